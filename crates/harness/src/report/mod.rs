@@ -17,6 +17,7 @@ pub mod paper;
 mod prelude;
 mod progress;
 pub mod query;
+mod query_column;
 mod query_figure;
 pub mod query_report;
 mod ray_cost;

@@ -1,0 +1,217 @@
+//! A column of the table that a query gives: an aggregate of each group of rows, or its quotient
+//! with a base.
+
+use super::query::{self, Conditions, Measure, QueryError, Row};
+use crate::statistics::{median_interval, range};
+use bvh_config::{Nested, above};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+bvh_config::config! { serde;
+    /// A column of the table.
+    pub struct Column {
+        /// Its name.
+        name: String;
+        /// The quantity in words, for axes and sentences; by default the name with blanks.
+        label: String;
+        /// The aggregate, such as `median cost`, or `text` and a column in which all rows of a
+        /// group agree.
+        value: String;
+        /// Which quotient with the base the column is, if any. Quotients of medians have further
+        /// columns: the ends of an interval, which is between the extremes of all pairs of runs or,
+        /// for paired runs, encloses the median with a probability of 95 %.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        ratio: Option<Ratio>;
+        /// Columns by which rows are paired with rows of the base, if quotients are computed pair
+        /// by pair. A further column then holds the verdict of the interval.
+        paired_by: Vec<String>;
+        /// Lowest and highest quotient accepted; others are an error.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        accepted: Option<[f64; 2]>, in 0.0..=1e300;
+        /// The paper's numbers, for a further column. Quotients of a file without seconds are also
+        /// compared with them in `paper.csv`.
+        paper: Vec<OfPaper>, in Nested;
+    }
+}
+
+bvh_config::config! { serde;
+    /// A number of the paper.
+    pub struct OfPaper {
+        /// Conditions on the row of the table that it belongs to.
+        row: String;
+        /// The number.
+        value: f64 = 1.0, in above(0.0);
+        /// The paper's number for the base, which it is divided by.
+        over: f64 = 1.0, in above(0.0);
+    }
+}
+
+/// A quotient of a group and its base.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Ratio {
+    /// The group's value over the base's.
+    OverBase,
+    /// The base's value over the group's.
+    BaseOver,
+}
+
+impl Ratio {
+    /// Returns the quotient; 1 for equal values, two zeros included.
+    fn of(self, own: f64, base: f64) -> f64 {
+        match self {
+            _ if own == base => 1.0,
+            Self::OverBase => own / base,
+            Self::BaseOver => base / own,
+        }
+    }
+}
+
+/// Rows that agree in the columns by which a query groups them.
+pub(super) struct Group<'r> {
+    /// Their values in these columns, and the label that `against` names.
+    pub key: Row,
+    pub rows: Vec<&'r Row>,
+    /// The rows that they are compared with.
+    pub base: Vec<&'r Row>,
+}
+
+/// A quotient with the ends of its interval.
+struct Compared {
+    value: Option<f64>,
+    interval: Option<(f64, f64)>,
+}
+
+impl Column {
+    pub(super) fn check(&self) -> Result<(), QueryError> {
+        match self.value.strip_prefix("text ") {
+            Some(_) => Ok(()),
+            None => Measure::parse(&self.value).map(|_| ()),
+        }
+    }
+
+    pub(super) fn label(&self) -> String {
+        if self.label.is_empty() { self.name.replace('_', " ") } else { self.label.clone() }
+    }
+
+    pub(super) fn has_interval(&self) -> bool {
+        self.ratio.is_some() && self.value.starts_with("median ")
+    }
+
+    pub(super) fn has_verdict(&self) -> bool {
+        self.has_interval() && !self.paired_by.is_empty()
+    }
+
+    /// Adds the cells of this column to the row of a group.
+    pub(super) fn fill(&self, group: &Group, row: &mut Row) -> Result<(), QueryError> {
+        if let Some(column) = self.value.strip_prefix("text ") {
+            let text = query::only_text(&group.rows, column)?;
+            row.insert(self.name.clone(), text.unwrap_or_default());
+            return Ok(());
+        }
+        let measure = Measure::parse(&self.value)?;
+        let Compared { value, interval } = match self.ratio {
+            None => Compared { value: measure.of_rows(&group.rows)?, interval: None },
+            Some(ratio) => self.quotient(group, &measure, ratio)?,
+        };
+        row.insert(self.name.clone(), text_of(value));
+        if self.has_interval() {
+            let (low, high) = interval.unzip();
+            row.insert(format!("{}_low", self.name), text_of(low));
+            row.insert(format!("{}_high", self.name), text_of(high));
+        }
+        if self.has_verdict() {
+            row.insert(format!("{}_verdict", self.name), verdict(interval).into());
+        }
+        for of_paper in &self.paper {
+            let paper = row
+                .entry(format!("paper_{}", self.name))
+                .or_default();
+            let is_own = Conditions::parse(&of_paper.row)?.are_met(&group.key)?;
+            if is_own {
+                *paper = text_of(Some(of_paper.value / of_paper.over));
+            }
+        }
+        Ok(())
+    }
+
+    fn quotient(
+        &self,
+        group: &Group,
+        measure: &Measure,
+        ratio: Ratio,
+    ) -> Result<Compared, QueryError> {
+        if self.paired_by.is_empty() {
+            let own = measure.of_rows(&group.rows)?;
+            let base = measure.of_rows(&group.base)?;
+            let value = own
+                .zip(base)
+                .map(|(own, base)| ratio.of(own, base));
+            self.check_accepted(group, value)?;
+            let of_all = |rows: &[&Row]| {
+                let values: Result<Vec<_>, _> = rows
+                    .iter()
+                    .map(|row| measure.of_row(row))
+                    .collect();
+                Ok(range(values?.into_iter().flatten()))
+            };
+            let ends = of_all(&group.rows)?.zip(of_all(&group.base)?);
+            let interval = ends.map(|(own, base)| {
+                let ends = [ratio.of(own.0, base.1), ratio.of(own.1, base.0)];
+                (ends[0].min(ends[1]), ends[0].max(ends[1]))
+            });
+            return Ok(Compared { value, interval });
+        }
+        let mut quotients = Vec::new();
+        for row in &group.rows {
+            let is_partner = |other: &&&Row| {
+                let mut columns = self.paired_by.iter();
+                columns.all(|column| row.get(column) == other.get(column))
+            };
+            let Some(partner) = group.base.iter().find(is_partner) else { continue };
+            let own = measure.of_row(row)?;
+            let base = measure.of_row(partner)?;
+            let quotient = own
+                .zip(base)
+                .map(|(own, base)| ratio.of(own, base));
+            self.check_accepted(group, quotient)?;
+            quotients.extend(quotient);
+        }
+        let value = measure.of_values(&quotients)?;
+        // Fewer than six pairs enclose the median with a lower probability.
+        let interval = median_interval(&quotients).filter(|_| quotients.len() >= 6);
+        Ok(Compared { value, interval })
+    }
+
+    /// Rejects a quotient that is not accepted.
+    fn check_accepted(&self, group: &Group, quotient: Option<f64>) -> Result<(), QueryError> {
+        let Some(([low, high], quotient)) = self.accepted.zip(quotient) else { return Ok(()) };
+        if (low..=high).contains(&quotient) {
+            return Ok(());
+        }
+        let words: Vec<&str> = group.key.values().map(String::as_str).collect();
+        Err(QueryError::NotAccepted {
+            column: self.name.clone(),
+            group: words.join(", "),
+            found: quotient,
+            accepted: format!("{low} to {high}"),
+        })
+    }
+}
+
+/// Returns the verdict of an interval of quotients.
+fn verdict(interval: Option<(f64, f64)>) -> &'static str {
+    match interval {
+        Some((_, high)) if high < 1.0 => "lower",
+        Some((low, _)) if low > 1.0 => "higher",
+        _ => "inconclusive",
+    }
+}
+
+fn text_of(number: Option<f64>) -> String {
+    let Some(number) = number else { return String::new() };
+    if number.fract() == 0.0 && number.abs() < 1e15 {
+        return format!("{number:.0}");
+    }
+    format!("{number:?}")
+}
