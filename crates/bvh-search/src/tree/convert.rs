@@ -34,9 +34,7 @@ impl<M: Metric> Working<M> {
         if nodes.len() > 1 {
             nodes[0].children[0] = 1;
         }
-        let mut working = Self::new(nodes, metric);
-        working.area.add(area);
-        Ok(working)
+        Ok(Self::with_area(nodes, metric, area))
     }
 
     /// Returns the flat tree, with adjacent children, left before right, and objects in leaf order.
