@@ -101,6 +101,11 @@ fn resuming_what_is_finished_does_nothing() {
         (names(&dir.join("results")), written()),
         (vec![".lock".into(), "best_known.csv".into(), "spec".into()], first)
     );
+    // A harness that is killed after its results are complete leaves its runs under this name.
+    let removed = dir.join("results/spec/.removed");
+    fs::create_dir_all(removed.join("000000")).unwrap();
+    said(dir, &["spec.toml", "--resume"]);
+    assert!(!removed.exists());
     // An interrupted repetition in the neighbouring folder is completed.
     said(dir, &["spec.toml"]);
     fs::create_dir(dir.join("results/spec.new/.partial")).unwrap();

@@ -113,7 +113,7 @@ impl Store {
         let lock = lock_folder(&folder)?;
         let removed = folder.join(REMOVED);
         if removed.exists() {
-            fs::remove_dir_all(&removed).map_err(Error::io(&removed, "remove the folder"))?;
+            remove(&removed)?;
         }
         let spec = partial.join("resolved.toml");
         let found = fs::read_to_string(&spec).ok();
@@ -135,8 +135,7 @@ impl Store {
                 if partial.is_dir() {
                     fs::rename(&partial, &removed)
                         .map_err(Error::io(&partial, "rename the folder"))?;
-                    fs::remove_dir_all(&removed)
-                        .map_err(Error::io(&removed, "remove the folder"))?;
+                    remove(&removed)?;
                 }
                 fs::create_dir_all(&partial).map_err(Error::io(&partial, "create the folder"))?;
                 files::write(&spec, resolved.as_bytes())?;
@@ -237,8 +236,26 @@ impl Store {
         let removed = self.folder.join(REMOVED);
         fs::rename(&self.partial, &removed)
             .map_err(Error::io(&self.partial, "rename the folder"))?;
-        fs::remove_dir_all(&removed).map_err(Error::io(&removed, "remove the folder"))
+        remove(&removed)
     }
+}
+
+/// Removes the runs that a harness has left which was killed after its results were complete.
+pub fn remove_leftovers(folder: &Path) -> Result<(), Error> {
+    let removed = folder.join(REMOVED);
+    if !removed.exists() {
+        return Ok(());
+    }
+    match lock_folder(folder) {
+        Ok(_lock) => remove(&removed),
+        // The other harness is removing them.
+        Err(Error::Busy(_)) => Ok(()),
+        Err(error) => Err(error),
+    }
+}
+
+fn remove(folder: &Path) -> Result<(), Error> {
+    fs::remove_dir_all(folder).map_err(Error::io(folder, "remove the folder"))
 }
 
 /// The name of the folder in which run `index` is kept.

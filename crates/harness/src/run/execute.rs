@@ -14,7 +14,7 @@ use super::suite::Suite;
 use super::target::Target;
 use super::trace::Tracing;
 use crate::Error;
-use crate::rows::store::{Existing, Store};
+use crate::rows::store::{self, Existing, Store};
 use crate::spec::Experiment;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
@@ -88,6 +88,7 @@ fn run(
     let target = Target::choose(out, &resolved, existing, shard.is_some())?;
     let Target { folder, previous, is_finished } = target;
     if is_finished {
+        store::remove_leftovers(&folder)?;
         return Ok(Summary { skipped_scenes, ..Summary::finished(folder) });
     }
     let store = Store::open(&folder, &to_toml(&resolved)?, existing)?;
