@@ -1,7 +1,8 @@
 //! Median cut: halves the objects of a node at the median of their box centres.
 //!
-//! Kay & Kajiya 1986, 'Ray tracing complex scenes', alternate the axes; Chang's CSS 552 report
-//! splits the longest axis of the node's box and stops at 10 % of all objects.
+//! Kay & Kajiya 1986, 'Ray tracing complex scenes', alternate the axes. Chang's CSS 552 report stops
+//! at 10 % of all objects; it names the 'local axis', which is 'also world axis', and no rule that
+//! chooses among the three.
 //!
 //! Differs from the sources: an odd object goes to the left half; equal centres are ordered by
 //! index.
@@ -34,8 +35,10 @@ bvh_config::config! {
 pub enum CutAxis {
     /// x at the root, then y, z, x and so on by level (Kay & Kajiya).
     Alternating,
-    /// The longest side of the node's box (Chang).
+    /// The longest side of the node's box.
     Longest,
+    /// Always x.
+    X,
 }
 
 struct Frame {
@@ -84,6 +87,7 @@ impl Builder for Config {
             let axis = match self.axis {
                 CutAxis::Alternating => level % 3,
                 CutAxis::Longest => aabb.longest_axis(),
+                CutAxis::X => 0,
             };
             let half = len.div_ceil(2);
             let key = |id: u32| boxes[id as usize].doubled_centroid()[axis];
@@ -131,6 +135,14 @@ mod tests {
             .build(&zigzag(4))
             .unwrap();
         assert_eq!(tree.prim_ids, [0, 2, 1, 3]);
+    }
+
+    #[test]
+    fn only_x_is_cut_when_asked_for() {
+        let tree = Config { axis: CutAxis::X, ..Config::default() }
+            .build(&zigzag(5)[1..])
+            .unwrap();
+        assert_eq!(tree.prim_ids, [0, 1, 2, 3], "along y, object 1 would be first");
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //! without counting tests.
 
 use super::kd_tree::KdTree;
+use super::unpruned;
 use bvh_core::{
     Bvh, Counter, Hit, Primitives, Ray, Shear, TestCounts, WideBvh, any_hit_by, any_hit_of_all,
     nearest_hit_by, nearest_hit_of_all,
@@ -34,6 +35,9 @@ pub enum Structure<'a> {
     KdTree(KdTree),
     /// A hierarchy.
     Tree(Cow<'a, Bvh>),
+    /// A hierarchy, traced as in Chang's CSS 552 report: last child first, without pruning, and
+    /// hits count only within the box of their leaf. Rounding can lose hits.
+    Unpruned(Cow<'a, Bvh>),
     /// A hierarchy of triangles in the wide layout, traced with the best instructions of this
     /// machine, which count no tests.
     Wide(WideBvh),
@@ -52,6 +56,7 @@ impl Structure<'_> {
     ) -> Option<Hit> {
         match self {
             Self::Tree(tree) => nearest_hit_by(&**tree, ray, test, counter),
+            Self::Unpruned(tree) => unpruned::nearest_hit(tree, ray, test, counter),
             Self::KdTree(tree) => tree.nearest_hit(ray, test, counter),
             _ => nearest_hit_of_all(objects as u32, ray, test, counter),
         }
@@ -66,14 +71,15 @@ impl Structure<'_> {
         counter: &mut impl Counter,
     ) -> bool {
         match self {
-            Self::Tree(tree) => any_hit_by(&**tree, ray, test, counter),
+            Self::Tree(tree) | Self::Unpruned(tree) => any_hit_by(&**tree, ray, test, counter),
             Self::KdTree(tree) => tree.any_hit(ray, test, counter),
             _ => any_hit_of_all(objects as u32, test, counter),
         }
     }
 }
 
-/// Objects with a structure over them. Every structure gives the same answers, bit for bit.
+/// Objects with a structure over them. Every structure gives the same answers, bit for bit, except
+/// [`Structure::Unpruned`].
 #[derive(Clone, Debug)]
 pub struct Accelerator<'a> {
     objects: &'a Primitives,
@@ -182,6 +188,8 @@ impl<'a> Accelerator<'a> {
             Structure::Wide(wide) | Structure::WidePortable(wide) => {
                 wide.any_hit_counted(ray, counter)
             }
+            // Its hits need distances, and none of them ends the traversal.
+            Structure::Unpruned(_) => self.find(ray, counter).is_some(),
             _ => self.visit(ray, true, counter),
         }
     }

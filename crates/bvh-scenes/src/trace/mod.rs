@@ -2,5 +2,6 @@
 
 mod accelerator;
 pub mod kd_tree;
+mod unpruned;
 
 pub use accelerator::{Accelerator, Query, Structure};

@@ -21,12 +21,20 @@ config! {
         height: u32 = 180, in 1..=10_000;
         /// `samples`² rays go through each pixel.
         samples: u32 = 1, in 1..=16;
+        /// Draw with every run's tree a second time, without pruning, as Chang's CSS 552 report
+        /// does.
+        unpruned: bool = false;
     }
 }
 
 /// The structures other than our trees: their names in tables, and the names that `--accel`
 /// accepts.
 pub const BASELINES: [(&str, &str); 2] = [("brute force", "brute"), ("KD-tree", "kdtree")];
+
+/// Returns the name in tables of the pictures that a method's trees draw without pruning.
+pub fn unpruned(method: &str) -> String {
+    format!("{method}, unpruned")
+}
 
 /// A picture is drawn again until this many seconds have passed.
 const REPEAT_WITHIN: f64 = 2.0;
@@ -48,14 +56,14 @@ impl Config {
         for (label, name) in BASELINES.into_iter().filter(|_| first) {
             let start = Instant::now();
             let structure = structure::by_name(name, scene)?;
-            structures.push((label, structure, 0, start.elapsed().as_secs_f64()));
+            structures.push((label.into(), structure, 0, start.elapsed().as_secs_f64()));
         }
-        structures.push((
-            &run.method,
-            Structure::Tree(Cow::Borrowed(tree)),
-            run.repetition,
-            build_seconds,
-        ));
+        let own = Structure::Tree(Cow::Borrowed(tree));
+        structures.push((run.method.clone(), own, run.repetition, build_seconds));
+        if self.unpruned {
+            let own = Structure::Unpruned(Cow::Borrowed(tree));
+            structures.push((unpruned(&run.method), own, run.repetition, build_seconds));
+        }
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
             .build();
@@ -68,7 +76,7 @@ impl Config {
             let rays = film.rays as f64;
             rows.push(RenderRow {
                 scene: scene.name.clone(),
-                method: method.into(),
+                method: method.clone(),
                 repetition,
                 objects: scene.boxes.len(),
                 rays: film.rays,
@@ -78,7 +86,7 @@ impl Config {
             });
             times.push(RenderTimeRow {
                 scene: scene.name.clone(),
-                method: method.into(),
+                method,
                 repetition,
                 repeats: seconds.len(),
                 build_seconds,
@@ -91,7 +99,7 @@ impl Config {
 
     /// Returns the picture and the seconds of each repetition.
     fn draw(&self, scene: &Scene, accelerator: &Accelerator) -> (Film, Vec<f64>) {
-        let Self { width, height, samples } = *self;
+        let Self { width, height, samples, .. } = *self;
         let options = Options { width, height, samples, ..Options::default() };
         let mut seconds = Vec::new();
         loop {

@@ -1,0 +1,162 @@
+//! Traversal of a hierarchy as in Chang's CSS 552 report: every box on the ray is opened, the last
+//! child first, and no hit ends the traversal or skips a box.
+//!
+//! A hit in a leaf counts only between the distances at which the ray enters and leaves the leaf's
+//! box. The box test is the one that the report cites (Williams, Barrus, Morley & Shirley 2005, 'An
+//! efficient and robust ray–box intersection algorithm'). It has no margin, so that rounding can
+//! lose a hit on a face of a box. No other traversal of this project loses hits.
+
+use bvh_core::{Aabb, Bvh, Counter, Hit, NodeKind, Ray};
+use std::ops::RangeInclusive;
+
+/// Returns the nearest hit in the ray's range that lies within the box of its leaf. `test` is as
+/// for [`bvh_core::nearest_hit_by`], and `counter` counts each box and each object that is tested.
+#[inline]
+pub fn nearest_hit(
+    tree: &Bvh,
+    ray: &Ray,
+    mut test: impl FnMut(u32, f32) -> Option<f32>,
+    counter: &mut impl Counter,
+) -> Option<Hit> {
+    let mut nearest: Option<Hit> = None;
+    let mut pending = Pending::default();
+    if !tree.nodes.is_empty() {
+        pending.push(0);
+    }
+    while let Some(index) = pending.pop() {
+        let node = &tree.nodes[index as usize];
+        counter.boxes(1);
+        let Some(inside) = interval(ray, &node.aabb) else { continue };
+        match node.kind() {
+            NodeKind::Inner { first, count } => {
+                for child in first..first + count {
+                    pending.push(child);
+                }
+            }
+            NodeKind::Leaf { first, count } => {
+                for &object in &tree.prim_ids[first as usize..first as usize + count as usize] {
+                    counter.object();
+                    let t_max = nearest.map_or(ray.t_max(), |hit| hit.t);
+                    let Some(t) = test(object, t_max).filter(|t| inside.contains(t)) else {
+                        continue;
+                    };
+                    let hit = Hit { t, object };
+                    if nearest.is_none_or(|nearest| hit.precedes(&nearest)) {
+                        nearest = Some(hit);
+                    }
+                }
+            }
+        }
+    }
+    nearest
+}
+
+/// Returns the distances at which the ray's half line enters and leaves the box, without a margin
+/// for rounding; `None` if it misses the box. The first distance is negative for a ray that starts
+/// in the box.
+#[inline]
+fn interval(ray: &Ray, aabb: &Aabb) -> Option<RangeInclusive<f32>> {
+    let low = (aabb.min - ray.origin()) * ray.inverse_direction();
+    let high = (aabb.max - ray.origin()) * ray.inverse_direction();
+    let enter = low.min(high).max_element();
+    let out = low.max(high).min_element();
+    (enter <= out && out >= 0.0).then_some(enter..=out)
+}
+
+/// The nodes that are visited later. A deep tree needs memory from the heap, others need none.
+#[derive(Default)]
+struct Pending {
+    inline: [u32; 32],
+    len: usize,
+    /// Entries above a full `inline`.
+    spilled: Vec<u32>,
+}
+
+impl Pending {
+    #[inline]
+    fn push(&mut self, node: u32) {
+        match self.inline.get_mut(self.len) {
+            Some(slot) => {
+                *slot = node;
+                self.len += 1;
+            }
+            None => self.spilled.push(node),
+        }
+    }
+
+    #[inline]
+    fn pop(&mut self) -> Option<u32> {
+        if let Some(node) = self.spilled.pop() {
+            return Some(node);
+        }
+        self.len = self.len.checked_sub(1)?;
+        Some(self.inline[self.len])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_build::{Builder, median_cut};
+    use bvh_core::{Node, TestCounts};
+    use glam::Vec3;
+
+    /// Returns unit cubes with their lower corners at x = 0, 2, 4, … on the x axis.
+    fn row(n: usize) -> Vec<Aabb> {
+        let min = |i: usize| Vec3::X * (2 * i) as f32;
+        (0..n)
+            .map(|i| Aabb { min: min(i), max: min(i) + 1.0 })
+            .collect()
+    }
+
+    fn along_x() -> Ray {
+        Ray::half_line(Vec3::new(-1.0, 0.5, 0.5), Vec3::X).unwrap()
+    }
+
+    /// Returns the distance at which that ray enters a cube of the row.
+    fn entry(cube: u32, t_max: f32) -> Option<f32> {
+        let t = (2 * cube + 1) as f32;
+        (t <= t_max).then_some(t)
+    }
+
+    #[test]
+    fn all_boxes_and_objects_on_the_ray_are_tested_from_the_last_child_to_the_first() {
+        let boxes = row(100);
+        let config = median_cut::Config { leaf_fraction: 0.1, ..Default::default() };
+        let tree = config.build(&boxes).unwrap();
+        let mut order = vec![];
+        let mut counts = TestCounts::default();
+        let test = |id, t_max| {
+            order.push(id);
+            entry(id, t_max)
+        };
+        let hit = nearest_hit(&tree, &along_x(), test, &mut counts);
+        assert_eq!(hit, Some(Hit { t: 1.0, object: 0 }));
+        assert_eq!(counts, TestCounts { boxes: tree.nodes.len() as u64, objects: 100 });
+        assert!(order[0] >= 50, "the last child comes first: {order:?}");
+    }
+
+    #[test]
+    fn a_hit_outside_the_box_of_its_leaf_does_not_count() {
+        let tree = Bvh { nodes: vec![Node::leaf(row(1)[0], 0, 1)], prim_ids: vec![0] };
+        // The ray is in the box from 1 to 2.
+        for (t, counts) in [(0.5, false), (1.0, true), (2.0, true), (2.5, false)] {
+            let hit = nearest_hit(&tree, &along_x(), |_, _| Some(t), &mut ());
+            assert_eq!(hit.is_some(), counts, "{t}");
+        }
+    }
+
+    #[test]
+    fn trees_deeper_than_the_inline_stack_are_visited_whole() {
+        let boxes = row(200);
+        let bounds = boxes[0].union(&boxes[199]);
+        let leaves = (0..200).map(|i| Node::leaf(boxes[i as usize], i, 1));
+        let mut nodes = vec![Node::inner(bounds, 1, 200)];
+        nodes.extend(leaves);
+        let tree = Bvh { nodes, prim_ids: (0..200).collect() };
+        let mut counts = TestCounts::default();
+        let hit = nearest_hit(&tree, &along_x(), entry, &mut counts);
+        assert_eq!(hit.map(|hit| hit.object), Some(0));
+        assert_eq!(counts, TestCounts { boxes: 201, objects: 200 });
+    }
+}
