@@ -4,7 +4,6 @@ use super::layout::WideBvh;
 use super::node::{Child, WideNode};
 use super::triangles::TriangleBlock;
 use crate::query::Near;
-use crate::ray::pow2;
 use alloc::vec::Vec;
 use glam::{DVec3, Vec3, Vec4};
 
@@ -19,10 +18,10 @@ pub struct Closest {
     pub distance: f64,
 }
 
-/// A child that is visited later, and a lower bound of the squared scaled distances of its triangles.
+/// A child that is visited later, and a lower bound of the squared distances of its triangles.
 #[derive(Clone, Copy)]
 struct Pending {
-    bound: f32,
+    bound: f64,
     child: Child,
 }
 
@@ -84,37 +83,29 @@ impl WideBvh {
         let target = point.as_dvec3();
         let mut nearest = Near { object: u32::MAX, distance_squared: f64::INFINITY };
         let mut closest = DVec3::ZERO;
-        // Makes the largest coordinate about 1, so that no square overflows.
-        let scale = (1.0 / point.abs().max_element().max(self.largest)).min(pow2(100));
-        // At least the squared scaled distance of the nearest triangle so far.
-        let mut most = f32::INFINITY;
-        let mut limit = f32::INFINITY;
+        let scale = 1.0 / f64::from(point.abs().max_element().max(self.largest));
         stack.clear();
         loop {
             if child.is_node() {
                 let node = &self.nodes[child.index()];
-                let bounds = bounds(node, point, scale);
+                let bounds = bounds(node, point);
                 let first = stack.len();
-                let mut lanes = 0;
                 for (lane, &bound) in bounds.iter().enumerate() {
                     // False for unused lanes, which are NaN.
-                    lanes |= u32::from(bound <= most) << lane;
-                }
-                while lanes != 0 {
-                    let lane = lanes.trailing_zeros() as usize & 7;
-                    lanes &= lanes - 1;
-                    let bound = bounds[lane];
-                    let mut at = stack.len();
-                    stack.push(Pending { bound, child: node.children[lane] });
-                    // Insertion, the nearest child last.
-                    while at > first && stack[at - 1].bound < bound {
-                        stack.swap(at - 1, at);
-                        at -= 1;
+                    if bound <= nearest.distance_squared {
+                        let mut at = stack.len();
+                        stack.push(Pending { bound, child: node.children[lane] });
+                        // Insertion, the nearest child last.
+                        while at > first && stack[at - 1].bound < bound {
+                            stack.swap(at - 1, at);
+                            at -= 1;
+                        }
                     }
                 }
             } else {
                 for block in &self.blocks[child.index()..] {
-                    let mut lanes = near_lanes(block, point, scale, limit);
+                    let limit = libm::sqrt(nearest.distance_squared) * scale + SLACK;
+                    let mut lanes = near_lanes(block, point, scale as f32, limit as f32);
                     while lanes != 0 {
                         let lane = lanes.trailing_zeros() as usize;
                         lanes &= lanes - 1;
@@ -124,10 +115,6 @@ impl WideBvh {
                         if near < nearest {
                             nearest = near;
                             closest = target + offset;
-                            let square = f64::from(scale) * f64::from(scale);
-                            most =
-                                (near.distance_squared * square) as f32 * ABOVE + f32::MIN_POSITIVE;
-                            limit = libm::sqrtf(most) + SLACK;
                         }
                     }
                     if block.is_last() {
@@ -143,7 +130,7 @@ impl WideBvh {
                         distance: libm::sqrt(nearest.distance_squared),
                     });
                 };
-                if pending.bound <= most {
+                if pending.bound <= nearest.distance_squared {
                     break pending.child;
                 }
             };
@@ -171,11 +158,7 @@ fn closest_of_all_plain(wide: &WideBvh, points: &[Vec3], closest: &mut [Option<C
 
 /// The part of the largest coordinate by which distances in f32 may be too large; their error is some
 /// dozen units in the last place, 2⁻²⁴ each.
-const SLACK: f32 = 1.0 / (1 << 16) as f32;
-
-/// Covers the rounding of a few operations in f32, upward and downward.
-const ABOVE: f32 = 1.0 + 1.0 / (1 << 20) as f32;
-const BELOW: f32 = 1.0 - 1.0 / (1 << 20) as f32;
+const SLACK: f64 = 1.0 / (1 << 16) as f64;
 
 /// Returns a bit per triangle whose scaled distance from the point may be at most `limit`: the distances
 /// of four triangles at once, in f32, where `scale` makes the largest coordinate 1. A triangle so small
@@ -233,10 +216,12 @@ impl Lanes3 {
     }
 }
 
-/// Returns lower bounds of the squared scaled distances of a point from the boxes of a node; NaN for
-/// unused lanes.
+/// Returns lower bounds of the squared distances of a point from the boxes of a node; NaN for unused
+/// lanes.
 #[inline(always)]
-fn bounds(node: &WideNode, point: Vec3, scale: f32) -> [f32; WideNode::LANES] {
+fn bounds(node: &WideNode, point: Vec3) -> [f64; WideNode::LANES] {
+    /// Covers the rounding of the differences in f32, and all rounding in f64.
+    const ROUNDING: f64 = 1.0 - 1.0 / (1 << 21) as f64;
     let mut bounds = [0.0; WideNode::LANES];
     for axis in 0..3 {
         let lower = &node.planes[axis];
@@ -246,10 +231,9 @@ fn bounds(node: &WideNode, point: Vec3, scale: f32) -> [f32; WideNode::LANES] {
             let above = point[axis] - upper[lane];
             // Comparisons that keep NaN.
             let outside = if below > above { below } else { above };
-            let outside = (if outside < 0.0 { 0.0 } else { outside }) * scale;
+            let outside = f64::from(if outside < 0.0 { 0.0 } else { outside });
             bounds[lane] += outside * outside;
         }
     }
-    // Squares that underflow are rounded by less than the last term.
-    bounds.map(|bound| bound * BELOW - f32::MIN_POSITIVE)
+    bounds.map(|bound| bound * ROUNDING)
 }
