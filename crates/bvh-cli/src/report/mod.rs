@@ -130,9 +130,12 @@ fn measure(tree: Bvh, scene: &Scene, interrupted: &AtomicBool) -> Result<Measure
     Ok(Measured { tree, levels, tests, film })
 }
 
+/// Computes a number from a tree, if it has this number.
+type Fact = fn(&Measured) -> Option<f64>;
+
 /// Compares the two trees, one fact each.
 fn rows(baked: &Measured, greedy: &Measured) -> Vec<Row> {
-    let facts: [(&'static str, fn(&Measured) -> Option<f64>); 7] = [
+    let facts: [(&'static str, Fact); 7] = [
         ("Internal area over root area", |of| {
             Some(cost::over_root_area(&of.tree, cost::internal_area(&of.tree)))
         }),
