@@ -46,17 +46,6 @@ pub(crate) fn map<T: Send>(count: usize, task: impl Fn(usize) -> T + Send + Sync
     (0..count).map(task).collect()
 }
 
-/// Does a few long tasks. Each may run on another thread.
-pub(crate) fn for_each<T: Send>(tasks: Vec<T>, task: impl Fn(T) + Send + Sync) {
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        tasks.into_par_iter().for_each(task);
-    }
-    #[cfg(not(feature = "rayon"))]
-    tasks.into_iter().for_each(task);
-}
-
 /// The number of threads that share the tasks.
 pub(crate) fn threads() -> usize {
     #[cfg(feature = "rayon")]

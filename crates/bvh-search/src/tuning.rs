@@ -49,14 +49,17 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 1,10,60 SCENE..." {
     MOVES_PER_WINDOW: u32 = 128, "moves";
     /// Trees smaller than this have no windows.
     LEAST_WINDOWS: usize = 16, "windows";
+    /// Subtrees with fewer objects are not annealed separately.
+    LEAST_SUBTREE: u32 = 16, "objects";
+    /// Part of a round in which moves use the whole tree: 1/16 was worse at equal work, 1/4 no
+    /// better.
+    WHOLE_TREE: f64 = 0.125, "fraction of the work of a round";
+    /// Maximum depth below the root of a separately annealed subtree at which moves on the whole
+    /// tree begin.
+    BELOW_SUBTREE_ROOTS: u8 = 6, "levels";
     /// Smallest subtrees of a round, relative to the largest. The size varies, so that the borders
     /// move.
     SMALLEST_SUBTREES: f64 = 0.5, "fraction of the size";
-    /// Largest top, which contains the borders between subtrees. With a quarter, trees end 0.3 %
-    /// more expensive; more threads than two wait for a larger one.
-    LARGEST_TOP: f64 = 0.5, "fraction of the nodes";
-    /// Part of the final passes reserved for the whole tree, after the passes in regions.
-    WHOLE_PASSES: u64 = 8, "divisor of the work";
 }}
 
 // The cost of the wide layout.
@@ -103,16 +106,14 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 --threa
     /// Length of the run at the lowest temperature that measures the rate of work under a time
     /// limit.
     PROBE: u64 = 4, "work per object";
-    /// Length of this run in regions, whose cutting and joining takes as long as a shorter run.
-    PROBE_OF_REGIONS: u64 = 16, "work per object";
     /// Minimum length of a time-limited search that first keeps a local optimum of reinsertion, in
     /// case it is stopped early. The local optimum takes 300 to 900 work per object.
     SECURED_FROM: f64 = 20_000.0, "work per object";
-    /// Smallest scenes that are annealed in regions by default. Smaller scenes lose too much of the
-    /// cost that the whole tree reaches.
-    REGIONS_FROM: u64 = 50_000, "objects";
-    /// Number of these regions.
-    REGIONS: u32 = 64, "regions";
+    /// Minimum length for which several threads anneal disjoint subtrees. Shorter runs have too few
+    /// rounds to cut them.
+    WORTH_SUBTREES: f64 = 256.0, "work per object";
+    /// Subtrees per thread; several unequal subtrees balance the threads.
+    SUBTREES_PER_THREAD: usize = 4, "subtrees";
     /// Maximum size of trees that are recombined after a cancellation. Recombination takes about a
     /// microsecond per object.
     RECOMBINED_AT_ONCE: usize = 100_000, "objects";

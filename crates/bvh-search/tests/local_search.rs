@@ -85,28 +85,20 @@ fn every_method_improves_on_its_start_and_the_best_most() {
 }
 
 #[test]
-fn regions_annealed_in_parallel_do_not_depend_on_the_number_of_threads() {
+fn subtrees_annealed_in_parallel_do_not_depend_on_the_number_of_threads() {
     let boxes = scatter(1500, 2);
-    for pieces in [8, 64] {
-        let method = Method::Best(best::Config { pieces, ..Default::default() });
-        let on = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .unwrap();
-            pool.install(|| run(&method, &boxes, 2_000_000))
-        };
-        let one = on(1);
-        for threads in [2, 3, 8] {
-            let other = on(threads);
-            assert_eq!((&one.tree, &one.history), (&other.tree, &other.history));
-        }
-        // A search never ends above a tree that it has built.
-        assert!(
-            one.history
-                .iter()
-                .all(|event| one.cost <= event.cost)
-        );
+    let method = Method::Best(best::Config { pieces: 8, ..Default::default() });
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| run(&method, &boxes, 2_000_000))
+    };
+    let one = on(1);
+    for threads in [2, 3] {
+        let other = on(threads);
+        assert_eq!((&one.tree, &one.history), (&other.tree, &other.history));
     }
 }
 

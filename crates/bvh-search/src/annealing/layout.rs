@@ -7,14 +7,11 @@
 
 use crate::tree::{ANCHOR, Metric, NONE, Working};
 use bvh_core::cost::LayoutCost;
-use std::ops::Range;
 
 /// A row of costs for every node of a tree, and the rows that undo a change.
 #[derive(Debug, Default)]
 pub(crate) struct Layout {
     rows: Vec<LayoutCost>,
-    /// The rows of the subtrees that are the leaves of a region; empty if its leaves are objects.
-    below: Vec<LayoutCost>,
     /// The rows that the current change has replaced.
     replaced: Vec<(u32, LayoutCost)>,
     /// Per node, the number of the last change that gave it a new row.
@@ -27,11 +24,6 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// Builds the layout of a region whose leaves are subtrees with these rows.
-    pub fn above(below: Vec<LayoutCost>) -> Self {
-        Self { below, ..Self::default() }
-    }
-
     /// Computes all rows, unless they exist.
     #[inline(always)]
     pub fn prepare(&mut self, tree: &Working<impl Metric>) {
@@ -57,29 +49,11 @@ impl Layout {
         self.cost = self.root(tree);
     }
 
-    /// Returns the row of a subtree of a tree in preorder: the nodes of the `range`. O(range).
-    pub fn of_subtree(tree: &Working<impl Metric>, range: Range<u32>) -> LayoutCost {
-        let mut rows = vec![LayoutCost::leaf(0.0, 0); range.len()];
-        for index in range.clone().rev() {
-            let node = &tree.nodes[index as usize];
-            rows[(index - range.start) as usize] = if node.is_leaf() {
-                LayoutCost::leaf(node.area, 1)
-            } else {
-                let [left, right] = node
-                    .children
-                    .map(|child| &rows[(child - range.start) as usize]);
-                LayoutCost::join(node.area, left, right)
-            };
-        }
-        rows[0]
-    }
-
     #[inline(always)]
     fn row(&self, tree: &Working<impl Metric>, index: u32) -> LayoutCost {
         let node = &tree.nodes[index as usize];
         if node.is_leaf() {
-            let below = self.below.get(node.children[1] as usize);
-            return below.map_or_else(|| LayoutCost::leaf(node.area, 1), |&row| row);
+            return LayoutCost::leaf(node.area, 1);
         }
         let [left, right] = node
             .children

@@ -1,9 +1,9 @@
 //! A series of Metropolis moves while the temperature falls.
 
+use super::node_sampler::NodeSampler;
 use crate::run::{Observer, Quota, Stream, Tally};
 use crate::tree::{Metric, Working};
 use crate::tuning::MOVES_PER_TEMPERATURE;
-use bvh_core::cost::LayoutCost;
 use bvh_core::with_vector_instructions;
 
 /// Makes moves of one kind.
@@ -14,8 +14,8 @@ pub(crate) trait Mover {
     -> bool;
     /// Nodes visited by all moves so far.
     fn work(&self) -> u64;
-    /// Prepares for a tree whose leaves are subtrees. `below` returns the costs of their layouts.
-    fn above(&mut self, _below: impl FnOnce() -> Vec<LayoutCost>) {}
+    /// Draws the nodes at which moves begin.
+    fn sampler(&mut self) -> &mut NodeSampler;
 }
 
 /// Work of a move after which the observer is polled at once, so that less than a millisecond

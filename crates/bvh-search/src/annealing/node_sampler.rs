@@ -15,6 +15,8 @@ use std::ops::Range;
 /// further, which visits every part of the tree about equally often, even with few windows.
 #[derive(Debug, Default)]
 pub(crate) struct NodeSampler {
+    /// The only nodes that are drawn; all nodes if empty.
+    only: Vec<u32>,
     /// Prefix sums of the weights, by position, the total last.
     sums: Vec<f64>,
     /// The current window, by position.
@@ -36,6 +38,11 @@ impl NodeSampler {
         Self { short_run: per_object < SHORT_RUN, ..Self::default() }
     }
 
+    /// Builds a sampler that draws only these nodes, or all nodes if `only` is empty.
+    pub fn among(only: Vec<u32>) -> Self {
+        Self { only, ..Self::default() }
+    }
+
     /// Draws a node of the tree, which must have the same nodes as at the first draw.
     #[inline(always)]
     pub fn draw(&mut self, tree: &Working<impl Metric>, rng: &mut Stream) -> u32 {
@@ -43,8 +50,15 @@ impl NodeSampler {
             self.next_window(tree, rng);
         }
         self.draws -= 1;
-        // Position 0 is node 1, because the anchor is never drawn.
-        self.position(self.window.clone(), rng.random()) as u32 + 1
+        self.node(self.position(self.window.clone(), rng.random()))
+    }
+
+    /// Returns the node at this position.
+    #[inline(always)]
+    fn node(&self, position: usize) -> u32 {
+        self.only
+            .get(position)
+            .map_or(position as u32 + 1, |&node| node)
     }
 
     /// Returns the position in the window at which the fraction `drawn` of its weight is reached.
@@ -81,11 +95,12 @@ impl NodeSampler {
 
     /// Sums up the weights. O(n).
     fn weigh(&mut self, tree: &Working<impl Metric>) {
-        self.sums.reserve(tree.nodes.len());
+        let all = if self.only.is_empty() { tree.nodes.len() - 1 } else { self.only.len() };
+        self.sums.reserve(all + 1);
         let mut sum = 0.0;
         self.sums.push(sum);
-        for node in 1..tree.nodes.len() as u32 {
-            sum += weight(tree, node);
+        for position in 0..all {
+            sum += weight(tree, self.node(position));
             self.sums.push(sum);
         }
     }
@@ -121,23 +136,33 @@ mod tests {
     #[test]
     fn nodes_are_drawn_by_the_square_root_of_their_parents_area() {
         let tree = built(&muller_fellner::Config::default(), &scatter(50));
-        let weight = |index: u32| {
-            let parent = tree.nodes[index as usize].parent;
-            tree.nodes[if parent == ANCHOR { index } else { parent } as usize]
-                .area
-                .sqrt()
-        };
-        let total = (1..100).map(weight).sum::<f64>();
-        let times = 400_000;
-        let counts = drawn(&mut NodeSampler::default(), &tree, times);
-        for index in 1..100 {
-            let expected = f64::from(times) * weight(index) / total;
-            let off = (f64::from(counts[index as usize]) - expected).abs();
-            assert!(
-                off < 5.0 * expected.sqrt(),
-                "node {index}: {} of {expected}",
-                counts[index as usize]
+        for only in [vec![], vec![7, 3, 60, 12]] {
+            let nodes: Vec<u32> = if only.is_empty() { (1..100).collect() } else { only.clone() };
+            let weight = |&index: &u32| {
+                let parent = tree.nodes[index as usize].parent;
+                tree.nodes[if parent == ANCHOR { index } else { parent } as usize]
+                    .area
+                    .sqrt()
+            };
+            let total = nodes.iter().map(weight).sum::<f64>();
+            let times = 400_000;
+            let counts = drawn(&mut NodeSampler::among(only), &tree, times);
+            assert_eq!(
+                counts.iter().sum::<u32>(),
+                nodes
+                    .iter()
+                    .map(|&index| counts[index as usize])
+                    .sum::<u32>()
             );
+            for index in nodes {
+                let expected = f64::from(times) * weight(&index) / total;
+                let off = (f64::from(counts[index as usize]) - expected).abs();
+                assert!(
+                    off < 5.0 * expected.sqrt(),
+                    "node {index}: {} of {expected}",
+                    counts[index as usize]
+                );
+            }
         }
     }
 

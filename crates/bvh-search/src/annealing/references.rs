@@ -35,8 +35,6 @@ pub(crate) struct Divider<'a> {
     spares: Vec<u32>,
     /// References in the tree.
     count: usize,
-    /// The cost of a reference, unless it follows from the cost of the tree.
-    price: Option<f64>,
     planes: Vec<(usize, f32)>,
     /// Nodes visited outside of the position search.
     visits: u64,
@@ -46,12 +44,7 @@ impl<'a> Divider<'a> {
     pub fn new(splits: Splits<'a>, by_layout: bool) -> Self {
         let (search, ring, spares, planes) = Default::default();
         let layout = by_layout.then(Layout::default);
-        Self { splits, search, layout, ring, spares, count: 0, price: None, planes, visits: 0 }
-    }
-
-    /// Builds a divider for one region of a tree. `price` is the cost of a reference in the tree.
-    pub fn of_region(splits: Splits<'a>, by_layout: bool, price: f64) -> Self {
-        Self { price: Some(price), ..Self::new(splits, by_layout) }
+        Self { splits, search, layout, ring, spares, count: 0, planes, visits: 0 }
     }
 
     /// Tries to reunite the leaves of every object, then to divide leaves until `quota` is used up.
@@ -82,24 +75,31 @@ impl<'a> Divider<'a> {
                 .map_or(0, |layout| layout.visits)
     }
 
-    /// Links the leaves of every object into a ring. O(nodes · log nodes).
+    /// Links the leaves of every object into a ring. O(nodes).
     fn tie(&mut self, tree: &Working<impl Metric>) {
         self.ring.clear();
         self.ring.resize(tree.nodes.len(), NONE);
         self.spares.clear();
         self.count = tree.objects();
-        let mut leaves: Vec<(u32, u32)> = (0..)
-            .zip(&tree.nodes)
-            .skip(1)
-            .filter(|(_, node)| node.is_leaf())
-            .map(|(index, node)| (node.children[1], index))
-            .collect();
-        leaves.sort_unstable();
-        for same in leaves.chunk_by(|(a, _), (b, _)| a == b) {
-            let next = same.iter().cycle().skip(1);
-            for (&(_, leaf), &(_, next)) in same.iter().zip(next) {
-                self.ring[leaf as usize] = next;
+        let leaves = || {
+            (0..)
+                .zip(&tree.nodes)
+                .skip(1)
+                .filter(|(_, node)| node.is_leaf())
+        };
+        let objects = leaves()
+            .map(|(_, node)| node.children[1] as usize + 1)
+            .max()
+            .unwrap_or(0);
+        let mut last = vec![NONE; objects];
+        for (index, node) in leaves() {
+            let last = &mut last[node.children[1] as usize];
+            self.ring[index as usize] = index;
+            if *last != NONE {
+                self.ring[index as usize] = self.ring[*last as usize];
+                self.ring[*last as usize] = index;
             }
+            *last = index;
         }
     }
 
@@ -237,13 +237,11 @@ impl<'a> Divider<'a> {
     /// division that saves almost nothing is no gain.
     #[inline(always)]
     fn price(&self, tree: &Working<impl Metric>) -> f64 {
-        let cost = || {
-            self.layout
-                .as_ref()
-                .map_or(tree.area(), Layout::current)
-        };
-        self.price
-            .unwrap_or_else(|| price(cost(), self.count))
+        let cost = self
+            .layout
+            .as_ref()
+            .map_or(tree.area(), Layout::current);
+        PRICE_OF_A_REFERENCE * cost / self.count as f64
     }
 
     /// Returns the maximum cost of the new positions, if the removal saved `saved`. With a layout,
@@ -301,11 +299,6 @@ impl<'a> Divider<'a> {
             self.planes.push((axis, middle));
         }
     }
-}
-
-/// Returns the cost of a reference in a tree of this cost with `count` references.
-pub(crate) fn price(cost: f64, count: usize) -> f64 {
-    PRICE_OF_A_REFERENCE * cost / count as f64
 }
 
 /// Returns the cost of leaves of this size.

@@ -15,7 +15,6 @@ use crate::run::{Found, Problem, Run, Stream};
 use crate::tree::{ANCHOR, Metric, Node, PositionSearch, Scope, Working, search_by_metric};
 use crate::tuning::{DEARER_BY_AREA, LAYOUT_HEAT};
 use bvh_config::{Nested, above};
-use bvh_core::cost::LayoutCost;
 use rand::RngExt;
 use rand::seq::SliceRandom;
 
@@ -210,10 +209,8 @@ impl Mover for RuinMover<'_> {
                 .map_or(0, |layout| layout.visits)
     }
 
-    fn above(&mut self, below: impl FnOnce() -> Vec<LayoutCost>) {
-        if self.layout.is_some() {
-            self.layout = Some(Layout::above(below()));
-        }
+    fn sampler(&mut self) -> &mut NodeSampler {
+        &mut self.sampler
     }
 
     #[inline(always)]

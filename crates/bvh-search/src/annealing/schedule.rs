@@ -13,7 +13,7 @@
 //! ```
 
 use super::metropolis::Mover;
-use super::regions;
+use super::subtrees;
 use crate::local::incumbent::Incumbent;
 use crate::local::initial::Start;
 use crate::run::{Observer, Problem, Quota, Run, SearchError, Tally};
@@ -34,8 +34,8 @@ pub(crate) struct Schedule {
     /// The observer's progress at which the run must end, if the observer reports its progress;
     /// greater than the progress at the start.
     pub end: f64,
-    /// Number of regions that are annealed at once, at least 1.
-    pub regions: u32,
+    /// Number of subtrees that are annealed at once, at least 1.
+    pub subtrees: u32,
     /// True if passes of reinsertion follow. They lower the area, which is not always the
     /// objective.
     pub to_local_optimum: bool,
@@ -66,7 +66,7 @@ impl AnnealingRun<'_> {
             self.work_per_object
                 .saturating_mul(problem.boxes.len() as u64),
         );
-        let schedule = Schedule { hot, cold, quota, end: 1.0, regions: 1, to_local_optimum: true };
+        let schedule = Schedule { hot, cold, quota, end: 1.0, subtrees: 1, to_local_optimum: true };
         let observer = run.observer();
         anneal(mover, &schedule, &mut tree, [seed, 0], observer, &mut |tree, tally| {
             run.count(tally);
@@ -83,7 +83,7 @@ pub(crate) fn check_fall(hot: f64, cold: f64) -> Option<OutOfRange> {
 }
 
 /// Anneals `tree`, then improves it to a local optimum of reinsertion. Calls `round` after every
-/// round, with the tree and the work since the previous call. Every round, and every region of a
+/// round, with the tree and the work since the previous call. Every round, and every subtree of a
 /// round, draws from a separate random stream of `seed`, from stream `first` on.
 ///
 /// If the observer reports its progress, the temperature follows the work or the time, whichever is
@@ -129,8 +129,8 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
         let end = if is_last { work } else { work.min(done.work + next) };
         let quota = Quota { work: end, moves }.less(&done);
         let tally =
-            regions::cool(&mover, tree, heat, quota, schedule.regions, [seed, streams], observer);
-        streams += regions::STREAMS;
+            subtrees::cool(&mover, tree, heat, quota, schedule.subtrees, [seed, streams], observer);
+        streams += subtrees::STREAMS;
         done += tally;
         round(tree, tally);
         // A cancelled search has no time for the final passes.
@@ -153,8 +153,12 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
         }
     }
     if schedule.to_local_optimum {
-        let tally =
-            regions::to_local_optimum(tree, schedule.regions, schedule.quota.less(&done), observer);
+        let tally = subtrees::to_local_optimum(
+            tree,
+            schedule.subtrees,
+            schedule.quota.less(&done),
+            observer,
+        );
         round(tree, tally);
     }
 }
@@ -162,6 +166,7 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::annealing::node_sampler::NodeSampler;
     use crate::annealing::{ruin_recreate, single};
     use crate::run::Stream;
     use crate::scatter::{built, scatter};
@@ -192,6 +197,9 @@ mod tests {
         fn work(&self) -> u64 {
             self.inner.work()
         }
+        fn sampler(&mut self) -> &mut NodeSampler {
+            self.inner.sampler()
+        }
     }
 
     fn check<M: Mover>(inner: impl Fn() -> M + Sync) {
@@ -199,7 +207,7 @@ mod tests {
         let mut tree = built(&muller_fellner::Config::default(), &boxes);
         let quota = Quota { moves: 300_000, work: u64::MAX / 1024 };
         let schedule =
-            Schedule { hot: 0.5, cold: 0.4, quota, end: 1.0, regions: 1, to_local_optimum: true };
+            Schedule { hot: 0.5, cold: 0.4, quota, end: 1.0, subtrees: 1, to_local_optimum: true };
         let moves = AtomicU64::new(0);
         let mover = || Checked { inner: inner(), moves: &moves };
         anneal(mover, &schedule, &mut tree, [1, 0], &(), &mut |_, _| ());

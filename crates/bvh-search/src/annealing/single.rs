@@ -150,6 +150,10 @@ impl Mover for SingleMover<'_> {
         self.work
     }
 
+    fn sampler(&mut self) -> &mut NodeSampler {
+        &mut self.sampler
+    }
+
     #[inline(always)]
     fn step(
         &mut self,

@@ -3,7 +3,6 @@
 use crate::annealing::ruin_recreate::{Ruin, Scale};
 use crate::local::initial::Start;
 use crate::run::Run;
-use crate::tuning::{REGIONS, REGIONS_FROM};
 use bvh_config::{Nested, above};
 use std::ops::Bound::{Excluded, Included};
 
@@ -34,9 +33,9 @@ bvh_config::config! {
         reheated: f64 = 0.3, in (Excluded(0.0), Excluded(1.0));
         /// Minimum work per object of a long annealing run, which short runs follow.
         reheats_from: f64 = 7000.0, in (Excluded(0.0), Included(f64::INFINITY));
-        /// Number of disjoint regions that are annealed at once, which limits the number of useful
-        /// threads. 1 is the whole tree, on one thread. 0 means 64 regions from 50 000 objects on,
-        /// and otherwise 1. The result depends on this number, but not on the number of threads.
+        /// Number of disjoint subtrees that are annealed at once, which limits the number of useful
+        /// threads. 1 is the whole tree, which is slightly better at equal work. 0 means four
+        /// subtrees per thread for a time limit with several threads, and otherwise 1.
         pieces: u32 = 0, in 0..=4096;
         /// Minimum work per object of an annealing run whose temperatures are relative to the
         /// [top](Scale::Top) of a move, overriding the move's `scale`. Long runs end lower with it,
@@ -84,15 +83,6 @@ impl Config {
             Some(horizon) => (horizon, configured.min(left)),
             None if timed || left <= configured => (Horizon::Known, configured.min(left)),
             None => (Horizon::Open, configured.min(left)),
-        }
-    }
-
-    /// Returns the number of regions that are annealed at once, for `n` objects.
-    pub(super) fn regions(&self, n: u64) -> u32 {
-        match self.pieces {
-            0 if n >= REGIONS_FROM => REGIONS,
-            0 => 1,
-            pieces => pieces,
         }
     }
 

@@ -4,17 +4,19 @@
 use super::config::{Config, Horizon};
 use super::plan::{Planned, plan};
 use super::recombine::recombine;
+use crate::annealing::cool;
 use crate::annealing::layout::Layout;
-use crate::annealing::regions;
+use crate::annealing::references::Divider;
 use crate::annealing::ruin_recreate::RuinMover;
 use crate::annealing::schedule::{Schedule, anneal};
 use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion;
-use crate::run::{Observer, Problem, Run, Splits, StopReason, Tally, stream};
+use crate::parallel::threads;
+use crate::run::{Observer, Problem, Quota, Run, StopReason, Stream, Tally, stream};
 use crate::tree::{Metric, Working};
 use crate::tuning::{
-    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, PROBE_OF_REGIONS, RECOMBINED_AT_ONCE,
-    ROUNDS_PER_LOOK, SECURED_FROM, TRIAL, WORK_ON_REFERENCES, WORTH_AN_EVENT,
+    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, RECOMBINED_AT_ONCE, ROUNDS_PER_LOOK,
+    SECURED_FROM, SUBTREES_PER_THREAD, TRIAL, WORK_ON_REFERENCES, WORTH_AN_EVENT, WORTH_SUBTREES,
 };
 use bvh_core::cost::Objective;
 
@@ -36,17 +38,19 @@ pub(crate) fn improve<A: Metric>(
     }
     let (horizon, work) = config.horizon(n, run);
     let by_layout = problem.objective == Objective::Layout;
+    let divider = problem
+        .splits
+        .map(|splits| Divider::new(splits, by_layout));
     let mut search = Improvement {
         config,
         seed,
         n,
         left: work,
         by_layout,
-        splits: problem.splits,
+        divider,
         best,
         run,
         is_secured: false,
-        regions: config.regions(n),
     };
     if let Some(other) = other {
         search.choose(tree, other, horizon);
@@ -71,12 +75,10 @@ struct Improvement<'a, 'p, 'r, 's> {
     left: u64,
     /// True if the objective is the cost of the wide layout, not the area.
     by_layout: bool,
-    /// The permission to divide objects, if any.
-    splits: Option<Splits<'s>>,
+    /// Divides and reunites references, if they may change.
+    divider: Option<Divider<'s>>,
     best: &'a mut Incumbent<'p>,
     run: &'a mut Run<'r>,
-    /// Number of regions that are annealed at once.
-    regions: u32,
     /// True if the incumbent is at least as good as a local optimum of reinsertion.
     is_secured: bool,
 }
@@ -91,7 +93,8 @@ impl Improvement<'_, '_, '_, '_> {
         // The last moves must end early enough for the conversion of the tree.
         let mut end_of_all = 1.0;
         if timed {
-            let (tally, in_time) = self.probe(tree);
+            let quota = self.run.left().at_most(self.left.min(PROBE * n));
+            let (tally, in_time) = self.probe(tree, stream(self.seed, 0), quota);
             self.left = self.left.saturating_sub(tally.work);
             self.run.count(tally);
             let now = observer.progress().unwrap_or(1.0);
@@ -118,7 +121,7 @@ impl Improvement<'_, '_, '_, '_> {
             if observer.progress().is_some_and(|now| now >= end) {
                 continue;
             }
-            let schedule = self.schedule(hot, work, end);
+            let schedule = self.schedule(hot, work, end, length);
             let first = number == 0;
             self.anneal(tree, number, (&schedule, each), first);
         }
@@ -130,7 +133,7 @@ impl Improvement<'_, '_, '_, '_> {
         let mut length = self.config.first;
         for number in 0..MOST_GENERATIONS {
             let work = self.left.min((length * self.n as f64) as u64);
-            let schedule = self.schedule(self.config.hot(length), work, 1.0);
+            let schedule = self.schedule(self.config.hot(length), work, 1.0, length);
             self.anneal(tree, number, (&schedule, length), false);
             length *= self.config.growth;
         }
@@ -138,12 +141,6 @@ impl Improvement<'_, '_, '_, '_> {
 
     /// Reinserts to a local optimum and offers it to the incumbent.
     fn reinsert(&mut self, tree: &mut Working<impl Metric>) {
-        if self.regions > 1 {
-            tree.sort_in_preorder();
-            let quota = self.run.left();
-            let tally = regions::reinsert(tree, self.regions, quota, self.run.observer());
-            self.run.count(tally);
-        }
         self.best
             .improve(tree, u32::MAX, self.run, |tree, _, quota, observer| {
                 reinsertion::pass_by_area(tree, quota, observer)
@@ -175,7 +172,11 @@ impl Improvement<'_, '_, '_, '_> {
         let began = observer.progress().unwrap_or(0.0);
         let work = match horizon {
             Horizon::Known if observer.progress().is_some() => {
-                let (tally, in_time) = self.probe(tree);
+                let quota = self
+                    .run
+                    .left()
+                    .at_most(self.left.min(PROBE * self.n));
+                let (tally, in_time) = self.probe(tree, stream(self.seed, 0), quota);
                 self.run.count(tally);
                 self.secure(tree.metric(), in_time / n);
                 TRIAL * in_time.min(self.left as f64)
@@ -186,7 +187,7 @@ impl Improvement<'_, '_, '_, '_> {
         let length = work / n;
         for (number, tree) in [&mut *tree, &mut other].into_iter().enumerate() {
             let end = began + (1.0 - began) * TRIAL * (number + 1) as f64;
-            let schedule = self.schedule(self.config.hot(length), work as u64, end);
+            let schedule = self.schedule(self.config.hot(length), work as u64, end, length);
             self.anneal(tree, TRIALS + number as u64, (&schedule, length), true);
         }
         if cost(&other, self.by_layout) < cost(tree, self.by_layout) {
@@ -194,8 +195,17 @@ impl Improvement<'_, '_, '_, '_> {
         }
     }
 
-    /// Returns the schedule of an annealing run.
-    fn schedule(&self, hot: f64, work: u64, end: f64) -> Schedule {
+    /// Returns the schedule of an annealing run. `length` is the work per object of the whole
+    /// search, or of the generation.
+    fn schedule(&self, hot: f64, work: u64, end: f64, length: f64) -> Schedule {
+        let timed = self.run.observer().progress().is_some();
+        let by_threads =
+            self.config.pieces == 0 && timed && length >= WORTH_SUBTREES && threads() > 1;
+        let subtrees = if by_threads {
+            (SUBTREES_PER_THREAD * threads().min(1024)) as u32
+        } else {
+            self.config.pieces.max(1)
+        };
         let Config { cold, .. } = *self.config;
         let quota = self.run.left().at_most(work);
         Schedule {
@@ -203,7 +213,7 @@ impl Improvement<'_, '_, '_, '_> {
             cold,
             quota,
             end,
-            regions: self.regions,
+            subtrees,
             to_local_optimum: !self.by_layout,
         }
     }
@@ -224,8 +234,8 @@ impl Improvement<'_, '_, '_, '_> {
         let observer: &dyn Observer = &Until { observer: self.run.observer(), end: schedule.end };
         let mut done = Tally::default();
         let mut rounds = 0;
-        // Every run has room for 2⁴⁰ random streams, enough for 2¹⁶ rounds. The streams after them
-        // belong to the probe and the divider.
+        // Every run has room for 2⁴⁰ random streams, enough for 2¹⁶ rounds. Stream 0 belongs to the
+        // probe, the last streams to the divider.
         let streams = [self.seed, 1 + (number << 40)];
         let mut division = stream(self.seed, (1 << 63) + number);
         let ruin = self.config.ruin(length);
@@ -235,24 +245,17 @@ impl Improvement<'_, '_, '_, '_> {
         // Trees with different references cannot be recombined. Only the first run, which is not
         // recombined, may change references between its rounds; the other runs change them before
         // they begin.
-        let splits = self.splits;
-        let count = schedule.regions;
-        let mut divide = |tree: &mut Working<_>, splits, work: u64, run: &Run| {
-            let quota = run
-                .left()
-                .at_most((work as f64 * WORK_ON_REFERENCES) as u64);
-            let splits = (splits, by_layout, run.incumbent());
-            regions::divide(tree, splits, quota, count, &mut division, observer)
-        };
-        if let Some(splits) = splits.filter(|_| !first) {
+        if let Some(divider) = self.divider.as_mut().filter(|_| !first) {
             tree.sort_in_preorder();
-            let tally = divide(tree, splits, schedule.quota.work, run);
+            let work = (schedule.quota.work as f64 * WORK_ON_REFERENCES) as u64;
+            let tally = divider.pass(tree, run.left().at_most(work), &mut division, observer);
             run.count(tally);
             done += tally;
             best.offer(tree, run);
         }
         // Anneal a copy: recombination needs both trees.
         let mut annealed = tree.clone();
+        let mut divider = self.divider.as_mut().filter(|_| first);
         anneal(
             || RuinMover::new(&ruin, length, by_layout),
             schedule,
@@ -262,8 +265,10 @@ impl Improvement<'_, '_, '_, '_> {
             &mut |tree, tally| {
                 done += tally;
                 run.count(tally);
-                if let Some(splits) = splits.filter(|_| first && !observer.cancelled()) {
-                    let tally = divide(tree, splits, tally.work, run);
+                if let Some(divider) = divider.as_mut().filter(|_| !observer.cancelled()) {
+                    let work = (tally.work as f64 * WORK_ON_REFERENCES) as u64;
+                    let tally =
+                        divider.pass(tree, run.left().at_most(work), &mut division, observer);
                     done += tally;
                     run.count(tally);
                 }
@@ -289,27 +294,25 @@ impl Improvement<'_, '_, '_, '_> {
                 *tree = annealed;
             }
         } else if !first || observer.progress().is_none() {
-            *tree = recombine(tree, &annealed);
+            *tree = recombine(&[tree, &annealed]);
         }
         best.offer(tree, run);
         self.left = self.left.saturating_sub(done.work);
     }
 
-    /// Makes moves at the lowest temperature, in the same regions as the annealing runs. Also
-    /// returns the work that fits into the rest of the time at this rate.
-    fn probe(&self, tree: &mut Working<impl Metric>) -> (Tally, f64) {
+    /// Makes moves at the lowest temperature. Also returns the work that fits into the rest of the
+    /// time at this rate.
+    fn probe(
+        &self,
+        tree: &mut Working<impl Metric>,
+        mut rng: Stream,
+        quota: Quota,
+    ) -> (Tally, f64) {
         let observer = self.run.observer();
         let heat = [self.config.cold; 2];
-        let length = if self.regions > 1 { PROBE_OF_REGIONS } else { PROBE };
-        let quota = self
-            .run
-            .left()
-            .at_most(self.left.min(length * self.n));
-        tree.sort_in_preorder();
         let began = observer.progress();
-        let mover = || RuinMover::new(&self.config.ruin, length as f64, self.by_layout);
-        let streams = [self.seed, 1 << 62];
-        let tally = regions::cool(&mover, tree, heat, quota, self.regions, streams, observer);
+        let mut mover = RuinMover::new(&self.config.ruin, PROBE as f64, self.by_layout);
+        let tally = cool(&mut mover, tree, heat, quota, &mut rng, observer);
         let in_time = match (began, observer.progress()) {
             (Some(began), Some(now)) => {
                 tally.work as f64 * (1.0 - now).max(0.0) / (now - began).max(1e-9)

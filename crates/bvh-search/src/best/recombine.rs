@@ -7,28 +7,47 @@
 //! 2009) and the clade-based search for species trees (Bryant 1996).
 
 use crate::tree::{ANCHOR, Metric, NONE, Node, Working};
+use std::collections::HashMap;
 
-/// Returns the best tree over the clades of two trees over the same objects. Of two equal divisions
-/// it keeps the `first` tree's. O(n), if every object has one leaf.
+/// Returns the best tree over the clades of `trees`, one tree or more over the same objects.
+/// O(total size).
 ///
-/// The leaves of a clade of the first tree are contiguous in its preorder. A clade of the second
-/// tree is therefore shared only if its leaves are contiguous there, too (Day 1985).
-pub(super) fn recombine<A: Metric>(first: &Working<A>, second: &Working<A>) -> Working<A> {
-    let Some(root) = first.root() else { return first.clone() };
-    let trees = [first, second];
-    let spans = Spans::of(first);
-    // A clade has the index of its node in the first tree, or follows all of them if only the
-    // second tree has it.
-    let of_first = (0..first.nodes.len() as u32).collect();
-    let of_second = spans.clades(second, &positions(first, second, &spans.of_node));
-    let clade_of: [Vec<u32>; 2] = [of_first, of_second];
-    let clades = first.nodes.len() + second.nodes.len();
+/// Clades are identified by 128-bit sums of scattered keys. Among a billion clades, the probability
+/// that any two different clades collide is below 10⁻²⁰.
+pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
+    // Every node of every tree, as number of objects, tree and index. The sort below then visits
+    // smaller clades first, and ties in the order of the trees, which makes the result
+    // deterministic.
+    let mut by_size: Vec<(u32, u32, u32)> = Vec::new();
+    let mut clade_of: Vec<Vec<u32>> = Vec::new();
+    let mut number = HashMap::new(); // only looked up by key, so that its order has no effect
+    for (which, tree) in (0..).zip(trees) {
+        let order = tree.preorder();
+        let mut keys = vec![(0u128, 0u32); tree.nodes.len()];
+        let mut clades = vec![NONE; tree.nodes.len()];
+        for &index in order.iter().rev() {
+            let node = &tree.nodes[index as usize];
+            let [left, right] = node.children.map(|child| child as usize);
+            keys[index as usize] = if node.is_leaf() {
+                (key_of_leaf::<A>(node), 1)
+            } else {
+                (keys[left].0.wrapping_add(keys[right].0), keys[left].1 + keys[right].1)
+            };
+            let (key, size) = keys[index as usize];
+            // Clades are numbered in the order of their first occurrence.
+            let next = number.len() as u32;
+            clades[index as usize] = *number.entry(key).or_insert(next);
+            by_size.push((size, which, index));
+        }
+        clade_of.push(clades);
+    }
+    by_size.sort_unstable();
     // Per clade: cost of the best division, including the area of the clade's box, and the node
     // that has the division. Parts are smaller than the clade, so their costs are final.
-    let mut best = vec![(f64::INFINITY, 0, NONE); clades];
-    for (which, index) in by_size(trees) {
-        let node = &trees[which].nodes[index as usize];
-        let clades = &clade_of[which];
+    let mut best = vec![(f64::INFINITY, 0, NONE); number.len()];
+    for (_, which, index) in by_size {
+        let node = &trees[which as usize].nodes[index as usize];
+        let clades = &clade_of[which as usize];
         let cost = if node.is_leaf() {
             A::LEAF * node.area
         } else {
@@ -42,186 +61,60 @@ pub(super) fn recombine<A: Metric>(first: &Working<A>, second: &Working<A>) -> W
             *best = (cost, which, index);
         }
     }
-    let mut nodes = vec![first.nodes[ANCHOR as usize]];
-    let mut stack = vec![(root, ANCHOR, 0)];
+    let mut nodes = vec![trees[0].nodes[ANCHOR as usize]];
+    // All trees are over the same objects, so their roots are the same clade.
+    let root = trees[0]
+        .root()
+        .map(|root| (clade_of[0][root as usize], ANCHOR, 0));
+    let mut stack: Vec<(u32, u32, usize)> = root.into_iter().collect();
     while let Some((clade, parent, side)) = stack.pop() {
         let (_, which, index) = best[clade as usize];
-        let node = trees[which].nodes[index as usize];
+        let node = trees[which as usize].nodes[index as usize];
         let to = nodes.len() as u32;
         nodes[parent as usize].children[side] = to;
         nodes.push(Node { parent, ..node });
         if !node.is_leaf() {
-            let clades = &clade_of[which];
+            let clades = &clade_of[which as usize];
             stack.extend([1, 0].map(|side| (clades[node.children[side] as usize], to, side)));
         }
     }
-    Working::from_nodes(nodes, first.metric())
+    Working::from_nodes(nodes, trees[0].metric())
 }
 
-/// Positions of leaves in preorder: `start..end`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Span {
-    start: u32,
-    end: u32,
-}
-
-/// The leaves below every node of a tree.
-struct Spans {
-    of_node: Vec<Span>,
-    /// Per position, the largest clade that starts there, and the largest that ends there.
-    starting: Vec<u32>,
-    ending: Vec<u32>,
-}
-
-impl Spans {
-    fn of(tree: &Working<impl Metric>) -> Self {
-        let order = tree.preorder();
-        let mut of_node = vec![Span::default(); tree.nodes.len()];
-        let mut starting = vec![NONE; tree.objects()];
-        let mut ending = vec![NONE; tree.objects()];
-        let mut leaves = tree.objects() as u32;
-        // From the back: children before their parent, and larger clades after smaller ones.
-        for &index in order.iter().rev() {
-            let node = &tree.nodes[index as usize];
-            let span = if node.is_leaf() {
-                leaves -= 1;
-                Span { start: leaves, end: leaves + 1 }
-            } else {
-                let [left, right] = node.children.map(|child| of_node[child as usize]);
-                Span { start: left.start, end: right.end }
-            };
-            of_node[index as usize] = span;
-            starting[span.start as usize] = index;
-            ending[span.end as usize - 1] = index;
-        }
-        Self { of_node, starting, ending }
-    }
-
-    /// Returns the clade of every node of another tree, whose leaves have these positions here: the
-    /// index of the node here with the same clade, or an index after all of them.
-    fn clades(&self, other: &Working<impl Metric>, positions: &[u32]) -> Vec<u32> {
-        let mut clades = vec![NONE; other.nodes.len()];
-        let mut extents = vec![(Span::default(), 0); other.nodes.len()];
-        for &index in other.preorder().iter().rev() {
-            let node = &other.nodes[index as usize];
-            let extent = if node.is_leaf() {
-                match positions[index as usize] {
-                    // No clade here is as long.
-                    NONE => (Span { start: 0, end: NONE }, 1),
-                    start => (Span { start, end: start + 1 }, 1),
-                }
-            } else {
-                let [left, right] = node.children.map(|child| extents[child as usize]);
-                let start = left.0.start.min(right.0.start);
-                let end = left.0.end.max(right.0.end);
-                (Span { start, end }, left.1 + right.1)
-            };
-            extents[index as usize] = extent;
-            let (span, leaves) = extent;
-            let is_contiguous = span.end - span.start == leaves;
-            // A right child is the largest clade that starts where it does, and a left child the
-            // largest that ends where it does.
-            let here = is_contiguous.then(|| {
-                let candidates =
-                    [self.starting[span.start as usize], self.ending[span.end as usize - 1]];
-                candidates
-                    .into_iter()
-                    .find(|&here| self.of_node[here as usize] == span)
-            });
-            clades[index as usize] = here
-                .flatten()
-                .unwrap_or(self.of_node.len() as u32 + index);
-        }
-        clades
-    }
-}
-
-/// Returns the nodes of both trees, each as tree and index, those with fewer leaves below first and
-/// equal ones in the order of the trees.
-fn by_size<A: Metric>(trees: [&Working<A>; 2]) -> Vec<(usize, u32)> {
-    let orders = trees.map(Working::preorder);
-    let mut sizes = trees.map(|tree| vec![0u32; tree.nodes.len()]);
-    // A counting sort: the number of nodes of every size, and from it the first place of each.
-    let most = trees
-        .map(Working::objects)
-        .into_iter()
-        .max()
-        .unwrap_or(0);
-    let mut places = vec![0usize; most + 2];
-    for which in 0..2 {
-        for &index in orders[which].iter().rev() {
-            let node = &trees[which].nodes[index as usize];
-            let sizes = &mut sizes[which];
-            let size = if node.is_leaf() {
-                1
-            } else {
-                let [left, right] = node.children.map(|child| sizes[child as usize]);
-                left + right
-            };
-            sizes[index as usize] = size;
-            places[size as usize + 1] += 1;
-        }
-    }
-    for size in 1..places.len() {
-        places[size] += places[size - 1];
-    }
-    let mut sorted = vec![(0, NONE); orders[0].len() + orders[1].len()];
-    for which in 0..2 {
-        for &index in &orders[which] {
-            let place = &mut places[sizes[which][index as usize] as usize];
-            sorted[*place] = (which, index);
-            *place += 1;
-        }
-    }
-    sorted
-}
-
-/// Returns the position in the first tree of every leaf of the second, by node; `NONE` if the first
-/// tree has no such leaf. An object that may have several leaves is known by its box, too.
-fn positions<A: Metric>(first: &Working<A>, second: &Working<A>, spans: &[Span]) -> Vec<u32> {
-    let mut positions = vec![NONE; second.nodes.len()];
+/// Returns a key for a leaf: its object, and the part of the object if the object may have several
+/// leaves.
+fn key_of_leaf<A: Metric>(node: &Node) -> u128 {
+    let object = key(node.children[1]);
     if A::LEAF == 0.0 {
-        let mut of_object = vec![NONE; first.objects()];
-        for leaf in leaves(first) {
-            of_object[first.nodes[leaf as usize].children[1] as usize] = spans[leaf as usize].start;
-        }
-        for leaf in leaves(second) {
-            positions[leaf as usize] = of_object[second.nodes[leaf as usize].children[1] as usize];
-        }
-        return positions;
+        return object;
     }
-    let keyed = |tree: &Working<A>| {
-        let mut keyed: Vec<_> = leaves(tree)
-            .map(|leaf| {
-                let node = &tree.nodes[leaf as usize];
-                let planes = node.aabb.planes();
-                (
-                    node.children[1],
-                    planes.map(|corner| [0, 1, 2].map(|axis| corner[axis].to_bits())),
-                    leaf,
-                )
-            })
-            .collect();
-        keyed.sort_unstable();
-        keyed
-    };
-    let of_first = keyed(first);
-    for (object, planes, leaf) in keyed(second) {
-        let at = of_first.partition_point(|&(a, b, _)| (a, b) < (object, planes));
-        if let Some(&(a, b, other)) = of_first.get(at)
-            && (a, b) == (object, planes)
-        {
-            positions[leaf as usize] = spans[other as usize].start;
-        }
-    }
-    positions
+    let [low, high] = node.aabb.planes();
+    [low[0], low[1], low[2], high[0], high[1], high[2]]
+        .into_iter()
+        .fold(object, |sum, plane| {
+            // Multiplying between the planes makes the key depend on their order, and an odd factor
+            // loses no bits.
+            sum.rotate_left(21)
+                .wrapping_mul(0x2d99_787926d46932a4c1f32680f70c55)
+                ^ key(plane.to_bits())
+        })
 }
 
-/// The leaves in the tree.
-fn leaves(tree: &Working<impl Metric>) -> impl Iterator<Item = u32> {
-    tree.preorder()
-        .into_iter()
-        .filter(|&index| tree.nodes[index as usize].is_leaf())
+/// Returns a key for an object, scattered over 128 bits by two rounds of SplitMix64 (Steele, Lea &
+/// Flood 2014).
+fn key(object: u32) -> u128 {
+    const GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
+    let number = 2 * u64::from(object) + 1;
+    let low = split_mix(number.wrapping_mul(GAMMA));
+    let high = split_mix((number + 1).wrapping_mul(GAMMA));
+    u128::from(high) << 64 | u128::from(low)
+}
+
+/// The output function of SplitMix64.
+fn split_mix(state: u64) -> u64 {
+    let state = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let state = (state ^ (state >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    state ^ (state >> 31)
 }
 
 #[cfg(test)]
@@ -263,12 +156,11 @@ mod tests {
         };
         let a = spoilt(left);
         let b = spoilt(right);
-        let found = recombine(&a, &b);
+        let found = recombine(&[&a, &b]);
         validate(&found.to_bvh(), &boxes).unwrap();
         assert!(a.area() > good.area() && b.area() > good.area());
         assert!(found.area() <= good.area() * (1.0 + 1e-12), "{} {}", found.area(), good.area());
-        assert_eq!(recombine(&good, &good).to_bvh(), good.to_bvh());
-        let empty = built(&muller_fellner::Config::default(), &[]);
-        assert_eq!(recombine(&empty, &empty).objects(), 0);
+        assert_eq!(recombine(&[&good]).to_bvh(), good.to_bvh());
+        assert_eq!(recombine(&[&built(&muller_fellner::Config::default(), &[])]).objects(), 0);
     }
 }

@@ -34,7 +34,9 @@ impl<M: Metric> Working<M> {
         if nodes.len() > 1 {
             nodes[0].children[0] = 1;
         }
-        Ok(Self::with_area(nodes, metric, area))
+        let mut working = Self::new(nodes, metric);
+        working.area.add(area);
+        Ok(working)
     }
 
     /// Returns the flat tree, with adjacent children, left before right, and objects in leaf order.

@@ -85,12 +85,8 @@ pub(crate) struct Working<M = Area> {
 }
 
 impl<M: Metric> Working<M> {
-    /// Builds a tree from linked nodes without stamps, the anchor first, whose
-    /// [`area`](Self::area) is known.
-    pub fn with_area(nodes: Vec<Node>, metric: M, area: f64) -> Self {
-        let journal = Vec::new();
-        let spare = Vec::new();
-        let area = Sum::from_iter([area]);
+    fn new(nodes: Vec<Node>, metric: M) -> Self {
+        let (area, journal, spare) = Default::default();
         Self { metric, nodes, area, added: 0.0, journal, change: 0, spare }
     }
 
@@ -102,7 +98,7 @@ impl<M: Metric> Working<M> {
     /// Builds a tree from linked nodes, the anchor first.
     pub fn from_nodes(mut nodes: Vec<Node>, metric: M) -> Self {
         nodes.iter_mut().for_each(|node| node.stamp = 0);
-        let mut tree = Self::with_area(nodes, metric, 0.0);
+        let mut tree = Self::new(nodes, metric);
         tree.area.add(tree.internal_area());
         tree
     }
@@ -134,7 +130,7 @@ impl<M: Metric> Working<M> {
 
     /// Returns the node's part of the tree's area; `None` if its kind has none.
     #[inline(always)]
-    pub fn part(node: &Node) -> Option<f64> {
+    fn part(node: &Node) -> Option<f64> {
         match node.is_leaf() {
             false => Some(node.area),
             true if M::LEAF > 0.0 => Some(M::LEAF * node.area),
