@@ -3,6 +3,7 @@
 use super::*;
 use crate::cost::SahConstants;
 use crate::{Ray, nearest_hit_by};
+use alloc::string::ToString;
 use alloc::vec;
 
 const ORIGIN: Origin = Origin {
