@@ -306,6 +306,7 @@ impl FromIterator<f64> for Sum {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use alloc::string::ToString;
     use alloc::{vec, vec::Vec};
 
     /// Unit cubes at x = 0 and x = 2 under one root of half area 7.
