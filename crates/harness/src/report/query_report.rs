@@ -1,4 +1,4 @@
-//! A table of some rows of a CSV file, by the language of [`query`](super::query): selected,
+//! A table of some rows of a CSV file, by the language of [`query`]: selected,
 //! grouped, aggregated, compared with a base, and drawn.
 
 use super::config::check_file;
