@@ -3,7 +3,7 @@
 use crate::Error;
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The limit on the program's threads.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]
@@ -87,6 +87,26 @@ fn folder_of(path: &Path) -> &Path {
     path.parent()
         .filter(|folder| !folder.as_os_str().is_empty())
         .unwrap_or(Path::new("."))
+}
+
+/// Returns the output that the flag gives, or otherwise the `derived` path. A path that nobody gave
+/// must be free, because nobody asked to replace a file.
+pub fn output_or_free(
+    flag: &str,
+    given: Option<&PathBuf>,
+    derived: impl FnOnce() -> PathBuf,
+) -> Result<PathBuf, Error> {
+    if let Some(given) = given {
+        return Ok(given.clone());
+    }
+    let path = derived();
+    if path.exists() {
+        return Err(Error::Usage(format!(
+            "{0} exists; accepted: {flag} {0} to replace it, or the name of a new file",
+            path.display()
+        )));
+    }
+    Ok(path)
 }
 
 /// Checks the path of a folder to write into: an existing folder, or one that can be created

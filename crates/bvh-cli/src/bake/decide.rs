@@ -76,8 +76,18 @@ pub struct Choices {
     pub references: f64,
 }
 
+/// The outcome of a decision.
+pub struct Decided {
+    /// The choices that pay.
+    pub choices: Choices,
+    /// The explanation of each choice, in one line.
+    pub reasons: Vec<String>,
+    /// The greedy tree, which the bake needs too.
+    pub greedy: Bvh,
+}
+
 /// Tries the open choices one after the other, and keeps those that pay. Begins with the `given`
-/// ones, and also ends with them if `interrupted` becomes true. Explains each choice in one line.
+/// ones, and also ends with them if `interrupted` becomes true.
 pub fn decide(
     open: Open,
     given: Choices,
@@ -85,7 +95,7 @@ pub fn decide(
     scene: &Scene,
     seed: u64,
     interrupted: &AtomicBool,
-) -> Result<(Choices, Vec<String>), Error> {
+) -> Result<Decided, Error> {
     let mut decision = Decision::begin(given, method, scene, seed, interrupted)?;
     if open.cost {
         let layout = Choices { objective: Objective::Layout, ..decision.chosen.clone() };
@@ -102,7 +112,8 @@ pub fn decide(
         let divided = Choices { references: REFERENCES, ..decision.chosen.clone() };
         decision.consider("references: 1.2 per object", divided)?;
     }
-    Ok((decision.chosen, decision.reasons))
+    let Decision { chosen, reasons, greedy, .. } = decision;
+    Ok(Decided { choices: chosen, reasons, greedy })
 }
 
 /// The choices so far, and what the trial of the next one needs.

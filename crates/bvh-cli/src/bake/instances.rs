@@ -1,10 +1,9 @@
 //! `bvh bake --instances`: writes a tree for every mesh of a glTF file, and one tree over the
 //! instances that its nodes place, into a folder.
 
-use super::effort::Effort;
+use super::BakeArgs;
 use super::plan::Plan;
 use super::watch::gain;
-use super::{BakeArgs, decide};
 use crate::Error;
 use crate::csv;
 use bvh_build::{Builder, median_cut};
@@ -60,13 +59,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         .chain([&top])
         .map(|scene| scene.boxes.len())
         .sum();
-    let plan = match args.budget {
-        Some(_) => plan,
-        None => {
-            print_line(&decide::reason_of_work(objects));
-            Plan { effort: Effort::Work(decide::work(objects)), ..plan }
-        }
-    };
+    let plan = args.with_budget(plan, objects);
     // The top tree's objects are boxes, which cannot be divided, and no wide layout is made of it.
     let plan_of_top = Plan { references: 1.0, objective: Objective::InternalArea, ..plan.clone() };
     let names = parts
@@ -100,7 +93,7 @@ fn bake_part(
     path: &Path,
     interrupted: &AtomicBool,
 ) -> Result<(), Error> {
-    let bake = plan.begin(scene, None, interrupted)?;
+    let bake = plan.begin(scene, None, None, interrupted)?;
     let baked = bake.search(interrupted)?;
     let bytes = bake
         .file(&baked)

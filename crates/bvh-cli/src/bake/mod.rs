@@ -10,17 +10,18 @@ mod watch;
 use crate::Error;
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
+use bvh_core::Bvh;
 use bvh_core::cost::Objective;
 use bvh_core::file::Header;
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_scenes::{Scene, explain};
 use bvh_search::best::{self, Horizon};
 use bvh_search::{Method, StopReason};
-use bvh_terminal::arguments::{FileKind, Jobs, input_file, output_file};
+use bvh_terminal::arguments::{FileKind, Jobs, input_file, output_file, output_or_free};
 use bvh_terminal::files::Reserved;
 use bvh_terminal::output::{print_error, print_line};
 use clap::Args;
-use decide::{Choices, Open, decide};
+use decide::{Choices, Decided, Open, decide};
 use effort::Effort;
 use plan::{Bake, Baked, Plan, Start};
 use std::path::{Path, PathBuf};
@@ -96,28 +97,23 @@ const TREE: FileKind =
 const BEST: &str = "best";
 
 impl BakeArgs {
-    /// Returns the file or folder to write. A name that is not given must be free.
+    /// Returns the file or folder to write.
     fn out(&self) -> Result<PathBuf, Error> {
-        if let Some(out) = &self.out {
-            return Ok(out.clone());
-        }
+        Ok(output_or_free("--out", self.out.as_ref(), || self.name_after_scene())?)
+    }
+
+    /// Returns the name that an output has if none is given.
+    fn name_after_scene(&self) -> PathBuf {
         let scene = Path::new(&self.scene);
         let stem = scene.file_stem().unwrap_or(scene.as_os_str());
         // The colon of `escher:1000` is no part of a file's name everywhere.
         let stem = stem.to_string_lossy().replace(':', "-");
         let extension = if self.instances { "" } else { ".bvh" };
-        let out = PathBuf::from(stem + extension);
-        if out.exists() {
-            return Err(Error::Usage(format!(
-                "{0} exists; accepted: --out {0} to replace it, or the name of a new file",
-                out.display()
-            )));
-        }
-        Ok(out)
+        PathBuf::from(stem + extension)
     }
 
     /// Returns the search that the arguments specify. Without `--budget` it has no work yet, which
-    /// [`Self::decided`] adds.
+    /// [`Self::with_budget`] adds.
     fn plan(&self) -> Result<Plan, Error> {
         let rays = self.rays.as_deref().map(Rays::read).transpose()?;
         let method = self.method()?;
@@ -139,20 +135,28 @@ impl BakeArgs {
         })
     }
 
-    /// Completes a plan without a budget: adds the work, and makes the choices that the arguments
-    /// leave open. Prints the reasons.
-    fn decided(&self, plan: Plan, scene: &Scene, interrupted: &AtomicBool) -> Result<Plan, Error> {
+    /// Adds the work for this many objects to a plan without a budget, and prints the reason.
+    fn with_budget(&self, plan: Plan, objects: usize) -> Plan {
         if self.budget.is_some() {
-            return Ok(plan);
+            return plan;
         }
-        let objects = scene.boxes.len();
         print_line(&decide::reason_of_work(objects));
-        let plan = Plan { effort: Effort::Work(decide::work(objects)), ..plan };
+        Plan { effort: Effort::Work(decide::work(objects)), ..plan }
+    }
+
+    /// Makes the choices that the arguments leave open if there is no budget, and prints the reasons.
+    /// Returns the greedy tree, too, if the choices needed it.
+    fn decided(
+        &self,
+        plan: Plan,
+        scene: &Scene,
+        interrupted: &AtomicBool,
+    ) -> Result<(Plan, Option<Bvh>), Error> {
         // Only `best` offers the choices, and only triangles have a wide layout. A search from an
         // earlier tree minimises the cost that is given.
         let has_choices = matches!(plan.method, Method::Best(_)) && scene.triangles().is_ok();
-        if !has_choices || self.from.is_some() {
-            return Ok(plan);
+        if self.budget.is_some() || !has_choices || self.from.is_some() {
+            return Ok((plan, None));
         }
         let open = Open {
             cost: self.cost.is_none() && self.rays.is_none(),
@@ -164,16 +168,17 @@ impl BakeArgs {
             rays: plan.rays.clone(),
             references: plan.references,
         };
-        let (chosen, reasons) = decide(open, given, &plan.method, scene, plan.seed, interrupted)?;
+        let Decided { choices, reasons, greedy } =
+            decide(open, given, &plan.method, scene, plan.seed, interrupted)?;
         for reason in reasons {
             print_line(&reason);
         }
-        let Choices { objective, rays, references } = chosen;
+        let Choices { objective, rays, references } = choices;
         let name = match (&rays, &self.rays) {
             (Some(_), None) => self.recorded(Some(Rays::DEFAULT)),
             _ => plan.name,
         };
-        Ok(Plan { objective, rays, references, name, ..plan })
+        Ok((Plan { objective, rays, references, name, ..plan }, Some(greedy)))
     }
 
     /// Returns the named method. If a tree is given, rejects methods that cannot continue from it.
@@ -254,10 +259,11 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         }
         None => None,
     };
-    let plan = args.decided(plan, &scene, interrupted)?;
+    let plan = args.with_budget(plan, scene.boxes.len());
+    let (plan, greedy) = args.decided(plan, &scene, interrupted)?;
     // Reserving the file first reports a full disk before the search and not after it.
     let reserved = Reserved::new(&out, plan.most_bytes(&scene))?;
-    let bake = plan.begin(&scene, start.as_ref(), interrupted)?;
+    let bake = plan.begin(&scene, start.as_ref(), greedy, interrupted)?;
     if args.explain && bake.is_whole() {
         print_line(
             "  skipped: divided objects: no spatial split of a top-down division saves anything",

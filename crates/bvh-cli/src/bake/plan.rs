@@ -53,14 +53,19 @@ impl Plan {
         Header::BYTES + self.most_references(scene) * reference
     }
 
-    /// Begins a bake. Its time starts after the greedy tree is built.
+    /// Begins a bake, with the greedy tree if the caller has it. The time of the bake starts after
+    /// the greedy tree is built.
     pub fn begin<'a>(
         &'a self,
         scene: &'a Scene,
         start: Option<&'a Start>,
+        known: Option<Bvh>,
         interrupted: &AtomicBool,
     ) -> Result<Bake<'a>, Error> {
-        let greedy = greedy(self.method.name(), scene, interrupted)?;
+        let greedy = match known {
+            Some(tree) => tree,
+            None => greedy(self.method.name(), scene, interrupted)?,
+        };
         let deadline = self.effort.deadline();
         // There is a tree now, which Ctrl-C must save instead of ending the program.
         interrupt::hold();

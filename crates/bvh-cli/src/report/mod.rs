@@ -13,7 +13,7 @@ use bvh_scenes::Scene;
 use bvh_scenes::render::{Film, Options, heat, image, render};
 use bvh_scenes::trace::{Accelerator, Structure};
 use bvh_scenes::tree_file::{self, TreeFileError};
-use bvh_terminal::arguments::{FileKind, Jobs, output_file};
+use bvh_terminal::arguments::{FileKind, Jobs, output_file, output_or_free};
 use bvh_terminal::files;
 use bvh_terminal::output::{print_error, print_line};
 use clap::Args;
@@ -51,23 +51,6 @@ const PAGE: FileKind =
 /// The width and the height of the pictures, in pixels.
 const PICTURE: (u32, u32) = (640, 400);
 
-impl ReportArgs {
-    /// Returns the page to write. A name that is not given must be free.
-    fn out(&self) -> Result<PathBuf, Error> {
-        if let Some(out) = &self.out {
-            return Ok(out.clone());
-        }
-        let out = self.file.with_extension("html");
-        if out.exists() {
-            return Err(Error::Usage(format!(
-                "{0} exists; accepted: --out {0} to replace it, or the name of a new file",
-                out.display()
-            )));
-        }
-        Ok(out)
-    }
-}
-
 /// One of the two trees on the page.
 struct Measured {
     tree: Bvh,
@@ -79,7 +62,7 @@ struct Measured {
 
 /// Measures the tree in a file and the greedy tree, draws both, and writes the page.
 pub fn report(args: &ReportArgs, interrupted: &AtomicBool) -> Result<(), Error> {
-    let out = args.out()?;
+    let out = output_or_free("--out", args.out.as_ref(), || args.file.with_extension("html"))?;
     output_file("--out", &out, &PAGE)?;
     args.jobs.apply()?;
     let scene = args.files.load(&args.scene)?;
