@@ -2,7 +2,7 @@
 
 mod support;
 
-use bvh_core::{Triangle, WideBvh};
+use bvh_core::{Kernel, Triangle, WideBvh};
 use glam::Vec3;
 use support::{Random, SHAPES, ball, boxes, grid_box, scaled, soup, tree};
 
@@ -37,7 +37,14 @@ fn the_closest_point_is_as_close_as_that_of_any_triangle_at_every_scale() {
             points.extend((0..200).map(|_| random.point() * 1.5 * scale));
             for shape in 0..SHAPES.len() {
                 let mut closest = vec![None; points.len()];
-                layout(&triangles, shape).closest_points(&points, &mut closest);
+                let wide = layout(&triangles, shape);
+                wide.closest_points(&points, &mut closest);
+                for kernel in Kernel::ALL {
+                    let Some(wide) = wide.clone().with_kernel(kernel) else { continue };
+                    let mut same = vec![None; points.len()];
+                    wide.closest_points(&points, &mut same);
+                    assert_eq!(same, closest, "{kernel:?}, 2^{exponent}");
+                }
                 for (&point, closest) in points.iter().zip(closest) {
                     let found = closest.unwrap();
                     let expected = brute_force(&triangles, point).0.sqrt();

@@ -35,11 +35,12 @@
 //! is perturbed, so three terms suffice. [`exact`](crate::exact) has the filter in f64 and its bounds;
 //! no rounding decides an answer.
 
-use super::crossed_leaves::AllHits;
+use super::all_in_flight::{self, Found};
+use super::crossed_leaves::{AllHits, SlopedLine};
 use super::layout::WideBvh;
 use super::portable;
 use super::vector;
-use crate::exact::{self, Line};
+use crate::exact::Line;
 use crate::{Hit, Kernel, Ray};
 use alloc::vec::Vec;
 use glam::Vec3;
@@ -70,6 +71,8 @@ impl WideBvh {
     pub fn all_hits(&self, ray: &Ray) -> Vec<Hit> {
         let mut hits = Vec::new();
         self.append_hits(ray, &mut hits);
+        let count = sort_hits(&mut hits);
+        hits.truncate(count);
         hits
     }
 
@@ -80,10 +83,10 @@ impl WideBvh {
     /// Panics if `rays` and `counts` are not equally many.
     pub fn all_hits_of(&self, rays: &[Ray], hits: &mut Vec<Hit>, counts: &mut [u32]) {
         assert_eq!(rays.len(), counts.len(), "a count for every ray");
-        for (ray, count) in rays.iter().zip(counts) {
-            let first = hits.len();
-            self.append_hits(ray, hits);
-            *count = (hits.len() - first) as u32;
+        let mut found = Vec::new();
+        let parts = rays.chunks(all_in_flight::MOST);
+        for (rays, counts) in parts.zip(counts.chunks_mut(all_in_flight::MOST)) {
+            self.append_hits_of(rays, hits, counts, &mut found);
         }
     }
 
@@ -94,10 +97,11 @@ impl WideBvh {
     pub fn count_hits(&self, rays: &[Ray], counts: &mut [u32]) {
         assert_eq!(rays.len(), counts.len(), "a count for every ray");
         let mut hits = Vec::new();
-        for (ray, count) in rays.iter().zip(counts) {
+        let mut found = Vec::new();
+        let parts = rays.chunks(all_in_flight::MOST);
+        for (rays, counts) in parts.zip(counts.chunks_mut(all_in_flight::MOST)) {
             hits.clear();
-            self.append_hits(ray, &mut hits);
-            *count = hits.len() as u32;
+            self.append_hits_of(rays, &mut hits, counts, &mut found);
         }
     }
 
@@ -110,27 +114,94 @@ impl WideBvh {
     /// Panics if `points` and `inside` are not equally many.
     pub fn contains(&self, points: &[Vec3], inside: &mut [bool]) {
         assert_eq!(points.len(), inside.len(), "an answer for every point");
-        let mut hits = Vec::new();
-        for (&point, inside) in points.iter().zip(inside) {
-            hits.clear();
+        let is_within = |point: Vec3| {
             // A point outside the box is outside the mesh. NaN fails every comparison.
-            if (self.bounds.min.cmple(point) & point.cmple(self.bounds.max)).all() {
-                let ray = Ray::assume_valid(point, Vec3::X, 0.0, f32::MAX);
-                self.append_hits(&ray, &mut hits);
-            }
-            *inside = hits.len() % 2 == 1;
+            (self.bounds.min.cmple(point) & point.cmple(self.bounds.max)).all()
+        };
+        let rays: Vec<Ray> = points
+            .iter()
+            .filter(|&&point| is_within(point))
+            .map(|&point| Ray::assume_valid(point, Vec3::X, 0.0, f32::MAX))
+            .collect();
+        let mut counts = alloc::vec![0; rays.len()];
+        self.count_hits(&rays, &mut counts);
+        let mut counts = counts.into_iter();
+        for (&point, inside) in points.iter().zip(inside) {
+            *inside = is_within(point) && counts.next().is_some_and(|count| count % 2 == 1);
         }
     }
 
-    /// Appends the hits of a ray.
-    fn append_hits(&self, ray: &Ray, hits: &mut Vec<Hit>) {
+    /// Appends the hits of every ray, sorted, and writes their numbers. `found` is room for work.
+    fn append_hits_of(
+        &self,
+        rays: &[Ray],
+        hits: &mut Vec<Hit>,
+        counts: &mut [u32],
+        found: &mut Vec<Found>,
+    ) {
+        /// The number of rays below which rays in flight are not worth their preparation.
+        const FEW: usize = 8;
+        found.clear();
+        if self.kernel == Kernel::Portable || rays.len() < FEW {
+            for (ray, count) in rays.iter().zip(counts) {
+                let first = hits.len();
+                self.append_hits(ray, hits);
+                *count = sort_hits(&mut hits[first..]) as u32;
+                hits.truncate(first + *count as usize);
+            }
+            return;
+        }
         let first = hits.len();
+        // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw; callers pass parts
+        // of no more rays.
+        let others = unsafe { vector::all_hits_of(self, rays, found) };
+        for (number, ray) in (0..).zip(rays) {
+            if others[number / 64] >> (number % 64) & 1 == 1 {
+                self.append_hits(ray, hits);
+                let number = number as u32;
+                found.extend(
+                    hits.drain(first..)
+                        .map(|hit| Found { number, hit }),
+                );
+            }
+        }
+        counts.fill(0);
+        for found in found.iter() {
+            counts[found.number as usize] += 1;
+        }
+        // Sorted by counting: the hits of ray after ray, in any order.
+        let mut next = [0; all_in_flight::MOST];
+        let mut end = first;
+        for (next, &count) in next.iter_mut().zip(counts.iter()) {
+            *next = end;
+            end += count as usize;
+        }
+        hits.resize(end, Hit::MISS);
+        for found in found.iter() {
+            let next = &mut next[found.number as usize];
+            hits[*next] = found.hit;
+            *next += 1;
+        }
+        let mut start = first;
+        let mut kept = first;
+        for count in counts {
+            let end = start + *count as usize;
+            let different = sort_hits(&mut hits[start..end]);
+            if kept < start {
+                hits.copy_within(start..start + different, kept);
+            }
+            *count = different as u32;
+            kept += different;
+            start = end;
+        }
+        hits.truncate(kept);
+    }
+
+    /// Appends the hits of a ray, in no order; the hits of a divided triangle once for each of its leaves.
+    fn append_hits(&self, ray: &Ray, hits: &mut Vec<Hit>) {
         let line = Line::new(ray);
-        let [dx, dy, dz] = line.direction;
-        let reach = f64::from(ray.origin().abs().max_element()) + f64::from(self.largest);
-        // 512 ε of the square.
-        let error = reach * reach * (8.0 * exact::ERROR);
-        let mut leaves = AllHits { ray, line, slope: [dx / dz, dy / dz], error, hits };
+        let sloped = SlopedLine::new(ray, self.largest);
+        let mut leaves = AllHits { ray, line, sloped, hits };
         // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
         let is_traced =
             self.kernel != Kernel::Portable && unsafe { vector::all_hits(self, ray, &mut leaves) };
@@ -140,18 +211,24 @@ impl WideBvh {
                 false
             });
         }
-        hits[first..].sort_unstable_by(|a, b| {
-            let by_distance = a.t.total_cmp(&b.t);
-            by_distance.then(a.object.cmp(&b.object))
-        });
-        // A divided triangle is in several leaves, every time at the same distance.
-        let mut kept = first;
-        for i in first..hits.len() {
-            if i == first || hits[i] != hits[i - 1] {
-                hits[kept] = hits[i];
-                kept += 1;
-            }
-        }
-        hits.truncate(kept);
     }
+}
+
+/// Sorts the hits of one ray and moves each to the front once: a divided triangle is in several leaves,
+/// every time at the same distance. Returns the number of different hits.
+#[inline]
+fn sort_hits(hits: &mut [Hit]) -> usize {
+    if hits.len() < 2 {
+        return hits.len();
+    }
+    // No distance is negative or −0, so distances are ordered as their bits are.
+    hits.sort_unstable_by_key(|hit| u64::from(hit.t.to_bits()) << 32 | u64::from(hit.object));
+    let mut kept = 1;
+    for i in 1..hits.len() {
+        if hits[i] != hits[kept - 1] {
+            hits[kept] = hits[i];
+            kept += 1;
+        }
+    }
+    kept
 }

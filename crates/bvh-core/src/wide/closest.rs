@@ -2,10 +2,11 @@
 
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
-use super::triangles::TriangleBlock;
+use super::vector;
+use crate::Kernel;
 use crate::query::Near;
 use alloc::vec::Vec;
-use glam::{DVec3, Vec3, Vec4};
+use glam::{DVec3, Vec3};
 
 /// The point of a mesh that is closest to a given point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +57,14 @@ impl WideBvh {
     /// Panics if `points` and `closest` are not equally many.
     pub fn closest_points(&self, points: &[Vec3], closest: &mut [Option<Closest>]) {
         assert_eq!(points.len(), closest.len(), "an answer for every point");
-        closest_of_all(self, points, closest);
+        if self.kernel != Kernel::Portable {
+            // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
+            return unsafe { vector::closest_points(self, points, closest) };
+        }
+        let mut stack = Vec::new();
+        for (&point, closest) in points.iter().zip(closest) {
+            *closest = self.closest_portable(point, &mut stack);
+        }
     }
 
     /// Writes the distance of every point from the [closest point](Self::closest_point), negative if the
@@ -77,45 +85,26 @@ impl WideBvh {
         }
     }
 
-    #[inline(always)]
-    fn closest(&self, point: Vec3, stack: &mut Vec<Pending>) -> Option<Closest> {
+    /// Returns the closest point by code for any machine.
+    fn closest_portable(&self, point: Vec3, stack: &mut Vec<Pending>) -> Option<Closest> {
         let mut child = self.root.filter(|_| point.is_finite())?;
-        let target = point.as_dvec3();
-        let mut nearest = Near { object: u32::MAX, distance_squared: f64::INFINITY };
-        let mut closest = DVec3::ZERO;
-        let scale = 1.0 / f64::from(point.abs().max_element().max(self.largest));
+        let mut nearest = Nearest::new(point);
         stack.clear();
         loop {
             if child.is_node() {
                 let node = &self.nodes[child.index()];
-                let bounds = bounds(node, point);
                 let first = stack.len();
-                for (lane, &bound) in bounds.iter().enumerate() {
+                for (lane, bound) in bounds(node, point).into_iter().enumerate() {
                     // False for unused lanes, which are NaN.
-                    if bound <= nearest.distance_squared {
-                        let mut at = stack.len();
+                    if bound <= nearest.near.distance_squared {
                         stack.push(Pending { bound, child: node.children[lane] });
-                        // Insertion, the nearest child last.
-                        while at > first && stack[at - 1].bound < bound {
-                            stack.swap(at - 1, at);
-                            at -= 1;
-                        }
                     }
                 }
+                stack[first..].sort_by(|a, b| b.bound.total_cmp(&a.bound));
             } else {
                 for block in &self.blocks[child.index()..] {
-                    let limit = libm::sqrt(nearest.distance_squared) * scale + SLACK;
-                    let mut lanes = near_lanes(block, point, scale as f32, limit as f32);
-                    while lanes != 0 {
-                        let lane = lanes.trailing_zeros() as usize;
-                        lanes &= lanes - 1;
-                        let Some((object, triangle)) = block.triangle(lane) else { continue };
-                        let offset = triangle.offset_from(target);
-                        let near = Near { object, distance_squared: offset.length_squared() };
-                        if near < nearest {
-                            nearest = near;
-                            closest = target + offset;
-                        }
+                    for (object, triangle) in block.triangles() {
+                        nearest.offer(object, triangle.offset_from(nearest.target));
                     }
                     if block.is_last() {
                         break;
@@ -123,14 +112,8 @@ impl WideBvh {
                 }
             }
             child = loop {
-                let Some(pending) = stack.pop() else {
-                    return Some(Closest {
-                        object: nearest.object,
-                        point: closest,
-                        distance: libm::sqrt(nearest.distance_squared),
-                    });
-                };
-                if pending.bound <= nearest.distance_squared {
+                let Some(pending) = stack.pop() else { return Some(nearest.closest()) };
+                if pending.bound <= nearest.near.distance_squared {
                     break pending.child;
                 }
             };
@@ -138,81 +121,37 @@ impl WideBvh {
     }
 }
 
-#[cfg(feature = "std")]
-crate::with_vector_instructions! {
-    /// Writes the closest point of every point.
-    closest_of_all = closest_of_all_plain(
-        wide: &WideBvh, points: &[Vec3], closest: &mut [Option<Closest>],
-    )
-}
-#[cfg(not(feature = "std"))]
-use closest_of_all_plain as closest_of_all;
-
-#[inline(always)]
-fn closest_of_all_plain(wide: &WideBvh, points: &[Vec3], closest: &mut [Option<Closest>]) {
-    let mut stack = Vec::new();
-    for (&point, closest) in points.iter().zip(closest) {
-        *closest = wide.closest(point, &mut stack);
-    }
+/// The nearest triangle of a point so far.
+pub(super) struct Nearest {
+    pub(super) target: DVec3,
+    pub(super) near: Near,
+    offset: DVec3,
 }
 
-/// The part of the largest coordinate by which distances in f32 may be too large; their error is some
-/// dozen units in the last place, 2⁻²⁴ each.
-const SLACK: f64 = 1.0 / (1 << 16) as f64;
-
-/// Returns a bit per triangle whose scaled distance from the point may be at most `limit`: the distances
-/// of four triangles at once, in f32, where `scale` makes the largest coordinate 1. A triangle so small
-/// that its normal underflows is smaller than the slack, and its edges are as near as its inside. NaN
-/// counts as near.
-#[inline(always)]
-fn near_lanes(block: &TriangleBlock, point: Vec3, scale: f32, limit: f32) -> u32 {
-    let corner = |corner: &[[f32; TriangleBlock::LANES]; 3]| {
-        Lanes3([0, 1, 2].map(|axis| (Vec4::from(corner[axis]) - Vec4::splat(point[axis])) * scale))
-    };
-    let [a, b, c] = block.corners.each_ref().map(corner);
-    let to_edge = |from: Lanes3, to: Lanes3| {
-        let edge = to.minus(from);
-        let along = -from.dot(edge) / edge.dot(edge);
-        let along = along.max(Vec4::ZERO).min(Vec4::ONE);
-        let nearest = Lanes3([0, 1, 2].map(|axis| from.0[axis] + edge.0[axis] * along));
-        nearest.dot(nearest)
-    };
-    let edges = to_edge(a, b)
-        .min(to_edge(b, c))
-        .min(to_edge(c, a));
-    let normal = b.minus(a).cross(c.minus(a));
-    let inside = |from: Lanes3, to: Lanes3| normal.dot(from.cross(to)).cmpgt(Vec4::ZERO);
-    let height = normal.dot(a);
-    let plane = height * height / normal.dot(normal);
-    let is_inside = inside(a, b) & inside(b, c) & inside(c, a);
-    let nearest = Vec4::select(is_inside, plane.min(edges), edges);
-    !nearest
-        .cmpgt(Vec4::splat(limit * limit))
-        .bitmask()
-        & 15
-}
-
-/// Four vectors.
-#[derive(Clone, Copy)]
-struct Lanes3([Vec4; 3]);
-
-impl Lanes3 {
+impl Nearest {
     #[inline(always)]
-    fn minus(self, other: Self) -> Self {
-        Self([0, 1, 2].map(|axis| self.0[axis] - other.0[axis]))
+    pub(super) fn new(point: Vec3) -> Self {
+        let near = Near { object: u32::MAX, distance_squared: f64::INFINITY };
+        Self { target: point.as_dvec3(), near, offset: DVec3::ZERO }
+    }
+
+    /// Takes a triangle if it is nearer; `offset` is the vector to its closest point.
+    #[inline(always)]
+    pub(super) fn offer(&mut self, object: u32, offset: DVec3) {
+        let near = Near { object, distance_squared: offset.length_squared() };
+        if near < self.near {
+            self.near = near;
+            self.offset = offset;
+        }
     }
 
     #[inline(always)]
-    fn dot(self, other: Self) -> Vec4 {
-        let [x, y, z] = self.0;
-        x * other.0[0] + y * other.0[1] + z * other.0[2]
-    }
-
-    #[inline(always)]
-    fn cross(self, other: Self) -> Self {
-        let [x, y, z] = self.0;
-        let [u, v, w] = other.0;
-        Self([y * w - z * v, z * u - x * w, x * v - y * u])
+    pub(super) fn closest(&self) -> Closest {
+        Closest {
+            object: self.near.object,
+            point: self.target + self.offset,
+            distance: libm::sqrt(self.near.distance_squared),
+        }
     }
 }
 

@@ -356,7 +356,11 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
 
 /// The eight boxes of a node: the distances at which the ray enters them, and a bit for each box entered before `t_max`.
 #[inline(always)]
-unsafe fn boxes<K: Instructions>(node: &WideNode, ray: &Prepared, t_max: f32) -> (K::Boxes, u32) {
+pub(super) unsafe fn boxes<K: Instructions>(
+    node: &WideNode,
+    ray: &Prepared,
+    t_max: f32,
+) -> (K::Boxes, u32) {
     // SAFETY: the caller's promises; loads are of whole, aligned planes, which the ray names.
     unsafe {
         let distance = |plane: u32, scale: f32, shift: f32| {

@@ -158,6 +158,15 @@ pub(crate) trait DoubleLanes:
     /// The processor has the instructions.
     unsafe fn splat(x: f64) -> Self;
 
+    /// Writes the numbers to any place.
+    ///
+    /// # Safety
+    /// There is room.
+    unsafe fn store(self, to: *mut f64);
+
+    /// Returns `yes` where the mask is set, otherwise `no`.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+
     /// The lesser, as [`Lanes::min`].
     fn min(self, other: Self) -> Self;
 

@@ -4,6 +4,7 @@
 #![cfg_attr(not(all(feature = "std", target_arch = "x86_64")), allow(dead_code))]
 
 mod all_hits;
+mod all_in_flight;
 mod answer;
 mod available;
 mod batch;
@@ -11,6 +12,7 @@ mod batches;
 mod box_ray;
 mod build;
 mod closest;
+mod closest_lanes;
 mod coherence;
 mod crossed_leaves;
 mod in_flight;

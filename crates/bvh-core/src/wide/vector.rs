@@ -1,10 +1,14 @@
 //! A target without vector kernels.
 
+use super::all_in_flight::{Found, MOST};
 use super::answer::Answers;
+use super::closest::Closest;
 use super::crossed_leaves::AllHits;
 use super::layout::WideBvh;
 use super::source::Source;
 use crate::{Coherence, Hit, Kernel, Ray};
+use alloc::vec::Vec;
+use glam::Vec3;
 
 /// Returns whether this processor can run a kernel other than the portable one: no.
 pub(super) fn has(_: Kernel) -> bool {
@@ -24,6 +28,14 @@ pub(super) unsafe fn one_ray<const ANY: bool>(
 pub(super) unsafe fn all_hits(_: &WideBvh, _: &Ray, _: &mut AllHits) -> bool {
     false
 }
+
+/// Is never called.
+pub(super) unsafe fn all_hits_of(_: &WideBvh, _: &[Ray], _: &mut Vec<Found>) -> [u64; MOST / 64] {
+    [0; MOST / 64]
+}
+
+/// Is never called.
+pub(super) unsafe fn closest_points(_: &WideBvh, _: &[Vec3], _: &mut [Option<Closest>]) {}
 
 /// Is never called.
 pub(super) unsafe fn trace<A: Answers>(_: &WideBvh, _: impl Source, _: &mut A, _: Coherence) {}

@@ -226,6 +226,27 @@ impl<const R: usize> DoubleLanes for Doubles<R> {
     }
 
     #[inline(always)]
+    unsafe fn store(self, to: *mut f64) {
+        for (i, half) in self.0.as_flattened().iter().enumerate() {
+            unsafe { store_double(to.add(2 * i), *half) };
+        }
+    }
+
+    #[inline(always)]
+    fn select(mask: Singles<R>, yes: Self, no: Self) -> Self {
+        // Twice the mask of 32 bits is the mask of 64.
+        let [low, high] = mask.interleaved(mask);
+        Self(from_fn(|i| unsafe {
+            let low = widen(low.0[i]);
+            let high = widen(high.0[i]);
+            [
+                select_double(yes.0[i][0], no.0[i][0], low),
+                select_double(yes.0[i][1], no.0[i][1], high),
+            ]
+        }))
+    }
+
+    #[inline(always)]
     fn min(self, other: Self) -> Self {
         self.zip(other, |a, b| unsafe { select_double(a, b, lt_double(a, b)) })
     }

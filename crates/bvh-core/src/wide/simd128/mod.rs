@@ -5,17 +5,21 @@ mod lanes;
 #[cfg_attr(target_arch = "wasm32", path = "wasm.rs")]
 mod registers;
 
+use super::all_in_flight::{Found, MOST};
 use super::answer::Answers;
+use super::closest::Closest;
 use super::crossed_leaves::AllHits;
 use super::instructions::{Instructions, Pending};
 use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
 use super::source::Source;
-use super::{batch, in_flight, one_ray};
+use super::{all_in_flight, batch, closest_lanes, in_flight, one_ray};
 use crate::{Coherence, Hit, Kernel, Ray};
+use alloc::vec::Vec;
 use core::cmp::Reverse;
 use core::ops::Range;
+use glam::Vec3;
 use lanes::Singles;
 
 pub(crate) struct Simd128;
@@ -39,6 +43,26 @@ pub(super) unsafe fn one_ray<const ANY: bool>(
 pub(super) unsafe fn all_hits(wide: &WideBvh, ray: &Ray, leaves: &mut AllHits) -> bool {
     // SAFETY: the target has the instructions; the rest is the caller's promise.
     unsafe { one_ray::traverse::<Simd128, true>(wide, ray, leaves) }.is_some()
+}
+
+/// [`all_in_flight::trace`].
+pub(super) unsafe fn all_hits_of(
+    wide: &WideBvh,
+    rays: &[Ray],
+    found: &mut Vec<Found>,
+) -> [u64; MOST / 64] {
+    // SAFETY: the target has the instructions; the rest is the caller's promise.
+    unsafe { all_in_flight::trace::<Simd128>(wide, rays, found) }
+}
+
+/// [`closest_lanes::trace`].
+pub(super) unsafe fn closest_points(
+    wide: &WideBvh,
+    points: &[Vec3],
+    closest: &mut [Option<Closest>],
+) {
+    // SAFETY: the target has the instructions; the rest is the caller's promise.
+    unsafe { closest_lanes::trace::<Simd128>(wide, points, closest) }
 }
 
 /// [`batch::trace`].

@@ -11,8 +11,8 @@ pub(super) use core::arch::aarch64::{
     vcvt_high_f64_f32 as double_high, vdivq_f32 as divide, vdivq_f64 as divide_double,
     vdupq_n_f32 as splat, vdupq_n_f64 as splat_double, vld1q_f32 as load, vmulq_f32 as multiply,
     vmulq_f64 as multiply_double, vrev64q_f32 as swap_ones, vst1q_f32 as store,
-    vsubq_f32 as subtract, vsubq_f64 as subtract_double, vzip1q_f32 as interleave_low,
-    vzip2q_f32 as interleave_high,
+    vst1q_f64 as store_double, vsubq_f32 as subtract, vsubq_f64 as subtract_double,
+    vzip1q_f32 as interleave_low, vzip2q_f32 as interleave_high,
 };
 
 /// Functions of two registers that are one instruction between other types of registers.
@@ -51,6 +51,13 @@ pub(super) unsafe fn select(yes: Single, no: Single, mask: Single) -> Single {
 pub(super) unsafe fn select_double(yes: Double, no: Double, mask: Double) -> Double {
     // SAFETY: as above.
     unsafe { vbslq_f64(transmute(mask), yes, no) }
+}
+
+/// The mask of 64 bits whose halves are masks of 32 bits.
+#[inline(always)]
+pub(super) unsafe fn widen(mask: Single) -> Double {
+    // SAFETY: as above.
+    unsafe { transmute(mask) }
 }
 
 #[inline(always)]

@@ -25,6 +25,18 @@ pub(super) unsafe fn store(to: *mut f32, a: v128) {
     unsafe { v128_store(to.cast(), a) }
 }
 
+#[inline(always)]
+pub(super) unsafe fn store_double(to: *mut f64, a: v128) {
+    // SAFETY: the caller's promise; the instruction accepts any alignment.
+    unsafe { v128_store(to.cast(), a) }
+}
+
+/// The mask of 64 bits whose halves are masks of 32 bits.
+#[inline(always)]
+pub(super) fn widen(mask: v128) -> v128 {
+    mask
+}
+
 /// Rounded twice: there is no fused operation.
 #[inline(always)]
 pub(super) fn mul_add(a: v128, b: v128, c: v128) -> v128 {

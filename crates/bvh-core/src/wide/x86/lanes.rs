@@ -308,6 +308,14 @@ impl DoubleLanes for F64x4 {
     unsafe fn splat(x: f64) -> Self {
         unsafe { Self(_mm256_set1_pd(x)) }
     }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f64) {
+        unsafe { _mm256_storeu_pd(to, self.0) }
+    }
+    #[inline(always)]
+    fn select(mask: WideMask4, yes: Self, no: Self) -> Self {
+        unsafe { Self(_mm256_blendv_pd(no.0, yes.0, mask.0)) }
+    }
     functions! {
         min(a, b) -> Self = Self(_mm256_min_pd(a.0, b.0));
         max(a, b) -> Self = Self(_mm256_max_pd(a.0, b.0));
@@ -323,6 +331,14 @@ impl DoubleLanes for F64x8 {
     #[inline(always)]
     unsafe fn splat(x: f64) -> Self {
         unsafe { Self(_mm512_set1_pd(x)) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f64) {
+        unsafe { _mm512_storeu_pd(to, self.0) }
+    }
+    #[inline(always)]
+    fn select(mask: u8, yes: Self, no: Self) -> Self {
+        unsafe { Self(_mm512_mask_mov_pd(no.0, mask, yes.0)) }
     }
     functions! {
         min(a, b) -> Self = Self(_mm512_min_pd(a.0, b.0));
@@ -354,6 +370,17 @@ impl<T: DoubleLanes> DoubleLanes for Two<T> {
     #[inline(always)]
     unsafe fn splat(x: f64) -> Self {
         unsafe { Self(T::splat(x), T::splat(x)) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f64) {
+        unsafe {
+            self.0.store(to);
+            self.1.store(to.cast::<T>().add(1).cast());
+        }
+    }
+    #[inline(always)]
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
+        Self(T::select(mask.0, yes.0, no.0), T::select(mask.1, yes.1, no.1))
     }
     functions! {
         min(a, b) -> Self = Self(a.0.min(b.0), a.1.min(b.1));

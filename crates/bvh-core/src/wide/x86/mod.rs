@@ -5,11 +5,15 @@ mod avx512;
 mod lanes;
 mod sort;
 
+use super::all_in_flight::{Found, MOST};
 use super::answer::Answers;
+use super::closest::Closest;
 use super::crossed_leaves::AllHits;
 use super::layout::WideBvh;
 use super::source::Source;
 use crate::{Coherence, Hit, Kernel, Ray};
+use alloc::vec::Vec;
+use glam::Vec3;
 
 /// Returns whether this processor can run a kernel.
 pub(super) fn has(kernel: Kernel) -> bool {
@@ -73,6 +77,42 @@ pub(super) unsafe fn all_hits(wide: &WideBvh, ray: &Ray, leaves: &mut AllHits) -
     }
 }
 
+/// Runs [`all_in_flight::trace`](super::all_in_flight::trace) by the layout's kernel.
+///
+/// # Safety
+/// As for [`one_ray`], and there are at most [`MOST`](super::all_in_flight::MOST) rays.
+pub(super) unsafe fn all_hits_of(
+    wide: &WideBvh,
+    rays: &[Ray],
+    found: &mut Vec<Found>,
+) -> [u64; MOST / 64] {
+    // SAFETY: the caller's promises.
+    unsafe {
+        match wide.kernel {
+            Kernel::Avx512 => avx512::all_hits_of(wide, rays, found),
+            _ => avx2::all_hits_of(wide, rays, found),
+        }
+    }
+}
+
+/// Runs [`closest_lanes::trace`](super::closest_lanes::trace) by the layout's kernel.
+///
+/// # Safety
+/// As for [`one_ray`].
+pub(super) unsafe fn closest_points(
+    wide: &WideBvh,
+    points: &[Vec3],
+    closest: &mut [Option<Closest>],
+) {
+    // SAFETY: the caller's promises.
+    unsafe {
+        match wide.kernel {
+            Kernel::Avx512 => avx512::closest_points(wide, points, closest),
+            _ => avx2::closest_points(wide, points, closest),
+        }
+    }
+}
+
 /// Runs [`batch::trace`](super::batch::trace) by the layout's kernel.
 ///
 /// # Safety
@@ -118,6 +158,28 @@ macro_rules! entry_points {
             // SAFETY: this function is compiled with the instructions; the rest is the caller's promise.
             unsafe { crate::wide::one_ray::traverse::<$instructions, true>(wide, ray, leaves) }
                 .is_some()
+        }
+
+        /// [`all_in_flight::trace`](crate::wide::all_in_flight::trace).
+        #[target_feature(enable = $features)]
+        pub(crate) unsafe fn all_hits_of(
+            wide: &WideBvh,
+            rays: &[crate::Ray],
+            found: &mut alloc::vec::Vec<crate::wide::all_in_flight::Found>,
+        ) -> [u64; crate::wide::all_in_flight::MOST / 64] {
+            // SAFETY: this function is compiled with the instructions; the rest is the caller's promise.
+            unsafe { crate::wide::all_in_flight::trace::<$instructions>(wide, rays, found) }
+        }
+
+        /// [`closest_lanes::trace`](crate::wide::closest_lanes::trace).
+        #[target_feature(enable = $features)]
+        pub(crate) unsafe fn closest_points(
+            wide: &WideBvh,
+            points: &[glam::Vec3],
+            closest: &mut [Option<crate::wide::Closest>],
+        ) {
+            // SAFETY: this function is compiled with the instructions; the rest is the caller's promise.
+            unsafe { crate::wide::closest_lanes::trace::<$instructions>(wide, points, closest) }
         }
 
         /// [`batch::trace`](crate::wide::batch::trace).
