@@ -1,8 +1,9 @@
-//! Which part of an axis is shown, and which ticks it has.
+//! Chooses the shown part of an axis and its ticks.
 //!
-//! Panels are drawn in coordinates: the values of a linear axis, the decimal logarithms of a logarithmic one, and the
-//! indices of categories. plotters' own logarithmic axis has no ticks between powers of ten and takes logarithms from
-//! the system's library, which differ in the last digit from machine to machine.
+//! Panels are drawn in coordinates: the values of a linear axis, the decimal logarithms of a
+//! logarithmic axis, and the indices of categories. plotters' own logarithmic axis has no ticks
+//! between powers of ten and takes logarithms from the system's library, whose last digit differs
+//! from machine to machine.
 
 use std::ops::Range;
 
@@ -10,7 +11,7 @@ use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, Value
 
 use super::model::{Axis, Marks, Panel, Scale};
 
-/// Values above this size, in either direction, count as non-finite, so that no difference overflows.
+/// Values of a larger magnitude count as non-finite, so that no difference overflows.
 const LARGEST: f64 = 1e300;
 
 /// The shown part of an axis with its ticks, in coordinates: `low < high`.
@@ -23,11 +24,11 @@ pub(super) struct Ruled {
     pub major: Vec<(f64, String)>,
     /// Unlabelled grid lines.
     minor: Vec<f64>,
-    /// The power of ten that every label is to be multiplied with, or empty.
+    /// The power of ten that multiplies every label, or empty.
     pub factor: String,
 }
 
-/// Both axes of a panel, without ticks, and whether any series has something to show.
+/// Returns both axes of a panel, without ticks, and true if any series has data to show.
 pub(super) fn axes(panel: &Panel) -> (Ruled, Ruled, bool) {
     let any = (Ruled::new(&panel.x, &[], 0.0), Ruled::new(&panel.y, &[], 0.0));
     let mut xs = Vec::new();
@@ -55,11 +56,6 @@ pub(super) fn axes(panel: &Panel) -> (Ruled, Ruled, bool) {
                     .iter()
                     .for_each(|&(x, low, high)| add(x, &[low, high]));
             }
-            Marks::ErrorBars(points) => {
-                points
-                    .iter()
-                    .for_each(|&(x, low, middle, high)| add(x, &[low, middle, high]));
-            }
             Marks::Bars { values, spread, base } => {
                 values
                     .iter()
@@ -86,8 +82,8 @@ pub(super) fn axes(panel: &Panel) -> (Ruled, Ruled, bool) {
 }
 
 impl Ruled {
-    /// The part of `axis` that shows its own range or, where it has none, all `values` and a margin of `margin` times
-    /// their extent.
+    /// Chooses the shown part of `axis`: its own range if it has one, otherwise all `values` with a
+    /// margin of `margin` times their extent.
     pub fn new(axis: &Axis, values: &[f64], margin: f64) -> Self {
         let log = axis.scale == Scale::Log;
         let any = Self { log, ..Self::default() };
@@ -101,7 +97,7 @@ impl Ruled {
         };
         let least = shown().reduce(f64::min).unwrap_or(0.0);
         let most = shown().reduce(f64::max).unwrap_or(1.0);
-        // A single value stands in the middle of a range of its own size, or of one decade.
+        // A single value is in the middle of a range proportional to it, or of one decade.
         let alone = if log || least == 0.0 { 0.5 } else { 0.1 * least.abs() };
         let margin = if most > least { margin * (most - least) } else { alone };
         // No margin beyond zero: a length or a count does not become negative.
@@ -116,7 +112,7 @@ impl Ruled {
         let high = set(axis.high)
             .filter(|&high| high > low)
             .unwrap_or(high);
-        // Wide enough for the ends to be told apart in ten digits.
+        // A narrower range would have ends that are equal in ten digits.
         let narrowest = (1e-9 * low.abs().max(high.abs())).max(1e-200);
         Self {
             low,
@@ -125,19 +121,21 @@ impl Ruled {
         }
     }
 
-    /// The value's coordinate, which may lie outside the shown part; none if the axis cannot show the value.
+    /// Returns the value's coordinate, which may be outside the shown part; `None` if the axis cannot
+    /// show the value.
     pub fn coordinate(&self, value: f64) -> Option<f64> {
         let possible = value.abs() <= LARGEST && (value > 0.0 || !self.log);
         possible.then(|| if self.log { libm::log10(value) } else { value })
     }
 
-    /// The coordinate, if it lies in the shown part or less than a pixel beside it.
+    /// Returns the coordinate if it is in the shown part or less than a pixel outside.
     pub fn shown(&self, value: f64) -> Option<f64> {
         self.coordinate(value)
             .filter(|&at| (-1e-3..=1.001).contains(&self.fraction(at)))
     }
 
-    /// The shown coordinate next to the value's; the lower end for a finite value without a logarithm.
+    /// Returns the shown coordinate nearest to the value; the lower end for a finite value without a
+    /// logarithm.
     pub fn nearest(&self, value: f64) -> Option<f64> {
         let at = self
             .coordinate(value)
@@ -145,12 +143,12 @@ impl Ruled {
         at.map(|at| at.clamp(self.low, self.high))
     }
 
-    /// A coordinate as a part of the axis, from the low end.
+    /// Returns the position of a coordinate on the axis, 0 at the low end and 1 at the high end.
     pub fn fraction(&self, at: f64) -> f64 {
         (at - self.low) / (self.high - self.low)
     }
 
-    /// Adds at most `most` ticks, at least three if that is possible.
+    /// Adds at most `most` ticks, and at least three if possible.
     pub fn rule(&mut self, most: usize) {
         if !self.log || !self.rule_decades(most) {
             let (low, high) = if self.log {
@@ -162,9 +160,9 @@ impl Ruled {
         }
     }
 
-    /// Ticks at multiples of 1, 2 or 5 times a power of ten between two values.
+    /// Adds ticks at multiples of 1, 2 or 5 times a power of ten between two values.
     fn rule_evenly(&mut self, low: f64, high: f64, most: usize) {
-        // Long labels share a power of ten.
+        // Labels of more than five digits would collide, so they share a power of ten.
         let size = libm::log10(low.abs().max(high.abs())).floor() as i32;
         let factor = if (-3..5).contains(&size) { 0 } else { size };
         let first = libm::log10((high - low) / most as f64).floor() as i32;
@@ -189,7 +187,8 @@ impl Ruled {
             if factor == 0 { String::new() } else { format!("×10{}", superscript(factor)) };
     }
 
-    /// Ticks at powers of ten, and at multiples of them where they are few; false if there are too few of both.
+    /// Adds ticks at powers of ten, and at their multiples if there are few powers. Returns false if
+    /// there are too few of both.
     fn rule_decades(&mut self, most: usize) -> bool {
         let first = (self.low - 1e-9).ceil() as i32;
         let last = (self.high + 1e-9).floor() as i32;
@@ -275,7 +274,7 @@ impl ValueFormatter<f64> for Ruled {
     }
 }
 
-/// The number with this many decimals and a true minus sign.
+/// Formats a number with this many decimals and a true minus sign.
 fn decimal(value: f64, digits: usize) -> String {
     let text = format!("{:.digits$}", value.abs());
     let zero = text
@@ -284,7 +283,7 @@ fn decimal(value: f64, digits: usize) -> String {
     if value < 0.0 && !zero { format!("−{text}") } else { text }
 }
 
-/// The integer in superscript digits.
+/// Formats an integer in superscript digits.
 fn superscript(number: i32) -> String {
     let raised = |digit: char| match digit.to_digit(10) {
         Some(digit) => ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][digit as usize],

@@ -1,4 +1,4 @@
-//! A sheet that pictures are drawn on through plotters, and the SVG document made of one.
+//! A sheet for drawing through plotters, and the SVG document made from it.
 
 use std::fmt::Write as _;
 
@@ -14,14 +14,14 @@ use plotters::style::{FontDesc, FontFamily, FontStyle, FontTransform, TextStyle}
 use super::model::FigureError;
 use super::text::{FAMILY, Fonts, Type};
 
-/// Steps of plotters' whole-number coordinates per pixel.
+/// Steps of plotters' integer coordinates per pixel.
 pub(super) const STEPS: f64 = 4.0;
 /// plotters' SVG backend divides font sizes by this.
 pub(super) const FONT_SIZE: f64 = 1.24;
 
 /// A drawing. It computes its layout first, because the size of the sheet follows from it.
 pub trait Picture {
-    /// Says what is shown, for readers who cannot see it.
+    /// Describes the picture for screen readers.
     fn title(&self) -> &str;
     /// Finds a place for everything.
     fn lay_out<'a>(&'a self, fonts: &'a Fonts) -> Result<impl Layout + 'a, FigureError>;
@@ -38,17 +38,17 @@ pub trait Layout {
 /// An error of plotters.
 pub type Fault<B> = DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>;
 
-/// How a text lies with respect to its point; always centred across the line.
+/// The position of a text relative to its point; always centred across the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Align {
     Left,
     Center,
     Right,
-    /// Reads upwards from the point.
+    /// Upwards from the point.
     Up,
-    /// Reads upwards, the point in its middle.
+    /// Upwards, with the point in its middle.
     UpCenter,
-    /// Reads upwards to the point.
+    /// Upwards to the point.
     UpTo,
 }
 
@@ -61,27 +61,27 @@ pub(super) struct Frame {
     pub height: f64,
 }
 
-/// A drawing area that is addressed in pixels.
+/// A drawing area with coordinates in pixels.
 pub struct Sheet<B: DrawingBackend>(pub(super) DrawingArea<B, Shift>);
 
-/// The nearest step. Casting saturates; the limit leaves room for plotters' own additions.
+/// Converts pixels to steps. Casting saturates; the limit leaves room for plotters' own additions.
 pub(super) fn steps(pixels: f64) -> i32 {
     (pixels * STEPS).clamp(-1e8, 1e8).round() as i32
 }
 
-/// A line of this width in pixels.
+/// Returns the style of a line of this width in pixels.
 pub(super) fn pen(colour: RGBColor, width: f64) -> ShapeStyle {
     colour.stroke_width(steps(width) as u32)
 }
 
-/// plotters' text style of this type and colour.
+/// Returns plotters' text style of this type and colour.
 pub(super) fn font(style: Type, colour: RGBColor) -> TextStyle<'static> {
     let weight = if style.bold { FontStyle::Bold } else { FontStyle::Normal };
     let font = FontDesc::new(FontFamily::Name(FAMILY), style.size * STEPS * FONT_SIZE, weight);
     TextStyle { color: colour.to_backend_color(), ..TextStyle::from(font) }
 }
 
-/// The text without control characters, which XML has not even escaped.
+/// Removes control characters, which XML does not allow even escaped.
 pub(super) fn printable(text: &str) -> String {
     let legal = |c: char| !c.is_control() && c != '\u{fffe}' && c != '\u{ffff}';
     text.chars()
@@ -117,7 +117,7 @@ impl<B: DrawingBackend> Sheet<B> {
             .draw_text(&printable(text), &style, (steps(x), steps(y)))
     }
 
-    /// Draws lines of text below each other, the first just below `top`.
+    /// Draws lines of text, the first just below `top`.
     pub(super) fn lines(
         &self,
         (x, top): (f64, f64),
@@ -143,7 +143,7 @@ impl<B: DrawingBackend> Sheet<B> {
     }
 }
 
-/// Draws a picture as an SVG document with whole-number coordinates, [`STEPS`] of them per pixel.
+/// Draws a picture as an SVG document with integer coordinates, [`STEPS`] per pixel.
 pub(super) fn svg(picture: &impl Picture) -> Result<String, FigureError> {
     let fonts = Fonts::new()?;
     let layout = picture.lay_out(&fonts)?;
@@ -180,8 +180,8 @@ pub(super) fn svg(picture: &impl Picture) -> Result<String, FigureError> {
     Ok(document)
 }
 
-/// The same document with successive lines of one style, such as the dashes of a line, in one element: a fifth of the
-/// bytes.
+/// Joins successive lines of one style, such as the dashes of a line, into one element. The document
+/// shrinks to a fifth.
 fn joined(svg: &str) -> String {
     let mut joined = String::with_capacity(svg.len());
     let mut open: Option<&str> = None;

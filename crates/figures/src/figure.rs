@@ -1,4 +1,4 @@
-//! Lays a figure out: title, caption and legend above panels whose axes line up.
+//! Lays out a figure: title, caption and legend above panels with aligned axes.
 
 use plotters::prelude::DrawingBackend;
 
@@ -13,11 +13,11 @@ use super::text::{BODY, Fonts, TITLE};
 pub(super) const WIDTH: f64 = 800.0;
 /// Width of a miniature, and the height of its plot.
 const MINIATURE: (f64, f64) = (240.0, 110.0);
-/// Blank border.
+/// Width of the blank border.
 pub(super) const BORDER: f64 = 14.0;
-/// Heights of plots in 1, 2, 3 and 4 columns.
+/// Heights of plots in figures of 1, 2, 3 and 4 columns.
 const HEIGHTS: [f64; 4] = [360.0, 240.0, 190.0, 150.0];
-/// Blank to the right of and below each panel.
+/// Blank space to the right of each panel and below it.
 const GUTTER: (f64, f64) = (16.0, 16.0);
 
 /// Title and caption.
@@ -44,7 +44,7 @@ impl Head {
     }
 }
 
-/// A figure with a place for everything.
+/// A figure with its layout.
 struct Plan<'a> {
     head: Head,
     strokes: Strokes,
@@ -80,7 +80,7 @@ impl Picture for Figure {
     }
 }
 
-/// The first panel of a figure without any words, small enough for a list of figures.
+/// The first panel of a figure without words, small enough for a list of figures.
 pub struct Miniature(Figure);
 
 impl From<&Figure> for Miniature {

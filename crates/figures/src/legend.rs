@@ -1,4 +1,4 @@
-//! The key to the series and reference lines of a figure, shared by all its panels.
+//! The legend of a figure: its series and reference lines, shared by all panels.
 
 use plotters::element::{DashedPathElement, Polygon};
 use plotters::prelude::{DrawingBackend, RGBColor};
@@ -10,7 +10,7 @@ use super::text::{BODY, Fonts};
 
 /// Width of a sample.
 const SAMPLE: f64 = 30.0;
-/// From a sample to its name, and from a name to the next sample.
+/// Distances from a sample to its name, and from a name to the next sample.
 const GAPS: (f64, f64) = (7.0, 18.0);
 /// Height of a row.
 const ROW: f64 = 20.0;
@@ -21,12 +21,12 @@ struct Entry {
     stroke: Stroke,
     line: bool,
     marker: bool,
-    /// It has bars or bands.
+    /// True if the series has bars or bands.
     area: bool,
 }
 
-/// The entries, in order of the series' appearance and then of the reference lines', in columns of equal width that
-/// are filled row by row.
+/// The entries: series in order of appearance, then reference lines. Columns have equal widths and are
+/// filled row by row.
 pub(super) struct Legend {
     entries: Vec<Entry>,
     columns: usize,
@@ -64,7 +64,7 @@ impl Legend {
         Self::arrange(entries, width, fonts)
     }
 
-    /// The key to areas of these names and colours.
+    /// Makes the legend of areas with these names and colours.
     pub fn of_areas(
         areas: impl Iterator<Item = (String, RGBColor)>,
         width: f64,

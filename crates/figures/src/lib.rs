@@ -1,10 +1,11 @@
 //! The chart engine: data series in, SVG out. It knows no BVH, no files and no clock.
 //!
-//! A [`Figure`] or [`HeatMap`] holds the data, in data units. [`svg`] lays it out and draws it with plotters, in text
-//! widths of embedded fonts. The same picture gives the same bytes on every machine.
+//! A [`Figure`] or [`HeatMap`] holds the data in data units. [`svg`] lays it out with the text widths
+//! of embedded fonts and draws it with plotters. The same picture gives the same bytes on every
+//! machine.
 //!
-//! Figures are 800 pixels wide with text of 12 pixels and more, as a README shows them. Series differ in colour and in
-//! dash or marker, so that they survive printing in grey.
+//! Figures are 800 pixels wide with text of 12 pixels and more, the size of a README. Series differ in
+//! colour and in dash or marker, so that they survive printing in grey.
 
 mod axis;
 mod canvas;
@@ -22,11 +23,12 @@ pub use model::{Axis, Cell, Figure, FigureError, HeatMap, Layer, Look, Marks, Pa
 
 /// Draws a picture as an SVG document.
 ///
-/// Degenerate data are drawn as far as they make sense: see [`Layer`].
+/// Skips points that an axis cannot show: see [`Marks`].
 ///
 /// # Errors
-/// [`FigureError::CellCount`] unless a heat map has one cell for every row and column, [`FigureError::Draw`] if plotters
-/// refuses, [`FigureError::Font`] if the embedded fonts are damaged.
+///
+/// [`FigureError::CellCount`] unless a heat map has one cell for every row and column,
+/// [`FigureError::Draw`] if plotters fails, [`FigureError::Font`] if the embedded fonts are damaged.
 pub fn svg(picture: &impl Picture) -> Result<String, FigureError> {
     canvas::svg(picture)
 }
@@ -62,15 +64,6 @@ mod tests {
             Layer::new("points <&>", Marks::Points(points.to_vec())),
             Layer::new("", Marks::Band(bands())),
             Layer::new("steps", Marks::StepBand(bands())),
-            Layer::new(
-                "bars",
-                Marks::ErrorBars(
-                    points
-                        .iter()
-                        .map(|&(x, y)| (x, y, y, x))
-                        .collect(),
-                ),
-            ),
             Layer::new("bars", Marks::Bars { values, spread: points.to_vec(), base: x }),
             Layer::new("level", Marks::HLine(y)),
             Layer::new("upright", Marks::VLine(x)),

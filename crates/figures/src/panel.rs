@@ -1,4 +1,4 @@
-//! One panel as a plotters chart: its ticks and labels, and the marks of its layers.
+//! Draws one panel as a plotters chart: ticks, labels, and the marks of its layers.
 
 use std::collections::BTreeSet;
 
@@ -12,14 +12,15 @@ use super::model::{Layer, Marks, Panel, Scale};
 use super::style::{FAINT, GREY, GRID, INK, REFERENCE_LINE, Stroke, Strokes, WHITE};
 use super::text::{BODY, Fonts, HEADING, SMALL};
 
-/// Widths of data lines, and of whiskers and reference lines.
+/// Width of data lines.
 const LINE: f64 = 2.0;
+/// Width of whiskers and reference lines.
 const THIN: f64 = 1.3;
 /// Length of ticks; their labels are twice as far from the axis.
 const TICK: f64 = 4.0;
-/// From tick labels to the axis label.
+/// Distance from tick labels to the axis label.
 const LABEL: f64 = 5.0;
-/// From one marker on a line to the next.
+/// Distance between markers on a line.
 const APART: f64 = 110.0;
 
 type Point = (f64, f64);
@@ -33,12 +34,12 @@ pub(super) struct Plot<'a> {
     has_data: bool,
     /// The names of categories below the plot, in lines, with their coordinates.
     names: Vec<(f64, Vec<String>)>,
-    /// The names read upwards.
+    /// True if the names are written upwards.
     upright: bool,
     title: Vec<String>,
     x_label: Vec<String>,
     y_label: Vec<String>,
-    /// Pixels above, to the left of and below the plot.
+    /// Pixels above the plot; `left` and `below` are the pixels on its other sides.
     pub above: f64,
     pub left: f64,
     pub below: f64,
@@ -107,7 +108,7 @@ impl<'a> Plot<'a> {
         self.below = (2.0 * TICK + depth + LABEL + BODY.line() * self.x_label.len() as f64).ceil();
     }
 
-    /// Leaves the label of the x axis to the panel below, if it has the same.
+    /// Drops the label of the x axis if the panel below has the same label.
     pub fn share_x_label(&mut self, below: &Self) {
         if self.x_label == below.x_label {
             self.below -= BODY.line() * self.x_label.len() as f64;
@@ -221,7 +222,7 @@ impl<B: DrawingBackend> Layers<'_, B> {
         Ok(())
     }
 
-    /// Draws the bars of all series beside each other, and then their whiskers.
+    /// Draws the bars of all series next to each other, and then their whiskers.
     fn bars(&self) -> Result<(), Fault<B>> {
         let x = &self.plot.x;
         let y = &self.plot.y;
@@ -244,7 +245,7 @@ impl<B: DrawingBackend> Layers<'_, B> {
                 let Some((_, tip)) = x.shown(index as f64).zip(y.coordinate(value)) else {
                     continue;
                 };
-                // A hair of white between neighbours.
+                // A thin white gap separates neighbours of similar colours.
                 let corners =
                     [(left + 0.03 * width, base), (left + 0.97 * width, tip.clamp(y.low, y.high))];
                 self.area.draw(&Rectangle::new(
@@ -296,7 +297,7 @@ impl<B: DrawingBackend> Layers<'_, B> {
         ends.map_or(Ok(()), |ends| self.stroke(ends, REFERENCE_LINE, THIN))
     }
 
-    /// Draws a line or staircase, with markers along it where lines carry them.
+    /// Draws a line or staircase, with markers along it if lines carry markers.
     fn line(&self, layer: &Layer) -> Result<(), Fault<B>> {
         let (order, stroke) = self.strokes.of(&layer.name);
         for path in self.paths(layer) {
@@ -324,7 +325,7 @@ impl<B: DrawingBackend> Layers<'_, B> {
         }
     }
 
-    /// Draws a marker with a white edge that tells neighbours apart.
+    /// Draws a marker with a white edge, which separates it from its neighbours.
     fn marker(&self, at: Point, stroke: Stroke, radius: f64, edge: f64) -> Result<(), Fault<B>> {
         for (radius, colour) in [(radius + edge, WHITE), (radius, stroke.colour)] {
             self.area
@@ -333,8 +334,8 @@ impl<B: DrawingBackend> Layers<'_, B> {
         Ok(())
     }
 
-    /// Draws points and error bars: smaller where there are many, and one marker for those that nobody could tell
-    /// apart. Lines of a single point, which would not show, have a marker too.
+    /// Draws points, smaller if there are many, and one marker for points that look the same. A line
+    /// of a single point would be invisible, so it gets a marker too.
     fn points(&self) -> Result<(), Fault<B>> {
         let x = &self.plot.x;
         let y = &self.plot.y;
@@ -348,13 +349,6 @@ impl<B: DrawingBackend> Layers<'_, B> {
                             Some((name, (x.shown(point.0)?, y.shown(point.1)?)))
                         }),
                     );
-                }
-                Marks::ErrorBars(points) => {
-                    for &(at, low, middle, high) in points {
-                        let Some(at) = x.shown(at).zip(y.shown(middle)) else { continue };
-                        self.whisker(at.0, low, high, self.strokes.of(name).1.colour)?;
-                        all.push((name, at));
-                    }
                 }
                 _ => {
                     let alone = self
@@ -381,7 +375,7 @@ impl<B: DrawingBackend> Layers<'_, B> {
             .try_for_each(|(name, at)| self.marker(at, self.strokes.of(name).1, radius, edge))
     }
 
-    /// The unbroken parts of a line or staircase; what leaves the panel is moved to its edge.
+    /// Returns the unbroken parts of a line or staircase. Points outside the panel move to its edge.
     fn paths(&self, layer: &Layer) -> Vec<Vec<Point>> {
         let (Marks::Line(points) | Marks::Steps(points)) = &layer.marks else { return Vec::new() };
         let stairs = matches!(layer.marks, Marks::Steps(_));
@@ -397,8 +391,8 @@ impl<B: DrawingBackend> Layers<'_, B> {
             .collect()
     }
 
-    /// Of successive points within half a pixel of x only the first, lowest, highest and last, and of a level line only
-    /// the ends.
+    /// Thins a path without a visible change: of successive points within half a pixel of x, keeps
+    /// the first, lowest, highest and last; of a level line, keeps the ends.
     fn thinned(&self, path: &[Point]) -> Vec<Point> {
         let column =
             |point: &Point| (self.plot.x.fraction(point.0) * self.frame.width * 2.0).floor();
@@ -425,7 +419,8 @@ impl<B: DrawingBackend> Layers<'_, B> {
         kept
     }
 
-    /// Places for markers along a path: every [`APART`] pixels from an offset on, or the middle of a short path.
+    /// Returns places for markers along a path: every [`APART`] pixels from an offset on, or the middle
+    /// of a short path.
     fn along(&self, path: &[Point], offset: f64) -> Vec<Point> {
         let pixel = |at: &Point| {
             (
@@ -456,7 +451,7 @@ impl<B: DrawingBackend> Layers<'_, B> {
     }
 }
 
-/// The unbroken parts of a sequence.
+/// Returns the unbroken parts of a sequence.
 fn runs<T: Copy>(placed: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
     let placed: Vec<Option<T>> = placed.collect();
     let parts = placed
@@ -467,7 +462,7 @@ fn runs<T: Copy>(placed: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
         .collect()
 }
 
-/// The path itself, or with each y held until the next x.
+/// Returns the path, or the staircase that holds each y until the next x.
 fn stepped(path: Vec<Point>, stairs: bool) -> Vec<Point> {
     if !stairs {
         return path;

@@ -5,19 +5,19 @@ use plotters::style::RGBColor;
 use super::canvas::steps;
 use super::model::{Figure, Look};
 
-/// The background.
+/// The colour of the background.
 pub(super) const WHITE: RGBColor = RGBColor(255, 255, 255);
-/// Text and axes.
+/// The colour of text and axes.
 pub(super) const INK: RGBColor = RGBColor(34, 34, 34);
-/// Captions and reference lines.
+/// The colour of captions and reference lines.
 pub(super) const GREY: RGBColor = RGBColor(85, 85, 85);
-/// Grid lines at labelled ticks.
+/// The colour of grid lines at labelled ticks.
 pub(super) const GRID: RGBColor = RGBColor(221, 221, 221);
-/// Grid lines between them.
+/// The colour of grid lines between labelled ticks.
 pub(super) const FAINT: RGBColor = RGBColor(240, 240, 240);
 
-/// Okabe and Ito's colours without yellow, which is lost on white, and black, which is the reference's; then darker
-/// ones of Paul Tol's, brown and grey.
+/// The colours of Okabe and Ito without yellow, which is invisible on white, and black, which is the
+/// reference; then brown, grey and darker colours of Paul Tol.
 const COLOURS: [RGBColor; Look::COLOURS] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -33,17 +33,18 @@ const COLOURS: [RGBColor; Look::COLOURS] = [
     RGBColor(17, 119, 51),
 ];
 
-/// Lengths of a dash and of the gap after it, in pixels; a solid line has none.
+/// Lengths of a dash and of the gap after it in pixels; `None` for a solid line.
 type Dash = Option<(f64, f64)>;
-/// The series' dashes. Four successive series share one, and the next series of the same colour has another.
+/// The dashes of series. Four successive series share a dash, and the next series of the same colour
+/// has another.
 const DASHES: [Dash; 3] = [None, Some((9.0, 3.0)), Some((3.0, 2.5))];
 /// The dash of reference lines and series.
 const REFERENCE_DASH: Dash = Some((5.0, 4.0));
 
-/// A star: its number of points, its inner radius where the outer is 1, and the direction of its first point in parts
-/// of a turn, clockwise from the right. A regular polygon is a star without notches.
+/// A star: number of points, inner radius relative to the outer radius, and direction of the first
+/// point in turns, clockwise from the right. A regular polygon is a star without notches.
 type Star = (u32, f64, f64);
-/// Disc, square, triangle, diamond, triangle on its tip, upright cross and star.
+/// The markers: disc, square, triangle, diamond, inverted triangle, upright cross and star.
 const MARKERS: [Star; 7] = [
     (6, 1.0, 0.0),
     (4, 0.71, 0.125),
@@ -53,10 +54,10 @@ const MARKERS: [Star; 7] = [
     (4, 0.42, 0.0),
     (5, 0.45, 0.75),
 ];
-/// A tilted cross.
+/// The marker of the reference: a tilted cross.
 const REFERENCE_MARKER: Star = (4, 0.42, 0.125);
 
-/// How one series is drawn.
+/// The colour, dash and marker of one series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Stroke {
     pub colour: RGBColor,
@@ -78,7 +79,7 @@ impl Stroke {
         }
     }
 
-    /// The marker around the origin as a polygon of as large an area as a disc of this radius, roughly.
+    /// Returns the marker around the origin as a polygon with about the area of a disc of this radius.
     pub fn outline(&self, radius: f64) -> Vec<(i32, i32)> {
         let (points, inner, first) = self.marker;
         let outer = radius * (1.6 - 0.6 * inner);
@@ -92,16 +93,16 @@ impl Stroke {
     }
 }
 
-/// Reference lines.
+/// The stroke of reference lines.
 pub(super) const REFERENCE_LINE: Stroke =
     Stroke { colour: GREY, dash: REFERENCE_DASH, marker: REFERENCE_MARKER };
-/// The series without a name.
+/// The stroke of series without a name.
 const UNNAMED: Stroke = Stroke { colour: GREY, dash: None, marker: MARKERS[0] };
 
 /// The strokes of all series of a figure, in order of their first appearance.
 pub(super) struct Strokes {
     pub series: Vec<(String, Stroke)>,
-    /// Whether lines carry markers: colours and dashes tell no more than four of them apart at a glance.
+    /// True if lines carry markers: colours and dashes alone distinguish only four lines at a glance.
     marked_lines: bool,
 }
 
@@ -144,12 +145,13 @@ impl Strokes {
         Self { series, marked_lines: lines.len() > 4 }
     }
 
-    /// Whether the lines of a series carry markers.
+    /// Returns true if the lines of a series carry markers.
     pub fn marks(&self, stroke: Stroke) -> bool {
         self.marked_lines && stroke.marker != REFERENCE_MARKER
     }
 
-    /// The named series' place in the order of appearance, and its stroke; solid grey for the one without a name.
+    /// Returns the place of the named series in the order of appearance, and its stroke; solid grey
+    /// for a series without a name.
     pub fn of(&self, name: &str) -> (usize, Stroke) {
         let place = self
             .series

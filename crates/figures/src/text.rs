@@ -6,12 +6,12 @@ use ab_glyph::{Font, FontRef};
 
 use super::model::FigureError;
 
-/// DejaVu Sans, reduced to the characters that figures use.
+/// The font DejaVu Sans, reduced to the characters that figures use.
 const REGULAR: &[u8] = include_bytes!("../assets/DejaVuSans-subset.ttf");
-/// DejaVu Sans Bold, reduced likewise.
+/// The font DejaVu Sans Bold, reduced to the same characters.
 const BOLD: &[u8] = include_bytes!("../assets/DejaVuSans-Bold-subset.ttf");
 
-/// The `font-family` of SVGs: DejaVu Sans, then fonts that are no wider.
+/// The `font-family` of SVGs: DejaVu Sans, then fonts that are not wider.
 pub(super) const FAMILY: &str = "DejaVu Sans, Verdana, Arial, sans-serif";
 
 /// Size and weight of a text.
@@ -19,7 +19,7 @@ pub(super) const FAMILY: &str = "DejaVu Sans, Verdana, Arial, sans-serif";
 pub struct Type {
     /// Font size in pixels.
     pub size: f64,
-    /// Bold instead of regular.
+    /// True for bold.
     pub bold: bool,
 }
 
@@ -30,13 +30,13 @@ impl Type {
     }
 }
 
-/// Figure titles.
+/// The type of figure titles.
 pub(super) const TITLE: Type = Type { size: 17.0, bold: true };
-/// Panel titles.
+/// The type of panel titles.
 pub(super) const HEADING: Type = Type { size: 14.0, bold: true };
-/// Captions, axis labels and legends.
+/// The type of captions, axis labels and legends.
 pub(super) const BODY: Type = Type { size: 13.0, bold: false };
-/// Tick labels.
+/// The type of tick labels.
 pub(super) const SMALL: Type = Type { size: 12.0, bold: false };
 
 /// The embedded fonts.
@@ -48,7 +48,7 @@ pub struct Fonts {
 /// One of the fonts.
 struct Face {
     font: FontRef<'static>,
-    /// By how much its characters advance, in font sizes: the font's own tables are slow to search.
+    /// Advances of its characters in font sizes, cached because the font's own tables are slow.
     advances: HashMap<char, f64>,
 }
 
@@ -64,7 +64,7 @@ impl Face {
     }
 }
 
-/// The advance of a character in font sizes, that of a box if the font lacks it.
+/// Returns the advance of a character in font sizes. A missing character has the advance of a box.
 fn advance(font: &FontRef, character: char) -> f64 {
     f64::from(
         font.h_advance_unscaled(font.glyph_id(character)) / font.units_per_em().unwrap_or(1.0),
@@ -90,14 +90,14 @@ impl Fonts {
                 .unwrap_or_else(|| advance(font, character))
     }
 
-    /// Width of a line of text in pixels, without kerning.
+    /// Returns the width of a line of text in pixels, without kerning.
     pub fn width(&self, text: &str, style: Type) -> f64 {
         text.chars()
             .map(|character| self.advance(character, style))
             .sum()
     }
 
-    /// The largest width among lines of text, in pixels.
+    /// Returns the largest width among lines of text in pixels.
     pub fn widest<'a>(&self, lines: impl IntoIterator<Item = &'a String>, style: Type) -> f64 {
         lines
             .into_iter()
@@ -105,8 +105,8 @@ impl Fonts {
             .fold(0.0, f64::max)
     }
 
-    /// Breaks a text at blanks into lines of at most `width` pixels. A word that is wider is broken anywhere. An
-    /// empty text has no lines.
+    /// Breaks a text at blanks into lines of at most `width` pixels. A wider word is broken anywhere.
+    /// An empty text has no lines.
     pub fn wrap(&self, text: &str, width: f64, style: Type) -> Vec<String> {
         let mut lines: Vec<String> = Vec::new();
         let mut line = String::new();
@@ -131,7 +131,7 @@ impl Fonts {
         lines
     }
 
-    /// The text, or as much of its beginning as fits `width` pixels with an ellipsis.
+    /// Returns the text, or its longest beginning that fits `width` pixels with an ellipsis.
     pub fn shorten(&self, text: &str, width: f64, style: Type) -> String {
         if self.width(text, style) <= width {
             return text.to_owned();
@@ -145,8 +145,8 @@ impl Fonts {
         format!("{}…", kept.trim_end())
     }
 
-    /// The text in lines of at most `width` pixels, together at most 32 pixels high, in the first of these font sizes in
-    /// which that is possible without breaking a word. In the last size it is cut if need be.
+    /// Breaks a text into lines of at most `width` pixels, together at most 32 pixels high. Uses the
+    /// first of these font sizes that breaks no word. In the last size the text is cut if necessary.
     pub fn fit(&self, text: &str, width: f64, sizes: &[f64]) -> (Vec<String>, Type) {
         let mut style = SMALL;
         for &size in sizes {

@@ -1,11 +1,11 @@
 //! One entry of a spec's `methods`: a method with its label, limits and seeds.
 
-use crate::measure::empirical_cost;
 use crate::measure::ray_cost::TrainedOn;
 use crate::peers::{Peer, command};
 use bvh_config::fault::{self, Fault, Read};
 use bvh_config::{Check, Keys, Nested, OutOfRange};
 use bvh_core::cost::Objective;
+use bvh_scenes::rays::RandomRays;
 use bvh_search::{Budget, Method, Shortcut};
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::Table;
@@ -85,7 +85,7 @@ bvh_config::config! { serde;
         seed_as: Option<String>;
         /// Random rays whose mean number of box tests judges trees instead of the objective; the
         /// costs in `history.csv` are then such means. Default none.
-        judge: Option<empirical_cost::Config>, in Nested;
+        judge: Option<RandomRays>, in Nested;
         /// Rays of the experiment's `ray_cost` whose visits replace areas in the method's runs and
         /// in their objective; the costs in `history.csv` are then such visits. Not for
         /// `median_cut`, which compares no box sizes. Default none.

@@ -11,8 +11,8 @@
 
 mod support;
 
-use harness::report::query_report;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use support::query::answer;
@@ -76,7 +76,7 @@ const WIDTH: usize = 100;
 fn the_prose_of_the_documentation_is_wrapped() {
     for page in pages() {
         let text = fs::read_to_string(&page).unwrap();
-        let is_generated = page.ends_with("KEYS.md") || page.ends_with("COLUMNS.md");
+        let is_generated = page.ends_with("KEYS.md");
         let mut is_example = false;
         for (number, line) in text.lines().enumerate() {
             is_example ^= line.starts_with("```");
@@ -133,69 +133,49 @@ fn every_experiment_is_checked_on_every_commit() {
     }
 }
 
-/// Returns the columns of a table that a query in the spec of its folder gives, if it is one.
-fn queried(table: &Path) -> Option<Vec<String>> {
-    let spec = fs::read_to_string(table.with_file_name("resolved.toml")).ok()?;
-    let spec: toml::Table = toml::from_str(&spec).ok()?;
-    let reports = spec["experiment"].get("reports")?.as_array()?;
-    let name = table.file_stem()?.to_str()?;
-    let report = reports
-        .iter()
-        .find(|report| report.get("file").and_then(toml::Value::as_str) == Some(name))?;
-    let mut report = report.as_table()?.clone();
-    report.remove("kind");
-    let config: query_report::Config = report.try_into().ok()?;
-    Some(config.header())
+/// Returns true if a report of the kind `query` wrote the table; its spec names the columns.
+fn is_queried(table: &Path) -> bool {
+    let Ok(spec) = fs::read_to_string(table.with_file_name("resolved.toml")) else {
+        return false;
+    };
+    let spec: toml::Table = toml::from_str(&spec).unwrap();
+    let name = table.file_stem().and_then(OsStr::to_str);
+    let reports = spec["experiment"].get("reports");
+    reports
+        .and_then(toml::Value::as_array)
+        .into_iter()
+        .flatten()
+        .any(|report| report.get("file").and_then(toml::Value::as_str) == name)
+}
+
+/// Collects the CSV files in a folder and its subfolders.
+fn tables(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            tables(&path, found);
+        } else if path.extension() == Some(OsStr::new("csv")) {
+            found.push(path);
+        }
+    }
 }
 
 #[test]
-fn every_column_of_every_committed_table_is_on_the_page_of_columns() {
-    let declared = harness::cli::columns::all();
-    let unsaid: Vec<_> = declared
-        .iter()
-        .filter_map(|file| Some((file.to_string(), file.unsaid()?.to_owned())))
-        .collect();
-    assert!(unsaid.is_empty(), "without a meaning: {unsaid:#?}");
-    assert_current(&top().join("docs/COLUMNS.md"), &harness::cli::columns::page(), "docs");
-    let mut folders = vec![top().join("results")];
-    let mut found = 0;
-    while let Some(folder) = folders.pop() {
-        for path in fs::read_dir(folder)
+fn a_file_name_means_the_same_columns_in_every_experiment() {
+    let mut paths = Vec::new();
+    tables(&top().join("results"), &mut paths);
+    paths.retain(|path| !is_queried(path));
+    assert!(paths.len() > 100, "{} tables", paths.len());
+    let mut headers = BTreeMap::new();
+    for path in paths {
+        let header = csv::Reader::from_path(&path)
             .unwrap()
-            .map(|entry| entry.unwrap().path())
-        {
-            // The scripts that write these tables describe them.
-            let is_of_script =
-                path.ends_with("results/choices") || path.ends_with("results/instructions");
-            if is_of_script {
-                continue;
-            }
-            if path.is_dir() {
-                folders.push(path);
-            } else if path
-                .extension()
-                .is_some_and(|extension| extension == "csv")
-            {
-                let name = path.file_name().unwrap().to_str().unwrap();
-                let header = csv::Reader::from_path(&path)
-                    .unwrap()
-                    .headers()
-                    .unwrap()
-                    .clone();
-                let header: Vec<&str> = header.iter().collect();
-                let of = declared
-                    .iter()
-                    .filter(|file| file.are_of(name, &header))
-                    .count();
-                let is_queried = of == 0 && queried(&path).is_some_and(|names| names == header);
-                assert!(
-                    of == 1 || is_queried,
-                    "{}: docs/COLUMNS.md lacks {header:?}",
-                    path.display()
-                );
-                found += 1;
-            }
-        }
+            .headers()
+            .unwrap()
+            .clone();
+        let known = headers
+            .entry(path.file_name().unwrap().to_owned())
+            .or_insert_with(|| header.clone());
+        assert_eq!(*known, header, "{}", path.display());
     }
-    assert!(found > 100, "{found} tables");
 }

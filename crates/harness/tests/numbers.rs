@@ -82,7 +82,7 @@ fn length_of_match(page: &str, fixed: &str) -> Option<usize> {
 struct Pattern<'a> {
     fixed: Vec<&'a str>,
     names: Vec<&'a str>,
-    /// Whether each name is for words; all others are for numbers.
+    /// True for each name that is for words; all others are for numbers.
     are_words: Vec<bool>,
 }
 

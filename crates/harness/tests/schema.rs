@@ -135,18 +135,3 @@ fn a_new_spec_runs_unchanged_and_replaces_no_file() {
     }
     assert_eq!(fs::read(at.join("mine.toml")).unwrap(), b"mine");
 }
-
-#[test]
-fn a_file_name_means_one_set_of_columns() {
-    let declared = harness::cli::columns::all();
-    let mut names: Vec<&str> = declared
-        .iter()
-        .flat_map(|columns| columns.files())
-        .collect();
-    names.sort_unstable();
-    let twice: Vec<_> = names
-        .windows(2)
-        .filter(|pair| pair[0] == pair[1])
-        .collect();
-    assert!(twice.is_empty(), "{twice:?}");
-}

@@ -1,13 +1,15 @@
-//! The rays of measurements and of renderers, their segments up to the hit, and the density of
-//! these segments.
+//! The rays of measurements and of renderers, their tests in a tree, their segments up to the hit,
+//! and the density of these segments.
 
 mod camera;
 mod density;
+mod empirical_cost;
 mod random;
 mod segments;
 
 pub use camera::{Camera, View, frame};
 pub use density::{TRAINED, density};
+pub use empirical_cost::{EmpiricalCost, Mean, RandomRays, empirical_cost};
 pub use random::{Family, Kind, Viewpoint, in_box, random_ray, rays};
 pub use segments::{
     OF_ANYTHING, Pose, RenderedRays, TracedRay, check_count, of_anything, of_inside, of_renderer,

@@ -1,6 +1,5 @@
 //! The commands of the program, one file each: arguments in, files and terminal output out.
 
-pub mod columns;
 pub mod compare;
 pub mod explain;
 pub mod merge;

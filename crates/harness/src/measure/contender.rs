@@ -11,9 +11,9 @@ use std::time::Instant;
 pub struct Batch<'a> {
     /// The question that the rays ask.
     pub query: Query,
-    /// Whether consecutive rays begin close to each other and run in similar directions.
+    /// Hint that consecutive rays begin close to each other and run in similar directions, or not.
     pub coherence: Coherence,
-    /// Whether the rays cover the pixels of squares of 16 × 16, square by square, in Morton order.
+    /// True if the rays cover the pixels of squares of 16 × 16, square by square, in Morton order.
     pub in_squares: bool,
     /// The rays.
     pub rays: &'a [Ray],

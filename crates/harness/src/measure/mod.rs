@@ -3,7 +3,6 @@
 
 mod answers;
 pub mod contender;
-pub mod empirical_cost;
 pub mod layout;
 pub mod picture;
 pub mod ray_cost;

@@ -9,7 +9,7 @@ use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 
 const STYLE: &str = include_str!("style.css");
 
-/// How verdicts come about, for the reader.
+/// The rule of the verdicts, for the reader.
 const RULE: &str = "Every verdict is made from the rows. Where the paper has numbers, it is what all comparisons with \
     them that can be told have in common: they agree, are in the same direction, differ, or agree in part. Elsewhere it is \
     the sentence in which the first report reads its own numbers; where reports only list them, no verdict is stated. \
@@ -207,13 +207,13 @@ fn figure(section: &Section, figure: &Drawing) -> String {
     )
 }
 
-/// The drawing without what may stand before it in a file of its own.
+/// Returns the drawing without the XML declaration that a separate file begins with.
 fn drawing(svg: &str) -> &str {
     svg.find("<svg").map_or("", |start| &svg[start..])
 }
 
-/// A table in a box of its own, which scrolls where the page would become too wide or the table too
-/// long. The first cell of a row names it.
+/// Returns a table in a box that scrolls if the table is too wide or too long for the page. The first
+/// cell of a row is its header.
 fn table(explanation: &str, table: &Table) -> String {
     let cells = |row: &Row| {
         row.cell_iter()

@@ -22,7 +22,7 @@ struct Section {
     /// The verdict on its rows.
     verdict: Verdict,
     stand_ins: bool,
-    /// Whether it reproduces something of the paper's.
+    /// True if it reproduces a result of the paper.
     of_paper: bool,
     /// The outputs of its reports.
     outputs: Vec<Output>,
@@ -52,14 +52,14 @@ struct Drawing {
     files: Vec<Link>,
 }
 
-/// The name of a file, and the way to it from the page.
+/// The name of a file, and its path relative to the page.
 struct Link {
     name: String,
     to: String,
 }
 
-/// Writes a page of all finished experiments in `results` to `out`, without quick variants and the
-/// repetitions that lie beside others. Returns the number of experiments.
+/// Writes a page of all finished experiments in `results` to `out`, without quick variants and
+/// without repetitions of experiments that are on the page. Returns the number of experiments.
 pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
     let mut names = files::names(results)?;
     names.retain(|name| results.join(name).join("resolved.toml").is_file());
@@ -151,8 +151,8 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
     })
 }
 
-/// Returns the verdict and the answers where numbers are next to the paper's, otherwise the first
-/// report's reading of its own.
+/// Returns the verdict and the answers if numbers are compared with the paper's, otherwise the first
+/// report's reading.
 fn verdict(outputs: &[Output]) -> Verdict {
     let compared = outputs
         .iter()

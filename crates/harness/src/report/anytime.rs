@@ -12,7 +12,7 @@ use bvh_config::{OutOfRange, above};
 bvh_config::config! { serde;
     /// Error against run time.
     pub struct Config {
-        /// The section or topic that it belongs to.
+        /// Section or topic of the report.
         source: String;
         /// Heading.
         title: String;
@@ -31,7 +31,7 @@ bvh_config::config! { serde;
 /// One corner of a curve, which is flat up to the next, or its end, as written to
 /// `timing_FILE.csv`, `FILE_evaluations.csv` and `FILE_work.csv`, where FILE is `anytime` unless
 /// the report says otherwise.
-#[derive(Clone, Copy, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Serialize)]
 pub(super) struct Point<'a> {
     scene: &'a str,
     method: &'a str,
@@ -90,7 +90,7 @@ impl Config {
         falls.into_iter().chain(check_file(&self.file))
     }
 
-    /// Which methods end lowest, on how many scenes, and how far below the greedy tree.
+    /// Returns a sentence on the methods that end lowest, their numbers of scenes, and their costs.
     fn reading(&self, rows: &Rows) -> String {
         let lowest = |scene: &&str| {
             let ends = self
@@ -150,7 +150,7 @@ impl Config {
     }
 }
 
-/// By how much a ratio to base is off the base.
+/// Returns the difference of a ratio to base from the base, in percent.
 fn percent(ratio: f64) -> String {
     format!("{:+.2} %", 100.0 * (ratio - 1.0))
 }

@@ -1,5 +1,5 @@
-//! The attempts of a method's runs at a problem, a scene with a target. Reports on run time are
-//! made from them.
+//! Attempts: the runs of a method at a problem, which is a scene with a target. Reports on run time
+//! are made from attempts.
 
 use super::config::Targets;
 use super::data::Rows;
@@ -15,15 +15,15 @@ pub struct Attempt<'a> {
     pub cost: f64,
     pub method: &'a str,
     pub runs: usize,
-    /// When those that reached the target did, ascending.
+    /// The times at which runs reached the target, ascending; fewer than `runs` if some did not.
     pub solved: Vec<f64>,
-    /// When the median run did; `None` if it did not.
+    /// The time at which the median run reached the target; `None` if it did not.
     pub median: Option<f64>,
-    /// Where the method's longest run on the scene ended.
+    /// The end of the method's longest run on the scene.
     pub end: f64,
 }
 
-/// The attempts of all methods on all problems, scene by scene, then target by target.
+/// Returns the attempts of all methods at all problems, scene by scene, then target by target.
 pub fn attempts<'a>(config: &'a Targets, rows: &'a Rows, axis: ProgressAxis) -> Vec<Attempt<'a>> {
     let mut attempts = Vec::new();
     for scene in rows.scenes() {
@@ -47,8 +47,8 @@ pub fn attempts<'a>(config: &'a Targets, rows: &'a Rows, axis: ProgressAxis) -> 
     attempts
 }
 
-/// The empirical distribution function that rises to each `(x, fraction)`, from 0 at the first to
-/// `end`. Empty if it never rises.
+/// Returns the corners of the empirical distribution function that rises to each `(x, fraction)`,
+/// from 0 at the first x up to `end`. Empty if it never rises.
 pub fn staircase(rises: Vec<(f64, f64)>, end: f64) -> Vec<(f64, f64)> {
     let (Some(&(first, _)), Some(&(last, fraction))) = (rises.first(), rises.last()) else {
         return rises;

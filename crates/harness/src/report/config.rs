@@ -1,4 +1,4 @@
-//! Keys that several kinds of reports share, and conditions on their lists.
+//! Keys that several kinds of reports share, and checks of their lists.
 
 use super::target::Target;
 use bvh_config::{Accepts, Nested, OutOfRange};
@@ -7,7 +7,7 @@ bvh_config::config! { serde;
     /// A report on how fast some methods reach targets. Every repetition is one run: 25 or more
     /// make a distribution.
     pub struct Targets {
-        /// The section or topic that it belongs to.
+        /// Section or topic of the report.
         source: String;
         /// Heading.
         title: String;
@@ -30,10 +30,9 @@ impl<T> Accepts<Vec<T>> for OneOrMore {
     }
 }
 
-/// The labels of methods that a configuration names under `key`, each with the key of its own
-/// place.
+/// The labels of methods that a configuration names, each with the key of its place.
 pub trait Labels {
-    /// All of them, in order.
+    /// Returns all labels under `key` in order.
     fn labels(&self, key: &str) -> Vec<(String, &str)>;
 }
 
@@ -61,7 +60,7 @@ impl Labels for [String; 2] {
 bvh_config::config! { serde;
     /// Methods that make one line of a figure.
     pub struct Series {
-        /// Its name in the figure.
+        /// Name of the line in the figure.
         name: String;
         /// Labels of the methods.
         methods: Vec<String>, in OneOrMore;

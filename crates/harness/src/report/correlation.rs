@@ -1,6 +1,7 @@
-//! How well costs predict the tests that rays take, over the trees that one method builds of one
-//! scene. Trees of different methods are never pooled: a rank over binary and n-ary trees mostly
-//! tells the one kind from the other (Simpson 1951).
+//! Correlations of costs with the tests of rays, over the trees that one method builds on one scene.
+//!
+//! Trees of different methods are never pooled: a ranking of binary and n-ary trees together mostly
+//! separates the two kinds (Simpson 1951).
 
 use super::config::first;
 use super::data::distinct;
@@ -13,44 +14,44 @@ use bvh_config::above;
 bvh_config::config! { serde;
     /// Costs against tests per ray.
     pub struct Config {
-        /// The section or topic that it belongs to.
+        /// Section or topic of the report.
         source: String;
         /// Heading.
         title: String;
-        /// Labels of the methods, the paper's own case first: the trees of each are compared among
-        /// themselves.
+        /// Labels of the methods, the paper's own case first. Trees of each method are compared with
+        /// each other only.
         methods: Vec<String>, in OneOrMore;
-        /// The words in which the paper describes the correlation over the trees of the first
-        /// method.
+        /// The paper's words on the correlation over the trees of the first method.
         #[serde(skip_serializing_if = "Option::is_none")]
         paper_says: Option<String>;
-        /// Pearson's correlation from which on these words hold.
+        /// Least value of Pearson's correlation for which these words hold.
         paper_from: f64 = 0.9, in above(0.0);
-        /// Why ours differs, where it does.
+        /// Reason for differences from the paper.
         reason: String;
     }
 }
 
 /// One cost against one kind of rays over the trees of one method, as written to `correlation.csv`.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize)]
 pub(super) struct Correlation<'a> {
     scene: &'a str,
     /// Label of the method whose trees are compared.
     method: &'a str,
-    /// Which cost.
+    /// Name of the cost.
     cost: &'a str,
     family: &'a str,
     query: &'a str,
     trees: usize,
     pearson: Option<f64>,
-    /// Lower end of its 95 % interval, by Fisher's transformation; empty for fewer than four trees.
+    /// Lower end of the 95 % interval of `pearson`, by Fisher's transformation; empty for fewer than
+    /// four trees.
     pearson_low: Option<f64>,
-    /// The upper end.
+    /// Upper end of this interval.
     pearson_high: Option<f64>,
     spearman: Option<f64>,
 }
 
-/// The kind of rays that the paper sends: they start inside and end at any hit.
+/// The family and query of the paper's rays: they start inside and end at any hit.
 const OF_PAPER: (&str, &str) = ("inside", "any");
 
 /// The cost that the paper compares with tests, as in `runs.csv`.
@@ -59,10 +60,10 @@ const OF_AREA: &str = "goldsmith_salmon";
 /// A tree, and the tests per ray of one kind in it.
 type Tree<'a> = (&'a RunRow, f64);
 
-/// A cost: its name in the table, and its value for the tree of a run.
+/// A cost: name in the table, and function of the tree of a run.
 type Cost<'a> = (String, Box<dyn Fn(&RunRow) -> Option<f64> + 'a>);
 
-/// The costs by area, and the one by the density of each kind of rays.
+/// Returns the costs by area, and one cost by the density of each kind of rays.
 fn costs(rows: &Rows) -> Vec<Cost<'_>> {
     let of_area: [Cost; 3] = [
         (OF_AREA.into(), Box::new(|run| Some(run.goldsmith_salmon))),
@@ -144,8 +145,8 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
 }
 
 impl Config {
-    /// The paper's words next to the correlation of its cost and its rays over the trees of its
-    /// case, scene by scene.
+    /// Compares the paper's words with the correlation of its cost and its rays over the trees of
+    /// its case, scene by scene.
     fn compare(&self, rows: &Rows, correlations: &[Correlation]) -> Vec<PaperRow> {
         let Some(says) = &self.paper_says else { return Vec::new() };
         let is_of_paper = |row: &&Correlation| {
@@ -182,8 +183,8 @@ impl Config {
     }
 }
 
-/// The method's trees through which rays of the kind were sent: random ones through the binary
-/// tree, others through its wide layout.
+/// Returns the method's trees through which rays of the kind were sent. Random rays traverse the
+/// binary tree, all other rays the wide layout.
 fn trees<'a>(rows: &'a Rows, scene: &str, method: &str, kind: (&str, &str)) -> Vec<Tree<'a>> {
     let random = rows
         .rays_of(scene, method, kind)
@@ -256,7 +257,7 @@ fn draw(
     panel(format!("{scene}: {family}, {query}{rank}"), x, y, methods.iter().map(points).collect())
 }
 
-/// How well every cost ranks the trees of each method, over scenes and kinds of rays.
+/// Returns a sentence on the rank correlations of every cost by method.
 fn reading(rows: &[Correlation], methods: &[String], costs: &[Cost]) -> String {
     let of_method = |method: &String| {
         let own: Vec<&Correlation> = rows

@@ -1,4 +1,4 @@
-//! An experiment's rows as its CSV files hold them, and the selections of them that reports share.
+//! Reads the rows of an experiment's CSV files and selects from them for reports.
 
 use crate::Error;
 use crate::rows::{
@@ -13,33 +13,33 @@ use std::path::{Path, PathBuf};
 pub struct Rows {
     /// The experiment's folder, for reports that read further files.
     pub folder: PathBuf,
-    /// Of `runs.csv`.
+    /// The rows of `runs.csv`.
     pub runs: Vec<RunRow>,
-    /// Of `history.csv`; none if no report reads them.
+    /// The rows of `history.csv`; none if no report reads them.
     pub history: Vec<HistoryRow>,
-    /// Of `trial_costs.csv`; none if no report reads them.
+    /// The rows of `trial_costs.csv`; none if no report reads them.
     pub trials: Vec<TrialRow>,
-    /// Of `timing.csv`.
+    /// The rows of `timing.csv`.
     pub timing: Vec<TimingRow>,
-    /// Of `rays.csv`; none if rays were not asked for.
+    /// The rows of `rays.csv`; none if the spec requests no rays.
     pub rays: Vec<RayRow>,
-    /// Of `bounds.csv`; none if bounds were not asked for.
+    /// The rows of `bounds.csv`; none if the spec requests no bounds.
     pub bounds: Vec<BoundRow>,
-    /// Of `timing_history.csv`; none if no report needs them, otherwise one for every row of
-    /// `history`, in its order.
+    /// The rows of `timing_history.csv`: one for every row of `history`, in the same order, or none
+    /// if no report needs them.
     pub clock: Vec<ClockRow>,
-    /// Of `references.csv`, under the experiment's objective; none if no report needs them.
+    /// The rows of `references.csv` by the experiment's objective; none if no report needs them.
     pub references: Vec<ReferenceRow>,
-    /// Of `tests.csv`; none if no rays judge the trees.
+    /// The rows of `tests.csv`; none if no rays judge the trees.
     pub tests: Vec<TestRow>,
-    /// Of `run_tests.csv`; none if trees were not tested one by one.
+    /// The rows of `run_tests.csv`; none if trees were not tested one by one.
     pub run_tests: Vec<RunTestRow>,
-    /// Of `visits.csv`, likewise.
+    /// The rows of `visits.csv`; none if trees were not tested one by one.
     pub visits: Vec<VisitRow>,
 }
 
 impl Rows {
-    /// Reads the CSV files in an experiment's folder. Only `runs.csv` has to be there.
+    /// Reads the CSV files in an experiment's folder. Only `runs.csv` is required.
     pub fn read(folder: &Path) -> Result<Self, Error> {
         Ok(Self {
             folder: folder.to_owned(),
@@ -57,17 +57,17 @@ impl Rows {
         })
     }
 
-    /// The scenes in the order of the rows.
+    /// Returns the scenes in the order of the rows.
     pub fn scenes(&self) -> Vec<&str> {
         distinct(self.runs.iter().map(|run| run.scene.as_str()))
     }
 
-    /// The labels of the methods in the order of the rows.
+    /// Returns the labels of the methods in the order of the rows.
     pub fn methods(&self) -> Vec<&str> {
         distinct(self.runs.iter().map(|run| run.method.as_str()))
     }
 
-    /// The scene's kind, as in `runs.csv`.
+    /// Returns the scene's kind, as in `runs.csv`.
     pub fn kind(&self, scene: &str) -> &str {
         self.runs
             .iter()
@@ -75,13 +75,13 @@ impl Rows {
             .map_or("", |run| run.scene_kind.as_str())
     }
 
-    /// The scene's name, followed by its kind unless it is a file: how tables and figures show it.
+    /// Returns the scene's name for tables and figures: its kind follows unless it is a file.
     pub fn shown(&self, scene: &str) -> String {
         let kind = self.kind(scene);
         if kind == SceneKind::File.to_string() { scene.into() } else { format!("{scene} ({kind})") }
     }
 
-    /// The names of all scenes, as [`Rows::shown`].
+    /// Returns the names of all scenes for tables and figures.
     pub fn all_shown(&self) -> Vec<String> {
         self.scenes()
             .into_iter()
@@ -89,7 +89,7 @@ impl Rows {
             .collect()
     }
 
-    /// The cost of the scene's greedy tree.
+    /// Returns the cost of the scene's greedy tree.
     pub fn base_cost(&self, scene: &str) -> f64 {
         self.runs
             .iter()
@@ -104,21 +104,21 @@ impl Rows {
             .find(|row| row.scene == scene)
     }
 
-    /// The runs of one method on one scene.
+    /// Returns the runs of one method on one scene.
     pub fn runs_of(&self, scene: &str, method: &str) -> impl Iterator<Item = &RunRow> {
         self.runs
             .iter()
             .filter(move |run| run.scene == scene && run.method == method)
     }
 
-    /// The costs over base with which the runs of one method on one scene ended.
+    /// Returns the final costs over base of the runs of one method on one scene.
     pub fn final_ratios(&self, scene: &str, method: &str) -> Vec<f64> {
         self.runs_of(scene, method)
             .map(|run| ratio(run.cost, run.base_cost))
             .collect()
     }
 
-    /// The seconds of the runs of one method on one scene.
+    /// Returns the seconds of the runs of one method on one scene.
     pub fn seconds_of(&self, scene: &str, method: &str) -> Vec<f64> {
         let own = self
             .timing
@@ -127,7 +127,7 @@ impl Rows {
         own.map(|row| row.seconds).collect()
     }
 
-    /// The trials of one method on one scene, one list per repetition.
+    /// Returns the trials of one method on one scene, one list per repetition.
     pub fn trials_of(&self, scene: &str, method: &str) -> Vec<Vec<&TrialRow>> {
         let own = |row: &&TrialRow| row.scene == scene && row.method == method;
         let rows: Vec<&TrialRow> = self.trials.iter().filter(own).collect();
@@ -136,7 +136,7 @@ impl Rows {
             .collect()
     }
 
-    /// The costs of all trials of one method on one scene, over all repetitions.
+    /// Returns the costs of all trials of one method on one scene, over all repetitions.
     pub fn trial_costs(&self, scene: &str, method: &str) -> Vec<f64> {
         self.trials_of(scene, method)
             .concat()
@@ -145,7 +145,8 @@ impl Rows {
             .collect()
     }
 
-    /// The costs of one method's trials on one scene over base, one list per repetition, in order.
+    /// Returns the costs over base of one method's trials on one scene, one list per repetition, in
+    /// order.
     pub fn trials_over_base(&self, scene: &str, method: &str) -> Vec<Vec<f64>> {
         let base = self.base_cost(scene);
         let over_base = |trials: Vec<&TrialRow>| {
@@ -160,7 +161,7 @@ impl Rows {
             .collect()
     }
 
-    /// The kinds of random rays sent: where they come from and what they ask.
+    /// Returns the kinds of random rays: family and query.
     pub fn ray_kinds(&self) -> Vec<(&str, &str)> {
         distinct(
             self.rays
@@ -169,7 +170,7 @@ impl Rows {
         )
     }
 
-    /// The measurements with random rays of one kind through the trees of one method on one scene.
+    /// Returns the measurements with random rays of one kind in the trees of one method on one scene.
     pub fn rays_of(&self, scene: &str, method: &str, kind: (&str, &str)) -> Vec<&RayRow> {
         let own = |row: &&RayRow| {
             row.scene == scene
@@ -180,7 +181,7 @@ impl Rows {
     }
 }
 
-/// A run on the scene `s` with nothing of note.
+/// Makes the row of an ordinary run on the scene `s`.
 #[cfg(test)]
 pub(super) fn run(method: &str, repetition: u32, evaluations: u64, work: u64) -> RunRow {
     let row = format!(
@@ -191,12 +192,12 @@ pub(super) fn run(method: &str, repetition: u32, evaluations: u64, work: u64) ->
         .unwrap()
 }
 
-/// A ratio of costs; 1 when the denominator is 0, as in `runs.csv`.
+/// Returns a ratio of costs; 1 when the denominator is 0, as in `runs.csv`.
 pub fn ratio(cost: f64, base: f64) -> f64 {
     if base > 0.0 { cost / base } else { 1.0 }
 }
 
-/// The distinct items, in the order in which they first occur.
+/// Returns the distinct items in the order of their first occurrence.
 pub(super) fn distinct<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
     let mut found = Vec::new();
     for item in items {

@@ -1,4 +1,4 @@
-//! How the costs of independent trials are distributed.
+//! Distributions of the costs of independent trials.
 
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
@@ -24,7 +24,7 @@ bvh_config::config! { serde;
 }
 
 /// One method's trials on one scene, pooled over repetitions, as written to `distribution.csv`.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize)]
 pub(super) struct Summary<'a> {
     scene: &'a str,
     method: &'a str,

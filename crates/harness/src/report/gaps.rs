@@ -1,5 +1,4 @@
-//! How far from the exact optimum every method ends on small scenes, and how tight the lower bound
-//! is there.
+//! Gaps to the exact optimum of small scenes, by method, and the tightness of the lower bound.
 
 use super::prelude::*;
 use crate::statistics::{median, quantile};
@@ -23,7 +22,7 @@ const SOLVED: f64 = 1e-12;
 
 /// One method on all scenes of one kind and size, as written to `gaps.csv`; gap = (cost − optimum)
 /// / optimum.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize)]
 pub(super) struct Gaps<'a> {
     method: &'a str,
     /// `random`, `cluster`, or `whole` for scenes that are no such part.
@@ -42,7 +41,7 @@ pub(super) struct Gaps<'a> {
 
 /// The lower bound over the optimum, on all scenes of one kind and size, as written to
 /// `tightness.csv`.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize)]
 pub(super) struct Tightness {
     /// `random` or `cluster`.
     part: &'static str,
@@ -153,7 +152,7 @@ impl Config {
             .collect()
     }
 
-    /// Fraction solved and worst gap against size, for every kind of part.
+    /// Draws the fraction solved and the worst gap against size, for every kind of part.
     fn draw(&self, summaries: &[Gaps]) -> Vec<Panel> {
         let parts: BTreeSet<&str> = summaries
             .iter()
@@ -225,7 +224,7 @@ fn tightness((&(part, objects), bounds): (&(&'static str, usize), &Vec<f64>)) ->
     }
 }
 
-/// The lower bound over the optimum against size, for every kind of part.
+/// Draws the lower bound over the optimum against size, for every kind of part.
 fn draw_bounds(tightness: &[Tightness]) -> Vec<Panel> {
     let parts: BTreeSet<&str> = tightness.iter().map(|row| row.part).collect();
     let draw = |part| {
@@ -248,7 +247,7 @@ fn draw_bounds(tightness: &[Tightness]) -> Vec<Panel> {
     parts.into_iter().map(draw).collect()
 }
 
-/// Which kind of part of a scene it is.
+/// Returns the kind of part of a scene.
 fn part(scene: &str) -> &'static str {
     match Subset::parse(scene) {
         Some((_, Subset::Random(..))) => "random",
@@ -261,7 +260,7 @@ fn at(values: &[f64], q: f64) -> f64 {
     quantile(values, q).unwrap_or(f64::NAN)
 }
 
-/// The fraction of gaps that are no more than rounding.
+/// Returns the fraction of gaps that are only rounding.
 fn solved(gaps: &[f64]) -> f64 {
     gaps.iter().filter(|&&gap| gap <= SOLVED).count() as f64 / gaps.len() as f64
 }

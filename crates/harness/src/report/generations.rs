@@ -1,5 +1,5 @@
-//! The paper's Figures 2 to 4: cost against generation, the median run and the range of all, with
-//! random picking.
+//! Figures 2 to 4 of the paper: cost against generation, with the median run, the range of all runs,
+//! and random picking.
 
 use super::paper::{PaperRow, Verdict, ratios};
 use super::prelude::*;
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 bvh_config::config! { serde;
     /// Cost against generation.
     pub struct Config {
-        /// Where the paper has it, such as `Figure 2`.
+        /// Place in the paper, such as `Figure 2`.
         source: String;
         /// Heading.
         title: String;
@@ -27,14 +27,14 @@ bvh_config::config! { serde;
         /// The paper's words on the gain, where it gives no number.
         #[serde(skip_serializing_if = "Option::is_none")]
         paper_says: Option<String>;
-        /// Why ours differs, where it does.
+        /// Reason for differences from the paper.
         reason: String;
     }
     check Self::check_order;
 }
 
 /// One generation, as written to `generations.csv`.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize)]
 pub(super) struct Generation<'a> {
     scene: &'a str,
     /// Number of the generation, from 0.
@@ -53,19 +53,19 @@ pub(super) struct Generation<'a> {
 struct Runs<'a> {
     scene: &'a str,
     runs: Vec<Vec<Progress>>,
-    /// Which of them has the median final cost, the lower of two.
+    /// Index of the run with the median final cost, the lower of two.
     middle: usize,
     random: Vec<f64>,
 }
 
-/// How far a run has come with one generation.
+/// The state of a run after one generation.
 struct Progress {
     evaluations: u64,
     /// The lowest cost so far.
     incumbent: f64,
 }
 
-/// Where the runs on a scene end.
+/// The final costs of the runs on a scene.
 struct Final {
     runs: usize,
     low: f64,
@@ -73,7 +73,7 @@ struct Final {
     high: f64,
     /// The mean cost of random orders.
     average: f64,
-    /// Müller–Fellner's cost.
+    /// The cost of the greedy Müller–Fellner tree.
     base: f64,
 }
 
@@ -144,7 +144,7 @@ impl Config {
         Some(Runs { scene, runs, middle, random: rows.trial_costs(scene, &self.baseline) })
     }
 
-    /// Our final costs next to the paper's spread and gain, as far as the spec has them.
+    /// Compares our final costs with the paper's spread and gain, if the spec has them.
     fn compare(&self, shown: &str, runs: &Runs, end: &Final) -> Vec<PaperRow> {
         let row = |quantity: &str| PaperRow::new(&self.source, shown, quantity, &self.reason);
         let spread = self
@@ -192,7 +192,7 @@ impl Config {
     }
 }
 
-/// The incumbents of a run, generation by generation.
+/// Returns the incumbents of a run, generation by generation.
 fn progress(run: &[&TrialRow]) -> Vec<Progress> {
     let mut incumbent = f64::INFINITY;
     let mut generations = Vec::new();
@@ -203,7 +203,8 @@ fn progress(run: &[&TrialRow]) -> Vec<Progress> {
     generations
 }
 
-/// The paper's costs are of other scenes and in no unit that it names, so that they are not drawn.
+/// Draws one scene. The paper's costs are of other scenes and in no unit that it names, so they are
+/// not drawn.
 fn draw(shown: &str, runs: usize, generations: &[Generation]) -> Panel {
     let at = |generation: &Generation| generation.generation as f64;
     let median: Vec<_> = generations

@@ -1,5 +1,4 @@
-//! Reports made from an experiment's CSV files: tables, figures, and the paper's numbers next to
-//! ours.
+//! Reports made from an experiment's CSV files: tables, figures, and comparisons with the paper.
 //!
 //! A kind of report is one file and one line in [`Report`]. Reports read CSV files only.
 
@@ -23,14 +22,12 @@ pub mod query_report;
 mod ray_cost;
 mod run_times;
 mod sides;
-pub mod significance;
 pub mod table;
 pub mod target;
 mod time_to_target;
 pub mod trials;
 
 use crate::Error;
-use crate::rows::columns::Columns;
 use crate::rows::store::Store;
 use crate::statistics::{median, minimum};
 use bvh_config::{Check, OutOfRange};
@@ -44,9 +41,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Declares the kinds of reports: name in specs (in snake case), configuration and its keys that
-/// name methods, the function that makes it, and the rows of its CSV files.
+/// name methods, and the function that makes it.
 macro_rules! reports {
-    ($($(#[$doc:meta])* $name:literal => $kind:ident($config:ty: $($label:ident),*) by $write:path => [$($row:ty),*];)*) => {
+    ($($(#[$doc:meta])* $name:literal => $kind:ident($config:ty: $($label:ident),*) by $write:path;)*) => {
         /// One report of a spec.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
         #[serde(tag = "kind")]
@@ -77,11 +74,6 @@ macro_rules! reports {
                 }
             }
 
-            /// The columns of the CSV files that reports make.
-            pub fn columns() -> Vec<Columns> {
-                vec![$($(Columns::of::<$row>(),)*)* Columns::of::<PaperRow>(), Columns::of::<Answer>()]
-            }
-
             /// The labels of the methods that the report names, each with its key.
             pub fn labels(&self) -> Vec<(String, &str)> {
                 match self {
@@ -99,43 +91,40 @@ macro_rules! reports {
 }
 
 reports! {
-    /// Ratios to base, scenes by columns, beside the paper's.
-    "table" => Table(table::Config: columns) by table::Config::write => [table::Cell];
+    /// Ratios to base, scenes by columns, compared with the paper's.
+    "table" => Table(table::Config: columns) by table::Config::write;
     /// Cost against number of trials.
-    "trials" => Trials(trials::Config: methods) by trials::Config::write => [trials::Point];
+    "trials" => Trials(trials::Config: methods) by trials::Config::write;
     /// Cost against generation.
-    "generations" => Generations(generations::Config: method, baseline) by generations::Config::write => [generations::Generation];
+    "generations" => Generations(generations::Config: method, baseline) by generations::Config::write;
     /// The distribution of costs over trials.
-    "distribution" => Distribution(distribution::Config: methods) by distribution::write => [distribution::Summary];
+    "distribution" => Distribution(distribution::Config: methods) by distribution::write;
     /// Costs against tests per ray over the trees of each method; every repetition is one tree.
-    "correlation" => Correlation(correlation::Config: methods) by correlation::write => [correlation::Correlation];
+    "correlation" => Correlation(correlation::Config: methods) by correlation::write;
     /// Error against run time and against work.
-    "anytime" => Anytime(anytime::Config: methods) by anytime::Config::write => [anytime::Point];
+    "anytime" => Anytime(anytime::Config: methods) by anytime::Config::write;
     /// Gaps to the exact optimum of small scenes.
-    "gaps" => Gaps(gaps::Config: methods, optimum) by gaps::Config::write => [gaps::Gaps, gaps::Tightness];
+    "gaps" => Gaps(gaps::Config: methods, optimum) by gaps::Config::write;
     /// Run-time distributions.
-    "run_times" => RunTimes(config::Targets: methods) by run_times::write => [run_times::Step, run_times::Fit];
+    "run_times" => RunTimes(config::Targets: methods) by run_times::write;
     /// Time and work until targets are reached, one row per method, scene and target.
-    "time_to_target" => TimeToTarget(config::Targets: methods) by time_to_target::write => [time_to_target::Reached];
+    "time_to_target" => TimeToTarget(config::Targets: methods) by time_to_target::write;
     /// Medians, quartiles and primal integrals.
-    "numbers" => Numbers(numbers::Config: methods) by numbers::Config::write => [numbers::Numbers, numbers::Timing];
-    /// Whether methods really differ.
-    "significance" => Significance(significance::Config: against, method) by significance::Config::write => [significance::Row];
+    "numbers" => Numbers(numbers::Config: methods) by numbers::Config::write;
     /// Tests of rays in trees that are trained on rays.
-    "ray_cost" => RayCost(ray_cost::Config: base, pairs) by ray_cost::Config::write
-        => [ray_cost::Compared, ray_cost::Paired];
+    "ray_cost" => RayCost(ray_cost::Config: base, pairs) by ray_cost::Config::write;
     /// Rows of one CSV file, selected, grouped, aggregated and drawn.
-    "query" => Query(query_report::Config: pairs) by query_report::Config::write => [];
+    "query" => Query(query_report::Config: pairs) by query_report::Config::write;
 }
 
 impl Report {
-    /// Whether the report asks when events happened.
+    /// Returns true if the report needs the times of events.
     pub fn needs_clock(&self) -> bool {
         self.needs_references()
     }
 
-    /// The labels of the methods whose single trials the report reads; `history.csv` suffices for
-    /// all others.
+    /// Returns the labels of the methods whose single trials the report reads; `history.csv` suffices
+    /// for all others.
     pub fn trial_methods(&self) -> Vec<&str> {
         match self {
             Self::Trials(config) => config
@@ -154,17 +143,17 @@ impl Report {
         }
     }
 
-    /// Whether the report measures gaps.
+    /// Returns true if the report measures gaps.
     pub fn needs_references(&self) -> bool {
         use Report::{Anytime, Numbers, RunTimes, TimeToTarget};
         matches!(self, Anytime(_) | RunTimes(_) | Numbers(_) | TimeToTarget(_))
     }
 }
 
-/// The file that keeps what the reports printed. Its tables may have seconds, as its name says.
+/// The file with the printed text of the reports. Its name marks it as a file with seconds.
 pub const TEXT_FILE: &str = "timing_report.txt";
 
-/// Makes all reports from the CSV files in a folder, the paper's numbers beside ours last. Writes
+/// Makes all reports from the CSV files in a folder; the comparison with the paper is last. Writes
 /// nothing.
 pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> {
     let rows = Rows::read(folder)?;
@@ -198,8 +187,8 @@ pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> 
     Ok(outputs)
 }
 
-/// Writes what reports have made into the store's folder. Returns the text for the terminal, which
-/// [`TEXT_FILE`] keeps. Figures are written only if they are `drawn`.
+/// Writes the output of reports into the store's folder. Returns the text for the terminal, which
+/// [`TEXT_FILE`] keeps. Writes figures only if `drawn` is true.
 pub fn write_all(outputs: &[Output], store: &Store, drawn: bool) -> Result<String, Error> {
     for output in outputs {
         for (name, bytes) in &output.csv {
@@ -250,7 +239,7 @@ fn final_costs(rows: &Rows) -> Result<Output, Error> {
     Ok(output)
 }
 
-/// The names of the series that a figure shows.
+/// Returns the names of the series in a figure.
 fn series(figure: &Figure) -> BTreeSet<String> {
     let layers = figure
         .panels
@@ -262,8 +251,8 @@ fn series(figure: &Figure) -> BTreeSet<String> {
         .collect()
 }
 
-/// The looks of an experiment's methods, the same in all its figures. If there are more methods
-/// than colours, those that share no figure may share a look.
+/// Chooses the looks of an experiment's methods, the same in all its figures. If there are more
+/// methods than colours, methods that share no figure may share a look.
 fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, Look)> {
     let mut slots: Vec<usize> = Vec::new();
     for (index, method) in methods.iter().enumerate() {
@@ -290,7 +279,7 @@ fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, Look)> 
         .collect()
 }
 
-/// The answers of all reports, in their order.
+/// Returns the answers of all reports in their order.
 fn answers(outputs: &[Output]) -> Vec<Answer> {
     let mut answers: Vec<Answer> = Vec::new();
     for output in outputs {
@@ -300,8 +289,8 @@ fn answers(outputs: &[Output]) -> Vec<Answer> {
     answers
 }
 
-/// The comparisons of all reports of an experiment with the paper. A number of the paper that
-/// several of ours are compared with is one number.
+/// Collects the comparisons with the paper of all reports. A number of the paper counts once, even
+/// if several of our numbers are compared with it.
 fn beside_paper(rows: &[PaperRow], answers: &[Answer]) -> Result<Output, Error> {
     let numbers = rows
         .iter()

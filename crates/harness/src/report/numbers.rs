@@ -1,5 +1,5 @@
-//! The numbers behind the figures: medians and quartiles of costs and gaps, primal integrals, and
-//! the lower bound beside them.
+//! Medians and quartiles of costs and gaps, primal integrals, and lower bounds, by method and
+//! scene.
 
 use super::data::ratio;
 use super::prelude::*;
@@ -18,43 +18,44 @@ bvh_config::config! { serde;
 }
 
 /// One method on one scene, as written to `numbers.csv`.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize)]
 pub(super) struct Numbers<'a> {
     scene: &'a str,
     method: &'a str,
     runs: usize,
     /// Lower quartile of cost over base, over repetitions.
     cost_over_base_quartile_1: f64,
-    /// Its median.
+    /// Median of cost over base.
     cost_over_base_median: f64,
-    /// Its upper quartile.
+    /// Upper quartile of cost over base.
     cost_over_base_quartile_3: f64,
     /// `exact optimum` or `best known`.
     reference: &'static str,
     /// The cost that gaps are measured from.
     reference_cost: f64,
-    /// The method that found it; its own gaps are too small if it did so in this very experiment.
+    /// The method that found the reference. If it did so in this experiment, its own gaps are too
+    /// small.
     reference_method: String,
-    /// Whether it did.
+    /// True if the reference was found in this experiment.
     reference_of_this_experiment: bool,
     gap_quartile_1: f64,
     gap_median: f64,
     gap_quartile_3: f64,
-    /// No binary tree costs less; empty where none is proven.
+    /// Proven lower bound of the cost of binary trees, if there is one.
     lower_bound: Option<f64>,
-    /// The bound over the reference.
+    /// `lower_bound` over `reference_cost`.
     lower_bound_over_reference: Option<f64>,
-    /// Median cost over the lower bound, minus 1: no tree is farther from the optimum.
+    /// Median cost over the lower bound, minus 1; the gap to the optimum is at most this.
     proven_gap_median: Option<f64>,
-    /// The mean gap over the evaluations of the longest run of any method on the scene, the median
-    /// over runs.
+    /// Mean gap over the evaluations of the longest run of any method on the scene; median over
+    /// runs.
     primal_integral_evaluations: f64,
-    /// Likewise over work.
+    /// The same mean gap over work.
     primal_integral_work: f64,
 }
 
-/// Its seconds, as written to `timing_numbers.csv`.
-#[derive(Serialize, JsonSchema)]
+/// The seconds of one method on one scene, as written to `timing_numbers.csv`.
+#[derive(Serialize)]
 pub(super) struct Timing<'a> {
     scene: &'a str,
     method: &'a str,
@@ -63,7 +64,7 @@ pub(super) struct Timing<'a> {
     seconds_quartile_3: f64,
     /// The end of the longest run of any method on the scene.
     horizon_seconds: f64,
-    /// The mean gap up to then, the median over runs.
+    /// Mean gap up to `horizon_seconds`; median over runs.
     primal_integral: f64,
 }
 
@@ -129,7 +130,7 @@ impl Config {
         Ok(output)
     }
 
-    /// The lower bound and every method's cost on every scene, over the least known cost.
+    /// Draws the lower bound and every method's cost on every scene, over the least known cost.
     fn draw(&self, rows: &Rows, numbers: &[Numbers]) -> Panel {
         let bound = |scene: &str| {
             rows.reference(scene)

@@ -25,19 +25,19 @@ pub struct Output {
     pub figures: Vec<(String, Figure)>,
     /// Comparisons with the paper.
     pub paper: Vec<PaperRow>,
-    /// The sentence that reads the result, made from its numbers; empty if the tables say it all.
+    /// The sentence that states the result, made from its numbers; empty if the tables suffice.
     pub reading: String,
-    /// The sentence that answers next to the paper, chosen by a rule from the numbers; only where
-    /// there is something of the paper's to compare with.
+    /// The sentence that compares with the paper, chosen by a rule from the numbers; only where the
+    /// paper has a number or words to compare with.
     pub answer: Option<String>,
-    /// The verdict on all of the paper's numbers; only where they are compared.
+    /// The verdict on all of the paper's numbers, if any are compared.
     pub outcome: Option<Outcome>,
     /// The tables, each under a line that explains it.
     pub tables: Vec<(String, Table)>,
 }
 
 impl Output {
-    /// The empty output of a report with this title. The source may be empty.
+    /// Makes the empty output of a report with this title. The source may be empty.
     pub fn new(source: &str, title: &str) -> Self {
         let heading =
             if source.is_empty() { title.to_owned() } else { format!("{source}: {title}") };
@@ -78,7 +78,7 @@ impl Output {
             .push((name.into(), Figure { title, caption: caption.into(), columns, panels, looks }));
     }
 
-    /// Makes `series` of the last figure what the others are compared with.
+    /// Makes `series` the reference of the last figure, which its other series are compared with.
     pub fn set_reference(&mut self, series: &str) {
         if let Some((_, figure)) = self.figures.last_mut() {
             figure
@@ -130,7 +130,7 @@ impl Output {
         Ok(())
     }
 
-    /// Heading, reading and tables, for the terminal. Blocks are separated by empty lines.
+    /// Returns heading, reading and tables for the terminal, separated by empty lines.
     pub fn text(&self) -> String {
         let table = |(explanation, table): &(String, Table)| format!("{explanation}\n{table}\n");
         let tables: String = self.tables.iter().map(table).collect();
@@ -164,7 +164,7 @@ pub fn table_bytes(columns: &[String], rows: &[Row]) -> Result<Vec<u8>, Error> {
     })
 }
 
-/// A number with four digits, and any other text, or a whole number, as it is.
+/// Rounds a number to four digits. Other texts and whole numbers stay unchanged.
 fn four_digits(text: &str) -> String {
     let number = if text.contains('.') { text.parse::<f64>().ok() } else { None };
     match number {
@@ -178,7 +178,7 @@ fn four_digits(text: &str) -> String {
     }
 }
 
-/// An empty table for the terminal.
+/// Makes an empty table for the terminal.
 pub fn text_table<'a>(header: impl IntoIterator<Item = &'a str>) -> Table {
     let mut table = Table::new();
     table
@@ -187,7 +187,7 @@ pub fn text_table<'a>(header: impl IntoIterator<Item = &'a str>) -> Table {
     table
 }
 
-/// A panel.
+/// Makes a panel.
 pub fn panel(title: impl Into<String>, x: Axis, y: Axis, layers: Vec<Layer>) -> Panel {
     Panel { title: title.into(), x, y, layers }
 }
@@ -201,8 +201,8 @@ pub fn each<T>(items: impl IntoIterator<Item = T>, say: impl FnMut(T) -> Option<
         .join(", ")
 }
 
-/// From where to where the values of the rows of each name go, to so many decimals: `a 0.91 to
-/// 1.20, b 1.02 to 1.10`. Names without values are left out.
+/// Returns the range of the rows' values for each name, rounded to `decimals`: `a 0.91 to 1.20, b
+/// 1.02 to 1.10`. Names without values are skipped.
 pub fn spans<'n, R>(
     names: impl IntoIterator<Item = &'n str>,
     rows: &[R],
@@ -220,8 +220,8 @@ pub fn spans<'n, R>(
     })
 }
 
-/// For how many of `total` cases something holds, by name: `‘a’, ‘b’ for all 7 scenes; ‘c’ for 3 of
-/// 7 scenes; ‘d’ for none`.
+/// Groups names by their numbers of cases out of `total`: `‘a’, ‘b’ for all 7 scenes; ‘c’ for 3 of 7
+/// scenes; ‘d’ for none`.
 pub fn tally<'a>(
     counts: impl IntoIterator<Item = (&'a str, usize)>,
     total: usize,

@@ -1,52 +1,51 @@
-//! The paper's numbers beside ours, and the verdicts on them.
+//! Compares the paper's numbers with ours and gives a verdict on each.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// One row of `paper.csv`: something that the paper says beside ours. Absolute costs are not
-/// compared, as the scenes are not the paper's.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// One row of `paper.csv`: a statement of the paper and our result. Absolute costs are not compared,
+/// because the scenes are not the paper's.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PaperRow {
-    /// Where the paper has it.
+    /// The place in the paper.
     pub source: String,
-    /// Scene, ours a stand-in.
+    /// The scene; ours is a stand-in.
     pub scene: String,
     /// The quantity that is compared.
     pub quantity: String,
     /// The paper's number or words; empty if it has none and the row only adds to the others.
     pub paper: String,
-    /// Ours.
+    /// Our number or words.
     pub ours: String,
     /// The paper's value as a ratio to its base; empty where it has no number.
     pub paper_over_base: Option<f64>,
-    /// Ours likewise.
+    /// Our value as a ratio to base; empty where the paper has no number.
     pub ours_over_base: Option<f64>,
-    /// Between which values ours lies in nine of ten repetitions, or in all where they are few;
-    /// empty where ours is one number without chance.
+    /// Lower end of the interval that has our value in nine of ten repetitions, or in all if there
+    /// are few; empty where chance plays no part.
     pub ours_low: Option<f64>,
-    /// The upper end.
+    /// Upper end of this interval.
     pub ours_high: Option<f64>,
-    /// Whether they agree, and if not, how they differ:
+    /// Agreement, or the kind of difference.
     pub verdict: Verdict,
-    /// When they would agree.
+    /// The condition of agreement.
     pub rule: String,
-    /// Why they differ, where known.
+    /// The reason for a difference, where known.
     pub reason: String,
 }
 
 /// One row of `answer.csv`: the sentence that a report answers with, chosen by a rule from its
 /// numbers.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
-    /// Where the paper has it.
+    /// The place in the paper.
     pub source: String,
     /// The sentence.
     pub answer: String,
 }
 
 impl PaperRow {
-    /// A row about what the paper has in `source`, without numbers.
+    /// Makes a row without numbers about the section `source` of the paper.
     pub fn new(
         source: &str,
         scene: impl Into<String>,
@@ -69,7 +68,7 @@ impl PaperRow {
         }
     }
 
-    /// The same row with both sides as they are shown, the verdict on them, and its rule.
+    /// Adds both sides as they are shown, the verdict on them, and its rule.
     #[must_use]
     pub fn compare(
         self,
@@ -81,9 +80,9 @@ impl PaperRow {
         Self { paper: paper.into(), ours: ours.into(), verdict, rule: rule.into(), ..self }
     }
 
-    /// The same row with a ratio to base of the paper's and ours, which lies in an interval where
-    /// it depends on chance. They agree if the whole interval is within `tolerance` of the paper's,
-    /// relatively, and on the same side of 1.
+    /// Adds the paper's and our ratio to base, and the verdict on them. Our ratio has an interval if
+    /// it depends on chance. The ratios agree if the whole interval is within the relative distance
+    /// `tolerance` of the paper's ratio and on the same side of 1.
     #[must_use]
     pub fn compare_ratios(
         self,
@@ -114,8 +113,8 @@ impl PaperRow {
     }
 }
 
-/// Returns a sentence for each quantity that is compared: ours, the paper's and the verdict, scene
-/// by scene. `None` if nothing is.
+/// Returns a sentence for each compared quantity: our value, the paper's and the verdict, scene by
+/// scene. `None` if nothing is compared.
 pub fn ratios(rows: &[PaperRow]) -> Option<String> {
     let compared: Vec<&PaperRow> = rows
         .iter()
@@ -128,7 +127,7 @@ pub fn ratios(rows: &[PaperRow]) -> Option<String> {
     (!sentences.is_empty()).then(|| sentences.join(" "))
 }
 
-/// The sentence for one quantity.
+/// Returns the sentence for one quantity.
 fn sentence(rows: &[&PaperRow]) -> String {
     let digits = |number: Option<f64>, text: &str| {
         number.map_or_else(|| text.to_owned(), |number| format!("{number:.2}"))
@@ -144,10 +143,10 @@ fn sentence(rows: &[&PaperRow]) -> String {
     format!("{}{rest}: {}.", first.to_uppercase(), scenes.join("; "))
 }
 
-/// How a number of ours compares with the paper's.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+/// The relation of our number to the paper's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Verdict {
-    /// As the rule demands.
+    /// The rule holds.
     #[serde(rename = "agrees")]
     Agrees,
     /// Higher than the rule allows, on the same side of the base.
@@ -162,19 +161,19 @@ pub enum Verdict {
     /// Lower, and below the base where the paper is above it.
     #[serde(rename = "differs, lower")]
     DiffersLower,
-    /// Not as the rule demands, and no matter of higher or lower.
+    /// The rule does not hold, and neither number is higher.
     #[serde(rename = "differs")]
     Differs,
     /// Another repetition may have led to another verdict, or the paper has no number.
     #[serde(rename = "inconclusive")]
     Inconclusive,
-    /// The paper does not speak of it.
+    /// The paper has no such statement.
     #[serde(rename = "not in the paper")]
     NotInPaper,
 }
 
 impl Verdict {
-    /// Its name, as in `paper.csv`.
+    /// Returns the name in `paper.csv`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Agrees => "agrees",
@@ -188,10 +187,10 @@ impl Verdict {
         }
     }
 
-    /// How our ratio to base compares with the paper's: whether it is within `tolerance` of it, and
-    /// on the same side of the base.
+    /// Compares our ratio to base with the paper's: by the relative distance `tolerance`, and by the
+    /// side of the base.
     fn of_ratios(paper: f64, ours: f64, tolerance: f64) -> Self {
-        // The paper prints four digits: closer to the base than this is on neither side.
+        // The paper prints four digits, so a ratio this close to the base is on neither side.
         let side =
             |ratio: f64| if (ratio - 1.0).abs() < 5e-4 { 0.0 } else { (ratio - 1.0).signum() };
         let close = (ours / paper - 1.0).abs() <= tolerance;
@@ -204,7 +203,7 @@ impl Verdict {
         }
     }
 
-    /// Whether ours is not the paper's number but on its side of the base.
+    /// Returns true if our number differs from the paper's but is on the same side of the base.
     pub fn is_same_direction(self) -> bool {
         matches!(self, Self::SameDirectionHigher | Self::SameDirectionLower)
     }
@@ -214,14 +213,14 @@ impl Verdict {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Outcome {
     agree: usize,
-    /// Not the paper's number, but on its side of the base.
+    /// Numbers that differ from the paper's on the same side of the base.
     same_side: usize,
     differ: usize,
     inconclusive: usize,
 }
 
 impl Outcome {
-    /// Of all rows but those that only add to the others.
+    /// Counts the verdicts of all rows, except rows that only add to the others.
     pub fn of(rows: &[PaperRow]) -> Self {
         let count = |wanted: fn(Verdict) -> bool| {
             rows.iter()
@@ -235,7 +234,7 @@ impl Outcome {
         Self { agree, same_side, inconclusive, differ: compared - agree - same_side - inconclusive }
     }
 
-    /// The verdict on all of them together: what all that can be told have in common.
+    /// Returns the verdict on all comparisons together, ignoring the inconclusive ones.
     pub fn name(&self) -> &'static str {
         match (self.agree, self.same_side, self.differ) {
             (0, 0, 0) => "inconclusive",

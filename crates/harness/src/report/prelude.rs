@@ -5,5 +5,4 @@ pub(crate) use super::data::Rows;
 pub(crate) use super::output::{Output, each, panel, spans, tally};
 pub(crate) use crate::Error;
 pub(crate) use figures::{Axis, Layer, Marks, Panel};
-pub(crate) use schemars::JsonSchema;
 pub(crate) use serde::Serialize;

@@ -93,10 +93,10 @@ impl ProgressAxis {
     }
 }
 
-/// A run's incumbents: when, or after how much work, and how costly.
+/// The incumbents of a run: place along the axis, and cost.
 pub type Series = Vec<(f64, f64)>;
 
-/// The incumbents of every run of a method on a scene.
+/// Returns the incumbents of every run of a method on a scene.
 pub fn series(rows: &Rows, scene: &str, method: &str, axis: ProgressAxis) -> Vec<Series> {
     let own = rows
         .history
@@ -121,7 +121,7 @@ pub fn series(rows: &Rows, scene: &str, method: &str, axis: ProgressAxis) -> Vec
         .collect()
 }
 
-/// Where the longest run of a method on a scene ended; 0 if there is none.
+/// Returns the end of the longest run of a method on a scene; 0 if there is none.
 pub fn longest(rows: &Rows, scene: &str, method: &str, axis: ProgressAxis) -> f64 {
     let ends: Vec<f64> = match axis {
         ProgressAxis::Seconds => rows.seconds_of(scene, method),
@@ -137,7 +137,7 @@ pub fn longest(rows: &Rows, scene: &str, method: &str, axis: ProgressAxis) -> f6
     ends.into_iter().fold(0.0, f64::max)
 }
 
-/// Where the longest run of any of these methods on a scene ended.
+/// Returns the end of the longest run of any of these methods on a scene.
 pub fn longest_of_all(rows: &Rows, scene: &str, methods: &[String], axis: ProgressAxis) -> f64 {
     methods
         .iter()
@@ -145,15 +145,15 @@ pub fn longest_of_all(rows: &Rows, scene: &str, methods: &[String], axis: Progre
         .fold(0.0, f64::max)
 }
 
-/// When a run first had an incumbent of at most this cost; `None` if it never had.
+/// Returns the time at which a run first had an incumbent of at most this cost, if it ever had.
 pub fn reached(run: &Series, cost: f64) -> Option<f64> {
     run.iter()
         .find(|(_, incumbent)| *incumbent <= cost)
         .map(|(x, _)| *x)
 }
 
-/// When the median run had an incumbent of at most this cost, unsolved runs last; `None` if it
-/// never had.
+/// Returns the time at which the median run had an incumbent of at most this cost, counting unsolved
+/// runs as last; `None` if the median run never had one.
 pub fn median_reached(runs: &[Series], cost: f64) -> Option<f64> {
     let times: Vec<f64> = runs
         .iter()

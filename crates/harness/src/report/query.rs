@@ -1,4 +1,5 @@
-//! Queries of CSV files, in which pages and charts select, group and aggregate rows.
+//! The query language of reports and documentation: selects, groups and aggregates rows of CSV
+//! files.
 //!
 //! ```text
 //! CONDITIONS   COLUMN=TEXT, COLUMN!=TEXT or TEXT, …          `*` for all rows; a comma in a text
@@ -23,7 +24,7 @@ pub type Row = BTreeMap<String, String>;
 
 /// Reasons why a query has no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "each message says what its fields are")]
+#[allow(missing_docs, reason = "each message names its fields")]
 pub enum QueryError {
     /// A part of the query that cannot be read.
     #[error("{found:?} is no {part}; accepted: {accepted}")]
@@ -42,7 +43,7 @@ pub enum QueryError {
     NotAccepted { column: String, group: String, found: f64, accepted: String },
 }
 
-/// Stands for a comma within a text while conditions are divided.
+/// Replaces commas within texts while conditions are split at commas.
 const COMMA: &str = "\u{0}";
 
 /// Reads the rows of a CSV file.
@@ -70,7 +71,7 @@ pub fn number_in(row: &Row, column: &str) -> Option<f64> {
 struct Condition {
     column: String,
     texts: Vec<String>,
-    /// Whether the cell is to be one of the texts, or none of them.
+    /// True if the cell must be one of the texts, false if it must be none of them.
     wanted: bool,
 }
 
@@ -136,14 +137,14 @@ impl Conditions {
         Self(vec![Condition { column: column.into(), texts, wanted: true }])
     }
 
-    /// The columns that the conditions are on.
+    /// Returns the columns of the conditions.
     pub fn columns(&self) -> impl Iterator<Item = &str> {
         self.0
             .iter()
             .map(|condition| condition.column.as_str())
     }
 
-    /// The texts that the conditions name.
+    /// Returns the texts of the conditions.
     pub fn texts(&self) -> Vec<&str> {
         let texts = self
             .0
@@ -225,7 +226,7 @@ pub fn group<'r>(rows: &'r [Row], columns: &[&str], values: &[String]) -> Vec<&'
     rows.iter().filter(is_own).collect()
 }
 
-/// How the values of some rows become one number.
+/// The reduction of the values of some rows to one number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aggregate {
     /// The value in which all rows agree.
@@ -272,7 +273,7 @@ impl Aggregate {
 
 /// An aggregate of a value, computed row by row from columns and numbers.
 pub struct Measure<'t> {
-    /// How the values become one.
+    /// The reduction of the values to one number.
     pub how: Aggregate,
     values: Vec<&'t str>,
     text: &'t str,

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 bvh_config::config! { serde;
     /// A column of the table.
     pub struct Column {
-        /// Its name.
+        /// Name of the column.
         name: String;
         /// The quantity in words, for axes and sentences; by default the name with blanks.
         label: String;

@@ -31,9 +31,9 @@ bvh_config::config! { serde;
         x_label: String;
         /// Label of the vertical axis.
         y_label: String;
-        /// Whether the horizontal axis is logarithmic.
+        /// True for a logarithmic horizontal axis.
         log_x: bool;
-        /// Whether the vertical axis is logarithmic.
+        /// True for a logarithmic vertical axis.
         log_y: bool;
         /// The height at which bars begin.
         bars_from: f64, in 0.0..=1e300;
@@ -41,13 +41,15 @@ bvh_config::config! { serde;
         /// comparison.
         #[serde(skip_serializing_if = "Option::is_none")]
         falls_by_power: Option<f64>, in 0.0..=10.0;
-        /// Whether a staircase leads through the points that no point to their left undercuts.
+        /// True for a staircase through the points that are lower than all points to their left.
         front: bool;
     }
 }
 
 /// The shape of marks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Shape {
     /// A bar per category.

@@ -15,7 +15,7 @@ use bvh_config::{Nested, OutOfRange};
 bvh_config::config! { serde;
     /// A table of some rows of a CSV file, and a figure of it.
     pub struct Config {
-        /// The section of the paper or the topic that it belongs to.
+        /// Section of the paper, or topic.
         source: String;
         /// Heading.
         title: String;
@@ -41,7 +41,7 @@ bvh_config::config! { serde;
         columns: Vec<Column>, in Nested;
         /// Ratios within this relative distance of the paper's agree with it.
         tolerance: f64 = 0.05, in 0.0..=1.0;
-        /// Why ours differs, where it does.
+        /// Reason for differences from the paper.
         reason: String;
         /// A figure of the table.
         #[serde(skip_serializing_if = "Option::is_none")]

@@ -1,5 +1,4 @@
-//! Tests of rays in trees that are trained on rays, over those in a tree that is searched for by
-//! area.
+//! Tests of rays in trees that are trained on rays, relative to a tree that is searched for by area.
 
 use super::data::distinct;
 use super::prelude::*;
@@ -24,7 +23,7 @@ bvh_config::config! { serde;
 
 /// A tree's tests over those of the base, as written to `ray_cost.csv`; rows for the geometric mean
 /// of all scenes come last.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize)]
 pub(super) struct Compared<'a> {
     scene: &'a str,
     /// The method's label, or `rays` if the tree was trained on rays.
@@ -43,7 +42,7 @@ pub(super) struct Compared<'a> {
 }
 
 /// A method's tests over those of another on one scene, as written to `ray_cost_pairs.csv`.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize)]
 pub(super) struct Paired<'a> {
     scene: &'a str,
     method: &'a str,
@@ -62,7 +61,7 @@ pub(super) struct Paired<'a> {
 }
 
 /// The verdict of an interval of a ratio of tests.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 enum Verdict {
     /// It lies below 1.
@@ -191,7 +190,7 @@ fn compared<'a>(rows: &'a Rows, row: &'a TestRow, base: &str) -> Option<Compared
     })
 }
 
-/// The second method of a pair against the first, on all scenes and for all rays.
+/// Compares the second method of a pair with the first, on all scenes and for all rays.
 fn paired<'a>(rows: &'a Rows, [first, second]: &'a [String; 2]) -> Vec<Paired<'a>> {
     let pair = |row: &'a TestRow| {
         let Compared { tests_over_base, over_base_low: low, over_base_high: high, .. } =
@@ -224,7 +223,7 @@ fn paired<'a>(rows: &'a Rows, [first, second]: &'a [String; 2]) -> Vec<Paired<'a
         .collect()
 }
 
-/// How often each verdict was reached on a pair.
+/// Returns a sentence on the verdicts on a pair.
 fn verdicts(paired: &[Paired], [first, second]: &[String; 2]) -> String {
     let own = || {
         paired
@@ -240,7 +239,7 @@ fn verdicts(paired: &[Paired], [first, second]: &[String; 2]) -> String {
     )
 }
 
-/// The geometric means over scenes of rows that agree in all else.
+/// Returns the geometric means over scenes of rows that agree in all other columns.
 fn means<'a>(table: &[Compared<'a>]) -> Vec<Compared<'a>> {
     let key = |row: &Compared<'a>| (row.tree, row.trained_on, row.judged_on, row.camera);
     let mean = |group| {
@@ -270,8 +269,8 @@ fn means<'a>(table: &[Compared<'a>]) -> Vec<Compared<'a>> {
         .collect()
 }
 
-/// With how many kinds of rays each trained tree takes fewer tests than the base, and the least of
-/// all.
+/// Returns a sentence on the kinds of rays that take fewer tests in each trained tree than in the
+/// base, and on the least ratio.
 fn reading(table: &[Compared], base: &str) -> String {
     let own = || {
         table

@@ -11,7 +11,7 @@ use crate::statistics::time_to_target::ShiftedExponential;
 
 /// One step of a distribution, as written to `timing_run_times.csv`, `run_times_evaluations.csv`
 /// and `run_times_work.csv`.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize)]
 pub(super) struct Step<'a> {
     scene: &'a str,
     target: String,
@@ -24,17 +24,17 @@ pub(super) struct Step<'a> {
 /// One fit, as written to `timing_run_times_fit.csv`, `run_times_fit_evaluations.csv` and
 /// `run_times_fit_work.csv`; shift, mean and median are in the unit of the file's
 /// axis.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize)]
 pub(super) struct Fit<'a> {
     scene: &'a str,
     target: String,
     method: &'a str,
     runs: usize,
     solved: usize,
-    /// Of all runs; empty if fewer than half were solved.
+    /// Median over all runs; empty if fewer than half were solved.
     median: Option<f64>,
-    /// Of the shifted exponential distribution; empty if fewer than three quarters were solved, or
-    /// all at once.
+    /// Shift of the fitted exponential distribution; empty if fewer than three quarters were solved,
+    /// or all at once.
     shift: Option<f64>,
     /// The mean time after the shift.
     mean: Option<f64>,
@@ -83,7 +83,7 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
     Ok(output)
 }
 
-/// The fraction of runs solved, at every time at which it grows and at the end.
+/// Returns the fraction of runs solved, at every time at which it grows and at the end.
 fn distribution(attempt: &Attempt) -> Vec<(f64, f64)> {
     let fraction = |count: u32| f64::from(count) / attempt.runs as f64;
     let rises = attempt
@@ -128,7 +128,7 @@ fn fit<'a>(attempt: &Attempt<'a>) -> Fit<'a> {
     }
 }
 
-/// All methods on one problem, with the fitted distributions on top.
+/// Draws all methods at one problem, with the fitted distributions on top.
 fn draw(problem: &[Attempt], axis: ProgressAxis) -> Panel {
     let curve = |attempt: &Attempt| Layer::new(attempt.method, Marks::Steps(distribution(attempt)));
     let laws = problem
@@ -145,7 +145,7 @@ fn draw(problem: &[Attempt], axis: ProgressAxis) -> Panel {
     panel(title, axis.axis(), Axis::linear("P(solved)").range(0.0, 1.02), layers)
 }
 
-/// The fitted distribution from the first run solved to the last.
+/// Draws the fitted distribution from the first run solved to the last.
 fn fitted_curve(law: &ShiftedExponential, first: f64, last: f64) -> Layer {
     const POINTS: u32 = 60;
     let place = |step: u32| first * (last / first).powf(f64::from(step) / f64::from(POINTS));
@@ -156,7 +156,7 @@ fn fitted_curve(law: &ShiftedExponential, first: f64, last: f64) -> Layer {
     Layer::new(FIT, Marks::Line(points))
 }
 
-/// How often each method reached the last target, which is the hardest in most specs.
+/// Returns a sentence on the last target, which is the hardest in most specs.
 fn reading(config: &Targets, fits: &[Fit]) -> String {
     let Some(last) = config.targets.last().map(ToString::to_string) else { return String::new() };
     let methods = each(&config.methods, |method| {

@@ -1,7 +1,6 @@
-//! On which side of the base the costs of something lie, scene by scene.
+//! Counts the scenes on which costs are below or above the base.
 
-/// The number of scenes on which a whole interval lies below the base, above it, or on neither
-/// side.
+/// The numbers of scenes whose whole interval is below the base or above it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Sides {
     below: usize,

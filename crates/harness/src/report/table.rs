@@ -1,4 +1,4 @@
-//! The paper's tables: ratios to base, scenes by columns, ours beside the paper's.
+//! Tables of the paper: ratios to base, scenes by columns, with the paper's ratios.
 
 use super::config::Labels;
 use super::output::text_table;
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 bvh_config::config! { serde;
     /// A table of cost ratios.
     pub struct Config {
-        /// Where the paper has it, such as `Table 4`.
+        /// Place in the paper, such as `Table 4`.
         source: String;
         /// Heading.
         title: String;
@@ -33,12 +33,13 @@ bvh_config::config! { serde;
         name: String;
         /// Label of the method.
         method: String;
-        /// The best of so many first trials; without it the run's result. Median over repetitions.
+        /// Number of first trials whose best counts; without it, the run's result counts. Median
+        /// over repetitions.
         #[serde(skip_serializing_if = "Option::is_none")]
         best_of: Option<usize>, in 1..;
         /// The paper's costs by scene.
         paper: BTreeMap<String, f64>, in above(0.0);
-        /// Why ours differs, where it does.
+        /// Reason for differences from the paper.
         reason: String;
     }
 }
@@ -50,7 +51,7 @@ impl Labels for Column {
 }
 
 /// One cell, as written to `table.csv`.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize)]
 pub(super) struct Cell<'a> {
     scene: &'a str,
     scene_kind: &'a str,
@@ -60,14 +61,13 @@ pub(super) struct Cell<'a> {
     /// Trials of which the best counts; empty for runs as a whole.
     best_of: Option<usize>,
     cost_over_base: f64,
-    /// The expected best of so many trials, from all trials run.
+    /// Expected best of `best_of` trials, from all trials run.
     expected_over_base: Option<f64>,
-    /// The lower of two numbers between which the best of as many fresh trials lies in at least
-    /// nine of ten repetitions. The pool of all trials predicts them, by its order statistics or,
-    /// below its lowest value, by an exponential tail. For full runs, the lowest of the
-    /// repetitions.
+    /// Lower end of the interval that has the best of as many new trials in at least nine of ten
+    /// repetitions, predicted from the order statistics of all trials, or from an exponential tail
+    /// below the lowest. For full runs, the lowest of the repetitions.
     low_over_base: Option<f64>,
-    /// The higher number.
+    /// Upper end of this interval.
     high_over_base: Option<f64>,
     /// The paper's ratio, where it has one.
     paper_over_base: Option<f64>,
@@ -95,7 +95,7 @@ impl Config {
         Ok(output)
     }
 
-    /// The labels of the methods of which some column shows the best of some trials.
+    /// Returns the labels of the methods whose trials some column reads.
     pub(super) fn trial_methods(&self) -> Vec<&str> {
         self.columns
             .iter()
@@ -135,7 +135,7 @@ impl Config {
         })
     }
 
-    /// Says only what the figure shows.
+    /// Explains the marks that the figure shows.
     fn caption(&self, cells: &[Cell]) -> String {
         let mut caption =
             String::from("Total area of inner nodes over that of the greedy Müller–Fellner tree.");
@@ -158,7 +158,7 @@ impl Config {
         Some(column.paper.get(scene)? / self.columns.first()?.paper.get(scene)?)
     }
 
-    /// A number of the paper beside ours.
+    /// Compares a number of the paper with ours.
     fn compare(&self, rows: &Rows, column: &Column, cell: &Cell) -> Option<PaperRow> {
         let paper = cell.paper_over_base?;
         let ours = cell.cost_over_base;
@@ -168,7 +168,7 @@ impl Config {
         Some(row.compare_ratios(paper, ours, interval, self.tolerance))
     }
 
-    /// A number of the paper next to the closest of the columns that read it in different ways.
+    /// Compares a number of the paper with the closest of the columns that read it in different ways.
     fn compare_readings(&self, rows: &Rows, scene: &str, cells: &[Cell]) -> Option<PaperRow> {
         let distance = |cell: &&Cell| {
             cell.paper_over_base
@@ -212,7 +212,7 @@ impl Config {
         })
     }
 
-    /// Whether the columns other than the base read one column of the paper in different ways.
+    /// Returns true if all columns except the base are readings of one column of the paper.
     fn are_readings(&self) -> bool {
         let mut others = self.columns.iter().skip(1);
         match others.next() {
@@ -225,7 +225,7 @@ impl Config {
         }
     }
 
-    /// The rows of `paper.csv`: one for each number of the paper.
+    /// Returns the rows of `paper.csv`, one for each number of the paper.
     fn compare_all(&self, rows: &Rows, cells: &[Cell]) -> Vec<PaperRow> {
         if self.are_readings() {
             let scenes = rows.scenes().into_iter();
@@ -247,8 +247,9 @@ impl Config {
             .collect()
     }
 
-    /// The sentence that answers for the paper: how many scenes each column is above and below the
-    /// base on, by whole intervals, or how many of the paper's ratios each reading comes close to.
+    /// Returns the sentence that compares with the paper: the numbers of scenes whose whole interval
+    /// is above or below the base, or the numbers of the paper's ratios that a reading comes close
+    /// to.
     fn answer(&self, cells: &[Cell]) -> Option<String> {
         cells
             .iter()
@@ -361,7 +362,8 @@ impl Config {
         output.add_table("Cost over base, ours (and the paper's, on its own scenes):", table);
     }
 
-    /// On how many scenes each column but the base is below the base, and the least ratio of all.
+    /// Returns a sentence on the scenes on which each column is below the base, and on the least
+    /// ratio.
     fn reading(&self, cells: &[Cell]) -> String {
         let of = |column: &Column| -> Vec<&Cell> {
             cells
@@ -402,7 +404,7 @@ fn highest_of_paper(cells: &[Cell]) -> f64 {
         .fold(1.0, f64::max)
 }
 
-/// Whether the figure ends below some bars.
+/// Returns true if the figure ends below some bars.
 fn is_cut(cells: &[Cell]) -> bool {
     let theirs = highest_of_paper(cells);
     theirs > 1.0
@@ -411,13 +413,13 @@ fn is_cut(cells: &[Cell]) -> bool {
             .any(|cell| cell.cost_over_base > MOST_OF_PAPER * theirs)
 }
 
-/// Whether the ratio is within the tolerance of the paper's.
+/// Returns true if the ratio is within the tolerance of the paper's.
 fn is_close(cell: &Cell, tolerance: f64) -> bool {
     cell.paper_over_base
         .is_some_and(|paper| (cell.cost_over_base / paper - 1.0).abs() <= tolerance)
 }
 
-/// The cell of a column on a scene.
+/// Returns the cell of a column on a scene.
 fn find<'c, 'a>(cells: &'c [Cell<'a>], scene: &str, column: &Column) -> Option<&'c Cell<'a>> {
     cells
         .iter()

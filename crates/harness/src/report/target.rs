@@ -1,4 +1,4 @@
-//! Costs to be reached: what it means that a run has solved a scene.
+//! Targets: the costs at which a run counts as having solved a scene.
 
 use super::data::Rows;
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ bvh_config::config! { serde;
     pub struct Target {
         /// The cost that the percentage is relative to.
         of: Of;
-        /// By how much the target is above it; below it if negative.
+        /// Distance of the target above that cost, in percent; below it if negative.
         percent: f64, in (Excluded(-100.0), Included(1e6));
     }
 }
@@ -25,18 +25,18 @@ pub enum Of {
     /// The greedy Müller–Fellner tree.
     #[default]
     Base,
-    /// The exact optimum of small scenes, else the best known cost.
+    /// The exact optimum of small scenes, otherwise the best known cost.
     BestKnown,
 }
 
 impl Target {
-    /// Base, base −1 %, best known +1 %, best known +0.1 %.
+    /// Returns base, base −1 %, best known +1 %, best known +0.1 %.
     pub fn usual() -> Vec<Self> {
         let of = |of, percent| Self { of, percent };
         vec![of(Of::Base, 0.0), of(Of::Base, -1.0), of(Of::BestKnown, 1.0), of(Of::BestKnown, 0.1)]
     }
 
-    /// The cost on this scene; `None` if the scene has no reference.
+    /// Returns the cost on this scene; `None` if the scene has no reference.
     pub fn cost(&self, rows: &Rows, scene: &str) -> Option<f64> {
         let of = match self.of {
             Of::Base => rows.base_cost(scene),

@@ -9,17 +9,17 @@ use crate::statistics::order_quantile;
 
 /// One method and target on one scene, as written to `timing_to_target.csv`,
 /// `to_target_evaluations.csv` and `to_target_work.csv`.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize)]
 pub(super) struct Reached<'a> {
     scene: &'a str,
     target: String,
     method: &'a str,
     runs: usize,
     solved: usize,
-    /// Over all runs, of which those that never reach the target are the last; empty if that is the
-    /// quantile's.
+    /// Median over all runs, counting runs that never reach the target as last; empty if such a run
+    /// is the median.
     median: Option<f64>,
-    /// When nine of ten runs have reached it.
+    /// The same for the quantile 0.9.
     quantile_90: Option<f64>,
 }
 
@@ -56,7 +56,7 @@ fn reached<'a>(attempt: &Attempt<'a>) -> Reached<'a> {
     }
 }
 
-/// Which method is the first to reach each target, by scene.
+/// Returns a sentence on the first method to reach each target, by scene.
 fn reading(config: &Targets, table: &[Reached]) -> String {
     let firsts = config.targets.iter().filter_map(|target| {
         let rows: Vec<&Reached> = table

@@ -1,5 +1,4 @@
-//! The paper's Figure 1: cost against number of trials, one run's staircase and the exact
-//! expectation.
+//! Figure 1 of the paper: cost against number of trials, for one run and as an exact expectation.
 
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
@@ -8,32 +7,32 @@ use crate::statistics::{expected_best_of, mean_interval, minimum};
 bvh_config::config! { serde;
     /// Cost against number of trials.
     pub struct Config {
-        /// Where the paper has it, such as `Figure 1`.
+        /// Place in the paper, such as `Figure 1`.
         source: String;
         /// Heading.
         title: String;
         /// Labels of the methods to compare.
         methods: Vec<String>, in OneOrMore;
-        /// Figures end at, and methods are compared at, the best of so many trials. Use fewer than
-        /// are run: the expectation needs a pool to draw from.
+        /// Number of trials whose best is compared, and at which figures end. Use fewer than are run:
+        /// the expectation needs a pool to draw from.
         best_of: usize = 100, in 1..;
         /// The method that the paper found best.
         #[serde(skip_serializing_if = "Option::is_none")]
         paper_best: Option<String>;
-        /// Why ours differs, where it does.
+        /// Reason for differences from the paper.
         reason: String;
     }
 }
 
 /// One point, as written to `trials.csv`.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize)]
 pub(super) struct Point<'a> {
     scene: &'a str,
     method: &'a str,
     trials: usize,
-    /// Best of the first so many trials of the first repetition.
+    /// Best of the first `trials` trials of the first repetition.
     single_run_over_base: f64,
-    /// Expected best of so many: the mean of what the trials of every repetition say exactly.
+    /// Expected best of `trials` trials: the mean of the exact expectations over repetitions.
     expected_over_base: f64,
     /// Lower end of the 95 % interval of that mean over repetitions; empty if there is only one.
     expected_low: Option<f64>,
@@ -42,13 +41,13 @@ pub(super) struct Point<'a> {
 }
 
 impl Point<'_> {
-    /// Between which values the expected best lies; one value if there is only one repetition.
+    /// Returns the interval of the expected best; one value if there is only one repetition.
     fn interval(&self) -> (f64, f64) {
         let end = |end: Option<f64>| end.unwrap_or(self.expected_over_base);
         (end(self.expected_low), end(self.expected_high))
     }
 
-    /// Whether its expected best is lower than the other's as far as the intervals tell.
+    /// Returns true if the whole interval of the expected best is below the other's.
     fn is_below(&self, other: &Self) -> bool {
         self.interval().1 < other.interval().0
     }
@@ -151,7 +150,7 @@ impl Config {
             .collect()
     }
 
-    /// On how many scenes each method is best, or cannot be distinguished from the best.
+    /// Returns a sentence on the scenes on which no other method is below each method.
     fn reading(&self, last: &[&Point]) -> String {
         let scenes: Vec<&[&Point]> = last.chunk_by(|a, b| a.scene == b.scene).collect();
         let is_best = |scene: &[&Point], method: &str| {
@@ -175,8 +174,7 @@ impl Config {
         )
     }
 
-    /// The methods that no other is below, by the expected best of as many trials as are compared,
-    /// the lowest first.
+    /// Returns the methods that no other method is below at `best_of` trials, the lowest first.
     fn best<'p, 'a>(&self, curves: &'p [Vec<Point<'a>>]) -> Vec<&'p Point<'a>> {
         let mut ranking: Vec<&Point> = curves
             .iter()
@@ -191,7 +189,7 @@ impl Config {
         ranking
     }
 
-    /// The best methods on a scene in words, with the scene.
+    /// Returns the best methods on a scene in words, with the scene.
     fn best_lists<'a>(&self, scene: &'a str, curves: &[Vec<Point>]) -> Option<(String, &'a str)> {
         let best = self.best(curves);
         (!best.is_empty()).then(|| (in_words(&best), scene))

@@ -17,7 +17,8 @@ pub fn lock_folder(folder: &Path) -> Result<File, Error> {
     }
 }
 
-/// As [`lock_folder`], but waits for another harness, which holds this lock for moments only.
+/// Locks a folder like [`lock_folder`], but waits for another harness, which holds this lock for
+/// moments only.
 pub fn wait_for_folder(folder: &Path) -> Result<File, Error> {
     let (path, lock) = lock_file(folder)?;
     lock.lock()

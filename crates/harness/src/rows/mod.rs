@@ -1,17 +1,38 @@
 //! The rows of the CSV files: flat, units in the names, full precision.
 //!
-//! Columns that many files have are described in [`mod@columns`], and the page of all columns is
-//! made from both.
-#![allow(missing_docs, reason = "columns whose names say it all, and those above")]
+//! These columns mean the same in every file and are not described again:
+//!
+//! | column | meaning |
+//! |---|---|
+//! | `scene` | Name of the scene. |
+//! | `scene_kind` | `stand-in`, `procedural` or `file`. |
+//! | `method` | Label of the method in the spec. |
+//! | `seed` | Seed of the run, derived from the spec's. |
+//! | `repetition` | Number of the repetition, from 0. |
+//! | `objects` | Number of the scene's objects. |
+//! | `evaluations` | Trees or moves evaluated. |
+//! | `work` | Nodes made or visited. |
+//! | `threads` | Number of threads of the run. |
+//! | `nodes`, `depth` | Nodes of the tree; edges from the root to the deepest leaf. |
+//! | `internal_area` | Total half area of inner nodes, world units squared. |
+//! | `goldsmith_salmon` | Boxes below the root that a random line through the root's box is tested against. |
+//! | `collapsed_sah` | Surface area heuristic with both constants 1, after the best collapse of leaves. |
+//! | `layout` | Layout of the tree in memory while rays are traced. |
+//! | `rays`, `judged_on`, `trained_on` | Kinds of rays: traced, judging the tree, training it. |
+//! | `camera` | Camera of the judging rays: `same` as in training, `other`, or `none`. |
+//! | `count` | Number of rays. |
+//! | `boxes_per_ray`, `objects_per_ray` | Mean number of tests; `boxes_low` and `boxes_high` end its 95 % interval. |
+//! | `missed_hits`, `false_hits`, `other_hits` | Rays that miss a hit, hit nothing real, or hit elsewhere. |
+//! | `references_per_object` | Leaves that name an object, per object: above 1 where objects are divided. |
+//! | `bytes_per_object` | Bytes over the number of objects. |
+#![allow(missing_docs, reason = "columns in the table above, or whose names are clear")]
 
-pub mod columns;
+pub mod csv_file;
 pub mod lock;
 pub mod store;
 
 use crate::Error;
-use columns::Columns;
-pub use columns::{Row, read, to_bytes};
-use schemars::JsonSchema;
+pub use csv_file::{Row, read, to_bytes};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -19,7 +40,7 @@ use std::path::Path;
 macro_rules! rows {
     ($($(#[$meta:meta])* $kind:ident in $file:literal { $($(#[$of:meta])* $column:ident: $type:ty,)* })*) => {$(
         $(#[$meta])*
-        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         pub struct $kind {
             $($(#[$of])* pub $column: $type,)*
         }
@@ -27,12 +48,7 @@ macro_rules! rows {
         impl Row for $kind {
             const FILE: &'static str = $file;
         }
-    )*
-        /// The columns of all these files.
-        pub fn columns() -> Vec<Columns> {
-            vec![$(Columns::of::<$kind>()),*]
-        }
-    };
+    )*};
 }
 
 rows! {
@@ -46,7 +62,7 @@ rows! {
         objects: usize,
         evaluations: u64,
         work: u64,
-        /// Why it ended:
+        /// Reason to stop.
         stop: bvh_search::StopReason,
         /// The objective's value for the best tree found.
         cost: f64,
@@ -67,7 +83,7 @@ rows! {
     }
 
     /// One row of `history.csv`: the first event of a run, an improvement, or the last event. The
-    /// file is there if a report reads it or the spec has no reports.
+    /// file exists if a report reads it or the spec has no reports.
     HistoryRow in "history.csv" {
         scene: String,
         method: String,
@@ -122,22 +138,22 @@ rows! {
         /// Seed of the run; the rays are the same for all runs on a scene.
         seed: u64,
         repetition: u32,
-        /// Where the rays come from.
+        /// Family of the rays: `inside` or `lines`.
         family: String,
-        /// The question that they ask.
+        /// Query of the rays: `any`, `nearest` or `all`.
         query: String,
         /// Number of rays.
         rays: u64,
-        /// Fraction of them that hit something.
+        /// Fraction of the rays that hit something.
         hit_fraction: f64,
         /// Mean number of tests against boxes, the root's and the leaves' included.
         boxes_per_ray: f64,
-        /// Of that mean.
+        /// Standard error of `boxes_per_ray`.
         boxes_standard_error: f64,
         boxes_low: f64,
         boxes_high: f64,
         objects_per_ray: f64,
-        /// Of that mean.
+        /// Standard error of `objects_per_ray`.
         objects_standard_error: f64,
     }
 
@@ -186,9 +202,9 @@ rows! {
         scene: String,
         method: String,
         repetition: u32,
-        /// How often the picture was drawn.
+        /// Number of times that the picture was drawn.
         repeats: usize,
-        /// Wall time of making the structure.
+        /// Wall time of building the structure.
         build_seconds: f64,
         /// Wall time of drawing on one thread, the least of all repeats.
         render_seconds: f64,
@@ -204,7 +220,7 @@ rows! {
         /// Kind of the rays, the same ones for all methods and layouts.
         rays: String,
         count: u64,
-        /// How many hit something.
+        /// Number of rays that hit something.
         hits: u64,
         missed_hits: u64,
         false_hits: u64,
@@ -231,7 +247,7 @@ rows! {
         preparation_seconds: f64,
         /// Wall time of all rays: the sum over small parts of them of each part's fastest turn.
         seconds: f64,
-        /// The same with each part's median turn.
+        /// Sum over the same parts of each part's median turn.
         median_seconds: f64,
     }
 
@@ -246,8 +262,8 @@ rows! {
         trained_on: String,
         /// Kind of the rays.
         judged_on: String,
-        /// Whether they come from the training's path of cameras: `same`, `other`, or `none`
-        /// without a camera.
+        /// Path of cameras of the rays: `same` as in the training, `other`, or `none` without a
+        /// camera.
         camera: String,
         /// Mean number of nodes tested per ray, eight boxes each: over all rays and repetitions.
         node_tests: f64,
@@ -321,7 +337,7 @@ rows! {
         /// Trees that the numbers are means over.
         repetitions: usize,
         references_per_object: f64,
-        /// Of the wide layout.
+        /// Bytes of the wide layout per object.
         bytes_per_object: f64,
         collapsed_sah: f64,
         /// Nodes and blocks of triangles that a random line through the root's box is expected to
@@ -351,7 +367,7 @@ rows! {
     TreeRow in "trees.csv" {
         scene: String,
         objects: usize,
-        /// Of the boxes, hexadecimal.
+        /// Checksum of the boxes, hexadecimal.
         checksum: String,
         internal_area: f64,
         /// The greatest proven lower bound known of `internal_area`.
@@ -365,9 +381,9 @@ rows! {
     ReferenceRow in "references.csv" {
         scene: String,
         objects: usize,
-        /// Of the boxes, hexadecimal: scenes of the same name are told apart by it.
+        /// Checksum of the boxes, hexadecimal, which distinguishes scenes of the same name.
         checksum: String,
-        /// Which cost.
+        /// Name of the objective.
         objective: String,
         /// The least known, or the exact optimum.
         cost: f64,
@@ -386,7 +402,7 @@ rows! {
 pub const ROUNDING: f64 = 1e-12;
 
 impl ReferenceRow {
-    /// Whether the lower bound proves the reference to be the optimum.
+    /// Returns true if the lower bound proves the reference to be the optimum.
     pub fn is_optimum(&self) -> bool {
         self.lower_bound
             .is_some_and(|bound| bound >= self.cost * (1.0 - ROUNDING))

@@ -35,7 +35,7 @@ impl FinishedRun {
         Ok(())
     }
 
-    /// Reads a kept run back. Refuses one whose files are not what was written.
+    /// Reads a kept run. Rejects a run whose files differ from the written ones.
     pub fn read(part: &Path) -> Result<Self, Error> {
         let damaged = |file: &str| Error::Damaged { part: part.to_owned(), file: file.to_owned() };
         let contents = fs::read_to_string(part.join(CONTENTS)).map_err(|_| damaged(CONTENTS))?;
@@ -67,7 +67,7 @@ impl FinishedRun {
         self.files.iter().map(line).collect()
     }
 
-    /// The first file, other than those with seconds, in which two runs differ.
+    /// Returns the first file without seconds in which two runs differ.
     pub fn difference<'a>(&'a self, other: &'a Self) -> Option<&'a str> {
         let names = self
             .files
@@ -83,7 +83,8 @@ impl FinishedRun {
 /// The treatment of results that exist already.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Existing {
-    /// They stay. A repetition of the same runs goes beside them; other runs are refused.
+    /// They stay. A repetition of the same runs goes into a folder next to them; other runs are
+    /// rejected.
     #[default]
     Keep,
     /// They stay, and those of an interrupted experiment are completed.
@@ -104,9 +105,9 @@ pub struct Store {
 }
 
 impl Store {
-    /// Creates and locks `folder`. If the finished runs of an interrupted experiment are there,
-    /// `existing` decides whether they are resumed, which takes the same resolved spec, discarded,
-    /// or the reason to refuse.
+    /// Creates and locks `folder`. If it has finished runs of an interrupted experiment, `existing`
+    /// decides: they are resumed, which requires the same resolved spec, or discarded, or the folder
+    /// is rejected.
     pub fn open(folder: &Path, resolved: &str, existing: Existing) -> Result<Self, Error> {
         let (folder, partial) = (folder.to_owned(), folder.join(".partial"));
         fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;
@@ -117,16 +118,16 @@ impl Store {
         }
         let spec = partial.join("resolved.toml");
         let found = fs::read_to_string(&spec).ok();
-        let refuse = |what: &str| Err(Error::Usage(format!("{}: {what}", folder.display())));
+        let rejected = |what: &str| Err(Error::Usage(format!("{}: {what}", folder.display())));
         match (existing, found) {
             (Existing::Resume, Some(found)) if found == resolved => {}
             (Existing::Resume, Some(_)) => {
-                return refuse(
+                return rejected(
                     "the interrupted experiment had another spec, scene or seed; --force discards it",
                 );
             }
             (Existing::Keep, Some(_)) if has_finished_runs(&partial)? => {
-                return refuse(
+                return rejected(
                     "there are finished runs of an interrupted experiment; --resume does the rest, --force \
                      discards them",
                 );
@@ -144,7 +145,7 @@ impl Store {
         Ok(Self { folder, partial, _lock: lock })
     }
 
-    /// Where the results go.
+    /// The folder of the results.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -153,13 +154,17 @@ impl Store {
         self.partial.join(part_name(index))
     }
 
-    /// Whether run `index` has been kept; an error if it has, but is damaged.
+    /// Returns true if run `index` has been kept.
+    ///
+    /// # Errors
+    ///
+    /// If its files are damaged.
     pub fn has(&self, index: usize) -> Result<bool, Error> {
         let part = self.part(index);
         if part.is_dir() { FinishedRun::read(&part).map(|_| true) } else { Ok(false) }
     }
 
-    /// Keeps run `index`, in place of a damaged one.
+    /// Keeps run `index`. Replaces a damaged copy of it.
     pub fn keep(&self, index: usize, run: &FinishedRun) -> Result<(), Error> {
         let part = self.part(index);
         let unfinished = part.with_extension("unfinished");
@@ -176,8 +181,7 @@ impl Store {
         fs::rename(&unfinished, &part).map_err(Error::io(&part, "rename the folder"))
     }
 
-    /// The rows of one kind that run `index`, which has been kept, left; none if it left no such
-    /// rows.
+    /// Returns the rows of one kind of the kept run `index`; none if it has no such rows.
     pub fn rows<R: Row>(&self, index: usize) -> Result<Vec<R>, Error> {
         read_if_any(&self.part(index))
     }
@@ -223,13 +227,13 @@ impl Store {
         Ok(files::write(&self.folder.join(name), bytes)?)
     }
 
-    /// Leaves the finished runs of a shard for merging, with where they come from.
+    /// Leaves the finished runs of a shard for merging, with their provenance.
     pub fn keep_shard(self, provenance: &str) -> Result<(), Error> {
         Ok(files::write(&self.partial.join("provenance.toml"), provenance.as_bytes())?)
     }
 
-    /// Removes what only an interrupted experiment needs. The lock file stays: removing it would
-    /// race.
+    /// Removes the kept runs, which only an interrupted experiment needs. The lock file stays:
+    /// removing it would race.
     pub fn finish(self) -> Result<(), Error> {
         // Renamed first, so that an interrupted removal leaves nothing that looks like finished
         // runs.
@@ -240,7 +244,7 @@ impl Store {
     }
 }
 
-/// Removes the runs that a harness has left which was killed after its results were complete.
+/// Removes the runs of a harness that was killed after its results were complete.
 pub fn remove_leftovers(folder: &Path) -> Result<(), Error> {
     let removed = folder.join(REMOVED);
     if !removed.exists() {
@@ -258,12 +262,12 @@ fn remove(folder: &Path) -> Result<(), Error> {
     fs::remove_dir_all(folder).map_err(Error::io(folder, "remove the folder"))
 }
 
-/// The name of the folder in which run `index` is kept.
+/// Returns the name of the folder of the kept run `index`.
 pub fn part_name(index: usize) -> String {
     format!("{index:06}")
 }
 
-/// Whether an interrupted experiment, or a part of one, has left finished runs in its folder.
+/// Returns true if an interrupted experiment, or a shard, has left finished runs in its folder.
 pub fn is_unfinished(folder: &Path) -> bool {
     folder.join(".partial").exists()
 }

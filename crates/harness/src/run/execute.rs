@@ -22,14 +22,14 @@ use std::sync::atomic::AtomicBool;
 
 pub use super::measurement::Verbosity;
 
-/// How much of an experiment to execute.
+/// The part of an experiment to execute.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Extent {
-    /// How to treat existing results.
+    /// The treatment of existing results.
     pub existing: Existing,
     /// Perform only these runs and keep them to be [merged](crate::run::merge::merge).
     pub shard: Option<Shard>,
-    /// Which lines about the runs go to standard error.
+    /// The lines about runs on standard error.
     pub verbosity: Verbosity,
 }
 

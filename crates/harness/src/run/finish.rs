@@ -1,4 +1,4 @@
-//! From finished runs to results: joins their rows, updates the references and makes the reports.
+//! Turns finished runs into results: joins their rows, updates the references and makes the reports.
 
 use crate::Error;
 use crate::report;

@@ -16,7 +16,7 @@ pub(crate) struct Job<'a> {
     pub base: f64,
     pub labelled: &'a Labelled,
     pub repetition: u32,
-    /// Whether this run also makes the measurements that depend only on the scene.
+    /// True if this run also makes the measurements that depend only on the scene.
     pub first_of_scene: bool,
 }
 

@@ -1,9 +1,8 @@
 //! Random rays that judge trees instead of a cost.
 
-use crate::measure::empirical_cost;
-use crate::rows::RayRow;
 use bvh_core::Bvh;
 use bvh_scenes::Scene;
+use bvh_scenes::rays::{RandomRays, empirical_cost};
 use bvh_search::Judge;
 
 /// Judges a tree by the mean number of box tests of random rays, the same rays for every tree.
@@ -16,7 +15,7 @@ use bvh_search::Judge;
 /// open, but new rays for every evaluation would explain the instability.
 #[derive(Debug)]
 pub(crate) struct RayJudge<'a> {
-    pub rays: &'a empirical_cost::Config,
+    pub rays: &'a RandomRays,
     pub scene: &'a Scene,
     /// Seed of the rays. Every repetition uses different rays, and none of them reappear in the
     /// final measurement.
@@ -25,7 +24,8 @@ pub(crate) struct RayJudge<'a> {
 
 impl Judge for RayJudge<'_> {
     fn judge(&self, tree: &Bvh) -> f64 {
-        empirical_cost::measure(self.rays, self.scene, tree, self.seed, RayRow::default())
-            .boxes_per_ray
+        empirical_cost(self.rays, &self.scene.primitives, tree, self.seed)
+            .boxes
+            .mean
     }
 }

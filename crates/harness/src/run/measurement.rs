@@ -66,7 +66,7 @@ fn all_finished(jobs: &[Job]) -> Error {
     Error::Interrupted { finished: jobs.len(), runs: jobs.len() }
 }
 
-/// How the progress of runs is reported on standard error.
+/// The reports on the progress of runs on standard error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Verbosity {
     /// A bar on a terminal, otherwise nothing.

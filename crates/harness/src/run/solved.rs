@@ -1,11 +1,10 @@
 //! The rows of a finished run.
 
 use super::job::Job;
-use crate::measure::empirical_cost;
 use crate::rows::{ClockRow, HistoryRow, RayRow, RunRow, TimingRow, TrialRow};
 use crate::spec::Experiment;
 use bvh_core::cost::{self, SahConstants};
-use bvh_scenes::rays::Family;
+use bvh_scenes::rays::{Family, RandomRays, empirical_cost};
 use bvh_scenes::trace::Query;
 use bvh_search::{Event, Outcome};
 
@@ -111,7 +110,7 @@ impl Solved<'_> {
             .collect()
     }
 
-    fn ray_row(&self, config: &empirical_cost::Config) -> RayRow {
+    fn ray_row(&self, config: &RandomRays) -> RayRow {
         let (family, stream) = match config.family {
             Family::Inside => ("inside", "rays Inside"),
             Family::Lines => ("lines", "rays Lines"),
@@ -124,17 +123,25 @@ impl Solved<'_> {
         let (scene, method, repetition) = self.identity();
         // Every method gets the same rays, so that methods differ only in their trees.
         let ray_seed = self.experiment.seed_of(&scene, stream, 0);
-        let identity = RayRow {
+        let primitives = &self.job.scene.primitives;
+        let cost = empirical_cost(config, primitives, &self.outcome.tree, ray_seed);
+        let [boxes_low, boxes_high] = cost.boxes.interval();
+        RayRow {
             scene,
             method,
             seed: self.seed,
             repetition,
             family: family.into(),
             query: query.into(),
-            ..Default::default()
-        };
-        let tree = &self.outcome.tree;
-        empirical_cost::measure(config, self.job.scene, tree, ray_seed, identity)
+            rays: cost.rays,
+            hit_fraction: cost.hit_fraction,
+            boxes_per_ray: cost.boxes.mean,
+            boxes_standard_error: cost.boxes.standard_error,
+            boxes_low,
+            boxes_high,
+            objects_per_ray: cost.objects.mean,
+            objects_standard_error: cost.objects.standard_error,
+        }
     }
 }
 

@@ -12,7 +12,7 @@ pub struct Target {
     pub folder: PathBuf,
     /// The folder with finished results of the same runs, if this run repeats them.
     pub previous: Option<PathBuf>,
-    /// Whether the folder already holds all requested results.
+    /// True if the folder already holds all requested results.
     pub is_finished: bool,
 }
 

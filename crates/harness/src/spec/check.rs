@@ -4,7 +4,6 @@
 
 use super::Experiment;
 use crate::contestant::{Contestant, EntryOptions, Labelled};
-use crate::stress;
 use bvh_config::OutOfRange;
 use bvh_config::fault::{Fault, is_within};
 use bvh_scenes::subset;
@@ -42,7 +41,7 @@ impl Experiment {
             return Err(OutOfRange::new("scenes", "empty", "at least one name or path"));
         }
         for name in &self.scenes {
-            if self.suite.is_some() && stress::by_id(name).is_none() {
+            if self.suite.is_some() && bvh_stress::by_id(name).is_none() {
                 return rejected(name, "cases of the suite, S01 to S45");
             }
             if subset::names(name) == 0 {

@@ -11,13 +11,14 @@ mod schema;
 
 use crate::contestant::{Contestant, Labelled};
 use crate::measure::picture;
-use crate::measure::{empirical_cost, ray_cost, speed};
+use crate::measure::{ray_cost, speed};
 use crate::processor::PROCESSOR;
 use crate::report::Report;
 use crate::stress;
 use bvh_config::{Nested, config};
 use bvh_core::cost::Objective;
 use bvh_scenes::fnv1a;
+use bvh_scenes::rays::RandomRays;
 use bvh_search::{Budget, exact};
 pub use name::Name;
 pub use read::Overrides;
@@ -34,7 +35,7 @@ config! {
     pub struct Experiment {
         /// Name of the results folder, from the spec's file.
         name: Name;
-        /// Whether this is the smaller variant of `--quick`.
+        /// True for the smaller variant of `--quick`.
         #[serde(skip_serializing_if = "std::ops::Not::not")]
         quick: bool;
         /// The question that the experiment answers, for its readers.
@@ -73,7 +74,7 @@ config! {
         /// The methods, at least one; with `suite`, none for every method of the registry.
         methods: Vec<Labelled>;
         /// Measurements of every run's tree with random rays.
-        rays: Vec<empirical_cost::Config>, in Nested;
+        rays: Vec<RandomRays>, in Nested;
         /// A picture drawn with every run's tree, with brute force and with a KD-tree.
         render: Option<picture::Config>, in Nested;
         /// Rays traced through the tree of every method's first run, in all layouts, interleaved.

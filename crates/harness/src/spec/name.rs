@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A name that is safe for a folder in the results: it cannot lead outside, and the harness gives
-/// it to none of its own files. Empty until a spec gets the name of its file.
+/// it to none of its files. Empty until a spec gets the name of its file.
 #[derive(
     Clone,
     Debug,

@@ -1,4 +1,4 @@
-//! From a spec's text to a checked [`Experiment`], with the overrides of the command line.
+//! Reads a spec's text, with the overrides of the command line, into a checked [`Experiment`].
 
 use super::{Experiment, Labelled, Name, check};
 use crate::Error;

@@ -1,8 +1,7 @@
 //! Statistics: quantiles, the expected best of several trials, the primal integral, correlations,
-//! rank tests, time-to-target fits.
+//! time-to-target fits.
 
 pub mod best_of;
-pub mod rank;
 pub mod time_to_target;
 
 /// Returns the values in ascending order.
@@ -103,7 +102,7 @@ pub fn expected_best_of(pool: &[f64], m: usize) -> Option<f64> {
 }
 
 /// Half the width of the normal distribution's central 95 % interval, in standard deviations.
-pub const NORMAL_95: f64 = 1.959_963_984_540_054;
+const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 /// Returns the geometric mean of positive values; NaN if there are no values.
 pub fn geometric_mean(values: &[f64]) -> f64 {

@@ -10,7 +10,7 @@ pub struct Found {
     pub depth: usize,
     /// The internal area.
     pub cost: f64,
-    /// The broken promises, in the notation of [`Broken`](super::promise::Broken).
+    /// The broken promises, in the notation of [`Broken`](bvh_stress::Broken).
     pub broken: Vec<String>,
 }
 
@@ -31,14 +31,14 @@ pub fn examine(_: &str, _: &[bvh_core::Triangle]) -> Option<Found> {
 mod compiled_in {
     use super::Found;
     use crate::peers::{NoSettings, Obvhs, Peer, Preset, Raw};
-    use crate::stress::exact_area;
-    use crate::stress::examine::ROUNDING;
-    use crate::stress::promise::Promise::{P2, P3, P5, P7};
-    use crate::stress::tracing::rays;
-    use crate::stress::transform::{same_topology, scale_range, scaled};
     use bvh_core::{Primitives, Ray, Shear, Triangle, cost, validate};
     use bvh_scenes::builtin::stiff;
     use bvh_scenes::trace::{Accelerator, Structure};
+    use bvh_stress::Promise::{P2, P3, P5, P7};
+    use bvh_stress::exact_area;
+    use bvh_stress::examine::ROUNDING;
+    use bvh_stress::tracing::rays;
+    use bvh_stress::transform::{same_topology, scale_range, scaled};
 
     /// The names of the libraries. Adding a library takes one line here and one in [`peer`].
     pub const NAMES: &[&str] = &["bvh 0.13", "obvhs 0.4 fast", "obvhs 0.4 slow"];

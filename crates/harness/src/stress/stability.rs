@@ -1,21 +1,20 @@
 //! The experiment `stability`: every case with every method, traversal and part, as rows and a heat
 //! map.
 
-use super::case::{Case, Effort, LargerScenes, Part, SceneCase, Size, is_builder};
-use super::cell::Cell;
-use super::examine::Examined;
+use super::child;
 use super::peers::{self, Found};
-use super::promise::{Broken, Promise};
-use super::table::CASES;
-use super::{child, tracing};
 use crate::Error;
 use crate::contestant::{Contestant, Labelled};
 use crate::report::output::Output;
-use crate::rows::columns::{Columns, read, to_bytes};
 use crate::rows::store::Store;
+use crate::rows::{read, to_bytes};
 use bvh_config::config;
+use bvh_stress::examine::Examined;
+use bvh_stress::{
+    Broken, CASES, Case, Cell, Effort, LargerScenes, Part, Promise, SceneCase, Size, is_builder,
+    tracing,
+};
 use figures::HeatMap;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -39,7 +38,7 @@ config! {
 }
 
 /// The outcome of a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 enum Class {
     #[serde(rename = "as promised")]
     Kept,
@@ -55,7 +54,7 @@ const CLASSES: [&str; 4] =
     ["as promised", "typed error, as promised", "promise broken", "crash or hang"];
 
 /// One cell, as written to `cells.csv`, and for other libraries to `timing_third_party_cells.csv`.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Row {
     /// The case.
     scene: String,
@@ -75,22 +74,17 @@ struct Row {
 }
 
 /// The time of a method on a case's scene, as written to `timing_cells.csv`.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Timing {
     scene: String,
     method: String,
     objects: usize,
     /// Wall time.
     seconds: f64,
-    /// The same per object.
+    /// Wall time per object, in nanoseconds.
     nanoseconds_per_object: f64,
     /// Peak memory of builders on S36, beyond the boxes, if the system reports it.
     peak_bytes_per_object: Option<f64>,
-}
-
-/// The columns of the files that a measurement writes.
-pub fn columns() -> Vec<Columns> {
-    vec![Columns::of::<Row>(), Columns::of::<Timing>()]
 }
 
 /// The case whose memory is measured.

@@ -1,0 +1,177 @@
+//! The empirical cost of a tree: the number of tests of random rays, with its standard error.
+//!
+//! Ng & Trifonov 2003, section 4: random rays start inside the root's box, and any hit ahead of the
+//! origin ends a ray. The surface area costs assume other rays: lines through the whole box that no
+//! hit ends.
+
+use super::random::{Family, random_ray};
+use crate::trace::{Accelerator, Query};
+use bvh_config::config;
+use bvh_core::{Aabb, Bvh, Primitives, TestCounts};
+use bvh_search::Stream;
+use rand::SeedableRng;
+use rayon::prelude::*;
+
+config! {
+    /// Random rays and their query.
+    pub struct RandomRays {
+        /// The distribution of the rays.
+        family: Family = Family::Inside;
+        /// The query of the rays.
+        query: Query = Query::Any;
+        /// The number of rays.
+        count: u64 = 10_000, in 1..;
+    }
+}
+
+/// Sums over some rays. They are integers, so that the order of addition does not matter.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    rays: u64,
+    hits: u64,
+    boxes: u64,
+    boxes_squared: u128,
+    objects: u64,
+    objects_squared: u128,
+}
+
+impl Sums {
+    fn add(mut self, other: Self) -> Self {
+        self.rays += other.rays;
+        self.hits += other.hits;
+        self.boxes += other.boxes;
+        self.boxes_squared += other.boxes_squared;
+        self.objects += other.objects;
+        self.objects_squared += other.objects_squared;
+        self
+    }
+}
+
+/// The mean of a number over random rays, with its standard error.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Mean {
+    /// The mean.
+    pub mean: f64,
+    /// The standard error of the mean.
+    pub standard_error: f64,
+}
+
+impl Mean {
+    /// Returns mean and standard error of `count` numbers from their sum and sum of squares.
+    fn of_sums(count: u64, sum: u64, squares: u128) -> Self {
+        let n = count as f64;
+        let sum = sum as f64;
+        let variance = ((squares as f64 - sum * sum / n) / (n - 1.0).max(1.0)).max(0.0);
+        Self { mean: sum / n, standard_error: (variance / n).sqrt() }
+    }
+
+    /// Returns the ends of the 95 % interval.
+    pub fn interval(&self) -> [f64; 2] {
+        /// The quantile 0.975 of the standard normal distribution.
+        const NORMAL_95: f64 = 1.959_963_984_540_054;
+        let half = NORMAL_95 * self.standard_error;
+        [self.mean - half, self.mean + half]
+    }
+}
+
+/// The tests of random rays in a tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EmpiricalCost {
+    /// Number of rays.
+    pub rays: u64,
+    /// Fraction of the rays that hit something.
+    pub hit_fraction: f64,
+    /// Tests against boxes per ray, with the root's box and the leaves' boxes.
+    pub boxes: Mean,
+    /// Tests against objects per ray.
+    pub objects: Mean,
+}
+
+/// Number of rays per random stream. Results depend on it, since it decides which rays are drawn.
+const CHUNK: u64 = 1024;
+
+/// Measures a tree over `primitives` by the rays of `config`, drawn from `seed`, on all threads of
+/// the current rayon pool. An empty tree costs nothing.
+pub fn empirical_cost(
+    config: &RandomRays,
+    primitives: &Primitives,
+    tree: &Bvh,
+    seed: u64,
+) -> EmpiricalCost {
+    let Some(root) = tree.root_aabb() else { return EmpiricalCost::default() };
+    let accelerator = Accelerator::of_tree(primitives, tree);
+    let sums = (0..config.count.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| measure_chunk(config, &accelerator, &root, seed, chunk))
+        .reduce(Sums::default, Sums::add);
+    EmpiricalCost {
+        rays: sums.rays,
+        hit_fraction: sums.hits as f64 / sums.rays as f64,
+        boxes: Mean::of_sums(sums.rays, sums.boxes, sums.boxes_squared),
+        objects: Mean::of_sums(sums.rays, sums.objects, sums.objects_squared),
+    }
+}
+
+/// Traces the rays of one random stream.
+fn measure_chunk(
+    config: &RandomRays,
+    accelerator: &Accelerator,
+    root: &Aabb,
+    seed: u64,
+    chunk: u64,
+) -> Sums {
+    let mut rng = Stream::seed_from_u64(seed);
+    rng.set_stream(chunk);
+    let mut sums = Sums::default();
+    for _ in chunk * CHUNK..config.count.min((chunk + 1) * CHUNK) {
+        let mut counts = TestCounts::default();
+        // A box of one point has no rays; each counts as a ray without tests or hits.
+        let hit = random_ray(config.family, root, &mut rng)
+            .is_some_and(|ray| accelerator.count(config.query, &ray, &mut counts));
+        sums = sums.add(Sums {
+            rays: 1,
+            hits: u64::from(hit),
+            boxes: counts.boxes,
+            boxes_squared: u128::from(counts.boxes).pow(2),
+            objects: counts.objects,
+            objects_squared: u128::from(counts.objects).pow(2),
+        });
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Scene;
+    use bvh_build::{Builder, muller_fellner};
+
+    fn measured(family: Family, query: Query, count: u64, seed: u64) -> (EmpiricalCost, Bvh) {
+        let scene = Scene::load("escher:2000").unwrap();
+        let tree = muller_fellner::Config::default()
+            .build(&scene.boxes)
+            .unwrap();
+        let rays = RandomRays { family, query, count };
+        (empirical_cost(&rays, &scene.primitives, &tree, seed), tree)
+    }
+
+    #[test]
+    fn lines_are_tested_against_the_root_and_both_children_of_every_inner_node_they_meet() {
+        let (cost, tree) = measured(Family::Lines, Query::All, 40_000, 1);
+        let expected = 1.0 + bvh_core::cost::goldsmith_salmon(&tree);
+        let error = (cost.boxes.mean - expected).abs();
+        // An unlucky seed exceeds four standard errors once in 16 000.
+        assert!(error < 4.0 * cost.boxes.standard_error, "{cost:?} {expected}");
+    }
+
+    #[test]
+    fn any_hit_needs_fewer_tests_than_nearest_and_nearest_fewer_than_all() {
+        let boxes = [Query::Any, Query::Nearest, Query::All].map(|query| {
+            measured(Family::Inside, query, 5_000, 4)
+                .0
+                .boxes
+                .mean
+        });
+        assert!(boxes[0] < boxes[1] && boxes[1] < boxes[2], "{boxes:?}");
+    }
+}

@@ -1,0 +1,233 @@
+//! Compares every kernel of the wide layout, ray by ray and in batches with both hints, with
+//! testing every triangle; and makes rays where rounding decides.
+
+use crate::promise::{Broken, ensure};
+use crate::tracing::{self, bits, wide_layouts};
+use bvh_core::{Coherence, Distances, Hit, Primitives, Ray, RayComponents, Triangle, WideBvh};
+use bvh_scenes::trace::{Accelerator, Structure};
+use bvh_search::Stream;
+use glam::Vec3;
+use rand::seq::IndexedRandom;
+use rand::{RngExt, SeedableRng};
+
+/// The lengths of consecutive batches: one ray, fewer and more rays than a kernel processes at
+/// once, and far more.
+const LENGTHS: [usize; 12] = [1, 3, 16, 15, 17, 33, 7, 23, 25, 65, 257, 1023];
+
+/// Checks P3, bit by bit, for the layouts of two trees and every kernel of this processor. Returns
+/// the number of rays that hit.
+pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
+    let objects = Primitives::Triangles(triangles.to_vec());
+    let brute_force = Accelerator::new(&objects, Structure::Brute);
+    let expected: Vec<_> = rays
+        .iter()
+        .map(|ray| brute_force.nearest_hit(ray))
+        .collect();
+    for (kernel, wide) in wide_layouts(triangles).map_err(Broken::case)? {
+        let nearest: Vec<_> = rays
+            .iter()
+            .map(|ray| wide.nearest_hit(ray))
+            .collect();
+        let any: Vec<_> = rays.iter().map(|ray| wide.any_hit(ray)).collect();
+        compare(rays, &expected, &nearest, &any)
+            .map_err(|broken| broken.within(format!("{kernel:?}")))?;
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let mut nearest = vec![Hit::MISS; rays.len()];
+            let mut any = vec![false; rays.len()];
+            let mut done = 0;
+            for length in LENGTHS.into_iter().cycle() {
+                let batch = done..rays.len().min(done + length);
+                wide.nearest_hits(&rays[batch.clone()], &mut nearest[batch.clone()], coherence);
+                wide.any_hits(&rays[batch.clone()], &mut any[batch.clone()], coherence);
+                done = batch.end;
+                if done == rays.len() {
+                    break;
+                }
+            }
+            let nearest: Vec<_> = nearest
+                .iter()
+                .map(|hit| (!hit.is_miss()).then_some(*hit))
+                .collect();
+            compare(rays, &expected, &nearest, &any)
+                .map_err(|broken| broken.within(format!("{kernel:?}, {coherence:?}")))?;
+            let (nearest, any) = by_component(&wide, rays, coherence);
+            compare(rays, &expected, &nearest, &any).map_err(|broken| {
+                broken.within(format!("{kernel:?}, {coherence:?}, by component"))
+            })?;
+        }
+    }
+    Ok(expected.iter().flatten().count())
+}
+
+/// Checks both kinds of answers to each ray against testing every triangle.
+fn compare(
+    rays: &[Ray],
+    expected: &[Option<Hit>],
+    nearest: &[Option<Hit>],
+    any: &[bool],
+) -> Result<(), Broken> {
+    for (index, ray) in rays.iter().enumerate() {
+        let expected = expected[index];
+        let nearest = nearest[index];
+        let any = any[index];
+        let is_right = bits(nearest) == bits(expected) && any == expected.is_some();
+        ensure!(
+            is_right,
+            P3: "{ray:?} gives {nearest:?} and {any}, testing every triangle {expected:?}"
+        );
+    }
+    Ok(())
+}
+
+/// Returns the answers to one batch of rays that is passed component by component.
+fn by_component(
+    wide: &WideBvh,
+    rays: &[Ray],
+    coherence: Coherence,
+) -> (Vec<Option<Hit>>, Vec<bool>) {
+    let origins = components(rays, Ray::origin);
+    let directions = components(rays, Ray::direction);
+    let t_min: Vec<_> = rays.iter().map(Ray::t_min).collect();
+    let t_max: Vec<_> = rays.iter().map(Ray::t_max).collect();
+    let components = RayComponents::new(
+        origins.each_ref().map(Vec::as_slice),
+        directions.each_ref().map(Vec::as_slice),
+        Distances::Each(&t_min),
+        Distances::Each(&t_max),
+    );
+    let components = components.expect("rays");
+    let mut distances = vec![0.0; rays.len()];
+    let mut objects = vec![0; rays.len()];
+    let mut any = vec![false; rays.len()];
+    wide.nearest_hits_by_component(&components, &mut distances, &mut objects, coherence);
+    wide.any_hits_by_component(&components, &mut any, coherence);
+    let hits = distances
+        .into_iter()
+        .zip(objects)
+        .map(|(t, object)| Hit { t, object });
+    let nearest = hits.map(|hit| if hit.is_miss() { None } else { Some(hit) });
+    (nearest.collect(), any)
+}
+
+fn components(rays: &[Ray], vector: fn(&Ray) -> Vec3) -> [Vec<f32>; 3] {
+    [0, 1, 2].map(|axis| rays.iter().map(|ray| vector(ray)[axis]).collect())
+}
+
+/// Returns rays of [`tracing::rays`], half of them single, half in bundles.
+pub fn random(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
+    half_in_bundles(count, seed, |count| tracing::rays(triangles, count, seed))
+}
+
+/// Returns rays where rounding decides, half of them single, half in bundles.
+///
+/// The rays run in planes of triangles and along edges, from and through their corners, edges and
+/// centres, and along axes, exactly or nearly. Their directions have any length, which makes
+/// distances underflow. They cover half lines, single points, and ranges that end at a hit or next
+/// to it.
+pub fn adversarial(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
+    let objects = Primitives::Triangles(triangles.to_vec());
+    let brute_force = Accelerator::new(&objects, Structure::Brute);
+    let mut rng = Stream::seed_from_u64(seed);
+    half_in_bundles(count, seed, |count| {
+        let draws =
+            (0..20 * count).filter_map(|_| one_adversarial(triangles, &brute_force, &mut rng));
+        draws.take(count).collect()
+    })
+}
+
+fn one_adversarial(
+    triangles: &[Triangle],
+    brute_force: &Accelerator,
+    rng: &mut Stream,
+) -> Option<Ray> {
+    let nowhere = Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]);
+    let triangle = triangles.choose(rng).unwrap_or(&nowhere);
+    let target = in_plane(triangle, rng);
+    let other = in_plane(triangle, rng);
+    let mut along = Vec3::from([(); 3].map(|()| if rng.random() { 0.0 } else { -0.0 }));
+    along[rng.random_range(0..3)] = if rng.random() { 1.0 } else { -1.0 };
+    if rng.random() {
+        along[rng.random_range(0..3)] += pick(&[1e-7, -1e-30, 1e-42, 1.0], rng);
+    }
+    let size = triangle.aabb().extent().max_element() as f32;
+    let direction = match rng.random_range(0..4) {
+        0 => triangle.0[1] - triangle.0[0],
+        1 => other - target,
+        2 => along,
+        _ => Vec3::from([(); 3].map(|()| rng.random_range(-1.0..1.0))),
+    };
+    // The largest component becomes 1, so that every length below is accepted.
+    let direction = direction / direction.abs().max_element();
+    let back = pick(&[0.0, 0.0, 1.0, -1.0, 0.3, 100.0, 1e-7], rng);
+    let origin = target - direction * (size * back).min(f32::MAX / 4.0);
+    let direction = direction * 2f32.powi(pick(&[0, 0, 1, -99, 99, 60, -60], rng));
+    let t = Ray::half_line(origin, direction)
+        .ok()
+        .map(|ray| brute_force.nearest_hit(&ray))?
+        .map_or(1.0, |hit| hit.t);
+    let (t_min, t_max) = match rng.random_range(0..12) {
+        0 | 1 => (t, t),
+        2 => (0.0, t),
+        3 => (t, f32::INFINITY),
+        4 => (0.0, t.next_down().max(0.0)),
+        5 => (t.next_up(), f32::MAX),
+        6 => (t.next_up(), t),
+        _ => (0.0, f32::INFINITY),
+    };
+    Ray::new(origin, direction, t_min, t_max).ok()
+}
+
+/// Returns a corner, a point of an edge, the centre, or any point in the plane near the triangle.
+fn in_plane(Triangle([a, b, c]): &Triangle, rng: &mut Stream) -> Vec3 {
+    let (u, v) = match rng.random_range(0..5) {
+        0 => (0.0, 0.0),
+        1 => (0.5, 0.0),
+        2 => (rng.random(), 0.0),
+        3 => (1.0 / 3.0, 1.0 / 3.0),
+        _ => (rng.random_range(-1.0..2.0), rng.random_range(-1.0..2.0)),
+    };
+    a * (1.0 - u - v) + b * u + c * v
+}
+
+fn pick<T: Copy>(of: &[T], rng: &mut Stream) -> T {
+    *of.choose(rng).expect("some")
+}
+
+/// The number of rays in a bundle, the same as in a packet.
+const BUNDLE: usize = 64;
+
+/// Returns `count` rays: half of them directly from `make`, half in bundles around further rays of
+/// `make`. The rays of a bundle are equal, nearly equal, or close to each other.
+fn half_in_bundles(count: usize, seed: u64, mut make: impl FnMut(usize) -> Vec<Ray>) -> Vec<Ray> {
+    let mut rng = Stream::seed_from_u64(!seed);
+    let mut rays = make(count / 2);
+    let first = rays.len();
+    for ray in make((count - first).div_ceil(BUNDLE)) {
+        let spread = pick(&[0.0, 1e-7, 1e-3, 0.1], &mut rng);
+        let mut near =
+            || Vec3::from([(); 3].map(|()| 1.0 + spread * rng.random_range(-1.0..1.0f32)));
+        for _ in 0..BUNDLE {
+            // Factors instead of offsets keep zeros, and work at every scale.
+            let origin = ray.origin() * near();
+            let direction = ray.direction() * near();
+            rays.push(Ray::new(origin, direction, ray.t_min(), ray.t_max()).unwrap_or(ray));
+        }
+    }
+    rays.truncate(count);
+    rays
+}
+
+/// Scales triangles by 2^`exponent`, which makes some of them denormal if the exponent is very low;
+/// `None` if they would not be finite.
+pub fn scaled(triangles: &[Triangle], exponent: i32) -> Option<Vec<Triangle>> {
+    // Two steps, because 2^-140 itself is denormal and would lose bits.
+    let step = 2f32.powi(exponent / 2);
+    let scaled: Vec<_> = triangles
+        .iter()
+        .map(|t| Triangle(t.0.map(|p| p * step * step)))
+        .collect();
+    scaled
+        .iter()
+        .all(|t| t.aabb().check().is_ok())
+        .then_some(scaled)
+}

@@ -1,0 +1,127 @@
+//! The promises that the suite checks, and the reports of broken ones.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// A promise of every method, traversal and reader for every input.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
+pub enum Promise {
+    /// No panic, hang or abort: a tree, or a typed error naming the object.
+    P1,
+    /// Containment is exact, bit by bit.
+    P2,
+    /// No false miss: every traversal gives the answers of brute force.
+    P3,
+    /// The same bytes for any number of threads.
+    P4,
+    /// Scaling by 2^k leaves the topology and multiplies areas by 4^k.
+    P5,
+    /// Depth is reported, no stack overflows.
+    P6,
+    /// Every cost is finite and equals the tree's cost.
+    P7,
+}
+
+impl Promise {
+    /// Reports that `what` breaks this promise.
+    pub fn broken(self, what: impl fmt::Display) -> Broken {
+        Broken { promise: Some(self), what: what.to_string() }
+    }
+}
+
+impl fmt::Display for Promise {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        fmt::Debug::fmt(self, f)
+    }
+}
+
+impl FromStr for Promise {
+    type Err = ();
+
+    fn from_str(name: &str) -> Result<Self, ()> {
+        use Promise::{P1, P2, P3, P4, P5, P6, P7};
+        [P1, P2, P3, P4, P5, P6, P7]
+            .into_iter()
+            .find(|promise| promise.to_string() == name)
+            .ok_or(())
+    }
+}
+
+/// A broken promise. Its text form, which can be parsed again, is `P2: observation`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Broken {
+    /// The general promise; none if only the case makes it.
+    pub promise: Option<Promise>,
+    /// The observation.
+    pub what: String,
+}
+
+impl Broken {
+    /// For `map_err`: reports a failure that breaks a promise of the case itself.
+    pub fn case(what: impl fmt::Display) -> Self {
+        Self { promise: None, what: what.to_string() }
+    }
+
+    /// Adds the `place` of the observation.
+    pub fn within(self, place: impl fmt::Display) -> Self {
+        Self { what: format!("{place}: {}", self.what), ..self }
+    }
+}
+
+impl fmt::Display for Broken {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self.promise {
+            Some(promise) => write!(f, "{promise}: {}", self.what),
+            None => f.write_str(&self.what),
+        }
+    }
+}
+
+impl From<&str> for Broken {
+    fn from(text: &str) -> Self {
+        match text
+            .split_once(": ")
+            .map(|(name, what)| (name.parse(), what))
+        {
+            Some((Ok(promise), what)) => Self { promise: Some(promise), what: what.into() },
+            _ => Self::case(text),
+        }
+    }
+}
+
+/// The text of a note, or the broken promise.
+pub type Verdict = Result<String, Broken>;
+
+/// Returns an error unless the condition holds: `ensure!(condition, P7: "cost {cost}")`, or without
+/// `P7:` for promises of the case itself.
+macro_rules! ensure {
+    ($holds:expr, $promise:ident: $($what:tt)+) => {
+        let holds: bool = $holds;
+        if !holds {
+            return Err($crate::promise::Promise::$promise.broken(format!($($what)+)));
+        }
+    };
+    ($holds:expr, $($what:tt)+) => {
+        let holds: bool = $holds;
+        if !holds {
+            return Err($crate::promise::Broken::case(format!($($what)+)));
+        }
+    };
+}
+pub(crate) use ensure;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_broken_promise_is_read_as_it_was_shown() {
+        for broken in
+            [Promise::P3.broken("2 of 9 rays: missed"), Broken::case("depth 7: 6 would do")]
+        {
+            assert_eq!(Broken::from(broken.to_string().as_str()), broken);
+        }
+    }
+}

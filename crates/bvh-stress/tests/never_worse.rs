@@ -1,0 +1,169 @@
+//! No search returns a tree that costs more than one it built on its way or got from its caller,
+//! and `best` never costs more than its start with the smallest budgets.
+//!
+//! The tests cover small versions of all built-in and stiff scenes, all methods, and budgets from
+//! nothing to several hundred nodes per object.
+
+use bvh_build::{Builder, muller_fellner, ploc};
+use bvh_core::{Aabb, Triangle, cost, validate};
+use bvh_scenes::Scene;
+use bvh_scenes::builtin::stiff;
+use bvh_search::{Budget, Method, Observer, Outcome, Problem, best, solve};
+use bvh_stress::EXACT_OBJECTS;
+use bvh_stress::examine::ROUNDING;
+use rand::{RngExt, SeedableRng};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+/// Returns triangles with corners anywhere in the unit cube; most are as large as the scene.
+fn soup(n: usize) -> Vec<Aabb> {
+    let mut random = bvh_search::Stream::seed_from_u64(1);
+    let mut corner = || [random.random::<f32>(), random.random(), random.random()];
+    (0..n)
+        .map(|_| Triangle::from([corner(), corner(), corner()]).aabb())
+        .collect()
+}
+
+/// Returns all scenes with several hundred objects, and a few that are stiff only at larger sizes.
+fn scenes() -> Vec<(String, Vec<Aabb>)> {
+    let built_in =
+        ["bijou", "cloister", "escher", "konistil", "pinecon2", "spheres7500"].map(|name| {
+            let name = format!("{name}:300");
+            let boxes = Scene::load(&name).unwrap().boxes;
+            (name, boxes)
+        });
+    let stiff = stiff::STIFF
+        .iter()
+        .map(|(id, triangles)| ((*id).to_owned(), stiff::boxes(&triangles(300))));
+    let soups = [300, 3000].map(|n| (format!("soup of {n}"), soup(n)));
+    let larger = ["S06:2000", "S17:2000", "S30:2000"].map(|name| {
+        let boxes = Scene::load(name).unwrap().boxes;
+        (name.to_owned(), boxes)
+    });
+    built_in
+        .into_iter()
+        .chain(stiff)
+        .chain(soups)
+        .chain(larger)
+        .collect()
+}
+
+/// Work per object: near the border between small and large budgets, and beyond.
+const WORK: [u64; 7] = [0, 3, 19, 20, 25, 60, 300];
+
+fn solved(method: &Method, problem: &Problem, work: u64, observer: &dyn Observer) -> Outcome {
+    let max_work = Some(work * problem.boxes.len() as u64);
+    let outcome =
+        solve(method, problem, 1, Budget { max_work, ..Budget::UNLIMITED }, observer).unwrap();
+    validate(&outcome.tree, problem.boxes).unwrap();
+    outcome
+}
+
+/// Returns true if a cost is at most `limit`, except for the rounding of a sum updated by
+/// increments.
+fn at_most(cost: f64, limit: f64) -> bool {
+    cost <= limit * (1.0 + ROUNDING)
+}
+
+#[test]
+fn no_method_ends_above_a_tree_that_it_has_evaluated_or_that_its_caller_has() {
+    for (name, boxes) in scenes()
+        .into_iter()
+        .filter(|(_, boxes)| boxes.len() <= 600)
+    {
+        for method in Method::all() {
+            let few = &boxes[..boxes.len().min(EXACT_OBJECTS)];
+            let boxes = if let Method::Exact(_) = method { few } else { &boxes };
+            let known = muller_fellner::Config::default()
+                .build(boxes)
+                .unwrap();
+            for work in [0, 20, 60] {
+                let here = format!("{name}, {}, {work} per object", method.name());
+                let found = solved(&method, &Problem::new(boxes), work, &());
+                let least = found
+                    .history
+                    .iter()
+                    .map(|event| event.cost)
+                    .fold(f64::INFINITY, f64::min);
+                assert!(at_most(found.cost, least), "{here}: {} after {least}", found.cost);
+                assert!(at_most(cost::internal_area(&found.tree), found.cost), "{here}");
+                let problem = Problem { known: Some(&known), ..Problem::new(boxes) };
+                let informed = solved(&method, &problem, work, &());
+                let least = found.cost.min(cost::internal_area(&known));
+                assert_eq!(informed.cost, least, "{here}");
+            }
+        }
+    }
+}
+
+#[test]
+fn no_budget_of_the_best_ends_above_the_fastest_builder() {
+    let fastest = ploc::Config { radius: 5, near_rounds: 1 };
+    let method = Method::Best(best::Config::default());
+    for (name, boxes) in scenes() {
+        let limit = cost::internal_area(&fastest.build(&boxes).unwrap());
+        for work in WORK {
+            let found = solved(&method, &Problem::new(&boxes), work, &());
+            assert!(
+                at_most(found.cost, limit),
+                "{name}, {work} per object: {} above {limit}",
+                found.cost
+            );
+        }
+    }
+}
+
+#[test]
+fn local_searches_begin_no_more_than_a_little_above_the_greedy_tree() {
+    for (name, boxes) in scenes() {
+        let greedy = cost::internal_area(
+            &muller_fellner::Config::default()
+                .build(&boxes)
+                .unwrap(),
+        );
+        for method in Method::all()
+            .iter()
+            .filter(|method| ["reinsertion", "annealing"].contains(&method.name()))
+        {
+            let begin = solved(method, &Problem::new(&boxes), 0, &()).cost;
+            assert!(begin <= 1.15 * greedy, "{name}, {}: {begin} above {greedy}", method.name());
+        }
+    }
+}
+
+/// A clock that expires after a number of queries of any kind.
+struct Questions {
+    asked: AtomicU64,
+    most: u64,
+}
+
+impl Observer for Questions {
+    fn cancelled(&self) -> bool {
+        self.asked.fetch_add(1, Relaxed) >= self.most
+    }
+
+    fn progress(&self) -> Option<f64> {
+        let asked = self.asked.fetch_add(1, Relaxed);
+        Some((asked as f64 / self.most as f64).min(1.0))
+    }
+}
+
+#[test]
+fn a_clock_ends_no_search_above_the_tree_that_its_caller_has() {
+    let boxes = soup(3000);
+    let known = muller_fellner::Config::default()
+        .build(&boxes)
+        .unwrap();
+    let limit = cost::internal_area(&known);
+    for method in Method::all()
+        .iter()
+        .filter(|method| method.name() != "exact")
+    {
+        for most in [1, 3, 10, 100, 1000] {
+            let clock = Questions { asked: AtomicU64::new(0), most };
+            let problem = Problem { known: Some(&known), ..Problem::new(&boxes) };
+            let found = solve(method, &problem, 1, Budget::UNLIMITED, &clock).unwrap();
+            validate(&found.tree, &boxes).unwrap();
+            assert!(found.cost <= limit, "{}, {most}: {} above {limit}", method.name(), found.cost);
+        }
+    }
+}

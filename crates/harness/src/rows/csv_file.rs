@@ -1,0 +1,33 @@
+//! CSV files as rows of a type, whose fields are the columns.
+
+use crate::Error;
+use serde::{Serialize, de::DeserializeOwned};
+use std::path::Path;
+
+/// A kind of rows with a separate file.
+pub trait Row: Serialize + DeserializeOwned {
+    /// The CSV file that holds them; its name begins with `timing` if they hold seconds.
+    const FILE: &'static str;
+}
+
+/// Reads all rows of a CSV file.
+pub fn read<R: DeserializeOwned>(path: &Path) -> Result<Vec<R>, Error> {
+    let mut reader = csv::Reader::from_path(path).map_err(Error::csv(path))?;
+    reader
+        .deserialize()
+        .collect::<Result<_, _>>()
+        .map_err(Error::csv(path))
+}
+
+/// Returns the bytes of a CSV file with these rows. Without rows there is no header either.
+pub fn to_bytes<R: Serialize>(rows: &[R], path: &Path) -> Result<Vec<u8>, Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        writer.serialize(row).map_err(Error::csv(path))?;
+    }
+    writer.into_inner().map_err(|error| Error::Io {
+        path: path.to_owned(),
+        action: "write",
+        source: std::io::Error::other(error.to_string()),
+    })
+}
