@@ -2,8 +2,8 @@
 
 use bvh_terminal::interrupt::{self, INTERRUPTED};
 use bvh_terminal::output::{answered, print_error, print_line, succeeded};
-use clap::{CommandFactory, Parser, Subcommand};
-use harness::cli::{compare, merge, mistyped, new, report, run};
+use clap::{Parser, Subcommand};
+use harness::cli::{compare, merge, new, report, run};
 use harness::{Error, stress::child};
 use std::process::ExitCode;
 
@@ -40,12 +40,6 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    if let Some(message) =
-        mistyped::mistyped(std::env::args_os().nth(1).as_deref(), &Cli::command())
-    {
-        print_error(&format!("error: {message}"));
-        return ExitCode::from(2);
-    }
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(answer) => return answered(&answer),

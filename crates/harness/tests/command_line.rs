@@ -6,41 +6,12 @@ mod support;
 use std::fs;
 use std::path::Path;
 use support::{
-    begin, ended, folder_with, refused, reproducible, rows, run, said, send, text, wait_for,
+    TABLE, begin, ended, folder_with, refused, reproducible, rows, run, said, send, text, wait_for,
 };
-
-const SPEC: &str = "
-question = 'Do results survive?'
-scenes = ['escher', 'pinecon2']
-repetitions = 3
-methods = [
-    { label = 'greedy', method = 'muller_fellner' },
-    { label = 'noise', method = 'grasp', trials = 12, noise = 0.1 },
-    { label = 'k', method = 'grasp', trials = 6, candidates = { k_best = 5 } },
-]
-
-[[reports]]
-kind = 'table'
-source = 'Test'
-title = 'a table'
-[[reports.columns]]
-name = 'base'
-method = 'greedy'
-paper = { escher = 1.0, pinecon2 = 1.0 }
-[[reports.columns]]
-name = 'best of 5'
-method = 'noise'
-best_of = 5
-paper = { escher = 1.0, pinecon2 = 0.9 }
-
-[quick]
-scenes = ['escher']
-repetitions = 1
-";
 
 /// Creates a folder with the spec.
 fn folder() -> tempfile::TempDir {
-    folder_with("spec.toml", SPEC)
+    folder_with("spec.toml", TABLE)
 }
 
 #[test]
@@ -97,7 +68,7 @@ fn any_number_of_threads_writes_the_same_bytes() {
 #[cfg(unix)]
 #[test]
 fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
-    let spec = SPEC
+    let spec = TABLE
         .replace("repetitions = 3", "repetitions = 40")
         .replace("trials = 12", "trials = 100");
     let folder = folder_with("spec.toml", &spec);
@@ -179,10 +150,10 @@ fn quick_seed_and_scene_change_what_is_run() {
 fn mistakes_are_named_before_any_work() {
     let folder = folder();
     for (name, text) in [
-        ("key.toml", &*SPEC.replace("repetitions = 3", "repetition = 3")),
-        ("parameter.toml", &SPEC.replace("noise = 0.1", "noise = 2.0")),
-        ("scene.toml", &SPEC.replace("'pinecon2'", "'sofa'")),
-        ("label.toml", &SPEC.replace("method = 'noise'", "method = 'nose'")),
+        ("key.toml", &*TABLE.replace("repetitions = 3", "repetition = 3")),
+        ("parameter.toml", &TABLE.replace("noise = 0.1", "noise = 2.0")),
+        ("scene.toml", &TABLE.replace("'pinecon2'", "'sofa'")),
+        ("label.toml", &TABLE.replace("method = 'noise'", "method = 'nose'")),
         ("nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n"),
         ("empty.obj", ""),
         ("file", ""),
@@ -359,22 +330,6 @@ fn without_reports_there_is_a_table_and_without_a_terminal_a_line_for_the_last_r
             format!("median_cut on spheres75, repetition {repetition}, seed {seed}, took 0.");
         assert!(said.contains(&part), "{part} in {said}");
     }
-}
-
-#[test]
-fn a_mistyped_command_is_answered_with_the_one_that_is_meant() {
-    let folder = folder();
-    for (args, meant) in [
-        (&["compar", "x.bvh", "escher"][..], "`compare`"),
-        (&["merg", "x"], "`merge`"),
-        (&["reports"], "`report`"),
-    ] {
-        refused(folder.path(), args, 2, &[args[0], meant]);
-    }
-    // A spec with the name of a command is not that command.
-    refused(folder.path(), &["merge.toml"], 2, &["merge.toml: no such file"]);
-    fs::rename(folder.path().join("spec.toml"), folder.path().join("mergee")).unwrap();
-    said(folder.path(), &["mergee"]);
 }
 
 #[test]

@@ -3,30 +3,7 @@
 mod support;
 
 use std::fs;
-use support::{folder_with, refused, said};
-
-const SPEC: &str = "
-question = 'Do results survive?'
-scenes = ['escher', 'pinecon2']
-methods = [
-    { label = 'greedy', method = 'muller_fellner' },
-    { label = 'noise', method = 'grasp', trials = 6, noise = 0.1 },
-]
-[[reports]]
-kind = 'table'
-title = 'a table'
-[[reports.columns]]
-name = 'base'
-method = 'greedy'
-paper = { escher = 1.0, pinecon2 = 1.0 }
-[[reports.columns]]
-name = 'best of 5'
-method = 'noise'
-best_of = 5
-paper = { escher = 1.0, pinecon2 = 0.8 }
-[quick]
-scenes = ['escher']
-";
+use support::{TABLE, folder_with, refused, said};
 
 /// The texts between `before` and `after` in the page.
 fn between<'a>(page: &'a str, before: &str, after: &str) -> Vec<&'a str> {
@@ -38,7 +15,7 @@ fn between<'a>(page: &'a str, before: &str, after: &str) -> Vec<&'a str> {
 
 #[test]
 fn the_page_of_all_results_answers_first_and_leads_to_files_that_are_there_but_needs_none() {
-    let folder = folder_with("spec.toml", SPEC);
+    let folder = folder_with("spec.toml", TABLE);
     let of_lists = "question = 'What is listed?'\nscenes = ['escher:50']\nmethods = [{ method = 'muller_fellner' }]\n";
     fs::write(folder.path().join("list.toml"), of_lists).unwrap();
     said(folder.path(), &["spec.toml", "list.toml"]);

@@ -68,6 +68,28 @@ fn read(spec: &Value) -> Result<Experiment, (u8, String)> {
         .map_err(|error| (error.exit_code(), error.to_string()))
 }
 
+/// Returns a valid spec with the table at `path` and few other ones, and the path of the table in it.
+///
+/// The test reads every spec thousands of times, and most of the time would go into methods and
+/// reports that no value concerns.
+fn around(spec: &Value, path: &[Step]) -> (Value, Vec<Step>) {
+    if let [Step::Key(list), Step::Index(index), below @ ..] = path
+        && (list == "methods" || list == "reports")
+    {
+        let mut small = spec.as_table().unwrap().clone();
+        if list == "methods" {
+            small.remove("reports");
+        }
+        small[list] = vec![spec[list][*index].clone()].into();
+        let small = Value::Table(small);
+        if read(&small).is_ok() {
+            let start = [Step::Key(list.clone()), Step::Index(0)];
+            return (small, [&start, below].concat());
+        }
+    }
+    (spec.clone(), path.to_vec())
+}
+
 /// Returns the names that a message lists as accepted.
 fn accepted(message: &str) -> Vec<String> {
     let Some((_, names)) = message.split_once("expected ") else { return Vec::new() };
@@ -176,6 +198,7 @@ fn a_wrong_value_under_any_key_of_a_spec_is_rejected_by_name() {
         tables(&spec, &[], &mut paths);
         for path in paths {
             let place = place(&spec, &path);
+            let (spec, path) = around(&spec, &path);
             let mut table = spec.clone();
             let table = path
                 .iter()

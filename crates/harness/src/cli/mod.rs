@@ -3,7 +3,6 @@
 pub mod compare;
 pub mod explain;
 pub mod merge;
-pub mod mistyped;
 pub mod new;
 pub mod report;
 pub mod run;

@@ -15,6 +15,36 @@ use std::path::Path;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_harness");
 
+/// A spec whose report is a table of the paper.
+pub const TABLE: &str = "
+question = 'Do results survive?'
+scenes = ['escher', 'pinecon2']
+repetitions = 3
+methods = [
+    { label = 'greedy', method = 'muller_fellner' },
+    { label = 'noise', method = 'grasp', trials = 12, noise = 0.1 },
+    { label = 'k', method = 'grasp', trials = 6, candidates = { k_best = 5 } },
+]
+
+[[reports]]
+kind = 'table'
+source = 'Test'
+title = 'a table'
+[[reports.columns]]
+name = 'base'
+method = 'greedy'
+paper = { escher = 1.0, pinecon2 = 1.0 }
+[[reports.columns]]
+name = 'best of 5'
+method = 'noise'
+best_of = 5
+paper = { escher = 1.0, pinecon2 = 0.9 }
+
+[quick]
+scenes = ['escher']
+repetitions = 1
+";
+
 /// The committed specs, each with its name and text, in the order of their names.
 pub fn experiments() -> Vec<(String, String)> {
     let folder = top().join("experiments");
