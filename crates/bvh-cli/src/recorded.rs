@@ -30,18 +30,26 @@ fn floats(bytes: &[u8]) -> Result<Vec<f32>, String> {
         .collect())
 }
 
-/// Reads lines of six numbers, separated by commas. The first line may be a header.
+/// Reads lines of six numbers, separated by commas. The first line may be a header, which has no
+/// number.
 fn csv(bytes: &[u8]) -> Result<Vec<f32>, String> {
     let text = str::from_utf8(bytes).map_err(|_| "the file is not UTF-8".to_owned())?;
+    // Spreadsheets begin UTF-8 with this mark, which would make the first number a word.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut numbers = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
-        let fields: Result<Vec<f32>, _> = line
+        let fields: Vec<Option<f32>> = line
             .split(',')
-            .map(|field| field.trim().parse())
+            .map(|field| field.trim().parse().ok())
             .collect();
-        match fields {
-            Ok(fields) if fields.len() == 6 => numbers.extend(fields),
-            Err(_) if number == 1 || line.trim().is_empty() => {}
+        let is_header = number == 1 && fields.iter().all(Option::is_none);
+        match fields
+            .iter()
+            .copied()
+            .collect::<Option<Vec<f32>>>()
+        {
+            Some(fields) if fields.len() == 6 => numbers.extend(fields),
+            None if is_header || line.trim().is_empty() => {}
             _ => return Err(format!("line {number} is {line:?}; accepted: six numbers")),
         }
     }
@@ -71,21 +79,44 @@ fn npy(bytes: &[u8]) -> Result<Vec<f32>, String> {
         .map_err(|_| invalid())?
         .split_whitespace()
         .collect();
-    let is_table = header.contains(",6)") || header.contains(",2,3)");
-    if header.contains("'fortran_order':True") || !is_table {
-        return Err(format!("the array is {header}; accepted: (n, 6) or (n, 2, 3) in row order"));
+    let segments = match shape(&header).as_deref() {
+        Some(&[segments, 6] | &[segments, 2, 3]) if header.contains("'fortran_order':False") => {
+            segments
+        }
+        _ => {
+            return Err(format!(
+                "the array is {header}; accepted: (n, 6) or (n, 2, 3) in row order"
+            ));
+        }
+    };
+    let size: usize = match &header {
+        header if header.contains("'descr':'<f4'") => size_of::<f32>(),
+        header if header.contains("'descr':'<f8'") => size_of::<f64>(),
+        _ => return Err(format!("the array is {header}; accepted: float32 or float64")),
+    };
+    // A copy that was cut off would otherwise train the tree for a part of its rays.
+    if segments.checked_mul(6 * size) != Some(data.len()) {
+        let bytes = data.len();
+        return Err(format!("the array is {header} and has {bytes} bytes of data"));
     }
-    if header.contains("'<f4'") {
+    if size == size_of::<f32>() {
         return floats(data);
-    }
-    if !header.contains("'<f8'") {
-        return Err(format!("the array is {header}; accepted: float32 or float64"));
     }
     let (numbers, _) = data.as_chunks();
     Ok(numbers
         .iter()
         .map(|&number| f64::from_le_bytes(number) as f32)
         .collect())
+}
+
+/// Returns the shape in the header of an array of numpy, from which spaces are removed.
+fn shape(header: &str) -> Option<Vec<usize>> {
+    let (_, rest) = header.split_once("'shape':(")?;
+    let (shape, _) = rest.split_once(')')?;
+    shape
+        .split(',')
+        .map(|length| length.parse().ok())
+        .collect()
 }
 
 #[cfg(test)]
@@ -116,6 +147,7 @@ mod tests {
             ("bin", single.clone()),
             ("csv", b"x,y,z,to x,to y,to z\n1,2,3, 4,5,-6.5\n".to_vec()),
             ("csv", b"1,2,3,4,5,-6.5".to_vec()),
+            ("csv", "\u{feff}1,2,3,4,5,-6.5\r\n".into()),
             ("npy", array("<f4", "(1, 6)", &single)),
             ("npy", array("<f8", "(1, 2, 3)", &double)),
         ] {
@@ -129,12 +161,35 @@ mod tests {
             ("bin", vec![0; 7], "there are 7 bytes; accepted: a multiple of 24"),
             ("bin", vec![0; 28], "there are 7 numbers; accepted: six for each segment"),
             ("csv", b"1,2,3,4,5,6\n1,2,3".to_vec(), "line 2 is \"1,2,3\"; accepted: six numbers"),
+            (
+                "csv",
+                b"1,2,3,4,5,6.5.0\n1,2,3,4,5,6".to_vec(),
+                "line 1 is \"1,2,3,4,5,6.5.0\"; accepted: six numbers",
+            ),
             ("npy", b"PK".to_vec(), "the file is not an array of numpy"),
             (
                 "npy",
                 array("<i8", "(1, 6)", &[0; 48]),
                 "the array is {'descr':'<i8','fortran_order':False,'shape':(1,6),}; \
                  accepted: float32 or float64",
+            ),
+            (
+                "npy",
+                array("<f4", "(2, 6)", &[0; 24]),
+                "the array is {'descr':'<f4','fortran_order':False,'shape':(2,6),} \
+                 and has 24 bytes of data",
+            ),
+            (
+                "npy",
+                array("<f8", "(1, 6)", &[0; 52]),
+                "the array is {'descr':'<f8','fortran_order':False,'shape':(1,6),} \
+                 and has 52 bytes of data",
+            ),
+            (
+                "npy",
+                array("<f4", "(1, 1, 6)", &[0; 24]),
+                "the array is {'descr':'<f4','fortran_order':False,'shape':(1,1,6),}; \
+                 accepted: (n, 6) or (n, 2, 3) in row order",
             ),
         ] {
             assert_eq!(read(format, &bytes).unwrap_err(), message);
