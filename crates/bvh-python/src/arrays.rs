@@ -6,7 +6,6 @@ use bvh_search::{Objects, prelude::*};
 use numpy::{Element, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use std::fmt::Display;
 use std::ops::Range;
 
@@ -23,22 +22,36 @@ fn floats<'py>(
     accepted: &str,
     accepts: impl Fn(&[usize]) -> bool,
 ) -> PyResult<PyReadonlyArrayDyn<'py, f32>> {
-    numbers(name, argument, "float32", accepted, accepts)
+    numbers(name, argument, ("float32", REAL_NUMBERS), accepted, accepts)
 }
 
-/// Converts anything that numpy accepts as an array of real numbers to `dtype`, which is the type `T`,
-/// in row order, and checks its shape.
+/// Converts anything that numpy accepts as an array of integers to `int64` in row order, and checks
+/// its shape.
+pub fn integers<'py>(
+    name: &str,
+    argument: &Bound<'py, PyAny>,
+    accepted: &str,
+    accepts: impl Fn(&[usize]) -> bool,
+) -> PyResult<PyReadonlyArrayDyn<'py, i64>> {
+    numbers(name, argument, ("int64", INTEGERS), accepted, accepts)
+}
+
+/// The kinds of elements that are accepted, by numpy's letters, and their name.
+type Kinds = (&'static str, &'static str);
+
+const REAL_NUMBERS: Kinds = ("biuf", "real numbers");
+const INTEGERS: Kinds = ("iu", "integers");
+
+/// Converts anything that numpy accepts as an array of some kinds to `dtype`, which is the type `T`,
+/// aligned and in row order, and checks its shape.
 fn numbers<'py, T: Element>(
     name: &str,
     argument: &Bound<'py, PyAny>,
-    dtype: &str,
+    (dtype, kinds): (&str, Kinds),
     accepted: &str,
     accepts: impl Fn(&[usize]) -> bool,
 ) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
     let py = argument.py();
-    let options = PyDict::new(py);
-    options.set_item("dtype", dtype)?;
-    options.set_item("order", "C")?;
     let numpy = py.import("numpy")?;
     let no_array =
         |error: PyErr| invalid(format!("{name}: {}; accepted: {accepted}", error.value(py)));
@@ -46,9 +59,10 @@ fn numbers<'py, T: Element>(
     let given = numpy
         .call_method1("asanyarray", (argument,))
         .map_err(no_array)?;
-    check_elements(name, &numpy, &given)?;
+    check_elements(name, &numpy, &given, kinds)?;
+    // Contiguous, aligned, and no subclass.
     let array = numpy
-        .call_method("asarray", (given,), Some(&options))
+        .call_method1("require", (given, dtype, "CAE"))
         .map_err(no_array)?;
     let array: PyReadonlyArrayDyn<T> = array.extract()?;
     if accepts(array.shape()) {
@@ -62,14 +76,27 @@ fn numbers<'py, T: Element>(
     Err(invalid(format!("{name} has shape ({}); accepted: {accepted}", sizes.join(", "))))
 }
 
-/// Rejects elements that would silently lose their imaginary part, unit or mask in a conversion to
-/// `float32`.
-fn check_elements(name: &str, numpy: &Bound<PyModule>, array: &Bound<PyAny>) -> PyResult<()> {
-    const REAL_NUMBERS: &str = "biuf";
+/// Rejects elements that would silently lose their fraction, imaginary part, unit or mask in a
+/// conversion.
+fn check_elements(
+    name: &str,
+    numpy: &Bound<PyModule>,
+    array: &Bound<PyAny>,
+    (kinds, accepted): Kinds,
+) -> PyResult<()> {
     let dtype = array.getattr("dtype")?;
     let kind: String = dtype.getattr("kind")?.extract()?;
-    if !REAL_NUMBERS.contains(&kind) {
-        return Err(invalid(format!("{name} has dtype {}; accepted: real numbers", dtype.str()?)));
+    // An empty list is an array of `float64` for numpy.
+    let is_empty = array.getattr("size")?.extract::<usize>()? == 0;
+    if !(kinds.contains(&kind) || is_empty && REAL_NUMBERS.0.contains(&kind)) {
+        return Err(invalid(format!("{name} has dtype {}; accepted: {accepted}", dtype.str()?)));
+    }
+    // Numbers above the range of `int64` would become negative.
+    if kinds == INTEGERS.0 && kind == "u" && !is_empty {
+        let largest: u64 = array.call_method0("max")?.extract()?;
+        if i64::try_from(largest).is_err() {
+            return Err(invalid(format!("{name} has {largest}; accepted: {accepted} of 63 bits")));
+        }
     }
     let masked_arrays = numpy.getattr("ma")?;
     let is_masked = masked_arrays.call_method1("is_masked", (array,))?;
@@ -88,8 +115,7 @@ pub fn triangles(argument: &Bound<PyAny>) -> PyResult<Objects> {
 
 /// Reads the vertices of a mesh, `(v, 3)`, and its faces, `(n, 3)`.
 pub fn mesh(vertices: &Bound<PyAny>, faces: &Bound<PyAny>) -> PyResult<(Objects, Vec<[u32; 3]>)> {
-    let faces: PyReadonlyArrayDyn<i64> =
-        numbers("faces", faces, "int64", "(n, 3)", |shape| matches!(shape, [_, 3]))?;
+    let faces = integers("faces", faces, "(n, 3)", |shape| matches!(shape, [_, 3]))?;
     let mut indices = Vec::with_capacity(faces.shape()[0]);
     for (face, corners) in faces
         .as_slice()?
@@ -158,7 +184,8 @@ impl<'py> Vectors<'py> {
         // Not a subclass, such as a masked array.
         let is_array = argument.get_type().name()? == "ndarray";
         match argument.extract::<PyReadonlyArrayDyn<f64>>() {
-            Ok(array) if is_array && array.is_c_contiguous() && accepts(array.shape()) => {
+            // A slice is contiguous and aligned.
+            Ok(array) if is_array && array.as_slice().is_ok() && accepts(array.shape()) => {
                 Ok(Self::Double(array))
             }
             _ => floats(name, argument, accepted, accepts).map(Self::Single),

@@ -1,7 +1,7 @@
 //! The class `Tracer`: triangles in the wide layout, which answer batches of rays and points on all
 //! threads.
 
-use crate::arrays::{RayArrays, RaySource, invalid, invalid_ray, points};
+use crate::arrays::{RayArrays, RaySource, integers, invalid, invalid_ray, points};
 use crate::tree::Tree;
 use bvh_search::OwnedTree;
 use bvh_search::bvh_core::InvalidRay;
@@ -289,14 +289,12 @@ impl Tracer {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, None, None, "miss")?;
         let source = arrays.source()?;
-        let indices = py
-            .import("numpy")?
-            .call_method1("ascontiguousarray", (triangle, "int64"))?;
-        let indices: PyReadonlyArray1<i64> = indices.extract()?;
+        let accepted = format!("({},), as origins", source.rays);
+        let indices = integers("triangle", triangle, &accepted, |shape| shape == [source.rays])?;
         let indices = indices.as_slice()?;
         let triangles = self.source.triangles().unwrap_or(&[]);
         let is_index = |&index: &i64| (-1..triangles.len() as i64).contains(&index);
-        if indices.len() != source.rays || !indices.iter().all(is_index) {
+        if !indices.iter().all(is_index) {
             let message =
                 format!("triangle: accepted: an index below {} per ray, or -1", triangles.len());
             return Err(invalid(message));

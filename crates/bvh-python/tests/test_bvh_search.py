@@ -120,6 +120,32 @@ def test_anything_that_numpy_converts_to_an_array_is_accepted():
     assert (t[0], triangle[0]) == (np.inf, -1)
 
 
+def test_arrays_may_be_misaligned():
+    tree = Tree.from_triangles(misaligned(TRIANGLES), 0)
+    tracer = Tracer(tree)
+    rays = TRIANGLES[:, 0], np.ones((500, 3), np.float32)
+    for dtype in (np.float32, np.float64):
+        shifted = [misaligned(array.astype(dtype)) for array in rays]
+        for answer, expected in zip(tracer.nearest(*shifted), tracer.nearest(*rays)):
+            np.testing.assert_array_equal(answer, expected)
+
+
+def misaligned(array):
+    """Returns a copy of the array at an odd address."""
+    copy = np.ndarray(array.shape, array.dtype, np.empty(array.nbytes + 1, np.uint8), offset=1)
+    copy[:] = array
+    assert not copy.flags.aligned
+    return copy
+
+
+CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+
+
+def surface_of(triangle):
+    tracer = Tracer(Tree.from_mesh(CORNERS, [[0, 1, 2]], work=10))
+    return tracer.surface([[0.2, 0.2, 1]], [[0, 0, -1]], triangle)
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -130,6 +156,13 @@ def test_anything_that_numpy_converts_to_an_array_is_accepted():
         (lambda: Tree.from_triangles(TRIANGLES + 1j), "triangles has dtype complex64; accepted: real numbers"),
         (lambda: Tree.from_triangles(TRIANGLES.astype("M8[s]")), "triangles has dtype datetime64.*; accepted: real numbers"),
         (lambda: Tree.from_triangles(np.ma.masked_less(TRIANGLES, 5)), "triangles has masked elements; accepted: none"),
+        (lambda: Tree.from_mesh(CORNERS, [[0.5, 1.2, 2.9]]), "faces has dtype float64; accepted: integers"),
+        (lambda: Tree.from_mesh(CORNERS, np.ma.masked_equal([[0, 1, 2]], 1)), "faces has masked elements; accepted: none"),
+        (lambda: Tree.from_mesh(CORNERS, np.array([[0, 1, 2**63]], "u8")), "faces has 9223372036854775808; accepted: integers of 63 bits"),
+        (lambda: surface_of([0.7]), "triangle has dtype float64; accepted: integers"),
+        (lambda: surface_of([1j]), "triangle has dtype complex128; accepted: integers"),
+        (lambda: surface_of(np.ma.masked_equal([0], 0)), "triangle has masked elements; accepted: none"),
+        (lambda: surface_of(np.array([2**64 - 1], "u8")), "triangle has 18446744073709551615; accepted: integers of 63 bits"),
         (lambda: Tree.from_triangles([[1, 2], [3]]), "triangles: .*inhomogeneous.*; accepted"),
         (lambda: Tree.from_triangles(np.where(np.arange(500)[:, None, None] == 4, np.nan, TRIANGLES)), "triangles: .*4"),
         (lambda: Tree.from_boxes(boxes_of(TRIANGLES)[:, ::-1]), "boxes: "),
