@@ -123,7 +123,7 @@ pub static CASES: [Case; 45] = [
     case("S33", "objects permuted", &[scene([120, 3_000, 30_000], scenes::order_does_not_matter)]),
     case("S34", "every triangle 10 times", &[plain([120, 20_000, 100_000])]),
     case("S35", "OBJ files as they come", &[Part(ObjFiles, files::files_as_people_write_them)]),
-    case("S36", "ten million triangles", &[plain([300, 50_000, 10_000_000])]),
+    case("S36", "uniform triangles", &[plain([300, 50_000, 10_000_000])]),
     case("S37", "threads and seeds", &[Method(None, methods::threads_and_seeds)]),
     case("S38", "damaged tree files", &[Part(TreeFiles, files::damaged_tree_files)]),
     case("S39", "budgets 0, 1 ms, cancelled", &[Method(None, methods::budgets_end)]),
