@@ -42,6 +42,9 @@ pub enum Error {
     /// Ctrl-C ended a picture.
     #[error("interrupted; no picture was written")]
     Abandoned,
+    /// Ctrl-C ended a measurement.
+    #[error("interrupted; nothing was written")]
+    Unmeasured,
     /// Ctrl-C ended a bake that had no tree.
     #[error("interrupted; there was no tree yet, and no file was written")]
     NoTree,
@@ -76,6 +79,7 @@ impl Error {
             Self::Stopped { .. }
             | Self::StoppedInstances { .. }
             | Self::Abandoned
+            | Self::Unmeasured
             | Self::NoTree => 130,
             Self::Io { .. } | Self::Search { .. } | Self::Tracing { .. } => 1,
         }

@@ -21,6 +21,7 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 /// Report the origin of a tree file, and the costs, depth, arity and validity of its tree.
 #[derive(Args, Clone, Debug)]
@@ -84,7 +85,7 @@ impl Serialize for Facts {
 
 /// Inspects a file, and prints each fact as a line `name: value`, or all as JSON. Rejects a damaged
 /// file, and a file for a different scene.
-pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
+pub fn inspect(args: &InspectArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     // A wrong path is reported before the scene is loaded, which may take long.
     if let Some(nodes) = &args.nodes {
         output_file("--nodes", nodes, &NODES)?;
@@ -97,7 +98,8 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
         .transpose()?;
     let (tree, mut facts) = examine(&args.file, scene.as_ref())?;
     if let (Some(rays), Some(scene)) = (rays, &scene) {
-        facts.add("expected tests of a ray", rays.expected_tests(&tree, scene)?);
+        let tests = rays.expected_tests(&tree, scene, interrupted)?;
+        facts.add("expected tests of a ray", tests);
     }
     if let Some(path) = &args.nodes {
         write_nodes(&tree, path)?;

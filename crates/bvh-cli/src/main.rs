@@ -5,6 +5,7 @@ mod commands;
 mod csv;
 mod error;
 mod inspect;
+mod memory;
 mod rays;
 mod recorded;
 mod render;
@@ -19,6 +20,9 @@ use clap_complete::Shell;
 use error::Error;
 use std::path::Path;
 use std::process::ExitCode;
+
+#[global_allocator]
+static ALLOCATOR: memory::HugePages = memory::HugePages;
 
 /// Bounding volume hierarchies by stochastic search: bake the best tree within a budget, and
 /// inspect it.
@@ -66,7 +70,7 @@ fn run(command: Command) -> Result<(), Error> {
     match command {
         Command::Bake(args) if args.instances => bake::instances::bake(&args, &INTERRUPTED),
         Command::Bake(args) => bake::bake(&args, &INTERRUPTED),
-        Command::Inspect(args) => inspect::inspect(&args),
+        Command::Inspect(args) => inspect::inspect(&args, &INTERRUPTED),
         Command::Verify(args) => inspect::verify(&args),
         Command::Render(args) => render::render(&args, &INTERRUPTED),
         Command::Report(args) => report::report(&args, &INTERRUPTED),

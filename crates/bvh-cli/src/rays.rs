@@ -10,6 +10,7 @@ use bvh_search::ray_density;
 use bvh_terminal::arguments::input_file;
 use std::fs;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// The rays that train a tree.
 #[derive(Clone)]
@@ -51,23 +52,40 @@ impl Rays {
             .map_err(|message| Error::Rays { file: path.to_owned(), message })
     }
 
-    /// Returns the rays' density in a scene; `tree` is any valid tree over the scene.
-    pub fn density(&self, scene: &Scene, tree: &Bvh, seed: u64) -> Result<RayDensity, Error> {
-        let tracing = |source| Error::Tracing { scene: scene.name.clone(), source };
-        let rays = match self {
-            Self::Default => of_anything(TRAINED, scene, tree, seed),
-            Self::Rendered(config) => of_renderer(config, scene, tree),
-            Self::Recorded(segments) => {
-                return ray_density(&scene.boxes, segments).map_err(tracing);
-            }
+    /// Returns the rays' density in a scene, or `None` soon after `interrupted` becomes true; `tree`
+    /// is any valid tree over the scene.
+    pub fn density(
+        &self,
+        scene: &Scene,
+        tree: &Bvh,
+        seed: u64,
+        interrupted: &AtomicBool,
+    ) -> Result<Option<RayDensity>, Error> {
+        let is_over = || interrupted.load(Relaxed);
+        let found = match self {
+            Self::Default => density(&of_anything(TRAINED, scene, tree, seed, &is_over), tree),
+            Self::Rendered(config) => density(&of_renderer(config, scene, tree, &is_over), tree),
+            Self::Recorded(segments) => ray_density(&scene.boxes, segments),
         };
-        density(&rays, tree).map_err(tracing)
+        // After an interruption some rays are missing, or all of them, which is an error otherwise.
+        if is_over() {
+            return Ok(None);
+        }
+        found
+            .map(Some)
+            .map_err(|source| Error::Tracing { scene: scene.name.clone(), source })
     }
 
     /// Returns the expected number of tests of a ray that enters the scene, in the wide layout of a
     /// tree. No bake trains on the same default rays.
-    pub fn expected_tests(&self, tree: &Bvh, scene: &Scene) -> Result<f64, Error> {
-        let density = self.density(scene, tree, Self::JUDGING)?;
+    pub fn expected_tests(
+        &self,
+        tree: &Bvh,
+        scene: &Scene,
+        interrupted: &AtomicBool,
+    ) -> Result<f64, Error> {
+        let density = self.density(scene, tree, Self::JUDGING, interrupted)?;
+        let density = density.ok_or(Error::Unmeasured)?;
         let tests = Objective::Layout.cost_by(tree, &density);
         let root = tree
             .root_aabb()

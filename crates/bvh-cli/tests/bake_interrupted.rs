@@ -6,9 +6,11 @@ mod support;
 use bvh_scenes::Scene;
 use bvh_scenes::tree_file;
 use std::fs;
+use std::io::Read;
 use std::path::Path;
+use std::process::Stdio;
 use std::time::{Duration, Instant};
-use support::{begin, cost, ended, names, said, send, text};
+use support::{begin, cost, ended, names, program, said, send, text};
 
 /// Bakes konistil into `a.bvh`, and interrupts the search this long after it has begun. Returns the
 /// messages.
@@ -34,6 +36,32 @@ fn ctrl_c_keeps_the_best_tree_so_far() {
     assert!(said.contains("`--from a.bvh` continues"), "{said}");
     tree_file::load(&folder.path().join("a.bvh"), &Scene::load("konistil").unwrap()).unwrap();
     assert_eq!(names(folder.path()).len(), 1);
+}
+
+#[test]
+fn ctrl_c_while_a_bake_decides_keeps_the_greedy_tree() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut child = program(folder.path(), &["bake", "konistil", "--out", "a.bvh"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // The budget is chosen before anything else, and the decision takes seconds after it.
+    let mut first = [0; 6];
+    child
+        .stdout
+        .as_mut()
+        .unwrap()
+        .read_exact(&mut first)
+        .unwrap();
+    assert_eq!(&first, b"budget");
+    send("-INT", &child);
+    let output = child.wait_with_output().unwrap();
+    ended(&output, 130, &[]);
+    let said = text(&output.stderr);
+    assert!(said.contains("`--from a.bvh` continues"), "{said}");
+    let scene = Scene::load("konistil").unwrap();
+    tree_file::load(&folder.path().join("a.bvh"), &scene).unwrap();
 }
 
 #[test]

@@ -122,12 +122,17 @@ impl Reserved {
     /// Writes the bytes, syncs the file, and renames it. At any moment the file at the path is the
     /// old one or the complete new one.
     pub fn write(self, bytes: &[u8]) -> Result<(), WriteError> {
+        self.write_sections(&[bytes])
+    }
+
+    /// Writes the sections one after the other like [`write`](Self::write).
+    pub fn write_sections(self, sections: &[&[u8]]) -> Result<(), WriteError> {
         let Self { path, mut unfinished } = self;
         // The user may have removed the file during hours of search.
         if !unfinished.path().exists() {
             unfinished = Self::new(&path, 0)?.unfinished;
         }
-        overwrite(unfinished.as_file_mut(), bytes)
+        overwrite(unfinished.as_file_mut(), sections)
             .map_err(WriteError::of(&path, "write the file"))?;
         let folder = path.parent().map(Path::to_owned);
         unfinished
@@ -142,11 +147,14 @@ impl Reserved {
     }
 }
 
-fn overwrite(file: &mut File, bytes: &[u8]) -> io::Result<()> {
+fn overwrite(file: &mut File, sections: &[&[u8]]) -> io::Result<()> {
     file.rewind()?;
-    file.write_all(bytes)?;
+    for section in sections {
+        file.write_all(section)?;
+    }
     // The reserved space may be larger than the contents.
-    file.set_len(bytes.len() as u64)?;
+    let length = file.stream_position()?;
+    file.set_len(length)?;
     file.sync_all()
 }
 

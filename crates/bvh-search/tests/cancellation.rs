@@ -3,8 +3,8 @@
 use bvh_build::{Builder, median_cut, ploc};
 use bvh_core::{Aabb, validate};
 use bvh_search::{
-    Budget, Event, Method, Observer, Problem, best, genetic, grasp, random_orders, rebuild,
-    ruin_recreate, solve,
+    Budget, Event, Method, Observer, Problem, StopReason, best, genetic, grasp, random_orders,
+    rebuild, ruin_recreate, solve,
 };
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -137,6 +137,7 @@ fn a_search_that_is_cancelled_during_its_first_construction_returns_the_known_tr
             let outcome = solve(&method, &problem, 1, Budget::UNLIMITED, &polls).unwrap();
             assert_eq!(outcome.tree, *expected, "{}", method.name());
             assert_eq!(outcome.cost, problem.cost(expected), "{}", method.name());
+            assert_eq!(outcome.stop, StopReason::Cancelled, "{}", method.name());
             assert!(polls.polled.into_inner() < 100, "{}", method.name());
         }
     }

@@ -16,6 +16,7 @@ use bvh_core::cost::{Measure, Objective};
 use bvh_core::{Bvh, RayDensity};
 use bvh_scenes::Scene;
 use bvh_search::{Budget, Method, Problem, solve};
+use bvh_terminal::interrupt;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// The work per object of a bake that chooses its own budget. On the 7 scenes of
@@ -123,8 +124,8 @@ struct Decision<'a> {
     seed: u64,
     interrupted: &'a AtomicBool,
     greedy: Bvh,
-    /// The rays that judge.
-    judging: RayDensity,
+    /// The rays that judge; `None` after an interruption.
+    judging: Option<RayDensity>,
     chosen: Choices,
     /// The expected tests of the judging rays in the tree of the chosen candidate.
     tests: f64,
@@ -141,7 +142,9 @@ impl<'a> Decision<'a> {
         interrupted: &'a AtomicBool,
     ) -> Result<Self, Error> {
         let greedy = greedy(method.name(), scene, interrupted)?;
-        let judging = Rays::Default.density(scene, &greedy, Rays::JUDGING)?;
+        // There is a tree now, which Ctrl-C must save instead of ending the program.
+        interrupt::hold();
+        let judging = Rays::Default.density(scene, &greedy, Rays::JUDGING, interrupted)?;
         let mut decision = Self {
             method,
             scene,
@@ -179,12 +182,17 @@ impl<'a> Decision<'a> {
         Ok(())
     }
 
-    /// Returns the expected tests of the judging rays in the tree of a short search.
+    /// Returns the expected tests of the judging rays in the tree of a short search; infinitely many
+    /// after an interruption.
     fn tests_after(&self, choices: &Choices) -> Result<f64, Error> {
         let Self { method, scene, seed, interrupted, greedy, .. } = self;
+        // A trial of no work takes seconds in large scenes.
+        if interrupted.load(Relaxed) {
+            return Ok(f64::INFINITY);
+        }
         let name = method.name();
         let density = match &choices.rays {
-            Some(rays) => Some(rays.density(scene, greedy, *seed)?),
+            Some(rays) => rays.density(scene, greedy, *seed, interrupted)?,
             None => None,
         };
         let most_references = (choices.references * scene.boxes.len() as f64) as usize;
@@ -203,6 +211,11 @@ impl<'a> Decision<'a> {
         let budget = Budget { max_work: Some(share as u64), ..Budget::UNLIMITED };
         let found = solve(*method, &problem, *seed, budget, &Interrupted(interrupted))
             .map_err(Error::search(&scene.name, name))?;
-        Ok(Objective::Layout.cost_by(&found.tree, &self.judging))
+        match &self.judging {
+            Some(judging) if !interrupted.load(Relaxed) => {
+                Ok(Objective::Layout.cost_by(&found.tree, judging))
+            }
+            _ => Ok(f64::INFINITY),
+        }
     }
 }

@@ -10,7 +10,6 @@ use bvh_build::{Builder, median_cut};
 use bvh_core::cost::Objective;
 use bvh_core::{Instance, InvalidInstances, Primitives, Triangle, WideBvh};
 use bvh_scenes::load::{Format, OutsideFiles, gltf};
-use bvh_scenes::tree_file::TreeFileError;
 use bvh_scenes::{Scene, SceneError, SceneKind, read};
 use bvh_terminal::arguments::output_folder;
 use bvh_terminal::files;
@@ -95,10 +94,7 @@ fn bake_part(
 ) -> Result<(), Error> {
     let bake = plan.begin(scene, None, None, interrupted)?;
     let baked = bake.search(interrupted)?;
-    let bytes = bake
-        .file(&baked)
-        .map_err(TreeFileError::of(path))?;
-    files::write(path, &bytes)?;
+    bake.save(&baked, path, files::Reserved::new(path, 0)?)?;
     let count = scene.boxes.len();
     let cost = baked.outcome.cost;
     let gain = gain(cost, baked.base);

@@ -13,7 +13,7 @@ use crate::scene_files::SceneFiles;
 use bvh_core::Bvh;
 use bvh_core::cost::Objective;
 use bvh_core::file::Header;
-use bvh_scenes::tree_file::{self, TreeFileError};
+use bvh_scenes::tree_file;
 use bvh_scenes::{Scene, explain};
 use bvh_search::best::{self, Horizon};
 use bvh_search::{Method, StopReason};
@@ -270,15 +270,12 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         );
     }
     let baked = bake.search(interrupted)?;
-    let bytes = bake
-        .file(&baked)
-        .map_err(TreeFileError::of(&out))?;
-    reserved.write(&bytes)?;
+    let bytes = bake.save(&baked, &out, reserved)?;
     if interrupted.load(Relaxed) {
         return Err(Error::Stopped { path: out, cost: baked.outcome.cost });
     }
     print_line(&summary(&plan, &scene, &bake, &baked));
-    print_line(&format!("{}: {} bytes", out.display(), bytes.len()));
+    print_line(&format!("{}: {bytes} bytes", out.display()));
     Ok(())
 }
 

@@ -6,11 +6,14 @@ use super::watch::{Interrupted, Watch};
 use crate::Error;
 use crate::rays::Rays;
 use bvh_core::cost::{Measure, Objective};
-use bvh_core::file::{self, FileError, Header, Origin};
+use bvh_core::file::{self, Header, Origin};
 use bvh_core::{Bvh, Node, RayDensity};
 use bvh_scenes::Scene;
+use bvh_scenes::tree_file::TreeFileError;
 use bvh_search::{Budget, Deadline, Method, Outcome, Problem, SearchError, best, optimize, solve};
+use bvh_terminal::files::Reserved;
 use bvh_terminal::interrupt;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// A search for the best tree of any scene.
@@ -75,7 +78,7 @@ impl Plan {
             interrupted.load(Relaxed) || is_timed && deadline.has_passed()
         })?;
         let density = match &self.rays {
-            Some(rays) => Some(rays.density(scene, &greedy, self.seed)?),
+            Some(rays) => rays.density(scene, &greedy, self.seed, interrupted)?,
             None => None,
         };
         Ok(Bake { plan: self, scene, start, greedy, deadline, division, density })
@@ -138,7 +141,7 @@ impl Bake<'_> {
         // With little work `best` may end above a tree that it builds on its way; that tree is
         // kept.
         let fallback = match (*effort, method) {
-            (Effort::Work(work), Method::Best(_)) => {
+            (Effort::Work(work), Method::Best(_)) if !interrupted.load(Relaxed) => {
                 best::fallback(problem, work, &Interrupted(interrupted))?
             }
             _ => None,
@@ -152,8 +155,8 @@ impl Bake<'_> {
         Ok(best::unless_behind(found, fallback))
     }
 
-    /// Returns the bytes of the tree file.
-    pub fn file(&self, baked: &Baked) -> Result<Vec<u8>, FileError> {
+    /// Writes the tree file. Returns its number of bytes.
+    pub fn save(&self, baked: &Baked, path: &Path, reserved: Reserved) -> Result<usize, Error> {
         let tree = &baked.outcome.tree;
         // The work of all bakes that led to this tree, one after the other.
         let spent = self.start.map_or(0, |start| start.work);
@@ -168,7 +171,11 @@ impl Bake<'_> {
             visits: &visits,
             objective: self.plan.objective,
         };
-        file::save_references(tree, &self.scene.boxes, &self.scene.primitives, &origin)
+        let sections = file::sections(tree, &self.scene.boxes, &self.scene.primitives, &origin)
+            .map_err(TreeFileError::of(path))?;
+        let sections = sections.each_ref().map(|section| &**section);
+        reserved.write_sections(&sections)?;
+        Ok(sections.iter().map(|section| section.len()).sum())
     }
 
     /// Names the cost that the search minimises.

@@ -100,7 +100,7 @@ pub fn report(args: &ReportArgs, interrupted: &AtomicBool) -> Result<(), Error> 
 /// Measures a tree, and draws the scene with it.
 fn measure(tree: Bvh, scene: &Scene, interrupted: &AtomicBool) -> Result<Measured, Error> {
     let tests = match scene.triangles() {
-        Ok(_) => Some(Rays::Default.expected_tests(&tree, scene)?),
+        Ok(_) => Some(Rays::Default.expected_tests(&tree, scene, interrupted)?),
         Err(_) => None,
     };
     let (width, height) = PICTURE;

@@ -123,8 +123,30 @@ pub fn save_references(
     saved(tree, boxes, origin)
 }
 
+/// Returns the sections of the same file as [`save_references`], to be written one after the other:
+/// the header, the nodes, the object ids and the visits. On little-endian machines all but the header
+/// are the tree's memory, which a file of gigabytes does not need twice.
+pub fn sections<'a>(
+    tree: &'a Bvh,
+    boxes: &[Aabb],
+    objects: &dyn Clip,
+    origin: &Origin<'a>,
+) -> Result<[Cow<'a, [u8]>; 4], FileError> {
+    validate_references(tree, boxes, objects)?;
+    sections_of_valid(tree, boxes, origin)
+}
+
 /// Returns the file of a valid tree.
 fn saved(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, FileError> {
+    Ok(sections_of_valid(tree, boxes, origin)?.concat())
+}
+
+/// Returns the sections of the file of a valid tree.
+fn sections_of_valid<'a>(
+    tree: &'a Bvh,
+    boxes: &[Aabb],
+    origin: &Origin<'a>,
+) -> Result<[Cow<'a, [u8]>; 4], FileError> {
     let Origin { method, seed, work, objective, visits } = *origin;
     if !visits.is_empty() {
         check_visits(&tree.nodes, visits)?;
@@ -142,15 +164,16 @@ fn saved(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, FileErr
         method: method.into(),
         has_visits: !visits.is_empty(),
     };
-    let mut bytes = header.encode()?;
-    let sections = [le_bytes(&tree.nodes), le_bytes(&tree.prim_ids), le_bytes(visits)];
-    // All at once: growing section by section would copy the nodes again.
-    bytes.reserve_exact(sections.iter().map(|section| section.len()).sum());
-    for section in sections {
-        bytes.extend_from_slice(&section);
+    let mut header = header.encode()?;
+    let body = [le_bytes(&tree.nodes), le_bytes(&tree.prim_ids), le_bytes(visits)];
+    let mut hasher = Hasher::new();
+    for section in &body {
+        hasher.update(section);
     }
-    seal(&mut bytes);
-    Ok(bytes)
+    hasher.update(&header[..Header::CHECKSUM.start]);
+    header[Header::CHECKSUM].copy_from_slice(&hasher.finalize().to_le_bytes());
+    let [nodes, prim_ids, visits] = body;
+    Ok([header.into(), nodes, prim_ids, visits])
 }
 
 /// Rejects visits that no measure can give. Measures are monotone, so no child has more visits than
@@ -208,6 +231,7 @@ fn checksum(file: &[u8], mut visit: impl FnMut(Range<usize>)) -> u32 {
 }
 
 /// Writes the checksum into a file.
+#[cfg(test)]
 fn seal(file: &mut [u8]) {
     let sum = checksum(file, |_| ());
     file[Header::CHECKSUM].copy_from_slice(&sum.to_le_bytes());

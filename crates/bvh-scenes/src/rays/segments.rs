@@ -111,11 +111,20 @@ pub struct TracedRay {
 
 /// Returns the rays of a renderer through `scene`: primary rays through random points of the
 /// pictures, `bounces` reflections in random directions, and shadow rays from primary hits to every
-/// light. `tree` is any valid tree over the scene.
-pub fn of_renderer(config: &RenderedRays, scene: &Scene, tree: &Bvh) -> Vec<TracedRay> {
+/// light. `tree` is any valid tree over the scene. Ends early, with fewer rays, when `is_over` returns
+/// true.
+pub fn of_renderer(
+    config: &RenderedRays,
+    scene: &Scene,
+    tree: &Bvh,
+    is_over: &dyn Fn() -> bool,
+) -> Vec<TracedRay> {
     let mut tracing = Tracing::new(scene, tree, config.seed);
     let up = scene.up();
     for index in 0..config.count {
+        if is_over() {
+            break;
+        }
         // One random position in each of `count` equal parts of the path covers it evenly.
         let position = (f64::from(index) + tracing.rng.random::<f64>()) / f64::from(config.count);
         let camera = config.camera(position, up);
@@ -138,12 +147,21 @@ pub fn of_renderer(config: &RenderedRays, scene: &Scene, tree: &Bvh) -> Vec<Trac
 
 /// Returns rays that need no camera: `count` rays from random points in the scene, `count` rays
 /// through it from outside, and from each hit one ray in a random direction and one to a random
-/// point.
-pub fn of_anything(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<TracedRay> {
+/// point. Ends early, with fewer rays, when `is_over` returns true.
+pub fn of_anything(
+    count: u32,
+    scene: &Scene,
+    tree: &Bvh,
+    seed: u64,
+    is_over: &dyn Fn() -> bool,
+) -> Vec<TracedRay> {
     let mut tracing = Tracing::new(scene, tree, seed);
     let Some(root) = tree.root_aabb() else { return Vec::new() };
     for family in [Family::Inside, Family::Lines] {
         for _ in 0..count {
+            if is_over() {
+                return tracing.rays;
+            }
             let Some(ray) = random_ray(family, &root, &mut tracing.rng) else { continue };
             let hit = tracing.nearest(Kind::Incoherent, ray.origin(), ray.direction().as_dvec3());
             let Some(point) = hit else { continue };
@@ -252,7 +270,7 @@ mod tests {
         let tree = muller_fellner::Config::default()
             .build(&scene.primitives.boxes())
             .unwrap();
-        of_anything(50, &scene, &tree, 1)
+        of_anything(50, &scene, &tree, 1, &|| false)
             .iter()
             .filter(|traced| traced.kind != Kind::Shadow)
             .map(|traced| [traced.segment.from, traced.segment.to])

@@ -46,6 +46,10 @@ pub(crate) fn cool<M: Mover>(
             Quota { work: work as u64, moves: quota.moves / (subtrees.len() as u64 + 1) }
         };
         let found = parallel::map(subtrees.len(), |number| {
+            // A cancelled search must return soon, and no move would change the copy.
+            if observer.cancelled() {
+                return None;
+            }
             let mut small = subtrees[number].take(tree);
             // A stream per subtree, not per thread: the result must not depend on the schedule of
             // threads.
@@ -54,7 +58,7 @@ pub(crate) fn cool<M: Mover>(
             let tally = metropolis::cool(&mut mover(), &mut small, heat, quota, rng, observer);
             // Sorted here, in parallel; `put_back` then leaves the full tree in preorder.
             small.sort_in_preorder();
-            (small, tally)
+            Some((small, tally))
         });
         done += put_back(tree, &subtrees, found);
         *whole.sampler() = NodeSampler::among(starts);
@@ -82,10 +86,13 @@ pub(crate) fn to_local_optimum(
         let parts = 2 * subtrees.len().max(1) as u64;
         let share = Quota { work: quota.work / parts, moves: quota.moves / parts };
         let found = parallel::map(subtrees.len(), |number| {
+            if observer.cancelled() {
+                return None;
+            }
             let mut small = subtrees[number].take(tree);
             let tally = reinsertion::to_local_optimum(&mut small, share, observer);
             small.sort_in_preorder();
-            (small, tally)
+            Some((small, tally))
         });
         done += put_back(tree, &subtrees, found);
     }
@@ -170,15 +177,16 @@ fn moved(node: &Node, place: impl Fn(u32) -> u32) -> Node {
     Node { children, parent, ..*node }
 }
 
-/// Puts annealed subtrees, in preorder, back to their place. O(n).
+/// Puts annealed subtrees, in preorder, back to their place; `None` leaves a subtree as it is. O(n).
 fn put_back<A: Metric>(
     tree: &mut Working<A>,
     subtrees: &[Subtree],
-    found: Vec<(Working<A>, Tally)>,
+    found: Vec<Option<(Working<A>, Tally)>>,
 ) -> Tally {
     let mut done = Tally::default();
     let mut nodes = std::mem::take(&mut tree.nodes);
-    for (subtree, (small, tally)) in subtrees.iter().zip(found) {
+    for (subtree, found) in subtrees.iter().zip(found) {
+        let Some((small, tally)) = found else { continue };
         done += tally;
         let to = subtree.root as usize;
         // The root's link leads out of the subtree and must survive the copy.
@@ -223,11 +231,13 @@ mod tests {
             );
             let covered: u32 = subtrees.iter().map(|subtree| subtree.nodes).sum();
             assert!(covered > if most > 0.01 { 3000 } else { 1000 }, "{covered}");
-            let taken =
-                |subtree: &Subtree| (subtree.take(&tree), Tally { work: 1, ..Tally::default() });
+            let taken = |subtree: &Subtree| {
+                Some((subtree.take(&tree), Tally { work: 1, ..Tally::default() }))
+            };
             let mut again = tree.clone();
             let tally = put_back(&mut again, &subtrees, subtrees.iter().map(taken).collect());
             assert_eq!(tally.work, subtrees.len() as u64);
+            put_back(&mut again, &subtrees, vec![None; subtrees.len()]);
             assert_eq!(again.to_bvh(), tree.to_bvh());
             assert!((again.area() - tree.area()).abs() <= 1e-12 * tree.area());
         }

@@ -256,9 +256,18 @@ pub fn solve(
     let known = problem
         .known
         .map(|tree| (problem.cost(tree), tree));
-    let found = search.search(problem, seed, &mut run);
+    // The first tree of a large scene takes seconds, which a search that is cancelled before it
+    // begins does not need.
+    let found = if known.is_some() && observer.cancelled() {
+        Err(BuildError::Cancelled.into())
+    } else {
+        search.search(problem, seed, &mut run)
+    };
     let tree = run.cheapest(found, problem, known)?;
-    let stop = run.stopped().unwrap_or(StopReason::Completed);
+    // Before the first tree no reason counts, but the caller's tree needs none.
+    let otherwise =
+        if observer.cancelled() { StopReason::Cancelled } else { StopReason::Completed };
+    let stop = run.stopped().unwrap_or(otherwise);
     let Run { evaluations, work, incumbent: cost, optimal: proof, history, .. } = run;
     Ok(Outcome { tree, cost, evaluations, work, stop, proof, history })
 }

@@ -138,7 +138,7 @@ impl Config {
             seed,
             ..Default::default()
         };
-        of_renderer(&rays, scene, tree)
+        of_renderer(&rays, scene, tree, &|| false)
     }
 
     /// Returns the density of the rays that a tree is trained on; `seed` draws the rays.
@@ -152,7 +152,7 @@ impl Config {
             .build(&scene.boxes)
             .map_err(|error| error.to_string())?;
         let rays = match trained {
-            TrainedOn::Default => of_anything(self.trained, scene, &tree, seed),
+            TrainedOn::Default => of_anything(self.trained, scene, &tree, seed, &|| false),
             TrainedOn::Camera => self.rendered(scene, &tree, false, self.trained, seed),
             TrainedOn::Inside => of_inside(self.trained, scene, &tree, seed),
         };
