@@ -14,7 +14,6 @@
 //! such branches.
 
 use super::crossed_leaves::{Decision, LineLanes, SlopedLine};
-use super::in_flight::boxes;
 use super::instructions::{Instructions, Pending};
 use super::kernel::STACK;
 use super::lanes::Lanes;
@@ -162,7 +161,7 @@ unsafe fn visit_nodes<K: Instructions>(
                 let traversal = &mut *active[i];
                 let ray = &*traversal.ray;
                 let node = &*nodes.add(traversal.child.index());
-                let (_, entered) = boxes::<K>(node, ray, ray.t_max);
+                let (_, entered) = ray.boxes::<K>(node, ray.t_max);
                 let leaves = K::Boxes::load(node.children.as_ptr().cast()).signs();
                 K::compress(node, entered & !leaves, traversal.top);
                 let inner = (entered & !leaves).count_ones() as usize;

@@ -13,15 +13,12 @@
 //! What a ray waits for decides which list it is in and is no branch; nor is the order of hits, nor what they cut off.
 
 use super::answer::Answers;
-use super::instructions::{Instructions, Pending};
-use super::kernel::STACK;
+use super::instructions::Instructions;
 use super::lanes::Lanes;
 use super::layout::WideBvh;
-use super::node::{Child, WideNode};
 use super::prepared::{Prepared, Ready};
 use super::source::Source;
-use super::triangles::TriangleBlock;
-use crate::triangle::AXES;
+use super::traversal::{self, END, Traversal};
 use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 use core::ops::Range;
@@ -34,9 +31,6 @@ const RAYS: usize = 16;
 
 /// Rays of a batch that are numbered together.
 const MOST: usize = 1 << 31;
-
-/// At the bottom of every stack.
-const END: Child = Child::leaf(u32::MAX);
 
 /// The answers of the rays of these numbers.
 ///
@@ -78,45 +72,6 @@ pub(crate) unsafe fn trace<K: Instructions, A: Answers>(
             flight.from = flight.end;
             flight.end = numbers.end.min(flight.from + MOST);
             flight.trace(traversals.as_mut_ptr().cast());
-        }
-    }
-}
-
-/// The way of one ray through the layout.
-#[repr(C, align(64))]
-struct Traversal {
-    ray: Prepared,
-    /// The nearest hit so far, or the end of the ray and `u32::MAX`.
-    t: f32,
-    object: u32,
-    top: *mut Pending,
-    /// The node or the block of triangles to visit next.
-    child: Child,
-    stack: Stack,
-}
-
-/// [`END`], what waits, the block after the present one, and room for stores of whole registers.
-#[repr(C, align(64))]
-struct Stack([MaybeUninit<Pending>; STACK + 24]);
-
-impl Traversal {
-    /// Goes on to what is on top of the stack, and has it fetched.
-    #[inline(always)]
-    unsafe fn pop<K: Instructions>(&mut self, wide: &WideBvh) {
-        // SAFETY: nothing is popped after `END`; a prefetch may name any address.
-        unsafe {
-            self.top = self.top.sub(1);
-            let child = Child::from_bits(*self.top as u32);
-            self.child = child;
-            let (array, size) = if child.is_node() {
-                (wide.nodes.as_ptr().cast::<u8>(), size_of::<WideNode>())
-            } else {
-                (wide.blocks.as_ptr().cast::<u8>(), size_of::<TriangleBlock>())
-            };
-            let lines = array.wrapping_add(child.index().wrapping_mul(size));
-            for line in 0..4 {
-                K::prefetch(lines.wrapping_add(64 * line));
-            }
         }
     }
 }
@@ -197,17 +152,8 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             let next = self.waiting.trailing_zeros() as usize;
             self.waiting &= self.waiting - 1;
             let traversal = &mut *traversal;
-            traversal.ray = self.ready.get_unchecked(next).assume_init();
-            traversal.t = traversal.ray.t_max;
-            traversal.object = u32::MAX;
-            traversal.child = self.wide.root.unwrap_or(END);
-            traversal.stack.0[0].write(u64::from(END.bits()));
-            traversal.top = traversal
-                .stack
-                .0
-                .as_mut_ptr()
-                .cast::<Pending>()
-                .add(1);
+            let ray = self.ready.get_unchecked(next).assume_init();
+            traversal.start(ray, self.wide.root.unwrap_or(END));
             self.enlist(traversal);
         }
     }
@@ -257,27 +203,35 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
         }
     }
 
+    /// Visits the nodes at which rays are, in three passes. A pass over many rays has short chains of
+    /// dependent operations, so that the processor works on several rays at once; the whole visit of
+    /// one ray fills half of its window of instructions.
     #[inline(always)]
     unsafe fn visit_nodes(&mut self) {
-        // SAFETY: the references of the layout are sound, and its stacks large enough.
+        let nodes = self.wide.nodes.as_ptr();
+        let count = self.at_nodes.count;
+        let mut entries = [const { MaybeUninit::<K::Boxes>::uninit() }; FLIGHT];
+        let mut masks = [0; FLIGHT];
+        // SAFETY: there are at most `FLIGHT` rays; the references of the layout are sound, and its
+        // stacks large enough.
         unsafe {
-            let count = self.at_nodes.count;
+            for i in 0..count {
+                let traversal = &*self.at_nodes.get(i);
+                let node = &*nodes.add(traversal.child.index());
+                let (entry, mask) = traversal.ray.boxes::<K>(node, traversal.t);
+                entries.get_unchecked_mut(i).write(entry);
+                *masks.get_unchecked_mut(i) = mask;
+            }
+            for i in 0..count {
+                let traversal = &mut *self.at_nodes.get(i);
+                let node = &*nodes.add(traversal.child.index());
+                let entry = entries.get_unchecked(i).assume_init();
+                traversal.enter::<K, A>(node, entry, *masks.get_unchecked(i));
+            }
             self.at_nodes.count = 0;
             for i in 0..count {
                 let traversal = &mut *self.at_nodes.get(i);
-                let node = &*self
-                    .wide
-                    .nodes
-                    .as_ptr()
-                    .add(traversal.child.index());
-                let (entry, mask) = boxes::<K>(node, &traversal.ray, traversal.t);
-                if A::ANY {
-                    K::compress(node, mask, traversal.top);
-                } else {
-                    K::sort(node, entry, mask, traversal.top);
-                }
-                traversal.top = traversal.top.add(mask.count_ones() as usize);
-                traversal.pop::<K>(self.wide);
+                traversal.fetch::<K>(self.wide);
                 self.enlist(traversal);
             }
         }
@@ -295,8 +249,7 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             for i in (0..count).step_by(quarters) {
                 let at = |k: usize| self.at_leaves.get((i + k).min(count - 1));
                 let four = [at(0), at(1), at(2), at(3)];
-                let pairs = Prepared::pairs::<K::Rays>(rays_of(four));
-                let found = pairs.candidates(&corners(four, blocks));
+                let found = traversal::candidates::<K::Rays>(four, blocks);
                 for (k, &traversal) in four.iter().enumerate().take(quarters) {
                     hopeful.append(traversal, (found >> (4 * k) & 0b1111 != 0) & (i + k < count));
                 }
@@ -304,33 +257,17 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             for i in (0..hopeful.count).step_by(quarters) {
                 let at = |k: usize| hopeful.get((i + k).min(hopeful.count - 1));
                 let four = [at(0), at(1), at(2), at(3)];
-                decide::<K::Rays>(four, blocks);
+                traversal::decide::<K::Rays>(four, blocks);
                 if !A::ANY {
                     for &traversal in four.iter().take(quarters) {
-                        let traversal = &mut *traversal;
-                        let base = traversal.stack.0.as_mut_ptr().cast::<Pending>();
-                        traversal.top = K::drop_farther(base, traversal.top, traversal.t);
+                        (*traversal).drop_farther::<K>();
                     }
                 }
             }
             for i in 0..count {
                 let traversal = &mut *self.at_leaves.get(i);
-                let block = traversal.child.index();
-                *traversal.top = u64::from(Child::leaf(block as u32 + 1).bits());
-                traversal.top = traversal
-                    .top
-                    .add(usize::from(!(*blocks.add(block)).is_last()));
-                if A::ANY {
-                    let bottom = traversal
-                        .stack
-                        .0
-                        .as_mut_ptr()
-                        .cast::<Pending>()
-                        .add(1);
-                    traversal.top =
-                        if traversal.object == u32::MAX { traversal.top } else { bottom };
-                }
-                traversal.pop::<K>(self.wide);
+                traversal.leave_block::<A>(blocks);
+                traversal.fetch::<K>(self.wide);
                 self.enlist(traversal);
             }
         }
@@ -352,114 +289,4 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             }
         }
     }
-}
-
-/// The eight boxes of a node: the distances at which the ray enters them, and a bit for each box entered before `t_max`.
-#[inline(always)]
-pub(super) unsafe fn boxes<K: Instructions>(
-    node: &WideNode,
-    ray: &Prepared,
-    t_max: f32,
-) -> (K::Boxes, u32) {
-    // SAFETY: the caller's promises; loads are of whole, aligned planes, which the ray names.
-    unsafe {
-        let distance = |plane: u32, scale: f32, shift: f32| {
-            let plane = node
-                .planes
-                .as_ptr()
-                .cast::<u8>()
-                .add(plane as usize)
-                .cast();
-            K::Boxes::load(plane).mul_add(K::Boxes::splat(scale), K::Boxes::splat(shift))
-        };
-        let near = |axis: usize| distance(ray.near[axis], ray.scale[axis], ray.near_shift[axis]);
-        let far = |axis: usize| distance(ray.far[axis], ray.scale[axis], ray.far_shift[axis]);
-        let entry = near(0)
-            .max(near(1))
-            .max(near(2).max(K::Boxes::splat(ray.t_min)));
-        // Of a NaN and a number the second: unused lanes stay NaN.
-        let exit = K::Boxes::splat(t_max).min(far(0).min(far(1)).min(far(2)));
-        (entry, K::entered(entry, exit))
-    }
-}
-
-#[inline(always)]
-unsafe fn rays_of<'a>(four: [*mut Traversal; 4]) -> [&'a Prepared; 4] {
-    // SAFETY: the caller's promise.
-    unsafe { [&(*four[0]).ray, &(*four[1]).ray, &(*four[2]).ray, &(*four[3]).ray] }
-}
-
-/// The corners of the block at which each ray is, along the axes of its shear.
-#[inline(always)]
-unsafe fn corners<L: Lanes>(
-    four: [*mut Traversal; 4],
-    blocks: *const TriangleBlock,
-) -> [[L; 3]; 3] {
-    // SAFETY: the caller's promises; axes are below 3.
-    unsafe {
-        let lanes = |i: usize, corner: usize, axis: usize| {
-            let traversal = &*four[i];
-            let axis = AXES[traversal.ray.largest_axis as usize % 3][axis];
-            let block = blocks.wrapping_add(traversal.child.index());
-            block
-                .cast::<f32>()
-                .wrapping_add((3 * corner + axis) * TriangleBlock::LANES)
-        };
-        let of = |corner: usize, axis: usize| {
-            L::load_quarters([
-                lanes(0, corner, axis),
-                lanes(1, corner, axis),
-                lanes(2, corner, axis),
-                lanes(3, corner, axis),
-            ])
-        };
-        [
-            [of(0, 0), of(0, 1), of(0, 2)],
-            [of(1, 0), of(1, 1), of(1, 2)],
-            [of(2, 0), of(2, 1), of(2, 2)],
-        ]
-    }
-}
-
-/// Gives every ray the nearest hit among those it has and those in the block at which it is, by
-/// [`Hit::precedes`](crate::Hit::precedes) and without a branch.
-#[inline(always)]
-unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4], blocks: *const TriangleBlock) {
-    // SAFETY: the caller's promises; ids are four aligned lanes, and so are a traversal's distance and what follows it.
-    unsafe {
-        let row = |i: usize| (&raw const (*four[i]).t);
-        let before = L::load_quarters([row(0), row(1), row(2), row(3)]);
-        let t_max = before.spread::<0>();
-        let (inside, t) = Prepared::pairs::<L>(rays_of(four)).decide(&corners(four, blocks), t_max);
-        let ids = |i: usize| {
-            (*blocks.wrapping_add((*four[i]).child.index()))
-                .ids()
-                .cast()
-        };
-        let ids = L::load_quarters([ids(0), ids(1), ids(2), ids(3)])
-            & L::splat_bits(!TriangleBlock::LAST);
-        let none = L::splat_bits(u32::MAX);
-        let t = L::select(inside, t, t_max);
-        let least = t.min(t.swap_twos());
-        let least = least.min(least.swap_ones());
-        let ids = L::select(inside & t.eq(least), ids, none);
-        let own = L::select(t_max.eq(least), before.spread::<1>(), none);
-        let ids = lower(ids, own);
-        let ids = lower(ids, ids.swap_twos());
-        let ids = lower(ids, ids.swap_ones());
-        let mut distances = [0.0; 16];
-        let mut objects = [0.0; 16];
-        least.store(distances.as_mut_ptr());
-        ids.store(objects.as_mut_ptr());
-        for (i, &traversal) in four.iter().enumerate().take(L::N / 4) {
-            (*traversal).t = distances[4 * i];
-            (*traversal).object = f32::to_bits(objects[4 * i]);
-        }
-    }
-}
-
-/// The lower of two ids.
-#[inline(always)]
-fn lower<L: Lanes>(a: L, b: L) -> L {
-    L::select(a.below(b), a, b)
 }

@@ -29,6 +29,7 @@ mod prepared;
 mod ray_lanes;
 mod refit;
 mod source;
+mod traversal;
 mod triangles;
 // The kernels of the target, or none.
 #[cfg_attr(all(feature = "std", target_arch = "x86_64"), path = "x86/mod.rs")]

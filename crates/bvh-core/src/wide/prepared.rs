@@ -1,7 +1,9 @@
 //! Rays made ready for rays in flight: what the tests of boxes and triangles need of one, together in memory.
 
 use super::box_ray::MARGIN;
+use super::instructions::Instructions;
 use super::lanes::{Lanes, Mask};
+use super::node::WideNode;
 use super::pairs::Pairs;
 use super::ray_lanes::RayLanes;
 use crate::Aabb;
@@ -131,6 +133,36 @@ impl Prepared {
         (&raw const *self)
             .cast::<f32>()
             .wrapping_add(4 * row)
+    }
+
+    /// Returns the distances at which the ray enters the eight boxes of a node, and a bit for each
+    /// box that it enters before `t_max`.
+    ///
+    /// # Safety
+    /// The processor has the instructions.
+    #[inline(always)]
+    pub(crate) unsafe fn boxes<K: Instructions>(
+        &self,
+        node: &WideNode,
+        t_max: f32,
+    ) -> (K::Boxes, u32) {
+        // SAFETY: the ray names whole, aligned planes.
+        unsafe {
+            let distance = |plane: u32, scale: f32, shift: f32| {
+                let planes = node.planes.as_ptr().cast::<u8>();
+                let plane = K::Boxes::load(planes.add(plane as usize).cast());
+                plane.mul_add(K::Boxes::splat(scale), K::Boxes::splat(shift))
+            };
+            let near =
+                |axis: usize| distance(self.near[axis], self.scale[axis], self.near_shift[axis]);
+            let far =
+                |axis: usize| distance(self.far[axis], self.scale[axis], self.far_shift[axis]);
+            let begin = K::Boxes::splat(self.t_min);
+            let entry = near(0).max(near(1)).max(near(2).max(begin));
+            // `min` returns the second of a NaN and a number: unused lanes stay NaN.
+            let exit = K::Boxes::splat(t_max).min(far(0).min(far(1)).min(far(2)));
+            (entry, K::entered(entry, exit))
+        }
     }
 
     /// A ray for every quarter of the lanes, as triangles are tested with it.

@@ -39,7 +39,7 @@ impl Instructions for Avx2 {
     type Block = F32x4;
     type Rays = F32x8;
     const PACKET: usize = 64;
-    const FLIGHT: usize = 24;
+    const FLIGHT: usize = 32;
     super::common_instructions!();
 
     #[inline(always)]
