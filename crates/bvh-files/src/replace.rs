@@ -135,9 +135,11 @@ impl Reserved {
         overwrite(unfinished.as_file_mut(), sections)
             .map_err(WriteError::of(&path, "write the file"))?;
         let folder = path.parent().map(Path::to_owned);
-        unfinished
+        let file = unfinished
             .persist(&path)
-            .map_err(|failed| WriteError::of(&path, "replace the file")(failed.error))?;
+            .map_err(|failed| WriteError::of(&path, "replace the file")(kept(failed)))?;
+        // On Windows a lock keeps others from reading, and may outlast the file that holds it.
+        let _ = file.unlock();
         // Syncing the folder makes the new name outlast a loss of power. Where that is impossible,
         // the old file may come back, complete.
         if let Some(folder) = folder.and_then(|folder| File::open(folder).ok()) {
@@ -145,6 +147,19 @@ impl Reserved {
         }
         Ok(())
     }
+}
+
+/// Keeps a complete file that could not get its name, because the old file is in use on Windows or
+/// is a folder by now. Returns the failure, which names the kept file.
+fn kept(failed: tempfile::PersistError) -> io::Error {
+    let tempfile::PersistError { error, file } = failed;
+    // With another suffix it is no leftover, which the next writer would remove.
+    let path = file.path().with_extension("kept");
+    let message = match file.persist_noclobber(&path) {
+        Ok(_) => format!("{error}; the new file is complete, as {}", path.display()),
+        Err(_) => return error,
+    };
+    io::Error::new(error.kind(), message)
 }
 
 fn overwrite(file: &mut File, sections: &[&[u8]]) -> io::Result<()> {
@@ -223,6 +238,22 @@ mod tests {
         fs::remove_file(reserved.unfinished.path()).unwrap();
         reserved.write(b"found in hours").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"found in hours");
+    }
+
+    #[test]
+    fn bytes_that_cannot_get_the_name_of_the_file_are_kept_under_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.bvh");
+        let reserved = Reserved::new(&path, 1000).unwrap();
+        fs::create_dir(&path).unwrap();
+        let error = reserved.write(b"found in hours").unwrap_err();
+        fs::remove_dir(&path).unwrap();
+        // The next writer removes no kept file.
+        write(&path, b"later").unwrap();
+        let mut entries = fs::read_dir(folder.path()).unwrap().flatten();
+        let kept = entries.find(|entry| entry.path() != path).unwrap().path();
+        assert_eq!(fs::read(&kept).unwrap(), b"found in hours");
+        assert!(error.to_string().contains(&kept.display().to_string()), "{error}");
     }
 
     #[test]

@@ -1,13 +1,10 @@
 //! The choices of a bake without `--budget`: the work, the cost, the rays and the split references
 //! that suit the scene.
 //!
-//! ```text
-//!   area ── pays? ──► layout ── pays? ──► default rays ── pays? ──► divided objects
-//! ```
-//!
-//! Each step is tried with a short search on top of the steps that have paid. Its tree is judged by
-//! rays that did not train it, and the step pays if it saves [`WORTHWHILE`] of their expected tests.
+//! Short searches try the combinations of the choices that are open. Rays that trained no tree judge
+//! the trees. Chosen is the simplest combination that is within [`TOLERANCE`] of the best one.
 
+use super::plan::Prepared;
 use super::starts::{Division, greedy};
 use super::watch::Interrupted;
 use crate::Error;
@@ -17,6 +14,8 @@ use bvh_core::{Bvh, RayDensity};
 use bvh_scenes::Scene;
 use bvh_search::{Budget, Method, Problem, solve};
 use bvh_terminal::interrupt;
+use bvh_terminal::output::print_error;
+use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// The work per object of a bake that chooses its own budget. On the 7 scenes of
@@ -27,10 +26,16 @@ const WORK_PER_OBJECT: u64 = 8000;
 const MOST_WORK: u64 = 4_000_000_000;
 /// The work per object of the largest scenes. `best` ends within 1.3 % of the best known cost.
 const LEAST_WORK_PER_OBJECT: u64 = 800;
-/// The share of the work that the short search of each step spends.
+/// The share of the work that each short search of a large scene spends.
 const TRIED: f64 = 0.02;
-/// The fraction of the expected tests of rays that a step must save.
-const WORTHWHILE: f64 = 0.01;
+/// The work of the short searches of smaller scenes: a fraction of a second each.
+const LEAST_TRIED: f64 = 1e7;
+/// The largest share of the work that a short search spends. Five times less chose wrongly on small
+/// scenes, where dividing objects pays late in the search.
+const MOST_TRIED: f64 = 0.1;
+/// The fraction of the expected tests of rays that a simpler combination may lose. Two searches
+/// with other seeds differ by as much.
+const TOLERANCE: f64 = 0.005;
 /// The number of references per object where divided objects pay.
 const REFERENCES: f64 = 1.2;
 
@@ -78,139 +83,225 @@ pub struct Choices {
 }
 
 /// The outcome of a decision.
-pub struct Decided {
+pub struct Decided<'a> {
     /// The choices that pay.
     pub choices: Choices,
     /// The explanation of each choice, in one line.
     pub reasons: Vec<String>,
-    /// The greedy tree, which the bake needs too.
-    pub greedy: Bvh,
+    /// The parts of the decision that the bake needs too.
+    pub prepared: Prepared<'a>,
 }
 
-/// Tries the open choices one after the other, and keeps those that pay. Begins with the `given`
-/// ones, and also ends with them if `interrupted` becomes true.
-pub fn decide(
+/// Tries the combinations of the open choices, and chooses one of them. Ends with the `given`
+/// choices if `interrupted` becomes true.
+pub fn decide<'a>(
     open: Open,
     given: Choices,
     method: &Method,
-    scene: &Scene,
-    seed: u64,
-    interrupted: &AtomicBool,
-) -> Result<Decided, Error> {
-    let mut decision = Decision::begin(given, method, scene, seed, interrupted)?;
-    if open.cost {
-        let layout = Choices { objective: Objective::Layout, ..decision.chosen.clone() };
-        decision.consider("cost: the wide layout's", layout)?;
-    }
-    if open.rays {
-        let mut with_rays = Choices { rays: Some(Rays::Default), ..decision.chosen.clone() };
-        if open.cost {
-            with_rays.objective = Objective::Layout;
-        }
-        decision.consider("rays: default", with_rays)?;
-    }
-    if open.references {
-        let divided = Choices { references: REFERENCES, ..decision.chosen.clone() };
-        decision.consider("references: 1.2 per object", divided)?;
-    }
-    let Decision { chosen, reasons, greedy, .. } = decision;
-    Ok(Decided { choices: chosen, reasons, greedy })
-}
-
-/// The choices so far, and what the trial of the next one needs.
-struct Decision<'a> {
-    method: &'a Method,
     scene: &'a Scene,
     seed: u64,
-    interrupted: &'a AtomicBool,
+    interrupted: &AtomicBool,
+) -> Result<Decided<'a>, Error> {
+    let costs = open.costs(&given);
+    let references = open.references(&given);
+    if costs.len() * references.len() == 1 {
+        let prepared = Prepared::default();
+        return Ok(Decided { choices: given, reasons: Vec::new(), prepared });
+    }
+    let mut trials = Trials::begin(&open, &given, method, scene, seed, interrupted)?;
+    let mut table = Table { columns: costs.len(), tests: Vec::new() };
+    let bar = bar(costs.len() * references.len());
+    for &references in &references {
+        for (objective, rays) in &costs {
+            let choices = Choices { objective: *objective, rays: rays.clone(), references };
+            table.tests.push(trials.expected_tests(&choices)?);
+            bar.inc(1);
+        }
+    }
+    bar.finish_and_clear();
+    // An interrupted search says nothing about the choices.
+    if interrupted.load(Relaxed) {
+        let prepared = Prepared { greedy: Some(trials.greedy), ..Prepared::default() };
+        return Ok(Decided { choices: given, reasons: Vec::new(), prepared });
+    }
+    let (row, column) = table.simplest();
+    let (objective, rays) = costs[column].clone();
+    let choices = Choices { objective, rays, references: references[row] };
+    let prepared = Prepared {
+        greedy: Some(trials.greedy),
+        density: trials.trained.take_if(|_| choices.rays.is_some()),
+        division: trials
+            .division
+            .take_if(|_| choices.references > 1.0),
+    };
+    Ok(Decided { choices, reasons: table.reasons(&open, row, column), prepared })
+}
+
+impl Open {
+    /// Returns the costs to try, with their rays: the simpler ones first.
+    fn costs(&self, given: &Choices) -> Vec<(Objective, Option<Rays>)> {
+        let mut costs = vec![(given.objective, given.rays.clone())];
+        let objective = if self.cost { Objective::Layout } else { given.objective };
+        if self.cost {
+            costs.push((objective, None));
+        }
+        if self.rays {
+            costs.push((objective, Some(Rays::Default)));
+        }
+        costs
+    }
+
+    /// Returns the numbers of references per object to try: the smaller one first.
+    fn references(&self, given: &Choices) -> Vec<f64> {
+        if self.references { vec![1.0, REFERENCES] } else { vec![given.references] }
+    }
+}
+
+/// The expected tests of the judging rays: a row for each number of references, a column for each
+/// cost, with the simplest combination first.
+struct Table {
+    columns: usize,
+    tests: Vec<f64>,
+}
+
+impl Table {
+    /// Returns the row and the column of the simplest combination near the best one.
+    fn simplest(&self) -> (usize, usize) {
+        let best = self
+            .tests
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
+        let index = self
+            .tests
+            .iter()
+            .position(|&tests| tests <= best * (1.0 + TOLERANCE));
+        let index = index.unwrap_or(0);
+        (index / self.columns, index % self.columns)
+    }
+
+    /// Explains the choice of a row and a column: each open choice is compared with its
+    /// alternative, other things being equal.
+    fn reasons(&self, open: &Open, row: usize, column: usize) -> Vec<String> {
+        let tests = |row: usize, column: usize| self.tests[row * self.columns + column];
+        let last = self.columns - 1;
+        let mut reasons = Vec::new();
+        if open.cost {
+            let saved = 1.0 - tests(row, column.max(1)) / tests(row, 0);
+            reasons.push(reason("cost: the wide layout's", column > 0, saved));
+        }
+        if open.rays {
+            let saved = 1.0 - tests(row, last) / tests(row, last - 1);
+            reasons.push(reason("rays: default", column == last, saved));
+        }
+        if open.references {
+            let saved = 1.0 - tests(1, column) / tests(0, column);
+            reasons.push(reason("references: 1.2 per object", row > 0, saved));
+        }
+        reasons
+    }
+}
+
+/// Explains one choice by the fraction of expected tests that it saves.
+fn reason(name: &str, is_chosen: bool, saved: f64) -> String {
+    let verdict = if is_chosen { "yes" } else { "no" };
+    let percent = 100.0 * saved.abs();
+    let direction = if saved < 0.0 { "more" } else { "fewer" };
+    format!("{name}: {verdict}, {percent:.1} % {direction} expected tests of untrained rays")
+}
+
+/// Returns a bar over the trials, or without a terminal prints that they begin.
+fn bar(trials: usize) -> ProgressBar {
+    let bar = ProgressBar::new(trials as u64);
+    let style = ProgressStyle::with_template("{bar:10} {msg}, {pos} of {len}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.set_message("trying the choices");
+    if bar.is_hidden() {
+        print_error(&format!("trying {trials} combinations of the choices"));
+    } else {
+        bar.tick();
+    }
+    bar
+}
+
+/// Short searches, and the data that they share.
+struct Trials<'a, 'b> {
+    method: &'b Method,
+    scene: &'a Scene,
+    seed: u64,
+    interrupted: &'b AtomicBool,
     greedy: Bvh,
     /// The rays that judge; `None` after an interruption.
     judging: Option<RayDensity>,
-    chosen: Choices,
-    /// The expected tests of the judging rays in the tree of the chosen candidate.
-    tests: f64,
-    reasons: Vec<String>,
+    /// The rays that train trees.
+    trained: Option<RayDensity>,
+    /// The permission to divide objects.
+    division: Option<Division<'a>>,
 }
 
-impl<'a> Decision<'a> {
-    /// Tries the given choices, with which all others are compared.
+impl<'a, 'b> Trials<'a, 'b> {
     fn begin(
-        given: Choices,
-        method: &'a Method,
+        open: &Open,
+        given: &Choices,
+        method: &'b Method,
         scene: &'a Scene,
         seed: u64,
-        interrupted: &'a AtomicBool,
+        interrupted: &'b AtomicBool,
     ) -> Result<Self, Error> {
         let greedy = greedy(method.name(), scene, interrupted)?;
         // There is a tree now, which Ctrl-C must save instead of ending the program.
         interrupt::hold();
         let judging = Rays::Default.density(scene, &greedy, Rays::JUDGING, interrupted)?;
-        let mut decision = Self {
+        let default = open.rays.then_some(Rays::Default);
+        let trained = match given.rays.as_ref().or(default.as_ref()) {
+            Some(rays) => rays.density(scene, &greedy, seed, interrupted)?,
+            None => None,
+        };
+        let references = if open.references { REFERENCES } else { given.references };
+        let most_references = (references * scene.boxes.len() as f64) as usize;
+        let is_over = || interrupted.load(Relaxed);
+        let division = Division::decide(most_references, scene, None, &is_over)?;
+        Ok(Self {
             method,
             scene,
             seed,
             interrupted,
             greedy,
             judging,
-            chosen: given.clone(),
-            tests: f64::INFINITY,
-            reasons: Vec::new(),
-        };
-        decision.tests = decision.tests_after(&given)?;
-        Ok(decision)
-    }
-
-    /// Tries other choices, and keeps them if they pay.
-    fn consider(&mut self, name: &str, choices: Choices) -> Result<(), Error> {
-        let tests = self.tests_after(&choices)?;
-        // An interrupted search says nothing about the choices.
-        if self.interrupted.load(Relaxed) {
-            return Ok(());
-        }
-        let saved = 1.0 - tests / self.tests;
-        let pays = saved >= WORTHWHILE;
-        let verdict = if pays { "yes" } else { "no" };
-        let percent = 100.0 * saved.abs();
-        let direction = if saved < 0.0 { "more" } else { "fewer" };
-        self.reasons.push(format!(
-            "{name}: {verdict}, {percent:.1} % {direction} expected tests of untrained rays"
-        ));
-        if pays {
-            self.chosen = choices;
-            self.tests = tests;
-        }
-        Ok(())
+            trained,
+            division: Some(division),
+        })
     }
 
     /// Returns the expected tests of the judging rays in the tree of a short search; infinitely many
     /// after an interruption.
-    fn tests_after(&self, choices: &Choices) -> Result<f64, Error> {
+    fn expected_tests(&self, choices: &Choices) -> Result<f64, Error> {
         let Self { method, scene, seed, interrupted, greedy, .. } = self;
         // A trial of no work takes seconds in large scenes.
         if interrupted.load(Relaxed) {
             return Ok(f64::INFINITY);
         }
-        let name = method.name();
-        let density = match &choices.rays {
-            Some(rays) => rays.density(scene, greedy, *seed, interrupted)?,
-            None => None,
-        };
-        let most_references = (choices.references * scene.boxes.len() as f64) as usize;
-        let is_over = || interrupted.load(Relaxed);
-        let division = Division::decide(most_references, scene, None, &is_over)?;
+        let is_divided = choices.references > 1.0;
         let problem = Problem {
             objective: choices.objective,
-            splits: division.splits(),
-            measure: density
+            splits: self
+                .division
                 .as_ref()
+                .filter(|_| is_divided)
+                .and_then(Division::splits),
+            measure: self
+                .trained
+                .as_ref()
+                .filter(|_| choices.rays.is_some())
                 .map(|density| density as &dyn Measure),
             known: Some(greedy),
             ..Problem::new(&scene.boxes)
         };
-        let share = TRIED * work(scene.boxes.len()) as f64;
-        let budget = Budget { max_work: Some(share as u64), ..Budget::UNLIMITED };
+        let work = work(scene.boxes.len()) as f64;
+        let tried = (TRIED * work).max(LEAST_TRIED.min(MOST_TRIED * work));
+        let budget = Budget { max_work: Some(tried as u64), ..Budget::UNLIMITED };
         let found = solve(*method, &problem, *seed, budget, &Interrupted(interrupted))
-            .map_err(Error::search(&scene.name, name))?;
+            .map_err(Error::search(&scene.name, method.name()))?;
         match &self.judging {
             Some(judging) if !interrupted.load(Relaxed) => {
                 Ok(Objective::Layout.cost_by(&found.tree, judging))

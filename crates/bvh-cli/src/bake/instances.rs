@@ -2,7 +2,7 @@
 //! instances that its nodes place, into a folder.
 
 use super::BakeArgs;
-use super::plan::Plan;
+use super::plan::{Plan, Prepared};
 use super::watch::gain;
 use crate::Error;
 use crate::csv;
@@ -92,7 +92,7 @@ fn bake_part(
     path: &Path,
     interrupted: &AtomicBool,
 ) -> Result<(), Error> {
-    let bake = plan.begin(scene, None, None, interrupted)?;
+    let bake = plan.begin(scene, None, Prepared::default(), interrupted)?;
     let baked = bake.search(interrupted)?;
     bake.save(&baked, path, files::Reserved::new(path, 0)?)?;
     let count = scene.boxes.len();

@@ -10,7 +10,6 @@ mod watch;
 use crate::Error;
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
-use bvh_core::Bvh;
 use bvh_core::cost::Objective;
 use bvh_core::file::Header;
 use bvh_scenes::tree_file;
@@ -23,7 +22,7 @@ use bvh_terminal::output::{print_error, print_line};
 use clap::Args;
 use decide::{Choices, Decided, Open, decide};
 use effort::Effort;
-use plan::{Bake, Baked, Plan, Start};
+use plan::{Bake, Baked, Plan, Prepared, Start};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use watch::gain;
@@ -145,18 +144,18 @@ impl BakeArgs {
     }
 
     /// Makes the choices that the arguments leave open if there is no budget, and prints the reasons.
-    /// Returns the greedy tree, too, if the choices needed it.
-    fn decided(
+    /// Also returns the results of the decision that the bake needs.
+    fn decided<'a>(
         &self,
         plan: Plan,
-        scene: &Scene,
+        scene: &'a Scene,
         interrupted: &AtomicBool,
-    ) -> Result<(Plan, Option<Bvh>), Error> {
+    ) -> Result<(Plan, Prepared<'a>), Error> {
         // Only `best` offers the choices, and only triangles have a wide layout. A search from an
         // earlier tree minimises the cost that is given.
         let has_choices = matches!(plan.method, Method::Best(_)) && scene.triangles().is_ok();
         if self.budget.is_some() || !has_choices || self.from.is_some() {
-            return Ok((plan, None));
+            return Ok((plan, Prepared::default()));
         }
         let open = Open {
             cost: self.cost.is_none() && self.rays.is_none(),
@@ -168,7 +167,7 @@ impl BakeArgs {
             rays: plan.rays.clone(),
             references: plan.references,
         };
-        let Decided { choices, reasons, greedy } =
+        let Decided { choices, reasons, prepared } =
             decide(open, given, &plan.method, scene, plan.seed, interrupted)?;
         for reason in reasons {
             print_line(&reason);
@@ -178,7 +177,7 @@ impl BakeArgs {
             (Some(_), None) => self.recorded(Some(Rays::DEFAULT)),
             _ => plan.name,
         };
-        Ok((Plan { objective, rays, references, name, ..plan }, Some(greedy)))
+        Ok((Plan { objective, rays, references, name, ..plan }, prepared))
     }
 
     /// Returns the named method. If a tree is given, rejects methods that cannot continue from it.
@@ -260,10 +259,10 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         None => None,
     };
     let plan = args.with_budget(plan, scene.boxes.len());
-    let (plan, greedy) = args.decided(plan, &scene, interrupted)?;
+    let (plan, prepared) = args.decided(plan, &scene, interrupted)?;
     // Reserving the file first reports a full disk before the search and not after it.
     let reserved = Reserved::new(&out, plan.most_bytes(&scene))?;
-    let bake = plan.begin(&scene, start.as_ref(), greedy, interrupted)?;
+    let bake = plan.begin(&scene, start.as_ref(), prepared, interrupted)?;
     if args.explain && bake.is_whole() {
         print_line(
             "  skipped: divided objects: no spatial split of a top-down division saves anything",

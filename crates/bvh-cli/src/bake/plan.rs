@@ -43,6 +43,17 @@ pub struct Start {
     pub work: u64,
 }
 
+/// The results of a decision that the bake needs too, and would otherwise make again.
+#[derive(Default)]
+pub struct Prepared<'a> {
+    /// The greedy tree.
+    pub greedy: Option<Bvh>,
+    /// The density of the plan's rays.
+    pub density: Option<RayDensity>,
+    /// The decision whether the plan's references pay.
+    pub division: Option<Division<'a>>,
+}
+
 impl Plan {
     /// Returns the largest number of references to a scene's objects.
     fn most_references(&self, scene: &Scene) -> usize {
@@ -56,16 +67,16 @@ impl Plan {
         Header::BYTES + self.most_references(scene) * reference
     }
 
-    /// Begins a bake, with the greedy tree if the caller has it. The time of the bake starts after
-    /// the greedy tree is built.
+    /// Begins a bake with the `prepared` results. The time of the bake starts after the greedy tree
+    /// is built.
     pub fn begin<'a>(
         &'a self,
         scene: &'a Scene,
         start: Option<&'a Start>,
-        known: Option<Bvh>,
+        prepared: Prepared<'a>,
         interrupted: &AtomicBool,
     ) -> Result<Bake<'a>, Error> {
-        let greedy = match known {
+        let greedy = match prepared.greedy {
             Some(tree) => tree,
             None => greedy(self.method.name(), scene, interrupted)?,
         };
@@ -73,13 +84,15 @@ impl Plan {
         // There is a tree now, which Ctrl-C must save instead of ending the program.
         interrupt::hold();
         let from = start.map(|start| &start.tree);
-        let division = Division::decide(self.most_references(scene), scene, from, &|| {
-            let is_timed = matches!(self.effort, Effort::Time(_));
-            interrupted.load(Relaxed) || is_timed && deadline.has_passed()
-        })?;
-        let density = match &self.rays {
-            Some(rays) => rays.density(scene, &greedy, self.seed, interrupted)?,
-            None => None,
+        let is_timed = matches!(self.effort, Effort::Time(_));
+        let is_over = || interrupted.load(Relaxed) || is_timed && deadline.has_passed();
+        let division = match prepared.division {
+            Some(division) => division,
+            None => Division::decide(self.most_references(scene), scene, from, &is_over)?,
+        };
+        let density = match (prepared.density, &self.rays) {
+            (None, Some(rays)) => rays.density(scene, &greedy, self.seed, interrupted)?,
+            (density, _) => density,
         };
         Ok(Bake { plan: self, scene, start, greedy, deadline, division, density })
     }
