@@ -186,7 +186,7 @@ pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> 
 fn write(args: &RenderArgs, film: &Film, rays_per_pixel: u32) -> Result<(), Error> {
     let action = "encode the picture";
     let bytes = if args.heatmap {
-        let pixels = heat::map(film, rays_per_pixel)
+        let pixels = heat::map(film, rays_per_pixel, &heat::range(film, rays_per_pixel))
             .map_err(io::Error::other)
             .map_err(Error::io(&args.out, action))?;
         image::png(film.width, &pixels)

@@ -45,7 +45,7 @@ fn a_bake_for_rays_saves_the_number_of_visits_of_each_node() {
     let at = folder.path();
     fs::write(at.join("walk.toml"), WALK).unwrap();
     for (rays, name) in
-        [("default", "best for rays of default"), ("walk.toml", "best for rays of walk.toml")]
+        [("default", "best for default rays"), ("walk.toml", "best for rays of walk.toml")]
     {
         let bytes = ["1", "2"].map(|jobs| {
             let args = [

@@ -251,9 +251,17 @@ mod tests {
         // The next writer removes no kept file.
         write(&path, b"later").unwrap();
         let mut entries = fs::read_dir(folder.path()).unwrap().flatten();
-        let kept = entries.find(|entry| entry.path() != path).unwrap().path();
+        let kept = entries
+            .find(|entry| entry.path() != path)
+            .unwrap()
+            .path();
         assert_eq!(fs::read(&kept).unwrap(), b"found in hours");
-        assert!(error.to_string().contains(&kept.display().to_string()), "{error}");
+        assert!(
+            error
+                .to_string()
+                .contains(&kept.display().to_string()),
+            "{error}"
+        );
     }
 
     #[test]

@@ -221,9 +221,12 @@ impl BakeArgs {
     fn recorded(&self, rays: Option<&str>) -> String {
         const MOST_BYTES: usize = 64;
         let Some(rays) = rays else { return self.method.clone() };
-        let file = Path::new(rays).file_name();
-        let file = file.map_or(rays.to_owned(), |name| name.to_string_lossy().into_owned());
-        let mut name = format!("{} for rays of {file}", self.method).replace('\0', "");
+        let rays = match Path::new(rays).file_name() {
+            _ if rays == Rays::DEFAULT => "default rays".to_owned(),
+            Some(file) => format!("rays of {}", file.to_string_lossy()),
+            None => format!("rays of {rays}"),
+        };
+        let mut name = format!("{} for {rays}", self.method).replace('\0', "");
         // Removing characters and not bytes keeps the name valid UTF-8.
         while name.len() > MOST_BYTES {
             name.pop();

@@ -25,10 +25,8 @@ pub struct Watch<'a> {
     /// The cost that gains are relative to.
     base: f64,
     last: Mutex<Option<Event>>,
-    /// The number of moves so far. Events are rare while the search is hot, so that their numbers
-    /// would be out of date.
-    moves: AtomicU64,
-    /// The work so far.
+    /// The work so far. Events are rare while the search is hot, so that their work would be out of
+    /// date.
     work: AtomicU64,
     /// The time of the bar's last update, in milliseconds since the beginning.
     shown: AtomicU64,
@@ -41,21 +39,19 @@ impl<'a> Watch<'a> {
         let bar = ProgressBar::new(1000);
         let style = ProgressStyle::with_template("{bar:10} {wide_msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        let [moves, work, shown] = [0, 0, 0].map(AtomicU64::new);
         Self {
             bar,
             deadline,
             effort,
             base,
             last: Mutex::default(),
-            moves,
-            work,
-            shown,
+            work: AtomicU64::default(),
+            shown: AtomicU64::default(),
             interrupted,
         }
     }
 
-    /// Shows the incumbent, its gain, the rate and the time left: in the bar ten times a second, or
+    /// Shows the incumbent, its gain and the time left: in the bar ten times a second, or
     /// without a terminal as a line every ten seconds.
     fn show(&self) {
         const BAR_MILLISECONDS: u64 = 100;
@@ -86,10 +82,9 @@ impl<'a> Watch<'a> {
             Effort::Work(work) => self.work.load(Relaxed) as f64 / work.max(1) as f64,
         };
         let message = format!(
-            "{:.6e}, {} MF, {:.2} M moves/s, {:.0} s left",
+            "cost {:.6e}, {} the greedy tree's, {:.0} s left",
             event.incumbent,
             gain(event.incumbent, self.base),
-            self.moves.load(Relaxed) as f64 / seconds / 1e6,
             (seconds / done.max(1e-9) - seconds).max(0.0)
         );
         if !is_bar {
@@ -110,8 +105,7 @@ impl Observer for Watch<'_> {
             .unwrap_or_else(PoisonError::into_inner) = Some(*event);
     }
 
-    fn counted(&self, evaluations: u64, work: u64) {
-        self.moves.store(evaluations, Relaxed);
+    fn counted(&self, _evaluations: u64, work: u64) {
         self.work.store(work, Relaxed);
     }
 

@@ -18,7 +18,7 @@ use bvh_terminal::files;
 use bvh_terminal::output::{print_error, print_line};
 use clap::Args;
 use levels::Level;
-use page::{Page, Row};
+use page::{Heat, Page, Row};
 use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -86,10 +86,7 @@ pub fn report(args: &ReportArgs, interrupted: &AtomicBool) -> Result<(), Error> 
         ),
         rows: rows(&baked, &greedy),
         scene: png(&out, &baked.film, &baked.film.pixels)?,
-        heat: [&baked, &greedy]
-            .into_iter()
-            .map(|measured| heat_map(&out, &measured.film))
-            .collect::<Result<_, Error>>()?,
+        heat: heat_maps(&out, &baked.film, &greedy.film)?,
         levels: [&baked.levels, &greedy.levels],
     };
     files::write(&out, page.html().as_bytes())?;
@@ -127,7 +124,7 @@ fn rows(baked: &Measured, greedy: &Measured) -> Vec<Row> {
             Some(cost::over_root_area(&of.tree, cost))
         }),
         ("Expected tests of a ray from anywhere", |of| of.tests),
-        ("Tests per ray of the picture", |of| {
+        ("Tests per ray of the picture, in the binary tree", |of| {
             let counts = of.film.counts;
             Some((counts.boxes + counts.objects) as f64 / of.film.rays.max(1) as f64)
         }),
@@ -143,12 +140,18 @@ fn rows(baked: &Measured, greedy: &Measured) -> Vec<Row> {
         .collect()
 }
 
-/// Returns the PNG file of a film's heat map, with the key below it.
-fn heat_map(out: &Path, film: &Film) -> Result<Vec<u8>, Error> {
-    let pixels = heat::map(film, 1)
-        .map_err(io::Error::other)
-        .map_err(Error::io(out, "encode the picture"))?;
-    png(out, film, &pixels)
+/// Returns the heat maps of both trees under one scale.
+fn heat_maps(out: &Path, baked: &Film, greedy: &Film) -> Result<[Heat; 2], Error> {
+    let ranges = [heat::range(baked, 1), heat::range(greedy, 1)];
+    // The same colour must mean the same number of tests in both.
+    let top = ranges[0].top.max(ranges[1].top);
+    let draw = |film: &Film, range: heat::Range| {
+        let pixels = heat::map(film, 1, &heat::Range { top, ..range })
+            .map_err(io::Error::other)
+            .map_err(Error::io(out, "encode the picture"))?;
+        Ok(Heat { png: png(out, film, &pixels)?, median: range.median, most: range.max })
+    };
+    Ok([draw(baked, ranges[0])?, draw(greedy, ranges[1])?])
 }
 
 /// Returns a PNG file as wide as the film.

@@ -16,6 +16,16 @@ pub struct Row {
     pub greedy: f64,
 }
 
+/// The tests of each pixel's rays in a tree.
+pub struct Heat {
+    /// The heat map, a PNG file.
+    pub png: Vec<u8>,
+    /// The median over the pixels.
+    pub median: f64,
+    /// The largest number of a pixel.
+    pub most: f64,
+}
+
 /// The contents of a page. Pairs begin with the baked tree, and the greedy tree follows.
 pub struct Page<'a> {
     pub title: &'a str,
@@ -23,8 +33,8 @@ pub struct Page<'a> {
     pub rows: Vec<Row>,
     /// A picture of the scene, a PNG file.
     pub scene: Vec<u8>,
-    /// The heat maps of both trees, PNG files.
-    pub heat: Vec<Vec<u8>>,
+    /// The heat of both trees under one scale.
+    pub heat: [Heat; 2],
     pub levels: [&'a [Level]; 2],
 }
 
@@ -35,13 +45,12 @@ impl Page<'_> {
         let origin = escaped(&self.origin);
         let table = self.table();
         let scene = picture(&self.scene, "The scene.");
-        let captions = [
-            "Tests of each pixel's rays in the baked tree.",
-            "Tests in the greedy tree. The ends of the two scales differ.",
-        ];
         let mut heat = String::new();
-        for (png, caption) in self.heat.iter().zip(captions) {
-            heat += &picture(png, caption);
+        for (Heat { png, median, most }, tree) in self.heat.iter().zip(["baked", "greedy"]) {
+            let caption = format!(
+                "Tests of each pixel's rays in the {tree} tree: median {median:.0}, most {most:.0}."
+            );
+            heat += &picture(png, &caption);
         }
         let area = chart(self.levels, |level| level.area);
         let overlap = chart(self.levels, |level| level.overlap);
@@ -57,6 +66,8 @@ impl Page<'_> {
 <p><span class=\"key baked\"></span> the baked tree
 <span class=\"key greedy\"></span> the greedy Müller–Fellner tree, a library's plain build</p>
 {table}
+<p>Less is better. A tree baked for the wide layout saves tests there, and not always in the binary
+tree.</p>
 <h2>Rays</h2>
 <div class=\"pictures\">{scene}{heat}</div>
 <h2>Cost by level</h2>
@@ -79,7 +90,8 @@ visits.</p>
         );
         for Row { name, baked, greedy } in &self.rows {
             let difference = if *greedy > 0.0 {
-                format!("{:+.1} %", 100.0 * (baked / greedy - 1.0))
+                // A hyphen would be shorter than the plus.
+                format!("{:+.1} %", 100.0 * (baked / greedy - 1.0)).replace('-', "−")
             } else {
                 String::new()
             };
@@ -154,7 +166,7 @@ fn chart(levels: [&[Level]; 2], value: fn(&Level) -> f64) -> String {
         text,
         "<text x=\"{:.2}\" y=\"{}\" text-anchor=\"middle\">depth</text>",
         width / 2.0,
-        base + 34.0
+        base + 38.0
     );
     text + "</svg>"
 }
@@ -171,12 +183,12 @@ mod tests {
             origin: "2 objects".into(),
             rows: vec![Row { name: "Depth", baked: 1.0, greedy: 2.0 }],
             scene: vec![1, 2, 3],
-            heat: vec![vec![4], vec![5]],
+            heat: [4, 5].map(|byte| Heat { png: vec![byte], median: 1.0, most: 2.0 }),
             levels: [&levels, &[]],
         };
         let html = page.html();
         assert!(html.contains("<h1>&lt;b&gt; &amp; co</h1>"), "{html}");
-        assert!(html.contains("<td>1</td><td>2</td><td>-50.0 %</td>"), "{html}");
+        assert!(html.contains("<td>1</td><td>2</td><td>−50.0 %</td>"), "{html}");
         assert_eq!(html.matches("data:image/png;base64,").count(), 3);
         assert!(!html.contains("http") && !html.contains("<script"), "{html}");
     }

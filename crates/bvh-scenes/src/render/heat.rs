@@ -54,9 +54,9 @@ pub fn range(film: &Film, rays_per_pixel: u32) -> Range {
     Range { min, median, top, max }
 }
 
-/// Returns the pixels of a film's heat map and of the key below it.
-pub fn map(film: &Film, rays_per_pixel: u32) -> Result<Vec<[u8; 3]>, BadFont> {
-    let range = range(film, rays_per_pixel);
+/// Returns the pixels of a film's heat map and of the key below it. `range` is the film's [`range`],
+/// or has the top of another film with which this one is compared.
+pub fn map(film: &Film, rays_per_pixel: u32, range: &Range) -> Result<Vec<[u8; 3]>, BadFont> {
     // A picture without tests has the top 0, and its colours would be 0 / 0.
     let top = range.top.max(f64::MIN_POSITIVE) * f64::from(rays_per_pixel);
     let mut pixels: Vec<[u8; 3]> = film
@@ -67,7 +67,7 @@ pub fn map(film: &Film, rays_per_pixel: u32) -> Result<Vec<[u8; 3]>, BadFont> {
     let colours: Vec<[u8; 3]> = (0..=255)
         .map(|part| colour(f64::from(part) / 255.0))
         .collect();
-    pixels.extend(key::draw(film.width, &colours, &labels(&range))?);
+    pixels.extend(key::draw(film.width, &colours, &labels(range))?);
     Ok(pixels)
 }
 
@@ -119,15 +119,26 @@ mod tests {
         assert!(shades.is_sorted_by(|a, b| a < b), "{shades:?}");
         for width in [64, 65] {
             let tests = (0..u64::from(width) * 8).collect();
-            let pixels = map(&film(width, tests), 1).unwrap();
+            let film = film(width, tests);
+            let pixels = map(&film, 1, &range(&film, 1)).unwrap();
             assert_eq!(pixels.len() % width as usize, 0);
             assert_eq!((pixels[0], pixels[width as usize * 8]), (INFERNO[0], [255; 3]));
         }
     }
 
     #[test]
+    fn the_same_number_of_tests_has_one_colour_under_one_scale() {
+        let (few, many) = (film(64, vec![5; 64]), film(64, vec![10; 64]));
+        let range = Range { top: 10.0, ..range(&few, 1) };
+        let few = map(&few, 1, &range).unwrap();
+        let many = map(&many, 1, &range).unwrap();
+        assert_eq!((few[0], many[0]), (colour(0.5), colour(1.0)));
+    }
+
+    #[test]
     fn a_picture_without_tests_has_a_heat_map_too() {
-        let pixels = map(&film(40, vec![0; 40]), 1).unwrap();
+        let film = film(40, vec![0; 40]);
+        let pixels = map(&film, 1, &range(&film, 1)).unwrap();
         assert_eq!(pixels[..40], [INFERNO[0]; 40]);
     }
 }
