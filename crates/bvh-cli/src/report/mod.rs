@@ -142,16 +142,20 @@ fn rows(baked: &Measured, greedy: &Measured) -> Vec<Row> {
 
 /// Returns the heat maps of both trees under one scale.
 fn heat_maps(out: &Path, baked: &Film, greedy: &Film) -> Result<[Heat; 2], Error> {
-    let ranges = [heat::range(baked, 1), heat::range(greedy, 1)];
+    let [ours, theirs] = [baked, greedy].map(|film| heat::range(film, 1));
     // The same colour must mean the same number of tests in both.
-    let top = ranges[0].top.max(ranges[1].top);
-    let draw = |film: &Film, range: heat::Range| {
-        let pixels = heat::map(film, 1, &heat::Range { top, ..range })
-            .map_err(io::Error::other)
-            .map_err(Error::io(out, "encode the picture"))?;
-        Ok(Heat { png: png(out, film, &pixels)?, median: range.median, most: range.max })
-    };
-    Ok([draw(baked, ranges[0])?, draw(greedy, ranges[1])?])
+    let top = ours.top.max(theirs.top);
+    Ok([
+        heat_map(out, baked, heat::Range { top, ..ours })?,
+        heat_map(out, greedy, heat::Range { top, ..theirs })?,
+    ])
+}
+
+fn heat_map(out: &Path, film: &Film, range: heat::Range) -> Result<Heat, Error> {
+    let pixels = heat::map(film, 1, &range)
+        .map_err(io::Error::other)
+        .map_err(Error::io(out, "encode the picture"))?;
+    Ok(Heat { png: png(out, film, &pixels)?, median: range.median, most: range.max })
 }
 
 /// Returns a PNG file as wide as the film.
