@@ -135,7 +135,6 @@ fn a_second_harness_on_the_same_folder_is_rejected_and_disturbs_nothing() {
     );
 }
 
-#[cfg(unix)]
 #[test]
 fn a_full_disk_is_reported_and_finished_runs_are_kept() {
     let folder = folder();
@@ -143,7 +142,7 @@ fn a_full_disk_is_reported_and_finished_runs_are_kept() {
     for blocks in [0, 1, 2, 8] {
         let out = format!("full{blocks}");
         let args = format!("spec.toml --jobs 2 --out {out}");
-        let output = run_on_a_small_disk(folder.path(), &args, blocks);
+        let Some(output) = run_on_a_small_disk(folder.path(), &args, blocks) else { return };
         ended(&output, 1, &[&format!("{out}/spec"), "cannot write the file"]);
         assert!(
             !folder
@@ -157,7 +156,6 @@ fn a_full_disk_is_reported_and_finished_runs_are_kept() {
     }
 }
 
-#[cfg(target_os = "linux")]
 #[test]
 fn help_and_version_that_cannot_be_printed_are_errors() {
     let folder = folder();
@@ -166,7 +164,6 @@ fn help_and_version_that_cannot_be_printed_are_errors() {
     }
 }
 
-#[cfg(unix)]
 #[test]
 fn a_folder_that_cannot_be_written_is_named() {
     let folder = folder();

@@ -5,12 +5,11 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// A folder without permission to write until the value is dropped.
-#[cfg(unix)]
 pub struct ReadOnly<'a>(&'a Path);
 
-#[cfg(unix)]
 impl<'a> ReadOnly<'a> {
-    /// Removes the permission to write; `None` if this user can still write there.
+    /// Removes the permission to write; `None` if this user can still write there, which is always
+    /// so on Windows.
     pub fn new(folder: &'a Path) -> Option<Self> {
         let this = Self(folder);
         // Modes do not stop root, but the attribute `immutable` does where the file system has it.
@@ -33,7 +32,6 @@ impl<'a> ReadOnly<'a> {
     }
 }
 
-#[cfg(unix)]
 impl Drop for ReadOnly<'_> {
     fn drop(&mut self) {
         self.set("755", "-i");

@@ -42,11 +42,10 @@ fn lock_file(folder: &Path) -> Result<(PathBuf, File), Error> {
     Ok((path, lock))
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use super::*;
 
-    #[cfg(unix)]
     #[test]
     fn a_lock_is_never_taken_through_a_link() {
         let folder = tempfile::tempdir().unwrap();
