@@ -150,6 +150,7 @@ fn examine(path: &Path, scene: Option<&Scene>) -> Result<(Bvh, Facts), Error> {
     measure(&tree, &mut facts);
     match scene {
         Some(scene) => against(&tree, file, scene, &mut facts).map_err(TreeFileError::of(path))?,
+        // Without a scene there are no boxes to check against, which the fact must not hide.
         None => facts.add("valid", "as a tree; name a scene to check its objects too"),
     }
     Ok((tree, facts))
@@ -194,6 +195,7 @@ fn measure(tree: &Bvh, facts: &mut Facts) {
     facts.add("internal area over root area", cost::over_root_area(tree, area));
     facts.add("Goldsmith–Salmon cost", cost::goldsmith_salmon(tree));
     facts.add("surface area heuristic", cost::sah(tree, &SahConstants::default()));
+    // Sorted by size, so that the same tree always gives the same line.
     let mut arities = BTreeMap::new();
     let mut leaves = BTreeMap::new();
     for node in &tree.nodes {
@@ -247,6 +249,7 @@ fn end_point_overlap(tree: &Bvh, triangles: &[Triangle]) -> f64 {
     let found: Vec<Overlap> = (0..parts.count())
         .into_par_iter()
         .map(|number| parts.part(number))
+        // Two million triangles take many seconds, so every part moves the bar.
         .inspect(|_| bar.inc(1))
         .collect();
     bar.finish_and_clear();
@@ -259,6 +262,7 @@ fn end_point_overlap(tree: &Bvh, triangles: &[Triangle]) -> f64 {
 }
 
 fn write_nodes(tree: &Bvh, path: &Path) -> Result<(), Error> {
+    // The flat tree stores no parents, so one pass over all children finds them.
     let mut parents = vec![None; tree.nodes.len()];
     for (index, node) in tree.nodes.iter().enumerate() {
         parents[node.children()].fill(Some(index));

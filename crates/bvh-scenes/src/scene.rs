@@ -154,6 +154,7 @@ impl Scene {
         let stem = path
             .file_stem()
             .map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());
+        // The remark names the scene, because an experiment loads many.
         let remark = mesh
             .remark()
             .map(|remark| format!("scene {stem}: {remark}"));

@@ -140,7 +140,9 @@ impl SceneCase {
     /// order. The exact optimum gets at most [`EXACT_OBJECTS`].
     pub fn extents(&self, method: &Method, effort: &Effort) -> Vec<(usize, u64)> {
         let few = (self.sizes[Size::Few as usize], effort.work_per_object);
+        // Builders are fast enough for many objects; searches get them only on request.
         let further = match method {
+            // The exact optimum takes exponential time.
             Method::Exact(_) => return vec![(few.0.min(EXACT_OBJECTS), few.1)],
             builder if is_builder(builder) => Some((self.sizes[effort.builders as usize], few.1)),
             _ => effort.larger.map(|larger| {

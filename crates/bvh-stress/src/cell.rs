@@ -64,6 +64,7 @@ impl Case {
                     }))
                 }
                 Check::Refused { boxes, object } => {
+                    // The exact method rejects larger scenes for their size first.
                     let objects = if let Method::Exact(_) = method { EXACT_OBJECTS } else { 100 };
                     let refused = examine::refuses(method, &boxes(objects), *object);
                     Some(refused.map_or_else(Cell::Broken, Cell::Refused))
@@ -79,6 +80,7 @@ impl Case {
     /// Checks a traversal's answers to the scene's rays; `None` if there is no scene.
     pub fn of_traversal(&self, traversal: tracing::Traversal, rays: usize) -> Option<Cell> {
         let triangles = self.triangles(self.scene()?.sizes[Size::Few as usize]);
+        // A panic is a broken promise to report, not the end of the suite.
         let traced = std::panic::catch_unwind(|| {
             let rays = tracing::rays(&triangles, rays, 1);
             tracing::check(traversal, &Primitives::Triangles(triangles), &rays)

@@ -54,6 +54,7 @@ fn solved(
     budget: Budget,
 ) -> Result<Result<Outcome, SearchError>, Broken> {
     let solved =
+        // Nothing that the closure borrows is used after a panic.
         catch_unwind(AssertUnwindSafe(|| solve(method, &Problem::new(boxes), 1, budget, &())));
     solved.map_err(|panic| {
         let text = panic.downcast_ref::<String>().cloned();
@@ -79,11 +80,13 @@ pub fn examine(
     let outcome = run(method, &boxes, work_per_object)?;
     let seconds = start.elapsed().as_secs_f64();
     let relative_error = check_outcome(&boxes, &outcome)?;
+    // Repetitions take several times as long, so large scenes are built once.
     if boxes.len() <= REPEATED {
         check_threads(method, &boxes, work_per_object, &outcome)?;
         let range = scale_range(&boxes);
         let low = *range.start().max(&-120);
         let high = *range.end().min(&120);
+        // The ends of the range are where exponents overflow; two scales in between cover the rest.
         for k in [low, low / 7, high / 7, high] {
             check_scale(method, &boxes, work_per_object, &outcome, k)?;
         }
@@ -110,6 +113,7 @@ pub fn check_outcome(boxes: &[Aabb], outcome: &Outcome) -> Result<f64, Broken> {
         .iter()
         .map(|event| event.cost)
         .fold(f64::INFINITY, f64::min);
+    // The incumbent must never be lost on the way.
     ensure!(best == *cost, P7: "the cost is {cost}, the best of the history {best}");
     Ok(error)
 }

@@ -35,6 +35,7 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
             let mut nearest = vec![Hit::MISS; rays.len()];
             let mut any = vec![false; rays.len()];
             let mut done = 0;
+            // Lengths around multiples of the vector width reach every remainder loop.
             for length in LENGTHS.into_iter().cycle() {
                 let batch = done..rays.len().min(done + length);
                 wide.nearest_hits(&rays[batch.clone()], &mut nearest[batch.clone()], coherence);
@@ -160,11 +161,13 @@ fn one_adversarial(
     let direction = direction / direction.abs().max_element();
     let back = pick(&[0.0, 0.0, 1.0, -1.0, 0.3, 100.0, 1e-7], rng);
     let origin = target - direction * (size * back).min(f32::MAX / 4.0);
+    // Lengths far from 1 make distances overflow or underflow.
     let direction = direction * 2f32.powi(pick(&[0, 0, 1, -99, 99, 60, -60], rng));
     let t = Ray::half_line(origin, direction)
         .ok()
         .map(|ray| brute_force.nearest_hit(&ray))?
         .map_or(1.0, |hit| hit.t);
+    // Ranges that end at a hit or next to it decide by the last bit of the distance.
     let (t_min, t_max) = match rng.random_range(0..12) {
         0 | 1 => (t, t),
         2 => (0.0, t),
@@ -199,6 +202,7 @@ const BUNDLE: usize = 64;
 /// Returns `count` rays: half of them directly from `make`, half in bundles around further rays of
 /// `make`. The rays of a bundle are equal, nearly equal, or close to each other.
 fn half_in_bundles(count: usize, seed: u64, mut make: impl FnMut(usize) -> Vec<Ray>) -> Vec<Ray> {
+    // A different stream from the rays' own, so that bundles do not repeat their numbers.
     let mut rng = Stream::seed_from_u64(!seed);
     let mut rays = make(count / 2);
     let first = rays.len();

@@ -35,4 +35,4 @@ pub use case::{
 };
 pub use cell::Cell;
 pub use promise::{Broken, Promise, Verdict};
-pub use table::{CASES, by_id};
+pub use table::{CASES, by_id, scenes};

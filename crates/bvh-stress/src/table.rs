@@ -2,15 +2,24 @@
 
 use crate::case::Check::{Method, Part, Refused, Scene};
 use crate::case::Part::{Costs, ObjFiles, Rays, TreeFiles};
-use crate::case::{Also, Case, Check, SceneCase};
+use crate::case::{Also, Case, Check, SceneCase, Size};
 use crate::checks::{files, methods, rays, scenes};
-use bvh_core::Aabb;
+use bvh_core::{Aabb, Triangle};
 use bvh_scenes::builtin::stiff;
 use glam::Vec3;
 
 /// Returns the case with this identifier.
 pub fn by_id(id: &str) -> Option<&'static Case> {
     CASES.iter().find(|case| case.id == id)
+}
+
+/// Returns the scene of every case that has one, in its smallest size and with at most `most`
+/// triangles.
+pub fn scenes(most: usize) -> impl Iterator<Item = (&'static Case, Vec<Triangle>)> {
+    CASES.iter().filter_map(move |case| {
+        let few = case.scene()?.sizes[Size::Few as usize];
+        Some((case, case.triangles(few.min(most))))
+    })
 }
 
 const fn case(id: &'static str, name: &'static str, checks: &'static [Check]) -> Case {
@@ -29,6 +38,7 @@ const fn plain(sizes: [usize; 3]) -> Check {
 
 /// Returns the uniform scene with one damaged box.
 fn with_bad_object(n: usize, damage: fn(&mut Aabb)) -> Vec<Aabb> {
+    // All other boxes are valid, so that the error can only be about this one.
     let mut boxes = stiff::boxes(&stiff::uniform(n));
     boxes
         .iter_mut()

@@ -117,8 +117,10 @@ pub fn rays(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
     let bounds = triangles
         .iter()
         .fold(Aabb::EMPTY, |b, t| b.union(&t.aabb()));
+    // An empty scene has no bounds, and rays are needed all the same.
     let bounds = if bounds.check().is_ok() { bounds } else { Aabb::from(([0.0; 3], [1.0; 3])) };
     let mut rays = Vec::with_capacity(count);
+    // Many attempts are no valid rays; the limit ends scenes that allow none.
     for attempt in 0..20 * count {
         if rays.len() == count {
             break;
@@ -133,6 +135,7 @@ pub fn rays(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
             .choose(&mut rng)
             .copied()
             .unwrap_or(Triangle([somewhere; 3]));
+        // All six directions occur, so that no axis or sign is favoured.
         let along = [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z][attempt / 8 % 6];
         let beside =
             |target: Vec3| target - along * (bounds.extent().max_element() as f32).min(1e38);

@@ -9,6 +9,7 @@ use std::ops::RangeInclusive;
 
 /// Multiplies all coordinates by 2^k; exact for every k of [`scale_range`].
 pub fn scaled(boxes: &[Aabb], k: i32) -> Vec<Aabb> {
+    // The product is exact in f64 and, within the range, in f32.
     let factor = libm::exp2(k.into());
     boxes
         .iter()
@@ -34,6 +35,7 @@ pub fn scale_range(boxes: &[Aabb]) -> RangeInclusive<i32> {
             .chain(b.max.to_array())
     });
     let exponents = coordinates
+        // Zero stays zero at every scale.
         .filter(|&x| x != 0.0)
         .map(|x| (x.to_bits() >> 23 & 0xff).max(1) as i32 - 127);
     let (low, high) = exponents.fold((127, -126), |(low, high), e| (low.min(e), high.max(e)));

@@ -44,6 +44,8 @@ fn mutated(inputs: &[Vec<u8>], rng: &mut Stream) -> Vec<u8> {
         0xff7f_ffff,
         0x3f80_0000,
     ];
+    // Kept inputs are nearly valid, so that mutations pass the first checks and reach the deeper
+    // ones.
     let mut bytes = inputs.choose(rng).cloned().unwrap_or_default();
     for _ in 0..rng.random_range(1..=8) {
         let start = rng.random_range(0..=bytes.len());

@@ -74,6 +74,7 @@ fn with_axes(boxes: &[Aabb], to: [usize; 3]) -> Vec<Aabb> {
 
 /// Moves all boxes; `None` unless every coordinate is exact afterwards.
 fn translated(boxes: &[Aabb], by: Vec3) -> Option<Vec<Aabb>> {
+    // One rounded coordinate would move a box relative to the others.
     let moved = boxes.iter().map(|aabb| {
         let min = exact_sum(aabb.min, by)?;
         let max = exact_sum(aabb.max, by)?;
@@ -255,6 +256,7 @@ proptest! {
 
     #[test]
     fn every_object_twice_costs_its_area_more_at_most(boxes in any_boxes()) {
+        // Twice as many objects must still be few enough for the exact method.
         let boxes = &boxes[..boxes.len().min(6)];
         let twice: Vec<Aabb> = boxes.iter().flat_map(|b| [*b; 2]).collect();
         let exact = named("exact");

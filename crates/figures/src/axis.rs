@@ -30,6 +30,7 @@ pub(super) struct Ruled {
 
 /// Returns both axes of a panel, without ticks, and true if any series has data to show.
 pub(super) fn axes(panel: &Panel) -> (Ruled, Ruled, bool) {
+    // Only the scale decides whether a value has a coordinate, so axes without ranges suffice here.
     let any = (Ruled::new(&panel.x, &[], 0.0), Ruled::new(&panel.y, &[], 0.0));
     let mut xs = Vec::new();
     let mut ys = Vec::new();
@@ -173,6 +174,7 @@ impl Ruled {
             let from = (low / step - 1e-6).ceil();
             let to = (high / step + 1e-6).floor();
             if to - from < most as f64 {
+                // All labels of an axis have as many decimals as its step needs.
                 let digits = (factor - power).clamp(0, 11) as usize;
                 let ticks = (0..=(to - from) as i64).filter_map(|index| {
                     let units = (from + index as f64) * f64::from(mantissa);
@@ -192,6 +194,7 @@ impl Ruled {
     fn rule_decades(&mut self, most: usize) -> bool {
         let first = (self.low - 1e-9).ceil() as i32;
         let last = (self.high + 1e-9).floor() as i32;
+        // Numbers of this size are easier to read than powers of ten.
         let plain = first >= -3 && last < 5;
         let at = |power: i32, mantissa: i32| f64::from(power) + libm::log10(f64::from(mantissa));
         let marks = |mantissas: &'static [i32]| -> Vec<(i32, i32)> {

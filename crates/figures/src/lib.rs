@@ -11,6 +11,7 @@ mod axis;
 mod canvas;
 mod figure;
 mod heatmap;
+mod layers;
 mod legend;
 mod model;
 mod panel;

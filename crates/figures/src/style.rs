@@ -128,6 +128,7 @@ impl Strokes {
                 .iter()
                 .any(|(name, look)| *look == Look::Slot(slot) && shown(name))
         };
+        // Series without a given look avoid the looks of series that have one.
         let mut free = (0..).filter(|&slot| !taken(slot)).map(Look::Slot);
         let (mut series, mut lines): (Vec<(String, Stroke)>, Vec<&str>) = (Vec::new(), Vec::new());
         for layer in layers() {
@@ -138,6 +139,7 @@ impl Strokes {
                     .unwrap_or(Look::Reference);
                 series.push((name.to_owned(), Stroke::of(look)));
             }
+            // The look of the reference is unique, so it needs no marker.
             if layer.is_line() && set(name) != Some(Look::Reference) && !lines.contains(&name) {
                 lines.push(name);
             }

@@ -49,6 +49,7 @@ impl Contestant {
         match name {
             command::Config::NAME => command::Config::deserialize(parameters)
                 .map(|program| Some(Self::External(program))),
+            // Our methods come first, so that no library can take the name of one.
             _ if Method::NAMES.contains(&name) => {
                 Method::read(name, parameters).map(|method| method.map(Self::Ours))
             }

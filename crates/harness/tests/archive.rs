@@ -74,6 +74,7 @@ fn a_tree_from_elsewhere_is_compared_with_the_best_known() {
     );
     // Another scene has no best known cost, and the tree does not fit it.
     let other = Scene::load("spheres75:50").unwrap();
+    // The tree is valid, but over other boxes than the named scene has.
     let [tree, _] = trees(&other);
     save(&tree, &other, &dir.join("other.bvh"));
     assert!(

@@ -295,6 +295,7 @@ fn no_file_uses_a_file_that_uses_it() {
         loop {
             let (uses, used): (BTreeSet<_>, BTreeSet<_>) = edges.iter().cloned().unzip();
             let before = edges.len();
+            // What is left when nothing changes any more is a circle.
             edges.retain(|(from, to)| used.contains(from) && uses.contains(to));
             if edges.len() == before {
                 break;

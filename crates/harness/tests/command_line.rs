@@ -116,6 +116,7 @@ fn check_passes_on_equal_results_and_names_an_altered_number() {
         .lines()
         .find(|line| line.contains("pinecon2,stand-in,noise"))
         .unwrap();
+    // Column 9 is the cost, which the check must compare to the last digit.
     let cost = line.split(',').nth(9).unwrap();
     fs::write(&path, runs.replace(cost, "12345.5")).unwrap();
     let output = run(folder.path(), &["spec.toml", "--check"]);
@@ -137,6 +138,7 @@ fn quick_seed_and_scene_change_what_is_run() {
     let folder = folder();
     said(folder.path(), &["spec.toml", "--quick"]);
     let quick = fs::read_to_string(folder.path().join("results/quick/spec/runs.csv")).unwrap();
+    // One scene, one repetition, three methods, and the header.
     assert_eq!(quick.lines().count(), 1 + 3);
     fs::write(
         folder.path().join("two.obj"),
@@ -208,6 +210,7 @@ fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_di
 
     // Two parts may hold the same run, as long as its results agree.
     part("2/3", "two");
+    // The second copy of the same part stands for a machine that was started twice.
     part("2/3", "again");
     let folders = ["merge", "one", "two", "three", "again", "--out"];
     said(folder.path(), &[&folders[..], &["merged"]].concat());

@@ -7,15 +7,16 @@
 //! (a Markdown table)
 //! <!-- end -->
 //! ```
-//! The queries are described in `support/query.rs`.
+//! The queries are described in `queries/mod.rs`.
 
+mod queries;
 mod support;
 
+use queries::answer;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
-use support::query::answer;
 use support::{assert_current, experiments, top};
 
 /// The beginning of a table's comment.
@@ -79,6 +80,7 @@ fn the_prose_of_the_documentation_is_wrapped() {
         let is_generated = page.ends_with("KEYS.md");
         let mut is_example = false;
         for (number, line) in text.lines().enumerate() {
+            // Commands and drawings in blocks cannot be wrapped.
             is_example ^= line.starts_with("```");
             let is_free = is_generated
                 || is_example

@@ -82,6 +82,7 @@ fn every_spec_runs_as_it_is_printed() {
             .into_iter()
             .flatten()
         {
+            // The run below uses a small scene, so the printed names are checked here.
             let loaded = Scene::load(name.as_str().unwrap());
             assert!(loaded.is_ok(), "{}: {}", block.place(), loaded.unwrap_err());
         }

@@ -52,6 +52,7 @@ fn the_tree_of_a_program_is_costed_by_us_and_every_run_has_its_seed_and_the_boxe
             .all(|row| row[0] == "theirs" && row[1..3] == ours[0][1..3]),
         "{rows:?}"
     );
+    // Equal seeds would make repetitions meaningless.
     assert!(theirs[0][3] != theirs[1][3]);
     let seeds = fs::read_to_string(dir.join("seeds")).unwrap();
     assert!(seeds.lines().eq(theirs.iter().map(|row| &row[3])), "{seeds} for {theirs:?}");
@@ -140,6 +141,7 @@ fn what_a_program_has_started_ends_with_it_however_the_program_ends() {
     let begin = "sh -c 'echo $$ > pid.new; mv pid.new pid; exec sleep 124' & while ! test -f pid; do sleep 0.01; done;";
     let leave = begin.replace("sh -c", "setsid sh -c");
     let daemon = format!("({leave});");
+    // A child in the group, one that leaves the group, and one whose parent has ended.
     let ways = [begin, &leave, &daemon];
     // On other systems a process that leaves the group escapes.
     let ways = if cfg!(target_os = "linux") { &ways[..] } else { &ways[..1] };

@@ -41,6 +41,7 @@ fn command(folder: &Path, args: &[&str]) -> Command {
 /// Returns the files that every run must reproduce.
 fn results(out: &Path) -> Vec<(String, Vec<u8>)> {
     let files = reproducible(&out.join("spec"));
+    // Comparing no files would always succeed.
     assert!(files.len() >= 3, "{files:?}");
     files
 }
@@ -68,6 +69,7 @@ fn killed_at_random_moments_and_resumed_the_bytes_are_the_same() {
             command(folder.path(), &["spec.toml", "--resume", "--jobs=2", "--out", &out])
                 .spawn()
                 .unwrap();
+        // A fixed sequence of moments makes a failure repeatable.
         state = state
             .wrapping_mul(747_796_405)
             .wrapping_add(2_891_336_453);
@@ -125,6 +127,7 @@ fn a_second_harness_on_the_same_folder_is_rejected_and_disturbs_nothing() {
             .join("results/long/.partial/000000/runs.csv")
             .is_file()
     );
+    // The first harness must be alive until here, otherwise its lock proves nothing.
     drop(first);
     // The lock died with its owner.
     refused(

@@ -3,11 +3,12 @@
 //!
 //! `UPDATE_DOCS=1 cargo test -p harness --test numbers` writes the values into the pages.
 
+mod queries;
 mod support;
 
+use queries::answer;
 use std::fs;
 use std::ops::Range;
-use support::query::answer;
 use support::{assert_current, top};
 
 /// A piece of prose: its text with a name in braces for every number, and a query for every name.
@@ -164,6 +165,7 @@ fn the_prose_shows_the_committed_numbers() {
             .find(&shown)
             .unwrap_or_else(|| panic!("{page} lacks: {text}"));
         let mut made = shown.clone();
+        // From the back, because a replacement moves everything behind it.
         for (place, name) in places.into_iter().zip(&pattern.names).rev() {
             let value = answer(query(name));
             if !reads_alike(&shown[place.clone()], &value) {

@@ -202,6 +202,7 @@ fn results_come_from_the_programs_repository_and_not_from_the_current_folders() 
     let folder = folder("spec.toml");
     git(folder.path(), &["init"]);
     git(folder.path(), &["commit", "--allow-empty", "--no-gpg-sign", "--message=x"]);
+    // The repository around the folder has another commit than the program.
     let head = git(folder.path(), &["rev-parse", "HEAD"]);
     let Some(elsewhere) = head.filter(|output| output.status.success()) else {
         return eprintln!("skipped: there is no git");
@@ -235,6 +236,7 @@ fn pipes_and_devices_are_rejected_as_inputs_and_links_are_not_written_through() 
         .args(["p.toml", "p.obj"])
         .current_dir(dir)
         .status();
+    // Opening a pipe that nobody writes to would block forever.
     assert!(made.unwrap().success());
     refused(dir, &["p.toml"], &["p.toml", "not a regular file"]);
     refused(dir, &["spec.toml", "--scene=p.obj"], &["p.obj"]);

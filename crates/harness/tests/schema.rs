@@ -25,6 +25,7 @@ fn fault(root: &Value, schema: &Value, value: &Value, at: &str) -> Option<String
             .iter()
             .filter(|fault| fault.is_none())
             .count();
+        // `oneOf` accepts exactly one alternative, `anyOf` at least one.
         let exact = right == 1 || schema.get("anyOf").is_some() && right > 1;
         return (!exact).then(|| format!("{at}: {right} choices accept it: {faults:?}"));
     }

@@ -173,6 +173,7 @@ tracing = { cameras = { escher = { eye = [1.0, 2.0, 3.0], target = [0.5, 0.5, 0.
 
 #[test]
 fn a_wrong_value_under_any_key_of_a_spec_is_rejected_by_name() {
+    // No key accepts a date, so a date is wrong under any key.
     let wrong = Value::Datetime("1979-05-27".parse().unwrap());
     let [nan, infinite] = [f64::NAN, f64::NEG_INFINITY].map(Value::from);
     let doubtful = [
@@ -249,6 +250,8 @@ fn a_wrong_value_under_any_key_of_a_spec_is_rejected_by_name() {
                         complain(format!("{place}.{key} = {value} is accepted"));
                     }
                 }
+                // These values are right under some keys; under the others the message must name
+                // them.
                 let taken: Vec<bool> = doubtful.iter().map(try_value).collect();
                 // All numbers are counts or measures, except percentages above or below a value.
                 if (taken[0] || taken[3] || taken[8]) && key != "percent" {

@@ -116,6 +116,7 @@ impl Fault {
             .split_whitespace()
             .collect::<Vec<_>>()
             .join(" ");
+        // A message must fit a terminal, whatever the file contains.
         let message = if words.len() > 300 {
             format!("{}…", words.chars().take(280).collect::<String>())
         } else {

@@ -144,6 +144,7 @@ fn mesh(vertices: &[Vertex], faces: &[Face], path: &Path) -> Result<Mesh, Fault>
         let message = format!("position {found:?}; expected finite x, y and z");
         return Err(element_fault(path, "vertex", number, message));
     }
+    // Unused vertices are reported, because they often show that an export went wrong.
     let mut used = vec![false; vertices.len()];
     let mut triangles = Vec::new();
     let mut short_faces = 0;

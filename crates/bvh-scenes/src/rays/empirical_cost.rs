@@ -121,6 +121,7 @@ fn measure_chunk(
     chunk: u64,
 ) -> Sums {
     let mut rng = Stream::seed_from_u64(seed);
+    // Streams by chunk make the rays independent of the number of threads.
     rng.set_stream(chunk);
     let mut sums = Sums::default();
     for _ in chunk * CHUNK..config.count.min((chunk + 1) * CHUNK) {

@@ -80,6 +80,7 @@ pub fn render(
     };
     let world = World::new(accelerator, &view, up, &bounds, lights, options.ground, options.depth);
     let columns = width.div_ceil(TILE);
+    // Tiles are collected in order, so that the picture does not depend on the order of completion.
     let finished: Option<Vec<Film>> = (0..tiles(options) as u32)
         .into_par_iter()
         .map(|index| {

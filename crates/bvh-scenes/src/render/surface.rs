@@ -53,6 +53,7 @@ impl Surface {
                 (point, normal, COLOURS[id % COLOURS.len()], 0.05)
             }
         };
+        // Meshes have triangles of both orientations, so the side that is seen counts as the front.
         let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
         Self { point, normal, colour, mirror, haze: 0.0 }
     }
@@ -103,6 +104,7 @@ impl Ground {
         let haze = squared / (squared + 20.0);
         let mut tiles = 0;
         for axis in 0..3 {
+            // The pattern varies along the ground only, not along the up direction.
             if self.up[axis] == 0.0 {
                 tiles += (aside[axis] * 3.0).floor() as i64 & 1;
             }

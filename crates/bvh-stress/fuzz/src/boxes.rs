@@ -82,6 +82,7 @@ fn check_built(boxes: &[Aabb], seed: u64, budget: Budget) {
         };
         let name = method.name();
         let problem = Problem::new(boxes);
+        // A second run finds outcomes that depend on addresses or on uninitialised memory.
         let [outcome, again] = [(); 2].map(|()| {
             solve(&method, &problem, seed, budget, &())
                 .unwrap_or_else(|error| panic!("{name}: {error}"))

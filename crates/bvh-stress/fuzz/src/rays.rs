@@ -47,6 +47,7 @@ pub fn rays(bytes: &[u8]) {
         check(*traversal, &objects, &rays).unwrap_or_else(|broken| panic!("{name}: {broken}"));
     }
     let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+    // Spheres from the same bits test the traversal with another object test.
     let spheres: Vec<Sphere> = triangles
         .iter()
         .map(|t| Sphere::new(t.0[0] / 4.0, t.0[1].x.abs() / 4.0))

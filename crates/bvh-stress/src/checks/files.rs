@@ -96,6 +96,7 @@ pub fn damaged_tree_files() -> Verdict {
         file::load(&whole, &boxes).ok() == Some(tree),
         "an undamaged file is not the tree saved"
     );
+    // Every bit is tried: an unchecked field would accept some flips.
     for bit in 0..8 * whole.len() {
         let mut damaged = whole.clone();
         damaged[bit / 8] ^= 1 << (bit % 8);

@@ -57,6 +57,7 @@ pub fn scales(method: &Method) -> Verdict {
     const WORK: u64 = 60;
     for (scene, boxes) in scaled_scenes(n).iter().enumerate() {
         let outcome = run(method, boxes, WORK)?;
+        // All scales are tried, because a fault of one exponent shows at that scale alone.
         for k in -120..=120 {
             check_scale(method, boxes, WORK, &outcome, k)
                 .map_err(|broken| broken.within(format!("scene {scene}")))?;
@@ -68,6 +69,7 @@ pub fn scales(method: &Method) -> Verdict {
 /// S37: P4 holds for 1, 2, 3 and 8 threads and three seeds.
 pub fn threads_and_seeds(method: &Method) -> Verdict {
     let boxes = boxes(if let Method::Exact(_) = method { 10 } else { 120 });
+    // The large seed would be lost by a cast to 32 bits.
     for seed in [1, 2, 1 << 40] {
         let budget = Budget { max_evaluations: None, max_work: Some(20_000) };
         let on = |threads| on_threads(threads, || solved(method, &boxes, seed, budget));
@@ -232,6 +234,7 @@ pub fn above_the_optimum(method: &Method) -> Verdict {
             {
                 return Ok("wide nodes: another class of trees".into());
             }
+            // Only binary trees are in the class over which the optimum is exact.
             let gap = outcome.cost / optimum - 1.0;
             ensure!(gap >= -ROUNDING, "{} is below the optimum {optimum}", outcome.cost);
             largest = largest.max(gap);

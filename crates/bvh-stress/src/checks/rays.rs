@@ -122,6 +122,7 @@ pub fn estimates_converge() -> Verdict {
         empirical_cost(&rays, &primitives, &tree, seed).boxes
     };
     const FEWEST: u64 = 2000;
+    // Enough seeds that a coverage below 95 % shows, and few enough for seconds.
     const SEEDS: u64 = 60;
     let truth = measure(1 << 18, 0).mean;
     let mut covered = 0;

@@ -49,6 +49,7 @@ pub fn compare(args: &CompareArgs) -> Result<(), Error> {
         input_folder("--keep", results)?;
     }
     let scene = Scene::load_with(&args.scene, args.outside_files.into())?;
+    // Any program may have written the file, so its cost is computed here and not read from it.
     let (tree, _) = tree_file::load(file, &scene)?;
     let area = cost::internal_area(&tree);
     print_line(&format!("internal area: {area}"));

@@ -31,6 +31,7 @@ pub fn new(args: &NewArgs) -> Result<(), Error> {
             file.display()
         )));
     }
+    // A check before the write could miss a file that appears in between.
     let mut new = File::create_new(file).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => Error::Usage(format!("{} exists already", file.display())),
         _ => Error::io(file, "write the file")(error),

@@ -72,6 +72,7 @@ pub struct RunArgs {
 
 /// Runs all experiments and prints their tables.
 pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
+    // A wrong folder is found before hours of work, not after them.
     output_folder("--out", &args.out)?;
     args.jobs.apply()?;
     let overrides = Overrides {
@@ -86,6 +87,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         .iter()
         .map(|path| Experiment::read(path, &overrides))
         .collect::<Result<Vec<_>, _>>()?;
+    // Two specs with one name would write into one folder.
     let mut folders = HashSet::new();
     if let Some(twice) = experiments
         .iter()
@@ -161,6 +163,7 @@ fn compare(
     experiment: &Experiment,
     interrupted: &AtomicBool,
 ) -> Result<usize, Error> {
+    // A check must not touch the committed results, not even for a moment.
     let temporary =
         tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
     let fresh = temporary.path().join(experiment.folder());

@@ -31,6 +31,7 @@ pub fn disagreements(
         .root_aabb()
         .map_or(0.0, |root| root.extent().length());
     compare(right, found, |index, right, found| {
+        // Distances are in units of the direction's length, and the tolerance is in world units.
         let length = rays
             .get(index)
             .map_or(1.0, |ray| ray.direction().as_dvec3().length());

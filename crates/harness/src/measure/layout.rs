@@ -131,6 +131,7 @@ pub fn own_contenders<'a>(
 
 /// Returns the kernels that trace a layout.
 fn kernels(layout: Layout, instructions: &[Instructions]) -> Vec<Kernel> {
+    // These layouts have one implementation, whatever the processor.
     if !layout.has_kernels() {
         return vec![Kernel::Portable];
     }
@@ -140,6 +141,7 @@ fn kernels(layout: Layout, instructions: &[Instructions]) -> Vec<Kernel> {
     instructions
         .iter()
         .map(|instructions| instructions.kernel())
+        // Results name what was measured, so a missing instruction set has no row.
         .filter(|kernel| kernel.is_available())
         .collect()
 }

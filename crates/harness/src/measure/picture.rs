@@ -58,12 +58,14 @@ impl Config {
             let structure = structure::by_name(name, scene)?;
             structures.push((label.into(), structure, 0, start.elapsed().as_secs_f64()));
         }
+        // The tree is borrowed: a copy would cost memory and no time of the drawing.
         let own = Structure::Tree(Cow::Borrowed(tree));
         structures.push((run.method.clone(), own, run.repetition, build_seconds));
         if self.unpruned {
             let own = Structure::Unpruned(Cow::Borrowed(tree));
             structures.push((unpruned(&run.method), own, run.repetition, build_seconds));
         }
+        // Seconds per picture compare structures only if all have one thread.
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
             .build();

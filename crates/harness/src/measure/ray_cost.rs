@@ -122,6 +122,7 @@ impl Config {
             .get(&scene.name)
             .cloned()
             .unwrap_or_default();
+        // Viewpoints are fractions of the root's box, which an empty tree lacks.
         let Some(root) = tree.root_aabb() else { return Vec::new() };
         let path = if other { &cameras.other } else { &cameras.same };
         let poses = path.iter().map(|view| Pose {
@@ -204,6 +205,8 @@ impl TestRays {
     pub fn tests(&self, wide: &WideBvh) -> [f64; 2] {
         let mut counts = TestCounts::default();
         for ray in &self.rays {
+            // A renderer stops a shadow ray at the first hit that it finds, so only these rays are
+            // any-hit queries.
             if self.kind == Kind::Shadow {
                 wide.any_hit_counted(ray, &mut counts);
             } else {

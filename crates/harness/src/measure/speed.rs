@@ -101,9 +101,11 @@ pub fn measure(
         let mut turns = vec![Vec::new(); contenders.len()];
         for round in 0..=config.rounds {
             for ((method, contender), turns) in contenders.iter().zip(&mut turns) {
+                // A round takes seconds, so cancellation between rounds would be too late.
                 if cancelled() {
                     return Ok(None);
                 }
+                // Answers of the contender before would hide rays that this one does not answer.
                 hits.fill(None);
                 let seconds = contender.tracer.trace(&batch, &mut hits)?;
                 // The first round warms the caches up; its time does not count.
@@ -172,6 +174,7 @@ impl OfKind<'_> {
             (Tracer::Own(_) | Tracer::Batches(_), Query::Nearest) => {
                 answers::exact_disagreements(self.right, hits)
             }
+            // Other libraries round differently, and any-hit queries may find any object.
             _ => answers::disagreements(self.right, hits, self.tree, self.rays),
         };
         let counts = match &contender.tracer {
@@ -182,6 +185,7 @@ impl OfKind<'_> {
                 }
                 Some(counts)
             }
+            // Packets share tests, and other libraries do not count them.
             Tracer::Batches(_) | Tracer::Other(_) => None,
         };
         let rays = self.rays.len().max(1) as f64;

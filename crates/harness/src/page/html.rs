@@ -27,6 +27,7 @@ fn escaped(text: &str) -> String {
 
 /// A name as it stands in a URL.
 pub(super) fn reference(name: &str) -> String {
+    // These are the unreserved characters of URLs (RFC 3986); all others are encoded.
     const KEPT: &AsciiSet = &NON_ALPHANUMERIC
         .remove(b'-')
         .remove(b'.')
@@ -43,6 +44,7 @@ pub(super) fn page(sections: &[Section]) -> String {
             .filter(|section| section.of_paper == of_paper)
             .map(answer)
             .collect();
+        // A heading without entries would look like a fault of the page.
         if own.is_empty() {
             own
         } else {

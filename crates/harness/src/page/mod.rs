@@ -107,11 +107,13 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
         let files = ["svg", "csv"].map(|kind| format!("{name}.{kind}"));
         let files = files
             .iter()
+            // A figure of several tables has no CSV file of its name.
             .filter(|file| found.contains(*file))
             .map(|file| link(file))
             .collect();
         figures.push(Drawing { svg: read(&folder.join(file))?, name, files });
     }
+    // Readers expect figures in the order of the reports, not of their file names.
     figures.sort_by_key(|figure| {
         drawn
             .iter()
@@ -181,6 +183,7 @@ fn spec_file(name: &str, provenance: &Provenance) -> Option<PathBuf> {
     command
         .split_whitespace()
         .map(PathBuf::from)
+        // Only the command line of the run records where the spec was.
         .find(is_spec)
 }
 
@@ -197,6 +200,7 @@ fn way(page: &Path, file: &Path) -> String {
             .unwrap_or(Path::new(".")),
     );
     let to = whole(file);
+    // Only a relative link still works when the results are moved or published.
     let common = from
         .components()
         .zip(to.components())

@@ -129,6 +129,7 @@ pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
     let preparation_seconds = start.elapsed().as_secs_f64();
     let meets = |shape: &Shape, ray: &TheirRay<f32, 3>| {
         let [a, b, c] = &shape.corners;
+        // The library culls back sides, and our rays hit both sides.
         let front = ray.intersects_triangle(a, b, c).distance;
         if front.is_finite() { front } else { ray.intersects_triangle(a, c, b).distance }
     };

@@ -84,6 +84,7 @@ impl Config {
             if let Some(status) = program.status()? {
                 break status;
             }
+            // The limit comes before the interruption, so that a slow program is named as such.
             let elapsed = start.elapsed();
             if let Some(limit) = self.timeout_seconds
                 && elapsed.as_secs_f64() > limit
@@ -128,6 +129,7 @@ fn last_line(path: &Path) -> io::Result<String> {
     file.seek(SeekFrom::Start(length.saturating_sub(MOST_BYTES)))?;
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes)?;
+    // The window may begin within a character.
     let text = String::from_utf8_lossy(&bytes);
     match text.lines().rfind(|line| !line.trim().is_empty()) {
         Some(line) => Ok(line.trim().to_owned()),

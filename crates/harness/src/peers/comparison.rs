@@ -44,6 +44,8 @@ pub fn speeds(
         } else {
             format!("{}: {}", answers.method, answers.layout)
         };
+        // Our trees come ready-made, so the seconds of their search are added; libraries build
+        // theirs here.
         let build_seconds = match library.as_str() {
             OURS => search_seconds(&answers.scene, &answers.method) + times.preparation_seconds,
             _ => times.preparation_seconds,
@@ -101,6 +103,7 @@ pub fn rows(speeds: &[Speed]) -> Vec<PeerRayRow> {
     }
     let mut complete: Vec<Vec<usize>> = groups
         .into_values()
+        // A mean over fewer scenes would not be comparable with the other means.
         .filter(|group| group.len() == scenes.len())
         .collect();
     complete.sort();
@@ -152,6 +155,7 @@ pub fn ratios(speeds: &[Speed]) -> Vec<RayRatioRow> {
         .iter()
         .filter(|speed| speed.row.library == OURS && speed.row.instructions != COMPILED)
     {
+        // Ratios are formed within one instruction set, to which all contenders are held.
         let key = [&speed.row.instructions, &speed.row.mode, &speed.row.rays].map(String::as_str);
         groups.entry(key).or_insert_with(|| {
             order.push(key);

@@ -48,6 +48,7 @@ fn modes(program: &Path) -> Result<Vec<Mode>, String> {
             )
         })?);
     }
+    // A program without modes would silently leave its library out of the comparison.
     if modes.is_empty() {
         return Err(format!("{shown}: it lists no mode; expected one per line"));
     }
@@ -73,6 +74,7 @@ pub fn contenders(
         let started = Process::start(program, &argument, triangles);
         let (process, preparation_seconds) =
             started.map_err(|error| format!("{command}: {error}"))?;
+        // Contenders trace one after the other on one thread, so no lock is needed.
         let process = RefCell::new(process);
         let trace = move |batch: &Batch, hits: &mut [Option<Hit>]| {
             process
@@ -115,6 +117,7 @@ impl Process {
         let mut answers = BufReader::new(answers);
         rays.write_all(&(triangles.len() as u32).to_le_bytes())?;
         rays.write_all(bytemuck::cast_slice(triangles))?;
+        // The program answers only after it has read everything, so unsent bytes would block both.
         rays.flush()?;
         let mut seconds = [0f64];
         answers.read_exact(bytemuck::cast_slice_mut(&mut seconds))?;

@@ -78,6 +78,7 @@ pub struct Built {
 impl Built {
     #[cfg(feature = "peers")]
     fn tight(mut tree: Bvh, seconds: f64, boxes: &[Aabb]) -> Self {
+        // Costs are compared by tight boxes; a library may pad its own.
         tree.refit(boxes);
         Self { tree, seconds }
     }

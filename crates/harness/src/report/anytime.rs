@@ -59,6 +59,7 @@ impl Config {
             let mut points = Vec::new();
             let mut panels = Vec::new();
             for scene in rows.scenes() {
+                // A scene without a reference has no gaps.
                 let Some(reference) = rows.reference(scene) else { continue };
                 let mut layers = Vec::new();
                 for method in &self.methods {
@@ -180,6 +181,7 @@ fn curve<'a>(scene: &'a str, method: &'a str, runs: &[Series], reference: f64) -
         .iter()
         .filter_map(|run| Some(run.last()?.0))
         .fold(0.0, f64::max);
+    // The places of a curve are evenly spaced logarithms, which need a positive start.
     if first <= 0.0 || !last.is_finite() {
         return Vec::new();
     }
@@ -187,6 +189,7 @@ fn curve<'a>(scene: &'a str, method: &'a str, runs: &[Series], reference: f64) -
         .ceil()
         .max(0.0) as u32;
     let place = |step: u32| {
+        // The last place is the end itself, which rounding of the power would miss.
         if step == steps { last } else { first * 10f64.powf(f64::from(step) / PER_DECADE) }
     };
     let point = |x: f64| {
@@ -203,6 +206,7 @@ fn corners<'a>(points: &[Point<'a>]) -> Vec<Point<'a>> {
     for curve in points.chunk_by(|a, b| (a.scene, a.method) == (b.scene, b.method)) {
         for (index, point) in curve.iter().enumerate() {
             let is_end = index == 0 || index + 1 == curve.len();
+            // Between corners the staircase is flat, so other points would only enlarge the file.
             if is_end || point.gaps() != curve[index - 1].gaps() {
                 kept.push(*point);
             }
@@ -217,6 +221,7 @@ fn draw(method: &str, points: &[Point]) -> Vec<Layer> {
         .iter()
         .map(|point| (point.x, point.gap_median))
         .collect();
+    // A builder has one event, and a staircase of one corner would be invisible.
     if points.len() == 1 {
         return vec![Layer::new(method, Marks::Points(medians))];
     }

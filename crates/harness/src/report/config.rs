@@ -69,6 +69,7 @@ bvh_config::config! { serde;
 
 /// Rejects names of files that could lead to another folder.
 pub fn check_file(name: &str) -> Vec<OutOfRange> {
+    // Other characters separate folders or are invalid on some system.
     let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if !name.is_empty() && name.chars().all(is_plain) {
         return vec![];

@@ -120,6 +120,7 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
                 );
                 drawn.push((method.as_str(), trees));
             }
+            // Only random rays are drawn; kinds of rays through layouts would make too many panels.
             if number < random {
                 panels.push(draw(&rows.shown(scene), kind, &drawn, correlations[start].spearman));
             }

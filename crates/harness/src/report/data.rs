@@ -78,6 +78,7 @@ impl Rows {
     /// Returns the scene's name for tables and figures: its kind follows unless it is a file.
     pub fn shown(&self, scene: &str) -> String {
         let kind = self.kind(scene);
+        // Everything that is not a file is marked, so that no stand-in passes for an original.
         if kind == SceneKind::File.to_string() { scene.into() } else { format!("{scene} ({kind})") }
     }
 
@@ -198,7 +199,7 @@ pub fn ratio(cost: f64, base: f64) -> f64 {
 }
 
 /// Returns the distinct items in the order of their first occurrence.
-pub(super) fn distinct<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
+pub(crate) fn distinct<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
     let mut found = Vec::new();
     for item in items {
         if !found.contains(&item) {

@@ -73,6 +73,7 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
             .flat_map(|row| [row.lowest_cost, row.highest_cost])
             .chain([base_cost]);
         let (low, high) = range(ends).unwrap_or((0.0, 1.0));
+        // The range covers the costs of all methods and the base, with room at both ends.
         let margin = 0.05 * (high - low);
         let x = Axis::linear("cost").range(low - margin, high + margin);
         panels.push(panel(rows.shown(scene), x, y, layers));

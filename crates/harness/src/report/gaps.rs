@@ -104,6 +104,7 @@ impl Config {
             .filter(|run| self.methods.contains(&run.method))
         {
             if let Some(&optimum) = optima.get(run.scene.as_str()) {
+                // An optimum of 0 has no relative gap, so the cost itself is the gap.
                 let gap = if optimum > 0.0 { run.cost / optimum - 1.0 } else { run.cost };
                 found
                     .gaps

@@ -140,6 +140,7 @@ impl Config {
         };
         let mut order: Vec<usize> = (0..runs.len()).collect();
         order.sort_by(|&a, &b| last(a).total_cmp(&last(b)));
+        // Of an even number of runs there is no median run, so the lower one stands for it.
         let middle = *order.get(order.len().checked_sub(1)? / 2)?;
         Some(Runs { scene, runs, middle, random: rows.trial_costs(scene, &self.baseline) })
     }
@@ -197,6 +198,7 @@ fn progress(run: &[&TrialRow]) -> Vec<Progress> {
     let mut incumbent = f64::INFINITY;
     let mut generations = Vec::new();
     for row in run {
+        // Rows hold the best of each generation, which need not be the best so far.
         incumbent = incumbent.min(row.cost);
         generations.push(Progress { evaluations: row.evaluations, incumbent });
     }
@@ -220,6 +222,7 @@ fn draw(shown: &str, runs: usize, generations: &[Generation]) -> Panel {
         .filter_map(|g| Some((at(g), g.random_picking_cost?)))
         .collect();
     let mut layers = vec![Layer::new("random picking", Marks::Line(random))];
+    // One run has no range, so it is drawn as one line.
     if runs > 1 {
         layers.insert(0, Layer::new("median run", Marks::Line(median)));
         layers.insert(0, Layer::new("range over runs", Marks::Band(range)));

@@ -23,6 +23,7 @@ mod ray_cost;
 mod run_times;
 mod sides;
 pub mod table;
+mod table_paper;
 pub mod target;
 mod time_to_target;
 pub mod trials;
@@ -161,6 +162,7 @@ pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> 
         .iter()
         .map(|report| report.write(&rows))
         .collect::<Result<Vec<_>, _>>()?;
+    // A spec without reports is a first try, whose author wants to see the costs.
     if reports.is_empty() {
         outputs.push(final_costs(&rows)?);
     }
@@ -267,6 +269,8 @@ fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, Look)> 
                 .zip(&slots)
                 .any(|(other, at)| *at == slot && shared(other))
         };
+        // Only more methods than colours share colours; otherwise each method keeps its number, and
+        // with it its colour in all figures.
         let free = (0..Look::COLOURS)
             .find(|&slot| !taken(slot))
             .filter(|_| methods.len() > Look::COLOURS);

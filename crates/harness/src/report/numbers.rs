@@ -73,6 +73,7 @@ impl Config {
         let mut numbers = Vec::new();
         let mut timing = Vec::new();
         for scene in rows.scenes() {
+            // Without a reference there are neither gaps nor integrals to report.
             let Some(reference) = rows.reference(scene) else { continue };
             let horizons =
                 ProgressAxis::ALL.map(|axis| longest_of_all(rows, scene, &self.methods, axis));
@@ -113,6 +114,7 @@ impl Config {
         output.show(explanation, &numbers, columns)?;
         let explanation = "The primal integral is the mean gap over the longest run's time:";
         output.show(explanation, &timing, "scene method seconds_median primal_integral")?;
+        // The figure shows bounds; medians alone are in the table.
         if !rows.bounds.is_empty() {
             let caption = "Over the least known cost of the scene: the proven lower bound, below which no tree is, and the median \
                            cost of every method's runs.";

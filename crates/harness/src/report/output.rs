@@ -117,6 +117,7 @@ impl Output {
             .headers()
             .map_err(Error::csv(path))?
             .clone();
+        // Columns are found by name, so that tables do not depend on their order in the file.
         let shown: Vec<usize> = columns
             .split(' ')
             .filter_map(|column| header.iter().position(|name| name == column))
@@ -166,6 +167,7 @@ pub fn table_bytes(columns: &[String], rows: &[Row]) -> Result<Vec<u8>, Error> {
 
 /// Rounds a number to four digits. Other texts and whole numbers stay unchanged.
 fn four_digits(text: &str) -> String {
+    // Counts and names stay as they are; only measured numbers are rounded.
     let number = if text.contains('.') { text.parse::<f64>().ok() } else { None };
     match number {
         None => text.into(),

@@ -93,6 +93,8 @@ impl PaperRow {
     ) -> Self {
         let (low, high) = interval.unwrap_or((ours, ours));
         let verdicts = [low, ours, high].map(|ours| Verdict::of_ratios(paper, ours, tolerance));
+        // The verdict must not depend on the luck of this repetition, so the whole interval
+        // decides.
         let same = verdicts
             .iter()
             .all(|verdict| *verdict == verdicts[0]);

@@ -80,6 +80,7 @@ impl ProgressAxis {
     ) -> Result<(), Error> {
         output.add_csv(self.file(kind), rows)?;
         if let Some((_, bytes)) = output.csv.last_mut() {
+            // All axes share one type of rows, so the column `x` gets its name here.
             let end = bytes
                 .iter()
                 .position(|&byte| byte == b'\n')

@@ -2,16 +2,12 @@
 //! files.
 //!
 //! ```text
-//! CONDITIONS   COLUMN=TEXT, COLUMN!=TEXT or TEXT, …          `*` for all rows; a comma in a text
-//! is written `\,`
-//!              COLUMN=max                                    rows with the greatest number of the column
-//! MEASURE      AGGREGATE VALUE [LOW, HIGH] (COLUMN)          an interval and a further column,
-//! both optional
-//!              spearman VALUE, VALUE                         the rank correlation; pearson likewise
-//! AGGREGATE    only (all rows agree), first, min, max, sum, median, geomean, count VALUE
-//! COLUMN, COLUMN / COLUMN * 1e-6, …             computed row by row, from left to right FORMAT
-//! DECIMALS [below | above | percent]            percent below one, above one, or of a fraction
-//!              text                                          cells as they are; all rows have the same one
+//! CONDITIONS   COLUMN=TEXT, COLUMN!=TEXT or TEXT, …   `*` for all rows; a comma in a text is `\,`
+//!              COLUMN=max                             rows with the greatest number of the column
+//! MEASURE      AGGREGATE VALUE
+//!              spearman VALUE, VALUE                  the rank correlation; also pearson
+//! AGGREGATE    only (all rows agree), first, min, max, sum, median, geomean, count
+//! VALUE        COLUMN, COLUMN / COLUMN * 1e-6, …      computed row by row, from left to right
 //! ```
 
 use crate::Error;
@@ -123,6 +119,7 @@ impl Conditions {
     /// Reads conditions; `*` and an empty text are none.
     pub fn parse(text: &str) -> Result<Self, QueryError> {
         let mut conditions = Vec::new();
+        // An empty text is the default of specs, and `*` its visible form in documentation.
         if !["", "*"].contains(&text) {
             for text in text.replace("\\, ", COMMA).split(", ") {
                 conditions.push(Condition::parse(&text.replace(COMMA, ", "))?);
@@ -389,156 +386,19 @@ fn operand(row: &Row, word: &str) -> Result<Option<f64>, QueryError> {
     }
 }
 
-/// Writes a number in a format.
-fn write(value: f64, format: &str) -> Result<String, QueryError> {
-    let malformed = || QueryError::Malformed {
-        part: "format",
-        found: format.into(),
-        accepted: "a number of decimals, alone or before below, above or percent",
-    };
-    let (digits, unit) = format.split_once(' ').unwrap_or((format, ""));
-    let digits: usize = digits.parse().map_err(|_| malformed())?;
-    let value = match unit {
-        "" => value,
-        "below" => 100.0 * (1.0 - value),
-        "above" => 100.0 * (value - 1.0),
-        "percent" => 100.0 * value,
-        _ => return Err(malformed()),
-    };
-    Ok(format!("{value:.digits$}"))
-}
-
 /// Returns the one text of a column; `None` if all cells are empty.
 pub fn only_text(rows: &[&Row], column: &str) -> Result<Option<String>, QueryError> {
     let mut texts = BTreeSet::new();
     for row in rows {
         texts.insert(cell(row, column)?.as_str());
     }
+    // Empty cells mean that the value does not exist, which contradicts no other value.
     texts.remove("");
     if texts.len() > 1 {
         let values = texts.into_iter().collect::<Vec<_>>().join(", ");
         return Err(QueryError::Several { column: column.into(), values });
     }
     Ok(texts.first().map(|text| (*text).to_owned()))
-}
-
-/// Returns the further column of a measure: a number in the format, a text as it is.
-fn further(rows: &[&Row], column: &str, format: &str) -> Result<Option<String>, QueryError> {
-    let is_number = rows
-        .iter()
-        .filter_map(|row| row.get(column))
-        .any(|text| text.parse::<f64>().is_ok());
-    if is_number && format != "text" {
-        one(rows, &format!("only {column}"), format)
-    } else {
-        only_text(rows, column)
-    }
-}
-
-/// Returns one value of `AGGREGATE COLUMN` in the format.
-fn one(rows: &[&Row], measure: &str, format: &str) -> Result<Option<String>, QueryError> {
-    if format == "text" {
-        return only_text(rows, measure.strip_prefix("only ").unwrap_or(measure));
-    }
-    Measure::parse(measure)?
-        .of_rows(rows)?
-        .map(|value| write(value, format))
-        .transpose()
-}
-
-/// Returns the text of a whole measure over some rows; empty if they have no value.
-pub fn show(rows: &[&Row], measure: &str, format: &str) -> Result<String, QueryError> {
-    let (measure, beside) = measure.split_once(" (").unwrap_or((measure, ""));
-    let (measure, ends) = measure.split_once(" [").unwrap_or((measure, ""));
-    let mut text = one(rows, measure, format)?.unwrap_or_default();
-    if let Some((low, high)) = ends.trim_end_matches(']').split_once(", ") {
-        let low = one(rows, &format!("min {low}"), format)?;
-        let high = one(rows, &format!("max {high}"), format)?;
-        if let Some((low, high)) = low.zip(high) {
-            text += &format!(" [{low}, {high}]");
-        }
-    }
-    if !beside.is_empty()
-        && let Some(beside) = further(rows, beside.trim_end_matches(')'), format)?
-    {
-        text += &format!(" ({beside})");
-    }
-    Ok(text)
-}
-
-/// Returns a Markdown table of `ROWS × COLUMNS`; ROWS may be several columns, with ` + ` between.
-pub fn pivot(rows: &[Row], axes: &str, measure: &str, format: &str) -> Result<String, QueryError> {
-    let (down, across) = axes
-        .split_once(" × ")
-        .ok_or_else(|| QueryError::Malformed {
-            part: "pair of axes",
-            found: axes.into(),
-            accepted: "ROWS × COLUMNS",
-        })?;
-    let down: Vec<&str> = down.split(" + ").collect();
-    let columns = distinct(rows, &[across])?.concat();
-    let mut header: Vec<String> = down
-        .iter()
-        .map(|column| escape(&column.replace('_', " ")))
-        .collect();
-    header.extend(columns.iter().map(|column| escape(column)));
-    let mut lines = vec![format!("| {} |", header.join(" | "))];
-    lines.push(format!("|{}", "---|".repeat(header.len())));
-    for names in together(distinct(rows, &down)?) {
-        let of_line: Vec<Row> = group(rows, &down, &names)
-            .into_iter()
-            .cloned()
-            .collect();
-        let mut cells: Vec<String> = down
-            .iter()
-            .zip(&names)
-            .map(|(column, name)| escape(&heading(column, name)))
-            .collect();
-        if down == ["scene"] {
-            cells[0] += &kind_note(&of_line);
-        }
-        for column in &columns {
-            let here = group(&of_line, &[across], std::slice::from_ref(column));
-            cells.push(escape(&show(&here, measure, format)?));
-        }
-        lines.push(format!("| {} |", cells.join(" | ")));
-    }
-    Ok(lines.join("\n"))
-}
-
-/// Sorts names so that those that begin alike follow each other.
-fn together(names: Vec<Vec<String>>) -> Vec<Vec<String>> {
-    let mut groups: Vec<Vec<Vec<String>>> = Vec::new();
-    for name in names {
-        let found = groups
-            .iter_mut()
-            .find(|group| group[0][0] == name[0]);
-        match found {
-            Some(group) => group.push(name),
-            None => groups.push(vec![name]),
-        }
-    }
-    groups.concat()
-}
-
-fn escape(text: &str) -> String {
-    text.replace('|', "\\|")
-}
-
-/// Returns the scene's kind in parentheses, unless it is a file.
-fn kind_note(rows: &[Row]) -> String {
-    let kind = rows.iter().find_map(|row| row.get("scene_kind"));
-    kind.filter(|kind| *kind != "file")
-        .map_or_else(String::new, |kind| format!(" ({kind})"))
-}
-
-/// Returns the name of a line: seconds with two digits, everything else as it is.
-fn heading(column: &str, name: &str) -> String {
-    match name.parse::<f64>() {
-        Ok(seconds) if column.ends_with("_seconds") && seconds >= 0.01 => format!("{seconds:.2}"),
-        Ok(seconds) if column.ends_with("_seconds") => format!("{seconds:.4}"),
-        _ => name.into(),
-    }
 }
 
 #[cfg(test)]
@@ -551,44 +411,31 @@ mod tests {
         reader.deserialize().map(Result::unwrap).collect()
     }
 
-    fn value(conditions: &str, measure: &str, format: &str) -> Result<String, QueryError> {
+    fn value(conditions: &str, measure: &str) -> Result<Option<f64>, QueryError> {
         let rows = select(rows(), conditions)?;
-        show(&rows.iter().collect::<Vec<_>>(), measure, format)
+        Measure::parse(measure)?.of_rows(&rows.iter().collect::<Vec<_>>())
     }
 
     #[test]
-    fn rows_are_selected_aggregated_and_written() {
-        assert_eq!(value("*", "median cost", "1").unwrap(), "3.0");
-        assert_eq!(value("method=x\\, y", "only cost", "0").unwrap(), "2");
-        assert_eq!(value("scene!=a", "count scene", "0").unwrap(), "1");
-        assert_eq!(value("scene=a or b", "max cost [cost, cost]", "0").unwrap(), "5 [2, 5]");
-        assert_eq!(value("scene=a", "min cost / rays (rays)", "0 percent").unwrap(), "50 (400)");
-        assert_eq!(value("scene=b", "only method (rays)", "text").unwrap(), "z");
-    }
-
-    #[test]
-    fn a_pivot_has_a_line_for_every_name_and_empty_cells_where_no_row_is() {
-        let table = pivot(&rows(), "scene × method", "only cost", "0").unwrap();
-        assert_eq!(table, "| scene | x, y | z |\n|---|---|---|\n| a | 2 | 3 |\n| b |  | 5 |");
+    fn rows_are_selected_and_aggregated() {
+        assert_eq!(value("*", "median cost"), Ok(Some(3.0)));
+        assert_eq!(value("method=x\\, y", "only cost"), Ok(Some(2.0)));
+        assert_eq!(value("scene!=a", "count scene"), Ok(Some(1.0)));
+        assert_eq!(value("scene=a or b", "max cost"), Ok(Some(5.0)));
+        assert_eq!(value("scene=a", "min cost / rays"), Ok(Some(0.5)));
+        assert_eq!(value("scene=b", "only rays"), Ok(None));
     }
 
     #[test]
     fn errors_name_what_was_found_and_what_is_accepted() {
-        for (conditions, measure, format, parts) in [
-            ("scene", "only cost", "0", &["\"scene\" is no condition", "COLUMN=TEXT"][..]),
-            (
-                "colour=red",
-                "only cost",
-                "0",
-                &["no column \"colour\"", "cost, method, rays, scene"],
-            ),
-            ("scene=c", "only cost", "0", &["no row meets \"scene=c\""]),
-            ("*", "mean cost", "0", &["\"mean cost\" is no measure", "median"]),
-            ("*", "only cost", "0", &["cost has several values, from 2 to 5"]),
-            ("*", "only scene", "text", &["scene has several values, a, b"]),
-            ("*", "max cost", "two", &["\"two\" is no format"]),
+        for (conditions, measure, parts) in [
+            ("scene", "only cost", &["\"scene\" is no condition", "COLUMN=TEXT"][..]),
+            ("colour=red", "only cost", &["no column \"colour\"", "cost, method, rays, scene"]),
+            ("scene=c", "only cost", &["no row meets \"scene=c\""]),
+            ("*", "mean cost", &["\"mean cost\" is no measure", "median"]),
+            ("*", "only cost", &["cost has several values, from 2 to 5"]),
         ] {
-            let message = value(conditions, measure, format)
+            let message = value(conditions, measure)
                 .unwrap_err()
                 .to_string();
             assert!(parts.iter().all(|part| message.contains(part)), "{message}");

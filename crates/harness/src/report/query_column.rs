@@ -155,6 +155,7 @@ impl Column {
                     .collect();
                 Ok(range(values?.into_iter().flatten()))
             };
+            // Runs are not paired, so any run of the group may meet any run of the base.
             let ends = of_all(&group.rows)?.zip(of_all(&group.base)?);
             let interval = ends.map(|(own, base)| {
                 let ends = [ratio.of(own.0, base.1), ratio.of(own.1, base.0)];
@@ -168,6 +169,7 @@ impl Column {
                 let mut columns = self.paired_by.iter();
                 columns.all(|column| row.get(column) == other.get(column))
             };
+            // A run without a partner, such as one on a scene that the base lacks, has no quotient.
             let Some(partner) = group.base.iter().find(is_partner) else { continue };
             let own = measure.of_row(row)?;
             let base = measure.of_row(partner)?;
@@ -210,6 +212,7 @@ fn verdict(interval: Option<(f64, f64)>) -> &'static str {
 
 fn text_of(number: Option<f64>) -> String {
     let Some(number) = number else { return String::new() };
+    // Counts stay integers, as in the files that rows are read from.
     if number.fract() == 0.0 && number.abs() < 1e15 {
         return format!("{number:.0}");
     }

@@ -99,6 +99,7 @@ impl Drawing {
                 .filter(|row| self.series_of(row) == series)
                 .copied()
                 .collect();
+            // Bars of a category have one place each, also where a series has no value.
             if self.marks == Shape::Bars {
                 layers.push(self.bars(series, &names, &rows_of_series));
                 continue;

@@ -123,6 +123,7 @@ impl Config {
             let rows_of_group = query::group(rows, &by, &values);
             if self.pairs.is_empty() {
                 let named: Vec<&str> = base.columns().collect();
+                // Without a base there is nothing to divide by, and no rows to look for.
                 let base = if named.is_empty() { vec![] } else { find(rows, &key, &named, &base)? };
                 groups.push(Group { key, rows: rows_of_group, base });
                 continue;
@@ -144,6 +145,7 @@ impl Config {
     /// Compares cells with the paper's numbers.
     fn compare(&self, rows: &Rows, table: &[Row]) -> Result<Vec<PaperRow>, QueryError> {
         let mut compared = Vec::new();
+        // `paper.csv` must have the same bytes on every machine, which seconds have not.
         if self.file.starts_with("timing") {
             return Ok(compared);
         }

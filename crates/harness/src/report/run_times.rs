@@ -54,6 +54,7 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
     for axis in ProgressAxis::of(rows, &config.methods) {
         let attempts = attempts(config, rows, axis);
         let problems = attempts.chunks(config.methods.len().max(1));
+        // A target that nobody has reached would be an empty panel.
         let reached = problems.filter(|problem| {
             problem
                 .iter()
@@ -98,6 +99,7 @@ fn distribution(attempt: &Attempt) -> Vec<(f64, f64)> {
 fn steps<'a>(attempt: &Attempt<'a>) -> Vec<Step<'a>> {
     let &Attempt { scene, target, cost, method, runs, end, .. } = attempt;
     let mut points = distribution(attempt);
+    // A method that never succeeds still has a row, at fraction 0, so that it is not forgotten.
     if points.is_empty() && runs > 0 {
         points.push((end, 0.0));
     }
@@ -148,6 +150,7 @@ fn draw(problem: &[Attempt], axis: ProgressAxis) -> Panel {
 /// Draws the fitted distribution from the first run solved to the last.
 fn fitted_curve(law: &ShiftedExponential, first: f64, last: f64) -> Layer {
     const POINTS: u32 = 60;
+    // The axis is logarithmic, so evenly spaced logarithms draw a smooth curve.
     let place = |step: u32| first * (last / first).powf(f64::from(step) / f64::from(POINTS));
     let points = (0..=POINTS)
         .map(place)

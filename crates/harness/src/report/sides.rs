@@ -13,6 +13,8 @@ impl Sides {
     pub(super) fn of(intervals: impl Iterator<Item = (f64, f64)>) -> Self {
         let mut sides = Self { below: 0, above: 0, scenes: 0 };
         for (low, high) in intervals {
+            // An interval that holds 1 is on neither side: another repetition could change its
+            // side.
             sides.below += usize::from(high < 1.0);
             sides.above += usize::from(low > 1.0);
             sides.scenes += 1;

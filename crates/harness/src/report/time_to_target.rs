@@ -42,6 +42,7 @@ pub(super) fn write(config: &Targets, rows: &Rows) -> Result<Output, Error> {
 }
 
 fn reached<'a>(attempt: &Attempt<'a>) -> Reached<'a> {
+    // Runs without success must count: dropping them would favour methods that rarely succeed.
     let mut times = attempt.solved.clone();
     times.resize(attempt.runs, WORST);
     let at = |q| order_quantile(&times, q).filter(|time| time.is_finite());

@@ -85,6 +85,7 @@ impl Config {
                     .map(|point| (x(point), point.interval().0, point.interval().1));
                 bands.push(Layer::new(name, Marks::Band(band.collect())));
             }
+            // One repetition has no interval, and its bands would cover the lines.
             if curves
                 .iter()
                 .flatten()
@@ -201,6 +202,7 @@ impl Config {
         let best = self.best(curves);
         let Some(least) = best.first() else { return };
         let Some(paper) = &self.paper_best else { return };
+        // With several best methods, the intervals do not show which is best.
         let verdict = match (best.iter().any(|point| point.method == paper), best.len()) {
             (true, 1) => Verdict::Agrees,
             (true, _) => Verdict::Inconclusive,

@@ -19,6 +19,12 @@ pub fn read<R: DeserializeOwned>(path: &Path) -> Result<Vec<R>, Error> {
         .map_err(Error::csv(path))
 }
 
+/// Reads all rows of a kind from an experiment's folder; none if no run left any.
+pub fn read_if_any<R: Row>(folder: &Path) -> Result<Vec<R>, Error> {
+    let path = folder.join(R::FILE);
+    if path.is_file() { read(&path) } else { Ok(vec![]) }
+}
+
 /// Returns the bytes of a CSV file with these rows. Without rows there is no header either.
 pub fn to_bytes<R: Serialize>(rows: &[R], path: &Path) -> Result<Vec<u8>, Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());

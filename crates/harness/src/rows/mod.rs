@@ -9,10 +9,8 @@
 //! | `method` | Label of the method in the spec. |
 //! | `seed` | Seed of the run, derived from the spec's. |
 //! | `repetition` | Number of the repetition, from 0. |
-//! | `objects` | Number of the scene's objects. |
-//! | `evaluations` | Trees or moves evaluated. |
-//! | `work` | Nodes made or visited. |
-//! | `threads` | Number of threads of the run. |
+//! | `objects`, `threads` | Numbers of the scene's objects and of the run's threads. |
+//! | `evaluations`, `work` | Trees or moves evaluated; nodes made or visited. |
 //! | `nodes`, `depth` | Nodes of the tree; edges from the root to the deepest leaf. |
 //! | `internal_area` | Total half area of inner nodes, world units squared. |
 //! | `goldsmith_salmon` | Boxes below the root that a random line through the root's box is tested against. |
@@ -20,21 +18,17 @@
 //! | `layout` | Layout of the tree in memory while rays are traced. |
 //! | `rays`, `judged_on`, `trained_on` | Kinds of rays: traced, judging the tree, training it. |
 //! | `camera` | Camera of the judging rays: `same` as in training, `other`, or `none`. |
-//! | `count` | Number of rays. |
 //! | `boxes_per_ray`, `objects_per_ray` | Mean number of tests; `boxes_low` and `boxes_high` end its 95 % interval. |
 //! | `missed_hits`, `false_hits`, `other_hits` | Rays that miss a hit, hit nothing real, or hit elsewhere. |
 //! | `references_per_object` | Leaves that name an object, per object: above 1 where objects are divided. |
-//! | `bytes_per_object` | Bytes over the number of objects. |
 #![allow(missing_docs, reason = "columns in the table above, or whose names are clear")]
 
 pub mod csv_file;
 pub mod lock;
 pub mod store;
 
-use crate::Error;
-pub use csv_file::{Row, read, to_bytes};
+pub use csv_file::{Row, read, read_if_any, to_bytes};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 
 /// Declares kinds of rows with the names of their files.
 macro_rules! rows {
@@ -407,10 +401,4 @@ impl ReferenceRow {
         self.lower_bound
             .is_some_and(|bound| bound >= self.cost * (1.0 - ROUNDING))
     }
-}
-
-/// Reads all rows of a kind from an experiment's folder; none if no run left any.
-pub fn read_if_any<R: Row>(folder: &Path) -> Result<Vec<R>, Error> {
-    let path = folder.join(R::FILE);
-    if path.is_file() { read(&path) } else { Ok(vec![]) }
 }

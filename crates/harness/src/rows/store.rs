@@ -116,6 +116,7 @@ impl Store {
         if removed.exists() {
             remove(&removed)?;
         }
+        // The spec is kept with the runs, because a run of another spec must never be resumed.
         let spec = partial.join("resolved.toml");
         let found = fs::read_to_string(&spec).ok();
         let rejected = |what: &str| Err(Error::Usage(format!("{}: {what}", folder.display())));
@@ -168,6 +169,7 @@ impl Store {
     pub fn keep(&self, index: usize, run: &FinishedRun) -> Result<(), Error> {
         let part = self.part(index);
         let unfinished = part.with_extension("unfinished");
+        // A killed harness may have left half a folder under either name.
         for old in [&unfinished, &part] {
             if old.exists() {
                 fs::remove_dir_all(old).map_err(Error::io(old, "remove the folder"))?;
@@ -210,6 +212,7 @@ impl Store {
                     .iter()
                     .position(|&byte| byte == b'\n')
                     .map_or(bytes.len(), |end| end + 1);
+                // A header in the middle would be read as a row.
                 joined.extend_from_slice(if joined.is_empty() { &bytes } else { &bytes[header..] });
             }
             files::write(&self.folder.join(name), &joined)?;

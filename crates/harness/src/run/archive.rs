@@ -79,6 +79,7 @@ pub fn keep(results: &Path, scene: &Scene, file: &Path, command: &str) -> Result
         lower_bound: best.and_then(|best| best.lower_bound),
         command: command.into(),
     });
+    // Sorted rows keep the differences between commits small.
     rows.sort_by(|a, b| a.scene.cmp(&b.scene));
     let folder = results.join(FOLDER);
     fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;

@@ -112,6 +112,7 @@ fn compare_values(key: &str, fresh: &Value, committed: &Value, differences: &mut
                 .chain(committed_table.keys())
                 .collect();
             for name in names {
+                // The full path of a key is what its author searches for.
                 let key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
                 match (fresh_table.get(name), committed_table.get(name)) {
                     (Some(fresh), Some(committed)) => {
@@ -141,6 +142,7 @@ fn compare_values(key: &str, fresh: &Value, committed: &Value, differences: &mut
 
 /// Returns the first differences in a file and the number of further ones.
 fn shortened(file: &str, mut differences: Vec<String>) -> Vec<String> {
+    // One changed column would otherwise print a line for every row.
     let more = differences.len().saturating_sub(SHOWN);
     differences.truncate(SHOWN);
     if more > 0 {
@@ -165,6 +167,7 @@ fn compare_rows(name: &str, fresh: &Rows, committed: &Rows, all_scenes: bool) ->
     if !all_scenes && !header.iter().any(|column| column == "scene") {
         return vec![];
     }
+    // Cells under different columns cannot be compared one by one.
     if *header != committed.header {
         let committed_header = &committed.header;
         return vec![format!("{name}: columns are {header:?}, committed {committed_header:?}")];

@@ -50,6 +50,7 @@ pub fn execute(
     {
         return Err(Error::Usage(format!("{}: {reason}", experiment.name)));
     }
+    // Without the key the program's pool serves, which `--jobs` has sized.
     let Some(threads) = experiment.threads else {
         return run(experiment, &measurements, out, extent, interrupted);
     };
@@ -118,6 +119,7 @@ fn run(
         text += &measurement.measure(&mut work)?;
     }
     let remarks = work.remarks;
+    // Gathered after the runs: the date is the time of completion.
     let provenance = Provenance::gather();
     if let Some(shard) = shard {
         store.keep_shard(&to_toml(&provenance)?)?;

@@ -50,6 +50,7 @@ pub(crate) fn conclude(
     } else {
         report(resolved, best_known, provenance, &store)?
     };
+    // Provenance comes last, so that it describes results that are complete.
     store.write("provenance.toml", to_toml(provenance)?.as_bytes())?;
     store.finish()?;
     Ok(text)
@@ -63,6 +64,7 @@ fn report(
     provenance: &Provenance,
     store: &Store,
 ) -> Result<String, Error> {
+    // Reports read references, so these are updated first.
     reference::update(resolved, best_known, &provenance.revision, store)?;
     let made = outputs(&resolved.experiment, store.folder())?;
     store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;

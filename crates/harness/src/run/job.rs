@@ -23,6 +23,7 @@ pub(crate) struct Job<'a> {
 impl<'a> Job<'a> {
     /// Returns all runs of an experiment, scene by scene, in the order of the spec.
     pub fn all(experiment: &'a Experiment, scenes: &'a [Scene]) -> Result<Vec<Self>, Error> {
+        // Bases are needed before any run, and scenes are independent.
         let bases = scenes
             .par_iter()
             .map(|scene| base_cost(scene, &experiment.objective))

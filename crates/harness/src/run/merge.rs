@@ -180,6 +180,7 @@ fn owners(
             missing.push(index);
             continue;
         };
+        // Reading verifies the checksums, so a damaged run is never merged.
         let run = FinishedRun::read(&owner)?;
         // Two machines may both have performed a run; the copies must agree.
         for copy in copies {
@@ -199,6 +200,7 @@ fn owners(
     }
     let names: Vec<String> = missing
         .iter()
+        // A shard that never ran misses thousands of runs.
         .take(NAMED)
         .map(|&index| resolved.run_name(index))
         .collect();

@@ -54,6 +54,7 @@ pub(crate) fn perform(
         return Ok(None);
     }
     let (outcome, seconds) = result?;
+    // A method's defect must not become a published number.
     let valid = validate_references(&outcome.tree, &scene.boxes, &scene.primitives);
     valid.map_err(|source| Error::InvalidTree {
         scene: scene.name.clone(),
@@ -113,6 +114,7 @@ fn solve_or_build(
                 source,
             })?,
     };
+    // Third-party methods report no events; their end is the only one.
     stopwatch.note(seconds);
     Ok((single_evaluation(tree, &experiment.objective), seconds))
 }
@@ -127,6 +129,7 @@ fn search(
 ) -> Result<(Outcome, f64), Error> {
     let Job { scene, labelled, .. } = *job;
     let options = &labelled.options;
+    // The judge's rays differ from the rays of all measurements.
     let ray_seed = experiment.seed_of(&scene.name, "rays of the judge", job.repetition);
     let judge = options
         .judge

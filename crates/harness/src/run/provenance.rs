@@ -36,6 +36,7 @@ pub struct Provenance {
 impl Provenance {
     /// Collects the provenance of results that are completed now.
     pub fn gather() -> Self {
+        // The program's path would reveal folders of the machine.
         let mut command = "harness".to_owned();
         for argument in std::env::args_os().skip(1) {
             // Arguments need not be UTF-8.

@@ -105,6 +105,7 @@ fn write_all_known(
 ) -> Result<(), Error> {
     known.sort_by(|a, b| key_of(a).cmp(&key_of(b)));
     let path = results.join(BEST_KNOWN);
+    // An unchanged file keeps its time stamp and needs no commit.
     if known != before {
         files::write(&path, &to_bytes(&known, &path)?)?;
     }
@@ -222,6 +223,7 @@ fn offer(known: &mut Vec<ReferenceRow>, mut found: ReferenceRow, bound_is_optimu
     else {
         return known.push(found);
     };
+    // A bound holds whoever found the cost, so the greatest one is kept.
     let lower_bound = old
         .lower_bound
         .into_iter()

@@ -48,6 +48,7 @@ impl Resolved {
 
     /// Returns true if `found` has the same runs, and perhaps further ones on optional scenes.
     pub fn repeats(&self, found: &Self) -> bool {
+        // A machine without fetched scenes may repeat results that have them.
         let optional = &self.experiment.optional_scenes;
         let mut required = self.scenes.iter();
         let mut recorded = found.scenes.iter();
@@ -88,6 +89,7 @@ pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>),
     for name in &experiment.optional_scenes {
         match Scene::load_with(name, outside) {
             Ok(scene) => scenes.push(scene),
+            // An optional scene that cannot be loaded is one that nobody has fetched.
             Err(_) => skipped_scenes.push(name.clone()),
         }
     }

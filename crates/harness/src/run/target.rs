@@ -51,6 +51,7 @@ impl Target {
                 folder.display()
             )));
         }
+        // `with_extension` would replace the part of the name after a dot, as in `v1.2`.
         let mut repetition = folder.as_os_str().to_owned();
         repetition.push(".new");
         let repetition = PathBuf::from(repetition);

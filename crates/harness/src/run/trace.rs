@@ -53,6 +53,7 @@ fn ray_programs(config: &speed::Config) -> (Vec<&PathBuf>, String) {
     let (found, missing): (Vec<_>, Vec<_>) = config
         .ray_peers
         .iter()
+        // A missing program must not end hours of measurements, so a remark names it.
         .partition(|program| program.exists());
     let remarks = missing.iter().map(|program| {
         let program = program.display();
@@ -99,6 +100,7 @@ fn trace_scene(
             }
         }
     }
+    // All methods of a scene get the same rays.
     let seed = experiment.seed_of(&scene.name, "tracing", 0);
     speed::measure(config, scene, first_tree, &contenders, seed, || work.watch.cancelled())
         .map_err(tracing_error(scene))?

@@ -166,6 +166,7 @@ impl Experiment {
     pub(super) fn check_reports(&self, labels: &[Option<String>], indices: &[usize]) -> Vec<Fault> {
         // Any name may be the label of an entry that could not be read.
         let known: Option<Vec<&str>> = labels.iter().map(Option::as_deref).collect();
+        // One fault is enough: a report may name the entry that could not be read.
         let Some(known) = known else { return vec![] };
         let accepted = known.join(", ");
         let mut faults = Vec::new();

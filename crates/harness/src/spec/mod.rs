@@ -161,6 +161,7 @@ impl Experiment {
             .options
             .budget
             .unwrap_or(Budget::UNLIMITED);
+        // The lower limit wins, so that a common limit bounds every method.
         let max_evaluations = [self.budget.max_evaluations, entry.max_evaluations];
         let max_work = [self.budget.max_work, entry.max_work];
         Budget {
@@ -171,10 +172,12 @@ impl Experiment {
 
     /// The seed of one run, of 32 bits, which every spreadsheet represents exactly.
     pub fn seed_of(&self, scene: &str, label: &str, repetition: u32) -> u64 {
+        // Quick runs differ from full runs, so they must not share seeds by accident.
         let variant = if self.quick { "-quick" } else { "" };
         let identity =
             format!("{}\0{}{variant}\0{scene}\0{label}\0{repetition}", self.seed, self.name);
         let hash = fnv1a(identity.into_bytes());
+        // Both halves are folded together, because the low bits of FNV-1a alone mix less well.
         (hash ^ (hash >> 32)) & 0xffff_ffff
     }
 }

@@ -90,11 +90,13 @@ impl Experiment {
         if let Some(seed) = overrides.seed {
             experiment.seed = seed;
         }
+        // The command line can only allow more than the spec, never less.
         experiment.outside_files |= overrides.outside_files;
         if !overrides.scenes.is_empty() {
             experiment.scenes.clone_from(&overrides.scenes);
             experiment.optional_scenes.clear();
         }
+        // The suite is about all methods; a list in the spec would miss new ones.
         if experiment.suite.is_some() && labels.is_empty() {
             experiment.methods = Method::all()
                 .into_iter()
@@ -147,6 +149,8 @@ fn labels(methods: Option<&Value>) -> Vec<Option<String>> {
     let entries = entries.into_iter().flatten();
     entries
         .map(|entry| {
+            // Labels are read before the entries, so that a faulty entry does not hide its label
+            // from reports.
             let label = entry.get("label").or(entry.get("method"))?;
             Some(label.as_str()?.to_owned())
         })
@@ -216,6 +220,7 @@ fn remove_unacceptable(table: &mut Table, above: &str, faults: &mut Vec<Fault>) 
 fn replace(table: &mut Table, replacements: Table) {
     for (key, value) in replacements {
         match (table.get_mut(&key), value) {
+            // A quick variant names only the keys that it changes, also within tables.
             (Some(Value::Table(old)), Value::Table(new)) => replace(old, new),
             (_, value) => {
                 table.insert(key, value);

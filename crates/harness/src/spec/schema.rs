@@ -94,6 +94,7 @@ fn tidy(schema: &mut Value) {
                 map.remove("default");
             }
             if let Some(Value::Array(types)) = map.get_mut("type") {
+                // TOML has no null: an optional key is omitted.
                 types.retain(|kind| kind != "null");
                 if let [one] = &types[..] {
                     let one = one.clone();
@@ -224,6 +225,7 @@ fn keys_of(table: &Value, above: &str, hidden: &[&str], rows: &mut Vec<String>) 
         ];
         let cells = cells.map(|cell| cell.replace('|', "\\|"));
         rows.push(format!("| {} |\n", cells.join(" | ")));
+        // Keys of nested tables, of elements of lists, and of alternatives have separate rows.
         keys_of(schema, &format!("{above}{key}."), &[], rows);
         keys_of(
             schema.get("items").unwrap_or(&Value::Null),

@@ -116,6 +116,7 @@ pub fn mean_interval(values: &[f64]) -> Option<(f64, Option<(f64, f64)>)> {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let freedom = values.len().checked_sub(1)?;
+    // One value says nothing about the spread.
     let Some(factor) = student(values.len()) else { return Some((mean, None)) };
     let variance = values
         .iter()
@@ -153,6 +154,7 @@ const STUDENT: [f64; 20] = [
 /// 0, a search that finds nothing has 1. `None` unless the horizon is above 0.
 pub fn primal_integral(incumbents: &[(f64, f64)], reference: f64, horizon: f64) -> Option<f64> {
     let mut since = 0.0;
+    // Before its first incumbent a search has the worst gap.
     let mut gap = 1.0;
     let mut integral = 0.0;
     for &(time, cost) in incumbents
@@ -194,6 +196,7 @@ pub fn pearson_interval(correlation: f64, pairs: usize) -> Option<(f64, f64)> {
         .checked_sub(3)
         .filter(|&freedom| freedom > 0)?;
     let half = NORMAL_95 / (freedom as f64).sqrt();
+    // The transformed correlation is nearly normal with a known variance.
     let transformed = correlation.atanh();
     Some(((transformed - half).tanh(), (transformed + half).tanh()))
 }

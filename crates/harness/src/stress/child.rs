@@ -43,6 +43,7 @@ fn ask(arguments: [&str; 3], limit: Duration) -> Result<String, String> {
         .map_err(|error| error.to_string())?;
     match output.status.success() {
         true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
+        // Rust programs exit with this code after a panic.
         false if output.status.code() == Some(101) => Err("panic".into()),
         false => Err(format!("crash, {}", output.status)),
     }
@@ -73,11 +74,13 @@ pub fn main(subject: &str, id: &str, objects: usize) -> Result<String, String> {
     }
     let method: Method = toml::from_str(subject).map_err(|error| error.to_string())?;
     let boxes = stiff::boxes(&triangles);
+    // The peak must count the build alone.
     drop(triangles);
     let before = status("VmRSS");
     let outcome = solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &())
         .map_err(|e| e.to_string())?;
     let peak = status("VmHWM");
+    // The outcome lives until here, so that its memory is part of the peak.
     drop(outcome);
     match (before, peak) {
         (Some(before), Some(peak)) => Ok(peak.saturating_sub(before).to_string()),

@@ -76,9 +76,12 @@ mod compiled_in {
                 broken.push(P7.broken(format!("cost {area}")));
             }
         }
+        // Brute force over many objects would take longer than the limit of the child.
         if triangles.len() <= FEW {
             let objects = Primitives::Triangles(triangles.to_vec());
             let brute_force = Accelerator::new(&objects, Structure::Brute);
+            // Every object is tested by our exact test, so differences come from the traversal
+            // alone.
             let differs = |ray: &&Ray| {
                 let shear = Shear::new(ray);
                 let found =

@@ -5,6 +5,7 @@ use super::child;
 use super::peers::{self, Found};
 use crate::Error;
 use crate::contestant::{Contestant, Labelled};
+use crate::report::data::distinct;
 use crate::report::output::Output;
 use crate::rows::store::Store;
 use crate::rows::{read, to_bytes};
@@ -144,6 +145,7 @@ impl Row {
     ) -> Self {
         let depth = found.map(|found| found.depth);
         let cost = found.map(|found| found.cost);
+        // CSV has no spelling of infinity that all readers share.
         let cost = cost.filter(|cost| cost.is_finite());
         Self { objects, depth, cost, ..Self::bare(case, peer, outcome, broken.join(BETWEEN)) }
     }
@@ -195,6 +197,7 @@ impl Config {
                 return Err(Error::Interrupted { finished: done, runs: cases.len() });
             }
             for Labelled { label, method, .. } in methods {
+                // Specs accept only methods of ours here; libraries run in child processes below.
                 let Contestant::Ours(method) = method else { continue };
                 let cell = case.of_method(method, &effort);
                 let Some((row, examined)) = cell.map(|cell| Row::new(case, label, cell)) else {
@@ -253,6 +256,7 @@ impl Config {
         let mut last = None;
         let mut broken = Vec::new();
         let [few, many, _] = scene.sizes;
+        // Few objects are checked thoroughly, many for crashes and time.
         for objects in [few, many] {
             match child::examine(peer, case.id, objects, limit) {
                 Ok(found) => {
@@ -284,8 +288,8 @@ fn rows(folder: &Path) -> Result<[Vec<Row>; 2], Error> {
 
 /// Draws the outcomes of all cases (rows) by method, traversal, part or library (columns).
 fn heat_map(rows: &[Row]) -> HeatMap {
-    let scenes = distinct(rows.iter().map(|row| &row.scene));
-    let columns = distinct(rows.iter().map(|row| &row.method));
+    let scenes = distinct(rows.iter().map(|row| row.scene.clone()));
+    let columns = distinct(rows.iter().map(|row| row.method.clone()));
     let mut cells = Vec::new();
     for scene in &scenes {
         for column in &columns {
@@ -313,17 +317,6 @@ fn heat_map(rows: &[Row]) -> HeatMap {
         cells,
         classes: CLASSES.map(String::from).into(),
     }
-}
-
-/// Returns the different names in the order of their first occurrence.
-fn distinct<'a>(all: impl Iterator<Item = &'a String>) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
-    for name in all {
-        if !names.contains(name) {
-            names.push(name.clone());
-        }
-    }
-    names
 }
 
 const HEADING: &str = "Stiff and extreme cases";

@@ -3,7 +3,6 @@
 
 #[path = "../../../bvh-terminal/tests/program/mod.rs"]
 mod program;
-pub mod query;
 
 use bvh_core::Bvh;
 use bvh_core::file::{self, Origin};

@@ -1,0 +1,219 @@
+//! Numbers and tables of pages, from queries of committed CSV files in the language of
+//! [`harness::report::query`].
+//!
+//! ```text
+//! FILE | CONDITIONS | SHOWN | FORMAT                     one value
+//! FILE | CONDITIONS | ROWS × COLUMNS | SHOWN | FORMAT    a table
+//!
+//! SHOWN    MEASURE [LOW, HIGH] (COLUMN)         an interval and a further column, both optional
+//! FORMAT   DECIMALS [below | above | percent]   percent below one, above one, or of a fraction
+//!          text                                 cells as they are; all rows have the same one
+//! ```
+//! A file with `/*/` in its path stands for all such files: results by processor.
+
+use super::support::top;
+use harness::report::query::{self, Measure, QueryError, Row, distinct, group, only_text};
+use std::fs;
+use std::path::PathBuf;
+
+/// The paths of a committed CSV; with `/*/` in it, one in every folder in which it is, by name.
+fn paths(file: &str) -> Vec<PathBuf> {
+    let results = top().join("results");
+    let Some((before, after)) = file.split_once("/*/") else { return vec![results.join(file)] };
+    let folders =
+        fs::read_dir(results.join(before)).unwrap_or_else(|error| panic!("{file}: {error}"));
+    let mut paths: Vec<PathBuf> = folders
+        .map(|folder| folder.unwrap().path().join(after))
+        .collect();
+    paths.retain(|path| path.is_file());
+    paths.sort();
+    paths
+}
+
+/// The rows of a committed CSV that meet all conditions; at least one.
+fn rows(file: &str, conditions: &str) -> Vec<Row> {
+    let mut rows = Vec::new();
+    for path in paths(file) {
+        rows.extend(query::read(&path).unwrap_or_else(|error| panic!("{file}: {error}")));
+    }
+    query::select(rows, conditions).unwrap_or_else(|error| panic!("{file}: {error}"))
+}
+
+/// The answer of a query of four or five parts.
+pub fn answer(query: &str) -> String {
+    let parts: Vec<&str> = query.split(" | ").collect();
+    let answer = match parts[..] {
+        [file, conditions, measure, format] => {
+            let rows = rows(file, conditions);
+            show(&rows.iter().collect::<Vec<_>>(), measure, format)
+        }
+        [file, conditions, axes, measure, format] => {
+            pivot(&rows(file, conditions), axes, measure, format)
+                .map(|table| format!("\n{table}\n"))
+        }
+        _ => panic!("{query}: expected FILE | CONDITIONS | [ROWS × COLUMNS |] MEASURE | FORMAT"),
+    };
+    let text = answer.unwrap_or_else(|error| panic!("{query}: {error}"));
+    assert!(!text.is_empty(), "{query}: no value");
+    text
+}
+
+/// Writes a number in a format.
+fn write(value: f64, format: &str) -> Result<String, QueryError> {
+    let malformed = || QueryError::Malformed {
+        part: "format",
+        found: format.into(),
+        accepted: "a number of decimals, alone or before below, above or percent",
+    };
+    let (digits, unit) = format.split_once(' ').unwrap_or((format, ""));
+    let digits: usize = digits.parse().map_err(|_| malformed())?;
+    // Percentages in prose are differences from 1, which no column holds.
+    let value = match unit {
+        "" => value,
+        "below" => 100.0 * (1.0 - value),
+        "above" => 100.0 * (value - 1.0),
+        "percent" => 100.0 * value,
+        _ => return Err(malformed()),
+    };
+    Ok(format!("{value:.digits$}"))
+}
+
+/// Returns the further column of a measure: a number in the format, a text as it is.
+fn further(rows: &[&Row], column: &str, format: &str) -> Result<Option<String>, QueryError> {
+    let is_number = rows
+        .iter()
+        .filter_map(|row| row.get(column))
+        .any(|text| text.parse::<f64>().is_ok());
+    if is_number && format != "text" {
+        one(rows, &format!("only {column}"), format)
+    } else {
+        only_text(rows, column)
+    }
+}
+
+/// Returns one value of `AGGREGATE COLUMN` in the format.
+fn one(rows: &[&Row], measure: &str, format: &str) -> Result<Option<String>, QueryError> {
+    if format == "text" {
+        return only_text(rows, measure.strip_prefix("only ").unwrap_or(measure));
+    }
+    Measure::parse(measure)?
+        .of_rows(rows)?
+        .map(|value| write(value, format))
+        .transpose()
+}
+
+/// Returns the text of a whole measure over some rows; empty if they have no value.
+fn show(rows: &[&Row], measure: &str, format: &str) -> Result<String, QueryError> {
+    let (measure, beside) = measure.split_once(" (").unwrap_or((measure, ""));
+    let (measure, ends) = measure.split_once(" [").unwrap_or((measure, ""));
+    let mut text = one(rows, measure, format)?.unwrap_or_default();
+    if let Some((low, high)) = ends.trim_end_matches(']').split_once(", ") {
+        let low = one(rows, &format!("min {low}"), format)?;
+        let high = one(rows, &format!("max {high}"), format)?;
+        if let Some((low, high)) = low.zip(high) {
+            text += &format!(" [{low}, {high}]");
+        }
+    }
+    if !beside.is_empty()
+        && let Some(beside) = further(rows, beside.trim_end_matches(')'), format)?
+    {
+        text += &format!(" ({beside})");
+    }
+    Ok(text)
+}
+
+/// Returns a Markdown table of `ROWS × COLUMNS`; ROWS may be several columns, with ` + ` between.
+fn pivot(rows: &[Row], axes: &str, measure: &str, format: &str) -> Result<String, QueryError> {
+    let (down, across) = axes
+        .split_once(" × ")
+        .ok_or_else(|| QueryError::Malformed {
+            part: "pair of axes",
+            found: axes.into(),
+            accepted: "ROWS × COLUMNS",
+        })?;
+    let down: Vec<&str> = down.split(" + ").collect();
+    let columns = distinct(rows, &[across])?.concat();
+    let mut header: Vec<String> = down
+        .iter()
+        .map(|column| escape(&column.replace('_', " ")))
+        .collect();
+    header.extend(columns.iter().map(|column| escape(column)));
+    let mut lines = vec![format!("| {} |", header.join(" | "))];
+    lines.push(format!("|{}", "---|".repeat(header.len())));
+    for names in together(distinct(rows, &down)?) {
+        let of_line: Vec<Row> = group(rows, &down, &names)
+            .into_iter()
+            .cloned()
+            .collect();
+        let mut cells: Vec<String> = down
+            .iter()
+            .zip(&names)
+            .map(|(column, name)| escape(&heading(column, name)))
+            .collect();
+        // Readers must see which scenes are stand-ins wherever a table names them.
+        if down == ["scene"] {
+            cells[0] += &kind_note(&of_line);
+        }
+        for column in &columns {
+            let here = group(&of_line, &[across], std::slice::from_ref(column));
+            cells.push(escape(&show(&here, measure, format)?));
+        }
+        lines.push(format!("| {} |", cells.join(" | ")));
+    }
+    Ok(lines.join("\n"))
+}
+
+/// Sorts names so that those that begin alike follow each other.
+fn together(names: Vec<Vec<String>>) -> Vec<Vec<String>> {
+    let mut groups: Vec<Vec<Vec<String>>> = Vec::new();
+    for name in names {
+        let found = groups
+            .iter_mut()
+            .find(|group| group[0][0] == name[0]);
+        match found {
+            Some(group) => group.push(name),
+            None => groups.push(vec![name]),
+        }
+    }
+    groups.concat()
+}
+
+fn escape(text: &str) -> String {
+    text.replace('|', "\\|")
+}
+
+/// Returns the scene's kind in parentheses, unless it is a file.
+fn kind_note(rows: &[Row]) -> String {
+    let kind = rows.iter().find_map(|row| row.get("scene_kind"));
+    kind.filter(|kind| *kind != "file")
+        .map_or_else(String::new, |kind| format!(" ({kind})"))
+}
+
+/// Returns the name of a line: seconds with two digits, everything else as it is.
+fn heading(column: &str, name: &str) -> String {
+    match name.parse::<f64>() {
+        Ok(seconds) if column.ends_with("_seconds") && seconds >= 0.01 => format!("{seconds:.2}"),
+        Ok(seconds) if column.ends_with("_seconds") => format!("{seconds:.4}"),
+        _ => name.into(),
+    }
+}
+
+#[test]
+fn values_are_written_in_their_format_and_a_table_has_empty_cells_where_no_row_is() {
+    let text = "scene,method,cost,rays\na,\"x, y\",2,4\na,z,3,4\nb,z,5,\n";
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let rows: Vec<Row> = reader.deserialize().map(Result::unwrap).collect();
+    let all: Vec<&Row> = rows.iter().collect();
+    let shown = |measure: &str, format: &str| show(&all, measure, format);
+    assert_eq!(shown("median cost", "1").unwrap(), "3.0");
+    assert_eq!(shown("max cost [cost, cost]", "0").unwrap(), "5 [2, 5]");
+    assert_eq!(shown("min cost / rays (rays)", "0 percent").unwrap(), "50 (400)");
+    let message = shown("only scene", "text")
+        .unwrap_err()
+        .to_string();
+    assert!(message.contains("scene has several values, a, b"), "{message}");
+    let message = shown("max cost", "two").unwrap_err().to_string();
+    assert!(message.contains("\"two\" is no format"), "{message}");
+    let table = pivot(&rows, "scene × method", "only cost", "0").unwrap();
+    assert_eq!(table, "| scene | x, y | z |\n|---|---|---|\n| a | 2 | 3 |\n| b |  | 5 |");
+}
