@@ -2,7 +2,7 @@
 //!
 //! | law | who | claim |
 //! |---|---|---|
-//! | scale by 2^k | every method | same tree, cost times 4^k, bit by bit; `stress::checks::methods::scales` has every k |
+//! | scale by 2^k | every method | same tree, cost times 4^k, bit by bit; the case S21 of the suite has every k |
 //! | | divided trees | the same, parts too; tests/suite.rs has every scene, and the number of threads |
 //! | translation, exact in f32, on a grid of 24 bits | every method | same tree and cost, bit by bit. Off such a grid the sum of two corners, which orders objects, may round differently |
 //! | reflection | insertion in any order, exact | same tree and cost, bit by bit: these see areas and indices only |
