@@ -4,37 +4,13 @@
 mod support;
 
 use bvh_core::{
-    Coherence, Distances, Hit, Kernel, Ray, RayComponents, RefitError, Shear, Triangle, WideBvh,
-    collapse_leaves, cost::SahConstants,
+    Coherence, Distances, Hit, Kernel, Ray, RayComponents, RefitError, Triangle, WideBvh,
 };
 use glam::Vec3;
+use support::layouts::{bundles, layouts};
 use support::{
     Random, SHAPES, ball, bits, boxes, brute_force, chain, grid_box, rays, scaled, soup, tree,
 };
-
-/// Returns the layouts of several trees over the triangles, for every kernel that this processor
-/// has.
-fn layouts(triangles: &[Triangle], random: &mut Random) -> Vec<(Kernel, WideBvh)> {
-    let boxes = boxes(triangles);
-    let mut trees: Vec<_> = SHAPES
-        .iter()
-        .map(|&shape| tree(&boxes, shape, random))
-        .collect();
-    trees.push(collapse_leaves(&trees[0], &SahConstants::default()));
-    let layouts = trees
-        .iter()
-        .map(|tree| WideBvh::new(tree, triangles).unwrap());
-    let kernels = Kernel::ALL
-        .into_iter()
-        .filter(|kernel| kernel.is_available());
-    let of_kernel = |wide: WideBvh| {
-        kernels
-            .clone()
-            .map(move |kernel| (kernel, wide.clone().with_kernel(kernel).unwrap()))
-            .collect::<Vec<_>>()
-    };
-    layouts.flat_map(of_kernel).collect()
-}
 
 /// Checks all rays by all layouts, one by one and in a batch. Returns the number of rays that hit.
 fn check(name: &str, triangles: &[Triangle], layouts: &[(Kernel, WideBvh)], rays: &[Ray]) -> usize {
@@ -65,45 +41,6 @@ fn check(name: &str, triangles: &[Triangle], layouts: &[(Kernel, WideBvh)], rays
         }
     }
     expected.iter().flatten().count()
-}
-
-/// Returns groups of sixteen rays that begin close to each other and run nearly in the same
-/// direction, towards and beyond an edge or a corner of some triangle: the rays that packets are
-/// made for, in the hardest places.
-fn bundles(triangles: &[Triangle], count: usize, random: &mut Random) -> Vec<Ray> {
-    let mut rays = Vec::new();
-    for _ in 0..count {
-        let Triangle([a, b, c]) = random.of(triangles);
-        let size = triangles
-            .iter()
-            .flat_map(|t| t.0)
-            .fold(0.0f32, |size, p| size.max(p.abs().max_element()));
-        let target = random.of(&[a, (a + b) * 0.5, (a + b + c) / 3.0]);
-        let far = random.point() * 3.0;
-        let inside = random.point();
-        let close = target + random.point() * size * 1e-3;
-        let origin = random.of(&[far * size, inside * size, close]);
-        let spread = random.of(&[0.0, 1e-7, 1e-3, 0.1]);
-        let shift = random.of(&[0.0, 1e-7, 1e-2]);
-        for _ in 0..16 {
-            let from = origin + random.point() * (shift * size);
-            let mut to = target + random.point() * (spread * size) - from;
-            if random.below(8) == 0 {
-                to[random.below(3)] = 0.0;
-            }
-            let to = to / size.max(f32::MIN_POSITIVE);
-            let (t_min, t_max) = random.of(&[
-                (0.0, f32::MAX),
-                (0.0, size),
-                (size, size),
-                (0.5 * size, f32::INFINITY),
-            ]);
-            rays.push(
-                Ray::new(from, to, t_min, t_max).unwrap_or(Ray::half_line(from, Vec3::X).unwrap()),
-            );
-        }
-    }
-    rays
 }
 
 #[test]
@@ -349,43 +286,6 @@ fn a_refitted_layout_answers_as_brute_force_at_the_new_places() {
         assert_eq!(again.expected_visits(), after);
     }
     assert!(check("moved", &moved, &layouts, &rays(&moved, 3000, &mut random)) > 500);
-}
-
-#[test]
-fn a_filter_passes_over_hits_and_sees_all_of_them_if_it_accepts_none() {
-    let mut random = Random(9);
-    let triangles = soup(150, &mut random);
-    let layouts = layouts(&triangles, &mut random);
-    let mut found = 0;
-    let mut several = 0;
-    for ray in rays(&triangles, 2000, &mut random) {
-        let shear = Shear::new(&ray);
-        let hit = |id: u32| {
-            Some(Hit { t: triangles[id as usize].intersect(&shear, ray.t_max())?, object: id })
-        };
-        let all: Vec<Hit> = (0..150).filter_map(hit).collect();
-        let kept = all.iter().filter(|hit| hit.object % 3 > 0);
-        let nearest = kept
-            .min_by(|a, b| a.t.total_cmp(&b.t).then(a.object.cmp(&b.object)))
-            .copied();
-        for (_, layout) in &layouts {
-            assert_eq!(layout.nearest_hit_where(&ray, |hit| hit.object % 3 > 0), nearest);
-            assert_eq!(layout.any_hit_where(&ray, |hit| hit.object % 3 > 0), nearest.is_some());
-            let mut seen = Vec::new();
-            assert_eq!(
-                layout.nearest_hit_where(&ray, |hit| {
-                    seen.push(hit);
-                    false
-                }),
-                None
-            );
-            seen.sort_by_key(|hit| hit.object);
-            assert_eq!(seen, all);
-        }
-        found += usize::from(nearest.is_some());
-        several += usize::from(all.len() > 1);
-    }
-    assert!(found > 300 && several > 100, "{found} {several}");
 }
 
 #[test]

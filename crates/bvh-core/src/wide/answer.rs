@@ -8,6 +8,15 @@ use crate::{Hit, Ray};
 pub(crate) trait Answers {
     /// Whether the first hit that is found will do.
     const ANY: bool;
+    /// Whether [`accepts`](Self::accepts) may reject hits.
+    const FILTERS: bool = false;
+
+    /// Returns whether a hit of the ray with this number counts.
+    #[inline(always)]
+    fn accepts(&mut self, number: usize, hit: Hit) -> bool {
+        let _ = (number, hit);
+        true
+    }
 
     /// Writes the answer for a ray whose traversal ended at this distance with this object, `u32::MAX` for none.
     fn write(&mut self, number: usize, t: f32, object: u32);
@@ -84,6 +93,42 @@ impl Answers for (&mut [f32], &mut [u32]) {
             let is_hit = object.below(none);
             L::select(is_hit, t, L::splat(f32::INFINITY)).store(distances.as_mut_ptr());
             object.store(objects.as_mut_ptr().cast());
+        }
+    }
+}
+
+/// Answers from the hits that a function accepts, which also sees the number of the ray.
+pub(crate) struct Filtered<'a, A> {
+    pub(crate) answers: A,
+    // Not generic over the function: a generic kernel would be compiled, perhaps without optimisation,
+    // by every crate that calls it.
+    pub(crate) accept: &'a mut dyn FnMut(usize, Hit) -> bool,
+}
+
+impl<A: Answers> Answers for Filtered<'_, A> {
+    const ANY: bool = A::ANY;
+    const FILTERS: bool = true;
+
+    #[inline(always)]
+    fn accepts(&mut self, number: usize, hit: Hit) -> bool {
+        (self.accept)(number, hit)
+    }
+
+    #[inline(always)]
+    fn write(&mut self, number: usize, t: f32, object: u32) {
+        self.answers.write(number, t, object);
+    }
+
+    fn alone(&mut self, number: usize, wide: &WideBvh, ray: &Ray) {
+        let accept = |hit| (self.accept)(number, hit);
+        if Self::ANY {
+            let object = if wide.any_hit_where(ray, accept) { 0 } else { u32::MAX };
+            self.write(number, 0.0, object);
+        } else {
+            let hit = wide
+                .nearest_hit_where(ray, accept)
+                .unwrap_or(Hit::MISS);
+            self.write(number, hit.t, hit.object);
         }
     }
 }

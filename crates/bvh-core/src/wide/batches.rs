@@ -1,6 +1,6 @@
 //! Batches of rays: one after the other in memory, or by component.
 
-use super::answer::Answers;
+use super::answer::{Answers, Filtered};
 use super::coherence::Coherence;
 use super::layout::WideBvh;
 use super::source::Source;
@@ -24,6 +24,73 @@ impl WideBvh {
     pub fn any_hits(&self, rays: &[Ray], mut hits: &mut [bool], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "an answer for every ray");
         self.trace(rays, &mut hits, coherence);
+    }
+
+    /// [`nearest_hit_where`](Self::nearest_hit_where) of every ray, into as many `hits`. `accept` sees
+    /// the number of the ray, too, and hits in no order.
+    ///
+    /// # Panics
+    /// If `rays` and `hits` are not equally many.
+    ///
+    /// ```
+    /// # use bvh_core::{Aabb, Bvh, Coherence, Hit, Node, Ray, Triangle, WideBvh};
+    /// # let triangles = [0.0, 1.0].map(|z| Triangle::from([[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z]]));
+    /// # let tree = Bvh { nodes: vec![Node::leaf(Aabb::from([[0.0; 3], [1.0; 3]]), 0, 2)], prim_ids: vec![0, 1] };
+    /// # let wide = WideBvh::new(&tree, &triangles)?;
+    /// let rays = [Ray::half_line([0.2, 0.2, 3.0], [0.0, 0.0, -1.0]).unwrap(); 2];
+    /// let mut hits = [Hit::MISS; 2];
+    /// // The second ray began on triangle 1.
+    /// let own = [u32::MAX, 1];
+    /// wide.nearest_hits_where(&rays, &mut hits, Coherence::Coherent, |ray, hit| hit.object != own[ray]);
+    /// assert_eq!(hits.map(|hit| hit.object), [1, 0]);
+    /// # Ok::<(), bvh_core::InvalidBvh>(())
+    /// ```
+    pub fn nearest_hits_where(
+        &self,
+        rays: &[Ray],
+        hits: &mut [Hit],
+        coherence: Coherence,
+        mut accept: impl FnMut(usize, Hit) -> bool,
+    ) {
+        assert_eq!(rays.len(), hits.len(), "a hit for every ray");
+        self.trace_nearest_where(rays, hits, coherence, &mut accept);
+    }
+
+    /// [`any_hit_where`](Self::any_hit_where) of every ray, as
+    /// [`nearest_hits_where`](Self::nearest_hits_where).
+    ///
+    /// # Panics
+    /// If `rays` and `hits` are not equally many.
+    pub fn any_hits_where(
+        &self,
+        rays: &[Ray],
+        hits: &mut [bool],
+        coherence: Coherence,
+        mut accept: impl FnMut(usize, Hit) -> bool,
+    ) {
+        assert_eq!(rays.len(), hits.len(), "an answer for every ray");
+        self.trace_any_where(rays, hits, coherence, &mut accept);
+    }
+
+    // Not generic, so that the kernels are compiled here and not by every crate that calls them.
+    fn trace_nearest_where(
+        &self,
+        rays: &[Ray],
+        answers: &mut [Hit],
+        coherence: Coherence,
+        accept: &mut dyn FnMut(usize, Hit) -> bool,
+    ) {
+        self.trace(rays, &mut Filtered { answers, accept }, coherence);
+    }
+
+    fn trace_any_where(
+        &self,
+        rays: &[Ray],
+        answers: &mut [bool],
+        coherence: Coherence,
+        accept: &mut dyn FnMut(usize, Hit) -> bool,
+    ) {
+        self.trace(rays, &mut Filtered { answers, accept }, coherence);
     }
 
     /// [`nearest_hits`](Self::nearest_hits) of rays by component, whose answers are by component, too: infinite and `u32::MAX` for a ray that

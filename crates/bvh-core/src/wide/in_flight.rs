@@ -131,7 +131,7 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             while self.at_nodes.count + self.at_leaves.count > 0 {
                 self.visit_nodes();
                 if self.at_leaves.count >= K::FLIGHT / 2 || self.at_nodes.count == 0 {
-                    self.visit_leaves();
+                    self.visit_leaves(first);
                     self.finish(first);
                 }
             }
@@ -238,7 +238,7 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
     }
 
     #[inline(always)]
-    unsafe fn visit_leaves(&mut self) {
+    unsafe fn visit_leaves(&mut self, first: usize) {
         let blocks = self.wide.blocks.as_ptr();
         // SAFETY: as for nodes; a block that is not its leaf's last is followed by another.
         unsafe {
@@ -257,7 +257,13 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             for i in (0..hopeful.count).step_by(quarters) {
                 let at = |k: usize| hopeful.get((i + k).min(hopeful.count - 1));
                 let four = [at(0), at(1), at(2), at(3)];
-                traversal::decide::<K::Rays>(four, blocks);
+                if A::FILTERS {
+                    // A traversal that only fills the lanes must not show its hits twice.
+                    let rays = &four[..quarters.min(hopeful.count - i)];
+                    traversal::decide_accepted::<K::Rays>(rays, blocks, first, self.answers);
+                } else {
+                    traversal::decide::<K::Rays>(four, blocks);
+                }
                 if !A::ANY {
                     for &traversal in four.iter().take(quarters) {
                         (*traversal).drop_farther::<K>();

@@ -15,6 +15,7 @@ mod closest;
 mod closest_lanes;
 mod coherence;
 mod crossed_leaves;
+mod culling;
 mod in_flight;
 mod instructions;
 mod kernel;

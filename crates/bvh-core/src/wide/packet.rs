@@ -5,14 +5,16 @@
 //! Ramamoorthi & Mark 2008, 'Large ray packets for real-time Whitted ray tracing' (ranged traversal).
 
 use super::answer::Answers;
+use super::culling::Culling;
 use super::instructions::Instructions;
 use super::kernel::STACK;
 use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
-use super::node::{Child, WideNode};
+use super::node::Child;
 use super::pairs::Pairs;
 use super::ray_lanes::{RayBounds, RayLanes};
 use super::triangles::TriangleBlock;
+use crate::Hit;
 use core::mem::MaybeUninit;
 
 /// Vectors of a packet, at most.
@@ -24,9 +26,6 @@ pub(crate) struct Packet<K: Instructions> {
     count: usize,
     /// A bit per axis along which the rays run backwards.
     octant: u32,
-    /// Indices of the planes that the rays meet first, by axis, and of those opposite.
-    near: [usize; 3],
-    far: [usize; 3],
     bounds: RayBounds<K::Rays>,
 }
 
@@ -56,18 +55,6 @@ struct Parent {
     vector: u32,
 }
 
-/// The bounds of a packet as its boxes are tested: along each axis the origins that make distances to near planes least and
-/// to far ones greatest, and the extreme scales.
-struct Culling<L> {
-    near_origin: [L; 3],
-    far_origin: [L; 3],
-    least: [L; 3],
-    most: [L; 3],
-    begin: L,
-    /// What is added to near planes, and subtracted from far ones.
-    margin: [f32; 3],
-}
-
 impl<K: Instructions> Packet<K> {
     /// No rays.
     ///
@@ -79,8 +66,6 @@ impl<K: Instructions> Packet<K> {
             vectors: [const { MaybeUninit::uninit() }; VECTORS],
             count: 0,
             octant: 0,
-            near: [0; 3],
-            far: [0; 3],
             // SAFETY: the caller's promise.
             bounds: unsafe { RayBounds::none() },
         }
@@ -131,14 +116,9 @@ impl<K: Instructions> Packet<K> {
     pub(crate) unsafe fn trace<A: Answers>(&mut self, wide: &WideBvh, answers: &mut A) {
         // SAFETY: the caller's promises; as many vectors are written as are counted.
         unsafe {
-            for axis in 0..3 {
-                let backwards = (self.octant >> axis & 1) as usize;
-                self.near[axis] = axis + 3 * backwards;
-                self.far[axis] = axis + 3 - 3 * backwards;
-            }
             let culling = Culling::<K::Boxes>::new(&self.bounds, self.octant, wide.largest);
             if let Some(root) = wide.root {
-                self.traverse::<A>(wide, root, &culling);
+                self.traverse(wide, root, &culling, answers);
             }
             for vector in &self.vectors[..self.count] {
                 let vector = vector.assume_init_ref();
@@ -155,6 +135,7 @@ impl<K: Instructions> Packet<K> {
         wide: &WideBvh,
         root: Child,
         culling: &Culling<K::Boxes>,
+        answers: &mut A,
     ) {
         // SAFETY: the references of the layout are sound, and its stacks large enough.
         unsafe {
@@ -164,7 +145,7 @@ impl<K: Instructions> Packet<K> {
             let mut end = key_of(farthest);
             if !root.is_node() {
                 for i in 0..self.count {
-                    self.visit_leaf::<A>(i, u32::MAX, blocks.add(root.index()));
+                    self.visit_leaf(i, u32::MAX, blocks.add(root.index()), answers);
                 }
                 return;
             }
@@ -176,7 +157,7 @@ impl<K: Instructions> Packet<K> {
             let mut parent = Parent { node: root.index() as u32, vector: 0 };
             loop {
                 let node = &*nodes.add(parent.node as usize);
-                let (entry, mask) = self.cull(node, culling, farthest);
+                let (entry, mask) = culling.cull::<K>(node, farthest);
                 if mask != 0 {
                     if A::ANY {
                         K::compress_keys(entry, mask, keys.add(top));
@@ -200,7 +181,7 @@ impl<K: Instructions> Packet<K> {
                     let lane = (!key & 7) as usize;
                     let waiting = *parents.add(top);
                     let node = &*nodes.add(waiting.node as usize);
-                    let planes = self.planes(node, lane, culling);
+                    let planes = culling.planes(node, lane);
                     let mut i = waiting.vector as usize;
                     let entered = loop {
                         let entered = self.enter(i, &planes);
@@ -217,11 +198,11 @@ impl<K: Instructions> Packet<K> {
                         break Parent { node: child.index() as u32, vector: i as u32 };
                     }
                     let block = blocks.add(child.index());
-                    let mut is_hit = self.visit_leaf::<A>(i, entered, block);
+                    let mut is_hit = self.visit_leaf(i, entered, block, answers);
                     for i in i + 1..self.count {
                         let entered = self.enter(i, &planes);
                         if entered != 0 {
-                            is_hit |= self.visit_leaf::<A>(i, entered, block);
+                            is_hit |= self.visit_leaf(i, entered, block, answers);
                         }
                     }
                     if is_hit {
@@ -246,58 +227,6 @@ impl<K: Instructions> Packet<K> {
                 t = t.max(vector.assume_init_ref().t);
             }
             t.greatest()
-        }
-    }
-
-    /// The least distance at which any ray may enter each child, and a bit per child that some ray may enter before
-    /// `farthest`: the bounds of `(plane − origin) · scale` over all rays.
-    #[inline(always)]
-    unsafe fn cull(
-        &self,
-        node: &WideNode,
-        culling: &Culling<K::Boxes>,
-        farthest: f32,
-    ) -> (K::Boxes, u32) {
-        // SAFETY: the caller's promises; loads are of whole, aligned planes.
-        unsafe {
-            let mut entry = culling.begin;
-            let mut exit = K::Boxes::splat(farthest);
-            for axis in 0..3 {
-                let near = K::Boxes::load(node.planes.as_ptr().add(self.near[axis]).cast());
-                let near = near - culling.near_origin[axis];
-                let near = (near * culling.least[axis]).min(near * culling.most[axis]);
-                // Of two zeros the second: entries are never −0.
-                entry = near.max(entry);
-                let far = K::Boxes::load(node.planes.as_ptr().add(self.far[axis]).cast());
-                let far = far - culling.far_origin[axis];
-                let far = (far * culling.least[axis]).max(far * culling.most[axis]);
-                // Of a NaN and a number the second: unused lanes stay NaN.
-                exit = exit.min(far);
-            }
-            (entry, K::entered(entry, exit))
-        }
-    }
-
-    /// The planes of the child in a lane, near and far by axis, moved by the margin.
-    #[inline(always)]
-    unsafe fn planes(
-        &self,
-        node: &WideNode,
-        lane: usize,
-        culling: &Culling<K::Boxes>,
-    ) -> [[f32; 2]; 3] {
-        // SAFETY: planes are six, lanes eight.
-        unsafe {
-            let lanes = node.planes.as_ptr().cast::<f32>().add(lane);
-            let mut planes = [[0.0; 2]; 3];
-            for (axis, planes) in planes.iter_mut().enumerate() {
-                let margin = culling.margin[axis];
-                *planes = [
-                    *lanes.add(WideNode::LANES * self.near[axis]) - margin,
-                    *lanes.add(WideNode::LANES * self.far[axis]) + margin,
-                ];
-            }
-            planes
         }
     }
 
@@ -329,6 +258,7 @@ impl<K: Instructions> Packet<K> {
         vector: usize,
         entered: u32,
         block: *const TriangleBlock,
+        answers: &mut A,
     ) -> bool {
         // SAFETY: the caller's promises; a block that is not its leaf's last is followed by another.
         unsafe {
@@ -361,6 +291,11 @@ impl<K: Instructions> Packet<K> {
                         t.lt(vector.t) & inside
                             | t.eq(vector.t) & inside & object.below(vector.object)
                     };
+                    let hits = if A::FILTERS {
+                        accepted(answers, vector.first, hits, t, (*block).id(lane))
+                    } else {
+                        hits
+                    };
                     if hits.bits() != 0 {
                         is_hit = true;
                         // A ray that has its answer ends before it begins.
@@ -378,44 +313,36 @@ impl<K: Instructions> Packet<K> {
     }
 }
 
+/// Returns the hits with one object that the answers accept. The ray of the first lane is number
+/// `first` of its batch.
+#[inline(always)]
+unsafe fn accepted<L: Lanes>(
+    answers: &mut impl Answers,
+    first: usize,
+    hits: L::Mask,
+    t: L,
+    object: u32,
+) -> L::Mask {
+    let mut distances = [0.0; 16];
+    let mut left = hits.bits();
+    let mut accepted = left;
+    // SAFETY: there is room for sixteen lanes; the processor has the instructions.
+    unsafe {
+        t.store(distances.as_mut_ptr());
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let hit = Hit { t: distances[lane], object };
+            if !answers.accepts(first + lane, hit) {
+                accepted ^= 1 << lane;
+            }
+        }
+        Mask::from_bits(accepted)
+    }
+}
+
 /// The greatest key of a child that a ray may enter before `farthest`.
 #[inline(always)]
 fn key_of(farthest: f32) -> u32 {
     farthest.to_bits() | 7
-}
-
-impl<L: Lanes> Culling<L> {
-    #[inline(always)]
-    unsafe fn new<R: Lanes>(bounds: &RayBounds<R>, octant: u32, largest: f32) -> Self {
-        // SAFETY: the caller's promise.
-        unsafe {
-            let margin = bounds.margin(largest);
-            let zero = L::splat(0.0);
-            let mut culling = Self {
-                near_origin: [zero; 3],
-                far_origin: [zero; 3],
-                least: [zero; 3],
-                most: [zero; 3],
-                begin: L::splat(bounds.begin()),
-                margin: [margin; 3],
-            };
-            for axis in 0..3 {
-                let [lowest, highest] = bounds.origins(axis);
-                let [least, most] = bounds.scales(axis);
-                let is_backwards = octant >> axis & 1 != 0;
-                // Distances grow with the plane minus the origin if the scale is positive, else the other way.
-                let (near, far) = if is_backwards {
-                    culling.margin[axis] = -margin;
-                    (lowest - margin, highest + margin)
-                } else {
-                    (highest + margin, lowest - margin)
-                };
-                culling.near_origin[axis] = L::splat(near);
-                culling.far_origin[axis] = L::splat(far);
-                culling.least[axis] = L::splat(least);
-                culling.most[axis] = L::splat(most);
-            }
-            culling
-        }
-    }
 }

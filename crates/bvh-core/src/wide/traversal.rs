@@ -3,12 +3,13 @@
 use super::answer::Answers;
 use super::instructions::{Instructions, Pending};
 use super::kernel::STACK;
-use super::lanes::Lanes;
+use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
 use super::pairs::Pairs;
 use super::prepared::Prepared;
 use super::triangles::TriangleBlock;
+use crate::Hit;
 use crate::triangle::AXES;
 use core::mem::MaybeUninit;
 
@@ -208,6 +209,42 @@ pub(super) unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4], blocks: *const 
         for (i, &traversal) in four.iter().enumerate().take(L::N / 4) {
             (*traversal).t = distances[4 * i];
             (*traversal).object = f32::to_bits(objects[4 * i]);
+        }
+    }
+}
+
+/// Gives every ray the nearest hit that the answers accept, among the hit it has and those in the block
+/// at which it is. The rays are numbered from `first` on.
+#[inline(always)]
+pub(super) unsafe fn decide_accepted<L: Lanes>(
+    four: &[*mut Traversal],
+    blocks: *const TriangleBlock,
+    first: usize,
+    answers: &mut impl Answers,
+) {
+    // SAFETY: the caller's promises; `four` has a traversal at least.
+    unsafe {
+        let rays: [*mut Traversal; 4] = core::array::from_fn(|i| four[i.min(four.len() - 1)]);
+        let ends = rays.map(|ray| &raw const (*ray).t);
+        let t_max = L::load_quarters(ends).spread::<0>();
+        let (inside, t) = pairs::<L>(rays).decide(&corners(rays, blocks), t_max);
+        let inside = inside.bits();
+        let mut distances = [0.0; 16];
+        t.store(distances.as_mut_ptr());
+        for (i, &traversal) in four.iter().enumerate() {
+            let traversal = &mut *traversal;
+            let block = &*blocks.add(traversal.child.index());
+            for lane in 0..TriangleBlock::LANES {
+                let number = TriangleBlock::LANES * i + lane;
+                let nearest = Hit { t: traversal.t, object: traversal.object };
+                let hit = Hit { t: distances[number], object: block.id(lane) };
+                // An unused lane repeats a triangle, which may have been rejected.
+                let is_new = inside >> number & 1 != 0 && !hit.is_miss() && hit.precedes(&nearest);
+                if is_new && answers.accepts(first + traversal.ray.number as usize, hit) {
+                    traversal.t = hit.t;
+                    traversal.object = hit.object;
+                }
+            }
         }
     }
 }

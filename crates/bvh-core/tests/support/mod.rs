@@ -1,6 +1,8 @@
 //! Scenes, trees and rays for the tests of traversals.
 #![allow(dead_code)] // each test file uses a part of this module
 
+pub mod layouts;
+
 use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Shear, Triangle, nearest_hit_of_all};
 use glam::Vec3;
 use std::collections::VecDeque;

@@ -1,0 +1,68 @@
+//! Layouts of several trees by every kernel, and rays that packets are made for.
+
+use super::{Random, SHAPES, boxes, tree};
+use bvh_core::{Kernel, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants};
+use glam::Vec3;
+
+/// Returns the layouts of several trees over the triangles, for every kernel that this processor
+/// has.
+pub fn layouts(triangles: &[Triangle], random: &mut Random) -> Vec<(Kernel, WideBvh)> {
+    let boxes = boxes(triangles);
+    let mut trees: Vec<_> = SHAPES
+        .iter()
+        .map(|&shape| tree(&boxes, shape, random))
+        .collect();
+    trees.push(collapse_leaves(&trees[0], &SahConstants::default()));
+    let layouts = trees
+        .iter()
+        .map(|tree| WideBvh::new(tree, triangles).unwrap());
+    let kernels = Kernel::ALL
+        .into_iter()
+        .filter(|kernel| kernel.is_available());
+    let of_kernel = |wide: WideBvh| {
+        kernels
+            .clone()
+            .map(move |kernel| (kernel, wide.clone().with_kernel(kernel).unwrap()))
+            .collect::<Vec<_>>()
+    };
+    layouts.flat_map(of_kernel).collect()
+}
+
+/// Returns groups of sixteen rays that begin close to each other and run nearly in the same
+/// direction, towards and beyond an edge or a corner of some triangle: the rays that packets are
+/// made for, in the hardest places.
+pub fn bundles(triangles: &[Triangle], count: usize, random: &mut Random) -> Vec<Ray> {
+    let mut rays = Vec::new();
+    for _ in 0..count {
+        let Triangle([a, b, c]) = random.of(triangles);
+        let size = triangles
+            .iter()
+            .flat_map(|t| t.0)
+            .fold(0.0f32, |size, p| size.max(p.abs().max_element()));
+        let target = random.of(&[a, (a + b) * 0.5, (a + b + c) / 3.0]);
+        let far = random.point() * 3.0;
+        let inside = random.point();
+        let close = target + random.point() * size * 1e-3;
+        let origin = random.of(&[far * size, inside * size, close]);
+        let spread = random.of(&[0.0, 1e-7, 1e-3, 0.1]);
+        let shift = random.of(&[0.0, 1e-7, 1e-2]);
+        for _ in 0..16 {
+            let from = origin + random.point() * (shift * size);
+            let mut to = target + random.point() * (spread * size) - from;
+            if random.below(8) == 0 {
+                to[random.below(3)] = 0.0;
+            }
+            let to = to / size.max(f32::MIN_POSITIVE);
+            let (t_min, t_max) = random.of(&[
+                (0.0, f32::MAX),
+                (0.0, size),
+                (size, size),
+                (0.5 * size, f32::INFINITY),
+            ]);
+            rays.push(
+                Ray::new(from, to, t_min, t_max).unwrap_or(Ray::half_line(from, Vec3::X).unwrap()),
+            );
+        }
+    }
+    rays
+}
