@@ -17,6 +17,7 @@ pub mod export;
 pub mod file;
 mod instances;
 mod layout_cost;
+mod leave;
 mod mesh;
 mod overlap;
 mod packed;

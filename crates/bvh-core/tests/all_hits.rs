@@ -249,23 +249,57 @@ fn crossings_are_those_of_a_moved_origin_in_exact_arithmetic() {
                 );
             }
             let hits = all_of(&triangles, &ray);
-            for hit in &hits {
-                let triangle = triangles[hit.object as usize];
-                assert!(is_crossed(&ray, &triangle), "{name}: {ray:?} {triangle:?}");
-                assert_eq!(triangle.hit_exactly(&ray, f32::MAX), Some(hit.t));
-            }
-            // The triangles that the ray touches and does not cross.
-            for triangle in &triangles {
-                if triangle.hit_exactly(&ray, f32::MAX).is_some() {
-                    assert_eq!(
-                        triangle.crossing(&ray).is_some(),
-                        is_crossed(&ray, triangle),
-                        "{name}: {ray:?}"
-                    );
-                }
-            }
+            check_exactly(name, &triangles, &ray, &hits);
             crossed += hits.len();
         }
     }
     assert!(crossed > 400, "{crossed}");
+}
+
+/// Compares the hits of a ray with exact arithmetic, and every triangle that the ray touches.
+fn check_exactly(name: &str, triangles: &[Triangle], ray: &Ray, hits: &[Hit]) {
+    for hit in hits {
+        let triangle = triangles[hit.object as usize];
+        assert!(is_crossed(ray, &triangle), "{name}: {ray:?} {triangle:?}");
+        assert_eq!(triangle.hit_exactly(ray, f32::MAX), Some(hit.t));
+    }
+    for (object, triangle) in (0..).zip(triangles) {
+        // A triangle that the ray touches and does not cross.
+        if triangle.hit_exactly(ray, f32::MAX).is_some()
+            && !hits.iter().any(|hit| hit.object == object)
+        {
+            assert!(!is_crossed(ray, triangle), "{name}: {ray:?} {triangle:?}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "slow: a million rays against exact arithmetic take minutes"]
+fn a_million_rays_cross_ten_closed_meshes_as_in_exact_arithmetic() {
+    let mut random = Random(7);
+    let mut tested = 0;
+    let mut crossed = 0;
+    for (name, triangles, inside) in closed_meshes() {
+        let wide = layout(&triangles, 0, Kernel::best()).unwrap();
+        let outside = Vec3::new(7.0, -5.5, 6.25);
+        for (origin, parity) in [(inside, 1), (outside, 0)] {
+            let rays = rays_through(&triangles, origin, 50_000, &mut random);
+            let mut counts = vec![0; rays.len()];
+            let mut hits = Vec::new();
+            wide.all_hits_of(&rays, &mut hits, &mut counts);
+            let mut hits = hits.as_slice();
+            for (ray, count) in rays.iter().zip(counts) {
+                let (own, others) = hits.split_at(count as usize);
+                hits = others;
+                check_exactly(name, &triangles, ray, own);
+                if ray.origin() == origin {
+                    assert_eq!(count % 2, parity, "{name}: {count} hits of {ray:?}");
+                }
+                crossed += own.len();
+                tested += 1;
+            }
+        }
+    }
+    println!("{tested} rays, {crossed} crossings");
+    assert_eq!(tested, 1_000_000);
 }

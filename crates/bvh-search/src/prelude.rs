@@ -4,9 +4,11 @@ pub use crate::{Budget, Outcome, Problem, StopReason, best, optimize, solve};
 #[cfg(feature = "std")]
 pub use crate::{Deadline, bake, bake_for_rays, improve};
 pub use bvh_build::{Builder, median_cut, muller_fellner, ploc};
-pub use bvh_core::glam::Vec3;
+pub use bvh_core::cost::Objective;
+pub use bvh_core::glam::{Affine3A, Vec3};
 pub use bvh_core::{
     Aabb, Bvh, Coherence, Hit, Instance, InstanceHit, Instances, Primitive, Ray, RayDensity,
-    Segment, Sphere, Triangle, WideBvh, any_hit, boxes, cost, file, nearest_hit, query, validate,
+    RefitError, Segment, Sphere, Triangle, WideBvh, any_hit, boxes, cost, file, nearest_hit, query,
+    validate,
 };
 pub use std::time::Duration;

@@ -52,7 +52,7 @@ impl Header {
     /// The flag of a file of version 4 that has visits.
     const VISITS: u32 = 1;
     /// A number whose stored bytes identify the byte order of the file.
-    const ENDIANNESS: u32 = 0x0102_0304;
+    pub(super) const ENDIANNESS: u32 = 0x0102_0304;
     /// The bytes of the root's box. They equal the box in the first node.
     pub(super) const BOUNDS: core::ops::Range<usize> = 80..104;
     /// The offset of the fields of version 4.
@@ -256,26 +256,26 @@ fn split_name(padded: &[u8; 64]) -> (&[u8], &[u8]) {
 }
 
 /// The bytes that are still to be read.
-struct Fields<'a>(&'a [u8]);
+pub(super) struct Fields<'a>(pub(super) &'a [u8]);
 
 impl Fields<'_> {
     /// Reads the next `N` bytes; `None` if there are fewer.
-    fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
+    pub(super) fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
         let (field, rest) = self.0.split_first_chunk()?;
         self.0 = rest;
         Some(*field)
     }
 
     /// Reads the next `N` bytes.
-    fn need<const N: usize>(&mut self) -> Result<[u8; N], FileError> {
+    pub(super) fn need<const N: usize>(&mut self) -> Result<[u8; N], FileError> {
         self.take().ok_or(FileError::Header)
     }
 
-    fn word(&mut self) -> Result<u32, FileError> {
+    pub(super) fn word(&mut self) -> Result<u32, FileError> {
         Ok(u32::from_le_bytes(self.need()?))
     }
 
-    fn words<const N: usize>(&mut self) -> Result<[u64; N], FileError> {
+    pub(super) fn words<const N: usize>(&mut self) -> Result<[u64; N], FileError> {
         let mut words = [0; N];
         for word in &mut words {
             *word = u64::from_le_bytes(self.need()?);

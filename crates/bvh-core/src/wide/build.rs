@@ -1,11 +1,12 @@
 //! The wide layout of least expected cost of a given tree.
 
 use super::kernel::Kernel;
-use super::layout::WideBvh;
+use super::layout::{WideBvh, largest};
 use super::node::{Child, WideNode};
 use super::triangles::TriangleBlock;
 use crate::collapse::{binary, binary_visited, collect};
 use crate::{Aabb, Bvh, NodeKind, Triangle};
+use alloc::borrow::Cow;
 use alloc::{vec, vec::Vec};
 
 /// Expected time of visiting a wide node: the unit.
@@ -155,13 +156,9 @@ pub(crate) fn widen(
     let mut wide = WideBvh {
         bounds,
         root: None,
-        nodes: Vec::new(),
-        blocks: Vec::new(),
-        largest: bounds
-            .min
-            .abs()
-            .max(bounds.max.abs())
-            .max_element(),
+        nodes: Cow::default(),
+        blocks: Cow::default(),
+        largest: largest(&bounds),
         kernel: Kernel::Portable,
         stack_need: 0,
     };
@@ -186,11 +183,13 @@ pub(crate) fn widen(
     let decisions = decide(tree, &visits, blocks);
     let promise = promise(tree, triangles, &visits, &decisions);
     let mut ids = Vec::new();
+    let mut nodes = Vec::new();
+    let mut all_blocks = Vec::new();
     // Subtrees, and the lane that is to name each; none names the root.
     let mut open = vec![(0, None, 0)];
     while let Some((subtree, place, waiting)) = open.pop() {
         let child = if decisions[subtree].leaf {
-            let child = Child::leaf(wide.blocks.len() as u32);
+            let child = Child::leaf(all_blocks.len() as u32);
             ids.clear();
             collect(tree, subtree, &mut ids);
             if split {
@@ -202,12 +201,11 @@ pub(crate) fn widen(
             if ids.is_empty() {
                 continue;
             }
-            wide.blocks
-                .extend(TriangleBlock::chain(&ids, triangles));
+            all_blocks.extend(TriangleBlock::chain(&ids, triangles));
             child
         } else {
-            let index = wide.nodes.len();
-            wide.nodes.push(WideNode::EMPTY);
+            let index = nodes.len();
+            nodes.push(WideNode::EMPTY);
             let (mut children, lanes) = children(tree, &decisions, subtree);
             children[..lanes].sort_by(|&a, &b| promise[a].total_cmp(&promise[b]));
             let waiting = waiting + 7;
@@ -218,11 +216,14 @@ pub(crate) fn widen(
         match place {
             None => wide.root = Some(child),
             Some((node, lane)) => {
-                wide.nodes[node].children[lane] = child;
-                wide.nodes[node].set_box(lane, &tree.nodes[subtree].aabb);
+                let parent: &mut WideNode = &mut nodes[node];
+                parent.children[lane] = child;
+                parent.set_box(lane, &tree.nodes[subtree].aabb);
             }
         }
     }
+    wide.nodes = nodes.into();
+    wide.blocks = all_blocks.into();
     wide
 }
 

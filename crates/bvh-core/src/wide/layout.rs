@@ -4,7 +4,7 @@ use super::kernel::Kernel;
 use super::node::{Child, WideNode};
 use super::triangles::TriangleBlock;
 use crate::Aabb;
-use alloc::vec::Vec;
+use alloc::borrow::Cow;
 
 /// An immutable copy of a [`Bvh`](crate::Bvh) and its triangles, for tracing only.
 ///
@@ -28,13 +28,14 @@ use alloc::vec::Vec;
 /// assert!(wide.any_hit(&ray));
 /// # Ok::<(), bvh_core::InvalidBvh>(())
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct WideBvh {
     pub(crate) bounds: Aabb,
     /// `None` for the tree over no triangles.
     pub(crate) root: Option<Child>,
-    pub(crate) nodes: Vec<WideNode>,
-    pub(crate) blocks: Vec<TriangleBlock>,
+    /// Borrowed in a [`WideView`](crate::file::WideView) alone.
+    pub(crate) nodes: Cow<'static, [WideNode]>,
+    pub(crate) blocks: Cow<'static, [TriangleBlock]>,
     /// The largest size of a coordinate; for the vector kernels.
     #[cfg_attr(not(all(feature = "std", target_arch = "x86_64")), allow(dead_code))]
     pub(crate) largest: f32,
@@ -42,4 +43,24 @@ pub struct WideBvh {
     pub(crate) kernel: Kernel,
     /// The most children that can be waiting on the way through it.
     pub(crate) stack_need: usize,
+}
+
+/// Returns the largest size of a coordinate of a box.
+pub(super) fn largest(bounds: &Aabb) -> f32 {
+    bounds
+        .min
+        .abs()
+        .max(bounds.max.abs())
+        .max_element()
+}
+
+/// Copies all arrays: a clone may outlive the bytes that a view borrows.
+impl Clone for WideBvh {
+    fn clone(&self) -> Self {
+        Self {
+            nodes: Cow::Owned(self.nodes.to_vec()),
+            blocks: Cow::Owned(self.blocks.to_vec()),
+            ..*self
+        }
+    }
 }

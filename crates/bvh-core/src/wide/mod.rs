@@ -48,17 +48,20 @@ pub use closest::Closest;
 pub use coherence::Coherence;
 pub use kernel::Kernel;
 pub use layout::WideBvh;
+use layout::largest;
+pub(crate) use node::{Child, WideNode};
 pub use refit::RefitError;
 pub(crate) use triangles::TriangleBlock;
 
 use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate_references};
+use alloc::borrow::Cow;
 use alloc::vec::Vec;
 use kernel::STACK;
 use portable::walk;
 
 impl WideBvh {
     /// Boxes that are tested, and counted, at every node.
-    pub const BOXES_OF_NODE: u64 = node::WideNode::LANES as u64;
+    pub const BOXES_OF_NODE: u64 = WideNode::LANES as u64;
     /// Objects that are tested, and counted, at every block of triangles of a leaf.
     pub const OBJECTS_OF_BLOCK: u64 = TriangleBlock::LANES as u64;
 
@@ -148,6 +151,24 @@ impl WideBvh {
         }
         self.choose(kernel);
         Some(self)
+    }
+
+    /// Returns the layout of these arrays, whose references are sound, with `depth` nodes on the longest
+    /// way.
+    pub(crate) fn from_arrays(
+        bounds: Aabb,
+        root: Option<Child>,
+        nodes: Cow<'static, [WideNode]>,
+        blocks: Cow<'static, [TriangleBlock]>,
+        depth: usize,
+    ) -> Self {
+        let largest = largest(&bounds);
+        // Seven of a node's eight children wait while the eighth is visited.
+        let stack_need = depth * (WideNode::LANES - 1);
+        let kernel = Kernel::Portable;
+        let mut wide = Self { bounds, root, nodes, blocks, largest, kernel, stack_need };
+        wide.choose(Kernel::best());
+        wide
     }
 
     fn choose(&mut self, available: Kernel) {

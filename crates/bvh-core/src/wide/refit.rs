@@ -1,6 +1,6 @@
 //! The wide layout over triangles that have moved, and what it then costs.
 
-use super::layout::WideBvh;
+use super::layout::{WideBvh, largest};
 use super::node::{Child, WideNode};
 use super::triangles::TriangleBlock;
 use crate::{Aabb, Triangle};
@@ -27,7 +27,7 @@ impl WideBvh {
     /// faster than a new layout. A refused layout is unchanged.
     pub fn refit(&mut self, triangles: &[Triangle]) -> Result<(), RefitError> {
         let mut is_new = vec![true; triangles.len()];
-        for block in &self.blocks {
+        for block in self.blocks.iter() {
             for (id, _) in block.triangles() {
                 let triangle = triangles
                     .get(id as usize)
@@ -44,9 +44,9 @@ impl WideBvh {
                 return Err(RefitError::Gained(id));
             }
         }
-        self.blocks
-            .iter_mut()
-            .for_each(|block| block.move_to(triangles));
+        for block in self.blocks.to_mut() {
+            block.move_to(triangles);
+        }
         // Children come after their parents.
         let mut around = vec![Aabb::EMPTY; self.nodes.len()];
         for index in (0..self.nodes.len()).rev() {
@@ -54,7 +54,7 @@ impl WideBvh {
                 let child = self.nodes[index].children[lane];
                 if self.nodes[index].lane_box(lane).is_some() {
                     let aabb = self.box_of(child, &around);
-                    self.nodes[index].set_box(lane, &aabb);
+                    self.nodes.to_mut()[index].set_box(lane, &aabb);
                     around[index] = around[index].union(&aabb);
                 }
             }
@@ -62,12 +62,7 @@ impl WideBvh {
         self.bounds = self
             .root
             .map_or(Aabb::EMPTY, |root| self.box_of(root, &around));
-        self.largest = self
-            .bounds
-            .min
-            .abs()
-            .max(self.bounds.max.abs())
-            .max_element();
+        self.largest = largest(&self.bounds);
         Ok(())
     }
 
