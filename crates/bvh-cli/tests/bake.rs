@@ -57,6 +57,7 @@ fn a_bake_for_rays_saves_the_number_of_visits_of_each_node() {
                 said.contains("wide layout for rays") && said.contains("below Müller–Fellner's"),
                 "{said}"
             );
+            assert!(said.contains("risk: a tree for rays may be worse for others"), "{said}");
             fs::read(at.join("x.bvh")).unwrap()
         });
         assert!(bytes[0] == bytes[1], "{rays}: the same bytes on any number of threads");

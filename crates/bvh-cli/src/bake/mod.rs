@@ -295,6 +295,12 @@ fn summary(plan: &Plan, scene: &Scene, bake: &Bake, baked: &Baked) -> String {
             gain(outcome.cost, *base)
         ),
     ];
+    if let Some([cost, greedy]) = bake.costs_elsewhere(&outcome.tree) {
+        lines.push(format!(
+            "risk: a tree for rays may be worse for others; for random lines it is {} Müller–Fellner's",
+            gain(cost, greedy)
+        ));
+    }
     if let Some(before) = before {
         lines.push(format!("{} the tree it started from, {before}", gain(outcome.cost, *before)));
     }

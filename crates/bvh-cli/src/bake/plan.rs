@@ -191,6 +191,15 @@ impl Bake<'_> {
         Ok(sections.iter().map(|section| section.len()).sum())
     }
 
+    /// Returns the costs of a tree and of the greedy tree for random lines, if the search was for other
+    /// rays.
+    pub fn costs_elsewhere(&self, tree: &Bvh) -> Option<[f64; 2]> {
+        let objective = self.plan.objective;
+        self.density
+            .is_some()
+            .then(|| [tree, &self.greedy].map(|tree| objective.cost(tree)))
+    }
+
     /// Names the cost that the search minimises.
     pub fn unit(&self) -> &'static str {
         match (self.plan.objective, &self.density) {
