@@ -163,7 +163,7 @@ def surface_of(triangle):
         (lambda: surface_of([1j]), "triangle has dtype complex128; accepted: integers"),
         (lambda: surface_of(np.ma.masked_equal([0], 0)), "triangle has masked elements; accepted: none"),
         (lambda: surface_of(np.array([2**64 - 1], "u8")), "triangle has 18446744073709551615; accepted: integers of 63 bits"),
-        (lambda: Tree.from_triangles([[1, 2], [3]]), "triangles: .*inhomogeneous.*; accepted"),
+        (lambda: Tree.from_triangles([[1, 2], [3]]), "triangles.*(inhomogeneous|dtype object).*; accepted"),
         (lambda: Tree.from_triangles(np.where(np.arange(500)[:, None, None] == 4, np.nan, TRIANGLES)), "triangles: .*4"),
         (lambda: Tree.from_boxes(boxes_of(TRIANGLES)[:, ::-1]), "boxes: "),
         (lambda: Tree.from_triangles(TRIANGLES, -1), "seconds is -1; accepted: 0 or more, finite"),

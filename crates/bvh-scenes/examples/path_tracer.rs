@@ -40,7 +40,7 @@ type Surface = (Triangle, f32);
 /// Returns whether a triangle is opaque at a hit: every eighth one of the scene is a grate.
 fn is_opaque(triangle: &Triangle, ray: &Ray, id: u32) -> bool {
     let Some([u, v, _]) = triangle.barycentrics(ray) else { return true };
-    id % 8 != 0 || ((u * 16.0) as u32 + (v * 16.0) as u32).is_multiple_of(2)
+    !id.is_multiple_of(8) || ((u * 16.0) as u32 + (v * 16.0) as u32).is_multiple_of(2)
 }
 
 impl World {
@@ -215,7 +215,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
 
     // Record a frame, and bake for its rays.
-    let (brightness, recorded) = world.frame(place(0.15, 0.3, 0.5), place(0.9, 0.35, 0.5), 1)?;
+    let (brightness, recorded) = world.frame(place(0.5, 0.6, 0.5), place(0.9, 0.4, 0.9), 1)?;
     println!("first frame: {} rays, brightness {brightness:.3}", recorded.len());
     let segments: Vec<Segment> = recorded
         .iter()
@@ -227,8 +227,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // The camera and the flag move on. The same frame by both trees is the same picture.
     world.wave(0.4)?;
-    let next = [place(0.17, 0.31, 0.5), place(0.9, 0.34, 0.52)];
-    let elsewhere = [place(0.85, 0.4, 0.3), place(0.1, 0.3, 0.6)];
+    let next = [place(0.51, 0.59, 0.48), place(0.88, 0.4, 0.88)];
+    let elsewhere = [place(0.4, 0.7, 0.3), place(0.6, 0.2, 0.9)];
     for (frame, [eye, at]) in [("next frame", next), ("elsewhere", elsewhere)] {
         let (before, traced) = world.frame(eye, at, 2)?;
         for (kind, is_shadow) in [("camera and bounces", false), ("light", true)] {
