@@ -1,10 +1,10 @@
 //! The triangles closest to points, four triangles and eight boxes at once.
 
-use super::closest::{Closest, Nearest};
 use super::instructions::{Instructions, Pending};
 use super::kernel::STACK;
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use super::layout::WideBvh;
+use super::nearest::{Closest, Nearest};
 use super::node::{Child, WideNode};
 use super::triangles::TriangleBlock;
 use crate::ray::pow2;

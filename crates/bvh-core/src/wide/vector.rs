@@ -2,9 +2,9 @@
 
 use super::all_in_flight::{Found, MOST};
 use super::answer::Answers;
-use super::closest::Closest;
 use super::crossed_leaves::AllHits;
 use super::layout::WideBvh;
+use super::nearest::Closest;
 use super::source::Source;
 use crate::{Coherence, Hit, Kernel, Ray};
 use alloc::vec::Vec;

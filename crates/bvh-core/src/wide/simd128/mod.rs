@@ -7,11 +7,11 @@ mod registers;
 
 use super::all_in_flight::{Found, MOST};
 use super::answer::Answers;
-use super::closest::Closest;
 use super::crossed_leaves::AllHits;
 use super::instructions::{Instructions, Pending};
 use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
+use super::nearest::Closest;
 use super::node::{Child, WideNode};
 use super::source::Source;
 use super::{all_in_flight, batch, closest_lanes, in_flight, one_ray};
