@@ -1,14 +1,14 @@
-//! What may be asked of rays: their nearest hits, or whether they have any.
+//! The two questions about a ray: its nearest hit, or whether it has any hit.
 
 use super::lanes::Lanes;
 use super::layout::WideBvh;
 use crate::{Hit, Ray};
 
-/// The answers to the rays of a batch, by their numbers.
+/// Answers to the rays of a batch, by the number of the ray.
 pub(crate) trait Answers {
-    /// Whether the first hit that is found will do.
+    /// True if the first hit that is found ends a ray.
     const ANY: bool;
-    /// Whether [`accepts`](Self::accepts) may reject hits.
+    /// True if [`accepts`](Self::accepts) may reject hits.
     const FILTERS: bool = false;
 
     /// Returns whether a hit of the ray with this number counts.
@@ -73,7 +73,7 @@ impl Answers for &mut [bool] {
     }
 }
 
-/// Distances and objects in slices of their own.
+/// Distances and objects in separate slices.
 impl Answers for (&mut [f32], &mut [u32]) {
     const ANY: bool = false;
 

@@ -4,7 +4,7 @@ use super::kernel::Kernel;
 use super::vector;
 
 impl Kernel {
-    /// Whether this processor can run the kernel.
+    /// Returns whether this processor can run the kernel.
     pub fn is_available(self) -> bool {
         self == Self::Portable || vector::has(self)
     }

@@ -1,4 +1,4 @@
-//! Batches of rays: packets where the rays are coherent, and else many rays in flight.
+//! Batches of rays: packets where the rays are coherent, otherwise many rays in flight.
 
 use super::answer::Answers;
 use super::coherence::Coherence;
@@ -9,10 +9,10 @@ use super::packet::Packet;
 use super::source::Source;
 use core::ops::Range;
 
-/// So many rays between packets are traced together.
+/// The minimum run of rays between packets that is traced in flight rather than ray by ray.
 const MANY: usize = 128;
 
-/// The answers of all rays: of coherent ones in packets, of the others in flight.
+/// Answers all rays: coherent rays in packets, other rays in flight.
 ///
 /// # Safety
 /// The processor has the instructions of `K`, and the caller is compiled with them; there is an answer for every ray; the
@@ -30,29 +30,30 @@ pub(crate) unsafe fn trace<K: Instructions, A: Answers>(
             return K::in_flight(wide, rays, answers, 0..rays.len());
         }
         let mut packet = Packet::<K>::new();
-        // Rays from here on wait to be traced otherwise.
-        let mut from = 0;
-        let mut at = 0;
-        while at + K::Rays::N <= rays.len() {
-            let lanes = rays.lanes::<K::Rays>(at);
+        // The rays from `first_of_rest` up to `next` fit no packet, and wait for `rest`.
+        let mut first_of_rest = 0;
+        let mut next = 0;
+        while next + K::Rays::N <= rays.len() {
+            let lanes = rays.lanes::<K::Rays>(next);
             if let Some(scale) = lanes.cohere(wide.largest) {
                 if !packet.takes(lanes.octant()) {
                     packet.trace(wide, answers);
                 }
-                packet.add(lanes, scale, at);
-                rest::<K, A>(wide, rays, answers, from..at);
-                from = at + K::Rays::N;
+                packet.add(lanes, scale, next);
+                rest::<K, A>(wide, rays, answers, first_of_rest..next);
+                first_of_rest = next + K::Rays::N;
             }
-            at += K::Rays::N;
+            next += K::Rays::N;
         }
         if !packet.is_empty() {
             packet.trace(wide, answers);
         }
-        rest::<K, A>(wide, rays, answers, from..rays.len());
+        rest::<K, A>(wide, rays, answers, first_of_rest..rays.len());
     }
 }
 
-/// Between packets: a few rays at the edge of something cohere nearly, and are traced one by one; many do not.
+/// Traces the rays between two packets. A few rays at the edge of something are nearly coherent and
+/// faster one by one; a long run of them is faster in flight.
 #[inline(always)]
 unsafe fn rest<K: Instructions, A: Answers>(
     wide: &WideBvh,

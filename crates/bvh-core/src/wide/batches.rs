@@ -1,4 +1,4 @@
-//! Batches of rays: one after the other in memory, or by component.
+//! The public calls for batches of rays, one after the other in memory or by component.
 
 use super::answer::{Answers, Filtered};
 use super::coherence::Coherence;

@@ -82,9 +82,9 @@ pub(super) struct LineLanes<L: Lanes> {
 
 /// The answers of four triangles.
 pub(super) struct Decision {
-    /// A bit per triangle that the line crosses at the origin or in front of it.
+    /// One bit per triangle: set if the line crosses it at the origin or in front of it.
     pub(super) hits: u32,
-    /// A bit per triangle for which the error bounds permit several answers.
+    /// One bit per triangle: set if the error bounds permit several answers.
     pub(super) unsure: u32,
     /// The rounded distances of the triangles that the line crosses.
     pub(super) distances: [f32; TriangleBlock::LANES],

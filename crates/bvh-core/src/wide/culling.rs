@@ -16,7 +16,7 @@ pub(super) struct Culling<L> {
     least: [L; 3],
     most: [L; 3],
     begin: L,
-    /// What is added to near planes, and subtracted from far ones.
+    /// The distance by which near and far planes are moved apart.
     margin: [f32; 3],
 }
 

@@ -1,8 +1,9 @@
-//! Batches of incoherent rays many rays in flight, a step of each in turn.
+//! Batches of incoherent rays, with many rays in flight: a step of each in turn.
 //!
-//! One ray alone waits: for the next node to come from memory, for one box test to end before the next can begin, for
-//! the processor to recover from branches that nobody can predict. Steps of different rays do not depend on each other,
-//! so that the processor does the next ray's while one waits:
+//! One ray alone waits: for the next node to come from memory, for one box test to end before the
+//! next can begin, for the processor to recover from branches that nobody can predict. Steps of
+//! different rays do not depend on each other. While one ray waits, the processor does the step of
+//! the next:
 //!
 //! ```text
 //!            ┌─> at a node: boxes ────────────────────────────┐
@@ -10,7 +11,8 @@
 //!            └─> at the end: write the answer, start another ─┘
 //! ```
 //!
-//! What a ray waits for decides which list it is in and is no branch; nor is the order of hits, nor what they cut off.
+//! No branch depends on one ray: its next step decides the list that it is appended to, and the order
+//! of hits and the children behind them are found without branches, too.
 
 use super::answer::Answers;
 use super::instructions::Instructions;
@@ -23,19 +25,19 @@ use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 use core::ops::Range;
 
-/// Rays in flight, at most.
+/// The maximum number of rays in flight.
 const FLIGHT: usize = 32;
 
-/// Rays that are prepared at once, at most.
+/// The maximum number of rays that are prepared at once.
 const RAYS: usize = 16;
 
-/// Rays of a batch that are numbered together.
+/// The maximum number of rays of a batch that are numbered together.
 const MOST: usize = 1 << 31;
 
-/// The answers of the rays of these numbers.
+/// Answers the rays of these numbers.
 ///
 /// # Safety
-/// As of [`batch::trace`](super::batch::trace).
+/// As for [`batch::trace`](super::batch::trace).
 #[inline(always)]
 pub(crate) unsafe fn trace<K: Instructions, A: Answers>(
     wide: &WideBvh,
@@ -76,7 +78,7 @@ pub(crate) unsafe fn trace<K: Instructions, A: Answers>(
     }
 }
 
-/// Rays that wait for the same.
+/// Rays that wait for the same step.
 struct List {
     rays: [*mut Traversal; FLIGHT],
     count: usize,
@@ -101,7 +103,7 @@ impl List {
     }
 }
 
-/// Rays of a batch: those on their way, those that have been prepared, and those that have not.
+/// The rays of a batch that are in flight, that are prepared, and that are neither.
 struct Flight<'a, K, S, A> {
     wide: &'a WideBvh,
     rays: S,

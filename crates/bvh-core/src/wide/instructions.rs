@@ -1,4 +1,4 @@
-//! What an instruction set brings to the kernels besides its lanes.
+//! The operations of an instruction set that the kernels need besides its lanes.
 
 use super::answer::Answers;
 use super::lanes::Lanes;
@@ -16,18 +16,18 @@ pub(crate) type Pending = u64;
 /// All functions are unsafe for the same reasons: the processor has the instructions, and there is room for eight places more than
 /// are written.
 pub(crate) trait Instructions {
-    /// As many numbers as a node has children.
+    /// A register of one number per child of a node.
     type Boxes: Lanes;
-    /// As many numbers as a block has triangles.
+    /// A register of one number per triangle of a block.
     type Block: Lanes;
     /// The widest register: one ray per lane.
     type Rays: Lanes;
-    /// Rays of a packet.
+    /// The number of rays in a packet.
     const PACKET: usize;
-    /// Rays in flight.
+    /// The number of rays in flight.
     const FLIGHT: usize;
 
-    /// A bit per child whose entry is at most its exit.
+    /// Returns a bit per child whose entry is at most its exit.
     unsafe fn entered(entry: Self::Boxes, exit: Self::Boxes) -> u32;
 
     /// Writes the keys of the entered children, the nearest last: the bits of the entry, of which the last three are the
@@ -37,7 +37,8 @@ pub(crate) trait Instructions {
     /// Writes the keys of the entered children in the order of their lanes.
     unsafe fn compress_keys(entry: Self::Boxes, mask: u32, to: *mut u32);
 
-    /// The nearest of two or more entered children; all are written to `to`, the nearest last.
+    /// Writes the entered children to `to`, the nearest last, and returns the nearest. If none was
+    /// entered, returns any child.
     unsafe fn sort(node: &WideNode, entry: Self::Boxes, mask: u32, to: *mut Pending) -> Child;
 
     /// Writes the entered children in the order of their lanes, with entries of 0.
@@ -54,7 +55,8 @@ pub(crate) trait Instructions {
         numbers: Range<usize>,
     );
 
-    /// Takes what begins behind `nearest` from a stack that is aligned to 64 bytes; its new end.
+    /// Removes the children behind `nearest` from a stack that is aligned to 64 bytes. Returns its new
+    /// end.
     #[inline(always)]
     unsafe fn drop_farther(base: *mut Pending, top: *mut Pending, nearest: f32) -> *mut Pending {
         let last = last_pending(nearest);
@@ -73,7 +75,7 @@ pub(crate) trait Instructions {
     }
 }
 
-/// What is behind a hit at this distance is greater.
+/// Returns the greatest [`Pending`] that is not behind a hit at this distance.
 #[inline(always)]
 pub(crate) fn last_pending(nearest: f32) -> Pending {
     u64::from(nearest.to_bits() | 7) << 32 | u64::from(u32::MAX)

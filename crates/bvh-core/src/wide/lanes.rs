@@ -21,7 +21,7 @@ pub(crate) trait Lanes:
     const N: usize;
     /// A set of lanes.
     type Mask: Mask;
-    /// As many numbers of f64.
+    /// One f64 per lane.
     type Double: DoubleLanes;
 
     /// The same number in all lanes.
@@ -36,7 +36,7 @@ pub(crate) trait Lanes:
     /// The processor has the instructions; `from` is aligned to `N` numbers.
     unsafe fn load(from: *const f32) -> Self;
 
-    /// As [`load`](Self::load), from any place.
+    /// Loads numbers from an address that need not be aligned.
     ///
     /// # Safety
     /// The processor has the instructions.
@@ -70,10 +70,10 @@ pub(crate) trait Lanes:
     /// Where `self < other` as u32.
     fn below(self, other: Self) -> Self::Mask;
 
-    /// A bit per lane whose sign is set, lane 0 lowest.
+    /// Returns a bit per lane whose sign is set, lane 0 lowest.
     fn signs(self) -> u32;
 
-    /// The greatest number, none of which is NaN.
+    /// Returns the greatest number. None may be NaN.
     fn greatest(self) -> f32;
 
     /// `yes` where the mask is set, else `no`.
@@ -115,7 +115,7 @@ pub(crate) trait Lanes:
     /// The same bits in all lanes.
     ///
     /// # Safety
-    /// As [`splat`](Self::splat).
+    /// Fills all lanes with one number.
     #[inline(always)]
     unsafe fn splat_bits(bits: u32) -> Self {
         // SAFETY: the caller's promise.
@@ -132,7 +132,7 @@ pub(crate) trait Lanes:
 
 /// A set of lanes.
 pub(crate) trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
-    /// A bit per lane, lane 0 lowest.
+    /// Returns a bit per lane, lane 0 lowest.
     fn bits(self) -> u32;
 
     /// The set of these bits, of which those beyond the lanes are ignored.
@@ -145,7 +145,7 @@ pub(crate) trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
     fn and_not(self, other: Self) -> Self;
 }
 
-/// As many numbers of f64 as there are lanes.
+/// One f64 per lane.
 pub(crate) trait DoubleLanes:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {

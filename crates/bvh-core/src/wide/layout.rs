@@ -39,7 +39,7 @@ pub struct WideBvh {
     /// The largest size of a coordinate; for the vector kernels.
     #[cfg_attr(not(all(feature = "std", target_arch = "x86_64")), allow(dead_code))]
     pub(crate) largest: f32,
-    /// What traces it; the processor has its instructions.
+    /// The kernel that traces it. The processor has its instructions.
     pub(crate) kernel: Kernel,
     /// The most children that can be waiting on the way through it.
     pub(crate) stack_need: usize,

@@ -1,6 +1,6 @@
 //! A tree of triangles laid out for speed: eight children per node and four triangles per leaf block, tested at once.
 
-// Of the vector kernels, which not every machine has.
+// Some machines have no vector kernel, and then its parts are unused.
 #![cfg_attr(not(all(feature = "std", target_arch = "x86_64")), allow(dead_code))]
 
 mod all_hits;
@@ -78,9 +78,12 @@ impl WideBvh {
         Self::made(tree, triangles, None, BLOCK_COST)
     }
 
-    /// As [`new`](Self::new), but of least expected time for rays that enter every node of `tree` as often as `visits` says,
-    /// in place of random lines: in any unit, for example [`RayDensity::visits`](crate::RayDensity::visits), which tree
-    /// files keep. Inner nodes with many children are divided as if their parts had nothing in common.
+    /// Lays out `tree` as [`new`](Self::new) does, but for rays that enter each node as often as `visits`
+    /// reports, rather than for random lines. Visits have any unit; [`RayDensity::visits`] returns them,
+    /// and tree files keep them. Inner nodes with many children are divided as if their parts had nothing
+    /// in common.
+    ///
+    /// [`RayDensity::visits`]: crate::RayDensity::visits
     ///
     /// # Panics
     /// If there are not as many `visits` as nodes.
@@ -93,8 +96,9 @@ impl WideBvh {
         Self::made(tree, triangles, Some(visits), BLOCK_COST)
     }
 
-    /// As [`new`](Self::new), where testing a block of four triangles is taken to last as long as visiting `block_cost` nodes.
-    /// The others take it to last as long as one, which was as good as half and twice of it where it was measured.
+    /// Lays out `tree` as [`new`](Self::new) does, for a machine on which the test of a block of four
+    /// triangles lasts as long as visits to `block_cost` nodes. `new` assumes one node; half and twice as
+    /// much made no difference where we measured it.
     ///
     /// # Panics
     /// If `block_cost` is not positive and finite.
@@ -123,17 +127,18 @@ impl WideBvh {
         Ok(wide)
     }
 
-    /// The nearest triangle that `ray` meets in its range; of several at the same distance the one of the lowest id.
+    /// Returns the nearest triangle that `ray` meets in its range. Of several at the same distance, the
+    /// one with the lowest id is nearest.
     pub fn nearest_hit(&self, ray: &Ray) -> Option<Hit> {
         self.one_ray::<false>(ray, |_| true)
     }
 
-    /// Whether `ray` meets any triangle in its range.
+    /// Returns whether `ray` meets any triangle in its range.
     pub fn any_hit(&self, ray: &Ray) -> bool {
         self.one_ray::<true>(ray, |_| true).is_some()
     }
 
-    /// The nearest hit, or with `ANY` the first one found, of those that `accept` accepts.
+    /// Returns the nearest hit, or with `ANY` the first one found, among those that `accept` accepts.
     #[inline]
     fn one_ray<const ANY: bool>(&self, ray: &Ray, accept: impl FnMut(Hit) -> bool) -> Option<Hit> {
         if self.kernel == Kernel::Portable {
@@ -144,8 +149,8 @@ impl WideBvh {
         (!hit.is_miss()).then_some(hit)
     }
 
-    /// The same layout traced by another kernel; `None` if this processor cannot run it. Layouts of trees far deeper
-    /// than wide are traced by [`Kernel::Portable`] whatever is asked for.
+    /// Returns the same layout for another kernel; `None` if this processor cannot run that kernel.
+    /// [`Kernel::Portable`] always traces layouts that need an unusually deep stack.
     pub fn with_kernel(mut self, kernel: Kernel) -> Option<Self> {
         if !kernel.is_available() {
             return None;
@@ -176,8 +181,9 @@ impl WideBvh {
         self.kernel = if self.stack_need <= STACK { available } else { Kernel::Portable };
     }
 
-    /// [`nearest_hit`](Self::nearest_hit) by [`Kernel::Portable`], with its tests counted: eight boxes for every node and
-    /// four objects for every block of triangles, whether these have so many or not. The same counts on every machine.
+    /// [`nearest_hit`](Self::nearest_hit) by [`Kernel::Portable`], with its tests counted: eight boxes
+    /// for each node and four objects for each block of triangles, including unused places. Counts are
+    /// the same on every machine.
     #[inline(never)]
     pub fn nearest_hit_counted(&self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
         walk::<false>(self, ray, counter, |_| true)
@@ -189,8 +195,8 @@ impl WideBvh {
         walk::<true>(self, ray, counter, |_| true).is_some()
     }
 
-    /// [`nearest_hit`](Self::nearest_hit) of the hits that `accept` accepts, for example where a texture is opaque. `accept` sees
-    /// hits in no order, and no more than it takes to know the answer: all of them if it accepts none.
+    /// Returns the nearest hit that `accept` accepts, for example where a texture is opaque. `accept` sees
+    /// hits in no order, and only as many as the answer needs: all of them if it accepts none.
     ///
     /// ```
     /// # use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle, WideBvh};
@@ -212,7 +218,7 @@ impl WideBvh {
         self.nearest_accepted(ray, &mut accept)
     }
 
-    /// [`any_hit`](Self::any_hit) of the hits that `accept` accepts, for example for shadows of what is cut out.
+    /// Returns whether `ray` has a hit that `accept` accepts, for example for shadows of cut-out leaves.
     pub fn any_hit_where(&self, ray: &Ray, mut accept: impl FnMut(Hit) -> bool) -> bool {
         self.any_accepted(ray, &mut accept)
     }
@@ -227,7 +233,7 @@ impl WideBvh {
         self.one_ray::<true>(ray, accept).is_some()
     }
 
-    /// Bytes of memory that nodes and triangles take.
+    /// The number of bytes of nodes and triangles.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..])
     }

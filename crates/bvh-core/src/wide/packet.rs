@@ -17,14 +17,14 @@ use super::triangles::TriangleBlock;
 use crate::Hit;
 use core::mem::MaybeUninit;
 
-/// Vectors of a packet, at most.
+/// The maximum number of vectors in a packet.
 pub(crate) const VECTORS: usize = 64 / 8;
 
 /// A packet of vectors of rays that [cohere](RayLanes::cohere), all of the same octant.
 pub(crate) struct Packet<K: Instructions> {
     vectors: [MaybeUninit<Vector<K::Rays>>; VECTORS],
     count: usize,
-    /// A bit per axis along which the rays run backwards.
+    /// One bit per axis: set where the rays run backwards.
     octant: u32,
     bounds: RayBounds<K::Rays>,
 }
@@ -38,7 +38,7 @@ struct Vector<L> {
     /// The nearest hits so far, or the ends of the rays and `u32::MAX`.
     t: L,
     object: L,
-    /// The rays, and whether `pairs` has been made of them: many packets come to no triangle.
+    /// The rays, and whether `pairs` has been made from them. Many packets meet no triangle.
     rays: RayLanes<L>,
     axes: [usize; 3],
     is_sheared: bool,
@@ -47,7 +47,7 @@ struct Vector<L> {
     first: usize,
 }
 
-/// What a child that waits came from.
+/// The parent of a child that waits.
 #[derive(Clone, Copy)]
 struct Parent {
     node: u32,
@@ -56,7 +56,7 @@ struct Parent {
 }
 
 impl<K: Instructions> Packet<K> {
-    /// No rays.
+    /// Returns a packet without rays.
     ///
     /// # Safety
     /// The processor has the instructions.
@@ -76,7 +76,7 @@ impl<K: Instructions> Packet<K> {
         self.count == 0
     }
 
-    /// Whether rays of this octant can be added.
+    /// Returns whether rays of this octant can be added.
     #[inline(always)]
     pub(crate) fn takes(&self, octant: u32) -> bool {
         self.count == 0
@@ -111,7 +111,7 @@ impl<K: Instructions> Packet<K> {
     /// be the nearest.
     ///
     /// # Safety
-    /// As of [`trace`](super::batch::trace).
+    /// As for [`trace`](super::batch::trace).
     #[inline(always)]
     pub(crate) unsafe fn trace<A: Answers>(&mut self, wide: &WideBvh, answers: &mut A) {
         // SAFETY: the caller's promises; as many vectors are written as are counted.
@@ -217,7 +217,7 @@ impl<K: Instructions> Packet<K> {
         }
     }
 
-    /// The greatest distance at which a ray may still have a nearer hit.
+    /// Returns the greatest distance at which a ray may still have a nearer hit.
     #[inline(always)]
     unsafe fn farthest(&self) -> f32 {
         // SAFETY: as many vectors are written as are counted.
@@ -230,7 +230,7 @@ impl<K: Instructions> Packet<K> {
         }
     }
 
-    /// A bit per ray of a vector that enters the box of these planes before its nearest hit.
+    /// Returns a bit per ray of a vector that enters the box of these planes before its nearest hit.
     #[inline(always)]
     unsafe fn enter(&self, vector: usize, planes: &[[f32; 2]; 3]) -> u32 {
         // SAFETY: the caller's promise: the vector is counted.
@@ -251,7 +251,8 @@ impl<K: Instructions> Packet<K> {
         }
     }
 
-    /// Tests the triangles of a leaf against those rays of a vector that entered it; whether any has a new nearest hit.
+    /// Tests the triangles of a leaf with the rays of a vector that entered it. Returns whether any ray
+    /// has a new nearest hit.
     #[inline(always)]
     unsafe fn visit_leaf<A: Answers>(
         &mut self,
@@ -341,7 +342,7 @@ unsafe fn accepted<L: Lanes>(
     }
 }
 
-/// The greatest key of a child that a ray may enter before `farthest`.
+/// Returns the greatest key of a child that a ray may enter before `farthest`.
 #[inline(always)]
 fn key_of(farthest: f32) -> u32 {
     farthest.to_bits() | 7

@@ -26,7 +26,8 @@ impl<L: Lanes> Pairs<L> {
         [x - self.slope[0] * z, y - self.slope[1] * z, z]
     }
 
-    /// A bit per pair whose triangle the ray's line may meet, by the sides of its edges in f32, which are right or zero.
+    /// Returns a bit per pair whose triangle the ray's line may meet. The sides of the edges are computed
+    /// in f32, whose signs are right or zero.
     #[inline(always)]
     pub(crate) fn candidates(&self, corners: &[[L; 3]; 3]) -> u32 {
         let [ax, ay, _] = self.relative(&corners[0]);
@@ -79,7 +80,7 @@ impl<L: Lanes> Pairs<L> {
         (inside & entry.le(exit) & moved.le(t_max), moved)
     }
 
-    /// The pairs whose ray has the triangle in front of it and inside its edges, and where.
+    /// Returns the pairs whose ray meets the triangle in front of its origin, and the distances.
     #[inline(always)]
     fn meet(&self, corners: &[[L; 3]; 3]) -> (L::Mask, L) {
         let [ax, ay, az] = self.relative(&corners[0]);

@@ -86,7 +86,7 @@ impl WideRay {
     }
 }
 
-/// The nearest hit, or with `ANY` the first one found, of those that `accept` does.
+/// Returns the nearest hit, or with `ANY` the first one found, among those that `accept` accepts.
 #[inline(always)]
 pub(crate) fn walk<const ANY: bool>(
     wide: &WideBvh,

@@ -14,11 +14,11 @@ pub(crate) struct Ready<L> {
     scale: [L; 3],
     near_shift: [L; 3],
     far_shift: [L; 3],
-    /// A bit per ray that is not left to the portable kernel.
+    /// One bit per ray: unset for a ray that the portable kernel must trace.
     pub(crate) in_range: u32,
 }
 
-/// What the tests of boxes and triangles need of one ray: two cache lines, in rows of four lanes.
+/// One ray as boxes and triangles are tested with it: two cache lines, in rows of four lanes.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(crate) struct Prepared {
@@ -66,7 +66,7 @@ impl<L: Lanes> Ready<L> {
         }
     }
 
-    /// A bit per ray that may meet something within `bounds`.
+    /// Returns a bit per ray that may meet something within `bounds`.
     #[inline(always)]
     pub(crate) fn enter(&self, bounds: &Aabb) -> u32 {
         let mut entry = self.rays.t_min;
@@ -83,7 +83,7 @@ impl<L: Lanes> Ready<L> {
         entry.le(exit).bits()
     }
 
-    /// The rays that run backwards along an axis.
+    /// Returns the rays that run backwards along an axis.
     #[inline(always)]
     fn backwards(&self, axis: usize) -> L::Mask {
         // SAFETY: a value exists.
@@ -165,7 +165,7 @@ impl Prepared {
         }
     }
 
-    /// A ray for every quarter of the lanes, as triangles are tested with it.
+    /// Returns a ray for each quarter of the lanes, as triangles are tested with it.
     ///
     /// # Safety
     /// The processor has the instructions.

@@ -5,7 +5,7 @@ use super::lanes::{Lanes, Mask};
 use super::pairs::Pairs;
 use crate::triangle::AXES;
 
-/// As many rays as there are lanes. Vectors of three are by axis.
+/// One ray per lane. Vectors of three are by axis.
 #[derive(Clone, Copy)]
 pub(crate) struct RayLanes<L> {
     pub(crate) origin: [L; 3],
@@ -16,7 +16,7 @@ pub(crate) struct RayLanes<L> {
 }
 
 impl<L: Lanes> RayLanes<L> {
-    /// A bit per axis along which the first ray runs backwards.
+    /// Returns a bit per axis along which the first ray runs backwards.
     #[inline(always)]
     pub(crate) fn octant(&self) -> u32 {
         let [x, y, z] = self.inverse;
@@ -79,7 +79,7 @@ impl<L: Lanes> RayLanes<L> {
         cohere.then_some(scale)
     }
 
-    /// The rays as triangles are tested with them.
+    /// Returns the rays as triangles are tested with them.
     #[inline(always)]
     pub(crate) fn sheared(&self, [x, y, z]: [usize; 3]) -> Pairs<L> {
         let Self { origin, direction, inverse, t_min, .. } = self;
@@ -104,7 +104,7 @@ pub(crate) struct RayBounds<L> {
 }
 
 impl<L: Lanes> RayBounds<L> {
-    /// Of no rays.
+    /// Returns the bounds of no rays.
     ///
     /// # Safety
     /// The processor has the instructions.
@@ -167,7 +167,7 @@ impl<L: Lanes> RayBounds<L> {
     }
 }
 
-/// The least lane.
+/// Returns the least lane.
 #[inline(always)]
 fn least<L: Lanes>(lanes: L) -> f32 {
     // SAFETY: a value exists.

@@ -1,4 +1,4 @@
-//! Where the rays of a batch come from: rays one after the other, or components in slices.
+//! Rays of a batch in memory: rays one after the other, or components in slices.
 
 use super::lanes::Lanes;
 use super::ray_lanes::RayLanes;
@@ -7,19 +7,20 @@ use crate::{Ray, RayComponents};
 
 /// Rays in memory, by their numbers.
 pub(crate) trait Source: Copy {
-    /// How many rays there are.
+    /// Returns the number of rays.
     fn len(self) -> usize;
 
-    /// One of the rays.
+    /// Returns the ray with a number.
     fn ray(self, number: usize) -> Ray;
 
-    /// As many rays as there are lanes, from number `first` on.
+    /// Returns one ray per lane, from number `first` on.
     ///
     /// # Safety
     /// The processor has the instructions, and there are so many rays.
     unsafe fn lanes<L: Lanes>(self, first: usize) -> RayLanes<L>;
 
-    /// As [`lanes`](Self::lanes); where there are fewer rays the last one is repeated.
+    /// Returns the same as [`lanes`](Self::lanes), where the last ray before `end` fills the lanes that
+    /// have none.
     ///
     /// # Safety
     /// The processor has the instructions, and there is a ray.
@@ -93,7 +94,7 @@ impl Source for &RayComponents<'_> {
             let one = L::splat(1.0);
             let most = L::splat(f32::MAX);
             let least = L::splat(f32::MIN);
-            // As `Ray` does.
+            // The same operations as in `Ray`, so that the bits agree.
             let inverse = |direction: L| (one / direction).max(least).min(most);
             RayLanes {
                 origin: [component(ox), component(oy), component(oz)],
@@ -106,7 +107,7 @@ impl Source for &RayComponents<'_> {
     }
 }
 
-/// One of the three vectors of rays, by component.
+/// Returns one of the three vectors of rays, by component.
 #[inline(always)]
 unsafe fn transpose<L: Lanes>(rays: *const Ray, vector: usize) -> [L; 4] {
     const STEP: usize = size_of::<Ray>() / 4;

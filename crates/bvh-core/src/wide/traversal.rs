@@ -175,7 +175,7 @@ unsafe fn corners<L: Lanes>(
     }
 }
 
-/// Gives every ray the nearest hit among those it has and those in the block at which it is, by
+/// Gives every ray the nearest hit among the hit it has and those in the block at which it is, by
 /// [`Hit::precedes`](crate::Hit::precedes) and without a branch.
 #[inline(always)]
 pub(super) unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4], blocks: *const TriangleBlock) {
@@ -249,7 +249,7 @@ pub(super) unsafe fn decide_accepted<L: Lanes>(
     }
 }
 
-/// The lower of two ids.
+/// Returns the lower of two ids.
 #[inline(always)]
 fn lower<L: Lanes>(a: L, b: L) -> L {
     L::select(a.below(b), a, b)

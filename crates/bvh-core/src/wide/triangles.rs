@@ -56,7 +56,7 @@ impl TriangleBlock {
         (0..Self::LANES).filter_map(|lane| self.triangle(lane))
     }
 
-    /// The id in a lane; the greatest of all in an unused one.
+    /// Returns the id in a lane; the greatest of all ids for an unused lane.
     #[inline(always)]
     pub(crate) fn id(&self, lane: usize) -> u32 {
         let id = self.ids[lane];
@@ -69,7 +69,7 @@ impl TriangleBlock {
         self.ids.as_ptr()
     }
 
-    /// How many lanes are used; they are the first.
+    /// Returns the number of used lanes, which are the first.
     #[inline(always)]
     pub(crate) fn len(&self) -> usize {
         1 + (1..Self::LANES)
@@ -77,14 +77,14 @@ impl TriangleBlock {
             .sum::<usize>()
     }
 
-    /// Whether this is a leaf's last block.
+    /// Returns whether this is a leaf's last block.
     #[inline(always)]
     pub(crate) fn is_last(&self) -> bool {
         self.ids[0] & Self::LAST != 0
     }
 
-    /// A bit per triangle that the ray's line may meet. [`Triangle::intersect`] would reject all others by the sides of
-    /// their edges, which are computed here as there, bit by bit.
+    /// Returns a bit per triangle that the ray's line may meet. [`Triangle::intersect`] rejects all other
+    /// triangles by the sides of their edges, which are computed here by the same operations.
     #[inline(always)]
     pub(crate) fn candidates(&self, shear: &Shear) -> u32 {
         let [kx, ky, kz] = shear.axes;
@@ -114,7 +114,7 @@ impl TriangleBlock {
         candidates
     }
 
-    /// The corners of all four triangles along these axes.
+    /// Returns the corners of all four triangles along these axes.
     ///
     /// # Safety
     /// The processor has the instructions; axes are below 3, and `L` has four lanes.
@@ -134,7 +134,7 @@ impl TriangleBlock {
         }
     }
 
-    /// The corners of the triangle in a lane along these axes, each coordinate in all lanes.
+    /// Returns the corners of the triangle in a lane along these axes, each coordinate in all lanes.
     ///
     /// # Safety
     /// The processor has the instructions; axes are below 3, and `lane` is one.

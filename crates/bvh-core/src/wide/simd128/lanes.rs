@@ -12,7 +12,7 @@ use core::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Sub};
 #[derive(Clone, Copy)]
 pub(crate) struct Singles<const R: usize>([Single; R]);
 
-/// As many numbers of f64: for each register the lower two and the upper two.
+/// One f64 per lane: for each register the lower two and the upper two.
 #[derive(Clone, Copy)]
 pub(crate) struct Doubles<const R: usize>([[Double; 2]; R]);
 
@@ -172,7 +172,7 @@ impl<const R: usize> Lanes for Singles<R> {
 }
 
 impl<const R: usize> Singles<R> {
-    /// The lower halves of every quarter of both in turn, and the upper halves.
+    /// Returns the lower halves of every quarter of both in turn, and the upper halves.
     #[inline(always)]
     fn interleaved(self, other: Self) -> [Self; 2] {
         [

@@ -72,7 +72,7 @@ pub(super) unsafe fn swap_twos(a: Single) -> Single {
     unsafe { vextq_f32::<2>(a, a) }
 }
 
-/// A bit per lane whose sign is set.
+/// Returns a bit per lane whose sign is set.
 #[inline(always)]
 pub(super) unsafe fn signs(a: Single) -> u32 {
     // SAFETY: as above.

@@ -63,7 +63,7 @@ pub(super) fn swap_ones(a: v128) -> v128 {
     i32x4_shuffle::<1, 0, 3, 2>(a, a)
 }
 
-/// A bit per lane whose sign is set.
+/// Returns a bit per lane whose sign is set.
 #[inline(always)]
 pub(super) fn signs(a: v128) -> u32 {
     u32::from(i32x4_bitmask(a))

@@ -83,7 +83,7 @@ impl Instructions for Avx2 {
             let keys = sort::keys(entry);
             let entered = _mm256_castps_si256(Mask8::from_bits(mask).0);
             let others = _mm256_set1_epi32(-1);
-            // The nearest child first: the rest of the work is not on the way to it.
+            // The nearest child first: a traversal waits for it, and not for the rest of the work.
             let nearest = sort::nearest(node, _mm256_blendv_epi8(others, keys, entered));
             sort::write(node, compress(keys, mask), mask.count_ones(), to);
             nearest

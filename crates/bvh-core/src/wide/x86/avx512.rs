@@ -83,7 +83,7 @@ impl Instructions for Avx512 {
         unsafe {
             let keys = sort::keys(entry);
             let others = _mm256_set1_epi32(-1);
-            // The nearest child first: the rest of the work is not on the way to it.
+            // The nearest child first: a traversal waits for it, and not for the rest of the work.
             let nearest = sort::nearest(node, _mm256_mask_mov_epi32(others, mask as u8, keys));
             let keys = _mm256_maskz_compress_epi32(mask as u8, keys);
             sort::write(node, keys, mask.count_ones(), to);

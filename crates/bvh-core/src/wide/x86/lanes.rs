@@ -35,7 +35,7 @@ macro_rules! functions {
     )*};
 }
 
-/// What loads and stores a register, and fills all its lanes.
+/// Loads and stores of a register, and the fill of all its lanes.
 macro_rules! memory {
     ($splat:ident $load:ident $load_unaligned:ident $store:ident) => {
         #[inline(always)]
@@ -57,7 +57,7 @@ macro_rules! memory {
     };
 }
 
-/// What moves lanes within quarters of a register.
+/// Moves of lanes within quarters of a register.
 macro_rules! quarters {
     ($low:ident $high:ident $shuffle:ident $permute:ident) => {
         #[inline(always)]

@@ -24,7 +24,7 @@ pub(super) fn has(kernel: Kernel) -> bool {
     }
 }
 
-/// Whether the processor has what the AVX2 kernel is compiled for.
+/// Returns whether the processor has the instructions of the AVX2 kernel.
 fn has_avx2() -> bool {
     is_x86_feature_detected!("avx2")
         && is_x86_feature_detected!("fma")
@@ -34,7 +34,7 @@ fn has_avx2() -> bool {
         && is_x86_feature_detected!("lzcnt")
 }
 
-/// Whether the processor has what the AVX-512 kernel is compiled for.
+/// Returns whether the processor has the instructions of the AVX-512 kernel.
 fn has_avx512() -> bool {
     has_avx2()
         && is_x86_feature_detected!("avx512f")
@@ -211,7 +211,7 @@ macro_rules! entry_points {
 }
 use entry_points;
 
-/// What all instruction sets of x86-64 have in common.
+/// The operations that all instruction sets of x86-64 have in common.
 macro_rules! common_instructions {
     () => {
         #[inline(always)]
