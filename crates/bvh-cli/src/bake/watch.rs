@@ -81,12 +81,12 @@ impl<'a> Watch<'a> {
             Effort::Time(_) => self.deadline.fraction(),
             Effort::Work(work) => self.work.load(Relaxed) as f64 / work.max(1) as f64,
         };
-        let message = format!(
-            "cost {:.6e}, {} the greedy tree's, {:.0} s left",
-            event.incumbent,
-            gain(event.incumbent, self.base),
-            (seconds / done.max(1e-9) - seconds).max(0.0)
-        );
+        let gain = gain(event.incumbent, self.base);
+        let mut message = format!("cost {:.6e}, {gain} the greedy tree's", event.incumbent);
+        // The rate of the first moments predicts nothing.
+        if done >= 0.01 {
+            message += &format!(", {:.0} s left", (seconds / done - seconds).max(0.0));
+        }
         if !is_bar {
             print_error(&message);
             return;

@@ -157,7 +157,7 @@ fn chart(levels: [&[Level]; 2], value: fn(&Level) -> f64) -> String {
     let every = count.div_ceil(10);
     for depth in (0..count).step_by(every) {
         let x = step * (depth as f64 + 0.5);
-        let y = base + 16.0;
+        let y = base + 20.0;
         let _ =
             writeln!(text, "<text x=\"{x:.2}\" y=\"{y}\" text-anchor=\"middle\">{depth}</text>");
     }
@@ -166,7 +166,7 @@ fn chart(levels: [&[Level]; 2], value: fn(&Level) -> f64) -> String {
         text,
         "<text x=\"{:.2}\" y=\"{}\" text-anchor=\"middle\">depth</text>",
         width / 2.0,
-        base + 38.0
+        base + 40.0
     );
     text + "</svg>"
 }
