@@ -3,7 +3,7 @@
 use bvh_terminal::interrupt::{self, INTERRUPTED};
 use bvh_terminal::output::{answered, print_error, print_line, succeeded};
 use clap::{Parser, Subcommand};
-use harness::cli::{compare, merge, new, report, run};
+use harness::cli::{compare, jobs, merge, new, report, run};
 use harness::{Error, stress::child};
 use std::process::ExitCode;
 
@@ -25,6 +25,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Report(report::ReportArgs),
+    Jobs(jobs::JobsArgs),
     Merge(merge::MergeArgs),
     Compare(compare::CompareArgs),
     New(new::NewArgs),
@@ -48,6 +49,7 @@ fn main() -> ExitCode {
     let result = match cli.command {
         None => run::run(&cli.run, &INTERRUPTED),
         Some(Command::Report(args)) => report::report(&args),
+        Some(Command::Jobs(args)) => jobs::jobs(&args),
         Some(Command::Merge(args)) => merge::merge(&args),
         Some(Command::Compare(args)) => compare::compare(&args),
         Some(Command::New(args)) => new::new(&args),

@@ -253,6 +253,50 @@ fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_di
     );
 }
 
+#[test]
+fn listed_runs_performed_one_by_one_are_merged_to_the_bytes_of_one_process() {
+    let folder = folder();
+    let dir = folder.path();
+    said(dir, &["spec.toml", "--out", "whole"]);
+    let list = said(dir, &["jobs", "spec.toml"]);
+    let ids: Vec<&str> = list
+        .lines()
+        .map(|line| line.split(' ').next().unwrap())
+        .collect();
+    assert_eq!(ids.len(), 18);
+    let parts: Vec<String> = ids
+        .iter()
+        .map(|id| format!("parts/{id}"))
+        .collect();
+    for (id, part) in ids.iter().zip(&parts) {
+        said(dir, &["spec.toml", "--run", id, "--resume", "--out", part]);
+    }
+    let merge: Vec<&str> = ["merge"]
+        .into_iter()
+        .chain(parts.iter().map(String::as_str))
+        .chain(["--out", "merged"])
+        .collect();
+    refused(dir, &[&merge[..5], &["--out", "merged"]].concat(), 1, &["14 of 18 runs are missing"]);
+
+    // A part that two processors have worked on.
+    let provenance = dir
+        .join(&parts[0])
+        .join("spec/.partial/provenance.toml");
+    let recorded = fs::read_to_string(&provenance).unwrap();
+    fs::write(&provenance, recorded.replace("cpu = \"", "cpu = \"another ")).unwrap();
+    let resumed = ["spec.toml", "--run", ids[0], "--resume", "--out", parts[0].as_str()];
+    said(dir, &resumed);
+    refused(dir, &merge, 1, &["unlike processors", "another ", "--unlike-processors"]);
+    assert!(!dir.join("merged").exists());
+    said(dir, &[&merge[..], &["--unlike-processors"]].concat());
+    assert!(reproducible(&dir.join("whole/spec")) == reproducible(&dir.join("merged/spec")));
+
+    let unknown = ["spec.toml", "--run", "0123456789abcdef", "--out", "unknown"];
+    refused(dir, &unknown, 2, &["0123456789abcdef", "no such run", "harness jobs"]);
+    assert!(!dir.join("unknown").exists());
+    refused(dir, &["jobs", "spec.toml", "--scene", "sofa"], 2, &["sofa"]);
+}
+
 const GAPS: &str = "
 question = 'What are gaps measured from?'
 scenes = ['escher:300', 'spheres75:12']

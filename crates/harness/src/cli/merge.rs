@@ -1,16 +1,16 @@
-//! `harness merge`: joins the parts of experiments that ran with `--shard`.
+//! `harness merge`: joins the parts of experiments that ran with `--run` or `--shard`.
 
 use crate::Error;
 use crate::rows::store::Existing;
-use crate::run::merge;
+use crate::run::merge::{self, UnlikeProcessors};
 use bvh_terminal::arguments::output_folder;
 use bvh_terminal::output::print_line;
 use std::path::PathBuf;
 
-/// Join the parts of experiments that ran with --shard into the files that one run writes.
+/// Join the parts of experiments that ran with --run or --shard into the files that one run writes.
 #[derive(clap::Args, Clone, Debug)]
 pub struct MergeArgs {
-    /// Folders that were given as --out to runs with --shard.
+    /// Folders that were given as --out to runs with --run or --shard.
     #[arg(value_name = "DIR", required = true)]
     pub folders: Vec<PathBuf>,
     /// Folder for the results.
@@ -19,13 +19,20 @@ pub struct MergeArgs {
     /// Replace existing results.
     #[arg(long)]
     pub force: bool,
+    /// Merge parts from unlike processors, whose seconds do not compare.
+    #[arg(long)]
+    pub unlike_processors: bool,
 }
 
 /// Merges the parts and prints the tables of every experiment.
 pub fn merge(args: &MergeArgs) -> Result<(), Error> {
     output_folder("--out", &args.out)?;
     let existing = if args.force { Existing::Replace } else { Existing::Keep };
-    for (text, folder) in merge::merge(&args.folders, &args.out, existing)? {
+    let unlike = match args.unlike_processors {
+        true => UnlikeProcessors::Merged,
+        false => UnlikeProcessors::Rejected,
+    };
+    for (text, folder) in merge::merge(&args.folders, &args.out, existing, unlike)? {
         print_line(&format!("{text}Results: {}", folder.display()));
     }
     Ok(())

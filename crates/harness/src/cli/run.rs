@@ -6,7 +6,7 @@ use crate::cli::explain;
 use crate::rows::store::Existing;
 use crate::run::execute::{Extent, Verbosity, execute};
 use crate::run::finish::Summary;
-use crate::run::shard::Shard;
+use crate::run::selection::{Selection, Shard};
 use crate::run::{check, finish, reference};
 use crate::spec::{Experiment, Overrides};
 use bvh_terminal::arguments::{Jobs, output_folder};
@@ -24,29 +24,18 @@ pub struct RunArgs {
     /// Folder for the results; each experiment writes to a separate folder in it.
     #[arg(long, value_name = "DIR", default_value = "results")]
     pub out: PathBuf,
-    /// Scene to run on instead of the spec's scenes, by name or path of a mesh file; may be
-    /// repeated.
-    #[arg(long = "scene", value_name = "NAME|PATH")]
-    pub scenes: Vec<String>,
-    /// Let a glTF file name buffers outside its own folder. Its author then chooses which files are
-    /// read.
-    #[arg(long)]
-    pub outside_files: bool,
+    /// Replaces parts of the specs.
+    #[command(flatten)]
+    pub overrides: Overrides,
     /// Limits the threads.
     #[command(flatten)]
     pub jobs: Jobs,
-    /// Seed instead of the spec's.
-    #[arg(long, value_name = "N")]
-    pub seed: Option<u64>,
-    /// Run the spec's smaller variant, into the folder `quick` of the results.
-    #[arg(long)]
-    pub quick: bool,
     /// Compare with the committed results instead of writing any; exit code 1 on a difference.
     #[arg(long, conflicts_with = "resume")]
     pub check: bool,
     /// Make the tables and figures again from existing rows, with the current best known costs; run
     /// nothing.
-    #[arg(long, conflicts_with_all = ["check", "resume", "shard"])]
+    #[arg(long, conflicts_with_all = ["check", "resume", "shard", "runs"])]
     pub redraw: bool,
     /// Keep the finished runs of an interrupted experiment and perform the missing ones.
     #[arg(long)]
@@ -55,10 +44,14 @@ pub struct RunArgs {
     /// to a folder next to them whose name ends with `.new`.
     #[arg(long, conflicts_with_all = ["check", "redraw", "resume"])]
     pub force: bool,
-    /// Perform only the I-th of N parts of the runs, from 1, and keep them for `harness merge`.
-    /// Every part needs a different --out.
+    /// Perform only the I-th of N parts of the runs, from 1, and keep them for `harness merge`:
+    /// every N-th run that `harness jobs` lists. Every part needs a different --out.
     #[arg(long, value_name = "I/N", conflicts_with = "check")]
     pub shard: Option<Shard>,
+    /// Perform only the run that `harness jobs` lists with this identifier, and keep it for
+    /// `harness merge`; may be repeated. Every process needs a different --out.
+    #[arg(long = "run", value_name = "ID", conflicts_with_all = ["check", "shard"])]
+    pub runs: Vec<String>,
     /// Print only errors and, under --check, differences.
     #[arg(long)]
     pub quiet: bool,
@@ -75,17 +68,11 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     // A wrong folder is found before hours of work, not after them.
     output_folder("--out", &args.out)?;
     args.jobs.apply()?;
-    let overrides = Overrides {
-        scenes: args.scenes.clone(),
-        outside_files: args.outside_files,
-        seed: args.seed,
-        quick: args.quick,
-    };
     // A mistake in the last spec must not surface after hours of runs of the first.
     let experiments = args
         .specs
         .iter()
-        .map(|path| Experiment::read(path, &overrides))
+        .map(|path| Experiment::read(path, &args.overrides))
         .collect::<Result<Vec<_>, _>>()?;
     // Two specs with one name would write into one folder.
     let mut folders = HashSet::new();
@@ -102,7 +89,12 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         (_, true) => Existing::Replace,
         _ => Existing::Keep,
     };
-    let extent = Extent { existing, shard: args.shard, verbosity: verbosity(args) };
+    let selection = match args.shard {
+        Some(shard) => Selection::Shard(shard),
+        None if args.runs.is_empty() => Selection::All,
+        None => Selection::Runs(args.runs.clone()),
+    };
+    let extent = Extent { existing, selection, verbosity: verbosity(args) };
     let mut differences = 0;
     for experiment in &experiments {
         if args.explain {
@@ -115,7 +107,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         let summary = if args.redraw {
             finish::redraw(experiment, &args.out)?
         } else {
-            execute(experiment, &args.out, extent, interrupted)?
+            execute(experiment, &args.out, &extent, interrupted)?
         };
         summary
             .remarks
@@ -171,7 +163,7 @@ fn compare(
     // Gaps are measured from the references of the committed run, not from later finds.
     reference::adopt(&committed, temporary.path())?;
     let extent = Extent { verbosity: verbosity(args), ..Extent::default() };
-    let summary = execute(experiment, temporary.path(), extent, interrupted)?;
+    let summary = execute(experiment, temporary.path(), &extent, interrupted)?;
     let found = check::compare(&fresh, &committed, &summary.skipped_scenes, !experiment.quick)?;
     let name = &experiment.name;
     for scene in &summary.skipped_scenes {

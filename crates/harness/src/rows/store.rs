@@ -93,6 +93,9 @@ pub enum Existing {
     Replace,
 }
 
+/// The file in the folder of a part that tells where its runs come from.
+pub const PART_PROVENANCE: &str = "provenance.toml";
+
 /// The name of `.partial/` while it is removed.
 const REMOVED: &str = ".removed";
 
@@ -230,9 +233,9 @@ impl Store {
         Ok(files::write(&self.folder.join(name), bytes)?)
     }
 
-    /// Leaves the finished runs of a shard for merging, with their provenance.
-    pub fn keep_shard(self, provenance: &str) -> Result<(), Error> {
-        Ok(files::write(&self.partial.join("provenance.toml"), provenance.as_bytes())?)
+    /// The file next to the finished runs of a part that has their provenance.
+    pub fn part_provenance(&self) -> PathBuf {
+        self.partial.join(PART_PROVENANCE)
     }
 
     /// Removes the kept runs, which only an interrupted experiment needs. The lock file stays:

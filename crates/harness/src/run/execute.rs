@@ -9,7 +9,7 @@ use super::ray_cost::Judging;
 use super::reference::BestKnown;
 use super::resolved::{Resolved, load_scenes, to_toml};
 use super::runs::Runs;
-use super::shard::Shard;
+use super::selection::Selection;
 use super::suite::Suite;
 use super::target::Target;
 use super::trace::Tracing;
@@ -23,12 +23,12 @@ use std::sync::atomic::AtomicBool;
 pub use super::measurement::Verbosity;
 
 /// The part of an experiment to execute.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Extent {
     /// The treatment of existing results.
     pub existing: Existing,
-    /// Perform only these runs and keep them to be [merged](crate::run::merge::merge).
-    pub shard: Option<Shard>,
+    /// The runs to perform. Those of a part are kept to be [merged](crate::run::merge::merge).
+    pub selection: Selection,
     /// The lines about runs on standard error.
     pub verbosity: Verbosity,
 }
@@ -38,18 +38,13 @@ pub struct Extent {
 pub fn execute(
     experiment: &Experiment,
     out: &Path,
-    extent: Extent,
+    extent: &Extent,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
-    let measurements = measurements(experiment);
-    let indivisible = measurements
-        .iter()
-        .find_map(|measurement| measurement.indivisible());
-    if let Some(reason) = indivisible
-        && extent.shard.is_some()
-    {
-        return Err(Error::Usage(format!("{}: {reason}", experiment.name)));
+    if extent.selection.is_part() {
+        reject_indivisible(experiment)?;
     }
+    let measurements = measurements(experiment);
     // Without the key the program's pool serves, which `--jobs` has sized.
     let Some(threads) = experiment.threads else {
         return run(experiment, &measurements, out, extent, interrupted);
@@ -59,6 +54,17 @@ pub fn execute(
         .build()
         .map_err(|error| Error::Usage(format!("threads = {threads}: {error}")))?;
     pool.install(|| run(experiment, &measurements, out, extent, interrupted))
+}
+
+/// Returns an error if several processes cannot share the experiment.
+pub fn reject_indivisible(experiment: &Experiment) -> Result<(), Error> {
+    let reason = measurements(experiment)
+        .iter()
+        .find_map(|measurement| measurement.indivisible());
+    match reason {
+        Some(reason) => Err(Error::Usage(format!("{}: {reason}", experiment.name))),
+        None => Ok(()),
+    }
 }
 
 /// Returns the measurements of an experiment in their order: later ones use the trees of the runs.
@@ -80,24 +86,27 @@ fn run(
     experiment: &Experiment,
     measurements: &[Box<dyn Measurement + Sync + '_>],
     out: &Path,
-    extent: Extent,
+    extent: &Extent,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
-    let Extent { existing, shard, verbosity } = extent;
+    let Extent { existing, ref selection, verbosity } = *extent;
+    let is_part = selection.is_part();
     let (scenes, skipped_scenes) = load_scenes(experiment)?;
     let resolved = Resolved::new(experiment, &scenes);
-    let target = Target::choose(out, &resolved, existing, shard.is_some())?;
+    let target = Target::choose(out, &resolved, existing, is_part)?;
     let Target { folder, previous, is_finished } = target;
     if is_finished {
         store::remove_leftovers(&folder)?;
         return Ok(Summary { skipped_scenes, ..Summary::finished(folder) });
     }
+    // An unknown identifier must not leave a folder.
+    let jobs = Job::selected(experiment, &scenes, selection)?;
     let store = Store::open(&folder, &to_toml(&resolved)?, existing)?;
-    let jobs = Job::all(experiment, &scenes)?;
-    let assigned: Vec<usize> = (0..jobs.len())
-        .filter(|&index| shard.is_none_or(|shard| shard.has(index)))
-        .collect();
-    let runs = assigned.len();
+    let runs = jobs.len();
+    if is_part {
+        // Before the runs, because a killed part may be resumed on another machine.
+        Provenance::add_to_part(&store.part_provenance())?;
+    }
     let mut remarks: Vec<String> = scenes
         .iter()
         .filter_map(|scene| scene.remark.clone())
@@ -107,7 +116,6 @@ fn run(
     let mut work = Work {
         experiment,
         jobs: &jobs,
-        assigned,
         store: &store,
         watch: Watch { bar: progress(runs as u64), interrupted },
         verbosity,
@@ -119,11 +127,8 @@ fn run(
         text += &measurement.measure(&mut work)?;
     }
     let remarks = work.remarks;
-    // Gathered after the runs: the date is the time of completion.
-    let provenance = Provenance::gather();
-    if let Some(shard) = shard {
-        store.keep_shard(&to_toml(&provenance)?)?;
-        let text = format!("{runs} runs, part {shard}; `harness merge` joins the parts.\n");
+    if is_part {
+        let text = format!("{runs} runs, {selection}; `harness merge` joins the parts.\n");
         return Ok(Summary { text, skipped_scenes, remarks, folder, previous });
     }
     // A repetition is compared with the previous results, which requires the same references.
@@ -131,7 +136,7 @@ fn run(
         Some(_) => BestKnown::Read(out),
         None => BestKnown::Improve(out),
     };
-    let text = conclude(&resolved, best_known, &provenance, store)? + &text;
+    let text = conclude(&resolved, best_known, &Provenance::gather(), store)? + &text;
     Ok(Summary { text, skipped_scenes, remarks, folder, previous })
 }
 

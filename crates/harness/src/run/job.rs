@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::contestant::Labelled;
+use crate::run::selection::Selection;
 use crate::spec::Experiment;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
@@ -11,6 +12,8 @@ use rayon::prelude::*;
 
 /// One run of an experiment.
 pub(crate) struct Job<'a> {
+    /// The position of the run in the order of the spec.
+    pub index: usize,
     pub scene: &'a Scene,
     /// The cost of the scene's greedy Müller–Fellner tree.
     pub base: f64,
@@ -21,20 +24,31 @@ pub(crate) struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
-    /// Returns all runs of an experiment, scene by scene, in the order of the spec.
-    pub fn all(experiment: &'a Experiment, scenes: &'a [Scene]) -> Result<Vec<Self>, Error> {
-        // Bases are needed before any run, and scenes are independent.
-        let bases = scenes
-            .par_iter()
-            .map(|scene| base_cost(scene, &experiment.objective))
-            .collect::<Result<Vec<_>, _>>()?;
-        let mut jobs = Vec::new();
-        for (scene, base) in scenes.iter().zip(bases) {
-            for (labelled, repetition, first_of_scene) in experiment.runs() {
-                jobs.push(Self { scene, base, labelled, repetition, first_of_scene });
-            }
-        }
-        Ok(jobs)
+    /// Returns the selected runs of an experiment, scene by scene, in the order of the spec.
+    pub fn selected(
+        experiment: &'a Experiment,
+        scenes: &'a [Scene],
+        selection: &Selection,
+    ) -> Result<Vec<Self>, Error> {
+        let selected = selection.of(experiment, scenes)?;
+        let runs: Vec<_> = experiment.runs().collect();
+        let runs_of_scenes: Vec<&[usize]> = selected
+            .chunk_by(|a, b| a / runs.len() == b / runs.len())
+            .collect();
+        // A process that performs one run of a large sweep needs no bases of the other scenes.
+        let jobs_of_scenes = runs_of_scenes
+            .into_par_iter()
+            .map(|indices| {
+                let scene = &scenes[indices[0] / runs.len()];
+                let base = base_cost(scene, &experiment.objective)?;
+                let job = |&index: &usize| {
+                    let (labelled, repetition, first_of_scene) = runs[index % runs.len()];
+                    Self { index, scene, base, labelled, repetition, first_of_scene }
+                };
+                Ok(indices.iter().map(job).collect())
+            })
+            .collect::<Result<Vec<Vec<Self>>, Error>>()?;
+        Ok(jobs_of_scenes.into_iter().flatten().collect())
     }
 
     /// The seed of the run.

@@ -14,7 +14,7 @@ pub(crate) type Trees = BTreeMap<usize, Bvh>;
 
 /// A part of an experiment that makes rows.
 pub(crate) trait Measurement {
-    /// Returns the reason why shards cannot share this measurement, if they cannot.
+    /// Returns the reason why processes cannot share this measurement, if they cannot.
     fn indivisible(&self) -> Option<&'static str> {
         None
     }
@@ -26,10 +26,8 @@ pub(crate) trait Measurement {
 /// A running experiment, with everything that its measurements share.
 pub(crate) struct Work<'a> {
     pub experiment: &'a Experiment,
-    /// All runs of the experiment.
+    /// The selected runs: all runs, unless several processes share the experiment.
     pub jobs: &'a [Job<'a>],
-    /// The indices of the runs of this shard: all runs, unless the experiment is split.
-    pub assigned: Vec<usize>,
     pub store: &'a Store,
     pub watch: Watch<'a>,
     pub verbosity: Verbosity,

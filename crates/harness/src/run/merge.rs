@@ -10,22 +10,32 @@ use crate::run::reference::BestKnown;
 use crate::run::resolved::Resolved;
 use crate::run::target::Target;
 use bvh_terminal::files;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-/// One part of an experiment, made with `--shard`. Its folder stays locked as long as this lives.
+/// One part of an experiment, made with `--run` or `--shard`. Its folder stays locked as long as this lives.
 struct Part {
     partial: PathBuf,
     resolved: String,
+    provenance: Option<Provenance>,
     _lock: File,
 }
 
 /// The maximum number of missing runs that an error names.
 const NAMED: usize = 5;
 
+/// Parts of one experiment from processors of several models.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UnlikeProcessors {
+    /// Their seconds are rows of the same tables.
+    Merged,
+    /// They are rejected: nothing can be concluded from their seconds.
+    Rejected,
+}
+
 /// Joins every experiment that has a part in one of `folders`, each the `--out` of a harness with
-/// `--shard`, into its folder in `out`.
+/// `--run` or `--shard`, into its folder in `out`.
 ///
 /// Except for seconds and provenance, the bytes are the same as from one machine. The parts stay.
 /// Returns the tables of every experiment and the folder of its results.
@@ -33,11 +43,13 @@ const NAMED: usize = 5;
 /// # Errors
 ///
 /// If parts come from different specs, scenes or seeds, if two parts have different results of a
-/// run, if a part is being written, or if runs are missing.
+/// run, if a part is being written, if runs are missing, or if parts come from `unlike` processors
+/// and are not to be merged then.
 pub fn merge(
     folders: &[PathBuf],
     out: &Path,
     existing: Existing,
+    unlike: UnlikeProcessors,
 ) -> Result<Vec<(String, PathBuf)>, Error> {
     let mut experiments: BTreeMap<PathBuf, Vec<Part>> = BTreeMap::new();
     for folder in folders {
@@ -45,7 +57,7 @@ pub fn merge(
         if found.is_empty() {
             return Err(Error::Usage(format!(
                 "{} holds no part of an experiment; accepted: folders given as --out to runs with \
-                 --shard",
+                 --run or --shard",
                 folder.display()
             )));
         }
@@ -55,7 +67,7 @@ pub fn merge(
     }
     experiments
         .iter()
-        .map(|(name, parts)| join(name, parts, out, existing))
+        .map(|(name, parts)| join(name, parts, out, existing, unlike))
         .collect()
 }
 
@@ -83,7 +95,8 @@ fn parts(out: &Path) -> Result<Vec<(PathBuf, Part)>, Error> {
             // Locked until the end, so that no part changes meanwhile.
             let lock = lock_folder(&folder)?;
             let resolved = fs::read_to_string(&spec).map_err(Error::io(&spec, "read the file"))?;
-            parts.push((name, Part { partial, resolved, _lock: lock }));
+            let provenance = Provenance::of_part(&partial.join(store::PART_PROVENANCE))?;
+            parts.push((name, Part { partial, resolved, provenance, _lock: lock }));
         }
     }
     Ok(parts)
@@ -95,6 +108,7 @@ fn join(
     parts: &[Part],
     out: &Path,
     existing: Existing,
+    unlike: UnlikeProcessors,
 ) -> Result<(String, PathBuf), Error> {
     let merge_error = |message| Error::Merge { experiment: name.display().to_string(), message };
     // Symbolic links and `..` may hide that two paths are the same folder.
@@ -110,25 +124,41 @@ fn join(
     }
     let resolved = common_spec(name, parts).map_err(merge_error)?;
     let owners = owners(&resolved, parts, merge_error)?;
+    if unlike == UnlikeProcessors::Rejected {
+        check_processors(parts).map_err(merge_error)?;
+    }
     let Target { folder, previous, .. } = Target::choose(out, &resolved, existing, false)?;
     let store = Store::open(&folder, &parts[0].resolved, existing)?;
     for (index, owner) in owners.iter().enumerate() {
         store.keep(index, &FinishedRun::read(owner)?)?;
     }
     let mut provenance = Provenance::gather();
-    for part in parts {
-        let path = part.partial.join("provenance.toml");
-        if let Ok(text) = fs::read_to_string(&path) {
-            provenance
-                .parts
-                .push(toml::from_str(&text).map_err(Error::toml(&path))?);
-        }
-    }
+    provenance.parts = parts
+        .iter()
+        .filter_map(|part| part.provenance.clone())
+        .collect();
     let best_known = match previous {
         Some(_) => BestKnown::Read(out),
         None => BestKnown::Improve(out),
     };
     Ok((conclude(&resolved, best_known, &provenance, store)?, folder))
+}
+
+/// Returns an error if the seconds of the parts come from unlike processors.
+fn check_processors(parts: &[Part]) -> Result<(), String> {
+    let processors: BTreeSet<&str> = parts
+        .iter()
+        .filter_map(|part| part.provenance.as_ref())
+        .flat_map(Provenance::processors)
+        .collect();
+    if processors.len() <= 1 {
+        return Ok(());
+    }
+    let processors = Vec::from_iter(processors).join("; ");
+    Err(format!(
+        "the seconds come from unlike processors: {processors}; accepted: parts from one model, or \
+         --unlike-processors, which merges them all the same"
+    ))
 }
 
 /// Returns the resolved spec that all parts share. Somebody may have edited it, so everything that

@@ -14,7 +14,7 @@ mod ray_cost;
 pub mod reference;
 pub mod resolved;
 mod runs;
-pub mod shard;
+pub mod selection;
 mod solved;
 mod suite;
 pub mod target;

@@ -1,8 +1,13 @@
 //! The origin of results: revision, compiler, processor, threads, date. It has a separate file, as
 //! it is not reproducible.
 
+use super::resolved::to_toml;
+use crate::Error;
 use crate::processor::PROCESSOR;
+use bvh_scenes::read_text;
+use bvh_terminal::files;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 use std::time::SystemTime;
 
 /// Contents of `provenance.toml`.
@@ -28,7 +33,8 @@ pub struct Provenance {
     pub threads: usize,
     /// The time at which the results were completed, UTC.
     pub date: String,
-    /// The provenance of every part, if the results are merged.
+    /// The provenance of every part, if the results are merged; of a part, earlier processes on
+    /// other processors.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<Provenance>,
 }
@@ -58,6 +64,38 @@ impl Provenance {
             date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
             parts: vec![],
         }
+    }
+
+    /// Records in the file of a part that this process adds runs to it.
+    pub fn add_to_part(path: &Path) -> Result<(), Error> {
+        let mut provenance = Self::gather();
+        if let Some(mut earlier) = Self::of_part(path)? {
+            provenance.parts = std::mem::take(&mut earlier.parts);
+            provenance.parts.push(earlier);
+            provenance
+                .parts
+                .retain(|part| part.cpu != provenance.cpu);
+        }
+        files::write(path, to_toml(&provenance)?.as_bytes())?;
+        Ok(())
+    }
+
+    /// Reads the file of a part, if there is one.
+    pub fn of_part(path: &Path) -> Result<Option<Self>, Error> {
+        if !path.is_file() {
+            return Ok(None);
+        }
+        toml::from_str(&read_text(path)?)
+            .map(Some)
+            .map_err(Error::toml(path))
+    }
+
+    /// Returns the processors of the results, with repetitions.
+    pub fn processors(&self) -> impl Iterator<Item = &str> {
+        self.parts
+            .iter()
+            .chain([self])
+            .map(|provenance| provenance.cpu.as_str())
     }
 }
 

@@ -19,19 +19,19 @@ impl Measurement for Runs {
     /// Performs the runs that are missing or damaged in the store, and keeps each once it finishes.
     fn measure(&self, work: &mut Work) -> Result<String, Error> {
         let missing = missing_runs(work)?;
-        let progress = Progress::new(work, work.assigned.len() - missing.len());
+        let progress = Progress::new(work, work.jobs.len() - missing.len());
         let result = if work.experiment.sequential {
             missing
                 .iter()
-                .try_for_each(|&index| progress.perform(work, index))
+                .try_for_each(|job| progress.perform(work, job))
         } else {
             missing
                 .par_iter()
-                .try_for_each(|&index| progress.perform(work, index))
+                .try_for_each(|job| progress.perform(work, job))
         };
         work.watch.bar.finish_and_clear();
         result?;
-        let runs = work.assigned.len();
+        let runs = work.jobs.len();
         match progress.finished.into_inner() {
             finished if finished < runs => Err(Error::Interrupted { finished, runs }),
             _ => {
@@ -45,25 +45,25 @@ impl Measurement for Runs {
     }
 }
 
-/// Returns the indices of the runs to perform, in their order, and adds a remark on damaged ones.
-fn missing_runs(work: &mut Work) -> Result<Vec<usize>, Error> {
+/// Returns the runs to perform, in their order, and adds a remark on damaged ones.
+fn missing_runs<'a>(work: &mut Work<'a>) -> Result<Vec<&'a Job<'a>>, Error> {
     let mut missing = Vec::new();
-    for &index in &work.assigned {
-        match work.store.has(index) {
+    for job in work.jobs {
+        match work.store.has(job.index) {
             Ok(true) => continue,
             Ok(false) => {}
             Err(damaged) => work
                 .remarks
                 .push(format!("done again: {damaged}")),
         }
-        missing.push(index);
+        missing.push(job);
     }
     let experiment = work.experiment;
     if experiment.sequential {
         // Methods alternate, so that a disturbance of the machine does not affect all repetitions
         // of one method.
         let runs_of_scene = experiment.methods.len() * experiment.repetitions as usize;
-        missing.sort_by_key(|&index| (index / runs_of_scene, work.jobs[index].repetition));
+        missing.sort_by_key(|job| (job.index / runs_of_scene, job.repetition));
     }
     Ok(missing)
 }
@@ -87,24 +87,23 @@ impl Progress {
         Self {
             trees: Mutex::default(),
             finished: finished.into(),
-            total: work.assigned.len(),
+            total: work.jobs.len(),
             start: Instant::now(),
             last_report: Mutex::new(Instant::now()),
         }
     }
 
     /// Performs a run and keeps it unless it is interrupted.
-    fn perform(&self, work: &Work, index: usize) -> Result<(), Error> {
+    fn perform(&self, work: &Work, job: &Job) -> Result<(), Error> {
         let start = Instant::now();
-        let job = &work.jobs[index];
         let experiment = work.experiment;
         let Some((run, tree)) = perform(experiment, job, &work.watch)? else { return Ok(()) };
-        work.store.keep(index, &run)?;
+        work.store.keep(job.index, &run)?;
         if experiment.judges().is_some() || experiment.tracing.is_some() && job.repetition == 0 {
             self.trees
                 .lock()
                 .unwrap_or_else(PoisonError::into_inner)
-                .insert(index, tree);
+                .insert(job.index, tree);
         }
         let finished = self.finished.fetch_add(1, Relaxed) + 1;
         work.watch.bar.inc(1);

@@ -24,12 +24,12 @@ impl Target {
     ///
     /// # Errors
     ///
-    /// If the folder holds finished results of other runs. For a shard, if it holds any.
+    /// If the folder holds finished results of other runs. For a part, if it holds any.
     pub(crate) fn choose(
         out: &Path,
         resolved: &Resolved,
         existing: Existing,
-        is_shard: bool,
+        is_part: bool,
     ) -> Result<Self, Error> {
         let folder = out.join(resolved.experiment.folder());
         let recorded = folder.join("resolved.toml");
@@ -38,7 +38,7 @@ impl Target {
         }
         let text =
             std::fs::read_to_string(&recorded).map_err(Error::io(&recorded, "read the file"))?;
-        let found = if is_shard {
+        let found = if is_part {
             Some("has finished results")
         } else if !toml::from_str(&text).is_ok_and(|found| resolved.repeats(&found)) {
             Some("has the results of another spec, scene or seed")

@@ -172,13 +172,23 @@ impl Experiment {
 
     /// The seed of one run, of 32 bits, which every spreadsheet represents exactly.
     pub fn seed_of(&self, scene: &str, label: &str, repetition: u32) -> u64 {
+        let hash = self.hash_of(scene, label, repetition);
+        // Both halves are folded together, because the low bits of FNV-1a alone mix less well.
+        (hash ^ (hash >> 32)) & 0xffff_ffff
+    }
+
+    /// The identifier of one run on every machine, also after other runs have joined the spec: 16
+    /// hexadecimal digits.
+    pub fn run_id(&self, scene: &str, label: &str, repetition: u32) -> String {
+        format!("{:016x}", self.hash_of(scene, label, repetition))
+    }
+
+    fn hash_of(&self, scene: &str, label: &str, repetition: u32) -> u64 {
         // Quick runs differ from full runs, so they must not share seeds by accident.
         let variant = if self.quick { "-quick" } else { "" };
         let identity =
             format!("{}\0{}{variant}\0{scene}\0{label}\0{repetition}", self.seed, self.name);
-        let hash = fnv1a(identity.into_bytes());
-        // Both halves are folded together, because the low bits of FNV-1a alone mix less well.
-        (hash ^ (hash >> 32)) & 0xffff_ffff
+        fnv1a(identity.into_bytes())
     }
 }
 

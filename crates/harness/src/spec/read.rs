@@ -11,15 +11,21 @@ use std::path::Path;
 use toml::{Table, Value};
 
 /// The keys that the command line changes in every spec.
-#[derive(Clone, Debug, Default)]
+#[derive(clap::Args, Clone, Debug, Default)]
 pub struct Overrides {
-    /// Replaces the scenes, if any are given.
+    /// Scene to run on instead of the spec's scenes, by name or path of a mesh file; may be
+    /// repeated.
+    #[arg(long = "scene", value_name = "NAME|PATH")]
     pub scenes: Vec<String>,
-    /// Allows glTF files to name buffers outside their folders.
+    /// Let a glTF file name buffers outside its own folder. Its author then chooses which files are
+    /// read.
+    #[arg(long)]
     pub outside_files: bool,
-    /// Replaces the seed.
+    /// Seed instead of the spec's.
+    #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// Applies the spec's `quick` table.
+    /// Run the spec's smaller variant, into the folder `quick` of the results.
+    #[arg(long)]
     pub quick: bool,
 }
 
