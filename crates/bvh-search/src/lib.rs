@@ -44,7 +44,7 @@ pub use rays::{FindError, ray_density};
 pub use registry::Method;
 pub use run::{
     Budget, Event, Judge, Observer, Outcome, Problem, Quota, Run, Search, SearchError, Shortcut,
-    Splits, StopReason, Stream, Tally, solve,
+    Splits, StopReason, Stream, Tally, solve, solve_or_keep,
 };
 #[cfg(feature = "std")]
 pub use run::{Deadline, Watched};

@@ -13,12 +13,13 @@ use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion;
 use crate::parallel::threads;
 use crate::run::{Observer, Problem, Quota, Run, StopReason, Stream, Tally, stream};
-use crate::tree::{Metric, Working};
+use crate::tree::{Metric, Shape, Working};
 use crate::tuning::{
     FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, RECOMBINED_AT_ONCE, ROUNDS_PER_LOOK,
     SECURED_FROM, SUBTREES_PER_THREAD, TRIAL, WORK_ON_REFERENCES, WORTH_AN_EVENT, WORTH_SUBTREES,
 };
 use bvh_core::cost::Objective;
+use bvh_core::{Aabb, Bvh};
 
 /// Improves the incumbent, whose working form is `tree`, until the work is done or the time is
 /// over. Also improves its references, if the problem has splits. With an `other` start, a trial
@@ -43,6 +44,7 @@ pub(crate) fn improve<A: Metric>(
         .map(|splits| Divider::new(splits, by_layout));
     let mut search = Improvement {
         config,
+        boxes: problem.boxes,
         seed,
         n,
         left: work,
@@ -65,9 +67,19 @@ pub(crate) fn improve<A: Metric>(
 /// follow the numbers of all other runs, so that no random stream is used twice.
 const TRIALS: u64 = 1 << 20;
 
+/// The tree from before an annealing run.
+enum Before {
+    /// The incumbent is no worse.
+    Incumbent,
+    Shape(Shape),
+    /// The tree with its area; leaves may hold parts of objects.
+    Flat(Bvh, f64),
+}
+
 /// A search in progress.
 struct Improvement<'a, 'p, 'r, 's> {
     config: &'a Config,
+    boxes: &'a [Aabb],
     seed: u64,
     /// Number of objects.
     n: u64,
@@ -100,7 +112,7 @@ impl Improvement<'_, '_, '_, '_> {
             let now = observer.progress().unwrap_or(1.0);
             end_of_all = 1.0 - (1.0 - now) * (FINISH_WORK * n as f64 / in_time).min(FINISH_AT_MOST);
             length = length.min(in_time / n as f64);
-            self.secure(tree.metric(), length);
+            self.secure(tree, length);
         }
         let all = self.left;
         let began = observer.progress().unwrap_or(0.0);
@@ -150,13 +162,20 @@ impl Improvement<'_, '_, '_, '_> {
     /// Keeps a local optimum of reinsertion. A caller who stops a time-limited search before
     /// annealing pays then gets at least the result of plain reinsertion. The plan continues from
     /// the unchanged tree.
-    fn secure(&mut self, metric: impl Metric, length: f64) {
-        if length >= SECURED_FROM
-            && !self.is_secured
-            && let Ok(mut aside) = self.best.working(metric)
-        {
+    fn secure(&mut self, tree: &mut Working<impl Metric>, length: f64) {
+        if length < SECURED_FROM || self.is_secured {
+            return;
+        }
+        self.is_secured = true;
+        if self.divider.is_none() {
+            // A working form is a large part of all memory, so the tree itself is searched.
+            let before = tree.shape();
+            if self.best.refill(tree).is_ok() {
+                self.reinsert(tree);
+            }
+            tree.reshape(&before, self.boxes);
+        } else if let Ok(mut aside) = self.best.working(tree.metric()) {
             self.reinsert(&mut aside);
-            self.is_secured = true;
         }
     }
 
@@ -178,7 +197,7 @@ impl Improvement<'_, '_, '_, '_> {
                     .at_most(self.left.min(PROBE * self.n));
                 let (tally, in_time) = self.probe(tree, stream(self.seed, 0), quota);
                 self.run.count(tally);
-                self.secure(tree.metric(), in_time / n);
+                self.secure(tree, in_time / n);
                 TRIAL * in_time.min(self.left as f64)
             }
             Horizon::Known => TRIAL * self.left as f64,
@@ -253,13 +272,28 @@ impl Improvement<'_, '_, '_, '_> {
             done += tally;
             best.offer(tree, run);
         }
-        // Anneal a copy: recombination needs both trees.
-        let mut annealed = tree.clone();
+        let metric = tree.metric();
+        let cost_before = cost(tree, by_layout);
+        let area_before = tree.area();
+        let is_timed = observer.progress().is_some();
+        // Recombination needs both trees, and a run that ends worse is discarded. A first run under
+        // a time limit is not recombined, so that the incumbent can take the place of the tree,
+        // unless a divider changes references or a trial compares two trees.
+        let discards_to_incumbent =
+            first && is_timed && !by_layout && self.divider.is_none() && number < TRIALS;
+        let before = if discards_to_incumbent {
+            best.offer(tree, run);
+            Before::Incumbent
+        } else if self.divider.is_some() {
+            Before::Flat(tree.to_bvh(), area_before)
+        } else {
+            Before::Shape(tree.shape())
+        };
         let mut divider = self.divider.as_mut().filter(|_| first);
         anneal(
             || RuinMover::new(&ruin, length, by_layout),
             schedule,
-            &mut annealed,
+            tree,
             streams,
             observer,
             &mut |tree, tally| {
@@ -281,20 +315,24 @@ impl Improvement<'_, '_, '_, '_> {
             },
         );
         // The cost of a layout is no sum over clades, so such trees cannot be recombined.
-        if by_layout {
-            if cost(&annealed, by_layout) < cost(tree, by_layout) {
-                *tree = annealed;
+        let is_better = cost(tree, by_layout) < cost_before;
+        let is_recombined = !by_layout
+            && !(first && (is_better || is_timed))
+            && !(run.stopped() == Some(StopReason::Cancelled)
+                && tree.objects() > RECOMBINED_AT_ONCE);
+        if is_recombined || !is_better {
+            // Recombination needs both trees.
+            let annealed = is_recombined.then(|| std::mem::take(&mut tree.nodes));
+            // A binary tree stays binary, so that no conversion fails.
+            match before {
+                Before::Shape(shape) => tree.reshape(&shape, self.boxes),
+                Before::Flat(flat, area) => _ = tree.refill(&flat, area),
+                Before::Incumbent => _ = best.refill(tree),
             }
-        } else if first && annealed.area() < tree.area() {
-            *tree = annealed;
-        } else if run.stopped() == Some(StopReason::Cancelled)
-            && annealed.objects() > RECOMBINED_AT_ONCE
-        {
-            if annealed.area() < tree.area() {
-                *tree = annealed;
+            if let Some(annealed) = annealed {
+                let annealed = Working::from_nodes(annealed, metric);
+                *tree = recombine(&[&*tree, &annealed]);
             }
-        } else if !first || observer.progress().is_none() {
-            *tree = recombine(&[tree, &annealed]);
         }
         best.offer(tree, run);
         self.left = self.left.saturating_sub(done.work);

@@ -8,6 +8,9 @@ use bvh_build::{Builder, Watch};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective};
 
+/// A relative difference of areas that is far above all rounding errors.
+const CERTAIN: f64 = 1e-9;
+
 /// The best tree so far. Local search lowers the internal area. For binary trees with one object
 /// per leaf, every objective of a [`Problem`] grows with the internal area, so all of them fall
 /// together.
@@ -36,6 +39,11 @@ impl<'p> Incumbent<'p> {
     /// Converts the best tree to its working form. Builders and moves leave boxes tight.
     pub fn working<A: Metric>(&self, metric: A) -> Result<Working<A>, SearchError> {
         Working::from_bvh(&self.tree, self.area, metric)
+    }
+
+    /// Makes `tree` the working form of the best tree, in the memory that it has.
+    pub fn refill(&self, tree: &mut Working<impl Metric>) -> Result<(), SearchError> {
+        tree.refill(&self.tree, self.area)
     }
 
     /// Starts with a valid tree whose boxes are tight.
@@ -81,6 +89,17 @@ impl<'p> Incumbent<'p> {
         // The incremental area rejects most trees without the conversion. The layout's cost does
         // not follow the area, so every tree is converted for it.
         let may_be_better = tree.area() < self.area || self.problem.objective == Objective::Layout;
+        // A tree that is better by more than rounding errors is certain to be kept, so the memory of
+        // the trees that it replaces is free before the conversion needs as much.
+        let Problem { objective, measure, splits, judge, .. } = self.problem;
+        let is_plain = measure.is_none() && splits.is_none() && judge.is_none();
+        if is_plain
+            && objective == Objective::InternalArea
+            && tree.area() < run.incumbent().min(self.area) * (1.0 - CERTAIN)
+        {
+            self.tree = Bvh::default();
+            run.drop_aside(tree.area() * (1.0 + CERTAIN));
+        }
         may_be_better && self.offer_tree(tree.to_bvh(), run)
     }
 

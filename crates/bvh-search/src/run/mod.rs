@@ -51,7 +51,9 @@ pub struct Run<'a> {
     incumbent: f64,
     /// The proof that no tree costs less than the incumbent, if there is one.
     optimal: Option<Shortcut>,
-    /// The cheapest of the trees that the search built and did not improve, with its cost.
+    /// The cheapest of the trees that the caller handed over, and that the search built and did not
+    /// improve, with its cost. Dropped with the first incumbent that costs no more, because it
+    /// cannot become the outcome then.
     aside: Option<(f64, Bvh)>,
     history: Vec<Event>,
 }
@@ -69,10 +71,21 @@ impl<'a> Run<'a> {
         self.count(Tally { moves: evaluations, work, kept: 0 });
         let improved = cost < self.incumbent;
         if improved {
-            self.incumbent = cost;
+            self.lower_incumbent(cost);
         }
         self.report(cost);
         improved
+    }
+
+    fn lower_incumbent(&mut self, cost: f64) {
+        self.incumbent = cost;
+        self.drop_aside(cost);
+    }
+
+    /// Drops the tree kept aside, if it costs at least as much as a tree that the search has or is
+    /// about to [improve](Self::improve) to.
+    pub(crate) fn drop_aside(&mut self, cost: f64) {
+        self.aside.take_if(|(aside, _)| *aside >= cost);
     }
 
     /// Counts moves without events. Searches that make millions of moves report improvements by
@@ -88,7 +101,7 @@ impl<'a> Run<'a> {
     pub fn improve(&mut self, cost: f64) -> bool {
         let improved = cost < self.incumbent;
         if improved {
-            self.incumbent = cost;
+            self.lower_incumbent(cost);
             self.report(cost);
         }
         improved
@@ -240,6 +253,20 @@ pub fn solve(
     budget: Budget,
     observer: &dyn Observer,
 ) -> Result<Outcome, SearchError> {
+    solve_or_keep(search, problem, None, seed, budget, observer)
+}
+
+/// Searches as [`solve`] does. The caller hands over a valid tree, as an alternative to lending it
+/// as [`Problem::known`]: the outcome never costs more, and the memory of the tree is free as soon
+/// as the search has a tree that costs no more.
+pub fn solve_or_keep(
+    search: &dyn Search,
+    problem: &Problem,
+    tree: Option<Bvh>,
+    seed: u64,
+    budget: Budget,
+    observer: &dyn Observer,
+) -> Result<Outcome, SearchError> {
     let incumbent = f64::INFINITY;
     let mut run = Run {
         budget,
@@ -248,7 +275,7 @@ pub fn solve(
         work: 0,
         incumbent,
         optimal: None,
-        aside: None,
+        aside: tree.map(|tree| (problem.cost(&tree), tree)),
         history: Vec::new(),
     };
     search.check()?;

@@ -2,6 +2,7 @@
 
 use super::{ANCHOR, Metric, NONE, Node, Working};
 use crate::run::SearchError;
+use bvh_core::cost::Sum;
 use bvh_core::{Aabb, Bvh, Node as BvhNode, NodeKind, PackedAabb};
 
 impl<M: Metric> Working<M> {
@@ -9,7 +10,16 @@ impl<M: Metric> Working<M> {
     /// internal area by the metric is `area`. Rejects inner nodes with more than two children.
     /// O(n).
     pub fn from_bvh(tree: &Bvh, area: f64, metric: M) -> Result<Self, SearchError> {
-        let mut nodes = Vec::with_capacity(tree.nodes.len() + 1);
+        let mut working = Self::new(Vec::with_capacity(tree.nodes.len() + 1), metric);
+        working.refill(tree, area)?;
+        Ok(working)
+    }
+
+    /// Becomes the working form of another tree, in the memory that it has. O(n).
+    pub fn refill(&mut self, tree: &Bvh, area: f64) -> Result<(), SearchError> {
+        let metric = self.metric;
+        let nodes = &mut self.nodes;
+        nodes.clear();
         nodes.push(Node::ANCHOR);
         // Leaves write to two dummy slots, so the store needs no branch, which the processor could
         // not predict.
@@ -34,9 +44,10 @@ impl<M: Metric> Working<M> {
         if nodes.len() > 1 {
             nodes[0].children[0] = 1;
         }
-        let mut working = Self::new(nodes, metric);
-        working.area.add(area);
-        Ok(working)
+        let mut sum = Sum::default();
+        sum.add(area);
+        self.restart(sum);
+        Ok(())
     }
 
     /// Returns the flat tree, with adjacent children, left before right, and objects in leaf order.

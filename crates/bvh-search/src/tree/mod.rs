@@ -13,6 +13,7 @@ mod convert;
 mod linked;
 mod metric;
 mod position;
+mod shape;
 mod siblings;
 mod subsets;
 
@@ -21,11 +22,15 @@ use bvh_core::cost::Sum;
 pub(crate) use linked::Linked;
 pub(crate) use metric::{Area, Metric, WithLeaves, search_by_metric};
 pub(crate) use position::{PositionSearch, Scope};
+pub(crate) use shape::Shape;
 pub(crate) use siblings::Siblings;
 pub(crate) use subsets::Subsets;
 
 /// No node.
 pub(crate) const NONE: u32 = u32::MAX;
+
+/// The number of nodes from which a tree is sorted in place, because memory is scarcer than time.
+const SORTED_IN_PLACE: usize = 1 << 20;
 
 /// The parent of the root.
 pub(crate) const ANCHOR: u32 = 0;
@@ -80,7 +85,7 @@ pub(crate) struct Working<M = Area> {
     added: f64,
     journal: Vec<Node>,
     change: u64,
-    /// Always empty; its capacity is reused by `sort_in_preorder`.
+    /// Always empty; `sort_in_preorder` reuses its capacity, except in large trees.
     spare: Vec<Node>,
 }
 
@@ -311,6 +316,73 @@ impl<M: Metric> Working<M> {
 
     /// Sorts the nodes in preorder, so that neighbours in the tree are neighbours in memory. O(n).
     pub fn sort_in_preorder(&mut self) {
+        if self.nodes.len() >= SORTED_IN_PLACE {
+            self.sort_in_place();
+        } else {
+            self.sort_into_spare();
+        }
+    }
+
+    /// Sorts by moving every node once, with an eighth of the memory of `sort_into_spare`, and in
+    /// about twice its time.
+    fn sort_in_place(&mut self) {
+        // The new index of every node, and then the parts of the area in the new order.
+        let order = self.preorder();
+        let mut places = vec![ANCHOR; self.nodes.len()];
+        let mut area = Sum::default();
+        for (&index, place) in order.iter().zip(1..) {
+            places[index as usize] = place;
+            if let Some(part) = Self::part(&self.nodes[index as usize]) {
+                area.add(part);
+            }
+        }
+        let kept = order.len() + 1;
+        drop(order);
+        // Nodes outside the tree go to the end.
+        let mut outside = kept as u32..;
+        for place in places[1..]
+            .iter_mut()
+            .filter(|place| **place == ANCHOR)
+        {
+            *place = outside.next().unwrap_or(NONE);
+        }
+        for node in &mut self.nodes {
+            node.stamp = 0;
+            if node.parent != NONE {
+                node.parent = places[node.parent as usize];
+            }
+            if node.is_leaf() {
+                continue;
+            }
+            // The anchor has one child.
+            for child in node
+                .children
+                .iter_mut()
+                .filter(|child| **child != NONE)
+            {
+                *child = places[*child as usize];
+            }
+        }
+        for index in 0..places.len() {
+            // Every swap moves one node to its place.
+            while places[index] as usize != index {
+                let place = places[index] as usize;
+                self.nodes.swap(index, place);
+                places.swap(index, place);
+            }
+        }
+        self.nodes.truncate(kept);
+        self.restart(area);
+    }
+
+    /// Forgets the current change and sets the area.
+    fn restart(&mut self, area: Sum) {
+        (self.area, self.added, self.change) = (Sum::default(), 0.0, 0);
+        self.area.add(area.value());
+        self.journal.clear();
+    }
+
+    fn sort_into_spare(&mut self) {
         let mut nodes = std::mem::take(&mut self.spare);
         nodes.reserve(self.nodes.len());
         nodes.push(Node { stamp: 0, ..self.nodes[0] });
@@ -335,9 +407,7 @@ impl<M: Metric> Working<M> {
         }
         self.spare = std::mem::replace(&mut self.nodes, nodes);
         self.spare.clear();
-        (self.area, self.added, self.change) = (Sum::default(), 0.0, 0);
-        self.area.add(area.value());
-        self.journal.clear();
+        self.restart(area);
     }
 }
 

@@ -76,6 +76,39 @@ fn conversion_there_and_back_changes_nothing() {
 }
 
 #[test]
+fn the_shape_alone_gives_the_sorted_tree() {
+    for n in [0, 1, 2, 3, 50] {
+        let (boxes, mut tree) = scene(n);
+        let shape = tree.shape();
+        let (_, mut again) = scene(n);
+        again.begin();
+        again.reshape(&shape, &boxes);
+        tree.sort_into_spare();
+        assert_eq!(format!("{:?}", again.nodes), format!("{:?}", tree.nodes));
+        assert_eq!(again.area().to_bits(), tree.area().to_bits());
+    }
+}
+
+#[test]
+fn sorting_in_place_gives_the_same_nodes() {
+    for n in [0, 1, 2, 3, 50, 300] {
+        for spare_leaves in 0..3 {
+            let (_, mut tree) = scene(n);
+            for _ in 0..spare_leaves {
+                tree.push_spare(0);
+            }
+            let mut in_place = tree.clone();
+            tree.sort_into_spare();
+            in_place.sort_in_place();
+            let [nodes, nodes_in_place] =
+                [&tree, &in_place].map(|tree| format!("{:?}", tree.nodes));
+            assert_eq!(nodes, nodes_in_place);
+            assert_eq!(tree.area().to_bits(), in_place.area().to_bits());
+        }
+    }
+}
+
+#[test]
 fn undoing_restores_every_bit() {
     let (_, mut tree) = scene(40);
     let mut rng = stream(3, 0);
