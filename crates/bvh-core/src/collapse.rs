@@ -87,17 +87,22 @@ pub(crate) fn collect(tree: &Bvh, subtree: usize, ids: &mut Vec<u32>) {
 /// Returns the same tree with two children per inner node. Wider nodes are halved, in the order of
 /// their children.
 pub(crate) fn binary(tree: &Bvh) -> Cow<'_, Bvh> {
+    if is_binary(tree) {
+        return Cow::Borrowed(tree);
+    }
     binary_visited(tree, &mut vec![0.0; tree.nodes.len()])
+}
+
+fn is_binary(tree: &Bvh) -> bool {
+    tree.nodes
+        .iter()
+        .all(|node| node.is_leaf() || node.children().len() == 2)
 }
 
 /// Returns the [`binary`] tree and updates `visits`, which has one number per node. A new node gets
 /// the sum of the visits of its parts, but at most the visits of the node that was divided.
 pub(crate) fn binary_visited<'t>(tree: &'t Bvh, visits: &mut Vec<f32>) -> Cow<'t, Bvh> {
-    if tree
-        .nodes
-        .iter()
-        .all(|node| node.is_leaf() || node.children().len() == 2)
-    {
+    if is_binary(tree) {
         return Cow::Borrowed(tree);
     }
     let root = tree.nodes[0];

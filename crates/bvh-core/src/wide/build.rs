@@ -134,6 +134,25 @@ fn promise(tree: &Bvh, triangles: &[Triangle], visits: &[f32], decisions: &[Deci
         .collect()
 }
 
+/// Returns the number of nodes of the layout, and the largest number of blocks that it can have.
+fn sizes(tree: &Bvh, decisions: &[Decision]) -> (usize, usize) {
+    let mut sizes = (0, 0);
+    let mut open = vec![0];
+    while let Some(subtree) = open.pop() {
+        let decision = &decisions[subtree];
+        if decision.leaf {
+            sizes.1 += decision
+                .objects
+                .div_ceil(TriangleBlock::LANES as u32) as usize;
+        } else {
+            sizes.0 += 1;
+            let (children, lanes) = children(tree, decisions, subtree);
+            open.extend_from_slice(&children[..lanes]);
+        }
+    }
+    sizes
+}
+
 /// The part of the lines through the root's box that meet each node's.
 pub(crate) fn areas(tree: &Bvh) -> Vec<f32> {
     let root_area = tree.nodes[0].aabb.half_area();
@@ -182,9 +201,12 @@ pub(crate) fn widen(
         |objects: u32| Some(block_cost * objects.div_ceil(TriangleBlock::LANES as u32) as f32);
     let decisions = decide(tree, &visits, blocks);
     let promise = promise(tree, triangles, &visits, &decisions);
+    drop(visits);
+    // A vector that grows would take up to three times its memory while it is copied.
+    let (node_count, most_blocks) = sizes(tree, &decisions);
     let mut ids = Vec::new();
-    let mut nodes = Vec::new();
-    let mut all_blocks = Vec::new();
+    let mut nodes = Vec::with_capacity(node_count);
+    let mut all_blocks = Vec::with_capacity(most_blocks);
     // Subtrees, and the lane that is to name each; none names the root.
     let mut open = vec![(0, None, 0)];
     while let Some((subtree, place, waiting)) = open.pop() {
