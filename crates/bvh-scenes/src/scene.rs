@@ -1,6 +1,6 @@
 //! A loaded scene, and the names that select one.
 
-use crate::builtin::{spheres, stand_ins, stiff};
+use crate::builtin::{landscape, spheres, stand_ins, stiff};
 use crate::load::OutsideFiles;
 use crate::subset::Subset;
 use crate::{fnv1a, load};
@@ -78,16 +78,16 @@ pub const FETCHED: [(&str, &str); 3] = [("sponza", "bvh"), ("kitchen", "obvhs"),
 pub const SPHERES: [(&str, usize); 3] =
     [("spheres75", 75), ("spheres750", 750), ("spheres7500", 7500)];
 
-/// The largest number of objects of a stiff scene. Together with boxes and a tree they need ten
+/// The largest number of objects of a generated scene. Together with boxes and a tree they need ten
 /// gigabytes.
-const MOST_STIFF: usize = 100_000_000;
+const MOST_GENERATED: usize = 100_000_000;
 
 impl Scene {
     /// Loads a scene by name.
     ///
     /// `name` is a stand-in, one of [`SPHERES`], one of [`FETCHED`] or the path of a mesh file,
-    /// each optionally followed by a [`Subset`]; or it is a stiff scene with its number of objects,
-    /// such as `S34:20000`.
+    /// each optionally followed by a [`Subset`]; or it is a landscape or a stiff scene with its
+    /// number of objects, such as `terrain:1000000` or `S34:20000`.
     ///
     /// # Errors
     ///
@@ -100,9 +100,9 @@ impl Scene {
     /// to files outside its folder.
     pub fn load_with(name: &str, outside: OutsideFiles) -> Result<Self, SceneError> {
         match Subset::parse(name) {
-            // A stiff scene is generated with any number of objects, so its count is not a subset.
-            Some((id, Subset::Spaced(objects))) if stiff::by_id(id).is_some() => {
-                Self::stiff(id, name, objects)
+            // A generated scene has any number of objects, so its count is not a subset.
+            Some((id, Subset::Spaced(objects))) if generator(id).is_some() => {
+                Self::generated(id, name, objects)
             }
             Some((whole, subset)) => {
                 Self::load_whole(whole, outside)?.subset(subset, &name[whole.len()..])
@@ -164,13 +164,13 @@ impl Scene {
         })
     }
 
-    /// Generates the stiff scene `id` with `objects` objects, or nearly as many where the generator
-    /// cannot make exactly that number.
-    fn stiff(id: &str, name: &str, objects: usize) -> Result<Self, SceneError> {
-        let generator = stiff::by_id(id).filter(|_| (1..=MOST_STIFF).contains(&objects));
+    /// Generates a scene of `objects` objects, or of nearly as many where the generator cannot make
+    /// exactly that number.
+    fn generated(id: &str, name: &str, objects: usize) -> Result<Self, SceneError> {
+        let generator = generator(id).filter(|_| (1..=MOST_GENERATED).contains(&objects));
         let triangles = generator.map_or_else(Vec::new, |triangles| triangles(objects));
         if triangles.is_empty() {
-            let message = format!("a case of the suite has 1 to {MOST_STIFF} objects");
+            let message = format!("a generated scene has 1 to {MOST_GENERATED} objects");
             return Err(SceneError::new(name, message));
         }
         Ok(Self::new(name, SceneKind::Procedural, Primitives::Triangles(triangles)))
@@ -235,6 +235,11 @@ pub fn fetched_path(name: &str) -> Option<PathBuf> {
         .find(|path| path.is_file())
 }
 
+/// Returns the generator of a scene of any number of objects, which is therefore no subset.
+fn generator(id: &str) -> Option<stiff::Generator> {
+    stiff::by_id(id).or_else(|| landscape::by_name(id))
+}
+
 /// Lists the accepted names, as a part of an error message.
 fn known_scenes() -> String {
     let names = stand_ins::STAND_INS
@@ -245,8 +250,8 @@ fn known_scenes() -> String {
         .chain(FETCHED.map(|(name, _)| name));
     format!(
         "accepted: {}, the path of an OBJ, PLY, STL or glTF file, either of them with `:COUNT`, \
-         `:random:COUNT:SEED` or `:cluster:COUNT:SEED` for a subset, or a case of the suite with a \
-         number of objects such as S34:20000",
+         `:random:COUNT:SEED` or `:cluster:COUNT:SEED` for a subset, or city, forest, terrain or a \
+         case of the suite with a number of objects such as terrain:1000000 or S34:20000",
         names.collect::<Vec<_>>().join(", ")
     )
 }

@@ -349,6 +349,27 @@ rows! {
         bytes_per_object: f64,
     }
 
+    /// One row of `timing_scale.csv`: one phase on a scene of millions of triangles, on one thread.
+    ScaleRow in "timing_scale.csv" {
+        scene: String,
+        objects: usize,
+        /// The processor that was measured.
+        processor: String,
+        /// Load, build, bake, save, map, inspect or lay out.
+        phase: String,
+        /// Wall time; of a bake, the greedy tree included.
+        seconds: f64,
+        /// The most bytes allocated at once, the scene and the trees that the phase needs included.
+        peak_bytes: usize,
+        bytes_per_object: f64,
+        /// Bytes that stay allocated after the phase.
+        bytes_after: usize,
+        /// Internal area over the greedy tree's, of phases that make a tree.
+        cost_over_base: Option<f64>,
+        /// Megabytes of the mesh file per second, of phases that load it.
+        megabytes_per_s: Option<f64>,
+    }
+
     /// One row of `bounds.csv`: a proven lower bound of a scene.
     BoundRow in "bounds.csv" {
         scene: String,

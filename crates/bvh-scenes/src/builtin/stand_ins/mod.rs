@@ -12,7 +12,7 @@ mod mesh_builder;
 mod pinecon2;
 
 use bvh_core::Triangle;
-pub use mesh_builder::jitter;
+pub use mesh_builder::{cos_sin, jitter};
 
 /// A procedural scene that replaces an original.
 #[derive(Clone, Copy, Debug)]

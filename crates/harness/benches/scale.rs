@@ -1,0 +1,250 @@
+//! Time and peak memory of every phase on scenes of millions of triangles, on one thread.
+//!
+//! `cargo bench -p harness --bench scale --features peers -- terrain:1000000 forest:8000000` writes
+//! `results/scale/timing_scale.csv`, and keeps its rows of other scenes. Without scenes it measures
+//! forests of 1, 8 and 20 million triangles.
+//!
+//! The program counts the bytes that it requests from its allocator; counting adds about 1 % to the
+//! times. Mapped files are not counted.
+
+use bvh_build::{Builder, muller_fellner, ploc};
+use bvh_core::file::{self, Origin, TreeFile};
+use bvh_core::{Aabb, Bvh, WideBvh, cost, validate};
+use bvh_scenes::{Scene, load};
+use bvh_search::best::{self, Horizon};
+use bvh_search::{Budget, Deadline, Problem, solve_or_keep};
+use harness::processor::PROCESSOR;
+use harness::rows::{Row, ScaleRow, read_if_any, to_bytes};
+use memmap2::Mmap;
+use peak_alloc::PeakAlloc;
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+#[global_allocator]
+static ALLOCATED: PeakAlloc = PeakAlloc;
+
+const FOLDER: &str = "results/scale";
+const DEFAULT: [&str; 3] = ["forest:1000000", "forest:8000000", "forest:20000000"];
+
+fn main() {
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    std::env::set_current_dir(&top).expect("the project's folder");
+    let mut names: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|argument| !argument.starts_with("--"))
+        .collect();
+    if names.is_empty() {
+        names = DEFAULT.map(String::from).into();
+    }
+    let one = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .expect("a pool of threads");
+    for name in names {
+        let mut phases = Phases { scene: name, objects: 0, rows: Vec::new() };
+        one.install(|| phases.measure());
+        phases.write();
+    }
+}
+
+/// The measured phases of one scene.
+struct Phases {
+    scene: String,
+    objects: usize,
+    rows: Vec<ScaleRow>,
+}
+
+impl Phases {
+    /// Performs a phase, and records its time and the most bytes allocated at once, those of the
+    /// scene and of the trees that the phase needs included.
+    fn phase<T>(&mut self, phase: &str, perform: impl FnOnce() -> T) -> T {
+        ALLOCATED.reset_peak_usage();
+        let start = Instant::now();
+        let result = perform();
+        let seconds = start.elapsed().as_secs_f64();
+        let peak_bytes = ALLOCATED.peak_usage();
+        let bytes_per_object = peak_bytes as f64 / self.objects as f64;
+        println!(
+            "{:<18} {phase:<28} {seconds:>8.2} s {bytes_per_object:>7.0} bytes per triangle",
+            self.scene
+        );
+        self.rows.push(ScaleRow {
+            scene: self.scene.clone(),
+            objects: self.objects,
+            processor: PROCESSOR.name(),
+            phase: phase.into(),
+            seconds,
+            peak_bytes,
+            bytes_per_object,
+            bytes_after: ALLOCATED.current_usage(),
+            cost_over_base: None,
+            megabytes_per_s: None,
+        });
+        result
+    }
+
+    /// Adds the cost of the tree that the last phase made.
+    fn cost(&mut self, tree: &Bvh, base: f64) {
+        let ratio = cost::internal_area(tree) / base;
+        println!("{:<18} {:<28} {ratio:>8.4} of greedy's cost", "", "");
+        self.rows
+            .last_mut()
+            .expect("a phase")
+            .cost_over_base = Some(ratio);
+    }
+
+    fn measure(&mut self) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let ply = folder.path().join("scene.ply");
+        let obj = folder.path().join("scene.obj");
+        {
+            let scene = Scene::load(&self.scene).expect("a scene");
+            self.objects = scene.boxes.len();
+            write_ply(&scene, &ply);
+            write_obj(&scene, &obj);
+        }
+        for (path, kind) in [(&obj, "OBJ"), (&ply, "PLY")] {
+            let megabytes = fs::metadata(path).expect("a file").len() as f64 / 1e6;
+            self.phase(&format!("load {kind}"), || load::load(path).expect("a mesh"));
+            let row = self.rows.last_mut().expect("a phase");
+            row.megabytes_per_s = Some(megabytes / row.seconds);
+        }
+        let name = ply.to_str().expect("a name").to_owned();
+        let scene = self.phase("load as a scene", || Scene::load(&name).expect("a scene"));
+        let boxes = &scene.boxes;
+        let greedy = self.phase("build greedy", || {
+            muller_fellner::Config::default()
+                .build(boxes)
+                .expect("finite boxes")
+        });
+        let base = cost::internal_area(&greedy);
+        self.cost(&greedy, base);
+        drop(greedy);
+        let clustered = self.phase("build PLOC", || {
+            ploc::Config::default()
+                .build(boxes)
+                .expect("finite boxes")
+        });
+        self.cost(&clustered, base);
+        drop(clustered);
+        self.peers(&scene, base);
+        drop(self.bake(boxes, base, 10));
+        let baked = self.bake(boxes, base, 60);
+        let path = folder.path().join("tree.bvh");
+        self.phase("save", || {
+            let bytes = file::save(&baked, boxes, &Origin::default()).expect("a valid tree");
+            fs::write(&path, bytes).expect("a file");
+        });
+        self.phase("map, check and view", || {
+            let file = File::open(&path).expect("the file");
+            // SAFETY: the file is in a temporary folder of this process, which does not write to it
+            // while it is mapped.
+            let bytes = unsafe { Mmap::map(&file) }.expect("a mapping");
+            let file = TreeFile::open(&bytes).expect("a tree file");
+            let file = file
+                .for_boxes(boxes)
+                .expect("a tree of these boxes");
+            assert_eq!(file.view().expect("a tree").nodes.len(), baked.nodes.len());
+        });
+        self.phase("inspect", || {
+            validate(&baked, boxes).expect("a valid tree");
+            [cost::internal_area(&baked), cost::goldsmith_salmon(&baked)]
+        });
+        let triangles = scene.triangles().expect("triangles");
+        self.phase("wide layout", || {
+            WideBvh::new(&baked, triangles)
+                .expect("a layout")
+                .bytes()
+        });
+    }
+
+    /// Bakes for `seconds` as the program does, which builds the greedy tree before the time begins.
+    fn bake(&mut self, boxes: &[Aabb], base: f64, seconds: u64) -> Bvh {
+        let config = best::Config { horizon: Some(Horizon::Known), ..Default::default() };
+        let baked = self.phase(&format!("bake {seconds} s"), || {
+            let greedy = muller_fellner::Config::default()
+                .build(boxes)
+                .expect("finite boxes");
+            let deadline = Deadline::after(Duration::from_secs(seconds));
+            let problem = Problem::new(boxes);
+            solve_or_keep(&config, &problem, Some(greedy), 1, Budget::UNLIMITED, &deadline)
+                .expect("a tree")
+                .tree
+        });
+        self.cost(&baked, base);
+        baked
+    }
+
+    #[cfg(feature = "peers")]
+    fn peers(&mut self, scene: &Scene, base: f64) {
+        use harness::peers::{Obvhs, Peer, Preset};
+        for preset in [Preset::Medium, Preset::VerySlow] {
+            let peer = Peer::Obvhs(Obvhs { preset, reinsertion: None });
+            let name = format!("build obvhs {preset:?}");
+            let built = self.phase(&name, || peer.build(scene).expect("a tree"));
+            // The library's stopwatch excludes the conversion to our tree.
+            self.rows.last_mut().expect("a phase").seconds = built.seconds;
+            self.cost(&built.tree, base);
+        }
+    }
+
+    #[cfg(not(feature = "peers"))]
+    fn peers(&mut self, _scene: &Scene, _base: f64) {}
+
+    /// Replaces the rows of this scene in the file.
+    fn write(self) {
+        let folder = Path::new(FOLDER);
+        fs::create_dir_all(folder).expect("a folder for results");
+        let mut rows: Vec<ScaleRow> = read_if_any(folder).expect("rows");
+        rows.retain(|row| row.scene != self.scene || row.processor != PROCESSOR.name());
+        rows.extend(self.rows);
+        rows.sort_by(|a, b| {
+            (&a.processor, a.objects, &a.scene).cmp(&(&b.processor, b.objects, &b.scene))
+        });
+        let path = folder.join(ScaleRow::FILE);
+        fs::write(&path, to_bytes(&rows, &path).expect("rows")).expect("a file");
+    }
+}
+
+/// Writes a binary PLY file in which every triangle has three vertices of its own.
+fn write_ply(scene: &Scene, path: &Path) {
+    let triangles = scene.triangles().expect("triangles");
+    let mut out = BufWriter::new(File::create(path).expect("a file"));
+    let header = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float \
+         y\nproperty float z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        3 * triangles.len(),
+        triangles.len()
+    );
+    out.write_all(header.as_bytes()).expect("a file");
+    for number in triangles
+        .iter()
+        .flat_map(|triangle| triangle.0)
+        .flat_map(|corner| corner.to_array())
+    {
+        out.write_all(&number.to_le_bytes())
+            .expect("a file");
+    }
+    for face in 0..triangles.len() as i32 {
+        out.write_all(&[3]).expect("a file");
+        for corner in 0..3 {
+            out.write_all(&(3 * face + corner).to_le_bytes())
+                .expect("a file");
+        }
+    }
+    out.flush().expect("a file");
+}
+
+fn write_obj(scene: &Scene, path: &Path) {
+    let triangles = scene.triangles().expect("triangles");
+    let mut out = BufWriter::new(File::create(path).expect("a file"));
+    for corner in triangles.iter().flat_map(|triangle| triangle.0) {
+        writeln!(out, "v {} {} {}", corner.x, corner.y, corner.z).expect("a file");
+    }
+    for face in 0..triangles.len() {
+        writeln!(out, "f {} {} {}", 3 * face + 1, 3 * face + 2, 3 * face + 3).expect("a file");
+    }
+    out.flush().expect("a file");
+}
