@@ -60,6 +60,12 @@ pub enum Error {
         .path.display()
     )]
     StoppedInstances { path: PathBuf },
+    /// Ctrl-C ended a bake of parts.
+    #[error(
+        "interrupted; finished parts are in {}, and the same command bakes the rest",
+        .path.display()
+    )]
+    StoppedParts { path: PathBuf },
 }
 
 impl Error {
@@ -78,6 +84,7 @@ impl Error {
             },
             Self::Stopped { .. }
             | Self::StoppedInstances { .. }
+            | Self::StoppedParts { .. }
             | Self::Abandoned
             | Self::Unmeasured
             | Self::NoTree => 130,

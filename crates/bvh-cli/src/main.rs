@@ -69,7 +69,10 @@ fn main() -> ExitCode {
 fn run(command: Command) -> Result<(), Error> {
     match command {
         Command::Bake(args) if args.instances => bake::instances::bake(&args, &INTERRUPTED),
-        Command::Bake(args) => bake::bake(&args, &INTERRUPTED),
+        Command::Bake(args) => match args.parts {
+            Some(count) => bake::parts::bake(&args, count, &INTERRUPTED),
+            None => bake::bake(&args, &INTERRUPTED),
+        },
         Command::Inspect(args) => inspect::inspect(&args, &INTERRUPTED),
         Command::Verify(args) => inspect::verify(&args),
         Command::Render(args) => render::render(&args, &INTERRUPTED),

@@ -22,6 +22,14 @@ impl Effort {
         }
     }
 
+    /// Returns the work, unless the budget is a time.
+    pub fn work(self) -> Option<u64> {
+        match self {
+            Self::Time(_) => None,
+            Self::Work(work) => Some(work),
+        }
+    }
+
     /// Returns the deadline of a search that begins now. A budget of work has none.
     pub(super) fn deadline(self) -> Deadline {
         Deadline::after(if let Self::Time(limit) = self { limit } else { Duration::MAX })

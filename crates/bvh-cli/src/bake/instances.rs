@@ -74,7 +74,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         // Every tree gets a share of the budget in proportion to its number of objects.
         let part = scene.boxes.len() as f64 / objects as f64;
         let plan = Plan { effort: plan.effort.share(part), ..plan.clone() };
-        bake_part(&plan, scene, &out.join(name), interrupted)?;
+        bake_part(&plan, scene, &out.join(name), Interruption::Keeps, interrupted)?;
     }
     if interrupted.load(Relaxed) {
         return Err(Error::StoppedInstances { path: out });
@@ -85,15 +85,26 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     Ok(())
 }
 
-/// Searches for the tree over one mesh or over the instances, and writes it.
-fn bake_part(
+/// What becomes of a tree whose search was interrupted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Interruption {
+    Keeps,
+    Discards,
+}
+
+/// Searches for the tree over a part of a scene, and writes it.
+pub(super) fn bake_part(
     plan: &Plan,
     scene: &Scene,
     path: &Path,
+    interruption: Interruption,
     interrupted: &AtomicBool,
 ) -> Result<(), Error> {
-    let bake = plan.begin(scene, None, Prepared::default(), interrupted)?;
-    let baked = bake.search(interrupted)?;
+    let (bake, greedy) = plan.begin(scene, None, Prepared::default(), interrupted)?;
+    let baked = bake.search(greedy, interrupted)?;
+    if interruption == Interruption::Discards && interrupted.load(Relaxed) {
+        return Ok(());
+    }
     bake.save(&baked, path, files::Reserved::new(path, 0)?)?;
     let count = scene.boxes.len();
     let cost = baked.outcome.cost;

@@ -3,6 +3,7 @@
 mod decide;
 mod effort;
 pub mod instances;
+pub mod parts;
 mod plan;
 mod starts;
 mod watch;
@@ -69,6 +70,18 @@ pub struct BakeArgs {
     /// Continue from the tree of an earlier bake of the same scene; the result is never worse.
     #[arg(long, value_name = "FILE.bvh")]
     pub from: Option<PathBuf>,
+    /// Cut the scene by space into N parts, bake each into the folder `FILE.parts`, and join their
+    /// trees under a searched top. Finished parts are not baked again.
+    #[arg(long, value_name = "N", requires = "budget")]
+    #[arg(conflicts_with_all = ["rays", "from", "instances", "explain"])]
+    #[arg(value_parser = clap::value_parser!(u32).range(2..=65_536))]
+    pub parts: Option<u32>,
+    /// With --parts, list the parts, one a line: identifier, estimated work, description.
+    #[arg(long, requires = "parts", conflicts_with = "part")]
+    pub list: bool,
+    /// With --parts, bake only the part with this identifier.
+    #[arg(long, value_name = "ID", requires = "parts")]
+    pub part: Option<String>,
     /// Limits the threads.
     #[command(flatten)]
     pub jobs: Jobs,
@@ -265,13 +278,13 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let (plan, prepared) = args.decided(plan, &scene, interrupted)?;
     // Reserving the file first reports a full disk before the search and not after it.
     let reserved = Reserved::new(&out, plan.most_bytes(&scene))?;
-    let bake = plan.begin(&scene, start.as_ref(), prepared, interrupted)?;
+    let (bake, greedy) = plan.begin(&scene, start.as_ref(), prepared, interrupted)?;
     if args.explain && bake.is_whole() {
         print_line(
             "  skipped: divided objects: no spatial split of a top-down division saves anything",
         );
     }
-    let baked = bake.search(interrupted)?;
+    let baked = bake.search(greedy, interrupted)?;
     let bytes = bake.save(&baked, &out, reserved)?;
     if interrupted.load(Relaxed) {
         return Err(Error::Stopped { path: out, cost: baked.outcome.cost });
@@ -283,7 +296,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
 
 /// Describes the result of a bake.
 fn summary(plan: &Plan, scene: &Scene, bake: &Bake, baked: &Baked) -> String {
-    let Baked { outcome, base, before, seconds } = baked;
+    let Baked { outcome, base, before, seconds, .. } = baked;
     let objects = scene.boxes.len();
     let method = plan.method.name();
     let mut lines = vec![
@@ -295,7 +308,7 @@ fn summary(plan: &Plan, scene: &Scene, bake: &Bake, baked: &Baked) -> String {
             gain(outcome.cost, *base)
         ),
     ];
-    if let Some([cost, greedy]) = bake.costs_elsewhere(&outcome.tree) {
+    if let Some([cost, greedy]) = bake.costs_elsewhere(baked) {
         lines.push(format!(
             "risk: a tree for rays may be worse for others; for random lines it is {} Müller–Fellner's",
             gain(cost, greedy)

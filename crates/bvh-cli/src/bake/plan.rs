@@ -10,7 +10,9 @@ use bvh_core::file::{self, Header, Origin};
 use bvh_core::{Bvh, Node, RayDensity};
 use bvh_scenes::Scene;
 use bvh_scenes::tree_file::TreeFileError;
-use bvh_search::{Budget, Deadline, Method, Outcome, Problem, SearchError, best, optimize, solve};
+use bvh_search::{
+    Budget, Deadline, Method, Outcome, Problem, SearchError, best, optimize, solve_or_keep,
+};
 use bvh_terminal::files::Reserved;
 use bvh_terminal::interrupt;
 use std::path::Path;
@@ -67,15 +69,15 @@ impl Plan {
         Header::BYTES + self.most_references(scene) * reference
     }
 
-    /// Begins a bake with the `prepared` results. The time of the bake starts after the greedy tree
-    /// is built.
+    /// Begins a bake with the `prepared` results, and returns the bake with the greedy tree. The time
+    /// of the bake starts after the greedy tree is built.
     pub fn begin<'a>(
         &'a self,
         scene: &'a Scene,
         start: Option<&'a Start>,
         prepared: Prepared<'a>,
         interrupted: &AtomicBool,
-    ) -> Result<Bake<'a>, Error> {
+    ) -> Result<(Bake<'a>, Bvh), Error> {
         let greedy = match prepared.greedy {
             Some(tree) => tree,
             None => greedy(self.method.name(), scene, interrupted)?,
@@ -94,7 +96,7 @@ impl Plan {
             (None, Some(rays)) => rays.density(scene, &greedy, self.seed, interrupted)?,
             (density, _) => density,
         };
-        Ok(Bake { plan: self, scene, start, greedy, deadline, division, density })
+        Ok((Bake { plan: self, scene, start, deadline, division, density }, greedy))
     }
 }
 
@@ -103,7 +105,6 @@ pub struct Bake<'a> {
     plan: &'a Plan,
     scene: &'a Scene,
     start: Option<&'a Start>,
-    greedy: Bvh,
     deadline: Deadline,
     division: Division<'a>,
     density: Option<RayDensity>,
@@ -116,7 +117,9 @@ impl Bake<'_> {
     }
 
     /// Searches until the budget is spent or `interrupted` becomes true.
-    pub fn search(&self, interrupted: &AtomicBool) -> Result<Baked, Error> {
+    ///
+    /// Takes the greedy tree, whose memory is free as soon as there is a better one.
+    pub fn search(&self, greedy: Bvh, interrupted: &AtomicBool) -> Result<Baked, Error> {
         let problem = Problem {
             objective: self.plan.objective,
             splits: self.division.splits(),
@@ -124,17 +127,18 @@ impl Bake<'_> {
                 .density
                 .as_ref()
                 .map(|density| density as &dyn Measure),
-            known: Some(&self.greedy),
             ..Problem::new(&self.scene.boxes)
         };
         // Gains are relative to the greedy tree, by the cost that the search minimises.
-        let base = problem.cost(&self.greedy);
+        let base = problem.cost(&greedy);
+        let base_elsewhere = self.cost_elsewhere(&greedy);
         let watch = Watch::new(self.plan.effort, self.deadline, base, interrupted);
-        let outcome = self.outcome(&problem, &watch, interrupted);
+        let outcome = self.outcome(&problem, greedy, &watch, interrupted);
         watch.bar.finish_and_clear();
         Ok(Baked {
             outcome: outcome.map_err(Error::search(&self.scene.name, self.plan.method.name()))?,
             base,
+            base_elsewhere,
             before: self.start.map(|start| problem.cost(&start.tree)),
             seconds: self.deadline.elapsed().as_secs_f64(),
         })
@@ -143,6 +147,7 @@ impl Bake<'_> {
     fn outcome(
         &self,
         problem: &Problem,
+        greedy: Bvh,
         watch: &Watch,
         interrupted: &AtomicBool,
     ) -> Result<Outcome, SearchError> {
@@ -161,9 +166,10 @@ impl Bake<'_> {
         };
         let found = match (self.start, method) {
             (Some(start), Method::Best(config)) => {
-                optimize(&start.tree, problem, config, *seed, budget, watch)?
+                let problem = Problem { known: Some(&greedy), ..*problem };
+                optimize(&start.tree, &problem, config, *seed, budget, watch)?
             }
-            _ => solve(method, problem, *seed, budget, watch)?,
+            _ => solve_or_keep(method, problem, Some(greedy), *seed, budget, watch)?,
         };
         Ok(best::unless_behind(found, fallback))
     }
@@ -191,13 +197,19 @@ impl Bake<'_> {
         Ok(sections.iter().map(|section| section.len()).sum())
     }
 
-    /// Returns the costs of a tree and of the greedy tree for random lines, if the search was for other
-    /// rays.
-    pub fn costs_elsewhere(&self, tree: &Bvh) -> Option<[f64; 2]> {
-        let objective = self.plan.objective;
+    /// Returns the cost of a tree for random lines, if the search is for other rays.
+    fn cost_elsewhere(&self, tree: &Bvh) -> Option<f64> {
         self.density
             .is_some()
-            .then(|| [tree, &self.greedy].map(|tree| objective.cost(tree)))
+            .then(|| self.plan.objective.cost(tree))
+    }
+
+    /// Returns the costs of the best tree and of the greedy tree for random lines, if the search was
+    /// for other rays.
+    pub fn costs_elsewhere(&self, baked: &Baked) -> Option<[f64; 2]> {
+        self.cost_elsewhere(&baked.outcome.tree)
+            .zip(baked.base_elsewhere)
+            .map(<[f64; 2]>::from)
     }
 
     /// Names the cost that the search minimises.
@@ -218,6 +230,8 @@ pub struct Baked {
     pub outcome: Outcome,
     /// The cost of the greedy tree.
     pub base: f64,
+    /// The cost of the greedy tree for random lines, if the search was for other rays.
+    base_elsewhere: Option<f64>,
     /// The cost of the tree that the search continued from.
     pub before: Option<f64>,
     /// The time since the bake began.

@@ -1,0 +1,251 @@
+//! `bvh bake --parts`: cuts a scene by space into parts, bakes each as a job of its own, and joins
+//! the trees of the parts under a searched top.
+
+use super::instances::{Interruption, bake_part};
+use super::plan::{Plan, Prepared, Start};
+use super::{BakeArgs, TREE, summary};
+use crate::Error;
+use bvh_core::{Aabb, Bvh, Node, NodeKind};
+use bvh_scenes::tree_file;
+use bvh_scenes::{Scene, fnv1a};
+use bvh_search::{Budget, Problem, best, solve};
+use bvh_terminal::arguments::output_file;
+use bvh_terminal::files::Reserved;
+use bvh_terminal::output::{print_error, print_line};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+/// The fraction of the budget for the parts. The rest moves subtrees across the borders.
+const SHARE_OF_PARTS: f64 = 0.8;
+/// The largest work on the tree over all parts, in nodes visited per part.
+const WORK_PER_PART: u64 = 10_000;
+
+/// A part of a scene.
+struct Part {
+    /// The identifier, which another scene, seed, budget or number of parts changes.
+    id: String,
+    /// The objects, ascending.
+    objects: Vec<usize>,
+    plan: Plan,
+}
+
+impl Part {
+    fn scene(&self, whole: &Scene) -> Scene {
+        let primitives = whole.primitives.select(&self.objects);
+        Scene::new(&format!("{}, part {}", whole.name, self.id), whole.kind, primitives)
+    }
+
+    /// Returns the file of the part's tree.
+    fn path(&self, folder: &Path) -> PathBuf {
+        folder.join(&self.id).with_extension("bvh")
+    }
+}
+
+/// Lists the parts, bakes one part, or bakes the missing parts and joins all.
+pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(), Error> {
+    let out = args.out()?;
+    output_file("--out", &out, &TREE)?;
+    let plan = args.plan()?;
+    args.jobs.apply()?;
+    let scene = args.files.load(&args.scene)?;
+    if let Some(remark) = &scene.remark {
+        print_error(remark);
+    }
+    let parts = parts(&plan, &scene, count)?;
+    if args.list {
+        for (number, part) in (1..).zip(&parts) {
+            let objects = part.objects.len();
+            let work = part.plan.effort.work().unwrap_or(objects as u64);
+            print_line(&format!("{} {work} part {number} of {count}, {objects} objects", part.id));
+        }
+        return Ok(());
+    }
+    let folder = out.with_extension("parts");
+    let chosen: Vec<&Part> = parts
+        .iter()
+        .filter(|part| args.part.as_ref().is_none_or(|id| *id == part.id))
+        .collect();
+    if let ([], Some(id)) = (&chosen[..], &args.part) {
+        let accepted = "an identifier that --list prints for the same scene, budget and seed";
+        return Err(Error::Usage(format!("--part {id}: no such part; accepted: {accepted}")));
+    }
+    fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;
+    for part in chosen {
+        let path = part.path(&folder);
+        if !path.exists() {
+            // A part whose search was cut short would differ from run to run.
+            let scene = part.scene(&scene);
+            bake_part(&part.plan, &scene, &path, Interruption::Discards, interrupted)?;
+        }
+        if interrupted.load(Relaxed) {
+            return Err(Error::StoppedParts { path: folder });
+        }
+    }
+    if args.part.is_some() {
+        return Ok(());
+    }
+    let reserved = Reserved::new(&out, plan.most_bytes(&scene))?;
+    let start = join(&scene, &parts, &folder)?;
+    let plan = Plan { effort: plan.effort.share(1.0 - SHARE_OF_PARTS), ..plan };
+    let (bake, greedy) = plan.begin(&scene, Some(&start), Prepared::default(), interrupted)?;
+    let baked = bake.search(greedy, interrupted)?;
+    let bytes = bake.save(&baked, &out, reserved)?;
+    if interrupted.load(Relaxed) {
+        return Err(Error::Stopped { path: out, cost: baked.outcome.cost });
+    }
+    print_line(&summary(&plan, &scene, &bake, &baked));
+    print_line(&format!("{}: {bytes} bytes", out.display()));
+    Ok(())
+}
+
+/// Cuts a scene, and gives every part a share of the budget in proportion to its objects.
+fn parts(plan: &Plan, scene: &Scene, count: u32) -> Result<Vec<Part>, Error> {
+    let all = scene.boxes.len();
+    if count as usize > all {
+        let message = format!("--parts {count}: the scene has {all} objects; accepted: 2 to {all}");
+        return Err(Error::Usage(message));
+    }
+    let mut parts = Vec::new();
+    for (number, objects) in cut(&scene.boxes, count as usize)
+        .into_iter()
+        .enumerate()
+    {
+        let share = SHARE_OF_PARTS * objects.len() as f64 / all as f64;
+        let plan = Plan { effort: plan.effort.share(share), ..plan.clone() };
+        let Plan { effort, seed, objective, references, name, .. } = &plan;
+        let identity = format!(
+            "{} {count} {number} {name} {effort:?} {seed} {objective:?} {references}",
+            scene.checksum()
+        );
+        let id = format!("{:016x}", fnv1a(identity.into_bytes()));
+        parts.push(Part { id, objects, plan });
+    }
+    Ok(parts)
+}
+
+/// Halves the objects by the centres of their boxes, along the longest axis of the centres, until
+/// there are `count` parts of about the same number of objects. Returns the objects of each part,
+/// ascending. O(n log count).
+fn cut(boxes: &[Aabb], count: usize) -> Vec<Vec<usize>> {
+    let mut parts = Vec::new();
+    let mut open = vec![((0..boxes.len()).collect::<Vec<usize>>(), count)];
+    while let Some((mut objects, count)) = open.pop() {
+        if count == 1 {
+            objects.sort_unstable();
+            parts.push(objects);
+            continue;
+        }
+        let centers = objects
+            .iter()
+            .map(|&object| boxes[object].doubled_centroid());
+        let low = centers.clone().reduce(|a, b| a.min(b));
+        let high = centers.reduce(|a, b| a.max(b));
+        let extent = high.unwrap_or_default() - low.unwrap_or_default();
+        let axis = extent.max_position();
+        let left_count = count / 2;
+        let left = objects.len() * left_count / count;
+        objects.select_nth_unstable_by(left, |&a, &b| {
+            let [center_a, center_b] = [a, b].map(|object| boxes[object].doubled_centroid()[axis]);
+            center_a.total_cmp(&center_b).then(a.cmp(&b))
+        });
+        let right = objects.split_off(left);
+        open.push((right, count - left_count));
+        open.push((objects, left_count));
+    }
+    parts
+}
+
+/// Reads the trees of all parts, and joins them under the best tree over their boxes.
+fn join(scene: &Scene, parts: &[Part], folder: &Path) -> Result<Start, Error> {
+    let mut trees = Vec::new();
+    let mut work = 0;
+    for part in parts {
+        let (tree, header) = tree_file::load(&part.path(folder), &part.scene(scene))?;
+        work += header.work;
+        trees.push(tree);
+    }
+    let boxes: Vec<Aabb> = trees.iter().filter_map(Bvh::root_aabb).collect();
+    let budget = Budget { max_work: Some(WORK_PER_PART * parts.len() as u64), ..Budget::UNLIMITED };
+    let top = solve(&best::Config::default(), &Problem::new(&boxes), 1, budget, &())
+        .map_err(Error::search(&scene.name, "the tree over all parts"))?
+        .tree;
+    let objects: Vec<&[usize]> = parts
+        .iter()
+        .map(|part| &part.objects[..])
+        .collect();
+    Ok(Start { tree: joined(&top, &trees, &objects), work })
+}
+
+/// Replaces every leaf of `top`, which has one object each, by the tree with the number of the
+/// object. `objects` has the ids of each tree's objects.
+fn joined(top: &Bvh, trees: &[Bvh], objects: &[&[usize]]) -> Bvh {
+    let mut whole = Bvh { nodes: top.nodes.clone(), prim_ids: Vec::new() };
+    for (index, leaf) in top.nodes.iter().enumerate() {
+        let NodeKind::Leaf { first, .. } = leaf.kind() else { continue };
+        let part = top.prim_ids[first as usize] as usize;
+        let nodes_before = whole.nodes.len() as u32;
+        let references_before = whole.prim_ids.len() as u32;
+        for (place, node) in trees[part].nodes.iter().enumerate() {
+            let moved = match node.kind() {
+                NodeKind::Leaf { first, count } => {
+                    Node::leaf(node.aabb, first + references_before, count)
+                }
+                // The root takes the place of the leaf, so that its descendants move by one less.
+                NodeKind::Inner { first, count } => {
+                    Node::inner(node.aabb, first + nodes_before - 1, count)
+                }
+            };
+            if place == 0 {
+                whole.nodes[index] = moved;
+            } else {
+                whole.nodes.push(moved);
+            }
+        }
+        let ids = &trees[part].prim_ids;
+        whole.prim_ids.extend(
+            ids.iter()
+                .map(|&id| objects[part][id as usize] as u32),
+        );
+    }
+    whole
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_build::{Builder, muller_fellner};
+    use bvh_core::validate;
+    use bvh_scenes::builtin::stiff::{STIFF, boxes};
+
+    #[test]
+    fn every_object_is_in_one_part_and_the_joined_tree_is_valid() {
+        let config = muller_fellner::Config::default();
+        for (case, triangles) in STIFF {
+            for (objects, count) in [(2, 2), (50, 3), (301, 7), (301, 64)] {
+                let boxes = boxes(&triangles(objects));
+                if boxes.len() < count {
+                    continue;
+                }
+                let parts = cut(&boxes, count);
+                assert_eq!(parts.len(), count, "{case}");
+                let mut all = parts.concat();
+                all.sort_unstable();
+                assert!(all.into_iter().eq(0..boxes.len()), "{case}");
+                let sizes = parts.iter().map(Vec::len);
+                assert!(sizes.clone().max().unwrap() <= sizes.min().unwrap() + 7, "{case}");
+                let trees: Vec<Bvh> = parts
+                    .iter()
+                    .map(|part| {
+                        let boxes: Vec<Aabb> = part.iter().map(|&object| boxes[object]).collect();
+                        config.build(&boxes).unwrap()
+                    })
+                    .collect();
+                let roots: Vec<Aabb> = trees.iter().filter_map(Bvh::root_aabb).collect();
+                let objects: Vec<&[usize]> = parts.iter().map(|part| &part[..]).collect();
+                let whole = joined(&config.build(&roots).unwrap(), &trees, &objects);
+                validate(&whole, &boxes).unwrap_or_else(|error| panic!("{case}: {error}"));
+            }
+        }
+    }
+}
