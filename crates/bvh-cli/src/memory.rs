@@ -10,6 +10,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 pub struct HugePages;
 
 /// The size from which a block contains at least one complete huge page wherever it begins.
+#[cfg(target_os = "linux")]
 const LARGE: usize = 4 << 20;
 
 // SAFETY: all methods return what the system's allocator returns for the same arguments; the advice
