@@ -104,3 +104,50 @@ fn distances_are_negative_inside_and_infinite_without_a_closest_point() {
     let empty = layout(&[Triangle([Vec3::ONE; 3])], 0);
     assert_eq!(empty.closest_point(Vec3::ZERO), None);
 }
+
+/// Returns the layouts of a scene for all kernels of this machine.
+fn layouts(triangles: &[Triangle]) -> Vec<WideBvh> {
+    let of_kernel = |kernel| layout(triangles, 0).with_kernel(kernel);
+    Kernel::ALL
+        .into_iter()
+        .filter_map(of_kernel)
+        .collect()
+}
+
+#[test]
+fn many_triangles_without_area_have_no_closest_point() {
+    let triangles: Vec<Triangle> = (0..100u8)
+        .map(|i| Triangle([Vec3::splat(f32::from(i)); 3]))
+        .collect();
+    for wide in layouts(&triangles) {
+        for point in [Vec3::ZERO, Vec3::splat(3.5), Vec3::MAX] {
+            assert_eq!(wide.closest_point(point), None);
+        }
+        let mut distances = [0.0];
+        wide.signed_distances(&[Vec3::ZERO], &mut distances);
+        assert_eq!(distances, [f64::INFINITY]);
+    }
+}
+
+#[test]
+fn differences_of_the_largest_coordinates_do_not_overflow() {
+    let mut random = Random(7);
+    for exponent in [100, 110, 120, 126] {
+        // All of the scene is on one side of zero, and the points are far on the other side.
+        let triangles: Vec<Triangle> =
+            scaled(&soup(100, &mut random), libm::exp2f(exponent as f32))
+                .iter()
+                .map(|triangle| Triangle(triangle.0.map(|corner| -corner.abs())))
+                .collect();
+        let mut points = vec![Vec3::MAX, Vec3::MIN];
+        points.extend((0..50).map(|_| random.point() * f32::MAX));
+        for wide in layouts(&triangles) {
+            for &point in &points {
+                let found = wide.closest_point(point).unwrap();
+                let (expected, _) = brute_force(&triangles, point);
+                let slack = 1e-13 * expected.sqrt();
+                assert!((found.distance - expected.sqrt()).abs() <= slack, "{point}: {found:?}");
+            }
+        }
+    }
+}

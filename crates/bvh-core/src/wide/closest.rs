@@ -101,7 +101,7 @@ impl WideBvh {
                 }
             }
             child = loop {
-                let Some(pending) = stack.pop() else { return Some(nearest.closest()) };
+                let Some(pending) = stack.pop() else { return nearest.closest() };
                 if pending.bound <= nearest.near.distance_squared {
                     break pending.child;
                 }
@@ -114,18 +114,19 @@ impl WideBvh {
 /// lanes.
 #[inline(always)]
 fn bounds(node: &WideNode, point: Vec3) -> [f64; WideNode::LANES] {
-    /// Covers the rounding of the differences in f32, and all rounding in f64.
+    /// Covers the rounding in f64.
     const ROUNDING: f64 = 1.0 - 1.0 / (1 << 21) as f64;
     let mut bounds = [0.0; WideNode::LANES];
     for axis in 0..3 {
         let lower = &node.planes[axis];
         let upper = &node.planes[axis + 3];
         for lane in 0..WideNode::LANES {
-            let below = lower[lane] - point[axis];
-            let above = point[axis] - upper[lane];
+            // In f32 differences of the largest coordinates would overflow.
+            let below = f64::from(lower[lane]) - f64::from(point[axis]);
+            let above = f64::from(point[axis]) - f64::from(upper[lane]);
             // Comparisons that keep NaN.
             let outside = if below > above { below } else { above };
-            let outside = f64::from(if outside < 0.0 { 0.0 } else { outside });
+            let outside = if outside < 0.0 { 0.0 } else { outside };
             bounds[lane] += outside * outside;
         }
     }

@@ -25,7 +25,7 @@ pub(crate) unsafe fn trace<K: Instructions>(
     for (&point, closest) in points.iter().zip(closest) {
         *closest = match wide.root {
             // SAFETY: the caller's promises.
-            Some(root) if point.is_finite() => Some(unsafe { one::<K>(wide, root, point) }),
+            Some(root) if point.is_finite() => unsafe { one::<K>(wide, root, point) },
             _ => None,
         };
     }
@@ -33,7 +33,7 @@ pub(crate) unsafe fn trace<K: Instructions>(
 
 /// Returns the closest point of one point.
 #[inline(always)]
-unsafe fn one<K: Instructions>(wide: &WideBvh, root: Child, point: Vec3) -> Closest {
+unsafe fn one<K: Instructions>(wide: &WideBvh, root: Child, point: Vec3) -> Option<Closest> {
     let mut nearest = Nearest::new(point);
     let nodes = wide.nodes.as_ptr();
     let blocks = wide.blocks.as_ptr();

@@ -39,11 +39,13 @@ impl Nearest {
     }
 
     #[inline(always)]
-    pub(super) fn closest(&self) -> Closest {
-        Closest {
+    pub(super) fn closest(&self) -> Option<Closest> {
+        // A layout over triangles without area has nodes and no triangles.
+        let is_found = self.near.object != u32::MAX;
+        is_found.then(|| Closest {
             object: self.near.object,
             point: self.target + self.offset,
             distance: libm::sqrt(self.near.distance_squared),
-        }
+        })
     }
 }
