@@ -94,12 +94,27 @@ pub fn layout_measure(tree: &Bvh, measure: &dyn Measure) -> f64 {
 
 fn layout(tree: &Bvh, size: impl Fn(&Node) -> f64) -> f64 {
     let tree = binary(tree);
-    let mut rows: Vec<LayoutCost> = alloc::vec![LayoutCost::leaf(0.0, 0); tree.nodes.len()];
-    for (index, node) in tree.nodes.iter().enumerate().rev() {
-        rows[index] = match &rows[node.children()] {
-            [left, right] => LayoutCost::join(size(node), left, right),
-            _ => LayoutCost::leaf(size(node), node.prims().len() as u32),
-        };
+    // Children before parents, so that the rows of a path suffice: a row for every node would take
+    // twice the memory of the tree.
+    let mut rows: Vec<LayoutCost> = Vec::new();
+    let mut pending = Vec::new();
+    if !tree.nodes.is_empty() {
+        pending.push((0, false));
+    }
+    while let Some((index, has_rows)) = pending.pop() {
+        let node = &tree.nodes[index];
+        let children = node.children();
+        if children.is_empty() {
+            rows.push(LayoutCost::leaf(size(node), node.prims().len() as u32));
+        } else if has_rows {
+            let both = rows.len() - 2;
+            let joined = LayoutCost::join(size(node), &rows[both], &rows[both + 1]);
+            rows.truncate(both);
+            rows.push(joined);
+        } else {
+            pending.push((index, true));
+            pending.extend(children.rev().map(|child| (child, false)));
+        }
     }
     rows.first().map_or(0.0, LayoutCost::value)
 }

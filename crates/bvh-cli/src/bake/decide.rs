@@ -37,7 +37,7 @@ const MOST_TRIED: f64 = 0.1;
 /// with other seeds differ by as much.
 const TOLERANCE: f64 = 0.005;
 /// The number of references per object where divided objects pay.
-const REFERENCES: f64 = 1.2;
+pub const REFERENCES: f64 = 1.2;
 
 /// Returns the work of a bake of `objects` without a budget, in visited nodes.
 pub fn work(objects: usize) -> u64 {

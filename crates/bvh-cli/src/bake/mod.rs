@@ -275,9 +275,15 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         None => None,
     };
     let plan = args.with_budget(plan, scene.boxes.len());
+    // Reserving the file first reports a full disk before the search and not after it. A decision may
+    // add references later.
+    let most_references = if args.budget.is_none() {
+        decide::REFERENCES.max(plan.references)
+    } else {
+        plan.references
+    };
+    let reserved = Reserved::new(&out, plan::most_bytes(&scene, most_references))?;
     let (plan, prepared) = args.decided(plan, &scene, interrupted)?;
-    // Reserving the file first reports a full disk before the search and not after it.
-    let reserved = Reserved::new(&out, plan.most_bytes(&scene))?;
     let (bake, greedy) = plan.begin(&scene, start.as_ref(), prepared, interrupted)?;
     if args.explain && bake.is_whole() {
         print_line(

@@ -85,7 +85,7 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
     if args.part.is_some() {
         return Ok(());
     }
-    let reserved = Reserved::new(&out, plan.most_bytes(&scene))?;
+    let reserved = Reserved::new(&out, super::plan::most_bytes(&scene, plan.references))?;
     let start = join(&scene, &parts, &folder)?;
     let plan = Plan { effort: plan.effort.share(1.0 - SHARE_OF_PARTS), ..plan };
     let (bake, greedy) = plan.begin(&scene, Some(&start), Prepared::default(), interrupted)?;

@@ -37,6 +37,14 @@ pub struct Plan {
     pub name: String,
 }
 
+/// Returns the size in bytes of the largest file of a tree over a scene with at most so many references
+/// per object.
+pub fn most_bytes(scene: &Scene, references: f64) -> usize {
+    // A tree with n leaves has fewer than 2n nodes; each node may have a number of visits.
+    let reference = 2 * (size_of::<Node>() + size_of::<f32>()) + size_of::<u32>();
+    Header::BYTES + (references * scene.boxes.len() as f64) as usize * reference
+}
+
 /// The tree of an earlier bake, from which a search continues.
 pub struct Start {
     /// The tree, over the same scene.
@@ -60,13 +68,6 @@ impl Plan {
     /// Returns the largest number of references to a scene's objects.
     fn most_references(&self, scene: &Scene) -> usize {
         (self.references * scene.boxes.len() as f64) as usize
-    }
-
-    /// Returns the size in bytes of the largest tree file that a bake of this scene can write.
-    pub fn most_bytes(&self, scene: &Scene) -> usize {
-        // A tree with n leaves has fewer than 2n nodes; each node may have a number of visits.
-        let reference = 2 * (size_of::<Node>() + size_of::<f32>()) + size_of::<u32>();
-        Header::BYTES + self.most_references(scene) * reference
     }
 
     /// Begins a bake with the `prepared` results, and returns the bake with the greedy tree. The time

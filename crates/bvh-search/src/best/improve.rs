@@ -314,6 +314,11 @@ impl Improvement<'_, '_, '_, '_> {
                 }
             },
         );
+        // The tree has been offered before, so that a cancelled search need not compare the two.
+        if by_layout && run.stopped() == Some(StopReason::Cancelled) {
+            best.offer(tree, run);
+            return;
+        }
         // The cost of a layout is no sum over clades, so such trees cannot be recombined.
         let is_better = cost(tree, by_layout) < cost_before;
         let is_recombined = !by_layout
