@@ -63,10 +63,10 @@ impl Config {
                 let Some(reference) = rows.reference(scene) else { continue };
                 let mut layers = Vec::new();
                 for method in &self.methods {
-                    let own =
-                        curve(scene, method, &series(rows, scene, method, axis), reference.cost);
-                    layers.extend(draw(method, &own));
-                    points.extend(own);
+                    let runs = series(rows, scene, method, axis);
+                    let curve = curve(scene, method, &runs, reference.cost);
+                    layers.extend(draw(method, &curve));
+                    points.extend(curve);
                 }
                 panels.push(panel(
                     rows.shown(scene),
@@ -75,7 +75,11 @@ impl Config {
                     layers,
                 ));
             }
-            output.add_figure(axis.file(&self.file), caption, self.panels_per_row, panels);
+            // Over work and evaluations the curves have nearly the same shapes, and no page shows
+            // them: their points are enough.
+            if axis == ProgressAxis::Seconds {
+                output.add_figure(axis.file(&self.file), caption, self.panels_per_row, panels);
+            }
             axis.add_csv(&mut output, &self.file, &corners(&points))?;
         }
         self.add_table(&mut output, rows);
