@@ -56,6 +56,9 @@ impl Config {
         let caption = "Cost of the incumbent over the best known cost of the scene, minus 1: median and quartiles over \
                        repetitions. Points are builders. A curve falls through the floor where it is the best known.";
         for axis in ProgressAxis::of(rows, &self.methods) {
+            // Over work and evaluations the curves have nearly the same shapes, and no page shows
+            // them: their points are enough.
+            let is_drawn = axis == ProgressAxis::Seconds;
             let mut points = Vec::new();
             let mut panels = Vec::new();
             for scene in rows.scenes() {
@@ -65,7 +68,9 @@ impl Config {
                 for method in &self.methods {
                     let runs = series(rows, scene, method, axis);
                     let curve = curve(scene, method, &runs, reference.cost);
-                    layers.extend(draw(method, &curve));
+                    if is_drawn {
+                        layers.extend(draw(method, &curve));
+                    }
                     points.extend(curve);
                 }
                 panels.push(panel(
@@ -75,9 +80,7 @@ impl Config {
                     layers,
                 ));
             }
-            // Over work and evaluations the curves have nearly the same shapes, and no page shows
-            // them: their points are enough.
-            if axis == ProgressAxis::Seconds {
+            if is_drawn {
                 output.add_figure(axis.file(&self.file), caption, self.panels_per_row, panels);
             }
             axis.add_csv(&mut output, &self.file, &corners(&points))?;
