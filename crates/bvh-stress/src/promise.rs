@@ -1,12 +1,9 @@
 //! The promises that the suite checks, and the reports of broken ones.
 
 use std::fmt;
-use std::str::FromStr;
 
 /// A promise of every method, traversal and reader for every input.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Promise {
     /// No panic, hang or abort: a tree, or a typed error naming the object.
     P1,
@@ -37,19 +34,7 @@ impl fmt::Display for Promise {
     }
 }
 
-impl FromStr for Promise {
-    type Err = ();
-
-    fn from_str(name: &str) -> Result<Self, ()> {
-        use Promise::{P1, P2, P3, P4, P5, P6, P7};
-        [P1, P2, P3, P4, P5, P6, P7]
-            .into_iter()
-            .find(|promise| promise.to_string() == name)
-            .ok_or(())
-    }
-}
-
-/// A broken promise. Its text form, which can be parsed again, is `P2: observation`.
+/// A broken promise. Its text form is `P2: observation`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Broken {
     /// The general promise; none if only the case makes it.
@@ -79,18 +64,6 @@ impl fmt::Display for Broken {
     }
 }
 
-impl From<&str> for Broken {
-    fn from(text: &str) -> Self {
-        match text
-            .split_once(": ")
-            .map(|(name, what)| (name.parse(), what))
-        {
-            Some((Ok(promise), what)) => Self { promise: Some(promise), what: what.into() },
-            _ => Self::case(text),
-        }
-    }
-}
-
 /// The text of a note, or the broken promise.
 pub type Verdict = Result<String, Broken>;
 
@@ -111,17 +84,3 @@ macro_rules! ensure {
     };
 }
 pub(crate) use ensure;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_broken_promise_is_read_as_it_was_shown() {
-        for broken in
-            [Promise::P3.broken("2 of 9 rays: missed"), Broken::case("depth 7: 6 would do")]
-        {
-            assert_eq!(Broken::from(broken.to_string().as_str()), broken);
-        }
-    }
-}

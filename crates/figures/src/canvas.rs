@@ -5,47 +5,26 @@ use std::fmt::Write as _;
 use plotters::coord::Shift;
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::element::Rectangle;
-use plotters::prelude::{
-    Color, DrawingArea, DrawingBackend, IntoDrawingArea, RGBColor, SVGBackend, ShapeStyle,
-};
+use plotters::prelude::{Color, DrawingArea, IntoDrawingArea, RGBColor, SVGBackend, ShapeStyle};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{FontDesc, FontFamily, FontStyle, FontTransform, TextStyle};
 
 use super::model::FigureError;
-use super::text::{FAMILY, Fonts, Type};
+use super::text::{FAMILY, Type};
 
 /// Steps of plotters' integer coordinates per pixel.
 pub(super) const STEPS: f64 = 4.0;
 /// plotters' SVG backend divides font sizes by this.
 pub(super) const FONT_SIZE: f64 = 1.24;
 
-/// A drawing. It computes its layout first, because the size of the sheet follows from it.
-pub trait Picture {
-    /// Describes the picture for screen readers.
-    fn title(&self) -> &str;
-    /// Finds a place for everything.
-    fn lay_out<'a>(&'a self, fonts: &'a Fonts) -> Result<impl Layout + 'a, FigureError>;
-}
-
-/// A picture with a place for everything.
-pub trait Layout {
-    /// Width and height in pixels.
-    fn size(&self) -> (f64, f64);
-    /// Draws everything.
-    fn draw<B: DrawingBackend>(&self, sheet: &Sheet<B>) -> Result<(), Fault<B>>;
-}
-
 /// An error of plotters.
-pub type Fault<B> = DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>;
+pub(super) type Fault = DrawingAreaErrorKind<std::io::Error>;
 
 /// The position of a text relative to its point; always centred across the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Align {
     Left,
     Center,
-    Right,
-    /// Upwards from the point.
-    Up,
     /// Upwards, with the point in its middle.
     UpCenter,
     /// Upwards to the point.
@@ -62,7 +41,7 @@ pub(super) struct Frame {
 }
 
 /// A drawing area with coordinates in pixels.
-pub struct Sheet<B: DrawingBackend>(pub(super) DrawingArea<B, Shift>);
+pub(super) struct Sheet<'a>(pub(super) DrawingArea<SVGBackend<'a>, Shift>);
 
 /// Converts pixels to steps. Casting saturates; the limit leaves room for plotters' own additions.
 pub(super) fn steps(pixels: f64) -> i32 {
@@ -89,7 +68,7 @@ pub(super) fn printable(text: &str) -> String {
         .collect()
 }
 
-impl<B: DrawingBackend> Sheet<B> {
+impl Sheet<'_> {
     /// Draws a line of text.
     pub(super) fn text(
         &self,
@@ -98,15 +77,13 @@ impl<B: DrawingBackend> Sheet<B> {
         style: Type,
         colour: RGBColor,
         align: Align,
-    ) -> Result<(), Fault<B>> {
+    ) -> Result<(), Fault> {
         if text.is_empty() {
             return Ok(());
         }
         let (side, turn) = match align {
             Align::Left => (HPos::Left, FontTransform::None),
             Align::Center => (HPos::Center, FontTransform::None),
-            Align::Right => (HPos::Right, FontTransform::None),
-            Align::Up => (HPos::Left, FontTransform::Rotate270),
             Align::UpCenter => (HPos::Center, FontTransform::Rotate270),
             Align::UpTo => (HPos::Right, FontTransform::Rotate270),
         };
@@ -125,7 +102,7 @@ impl<B: DrawingBackend> Sheet<B> {
         style: Type,
         colour: RGBColor,
         align: Align,
-    ) -> Result<(), Fault<B>> {
+    ) -> Result<(), Fault> {
         let place = |index: usize| (x, top + style.line() * (index as f64 + 0.5));
         lines
             .iter()
@@ -134,7 +111,7 @@ impl<B: DrawingBackend> Sheet<B> {
     }
 
     /// Fills a rectangle.
-    pub(super) fn rectangle(&self, frame: Frame, colour: RGBColor) -> Result<(), Fault<B>> {
+    pub(super) fn rectangle(&self, frame: Frame, colour: RGBColor) -> Result<(), Fault> {
         let corner = |x: f64, y: f64| (steps(frame.left + x), steps(frame.top + y));
         self.0.draw(&Rectangle::new(
             [corner(0.0, 0.0), corner(frame.width, frame.height)],
@@ -143,27 +120,25 @@ impl<B: DrawingBackend> Sheet<B> {
     }
 }
 
-/// Draws a picture as an SVG document with integer coordinates, [`STEPS`] per pixel.
-pub(super) fn svg(picture: &impl Picture) -> Result<String, FigureError> {
-    let fonts = Fonts::new()?;
-    let layout = picture.lay_out(&fonts)?;
-    let (width, height) = layout.size();
+/// Makes an SVG document of this size in pixels, with integer coordinates, [`STEPS`] per pixel.
+/// Screen readers read the title.
+pub(super) fn svg(
+    title: &str,
+    (width, height): (f64, f64),
+    draw: impl FnOnce(&Sheet) -> Result<(), Fault>,
+) -> Result<String, FigureError> {
     let across = steps(width.ceil());
     let down = steps(height.ceil());
     let mut body = String::new();
     {
         let area =
             SVGBackend::with_string(&mut body, (across as u32, down as u32)).into_drawing_area();
-        let refused = |fault: Fault<SVGBackend<'_>>| FigureError::Draw {
-            title: picture.title().to_owned(),
-            reason: fault.to_string(),
-        };
-        layout
-            .draw(&Sheet(area.clone()))
-            .map_err(refused)?;
+        let refused =
+            |fault: Fault| FigureError::Draw { title: title.to_owned(), reason: fault.to_string() };
+        draw(&Sheet(area.clone())).map_err(refused)?;
         area.present().map_err(refused)?;
     }
-    let title = printable(picture.title())
+    let title = printable(title)
         .replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;");

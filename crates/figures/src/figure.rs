@@ -1,8 +1,6 @@
 //! Lays out a figure: title, caption and legend above panels with aligned axes.
 
-use plotters::prelude::DrawingBackend;
-
-use super::canvas::{Align, Fault, Frame, Layout, Picture, Sheet};
+use super::canvas::{self, Align, Fault, Frame, Sheet};
 use super::legend::Legend;
 use super::model::{Axis, Figure, FigureError, Panel, Scale};
 use super::panel::Plot;
@@ -10,18 +8,19 @@ use super::style::{GREY, INK, Strokes};
 use super::text::{BODY, Fonts, TITLE};
 
 /// Width of every figure in pixels.
-pub(super) const WIDTH: f64 = 800.0;
+const WIDTH: f64 = 800.0;
 /// Width of a miniature, and the height of its plot.
 const MINIATURE: (f64, f64) = (240.0, 110.0);
 /// Width of the blank border.
-pub(super) const BORDER: f64 = 14.0;
+const BORDER: f64 = 14.0;
 /// Heights of plots in figures of 1, 2, 3 and 4 columns.
 const HEIGHTS: [f64; 4] = [360.0, 240.0, 190.0, 150.0];
 /// Blank space to the right of each panel and below it.
 const GUTTER: (f64, f64) = (16.0, 16.0);
 
 /// Title and caption.
-pub(super) struct Head {
+#[derive(Default)]
+struct Head {
     title: Vec<String>,
     caption: Vec<String>,
     /// Pixels from the top of the figure to the end of the caption.
@@ -37,7 +36,7 @@ impl Head {
         Self { title, caption, bottom: BORDER + lines + 8.0 }
     }
 
-    pub fn draw<B: DrawingBackend>(&self, sheet: &Sheet<B>) -> Result<(), Fault<B>> {
+    pub fn draw(&self, sheet: &Sheet) -> Result<(), Fault> {
         let below = BORDER + TITLE.line() * self.title.len() as f64;
         sheet.lines((BORDER, BORDER), &self.title, TITLE, INK, Align::Left)?;
         sheet.lines((BORDER, below), &self.caption, BODY, GREY, Align::Left)
@@ -55,72 +54,50 @@ struct Plan<'a> {
     height: f64,
 }
 
-impl Picture for Figure {
-    fn title(&self) -> &str {
-        &self.title
-    }
+/// Draws a figure as an SVG document.
+pub(super) fn svg(figure: &Figure) -> Result<String, FigureError> {
+    let fonts = Fonts::new()?;
+    let strokes = Strokes::new(figure);
+    let legend = Legend::new(figure, &strokes, WIDTH - 2.0 * BORDER, &fonts);
+    let head = Head::new(&figure.title, &figure.caption, &fonts);
+    let columns = figure
+        .columns
+        .clamp(1, HEIGHTS.len())
+        .min(figure.panels.len().max(1));
+    let size = (WIDTH, HEIGHTS[columns - 1]);
+    Plan::new(head, strokes, legend, &figure.panels, columns, size, &fonts).svg(&figure.title)
+}
 
-    fn lay_out<'a>(&'a self, fonts: &'a Fonts) -> Result<impl Layout + 'a, FigureError> {
-        let strokes = Strokes::new(self);
-        let legend = Legend::new(self, &strokes, WIDTH - 2.0 * BORDER, fonts);
-        let head = Head::new(&self.title, &self.caption, fonts);
-        let columns = self
-            .columns
-            .clamp(1, HEIGHTS.len())
-            .min(self.panels.len().max(1));
-        Ok(Plan::new(
-            head,
-            strokes,
-            legend,
-            &self.panels,
-            columns,
-            (WIDTH, HEIGHTS[columns - 1]),
-            fonts,
-        ))
+/// Draws the first panel of a figure without words, small enough for a list of figures.
+pub(super) fn miniature(figure: &Figure) -> Result<String, FigureError> {
+    let fonts = Fonts::new()?;
+    let nothing = Figure::default();
+    let legend = Legend::new(&nothing, &Strokes::new(&nothing), MINIATURE.0, &fonts);
+    let panels: Vec<Panel> = figure
+        .panels
+        .iter()
+        .take(1)
+        .map(wordless_panel)
+        .collect();
+    let strokes = Strokes::new(figure);
+    Plan::new(Head::default(), strokes, legend, &panels, 1, MINIATURE, &fonts).svg(&figure.title)
+}
+
+fn wordless_panel(panel: &Panel) -> Panel {
+    Panel {
+        title: String::new(),
+        x: wordless_axis(&panel.x),
+        y: wordless_axis(&panel.y),
+        layers: panel.layers.clone(),
     }
 }
 
-/// The first panel of a figure without words, small enough for a list of figures.
-pub struct Miniature(Figure);
-
-impl From<&Figure> for Miniature {
-    fn from(figure: &Figure) -> Self {
-        let wordless = |axis: &Axis| Axis {
-            label: String::new(),
-            scale: match &axis.scale {
-                Scale::Category(names) => Scale::Category(vec![String::new(); names.len()]),
-                other => other.clone(),
-            },
-            ..axis.clone()
-        };
-        let panel = |panel: &Panel| Panel {
-            title: String::new(),
-            x: wordless(&panel.x),
-            y: wordless(&panel.y),
-            layers: panel.layers.clone(),
-        };
-        Self(Figure {
-            panels: figure
-                .panels
-                .first()
-                .map(panel)
-                .into_iter()
-                .collect(),
-            ..figure.clone()
-        })
-    }
-}
-
-impl Picture for Miniature {
-    fn title(&self) -> &str {
-        &self.0.title
-    }
-
-    fn lay_out<'a>(&'a self, fonts: &'a Fonts) -> Result<impl Layout + 'a, FigureError> {
-        let legend = Legend::of_areas(std::iter::empty(), 0.0, fonts);
-        let head = Head { title: vec![], caption: vec![], bottom: 0.0 };
-        Ok(Plan::new(head, Strokes::new(&self.0), legend, &self.0.panels, 1, MINIATURE, fonts))
-    }
+fn wordless_axis(axis: &Axis) -> Axis {
+    let scale = match &axis.scale {
+        Scale::Category(names) => Scale::Category(vec![String::new(); names.len()]),
+        other => other.clone(),
+    };
+    Axis { label: String::new(), scale, ..axis.clone() }
 }
 
 impl<'a> Plan<'a> {
@@ -169,14 +146,12 @@ impl<'a> Plan<'a> {
         }
         Self { head, strokes, legend, panels, width: whole, height: top }
     }
-}
 
-impl Layout for Plan<'_> {
-    fn size(&self) -> (f64, f64) {
-        (self.width, self.height)
+    fn svg(&self, title: &str) -> Result<String, FigureError> {
+        canvas::svg(title, (self.width, self.height), |sheet| self.draw(sheet))
     }
 
-    fn draw<B: DrawingBackend>(&self, sheet: &Sheet<B>) -> Result<(), Fault<B>> {
+    fn draw(&self, sheet: &Sheet) -> Result<(), Fault> {
         self.head.draw(sheet)?;
         self.legend
             .draw(sheet, (BORDER, self.head.bottom))?;

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use plotters::element::{DashedPathElement, EmptyElement, PathElement, Polygon, Rectangle};
-use plotters::prelude::{Cartesian2d, Color, DrawingArea, DrawingBackend, RGBColor};
+use plotters::prelude::{Cartesian2d, Color, DrawingArea, RGBColor, SVGBackend};
 
 use super::axis::Ruled;
 use super::canvas::{Fault, Frame, pen, steps};
@@ -18,24 +18,24 @@ const THIN: f64 = 1.3;
 const APART: f64 = 110.0;
 
 type Point = (f64, f64);
-type Area<B> = DrawingArea<B, Cartesian2d<Ruled, Ruled>>;
+type Area<'a> = DrawingArea<SVGBackend<'a>, Cartesian2d<Ruled, Ruled>>;
 
 /// The layers of a panel being drawn.
-pub(super) struct Layers<'a, B: DrawingBackend> {
+pub(super) struct Layers<'a, 's> {
     pub layers: &'a [Layer],
     /// The horizontal axis.
     pub x: &'a Ruled,
     /// The vertical axis.
     pub y: &'a Ruled,
-    pub area: &'a Area<B>,
+    pub area: &'a Area<'s>,
     pub strokes: &'a Strokes,
     /// The place of the plot on the sheet.
     pub frame: Frame,
 }
 
-impl<B: DrawingBackend> Layers<'_, B> {
+impl Layers<'_, '_> {
     /// Draws all layers, each kind of marks on top of the kinds before.
-    pub fn draw(&self) -> Result<(), Fault<B>> {
+    pub fn draw(&self) -> Result<(), Fault> {
         let layers = self.layers;
         layers
             .iter()
@@ -50,7 +50,7 @@ impl<B: DrawingBackend> Layers<'_, B> {
         self.points()
     }
 
-    fn band(&self, layer: &Layer) -> Result<(), Fault<B>> {
+    fn band(&self, layer: &Layer) -> Result<(), Fault> {
         let (Marks::Band(points) | Marks::StepBand(points)) = &layer.marks else { return Ok(()) };
         let stairs = matches!(layer.marks, Marks::StepBand(_));
         let x = self.x;
@@ -79,7 +79,7 @@ impl<B: DrawingBackend> Layers<'_, B> {
     }
 
     /// Draws the bars of all series next to each other, and then their whiskers.
-    fn bars(&self) -> Result<(), Fault<B>> {
+    fn bars(&self) -> Result<(), Fault> {
         let x = self.x;
         let y = self.y;
         let layers = || {
@@ -120,7 +120,7 @@ impl<B: DrawingBackend> Layers<'_, B> {
     }
 
     /// Draws an upright bar with caps at the ends that are inside the panel.
-    fn whisker(&self, x: f64, low: f64, high: f64, colour: RGBColor) -> Result<(), Fault<B>> {
+    fn whisker(&self, x: f64, low: f64, high: f64, colour: RGBColor) -> Result<(), Fault> {
         let y = self.y;
         let style = pen(colour, THIN);
         let Some((from, to)) = y.nearest(low).zip(y.nearest(high)) else { return Ok(()) };
@@ -137,7 +137,7 @@ impl<B: DrawingBackend> Layers<'_, B> {
         Ok(())
     }
 
-    fn reference(&self, layer: &Layer) -> Result<(), Fault<B>> {
+    fn reference(&self, layer: &Layer) -> Result<(), Fault> {
         let x = self.x;
         let y = self.y;
         let ends = match layer.marks {
@@ -153,7 +153,7 @@ impl<B: DrawingBackend> Layers<'_, B> {
     }
 
     /// Draws a line or staircase, with markers along it if lines carry markers.
-    fn line(&self, layer: &Layer) -> Result<(), Fault<B>> {
+    fn line(&self, layer: &Layer) -> Result<(), Fault> {
         let (order, stroke) = self.strokes.of(&layer.name);
         for path in self.paths(layer) {
             let markers = if self.strokes.marks(stroke) {
@@ -169,7 +169,7 @@ impl<B: DrawingBackend> Layers<'_, B> {
         Ok(())
     }
 
-    fn stroke(&self, path: Vec<Point>, stroke: Stroke, width: f64) -> Result<(), Fault<B>> {
+    fn stroke(&self, path: Vec<Point>, stroke: Stroke, width: f64) -> Result<(), Fault> {
         let style = pen(stroke.colour, width);
         match stroke.dash {
             None => self.area.draw(&PathElement::new(path, style)),
@@ -181,7 +181,7 @@ impl<B: DrawingBackend> Layers<'_, B> {
     }
 
     /// Draws a marker with a white edge, which separates it from its neighbours.
-    fn marker(&self, at: Point, stroke: Stroke, radius: f64, edge: f64) -> Result<(), Fault<B>> {
+    fn marker(&self, at: Point, stroke: Stroke, radius: f64, edge: f64) -> Result<(), Fault> {
         for (radius, colour) in [(radius + edge, WHITE), (radius, stroke.colour)] {
             self.area
                 .draw(&(EmptyElement::at(at) + Polygon::new(stroke.outline(radius), colour)))?;
@@ -191,7 +191,7 @@ impl<B: DrawingBackend> Layers<'_, B> {
 
     /// Draws points, smaller if there are many, and one marker for points that look the same. A line
     /// of a single point would be invisible, so it gets a marker too.
-    fn points(&self) -> Result<(), Fault<B>> {
+    fn points(&self) -> Result<(), Fault> {
         let x = self.x;
         let y = self.y;
         let mut all: Vec<(&str, Point)> = Vec::new();

@@ -1,7 +1,6 @@
 //! The legend of a figure: its series and reference lines, shared by all panels.
 
 use plotters::element::{DashedPathElement, Polygon};
-use plotters::prelude::{DrawingBackend, RGBColor};
 
 use super::canvas::{Align, Fault, Frame, Sheet, pen, steps};
 use super::model::{Figure, Layer};
@@ -64,20 +63,6 @@ impl Legend {
         Self::arrange(entries, width, fonts)
     }
 
-    /// Makes the legend of areas with these names and colours.
-    pub fn of_areas(
-        areas: impl Iterator<Item = (String, RGBColor)>,
-        width: f64,
-        fonts: &Fonts,
-    ) -> Self {
-        let entry = |(name, colour)| {
-            let mut stroke = REFERENCE_LINE;
-            stroke.colour = colour;
-            Entry { name, stroke, line: false, marker: false, area: true }
-        };
-        Self::arrange(areas.map(entry).collect(), width, fonts)
-    }
-
     fn arrange(mut entries: Vec<Entry>, width: f64, fonts: &Fonts) -> Self {
         let before = SAMPLE + GAPS.0;
         let room = width - before;
@@ -100,11 +85,7 @@ impl Legend {
     }
 
     /// Draws the entries with their upper left corner at a point.
-    pub fn draw<B: DrawingBackend>(
-        &self,
-        sheet: &Sheet<B>,
-        corner: (f64, f64),
-    ) -> Result<(), Fault<B>> {
+    pub fn draw(&self, sheet: &Sheet, corner: (f64, f64)) -> Result<(), Fault> {
         for (index, entry) in self.entries.iter().enumerate() {
             let left = corner.0 + self.column_width * (index % self.columns) as f64;
             let middle = corner.1 + ROW * ((index / self.columns) as f64 + 0.5);
@@ -117,12 +98,7 @@ impl Legend {
 
 impl Entry {
     /// Draws a sample of the marks, its left end at a point.
-    fn draw<B: DrawingBackend>(
-        &self,
-        sheet: &Sheet<B>,
-        left: f64,
-        middle: f64,
-    ) -> Result<(), Fault<B>> {
+    fn draw(&self, sheet: &Sheet, left: f64, middle: f64) -> Result<(), Fault> {
         let colour = self.stroke.colour;
         let style = pen(self.stroke.colour, 2.0);
         let ends = [left, left + SAMPLE].map(|x| (steps(x), steps(middle)));

@@ -175,43 +175,10 @@ impl Layer {
     }
 }
 
-/// A table of coloured cells with its key.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HeatMap {
-    /// The title, printed bold at the top and wrapped.
-    pub title: String,
-    /// The caption under the title, wrapped.
-    pub caption: String,
-    /// The kind of the rows, such as `case`; may be empty.
-    pub row_label: String,
-    /// One name per row, from the top.
-    pub rows: Vec<String>,
-    /// One name per column, from the left.
-    pub columns: Vec<String>,
-    /// `rows.len() * columns.len()` cells, row by row.
-    pub cells: Vec<Cell>,
-    /// The meanings of the colours, from best to worst; at most five.
-    pub classes: Vec<String>,
-}
-
-/// One cell of a heat map.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Cell {
-    /// Index of the class that gives the cell its colour; grey without one.
-    pub class: Option<usize>,
-    /// The text in the cell; may be empty.
-    pub text: String,
-}
-
 /// The reason why there is no picture.
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "each message names its fields")]
 pub enum FigureError {
-    /// A heat map whose cells do not fill its table.
-    #[error(
-        "heat map '{title}' has {rows} rows of {columns} cells, and {cells} cells instead of their product"
-    )]
-    CellCount { title: String, rows: usize, columns: usize, cells: usize },
     /// The drawing library failed.
     #[error("figure '{title}' could not be drawn: {reason}")]
     Draw { title: String, reason: String },

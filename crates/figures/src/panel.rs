@@ -1,7 +1,6 @@
 //! Draws one panel as a plotters chart: ticks, labels and, by [`Layers`], the marks.
 
 use plotters::chart::ChartBuilder;
-use plotters::prelude::DrawingBackend;
 
 use super::axis::{Ruled, axes};
 use super::canvas::{Align, Fault, Frame, Sheet, font, pen, steps};
@@ -108,12 +107,7 @@ impl<'a> Plot<'a> {
     }
 
     /// Draws the panel with its plot in a place of the sheet.
-    pub fn draw<B: DrawingBackend>(
-        &self,
-        sheet: &Sheet<B>,
-        frame: Frame,
-        strokes: &Strokes,
-    ) -> Result<(), Fault<B>> {
+    pub fn draw(&self, sheet: &Sheet, frame: Frame, strokes: &Strokes) -> Result<(), Fault> {
         let Frame { left, top, width, height } = frame;
         let area = sheet.0.clone().shrink(
             (steps(left - self.left), steps(top)),

@@ -144,20 +144,6 @@ impl Fonts {
         let kept: String = text.chars().take_while(fits).collect();
         format!("{}…", kept.trim_end())
     }
-
-    /// Breaks a text into lines of at most `width` pixels, together at most 32 pixels high. Uses the
-    /// first of these font sizes that breaks no word. In the last size the text is cut if necessary.
-    pub fn fit(&self, text: &str, width: f64, sizes: &[f64]) -> (Vec<String>, Type) {
-        let mut style = SMALL;
-        for &size in sizes {
-            style = Type { size, bold: false };
-            let lines = self.wrap(text, width, style);
-            if lines.len() as f64 * style.line() <= 32.0 && lines.join(" ") == text {
-                return (lines, style);
-            }
-        }
-        (vec![self.shorten(text, width, style)], style)
-    }
 }
 
 #[cfg(test)]
@@ -181,13 +167,6 @@ mod tests {
         let short = fonts.shorten("interlocking staircases", 80.0, SMALL);
         assert!(short.ends_with('…') && fonts.width(&short, SMALL) <= 80.0);
         assert_eq!(fonts.shorten("jewel", 80.0, SMALL), "jewel");
-        assert_eq!(
-            fonts
-                .fit("S14 origins at corners", 100.0, &[12.0, 10.0])
-                .0,
-            ["S14 origins at", "corners"]
-        );
-        assert_eq!(fonts.fit("119", 18.0, &[12.0, 9.0]).1.size, 9.0);
     }
 
     #[test]

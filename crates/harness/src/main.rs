@@ -31,10 +31,10 @@ enum Command {
     New(new::NewArgs),
     /// Print the JSON schema of specs, which lets editors complete and check them.
     Schema,
-    /// One case of the suite, in a separate process.
+    /// Print the peak memory of one build of the suite, made in this process.
     #[command(name = child::COMMAND, hide = true)]
     SuiteChild {
-        subject: String,
+        method: String,
         case: String,
         objects: usize,
     },
@@ -57,11 +57,9 @@ fn main() -> ExitCode {
             new::schema();
             Ok(())
         }
-        Some(Command::SuiteChild { subject, case, objects }) => {
-            child::main(&subject, &case, objects)
-                .map(|answer| print_line(&answer))
-                .map_err(Error::Usage)
-        }
+        Some(Command::SuiteChild { method, case, objects }) => child::main(&method, &case, objects)
+            .map(|answer| print_line(&answer))
+            .map_err(Error::Usage),
     };
     match result {
         Ok(()) => succeeded(),

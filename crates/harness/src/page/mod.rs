@@ -10,7 +10,6 @@ use crate::run::provenance::Provenance;
 use crate::run::resolved::Resolved;
 use bvh_scenes::SceneKind;
 use bvh_terminal::files;
-use figures::Miniature;
 use serde::de::DeserializeOwned;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -138,7 +137,7 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
             .iter()
             .any(|output| output.outcome.is_some()),
         miniature: first
-            .map(|(_, figure)| figures::svg(&Miniature::from(figure)))
+            .map(|(_, figure)| figures::miniature(figure))
             .transpose()?,
         outputs,
         figures,

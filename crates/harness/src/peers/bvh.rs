@@ -1,6 +1,6 @@
 //! The crate `bvh`.
 
-use super::{Built, Raw};
+use super::Built;
 use crate::measure::contender::{Batch, Contender, Tracer, timed};
 use crate::measure::layout::COMPILED;
 use ::bvh::aabb::{Aabb as TheirAabb, Bounded};
@@ -58,10 +58,6 @@ fn ray(ray: &Ray) -> TheirRay<f32, 3> {
     TheirRay::new(point(ray.origin()), Vector3::new(direction.x, direction.y, direction.z))
 }
 
-fn shapes_of_boxes(boxes: &[Aabb]) -> Vec<Shape> {
-    shapes(boxes.iter().map(|&aabb| (aabb, [aabb.min; 3])))
-}
-
 /// Converts a tree to our type.
 ///
 /// The library keeps the boxes of children in their parent, and none for the root or in leaves.
@@ -92,27 +88,12 @@ fn to_ours(theirs: &TheirBvh<f32, 3>, boxes: &[Aabb]) -> Bvh {
 
 /// Builds on one thread; the library's leaves have one object.
 pub(super) fn build(boxes: &[Aabb]) -> Built {
-    let mut shapes = shapes_of_boxes(boxes);
+    // Building reads no corners.
+    let mut shapes = shapes(boxes.iter().map(|&aabb| (aabb, [aabb.min; 3])));
     let start = Instant::now();
     let theirs = TheirBvh::build(&mut shapes);
     let seconds = start.elapsed().as_secs_f64();
     Built::tight(to_ours(&theirs, boxes), seconds, boxes)
-}
-
-/// Returns the library's tree and its recursive traversal, which collects all objects whose boxes
-/// the ray meets.
-pub(super) fn raw(boxes: &[Aabb]) -> Raw {
-    let mut shapes = shapes_of_boxes(boxes);
-    let theirs = TheirBvh::build(&mut shapes);
-    let tree = to_ours(&theirs, boxes);
-    let nearest = move |ray: &Ray, test: &dyn Fn(u32) -> Option<f32>| {
-        let found = theirs.traverse(&self::ray(ray), &shapes);
-        found
-            .iter()
-            .filter_map(|shape| test(shape.object))
-            .min_by(f32::total_cmp)
-    };
-    Raw { tree, nearest: Box::new(nearest) }
 }
 
 /// The iterator by distance, ended at the first box that begins behind the nearest hit: the

@@ -15,9 +15,9 @@ mod program;
 
 use crate::measure::contender::Contender;
 use bvh_config::{Accepts, Check, OutOfRange};
-use bvh_core::Bvh;
 #[cfg(feature = "peers")]
-use bvh_core::{Aabb, Ray};
+use bvh_core::Aabb;
+use bvh_core::Bvh;
 use bvh_scenes::Scene;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -84,19 +84,6 @@ impl Built {
     }
 }
 
-/// A library's unmodified tree over boxes and its traversal, for the stress suite.
-#[cfg(feature = "peers")]
-pub(crate) struct Raw {
-    /// The tree as our type, with the library's boxes.
-    pub(crate) tree: Bvh,
-    /// Returns the nearest distance at which a ray meets an object, found by the library's
-    /// traversal with the caller's test of objects.
-    pub(crate) nearest: Nearest,
-}
-
-#[cfg(feature = "peers")]
-pub(crate) type Nearest = Box<dyn Fn(&Ray, &dyn Fn(u32) -> Option<f32>) -> Option<f32>>;
-
 impl Check for Peer {
     fn faults(&self) -> Vec<OutOfRange> {
         match self {
@@ -152,15 +139,6 @@ impl Peer {
             Self::Obvhs(config) => Ok(obvhs::build(config, &scene.boxes)),
             #[cfg(not(feature = "peers"))]
             _ => Err(format!("this program was built without the library {}", self.name())),
-        }
-    }
-
-    /// Builds the tree over boxes with unmodified settings.
-    #[cfg(feature = "peers")]
-    pub(crate) fn raw(&self, boxes: &[Aabb]) -> Raw {
-        match self {
-            Self::Bvh(_) => bvh::raw(boxes),
-            Self::Obvhs(config) => obvhs::raw(config, boxes),
         }
     }
 

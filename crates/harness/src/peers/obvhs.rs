@@ -1,6 +1,6 @@
 //! The crate `obvhs`.
 
-use super::{Built, Obvhs, Preset, Raw};
+use super::{Built, Obvhs, Preset};
 use crate::measure::contender::{Batch, Contender, Trace, Tracer, timed};
 use crate::measure::layout::COMPILED;
 use ::obvhs::bvh2::{Bvh2, builder as binary};
@@ -67,22 +67,6 @@ pub(super) fn build(config: &Obvhs, boxes: &[Aabb]) -> Built {
         BvhBuildParams { max_prims_per_leaf: 1, pre_split: false, ..parameters(config) };
     let (theirs, time) = build_over(boxes, parameters);
     Built::tight(to_ours(&theirs, boxes), time.as_secs_f64(), boxes)
-}
-
-/// Builds with the unmodified preset, with several objects per leaf.
-pub(super) fn raw(config: &Obvhs, boxes: &[Aabb]) -> Raw {
-    let (theirs, _) = build_over(boxes, parameters(config));
-    let tree = to_ours(&theirs, boxes);
-    let nearest = move |ray: &Ray, test: &dyn Fn(u32) -> Option<f32>| {
-        let mut hit = RayHit::none();
-        // The library accepts only hits strictly before the end of the range.
-        theirs.ray_traverse(self::ray(ray, ray.t_max().next_up()), &mut hit, |_, at| {
-            test(theirs.primitive_indices[at]).unwrap_or(f32::INFINITY)
-        });
-        // The library overwrites the distance even if there was no hit.
-        (hit.primitive_id != u32::MAX).then_some(hit.t)
-    };
-    Raw { tree, nearest: Box::new(nearest) }
 }
 
 /// Makes a [`Trace`](crate::measure::contender::Trace) from a tree over `triangles` in the order of

@@ -1,10 +1,9 @@
 //! The measurement of the suite of stiff and extreme cases, which `bvh_stress` declares and checks:
-//! rows, seconds and a heat map.
+//! rows and seconds.
 //!
 //! Only the commands and specs that run the suite know it.
 
 pub mod child;
-mod peers;
 pub mod stability;
 
 use crate::Error;
@@ -21,7 +20,7 @@ pub enum Measure {
 }
 
 impl Measure {
-    /// Makes tables and figures from the CSV files in the folder.
+    /// Makes the table from the CSV files in the folder.
     pub fn output(&self, folder: &Path) -> Result<Output, Error> {
         match self {
             Self::Stability(_) => stability::output(folder),
