@@ -1,6 +1,6 @@
 //! The examples in the documentation, and its commands that call a program.
 
-use super::support::{program, run, text, top};
+use crate::support::{program, run, text, top};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
@@ -165,7 +165,7 @@ impl Called {
                     let Some(mut arguments) = self.arguments(&command) else { continue };
                     arguments.push("--help");
                     let answer = run(Path::new("."), &arguments);
-                    let message = super::support::text(&answer.stderr);
+                    let message = crate::support::text(&answer.stderr);
                     assert_eq!(answer.status.code(), Some(0), "{place}: `{code}`: {message}");
                     read += 1;
                 }

@@ -1,0 +1,412 @@
+//! Baking and inspecting from the command line: files that are written, kept, rejected, and read by
+//! other languages.
+
+use crate::support::{begin, cost, ended, facts, names, refused, run_on_a_small_disk, said, text};
+use bvh_scenes::Scene;
+use bvh_scenes::tree_file;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+#[test]
+fn a_bake_of_work_writes_the_same_bytes_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = ["1", "2"].map(|jobs| {
+        let out = format!("{jobs}.bvh");
+        let args = ["bake", "escher", "--budget", "10Mwork", "--out", &out, "--jobs", jobs];
+        assert!(said(folder.path(), &args).contains("below Müller–Fellner's"));
+        fs::read(folder.path().join(out)).unwrap()
+    });
+    assert!(bytes[0] == bytes[1]);
+    assert_eq!(names(folder.path()).len(), 2, "no other file is left");
+    let scene = Scene::load("escher").unwrap();
+    let (tree, _) = tree_file::load(&folder.path().join("1.bvh"), &scene).unwrap();
+    let facts = facts(&said(folder.path(), &["inspect", "1.bvh", "escher"]));
+    let area = &facts["internal area"];
+    assert_eq!(*area, bvh_core::cost::internal_area(&tree).to_string());
+    assert_eq!((facts["method"].as_str(), &facts["cost when saved"]), ("best", area));
+    assert_eq!(facts["version"], "2", "the oldest version that suffices");
+    assert!(number(&facts, "internal area over Müller–Fellner's") < 0.9);
+    assert!(number(&facts, "end-point overlap") > 0.0);
+    assert!(facts["valid"].starts_with("yes"));
+}
+
+fn number(facts: &BTreeMap<String, String>, name: &str) -> f64 {
+    facts[name].parse().unwrap()
+}
+
+#[test]
+fn a_bake_for_rays_saves_the_number_of_visits_of_each_node() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("walk.toml"), WALK).unwrap();
+    for (rays, name) in
+        [("default", "best for default rays"), ("walk.toml", "best for rays of walk.toml")]
+    {
+        let bytes = ["1", "2"].map(|jobs| {
+            let args = [
+                "bake", "escher", "--budget", "2Mwork", "--out", "x.bvh", "--rays", rays, "--jobs",
+                jobs,
+            ];
+            let said = said(at, &args);
+            assert!(
+                said.contains("wide layout for rays") && said.contains("below Müller–Fellner's"),
+                "{said}"
+            );
+            assert!(said.contains("risk: a tree for rays may be worse for others"), "{said}");
+            fs::read(at.join("x.bvh")).unwrap()
+        });
+        assert!(bytes[0] == bytes[1], "{rays}: the same bytes on any number of threads");
+        let scene = Scene::load("escher").unwrap();
+        let file = bvh_core::file::TreeFile::open(&bytes[0])
+            .unwrap()
+            .for_boxes(&scene.boxes)
+            .unwrap();
+        assert_eq!(file.header().method, name);
+        let tree = file.tree().unwrap();
+        let visits = file.visits().unwrap().unwrap();
+        assert_eq!(visits[0], 1.0);
+        bvh_core::WideBvh::for_rays(&tree, scene.triangles().unwrap(), &visits).unwrap();
+        assert_eq!(facts(&said(at, &["inspect", "x.bvh", "escher"]))["method"], name);
+        let by_area = [
+            "bake", "escher", "--budget", "2Mwork", "--out", "x.bvh", "--rays", rays, "--cost",
+            "area",
+        ];
+        assert!(said(at, &by_area).contains("visits of rays times root area"));
+        assert!(
+            fs::read(at.join("x.bvh")).unwrap() != bytes[0],
+            "{rays}: another cost, another tree"
+        );
+    }
+    fs::write(at.join("wrong.toml"), WALK.replace("bounces = 2", "bounces = 2\nbouncy = 1"))
+        .unwrap();
+    fs::write(at.join("none.toml"), "bounces = 1").unwrap();
+    for (file, parts) in [
+        ("wrong.toml", &["wrong.toml", "line 3", "bouncy", "bounces"][..]),
+        ("none.toml", &["none.toml", "cameras is empty", "eye"]),
+        ("gone.toml", &["--rays", "gone.toml", "no such file"]),
+    ] {
+        refused(
+            at,
+            &["bake", "escher", "--budget", "1s", "--out", "y.bvh", "--rays", file],
+            2,
+            parts,
+        );
+        assert!(!at.join("y.bvh").exists());
+    }
+}
+
+/// A walk through escher's stairs.
+const WALK: &str = "count = 5000
+bounces = 2
+lights = [[0.0, 9.0, 0.0]]
+cameras = [
+    { eye = [9.0, 5.0, 8.0], target = [0.0, 0.0, 0.0] },
+    { eye = [-9.0, 6.0, 8.0], target = [0.0, 1.0, 0.0] },
+]
+";
+
+#[test]
+fn a_bake_from_an_earlier_tree_is_never_worse() {
+    let folder = tempfile::tempdir().unwrap();
+    let bake = |out: &str, more: &[&str]| {
+        said(folder.path(), &[&["bake", "spheres750", "--out", out], more].concat());
+        cost(folder.path(), out)
+    };
+    let greedy = bake("a.bvh", &["--method", "muller_fellner", "--budget", "1s"]);
+    let mut before = greedy;
+    for (seed, budget) in
+        [("1", "0s"), ("2", "1work"), ("3", "2Mwork"), ("4", "4Mwork"), ("5", "100ms")]
+    {
+        let after = bake("a.bvh", &["--from", "a.bvh", "--seed", seed, "--budget", budget]);
+        assert!(after <= before, "{before} became {after} within {budget}");
+        before = after;
+    }
+    assert!(before < greedy);
+    assert_eq!(facts(&said(folder.path(), &["inspect", "a.bvh"]))["seed"], "5");
+}
+
+#[test]
+fn a_bake_uses_its_whole_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = Instant::now();
+    said(folder.path(), &["bake", "spheres75", "--budget", "500ms", "--out", "a.bvh"]);
+    assert!(start.elapsed() >= Duration::from_millis(500));
+}
+
+#[test]
+fn a_kill_leaves_the_old_file_or_a_complete_new_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.bvh");
+    let scene = Scene::load("spheres750").unwrap();
+    let bake =
+        ["bake", "spheres750", "--method", "muller_fellner", "--budget", "0s", "--out", "a.bvh"];
+    said(folder.path(), &bake);
+    let old = fs::read(&path).unwrap();
+    let mut replaced = 0;
+    // The kills come before, during and after the write, also on a busy machine.
+    for milliseconds in [0, 5, 10, 20, 30, 40, 60, 80, 120, 160, 240, 320] {
+        fs::write(&path, &old).unwrap();
+        let args = ["bake", "spheres750", "--budget", "20ms", "--out", "a.bvh", "--seed", "2"];
+        let mut child = begin(folder.path(), &args);
+        std::thread::sleep(Duration::from_millis(milliseconds));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        tree_file::load(&path, &scene).unwrap();
+        replaced += usize::from(fs::read(&path).unwrap() != old);
+    }
+    eprintln!("{replaced} of 12 were killed too late");
+}
+
+#[test]
+fn invalid_bakes_and_inspections_are_rejected_and_change_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    said(folder.path(), &["bake", "spheres75", "--budget", "0s", "--out", "good.bvh"]);
+    let good = fs::read(path("good.bvh")).unwrap();
+    fs::write(path("cut.bvh"), &good[..good.len() - 1]).unwrap();
+    let mut flipped = good.clone();
+    flipped[300] ^= 1;
+    fs::write(path("flipped.bvh"), flipped).unwrap();
+    fs::write(path("file"), "").unwrap();
+    fs::create_dir(path("folder")).unwrap();
+    let bake = |more: &[&'static str]| [&["bake", "spheres75", "--budget", "0s"], more].concat();
+    for (args, code, parts) in [
+        (bake(&["--out", "folder"]), 2, &["folder is a folder"][..]),
+        (bake(&["--out", "none/x.bvh"]), 2, &["none is no folder"]),
+        (bake(&["--out", "file/x.bvh"]), 2, &["file is no folder"]),
+        (
+            bake(&["--out", "good.bvh", "--method", "greedy"]),
+            2,
+            &["greedy", "accepted: muller_fellner"],
+        ),
+        (
+            bake(&["--out", "good.bvh", "--method", "grasp", "--from", "good.bvh"]),
+            2,
+            &["grasp", "--from", "best"],
+        ),
+        (bake(&["--out", "good.bvh", "--from", "cut.bvh"]), 2, &["cut.bvh", "cut or extended"]),
+        (bake(&["--out", "good.bvh", "--from", "flipped.bvh"]), 2, &["flipped.bvh", "checksum"]),
+        (bake(&["--out", "good.bvh", "--from", "file"]), 2, &["file", "not a tree file"]),
+        (bake(&["--out", "good.bvh", "--from", "x.bvh"]), 2, &["x.bvh", "no such file"]),
+        (
+            vec!["bake", "sofa", "--budget", "1s", "--out", "good.bvh"],
+            2,
+            &["sofa", "accepted: bijou"],
+        ),
+        (
+            vec!["bake", "spheres75", "--budget", "ten", "--out", "good.bvh"],
+            2,
+            &["ten", "10s", "50Mwork"],
+        ),
+        (vec!["inspect", "good.bvh", "spheres750"], 2, &["good.bvh", "75 objects", "750"]),
+        (vec!["inspect", "good.bvh", "spheres750:75"], 2, &["good.bvh", "another scene"]),
+        (vec!["inspect", "flipped.bvh"], 2, &["flipped.bvh", "checksum"]),
+    ] {
+        refused(folder.path(), &args, code, parts);
+    }
+    assert_eq!(fs::read(path("good.bvh")).unwrap(), good);
+    assert_eq!(names(folder.path()).len(), 5, "nothing was left behind");
+}
+
+#[test]
+fn a_disk_without_room_is_noticed_before_the_search_and_the_old_file_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let old = b"\x89BVH\r\n\x1a\nold";
+    fs::write(folder.path().join("a.bvh"), old).unwrap();
+    // A budget of an hour would make the test time out if the search came first.
+    let bake = "bake spheres75 --budget 1h --out a.bvh";
+    let Some(output) = run_on_a_small_disk(folder.path(), bake, 4) else { return };
+    ended(&output, 1, &["a.bvh: cannot reserve the file's space"]);
+    assert_eq!(fs::read(folder.path().join("a.bvh")).unwrap(), old);
+    assert_eq!(names(folder.path()).len(), 1);
+}
+
+#[test]
+fn the_facts_are_the_same_in_json() {
+    let folder = tempfile::tempdir().unwrap();
+    said(folder.path(), &["bake", "spheres75", "--budget=0s", "--out=x.bvh"]);
+    let plain = facts(&said(folder.path(), &["inspect", "x.bvh", "spheres75"]));
+    let json = said(folder.path(), &["inspect", "x.bvh", "spheres75", "--json"]);
+    let json: BTreeMap<String, serde_json::Value> = serde_json::from_str(&json).unwrap();
+    assert!(
+        json["objects"] == 75 && json["method"] == "best" && json["depth"].is_u64(),
+        "{json:?}"
+    );
+    assert!(json.keys().eq(plain.keys()));
+    for name in ["internal area", "surface area heuristic", "internal area over Müller–Fellner's"]
+    {
+        assert_eq!(json[name].as_f64(), plain[name].parse().ok(), "{name}");
+    }
+}
+
+#[test]
+fn a_tree_from_elsewhere_is_verified_for_its_own_scene_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    said(at, &["bake", "spheres75", "--budget=0s", "--out=x.bvh"]);
+    let inspected = said(at, &["inspect", "x.bvh", "spheres75"]);
+    assert_eq!(said(at, &["verify", "x.bvh", "spheres75"]), inspected);
+    refused(at, &["verify", "x.bvh", "spheres750"], 2, &["75 objects", "750"]);
+}
+
+#[test]
+fn the_nodes_are_written_in_full_precision() {
+    let folder = tempfile::tempdir().unwrap();
+    said(folder.path(), &["bake", "spheres75", "--budget", "0s", "--out", "a.bvh"]);
+    said(folder.path(), &["inspect", "a.bvh", "--nodes", "nodes.csv"]);
+    let scene = Scene::load("spheres75").unwrap();
+    let (tree, _) = tree_file::load(&folder.path().join("a.bvh"), &scene).unwrap();
+    let mut reader = csv::Reader::from_path(folder.path().join("nodes.csv")).unwrap();
+    let columns = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
+    let headers: Vec<&str> = reader.headers().unwrap().iter().collect();
+    assert_eq!(headers.join(","), columns);
+    let mut rows = 0;
+    for (index, row) in reader.records().enumerate() {
+        let row = row.unwrap();
+        let node = &tree.nodes[index];
+        let corners = [node.aabb.min.to_array(), node.aabb.max.to_array()].concat();
+        let written: Vec<f32> = (5..11)
+            .map(|column| row[column].parse().unwrap())
+            .collect();
+        assert_eq!(written, corners);
+        let kind = if node.is_leaf() { "leaf" } else { "inner" };
+        assert_eq!((&row[0], &row[2]), (index.to_string().as_str(), kind));
+        // Only the root has an empty cell instead of a parent.
+        match row[1].parse::<usize>() {
+            Ok(parent) => assert!(tree.nodes[parent].children().contains(&index)),
+            Err(_) => assert_eq!((&row[1], index), ("", 0)),
+        }
+        rows += 1;
+    }
+    assert_eq!(rows, tree.nodes.len());
+}
+
+/// Compares the facts of another reader with the facts of `inspect`.
+fn agree(reader: &str, output: &Output, inspected: &BTreeMap<String, String>) {
+    assert!(output.status.success(), "{reader}: {}", text(&output.stderr));
+    let read = facts(&text(&output.stdout));
+    for name in ["method", "seed", "work", "objects", "nodes", "inner nodes", "leaves", "depth"] {
+        assert_eq!(read[name], inspected[name], "{reader}: {name}");
+    }
+    // Another order of additions changes the last digits of a sum of areas.
+    for name in ["cost when saved", "internal area"] {
+        let expected = number(inspected, name);
+        let found = number(&read, name);
+        let error = (found - expected).abs();
+        assert!(error <= 1e-12 * expected, "{reader}: {name}: {found}, not {expected}");
+    }
+}
+
+#[test]
+fn readers_in_python_and_cpp_agree_with_inspect_and_reject_damage() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let scripts = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scripts");
+    let trees = [("best", "escher"), ("goldsmith_salmon", "spheres750"), ("best", "spheres75:1")];
+    for (index, (method, scene)) in trees.iter().enumerate() {
+        let out = format!("{index}.bvh");
+        let bake = ["bake", scene, "--budget=1Mwork", "--seed=18446744073709551615"];
+        said(at, &[&bake[..], &["--method", method, "--out", &out]].concat());
+        // One flipped bit must not go unnoticed.
+        let mut bytes = fs::read(at.join(&out)).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        fs::write(at.join(format!("{index}.damaged")), bytes).unwrap();
+    }
+    let mut readers = Vec::new();
+    let python = Command::new("python3").arg("--version").output();
+    if python.is_ok_and(|output| output.status.success()) {
+        readers.push(("python3", vec![scripts.join("read_tree.py")]));
+    }
+    let built = Command::new("c++")
+        .args(["-std=c++17", "-O1", "-o"])
+        .args([at.join("read_tree"), scripts.join("read_tree.cpp")])
+        .output();
+    match built {
+        Ok(output) if output.status.success() => readers.push(("read_tree", vec![])),
+        Ok(output) => panic!("read_tree.cpp: {}", text(&output.stderr)),
+        Err(_) => {}
+    }
+    for (name, args) in &readers {
+        let program = if args.is_empty() { at.join(name).into_os_string() } else { name.into() };
+        let read = |file: String| {
+            Command::new(&program)
+                .args(args)
+                .arg(at.join(file))
+                .output()
+                .unwrap()
+        };
+        for index in 0..trees.len() {
+            let inspected = facts(&said(at, &["inspect", &format!("{index}.bvh")]));
+            agree(name, &read(format!("{index}.bvh")), &inspected);
+            let damaged = read(format!("{index}.damaged"));
+            assert!(!damaged.status.success(), "{name} accepted a damaged file");
+        }
+    }
+    let tried: Vec<&str> = readers.iter().map(|reader| reader.0).collect();
+    eprintln!("readers tried: {tried:?}; the other programs are not installed");
+}
+
+#[test]
+fn a_bake_without_flags_chooses_says_why_and_writes_the_same_bytes_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let bytes = ["1", "2"].map(|jobs| {
+        let out = format!("{jobs}.bvh");
+        let said = said(at, &["bake", "escher:400", "--out", &out, "--jobs", jobs]);
+        for choice in ["budget: 3 Mwork, 8000 nodes per object", "cost: ", "rays: ", "references: "]
+        {
+            assert_eq!(said.matches(choice).count(), 1, "{choice}: {said}");
+        }
+        fs::read(at.join(out)).unwrap()
+    });
+    assert!(bytes[0] == bytes[1]);
+}
+
+#[test]
+fn a_given_choice_is_kept_and_not_tried() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (flags, kept) in [
+        (&["--cost", "area"][..], "cost: "),
+        (&["--rays", "default"], "rays: "),
+        (&["--references", "1"], "references: "),
+    ] {
+        let bake = ["bake", "escher:200", "--out", "a.bvh"];
+        let said = said(at, &[&bake[..], flags].concat());
+        assert!(said.contains("budget: ") && !said.contains(kept), "{flags:?}: {said}");
+    }
+    // Spheres have no wide layout, and other methods than `best` offer no choices.
+    for flags in [&["spheres75"][..], &["escher:200", "--method", "reinsertion"]] {
+        let said = said(at, &[&["bake", "--out", "a.bvh"][..], flags].concat());
+        assert!(said.contains("budget: ") && !said.contains("references: "), "{flags:?}: {said}");
+    }
+}
+
+#[test]
+fn a_bake_without_a_name_writes_a_new_file_named_after_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let bake = ["bake", "escher:50", "--budget=0s"];
+    said(at, &bake);
+    assert_eq!(names(at), ["escher-50.bvh"]);
+    refused(at, &bake, 2, &["escher-50.bvh exists", "--out"]);
+}
+
+#[test]
+fn an_inspection_with_rays_measures_their_expected_tests() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let measured = |method: &str| {
+        let bake = ["bake", "escher", "--budget=2Mwork", "--out=a.bvh", "--method", method];
+        said(at, &bake);
+        let facts = facts(&said(at, &["inspect", "a.bvh", "escher", "--rays", "default"]));
+        number(&facts, "expected tests of a ray")
+    };
+    let searched = measured("best");
+    assert!(0.0 < searched && searched < measured("muller_fellner"), "{searched}");
+    refused(at, &["inspect", "a.bvh", "--rays", "default"], 2, &["--rays", "SCENE"]);
+}

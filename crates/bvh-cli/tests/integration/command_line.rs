@@ -1,0 +1,236 @@
+//! The commands of `bvh` that build no tree, and the rejection of invalid input by all commands.
+
+// Tests that send signals or make links and pipes are left out on Windows, and their imports stay.
+#![cfg_attr(windows, allow(unused_imports))]
+
+use crate::support::{
+    ReadOnly, ended, names, outside_buffer, outside_scene, program, refused, said, unsaid,
+    wrong_flags,
+};
+use std::fs;
+use std::path::Path;
+use std::process::Stdio;
+
+#[test]
+fn scenes_are_listed_with_the_originals_that_they_replace() {
+    assert!(said(Path::new("."), &["scenes"]).contains("stand-in for Cloister"));
+}
+
+#[test]
+fn every_shell_and_the_manual_get_all_commands() {
+    let folder = tempfile::tempdir().unwrap();
+    for args in
+        [&["man"][..], &["completions", "bash"], &["completions", "zsh"], &["completions", "fish"]]
+    {
+        let said = said(folder.path(), args);
+        for part in ["inspect", "budget", "Number of threads", "heatmap"] {
+            // Bash has no room for explanations.
+            assert!(
+                said.contains(part) || (args[1..] == ["bash"] && part.contains(' ')),
+                "{args:?}: {part}"
+            );
+        }
+    }
+}
+
+#[test]
+fn no_command_replaces_a_file_of_another_kind() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    fs::write(at.join("mesh.obj"), mesh).unwrap();
+    said(at, &["bake", "mesh.obj", "--budget=0s", "--out=tree.bvh"]);
+    for (args, parts) in [
+        (
+            &["bake", "mesh.obj", "--budget=0s", "--out=mesh.obj"][..],
+            ["--out", "mesh.obj", "tree file"],
+        ),
+        (&["render", "mesh.obj", "--size=8x8", "--out=mesh.obj"], ["--out", "mesh.obj", "PNG"]),
+        (
+            &["render", "mesh.obj", "--accel=tree.bvh", "--out=tree.bvh"],
+            ["--out", "tree.bvh", "PNG"],
+        ),
+        (&["inspect", "tree.bvh", "--nodes=tree.bvh"], ["--nodes", "tree.bvh", "CSV"]),
+    ] {
+        refused(at, args, 2, &parts);
+    }
+    assert_eq!(fs::read_to_string(at.join("mesh.obj")).unwrap(), mesh);
+    // Files of the same kind are replaced.
+    said(at, &["bake", "mesh.obj", "--budget=0s", "--out=tree.bvh", "--from=tree.bvh"]);
+    for _ in 0..2 {
+        said(at, &["inspect", "tree.bvh", "--nodes=nodes.csv"]);
+        said(at, &["render", "mesh.obj", "--size=8x8", "--out=x.png"]);
+    }
+}
+
+#[test]
+fn an_extension_of_another_kind_is_rejected() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (args, accepted) in [
+        (&["bake", "spheres75", "--budget=0s", "--out=x.obj"][..], ".bvh"),
+        (&["render", "spheres75", "--size=8x8", "--out=x.jpg"], ".png"),
+        (&["inspect", "x.bvh", "--nodes=x.bvh"], ".csv"),
+    ] {
+        refused(at, args, 2, &["a name that ends with", accepted, "accepted"]);
+    }
+    said(at, &["bake", "spheres75", "--budget=0s", "--out=tree"]);
+    assert_eq!(names(at), ["tree"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_devices_and_folders_are_rejected_as_inputs() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let made = std::process::Command::new("mkfifo")
+        .arg("p.bvh")
+        .current_dir(at)
+        .status();
+    assert!(made.unwrap().success());
+    fs::create_dir(at.join("folder.bvh")).unwrap();
+    for (args, parts) in [
+        (&["inspect", "p.bvh"][..], &["p.bvh", "not a regular file"][..]),
+        (&["bake", "spheres75", "--budget=0s", "--from=p.bvh", "--out=x.bvh"], &["p.bvh"]),
+        (&["bake", "/dev/zero", "--budget=0s", "--out=x.bvh"], &["/dev/zero"]),
+        (&["inspect", "folder.bvh"], &["folder.bvh", "a folder"]),
+        (&["render", "spheres75", "--accel=folder.bvh", "--out=x.png"], &["--accel", "folder.bvh"]),
+    ] {
+        refused(at, args, 2, parts);
+    }
+}
+
+// Linux stores holes of files, so that this file needs no space on the disk.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_of_64_gigabytes_is_rejected_by_its_header() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::File::create(folder.path().join("huge.bvh"))
+        .unwrap()
+        .set_len(64 << 30)
+        .unwrap();
+    refused(folder.path(), &["inspect", "huge.bvh"], 2, &["huge.bvh: not a tree file"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_output_is_an_error_and_a_closed_pipe_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let full = fs::File::options()
+        .write(true)
+        .open("/dev/full")
+        .unwrap();
+    let output = program(folder.path(), &["scenes"])
+        .stdout(full)
+        .output()
+        .unwrap();
+    ended(&output, 1, &["standard output"]);
+    for args in [&["scenes"][..], &["--help"]] {
+        let mut child = program(folder.path(), args)
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        assert!(child.wait().unwrap().success(), "{args:?}");
+    }
+    // A new file replaces the file with its name, and must never replace a device.
+    refused(
+        folder.path(),
+        &["render", "spheres75", "--out", "/dev/full"],
+        2,
+        &["--out", "/dev/full"],
+    );
+}
+
+#[test]
+fn help_and_version_on_a_full_output_are_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    for args in
+        [&["--help"][..], &["--version"], &["-h"], &["bake", "--help"], &["help", "inspect"]]
+    {
+        unsaid(folder.path(), args);
+    }
+}
+
+#[test]
+fn a_missing_folder_is_named_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    said(at, &["bake", "spheres75", "--budget=0s", "--out=tree.bvh"]);
+    // The work would take so long that the test would time out.
+    for args in [
+        &["bake", "spheres75", "--budget=1h", "--out=no/x.bvh"][..],
+        &["render", "spheres7500", "--accel=brute", "--size=10000x10000", "--out=no/x.png"],
+        &["inspect", "tree.bvh", "--nodes=no/x.csv"],
+    ] {
+        refused(at, args, 2, &["no is no folder", "accepted: a path in a folder that is there"]);
+    }
+    assert_eq!(names(at), ["tree.bvh"]);
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let locked = at.join("locked");
+    fs::create_dir(&locked).unwrap();
+    said(at, &["bake", "spheres75", "--budget=0s", "--out=good.bvh"]);
+    let Some(_guard) = ReadOnly::new(&locked) else {
+        eprintln!("not tried: this user can write into any folder here");
+        return;
+    };
+    for (args, parts) in [
+        (
+            &["bake", "spheres75", "--budget=1h", "--out=locked/x.bvh"][..],
+            ["locked", "cannot create"],
+        ),
+        (&["inspect", "good.bvh", "--nodes=locked/x.csv"], ["locked/x.csv", "cannot write"]),
+        (&["render", "spheres75", "--size=8x8", "--out=locked/x.png"], ["locked/x.png", "cannot"]),
+    ] {
+        refused(at, args, 1, &parts);
+    }
+    assert_eq!(fs::read_dir(&locked).unwrap().count(), 0);
+}
+
+#[test]
+fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    said(at, &["bake", "spheres75", "--budget=0s", "--out=good.bvh"]);
+    // Every command needs its required arguments before a flag can be wrong.
+    let flags = wrong_flags(
+        at,
+        &[
+            ("bake", &["spheres75", "--budget=0s", "--out=x.bvh"]),
+            ("inspect", &["good.bvh", "spheres75"]),
+            ("verify", &["good.bvh", "spheres75"]),
+            ("render", &["spheres75", "--out=x.png", "--size=8x8"]),
+            ("report", &["good.bvh", "spheres75"]),
+            ("scenes", &[]),
+            ("completions", &["bash"]),
+            ("man", &[]),
+        ],
+    );
+    assert!(flags > 20, "{flags} flags");
+}
+
+#[test]
+fn every_command_reads_buffers_outside_the_folder_of_a_scene_only_with_permission() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = &folder.path().join("inner");
+    fs::create_dir(at).unwrap();
+    fs::write(at.join("scene.gltf"), outside_scene("../outside.bin")).unwrap();
+    fs::write(folder.path().join("outside.bin"), outside_buffer()).unwrap();
+    let bake = ["bake", "scene.gltf", "--budget=0s", "--out=x.bvh"];
+    for command in [
+        &bake[..],
+        &["bake", "scene.gltf", "--instances", "--budget=0s", "--out=x"],
+        &["inspect", "x.bvh", "scene.gltf"],
+        &["verify", "x.bvh", "scene.gltf"],
+        &["render", "scene.gltf", "--size=8x8", "--out=x.png"],
+        &["report", "x.bvh", "scene.gltf"],
+    ] {
+        refused(at, command, 2, &["buffers[0]", "outside the scene's folder", "--outside-files"]);
+        said(at, &[command, &["--outside-files"]].concat());
+    }
+}

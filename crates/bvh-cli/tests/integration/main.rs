@@ -1,0 +1,13 @@
+//! The program `bvh`, run as users run it.
+
+mod bake;
+mod bake_instances;
+#[cfg(unix)]
+mod bake_interrupted;
+mod bake_parts;
+mod bake_references;
+mod command_line;
+mod examples;
+mod render;
+mod report;
+mod support;

@@ -1,0 +1,303 @@
+//! All hits of a ray: each crossing of a surface once, and a parity that is right on closed meshes
+//! for rays through edges and corners.
+
+use crate::support::{Random, SHAPES, ball, boxes, grid_box, rays, scaled, soup, tree};
+use bvh_core::{Hit, Kernel, Ray, Triangle, WideBvh};
+use glam::{Quat, Vec3};
+use num_bigint::{BigInt, Sign};
+
+/// Returns a closed torus whose tube has `sides` and is bent along `rings`.
+fn torus(rings: usize, sides: usize) -> Vec<Triangle> {
+    let at = |ring: usize, side: usize| {
+        let turn = std::f32::consts::TAU;
+        let (bent, along) = ((ring % rings) as f32 / rings as f32 * turn).sin_cos();
+        let (up, out) = ((side % sides) as f32 / sides as f32 * turn).sin_cos();
+        Vec3::new(along * (1.0 + 0.4 * out), bent * (1.0 + 0.4 * out), 0.4 * up)
+    };
+    let mut triangles = Vec::new();
+    for ring in 0..rings {
+        for side in 0..sides {
+            let a = at(ring, side);
+            let b = at(ring + 1, side);
+            let c = at(ring + 1, side + 1);
+            let d = at(ring, side + 1);
+            triangles.extend([[a, b, c], [a, c, d]].map(Triangle));
+        }
+    }
+    triangles
+}
+
+/// Returns a tetrahedron. One of its edges is divided on one side only, and a triangle without area
+/// closes the gap.
+fn junction() -> Vec<Triangle> {
+    let [a, b, c, d] =
+        [Vec3::ZERO, Vec3::new(2.0, 4.0, 6.0), 3.0 * Vec3::X, Vec3::new(0.3, 2.0, 0.1)];
+    let middle = (a + b) / 2.0;
+    [[a, b, c], [a, d, middle], [middle, d, b], [a, middle, b], [a, c, d], [b, d, c]]
+        .map(Triangle)
+        .to_vec()
+}
+
+/// Returns closed meshes, each with a point in its inside.
+fn closed_meshes() -> Vec<(&'static str, Vec<Triangle>, Vec3)> {
+    let turned = |triangles: Vec<Triangle>| -> Vec<Triangle> {
+        let turn = Quat::from_xyzw(0.1, 0.7, -0.3, 0.5).normalize();
+        // Neighbours have the same corners, and the same operations move them.
+        (triangles.iter())
+            .map(|triangle| Triangle(triangle.0.map(|corner| turn * corner)))
+            .collect()
+    };
+    let nested = [scaled(&ball(2), 2.0), ball(2)].concat();
+    let center = Vec3::new(0.013, -0.02, 0.017);
+    let torus_inside = Vec3::new(0.99, 0.02, 0.03);
+    let turn = Quat::from_xyzw(0.1, 0.7, -0.3, 0.5).normalize();
+    vec![
+        ("octahedron", ball(0), center),
+        ("ball", ball(3), center),
+        ("turned ball", turned(ball(2)), center),
+        ("box", grid_box(1), center),
+        ("grid box", grid_box(4), center),
+        ("turned grid box", turned(grid_box(3)), center),
+        ("torus", torus(12, 8), torus_inside),
+        ("turned torus", turned(torus(9, 7)), turn * torus_inside),
+        ("nested balls", nested, Vec3::new(1.5, 0.1, 0.1)),
+        ("junction", junction(), Vec3::new(1.2, 1.3, 1.2)),
+    ]
+}
+
+fn layout(triangles: &[Triangle], shape: usize, kernel: Kernel) -> Option<WideBvh> {
+    let tree = tree(&boxes(triangles), SHAPES[shape], &mut Random(5));
+    WideBvh::new(&tree, triangles)
+        .unwrap()
+        .with_kernel(kernel)
+}
+
+/// Returns all crossings by testing every triangle.
+fn all_of(triangles: &[Triangle], ray: &Ray) -> Vec<Hit> {
+    let mut hits: Vec<Hit> = (0..)
+        .zip(triangles)
+        .filter_map(|(object, triangle)| Some(Hit { t: triangle.crossing(ray)?, object }))
+        .collect();
+    hits.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.object.cmp(&b.object)));
+    hits
+}
+
+#[test]
+fn every_kernel_finds_each_crossing_once_at_every_scale() {
+    let mut random = Random(3);
+    let mut found = 0;
+    for exponent in [-100, -30, 0, 30, 100] {
+        for scene in [soup(120, &mut random), ball(2), grid_box(3), junction()] {
+            let triangles = scaled(&scene, libm::exp2f(exponent as f32));
+            let rays = rays(&triangles, 1000, &mut random);
+            let expected: Vec<Vec<Hit>> = rays
+                .iter()
+                .map(|ray| all_of(&triangles, ray))
+                .collect();
+            for kernel in Kernel::ALL {
+                for shape in 0..SHAPES.len() {
+                    let Some(wide) = layout(&triangles, shape, kernel) else { continue };
+                    let mut hits = Vec::new();
+                    let mut counts = vec![0; rays.len()];
+                    wide.all_hits_of(&rays, &mut hits, &mut counts);
+                    assert_eq!(hits, expected.concat(), "{kernel:?}, 2^{exponent}");
+                    for (ray, expected) in rays.iter().zip(&expected) {
+                        assert_eq!(&wide.all_hits(ray), expected, "{kernel:?}, {ray:?}");
+                    }
+                    wide.count_hits(&rays, &mut counts);
+                    let lengths: Vec<u32> = expected
+                        .iter()
+                        .map(|hits| hits.len() as u32)
+                        .collect();
+                    assert_eq!(counts, lengths);
+                }
+            }
+            found += expected.iter().flatten().count();
+        }
+    }
+    assert!(found > 10_000, "{found}");
+}
+
+/// Returns rays from `origin` through corners, edges and centres of the triangles.
+fn rays_through(
+    triangles: &[Triangle],
+    origin: Vec3,
+    count: usize,
+    random: &mut Random,
+) -> Vec<Ray> {
+    let mut rays = Vec::new();
+    while rays.len() < count {
+        let Triangle([a, b, c]) = random.of(triangles);
+        let on_edge = a + (c - a) * random.unit();
+        let target = random.of(&[a, (a + b) / 2.0, on_edge, (a + b + c) / 3.0]);
+        // Every other ray is parallel to an axis through its target or along an edge.
+        let mut axis = Vec3::ZERO;
+        axis[random.below(3)] = random.of(&[1.0, -1.0]);
+        let (origin, direction) = match random.below(4) {
+            0 => (target - 8.0 * axis, axis),
+            1 => (a - 8.0 * (b - a), b - a),
+            _ => (origin, target - origin),
+        };
+        rays.extend(Ray::half_line(origin, direction));
+    }
+    rays
+}
+
+#[test]
+fn a_half_line_crosses_a_closed_mesh_an_odd_number_of_times_from_inside_only() {
+    let mut random = Random(4);
+    for (name, triangles, inside) in closed_meshes() {
+        let wide = layout(&triangles, 0, Kernel::best()).unwrap();
+        let outside = Vec3::new(7.0, -5.5, 6.25);
+        for (origin, parity) in [(inside, 1), (outside, 0)] {
+            let rays = rays_through(&triangles, origin, 10_000, &mut random);
+            let mut counts = vec![0; rays.len()];
+            wide.count_hits(&rays, &mut counts);
+            for (ray, count) in rays.iter().zip(counts) {
+                let expected = if ray.origin() == origin { parity } else { 0 };
+                // Rays along short edges may begin anywhere.
+                if ray.origin() == origin || ray.origin().abs().max_element() > 4.0 {
+                    assert_eq!(count % 2, expected, "{name}: {count} hits of {ray:?}");
+                }
+            }
+        }
+        let points = [inside, outside, Vec3::NAN, Vec3::INFINITY];
+        let mut answers = [true; 4];
+        wide.contains(&points, &mut answers);
+        assert_eq!(answers, [true, false, false, false], "{name}");
+    }
+}
+
+#[test]
+fn of_two_boxes_with_a_common_face_one_contains_each_point_of_it() {
+    let left = grid_box(2);
+    let right: Vec<Triangle> = (left.iter())
+        .map(|triangle| Triangle(triangle.0.map(|corner| corner + 2.0 * Vec3::X)))
+        .collect();
+    let points: Vec<Vec3> = (0..25)
+        .map(|i| Vec3::new(1.0, (i % 5) as f32 / 2.5 - 0.8, (i / 5) as f32 / 2.5 - 0.8))
+        .collect();
+    let contains = |triangles: &[Triangle]| {
+        let mut inside = vec![false; points.len()];
+        layout(triangles, 0, Kernel::best())
+            .unwrap()
+            .contains(&points, &mut inside);
+        inside
+    };
+    assert!(
+        contains(&left)
+            .iter()
+            .zip(contains(&right))
+            .all(|(&left, right)| left != right)
+    );
+}
+
+/// The exponent of ε: with K bits for each of its powers, ε is less than any exact value of the test.
+const K: usize = 1000;
+
+/// Returns `x · 2^149`.
+fn integer(x: f32) -> BigInt {
+    let bits = x.to_bits();
+    let exponent = bits >> 23 & 0xff;
+    let fraction = bits & 0x7f_ffff | if exponent > 0 { 1 << 23 } else { 0 };
+    let size = BigInt::from(fraction) << exponent.saturating_sub(1);
+    if x.is_sign_negative() { -size } else { size }
+}
+
+/// Returns whether the line of the ray crosses the inside of the triangle in exact arithmetic, after
+/// the origin has been moved by (ε, ε², ε³).
+fn is_crossed(ray: &Ray, triangle: &Triangle) -> bool {
+    let direction = ray.direction().to_array().map(integer);
+    let origin = ray
+        .origin()
+        .to_array()
+        .map(|x| integer(x) << (3 * K));
+    let [x, y, z] = origin;
+    let origin = [x + (BigInt::from(1) << (2 * K)), y + (BigInt::from(1) << K), z + 1];
+    let corners = triangle.0.map(|corner| {
+        let corner = corner.to_array().map(|x| integer(x) << (3 * K));
+        [0, 1, 2].map(|axis| &corner[axis] - &origin[axis])
+    });
+    let side = |p: &[BigInt; 3], q: &[BigInt; 3]| -> Sign {
+        [(0, 1, 2), (1, 2, 0), (2, 0, 1)]
+            .map(|(i, j, k)| &direction[i] * (&p[j] * &q[k] - &p[k] * &q[j]))
+            .into_iter()
+            .sum::<BigInt>()
+            .sign()
+    };
+    let [a, b, c] = &corners;
+    let sides = [side(c, b), side(a, c), side(b, a)];
+    sides[0] != Sign::NoSign && sides.iter().all(|&side| side == sides[0])
+}
+
+#[test]
+fn crossings_are_those_of_a_moved_origin_in_exact_arithmetic() {
+    let mut random = Random(6);
+    let mut crossed = 0;
+    for (name, triangles, inside) in closed_meshes() {
+        for ray in rays_through(&triangles, inside, 40, &mut random) {
+            for _ in 0..12 {
+                let triangle = random.of(&triangles);
+                let expected =
+                    is_crossed(&ray, &triangle) && triangle.hit_exactly(&ray, f32::MAX).is_some();
+                assert_eq!(
+                    triangle.crossing(&ray).is_some(),
+                    expected,
+                    "{name}: {ray:?} {triangle:?}"
+                );
+            }
+            let hits = all_of(&triangles, &ray);
+            check_exactly(name, &triangles, &ray, &hits);
+            crossed += hits.len();
+        }
+    }
+    assert!(crossed > 400, "{crossed}");
+}
+
+/// Compares the hits of a ray with exact arithmetic, and every triangle that the ray touches.
+fn check_exactly(name: &str, triangles: &[Triangle], ray: &Ray, hits: &[Hit]) {
+    for hit in hits {
+        let triangle = triangles[hit.object as usize];
+        assert!(is_crossed(ray, &triangle), "{name}: {ray:?} {triangle:?}");
+        assert_eq!(triangle.hit_exactly(ray, f32::MAX), Some(hit.t));
+    }
+    for (object, triangle) in (0..).zip(triangles) {
+        // A triangle that the ray touches and does not cross.
+        if triangle.hit_exactly(ray, f32::MAX).is_some()
+            && !hits.iter().any(|hit| hit.object == object)
+        {
+            assert!(!is_crossed(ray, triangle), "{name}: {ray:?} {triangle:?}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "slow: a million rays against exact arithmetic take minutes"]
+fn a_million_rays_cross_ten_closed_meshes_as_in_exact_arithmetic() {
+    let mut random = Random(7);
+    let mut tested = 0;
+    let mut crossed = 0;
+    for (name, triangles, inside) in closed_meshes() {
+        let wide = layout(&triangles, 0, Kernel::best()).unwrap();
+        let outside = Vec3::new(7.0, -5.5, 6.25);
+        for (origin, parity) in [(inside, 1), (outside, 0)] {
+            let rays = rays_through(&triangles, origin, 50_000, &mut random);
+            let mut counts = vec![0; rays.len()];
+            let mut hits = Vec::new();
+            wide.all_hits_of(&rays, &mut hits, &mut counts);
+            let mut hits = hits.as_slice();
+            for (ray, count) in rays.iter().zip(counts) {
+                let (own, others) = hits.split_at(count as usize);
+                hits = others;
+                check_exactly(name, &triangles, ray, own);
+                if ray.origin() == origin {
+                    assert_eq!(count % 2, parity, "{name}: {count} hits of {ray:?}");
+                }
+                crossed += own.len();
+                tested += 1;
+            }
+        }
+    }
+    println!("{tested} rays, {crossed} crossings");
+    assert_eq!(tested, 1_000_000);
+}

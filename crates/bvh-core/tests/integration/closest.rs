@@ -1,0 +1,151 @@
+//! Closest points and signed distances by the wide layout agree with a test of every triangle.
+
+use crate::support::{Random, SHAPES, ball, boxes, grid_box, scaled, soup, tree};
+use bvh_core::{Kernel, Triangle, WideBvh};
+use glam::Vec3;
+
+fn layout(triangles: &[Triangle], shape: usize) -> WideBvh {
+    let tree = tree(&boxes(triangles), SHAPES[shape], &mut Random(5));
+    WideBvh::new(&tree, triangles).unwrap()
+}
+
+/// Returns the squared distance of the nearest triangle with an area, and the lowest id of the
+/// triangles at this distance.
+fn brute_force(triangles: &[Triangle], point: Vec3) -> (f64, u32) {
+    let mut nearest = (f64::INFINITY, u32::MAX);
+    for (id, triangle) in (0..).zip(triangles) {
+        let closest = triangle.closest_point(point);
+        let distance = closest.distance_squared(point.as_dvec3());
+        if !triangle.is_degenerate() && distance < nearest.0 {
+            nearest = (distance, id);
+        }
+    }
+    nearest
+}
+
+#[test]
+fn the_closest_point_is_as_close_as_that_of_any_triangle_at_every_scale() {
+    let mut random = Random(1);
+    for exponent in [-120, -60, 0, 60, 120] {
+        let scale = libm::exp2f(exponent as f32);
+        for scene in [soup(150, &mut random), ball(3), grid_box(3)] {
+            let triangles = scaled(&scene, scale);
+            let corner = random.of(&triangles).0[1];
+            let mut points = vec![corner, Vec3::ZERO, Vec3::splat(9.0 * scale)];
+            points.extend((0..200).map(|_| random.point() * 1.5 * scale));
+            for shape in 0..SHAPES.len() {
+                let mut closest = vec![None; points.len()];
+                let wide = layout(&triangles, shape);
+                wide.closest_points(&points, &mut closest);
+                for kernel in Kernel::ALL {
+                    let Some(wide) = wide.clone().with_kernel(kernel) else { continue };
+                    let mut same = vec![None; points.len()];
+                    wide.closest_points(&points, &mut same);
+                    assert_eq!(same, closest, "{kernel:?}, 2^{exponent}");
+                }
+                for (&point, closest) in points.iter().zip(closest) {
+                    let found = closest.unwrap();
+                    let expected = brute_force(&triangles, point).0.sqrt();
+                    let slack = 1e-13 * f64::from(scale);
+                    assert!((found.distance - expected).abs() <= slack, "{point}: {found:?}");
+                    let offset = found.point - point.as_dvec3();
+                    assert!(
+                        (offset.length() - found.distance).abs() <= slack,
+                        "{point}: {found:?}"
+                    );
+                    let on = triangles[found.object as usize].closest_point(point);
+                    assert_eq!(on, found.point);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn triangles_with_the_same_closest_point_tie_to_the_lowest_id() {
+    let triangles = grid_box(4);
+    // Multiples of one eighth: every distance is exact.
+    let mut points = Vec::new();
+    for i in 0..1000 {
+        points
+            .push(Vec3::new((i % 10) as f32, (i / 10 % 10) as f32, (i / 100) as f32) / 4.0 - 1.25);
+    }
+    for shape in 0..SHAPES.len() {
+        let wide = layout(&triangles, shape);
+        for &point in &points {
+            let found = wide.closest_point(point).unwrap();
+            assert_eq!(found.object, brute_force(&triangles, point).1, "{point}");
+        }
+    }
+    // The corners of a ball are on no grid, and its triangles meet in them.
+    let triangles = ball(3);
+    let wide = layout(&triangles, 0);
+    for corner in triangles.iter().flat_map(|triangle| triangle.0) {
+        let first = triangles
+            .iter()
+            .position(|triangle| triangle.0.contains(&corner));
+        let found = wide.closest_point(corner).unwrap();
+        assert_eq!((Some(found.object as usize), found.distance), (first, 0.0));
+    }
+}
+
+#[test]
+fn distances_are_negative_inside_and_infinite_without_a_closest_point() {
+    let wide = layout(&grid_box(4), 0);
+    let points =
+        [[0.0, 0.0, 0.0], [0.5, 0.25, 0.0], [3.0, 0.0, 0.0], [4.0, 5.0, 1.0]].map(Vec3::from);
+    let mut distances = [0.0; 4];
+    wide.signed_distances(&points, &mut distances);
+    assert_eq!(distances, [-1.0, -0.5, 2.0, 5.0]);
+    wide.signed_distances(&[Vec3::NAN, Vec3::INFINITY], &mut distances[..2]);
+    assert_eq!(distances[..2], [f64::INFINITY; 2]);
+    let empty = layout(&[Triangle([Vec3::ONE; 3])], 0);
+    assert_eq!(empty.closest_point(Vec3::ZERO), None);
+}
+
+/// Returns the layouts of a scene for all kernels of this machine.
+fn layouts(triangles: &[Triangle]) -> Vec<WideBvh> {
+    let of_kernel = |kernel| layout(triangles, 0).with_kernel(kernel);
+    Kernel::ALL
+        .into_iter()
+        .filter_map(of_kernel)
+        .collect()
+}
+
+#[test]
+fn many_triangles_without_area_have_no_closest_point() {
+    let triangles: Vec<Triangle> = (0..100u8)
+        .map(|i| Triangle([Vec3::splat(f32::from(i)); 3]))
+        .collect();
+    for wide in layouts(&triangles) {
+        for point in [Vec3::ZERO, Vec3::splat(3.5), Vec3::MAX] {
+            assert_eq!(wide.closest_point(point), None);
+        }
+        let mut distances = [0.0];
+        wide.signed_distances(&[Vec3::ZERO], &mut distances);
+        assert_eq!(distances, [f64::INFINITY]);
+    }
+}
+
+#[test]
+fn differences_of_the_largest_coordinates_do_not_overflow() {
+    let mut random = Random(7);
+    for exponent in [100, 110, 120, 126] {
+        // All of the scene is on one side of zero, and the points are far on the other side.
+        let triangles: Vec<Triangle> =
+            scaled(&soup(100, &mut random), libm::exp2f(exponent as f32))
+                .iter()
+                .map(|triangle| Triangle(triangle.0.map(|corner| -corner.abs())))
+                .collect();
+        let mut points = vec![Vec3::MAX, Vec3::MIN];
+        points.extend((0..50).map(|_| random.point() * f32::MAX));
+        for wide in layouts(&triangles) {
+            for &point in &points {
+                let found = wide.closest_point(point).unwrap();
+                let (expected, _) = brute_force(&triangles, point);
+                let slack = 1e-13 * expected.sqrt();
+                assert!((found.distance - expected.sqrt()).abs() <= slack, "{point}: {found:?}");
+            }
+        }
+    }
+}

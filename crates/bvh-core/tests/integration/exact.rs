@@ -1,0 +1,352 @@
+//! Hits and distances agree with real arithmetic, rounded once: a comparison with exact rationals.
+
+use crate::support::Random;
+use bvh_core::{Ray, Triangle};
+use glam::Vec3;
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use proptest::prelude::*;
+
+type Vector = [BigRational; 3];
+
+fn zero() -> BigRational {
+    BigRational::from_integer(BigInt::ZERO)
+}
+
+fn integer(n: i64) -> BigRational {
+    BigRational::from_integer(BigInt::from(n))
+}
+
+/// 2^k.
+fn power(k: i32) -> BigRational {
+    let size = BigRational::from_integer(BigInt::from(1) << k.unsigned_abs());
+    if k < 0 { size.recip() } else { size }
+}
+
+/// Returns the exact value of a finite number.
+fn exact(x: f32) -> BigRational {
+    let bits = x.to_bits();
+    let fraction = i64::from(bits & 0x7f_ffff);
+    let exponent = (bits >> 23 & 0xff) as i32;
+    let size = match exponent {
+        0 => integer(fraction) * power(-149),
+        _ => integer(fraction | 1 << 23) * power(exponent - 150),
+    };
+    if x.is_sign_negative() { -size } else { size }
+}
+
+fn point(p: Vec3) -> Vector {
+    p.to_array().map(exact)
+}
+
+fn minus(p: &Vector, q: &Vector) -> Vector {
+    [0, 1, 2].map(|i| &p[i] - &q[i])
+}
+
+fn cross(p: &Vector, q: &Vector) -> Vector {
+    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| &p[i] * &q[j] - &p[j] * &q[i])
+}
+
+fn dot(p: &Vector, q: &Vector) -> BigRational {
+    &p[0] * &q[0] + &p[1] * &q[1] + &p[2] * &q[2]
+}
+
+/// Returns the distance and the weights of the second and third corner by Cramer's rule (Möller &
+/// Trumbore 1997), with other products than the library.
+fn cramer(ray: &Ray, triangle: &Triangle) -> Option<[BigRational; 3]> {
+    let [a, b, c] = triangle.0.map(point);
+    let origin = point(ray.origin());
+    let direction = point(ray.direction());
+    let p = minus(&b, &a);
+    let q = minus(&c, &a);
+    let height = cross(&direction, &q);
+    let determinant = dot(&p, &height);
+    if determinant == zero() {
+        return None;
+    }
+    let from_a = minus(&origin, &a);
+    let aside = cross(&from_a, &p);
+    let quotients = [dot(&q, &aside), dot(&from_a, &height), dot(&direction, &aside)];
+    Some(quotients.map(|numerator| numerator / &determinant))
+}
+
+/// Rounds a number that is not negative to the nearest f32, ties to even, by integer division;
+/// infinity beyond the largest.
+fn rounded(x: &BigRational) -> f32 {
+    // Units of the last place: the exponent for which the quotient has 24 bits, or the exponent of
+    // subnormal numbers.
+    let mut exponent = (x.numer().bits() as i32 - x.denom().bits() as i32 - 24).max(-149);
+    if x / power(exponent) >= power(24) {
+        exponent += 1;
+    }
+    let scaled = x / power(exponent);
+    let mut whole = scaled.to_integer();
+    let rest = (scaled - BigRational::from_integer(whole.clone())) * integer(2);
+    if rest > integer(1) || (rest == integer(1) && whole.bit(0)) {
+        whole += 1;
+    }
+    let whole = whole.iter_u32_digits().next().unwrap_or(0);
+    // The product of a number up to 2^24 and a power of two is exact. Powers beyond the range of
+    // f32 are infinite.
+    (f64::from(whole) * 2f64.powi(exponent)) as f32
+}
+
+/// Returns the distance of the hit by the definition.
+fn expected(ray: &Ray, triangle: &Triangle) -> Option<f32> {
+    let [t, v, w] = cramer(ray, triangle)?;
+    let is_inside = v >= zero() && w >= zero() && &v + &w <= integer(1);
+    if !is_inside || t < zero() {
+        return None;
+    }
+    let t = rounded(&t);
+    (ray.t_min() <= t && t <= ray.t_max()).then_some(t)
+}
+
+/// Compares one ray and one triangle. Returns whether the ray hits.
+fn check(ray: &Ray, triangle: &Triangle) -> bool {
+    let found = triangle.hit_exactly(ray, ray.t_max());
+    let expected = expected(ray, triangle);
+    assert_eq!(
+        found.map(f32::to_bits),
+        expected.map(f32::to_bits),
+        "{found:?} {expected:?} {ray:?} {triangle:?}"
+    );
+    found.is_some()
+}
+
+#[test]
+fn the_reference_rounds_as_the_processor_does() {
+    let mut random = Random(3);
+    for _ in 0..10_000 {
+        let x = f32::from_bits(random.bits() as u32 & 0x7fff_ffff);
+        if !x.is_finite() {
+            continue;
+        }
+        assert_eq!(rounded(&exact(x)), x);
+        let next = x.next_up();
+        let middle = f64::midpoint(f64::from(x), f64::from(next.min(f32::MAX)));
+        for number in [middle, middle.next_up(), middle.next_down().max(0.0)] {
+            let as_rational = BigRational::from_integer(BigInt::from(0)) + {
+                let bits = number.to_bits();
+                let exponent = (bits >> 52) as i32;
+                integer((bits & ((1 << 52) - 1) | 1 << 52) as i64) * power(exponent - 1075)
+            };
+            if number >= f64::MIN_POSITIVE {
+                assert_eq!(rounded(&as_rational), number as f32, "{number:e}");
+            }
+        }
+    }
+    assert_eq!(rounded(&(exact(f32::MAX) + power(103))), f32::INFINITY);
+    assert_eq!(rounded(&(exact(f32::MAX) + power(102))), f32::MAX);
+}
+
+/// Returns a number of any size, subnormal numbers and zeros included, or one of a few values, so
+/// that values coincide.
+fn number(random: &mut Random) -> f32 {
+    match random.below(8) {
+        0 => 0.0,
+        1 => -0.0,
+        2 => f32::from_bits((random.bits() as u32) & 0x807f_ffff),
+        3 => f32::from_bits((random.bits() as u32) & 0x807f_ffff | 0x7f00_0000),
+        4 | 5 => (random.below(9) as f32 - 4.0) * 0.25,
+        6 => random.unit() * 2.0 - 1.0,
+        _ => loop {
+            let x = f32::from_bits(random.bits() as u32);
+            if x.is_finite() {
+                break x;
+            }
+        },
+    }
+}
+
+fn wild_point(random: &mut Random) -> Vec3 {
+    Vec3::new(number(random), number(random), number(random))
+}
+
+/// Returns a point at or next to an edge, a corner, the inside or the plane of the triangle, in
+/// f32.
+fn target(triangle: &Triangle, random: &mut Random) -> Vec3 {
+    let [a, b, c] = triangle.0.map(Vec3::as_dvec3);
+    let s = random.of(&[0.0, 0.5, 1.0, 0.25, 1.0 / 3.0, 0.1, 1.5]);
+    let r = f64::from(random.unit());
+    let point = match random.below(5) {
+        0 => a,
+        1 => a + (b - a) * s,
+        2 => b + (c - b) * r,
+        3 => a + (b - a) * (0.5 * r) + (c - a) * (0.5 * s),
+        _ => (a + b + c) / 3.0,
+    };
+    let mut point = point.as_vec3();
+    if random.below(3) == 0 {
+        let axis = random.below(3);
+        point[axis] =
+            if random.below(2) == 0 { point[axis].next_up() } else { point[axis].next_down() };
+    }
+    point
+}
+
+/// Returns rays towards points where the decision is hard.
+fn hard_ray(triangle: &Triangle, random: &mut Random) -> Option<Ray> {
+    let [a, b, c] = triangle.0;
+    let size = triangle
+        .0
+        .iter()
+        .fold(0.0f32, |size, p| size.max(p.abs().max_element()));
+    let target = target(triangle, random);
+    let mut axis_parallel = Vec3::ZERO;
+    axis_parallel[random.below(3)] = random.of(&[1.0, -1.0, 0.125, 3.0]);
+    let power = libm::exp2f(random.below(41) as f32 - 20.0);
+    let (origin, direction) = match random.below(9) {
+        // From anywhere. The ray misses the target slightly, because the direction is rounded.
+        0 => {
+            let origin = random.point() * size * random.of(&[0.0, 1.0, 100.0, 1e6]);
+            (origin, target - origin)
+        }
+        // Through the target exactly, along an axis.
+        1 => (target - axis_parallel * size, axis_parallel),
+        2 => (target, random.point()),
+        // Along an edge, and in the plane.
+        3 => (a - (b - a), b - a),
+        4 => (a, c - b),
+        // Exactly through the target, if the sums are exact.
+        5 => {
+            let step =
+                Vec3::new(1.0, random.below(5) as f32 - 2.0, 0.5 * random.below(5) as f32 - 1.0);
+            (target - step * power * size, step)
+        }
+        // Close to the triangle, nearly in its plane.
+        6 => {
+            let origin = target + random.point() * size * 1e-6;
+            (origin, b - a + random.point() * size * 1e-6)
+        }
+        7 => (wild_point(random), wild_point(random)),
+        _ => (target + (target - a) * 2.0, a - target),
+    };
+    let direction = direction * random.of(&[1.0, 1.0, 1e-20, 1e20]);
+    let (t_min, t_max) =
+        random.of(&[(0.0, f32::MAX), (0.0, f32::MAX), (1.0, 1.0), (0.5, 2.0), (0.0, 0.0)]);
+    Ray::new(origin, direction, t_min, t_max).ok()
+}
+
+/// Returns triangles of many kinds, at many scales.
+fn hard_triangle(random: &mut Random) -> Triangle {
+    let scale = match random.below(4) {
+        0 => 1.0,
+        1 => libm::exp2f(random.below(241) as f32 - 120.0),
+        2 => libm::exp2f(random.below(20) as f32 - 149.0),
+        _ => 0.0625,
+    };
+    let grid = |random: &mut Random| {
+        Vec3::new(random.below(5) as f32, random.below(5) as f32, random.below(5) as f32) - 2.0
+    };
+    let corners = match random.below(6) {
+        0 => [random.point(), random.point(), random.point()],
+        1 => [grid(random), grid(random), grid(random)],
+        // Nearly degenerate.
+        2 => {
+            let a = random.point();
+            let b = random.point();
+            [a, b, a + (b - a) * random.unit()]
+        }
+        3 => {
+            let a = random.point() * 1e3;
+            [a, a + random.point() * 1e-3, a + random.point() * 1e-3]
+        }
+        4 => {
+            let z = random.unit();
+            [0, 1, 2].map(|_| Vec3::new(random.unit(), random.below(3) as f32, z))
+        }
+        _ => return Triangle([wild_point(random), wild_point(random), wild_point(random)]),
+    };
+    Triangle(corners.map(|corner| corner * scale))
+}
+
+#[test]
+fn hard_rays_hit_where_real_arithmetic_says_at_the_real_distance_rounded_once() {
+    let mut random = Random(1);
+    let mut hits = 0;
+    for _ in 0..15_000 {
+        let triangle = hard_triangle(&mut random);
+        for _ in 0..4 {
+            if let Some(ray) = hard_ray(&triangle, &mut random) {
+                hits += usize::from(check(&ray, &triangle));
+            }
+        }
+    }
+    assert!(hits > 5000, "{hits}");
+}
+
+#[test]
+fn a_range_that_ends_at_the_rounded_distance_has_the_hit_and_one_that_ends_before_it_has_not() {
+    let mut random = Random(2);
+    let mut hits = 0;
+    for _ in 0..10_000 {
+        let triangle = hard_triangle(&mut random);
+        let Some(ray) = hard_ray(&triangle, &mut random) else { continue };
+        let in_range = |t_min: f32, t_max: f32| {
+            let ray = Ray::new(ray.origin(), ray.direction(), t_min, t_max).unwrap();
+            check(&ray, &triangle)
+        };
+        if let Some(t) = triangle.hit_exactly(&ray, ray.t_max()) {
+            hits += 1;
+            assert!(in_range(t, t));
+            assert!(!in_range(t.next_up(), f32::MAX));
+            assert!(t == 0.0 || !in_range(0.0, t.next_down()));
+        }
+    }
+    assert!(hits > 1000, "{hits}");
+}
+
+#[test]
+fn a_triangle_behind_the_origin_is_not_hit_however_little() {
+    let sheet = |z: f32| Triangle::from([[-1.0, -1.0, z], [3.0, -1.0, z], [-1.0, 3.0, z]]);
+    let least = f32::from_bits(1);
+    for (z, length, expected) in [
+        (0.0, 1.0, Some(0.0)),
+        (-0.0, 1.0, Some(0.0)),
+        (least, 1.0, Some(least)),
+        (least, 2.0, Some(0.0)),
+        (3.0 * least, 2.0, Some(2.0 * least)),
+        (least, 1e30, Some(0.0)),
+        (-least, 1.0, None),
+        (-least, 1e30, None),
+        (f32::MAX, 1.0, Some(f32::MAX)),
+        (f32::MAX, 0.5, None),
+    ] {
+        let ray = Ray::half_line([0.1, 0.2, 0.0], [0.0, 0.0, length]).unwrap();
+        let found = sheet(z).hit_exactly(&ray, f32::MAX);
+        assert_eq!(found.map(f32::to_bits), expected.map(f32::to_bits), "{z:e} {length:e}");
+        check(&ray, &sheet(z));
+    }
+}
+
+#[test]
+fn triangles_with_a_corner_that_is_not_finite_are_never_hit() {
+    let corners =
+        [Vec3::new(-1.0, -1.0, 1.0), Vec3::new(3.0, -1.0, 1.0), Vec3::new(-1.0, 3.0, 1.0)];
+    let ray = Ray::half_line([0.1, 0.2, 0.0], [0.0, 0.0, 1.0]).unwrap();
+    assert!(check(&ray, &Triangle(corners)));
+    for corner in 0..3 {
+        for axis in 0..3 {
+            for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                let mut corners = corners;
+                corners[corner][axis] = bad;
+                assert_eq!(Triangle(corners).hit_exactly(&ray, f32::MAX), None);
+            }
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn any_ray_and_any_triangle_agree_with_real_arithmetic(bits in prop::array::uniform15(any::<u32>()), range in any::<u32>()) {
+        let numbers = bits.map(f32::from_bits);
+        let point = |i: usize| Vec3::new(numbers[i], numbers[i + 1], numbers[i + 2]);
+        let triangle = Triangle([point(0), point(3), point(6)]);
+        let is_finite = numbers.iter().all(|x| x.is_finite());
+        let t_max = f32::from_bits(range);
+        if is_finite && let Ok(ray) = Ray::new(point(9), point(12), 0.0, t_max) {
+            check(&ray, &triangle);
+        }
+    }
+}

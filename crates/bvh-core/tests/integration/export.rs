@@ -1,0 +1,203 @@
+//! Every layout for other libraries can be converted back to a tree that traces the same hits, and
+//! has the documented bytes.
+
+use crate::support::{Random, SHAPES, ball, boxes, chain, grid_box, rays, scaled, soup, tree};
+use bvh_core::export::{AilaLaineNode, CompressedBvh, CompressedNode, FirstCountNode};
+use bvh_core::{Aabb, Bvh, InvalidBvh, Node, Triangle, any_hit, nearest_hit, validate};
+use glam::Vec3;
+use proptest::prelude::*;
+
+/// Converts the tree to every layout and back.
+fn returned(tree: &Bvh, boxes: &[Aabb]) -> [(&'static str, Bvh); 3] {
+    [
+        ("binary", Bvh::from_first_count(&tree.to_first_count(), &tree.prim_ids).unwrap()),
+        ("Aila-Laine", Bvh::from_aila_laine(&tree.to_aila_laine(), &tree.prim_ids).unwrap()),
+        (
+            "compressed",
+            CompressedBvh::new(tree, boxes)
+                .unwrap()
+                .decode()
+                .unwrap(),
+        ),
+    ]
+}
+
+fn check(name: &str, tree: &Bvh, triangles: &[Triangle], random: &mut Random) -> usize {
+    let boxes = boxes(triangles);
+    let rays = rays(triangles, 600, random);
+    for (layout, mut returned) in returned(tree, &boxes) {
+        for ray in &rays {
+            let expected = nearest_hit(tree, triangles, ray);
+            assert_eq!(
+                nearest_hit(&returned, triangles, ray),
+                expected,
+                "{name}, {layout}: {ray:?}"
+            );
+        }
+        // Boxes are never smaller than the tight ones.
+        let mut tight = returned.clone();
+        tight.refit(&boxes);
+        validate(&tight, &boxes).unwrap();
+        for (node, tight_node) in returned.nodes.iter().zip(&tight.nodes) {
+            assert!(node.aabb.contains(&tight_node.aabb), "{name}, {layout}");
+        }
+        // Compression merges nodes and rounds boxes; the other layouts keep everything.
+        if layout != "compressed" {
+            returned.refit(&boxes);
+            assert_eq!(returned, tight);
+            assert_eq!(returned.prim_ids.len(), tree.prim_ids.len());
+        }
+    }
+    rays.iter()
+        .filter(|ray| any_hit(tree, triangles, ray))
+        .count()
+}
+
+#[test]
+fn every_layout_traces_the_hits_of_the_tree_at_every_scale() {
+    let mut random = Random(1);
+    let mut hits = 0;
+    let mut flat = soup(60, &mut random);
+    for corner in flat
+        .iter_mut()
+        .flat_map(|triangle| &mut triangle.0)
+    {
+        corner.y = 0.25;
+    }
+    let scenes = [
+        ("soup", soup(150, &mut random)),
+        ("grid", grid_box(4)),
+        ("ball", ball(2)),
+        ("flat", flat),
+    ];
+    for (name, scene) in scenes {
+        for exponent in [-140, -60, 0, 60, 126] {
+            let root = libm::exp2f(exponent as f32 / 2.0);
+            let triangles = scaled(&scene, root * root);
+            for shape in SHAPES {
+                let tree = tree(&boxes(&triangles), shape, &mut random);
+                hits += check(
+                    &format!("{name} * 2^{exponent}, {shape:?}"),
+                    &tree,
+                    &triangles,
+                    &mut random,
+                );
+            }
+        }
+    }
+    assert!(hits > 10_000, "{hits}");
+}
+
+#[test]
+fn small_trees_deep_trees_and_trees_of_points_have_layouts() {
+    let mut random = Random(2);
+    let points = vec![Triangle([Vec3::new(1.0, 2.0, 3.0); 3]); 30];
+    let huge = [1.0, -1.0]
+        .map(|sign| Triangle([Vec3::splat(f32::MAX * sign), Vec3::ZERO, Vec3::X * sign]));
+    for triangles in
+        [soup(1, &mut random), soup(3, &mut random), points, soup(300, &mut random), huge.into()]
+    {
+        let boxes = boxes(&triangles);
+        let count = boxes.len() as u32;
+        let leaf = Node::leaf(Aabb::EMPTY, 0, count);
+        let mut one_leaf = Bvh { nodes: vec![leaf], prim_ids: (0..count).collect() };
+        one_leaf.refit(&boxes);
+        check("one leaf", &one_leaf, &triangles, &mut random);
+        check("chain", &chain(&boxes), &triangles, &mut random);
+    }
+    for (layout, returned) in returned(&Bvh::default(), &[]) {
+        assert_eq!(returned, Bvh::default(), "{layout}");
+    }
+}
+
+#[test]
+fn the_bytes_are_the_documented_ones() {
+    assert_eq!(
+        [size_of::<FirstCountNode>(), size_of::<AilaLaineNode>(), size_of::<CompressedNode>()],
+        [32, 64, 80]
+    );
+    // Two cubes of side 1 at x = 0 and x = 509: the grid's step is 2 along x, and 1/128 along y and
+    // z.
+    let cube = |x: f32| Aabb::from([[x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]]);
+    let boxes = [cube(0.0), cube(509.0)];
+    let nodes = vec![
+        Node::inner(boxes[0].union(&boxes[1]), 1, 2),
+        Node::leaf(boxes[0], 0, 1),
+        Node::leaf(boxes[1], 1, 1),
+    ];
+    let tree = Bvh { nodes, prim_ids: vec![1, 0] };
+    let mut refitted = tree.clone();
+    refitted.refit(&boxes);
+    let nodes = refitted.to_aila_laine();
+    let bytes: &[u8] = bytemuck::cast_slice(&nodes);
+    let floats = [0, 16, 32, 48].map(|offset| float(bytes, offset));
+    assert_eq!(floats, [509.0, 510.0, 0.0, 1.0]);
+    assert_eq!([12, 28, 44].map(|offset| word(bytes, offset)), [1, 2, 0]);
+    let leaves = [64 + 44, 64 + 60, 128 + 44, 128 + 60].map(|offset| word(bytes, offset));
+    assert_eq!(leaves, [1, 0, 1, 1]);
+
+    let compressed = CompressedBvh::new(&refitted, &boxes).unwrap();
+    let bytes: &[u8] = bytemuck::cast_slice(&compressed.nodes);
+    // Both objects are in one leaf, and the leaf is in one slot.
+    assert_eq!(bytes.len(), 80);
+    assert_eq!([0, 4, 8].map(|offset| float(bytes, offset)), [0.0; 3]);
+    assert_eq!(bytes[12..16], [128, 120, 120, 0]);
+    assert_eq!([word(bytes, 16), word(bytes, 20)], [1, 0]);
+    let slot = (0..8).find(|slot| bytes[24 + slot] != 0).unwrap();
+    assert_eq!(bytes[24 + slot], 0b011_00000);
+    assert_eq!(
+        [32, 40, 48, 56, 64, 72].map(|offset| bytes[offset + slot]),
+        [0, 0, 0, 255, 128, 128]
+    );
+    assert_eq!(compressed.prim_ids, [1, 0]);
+}
+
+fn float(bytes: &[u8], offset: usize) -> f32 {
+    f32::from_bits(word(bytes, offset))
+}
+
+fn word(bytes: &[u8], offset: usize) -> u32 {
+    let (word, _) = bytes[offset..].split_first_chunk().unwrap();
+    u32::from_le_bytes(*word)
+}
+
+#[test]
+fn children_are_in_the_slots_of_their_corners() {
+    let mut boxes = Vec::new();
+    for slot in 0..8u8 {
+        let low = [2, 1, 0].map(|bit| f32::from(slot >> bit & 1) * 10.0);
+        boxes.push(Aabb::from([low, low.map(|x| x + 1.0)]));
+    }
+    let mut random = Random(3);
+    for _ in 0..10 {
+        let compressed = CompressedBvh::new(&tree(&boxes, SHAPES[2], &mut random), &boxes).unwrap();
+        let bytes: &[u8] = bytemuck::cast_slice(&compressed.nodes);
+        assert_eq!(bytes.len(), 80);
+        for slot in 0..8 {
+            assert_eq!(compressed.prim_ids[slot], slot as u32);
+            assert_eq!(bytes[24 + slot], 1 << 5 | slot as u8);
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn bytes_that_are_no_tree_are_rejected_or_give_a_tree_that_can_be_traversed(
+        bytes in prop::collection::vec(prop_oneof![Just(0u8), 0u8..6, any::<u8>()], 0..640),
+        ids in prop::collection::vec(0u32..8, 0..8),
+    ) {
+        fn nodes<T: bytemuck::Pod>(bytes: &[u8]) -> Vec<T> {
+            bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect()
+        }
+        let compressed = CompressedBvh { nodes: nodes(&bytes), prim_ids: ids.clone() };
+        let trees: [Result<Bvh, InvalidBvh>; 3] = [
+            Bvh::from_first_count(&nodes(&bytes), &ids),
+            Bvh::from_aila_laine(&nodes(&bytes), &ids),
+            compressed.decode(),
+        ];
+        for tree in trees.into_iter().flatten() {
+            prop_assert!(tree.prim_ids.len() <= ids.len());
+            prop_assert!(tree.depth() < 1 + tree.nodes.len());
+        }
+    }
+}

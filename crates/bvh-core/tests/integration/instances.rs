@@ -1,0 +1,200 @@
+//! Instances give the same answers as the scene with all triangles written out, and as their parts,
+//! for any tree over the instances.
+
+use crate::support::{Random, SHAPES, ball, boxes, grid_box, soup, tree};
+use bvh_core::{
+    Aabb, Bvh, Instance, InstanceHit, Instances, InvalidInstances, Ray, Triangle, WideBvh,
+    nearest_hit,
+};
+use glam::{Affine3A, DAffine3, DMat3, DVec3, Mat3A, Quat, Vec3, Vec3A};
+
+/// Parts as triangles and in the wide layout, and instances of the parts.
+struct Scene {
+    triangles: Vec<Vec<Triangle>>,
+    parts: Vec<WideBvh>,
+    instances: Vec<Instance>,
+}
+
+fn scene(triangles: Vec<Vec<Triangle>>, transforms: Vec<Affine3A>, random: &mut Random) -> Scene {
+    let mut parts = Vec::new();
+    for part in &triangles {
+        let tree = tree(&boxes(part), SHAPES[0], random);
+        parts.push(WideBvh::new(&tree, part).unwrap());
+    }
+    let mut instances = Vec::new();
+    for (index, transform) in transforms.into_iter().enumerate() {
+        instances.push(Instance { part: (index % parts.len()) as u32, transform });
+    }
+    Scene { triangles, parts, instances }
+}
+
+impl Scene {
+    /// Makes one scene for each shape of tree over the instances.
+    fn all(&self, random: &mut Random) -> Vec<Instances> {
+        let boxes = Instance::boxes(&self.instances, &self.parts).unwrap();
+        let mut scenes = Vec::new();
+        for shape in SHAPES {
+            let top = tree(&boxes, shape, random);
+            scenes.push(Instances::new(self.parts.clone(), self.instances.clone(), top).unwrap());
+        }
+        scenes
+    }
+
+    /// Returns the triangles of all instances, moved in f64 and rounded. Every triangle has the
+    /// index of its instance and its id in the part.
+    fn flat(&self) -> (Vec<Triangle>, Vec<(u32, u32)>) {
+        let mut flat = Vec::new();
+        let mut names = Vec::new();
+        for (instance, Instance { part, transform }) in (0..).zip(&self.instances) {
+            let matrix = DMat3::from_cols_array(&transform.matrix3.to_cols_array().map(f64::from));
+            let shift = DVec3::from_array(transform.translation.to_array().map(f64::from));
+            let moved = DAffine3::from_mat3_translation(matrix, shift);
+            for (id, triangle) in (0..).zip(&self.triangles[*part as usize]) {
+                flat.push(Triangle(
+                    triangle
+                        .0
+                        .map(|p| moved.transform_point3(p.as_dvec3()).as_vec3()),
+                ));
+                names.push((instance, id));
+            }
+        }
+        (flat, names)
+    }
+}
+
+/// Makes rays from inside and outside. About every second ray meets an instance.
+fn rays(bounds: &Aabb, n: usize, random: &mut Random) -> Vec<Ray> {
+    let mut rays = Vec::new();
+    for i in 0..n {
+        let scale = if i % 3 == 0 { 3.0 } else { 1.0 };
+        let t_max = if i % 5 == 0 { 0.7 } else { f32::INFINITY };
+        let from = point_inside(bounds, random) * scale;
+        let to = point_inside(bounds, random);
+        rays.push(Ray::new(from, to - from, 0.0, t_max).unwrap());
+    }
+    rays
+}
+
+fn point_inside(bounds: &Aabb, random: &mut Random) -> Vec3 {
+    bounds.min + (bounds.max - bounds.min) * ((random.point() + 1.0) * 0.5)
+}
+
+/// Turns, scales, shears and moves a part.
+fn transform(random: &mut Random) -> Affine3A {
+    let turn = Quat::from_axis_angle(random.point().normalize(), random.unit() * 6.0);
+    let scale = Vec3::splat(random.of(&[0.1, 1.0, 3.0])) * (random.point() * 0.4 + 1.0);
+    let shift = random.point() * 20.0;
+    let mut transform = Affine3A::from_scale_rotation_translation(scale, turn, shift);
+    transform.matrix3.y_axis += transform.matrix3.x_axis * 0.3;
+    transform
+}
+
+fn bits(hit: Option<InstanceHit>) -> Option<(u32, u32, u32)> {
+    hit.map(|hit| (hit.t.to_bits(), hit.instance, hit.triangle))
+}
+
+#[test]
+fn turned_scaled_and_sheared_instances_answer_as_the_flat_scene() {
+    let mut random = Random(1);
+    let transforms = (0..60).map(|_| transform(&mut random)).collect();
+    let scene = scene(vec![ball(2), grid_box(3), ball(1)], transforms, &mut random);
+    let (flat, names) = scene.flat();
+    let flat_tree = tree(&boxes(&flat), SHAPES[0], &mut random);
+    let scenes = scene.all(&mut random);
+    let mut hits = 0;
+    // Rays that graze a surface may differ by rounding.
+    let mut differences = 0;
+    for ray in rays(&flat_tree.root_aabb().unwrap(), 6000, &mut random) {
+        let found = scenes[0].nearest_hit(&ray);
+        for other in &scenes {
+            assert_eq!(bits(other.nearest_hit(&ray)), bits(found), "{ray:?}");
+            assert_eq!(other.any_hit(&ray), found.is_some(), "{ray:?}");
+        }
+        let expected = nearest_hit(&flat_tree, &flat, &ray);
+        hits += usize::from(expected.is_some());
+        match (found, expected) {
+            (Some(found), Some(expected)) => {
+                let name = names[expected.object as usize];
+                differences += usize::from((found.instance, found.triangle) != name);
+                let reach = ray.origin().abs().max_element() + 40.0;
+                let length = ray.direction().length();
+                let error = (found.t - expected.t).abs() * length / reach;
+                // A ray that only grazes a surface multiplies the rounding.
+                differences += usize::from(error > 1e-5);
+                let local = scenes[0].local_ray(found.instance, &ray).unwrap();
+                let part = scene.instances[found.instance as usize].part as usize;
+                assert_eq!(
+                    scene.parts[part]
+                        .nearest_hit(&local)
+                        .unwrap()
+                        .object,
+                    found.triangle
+                );
+            }
+            (found, expected) => differences += usize::from(found.is_some() != expected.is_some()),
+        }
+    }
+    assert!(hits > 1000, "{hits}");
+    assert!(differences < 3, "{differences} of {hits} hits");
+}
+
+#[test]
+fn transforms_without_rounding_give_the_distances_of_the_flat_scene_bit_by_bit() {
+    let mut random = Random(2);
+    let quarter_turn = Mat3A::from_cols(Vec3A::Y, Vec3A::NEG_X, Vec3A::Z);
+    let turns = [Mat3A::IDENTITY, quarter_turn * 2.0, -Mat3A::IDENTITY];
+    let mut transforms = Vec::new();
+    for i in 0..40 {
+        let shift = integer_point(30, &mut random);
+        transforms.push(Affine3A::from_mat3_translation(turns[i % 3].into(), shift));
+    }
+    let scene = scene(vec![grid_box(4), grid_box(2)], transforms, &mut random);
+    let (flat, names) = scene.flat();
+    let flat_tree = tree(&boxes(&flat), SHAPES[0], &mut random);
+    let scenes = scene.all(&mut random);
+    let mut hits = 0;
+    for _ in 0..4000 {
+        let from = integer_point(40, &mut random) - 4.0;
+        let to = integer_point(240, &mut random) / 8.0;
+        let Ok(ray) = Ray::half_line(from, to - from) else { continue };
+        let expected = nearest_hit(&flat_tree, &flat, &ray).map(|hit| {
+            let (instance, triangle) = names[hit.object as usize];
+            InstanceHit { t: hit.t, instance, triangle }
+        });
+        hits += usize::from(expected.is_some());
+        for scene in &scenes {
+            assert_eq!(scene.nearest_hit(&ray), expected, "{ray:?}");
+        }
+    }
+    assert!(hits > 1000, "{hits}");
+}
+
+/// Returns a point whose coordinates are integers from 0 to `end` − 1.
+fn integer_point(end: usize, random: &mut Random) -> Vec3 {
+    Vec3::new(random.below(end) as f32, random.below(end) as f32, random.below(end) as f32)
+}
+
+#[test]
+fn an_invalid_scene_is_rejected_by_its_instance() {
+    let mut random = Random(3);
+    let Scene { mut parts, .. } = scene(vec![soup(20, &mut random)], vec![], &mut random);
+    parts.push(WideBvh::new(&Bvh::default(), &[]).unwrap());
+    let valid = Instance { part: 0, transform: Affine3A::IDENTITY };
+    let rejection = |instance| Instance::boxes(&[valid, instance], &parts).unwrap_err();
+    let no_part = InvalidInstances::Part { instance: 1, part: 2, parts: 2 };
+    assert_eq!(rejection(Instance { part: 2, ..valid }), no_part);
+    assert_eq!(rejection(Instance { part: 1, ..valid }), InvalidInstances::Empty(1));
+    for scale in [Vec3::new(1.0, 0.0, 1.0), Vec3::NAN, Vec3::INFINITY, Vec3::splat(3e38)] {
+        let transform = Affine3A::from_scale(scale);
+        assert_eq!(
+            rejection(Instance { transform, ..valid }),
+            InvalidInstances::Transform(1),
+            "{scale}"
+        );
+    }
+    let wrong_tree = Instances::new(parts.clone(), vec![valid], Bvh::default());
+    assert!(matches!(wrong_tree, Err(InvalidInstances::Tree(_))));
+    let empty = Instances::new(parts, vec![], Bvh::default()).unwrap();
+    let ray = Ray::half_line([0.0; 3], [1.0; 3]).unwrap();
+    assert!(empty.nearest_hit(&ray).is_none() && !empty.any_hit(&ray));
+}

@@ -1,0 +1,17 @@
+//! The laws of trees, files and rays, in one program, which links the library once.
+
+mod all_hits;
+mod closest;
+mod exact;
+mod export;
+mod filters;
+mod instances;
+mod layout_files;
+mod leave;
+mod peers;
+mod query;
+mod ray_density;
+mod references;
+mod support;
+mod traversal;
+mod wide;

@@ -1,0 +1,218 @@
+//! The ray density counts segments exactly on the grid, is monotone everywhere, and equals the area
+//! for uniform lines.
+
+use crate::support::Random;
+use bvh_core::cost::Measure;
+use bvh_core::{Aabb, DensityError, PackedAabb, RayDensity, Segment};
+use glam::Vec3;
+use proptest::prelude::*;
+use std::sync::OnceLock;
+
+/// The size of bounds whose cells have a side of 1. Boxes with integer coordinates are on the grid.
+const GRID: f32 = 32.0;
+
+fn bounds() -> Aabb {
+    Aabb::from([[0.0; 3], [GRID; 3]])
+}
+
+/// Makes segments inside the bounds, through them and outside of them.
+fn segments(count: usize, seed: u64) -> Vec<Segment> {
+    let mut random = Random(seed);
+    let mut segments = Vec::new();
+    for i in 0..count {
+        let [spread_from, spread_to] = if i % 2 == 0 { [1.0, 1.0] } else { [3.0, 1.5] };
+        let from = point(spread_from, &mut random);
+        let to = point(spread_to, &mut random);
+        segments.push(Segment { from, to });
+    }
+    segments
+}
+
+/// Returns a point of a cube around the middle of the bounds, `spread` times as large.
+fn point(spread: f32, random: &mut Random) -> [f32; 3] {
+    [0, 1, 2].map(|_| GRID * (0.5 + spread * (random.unit() - 0.5)))
+}
+
+/// Returns whether the segment has a point in the box, by its slabs.
+fn meets(segment: &Segment, bounds: &Aabb) -> bool {
+    let mut first = 0.0f64;
+    let mut last = 1.0f64;
+    for axis in 0..3 {
+        let from = f64::from(segment.from[axis]);
+        let to = f64::from(segment.to[axis]);
+        let a = (f64::from(bounds.min[axis]) - from) / (to - from);
+        let b = (f64::from(bounds.max[axis]) - from) / (to - from);
+        first = first.max(a.min(b));
+        last = last.min(a.max(b));
+    }
+    first <= last
+}
+
+#[test]
+fn boxes_on_the_grid_are_entered_as_often_as_segments_meet_them() {
+    let segments = segments(3000, 1);
+    let density = RayDensity::new(&bounds(), &segments, 0.0).unwrap();
+    let mut random = Random(2);
+    for _ in 0..2000 {
+        let a = [0, 1, 2].map(|_| random.below(33) as f32);
+        let b = [0, 1, 2].map(|_| random.below(33) as f32);
+        let cells = around(a, b);
+        // Only boxes of at least one cell along every axis.
+        if cells.extent().min_element() == 0.0 {
+            continue;
+        }
+        let mut counted = 0;
+        for segment in &segments {
+            counted += u32::from(meets(segment, &cells));
+        }
+        assert_eq!(density.entries(&cells), f64::from(counted), "{cells:?}");
+    }
+    assert_eq!(density.measure(&bounds()), bounds().half_area());
+}
+
+/// Makes a box from two corners in any order.
+fn around(a: [f32; 3], b: [f32; 3]) -> Aabb {
+    Aabb::around([a.into(), b.into()])
+}
+
+fn corner() -> impl Strategy<Value = [f32; 3]> {
+    let coordinate = prop_oneof![-1.0f32..33.0, (0u8..33).prop_map(f32::from), 15.0f32..15.2];
+    prop::array::uniform3(coordinate)
+}
+
+/// Returns one of nine densities, of three samples with three weights of area. They are made once.
+fn density(sample: usize, share: usize) -> &'static RayDensity {
+    static DENSITIES: OnceLock<Vec<RayDensity>> = OnceLock::new();
+    &DENSITIES.get_or_init(all_densities)[3 * sample + share]
+}
+
+fn all_densities() -> Vec<RayDensity> {
+    let mut densities = Vec::new();
+    for seed in 0..3 {
+        for area_weight in [0.0, 0.1, 1.0] {
+            densities.push(RayDensity::new(&bounds(), &segments(200, seed), area_weight).unwrap());
+        }
+    }
+    densities
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+    #[test]
+    fn a_larger_box_never_measures_less(a in corner(), b in corner(), c in corner(), d in corner(), seed in 0usize..3, share in 0usize..3) {
+        let density = density(seed, share);
+        let inner = around(a, b);
+        let outer = inner.union(&around(c, d));
+        prop_assert!(density.measure(&inner) <= density.measure(&outer), "{inner:?} in {outer:?}");
+        prop_assert!(density.entries(&inner) <= density.entries(&outer));
+        for aabb in [inner, outer] {
+            let packed = density.of(&PackedAabb::from(&aabb));
+            prop_assert_eq!(packed.to_bits(), density.measure(&aabb).to_bits(), "{:?}: vectors differ", aabb);
+        }
+        prop_assert!(density.entries(&inner) >= 0.0 && density.entries(&outer) <= f64::from(density.segments()));
+    }
+}
+
+#[test]
+fn uniform_endless_lines_give_the_area_back() {
+    let mut random = Random(5);
+    let mut lines = Vec::new();
+    // Lines through two uniform and independent points of a sphere around the bounds are uniform
+    // lines.
+    while lines.len() < 400_000 {
+        let from = on_sphere(&mut random);
+        let to = on_sphere(&mut random);
+        lines.push(Segment { from, to });
+    }
+    let density = RayDensity::new(&bounds(), &lines, 0.0).unwrap();
+    for cells in [
+        [[4.0, 4.0, 4.0], [20.0, 12.0, 28.0]],
+        [[1.0, 1.0, 1.0], [5.0, 31.0, 6.0]],
+        [[8.0, 8.0, 8.0], [9.0, 9.0, 9.0]],
+    ] {
+        let cells = Aabb::from(cells);
+        let ratio = density.measure(&cells) / cells.half_area();
+        let deviation = 1.0 / density.entries(&cells).sqrt();
+        assert!((ratio - 1.0).abs() < 4.0 * deviation + 0.01, "{cells:?}: {ratio}");
+    }
+}
+
+/// Returns a uniform point of a sphere around the bounds.
+fn on_sphere(random: &mut Random) -> [f32; 3] {
+    loop {
+        let offset = random.point();
+        let length_squared = offset.length_squared();
+        // Points of the cube outside of the ball would favour its corners.
+        if length_squared > 1e-4 && length_squared <= 1.0 {
+            return (Vec3::splat(16.0) + 28.0 * offset / length_squared.sqrt()).to_array();
+        }
+    }
+}
+
+#[test]
+fn each_invalid_input_has_its_error() {
+    let one = [Segment { from: [1.0; 3], to: [2.0; 3] }];
+    let nan = [one[0], Segment { from: [f32::NAN; 3], to: [2.0; 3] }];
+    let far = [Segment { from: [100.0; 3], to: [200.0; 3] }];
+    assert_eq!(
+        RayDensity::new(&bounds(), &nan, 0.1).unwrap_err(),
+        DensityError::NotFinite { index: 1 }
+    );
+    assert_eq!(
+        RayDensity::new(&bounds(), &[], 0.1).unwrap_err(),
+        DensityError::Count { segments: 0 }
+    );
+    assert_eq!(RayDensity::new(&bounds(), &far, 0.1).unwrap_err(), DensityError::NoneMeets);
+    assert_eq!(RayDensity::new(&bounds(), &one, -0.1).unwrap_err(), DensityError::AreaWeight(-0.1));
+    assert_eq!(RayDensity::new(&Aabb::EMPTY, &one, 0.1).unwrap_err(), DensityError::Bounds);
+}
+
+#[test]
+fn rays_that_end_on_a_wall_enter_the_flat_box_around_it() {
+    // Downwards onto a wall in the middle of the cells between 16 and 17.
+    let mut random = Random(5);
+    let mut rays = Vec::new();
+    for _ in 0..1000 {
+        let x = GRID * random.unit();
+        let z = GRID * random.unit();
+        rays.push(Segment { from: [x, 30.2, z], to: [x, 16.5, z] });
+    }
+    let wall = wall_at(16.5);
+    let plain = RayDensity::new(&bounds(), &rays, 0.0).unwrap();
+    assert_eq!(plain.entries(&wall), 500.0);
+    let longer = RayDensity::new(&bounds(), &ending_at(&rays, 15.9), 0.0).unwrap();
+    assert_eq!(longer.entries(&wall), 1000.0);
+    // On average over walls at all heights, half of the rays seem to enter, and three quarters of
+    // the extended rays.
+    let mut plain_entries = 0.0;
+    let mut extended_entries = 0.0;
+    for i in 0..64u8 {
+        let height = 16.0 + f32::from(i) / 64.0;
+        let ending = ending_at(&rays, height);
+        let wall = wall_at(height);
+        plain_entries += RayDensity::new(&bounds(), &ending, 0.0)
+            .unwrap()
+            .entries(&wall);
+        extended_entries += RayDensity::of_rays(&bounds(), &ending, 0.0)
+            .unwrap()
+            .entries(&wall);
+    }
+    let plain_share = plain_entries / 64.0 / 1000.0;
+    let extended_share = extended_entries / 64.0 / 1000.0;
+    assert!((0.45..0.55).contains(&plain_share), "{plain_share}");
+    assert!((0.7..0.8).contains(&extended_share), "{extended_share}");
+}
+
+/// Returns a flat box across the bounds.
+fn wall_at(height: f32) -> Aabb {
+    Aabb::from([[0.0, height, 0.0], [GRID, height, GRID]])
+}
+
+/// Returns vertical rays that end at this height instead.
+fn ending_at(rays: &[Segment], height: f32) -> Vec<Segment> {
+    let end = |ray: &Segment| [ray.to[0], height, ray.to[2]];
+    rays.iter()
+        .map(|ray| Segment { to: end(ray), ..*ray })
+        .collect()
+}

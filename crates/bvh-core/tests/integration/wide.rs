@@ -1,0 +1,374 @@
+//! Every kernel of the wide layout, ray by ray and in batches, gives the answer of testing every
+//! triangle, bit by bit.
+
+use crate::support::layouts::{bundles, layouts};
+use crate::support::{
+    Random, SHAPES, ball, bits, boxes, brute_force, chain, grid_box, rays, scaled, soup, tree,
+};
+use bvh_core::{
+    Coherence, Distances, Hit, Kernel, Ray, RayComponents, RefitError, Triangle, WideBvh,
+};
+use glam::Vec3;
+
+/// Checks all rays by all layouts, one by one and in a batch. Returns the number of rays that hit.
+fn check(name: &str, triangles: &[Triangle], layouts: &[(Kernel, WideBvh)], rays: &[Ray]) -> usize {
+    let expected: Vec<Option<Hit>> = rays
+        .iter()
+        .map(|ray| brute_force(triangles, ray))
+        .collect();
+    for (kernel, wide) in layouts {
+        for (ray, &expected) in rays.iter().zip(&expected) {
+            let case = format!("{name}, {kernel:?}, {ray:?}");
+            assert_eq!(bits(wide.nearest_hit(ray)), bits(expected), "{case}");
+            assert_eq!(wide.any_hit(ray), expected.is_some(), "{case}");
+        }
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let mut nearest = vec![Hit::MISS; rays.len()];
+            let mut any = vec![false; rays.len()];
+            wide.nearest_hits(rays, &mut nearest, coherence);
+            wide.any_hits(rays, &mut any, coherence);
+            for (i, (ray, &expected)) in rays.iter().zip(&expected).enumerate() {
+                let case = format!("{name}, {kernel:?}, {coherence:?}, {ray:?}");
+                assert_eq!(
+                    bits((!nearest[i].is_miss()).then_some(nearest[i])),
+                    bits(expected),
+                    "{case}"
+                );
+                assert_eq!(any[i], expected.is_some(), "{case}");
+            }
+        }
+    }
+    expected.iter().flatten().count()
+}
+
+#[test]
+fn every_kernel_answers_as_brute_force_at_every_scale() {
+    let mut random = Random(1);
+    let mut hits = 0;
+    for (name, scene) in
+        [("soup", soup(150, &mut random)), ("grid", grid_box(4)), ("ball", ball(2))]
+    {
+        for exponent in [-120, -60, -20, 0, 20, 60, 120] {
+            let triangles = scaled(&scene, libm::exp2f(exponent as f32));
+            let layouts = layouts(&triangles, &mut random);
+            let name = format!("{name} * 2^{exponent}");
+            hits += check(&name, &triangles, &layouts, &rays(&triangles, 1500, &mut random));
+            hits += check(&name, &triangles, &layouts, &bundles(&triangles, 100, &mut random));
+        }
+    }
+    assert!(hits > 10_000, "the rays should hit something: {hits}");
+}
+
+#[test]
+fn batches_of_any_length_answer_as_their_rays_do() {
+    let mut random = Random(9);
+    let triangles = soup(60, &mut random);
+    for (kernel, wide) in layouts(&triangles, &mut random) {
+        for count in (0..50).chain([63, 64, 65, 100, 257]) {
+            let mut batch = rays(&triangles, count, &mut random);
+            batch.truncate(count);
+            for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+                let mut nearest = vec![Hit::MISS; batch.len()];
+                let mut any = vec![false; batch.len()];
+                wide.nearest_hits(&batch, &mut nearest, coherence);
+                wide.any_hits(&batch, &mut any, coherence);
+                let alone: Vec<Hit> = batch
+                    .iter()
+                    .map(|ray| wide.nearest_hit(ray).unwrap_or(Hit::MISS))
+                    .collect();
+                assert_eq!(nearest, alone, "{kernel:?}, {coherence:?}, {count}");
+                let alone: Vec<bool> = batch
+                    .iter()
+                    .map(|ray| wide.any_hit(ray))
+                    .collect();
+                assert_eq!(any, alone, "{kernel:?}, {coherence:?}, {count}");
+            }
+        }
+    }
+}
+
+/// Distances that f32 represents badly. Answers were once lost because corners beyond the rounded
+/// product of `t_max` and the direction's length counted as beyond every hit.
+#[test]
+fn distances_that_underflow_are_answered_alike() {
+    let mut random = Random(2);
+    let at = |z: f32| {
+        Triangle([Vec3::new(-1.0, -1.0, z), Vec3::new(3.0, -1.0, z), Vec3::new(-1.0, 3.0, z)])
+    };
+    let depths = [1e-30, 2e-30, 0.0, 1e-45, -1e-30, 3e-38, 1.5e-20, 1e-30];
+    let triangles: Vec<Triangle> = depths.into_iter().map(at).collect();
+    let layouts = layouts(&triangles, &mut random);
+    let mut rays = Vec::new();
+    for length in [1e20, 1e25, 1e15, 1.0, 1e8, 1e-20] {
+        for (t_min, t_max) in [
+            (0.0, 0.0),
+            (0.0, f32::MAX),
+            (0.0, 1e-45),
+            (1e-45, 1e-45),
+            (0.0, 1e-40),
+            (1e-44, 1e-38),
+        ] {
+            for side in [1.0, -1.0] {
+                for z in [0.0, -1e-30, 1e-45, 2e-38, 1e-20] {
+                    for slope in [0.0, 0.1, 1e-30] {
+                        let direction = Vec3::new(slope, slope, side) * length;
+                        rays.push(
+                            Ray::new(Vec3::new(0.1, 0.2, -side * z), direction, t_min, t_max)
+                                .unwrap(),
+                        );
+                    }
+                }
+            }
+        }
+    }
+    let hits = check("thin sheets", &triangles, &layouts, &rays);
+    assert!(hits > 300, "{hits} of {}", rays.len());
+}
+
+#[test]
+fn a_range_that_ends_at_either_zero_has_the_same_bits_from_every_kernel() {
+    let mut random = Random(4);
+    let sheet = |x: f32| {
+        Triangle([Vec3::new(x, -1.0, 0.0), Vec3::new(x + 1.0, -1.0, 0.0), Vec3::new(x, 3.0, 0.0)])
+    };
+    let triangles: Vec<Triangle> = (0..20).map(|x| sheet(x as f32)).collect();
+    let layouts = layouts(&triangles, &mut random);
+    let ray = |i: usize| {
+        let side = [1.0, -1.0][i % 2];
+        Ray::new(
+            Vec3::new(0.3 * i as f32, 0.0, 0.0),
+            Vec3::new(0.0, 0.0, side),
+            0.0,
+            [-0.0, 0.0][i / 2 % 2],
+        )
+        .unwrap()
+    };
+    let rays: Vec<Ray> = (0..64).map(ray).collect();
+    let hits = check("sheets that rays begin in", &triangles, &layouts, &rays);
+    assert!(hits > 40, "{hits} of 64");
+}
+
+/// The answers to rays by component, all of whose ranges begin and end at the given distances.
+fn by_component(
+    wide: &WideBvh,
+    rays: &[Ray],
+    range: [f32; 2],
+    coherence: Coherence,
+) -> Vec<(u32, u32)> {
+    let components = |vector: fn(&Ray) -> Vec3| {
+        [0, 1, 2].map(|axis| -> Vec<f32> { rays.iter().map(|ray| vector(ray)[axis]).collect() })
+    };
+    let origins = components(Ray::origin);
+    let directions = components(Ray::direction);
+    let components = RayComponents::assume_valid(
+        origins.each_ref().map(Vec::as_slice),
+        directions.each_ref().map(Vec::as_slice),
+        Distances::All(range[0]),
+        Distances::All(range[1]),
+    );
+    let mut distances = vec![0.0; rays.len()];
+    let mut objects = vec![0; rays.len()];
+    wide.nearest_hits_by_component(&components, &mut distances, &mut objects, coherence);
+    let distance_bits = distances.into_iter().map(f32::to_bits);
+    distance_bits.zip(objects).collect()
+}
+
+/// The answers to a batch of rays.
+fn of_batch(wide: &WideBvh, rays: &[Ray], coherence: Coherence) -> Vec<(u32, u32)> {
+    let mut hits = vec![Hit::MISS; rays.len()];
+    wide.nearest_hits(rays, &mut hits, coherence);
+    hits.iter()
+        .map(|hit| (hit.t.to_bits(), hit.object))
+        .collect()
+}
+
+#[test]
+fn batches_miss_a_scene_in_which_no_triangle_has_an_area() {
+    let line = Triangle::from([[-1.0; 3], [0.0; 3], [1.0; 3]]);
+    let ray = Ray::half_line([0.0, 0.0, 5.0], [0.01, 0.01, -1.0]).unwrap();
+    for (kernel, wide) in layouts(&[line, line], &mut Random(7)) {
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let mut hits = vec![Hit { t: 1.0, object: 0 }; 100];
+            let mut any = vec![true; 100];
+            wide.nearest_hits(&[ray; 100], &mut hits, coherence);
+            wide.any_hits(&[ray; 100], &mut any, coherence);
+            let is_miss = hits.iter().all(Hit::is_miss) && !any.contains(&true);
+            assert!(is_miss, "{kernel:?}, {coherence:?}");
+        }
+    }
+}
+
+#[test]
+fn ranges_by_component_end_at_either_zero_with_the_same_bits() {
+    let sheet = |x: f32| {
+        Triangle([Vec3::new(x, -1.0, 0.0), Vec3::new(x + 1.0, -1.0, 0.0), Vec3::new(x, 3.0, 0.0)])
+    };
+    let triangles: Vec<Triangle> = (0..20).map(|x| sheet(x as f32)).collect();
+    let rays: Vec<Ray> = (0..64)
+        .map(|i| {
+            let side = [1.0, -1.0][i % 2];
+            Ray::new([0.3 * i as f32, 0.0, 0.0], [0.0, 0.0, side], 0.0, 0.0).unwrap()
+        })
+        .collect();
+    for (kernel, wide) in layouts(&triangles, &mut Random(5)) {
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let answers = by_component(&wide, &rays, [-0.0, -0.0], coherence);
+            assert_eq!(answers, of_batch(&wide, &rays, coherence), "{kernel:?}, {coherence:?}");
+        }
+    }
+}
+
+#[test]
+fn ranges_that_begin_below_zero_are_answered_as_from_zero() {
+    let mut random = Random(6);
+    let triangles = soup(200, &mut random);
+    let valid = rays(&triangles, 500, &mut random);
+    let invalid: Vec<Ray> = valid
+        .iter()
+        .map(|ray| Ray::assume_valid(ray.origin(), ray.direction(), -1e30, f32::INFINITY))
+        .collect();
+    let valid: Vec<Ray> = valid
+        .iter()
+        .map(|ray| Ray::half_line(ray.origin(), ray.direction()).unwrap())
+        .collect();
+    for (kernel, wide) in layouts(&triangles, &mut random) {
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let expected = of_batch(&wide, &valid, coherence);
+            let range = [-1e30, f32::INFINITY];
+            let separate = by_component(&wide, &valid, range, coherence);
+            assert_eq!(separate, expected, "{kernel:?}, {coherence:?}, by component");
+            let together = of_batch(&wide, &invalid, coherence);
+            assert_eq!(together, expected, "{kernel:?}, {coherence:?}");
+        }
+        for (ray, invalid) in valid.iter().zip(&invalid) {
+            let answer = bits(wide.nearest_hit(invalid));
+            assert_eq!(answer, bits(wide.nearest_hit(ray)), "{kernel:?}");
+        }
+    }
+}
+
+#[test]
+fn coordinates_down_to_denormal_ones_are_answered_alike() {
+    let mut random = Random(3);
+    for exponent in [-149, -140, -127, -110, -91, -88] {
+        let triangles = scaled(&soup(40, &mut random), libm::exp2f(exponent as f32 + 7.0) / 128.0);
+        let layouts = layouts(&triangles, &mut random);
+        let name = format!("soup * 2^{exponent}");
+        check(&name, &triangles, &layouts, &rays(&triangles, 600, &mut random));
+        check(&name, &triangles, &layouts, &bundles(&triangles, 40, &mut random));
+    }
+}
+
+#[test]
+fn a_refitted_layout_answers_as_brute_force_at_the_new_places() {
+    let mut random = Random(6);
+    let triangles = soup(150, &mut random);
+    let moved: Vec<Triangle> = (triangles.iter())
+        .map(|t| match t.is_degenerate() {
+            true => Triangle([Vec3::splat(9.0); 3]),
+            false => {
+                let by = random.point();
+                Triangle(t.0.map(|p| p * 1.5 + by))
+            }
+        })
+        .collect();
+    let mut layouts = layouts(&triangles, &mut random);
+    for (_, layout) in &mut layouts {
+        layout.refit(&moved).unwrap();
+        let after = layout.expected_visits();
+        // Back and forth changes nothing.
+        let mut again = layout.clone();
+        again.refit(&triangles).unwrap();
+        assert_ne!(again.expected_visits(), after);
+        again.refit(&moved).unwrap();
+        assert_eq!(again.expected_visits(), after);
+    }
+    assert!(check("moved", &moved, &layouts, &rays(&moved, 3000, &mut random)) > 500);
+}
+
+#[test]
+fn a_refitted_layout_costs_no_less_than_a_new_one_of_the_refitted_tree() {
+    let mut random = Random(8);
+    let triangles = ball(3);
+    let moved: Vec<Triangle> = (triangles.iter())
+        .map(|t| Triangle(t.0.map(|p| Vec3::new(p.x * 4.0, p.y + p.x * p.z, p.z * 0.1))))
+        .collect();
+    let mut tree = tree(&boxes(&triangles), SHAPES[0], &mut random);
+    let mut layout = WideBvh::new(&tree, &triangles).unwrap();
+    layout.refit(&moved).unwrap();
+    tree.refit(&boxes(&moved));
+    let new = WideBvh::new(&tree, &moved).unwrap();
+    let refitted = layout.expected_visits();
+    let new = new.expected_visits();
+    assert!(refitted > new && refitted < 2.0 * new, "{refitted} {new}");
+}
+
+#[test]
+fn a_layout_whose_triangles_cannot_be_followed_says_so_and_stays_as_it_was() {
+    let mut random = Random(7);
+    let triangles = soup(40, &mut random);
+    let mut layouts = layouts(&triangles, &mut random);
+    let with = |at: usize, triangle: Triangle| {
+        let mut changed = triangles.clone();
+        changed[at] = triangle;
+        changed
+    };
+    let flat = Triangle([Vec3::ONE; 3]);
+    let new = Triangle([Vec3::X, Vec3::Y, Vec3::Z]);
+    let infinite = Triangle([Vec3::X, Vec3::Y, Vec3::INFINITY]);
+    for (_, layout) in &mut layouts {
+        assert_eq!(layout.refit(&with(3, flat)), Err(RefitError::Lost(3)));
+        assert_eq!(layout.refit(&with(7, new)), Err(RefitError::Gained(7)));
+        assert_eq!(layout.refit(&with(4, infinite)), Err(RefitError::NotFinite(4)));
+        assert!(matches!(layout.refit(&triangles[..20]), Err(RefitError::Lost(20..))));
+    }
+    check("rejected", &triangles, &layouts, &rays(&triangles, 500, &mut random));
+}
+
+#[test]
+fn triangles_without_area_are_left_out_and_never_hit() {
+    let mut random = Random(4);
+    let flat = |p: Vec3, q: Vec3| Triangle([p, q, (p + q) * 0.5]);
+    let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE];
+    let mut triangles: Vec<Triangle> = corners
+        .iter()
+        .flat_map(|&p| corners.iter().map(move |&q| flat(p, q)))
+        .collect();
+    let empty = layouts(&triangles, &mut random);
+    assert!(empty.iter().all(|(_, wide)| {
+        wide.nearest_hit(&Ray::half_line(-Vec3::ONE, Vec3::ONE).unwrap())
+            .is_none()
+    }));
+    triangles.push(Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]));
+    let layouts = layouts(&triangles, &mut random);
+    assert!(check("flat", &triangles, &layouts, &rays(&triangles, 500, &mut random)) > 0);
+}
+
+#[test]
+fn trees_too_deep_for_the_stack_of_a_vector_kernel_are_traced_all_the_same() {
+    let triangles: Vec<Triangle> = (0..20_000)
+        .map(|i| {
+            Triangle(
+                [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p * (i + 1) as f32 + Vec3::Z * (i as f32)),
+            )
+        })
+        .collect();
+    let wide = WideBvh::new(&chain(&boxes(&triangles)), &triangles).unwrap();
+    for (z, direction, object) in [(-1.0, 1.0, 0), (30_000.0, -1.0, 19_999)] {
+        let ray = Ray::half_line(Vec3::new(0.1, 0.1, z), Vec3::Z * direction).unwrap();
+        assert_eq!(wide.nearest_hit(&ray).map(|hit| hit.object), Some(object));
+    }
+}
+
+#[test]
+fn packets_and_what_is_left_over_are_answered_in_their_order() {
+    let mut random = Random(5);
+    let triangles = ball(2);
+    let layouts = layouts(&triangles, &mut random);
+    for count in [0, 1, 15, 16, 17, 33, 100] {
+        let rays: Vec<Ray> = (0..count)
+            .map(|i| Ray::half_line(Vec3::new(i as f32 * 0.03 - 1.5, 0.1, -3.0), Vec3::Z).unwrap())
+            .collect();
+        check("in line", &triangles, &layouts, &rays);
+    }
+}

@@ -1,0 +1,7 @@
+//! Scenes read from files, in one program, which links the library once.
+
+mod base_cost;
+mod glb;
+mod gltf;
+mod meshes;
+mod obj;

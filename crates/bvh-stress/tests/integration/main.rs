@@ -1,0 +1,9 @@
+//! All methods, traversals and readers on stiff and extreme input, in one program.
+
+mod fuzz;
+mod laws;
+mod never_worse;
+mod objectives;
+#[cfg(target_arch = "x86_64")]
+mod subnormals;
+mod suite;

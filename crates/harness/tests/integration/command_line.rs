@@ -1,0 +1,403 @@
+//! The program from its users' view: the files it writes, the arguments it rejects, and the runs
+//! that survive a kill.
+
+// Tests that send signals or make links and pipes are left out on Windows, and their imports stay.
+#![cfg_attr(windows, allow(unused_imports))]
+
+use crate::support::{
+    TABLE, begin, ended, folder_with, refused, reproducible, rows, run, said, send, text, wait_for,
+};
+use std::fs;
+use std::path::Path;
+
+/// Creates a folder with the spec.
+fn folder() -> tempfile::TempDir {
+    folder_with("spec.toml", TABLE)
+}
+
+#[test]
+fn a_run_writes_rows_figures_and_provenance_and_prints_the_table() {
+    let folder = folder();
+    let said = said(folder.path(), &["spec.toml"]);
+    assert!(said.contains("escher (stand-in)"), "{said}");
+    let results = folder.path().join("results/spec");
+    for name in [
+        "runs.csv",
+        "trial_costs.csv",
+        "timing.csv",
+        "paper.csv",
+        "table.csv",
+        "table.svg",
+        "provenance.toml",
+    ] {
+        assert!(results.join(name).is_file(), "{name}");
+    }
+    assert!(!results.join(".partial").exists());
+    let runs = fs::read_to_string(results.join("runs.csv")).unwrap();
+    assert_eq!(runs.lines().count(), 1 + 2 * 3 * 3);
+    assert!(
+        !reproducible(&results)
+            .iter()
+            .any(|(_, bytes)| text(bytes).contains("seconds"))
+    );
+    let provenance: toml::Table = fs::read_to_string(results.join("provenance.toml"))
+        .unwrap()
+        .parse()
+        .unwrap();
+    let build = provenance["build"].as_str().unwrap();
+    let assertions = cfg!(debug_assertions);
+    let (profile, on) =
+        if assertions { ("debug, opt-level ", "on") } else { ("release, opt-level ", "off") };
+    assert!(
+        build.starts_with(profile) && build.contains(&format!("debug assertions {on}")),
+        "{build}"
+    );
+}
+
+#[test]
+fn any_number_of_threads_writes_the_same_bytes() {
+    let folder = folder();
+    let results: Vec<_> = ["1", "2", "3"]
+        .map(|jobs| {
+            said(folder.path(), &["spec.toml", "--jobs", jobs, "--out", jobs]);
+            reproducible(&folder.path().join(jobs).join("spec"))
+        })
+        .into();
+    assert!(results[0] == results[1] && results[0] == results[2]);
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
+    let spec = TABLE
+        .replace("repetitions = 3", "repetitions = 40")
+        .replace("trials = 12", "trials = 100");
+    let folder = folder_with("spec.toml", &spec);
+    let child = begin(folder.path(), &["spec.toml"]);
+    wait_for(&folder.path().join("results/spec/.partial/000000"));
+    send("-INT", &child);
+    ended(
+        &child.wait_with_output().unwrap(),
+        130,
+        &["of 240 runs are kept, `--resume` does the rest"],
+    );
+    assert!(
+        folder
+            .path()
+            .join("results/spec/.partial/000000")
+            .is_dir()
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_a_lower_bound_of_any_effort() {
+    let spec = "question = 'q'\nscenes = ['escher']\nlower_bound = 4000000000\nmethods = [{ method = 'median_cut' }]\n";
+    let folder = folder_with("spec.toml", spec);
+    let child = begin(folder.path(), &["spec.toml"]);
+    wait_for(&folder.path().join("results/spec/.partial"));
+    // The tree takes milliseconds, so the signal interrupts the bound.
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    send("-INT", &child);
+    // An interrupted bound is not a result.
+    ended(&child.wait_with_output().unwrap(), 130, &["0 of 1 runs are kept"]);
+}
+
+#[test]
+fn check_passes_on_equal_results_and_names_an_altered_number() {
+    let folder = folder();
+    said(folder.path(), &["spec.toml"]);
+    said(folder.path(), &["spec.toml", "--check"]);
+    let path = folder.path().join("results/spec/runs.csv");
+    let runs = fs::read_to_string(&path).unwrap();
+    let line = runs
+        .lines()
+        .find(|line| line.contains("pinecon2,stand-in,noise"))
+        .unwrap();
+    // Column 9 is the cost, which the check must compare to the last digit.
+    let cost = line.split(',').nth(9).unwrap();
+    fs::write(&path, runs.replace(cost, "12345.5")).unwrap();
+    let output = run(folder.path(), &["spec.toml", "--check"]);
+    let said = text(&output.stdout);
+    assert_eq!(output.status.code(), Some(1));
+    for part in ["scene pinecon2", "method noise", &format!("cost is {cost}, committed 12345.5")] {
+        assert!(said.contains(part), "{part} in {said}");
+    }
+    assert!(
+        fs::read_to_string(&path)
+            .unwrap()
+            .contains("12345.5"),
+        "a check writes nothing"
+    );
+}
+
+#[test]
+fn quick_seed_and_scene_change_what_is_run() {
+    let folder = folder();
+    said(folder.path(), &["spec.toml", "--quick"]);
+    let quick = fs::read_to_string(folder.path().join("results/quick/spec/runs.csv")).unwrap();
+    // One scene, one repetition, three methods, and the header.
+    assert_eq!(quick.lines().count(), 1 + 3);
+    fs::write(
+        folder.path().join("two.obj"),
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\nf 1 2 3\nf 2 3 4\n",
+    )
+    .unwrap();
+    let args = ["spec.toml", "--quick", "--scene", "two.obj", "--seed", "9", "--out", "other"];
+    said(folder.path(), &args);
+    let other = fs::read_to_string(folder.path().join("other/quick/spec/runs.csv")).unwrap();
+    assert!(other.contains("\ntwo,file,greedy,") && !other.contains("escher"), "{other}");
+}
+
+#[test]
+fn mistakes_are_named_before_any_work() {
+    let folder = folder();
+    for (name, text) in [
+        ("key.toml", &*TABLE.replace("repetitions = 3", "repetition = 3")),
+        ("parameter.toml", &TABLE.replace("noise = 0.1", "noise = 2.0")),
+        ("scene.toml", &TABLE.replace("'pinecon2'", "'sofa'")),
+        ("label.toml", &TABLE.replace("method = 'noise'", "method = 'nose'")),
+        ("nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n"),
+        ("empty.obj", ""),
+        ("file", ""),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    for (args, parts) in [
+        (&["missing.toml"][..], &["missing.toml"][..]),
+        (&["key.toml"], &["key.toml", "repetition", "repetitions"]),
+        (&["parameter.toml"], &["line 7", "methods[1].noise is 2", "0 to 1"]),
+        (&["scene.toml"], &["sofa", "accepted: bijou, cloister, escher, konistil"]),
+        (&["label.toml"], &["reports[0]", "nose", "accepted: greedy, noise, k"]),
+        (&["spec.toml", "--scene", "nan.obj"], &["nan.obj:2", "nan"]),
+        (&["spec.toml", "--scene", "empty.obj"], &["empty.obj is empty"]),
+        (&["spec.toml", "--scene", "none.obj"], &["none.obj", "no such file"]),
+        (&["spec.toml", "--jobs", "0"], &["--jobs", "1..=1024"]),
+        (&["spec.toml", "--sed", "1"], &["--sed", "--seed"]),
+        (&["spec.toml", "--out", "file"], &["--out", "file is a file", "a folder"]),
+        (&["spec.toml", "--check", "--resume"], &["--check", "--resume"]),
+        (&[], &["Usage"]),
+    ] {
+        refused(folder.path(), args, 2, parts);
+    }
+    assert!(!folder.path().join("results").exists(), "nothing was written");
+}
+
+#[test]
+fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_differs_is_named() {
+    let folder = folder();
+    let part = |number: &str, out: &str| {
+        said(folder.path(), &["spec.toml", "--shard", number, "--out", out]);
+    };
+    let refused = |args: &[&str], code: i32, parts: &[&str]| {
+        refused(folder.path(), args, code, parts);
+        assert!(!folder.path().join("merged").exists());
+    };
+    said(folder.path(), &["spec.toml", "--out", "whole"]);
+    part("1/3", "one");
+    part("3/3", "three");
+    let missing = ["spec: 6 of 18 runs are missing", "scene escher, method greedy, repetition 1"];
+    refused(&["merge", "one", "three", "--out", "merged"], 1, &missing);
+    refused(&["merge", "one", "whole", "--out", "merged"], 2, &["whole", "--shard"]);
+    refused(&["merge", "one", "nowhere", "--out", "merged"], 1, &["nowhere"]);
+    refused(
+        &["spec.toml", "--shard", "4/3", "--out", "merged"],
+        2,
+        &["--shard", "4/3", "from 1 to N"],
+    );
+
+    // Two parts may hold the same run, as long as its results agree.
+    part("2/3", "two");
+    // The second copy of the same part stands for a machine that was started twice.
+    part("2/3", "again");
+    let folders = ["merge", "one", "two", "three", "again", "--out"];
+    said(folder.path(), &[&folders[..], &["merged"]].concat());
+    let whole = reproducible(&folder.path().join("whole/spec"));
+    assert!(whole == reproducible(&folder.path().join("merged/spec")));
+    let [figure, merged_figure] = ["whole", "merged"]
+        .map(|out| fs::read(folder.path().join(out).join("spec/table.svg")).unwrap());
+    assert!(figure == merged_figure);
+    let provenance = fs::read_to_string(folder.path().join("merged/spec/provenance.toml")).unwrap();
+    assert_eq!(provenance.matches("[[parts]]").count(), 4);
+    fs::remove_dir_all(folder.path().join("merged")).unwrap();
+
+    let kept = folder
+        .path()
+        .join("again/spec/.partial/000001/runs.csv");
+    fs::write(
+        &kept,
+        fs::read_to_string(&kept)
+            .unwrap()
+            .replace("escher", "esther"),
+    )
+    .unwrap();
+    let differs = ["again/spec/.partial/000001", "runs.csv is damaged"];
+    refused(&[&folders[..], &["merged"]].concat(), 1, &differs);
+    said(folder.path(), &["spec.toml", "--seed", "9", "--shard", "2/3", "--out", "two", "--force"]);
+    refused(&["merge", "one", "two", "three", "--out", "merged"], 1, &["different specs"]);
+    refused(&["merge", "one", "--out", "one"], 2, &["--out one"]);
+
+    let resolved = folder
+        .path()
+        .join("one/spec/.partial/resolved.toml");
+    let edited = fs::read_to_string(&resolved)
+        .unwrap()
+        .replace("repetitions = 3", "repetitions = 4294967295");
+    fs::write(&resolved, edited).unwrap();
+    refused(
+        &["merge", "one", "--out", "merged"],
+        1,
+        &["one/spec/.partial/resolved.toml: ", "runs; accepted"],
+    );
+}
+
+#[test]
+fn listed_runs_performed_one_by_one_are_merged_to_the_bytes_of_one_process() {
+    let folder = folder();
+    let dir = folder.path();
+    said(dir, &["spec.toml", "--out", "whole"]);
+    let list = said(dir, &["jobs", "spec.toml"]);
+    let ids: Vec<&str> = list
+        .lines()
+        .map(|line| line.split(' ').next().unwrap())
+        .collect();
+    assert_eq!(ids.len(), 18);
+    let parts: Vec<String> = ids
+        .iter()
+        .map(|id| format!("parts/{id}"))
+        .collect();
+    for (id, part) in ids.iter().zip(&parts) {
+        said(dir, &["spec.toml", "--run", id, "--resume", "--out", part]);
+    }
+    let merge: Vec<&str> = ["merge"]
+        .into_iter()
+        .chain(parts.iter().map(String::as_str))
+        .chain(["--out", "merged"])
+        .collect();
+    refused(dir, &[&merge[..5], &["--out", "merged"]].concat(), 1, &["14 of 18 runs are missing"]);
+
+    // A part that two processors have worked on.
+    let provenance = dir
+        .join(&parts[0])
+        .join("spec/.partial/provenance.toml");
+    let recorded = fs::read_to_string(&provenance).unwrap();
+    fs::write(&provenance, recorded.replace("cpu = \"", "cpu = \"another ")).unwrap();
+    let resumed = ["spec.toml", "--run", ids[0], "--resume", "--out", parts[0].as_str()];
+    said(dir, &resumed);
+    refused(dir, &merge, 1, &["unlike processors", "another ", "--unlike-processors"]);
+    assert!(!dir.join("merged").exists());
+    said(dir, &[&merge[..], &["--unlike-processors"]].concat());
+    assert!(reproducible(&dir.join("whole/spec")) == reproducible(&dir.join("merged/spec")));
+
+    let unknown = ["spec.toml", "--run", "0123456789abcdef", "--out", "unknown"];
+    refused(dir, &unknown, 2, &["0123456789abcdef", "no such run", "harness jobs"]);
+    assert!(!dir.join("unknown").exists());
+    refused(dir, &["jobs", "spec.toml", "--scene", "sofa"], 2, &["sofa"]);
+}
+
+const GAPS: &str = "
+question = 'What are gaps measured from?'
+scenes = ['escher:300', 'spheres75:12']
+methods = [
+    { label = 'greedy', method = 'muller_fellner' },
+    { label = 'search', method = 'reinsertion', budget = { max_work = 2000 } },
+]
+[[reports]]
+kind = 'numbers'
+title = 'gaps'
+methods = ['greedy', 'search']
+";
+
+/// Returns the column of the first row of the scene and method.
+fn cell(path: &Path, scene: &str, method: &str, column: &str) -> f64 {
+    let rows = rows(path);
+    let row = rows
+        .iter()
+        .find(|row| row["scene"] == scene && row["method"] == method)
+        .unwrap();
+    row[column].parse().unwrap()
+}
+
+#[test]
+fn gaps_are_to_the_best_known_cost_and_stay_until_they_are_redrawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    fs::write(path.join("short.toml"), GAPS).unwrap();
+    let long = GAPS.replace("max_work = 2000", "max_work = 10000000");
+    fs::write(path.join("long.toml"), long).unwrap();
+    said(path, &["short.toml"]);
+    assert_eq!(gap(path), 0.0, "its own best is the best known");
+    // Small scenes are compared with their exact optimum, which no run needs to find.
+    let numbers = path.join("results/short/numbers.csv");
+    assert!(cell(&numbers, "spheres75:12", "greedy", "lower_bound_over_reference") >= 1.0 - 1e-12);
+    let best_known = path.join("results/best_known.csv");
+    let before = fs::read(&best_known).unwrap();
+    said(path, &["long.toml"]);
+    let after = fs::read(&best_known).unwrap();
+    assert!(before != after);
+    assert_eq!(gap(path), 0.0, "later finds do not change recorded gaps");
+    said(path, &["short.toml", "--check"]);
+    assert!(fs::read(&best_known).unwrap() == after, "a check writes nothing");
+    said(path, &["short.toml", "--redraw"]);
+    assert!(gap(path) > 0.0);
+    said(path, &["short.toml", "--check"]);
+    // Rows of another spec cannot be redrawn.
+    let other = GAPS.replace("max_work = 2000", "max_work = 3000");
+    fs::write(path.join("short.toml"), other).unwrap();
+    refused(path, &["short.toml", "--redraw"], 2, &["another spec"]);
+}
+
+fn gap(folder: &Path) -> f64 {
+    let numbers = folder.join("results/short/numbers.csv");
+    cell(&numbers, "escher:300", "search", "gap_median")
+}
+
+#[test]
+fn without_reports_there_is_a_table_and_without_a_terminal_a_line_for_the_last_run() {
+    let spec = "question = 'q'\nscenes = ['spheres75']\nrepetitions = 3\nmethods = [{ method = 'median_cut' }]\n";
+    let folder = folder_with("plain.toml", spec);
+    let output = run(folder.path(), &["plain.toml"]);
+    let out = text(&output.stdout);
+    let err = text(&output.stderr);
+    assert!(
+        ["spheres75", "median_cut", "least_over_base"]
+            .iter()
+            .all(|part| out.contains(part)),
+        "{out}"
+    );
+    assert!(err.contains("plain: 3 of 3 runs") && err.contains("median_cut on spheres75"), "{err}");
+    let quiet = run(folder.path(), &["plain.toml", "--quiet", "--force"]);
+    assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty());
+    let verbose = run(folder.path(), &["plain.toml", "--verbose", "--force"]);
+    let said = text(&verbose.stderr);
+    assert_eq!(said.lines().count(), 3, "a line for every run: {said}");
+    let rows = fs::read_to_string(folder.path().join("results/plain/runs.csv")).unwrap();
+    for (repetition, row) in rows.lines().skip(1).enumerate() {
+        let seed = row.split(',').nth(3).unwrap();
+        let part =
+            format!("median_cut on spheres75, repetition {repetition}, seed {seed}, took 0.");
+        assert!(said.contains(&part), "{part} in {said}");
+    }
+}
+
+#[test]
+fn a_redraw_that_fails_leaves_finished_results() {
+    let spec = "question = 'q'\nscenes = ['spheres75']\nmethods = [{ method = 'median_cut' }]\n";
+    let report = "[[reports]]\nkind = 'query'\nfile = 'x'\nrows = 'runs.csv'\nby = ['scene']\n\
+                  columns = [{ name = 'a', value = 'only COLUMN' }]\n";
+    let folder = folder_with("plain.toml", spec);
+    let path = folder.path();
+    said(path, &["plain.toml"]);
+    let resolved = path.join("results/plain/resolved.toml");
+    let before = fs::read(&resolved).unwrap();
+    fs::write(path.join("plain.toml"), format!("{spec}{report}")).unwrap();
+    let parts = ["results/plain/runs.csv", "no column \"COLUMN\"", "cost_over_base"];
+    refused(path, &["plain.toml", "--redraw"], 1, &parts);
+    assert!(!path.join("results/plain/.partial").exists());
+    assert!(fs::read(&resolved).unwrap() == before);
+    let report = report.replace("COLUMN", "objects");
+    fs::write(path.join("plain.toml"), format!("{spec}{report}")).unwrap();
+    said(path, &["plain.toml", "--redraw"]);
+    let table = fs::read_to_string(path.join("results/plain/x.csv")).unwrap();
+    assert_eq!(table, "scene,a\nspheres75,75\n");
+}

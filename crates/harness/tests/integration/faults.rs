@@ -1,0 +1,207 @@
+//! External faults during a run: full disks, read-only folders, kills, a second harness.
+//!
+//! `KILLS=100 cargo test -p harness faults::` kills the harness 100 times.
+
+use crate::support::{
+    ReadOnly, ended, folder_with, program, refused, reproducible, run_on_a_small_disk, said,
+    unsaid, wait_for,
+};
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+const SPEC: &str = "
+question = 'What survives?'
+scenes = ['spheres75', 'escher:300', 'spheres750']
+repetitions = 12
+methods = [
+    { label = 'greedy', method = 'muller_fellner' },
+    { label = 'noise', method = 'grasp', trials = 60, noise = 0.1 },
+    { label = 'orders', method = 'random_orders', trials = 10 },
+]
+";
+
+/// Creates a folder with the spec.
+fn folder() -> tempfile::TempDir {
+    folder_with("spec.toml", SPEC)
+}
+
+/// Prepares a harness that is killed or runs in the background, without output.
+fn command(folder: &Path, args: &[&str]) -> Command {
+    let mut command = program(folder, args);
+    command
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    command
+}
+
+/// Returns the files that every run must reproduce.
+fn results(out: &Path) -> Vec<(String, Vec<u8>)> {
+    let files = reproducible(&out.join("spec"));
+    // Comparing no files would always succeed.
+    assert!(files.len() >= 3, "{files:?}");
+    files
+}
+
+/// Returns the files of one uninterrupted run.
+fn whole(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    said(folder, &["spec.toml", "--out", "whole"]);
+    results(&folder.join("whole"))
+}
+
+#[test]
+fn killed_at_random_moments_and_resumed_the_bytes_are_the_same() {
+    let folder = folder();
+    let whole = whole(folder.path());
+    let kills: u32 = std::env::var("KILLS")
+        .ok()
+        .and_then(|kills| kills.parse().ok())
+        .unwrap_or(20);
+    let mut killed = 0;
+    let mut finished = 0;
+    let mut state = 1u32;
+    let mut out = "out0".to_owned();
+    while killed < kills {
+        let mut child =
+            command(folder.path(), &["spec.toml", "--resume", "--jobs=2", "--out", &out])
+                .spawn()
+                .unwrap();
+        // A fixed sequence of moments makes a failure repeatable.
+        state = state
+            .wrapping_mul(747_796_405)
+            .wrapping_add(2_891_336_453);
+        std::thread::sleep(Duration::from_micros(u64::from(state >> 8) % 60_000));
+        if child.try_wait().unwrap().is_none() {
+            child.kill().unwrap();
+            killed += 1;
+            child.wait().unwrap();
+        } else if child.wait().unwrap().success() {
+            assert!(results(&folder.path().join(&out)) == whole, "after {killed} kills");
+            finished += 1;
+            out = format!("out{finished}");
+        } else {
+            panic!("after {killed} kills --resume fails");
+        }
+    }
+    said(folder.path(), &["spec.toml", "--resume", "--out", &out]);
+    let found = results(&folder.path().join(&out));
+    let differing: Vec<&String> = found
+        .iter()
+        .filter(|file| !whole.contains(file))
+        .map(|(name, _)| name)
+        .collect();
+    assert!(found == whole, "{differing:?}");
+    eprintln!("{killed} kills, {} experiments finished", finished + 1);
+}
+
+#[test]
+fn a_second_harness_on_the_same_folder_is_rejected_and_disturbs_nothing() {
+    struct Killed(Child);
+    impl Drop for Killed {
+        fn drop(&mut self) {
+            let _ = self.0.kill();
+            let _ = self.0.wait();
+        }
+    }
+    let folder = folder();
+    let long = SPEC.replace("trials = 60", "trials = 1000000");
+    fs::write(folder.path().join("long.toml"), long).unwrap();
+    let first = Killed(
+        command(folder.path(), &["long.toml"])
+            .spawn()
+            .unwrap(),
+    );
+    wait_for(&folder.path().join("results/long/.partial/000000"));
+    for more in [&[][..], &["--resume"], &["--seed=3"], &["--shard=1/2"]] {
+        let args = [&["long.toml"], more].concat();
+        refused(folder.path(), &args, 1, &["results/long is in use by another harness", "--out"]);
+    }
+    // Other folders are free, and the kept run still exists.
+    said(folder.path(), &["spec.toml"]);
+    assert!(
+        folder
+            .path()
+            .join("results/long/.partial/000000/runs.csv")
+            .is_file()
+    );
+    // The first harness must be alive until here, otherwise its lock proves nothing.
+    drop(first);
+    // The lock died with its owner.
+    refused(
+        folder.path(),
+        &["long.toml", "--resume", "--seed=3"],
+        2,
+        &["results/long", "another spec"],
+    );
+}
+
+#[test]
+fn a_full_disk_is_reported_and_finished_runs_are_kept() {
+    let folder = folder();
+    let whole = whole(folder.path());
+    for blocks in [0, 1, 2, 8] {
+        let out = format!("full{blocks}");
+        let args = format!("spec.toml --jobs 2 --out {out}");
+        let Some(output) = run_on_a_small_disk(folder.path(), &args, blocks) else { return };
+        ended(&output, 1, &[&format!("{out}/spec"), "cannot write the file"]);
+        assert!(
+            !folder
+                .path()
+                .join(&out)
+                .join("spec/runs.csv")
+                .exists()
+        );
+        said(folder.path(), &["spec.toml", "--resume", "--out", &out]);
+        assert!(results(&folder.path().join(&out)) == whole);
+    }
+}
+
+#[test]
+fn help_and_version_that_cannot_be_printed_are_errors() {
+    let folder = folder();
+    for args in [&["--help"][..], &["--version"], &["-h"], &["merge", "--help"], &["help", "new"]] {
+        unsaid(folder.path(), args);
+    }
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_named() {
+    let folder = folder();
+    let locked = folder.path().join("locked");
+    fs::create_dir(&locked).unwrap();
+    let Some(_guard) = ReadOnly::new(&locked) else {
+        eprintln!("not tried: this user can write into any folder here");
+        return;
+    };
+    refused(
+        folder.path(),
+        &["spec.toml", "--out=locked"],
+        1,
+        &["locked/spec", "cannot create the folder"],
+    );
+    assert_eq!(fs::read_dir(&locked).unwrap().count(), 0);
+}
+
+#[test]
+fn a_folder_instead_of_a_file_is_named_and_so_is_the_reverse() {
+    let folder = folder();
+    let dir = folder.path();
+    fs::create_dir(dir.join("folder.obj")).unwrap();
+    fs::create_dir(dir.join("folder.toml")).unwrap();
+    refused(dir, &["folder.toml"], 2, &["folder.toml"]);
+    refused(dir, &["spec.toml", "--scene=folder.obj"], 2, &["folder.obj", "a folder"]);
+    for folder in ["a/spec/runs.csv", "b/spec/.lock", "c/spec", "d"] {
+        fs::create_dir_all(dir.join(folder)).unwrap();
+    }
+    refused(dir, &["spec.toml", "--out=a"], 1, &["a/spec/runs.csv", "cannot replace the file"]);
+    assert!(!dir.join("a/spec/runs.csv.unfinished").exists());
+    fs::remove_dir(dir.join("a/spec/runs.csv")).unwrap();
+    // The runs were not lost.
+    said(dir, &["spec.toml", "--out=a", "--resume"]);
+    refused(dir, &["spec.toml", "--out=b"], 1, &["b/spec/.lock", "cannot create the file"]);
+    fs::write(dir.join("c/spec/.partial"), "").unwrap();
+    refused(dir, &["spec.toml", "--out=c"], 1, &["c/spec/.partial", "cannot"]);
+    fs::write(dir.join("d/spec"), "").unwrap();
+    refused(dir, &["spec.toml", "--out=d"], 1, &["d/spec", "cannot create the folder"]);
+}

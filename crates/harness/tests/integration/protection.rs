@@ -1,0 +1,341 @@
+//! No arguments make the program damage its user's files: it never writes results elsewhere, loses
+//! finished runs, writes through links, waits forever for a pipe, or replaces files of others.
+
+// Tests that send signals or make links and pipes are left out on Windows, and their imports stay.
+#![cfg_attr(windows, allow(unused_imports))]
+
+use crate::support::{
+    ended, folder_with, names, outside_buffer, outside_scene, program, reproducible, run, said,
+    send, text, wait_for,
+};
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+const SPEC: &str = "
+question = 'What stays?'
+scenes = ['spheres75']
+repetitions = 3
+methods = [{ method = 'muller_fellner' }, { method = 'grasp', trials = 3 }]
+";
+
+/// A measurement over the suite, of one case and one method.
+const SUITE: &str = "
+question = 'q'
+scenes = ['S01']
+methods = [{ method = 'median_cut' }]
+[suite.stability]
+builders = 'few'
+work_per_object = 1
+larger_searches = { objects = 0, work_per_object = 1 }
+rays = 1
+";
+
+/// Creates a folder with a spec of this name.
+fn folder(spec: &str) -> tempfile::TempDir {
+    folder_with(spec, SPEC)
+}
+
+/// Asserts that the arguments are rejected as a usage error with these parts of the message.
+fn refused(folder: &Path, args: &[&str], parts: &[&str]) {
+    crate::support::refused(folder, args, 2, parts);
+}
+
+#[test]
+fn a_spec_whose_name_would_lead_elsewhere_is_rejected() {
+    for spec in ["...toml", "..toml", ".lock.toml", ".partial.toml", "quick.toml", "x.new.toml"] {
+        let folder = folder(spec);
+        refused(folder.path(), &[spec, "--out", "out/below"], &[spec, "do not begin with a dot"]);
+        assert_eq!(names(folder.path()), [spec]);
+    }
+}
+
+#[test]
+fn two_specs_with_one_name_in_one_command_are_rejected_before_the_work() {
+    let folder = folder("spec.toml");
+    fs::create_dir(folder.path().join("other")).unwrap();
+    fs::write(folder.path().join("other/spec.toml"), SPEC).unwrap();
+    refused(folder.path(), &["spec.toml", "other/spec.toml"], &["two specs are called spec"]);
+    assert!(!folder.path().join("results").exists());
+}
+
+#[test]
+fn finished_results_are_replaced_by_force_only() {
+    let folder = folder("spec.toml");
+    let dir = folder.path();
+    said(dir, &["spec.toml"]);
+    let results = dir.join("results/spec");
+    let first = reproducible(&results);
+    let first_timing = fs::read(results.join("timing.csv")).unwrap();
+    // A repetition writes to a folder next to them.
+    let repeated = said(dir, &["spec.toml"]);
+    assert!(repeated.contains("results/spec is kept and has the same rows"), "{repeated}");
+    assert!(reproducible(&dir.join("results/spec.new")) == first);
+    // Other runs are rejected.
+    for other in [&["--scene=spheres750"][..], &["--seed=2"], &["--shard=1/2"]] {
+        refused(dir, &[&["spec.toml"], other].concat(), &["results/spec", "--force", "--out"]);
+    }
+    assert!(reproducible(&results) == first);
+    assert!(fs::read(results.join("timing.csv")).unwrap() == first_timing);
+    said(dir, &["spec.toml", "--seed=2", "--force"]);
+    assert!(reproducible(&results) != first);
+}
+
+#[test]
+fn resuming_what_is_finished_does_nothing() {
+    let folder = folder("spec.toml");
+    let dir = folder.path();
+    said(dir, &["spec.toml", "--resume"]);
+    let written = || {
+        let files = names(&dir.join("results/spec"))
+            .into_iter()
+            .map(|name| dir.join("results/spec").join(name));
+        files
+            .map(|file| (fs::metadata(&file).unwrap().modified().unwrap(), file))
+            .collect::<Vec<_>>()
+    };
+    let first = written();
+    let resumed = run(dir, &["spec.toml", "--resume"]);
+    ended(&resumed, 0, &[]);
+    assert!(text(&resumed.stdout).contains("nothing was done"), "{}", text(&resumed.stdout));
+    assert_eq!(
+        (names(&dir.join("results")), written()),
+        (vec![".lock".into(), "best_known.csv".into(), "spec".into()], first)
+    );
+    // A harness that is killed after its results are complete leaves its runs under this name.
+    let removed = dir.join("results/spec/.removed");
+    fs::create_dir_all(removed.join("000000")).unwrap();
+    said(dir, &["spec.toml", "--resume"]);
+    assert!(!removed.exists());
+    // An interrupted repetition in the neighbouring folder is completed.
+    said(dir, &["spec.toml"]);
+    fs::create_dir(dir.join("results/spec.new/.partial")).unwrap();
+    fs::copy(
+        dir.join("results/spec.new/resolved.toml"),
+        dir.join("results/spec.new/.partial/resolved.toml"),
+    )
+    .unwrap();
+    said(dir, &["spec.toml", "--resume"]);
+    assert!(!dir.join("results/spec.new/.partial").exists());
+    // The suite of cases is no exception.
+    fs::write(dir.join("suite.toml"), SUITE).unwrap();
+    said(dir, &["suite.toml"]);
+    assert!(said(dir, &["suite.toml", "--resume"]).contains("nothing was done"));
+}
+
+#[test]
+fn a_missing_folder_is_named_before_the_work() {
+    let folder = folder("spec.toml");
+    refused(
+        folder.path(),
+        &["report", "--results=.", "--out=no/x.html"],
+        &["no is no folder", "accepted: a path in a folder that is there"],
+    );
+    refused(folder.path(), &["report"], &["--results", "results is no folder"]);
+    assert_eq!(names(folder.path()), ["spec.toml"]);
+}
+
+/// Returns the names of the runs that the results of an interrupted experiment keep.
+fn kept_runs(results: &Path) -> Vec<String> {
+    let mut kept = names(&results.join(".partial"));
+    kept.retain(|name| name.bytes().all(|byte| byte.is_ascii_digit()));
+    kept
+}
+
+#[test]
+fn the_finished_runs_of_an_interrupted_experiment_are_discarded_by_force_only() {
+    let folder = folder("spec.toml");
+    let dir = folder.path();
+    said(dir, &["spec.toml", "--shard=1/2"]);
+    refused(dir, &["spec.toml"], &["finished runs", "--resume", "--force"]);
+    assert!(!kept_runs(&dir.join("results/spec")).is_empty());
+    said(dir, &["spec.toml", "--resume"]);
+    said(dir, &["spec.toml", "--out=whole"]);
+    assert!(reproducible(&dir.join("results/spec")) == reproducible(&dir.join("whole/spec")));
+}
+
+#[test]
+fn a_damaged_finished_run_is_named_and_repeated_or_rejected() {
+    let folder = folder("spec.toml");
+    let dir = folder.path();
+    said(dir, &["spec.toml", "--out=whole"]);
+    let whole = reproducible(&dir.join("whole/spec"));
+    let damages: [fn(&Path); 3] = [
+        |part| fs::remove_file(part.join("runs.csv")).unwrap(),
+        |part| fs::write(part.join("timing.csv"), "").unwrap(),
+        |part| {
+            let rows = fs::read_to_string(part.join("runs.csv")).unwrap();
+            fs::write(part.join("runs.csv"), rows.split_once('\n').unwrap().0.to_owned() + "\n")
+                .unwrap();
+        },
+    ];
+    for (number, damage) in damages.into_iter().enumerate() {
+        let one = format!("one{number}");
+        let two = format!("two{number}");
+        said(dir, &["spec.toml", "--shard=1/2", "--out", &one]);
+        said(dir, &["spec.toml", "--shard=2/2", "--out", &two]);
+        let kept = kept_runs(&dir.join(&one).join("spec"));
+        let damaged = kept.last().unwrap();
+        damage(&dir.join(&one).join("spec/.partial").join(damaged));
+        let merge = run(dir, &["merge", &one, &two, "--out=merged"]);
+        let error = text(&merge.stderr);
+        assert!(
+            !merge.status.success() && error.contains(damaged) && error.contains("damaged"),
+            "{error}"
+        );
+        assert!(!dir.join("merged").exists());
+        let resumed = run(dir, &["spec.toml", "--resume", "--out", &one]);
+        ended(&resumed, 0, &["done again", damaged]);
+        assert!(reproducible(&dir.join(&one).join("spec")) == whole);
+    }
+}
+
+#[test]
+fn the_page_replaces_no_file_of_another_kind() {
+    let folder = folder("spec.toml");
+    let dir = folder.path();
+    said(dir, &["spec.toml"]);
+    refused(dir, &["report", "--out=spec.toml"], &["--out", "spec.toml", "HTML"]);
+    refused(dir, &["report", "--out=results/spec/runs.csv"], &["--out", "runs.csv", "HTML"]);
+    refused(dir, &["report", "--out=x.csv"], &["a name that ends with", ".html", "accepted"]);
+    assert_eq!(fs::read_to_string(dir.join("spec.toml")).unwrap(), SPEC);
+    for _ in 0..2 {
+        said(dir, &["report", "--out=page.html"]);
+    }
+}
+
+#[test]
+fn results_come_from_the_programs_repository_and_not_from_the_current_folders() {
+    let folder = folder("spec.toml");
+    git(folder.path(), &["init"]);
+    git(folder.path(), &["commit", "--allow-empty", "--no-gpg-sign", "--message=x"]);
+    // The repository around the folder has another commit than the program.
+    let head = git(folder.path(), &["rev-parse", "HEAD"]);
+    let Some(elsewhere) = head.filter(|output| output.status.success()) else {
+        return eprintln!("skipped: there is no git");
+    };
+    said(folder.path(), &["spec.toml"]);
+    let provenance =
+        fs::read_to_string(folder.path().join("results/spec/provenance.toml")).unwrap();
+    let provenance: toml::Table = provenance.parse().unwrap();
+    assert_eq!(provenance["revision"].as_str(), Some(env!("HARNESS_REVISION")));
+    assert!(!env!("HARNESS_REVISION").starts_with(text(&elsewhere.stdout).trim()));
+}
+
+/// Runs git with an author and a branch, which a machine's configuration may lack.
+fn git(folder: &Path, args: &[&str]) -> Option<std::process::Output> {
+    let settings = ["-c", "user.name=x", "-c", "user.email=x", "-c", "init.defaultBranch=x"];
+    std::process::Command::new("git")
+        .args(settings)
+        .args(args)
+        .current_dir(folder)
+        .output()
+        .ok()
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_and_devices_are_rejected_as_inputs_and_links_are_not_written_through() {
+    use std::os::unix::fs::symlink;
+    let folder = folder("spec.toml");
+    let dir = folder.path();
+    let made = std::process::Command::new("mkfifo")
+        .args(["p.toml", "p.obj"])
+        .current_dir(dir)
+        .status();
+    // Opening a pipe that nobody writes to would block forever.
+    assert!(made.unwrap().success());
+    refused(dir, &["p.toml"], &["p.toml", "not a regular file"]);
+    refused(dir, &["spec.toml", "--scene=p.obj"], &["p.obj"]);
+    fs::write(dir.join("precious"), "precious").unwrap();
+    fs::create_dir_all(dir.join("results/spec")).unwrap();
+    for lock in ["results/.lock", "results/spec/.lock"] {
+        let _ = fs::remove_file(dir.join(lock));
+        symlink(dir.join("precious"), dir.join(lock)).unwrap();
+        let output = run(dir, &["spec.toml", "--force"]);
+        assert!(
+            !output.status.success() && text(&output.stderr).contains(lock),
+            "{}",
+            text(&output.stderr)
+        );
+        fs::remove_file(dir.join(lock)).unwrap();
+    }
+    assert_eq!(fs::read_to_string(dir.join("precious")).unwrap(), "precious");
+}
+
+#[cfg(unix)]
+#[test]
+fn arguments_need_not_be_utf_8() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let folder = folder("spec.toml");
+    let out = OsStr::from_bytes(b"out\xff");
+    let output = program(folder.path(), &["spec.toml", "--out"])
+        .arg(out)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let provenance = fs::read_to_string(
+        folder
+            .path()
+            .join(out)
+            .join("spec/provenance.toml"),
+    )
+    .unwrap();
+    assert!(provenance.contains("harness spec.toml --out out"), "{provenance}");
+}
+
+#[cfg(unix)]
+#[test]
+fn the_first_signal_ends_even_a_program_that_waits_for_another() {
+    let folder = folder("spec.toml");
+    let dir = folder.path();
+    fs::create_dir(dir.join("results")).unwrap();
+    let lock = fs::File::create(dir.join("results/.lock")).unwrap();
+    lock.lock().unwrap();
+    let mut child = program(dir, &["spec.toml"])
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    // All runs are finished, and the program waits for the best known costs, which this test locks.
+    wait_for(&dir.join("results/spec/runs.csv"));
+    let start = Instant::now();
+    send("-TERM", &child);
+    while child.try_wait().unwrap().is_none() && start.elapsed() < Duration::from_secs(5) {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    // This has no effect on a program that has ended.
+    child.kill().unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{:?}", start.elapsed());
+    // Nothing is lost.
+    drop(lock);
+    said(dir, &["spec.toml", "--resume"]);
+}
+
+#[test]
+fn control_characters_of_a_spec_do_not_reach_the_terminal() {
+    let folder = folder("spec.toml");
+    fs::write(folder.path().join("wrong.toml"), format!("{SPEC}\"\\u001b[31mred\" = 1\n")).unwrap();
+    let output = run(folder.path(), &["wrong.toml"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        !output.stderr.contains(&0x1b) && text(&output.stderr).contains("red"),
+        "{}",
+        text(&output.stderr)
+    );
+}
+
+#[test]
+fn only_a_spec_that_allows_it_reads_a_buffer_outside_the_folder_of_a_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = &folder.path().join("inner");
+    fs::create_dir(dir).unwrap();
+    fs::write(dir.join("scene.gltf"), outside_scene("../outside.bin")).unwrap();
+    fs::write(folder.path().join("outside.bin"), outside_buffer()).unwrap();
+    let spec = "question = 'q'\nscenes = ['scene.gltf']\nmethods = [{ method = 'median_cut' }]\n";
+    fs::write(dir.join("spec.toml"), spec).unwrap();
+    refused(dir, &["spec.toml"], &["buffers[0]", "outside the scene's folder", "--outside-files"]);
+    said(dir, &["spec.toml", "--outside-files"]);
+    fs::write(dir.join("told.toml"), format!("outside_files = true\n{spec}")).unwrap();
+    said(dir, &["told.toml"]);
+}

@@ -1,0 +1,341 @@
+//! A wrong value under any key of a spec, or of any flag of the program, is rejected with exit code
+//! 2 and its name.
+//!
+//! The parser lists the keys, and `--help` the flags, so that new ones are tested too.
+
+use crate::support::{experiments, folder_with, top, wrong_flags};
+use bvh_search::Method;
+use harness::peers::Peer;
+use harness::report::Report;
+use harness::spec::{Experiment, Name, Overrides};
+use proptest::prelude::*;
+use proptest::sample::Index;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+use toml::{Table, Value};
+
+/// A step from a table to a value in it.
+#[derive(Clone, Debug)]
+enum Step {
+    Key(String),
+    Index(usize),
+}
+
+fn follow<'a>(value: &'a mut Value, step: &Step) -> &'a mut Value {
+    match step {
+        Step::Key(key) => &mut value[key.as_str()],
+        Step::Index(index) => &mut value[*index],
+    }
+}
+
+/// Collects the paths of all tables in a value.
+fn tables(value: &Value, path: &[Step], found: &mut Vec<Vec<Step>>) {
+    match value {
+        Value::Table(table) => {
+            found.push(path.to_vec());
+            for (key, value) in table {
+                tables(value, &[path, &[Step::Key(key.clone())]].concat(), found);
+            }
+        }
+        Value::Array(array) => {
+            for (index, value) in array.iter().enumerate() {
+                tables(value, &[path, &[Step::Index(index)]].concat(), found);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Returns a spec with the value under a key of the table at `path`.
+fn with(spec: &Value, path: &[Step], key: &str, value: Value) -> Value {
+    let mut spec = spec.clone();
+    path.iter()
+        .fold(&mut spec, follow)
+        .as_table_mut()
+        .unwrap()
+        .insert(key.into(), value);
+    spec
+}
+
+/// Parses a spec. An error is an exit code and a message.
+fn read(spec: &Value) -> Result<Experiment, (u8, String)> {
+    let text = toml::to_string(spec).unwrap();
+    Experiment::parse(Path::new("folder/some.toml"), &text, &Overrides::default())
+        .map_err(|error| (error.exit_code(), error.to_string()))
+}
+
+/// Returns a valid spec with the table at `path` and few other ones, and the path of the table in it.
+///
+/// The test reads every spec thousands of times, and most of the time would go into methods and
+/// reports that no value concerns.
+fn around(spec: &Value, path: &[Step]) -> (Value, Vec<Step>) {
+    if let [Step::Key(list), Step::Index(index), below @ ..] = path
+        && (list == "methods" || list == "reports")
+    {
+        let mut small = spec.as_table().unwrap().clone();
+        if list == "methods" {
+            small.remove("reports");
+        }
+        small[list] = vec![spec[list][*index].clone()].into();
+        let small = Value::Table(small);
+        if read(&small).is_ok() {
+            let start = [Step::Key(list.clone()), Step::Index(0)];
+            return (small, [&start, below].concat());
+        }
+    }
+    (spec.clone(), path.to_vec())
+}
+
+/// Returns the names that a message lists as accepted.
+fn accepted(message: &str) -> Vec<String> {
+    let Some((_, names)) = message.split_once("expected ") else { return Vec::new() };
+    names
+        .split('`')
+        .skip(1)
+        .step_by(2)
+        .map(str::to_owned)
+        .collect()
+}
+
+/// Returns the place of a table. It names elements of arrays by their method or kind instead of
+/// their index, so that each method and kind is tested once.
+fn place(spec: &Value, path: &[Step]) -> String {
+    let mut value = spec.clone();
+    let mut place = String::new();
+    for step in path {
+        value = follow(&mut value, step).clone();
+        let tag = ["kind", "method"]
+            .iter()
+            .find_map(|tag| value.get(tag)?.as_str())
+            .unwrap_or_default();
+        match step {
+            Step::Key(key) => place += &format!(".{key}"),
+            Step::Index(_) => place += &format!("[{tag}]"),
+        }
+    }
+    place
+}
+
+/// Returns the committed experiments with every default spelled out, and one with every method.
+fn specs() -> Vec<Value> {
+    let mut specs = Vec::new();
+    for (_, text) in experiments() {
+        let mut spec: Table = text.parse().unwrap();
+        spec.remove("quick");
+        // Other libraries may not be compiled in, so a method of ours replaces them.
+        for method in spec
+            .get_mut("methods")
+            .and_then(Value::as_array_mut)
+            .into_iter()
+            .flatten()
+        {
+            if Peer::NAMES.contains(&method["method"].as_str().unwrap()) {
+                let label = method
+                    .get("label")
+                    .unwrap_or(&method["method"])
+                    .clone();
+                *method = Value::Table(Table::from_iter([
+                    ("label".into(), label),
+                    ("method".into(), "median_cut".into()),
+                ]));
+            }
+        }
+        let experiment: Experiment = Value::Table(spec).try_into().unwrap();
+        specs.push(Value::try_from(&experiment).unwrap());
+    }
+    let methods: Vec<Table> = Method::all()
+        .iter()
+        .map(|method| Table::try_from(method).unwrap())
+        .collect();
+    let question = Value::from("Which keys does every method have?");
+    let all =
+        [("question", question), ("scenes", vec!["escher"].into()), ("methods", methods.into())];
+    let mut all: Table = all
+        .map(|(key, value)| (key.to_owned(), value))
+        .into_iter()
+        .collect();
+    let text = "
+budget = { max_work = 5 }
+objective = { sah = { traversal = 1.0, intersection = 2.0 } }
+rays = [{ family = 'lines', query = 'any', count = 7 }]
+render = { width = 8, height = 8, samples = 2 }
+reports = [{ kind = 'generations', source = 's', title = 't', method = 'genetic', baseline = 'grasp', reason = 'r' }]
+tracing = { cameras = { escher = { eye = [1.0, 2.0, 3.0], target = [0.5, 0.5, 0.5] } } }
+";
+    all.extend(text.parse::<Table>().unwrap());
+    specs.push(Value::Table(all));
+    specs
+}
+
+#[test]
+fn a_wrong_value_under_any_key_of_a_spec_is_rejected_by_name() {
+    // No key accepts a date, so a date is wrong under any key.
+    let wrong = Value::Datetime("1979-05-27".parse().unwrap());
+    let [nan, infinite] = [f64::NAN, f64::NEG_INFINITY].map(Value::from);
+    let doubtful = [
+        Value::from(-1),
+        Value::from(0),
+        Value::from(i64::MAX),
+        Value::from(-0.5),
+        Value::from(1e300),
+        Value::from(true),
+        Value::from("no such thing"),
+        Value::Array(vec![]),
+        Value::Array(vec![Value::from(-1)]),
+        Value::Array(vec![Value::from("no such thing")]),
+        Value::Table(Table::new()),
+        Value::Table(Table::from_iter([("unheard_of".into(), Value::from(1))])),
+    ];
+    let mut seen = BTreeMap::new();
+    let found = RefCell::new(BTreeSet::new());
+    let complain = |message: String| found.borrow_mut().insert(message);
+    for spec in specs() {
+        assert!(read(&spec).is_ok(), "{:?}", read(&spec));
+        let mut paths = Vec::new();
+        tables(&spec, &[], &mut paths);
+        for path in paths {
+            let place = place(&spec, &path);
+            let (spec, path) = around(&spec, &path);
+            let mut table = spec.clone();
+            let table = path
+                .iter()
+                .fold(&mut table, follow)
+                .as_table()
+                .unwrap()
+                .clone();
+            // An unknown key makes the parser list the keys that it accepts.
+            let unknown = read(&with(&spec, &path, "unheard_of", 1.into()));
+            let listed = unknown.map_or_else(|(_, message)| accepted(&message), |_| Vec::new());
+            for key in table.keys().cloned().chain(listed) {
+                if key == "unheard_of"
+                    || seen
+                        .insert(format!("{place}.{key}"), ())
+                        .is_some()
+                {
+                    continue;
+                }
+                let try_value = |value: &Value| match read(&with(&spec, &path, &key, value.clone()))
+                {
+                    Ok(_) => true,
+                    Err((code, message)) => {
+                        // The message names the key or one within it. A label is only wrong because
+                        // a report names another one. For a table, the key above may be named.
+                        let other = key == "label" && message.contains("names method");
+                        let above = path
+                            .iter()
+                            .rev()
+                            .filter(|_| value.is_table())
+                            .any(|step| match step {
+                                Step::Key(above) => message.contains(above),
+                                Step::Index(_) => false,
+                            });
+                        let named = message.starts_with("folder/some.toml: ")
+                            && (message.contains(&key) || above || other)
+                            && ["accepted", "expected", "missing", "wanted", " to "]
+                                .iter()
+                                .any(|word| message.contains(word))
+                            && code == 2;
+                        if !named {
+                            complain(format!("{place}.{key} = {value}: code {code}, {message}"));
+                        }
+                        false
+                    }
+                };
+                for value in [&wrong, &nan, &infinite] {
+                    if try_value(value) {
+                        complain(format!("{place}.{key} = {value} is accepted"));
+                    }
+                }
+                // These values are right under some keys; under the others the message must name
+                // them.
+                let taken: Vec<bool> = doubtful.iter().map(try_value).collect();
+                // All numbers are counts or measures, except percentages above or below a value.
+                if (taken[0] || taken[3] || taken[8]) && key != "percent" {
+                    complain(format!("{place}.{key}: -1, -0.5 or [-1] is accepted"));
+                }
+            }
+        }
+    }
+    eprintln!("{} keys", seen.len());
+    for method in Method::NAMES {
+        assert!(seen.contains_key(&format!(".methods[{method}].label")), "{method}");
+    }
+    for kind in Report::NAMES {
+        if !seen.contains_key(&format!(".reports[{kind}].kind")) {
+            complain(format!("no report of kind {kind} was tried"));
+        }
+    }
+    let found = found.take();
+    assert!(found.is_empty(), "\n{}", found.into_iter().collect::<Vec<_>>().join("\n"));
+}
+
+/// Checks that a text is rejected with the name of its file, or that the resolved spec reads back as
+/// itself.
+fn check_text(text: &str, quick: bool) {
+    let path = Path::new("spec.toml");
+    match Experiment::parse(path, text, &Overrides { quick, ..Default::default() }) {
+        Ok(experiment) => {
+            let mut expected = Experiment { name: Name::default(), quick: false, ..experiment };
+            let resolved = toml::to_string(&expected).unwrap();
+            let read = Experiment::parse(path, &resolved, &Overrides::default());
+            expected.name = Name::try_from("spec".to_owned()).unwrap();
+            assert_eq!(read.unwrap(), expected, "{resolved}");
+        }
+        Err(error) => {
+            assert_eq!(error.exit_code(), 2);
+            assert!(error.to_string().starts_with("spec.toml: "), "{error}");
+        }
+    }
+}
+
+/// Returns the last place up to `byte` where a character begins.
+fn boundary(text: &str, byte: usize) -> usize {
+    (0..=byte)
+        .rev()
+        .find(|&at| text.is_char_boundary(at))
+        .unwrap_or(0)
+}
+
+proptest! {
+    #[test]
+    fn a_damaged_spec_is_rejected_or_reads_back_as_itself(
+        which in any::<Index>(),
+        quick in any::<bool>(),
+        edits in prop::collection::vec(
+            (any::<Index>(), 0usize..40, "-1|0|nan|1e39|18446744073709551616|[ -~]{0,3}|\\n"),
+            1..8,
+        ),
+    ) {
+        let specs = experiments();
+        let (_, mut text) = which.get(&specs).clone();
+        for (place, length, word) in edits {
+            let start = boundary(&text, place.index(text.len() + 1));
+            let end = boundary(&text, (start + length).min(text.len()));
+            text.replace_range(start..end, &word);
+        }
+        check_text(&text, quick);
+    }
+}
+
+#[test]
+fn a_wrong_value_of_any_flag_is_rejected_by_name() {
+    let spec = "question = 'q'\nscenes = ['spheres75']\nmethods = [{ method = 'median_cut' }]\n";
+    let folder = folder_with("spec.toml", spec);
+    fs::copy(top().join("results/trees/spheres75.bvh"), folder.path().join("good.bvh")).unwrap();
+    // Every command with its required arguments.
+    let flags = wrong_flags(
+        folder.path(),
+        &[
+            ("", &["spec.toml"]),
+            ("report", &["--results=."]),
+            ("jobs", &["spec.toml"]),
+            ("merge", &["folder", "--out=x"]),
+            ("compare", &["good.bvh", "spheres75"]),
+            ("new", &["x.toml"]),
+            ("schema", &[]),
+        ],
+    );
+    assert!(flags > 15, "{flags} flags");
+}
