@@ -156,7 +156,7 @@ impl Layers<'_, '_> {
     fn line(&self, layer: &Layer) -> Result<(), Fault> {
         let (order, stroke) = self.strokes.of(&layer.name);
         for path in self.paths(layer) {
-            let markers = if self.strokes.marks(stroke) {
+            let markers = if self.strokes.marked_lines {
                 self.along(&path, 37.0 * order as f64)
             } else {
                 Vec::new()

@@ -45,7 +45,7 @@ impl Legend {
                 layers().any(|layer| layer.series() == Some(name) && kind(layer))
             };
             let line = has(Layer::is_line);
-            let marker = has(Layer::is_marked) || line && strokes.marks(*stroke);
+            let marker = has(Layer::is_marked) || line && strokes.marked_lines;
             let area = !line && has(|layer| !layer.is_marked());
             Entry { name: name.clone(), stroke: *stroke, line, marker, area }
         };

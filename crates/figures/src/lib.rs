@@ -17,7 +17,7 @@ mod panel;
 mod style;
 mod text;
 
-pub use model::{Axis, Figure, FigureError, Layer, Look, Marks, Panel, Scale};
+pub use model::{Axis, COLOURS, Figure, FigureError, Layer, Marks, Panel, Scale};
 
 /// Draws a figure as an SVG document.
 ///

@@ -16,24 +16,14 @@ pub struct Figure {
     pub columns: usize,
     /// The panels, row by row.
     pub panels: Vec<Panel>,
-    /// Looks of some series, so that a method looks the same in every figure. Other series take the
-    /// free slots in order of appearance.
-    pub looks: Vec<(String, Look)>,
+    /// Looks of some series, so that a method looks the same in every figure: numbers, from 0, of
+    /// combinations of colour, dash and marker, which repeat after 84. Other series take the free
+    /// numbers in order of appearance.
+    pub looks: Vec<(String, usize)>,
 }
 
-/// The look that distinguishes the marks of a series.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Look {
-    /// Combination of colour, dash and marker by number, from 0. They repeat after 84.
-    Slot(usize),
-    /// Black and dashed, for values that the other series are compared with, such as the paper's.
-    Reference,
-}
-
-impl Look {
-    /// Number of slots, from 0 on, that differ in colour.
-    pub const COLOURS: usize = 12;
-}
+/// Number of looks, from 0 on, that differ in colour.
+pub const COLOURS: usize = 12;
 
 /// One pair of axes with layers. Bands are drawn first, then bars, reference lines, lines and points;
 /// within a kind, the first layer is at the bottom.

@@ -3,7 +3,7 @@
 use plotters::style::RGBColor;
 
 use super::canvas::steps;
-use super::model::{Figure, Look};
+use super::model::{COLOURS, Figure};
 
 /// The colour of the background.
 pub(super) const WHITE: RGBColor = RGBColor(255, 255, 255);
@@ -16,9 +16,9 @@ pub(super) const GRID: RGBColor = RGBColor(221, 221, 221);
 /// The colour of grid lines between labelled ticks.
 pub(super) const FAINT: RGBColor = RGBColor(240, 240, 240);
 
-/// The colours of Okabe and Ito without yellow, which is invisible on white, and black, which is the
-/// reference; then brown, grey and darker colours of Paul Tol.
-const COLOURS: [RGBColor; Look::COLOURS] = [
+/// The colours of Okabe and Ito without yellow, which is invisible on white, and black, which looks
+/// like the axes; then brown, grey and darker colours of Paul Tol.
+const PALETTE: [RGBColor; COLOURS] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -38,7 +38,7 @@ type Dash = Option<(f64, f64)>;
 /// The dashes of series. Four successive series share a dash, and the next series of the same colour
 /// has another.
 const DASHES: [Dash; 3] = [None, Some((9.0, 3.0)), Some((3.0, 2.5))];
-/// The dash of reference lines and series.
+/// The dash of reference lines.
 const REFERENCE_DASH: Dash = Some((5.0, 4.0));
 
 /// A star: number of points, inner radius relative to the outer radius, and direction of the first
@@ -54,8 +54,6 @@ const MARKERS: [Star; 7] = [
     (4, 0.42, 0.0),
     (5, 0.45, 0.75),
 ];
-/// The marker of the reference: a tilted cross.
-const REFERENCE_MARKER: Star = (4, 0.42, 0.125);
 
 /// The colour, dash and marker of one series.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,16 +64,11 @@ pub(super) struct Stroke {
 }
 
 impl Stroke {
-    fn of(look: Look) -> Self {
-        match look {
-            Look::Reference => {
-                Self { colour: RGBColor(0, 0, 0), dash: REFERENCE_DASH, marker: REFERENCE_MARKER }
-            }
-            Look::Slot(slot) => Self {
-                colour: COLOURS[slot % COLOURS.len()],
-                dash: DASHES[(slot / 4 + slot / 12) % DASHES.len()],
-                marker: MARKERS[slot % MARKERS.len()],
-            },
+    fn of(look: usize) -> Self {
+        Self {
+            colour: PALETTE[look % PALETTE.len()],
+            dash: DASHES[(look / 4 + look / 12) % DASHES.len()],
+            marker: MARKERS[look % MARKERS.len()],
         }
     }
 
@@ -95,7 +88,7 @@ impl Stroke {
 
 /// The stroke of reference lines.
 pub(super) const REFERENCE_LINE: Stroke =
-    Stroke { colour: GREY, dash: REFERENCE_DASH, marker: REFERENCE_MARKER };
+    Stroke { colour: GREY, dash: REFERENCE_DASH, marker: MARKERS[0] };
 /// The stroke of series without a name.
 const UNNAMED: Stroke = Stroke { colour: GREY, dash: None, marker: MARKERS[0] };
 
@@ -103,7 +96,7 @@ const UNNAMED: Stroke = Stroke { colour: GREY, dash: None, marker: MARKERS[0] };
 pub(super) struct Strokes {
     pub series: Vec<(String, Stroke)>,
     /// True if lines carry markers: colours and dashes alone distinguish only four lines at a glance.
-    marked_lines: bool,
+    pub marked_lines: bool,
 }
 
 impl Strokes {
@@ -122,34 +115,27 @@ impl Strokes {
                 .find(|(known, _)| known == name)
                 .map(|&(_, look)| look)
         };
-        let taken = |slot| {
+        let taken = |number| {
             figure
                 .looks
                 .iter()
-                .any(|(name, look)| *look == Look::Slot(slot) && shown(name))
+                .any(|(name, look)| *look == number && shown(name))
         };
         // Series without a given look avoid the looks of series that have one.
-        let mut free = (0..).filter(|&slot| !taken(slot)).map(Look::Slot);
-        let (mut series, mut lines): (Vec<(String, Stroke)>, Vec<&str>) = (Vec::new(), Vec::new());
+        let mut free = (0..).filter(|&number| !taken(number));
+        let mut series: Vec<(String, Stroke)> = Vec::new();
+        let mut lines: Vec<&str> = Vec::new();
         for layer in layers() {
             let Some(name) = layer.series().filter(|name| !name.is_empty()) else { continue };
             if series.iter().all(|(known, _)| known != name) {
-                let look = set(name)
-                    .or_else(|| free.next())
-                    .unwrap_or(Look::Reference);
+                let look = set(name).or_else(|| free.next()).unwrap_or(0);
                 series.push((name.to_owned(), Stroke::of(look)));
             }
-            // The look of the reference is unique, so it needs no marker.
-            if layer.is_line() && set(name) != Some(Look::Reference) && !lines.contains(&name) {
+            if layer.is_line() && !lines.contains(&name) {
                 lines.push(name);
             }
         }
         Self { series, marked_lines: lines.len() > 4 }
-    }
-
-    /// Returns true if the lines of a series carry markers.
-    pub fn marks(&self, stroke: Stroke) -> bool {
-        self.marked_lines && stroke.marker != REFERENCE_MARKER
     }
 
     /// Returns the place of the named series in the order of appearance, and its stroke; solid grey
@@ -168,7 +154,7 @@ mod tests {
     use super::super::model::{Layer, Marks, Panel};
     use super::*;
 
-    fn strokes(names: &[String], looks: Vec<(String, Look)>) -> Strokes {
+    fn strokes(names: &[String], looks: Vec<(String, usize)>) -> Strokes {
         let line = |name: &String| Layer::new(name, Marks::Line(Vec::new()));
         let layers = names
             .iter()
@@ -196,11 +182,9 @@ mod tests {
 
     #[test]
     fn looks_given_in_advance_are_kept_and_not_given_again() {
-        let looks =
-            vec![("paper".to_owned(), Look::Reference), ("GRASP".to_owned(), Look::Slot(0))];
-        let strokes = strokes(&["MF", "GRASP", "paper"].map(str::to_owned), looks);
-        assert_eq!(strokes.of("GRASP").1, Stroke::of(Look::Slot(0)));
-        assert_eq!(strokes.of("MF").1, Stroke::of(Look::Slot(1)));
-        assert_eq!(strokes.of("paper").1, Stroke::of(Look::Reference));
+        let looks = vec![("GRASP".to_owned(), 0)];
+        let strokes = strokes(&["MF", "GRASP"].map(str::to_owned), looks);
+        assert_eq!(strokes.of("GRASP").1, Stroke::of(0));
+        assert_eq!(strokes.of("MF").1, Stroke::of(1));
     }
 }

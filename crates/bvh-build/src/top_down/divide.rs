@@ -10,9 +10,10 @@
 #[cfg(feature = "rayon")]
 use super::presort::PARALLEL_OBJECTS;
 use super::presort::{Presorted, note_same_orders};
+use super::rule::SplitRule;
 use super::split_cost::SplitCost;
 use super::stall::{LEAST_STALLED, is_stall};
-use super::sweep::{Block, Split, SplitRule, Sweep, union_of};
+use super::sweep::{Block, Split, Sweep, union_of};
 use crate::watch::Pace;
 use crate::{BuildError, Watch};
 use bvh_core::{Aabb, Bvh, Node, PackedAabb, with_vector_instructions};

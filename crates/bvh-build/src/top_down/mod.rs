@@ -5,6 +5,7 @@ mod divide;
 pub mod median_cut;
 pub mod muller_fellner;
 mod presort;
+mod rule;
 pub mod spatial;
 mod split_cost;
 mod stall;
@@ -12,5 +13,6 @@ mod sweep;
 
 pub use divide::{Division, Workspace};
 pub use presort::{PARALLEL_OBJECTS, Presorted};
+pub use rule::{SplitRule, TakeBest};
 pub use split_cost::{AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, SplitCost};
-pub use sweep::{Split, SplitRule, Sweep, TakeBest};
+pub use sweep::{Split, Sweep};

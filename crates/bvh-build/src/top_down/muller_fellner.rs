@@ -11,10 +11,10 @@ use super::divide::{Division, Workspace};
 #[cfg(feature = "rayon")]
 use super::presort::PARALLEL_OBJECTS;
 use super::presort::Presorted;
+use super::rule::{SplitRule, TakeBest};
 use super::split_cost::{
     AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, ByMeasure, SplitCost,
 };
-use super::sweep::{SplitRule, TakeBest};
 use crate::{BuildError, Builder, Check, OutOfRange, Watch};
 use bvh_config::{Accepts, Nested};
 use bvh_core::cost::Measure;

@@ -27,3 +27,8 @@ pub fn cost(folder: &Path, file: &str) -> f64 {
         .parse()
         .unwrap()
 }
+
+/// Returns a fact that is a number.
+pub fn number(facts: &BTreeMap<String, String>, name: &str) -> f64 {
+    facts[name].parse().unwrap()
+}

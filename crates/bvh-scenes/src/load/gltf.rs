@@ -5,10 +5,12 @@
 //! Materials, cameras, animations and skins are ignored: nodes alone place the meshes.
 
 mod buffers;
+mod document;
 
 use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Place};
 use buffers::Buffers;
 use bvh_core::Triangle;
+use document::document;
 use glam::{DMat4, DQuat, DVec3, Vec3};
 use gltf_json::accessor::{ComponentType, Type};
 use gltf_json::buffer::View;
@@ -26,37 +28,6 @@ use std::path::Path;
 const MOST_BYTES: u64 = 48 * MOST_TRIANGLES as u64;
 /// The largest number of positions and indices: [`MOST_TRIANGLES`] that share no position.
 const MOST_ITEMS: u64 = 6 * MOST_TRIANGLES as u64;
-
-/// Extensions that a file may require, because none of them changes its triangles: lights,
-/// materials, textures, metadata, and other types of positions, which [`Loader::items`] rejects
-/// where a mesh uses them.
-const HARMLESS: [&str; 25] = [
-    "EXT_texture_avif",
-    "EXT_texture_webp",
-    "KHR_animation_pointer",
-    "KHR_lights_punctual",
-    "KHR_materials_anisotropy",
-    "KHR_materials_clearcoat",
-    "KHR_materials_diffuse_transmission",
-    "KHR_materials_dispersion",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_iridescence",
-    "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_sheen",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_unlit",
-    "KHR_materials_variants",
-    "KHR_materials_volume",
-    "KHR_mesh_quantization",
-    "KHR_techniques_webgl",
-    "KHR_texture_basisu",
-    "KHR_texture_transform",
-    "KHR_xmp",
-    "KHR_xmp_json_ld",
-    "MSFT_texture_dds",
-];
 
 /// The treatment of buffers outside the file's folder. Reading them lets the author of the file
 /// decide which files of the user are opened.
@@ -136,55 +107,6 @@ fn no_triangle(path: &Path) -> Fault {
         Place::File,
         "no triangle in its scene; expected a glTF file with at least one",
     )
-}
-
-/// Reads a file's JSON, and returns the bytes of the binary chunk of a GLB file with it.
-fn document<'a>(bytes: &'a [u8], path: &Path) -> Result<(Root, Option<&'a [u8]>), Fault> {
-    let (json, chunk) = match bytes.starts_with(b"glTF") {
-        true => chunks(bytes).ok_or_else(|| {
-            let message = "no chunk of JSON in version 2; expected a GLB file, and whole";
-            Fault::new(path, Place::File, message)
-        })?,
-        false => (
-            bytes
-                .strip_prefix(b"\xef\xbb\xbf")
-                .unwrap_or(bytes),
-            None,
-        ),
-    };
-    let root = Root::from_slice(json).map_err(|error| Fault::new(path, Place::File, error))?;
-    if let Some(unknown) = root
-        .extensions_required
-        .iter()
-        .find(|name| !HARMLESS.contains(&name.as_str()))
-    {
-        let place = Place::Element("extensionsRequired".into());
-        let message = format!(
-            "`{unknown}`; expected none that changes triangles (compressed meshes cannot be read)"
-        );
-        return Err(Fault::new(path, place, message));
-    }
-    Ok((root, chunk))
-}
-
-/// Returns the JSON chunk and the binary chunk of a GLB file of version 2.
-fn chunks(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
-    if bytes.get(4..8)? != [2, 0, 0, 0] {
-        return None;
-    }
-    // The file's header has 12 bytes, and each chunk's header has 8.
-    let json = chunk(bytes, 12, b"JSON")?;
-    Some((json, chunk(bytes, 20 + json.len(), b"BIN\0")))
-}
-
-/// Returns the contents of the chunk whose header begins at `offset`, if it has this kind.
-fn chunk<'a>(bytes: &'a [u8], offset: usize, kind: &[u8; 4]) -> Option<&'a [u8]> {
-    let (header, rest) = bytes.get(offset..)?.split_first_chunk::<8>()?;
-    let length = u32::from_le_bytes(*header.first_chunk()?) as usize;
-    if header[4..] != *kind {
-        return None;
-    }
-    rest.get(..length)
 }
 
 /// A file while its nodes are followed.

@@ -41,13 +41,14 @@
 //! Large objects among small ones belong into separate clusters. The weight wᵢ therefore grows with
 //! the square root of the area of the union of i and its nearest neighbour.
 
+mod clusters;
 mod smallest_box;
 
 use crate::parallel::map_init;
 use crate::run::Observer;
 use bvh_build::BuildError;
 use bvh_core::{Aabb, PackedAabb, cost::Sum};
-use smallest_box::{Clusters, Grouped};
+use clusters::{Clusters, Grouped};
 
 /// The effort beyond which the bound improves too little for the time it takes.
 pub const DEFAULT_EFFORT: u32 = 16;

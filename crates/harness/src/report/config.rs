@@ -1,24 +1,6 @@
 //! Keys that several kinds of reports share, and checks of their lists.
 
-use super::target::Target;
-use bvh_config::{Accepts, Nested, OutOfRange};
-
-bvh_config::config! { serde;
-    /// A report on how fast some methods reach targets. Every repetition is one run: 25 or more
-    /// make a distribution.
-    pub struct Targets {
-        /// Section or topic of the report.
-        source: String;
-        /// Heading.
-        title: String;
-        /// Labels of the methods.
-        methods: Vec<String>, in OneOrMore;
-        /// Costs to be reached: base, base −1 %, best known +1 % and +0.1 % unless others are
-        /// named.
-        targets: Vec<Target> = Target::usual(), in Nested;
-    }
-    check |config: &Self| OneOrMore.faults("targets", &config.targets);
-}
+use bvh_config::{Accepts, OutOfRange};
 
 /// Accepts lists that are not empty.
 #[derive(Clone, Copy, Debug)]

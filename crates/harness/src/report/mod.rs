@@ -3,7 +3,6 @@
 //! A kind of report is one file and one line in [`Report`]. Reports read CSV files only.
 
 pub mod anytime;
-mod attempt;
 pub mod config;
 mod correlation;
 pub mod data;
@@ -18,14 +17,14 @@ mod progress;
 pub mod query;
 mod query_column;
 mod query_figure;
+pub mod query_measure;
 pub mod query_report;
 mod ray_cost;
-mod run_times;
 mod sides;
 pub mod table;
 mod table_paper;
 pub mod target;
-mod time_to_target;
+mod to_target;
 pub mod trials;
 
 use crate::Error;
@@ -34,7 +33,7 @@ use crate::statistics::{median, minimum};
 use bvh_config::{Check, OutOfRange};
 use config::Labels as _;
 use data::Rows;
-use figures::{Figure, Layer, Look};
+use figures::{COLOURS, Figure, Layer};
 use output::Output;
 use paper::{Answer, Outcome, PaperRow};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -106,11 +105,7 @@ reports! {
     "anytime" => Anytime(anytime::Config: methods) by anytime::Config::write;
     /// Gaps to the exact optimum of small scenes.
     "gaps" => Gaps(gaps::Config: methods, optimum) by gaps::Config::write;
-    /// Run-time distributions.
-    "run_times" => RunTimes(config::Targets: methods) by run_times::write;
-    /// Time and work until targets are reached, one row per method, scene and target.
-    "time_to_target" => TimeToTarget(config::Targets: methods) by time_to_target::write;
-    /// Medians, quartiles and primal integrals.
+    /// Medians, quartiles, primal integrals, and time and work until targets are reached.
     "numbers" => Numbers(numbers::Config: methods) by numbers::Config::write;
     /// Tests of rays in trees that are trained on rays.
     "ray_cost" => RayCost(ray_cost::Config: base, pairs) by ray_cost::Config::write;
@@ -146,8 +141,7 @@ impl Report {
 
     /// Returns true if the report measures gaps.
     pub fn needs_references(&self) -> bool {
-        use Report::{Anytime, Numbers, RunTimes, TimeToTarget};
-        matches!(self, Anytime(_) | RunTimes(_) | Numbers(_) | TimeToTarget(_))
+        matches!(self, Self::Anytime(_) | Self::Numbers(_))
     }
 }
 
@@ -255,7 +249,7 @@ fn series(figure: &Figure) -> BTreeSet<String> {
 
 /// Chooses the looks of an experiment's methods, the same in all its figures. If there are more
 /// methods than colours, methods that share no figure may share a look.
-fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, Look)> {
+fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, usize)> {
     let mut slots: Vec<usize> = Vec::new();
     for (index, method) in methods.iter().enumerate() {
         let shared = |other: &str| {
@@ -271,15 +265,15 @@ fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, Look)> 
         };
         // Only more methods than colours share colours; otherwise each method keeps its number, and
         // with it its colour in all figures.
-        let free = (0..Look::COLOURS)
+        let free = (0..COLOURS)
             .find(|&slot| !taken(slot))
-            .filter(|_| methods.len() > Look::COLOURS);
+            .filter(|_| methods.len() > COLOURS);
         slots.push(free.unwrap_or(index));
     }
     methods
         .iter()
         .zip(slots)
-        .map(|(method, slot)| ((*method).to_owned(), Look::Slot(slot)))
+        .map(|(method, slot)| ((*method).to_owned(), slot))
         .collect()
 }
 
@@ -351,17 +345,14 @@ mod tests {
         assert!(
             few.iter()
                 .enumerate()
-                .all(|(index, (_, look))| *look == Look::Slot(index))
+                .all(|(index, (_, look))| *look == index)
         );
         let looks = looks(&methods, &figures);
         for shown in &figures {
             let colours: BTreeSet<usize> = looks
                 .iter()
                 .filter(|(method, _)| shown.contains(method))
-                .map(|(_, look)| match look {
-                    Look::Slot(slot) => slot % Look::COLOURS,
-                    Look::Reference => panic!("no method is the reference"),
-                })
+                .map(|(_, look)| look % COLOURS)
                 .collect();
             assert_eq!(colours.len(), shown.len());
         }

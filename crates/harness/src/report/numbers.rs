@@ -1,11 +1,14 @@
-//! Medians and quartiles of costs and gaps, primal integrals, and lower bounds, by method and
-//! scene.
+//! Medians and quartiles of costs and gaps, primal integrals, lower bounds, and times until targets
+//! are reached, by method and scene.
 
 use super::data::ratio;
 use super::prelude::*;
 use super::progress::{ProgressAxis, Series, longest_of_all, series};
+use super::target::Target;
+use super::to_target;
 use crate::rows::ReferenceRow;
 use crate::statistics::{median, primal_integral, quartiles, range};
+use bvh_config::Nested;
 
 bvh_config::config! { serde;
     /// Numbers of every method on every scene.
@@ -14,6 +17,10 @@ bvh_config::config! { serde;
         title: String;
         /// Labels of the methods.
         methods: Vec<String>, in OneOrMore;
+        /// Costs to be reached, for a table of the seconds and the work that the methods need.
+        /// Default none.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        targets: Vec<Target> = vec![], in Nested;
     }
 }
 
@@ -129,6 +136,10 @@ impl Config {
                 "The best known trees cost at most {low:.0} to {high:.0} % more than the optimum, by scene."
             )
         });
+        if !self.targets.is_empty() {
+            let firsts = to_target::add(&mut output, &self.methods, &self.targets, rows)?;
+            output.reading = format!("{} {firsts}", output.reading);
+        }
         Ok(output)
     }
 

@@ -8,7 +8,7 @@ use crate::rows::store::Store;
 use crate::rows::to_bytes;
 use crate::statistics::range;
 use comfy_table::{Table, presets};
-use figures::{Axis, Figure, Layer, Look, Panel};
+use figures::{Axis, Figure, Layer, Panel};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::io;
@@ -76,15 +76,6 @@ impl Output {
         let looks = vec![];
         self.figures
             .push((name.into(), Figure { title, caption: caption.into(), columns, panels, looks }));
-    }
-
-    /// Makes `series` the reference of the last figure, which its other series are compared with.
-    pub fn set_reference(&mut self, series: &str) {
-        if let Some((_, figure)) = self.figures.last_mut() {
-            figure
-                .looks
-                .push((series.into(), Look::Reference));
-        }
     }
 
     /// Adds a table under a line that explains it.

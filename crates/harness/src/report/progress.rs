@@ -4,7 +4,6 @@
 use super::data::Rows;
 use super::output::Output;
 use crate::Error;
-use crate::statistics::median;
 use figures::Axis;
 use serde::Serialize;
 
@@ -153,35 +152,10 @@ pub fn reached(run: &Series, cost: f64) -> Option<f64> {
         .map(|(x, _)| *x)
 }
 
-/// Returns the time at which the median run had an incumbent of at most this cost, counting unsolved
-/// runs as last; `None` if the median run never had one.
-pub fn median_reached(runs: &[Series], cost: f64) -> Option<f64> {
-    let times: Vec<f64> = runs
-        .iter()
-        .map(|run| reached(run, cost).unwrap_or(WORST))
-        .collect();
-    // Between a number and infinity there is only infinity, and between two infinities there is
-    // NaN.
-    median(&times).filter(|time| time.is_finite())
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::data::run;
     use super::*;
-
-    #[test]
-    fn a_method_reaches_what_its_median_run_does() {
-        let runs = |times: &[f64]| {
-            times
-                .iter()
-                .map(|&time| vec![(time, 1.0)])
-                .collect::<Vec<_>>()
-        };
-        assert_eq!(median_reached(&runs(&[3.0, 1.0, 2.0]), 1.0), Some(2.0));
-        let one_of_two = vec![vec![(1.0, 1.0)], vec![(1.0, 5.0)]];
-        assert_eq!([median_reached(&one_of_two, 1.0), median_reached(&[], 1.0)], [None, None]);
-    }
 
     #[test]
     fn a_column_is_called_after_the_axis_and_only_seconds_go_into_timing_files() {

@@ -1,7 +1,8 @@
 //! A column of the table that a query gives: an aggregate of each group of rows, or its quotient
 //! with a base.
 
-use super::query::{self, Conditions, Measure, QueryError, Row};
+use super::query::{self, Conditions, QueryError, Row};
+use super::query_measure::Measure;
 use crate::statistics::{median_interval, range};
 use bvh_config::{Nested, above};
 use schemars::JsonSchema;

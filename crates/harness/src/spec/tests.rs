@@ -223,7 +223,7 @@ judge = { count = 0 }, for_rays = 'camera' },
     { method = 'best', label = 'd', references = 99.0, keep = ['nothing'] },
 ]
 [[reports]]
-kind = 'time_to_target'
+kind = 'numbers'
 titel = 't'
 methods = ['a', 'b', 'e']
 targets = [{ of = 'bse', percent = 'x' }, { of = 'base', percent = -100 }]

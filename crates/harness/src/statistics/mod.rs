@@ -2,7 +2,6 @@
 //! time-to-target fits.
 
 pub mod best_of;
-pub mod time_to_target;
 
 /// Returns the values in ascending order.
 pub fn sorted(values: &[f64]) -> Vec<f64> {

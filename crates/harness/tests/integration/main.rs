@@ -7,6 +7,7 @@ mod examples;
 #[cfg(unix)]
 mod external;
 mod faults;
+mod merge;
 mod page;
 mod paper;
 mod pictures;

@@ -12,7 +12,8 @@
 //! A file with `/*/` in its path stands for all such files: results by processor.
 
 use super::support::top;
-use harness::report::query::{self, Measure, QueryError, Row, distinct, group, only_text};
+use harness::report::query::{self, QueryError, Row, distinct, group, only_text};
+use harness::report::query_measure::Measure;
 use std::fs;
 use std::path::PathBuf;
 

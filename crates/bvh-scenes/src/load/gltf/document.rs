@@ -1,0 +1,88 @@
+//! The JSON of a glTF or GLB file, and the binary chunk next to it.
+
+use super::super::mesh::{Fault, Place};
+use gltf_json::Root;
+use std::path::Path;
+
+/// Extensions that a file may require, because none of them changes its triangles: lights,
+/// materials, textures, metadata, and other types of positions, which the loader rejects
+/// where a mesh uses them.
+const HARMLESS: [&str; 25] = [
+    "EXT_texture_avif",
+    "EXT_texture_webp",
+    "KHR_animation_pointer",
+    "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_techniques_webgl",
+    "KHR_texture_basisu",
+    "KHR_texture_transform",
+    "KHR_xmp",
+    "KHR_xmp_json_ld",
+    "MSFT_texture_dds",
+];
+
+/// Reads a file's JSON, and returns the bytes of the binary chunk of a GLB file with it.
+pub(super) fn document<'a>(
+    bytes: &'a [u8],
+    path: &Path,
+) -> Result<(Root, Option<&'a [u8]>), Fault> {
+    let (json, chunk) = match bytes.starts_with(b"glTF") {
+        true => chunks(bytes).ok_or_else(|| {
+            let message = "no chunk of JSON in version 2; expected a GLB file, and whole";
+            Fault::new(path, Place::File, message)
+        })?,
+        false => (
+            bytes
+                .strip_prefix(b"\xef\xbb\xbf")
+                .unwrap_or(bytes),
+            None,
+        ),
+    };
+    let root = Root::from_slice(json).map_err(|error| Fault::new(path, Place::File, error))?;
+    if let Some(unknown) = root
+        .extensions_required
+        .iter()
+        .find(|name| !HARMLESS.contains(&name.as_str()))
+    {
+        let place = Place::Element("extensionsRequired".into());
+        let message = format!(
+            "`{unknown}`; expected none that changes triangles (compressed meshes cannot be read)"
+        );
+        return Err(Fault::new(path, place, message));
+    }
+    Ok((root, chunk))
+}
+
+/// Returns the JSON chunk and the binary chunk of a GLB file of version 2.
+fn chunks(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
+    if bytes.get(4..8)? != [2, 0, 0, 0] {
+        return None;
+    }
+    // The file's header has 12 bytes, and each chunk's header has 8.
+    let json = chunk(bytes, 12, b"JSON")?;
+    Some((json, chunk(bytes, 20 + json.len(), b"BIN\0")))
+}
+
+/// Returns the contents of the chunk whose header begins at `offset`, if it has this kind.
+fn chunk<'a>(bytes: &'a [u8], offset: usize, kind: &[u8; 4]) -> Option<&'a [u8]> {
+    let (header, rest) = bytes.get(offset..)?.split_first_chunk::<8>()?;
+    let length = u32::from_le_bytes(*header.first_chunk()?) as usize;
+    if header[4..] != *kind {
+        return None;
+    }
+    rest.get(..length)
+}

@@ -1,0 +1,157 @@
+//! Files of a square in every format.
+
+use base64::Engine as _;
+use bvh_core::Triangle;
+use bvh_scenes::load::{Format, parse};
+use std::path::Path;
+
+pub const CORNERS: [[f32; 3]; 4] =
+    [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.5], [0.0, 1.0, 0.5]];
+pub const FACES: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
+
+pub fn square() -> Vec<Triangle> {
+    Triangle::from_mesh(&CORNERS, &FACES).unwrap()
+}
+
+pub fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
+    values
+        .into_iter()
+        .flat_map(f32::to_le_bytes)
+        .collect()
+}
+
+pub fn ply_text() -> Vec<u8> {
+    let mut text = "ply\nformat ascii 1.0\ncomment a square\n\
+                    element vertex 4\nproperty float x\nproperty double y\nproperty float z\n\
+                    property uchar red\n\
+                    element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        .to_string();
+    for [x, y, z] in CORNERS {
+        text += &format!("{x} {y} {z} 255\n");
+    }
+    (text + "4 0 1 2 3\n").into_bytes()
+}
+
+pub fn ply_binary(big: bool) -> Vec<u8> {
+    let order = if big { "big" } else { "little" };
+    let mut bytes = format!(
+        "ply\nformat binary_{order}_endian 1.0\n\
+         element vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+         element face 2\nproperty list uchar uint vertex_index\nend_header\n"
+    )
+    .into_bytes();
+    let word = |x: u32| if big { x.to_be_bytes() } else { x.to_le_bytes() };
+    bytes.extend(
+        CORNERS
+            .as_flattened()
+            .iter()
+            .flat_map(|x| word(x.to_bits())),
+    );
+    for face in FACES {
+        bytes.push(3);
+        bytes.extend(face.into_iter().flat_map(word));
+    }
+    bytes
+}
+
+pub fn stl_text() -> Vec<u8> {
+    let mut text = String::new();
+    // A file may have several solids, and a solid may have no name.
+    for (solid, triangle) in ["solid a square", "solid"].iter().zip(square()) {
+        text += &format!("{solid}\r\n facet normal 0 0 1\r\n  outer loop\r\n");
+        for corner in triangle.0 {
+            text += &format!("   vertex {} {:e} {}\r\n", corner.x, corner.y, corner.z);
+        }
+        text += "  endloop\r\n endfacet\r\nendsolid\r\n";
+    }
+    text.into_bytes()
+}
+
+pub fn stl_binary() -> Vec<u8> {
+    let mut bytes = b"solid of a program that knows no better".to_vec();
+    bytes.resize(80, b' ');
+    bytes.extend(2u32.to_le_bytes());
+    for triangle in square() {
+        bytes.extend(floats([0.0; 3]));
+        bytes.extend(floats(triangle.0.iter().flat_map(|p| p.to_array())));
+        bytes.extend([7, 7]);
+    }
+    bytes
+}
+
+/// Returns the JSON of a scene over a buffer of four positions and of the indices of two triangles,
+/// `u16`.
+pub fn gltf_json(uri: &str, nodes: &str, primitive: &str) -> String {
+    let uri = if uri.is_empty() { String::new() } else { format!(r#""uri": "{uri}", "#) };
+    format!(
+        r#"{{"asset": {{"version": "2.0"}},
+        "scene": 0, "scenes": [{{"nodes": [0]}}], "nodes": [{nodes}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}{primitive}}}]}}],
+        "accessors": [
+            {{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+              "min": [0, 0, 0], "max": [1, 1, 1]}},
+            {{"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}}],
+        "bufferViews": [
+            {{"buffer": 0, "byteLength": 48}},
+            {{"buffer": 0, "byteOffset": 48, "byteLength": 12}}],
+        "buffers": [{{{uri}"byteLength": 60}}]}}"#
+    )
+}
+
+pub const INDEXED: &str = r#", "indices": 1"#;
+
+pub fn buffer() -> Vec<u8> {
+    let indices = FACES
+        .as_flattened()
+        .iter()
+        .flat_map(|&index| (index as u16).to_le_bytes());
+    floats(CORNERS.as_flattened().iter().copied())
+        .into_iter()
+        .chain(indices)
+        .collect()
+}
+
+pub fn data_uri() -> String {
+    format!(
+        "data:application/octet-stream;base64,{}",
+        base64::engine::general_purpose::STANDARD.encode(buffer())
+    )
+}
+
+pub fn gltf(nodes: &str, primitive: &str) -> Vec<u8> {
+    gltf_json(&data_uri(), nodes, primitive).into_bytes()
+}
+
+pub fn glb() -> Vec<u8> {
+    crate::glb::glb(gltf_json("", r#"{"mesh": 0}"#, INDEXED), &buffer())
+}
+
+/// Returns files of a square in every format.
+pub fn samples() -> [(&'static str, Format, Vec<u8>); 8] {
+    let obj = b"v 0 0 0\nv 1 0 0\nv 1 1 0.5\nv 0 1 0.5\nf 1 2 3 4\n".to_vec();
+    [
+        ("square.obj", Format::Obj, obj),
+        ("text.ply", Format::Ply, ply_text()),
+        ("little.ply", Format::Ply, ply_binary(false)),
+        ("big.ply", Format::Ply, ply_binary(true)),
+        ("text.stl", Format::Stl, stl_text()),
+        ("binary.stl", Format::Stl, stl_binary()),
+        ("square.gltf", Format::Gltf, gltf(r#"{"mesh": 0}"#, INDEXED)),
+        ("square.glb", Format::Gltf, glb()),
+    ]
+}
+
+pub fn error(bytes: impl AsRef<[u8]>, name: &str) -> String {
+    parse(bytes.as_ref(), Path::new(name))
+        .unwrap_err()
+        .to_string()
+}
+
+/// Replaces the first occurrence of a text.
+pub fn with(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
+    let start = bytes
+        .windows(from.len())
+        .position(|window| window == from.as_bytes())
+        .expect(from);
+    [&bytes[..start], to.as_bytes(), &bytes[start + from.len()..]].concat()
+}

@@ -1,0 +1,112 @@
+//! The order of the nodes in memory.
+
+use super::{ANCHOR, Metric, NONE, Node, Working};
+use bvh_core::cost::Sum;
+
+/// The number of nodes from which a tree is sorted in place, because memory is scarcer than time.
+const SORTED_IN_PLACE: usize = 1 << 20;
+
+impl<M: Metric> Working<M> {
+    /// Returns all nodes except the anchor, parents before children, left before right. O(n).
+    pub fn preorder(&self) -> Vec<u32> {
+        let mut order = Vec::with_capacity(self.nodes.len());
+        let mut stack: Vec<u32> = self.root().into_iter().collect();
+        while let Some(index) = stack.pop() {
+            order.push(index);
+            let node = &self.nodes[index as usize];
+            if !node.is_leaf() {
+                stack.extend([node.children[1], node.children[0]]);
+            }
+        }
+        order
+    }
+
+    /// Sorts the nodes in preorder, so that neighbours in the tree are neighbours in memory. O(n).
+    pub fn sort_in_preorder(&mut self) {
+        if self.nodes.len() >= SORTED_IN_PLACE {
+            self.sort_in_place();
+        } else {
+            self.sort_into_spare();
+        }
+    }
+
+    /// Sorts by moving every node once, with an eighth of the memory of `sort_into_spare`, and in
+    /// about twice its time.
+    pub(super) fn sort_in_place(&mut self) {
+        // The new index of every node, and then the parts of the area in the new order.
+        let order = self.preorder();
+        let mut places = vec![ANCHOR; self.nodes.len()];
+        let mut area = Sum::default();
+        for (&index, place) in order.iter().zip(1..) {
+            places[index as usize] = place;
+            if let Some(part) = Self::part(&self.nodes[index as usize]) {
+                area.add(part);
+            }
+        }
+        let kept = order.len() + 1;
+        drop(order);
+        // Nodes outside the tree go to the end.
+        let mut outside = kept as u32..;
+        for place in places[1..]
+            .iter_mut()
+            .filter(|place| **place == ANCHOR)
+        {
+            *place = outside.next().unwrap_or(NONE);
+        }
+        for node in &mut self.nodes {
+            node.stamp = 0;
+            if node.parent != NONE {
+                node.parent = places[node.parent as usize];
+            }
+            if node.is_leaf() {
+                continue;
+            }
+            // The anchor has one child.
+            for child in node
+                .children
+                .iter_mut()
+                .filter(|child| **child != NONE)
+            {
+                *child = places[*child as usize];
+            }
+        }
+        for index in 0..places.len() {
+            // Every swap moves one node to its place.
+            while places[index] as usize != index {
+                let place = places[index] as usize;
+                self.nodes.swap(index, place);
+                places.swap(index, place);
+            }
+        }
+        self.nodes.truncate(kept);
+        self.restart(area);
+    }
+
+    pub(super) fn sort_into_spare(&mut self) {
+        let mut nodes = std::mem::take(&mut self.spare);
+        nodes.reserve(self.nodes.len());
+        nodes.push(Node { stamp: 0, ..self.nodes[0] });
+        // Pending nodes: old index, new parent, side.
+        let mut stack: Vec<(u32, u32, usize)> = self
+            .root()
+            .map(|root| (root, ANCHOR, 0))
+            .into_iter()
+            .collect();
+        let mut area = Sum::default();
+        while let Some((old, parent, side)) = stack.pop() {
+            let index = nodes.len() as u32;
+            let node = self.nodes[old as usize];
+            nodes.push(Node { parent, stamp: 0, ..node });
+            nodes[parent as usize].children[side] = index;
+            if let Some(part) = Self::part(&node) {
+                area.add(part);
+            }
+            if !node.is_leaf() {
+                stack.extend([(node.children[1], index, 1), (node.children[0], index, 0)]);
+            }
+        }
+        self.spare = std::mem::replace(&mut self.nodes, nodes);
+        self.spare.clear();
+        self.restart(area);
+    }
+}

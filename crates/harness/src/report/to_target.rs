@@ -1,0 +1,101 @@
+//! Error against run time in one table: seconds and work until every method is within a distance of
+//! the best known.
+
+use super::prelude::*;
+use super::progress::{ProgressAxis, Series, WORST, reached, series};
+use super::target::Target;
+use crate::statistics::order_quantile;
+
+/// One method and target on one scene, as written to `timing_to_target.csv`,
+/// `to_target_evaluations.csv` and `to_target_work.csv`.
+#[derive(Serialize)]
+pub(super) struct Reached<'a> {
+    scene: &'a str,
+    target: String,
+    method: &'a str,
+    runs: usize,
+    solved: usize,
+    /// Median over all runs, counting runs that never reach the target as last; empty if such a run
+    /// is the median.
+    median: Option<f64>,
+    /// The same for the quantile 0.9.
+    quantile_90: Option<f64>,
+}
+
+/// Adds the seconds and the work until `methods` reach `targets`, and returns a sentence on the
+/// first method to reach each target.
+pub(super) fn add(
+    output: &mut Output,
+    methods: &[String],
+    targets: &[Target],
+    rows: &Rows,
+) -> Result<String, Error> {
+    let mut sentence = String::new();
+    for axis in [ProgressAxis::Seconds, ProgressAxis::Work] {
+        let mut table = Vec::new();
+        for scene in rows.scenes() {
+            let runs_of_methods: Vec<Vec<Series>> = methods
+                .iter()
+                .map(|method| series(rows, scene, method, axis))
+                .collect();
+            for target in targets {
+                let Some(cost) = target.cost(rows, scene) else { continue };
+                for (method, runs) in methods.iter().zip(&runs_of_methods) {
+                    table.push(Reached::new(scene, target, method, runs, cost));
+                }
+            }
+        }
+        axis.add_csv(output, "to_target", &table)?;
+        let explanation = format!("{} until the target is reached, over all runs:", axis.label());
+        let columns = "scene target method runs solved median quantile_90";
+        output.show(&explanation, &table, columns)?;
+        if axis == ProgressAxis::Seconds {
+            sentence = reading(targets, &table);
+        }
+    }
+    Ok(sentence)
+}
+
+impl<'a> Reached<'a> {
+    fn new(scene: &'a str, target: &Target, method: &'a str, runs: &[Series], cost: f64) -> Self {
+        // Runs without success must count: dropping them would favour methods that rarely succeed.
+        let times: Vec<f64> = runs
+            .iter()
+            .map(|run| reached(run, cost).unwrap_or(WORST))
+            .collect();
+        let quantile = |q| order_quantile(&times, q).filter(|time| time.is_finite());
+        Self {
+            scene,
+            target: target.to_string(),
+            method,
+            runs: runs.len(),
+            solved: times
+                .iter()
+                .filter(|time| time.is_finite())
+                .count(),
+            median: quantile(0.5),
+            quantile_90: quantile(0.9),
+        }
+    }
+}
+
+/// Returns a sentence on the first method to reach each target, by scene.
+fn reading(targets: &[Target], table: &[Reached]) -> String {
+    let firsts = targets.iter().filter_map(|target| {
+        let rows: Vec<&Reached> = table
+            .iter()
+            .filter(|row| row.target == target.to_string())
+            .collect();
+        let first = |scene: &[&Reached]| {
+            let timed = scene
+                .iter()
+                .filter_map(|row| Some((row.median?, row.method)));
+            let (seconds, method) = timed.min_by(|a, b| a.0.total_cmp(&b.0))?;
+            Some(format!("{method} on {} ({seconds:.2} s)", scene[0].scene))
+        };
+        let firsts = each(rows.chunk_by(|a, b| a.scene == b.scene), first);
+        (!firsts.is_empty()).then(|| format!("{target}: {firsts}"))
+    });
+    let firsts: Vec<String> = firsts.collect();
+    format!("The first method in the median to reach {}.", firsts.join("; "))
+}
