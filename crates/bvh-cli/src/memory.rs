@@ -44,18 +44,21 @@ unsafe impl GlobalAlloc for HugePages {
     }
 }
 
+/// The largest page of any Linux, to which the start of advice is aligned.
+#[cfg(target_os = "linux")]
+const LARGEST_PAGE: usize = 64 << 10;
+
 /// Asks for huge pages for the complete pages of a large block.
 #[cfg(target_os = "linux")]
 fn advise(block: *mut u8, size: usize) {
-    use rustix::mm::{Advice, madvise};
     if size < LARGE || block.is_null() {
         return;
     }
-    let before = block.align_offset(rustix::param::page_size());
+    let before = block.align_offset(LARGEST_PAGE);
     let pages = block.wrapping_add(before);
     // SAFETY: the pages are in the block, and this advice changes no contents. Systems without huge
     // pages reject it, and the block has small ones.
-    let _ = unsafe { madvise(pages.cast(), size - before, Advice::LinuxHugepage) };
+    unsafe { libc::madvise(pages.cast(), size - before, libc::MADV_HUGEPAGE) };
 }
 
 #[cfg(not(target_os = "linux"))]

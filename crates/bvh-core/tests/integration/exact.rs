@@ -265,7 +265,7 @@ fn hard_triangle(random: &mut Random) -> Triangle {
 fn hard_rays_hit_where_real_arithmetic_says_at_the_real_distance_rounded_once() {
     let mut random = Random(1);
     let mut hits = 0;
-    for _ in 0..15_000 {
+    for _ in 0..5000 {
         let triangle = hard_triangle(&mut random);
         for _ in 0..4 {
             if let Some(ray) = hard_ray(&triangle, &mut random) {
@@ -273,7 +273,7 @@ fn hard_rays_hit_where_real_arithmetic_says_at_the_real_distance_rounded_once() 
             }
         }
     }
-    assert!(hits > 5000, "{hits}");
+    assert!(hits > 1500, "{hits}");
 }
 
 #[test]

@@ -8,7 +8,6 @@ mod filters;
 mod instances;
 mod layout_files;
 mod leave;
-mod peers;
 mod query;
 mod ray_density;
 mod references;

@@ -284,7 +284,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(10_000))]
+        #![proptest_config(ProptestConfig::with_cases(2500))]
         #[test]
         fn it_is_never_above_the_optimum(
             boxes in (0usize..=9, 0usize..3).prop_flat_map(|(n, flat)| scene(n, flat)),

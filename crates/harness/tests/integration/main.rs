@@ -8,6 +8,8 @@ mod examples;
 mod external;
 mod faults;
 mod merge;
+#[cfg(feature = "peers")]
+mod obvhs;
 mod page;
 mod paper;
 mod pictures;

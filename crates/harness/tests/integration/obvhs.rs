@@ -1,12 +1,12 @@
 //! Trees can be converted to another library and back, and both libraries find the same hits in
 //! them.
 
+use ::obvhs::bvh2::{Bvh2, builder::build_bvh2, node::Bvh2Node};
+use ::obvhs::cwbvh::{CwBvh, node::CwBvhNode};
+use ::obvhs::ray::RayHit;
+use ::obvhs::{BvhBuildParams, aabb};
 use bvh_core::export::{CompressedBvh, CompressedNode};
 use bvh_core::{Aabb, Bvh, FirstCountNode, Ray, Shear, Triangle, nearest_hit, validate};
-use obvhs::bvh2::{Bvh2, builder::build_bvh2, node::Bvh2Node};
-use obvhs::cwbvh::{CwBvh, node::CwBvhNode};
-use obvhs::ray::RayHit;
-use obvhs::{BvhBuildParams, aabb};
 
 /// Makes small triangles at pseudo-random points.
 fn triangles(n: u32) -> Vec<Triangle> {
@@ -102,7 +102,7 @@ fn a_tree_of_obvhs_survives_a_round_trip_and_traces_the_same_hits() {
                 let origin = [-3.0, f32::from(i % 14), f32::from(i / 14)];
                 let direction = [1.0, 0.05, f32::from(i) * 0.01 - 1.0];
                 let ray = Ray::half_line(origin, direction).unwrap();
-                let their_ray = obvhs::ray::Ray::new_inf(origin.into(), direction.into());
+                let their_ray = ::obvhs::ray::Ray::new_inf(origin.into(), direction.into());
                 let expected = nearest_hit(&tree, &triangles, &ray).map(|hit| hit.t);
                 let mut hit = RayHit::none();
                 let found = returned.ray_traverse(their_ray, &mut hit, |_, position| {
