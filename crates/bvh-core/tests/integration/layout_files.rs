@@ -2,7 +2,7 @@
 
 use crate::support::{Random, SHAPES, ball, boxes, rays, scaled, soup, tree};
 use bvh_core::file::{FileError, load_layout, save_layout, view_layout};
-use bvh_core::{Kernel, Triangle, WideBvh};
+use bvh_core::{Coherence, Hit, Kernel, Triangle, WideBvh};
 
 /// Bytes at a multiple of 64, as mapped files have them.
 struct Mapped {
@@ -119,6 +119,13 @@ fn traversals_of_forged_layouts_end_and_stay_in_bounds() {
                 let Some(wide) = wide.clone().with_kernel(kernel) else { continue };
                 let mut counts = vec![0; rays.len()];
                 wide.all_hits_of(&rays, &mut vec![], &mut counts);
+                for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+                    let mut hits = vec![Hit::MISS; rays.len()];
+                    wide.nearest_hits(&rays, &mut hits, coherence);
+                    // Nothing is in an unused lane.
+                    let is_object = |hit: &Hit| hit.object < 1 << 30 || *hit == Hit::MISS;
+                    assert!(hits.iter().all(is_object), "{hits:?}");
+                }
                 for ray in &rays {
                     wide.nearest_hit(ray);
                     wide.any_hit(ray);
