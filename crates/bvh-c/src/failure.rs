@@ -95,22 +95,35 @@ pub(crate) fn array<T>(action: impl FnOnce() -> Result<*const T, Failure>) -> *c
     attempt(action).unwrap_or(std::ptr::null())
 }
 
-/// Converts a pointer into a reference, and rejects null.
+/// Converts a pointer into a reference, and rejects null and wrong alignment.
 ///
 /// # Safety
-/// `pointer` is null, or points to a `T` that nobody changes while the result is in use.
+/// `pointer` is null or not aligned, or points to a `T` that nobody changes while the result is in
+/// use.
 pub(crate) unsafe fn given<'a, T>(name: &str, pointer: *const T) -> Result<&'a T, Failure> {
-    // SAFETY: a pointer that is not null points to a `T` that nobody changes meanwhile.
+    check_alignment(name, pointer)?;
+    // SAFETY: an aligned pointer that is not null points to a `T` that nobody changes meanwhile.
     unsafe { pointer.as_ref() }.ok_or_else(|| Failure::invalid(format!("{name} is null")))
 }
 
-/// Converts a pointer into a mutable reference, and rejects null.
+/// Converts a pointer into a mutable reference, and rejects null and wrong alignment.
 ///
 /// # Safety
-/// `pointer` is null, or points to a `T` that nobody else uses while the result is in use.
+/// `pointer` is null or not aligned, or points to a `T` that nobody else uses while the result is in
+/// use.
 pub(crate) unsafe fn given_mut<'a, T>(name: &str, pointer: *mut T) -> Result<&'a mut T, Failure> {
-    // SAFETY: a pointer that is not null points to a `T` that nobody else uses meanwhile.
+    check_alignment(name, pointer)?;
+    // SAFETY: an aligned pointer that is not null points to a `T` that nobody else uses meanwhile.
     unsafe { pointer.as_mut() }.ok_or_else(|| Failure::invalid(format!("{name} is null")))
+}
+
+/// Rejects pointers with the wrong alignment for their type.
+fn check_alignment<T>(name: &str, pointer: *const T) -> Result<(), Failure> {
+    if pointer.is_aligned() {
+        return Ok(());
+    }
+    let multiple = align_of::<T>();
+    Err(Failure::invalid(format!("{name} is not aligned to a multiple of {multiple}")))
 }
 
 /// Rejects arrays that cannot exist: null, not aligned, or larger than the address space.
@@ -118,12 +131,7 @@ fn check<T>(name: &str, first: *const T, count: usize) -> Result<(), Failure> {
     if first.is_null() {
         return Err(Failure::invalid(format!("{name} is null; accepted: {count} elements")));
     }
-    if !first.is_aligned() {
-        return Err(Failure::invalid(format!(
-            "{name} is not aligned to a multiple of {}",
-            align_of::<T>()
-        )));
-    }
+    check_alignment(name, first)?;
     if count > isize::MAX as usize / size_of::<T>() {
         return Err(Failure::invalid(format!("{name} has {count} elements, more than memory has")));
     }

@@ -281,7 +281,7 @@ fn invalid_arguments_are_rejected_by_name() {
         assert!(bvh_tree_from_triangles(wrong.as_ptr(), 5, 0.0, f64::NAN).is_null());
         rejected("references is NaN; accepted: 1 to 16");
         assert!(bvh_tree_from_boxes(boxes.as_ptr(), 1, -1.0).is_null());
-        rejected("seconds is -1; accepted");
+        rejected("seconds is -1.0; accepted: 0 to 1e19");
         assert!(bvh_tree_from_boxes(boxes.as_ptr().add(1), 0, f64::INFINITY).is_null());
         rejected("seconds is inf");
         let boxed = bvh_tree_from_boxes(boxes.as_ptr(), 1, 0.0);
@@ -295,6 +295,11 @@ fn invalid_arguments_are_rejected_by_name() {
         assert_eq!((bvh_tree_cost(null(), 0, &mut cost), cost), (BvhStatus::Invalid, 7.0));
         rejected("tree is null");
         assert_eq!(bvh_tree_cost(tree, 0, null_mut()), BvhStatus::Invalid);
+        let misaligned = (&raw mut cost).byte_add(1);
+        assert_eq!(bvh_tree_cost(tree, 0, misaligned), BvhStatus::Invalid);
+        rejected("cost is not aligned to a multiple of 8");
+        assert!(bvh_tree_for_rays(wrong.as_ptr(), 3, 0.0, 1.0, null(), 0).is_null());
+        rejected("ray_count is 0; accepted: 1 or more");
         assert!(
             bvh_tree_nodes(tree, null_mut()).is_null() && bvh_tree_nodes(null(), &mut 0).is_null()
         );

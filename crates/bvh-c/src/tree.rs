@@ -102,6 +102,10 @@ pub unsafe extern "C" fn bvh_tree_for_rays(
             .iter()
             .map(|&[from, to]| Segment { from, to })
             .collect();
+        // Without rays the search would be by area, which nobody asks for by this name.
+        if rays.is_empty() {
+            return Err(Failure::invalid("ray_count is 0; accepted: 1 or more"));
+        }
         check_references(references)?;
         let options = Options { references, rays: &rays, ..Options::default() };
         OwnedTree::find_with(triangles, &options, &deadline(seconds)?)
@@ -341,7 +345,7 @@ fn loaded(path: &str, objects: Objects) -> Result<BvhTree, Failure> {
 fn deadline(seconds: f64) -> Result<Deadline, Failure> {
     Duration::try_from_secs_f64(seconds)
         .map(Deadline::after)
-        .map_err(|_| Failure::invalid(format!("seconds is {seconds}; accepted: 0 or more, finite")))
+        .map_err(|_| Failure::invalid(format!("seconds is {seconds:?}; accepted: 0 to 1e19")))
 }
 
 /// Copies boxes.

@@ -60,7 +60,7 @@ pub fn searched<T: Send>(
     let limit =
         match seconds {
             Some(seconds) => Some(Duration::try_from_secs_f64(seconds).map_err(|_| {
-                invalid(format!("seconds is {seconds}; accepted: 0 or more, finite"))
+                invalid(format!("seconds is {seconds:?}; accepted: 0 to 1e19"))
             })?),
             None => None,
         };
