@@ -50,10 +50,11 @@ pub enum Error {
     NoTree,
     /// Ctrl-C ended a bake.
     #[error(
-        "interrupted; the best tree so far, of cost {cost}, is in {0}; `--from {0}` continues",
-        .path.display()
+        "interrupted; the best tree so far{1} is in {0}; `--from {0}` continues",
+        .path.display(),
+        .cost.map_or_else(String::new, |cost| format!(", of cost {cost},"))
     )]
-    Stopped { path: PathBuf, cost: f64 },
+    Stopped { path: PathBuf, cost: Option<f64> },
     /// Ctrl-C ended a bake of instances.
     #[error(
         "interrupted; the best trees so far, of all meshes and over the instances, are in {}",

@@ -84,15 +84,27 @@ fn leaf_cost(size: f64, objects: u32) -> f64 {
 /// root's half area: nodes and blocks of triangles, each weighted by the half area of its box, in
 /// world units squared. Nodes with more than two children are halved first. O(nodes).
 pub fn layout_area(tree: &Bvh) -> f64 {
-    layout(tree, |node| node.aabb.half_area())
+    layout(tree, None)
 }
 
 /// Returns the same as [`layout_area`], with the measure instead of the half area. O(nodes).
 pub fn layout_measure(tree: &Bvh, measure: &dyn Measure) -> f64 {
-    layout(tree, |node| measure.of(&PackedAabb::from(&node.aabb)))
+    layout(tree, Some(measure))
 }
 
-fn layout(tree: &Bvh, size: impl Fn(&Node) -> f64) -> f64 {
+#[cfg(feature = "std")]
+crate::with_vector_instructions! {
+    layout = layout_plain(tree: &Bvh, measure: Option<&dyn Measure>) -> f64
+}
+#[cfg(not(feature = "std"))]
+use layout_plain as layout;
+
+#[inline(always)]
+fn layout_plain(tree: &Bvh, measure: Option<&dyn Measure>) -> f64 {
+    let size = |node: &Node| match measure {
+        Some(measure) => measure.of(&PackedAabb::from(&node.aabb)),
+        None => node.aabb.half_area(),
+    };
     let tree = binary(tree);
     // Children before parents, so that the rows of a path suffice: a row for every node would take
     // twice the memory of the tree.

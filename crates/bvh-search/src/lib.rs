@@ -43,8 +43,8 @@ pub use rays::{FindError, ray_density};
 #[cfg(feature = "serde")]
 pub use registry::Method;
 pub use run::{
-    Budget, Event, Judge, Observer, Outcome, Problem, Quota, Run, Search, SearchError, Shortcut,
-    Splits, StopReason, Stream, Tally, solve, solve_or_keep,
+    Budget, Event, Judge, Kept, Observer, Outcome, Problem, Quota, Run, Search, SearchError,
+    Shortcut, Splits, StopReason, Stream, Tally, solve, solve_or_keep,
 };
 #[cfg(feature = "std")]
 pub use run::{Deadline, Watched};

@@ -1,7 +1,7 @@
 //! Improvement of any binary tree, for callers with their own builder.
 
 use crate::best;
-use crate::run::{Budget, Found, Observer, Outcome, Problem, Run, SearchError, solve};
+use crate::run::{Budget, Found, Kept, Observer, Outcome, Problem, Run, SearchError, solve};
 use crate::tree::{Metric, search_by_metric};
 use bvh_config::{Check, OutOfRange};
 use bvh_core::cost::Objective;
@@ -154,7 +154,8 @@ impl From<'_> {
         seed: u64,
         run: &mut Run,
     ) -> Found {
+        let tree = Kept::new(self.tree.clone(), problem);
         self.config
-            .improved((self.tree.clone(), None), metric, problem, seed, run)
+            .improved((tree, None), metric, problem, seed, run)
     }
 }

@@ -117,6 +117,9 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 --threa
     /// Maximum size of trees that are recombined after a cancellation. Recombination takes about a
     /// microsecond per object.
     RECOMBINED_AT_ONCE: usize = 100_000, "objects";
+    /// Maximum size of trees that are evaluated by rays or by their layout after a cancellation
+    /// although there is another tree. The evaluation takes a tenth of a microsecond per object.
+    EVALUATED_AT_ONCE: usize = 1_000_000, "objects";
     /// Ratio of the costs of a clustering and a top-down division below which annealing starts from
     /// the clustering, although it ends lower from a division of the same cost.
     CLUSTERING_MUCH_CHEAPER: f64 = 0.9, "fraction";

@@ -12,7 +12,7 @@ use bvh_core::file::{self, Origin, TreeFile};
 use bvh_core::{Aabb, Bvh, WideBvh, cost, validate};
 use bvh_scenes::{Scene, load};
 use bvh_search::best::{self, Horizon};
-use bvh_search::{Budget, Deadline, Problem, solve_or_keep};
+use bvh_search::{Budget, Deadline, Kept, Problem, solve_or_keep};
 use harness::processor::PROCESSOR;
 use harness::rows::{Row, ScaleRow, read_if_any, to_bytes};
 use memmap2::Mmap;
@@ -169,6 +169,7 @@ impl Phases {
                 .expect("finite boxes");
             let deadline = Deadline::after(Duration::from_secs(seconds));
             let problem = Problem::new(boxes);
+            let greedy = Kept::new(greedy, &problem);
             solve_or_keep(&config, &problem, Some(greedy), 1, Budget::UNLIMITED, &deadline)
                 .expect("a tree")
                 .tree

@@ -11,6 +11,7 @@ mod watch;
 use crate::Error;
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
+use bvh_core::Bvh;
 use bvh_core::cost::Objective;
 use bvh_core::file::Header;
 use bvh_scenes::tree_file;
@@ -23,7 +24,7 @@ use bvh_terminal::output::{print_error, print_line};
 use clap::Args;
 use decide::{Choices, Decided, Open, decide};
 use effort::Effort;
-use plan::{Bake, Baked, Plan, Prepared, Start};
+use plan::{Bake, Baked, Figures, Plan, Prepared, Start};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use watch::gain;
@@ -290,41 +291,53 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
             "  skipped: divided objects: no spatial split of a top-down division saves anything",
         );
     }
-    let baked = bake.search(greedy, interrupted)?;
-    let bytes = bake.save(&baked, &out, reserved)?;
-    if interrupted.load(Relaxed) {
-        return Err(Error::Stopped { path: out, cost: baked.outcome.cost });
+    search_and_save(&bake, greedy, &out, reserved, interrupted)
+}
+
+/// Searches, writes the best tree, and prints its cost.
+fn search_and_save(
+    bake: &Bake,
+    greedy: Bvh,
+    out: &Path,
+    reserved: Reserved,
+    interrupted: &AtomicBool,
+) -> Result<(), Error> {
+    let Baked { tree, work, figures } = bake.search(greedy, interrupted)?;
+    let bytes = bake.save(&tree, work, out, reserved)?;
+    match figures {
+        Some(figures) if !interrupted.load(Relaxed) => {
+            print_line(&summary(bake, &tree, work, &figures));
+            print_line(&format!("{}: {bytes} bytes", out.display()));
+            Ok(())
+        }
+        figures => {
+            let cost = figures.map(|figures| figures.cost);
+            Err(Error::Stopped { path: out.to_owned(), cost })
+        }
     }
-    print_line(&summary(&plan, &scene, &bake, &baked));
-    print_line(&format!("{}: {bytes} bytes", out.display()));
-    Ok(())
 }
 
 /// Describes the result of a bake.
-fn summary(plan: &Plan, scene: &Scene, bake: &Bake, baked: &Baked) -> String {
-    let Baked { outcome, base, before, seconds, .. } = baked;
+fn summary(bake: &Bake, tree: &Bvh, work: u64, figures: &Figures) -> String {
+    let Bake { plan, scene, .. } = *bake;
+    let Figures { cost, base, before, moves, stop, seconds, .. } = figures;
     let objects = scene.boxes.len();
     let method = plan.method.name();
     let mut lines = vec![
         format!("{} ({}), {objects} objects, {method}, seed {}", scene.name, scene.kind, plan.seed),
-        format!(
-            "{} {}, {} Müller–Fellner's {base}",
-            bake.unit(),
-            outcome.cost,
-            gain(outcome.cost, *base)
-        ),
+        format!("{} {cost}, {} Müller–Fellner's {base}", bake.unit(), gain(*cost, *base)),
     ];
-    if let Some([cost, greedy]) = bake.costs_elsewhere(baked) {
+    if let Some([cost, greedy]) = bake.costs_elsewhere(tree, figures) {
         lines.push(format!(
             "risk: a tree for rays may be worse for others; for random lines it is {} Müller–Fellner's",
             gain(cost, greedy)
         ));
     }
     if let Some(before) = before {
-        lines.push(format!("{} the tree it started from, {before}", gain(outcome.cost, *before)));
+        lines.push(format!("{} the tree it started from, {before}", gain(*cost, *before)));
     }
     if plan.references > 1.0 {
-        let references = outcome.tree.prim_ids.len();
+        let references = tree.prim_ids.len();
         let allowed = plan.references;
         lines.push(if references > objects {
             format!("{references} references to {objects} objects, at most {allowed} per object")
@@ -336,13 +349,12 @@ fn summary(plan: &Plan, scene: &Scene, bake: &Bake, baked: &Baked) -> String {
     // have used more.
     let in_time =
         matches!(plan.effort, Effort::Time(limit) if *seconds >= 0.5 * limit.as_secs_f64());
-    let why = match outcome.stop {
+    let why = match stop {
         StopReason::Completed if in_time => "",
         StopReason::Completed => ", and the method has completed",
         StopReason::Optimal => ", and no tree is better",
         _ => "",
     };
-    let moves = outcome.evaluations;
-    lines.push(format!("{moves} moves, {} nodes visited, {seconds:.1} s{why}", outcome.work));
+    lines.push(format!("{moves} moves, {work} nodes visited, {seconds:.1} s{why}"));
     lines.join("\n")
 }

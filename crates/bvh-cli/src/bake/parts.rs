@@ -3,7 +3,7 @@
 
 use super::instances::{Interruption, bake_part};
 use super::plan::{Plan, Prepared, Start};
-use super::{BakeArgs, TREE, summary};
+use super::{BakeArgs, TREE, search_and_save};
 use crate::Error;
 use bvh_core::{Aabb, Bvh, Node, NodeKind};
 use bvh_scenes::tree_file;
@@ -89,21 +89,16 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
     let start = join(&scene, &parts, &folder)?;
     let plan = Plan { effort: plan.effort.share(1.0 - SHARE_OF_PARTS), ..plan };
     let (bake, greedy) = plan.begin(&scene, Some(&start), Prepared::default(), interrupted)?;
-    let baked = bake.search(greedy, interrupted)?;
-    let bytes = bake.save(&baked, &out, reserved)?;
-    if interrupted.load(Relaxed) {
-        return Err(Error::Stopped { path: out, cost: baked.outcome.cost });
-    }
-    print_line(&summary(&plan, &scene, &bake, &baked));
-    print_line(&format!("{}: {bytes} bytes", out.display()));
-    Ok(())
+    search_and_save(&bake, greedy, &out, reserved, interrupted)
 }
 
 /// Cuts a scene, and gives every part a share of the budget in proportion to its objects.
 fn parts(plan: &Plan, scene: &Scene, count: u32) -> Result<Vec<Part>, Error> {
     let all = scene.boxes.len();
     if count as usize > all {
-        let message = format!("--parts {count}: the scene has {all} objects; accepted: 2 to {all}");
+        let accepted = if all < 2 { "no parts".into() } else { format!("2 to {all}") };
+        let message =
+            format!("--parts {count}: the number of objects is {all}; accepted: {accepted}");
         return Err(Error::Usage(message));
     }
     let mut parts = Vec::new();

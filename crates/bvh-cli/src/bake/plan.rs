@@ -7,14 +7,16 @@ use crate::Error;
 use crate::rays::Rays;
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::file::{self, Header, Origin};
-use bvh_core::{Bvh, Node, RayDensity};
+use bvh_core::{Aabb, Bvh, Node, RayDensity};
 use bvh_scenes::Scene;
 use bvh_scenes::tree_file::TreeFileError;
 use bvh_search::{
-    Budget, Deadline, Method, Outcome, Problem, SearchError, best, optimize, solve_or_keep,
+    Budget, Deadline, Kept, Method, Outcome, Problem, SearchError, StopReason, best, optimize,
+    solve_or_keep,
 };
 use bvh_terminal::files::Reserved;
 use bvh_terminal::interrupt;
+use rayon::prelude::*;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -103,8 +105,10 @@ impl Plan {
 
 /// A bake that has begun.
 pub struct Bake<'a> {
-    plan: &'a Plan,
-    scene: &'a Scene,
+    /// The search.
+    pub plan: &'a Plan,
+    /// The scene.
+    pub scene: &'a Scene,
     start: Option<&'a Start>,
     deadline: Deadline,
     division: Division<'a>,
@@ -121,6 +125,13 @@ impl Bake<'_> {
     ///
     /// Takes the greedy tree, whose memory is free as soon as there is a better one.
     pub fn search(&self, greedy: Bvh, interrupted: &AtomicBool) -> Result<Baked, Error> {
+        // An interrupted bake has no time for costs by rays, which take a second in large scenes.
+        if interrupted.load(Relaxed) {
+            let tree = self
+                .start
+                .map_or(greedy, |start| start.tree.clone());
+            return Ok(Baked { tree, work: 0, figures: None });
+        }
         let problem = Problem {
             objective: self.plan.objective,
             splits: self.division.splits(),
@@ -130,25 +141,28 @@ impl Bake<'_> {
                 .map(|density| density as &dyn Measure),
             ..Problem::new(&self.scene.boxes)
         };
-        // Gains are relative to the greedy tree, by the cost that the search minimises.
-        let base = problem.cost(&greedy);
         let base_elsewhere = self.cost_elsewhere(&greedy);
+        // Gains are relative to the greedy tree, by the cost that the search minimises.
+        let greedy = Kept::new(greedy, &problem);
+        let base = greedy.cost;
         let watch = Watch::new(self.plan.effort, self.deadline, base, interrupted);
         let outcome = self.outcome(&problem, greedy, &watch, interrupted);
         watch.bar.finish_and_clear();
-        Ok(Baked {
-            outcome: outcome.map_err(Error::search(&self.scene.name, self.plan.method.name()))?,
-            base,
-            base_elsewhere,
-            before: self.start.map(|start| problem.cost(&start.tree)),
-            seconds: self.deadline.elapsed().as_secs_f64(),
-        })
+        let outcome = outcome.map_err(Error::search(&self.scene.name, self.plan.method.name()))?;
+        let Outcome { tree, cost, evaluations: moves, work, stop, .. } = outcome;
+        let seconds = self.deadline.elapsed().as_secs_f64();
+        let before = self
+            .start
+            .filter(|_| !interrupted.load(Relaxed))
+            .map(|start| problem.cost(&start.tree));
+        let figures = Figures { cost, base, base_elsewhere, before, moves, stop, seconds };
+        Ok(Baked { tree, work, figures: Some(figures) })
     }
 
     fn outcome(
         &self,
         problem: &Problem,
-        greedy: Bvh,
+        greedy: Kept,
         watch: &Watch,
         interrupted: &AtomicBool,
     ) -> Result<Outcome, SearchError> {
@@ -161,13 +175,15 @@ impl Bake<'_> {
         // kept.
         let fallback = match (*effort, method) {
             (Effort::Work(work), Method::Best(_)) if !interrupted.load(Relaxed) => {
-                best::fallback(problem, work, &Interrupted(interrupted))?
+                // With the greedy tree, no other is built after an interruption.
+                let problem = Problem { known: Some(&greedy.tree), ..*problem };
+                best::fallback(&problem, work, &Interrupted(interrupted))?
             }
             _ => None,
         };
         let found = match (self.start, method) {
             (Some(start), Method::Best(config)) => {
-                let problem = Problem { known: Some(&greedy), ..*problem };
+                let problem = Problem { known: Some(&greedy.tree), ..*problem };
                 optimize(&start.tree, &problem, config, *seed, budget, watch)?
             }
             _ => solve_or_keep(method, problem, Some(greedy), *seed, budget, watch)?,
@@ -175,19 +191,24 @@ impl Bake<'_> {
         Ok(best::unless_behind(found, fallback))
     }
 
-    /// Writes the tree file. Returns its number of bytes.
-    pub fn save(&self, baked: &Baked, path: &Path, reserved: Reserved) -> Result<usize, Error> {
-        let tree = &baked.outcome.tree;
+    /// Writes the file of a tree that took this `work`. Returns its number of bytes.
+    pub fn save(
+        &self,
+        tree: &Bvh,
+        work: u64,
+        path: &Path,
+        reserved: Reserved,
+    ) -> Result<usize, Error> {
         // The work of all bakes that led to this tree, one after the other.
         let spent = self.start.map_or(0, |start| start.work);
         let visits = self
             .density
             .as_ref()
-            .map_or_else(Vec::new, |density| density.visits(tree));
+            .map_or_else(Vec::new, |density| visits(density, tree));
         let origin = Origin {
             method: &self.plan.name,
             seed: self.plan.seed,
-            work: spent.saturating_add(baked.outcome.work),
+            work: spent.saturating_add(work),
             visits: &visits,
             objective: self.plan.objective,
         };
@@ -207,9 +228,9 @@ impl Bake<'_> {
 
     /// Returns the costs of the best tree and of the greedy tree for random lines, if the search was
     /// for other rays.
-    pub fn costs_elsewhere(&self, baked: &Baked) -> Option<[f64; 2]> {
-        self.cost_elsewhere(&baked.outcome.tree)
-            .zip(baked.base_elsewhere)
+    pub fn costs_elsewhere(&self, tree: &Bvh, figures: &Figures) -> Option<[f64; 2]> {
+        self.cost_elsewhere(tree)
+            .zip(figures.base_elsewhere)
             .map(<[f64; 2]>::from)
     }
 
@@ -225,16 +246,41 @@ impl Bake<'_> {
     }
 }
 
+/// Returns the visits of all nodes, computed by all threads, because somebody may wait for the file
+/// of a large tree after Ctrl-C.
+fn visits(density: &RayDensity, tree: &Bvh) -> Vec<f32> {
+    const NODES_PER_TASK: usize = 1 << 16;
+    let root = tree.root_aabb().unwrap_or(Aabb::EMPTY);
+    tree.nodes
+        .par_chunks(NODES_PER_TASK)
+        .flat_map_iter(|nodes| density.visits_of(&root, nodes))
+        .collect()
+}
+
 /// The result of a search.
 pub struct Baked {
-    /// The best tree, and the reason why the search ended.
-    pub outcome: Outcome,
+    /// The best tree.
+    pub tree: Bvh,
+    /// The nodes built or visited.
+    pub work: u64,
+    /// The course of the search; `None` if it was interrupted before it began.
+    pub figures: Option<Figures>,
+}
+
+/// The costs of a search, and its course.
+pub struct Figures {
+    /// The cost of the best tree.
+    pub cost: f64,
     /// The cost of the greedy tree.
     pub base: f64,
     /// The cost of the greedy tree for random lines, if the search was for other rays.
     base_elsewhere: Option<f64>,
     /// The cost of the tree that the search continued from.
     pub before: Option<f64>,
+    /// The number of moves tried.
+    pub moves: u64,
+    /// The reason why the search ended.
+    pub stop: StopReason,
     /// The time since the bake began.
     pub seconds: f64,
 }

@@ -56,6 +56,10 @@ impl<'a> Division<'a> {
         if from.is_some_and(|tree| tree.prim_ids.len() > scene.boxes.len()) {
             return Ok(Self::OfStart(splits));
         }
+        // The division of a large scene takes tenths of a second before it looks at its watch.
+        if is_over() {
+            return Ok(Self::No);
+        }
         let divided = match splits.divide(&scene.boxes, &Watch::new(is_over)) {
             Err(BuildError::Cancelled) => return Ok(Self::No),
             divided => divided.map_err(Error::search(&scene.name, "--references"))?,

@@ -41,7 +41,7 @@ mod crossings;
 mod x86;
 
 use crate::cost::Measure;
-use crate::{Aabb, Bvh, PackedAabb};
+use crate::{Aabb, Bvh, Node, PackedAabb};
 use alloc::vec::Vec;
 use crossings::{CELLS, Crossings, index};
 use glam::{DVec3, Vec3};
@@ -253,10 +253,16 @@ impl RayDensity {
     /// of the node's box, divided by the measure of the root. The root has 1 unless its measure is
     /// 0. O(nodes).
     pub fn visits(&self, tree: &Bvh) -> Vec<f32> {
-        let root = self.measure(&tree.root_aabb().unwrap_or(Aabb::EMPTY));
+        self.visits_of(&tree.root_aabb().unwrap_or(Aabb::EMPTY), &tree.nodes)
+    }
+
+    /// Returns the number of [visits](Self::visits) of some nodes of a tree with this root, so that
+    /// several threads can share a tree.
+    pub fn visits_of(&self, root: &Aabb, nodes: &[Node]) -> Vec<f32> {
+        let root = self.measure(root);
         let scale = if root > 0.0 { 1.0 / root } else { 0.0 };
-        let mut visits = Vec::with_capacity(tree.nodes.len());
-        for node in &tree.nodes {
+        let mut visits = Vec::with_capacity(nodes.len());
+        for node in nodes {
             // Rounding must not give a child more visits than the root.
             let relative = (self.measure(&node.aabb) * scale) as f32;
             visits.push(relative.min(1.0));
@@ -269,6 +275,18 @@ impl RayDensity {
         if bounds.min.cmpgt(bounds.max).any() {
             return 0.0;
         }
+        #[cfg(all(feature = "std", target_arch = "x86_64"))]
+        if x86::is_available() {
+            // SAFETY: `x86::fractional_entries` needs AVX2 and FMA, and the processor has both by
+            // the test above.
+            return unsafe { x86::fractional_entries(self, &PackedAabb::from(bounds)) };
+        }
+        self.portable_entries(bounds)
+    }
+
+    /// Returns the same as [`Self::fractional_entries`] on any processor, for a box that is not
+    /// empty.
+    fn portable_entries(&self, bounds: &Aabb) -> f64 {
         let rounded = self.round(bounds);
         // A box within one cell needs one look-up instead of eight.
         let cell = rounded.low.map(cell_of);
@@ -338,7 +356,7 @@ impl Measure for RayDensity {
     #[inline(never)]
     fn of(&self, aabb: &PackedAabb) -> f64 {
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        if x86::is_available() {
             // SAFETY: `x86::fractional_entries` needs AVX2 and FMA, and the processor has both by
             // the test above.
             let entries = unsafe { x86::fractional_entries(self, aabb) };

@@ -1,4 +1,4 @@
-//! The shortcut for boxes within a cell changes no bit.
+//! Neither the shortcut for boxes within a cell nor the processor's vectors change a bit.
 
 use super::*;
 
@@ -44,6 +44,28 @@ fn the_shortcut_within_a_cell_and_the_sum_over_corners_give_the_same_bits() {
             assert_eq!(short.to_bits(), full.to_bits(), "{rounded:?}");
             entered += u32::from(short > 0.0);
         }
+    }
+    assert!(entered > 5000);
+}
+
+#[test]
+fn every_processor_counts_the_same_entries() {
+    let mut random = Random(2);
+    let mut segments = Vec::new();
+    for _ in 0..2000 {
+        segments.push(Segment { from: random.point(), to: random.point() });
+    }
+    let bounds = Aabb::from([[0.0; 3], [CELLS as f32; 3]]);
+    let density = RayDensity::of_rays(&bounds, &segments, 0.1).unwrap();
+    let mut entered = 0;
+    for number in 0..20_000 {
+        let corner = Vec3::from(random.point());
+        // Boxes of all sizes, and beyond the bounds.
+        let size = Vec3::from(random.point()) / (1 << (number % 12)) as f32;
+        let aabb = Aabb { min: corner - size, max: corner + size };
+        let entries = density.fractional_entries(&aabb);
+        assert_eq!(entries.to_bits(), density.portable_entries(&aabb).to_bits(), "{aabb:?}");
+        entered += u32::from(entries > 0.0);
     }
     assert!(entered > 5000);
 }

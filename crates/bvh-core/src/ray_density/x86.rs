@@ -8,6 +8,12 @@ use super::{FRACTION_BITS, FRACTIONS, RayDensity};
 use crate::PackedAabb;
 use core::arch::x86_64::*;
 
+/// Returns whether the processor has the instructions of this module.
+#[inline]
+pub(super) fn is_available() -> bool {
+    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+}
+
 /// Returns the entries times 512³ of a box that is not empty.
 #[target_feature(enable = "avx2,fma")]
 #[inline]

@@ -7,6 +7,7 @@
 
 use crate::tree::{ANCHOR, Metric, NONE, Working};
 use bvh_core::cost::LayoutCost;
+use bvh_core::with_vector_instructions;
 
 /// A row of costs for every node of a tree, and the rows that undo a change.
 #[derive(Debug, Default)]
@@ -42,10 +43,7 @@ impl Layout {
         self.marks.clear();
         self.marks.resize(tree.nodes.len(), 0);
         self.change = 0;
-        // Children before parents, because a row depends on the rows of both children.
-        for &index in tree.preorder().iter().rev() {
-            self.rows[index as usize] = self.row(tree, index);
-        }
+        fill_rows(self, tree);
         self.cost = self.root(tree);
     }
 
@@ -132,6 +130,27 @@ impl Layout {
             self.rows[index as usize] = row;
         }
         false
+    }
+}
+
+with_vector_instructions! {
+    /// Computes the row of every node.
+    fill_rows = fill_rows_plain<M: Metric>(layout: &mut Layout, tree: &Working<M>)
+}
+
+#[inline(always)]
+fn fill_rows_plain<M: Metric>(layout: &mut Layout, tree: &Working<M>) {
+    // Children before parents, because a row depends on the rows of both children. In a sorted tree
+    // this is the order in memory; to find any other order takes longer than the rows.
+    for (index, node) in tree.nodes.iter().enumerate().skip(1).rev() {
+        let index = index as u32;
+        if !node.is_leaf() && node.children.iter().any(|&child| child <= index) {
+            for &index in tree.preorder().iter().rev() {
+                layout.rows[index as usize] = layout.row(tree, index);
+            }
+            return;
+        }
+        layout.rows[index as usize] = layout.row(tree, index);
     }
 }
 

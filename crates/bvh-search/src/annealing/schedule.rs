@@ -121,7 +121,10 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
     let mut fraction = 0.0;
     let mut rate = 1.0 / work as f64;
     // Moves find their nodes near each other in memory only after a sort.
-    tree.sort_in_preorder();
+    tree.sort_in_preorder_unless(&|| observer.cancelled());
+    if observer.cancelled() {
+        return;
+    }
     while fraction < 1.0 {
         let step = rate * next as f64;
         let heat = [fraction, fraction + step].map(temperature);

@@ -66,7 +66,7 @@ pub(crate) fn cool<M: Mover>(
     done += metropolis::cool(&mut whole, tree, heat, quota.less(&done), &mut rng, observer);
     // A cancelled search must return soon, and every later round would sort first.
     if !observer.cancelled() {
-        tree.sort_in_preorder();
+        tree.sort_in_preorder_unless(&|| observer.cancelled());
     }
     done
 }

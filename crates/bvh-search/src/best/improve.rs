@@ -173,7 +173,10 @@ impl Improvement<'_, '_, '_, '_> {
             if self.best.refill(tree).is_ok() {
                 self.reinsert(tree);
             }
-            tree.reshape(&before, self.boxes);
+            // After a cancellation nobody continues from the tree.
+            if self.run.stopped().is_none() {
+                tree.reshape(&before, self.boxes);
+            }
         } else if let Ok(mut aside) = self.best.working(tree.metric()) {
             self.reinsert(&mut aside);
         }
@@ -209,7 +212,9 @@ impl Improvement<'_, '_, '_, '_> {
             let schedule = self.schedule(self.config.hot(length), work as u64, end, length);
             self.anneal(tree, TRIALS + number as u64, (&schedule, length), true);
         }
-        if cost(&other, self.by_layout) < cost(tree, self.by_layout) {
+        // A cancelled search continues from neither.
+        if self.run.stopped().is_none() && cost(&other, self.by_layout) < cost(tree, self.by_layout)
+        {
             *tree = other;
         }
     }
@@ -315,16 +320,18 @@ impl Improvement<'_, '_, '_, '_> {
             },
         );
         // The tree has been offered before, so that a cancelled search need not compare the two.
-        if by_layout && run.stopped() == Some(StopReason::Cancelled) {
-            best.offer(tree, run);
+        // Nobody continues from the tree then, and a large one takes seconds to restore.
+        if run.stopped() == Some(StopReason::Cancelled)
+            && (by_layout || tree.objects() > RECOMBINED_AT_ONCE)
+        {
+            if done.kept > 0 {
+                best.offer(tree, run);
+            }
             return;
         }
         // The cost of a layout is no sum over clades, so such trees cannot be recombined.
         let is_better = cost(tree, by_layout) < cost_before;
-        let is_recombined = !by_layout
-            && !(first && (is_better || is_timed))
-            && !(run.stopped() == Some(StopReason::Cancelled)
-                && tree.objects() > RECOMBINED_AT_ONCE);
+        let is_recombined = !by_layout && !(first && (is_better || is_timed));
         if is_recombined || !is_better {
             // Recombination needs both trees.
             let annealed = is_recombined.then(|| std::mem::take(&mut tree.nodes));

@@ -22,9 +22,13 @@ mod small_budget;
 use crate::exact;
 use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion;
-use crate::run::{Budget, Found, Observer, Outcome, Problem, Run, SearchError, solve, watched};
+use crate::run::{
+    Budget, Found, Kept, Observer, Outcome, Problem, Run, SearchError, StopReason, solve, watched,
+};
 use crate::tree::{Metric, WithLeaves, Working, search_by_metric};
-use crate::tuning::{CLUSTERING, CLUSTERING_MUCH_CHEAPER, SECURED_FROM};
+use crate::tuning::{
+    CLUSTERING, CLUSTERING_MUCH_CHEAPER, EVALUATED_AT_ONCE, RECOMBINED_AT_ONCE, SECURED_FROM,
+};
 use bvh_build::ploc::MortonOrder;
 use bvh_build::{BuildError, Builder, Watch};
 use bvh_core::Bvh;
@@ -78,6 +82,12 @@ fn division(problem: &Problem, observer: &dyn Observer) -> Result<Option<Bvh>, S
     }
 }
 
+/// Returns whether the evaluation of a tree takes a noticeable part of a second.
+fn is_dear(problem: &Problem) -> bool {
+    let is_by_area = problem.measure.is_none() && problem.objective != Objective::Layout;
+    !is_by_area && problem.boxes.len() > EVALUATED_AT_ONCE
+}
+
 impl Config {
     /// Anneals several subtrees in parallel, each with a separate random stream.
     fn search_by<A: Metric>(
@@ -106,6 +116,10 @@ impl Config {
             SmallBudget::LocalOptimum(best, tree) => (best, tree),
             SmallBudget::Large(morton) => {
                 let best = Incumbent::begin(self.initial(morton, problem, run)?, problem, run);
+                // The working form of a large tree takes half a second.
+                if run.stopped() == Some(StopReason::Cancelled) {
+                    return Ok(best.tree);
+                }
                 let tree = best.working(metric)?;
                 (best, tree)
             }
@@ -123,28 +137,36 @@ impl Config {
         morton: Option<MortonOrder>,
         problem: &Problem,
         run: &mut Run,
-    ) -> Result<Bvh, SearchError> {
+    ) -> Result<Kept, SearchError> {
         let boxes = problem.boxes;
         let start = self.start.clone().unwrap_or_default();
         let build = |watch: &Watch| start.build_watched(boxes, problem.measure, watch);
         if self.start.is_some() {
-            return Ok(watched(run.observer(), build)?);
+            return Ok(Kept::new(watched(run.observer(), build)?, problem));
         }
         let morton = morton.map_or_else(|| MortonOrder::new(boxes), Ok)?;
         let clustered =
             watched(run.observer(), |watch| morton.build_watched(&CLUSTERING, None, watch))?;
-        let started = match watched(run.observer(), build) {
-            Err(BuildError::Cancelled) => return Ok(clustered),
+        // A large division takes tenths of a second before it looks at its watch.
+        let is_over = boxes.len() > RECOMBINED_AT_ONCE && run.observer().cancelled();
+        let started =
+            if is_over { Err(BuildError::Cancelled) } else { watched(run.observer(), build) };
+        let started = match started {
+            // Where an evaluation takes long, a cancelled search does with the tree that it has.
+            Err(BuildError::Cancelled) if run.has_tree() && is_dear(problem) => {
+                return Err(BuildError::Cancelled.into());
+            }
+            Err(BuildError::Cancelled) => return Ok(Kept::new(clustered, problem)),
             started => started?,
         };
         // Both are evaluated by the problem's objective, also where the clustering was built by
         // area.
-        let [other, first] = [&clustered, &started].map(|tree| problem.cost(tree));
-        if other < CLUSTERING_MUCH_CHEAPER * first {
-            run.keep_aside(problem, started);
+        let [clustered, started] = [clustered, started].map(|tree| Kept::new(tree, problem));
+        if clustered.cost < CLUSTERING_MUCH_CHEAPER * started.cost {
+            run.keep_aside(started);
             return Ok(clustered);
         }
-        run.keep_aside(problem, clustered);
+        run.keep_aside(clustered);
         Ok(started)
     }
 
@@ -152,20 +174,23 @@ impl Config {
     /// trial shows that the other tree is better, improves the other tree instead.
     pub(crate) fn improved<A: Metric>(
         &self,
-        (tree, other): (Bvh, Option<Bvh>),
+        (tree, other): (Kept, Option<Bvh>),
         metric: A,
         problem: &Problem,
         seed: u64,
         run: &mut Run,
     ) -> Found {
         let mut best = Incumbent::begin(tree, problem, run);
+        if run.stopped() == Some(StopReason::Cancelled) {
+            return Ok(best.tree);
+        }
         if problem.splits.is_some() {
             let metric = WithLeaves(metric);
             let mut tree = best.working(metric)?;
             let working = |tree: &Bvh| Working::from_bvh(tree, metric.internal(tree), metric);
             let other_working = other.as_ref().map(working).transpose()?;
             if let Some(other) = other {
-                run.keep_aside(problem, other);
+                run.keep_aside(Kept::new(other, problem));
             }
             improve(self, (&mut tree, other_working), seed, problem, &mut best, run);
         } else {

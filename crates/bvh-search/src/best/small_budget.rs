@@ -11,7 +11,7 @@ use crate::local::incumbent::Incumbent;
 use crate::local::initial::construction;
 use crate::local::reinsertion::pass;
 use crate::parallel::threads;
-use crate::run::{Observer, Problem, Run, SearchError, Tally, watched};
+use crate::run::{Kept, Observer, Problem, Run, SearchError, Tally, watched};
 use crate::tree::{Linked, Metric, Siblings, Working};
 use crate::tuning::{
     ANNEAL_FROM_TIME, ANNEAL_FROM_WORK, BUILDS, CLUSTERING, COLD_MEMORY, FINISH_TIME, FIRST_PASS,
@@ -69,8 +69,8 @@ pub(super) fn search<'p, A: Metric>(
             .into_iter()
             .find(|(enough, _)| times < *enough)
         {
-            let tree = Incumbent::begin_unbounded(morton.build(&config)?, problem, run).tree;
-            return Ok(SmallBudget::Tree(tree));
+            let tree = Kept::new(morton.build(&config)?, problem);
+            return Ok(SmallBudget::Tree(Incumbent::begin_unbounded(tree, problem, run).tree));
         }
         // Stop early enough to order and evaluate the tree.
         (two_starts, end) = (times >= two_starts_from, 1.0 - FINISH_TIME * sort);
@@ -88,7 +88,7 @@ pub(super) fn search<'p, A: Metric>(
     // and the evaluation would take the time of many moves.
     let mut before = None;
     if began.is_none() {
-        before = Some(Incumbent::begin(start.clone(), problem, run));
+        before = Some(Incumbent::begin(Kept::new(start.clone(), problem), problem, run));
     } else {
         run.count(Tally { moves: 1, kept: 0, work: start.nodes.len() as u64 });
     }
@@ -100,7 +100,7 @@ pub(super) fn search<'p, A: Metric>(
             best.offer_tree(tree, run);
             best
         }
-        None => Incumbent::begin_unbounded(tree, problem, run),
+        None => Incumbent::begin_unbounded(Kept::new(tree, problem), problem, run),
     };
     if !still {
         return Ok(SmallBudget::Tree(best.tree));

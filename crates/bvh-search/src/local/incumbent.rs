@@ -2,7 +2,7 @@
 
 use super::pass::TOLERANCE;
 use crate::lower_bound;
-use crate::run::{Observer, Problem, Quota, Run, SearchError, Shortcut, Tally, watched};
+use crate::run::{Kept, Observer, Problem, Quota, Run, SearchError, Shortcut, Tally, watched};
 use crate::tree::{Metric, Working};
 use bvh_build::{Builder, Watch};
 use bvh_core::Bvh;
@@ -31,7 +31,8 @@ impl<'p> Incumbent<'p> {
         run: &mut Run,
     ) -> Result<(Self, Working<A>), SearchError> {
         let build = |watch: &Watch| builder.build_watched(problem.boxes, problem.measure, watch);
-        let incumbent = Self::begin(watched(run.observer(), build)?, problem, run);
+        let tree = watched(run.observer(), build)?;
+        let incumbent = Self::begin(Kept::new(tree, problem), problem, run);
         let working = incumbent.working(metric)?;
         Ok((incumbent, working))
     }
@@ -47,8 +48,8 @@ impl<'p> Incumbent<'p> {
     }
 
     /// Starts with a valid tree whose boxes are tight.
-    pub fn begin(tree: Bvh, problem: &Problem<'p>, run: &mut Run) -> Self {
-        let mut incumbent = Self::begin_unbounded(tree, problem, run);
+    pub fn begin(kept: Kept, problem: &Problem<'p>, run: &mut Run) -> Self {
+        let mut incumbent = Self::begin_unbounded(kept, problem, run);
         incumbent.bound(run);
         incumbent
     }
@@ -66,8 +67,9 @@ impl<'p> Incumbent<'p> {
 
     /// Like [`begin`](Self::begin), without a lower bound, for searches without the time to compute
     /// it.
-    pub fn begin_unbounded(tree: Bvh, problem: &Problem<'p>, run: &mut Run) -> Self {
-        let (cost, area) = costs(problem, &tree);
+    pub fn begin_unbounded(kept: Kept, problem: &Problem<'p>, run: &mut Run) -> Self {
+        let Kept { tree, cost } = kept;
+        let area = area(problem, &tree, cost);
         run.record(cost, tree.nodes.len() as u64);
         Self { problem: *problem, area, tree, lower_bound: f64::NEG_INFINITY }
     }
@@ -105,10 +107,10 @@ impl<'p> Incumbent<'p> {
 
     /// Like [`offer`](Self::offer), for a valid tree that needs no conversion.
     pub fn offer_tree(&mut self, candidate: Bvh, run: &mut Run) -> bool {
-        let (cost, area) = costs(&self.problem, &candidate);
+        let cost = self.problem.cost(&candidate);
         let improved = run.improve(cost);
         if improved {
-            self.area = area;
+            self.area = area(&self.problem, &candidate, cost);
             self.tree = candidate;
             // Only a new incumbent can meet the bound.
             self.stop_if_optimal(run);
@@ -139,15 +141,13 @@ impl<'p> Incumbent<'p> {
     }
 }
 
-/// Returns the tree's cost, and the total that its working form calls the area.
-fn costs(problem: &Problem, tree: &Bvh) -> (f64, f64) {
-    let cost = problem.cost(tree);
-    let area = match *problem {
+/// Returns the total that the working form of a tree of this cost calls the area.
+fn area(problem: &Problem, tree: &Bvh, cost: f64) -> f64 {
+    match *problem {
         Problem { splits: Some(_), measure, .. } => measure
             .map_or_else(|| cost::total_area(tree), |measure| cost::total_measure(tree, measure)),
         Problem { objective: Objective::InternalArea, .. } => cost,
         Problem { measure: Some(measure), .. } => cost::internal_measure(tree, measure),
         _ => cost::internal_area(tree),
-    };
-    (cost, area)
+    }
 }

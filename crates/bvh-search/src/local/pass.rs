@@ -11,11 +11,9 @@ pub(crate) const TOLERANCE: f64 = 1e-12;
 /// Sorts nodes by area, the largest first. The sort is stable: nodes of equal area keep their
 /// order.
 pub(crate) fn sort_by_area(tree: &Working<impl Metric>, order: &mut [u32]) {
-    order.sort_by(|&a, &b| {
-        tree.nodes[b as usize]
-            .area
-            .total_cmp(&tree.nodes[a as usize].area)
-    });
+    // Areas are never negative, so their inverted bits are in reverse order. A key is read from
+    // memory once and not at every comparison, which in large trees takes most of the time.
+    order.sort_by_cached_key(|&index| !tree.nodes[index as usize].area.to_bits());
 }
 
 /// Repeats a pass until it keeps no move, the quota is used up, or the observer cancels.

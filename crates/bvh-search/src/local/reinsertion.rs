@@ -71,6 +71,10 @@ pub(crate) fn pass_by_area(
     quota: Quota,
     observer: &dyn Observer,
 ) -> Tally {
+    // The order of a large tree takes a second, which a cancelled search does not have.
+    if observer.cancelled() {
+        return Tally::default();
+    }
     let mut order = tree.preorder();
     sort_by_area(tree, &mut order);
     pass(tree, &order, quota, observer)

@@ -54,8 +54,25 @@ pub struct Run<'a> {
     /// The cheapest of the trees that the caller handed over, and that the search built and did not
     /// improve, with its cost. Dropped with the first incumbent that costs no more, because it
     /// cannot become the outcome then.
-    aside: Option<(f64, Bvh)>,
+    aside: Option<Kept>,
     history: Vec<Event>,
+}
+
+/// A valid tree, and its cost by the problem's objective.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Kept {
+    /// The tree.
+    pub tree: Bvh,
+    /// The [cost](Problem::cost) of the tree.
+    pub cost: f64,
+}
+
+impl Kept {
+    /// Evaluates a valid tree. O(nodes).
+    pub fn new(tree: Bvh, problem: &Problem) -> Self {
+        let cost = problem.cost(&tree);
+        Self { tree, cost }
+    }
 }
 
 impl<'a> Run<'a> {
@@ -85,7 +102,7 @@ impl<'a> Run<'a> {
     /// Drops the tree kept aside, if it costs at least as much as a tree that the search has or is
     /// about to [improve](Self::improve) to.
     pub(crate) fn drop_aside(&mut self, cost: f64) {
-        self.aside.take_if(|(aside, _)| *aside >= cost);
+        self.aside.take_if(|aside| aside.cost >= cost);
     }
 
     /// Counts moves without events. Searches that make millions of moves report improvements by
@@ -115,16 +132,21 @@ impl<'a> Run<'a> {
     }
 
     /// Keeps a tree that the search has built and does not improve. It becomes the outcome if it
-    /// ends as the cheapest. O(nodes).
-    pub fn keep_aside(&mut self, problem: &Problem, tree: Bvh) {
-        let cost = problem.cost(&tree);
+    /// ends as the cheapest.
+    pub fn keep_aside(&mut self, kept: Kept) {
         if self
             .aside
             .as_ref()
-            .is_none_or(|(least, _)| cost < *least)
+            .is_none_or(|aside| kept.cost < aside.cost)
         {
-            self.aside = Some((cost, tree));
+            self.aside = Some(kept);
         }
+    }
+
+    /// Returns whether there is a tree aside, which becomes the outcome of a search that ends
+    /// without a tree.
+    pub fn has_tree(&self) -> bool {
+        self.aside.is_some()
     }
 
     /// Returns the cheapest of the tree that the search `found`, the tree kept aside, and the
@@ -135,8 +157,8 @@ impl<'a> Run<'a> {
             Err(SearchError::Build(BuildError::Cancelled)) => None,
             found => Some(found?),
         };
-        if let Some((cost, aside)) = self.aside.take() {
-            self.prefer(&mut tree, cost, || aside);
+        if let Some(aside) = self.aside.take() {
+            self.prefer(&mut tree, aside.cost, || aside.tree);
         }
         if let Some((cost, known)) = known {
             self.prefer(&mut tree, cost, || known.clone());
@@ -256,13 +278,13 @@ pub fn solve(
     solve_or_keep(search, problem, None, seed, budget, observer)
 }
 
-/// Searches as [`solve`] does. The caller hands over a valid tree, as an alternative to lending it
-/// as [`Problem::known`]: the outcome never costs more, and the memory of the tree is free as soon
-/// as the search has a tree that costs no more.
+/// Searches as [`solve`] does. The caller hands over a tree, as an alternative to lending it as
+/// [`Problem::known`]: the outcome never costs more, and the memory of the tree is free as soon as
+/// the search has a tree that costs no more.
 pub fn solve_or_keep(
     search: &dyn Search,
     problem: &Problem,
-    tree: Option<Bvh>,
+    kept: Option<Kept>,
     seed: u64,
     budget: Budget,
     observer: &dyn Observer,
@@ -275,7 +297,7 @@ pub fn solve_or_keep(
         work: 0,
         incumbent,
         optimal: None,
-        aside: tree.map(|tree| (problem.cost(&tree), tree)),
+        aside: kept,
         history: Vec::new(),
     };
     search.check()?;
@@ -285,7 +307,8 @@ pub fn solve_or_keep(
         .map(|tree| (problem.cost(tree), tree));
     // The first tree of a large scene takes seconds, which a search that is cancelled before it
     // begins does not need.
-    let found = if known.is_some() && observer.cancelled() {
+    let has_tree = known.is_some() || run.aside.is_some();
+    let found = if has_tree && observer.cancelled() {
         Err(BuildError::Cancelled.into())
     } else {
         search.search(problem, seed, &mut run)

@@ -7,6 +7,7 @@ use bvh_build::muller_fellner;
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, validate};
 use rand::RngExt;
+use std::cell::Cell;
 
 fn scene(n: usize) -> (Vec<Aabb>, Working) {
     let mut rng = stream(1, 0);
@@ -99,13 +100,34 @@ fn sorting_in_place_gives_the_same_nodes() {
             }
             let mut in_place = tree.clone();
             tree.sort_into_spare();
-            in_place.sort_in_place();
+            in_place.sort_in_place(&|| false);
             let [nodes, nodes_in_place] =
                 [&tree, &in_place].map(|tree| format!("{:?}", tree.nodes));
             assert_eq!(nodes, nodes_in_place);
             assert_eq!(tree.area().to_bits(), in_place.area().to_bits());
         }
     }
+}
+
+#[test]
+fn a_sort_in_place_that_ends_early_changes_nothing() {
+    let (_, tree) = scene(50);
+    let mut ended = 0;
+    for most in 0.. {
+        let polls = Cell::new(0);
+        let mut sorted = tree.clone();
+        sorted.sort_in_place(&|| {
+            polls.set(polls.get() + 1);
+            polls.get() > most
+        });
+        if polls.get() <= most {
+            assert_ne!(format!("{:?}", sorted.nodes), format!("{:?}", tree.nodes));
+            break;
+        }
+        assert_eq!(format!("{:?}", sorted.nodes), format!("{:?}", tree.nodes));
+        ended += 1;
+    }
+    assert_eq!(ended, 2);
 }
 
 #[test]

@@ -1,10 +1,10 @@
 //! A search returns soon after its observer cancels, for any numbers in its configuration.
 
 use bvh_build::{Builder, median_cut, ploc};
-use bvh_core::{Aabb, validate};
+use bvh_core::{Aabb, Bvh, validate};
 use bvh_search::{
-    Budget, Event, Method, Observer, Problem, StopReason, best, genetic, grasp, random_orders,
-    rebuild, ruin_recreate, solve,
+    Budget, Event, Judge, Kept, Method, Observer, Problem, StopReason, best, genetic, grasp,
+    random_orders, rebuild, ruin_recreate, solve, solve_or_keep,
 };
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -47,6 +47,37 @@ fn a_search_that_is_cancelled_at_once_evaluates_one_tree_only() {
         validate(&outcome.tree, &boxes).unwrap();
         assert_eq!(outcome.evaluations, 1, "{}", method.name());
     }
+}
+
+/// Counts the trees that it judges.
+#[derive(Debug, Default)]
+struct Judged(AtomicU64);
+
+impl Judge for Judged {
+    fn judge(&self, tree: &Bvh) -> f64 {
+        self.0.fetch_add(1, Relaxed);
+        tree.nodes.len() as f64
+    }
+}
+
+#[test]
+fn a_cancelled_search_returns_the_tree_of_its_caller_without_an_evaluation() {
+    let boxes = boxes(300);
+    let judged = Judged::default();
+    let problem = Problem { judge: Some(&judged), ..Problem::new(&boxes) };
+    let tree = median_cut::Config::default()
+        .build(&boxes)
+        .unwrap();
+    for method in Method::all() {
+        let kept = Kept { tree: tree.clone(), cost: 7.0 };
+        let polls = Polls { polled: 0.into(), until: 0 };
+        let outcome =
+            solve_or_keep(&method, &problem, Some(kept), 1, Budget::UNLIMITED, &polls).unwrap();
+        assert_eq!(outcome.tree, tree, "{}", method.name());
+        assert_eq!((outcome.cost, outcome.evaluations), (7.0, 0), "{}", method.name());
+        assert_eq!(outcome.stop, StopReason::Cancelled);
+    }
+    assert_eq!(judged.0.into_inner(), 0);
 }
 
 #[test]
