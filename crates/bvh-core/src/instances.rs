@@ -167,6 +167,12 @@ pub struct InstanceHit {
     pub triangle: u32,
 }
 
+impl InstanceHit {
+    fn new(instance: u32, Hit { t, object: triangle }: Hit) -> Self {
+        Self { t, instance, triangle }
+    }
+}
+
 /// A scene of instances for tracing.
 #[derive(Clone, Debug)]
 pub struct Instances {
@@ -207,13 +213,40 @@ impl Instances {
     /// Returns the nearest triangle of any instance that `ray` hits in its range. Among triangles
     /// at the same distance, the lowest instance comes first, then the lowest id.
     pub fn nearest_hit(&self, ray: &Ray) -> Option<InstanceHit> {
+        self.nearest(ray, |part, _, local_ray| part.nearest_hit(local_ray))
+    }
+
+    /// Returns the nearest hit that `accept` accepts, for example where a texture is opaque. `accept`
+    /// sees hits in no order, and only as many as the answer needs.
+    pub fn nearest_hit_where(
+        &self,
+        ray: &Ray,
+        mut accept: impl FnMut(InstanceHit) -> bool,
+    ) -> Option<InstanceHit> {
+        self.nearest(ray, |part, instance, local_ray| {
+            part.nearest_hit_where(local_ray, |hit| accept(InstanceHit::new(instance, hit)))
+        })
+    }
+
+    /// Returns the nearest hit, where `find` returns the nearest one of an instance's part.
+    #[inline(always)]
+    fn nearest(
+        &self,
+        ray: &Ray,
+        mut find: impl FnMut(&WideBvh, u32, &Ray) -> Option<Hit>,
+    ) -> Option<InstanceHit> {
         let slabs = Slabs::new(ray, &self.top.root_aabb()?);
         let mut nearest: Option<(Hit, u32)> = None;
         let test = |instance: u32, t_max: f32| {
-            let Hit { t, object: triangle } = self.nearest_in(instance, ray, t_max, &slabs)?;
+            let placed = &self.placed[instance as usize];
+            let local_ray = placed.local(ray, t_max)?;
+            let found = find(&self.parts[placed.part as usize], instance, &local_ray)?;
+            // A hit in front of the instance's box would depend on the tree: a tree that visits the box
+            // later would skip it.
+            let t = found.t.max(slabs.entry(&placed.aabb));
             let hit = Hit { t, object: instance };
             if t <= t_max && nearest.is_none_or(|(nearest, _)| hit.precedes(&nearest)) {
-                nearest = Some((hit, triangle));
+                nearest = Some((hit, found.object));
             }
             Some(t)
         };
@@ -221,36 +254,36 @@ impl Instances {
         nearest.map(|(Hit { t, object: instance }, triangle)| InstanceHit { t, instance, triangle })
     }
 
-    /// Returns the nearest hit of the ray, up to `t_max`, in the part of an instance.
-    #[inline(always)]
-    fn nearest_in(&self, instance: u32, ray: &Ray, t_max: f32, slabs: &Slabs) -> Option<Hit> {
-        let placed = &self.placed[instance as usize];
-        let local_ray = placed.local(ray, t_max)?;
-        let hit = self.parts[placed.part as usize].nearest_hit(&local_ray)?;
-        // A hit in front of the instance's box would depend on the tree: a tree that visits the box
-        // later would skip it.
-        Some(Hit { t: hit.t.max(slabs.entry(&placed.aabb)), ..hit })
-    }
-
     /// Returns whether `ray` hits a triangle of any instance in its range.
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        let Some(bounds) = self.top.root_aabb() else { return false };
-        let slabs = Slabs::new(ray, &bounds);
-        any_hit_by(&self.top, ray, |instance| self.hits(instance, ray, &slabs), &mut ())
+        self.any(ray, |part, _, local_ray| part.any_hit(local_ray))
     }
 
-    /// Returns whether the ray hits a triangle of an instance.
+    /// Returns whether `ray` has a hit that `accept` accepts, for example for shadows of cut-out leaves.
+    pub fn any_hit_where(&self, ray: &Ray, mut accept: impl FnMut(InstanceHit) -> bool) -> bool {
+        self.any(ray, |part, instance, local_ray| {
+            part.any_hit_where(local_ray, |hit| accept(InstanceHit::new(instance, hit)))
+        })
+    }
+
+    /// Returns whether `ray` hits any instance, where `hits` returns whether it hits an instance's part.
     #[inline(always)]
-    fn hits(&self, instance: u32, ray: &Ray, slabs: &Slabs) -> bool {
-        let placed = &self.placed[instance as usize];
-        // The nearest hit is never in front of the instance's box. If the ray ends before the box,
-        // no hit counts here either.
-        if slabs.entry(&placed.aabb) > ray.t_max() {
-            return false;
-        }
-        match placed.local(ray, ray.t_max()) {
-            Some(local_ray) => self.parts[placed.part as usize].any_hit(&local_ray),
-            None => false,
-        }
+    fn any(&self, ray: &Ray, mut hits: impl FnMut(&WideBvh, u32, &Ray) -> bool) -> bool {
+        let Some(bounds) = self.top.root_aabb() else { return false };
+        let slabs = Slabs::new(ray, &bounds);
+        let test = |instance: u32| {
+            let placed = &self.placed[instance as usize];
+            // The nearest hit is never in front of the instance's box. If the ray ends before the box,
+            // no hit counts here either.
+            if slabs.entry(&placed.aabb) > ray.t_max() {
+                return false;
+            }
+            placed
+                .local(ray, ray.t_max())
+                .is_some_and(|local_ray| {
+                    hits(&self.parts[placed.part as usize], instance, &local_ray)
+                })
+        };
+        any_hit_by(&self.top, ray, test, &mut ())
     }
 }

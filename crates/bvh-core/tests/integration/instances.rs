@@ -169,6 +169,40 @@ fn transforms_without_rounding_give_the_distances_of_the_flat_scene_bit_by_bit()
     assert!(hits > 1000, "{hits}");
 }
 
+#[test]
+fn filters_see_every_hit_that_the_answer_needs_and_no_rejected_hit_is_an_answer() {
+    let mut random = Random(4);
+    let transforms = (0..40).map(|_| transform(&mut random)).collect();
+    let scene = scene(vec![ball(2), grid_box(3)], transforms, &mut random);
+    let scenes = scene.all(&mut random);
+    let bounds = Instance::boxes(&scene.instances, &scene.parts)
+        .unwrap()
+        .iter()
+        .fold(Aabb::EMPTY, |bounds, aabb| bounds.union(aabb));
+    let is_accepted = |hit: InstanceHit| (hit.triangle + hit.instance).is_multiple_of(3);
+    let mut hits = 0;
+    for ray in rays(&bounds, 2000, &mut random) {
+        let mut accepted = Vec::new();
+        let rejects_all = |hit| {
+            accepted.extend(is_accepted(hit).then_some(hit));
+            false
+        };
+        assert_eq!(scenes[0].nearest_hit_where(&ray, rejects_all), None);
+        let found = scenes[0].nearest_hit_where(&ray, is_accepted);
+        hits += usize::from(found.is_some());
+        assert_eq!(found.is_some(), !accepted.is_empty(), "{ray:?}");
+        if let Some(found) = found {
+            assert!(is_accepted(found));
+            assert!(accepted.iter().all(|hit| hit.t >= found.t));
+        }
+        for other in &scenes {
+            assert_eq!(bits(other.nearest_hit_where(&ray, is_accepted)), bits(found), "{ray:?}");
+            assert_eq!(other.any_hit_where(&ray, is_accepted), found.is_some(), "{ray:?}");
+        }
+    }
+    assert!(hits > 200, "{hits}");
+}
+
 /// Returns a point whose coordinates are integers from 0 to `end` − 1.
 fn integer_point(end: usize, random: &mut Random) -> Vec3 {
     Vec3::new(random.below(end) as f32, random.below(end) as f32, random.below(end) as f32)
