@@ -141,6 +141,12 @@ impl Tree {
     }
 
     /// Loads the tree in a file. The triangles or boxes must be the ones that it was saved for.
+    ///
+    /// >>> import tempfile
+    /// >>> folder = tempfile.TemporaryDirectory()
+    /// >>> triangle.save(folder.name + "/scene.bvh")
+    /// >>> Tree.load(folder.name + "/scene.bvh", triangles=[[[0, 0, 0], [1, 0, 0], [0, 1, 0]]])
+    /// <Tree of 1 nodes over 1 objects>
     #[staticmethod]
     #[pyo3(signature = (path, *, triangles = None, boxes = None))]
     fn load(
@@ -163,6 +169,8 @@ impl Tree {
 
     /// Writes the tree to a file. An existing file is replaced when the new one is complete; a
     /// failure leaves the old one.
+    ///
+    /// >>> square.save(folder.name + "/square.bvh")
     fn save(&self, path: PathBuf) -> PyResult<()> {
         let bytes = self.owned().save().map_err(invalid)?;
         bvh_files::write(&path, &bytes).map_err(write_error)

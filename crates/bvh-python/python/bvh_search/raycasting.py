@@ -32,7 +32,11 @@ class RaycastingScene:
 
     def add_triangles(self, vertex_positions, triangle_indices=None):
         """Adds a mesh and returns its geometry id. Accepts vertices and indices, or anything with
-        `vertices` and `faces`, such as a mesh of trimesh."""
+        `vertices` and `faces`, such as a mesh of trimesh.
+
+        >>> scene.add_triangles([[0, 0, 5], [1, 0, 5], [0, 1, 5]], [[0, 1, 2]])
+        1
+        """
         if triangle_indices is None:
             mesh = vertex_positions
             vertex_positions, triangle_indices = mesh.vertices, mesh.faces
@@ -66,7 +70,11 @@ class RaycastingScene:
 
     def cast_rays(self, rays):
         """Returns the nearest hits: `t_hit`, `geometry_ids`, `primitive_ids`, `primitive_uvs` and
-        `primitive_normals`."""
+        `primitive_normals`.
+
+        >>> scene.cast_rays([0.25, 0.25, 2, 0, 0, 1])["geometry_ids"]
+        array(1, dtype=uint32)
+        """
         tracer, first = self._scene()
         shape, origins, directions = self._split(rays)
         t, triangle = tracer.nearest(origins, directions, coherent=True, invalid="miss")
@@ -81,21 +89,33 @@ class RaycastingScene:
         }
 
     def test_occlusions(self, rays, tnear=0.0, tfar=np.inf):
-        """Returns whether each ray hits anything between `tnear` and `tfar`."""
+        """Returns whether each ray hits anything between `tnear` and `tfar`.
+
+        >>> scene.test_occlusions([[0.25, 0.25, 2, 0, 0, 1]], tfar=1)
+        array([False])
+        """
         shape, origins, directions = self._split(rays)
         tracer, _ = self._scene()
         hits = tracer.any(origins, directions, tnear, tfar, coherent=True, invalid="miss")
         return hits.reshape(shape)
 
     def count_intersections(self, rays):
-        """Returns the number of crossings of the surface by each ray."""
+        """Returns the number of crossings of the surface by each ray.
+
+        >>> scene.count_intersections([[0.25, 0.25, -1, 0, 0, 1]])
+        array([2], dtype=int32)
+        """
         shape, origins, directions = self._split(rays)
         counts = self._scene()[0].counts(origins, directions, invalid="miss")
         return counts.astype(np.int32).reshape(shape)
 
     def list_intersections(self, rays):
         """Returns all crossings of the surface, ray after ray: `ray_splits`, `ray_ids`, `t_hit`,
-        `geometry_ids`, `primitive_ids` and `primitive_uvs`."""
+        `geometry_ids`, `primitive_ids` and `primitive_uvs`.
+
+        >>> scene.list_intersections([[0.25, 0.25, -1, 0, 0, 1]])["t_hit"]
+        array([1., 6.], dtype=float32)
+        """
         tracer, first = self._scene()
         _, origins, directions = self._split(rays)
         t, triangle, ray = tracer.all(origins, directions, invalid="miss")
@@ -117,7 +137,11 @@ class RaycastingScene:
 
     def compute_closest_points(self, query_points):
         """Returns the closest points of the surface: `points`, `geometry_ids`, `primitive_ids`,
-        `primitive_uvs` and `primitive_normals`."""
+        `primitive_uvs` and `primitive_normals`.
+
+        >>> scene.compute_closest_points([[0.25, 0.25, 4]])["points"]
+        array([[0.25, 0.25, 5.  ]], dtype=float32)
+        """
         tracer, first = self._scene()
         shape, points = self._points(query_points)
         closest, triangle, _ = tracer.closest(points)
@@ -134,17 +158,29 @@ class RaycastingScene:
         }
 
     def compute_distance(self, query_points):
-        """Returns the distances of points from the surface."""
+        """Returns the distances of points from the surface.
+
+        >>> scene.compute_distance([[0.25, 0.25, 4]])
+        array([1.], dtype=float32)
+        """
         shape, points = self._points(query_points)
         return self._scene()[0].closest(points)[2].astype(np.float32).reshape(shape)
 
     def compute_signed_distance(self, query_points):
         """Returns the distances of points from the surface, negative inside; the sign follows from the
-        parity of crossings."""
+        parity of crossings.
+
+        >>> scene.compute_signed_distance([[0.25, 0.25, 6]])
+        array([1.], dtype=float32)
+        """
         shape, points = self._points(query_points)
         return self._scene()[0].signed_distance(points).astype(np.float32).reshape(shape)
 
     def compute_occupancy(self, query_points):
-        """Returns 1 for points inside the surface and 0 for others."""
+        """Returns 1 for points inside the surface and 0 for others.
+
+        >>> scene.compute_occupancy([[0.25, 0.25, 6]])
+        array([0.], dtype=float32)
+        """
         shape, points = self._points(query_points)
         return self._scene()[0].contains(points).astype(np.float32).reshape(shape)

@@ -64,7 +64,12 @@ class RayMeshIntersector:
         return tracer, origins if center is None else origins - center, directions, origins
 
     def intersects_location(self, ray_origins, ray_directions, multiple_hits=True, **kwargs):
-        """Returns the locations of hits, `(h, 3)`, and the indices of their rays and faces."""
+        """Returns the locations of hits, `(h, 3)`, and the indices of their rays and faces.
+
+        >>> mesh.ray.intersects_location([[0.1, 0.2, 5]], [[0, 0, -1]])[0]
+        array([[ 0.1,  0.2,  0.5],
+               [ 0.1,  0.2, -0.5]])
+        """
         index_tri, index_ray, found = self.intersects_id(
             ray_origins, ray_directions, multiple_hits=multiple_hits, return_locations=True, **kwargs
         )
@@ -74,7 +79,11 @@ class RayMeshIntersector:
         self, ray_origins, ray_directions, multiple_hits=True, max_hits=100, return_locations=False
     ):
         """Returns the indices of the faces that are hit and of their rays, and with
-        `return_locations` the locations. Hits are sorted by ray, then by distance."""
+        `return_locations` the locations. Hits are sorted by ray, then by distance.
+
+        >>> mesh.ray.intersects_id([[0.1, 0.2, 5]], [[0, 0, -1]])[1]
+        array([0, 0])
+        """
         tracer, moved, directions, origins = self._rays(ray_origins, ray_directions)
         if multiple_hits:
             t, index_tri, index_ray = tracer.all(moved, directions, invalid="miss")
@@ -94,17 +103,29 @@ class RayMeshIntersector:
         return index_tri.astype(np.int64), index_ray, found
 
     def intersects_first(self, ray_origins, ray_directions):
-        """Returns the index of the first face that each ray hits, or -1."""
+        """Returns the index of the first face that each ray hits, or -1.
+
+        >>> mesh.ray.intersects_first([[5, 5, 5]], [[0, 0, -1]])
+        array([-1], dtype=int32)
+        """
         tracer, moved, directions, _ = self._rays(ray_origins, ray_directions)
         return tracer.nearest(moved, directions, coherent=True, invalid="miss")[1]
 
     def intersects_any(self, ray_origins, ray_directions):
-        """Returns whether each ray hits the mesh."""
+        """Returns whether each ray hits the mesh.
+
+        >>> mesh.ray.intersects_any([[5, 5, 5]], [[0, 0, -1]])
+        array([False])
+        """
         tracer, moved, directions, _ = self._rays(ray_origins, ray_directions)
         return tracer.any(moved, directions, coherent=True, invalid="miss")
 
     def contains_points(self, points):
-        """Returns whether each point is inside the mesh. The answer is exact for watertight meshes."""
+        """Returns whether each point is inside the mesh. The answer is exact for watertight meshes.
+
+        >>> mesh.ray.contains_points([[0, 0, 0.25], [0, 0, 1]])
+        array([ True, False])
+        """
         points = np.ascontiguousarray(points, dtype=np.float64).view(np.ndarray)
         if points.ndim != 2 or points.shape[1] != 3:
             raise ValueError("points must be (n, 3)!")
