@@ -65,7 +65,9 @@ impl Rays {
         let found = match self {
             Self::Default => density(&of_anything(TRAINED, scene, tree, seed, &is_over), tree),
             Self::Rendered(config) => density(&of_renderer(config, scene, tree, &is_over), tree),
-            Self::Recorded(segments) => ray_density(&scene.boxes, segments),
+            Self::Recorded(segments) => {
+                ray_density(&scene.boxes, Some(&scene.primitives), segments)
+            }
         };
         // After an interruption some rays are missing, or all of them, which is an error otherwise.
         if is_over() {

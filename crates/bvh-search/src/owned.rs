@@ -25,7 +25,7 @@ pub struct Options<'a> {
     pub seed: u64,
     /// The limits of the search besides its observer.
     pub budget: Budget,
-    /// The rays that the tree is for, sampled as by [`bake_for_rays`](crate::bake_for_rays); random lines if empty.
+    /// The rays that the tree is for, as in [`ray_density`]; random lines if empty.
     pub rays: &'a [Segment],
 }
 
@@ -76,7 +76,7 @@ impl OwnedTree {
         let mut owned = Self::bare(objects, options.references);
         owned.seed = options.seed;
         if !options.rays.is_empty() {
-            owned.density = Some(ray_density(&owned.boxes, options.rays)?);
+            owned.density = Some(ray_density(&owned.boxes, owned.shapes.as_ref(), options.rays)?);
         }
         owned.search(options.budget, observer)?;
         Ok(owned)

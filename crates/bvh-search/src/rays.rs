@@ -1,17 +1,28 @@
 //! Trees for the rays of one program: record segments, search, trace the next ones.
 
-use crate::SearchError;
 #[cfg(feature = "std")]
 use crate::{Budget, Deadline, Outcome, Problem, best, solve};
+use crate::{SearchError, Stream};
+use bvh_build::{Builder, muller_fellner};
+#[cfg(feature = "std")]
+use bvh_core::Triangle;
 #[cfg(feature = "std")]
 use bvh_core::cost::{Measure, Objective};
-use bvh_core::{Aabb, DensityError, RayDensity, Segment};
+use bvh_core::glam::Vec3;
+use bvh_core::{Aabb, DensityError, Primitive, Primitives, Ray, RayDensity, Segment, nearest_hit};
+use rand::{RngExt, SeedableRng};
 #[cfg(feature = "std")]
 use std::time::Duration;
 
-/// The share of area in the measure of a box. Without it, a box that no recorded ray enters would be
-/// free; with it, other rays lose little.
+/// The share of area in the measure of a box. Without it, a box that no ray enters would be free.
 const AREA_WEIGHT: f64 = 0.1;
+
+/// One in this many rays of a density comes from anywhere in the scene, as a guard of rays that were
+/// not recorded. Half of the rays instead cost recorded rays two per cent more tests.
+const GUARD: usize = 4;
+
+/// The part of the way to a hit after which the next ray begins: before the surface.
+const JUST_BEFORE: f32 = 0.9999;
 
 /// The reason why no tree was found.
 #[derive(Debug, thiserror::Error)]
@@ -24,9 +35,9 @@ pub enum FindError {
     Rays(#[from] DensityError),
 }
 
-/// Returns the best tree over `boxes` that [`best`](crate::best) finds in about `time` for rays like
-/// the recorded `segments`, and their density. The segments begin where rays began and end at their
-/// hits or outside the scene. Of more than [`RayDensity::MOST_SEGMENTS`] segments, every n-th counts.
+/// Returns the best tree over `triangles` that [`best`](crate::best) finds in about `time` for rays
+/// like the recorded `segments`, and the density of these rays as by [`ray_density`]. The segments begin
+/// where rays began and end at their hits or outside the scene.
 ///
 /// The tree is best for its rays; other rays may take longer than with a tree from
 /// [`bake`](crate::bake). The layout for the same rays is
@@ -41,42 +52,167 @@ pub enum FindError {
 /// let segments: Vec<Segment> = (0..100u8)
 ///     .map(|i| Segment { from: [0.5, 0.5, -9.0], to: [f32::from(i) / 9.0, 0.5, 1.0] })
 ///     .collect();
-/// let (outcome, density) = bake_for_rays(&boxes(&triangles), &segments, Duration::from_millis(10))?;
+/// let (outcome, density) = bake_for_rays(&triangles, &segments, Duration::from_millis(10))?;
 /// let wide = WideBvh::for_rays(&outcome.tree, &triangles, &density.visits(&outcome.tree))?;
 /// assert!(wide.any_hit(&Ray::half_line([0.2, 0.2, 0.0], [0.0, 0.0, 1.0])?));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[cfg(feature = "std")]
 pub fn bake_for_rays(
-    boxes: &[Aabb],
+    triangles: &[Triangle],
     segments: &[Segment],
     time: Duration,
 ) -> Result<(Outcome, RayDensity), FindError> {
     let deadline = Deadline::after(time);
-    let density = ray_density(boxes, segments)?;
+    let boxes = bvh_core::boxes(triangles);
+    let density = guarded(&boxes, segments, |count| from_anywhere(triangles, &boxes, count))?;
     let problem = Problem {
         objective: Objective::Layout,
         measure: Some(&density as &dyn Measure),
-        ..Problem::new(boxes)
+        ..Problem::new(&boxes)
     };
     let config = best::Config::default();
     let outcome = solve(&config, &problem, 1, Budget::UNLIMITED, &deadline)?;
     Ok((outcome, density))
 }
 
-/// Returns the density of segments between surfaces of the boxes, with a tenth of area. Of more than
-/// [`RayDensity::MOST_SEGMENTS`] segments, every n-th counts.
-pub fn ray_density(boxes: &[Aabb], segments: &[Segment]) -> Result<RayDensity, DensityError> {
-    let bounds = boxes
-        .iter()
-        .fold(Aabb::EMPTY, |bounds, aabb| bounds.union(aabb));
-    let step = segments
-        .len()
-        .div_ceil(RayDensity::MOST_SEGMENTS)
-        .max(1);
-    if step == 1 {
-        return RayDensity::of_rays(&bounds, segments, AREA_WEIGHT);
+/// Returns the density of recorded segments between the surfaces of a scene, with a tenth of area. If
+/// the `shapes` of the boxes are known, a quarter of its rays comes from anywhere in the scene, so that
+/// rays from elsewhere lose little. Of more segments than fit into [`RayDensity::MOST_SEGMENTS`], every
+/// n-th counts.
+pub fn ray_density(
+    boxes: &[Aabb],
+    shapes: Option<&Primitives>,
+    segments: &[Segment],
+) -> Result<RayDensity, DensityError> {
+    guarded(boxes, segments, |count| match shapes {
+        Some(Primitives::Triangles(triangles)) => from_anywhere(triangles, boxes, count),
+        Some(Primitives::Spheres(spheres)) => from_anywhere(spheres, boxes, count),
+        None => vec![],
+    })
+}
+
+/// Returns the density of segments and of those that `others` returns for their number.
+fn guarded(
+    boxes: &[Aabb],
+    segments: &[Segment],
+    others: impl FnOnce(usize) -> Vec<Segment>,
+) -> Result<RayDensity, DensityError> {
+    let most = RayDensity::MOST_SEGMENTS / GUARD * (GUARD - 1);
+    let step = segments.len().div_ceil(most).max(1);
+    let mut sampled: Vec<Segment> = segments.iter().step_by(step).copied().collect();
+    sampled.extend(others(sampled.len() / (GUARD - 1)));
+    RayDensity::of_rays(&bounds(boxes), &sampled, AREA_WEIGHT)
+}
+
+/// Returns the segments of `count` rays, up to their nearest hits: from random points of the scene's box
+/// in random directions, and from each hit one more. They are the same on every machine.
+fn from_anywhere<P: Primitive>(objects: &[P], boxes: &[Aabb], count: usize) -> Vec<Segment> {
+    // A search rejects the same boxes with a better message.
+    let Ok(tree) = muller_fellner::Config::default().build(boxes) else { return vec![] };
+    let bounds = bounds(boxes);
+    let extent = bounds.max - bounds.min;
+    let mut rng = Stream::seed_from_u64(1);
+    let mut segments = Vec::with_capacity(count);
+    let mut bounce = None;
+    for _ in 0..count {
+        let inside = bounds.min + extent * Vec3::from_array(rng.random());
+        let direction = random_direction(&mut rng);
+        let Ok(ray) = Ray::half_line(bounce.unwrap_or(inside), direction) else { break };
+        let hit = nearest_hit(&tree, objects, &ray);
+        bounce = match (bounce, hit) {
+            (None, Some(hit)) => Some(ray.at(hit.t * JUST_BEFORE)),
+            _ => None,
+        };
+        // A ray without a hit ends outside the scene.
+        let end = ray.at(hit.map_or(2.0 * extent.length(), |hit| hit.t));
+        if end.is_finite() {
+            segments.push(Segment { from: ray.origin().to_array(), to: end.to_array() });
+        }
     }
-    let sampled: Vec<Segment> = segments.iter().step_by(step).copied().collect();
-    RayDensity::of_rays(&bounds, &sampled, AREA_WEIGHT)
+    segments
+}
+
+/// Returns a direction that is uniform on the sphere, by arithmetic that is the same on every machine.
+fn random_direction(rng: &mut Stream) -> Vec3 {
+    loop {
+        let point = 2.0 * Vec3::from_array(rng.random()) - 1.0;
+        let squared = point.length_squared();
+        if squared <= 1.0 && squared > 1e-6 {
+            return point / squared.sqrt();
+        }
+    }
+}
+
+/// Returns the box around all boxes.
+fn bounds(boxes: &[Aabb]) -> Aabb {
+    boxes
+        .iter()
+        .fold(Aabb::EMPTY, |bounds, aabb| bounds.union(aabb))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_core::Triangle;
+
+    /// Returns walls across the x axis at 0, 1, 2, 3.
+    fn walls() -> Vec<Triangle> {
+        (0..4u8)
+            .map(f32::from)
+            .map(|x| Triangle::from([[x, 0.0, 0.0], [x, 9.0, 0.0], [x, 0.0, 9.0]]))
+            .collect()
+    }
+
+    #[test]
+    fn a_quarter_of_a_density_is_rays_from_anywhere_up_to_their_hits() {
+        let triangles = walls();
+        let boxes = bvh_core::boxes(&triangles);
+        let recorded = [Segment { from: [-1.0, 1.0, 1.0], to: [0.0, 1.0, 1.0] }; 300];
+        let last = boxes[3];
+        let alone = ray_density(&boxes, None, &recorded).unwrap();
+        assert_eq!((alone.segments(), alone.entries(&last)), (300, 0.0));
+        let guarded =
+            ray_density(&boxes, Some(&Primitives::Triangles(triangles.clone())), &recorded)
+                .unwrap();
+        assert_eq!(guarded.segments(), 400);
+        assert!(guarded.entries(&last) > 1.0, "{}", guarded.entries(&last));
+        let segments = from_anywhere(&triangles, &boxes, 1000);
+        let ends = segments
+            .iter()
+            .map(|segment| Vec3::from(segment.to));
+        let is_on_a_wall = |end: &Vec3| {
+            (end.x - end.x.round()).abs() < 1e-4
+                && end.y + end.z <= 9.0
+                && end.min_element() > -1e-4
+        };
+        assert!(ends.filter(is_on_a_wall).count() > 300);
+        // No ray passes a wall where its triangle is.
+        let passes = |segment: &&Segment| {
+            let [from, to] = [segment.from, segment.to].map(Vec3::from);
+            let is_through = |wall: u8| {
+                let share = (f32::from(wall) - from.x) / (to.x - from.x);
+                let point = from.lerp(to, share);
+                let is_inside = point.y.min(point.z) > 0.001 && point.y + point.z < 8.999;
+                (0.01..0.99).contains(&share) && is_inside
+            };
+            // The shortest rays begin and end at the same wall.
+            from.distance(to) > 0.01 && (0..4).any(is_through)
+        };
+        assert_eq!(segments.iter().find(passes), None);
+    }
+
+    #[test]
+    fn more_recorded_segments_than_a_density_counts_leave_room_for_the_guard() {
+        let triangles = walls();
+        let boxes = bvh_core::boxes(&triangles);
+        let most = RayDensity::MOST_SEGMENTS;
+        let recorded = vec![Segment { from: [-1.0, 1.0, 1.0], to: [0.0, 1.0, 1.0] }; most];
+        let shapes = Primitives::Triangles(triangles);
+        let segments = ray_density(&boxes, Some(&shapes), &recorded)
+            .unwrap()
+            .segments() as usize;
+        // Every second one is recorded.
+        assert_eq!(segments, most / 2 + most / 6);
+    }
 }
