@@ -3,13 +3,13 @@
 
 use bvh_build::{Builder, muller_fellner};
 use bvh_config::{OutOfRange, config};
-use bvh_core::{Bvh, Ray, RayDensity, TestCounts, WideBvh};
+use bvh_core::{Bvh, Ray, RayDensity, Segment, TestCounts, WideBvh};
 use bvh_scenes::Scene;
 use bvh_scenes::rays::{
     Family, Kind, OF_ANYTHING, Pose, RenderedRays, TRAINED, TracedRay, Viewpoint, check_count,
     density, in_box, of_anything, of_inside, of_renderer, random_ray,
 };
-use bvh_search::Stream;
+use bvh_search::{Stream, ray_density};
 use rand::SeedableRng;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -22,6 +22,8 @@ pub enum TrainedOn {
     Default,
     /// Rays from the scene's first path of cameras.
     Camera,
+    /// The same rays as `camera`, recorded for `bake_for_rays`, which adds rays from anywhere.
+    Recorded,
     /// The paper's random rays, which start anywhere inside.
     Inside,
 }
@@ -33,6 +35,7 @@ impl TrainedOn {
             None => "none",
             Some(Self::Default) => "default",
             Some(Self::Camera) => "camera",
+            Some(Self::Recorded) => "recorded",
             Some(Self::Inside) => "inside",
         }
     }
@@ -63,6 +66,9 @@ config! {
 pub struct Cameras {
     /// The path that trees are trained on; other rays from it judge them.
     pub same: Vec<Viewpoint>,
+    /// The path that judges trees instead of `same`: the next frame.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub next: Vec<Viewpoint>,
     /// A path that only judges trees; unnecessary if none are judged.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub other: Vec<Viewpoint>,
@@ -70,11 +76,29 @@ pub struct Cameras {
     pub lights: Vec<[f64; 3]>,
 }
 
+/// A choice among the paths of the cameras.
+type Path = fn(&Cameras) -> &[Viewpoint];
+
+impl Cameras {
+    fn recorded(&self) -> &[Viewpoint] {
+        &self.same
+    }
+
+    fn next_frame(&self) -> &[Viewpoint] {
+        if self.next.is_empty() { &self.same } else { &self.next }
+    }
+
+    fn elsewhere(&self) -> &[Viewpoint] {
+        &self.other
+    }
+}
+
 impl Default for Cameras {
     /// Two arcs around the scene, and a light above it.
     fn default() -> Self {
         Self {
             same: towards_centre([[1.9, 1.3, 2.2], [2.4, 1.0, 0.9], [2.0, 1.5, -0.5]]),
+            next: vec![],
             other: towards_centre([[-0.9, 1.2, -1.0], [-1.4, 0.8, 0.3], [-0.8, 0.6, 1.7]]),
             lights: vec![[0.8, 2.0, 1.3]],
         }
@@ -113,7 +137,7 @@ impl Config {
         &self,
         scene: &Scene,
         tree: &Bvh,
-        other: bool,
+        path: Path,
         count: u32,
         seed: u64,
     ) -> Vec<TracedRay> {
@@ -124,8 +148,7 @@ impl Config {
             .unwrap_or_default();
         // Viewpoints are fractions of the root's box, which an empty tree lacks.
         let Some(root) = tree.root_aabb() else { return Vec::new() };
-        let path = if other { &cameras.other } else { &cameras.same };
-        let poses = path.iter().map(|view| Pose {
+        let poses = path(&cameras).iter().map(|view| Pose {
             eye: in_box(&root, view.eye).to_array(),
             target: in_box(&root, view.target).to_array(),
         });
@@ -154,9 +177,16 @@ impl Config {
             .map_err(|error| error.to_string())?;
         let rays = match trained {
             TrainedOn::Default => of_anything(self.trained, scene, &tree, seed, &|| false),
-            TrainedOn::Camera => self.rendered(scene, &tree, false, self.trained, seed),
+            TrainedOn::Camera | TrainedOn::Recorded => {
+                self.rendered(scene, &tree, Cameras::recorded, self.trained, seed)
+            }
             TrainedOn::Inside => of_inside(self.trained, scene, &tree, seed),
         };
+        if trained == TrainedOn::Recorded {
+            let segments: Vec<Segment> = rays.iter().map(|traced| traced.segment).collect();
+            return ray_density(&scene.boxes, Some(&scene.primitives), &segments)
+                .map_err(|error| error.to_string());
+        }
         density(&rays, &tree).map_err(|error| error.to_string())
     }
 }
@@ -173,8 +203,8 @@ pub struct TestRays {
 /// Returns all rays that judge the trees of a scene. `tree` is any of these trees.
 pub fn test_rays(config: &Config, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<TestRays> {
     let mut test_rays = Vec::new();
-    for (camera, other) in [("same", false), ("other", true)] {
-        let traced = config.rendered(scene, tree, other, config.count, seed);
+    for (camera, path) in [("same", Cameras::next_frame as Path), ("other", Cameras::elsewhere)] {
+        let traced = config.rendered(scene, tree, path, config.count, seed);
         for kind in [Kind::Primary, Kind::Bounce, Kind::Shadow] {
             let rays_of_kind = traced
                 .iter()
