@@ -98,7 +98,7 @@ fn parts(plan: &Plan, scene: &Scene, count: u32) -> Result<Vec<Part>, Error> {
     if count as usize > all {
         let accepted = if all < 2 { "no parts".into() } else { format!("2 to {all}") };
         let message =
-            format!("--parts {count}: the number of objects is {all}; accepted: {accepted}");
+            format!("--parts {count} of a scene with {all} objects; accepted: {accepted}");
         return Err(Error::Usage(message));
     }
     let mut parts = Vec::new();

@@ -84,6 +84,13 @@ fn wrong_parts_are_named() {
         2,
         &["--parts 76", "75 objects", "2 to 75"],
     );
+    // No number of parts suits a scene of one object.
+    refused(
+        at,
+        &["bake", "escher:1", "--parts", "2", "--budget", "1Mwork"],
+        2,
+        &["--parts 2", "accepted: no parts"],
+    );
     refused(at, &["bake", "escher", "--parts", "4"], 2, &["--budget"]);
     assert!(names(at).is_empty());
 }
