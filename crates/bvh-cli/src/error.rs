@@ -27,6 +27,12 @@ pub enum Error {
     /// A file or folder cannot be read or written.
     #[error("{}: cannot {action}: {source}", .path.display())]
     Io { path: PathBuf, action: &'static str, source: io::Error },
+    /// An argument, a file or a folder is rejected.
+    #[error(transparent)]
+    Interface(#[from] bvh_terminal::Error),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(#[from] bvh_terminal::files::WriteError),
     /// A search failed.
     #[error("scene {scene}, method {method}: {source}")]
     Search { scene: String, method: String, source: Box<SearchError> },
@@ -74,6 +80,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Scene(_) | Self::Usage(_) | Self::Rays { .. } => 2,
+            Self::Interface(bvh_terminal::Error::Usage(_)) => 2,
             Self::Read(error) | Self::TreeFile(TreeFileError::Read(error)) => read_code(error),
             Self::TreeFile(_) => 2,
             Self::Structure(error) => match error {
@@ -89,13 +96,23 @@ impl Error {
             | Self::Abandoned
             | Self::Unmeasured
             | Self::NoTree => 130,
-            Self::Io { .. } | Self::Search { .. } | Self::Tracing { .. } => 1,
+            Self::Io { .. }
+            | Self::Interface(bvh_terminal::Error::Io { .. })
+            | Self::Write(_)
+            | Self::Search { .. }
+            | Self::Tracing { .. } => 1,
         }
     }
 
     /// Returns a function for `map_err` on file operations that names the path and the operation.
     pub fn io(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
         move |source| Self::Io { path: path.to_owned(), action, source }
+    }
+
+    /// Returns a function for `map_err` on tables that names the file.
+    pub fn csv(path: &Path) -> impl FnOnce(csv::Error) -> Self {
+        let path = path.to_owned();
+        move |error| Self::Io { path, action: "write the table", source: error.into() }
     }
 
     /// Returns a function for `map_err` on builders and searches that names the scene and the
@@ -110,20 +127,4 @@ impl Error {
 fn read_code(error: &ReadError) -> u8 {
     // A wrong path is a fault of the command line, a failing disk is not.
     if error.is_of_the_path() { 2 } else { 1 }
-}
-
-impl From<bvh_terminal::Error> for Error {
-    fn from(error: bvh_terminal::Error) -> Self {
-        match error {
-            bvh_terminal::Error::Usage(message) => Self::Usage(message),
-            bvh_terminal::Error::Io { path, action, source } => Self::Io { path, action, source },
-        }
-    }
-}
-
-impl From<bvh_terminal::files::WriteError> for Error {
-    fn from(error: bvh_terminal::files::WriteError) -> Self {
-        let bvh_terminal::files::WriteError { path, action, source } = error;
-        Self::Io { path, action, source }
-    }
 }

@@ -3,16 +3,16 @@
 
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
-use crate::{Error, csv};
+use crate::{Error, csv_table};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, EndPointOverlap, Objective, Overlap, SahConstants};
 use bvh_core::file::{FileError, Header, TreeFile};
-use bvh_core::{Bvh, NodeKind, Triangle, validate_references};
+use bvh_core::{Aabb, Bvh, NodeKind, Triangle, validate_references};
 use bvh_scenes::Scene;
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_terminal::arguments::{FileKind, output_file};
 use bvh_terminal::files;
-use bvh_terminal::output::{print_error, print_line};
+use bvh_terminal::output::print_line;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
@@ -141,9 +141,6 @@ fn print(facts: &Facts, as_json: bool) {
 fn examine(path: &Path, scene: Option<&Scene>) -> Result<(Bvh, Facts), Error> {
     let bytes = tree_file::read(path)?;
     let file = tree_file::open(path, &bytes)?;
-    if let Some(remark) = scene.and_then(|scene| scene.remark.as_ref()) {
-        print_error(remark);
-    }
     let mut facts = Facts::default();
     describe(file.header(), &bytes, &mut facts);
     let tree = file.tree().map_err(TreeFileError::of(path))?;
@@ -267,20 +264,15 @@ fn write_nodes(tree: &Bvh, path: &Path) -> Result<(), Error> {
     for (index, node) in tree.nodes.iter().enumerate() {
         parents[node.children()].fill(Some(index));
     }
-    let mut table = csv::Table::new(COLUMNS);
-    for (index, (node, parent)) in tree.nodes.iter().zip(parents).enumerate() {
+    let nodes = tree.nodes.iter().zip(parents).enumerate();
+    let rows = nodes.map(|(index, (node, parent))| {
         let (kind, first, count) = match node.kind() {
             NodeKind::Inner { first, count } => ("inner", first, count),
             NodeKind::Leaf { first, count } => ("leaf", first, count),
         };
-        table.cell(index);
-        table.cell(parent.map_or_else(String::new, |parent| parent.to_string()));
-        table.cell(kind);
-        table.cell(first);
-        table.cell(count);
-        table.numbers(&node.aabb.min.to_array());
-        table.numbers(&node.aabb.max.to_array());
-        table.end_row();
-    }
-    Ok(files::write(path, table.text().as_bytes())?)
+        let Aabb { min, max } = node.aabb;
+        (index, parent, kind, first, count, min.to_array(), max.to_array())
+    });
+    let table = csv_table::to_bytes(COLUMNS, rows).map_err(Error::csv(path))?;
+    Ok(files::write(path, &table)?)
 }

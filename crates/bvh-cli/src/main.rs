@@ -2,7 +2,7 @@
 
 mod bake;
 mod commands;
-mod csv;
+mod csv_table;
 mod error;
 mod inspect;
 mod memory;

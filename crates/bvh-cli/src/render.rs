@@ -9,7 +9,7 @@ use bvh_scenes::render::{Film, Options, framing, heat, image, render as draw, st
 use bvh_scenes::trace::Accelerator;
 use bvh_terminal::arguments::{FileKind, Jobs, input_file, output_file};
 use bvh_terminal::files;
-use bvh_terminal::output::{print_error, print_line};
+use bvh_terminal::output::print_line;
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io;
@@ -149,9 +149,6 @@ pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> 
     output_file("--out", &args.out, &PICTURE)?;
     args.jobs.apply()?;
     let scene = args.files.load(&args.scene)?;
-    if let Some(remark) = &scene.remark {
-        print_error(remark);
-    }
     if args.heatmap && args.accel == "wide" {
         return Err(Error::Usage(
             "--heatmap: the wide layout counts no tests; \

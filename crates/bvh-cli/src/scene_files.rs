@@ -2,6 +2,7 @@
 
 use bvh_scenes::load::OutsideFiles;
 use bvh_scenes::{Scene, SceneError};
+use bvh_terminal::output::print_error;
 
 /// The permission to read files outside a scene's folder.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]
@@ -13,9 +14,13 @@ pub struct SceneFiles {
 }
 
 impl SceneFiles {
-    /// Loads a scene by name or path.
+    /// Loads a scene by name or path, and prints the remark on it, if it has one.
     pub fn load(self, name: &str) -> Result<Scene, SceneError> {
-        Scene::load_with(name, self.outside())
+        let scene = Scene::load_with(name, self.outside())?;
+        if let Some(remark) = &scene.remark {
+            print_error(remark);
+        }
+        Ok(scene)
     }
 
     /// Returns whether such buffers are read.

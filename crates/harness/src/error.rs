@@ -28,6 +28,12 @@ pub enum Error {
     /// A file or folder that could not be read or written.
     #[error("{}: cannot {action}: {source}", .path.display())]
     Io { path: PathBuf, action: &'static str, source: io::Error },
+    /// An argument, a file or a folder that the program's interface rejects.
+    #[error(transparent)]
+    Interface(#[from] bvh_terminal::Error),
+    /// A file that could not be written.
+    #[error(transparent)]
+    Write(#[from] bvh_terminal::files::WriteError),
     /// A CSV file that the harness cannot have written.
     #[error("{}: {source}", .path.display())]
     Csv { path: PathBuf, source: csv::Error },
@@ -124,7 +130,7 @@ impl Error {
             {
                 1
             }
-            Self::Read(_) => 2,
+            Self::Read(_) | Self::Interface(bvh_terminal::Error::Usage(_)) => 2,
             Self::Spec { .. } | Self::Scene(_) | Self::Usage(_) | Self::TreeFile(_) => 2,
             Self::Interrupted { .. } => 130,
             _ => 1,
@@ -151,21 +157,5 @@ impl Error {
     /// For `map_err` on CSV operations: names the path.
     pub fn csv(path: &Path) -> impl FnOnce(csv::Error) -> Self {
         move |source| Self::Csv { path: path.to_owned(), source }
-    }
-}
-
-impl From<bvh_terminal::Error> for Error {
-    fn from(error: bvh_terminal::Error) -> Self {
-        match error {
-            bvh_terminal::Error::Usage(message) => Self::Usage(message),
-            bvh_terminal::Error::Io { path, action, source } => Self::Io { path, action, source },
-        }
-    }
-}
-
-impl From<bvh_terminal::files::WriteError> for Error {
-    fn from(error: bvh_terminal::files::WriteError) -> Self {
-        let bvh_terminal::files::WriteError { path, action, source } = error;
-        Self::Io { path, action, source }
     }
 }

@@ -11,11 +11,11 @@ pub(super) fn order(boxes: &[PackedAabb]) -> Vec<u32> {
     let mut order: Vec<(u32, u32)> = codes
         .iter()
         .zip(0..)
-        .map(|(&code, index)| (high(code), index))
+        .map(|(&code, index)| (upper_half(code), index))
         .collect();
     // Equal upper halves are rare, so sorting 32-bit keys first and comparing lower halves later is
     // faster than sorting 64-bit keys.
-    radsort::sort_by_key(&mut order, |&(high, _)| high);
+    radsort::sort_by_key(&mut order, |&(half, _)| half);
     for equal in order
         .chunk_by_mut(|a, b| a.0 == b.0)
         .filter(|equal| equal.len() > 1)
@@ -29,7 +29,7 @@ pub(super) fn order(boxes: &[PackedAabb]) -> Vec<u32> {
 }
 
 /// Returns the upper 32 bits of a code of 63 bits.
-fn high(code: u64) -> u32 {
+fn upper_half(code: u64) -> u32 {
     (code >> 31) as u32
 }
 

@@ -5,7 +5,7 @@ use super::BakeArgs;
 use super::plan::{Baked, Figures, Plan, Prepared};
 use super::watch::gain;
 use crate::Error;
-use crate::csv;
+use crate::csv_table;
 use bvh_build::{Builder, median_cut};
 use bvh_core::cost::Objective;
 use bvh_core::{Instance, InvalidInstances, Primitives, Triangle, WideBvh};
@@ -51,7 +51,9 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let top = top(&stem, &scenes, &instances, &parts)?;
     // Everything that can be invalid has been checked, so that a fault leaves no folder behind.
     fs::create_dir_all(&out).map_err(Error::io(&out, "create the folder"))?;
-    files::write(&out.join(INSTANCES), table(&instances, &parts).as_bytes())?;
+    let path = out.join(INSTANCES);
+    let table = table(&instances, &parts).map_err(Error::csv(&path))?;
+    files::write(&path, &table)?;
 
     let objects: usize = scenes
         .iter()
@@ -80,7 +82,6 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         return Err(Error::StoppedInstances { path: out });
     }
     let places = instances.len();
-    let path = out.join(INSTANCES);
     print_line(&format!("{}: {places} instances of {} meshes", path.display(), scenes.len()));
     Ok(())
 }
@@ -198,13 +199,9 @@ fn top(
 }
 
 /// Returns the text of [`INSTANCES`]: the node, the mesh and the transform of each instance.
-fn table(instances: &[Instance], parts: &gltf::Parts) -> String {
-    let mut table = csv::Table::new(COLUMNS);
-    for (place, instance) in parts.places.iter().zip(instances) {
-        table.cell(place.node);
-        table.cell(place.mesh);
-        table.numbers(&instance.transform.to_cols_array());
-        table.end_row();
-    }
-    table.text().to_owned()
+fn table(instances: &[Instance], parts: &gltf::Parts) -> Result<Vec<u8>, csv::Error> {
+    let places = parts.places.iter().zip(instances);
+    let rows = places
+        .map(|(place, instance)| (place.node, place.mesh, instance.transform.to_cols_array()));
+    csv_table::to_bytes(COLUMNS, rows)
 }

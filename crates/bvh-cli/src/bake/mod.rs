@@ -20,7 +20,7 @@ use bvh_search::best::{self, Horizon};
 use bvh_search::{Method, StopReason};
 use bvh_terminal::arguments::{FileKind, Jobs, input_file, output_file, output_or_free};
 use bvh_terminal::files::Reserved;
-use bvh_terminal::output::{print_error, print_line};
+use bvh_terminal::output::print_line;
 use clap::Args;
 use decide::{Choices, Decided, Open, decide};
 use effort::Effort;
@@ -261,9 +261,6 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let plan = args.plan()?;
     args.jobs.apply()?;
     let scene = args.files.load(&args.scene)?;
-    if let Some(remark) = &scene.remark {
-        print_error(remark);
-    }
     if args.explain {
         let text = explain::scene(&scene).map_err(Error::search(&scene.name, "--explain"))?;
         print_line(&text);

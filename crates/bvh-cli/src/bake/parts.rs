@@ -11,7 +11,7 @@ use bvh_scenes::{Scene, fnv1a};
 use bvh_search::{Budget, Problem, best, solve};
 use bvh_terminal::arguments::output_file;
 use bvh_terminal::files::Reserved;
-use bvh_terminal::output::{print_error, print_line};
+use bvh_terminal::output::print_line;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -49,9 +49,6 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
     let plan = args.plan()?;
     args.jobs.apply()?;
     let scene = args.files.load(&args.scene)?;
-    if let Some(remark) = &scene.remark {
-        print_error(remark);
-    }
     let parts = parts(&plan, &scene, count)?;
     if args.list {
         for (number, part) in (1..).zip(&parts) {

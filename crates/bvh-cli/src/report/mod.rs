@@ -15,7 +15,7 @@ use bvh_scenes::trace::{Accelerator, Structure};
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_terminal::arguments::{FileKind, Jobs, output_file, output_or_free};
 use bvh_terminal::files;
-use bvh_terminal::output::{print_error, print_line};
+use bvh_terminal::output::print_line;
 use clap::Args;
 use levels::Level;
 use page::{Heat, Page, Row};
@@ -66,9 +66,6 @@ pub fn report(args: &ReportArgs, interrupted: &AtomicBool) -> Result<(), Error> 
     output_file("--out", &out, &PAGE)?;
     args.jobs.apply()?;
     let scene = args.files.load(&args.scene)?;
-    if let Some(remark) = &scene.remark {
-        print_error(remark);
-    }
     let (tree, header) = tree_file::load(&args.file, &scene)?;
     validate_references(&tree, &scene.boxes, &scene.primitives)
         .map_err(|fault| TreeFileError::of(&args.file)(fault.into()))?;

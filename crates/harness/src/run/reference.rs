@@ -57,11 +57,11 @@ pub(crate) fn update(
     let before = all_known(out)?;
     let mut known = before.clone();
     let experiment = &resolved.experiment;
-    let objective = name(&experiment.objective);
+    let objective = objective_name(&experiment.objective);
     let mut references = Vec::new();
     for scene in &resolved.scenes {
         let has_optimum = experiment.needs_optimum(scene.objects);
-        // Other small scenes are solved exactly by the hundreds; nobody looks their costs up.
+        // Experiments solve other small scenes by the hundred, and nothing reads their costs later.
         if scene.objects > exact::MOST_OBJECTS || has_optimum {
             let bound = bounds
                 .iter()
@@ -70,7 +70,7 @@ pub(crate) fn update(
             let eligible = runs
                 .iter()
                 .filter(|run| run.scene == scene.name && run.nodes + 1 == 2 * run.objects);
-            for found in eligible.flat_map(|run| finds(scene, &objective, run, bound)) {
+            for found in eligible.flat_map(|run| references_of(scene, &objective, run, bound)) {
                 let found = ReferenceRow { revision: revision.to_owned(), ..found };
                 offer(&mut known, found, has_optimum);
             }
@@ -129,7 +129,7 @@ pub(crate) fn improve(
             scene: scene.name.clone(),
             objects: scene.boxes.len(),
             checksum: checksum(scene),
-            objective: name(&objective),
+            objective: objective_name(&objective),
             cost: objective.cost(tree),
             method: header.method.clone(),
             seed: header.seed,
@@ -154,7 +154,7 @@ pub fn adopt(folder: &Path, out: &Path) -> Result<(), Error> {
 /// Returns the least known internal area of a scene with exactly these boxes.
 pub fn best_known(results: &Path, scene: &Scene) -> Result<Option<ReferenceRow>, Error> {
     let checksum = checksum(scene);
-    let objective = name(&Objective::InternalArea);
+    let objective = objective_name(&Objective::InternalArea);
     let key = (scene.name.as_str(), scene.boxes.len(), checksum.as_str(), objective.as_str());
     Ok(all_known(results)?
         .into_iter()
@@ -167,7 +167,7 @@ fn key_of(row: &ReferenceRow) -> (&str, usize, &str, &str) {
 }
 
 /// The objective's name, as in [`ReferenceRow::objective`].
-fn name(objective: &Objective) -> String {
+fn objective_name(objective: &Objective) -> String {
     match objective {
         Objective::InternalArea => "internal_area".into(),
         Objective::GoldsmithSalmon => "goldsmith_salmon".into(),
@@ -178,7 +178,7 @@ fn name(objective: &Objective) -> String {
 
 /// Returns the costs of one run: under the experiment's objective, and under the objectives that
 /// are columns of every run. `bound` is a lower bound of the internal area.
-fn finds(
+fn references_of(
     scene: &LoadedScene,
     objective: &str,
     run: &RunRow,
@@ -188,8 +188,8 @@ fn finds(
     // Goldsmith and Salmon's cost is twice the internal area over the root's, and so is its bound.
     let goldsmith_salmon_bound = bound.map(|bound| 2.0 * bound / root_area);
     let costs = [
-        (name(&Objective::InternalArea), run.internal_area, bound),
-        (name(&Objective::GoldsmithSalmon), run.goldsmith_salmon, goldsmith_salmon_bound),
+        (objective_name(&Objective::InternalArea), run.internal_area, bound),
+        (objective_name(&Objective::GoldsmithSalmon), run.goldsmith_salmon, goldsmith_salmon_bound),
         (objective.to_owned(), run.cost, None),
     ];
     costs
