@@ -159,18 +159,15 @@ def test_a_scene_has_open3ds_answers():
 
 
 def test_every_public_function_has_an_example_and_all_examples_run():
-    parts = [Tree, Tracer, RaycastingScene]
-    modules = [bvh_search, importlib.import_module("bvh_search.raycasting")]
+    parts = [(bvh_search, Tree), (bvh_search, Tracer), (bvh_search, RaycastingScene)]
     if importlib.util.find_spec("trimesh"):
-        modules.append(importlib.import_module("bvh_search.trimesh"))
-        parts.append(modules[-1].RayMeshIntersector)
-    texts = [module.__doc__ for module in modules]
-    for part in parts:
+        module = importlib.import_module("bvh_search.trimesh")
+        parts.append((module, module.RayMeshIntersector))
+    for module, part in parts:
         names = [name for name in vars(part) if not name.startswith("_") and name.islower()]
         documentation = {name: getattr(part, name).__doc__ for name in names}
         assert {name for name, text in documentation.items() if ">>>" not in text} == set()
-        texts += [part.__doc__, *documentation.values()]
-    examples = "\n\n".join(map(inspect.cleandoc, texts))
-    test = doctest.DocTestParser().get_doctest(examples, {}, "docstrings", None, None)
-    failures = doctest.DocTestRunner().run(test).failed
-    assert failures == 0
+        texts = [module.__doc__, part.__doc__, *documentation.values()]
+        examples = "\n\n".join(map(inspect.cleandoc, texts))
+        test = doctest.DocTestParser().get_doctest(examples, {}, part.__name__, None, None)
+        assert doctest.DocTestRunner().run(test).failed == 0
