@@ -98,13 +98,16 @@ fn sorting_in_place_gives_the_same_nodes() {
             for _ in 0..spare_leaves {
                 tree.push_spare(0);
             }
-            let mut in_place = tree.clone();
+            let unsorted = tree.clone();
             tree.sort_into_spare();
-            in_place.sort_in_place(&|| false);
-            let [nodes, nodes_in_place] =
-                [&tree, &in_place].map(|tree| format!("{:?}", tree.nodes));
-            assert_eq!(nodes, nodes_in_place);
-            assert_eq!(tree.area().to_bits(), in_place.area().to_bits());
+            for at_once in [1, 7, 4096] {
+                let mut in_place = unsorted.clone();
+                in_place.sort_in_place(at_once, &|| false);
+                let [nodes, nodes_in_place] =
+                    [&tree, &in_place].map(|tree| format!("{:?}", tree.nodes));
+                assert_eq!(nodes, nodes_in_place);
+                assert_eq!(tree.area().to_bits(), in_place.area().to_bits());
+            }
         }
     }
 }
@@ -116,7 +119,7 @@ fn a_sort_in_place_that_ends_early_changes_nothing() {
     for most in 0.. {
         let polls = Cell::new(0);
         let mut sorted = tree.clone();
-        sorted.sort_in_place(&|| {
+        sorted.sort_in_place(4096, &|| {
             polls.set(polls.get() + 1);
             polls.get() > most
         });
