@@ -32,18 +32,18 @@ pub(crate) fn map_init<S, T: Send>(
 }
 
 /// Returns the results of a few long tasks. Each may run on another thread.
-pub(crate) fn map<T: Send>(count: usize, task: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
+pub(crate) fn map<I: Send, T: Send>(tasks: Vec<I>, task: impl Fn(I) -> T + Send + Sync) -> Vec<T> {
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
-        (0..count)
+        tasks
             .into_par_iter()
             .with_max_len(1)
             .map(task)
             .collect()
     }
     #[cfg(not(feature = "rayon"))]
-    (0..count).map(task).collect()
+    tasks.into_iter().map(task).collect()
 }
 
 /// The number of threads that share the tasks.

@@ -51,9 +51,12 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 1,10,60 SCENE..." {
     LEAST_WINDOWS: usize = 16, "windows";
     /// Subtrees with fewer objects are not annealed separately.
     LEAST_SUBTREE: u32 = 16, "objects";
-    /// Part of a round in which moves use the whole tree: 1/16 was worse at equal work, 1/4 no
-    /// better.
+    /// Maximum part of a round in which moves use the whole tree: 1/16 was worse at equal work on
+    /// 80 000 objects, 1/4 no better.
     WHOLE_TREE: f64 = 0.125, "fraction of the work of a round";
+    /// How much more often moves on the whole tree begin at a node outside all subtrees than moves
+    /// on the whole tree alone would. A million objects have few such nodes.
+    MOVES_AT_BORDERS: f64 = 1.5, "factor";
     /// Maximum depth below the root of a separately annealed subtree at which moves on the whole
     /// tree begin.
     BELOW_SUBTREE_ROOTS: u8 = 6, "levels";
@@ -112,6 +115,10 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 --threa
     /// Minimum length for which several threads anneal disjoint subtrees. Shorter runs have too few
     /// rounds to cut them.
     WORTH_SUBTREES: f64 = 256.0, "work per object";
+    /// This minimum for large subtrees, whose borders hold few moves back.
+    WORTH_LARGE_SUBTREES: f64 = 64.0, "work per object";
+    /// Minimum size of large subtrees.
+    LARGE_SUBTREE: usize = 1 << 15, "objects";
     /// Subtrees per thread; several unequal subtrees balance the threads.
     SUBTREES_PER_THREAD: usize = 4, "subtrees";
     /// Maximum size of trees that are recombined after a cancellation. Recombination takes about a

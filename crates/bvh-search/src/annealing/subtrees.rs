@@ -11,7 +11,9 @@ use crate::local::reinsertion;
 use crate::parallel;
 use crate::run::{Observer, Quota, Tally, stream};
 use crate::tree::{ANCHOR, Metric, NONE, Node, Working};
-use crate::tuning::{BELOW_SUBTREE_ROOTS, LEAST_SUBTREE, SMALLEST_SUBTREES, WHOLE_TREE};
+use crate::tuning::{
+    BELOW_SUBTREE_ROOTS, LEAST_SUBTREE, MOVES_AT_BORDERS, SMALLEST_SUBTREES, WHOLE_TREE,
+};
 use rand::RngExt;
 
 /// Random streams per round: one for the whole tree, one for every subtree.
@@ -35,33 +37,24 @@ pub(crate) fn cool<M: Mover>(
     if count > 1 && tree.objects() as f64 >= f64::from(count) * f64::from(LEAST_SUBTREE) {
         // A different size in every round moves the borders, across which nothing moves.
         let smaller = SMALLEST_SUBTREES + (1.0 - SMALLEST_SUBTREES) * rng.random::<f64>();
-        let (subtrees, starts) =
-            cut(tree, smaller / f64::from(count), |index| node_sampler::weight(tree, index));
-        let all: f64 = subtrees
+        let cut = cut(tree, smaller / f64::from(count), |index| node_sampler::weight(tree, index));
+        let in_subtrees: f64 = cut
+            .subtrees
             .iter()
             .map(|subtree| subtree.weight)
             .sum();
-        let share = |subtree: &Subtree| {
-            let work = quota.work as f64 * (1.0 - WHOLE_TREE) * (subtree.weight / all);
-            Quota { work: work as u64, moves: quota.moves / (subtrees.len() as u64 + 1) }
+        let quota_of = |subtree: &Subtree| {
+            let work = quota.work as f64 * (1.0 - cut.whole_tree) * (subtree.weight / in_subtrees);
+            Quota { work: work as u64, moves: quota.moves / (cut.subtrees.len() as u64 + 1) }
         };
-        let found = parallel::map(subtrees.len(), |number| {
-            // A cancelled search must return soon, and no move would change the copy.
-            if observer.cancelled() {
-                return None;
-            }
-            let mut small = subtrees[number].take(tree);
+        done += improve_each(tree, &cut.subtrees, observer, |number, small| {
             // A stream per subtree, not per thread: the result must not depend on the schedule of
             // threads.
             let rng = &mut stream(seed, first + 1 + number as u64);
-            let quota = share(&subtrees[number]);
-            let tally = metropolis::cool(&mut mover(), &mut small, heat, quota, rng, observer);
-            // Sorted here, in parallel; `put_back` then leaves the full tree in preorder.
-            small.sort_in_preorder();
-            Some((small, tally))
+            let quota = quota_of(&cut.subtrees[number]);
+            metropolis::cool(&mut mover(), small, heat, quota, rng, observer)
         });
-        done += put_back(tree, &subtrees, found);
-        *whole.sampler() = NodeSampler::among(starts);
+        *whole.sampler() = NodeSampler::among(cut.starts);
     }
     done += metropolis::cool(&mut whole, tree, heat, quota.less(&done), &mut rng, observer);
     // A cancelled search must return soon, and every later round would sort first.
@@ -81,20 +74,13 @@ pub(crate) fn to_local_optimum(
 ) -> Tally {
     let mut done = Tally::default();
     if count > 1 {
-        let (subtrees, _) = cut(tree, 1.0 / f64::from(count), |_| 1.0);
+        let Cut { subtrees, .. } = cut(tree, 1.0 / f64::from(count), |_| 1.0);
         // One half of the quota for all subtrees together, one for the whole tree.
         let parts = 2 * subtrees.len().max(1) as u64;
         let share = Quota { work: quota.work / parts, moves: quota.moves / parts };
-        let found = parallel::map(subtrees.len(), |number| {
-            if observer.cancelled() {
-                return None;
-            }
-            let mut small = subtrees[number].take(tree);
-            let tally = reinsertion::to_local_optimum(&mut small, share, observer);
-            small.sort_in_preorder();
-            Some((small, tally))
+        done += improve_each(tree, &subtrees, observer, |_, small| {
+            reinsertion::to_local_optimum(small, share, observer)
         });
-        done += put_back(tree, &subtrees, found);
     }
     done += reinsertion::to_local_optimum(tree, quota.less(&done), observer);
     done
@@ -109,14 +95,19 @@ struct Subtree {
     weight: f64,
 }
 
+/// The subtrees of a round, and the rest of the tree.
+struct Cut {
+    /// Disjoint, in the order of their nodes.
+    subtrees: Vec<Subtree>,
+    /// The nodes that are outside all subtrees or near the root of one.
+    starts: Vec<u32>,
+    /// The part of a round's work that moves on the whole tree get.
+    whole_tree: f64,
+}
+
 /// Returns the largest subtrees of a tree in preorder that each have at most the fraction `most` of
-/// its weight, except tiny ones; and the nodes that are outside all subtrees or near the root of
-/// one. O(n).
-fn cut(
-    tree: &Working<impl Metric>,
-    most: f64,
-    weight: impl Fn(u32) -> f64,
-) -> (Vec<Subtree>, Vec<u32>) {
+/// its weight, except tiny ones. O(n).
+fn cut(tree: &Working<impl Metric>, most: f64, weight: impl Fn(u32) -> f64) -> Cut {
     let mut totals = vec![(1u32, 0.0); tree.nodes.len()];
     for (index, node) in tree.nodes.iter().enumerate().skip(1).rev() {
         let mut total = (1, weight(index as u32));
@@ -127,46 +118,96 @@ fn cut(
         }
         totals[index] = total;
     }
-    let most = most
-        * tree
-            .root()
-            .map_or(0.0, |root| totals[root as usize].1);
+    let all = tree
+        .root()
+        .map_or(0.0, |root| totals[root as usize].1);
     // The level in a subtree, 1 for its root; 0 outside all subtrees.
     let mut depths = vec![0u8; tree.nodes.len()];
     let mut subtrees = vec![];
     let mut starts = vec![];
+    let mut of_starts = 0.0;
     for (index, node) in (0..).zip(&tree.nodes).skip(1) {
         let above = depths[node.parent as usize];
-        let (nodes, weight) = totals[index as usize];
+        let (nodes, total) = totals[index as usize];
         if above > 0 {
             depths[index as usize] = above.saturating_add(1);
-        } else if weight <= most {
+        } else if total <= most * all {
             depths[index as usize] = 1;
             // A smaller subtree is left to the moves on the whole tree.
             if nodes >= 2 * LEAST_SUBTREE {
-                subtrees.push(Subtree { root: index, nodes, weight });
+                subtrees.push(Subtree { root: index, nodes, weight: total });
             }
         }
         if depths[index as usize] <= BELOW_SUBTREE_ROOTS {
             starts.push(index);
+            of_starts += weight(index);
         }
     }
-    (subtrees, starts)
+    let whole_tree = (MOVES_AT_BORDERS * of_starts / all).min(WHOLE_TREE);
+    Cut { subtrees, starts, whole_tree }
+}
+
+/// Improves a copy of every subtree, given its number, and puts it back in preorder; then the full
+/// tree is in preorder, too. A cancelled search leaves the rest of the subtrees as they are.
+fn improve_each<A: Metric>(
+    tree: &mut Working<A>,
+    subtrees: &[Subtree],
+    observer: &dyn Observer,
+    improve: impl Fn(usize, &mut Working<A>) -> Tally + Send + Sync,
+) -> Tally {
+    let metric = tree.metric();
+    let mut tasks = Vec::with_capacity(subtrees.len());
+    let mut rest = &mut tree.nodes[..];
+    let mut first = 0;
+    for (number, subtree) in subtrees.iter().enumerate() {
+        let (_, from) = rest.split_at_mut((subtree.root - first) as usize);
+        let (nodes, after) = from.split_at_mut(subtree.nodes as usize);
+        tasks.push((number, nodes));
+        rest = after;
+        first = subtree.root + subtree.nodes;
+    }
+    let tallies = parallel::map(tasks, |(number, nodes)| {
+        // A cancelled search must return soon, and no move would change the copy.
+        if observer.cancelled() {
+            return Tally::default();
+        }
+        let subtree = &subtrees[number];
+        let mut small = subtree.take(nodes, metric);
+        let tally = improve(number, &mut small);
+        small.sort_in_preorder();
+        subtree.put_back(nodes, &small);
+        tally
+    });
+    tree.forget_changes();
+    let mut done = Tally::default();
+    for tally in tallies {
+        done += tally;
+    }
+    done
 }
 
 impl Subtree {
-    /// Copies the subtree into a separate tree.
-    fn take<A: Metric>(&self, tree: &Working<A>) -> Working<A> {
-        let range = self.root as usize..(self.root + self.nodes) as usize;
-        let mut nodes = Vec::with_capacity(range.len() + 1);
-        nodes.push(Node { children: [1, NONE], ..tree.nodes[ANCHOR as usize] });
-        nodes.extend(
-            tree.nodes[range]
+    /// Copies the subtree, whose nodes are these, into a separate tree.
+    fn take<A: Metric>(&self, nodes: &[Node], metric: A) -> Working<A> {
+        let mut copy = Vec::with_capacity(nodes.len() + 1);
+        copy.push(Node { children: [1, NONE], ..Node::ANCHOR });
+        copy.extend(
+            nodes
                 .iter()
                 .map(|node| moved(node, |index| index.wrapping_sub(self.root - 1))),
         );
-        nodes[1].parent = ANCHOR;
-        Working::from_nodes(nodes, tree.metric())
+        copy[1].parent = ANCHOR;
+        Working::from_nodes(copy, metric)
+    }
+
+    /// Copies a tree in preorder to the nodes of the subtree that it was taken from.
+    fn put_back(&self, nodes: &mut [Node], small: &Working<impl Metric>) {
+        // The root's link leads out of the subtree and must survive the copy.
+        let parent = nodes[0].parent;
+        for (old, new) in nodes.iter_mut().zip(&small.nodes[1..]) {
+            *old = moved(new, |index| index + self.root - 1);
+        }
+        nodes[0].parent = parent;
     }
 }
 
@@ -175,29 +216,6 @@ fn moved(node: &Node, place: impl Fn(u32) -> u32) -> Node {
     let children = if node.is_leaf() { node.children } else { node.children.map(&place) };
     let parent = if node.parent == ANCHOR { ANCHOR } else { place(node.parent) };
     Node { children, parent, ..*node }
-}
-
-/// Puts annealed subtrees, in preorder, back to their place; `None` leaves a subtree as it is. O(n).
-fn put_back<A: Metric>(
-    tree: &mut Working<A>,
-    subtrees: &[Subtree],
-    found: Vec<Option<(Working<A>, Tally)>>,
-) -> Tally {
-    let mut done = Tally::default();
-    let mut nodes = std::mem::take(&mut tree.nodes);
-    for (subtree, found) in subtrees.iter().zip(found) {
-        let Some((small, tally)) = found else { continue };
-        done += tally;
-        let to = subtree.root as usize;
-        // The root's link leads out of the subtree and must survive the copy.
-        let parent = nodes[to].parent;
-        for (old, new) in nodes[to..].iter_mut().zip(&small.nodes[1..]) {
-            *old = moved(new, |index| index + subtree.root - 1);
-        }
-        nodes[to].parent = parent;
-    }
-    *tree = Working::from_nodes(nodes, tree.metric());
-    done
 }
 
 #[cfg(test)]
@@ -212,7 +230,9 @@ mod tests {
         let mut tree = built(&muller_fellner::Config::default(), &boxes);
         tree.sort_in_preorder();
         for most in [0.007, 0.03, 0.3, 0.99] {
-            let (subtrees, starts) = cut(&tree, most, |_| 1.0);
+            let Cut { subtrees, starts, whole_tree } = cut(&tree, most, |_| 1.0);
+            let of_starts = starts.len() as f64 / 5999.0;
+            assert_eq!(whole_tree, WHOLE_TREE.min(MOVES_AT_BORDERS * of_starts));
             assert!(
                 subtrees
                     .windows(2)
@@ -231,13 +251,12 @@ mod tests {
             );
             let covered: u32 = subtrees.iter().map(|subtree| subtree.nodes).sum();
             assert!(covered > if most > 0.01 { 3000 } else { 1000 }, "{covered}");
-            let taken = |subtree: &Subtree| {
-                Some((subtree.take(&tree), Tally { work: 1, ..Tally::default() }))
-            };
             let mut again = tree.clone();
-            let tally = put_back(&mut again, &subtrees, subtrees.iter().map(taken).collect());
+            let tally = improve_each(&mut again, &subtrees, &(), |number, small| {
+                assert_eq!(small.nodes.len(), subtrees[number].nodes as usize + 1);
+                Tally { work: 1, ..Tally::default() }
+            });
             assert_eq!(tally.work, subtrees.len() as u64);
-            put_back(&mut again, &subtrees, vec![None; subtrees.len()]);
             assert_eq!(again.to_bvh(), tree.to_bvh());
             assert!((again.area() - tree.area()).abs() <= 1e-12 * tree.area());
         }

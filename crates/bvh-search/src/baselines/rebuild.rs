@@ -106,7 +106,7 @@ impl Config {
                         run.observer(),
                     )
                 };
-                let found = parallel::map(subtrees.len(), construct)
+                let found = parallel::map((0..subtrees.len()).collect(), construct)
                     .into_iter()
                     .collect::<Result<Vec<_>, _>>()?;
                 number += subtrees.len() as u64;

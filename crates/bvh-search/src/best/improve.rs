@@ -15,8 +15,9 @@ use crate::parallel::threads;
 use crate::run::{Observer, Problem, Quota, Run, StopReason, Stream, Tally, stream};
 use crate::tree::{Metric, Shape, Working};
 use crate::tuning::{
-    FINISH_AT_MOST, FINISH_WORK, MOST_GENERATIONS, PROBE, RECOMBINED_AT_ONCE, ROUNDS_PER_LOOK,
-    SECURED_FROM, SUBTREES_PER_THREAD, TRIAL, WORK_ON_REFERENCES, WORTH_AN_EVENT, WORTH_SUBTREES,
+    FINISH_AT_MOST, FINISH_WORK, LARGE_SUBTREE, MOST_GENERATIONS, PROBE, RECOMBINED_AT_ONCE,
+    ROUNDS_PER_LOOK, SECURED_FROM, SUBTREES_PER_THREAD, TRIAL, WORK_ON_REFERENCES, WORTH_AN_EVENT,
+    WORTH_LARGE_SUBTREES, WORTH_SUBTREES,
 };
 use bvh_core::cost::Objective;
 use bvh_core::{Aabb, Bvh};
@@ -223,10 +224,11 @@ impl Improvement<'_, '_, '_, '_> {
     /// search, or of the generation.
     fn schedule(&self, hot: f64, work: u64, end: f64, length: f64) -> Schedule {
         let timed = self.run.observer().progress().is_some();
-        let by_threads =
-            self.config.pieces == 0 && timed && length >= WORTH_SUBTREES && threads() > 1;
-        let subtrees = if by_threads {
-            (SUBTREES_PER_THREAD * threads().min(1024)) as u32
+        let by_threads = SUBTREES_PER_THREAD * threads().min(1024);
+        let is_large = self.n as usize >= by_threads * LARGE_SUBTREE;
+        let worth = if is_large { WORTH_LARGE_SUBTREES } else { WORTH_SUBTREES };
+        let subtrees = if self.config.pieces == 0 && timed && length >= worth && threads() > 1 {
+            by_threads as u32
         } else {
             self.config.pieces.max(1)
         };

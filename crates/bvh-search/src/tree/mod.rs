@@ -52,7 +52,7 @@ pub(crate) struct Node {
 }
 
 impl Node {
-    const ANCHOR: Self = Self {
+    pub const ANCHOR: Self = Self {
         aabb: PackedAabb::EMPTY,
         area: 0.0,
         stamp: 0,
@@ -99,11 +99,20 @@ impl<M: Metric> Working<M> {
     }
 
     /// Builds a tree from linked nodes, the anchor first.
-    pub fn from_nodes(mut nodes: Vec<Node>, metric: M) -> Self {
-        nodes.iter_mut().for_each(|node| node.stamp = 0);
+    pub fn from_nodes(nodes: Vec<Node>, metric: M) -> Self {
         let mut tree = Self::new(nodes, metric);
-        tree.area.add(tree.internal_area());
+        tree.forget_changes();
         tree
+    }
+
+    /// Begins again with the nodes as they are. O(n).
+    pub fn forget_changes(&mut self) {
+        self.nodes
+            .iter_mut()
+            .for_each(|node| node.stamp = 0);
+        let mut area = Sum::default();
+        area.add(self.internal_area());
+        self.restart(area);
     }
 
     /// The root, unless there are no objects.
