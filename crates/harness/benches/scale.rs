@@ -1,4 +1,5 @@
-//! Time and peak memory of every phase on scenes of millions of triangles, on one thread.
+//! Time and peak memory of every phase on scenes of millions of triangles, on one thread, and of
+//! bakes on two.
 //!
 //! `cargo bench -p harness --bench scale --features peers -- terrain:1000000 forest:8000000` writes
 //! `results/scale/timing_scale.csv`, and keeps its rows of other scenes. Without scenes it measures
@@ -17,6 +18,7 @@ use harness::processor::PROCESSOR;
 use harness::rows::{Row, ScaleRow, read_if_any, to_bytes};
 use memmap2::Mmap;
 use peak_alloc::PeakAlloc;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -38,15 +40,18 @@ fn main() {
     if names.is_empty() {
         names = DEFAULT.map(String::from).into();
     }
-    let one = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .expect("a pool of threads");
     for name in names {
         let mut phases = Phases { scene: name, objects: 0, rows: Vec::new() };
-        one.install(|| phases.measure());
+        pool(1).install(|| phases.measure());
         phases.write();
     }
+}
+
+fn pool(threads: usize) -> ThreadPool {
+    ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .expect("a pool of threads")
 }
 
 /// The measured phases of one scene.
@@ -130,8 +135,11 @@ impl Phases {
         self.cost(&clustered, base);
         drop(clustered);
         self.peers(&scene, base);
-        drop(self.bake(boxes, base, 10));
-        let baked = self.bake(boxes, base, 60);
+        drop(self.bake(boxes, base, 10, 1));
+        drop(self.bake(boxes, base, 10, 2));
+        drop(self.bake(boxes, base, 18, 1));
+        drop(self.bake(boxes, base, 60, 2));
+        let baked = self.bake(boxes, base, 60, 1);
         let path = folder.path().join("tree.bvh");
         self.phase("save", || {
             let bytes = file::save(&baked, boxes, &Origin::default()).expect("a valid tree");
@@ -161,9 +169,11 @@ impl Phases {
     }
 
     /// Bakes for `seconds` as the program does, which builds the greedy tree before the time begins.
-    fn bake(&mut self, boxes: &[Aabb], base: f64, seconds: u64) -> Bvh {
+    fn bake(&mut self, boxes: &[Aabb], base: f64, seconds: u64, threads: usize) -> Bvh {
         let config = best::Config { horizon: Some(Horizon::Known), ..Default::default() };
-        let baked = self.phase(&format!("bake {seconds} s"), || {
+        let plural = if threads == 1 { "" } else { "s" };
+        let name = format!("bake {seconds} s, {threads} thread{plural}");
+        let bake = || {
             let greedy = muller_fellner::Config::default()
                 .build(boxes)
                 .expect("finite boxes");
@@ -173,7 +183,8 @@ impl Phases {
             solve_or_keep(&config, &problem, Some(greedy), 1, Budget::UNLIMITED, &deadline)
                 .expect("a tree")
                 .tree
-        });
+        };
+        let baked = self.phase(&name, || pool(threads).install(bake));
         self.cost(&baked, base);
         baked
     }
