@@ -84,10 +84,13 @@ struct Compared {
 }
 
 impl Column {
-    pub(super) fn check(&self) -> Result<(), QueryError> {
+    /// Computes the value of a group, for its errors alone.
+    pub(super) fn try_on(&self, group: &Group) -> Result<(), QueryError> {
         match self.value.strip_prefix("text ") {
-            Some(_) => Ok(()),
-            None => Measure::parse(&self.value).map(|_| ()),
+            Some(column) => query::only_text(&group.rows, column).map(|_| ()),
+            None => Measure::parse(&self.value)?
+                .of_rows(&group.rows)
+                .map(|_| ()),
         }
     }
 

@@ -32,7 +32,8 @@ use serde::{Deserialize, Serialize};
 
 /// Declares kinds of rows with the names of their files.
 macro_rules! rows {
-    ($($(#[$meta:meta])* $kind:ident in $file:literal { $($(#[$of:meta])* $column:ident: $type:ty,)* })*) => {$(
+    ($($(#[$meta:meta])* $kind:ident in $file:literal { $($(#[$of:meta])* $column:ident: $type:ty,)* })*) => {
+        $(
         $(#[$meta])*
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         pub struct $kind {
@@ -42,11 +43,21 @@ macro_rules! rows {
         impl Row for $kind {
             const FILE: &'static str = $file;
         }
-    )*};
+        )*
+
+        /// The files of these rows, with their columns.
+        pub(super) const COLUMNS: &[(&str, &[&str])] =
+            &[$(($file, &[$(stringify!($column)),*])),*];
+    };
 }
 
 mod rays;
 pub use rays::*;
+
+/// Returns the files that runs write, each with its columns.
+pub fn files() -> impl Iterator<Item = &'static (&'static str, &'static [&'static str])> {
+    COLUMNS.iter().chain(rays::COLUMNS)
+}
 
 rows! {
     /// One row of `runs.csv`: what one run of one method on one scene found.
