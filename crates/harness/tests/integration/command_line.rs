@@ -272,18 +272,18 @@ fn without_reports_there_is_a_table_and_without_a_terminal_a_line_for_the_last_r
 fn a_redraw_that_fails_leaves_finished_results() {
     let spec = "question = 'q'\nscenes = ['spheres75']\nmethods = [{ method = 'median_cut' }]\n";
     let report = "[[reports]]\nkind = 'query'\nfile = 'x'\nrows = 'runs.csv'\nby = ['scene']\n\
-                  columns = [{ name = 'a', value = 'only COLUMN' }]\n";
+                  select = 'scene=SCENE'\ncolumns = [{ name = 'a', value = 'only objects' }]\n";
     let folder = folder_with("plain.toml", spec);
     let path = folder.path();
     said(path, &["plain.toml"]);
     let resolved = path.join("results/plain/resolved.toml");
     let before = fs::read(&resolved).unwrap();
     fs::write(path.join("plain.toml"), format!("{spec}{report}")).unwrap();
-    let parts = ["results/plain/runs.csv", "no column \"COLUMN\"", "cost_over_base"];
+    let parts = ["results/plain/runs.csv", "no row meets \"scene=SCENE\""];
     refused(path, &["plain.toml", "--redraw"], 1, &parts);
     assert!(!path.join("results/plain/.partial").exists());
     assert!(fs::read(&resolved).unwrap() == before);
-    let report = report.replace("COLUMN", "objects");
+    let report = report.replace("SCENE", "spheres75");
     fs::write(path.join("plain.toml"), format!("{spec}{report}")).unwrap();
     said(path, &["plain.toml", "--redraw"]);
     let table = fs::read_to_string(path.join("results/plain/x.csv")).unwrap();
