@@ -30,7 +30,7 @@ impl<M: Metric> Working<M> {
     }
 
     /// Sorts the nodes in preorder, unless `is_over` returns true before a large tree has been
-    /// changed. The sort of ten million nodes takes more than a second.
+    /// changed. The sort of ten million nodes takes about half a second.
     pub fn sort_in_preorder_unless(&mut self, is_over: &dyn Fn() -> bool) {
         if self.nodes.len() >= SORTED_IN_PLACE {
             self.sort_in_place(SORTED_AT_ONCE, is_over);
