@@ -6,7 +6,7 @@ use bvh_core::cost::Objective;
 use bvh_core::{Bvh, RayDensity, Segment};
 use bvh_scenes::rays::{RenderedRays, TRAINED, density, of_anything, of_renderer};
 use bvh_scenes::{Scene, read_text};
-use bvh_search::ray_density;
+use bvh_search::ray_density_through;
 use bvh_terminal::arguments::input_file;
 use std::fs;
 use std::path::Path;
@@ -63,19 +63,23 @@ impl Rays {
     ) -> Result<Option<RayDensity>, Error> {
         let is_over = || interrupted.load(Relaxed);
         let found = match self {
-            Self::Default => density(&of_anything(TRAINED, scene, tree, seed, &is_over), tree),
-            Self::Rendered(config) => density(&of_renderer(config, scene, tree, &is_over), tree),
+            Self::Default => {
+                let rays = of_anything(TRAINED, scene, tree, seed, &is_over);
+                density(&rays, tree).map(Some)
+            }
+            Self::Rendered(config) => {
+                let rays = of_renderer(config, scene, tree, &is_over);
+                density(&rays, tree).map(Some)
+            }
             Self::Recorded(segments) => {
-                ray_density(&scene.boxes, Some(&scene.primitives), segments)
+                ray_density_through(tree, &scene.primitives, segments, &is_over)
             }
         };
         // After an interruption some rays are missing, or all of them, which is an error otherwise.
         if is_over() {
             return Ok(None);
         }
-        found
-            .map(Some)
-            .map_err(|source| Error::Tracing { scene: scene.name.clone(), source })
+        found.map_err(|source| Error::Tracing { scene: scene.name.clone(), source })
     }
 
     /// Returns the expected number of tests of a ray that enters the scene, in the wide layout of a

@@ -39,7 +39,7 @@ pub use orders::{genetic, random_orders};
 pub use owned::{Improvement, Objects, Options, OwnedTree};
 #[cfg(feature = "std")]
 pub use rays::bake_for_rays;
-pub use rays::{FindError, ray_density};
+pub use rays::{FindError, ray_density, ray_density_through};
 #[cfg(feature = "serde")]
 pub use registry::Method;
 pub use run::{

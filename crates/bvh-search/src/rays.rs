@@ -9,7 +9,9 @@ use bvh_core::Triangle;
 #[cfg(feature = "std")]
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::glam::Vec3;
-use bvh_core::{Aabb, DensityError, Primitive, Primitives, Ray, RayDensity, Segment, nearest_hit};
+use bvh_core::{
+    Aabb, Bvh, DensityError, Primitive, Primitives, Ray, RayDensity, Segment, nearest_hit,
+};
 use rand::{RngExt, SeedableRng};
 #[cfg(feature = "std")]
 use std::time::Duration;
@@ -92,34 +94,72 @@ pub fn ray_density(
     })
 }
 
+/// Returns the density as [`ray_density`] does, or `None` soon after `is_over` returns true. The rays
+/// from anywhere are traced through `tree`, any valid tree over the shapes.
+pub fn ray_density_through(
+    tree: &Bvh,
+    shapes: &Primitives,
+    segments: &[Segment],
+    is_over: &dyn Fn() -> bool,
+) -> Result<Option<RayDensity>, DensityError> {
+    let root = tree.root_aabb().ok_or(DensityError::Bounds)?;
+    let sampled = with_others(segments, |count| match shapes {
+        Primitives::Triangles(triangles) => traced(tree, triangles, &root, count, is_over),
+        Primitives::Spheres(spheres) => traced(tree, spheres, &root, count, is_over),
+    });
+    if is_over() {
+        return Ok(None);
+    }
+    RayDensity::of_rays(&root, &sampled, AREA_WEIGHT).map(Some)
+}
+
 /// Returns the density of segments and of those that `others` returns for their number.
 fn guarded(
     boxes: &[Aabb],
     segments: &[Segment],
     others: impl FnOnce(usize) -> Vec<Segment>,
 ) -> Result<RayDensity, DensityError> {
+    RayDensity::of_rays(&bounds(boxes), &with_others(segments, others), AREA_WEIGHT)
+}
+
+/// Returns as many segments as leave room for those that `others` returns for their number, and these.
+fn with_others(segments: &[Segment], others: impl FnOnce(usize) -> Vec<Segment>) -> Vec<Segment> {
     let most = RayDensity::MOST_SEGMENTS / GUARD * (GUARD - 1);
     let step = segments.len().div_ceil(most).max(1);
     let mut sampled: Vec<Segment> = segments.iter().step_by(step).copied().collect();
     sampled.extend(others(sampled.len() / (GUARD - 1)));
-    RayDensity::of_rays(&bounds(boxes), &sampled, AREA_WEIGHT)
+    sampled
 }
 
-/// Returns the segments of `count` rays, up to their nearest hits: from random points of the scene's box
-/// in random directions, and from each hit one more. They are the same on every machine.
+/// Returns the segments of `count` rays as [`traced`] does, through the greedy tree.
 fn from_anywhere<P: Primitive>(objects: &[P], boxes: &[Aabb], count: usize) -> Vec<Segment> {
     // A search rejects the same boxes with a better message.
     let Ok(tree) = muller_fellner::Config::default().build(boxes) else { return vec![] };
-    let bounds = bounds(boxes);
+    traced(&tree, objects, &bounds(boxes), count, &|| false)
+}
+
+/// Returns the segments of `count` rays, up to their nearest hits: from random points of the scene's box
+/// in random directions, and from each hit one more. They are the same on every machine. Ends early, with
+/// fewer rays, when `is_over` returns true.
+fn traced<P: Primitive>(
+    tree: &Bvh,
+    objects: &[P],
+    bounds: &Aabb,
+    count: usize,
+    is_over: &dyn Fn() -> bool,
+) -> Vec<Segment> {
     let extent = bounds.max - bounds.min;
     let mut rng = Stream::seed_from_u64(1);
     let mut segments = Vec::with_capacity(count);
     let mut bounce = None;
     for _ in 0..count {
+        if is_over() {
+            break;
+        }
         let inside = bounds.min + extent * Vec3::from_array(rng.random());
         let direction = random_direction(&mut rng);
         let Ok(ray) = Ray::half_line(bounce.unwrap_or(inside), direction) else { break };
-        let hit = nearest_hit(&tree, objects, &ray);
+        let hit = nearest_hit(tree, objects, &ray);
         bounce = match (bounce, hit) {
             (None, Some(hit)) => Some(ray.at(hit.t * JUST_BEFORE)),
             _ => None,
@@ -154,7 +194,9 @@ fn bounds(boxes: &[Aabb]) -> Aabb {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bvh_build::median_cut;
     use bvh_core::Triangle;
+    use std::cell::Cell;
 
     /// Returns walls across the x axis at 0, 1, 2, 3.
     fn walls() -> Vec<Triangle> {
@@ -214,5 +256,29 @@ mod tests {
             .segments() as usize;
         // Every second one is recorded.
         assert_eq!(segments, most / 2 + most / 6);
+    }
+
+    #[test]
+    fn a_density_through_a_given_tree_is_the_same_and_ends_when_the_caller_says_so() {
+        let triangles = walls();
+        let boxes = bvh_core::boxes(&triangles);
+        let recorded = [Segment { from: [-1.0, 1.0, 1.0], to: [0.0, 1.0, 1.0] }; 300];
+        let shapes = Primitives::Triangles(triangles);
+        let expected = ray_density(&boxes, Some(&shapes), &recorded).unwrap();
+        // The order of its objects makes this tree another one than the greedy tree.
+        let tree = median_cut::Config::default()
+            .build(&boxes)
+            .unwrap();
+        let polls = Cell::new(0);
+        let over_after = |most: usize| {
+            polls.set(0);
+            let is_over = || polls.replace(polls.get() + 1) >= most;
+            ray_density_through(&tree, &shapes, &recorded, &is_over).unwrap()
+        };
+        let found = over_after(usize::MAX).unwrap();
+        assert_eq!(found.visits(&tree), expected.visits(&tree));
+        assert_eq!(found.segments(), 400);
+        assert!(over_after(10).is_none());
+        assert_eq!(polls.get(), 12);
     }
 }

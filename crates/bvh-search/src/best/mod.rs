@@ -159,6 +159,10 @@ impl Config {
             Err(BuildError::Cancelled) => return Ok(Kept::new(clustered, problem)),
             started => started?,
         };
+        // The evaluations of two large trees take half a second.
+        if run.has_tree() && is_dear(problem) && run.observer().cancelled() {
+            return Err(BuildError::Cancelled.into());
+        }
         // Both are evaluated by the problem's objective, also where the clustering was built by
         // area.
         let [clustered, started] = [clustered, started].map(|tree| Kept::new(tree, problem));
