@@ -118,9 +118,14 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 --threa
     /// This minimum for large subtrees, whose borders hold few moves back.
     WORTH_LARGE_SUBTREES: f64 = 64.0, "work per object";
     /// Minimum size of large subtrees.
-    LARGE_SUBTREE: usize = 1 << 15, "objects";
+    LARGE_SUBTREE: u64 = 1 << 15, "objects";
+    /// Minimum number of large subtrees for which a search without a clock anneals them separately, on
+    /// any number of threads. Smaller trees end slightly lower as a whole at equal work.
+    LEAST_LARGE_SUBTREES: u32 = 8, "subtrees";
+    /// Maximum number of subtrees.
+    MOST_SUBTREES: u64 = 4096, "subtrees";
     /// Subtrees per thread; several unequal subtrees balance the threads.
-    SUBTREES_PER_THREAD: usize = 4, "subtrees";
+    SUBTREES_PER_THREAD: u32 = 4, "subtrees";
     /// Maximum size of trees that are recombined after a cancellation. Recombination takes about a
     /// microsecond per object.
     RECOMBINED_AT_ONCE: usize = 100_000, "objects";

@@ -118,7 +118,8 @@ impl CompressedBvh {
         }
         let tree = &with_small_leaves(binary(tree).into_owned(), boxes);
         let visits = areas(tree);
-        let decisions = decide(tree, &visits, |objects| (objects <= LEAF as u32).then_some(1.0));
+        let (decisions, _) =
+            decide(tree, &visits, |objects| (objects <= LEAF as u32).then_some(1.0));
         compressed
             .nodes
             .push(CompressedNode::around(&tree.nodes[0].aabb));
@@ -127,7 +128,7 @@ impl CompressedBvh {
         let mut index = 0;
         while let Some(&subtree) = subtrees.get(index) {
             // A root that is a leaf becomes a node with one child.
-            let (below, count) = match decisions[subtree].leaf {
+            let (below, count) = match decisions[subtree].is_leaf {
                 true => ([subtree; 8], 1),
                 false => children(tree, &decisions, subtree),
             };
@@ -140,7 +141,7 @@ impl CompressedBvh {
                 let Some(child) = child else { continue };
                 let aabb = &tree.nodes[child].aabb;
                 node.set_box(slot, aabb);
-                if decisions[child].leaf {
+                if decisions[child].is_leaf {
                     let before = compressed.prim_ids.len();
                     collect(tree, child, &mut compressed.prim_ids);
                     let unary = (1u8 << (compressed.prim_ids.len() - before)) - 1;

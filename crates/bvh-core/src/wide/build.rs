@@ -1,105 +1,14 @@
 //! The wide layout of least expected cost of a given tree.
 
+use super::decide::{Costs, Decision, areas, children, decide};
 use super::kernel::Kernel;
 use super::layout::{WideBvh, largest};
 use super::node::{Child, WideNode};
 use super::triangles::TriangleBlock;
 use crate::collapse::{binary, binary_visited, collect};
-use crate::{Aabb, Bvh, NodeKind, Triangle};
+use crate::{Aabb, Bvh, Triangle};
 use alloc::borrow::Cow;
 use alloc::{vec, vec::Vec};
-
-/// Expected time of visiting a wide node: the unit.
-pub(crate) const NODE_COST: f32 = 1.0;
-/// Expected time of testing a block. Rays were no faster with half of it or twice as much.
-pub(crate) const BLOCK_COST: f32 = 1.0;
-
-/// How a subtree becomes children of a wide node.
-#[derive(Clone, Copy)]
-pub(crate) struct Decision {
-    /// Least cost as at most 1 to 7 children, times the root's area; last, as the 8 children of a node of its own.
-    costs: [f32; 8],
-    /// How many of those slots go to the first child (low half) and to the second one; 0 to be one child.
-    slots: [u8; 8],
-    objects: u32,
-    /// Whether, as one child, it is a leaf.
-    pub(crate) leaf: bool,
-}
-
-/// Decides by dynamic programming from the leaves up; every node of `tree` has two children or none. `leaf_cost` is the expected
-/// time of testing a leaf of so many objects, if there may be one.
-pub(crate) fn decide(
-    tree: &Bvh,
-    visits: &[f32],
-    leaf_cost: impl Fn(u32) -> Option<f32>,
-) -> Vec<Decision> {
-    let nothing = Decision { costs: [0.0; 8], slots: [0; 8], objects: 0, leaf: true };
-    let mut decisions = vec![nothing; tree.nodes.len()];
-    for (index, node) in tree.nodes.iter().enumerate().rev() {
-        let visits = visits[index];
-        let leaf_cost =
-            |objects: u32| leaf_cost(objects).map_or(f32::INFINITY, |cost| visits * cost);
-        decisions[index] = match (node.kind(), &decisions[node.children()]) {
-            (NodeKind::Inner { .. }, [a, b]) => {
-                let objects = a.objects + b.objects;
-                let mut decision = Decision { objects, ..nothing };
-                for slots in 2..=8 {
-                    let mut least = f32::INFINITY;
-                    let mut split = 0;
-                    for first in 1..slots {
-                        let cost = a.costs[first - 1] + b.costs[slots - first - 1];
-                        if cost < least {
-                            (least, split) = (cost, first | (slots - first) << 4);
-                        }
-                    }
-                    (decision.costs[slots - 1], decision.slots[slots - 1]) = (least, split as u8);
-                }
-                let as_node = decision.costs[7] + visits * NODE_COST;
-                let as_leaf = leaf_cost(objects);
-                decision.leaf = as_leaf < as_node
-                    || (as_leaf == as_node && objects <= TriangleBlock::LANES as u32);
-                decision.costs[0] = if decision.leaf { as_leaf } else { as_node };
-                // Fewer children where more are no better.
-                for slots in 1..7 {
-                    if decision.costs[slots - 1] <= decision.costs[slots] {
-                        decision.costs[slots] = decision.costs[slots - 1];
-                        decision.slots[slots] = decision.slots[slots - 1];
-                    }
-                }
-                decision
-            }
-            (kind, _) => {
-                let objects = if let NodeKind::Leaf { count, .. } = kind { count } else { 0 };
-                Decision { costs: [leaf_cost(objects); 8], objects, ..nothing }
-            }
-        };
-    }
-    decisions
-}
-
-/// The roots of the subtrees that become the children of the wide node of `subtree`, which is no leaf, and how many there are.
-pub(crate) fn children(tree: &Bvh, decisions: &[Decision], subtree: usize) -> ([usize; 8], usize) {
-    // At most 8 slots are shared out: no more than 8 parts wait at any time.
-    let mut parts = [(subtree, decisions[subtree].slots[7]); 8];
-    let mut count = 1;
-    let mut lanes = 0;
-    let mut children = [0; 8];
-    while count > 0 {
-        count -= 1;
-        let (part, slots) = parts[count];
-        if slots == 0 {
-            children[lanes] = part;
-            lanes += 1;
-            continue;
-        }
-        let first = tree.nodes[part].children().start;
-        for (part, slots) in [(first + 1, slots >> 4), (first, slots & 15)] {
-            parts[count] = (part, decisions[part].slots[usize::from(slots) - 1]);
-            count += 1;
-        }
-    }
-    (children, lanes)
-}
 
 /// By how much each subtree promises to stop a ray, in relation to the expected time of tracing a ray through it. Rays that
 /// ask for any hit visit the child of most promise first, which is in the last lane.
@@ -109,7 +18,7 @@ pub(crate) fn children(tree: &Bvh, decisions: &[Decision], subtree: usize) -> ([
 ///
 /// Source: Ogaki & Derouet-Jourdan 2014, 'An N-ary BVH child node sorting technique for occlusion test'. Differs from the paper:
 /// no rays are sampled.
-fn promise(tree: &Bvh, triangles: &[Triangle], visits: &[f32], decisions: &[Decision]) -> Vec<f32> {
+fn promise(tree: &Bvh, triangles: &[Triangle], visits: &[f32], costs: &[Costs]) -> Vec<f32> {
     let mut areas = vec![0.0f64; tree.nodes.len()];
     for (index, node) in tree.nodes.iter().enumerate().rev() {
         // A leaf tests all of a triangle, though only a part of it may be in its box.
@@ -124,7 +33,7 @@ fn promise(tree: &Bvh, triangles: &[Triangle], visits: &[f32], decisions: &[Deci
         let area = areas[index];
         let half_area = node.aabb.half_area();
         let stopped = if area > 0.0 { area / (area + half_area) } else { 0.0 };
-        let time = decisions[index].costs[0] / visits[index].max(f32::MIN_POSITIVE);
+        let time = costs[index][0] / visits[index].max(f32::MIN_POSITIVE);
         (stopped / f64::from(time).max(f64::MIN_POSITIVE)) as f32
     };
     tree.nodes
@@ -140,7 +49,7 @@ fn sizes(tree: &Bvh, decisions: &[Decision]) -> (usize, usize) {
     let mut open = vec![0];
     while let Some(subtree) = open.pop() {
         let decision = &decisions[subtree];
-        if decision.leaf {
+        if decision.is_leaf {
             sizes.1 += decision
                 .objects
                 .div_ceil(TriangleBlock::LANES as u32) as usize;
@@ -151,16 +60,6 @@ fn sizes(tree: &Bvh, decisions: &[Decision]) -> (usize, usize) {
         }
     }
     sizes
-}
-
-/// The part of the lines through the root's box that meet each node's.
-pub(crate) fn areas(tree: &Bvh) -> Vec<f32> {
-    let root_area = tree.nodes[0].aabb.half_area();
-    let scale = if root_area > 0.0 { 1.0 / root_area } else { 0.0 };
-    tree.nodes
-        .iter()
-        .map(|node| (node.aabb.half_area() * scale) as f32)
-        .collect()
 }
 
 /// The wide layout of least expected cost for rays that enter the nodes of `tree` as often as `visits` says, by default for
@@ -199,9 +98,10 @@ pub(crate) fn widen(
     let split = tree.prim_ids.len() > triangles.len();
     let blocks =
         |objects: u32| Some(block_cost * objects.div_ceil(TriangleBlock::LANES as u32) as f32);
-    let decisions = decide(tree, &visits, blocks);
-    let promise = promise(tree, triangles, &visits, &decisions);
+    let (decisions, costs) = decide(tree, &visits, blocks);
+    let promise = promise(tree, triangles, &visits, &costs);
     drop(visits);
+    drop(costs);
     // A vector that grows would take up to three times its memory while it is copied.
     let (node_count, most_blocks) = sizes(tree, &decisions);
     let mut ids = Vec::new();
@@ -210,7 +110,7 @@ pub(crate) fn widen(
     // Subtrees, and the lane that is to name each; none names the root.
     let mut open = vec![(0, None, 0)];
     while let Some((subtree, place, waiting)) = open.pop() {
-        let child = if decisions[subtree].leaf {
+        let child = if decisions[subtree].is_leaf {
             let child = Child::leaf(all_blocks.len() as u32);
             ids.clear();
             collect(tree, subtree, &mut ids);
@@ -251,6 +151,7 @@ pub(crate) fn widen(
 
 #[cfg(test)]
 mod tests {
+    use super::super::decide::{BLOCK_COST, NODE_COST};
     use super::*;
     use crate::Node;
     use crate::collapse::tests::{exhaustive, objects, scene};
@@ -393,7 +294,8 @@ mod tests {
         let promised = |ids: [u32; 2]| {
             let tree = Bvh { nodes: vec![root, leaves[0], leaves[1]], prim_ids: ids.to_vec() };
             let visits = areas(&tree);
-            promise(&tree, &triangles, &visits, &decide(&tree, &visits, |_| Some(BLOCK_COST)))[1]
+            let (_, costs) = decide(&tree, &visits, |_| Some(BLOCK_COST));
+            promise(&tree, &triangles, &visits, &costs)[1]
         };
         assert_eq!(promised([0, 0]), promised([0, 1]));
     }

@@ -35,7 +35,8 @@ bvh_config::config! {
         reheats_from: f64 = 7000.0, in (Excluded(0.0), Included(f64::INFINITY));
         /// Number of disjoint subtrees that are annealed at once, which limits the number of useful
         /// threads. 1 is the whole tree, which is slightly better at equal work. 0 means four
-        /// subtrees per thread for a time limit with several threads, and otherwise 1.
+        /// subtrees per thread for a time limit with several threads, one per 32 768 objects for a
+        /// budget of work if they are at least eight, and otherwise 1.
         pieces: u32 = 0, in 0..=4096;
         /// Minimum work per object of an annealing run whose temperatures are relative to the
         /// [top](Scale::Top) of a move, overriding the move's `scale`. Long runs end lower with it,

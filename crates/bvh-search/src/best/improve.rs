@@ -15,9 +15,9 @@ use crate::parallel::threads;
 use crate::run::{Observer, Problem, Quota, Run, StopReason, Stream, Tally, stream};
 use crate::tree::{Metric, Shape, Working};
 use crate::tuning::{
-    FINISH_AT_MOST, FINISH_WORK, LARGE_SUBTREE, MOST_GENERATIONS, PROBE, RECOMBINED_AT_ONCE,
-    ROUNDS_PER_LOOK, SECURED_FROM, SUBTREES_PER_THREAD, TRIAL, WORK_ON_REFERENCES, WORTH_AN_EVENT,
-    WORTH_LARGE_SUBTREES, WORTH_SUBTREES,
+    FINISH_AT_MOST, FINISH_WORK, LARGE_SUBTREE, LEAST_LARGE_SUBTREES, MOST_GENERATIONS,
+    MOST_SUBTREES, PROBE, RECOMBINED_AT_ONCE, ROUNDS_PER_LOOK, SECURED_FROM, SUBTREES_PER_THREAD,
+    TRIAL, WORK_ON_REFERENCES, WORTH_AN_EVENT, WORTH_LARGE_SUBTREES, WORTH_SUBTREES,
 };
 use bvh_core::cost::Objective;
 use bvh_core::{Aabb, Bvh};
@@ -223,15 +223,6 @@ impl Improvement<'_, '_, '_, '_> {
     /// Returns the schedule of an annealing run. `length` is the work per object of the whole
     /// search, or of the generation.
     fn schedule(&self, hot: f64, work: u64, end: f64, length: f64) -> Schedule {
-        let timed = self.run.observer().progress().is_some();
-        let by_threads = SUBTREES_PER_THREAD * threads().min(1024);
-        let is_large = self.n as usize >= by_threads * LARGE_SUBTREE;
-        let worth = if is_large { WORTH_LARGE_SUBTREES } else { WORTH_SUBTREES };
-        let subtrees = if self.config.pieces == 0 && timed && length >= worth && threads() > 1 {
-            by_threads as u32
-        } else {
-            self.config.pieces.max(1)
-        };
         let Config { cold, .. } = *self.config;
         let quota = self.run.left().at_most(work);
         Schedule {
@@ -239,9 +230,28 @@ impl Improvement<'_, '_, '_, '_> {
             cold,
             quota,
             end,
-            subtrees,
+            subtrees: self.subtrees(length),
             to_local_optimum: !self.by_layout,
         }
+    }
+
+    /// Returns the number of subtrees that are annealed at once in a run of a search with `length` work
+    /// per object.
+    fn subtrees(&self, length: f64) -> u32 {
+        if self.config.pieces > 0 {
+            return self.config.pieces;
+        }
+        let large = (self.n / LARGE_SUBTREE).min(MOST_SUBTREES) as u32;
+        let by_threads = SUBTREES_PER_THREAD * threads().min(1024) as u32;
+        let timed = self.run.observer().progress().is_some();
+        // Without a clock the number of threads must not change the tree.
+        let subtrees = match timed {
+            true if threads() > 1 => by_threads,
+            false if large >= LEAST_LARGE_SUBTREES => large,
+            _ => 1,
+        };
+        let worth = if large >= subtrees { WORTH_LARGE_SUBTREES } else { WORTH_SUBTREES };
+        if length >= worth { subtrees } else { 1 }
     }
 
     /// Makes one annealing run from `tree` and recombines the tree with the result. The `first` run

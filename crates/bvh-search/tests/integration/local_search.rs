@@ -86,19 +86,23 @@ fn every_method_improves_on_its_start_and_the_best_most() {
 
 #[test]
 fn subtrees_annealed_in_parallel_do_not_depend_on_the_number_of_threads() {
-    let boxes = scatter(1500, 2);
-    let method = Method::Best(best::Config { pieces: 8, ..Default::default() });
-    let on = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        pool.install(|| run(&method, &boxes, 2_000_000))
-    };
-    let one = on(1);
-    for threads in [2, 3] {
-        let other = on(threads);
-        assert_eq!((&one.tree, &one.history), (&other.tree, &other.history));
+    // A large scene is cut into subtrees unasked, and then ends elsewhere than as a whole.
+    for (objects, pieces, work) in [(1500, 8, 2_000_000), (1 << 18, 0, 80 << 18)] {
+        let boxes = scatter(objects, 2);
+        let run_on = |threads, pieces| {
+            let method = Method::Best(best::Config { pieces, ..Default::default() });
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            pool.install(|| run(&method, &boxes, work))
+        };
+        let one = run_on(1, pieces);
+        for threads in [2, 3] {
+            let other = run_on(threads, pieces);
+            assert_eq!((&one.tree, &one.history), (&other.tree, &other.history), "{objects}");
+        }
+        assert_ne!(one.cost, run_on(1, 1).cost, "{objects}");
     }
 }
 
