@@ -108,41 +108,43 @@ struct Cut {
 /// Returns the largest subtrees of a tree in preorder that each have at most the fraction `most` of
 /// its weight, except tiny ones. O(n).
 fn cut(tree: &Working<impl Metric>, most: f64, weight: impl Fn(u32) -> f64) -> Cut {
-    let mut totals = vec![(1u32, 0.0); tree.nodes.len()];
+    // Weights of subtrees.
+    let mut totals = vec![0.0; tree.nodes.len()];
     for (index, node) in tree.nodes.iter().enumerate().skip(1).rev() {
-        let mut total = (1, weight(index as u32));
+        totals[index] = weight(index as u32);
         if !node.is_leaf() {
-            for (nodes, weight) in node.children.map(|child| totals[child as usize]) {
-                total = (total.0 + nodes, total.1 + weight);
+            for child in node.children {
+                totals[index] += totals[child as usize];
             }
         }
-        totals[index] = total;
     }
     let all = tree
         .root()
-        .map_or(0.0, |root| totals[root as usize].1);
+        .map_or(0.0, |root| totals[root as usize]);
     // The level in a subtree, 1 for its root; 0 outside all subtrees.
     let mut depths = vec![0u8; tree.nodes.len()];
-    let mut subtrees = vec![];
+    let mut subtrees: Vec<Subtree> = vec![];
     let mut starts = vec![];
     let mut of_starts = 0.0;
     for (index, node) in (0..).zip(&tree.nodes).skip(1) {
         let above = depths[node.parent as usize];
-        let (nodes, total) = totals[index as usize];
+        let total = totals[index as usize];
         if above > 0 {
             depths[index as usize] = above.saturating_add(1);
+            if let Some(subtree) = subtrees.last_mut() {
+                subtree.nodes += 1;
+            }
         } else if total <= most * all {
             depths[index as usize] = 1;
-            // A smaller subtree is left to the moves on the whole tree.
-            if nodes >= 2 * LEAST_SUBTREE {
-                subtrees.push(Subtree { root: index, nodes, weight: total });
-            }
+            subtrees.push(Subtree { root: index, nodes: 1, weight: total });
         }
         if depths[index as usize] <= BELOW_SUBTREE_ROOTS {
             starts.push(index);
             of_starts += weight(index);
         }
     }
+    // A smaller subtree is left to the moves on the whole tree.
+    subtrees.retain(|subtree| subtree.nodes >= 2 * LEAST_SUBTREE);
     let whole_tree = (MOVES_AT_BORDERS * of_starts / all).min(WHOLE_TREE);
     Cut { subtrees, starts, whole_tree }
 }

@@ -129,9 +129,10 @@ impl Config {
     }
 
     /// Builds the initial tree. Unless the configuration names a builder, also builds a clustering,
-    /// which takes a fraction of the time. A much cheaper clustering becomes the initial tree;
-    /// otherwise it is kept aside, so no budget ends above the start of the smallest budgets. Its
-    /// work counts only if it is used, like the work of the [`fallback`].
+    /// which takes a fraction of the time. If the clustering or the caller's tree is much cheaper, it
+    /// becomes the initial tree; otherwise the cheaper of the two is kept aside, so no budget ends above
+    /// the start of the smallest budgets. The work of a clustering counts only if it is used, like the
+    /// work of the [`fallback`].
     fn initial(
         &self,
         morton: Option<MortonOrder>,
@@ -147,30 +148,24 @@ impl Config {
         let morton = morton.map_or_else(|| MortonOrder::new(boxes), Ok)?;
         let clustered =
             watched(run.observer(), |watch| morton.build_watched(&CLUSTERING, None, watch))?;
+        // The objective evaluates a clustering by area, too. Only the cheapest tree is kept, because the
+        // division of a large scene needs most of the memory of the search.
+        run.keep_aside(Kept::new(clustered, problem));
         // A large division takes tenths of a second before it looks at its watch.
         let is_over = boxes.len() > RECOMBINED_AT_ONCE && run.observer().cancelled();
         let started =
             if is_over { Err(BuildError::Cancelled) } else { watched(run.observer(), build) };
-        let started = match started {
-            // Where an evaluation takes long, a cancelled search does with the tree that it has.
-            Err(BuildError::Cancelled) if run.has_tree() && is_dear(problem) => {
-                return Err(BuildError::Cancelled.into());
-            }
-            Err(BuildError::Cancelled) => return Ok(Kept::new(clustered, problem)),
-            started => started?,
-        };
-        // The evaluations of two large trees take half a second.
-        if run.has_tree() && is_dear(problem) && run.observer().cancelled() {
+        let started = started?;
+        // A cancelled search ends with the tree aside. The evaluation of another takes a quarter of a
+        // second.
+        if is_dear(problem) && run.observer().cancelled() {
             return Err(BuildError::Cancelled.into());
         }
-        // Both are evaluated by the problem's objective, also where the clustering was built by
-        // area.
-        let [clustered, started] = [clustered, started].map(|tree| Kept::new(tree, problem));
-        if clustered.cost < CLUSTERING_MUCH_CHEAPER * started.cost {
+        let started = Kept::new(started, problem);
+        if let Some(aside) = run.take_aside_below(CLUSTERING_MUCH_CHEAPER * started.cost) {
             run.keep_aside(started);
-            return Ok(clustered);
+            return Ok(aside);
         }
-        run.keep_aside(clustered);
         Ok(started)
     }
 

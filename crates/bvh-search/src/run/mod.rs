@@ -143,10 +143,9 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Returns whether there is a tree aside, which becomes the outcome of a search that ends
-    /// without a tree.
-    pub fn has_tree(&self) -> bool {
-        self.aside.is_some()
+    /// Takes the tree kept aside, if it costs less.
+    pub(crate) fn take_aside_below(&mut self, cost: f64) -> Option<Kept> {
+        self.aside.take_if(|aside| aside.cost < cost)
     }
 
     /// Returns the cheapest of the tree that the search `found`, the tree kept aside, and the
