@@ -237,9 +237,7 @@ impl Build<'_> {
         if self.extra == 0 || left.intersection(right).half_area() <= self.least_overlap {
             return Ok(by_objects);
         }
-        let spatial = self
-            .best_plane(aabb, references)
-            .filter(|plane| plane.cost < by_objects.cost);
+        let spatial = self.best_plane(aabb, references, by_objects.cost);
         let spatial = spatial.and_then(|plane| self.spatial_split(references, plane));
         Ok(match spatial.filter(|spatial| spatial.cost < by_objects.cost) {
             Some(spatial) => {
@@ -304,6 +302,42 @@ mod tests {
             .unwrap();
         let whole = cost::total_area(&whole);
         assert!(before < 0.97 * whole, "{before} of {whole}");
+    }
+
+    #[test]
+    fn planes_that_cannot_cost_less_than_the_object_split_are_skipped_and_no_other() {
+        let triangles = needles(2000);
+        let objects = &triangles.as_slice();
+        let config = Config::default();
+        let watch = Watch::default();
+        let build = Build {
+            config: &config,
+            objects,
+            extra: usize::MAX,
+            watch: &watch,
+            least_overlap: 0.0,
+            powers: (0..=8)
+                .map(|n| libm::pow(f64::from(n), config.power))
+                .collect(),
+            axes: Default::default(),
+        };
+        let mut kept = 0;
+        for (group, first) in triangles.chunks(8).zip((0..).step_by(8)) {
+            let references: Vec<Reference> = group
+                .iter()
+                .zip(first..)
+                .map(|(triangle, object)| Reference { aabb: triangle.aabb(), object })
+                .collect();
+            let aabb = union(&references);
+            let all = build.best_plane(&aabb, &references, f64::INFINITY);
+            for part in [0.5, 0.6, 0.7, 0.8, 0.9, 1.0] {
+                let most = part * build.cost(&aabb, references.len());
+                let expected = all.filter(|plane| plane.cost < most);
+                assert_eq!(build.best_plane(&aabb, &references, most), expected);
+                kept += usize::from(expected.is_some());
+            }
+        }
+        assert!((100..1400).contains(&kept), "{kept}");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use crate::watch::Pace;
 use bvh_core::Aabb;
 
 /// A candidate of a spatial split.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Plane {
     pub cost: f64,
     axis: usize,
@@ -15,13 +15,19 @@ pub(super) struct Plane {
 
 impl Build<'_> {
     /// Returns the border of bins where a spatial split costs least before unsplitting; the first
-    /// among equal borders.
-    pub(super) fn best_plane(&self, aabb: &Aabb, references: &[Reference]) -> Option<Plane> {
-        let along = |axis| self.best_plane_along(axis, aabb, references);
+    /// among equal borders. `None` if no border costs less than `most`.
+    pub(super) fn best_plane(
+        &self,
+        aabb: &Aabb,
+        references: &[Reference],
+        most: f64,
+    ) -> Option<Plane> {
+        let along = |axis| self.best_plane_along(axis, aabb, references, most);
         let found = in_parallel(references.len(), || along(0), || along(1), || along(2));
         found
             .into_iter()
             .flatten()
+            .filter(|plane| plane.cost < most)
             .reduce(|best, plane| if plane.cost < best.cost { plane } else { best })
     }
 
@@ -30,6 +36,7 @@ impl Build<'_> {
         axis: usize,
         aabb: &Aabb,
         references: &[Reference],
+        most: f64,
     ) -> Option<Plane> {
         let bins = self.config.bins as usize;
         let all = references.len();
@@ -43,25 +50,41 @@ impl Build<'_> {
         if border(1) <= aabb.min[axis] || border(bins - 1) >= aabb.max[axis] {
             return None;
         }
+        // The box around everything in a bin, how many references begin there, and how many end.
         let mut parts = vec![(Aabb::EMPTY, 0usize, 0usize); bins];
         let bins_of = |reference: &Reference| {
             [reference.aabb.min[axis], reference.aabb.max[axis]].map(bin_of)
         };
-        for [first, last] in references.iter().map(bins_of) {
+        // The boxes around the undivided references that begin in a bin, and that end there.
+        let mut whole = vec![[Aabb::EMPTY; 2]; bins];
+        for reference in references {
+            let [first, last] = bins_of(reference);
             // A reference enters the left side of every plane after its first bin, and leaves the
             // right side of every plane after its last.
             parts[first].1 += 1;
             parts[last].2 += 1;
+            whole[first][0] = whole[first][0].union(&reference.aabb);
+            whole[last][1] = whole[last][1].union(&reference.aabb);
         }
-        // If no plane has a reference entirely on either side, no plane divides anything, and the
-        // parts need not be clipped.
+        // A side costs at least as much as with the references alone that no plane cuts. If no plane
+        // divides anything for less than `most` even so, the parts need not be clipped.
+        let mut behind = vec![Aabb::EMPTY; bins + 1];
+        for bin in (0..bins).rev() {
+            behind[bin] = behind[bin + 1].union(&whole[bin][0]);
+        }
+        let mut before = Aabb::EMPTY;
         let mut entered = 0;
         let mut gone = 0;
-        let divides = parts[..bins - 1].iter().any(|part| {
-            (entered, gone) = (entered + part.1, gone + part.2);
-            (1..all).contains(&entered) && (1..all).contains(&(all - gone))
+        let may_pay = (1..bins).any(|bin| {
+            before = before.union(&whole[bin - 1][1]);
+            entered += parts[bin - 1].1;
+            gone += parts[bin - 1].2;
+            let left = all - gone;
+            (1..all).contains(&entered)
+                && (1..all).contains(&left)
+                && self.cost(&before, entered) + self.cost(&behind[bin], left) < most
         });
-        if !divides {
+        if !may_pay {
             return None;
         }
         let mut pace = Pace::new(self.watch);
