@@ -33,6 +33,12 @@ pub enum Error {
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] bvh_terminal::files::WriteError),
+    /// The scene is too large for the memory that the process can have.
+    #[error(
+        "scene {scene}: a bake of {objects} objects needs {bytes} bytes of memory, more than this \
+         process can have; accepted: fewer objects"
+    )]
+    Memory { scene: String, objects: usize, bytes: usize },
     /// A search failed.
     #[error("scene {scene}, method {method}: {source}")]
     Search { scene: String, method: String, source: Box<SearchError> },
@@ -99,6 +105,7 @@ impl Error {
             Self::Io { .. }
             | Self::Interface(bvh_terminal::Error::Io { .. })
             | Self::Write(_)
+            | Self::Memory { .. }
             | Self::Search { .. }
             | Self::Tracing { .. } => 1,
         }

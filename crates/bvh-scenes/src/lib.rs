@@ -24,4 +24,6 @@ pub mod tree_file;
 
 pub use bvh_files::{ReadError, read, read_text};
 pub use fnv::fnv1a;
-pub use scene::{FETCHED, NoTriangles, SPHERES, Scene, SceneError, SceneKind, fetched_path};
+pub use scene::{
+    FETCHED, NoTriangles, SPHERES, Scene, SceneError, SceneKind, fetched_path, is_allocatable,
+};

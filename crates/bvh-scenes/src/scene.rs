@@ -78,9 +78,18 @@ pub const FETCHED: [(&str, &str); 3] = [("sponza", "bvh"), ("kitchen", "obvhs"),
 pub const SPHERES: [(&str, usize); 3] =
     [("spheres75", 75), ("spheres750", 750), ("spheres7500", 7500)];
 
-/// The largest number of objects of a generated scene. Together with boxes and a tree they need ten
-/// gigabytes.
+/// The largest number of objects of a generated scene. A bake of as many needs 35 gigabytes.
 const MOST_GENERATED: usize = 100_000_000;
+
+/// Returns whether the process may have a block of this many bytes: whether its limits permit it, and
+/// the system does not reject it as larger than all memory. Touches no memory.
+pub fn is_allocatable(bytes: usize) -> bool {
+    let mut block: Vec<u8> = Vec::new();
+    let result = block.try_reserve_exact(bytes);
+    // A block that nobody sees need not be allocated.
+    std::hint::black_box(&block);
+    result.is_ok()
+}
 
 impl Scene {
     /// Loads a scene by name.
@@ -164,10 +173,27 @@ impl Scene {
         })
     }
 
+    /// Returns the number of objects of a scene that [`load`](Self::load) would generate by this name;
+    /// `None` for all other names.
+    pub fn generated_objects(name: &str) -> Option<usize> {
+        match Subset::parse(name)? {
+            (id, Subset::Spaced(objects)) => {
+                generator(id)?;
+                Some(objects).filter(|objects| (1..=MOST_GENERATED).contains(objects))
+            }
+            _ => None,
+        }
+    }
+
     /// Generates a scene of `objects` objects, or of nearly as many where the generator cannot make
     /// exactly that number.
     fn generated(id: &str, name: &str, objects: usize) -> Result<Self, SceneError> {
         let generator = generator(id).filter(|_| (1..=MOST_GENERATED).contains(&objects));
+        let bytes = objects.saturating_mul(size_of::<Triangle>() + size_of::<Aabb>());
+        if generator.is_some() && !is_allocatable(bytes) {
+            let message = format!("its triangles and their boxes need {bytes} bytes of memory");
+            return Err(SceneError::new(name, message));
+        }
         let triangles = generator.map_or_else(Vec::new, |triangles| triangles(objects));
         if triangles.is_empty() {
             let message = format!("a generated scene has 1 to {MOST_GENERATED} objects");
@@ -292,6 +318,23 @@ mod tests {
             let message = Scene::load(wrong).unwrap_err().to_string();
             assert!(message.contains(wrong) && message.contains("1 to 100000000"), "{message}");
         }
+    }
+
+    #[test]
+    fn the_number_of_objects_of_a_generated_scene_is_known_before_it_is_generated() {
+        assert_eq!(Scene::generated_objects("city:100000000"), Some(100_000_000));
+        assert_eq!(Scene::generated_objects("S34:20000"), Some(20_000));
+        for other in
+            ["city", "city:100000001", "escher:100", "spheres75", "a.ply", "city:random:9:1"]
+        {
+            assert_eq!(Scene::generated_objects(other), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn a_block_larger_than_all_memory_is_not_allocatable() {
+        assert!(is_allocatable(0) && is_allocatable(1 << 20));
+        assert!(!is_allocatable(usize::MAX / 4));
     }
 
     #[test]

@@ -260,7 +260,19 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     output_file("--out", &out, &TREE)?;
     let plan = args.plan()?;
     args.jobs.apply()?;
+    // A decision may add references later.
+    let most_references = if args.budget.is_none() {
+        decide::REFERENCES.max(plan.references)
+    } else {
+        plan.references
+    };
+    // The number of objects of a mesh file is known when it is loaded.
+    if let Some(objects) = Scene::generated_objects(&args.scene) {
+        plan::check_memory(&args.scene, objects, most_references, 0)?;
+    }
     let scene = args.files.load(&args.scene)?;
+    let objects = scene.boxes.len();
+    plan::check_memory(&scene.name, objects, most_references, plan::BYTES_PER_LOADED)?;
     if args.explain {
         let text = explain::scene(&scene).map_err(Error::search(&scene.name, "--explain"))?;
         print_line(&text);
@@ -272,14 +284,8 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         }
         None => None,
     };
-    let plan = args.with_budget(plan, scene.boxes.len());
-    // Reserving the file first reports a full disk before the search and not after it. A decision may
-    // add references later.
-    let most_references = if args.budget.is_none() {
-        decide::REFERENCES.max(plan.references)
-    } else {
-        plan.references
-    };
+    let plan = args.with_budget(plan, objects);
+    // Reserving the file first reports a full disk before the search and not after it.
     let reserved = Reserved::new(&out, plan::most_bytes(&scene, most_references))?;
     let (plan, prepared) = args.decided(plan, &scene, interrupted)?;
     let (bake, greedy) = plan.begin(&scene, start.as_ref(), prepared, interrupted)?;

@@ -4,8 +4,8 @@
 #![cfg_attr(windows, allow(unused_imports))]
 
 use crate::support::{
-    ReadOnly, ended, names, outside_buffer, outside_scene, program, refused, said, unsaid,
-    wrong_flags,
+    ReadOnly, ended, names, outside_buffer, outside_scene, program, refused, run_in_little_memory,
+    said, unsaid, wrong_flags,
 };
 use std::fs;
 use std::path::Path;
@@ -98,6 +98,20 @@ fn pipes_devices_and_folders_are_rejected_as_inputs() {
     ] {
         refused(at, args, 2, parts);
     }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_scene_that_needs_more_memory_than_the_limit_is_rejected_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let limited = |args: &str| run_in_little_memory(folder.path(), args, 4_000_000);
+    // A rejection of the scene's own size would end with code 2.
+    let output = limited("bake city:100000000 --budget=0s --out=x.bvh");
+    ended(&output, 1, &["city:100000000", "100000000 objects", "36500000000 bytes", "fewer"]);
+    let output = limited("render city:100000000 --out=x.png");
+    ended(&output, 2, &["city:100000000", "6000000000 bytes"]);
+    assert_eq!(names(folder.path()), [""; 0]);
+    ended(&limited("bake city:1000 --budget=0s --out=x.bvh"), 0, &[]);
 }
 
 // Linux stores holes of files, so that this file needs no space on the disk.
