@@ -226,8 +226,38 @@ pub fn add_together(faults: &mut Vec<OutOfRange>, together: impl IntoIterator<It
 /// it. Without `in`, every value is accepted. The right side of `in` is any value that
 /// [`Accepts`](crate::Accepts) the field's type. A function after the struct may check combinations
 /// of fields and returns their faults, as in `check Self::temperatures_fall;`.
+///
+/// An `enum` instead of the struct gets the same traits except [`Default`] and
+/// [`Check`](crate::Check), and names in snake case:
+///
+/// ```
+/// bvh_config::config! {
+///     /// The order of measurements.
+///     #[derive(Copy, Eq)]
+///     pub enum Order {
+///         /// By the time of arrival.
+///         FirstIn,
+///         /// By the measured value.
+///         Ascending,
+///     }
+/// }
+/// assert_ne!(Order::FirstIn, Order::Ascending);
+/// ```
 #[macro_export]
 macro_rules! config {
+    ($(#[$meta:meta])* $visibility:vis enum $name:ident { $($variants:tt)* }) => {
+        #[derive(Clone, Debug, PartialEq)]
+        #[cfg_attr(
+            feature = "serde",
+            derive(::serde::Serialize, ::serde::Deserialize),
+            serde(rename_all = "snake_case")
+        )]
+        #[cfg_attr(feature = "schema", derive(::schemars::JsonSchema))]
+        $(#[$meta])*
+        $visibility enum $name {
+            $($variants)*
+        }
+    };
     (@default) => { ::core::default::Default::default() };
     (@default $default:expr) => { $default };
     (@accepted $type:ty) => { ::core::option::Option::None };

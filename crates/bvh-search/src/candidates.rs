@@ -7,21 +7,17 @@ use bvh_build::top_down::{Split, SplitCost, SplitRule, Sweep};
 use bvh_config::{Accepts, Check, OutOfRange};
 use rand::RngExt;
 
-/// The restricted candidate list of a node.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Candidates {
-    /// The best split of each of the three axes.
-    AxisBest,
-    /// The k best splits of all axes, k ≥ 1.
-    KBest(u32),
-    /// The best split and all splits that cost less than (1 + α) times as much, α ≥ 0.
-    Within(f64),
+bvh_config::config! {
+    /// The restricted candidate list of a node.
+    #[derive(Copy)]
+    pub enum Candidates {
+        /// The best split of each of the three axes.
+        AxisBest,
+        /// The k best splits of all axes, k ≥ 1.
+        KBest(u32),
+        /// The best split and all splits that cost less than (1 + α) times as much, α ≥ 0.
+        Within(f64),
+    }
 }
 
 impl Check for Candidates {

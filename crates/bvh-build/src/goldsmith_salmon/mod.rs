@@ -50,23 +50,20 @@ bvh_config::config! {
     }
 }
 
-/// The choice of the next node on the path among children that do not contain the object.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Descent {
-    /// The child whose cost grows least: by children · growth of S for an inner node, and by 2 ·
-    /// S(pair) for a leaf, which cost nothing before. Ng & Trifonov's 'minimal increase in cost'.
-    #[default]
-    Cost,
-    /// The child whose area grows least, inner node or leaf: Ericson's reading of Goldsmith &
-    /// Salmon. Its mean cost is within 3 % of the other rule. A build takes O(n²) if many leaves
-    /// are nested.
-    Area,
+bvh_config::config! {
+    /// The choice of the next node on the path among children that do not contain the object.
+    #[derive(Copy, Default, Eq)]
+    pub enum Descent {
+        /// The child whose cost grows least: by children · growth of S for an inner node, and by 2
+        /// · S(pair) for a leaf, which cost nothing before. Ng & Trifonov's 'minimal increase in
+        /// cost'.
+        #[default]
+        Cost,
+        /// The child whose area grows least, inner node or leaf: Ericson's reading of Goldsmith &
+        /// Salmon. Its mean cost is within 3 % of the other rule. A build takes O(n²) if many
+        /// leaves are nested.
+        Area,
+    }
 }
 
 /// The objects of a scene, checked once for any number of builds by half area or by a measure.

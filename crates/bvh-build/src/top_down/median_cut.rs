@@ -24,21 +24,17 @@ bvh_config::config! {
     }
 }
 
-/// The axis along which a node is cut.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum CutAxis {
-    /// x at the root, then y, z, x and so on by level (Kay & Kajiya).
-    Alternating,
-    /// The longest side of the node's box.
-    Longest,
-    /// Always x.
-    X,
+bvh_config::config! {
+    /// The axis along which a node is cut.
+    #[derive(Copy, Eq)]
+    pub enum CutAxis {
+        /// x at the root, then y, z, x and so on by level (Kay & Kajiya).
+        Alternating,
+        /// The longest side of the node's box.
+        Longest,
+        /// Always x.
+        X,
+    }
 }
 
 struct Frame {

@@ -37,25 +37,21 @@ bvh_config::config! {
     }
 }
 
-/// The cost of a split.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Heuristic {
-    /// S(L)·|L| + S(R)·|R|.
-    #[default]
-    AreaTimesCount,
-    /// S(L)·|L|^p + S(R)·|R|^p, 0 ≤ p ≤ 1.
-    AreaTimesPower(f64),
-    /// Only areas: the heuristic of Table 2, in one of its readings.
-    AreaOnly(AreaOnly),
-    /// S(L)·ΣC_obj(L) + S(R)·ΣC_obj(R) with made-up costs, to measure the effect of object costs.
-    /// Pass known costs to [`Config::build_weighted`].
-    AreaTimesCost(MadeUpCosts),
+bvh_config::config! {
+    /// The cost of a split.
+    #[derive(Copy, Default)]
+    pub enum Heuristic {
+        /// S(L)·|L| + S(R)·|R|.
+        #[default]
+        AreaTimesCount,
+        /// S(L)·|L|^p + S(R)·|R|^p, 0 ≤ p ≤ 1.
+        AreaTimesPower(f64),
+        /// Only areas: the heuristic of Table 2, in one of its readings.
+        AreaOnly(AreaOnly),
+        /// S(L)·ΣC_obj(L) + S(R)·ΣC_obj(R) with made-up costs, to measure the effect of object
+        /// costs. Pass known costs to [`Config::build_weighted`].
+        AreaTimesCost(MadeUpCosts),
+    }
 }
 
 /// Costs C_obj for scenes whose objects have no known costs: one object in `every` is more

@@ -121,30 +121,26 @@ impl SplitCost for AreaTimesPower {
     }
 }
 
-/// A heuristic that 'only considers the surface area of the subscene bounding volumes, ignoring the
-/// number of objects contained inside them' (Ng & Trifonov 2003, section 3.3 and Table 2). The
-/// paper gives no formula; these are the known readings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum AreaOnly {
-    /// S(L) + S(R), the literal reading.
-    Sum,
-    /// S(L) + S(R), where a side of one object counts 0: the direct use of the objective, which
-    /// skips leaves.
-    InnerSum,
-    /// max(S(L), S(R)).
-    Max,
-    /// S(L)² + S(R)², between the sum and the maximum.
-    SumOfSquares,
-    /// |S(L) − S(R)|, least for equal areas.
-    Difference,
-    /// S(L) · S(R).
-    Product,
+bvh_config::config! {
+    /// A heuristic that 'only considers the surface area of the subscene bounding volumes, ignoring
+    /// the number of objects contained inside them' (Ng & Trifonov 2003, section 3.3 and Table 2).
+    /// The paper gives no formula; these are the known readings.
+    #[derive(Copy, Eq)]
+    pub enum AreaOnly {
+        /// S(L) + S(R), the literal reading.
+        Sum,
+        /// S(L) + S(R), where a side of one object counts 0: the direct use of the objective, which
+        /// skips leaves.
+        InnerSum,
+        /// max(S(L), S(R)).
+        Max,
+        /// S(L)² + S(R)², between the sum and the maximum.
+        SumOfSquares,
+        /// |S(L) − S(R)|, least for equal areas.
+        Difference,
+        /// S(L) · S(R).
+        Product,
+    }
 }
 
 impl SplitCost for AreaOnly {

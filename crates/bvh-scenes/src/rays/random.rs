@@ -8,19 +8,15 @@ use bvh_search::Stream;
 use glam::{DVec3, Vec3};
 use rand::{RngExt, SeedableRng};
 
-/// A distribution of random rays over the root's box.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Family {
-    /// The paper's rays: the origin is uniform in the box, and the direction is uniform.
-    Inside,
-    /// Lines that meet the box, uniform in the measure that is proportional to surface area.
-    Lines,
+bvh_config::config! {
+    /// A distribution of random rays over the root's box.
+    #[derive(Copy, Eq)]
+    pub enum Family {
+        /// The paper's rays: the origin is uniform in the box, and the direction is uniform.
+        Inside,
+        /// Lines that meet the box, uniform in the measure that is proportional to surface area.
+        Lines,
+    }
 }
 
 /// Returns a random ray of a family; `None` if the box is too small or too large for a ray.
@@ -67,26 +63,23 @@ pub(super) fn on_sphere(rng: &mut Stream) -> DVec3 {
     }
 }
 
-/// A kind of rays that a renderer traces. All directions are unit vectors and all rays begin at
-/// distance 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Kind {
-    /// Rays with uniform origins in the root's box and uniform directions; nearest hit.
-    Incoherent,
-    /// Rays from a pinhole camera with an angle of view of 60 degrees, pixels in Morton order;
-    /// nearest hit.
-    Primary,
-    /// Rays from the hits of the primary rays, in their order, in random directions; nearest hit.
-    Bounce,
-    /// Rays from the hits of the primary rays, in their order, to a light below the middle of the
-    /// box's upper side; any hit.
-    Shadow,
+bvh_config::config! {
+    /// A kind of rays that a renderer traces. All directions are unit vectors and all rays begin at
+    /// distance 0.
+    #[derive(Copy, Eq)]
+    pub enum Kind {
+        /// Rays with uniform origins in the root's box and uniform directions; nearest hit.
+        Incoherent,
+        /// Rays from a pinhole camera with an angle of view of 60 degrees, pixels in Morton order;
+        /// nearest hit.
+        Primary,
+        /// Rays from the hits of the primary rays, in their order, in random directions; nearest
+        /// hit.
+        Bounce,
+        /// Rays from the hits of the primary rays, in their order, to a light below the middle of
+        /// the box's upper side; any hit.
+        Shadow,
+    }
 }
 
 impl Kind {

@@ -9,21 +9,17 @@ use bvh_core::{
 };
 use std::borrow::Cow;
 
-/// The question that a ray answers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Query {
-    /// Does the ray hit any object? The paper's shadow rays ask this.
-    Any,
-    /// Which object does the ray hit first?
-    Nearest,
-    /// Which objects are on the ray? No hit ends the traversal.
-    All,
+bvh_config::config! {
+    /// The question that a ray answers.
+    #[derive(Copy, Eq)]
+    pub enum Query {
+        /// Does the ray hit any object? The paper's shadow rays ask this.
+        Any,
+        /// Which object does the ray hit first?
+        Nearest,
+        /// Which objects are on the ray? No hit ends the traversal.
+        All,
+    }
 }
 
 /// A structure that narrows down the objects that a ray may hit.

@@ -13,25 +13,21 @@ use crate::local::reinsertion;
 use crate::run::{Observer, Quota, Tally};
 use crate::tree::{Metric, Working};
 
-/// A local search by name, with its default order of nodes: how other searches improve a tree they
-/// have made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum LocalSearch {
-    /// Leaves the tree as it is.
-    #[default]
-    None,
-    /// By [rotations](crate::rotation).
-    Rotation,
-    /// By [treelets](crate::treelet) of 7 leaves.
-    Treelet,
-    /// By [reinsertion](crate::reinsertion).
-    Reinsertion,
+bvh_config::config! {
+    /// A local search by name, with its default order of nodes: how other searches improve a tree
+    /// they have made.
+    #[derive(Copy, Default, Eq)]
+    pub enum LocalSearch {
+        /// Leaves the tree as it is.
+        #[default]
+        None,
+        /// By [rotations](crate::rotation).
+        Rotation,
+        /// By [treelets](crate::treelet) of 7 leaves.
+        Treelet,
+        /// By [reinsertion](crate::reinsertion).
+        Reinsertion,
+    }
 }
 
 impl LocalSearch {

@@ -27,19 +27,15 @@ bvh_config::config! {
     }
 }
 
-/// The order of a pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Order {
-    /// Children before their parents.
-    BottomUp,
-    /// The largest node first; among equal nodes, parents first.
-    ByArea,
+bvh_config::config! {
+    /// The order of a pass.
+    #[derive(Copy, Eq)]
+    pub enum Order {
+        /// Children before their parents.
+        BottomUp,
+        /// The largest node first; among equal nodes, parents first.
+        ByArea,
+    }
 }
 
 search_by_metric!(Config);

@@ -56,21 +56,17 @@ bvh_config::config! {
     }
 }
 
-/// The search's knowledge of its end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Horizon {
-    /// The search ends with the budget's work or the observer's time, or after `work_per_object` if
-    /// there is neither. It plans one long annealing run until then.
-    Known,
-    /// The search may be stopped at any moment, and otherwise ends after `work_per_object`.
-    /// Generations of growing length keep a good tree available.
-    Open,
+bvh_config::config! {
+    /// The search's knowledge of its end.
+    #[derive(Copy, Eq)]
+    pub enum Horizon {
+        /// The search ends with the budget's work or the observer's time, or after
+        /// `work_per_object` if there is neither. It plans one long annealing run until then.
+        Known,
+        /// The search may be stopped at any moment, and otherwise ends after `work_per_object`.
+        /// Generations of growing length keep a good tree available.
+        Open,
+    }
 }
 
 impl Config {

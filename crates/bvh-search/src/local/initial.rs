@@ -5,21 +5,16 @@ use bvh_config::{Accepts, Check, Nested, OutOfRange};
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh};
 
-/// A builder of a tree with one object per leaf. Different initial trees lead to different local
-/// optima.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Start {
-    /// Greedy top-down division.
-    MullerFellner(muller_fellner::Config),
-    /// Bottom-up clustering: better on some scenes of architecture and machines, much worse on
-    /// smooth surfaces.
-    Agglomerative(ploc::Config),
+bvh_config::config! {
+    /// A builder of a tree with one object per leaf. Different initial trees lead to different
+    /// local optima.
+    pub enum Start {
+        /// Greedy top-down division.
+        MullerFellner(muller_fellner::Config),
+        /// Bottom-up clustering: better on some scenes of architecture and machines, much worse on
+        /// smooth surfaces.
+        Agglomerative(ploc::Config),
+    }
 }
 
 impl Default for Start {

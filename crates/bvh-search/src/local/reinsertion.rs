@@ -27,19 +27,15 @@ bvh_config::config! {
     }
 }
 
-/// The order of a pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Order {
-    /// The largest node first, equal nodes by index.
-    ByArea,
-    /// A new random order in every pass.
-    Random,
+bvh_config::config! {
+    /// The order of a pass.
+    #[derive(Copy, Eq)]
+    pub enum Order {
+        /// The largest node first, equal nodes by index.
+        ByArea,
+        /// A new random order in every pass.
+        Random,
+    }
 }
 
 search_by_metric!(Config);

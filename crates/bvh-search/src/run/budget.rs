@@ -26,25 +26,21 @@ impl Budget {
     pub const UNLIMITED: Self = Self { max_evaluations: None, max_work: None };
 }
 
-/// Why a search returned.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum StopReason {
-    /// The search completed everything that its configuration requests.
-    Completed,
-    /// No tree costs less than the incumbent.
-    Optimal,
-    /// [`Budget::max_evaluations`] was reached.
-    Evaluations,
-    /// [`Budget::max_work`] was reached.
-    Work,
-    /// The observer cancelled the search.
-    Cancelled,
+bvh_config::config! {
+    /// Why a search returned.
+    #[derive(Copy, Eq)]
+    pub enum StopReason {
+        /// The search completed everything that its configuration requests.
+        Completed,
+        /// No tree costs less than the incumbent.
+        Optimal,
+        /// [`Budget::max_evaluations`] was reached.
+        Evaluations,
+        /// [`Budget::max_work`] was reached.
+        Work,
+        /// The observer cancelled the search.
+        Cancelled,
+    }
 }
 
 /// Counts of moves and work, for [`Run::count`](crate::Run::count).

@@ -99,28 +99,26 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// A kind of work that some scenes do not need. No shortcut changes the cost of a built tree. A
-/// search that ends early, or that the exact solver replaces, never returns a more expensive tree.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Shortcut {
-    /// An axis that orders the objects like a lower axis is neither scanned nor divided: its split
-    /// candidates are the same, and it loses ties. See
-    /// [`skip_same_order`](bvh_build::muller_fellner::Config::skip_same_order).
-    SameOrder,
-    /// Objects that are already in order along an axis are not sorted along it, for example if all
-    /// centres coincide. See [`skip_sorted`](bvh_build::muller_fellner::Config::skip_sorted).
-    Sorted,
-    /// A scene without area is divided along x only. See
-    /// [`skip_flat`](bvh_build::muller_fellner::Config::skip_flat).
-    Flat,
-    /// A search ends when its incumbent meets [a lower bound](crate::lower_bound::of_largest).
-    BoundMet,
-    /// The [exact solver](crate::exact) replaces the search `best` if it takes less work.
-    Tiny,
+bvh_config::config! {
+    /// A kind of work that some scenes do not need. No shortcut changes the cost of a built tree. A
+    /// search that ends early, or that the exact solver replaces, never returns a more expensive
+    /// tree.
+    #[derive(Copy, Eq)]
+    pub enum Shortcut {
+        /// An axis that orders the objects like a lower axis is neither scanned nor divided: its
+        /// split candidates are the same, and it loses ties. See
+        /// [`skip_same_order`](bvh_build::muller_fellner::Config::skip_same_order).
+        SameOrder,
+        /// Objects that are already in order along an axis are not sorted along it, for example if
+        /// all centres coincide. See
+        /// [`skip_sorted`](bvh_build::muller_fellner::Config::skip_sorted).
+        Sorted,
+        /// A scene without area is divided along x only. See
+        /// [`skip_flat`](bvh_build::muller_fellner::Config::skip_flat).
+        Flat,
+        /// A search ends when its incumbent meets [a lower bound](crate::lower_bound::of_largest).
+        BoundMet,
+        /// The [exact solver](crate::exact) replaces the search `best` if it takes less work.
+        Tiny,
+    }
 }
