@@ -23,7 +23,7 @@ impl SceneFiles {
         Ok(scene)
     }
 
-    /// Returns whether such buffers are read.
+    /// Returns the permission to read buffers outside the scene's folder.
     pub fn outside(self) -> OutsideFiles {
         self.outside_files.into()
     }

@@ -1,26 +1,23 @@
-//! From an initial tree to the end of the budget: annealing runs, each recombined with the
-//! incumbent.
+//! From an initial tree to the end of the budget: the choice of annealing runs and their schedules.
 
 use super::config::{Config, Horizon};
+use super::improvement::{AnnealingRun, Improvement, TRIALS, cost};
 use super::plan::{Planned, plan};
-use super::recombine::recombine;
 use crate::annealing::cool;
-use crate::annealing::layout::Layout;
 use crate::annealing::references::Divider;
 use crate::annealing::ruin_recreate::RuinMover;
-use crate::annealing::schedule::{Schedule, anneal};
+use crate::annealing::schedule::Schedule;
 use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion;
 use crate::parallel::threads;
-use crate::run::{Observer, Problem, Quota, Run, StopReason, Stream, Tally, stream};
-use crate::tree::{Metric, Shape, Working};
+use crate::run::{Problem, Quota, Run, Stream, Tally, stream};
+use crate::tree::{Metric, Working};
 use crate::tuning::{
     FINISH_AT_MOST, FINISH_WORK, LARGE_SUBTREE, LEAST_LARGE_SUBTREES, MOST_GENERATIONS,
-    MOST_SUBTREES, PROBE, RECOMBINED_AT_ONCE, ROUNDS_PER_LOOK, SECURED_FROM, SUBTREES_PER_THREAD,
-    TRIAL, WORK_ON_REFERENCES, WORTH_AN_EVENT, WORTH_LARGE_SUBTREES, WORTH_SUBTREES,
+    MOST_SUBTREES, PROBE, SECURED_FROM, SUBTREES_PER_THREAD, TRIAL, WORTH_LARGE_SUBTREES,
+    WORTH_SUBTREES,
 };
 use bvh_core::cost::Objective;
-use bvh_core::{Aabb, Bvh};
 
 /// Improves the incumbent, whose working form is `tree`, until the work is done or the time is
 /// over. Also improves its references, if the problem has splits. With an `other` start, a trial
@@ -64,38 +61,6 @@ pub(crate) fn improve<A: Metric>(
     }
 }
 
-/// The number of the first trial run. Trial runs decide between two starts, and their numbers
-/// follow the numbers of all other runs, so that no random stream is used twice.
-const TRIALS: u64 = 1 << 20;
-
-/// The tree from before an annealing run.
-enum Before {
-    /// The incumbent is no worse.
-    Incumbent,
-    Shape(Shape),
-    /// The tree with its area; leaves may hold parts of objects.
-    Flat(Bvh, f64),
-}
-
-/// A search in progress.
-struct Improvement<'a, 'p, 'r, 's> {
-    config: &'a Config,
-    boxes: &'a [Aabb],
-    seed: u64,
-    /// Number of objects.
-    n: u64,
-    /// The remaining work.
-    left: u64,
-    /// True if the objective is the cost of the wide layout, not the area.
-    by_layout: bool,
-    /// Divides and reunites references, if they may change.
-    divider: Option<Divider<'s>>,
-    best: &'a mut Incumbent<'p>,
-    run: &'a mut Run<'r>,
-    /// True if the incumbent is at least as good as a local optimum of reinsertion.
-    is_secured: bool,
-}
-
 impl Improvement<'_, '_, '_, '_> {
     /// Follows a plan of annealing runs. Each ends at a fraction of the work or of the time.
     fn until_known_end(&mut self, tree: &mut Working<impl Metric>) {
@@ -135,8 +100,8 @@ impl Improvement<'_, '_, '_, '_> {
                 continue;
             }
             let schedule = self.schedule(hot, work, end, length);
-            let first = number == 0;
-            self.anneal(tree, number, (&schedule, each), first);
+            let is_first = number == 0;
+            self.anneal(tree, &AnnealingRun { number, schedule, length: each, is_first });
         }
     }
 
@@ -147,7 +112,7 @@ impl Improvement<'_, '_, '_, '_> {
         for number in 0..MOST_GENERATIONS {
             let work = self.left.min((length * self.n as f64) as u64);
             let schedule = self.schedule(self.config.hot(length), work, 1.0, length);
-            self.anneal(tree, number, (&schedule, length), false);
+            self.anneal(tree, &AnnealingRun { number, schedule, length, is_first: false });
             length *= self.config.growth;
         }
     }
@@ -211,7 +176,8 @@ impl Improvement<'_, '_, '_, '_> {
         for (number, tree) in [&mut *tree, &mut other].into_iter().enumerate() {
             let end = began + (1.0 - began) * TRIAL * (number + 1) as f64;
             let schedule = self.schedule(self.config.hot(length), work as u64, end, length);
-            self.anneal(tree, TRIALS + number as u64, (&schedule, length), true);
+            let number = TRIALS + number as u64;
+            self.anneal(tree, &AnnealingRun { number, schedule, length, is_first: true });
         }
         // A cancelled search continues from neither.
         if self.run.stopped().is_none() && cost(&other, self.by_layout) < cost(tree, self.by_layout)
@@ -235,8 +201,8 @@ impl Improvement<'_, '_, '_, '_> {
         }
     }
 
-    /// Returns the number of subtrees that are annealed at once in a run of a search with `length` work
-    /// per object.
+    /// Returns the number of subtrees that are annealed at once in a run of a search with `length`
+    /// work per object.
     fn subtrees(&self, length: f64) -> u32 {
         if self.config.pieces > 0 {
             return self.config.pieces;
@@ -252,114 +218,6 @@ impl Improvement<'_, '_, '_, '_> {
         };
         let worth = if large >= subtrees { WORTH_LARGE_SUBTREES } else { WORTH_SUBTREES };
         if length >= worth { subtrees } else { 1 }
-    }
-
-    /// Makes one annealing run from `tree` and recombines the tree with the result. The `first` run
-    /// of a plan replaces the tree instead, if it ends better. If it does not and time is limited,
-    /// the time was too short for annealing, and recombination is skipped, too.
-    fn anneal(
-        &mut self,
-        tree: &mut Working<impl Metric>,
-        number: u64,
-        (schedule, length): (&Schedule, f64),
-        first: bool,
-    ) {
-        if self.run.stopped().is_some() || schedule.quota.work == 0 {
-            return;
-        }
-        let observer: &dyn Observer = &Until { observer: self.run.observer(), end: schedule.end };
-        let mut done = Tally::default();
-        let mut rounds = 0;
-        // Every run has room for 2⁴⁰ random streams, enough for 2¹⁶ rounds. Stream 0 belongs to the
-        // probe, the last streams to the divider.
-        let streams = [self.seed, 1 + (number << 40)];
-        let mut division = stream(self.seed, (1 << 63) + number);
-        let ruin = self.config.ruin(length);
-        let best = &mut *self.best;
-        let run = &mut *self.run;
-        let by_layout = self.by_layout;
-        // Trees with different references cannot be recombined. Only the first run, which is not
-        // recombined, may change references between its rounds; the other runs change them before
-        // they begin.
-        if let Some(divider) = self.divider.as_mut().filter(|_| !first) {
-            tree.sort_in_preorder();
-            let work = (schedule.quota.work as f64 * WORK_ON_REFERENCES) as u64;
-            let tally = divider.pass(tree, run.left().at_most(work), &mut division, observer);
-            run.count(tally);
-            done += tally;
-            best.offer(tree, run);
-        }
-        let metric = tree.metric();
-        let cost_before = cost(tree, by_layout);
-        let area_before = tree.area();
-        let is_timed = observer.progress().is_some();
-        // Recombination needs both trees, and a run that ends worse is discarded. A first run under
-        // a time limit is not recombined, so that the incumbent can take the place of the tree,
-        // unless a divider changes references or a trial compares two trees.
-        let discards_to_incumbent =
-            first && is_timed && !by_layout && self.divider.is_none() && number < TRIALS;
-        let before = if discards_to_incumbent {
-            best.offer(tree, run);
-            Before::Incumbent
-        } else if self.divider.is_some() {
-            Before::Flat(tree.to_bvh(), area_before)
-        } else {
-            Before::Shape(tree.shape())
-        };
-        let mut divider = self.divider.as_mut().filter(|_| first);
-        anneal(
-            || RuinMover::new(&ruin, length, by_layout),
-            schedule,
-            tree,
-            streams,
-            observer,
-            &mut |tree, tally| {
-                done += tally;
-                run.count(tally);
-                if let Some(divider) = divider.as_mut().filter(|_| !observer.cancelled()) {
-                    let work = (tally.work as f64 * WORK_ON_REFERENCES) as u64;
-                    let tally =
-                        divider.pass(tree, run.left().at_most(work), &mut division, observer);
-                    done += tally;
-                    run.count(tally);
-                }
-                rounds += 1;
-                if by_layout && rounds % ROUNDS_PER_LOOK == 0
-                    || !by_layout && tree.area() < best.area() * (1.0 - WORTH_AN_EVENT)
-                {
-                    best.offer(tree, run);
-                }
-            },
-        );
-        // The tree has been offered before, so that a cancelled search need not compare the two.
-        // Nobody continues from the tree then, and a large one takes seconds to restore.
-        if run.stopped() == Some(StopReason::Cancelled)
-            && (by_layout || tree.objects() > RECOMBINED_AT_ONCE)
-        {
-            if done.kept > 0 {
-                best.offer(tree, run);
-            }
-            return;
-        }
-        // The cost of a layout is no sum over clades, so such trees cannot be recombined.
-        let is_better = cost(tree, by_layout) < cost_before;
-        let is_recombined = !by_layout && !(first && (is_better || is_timed));
-        if is_recombined || !is_better {
-            // Recombination needs both trees.
-            let annealed = is_recombined.then(|| std::mem::take(&mut tree.nodes));
-            // A binary tree stays binary, so that no conversion fails.
-            match before {
-                Before::Shape(shape) => tree.reshape(&shape, self.boxes),
-                Before::Flat(flat, area) => _ = tree.refill(&flat, area),
-                Before::Incumbent => _ = best.refill(tree),
-            }
-            if let Some(annealed) = annealed {
-                let annealed = Working::from_nodes(annealed, metric);
-                *tree = recombine(&[&*tree, &annealed]);
-            }
-        }
-        best.offer(tree, run);
-        self.left = self.left.saturating_sub(done.work);
     }
 
     /// Makes moves at the lowest temperature. Also returns the work that fits into the rest of the
@@ -382,27 +240,6 @@ impl Improvement<'_, '_, '_, '_> {
             _ => f64::INFINITY,
         };
         (tally, in_time)
-    }
-}
-
-/// Returns the cost of a tree. O(n).
-fn cost(tree: &Working<impl Metric>, by_layout: bool) -> f64 {
-    if by_layout { Layout::default().cost(tree) } else { tree.area() }
-}
-
-/// An observer that also cancels when the progress reaches `end`.
-struct Until<'a> {
-    observer: &'a dyn Observer,
-    end: f64,
-}
-
-impl Observer for Until<'_> {
-    fn cancelled(&self) -> bool {
-        self.observer.cancelled() || self.progress().is_some_and(|now| now >= self.end)
-    }
-
-    fn progress(&self) -> Option<f64> {
-        self.observer.progress()
     }
 }
 

@@ -15,6 +15,7 @@
 
 mod config;
 mod improve;
+mod improvement;
 mod plan;
 mod recombine;
 mod small_budget;

@@ -50,7 +50,7 @@ pub(super) fn search<'p, A: Metric>(
         return Ok(SmallBudget::Large(None));
     }
     let morton = MortonOrder::new(problem.boxes)?;
-    let mut two_starts = false;
+    let mut has_two_starts = false;
     let mut end = f64::INFINITY;
     if let (Some(began), Some(sorted)) = (began, observer.progress()) {
         // A coarse clock may not have advanced; the bound avoids a division by zero.
@@ -73,15 +73,18 @@ pub(super) fn search<'p, A: Metric>(
             return Ok(SmallBudget::Tree(Incumbent::begin_unbounded(tree, problem, run).tree));
         }
         // Stop early enough to order and evaluate the tree.
-        (two_starts, end) = (times >= two_starts_from, 1.0 - FINISH_TIME * sort);
+        has_two_starts = times >= two_starts_from;
+        end = 1.0 - FINISH_TIME * sort;
     }
-    let two_starts = two_starts && top_down_may_be_better(&morton, problem, run)?;
+    let tries_division = has_two_starts && top_down_may_be_better(&morton, problem, run)?;
     let mut start = morton.build(&CLUSTERING)?;
     let mut front = FRONT;
-    if two_starts && let Some(divided) = divided(problem.boxes, run)? {
+    if tries_division && let Some(divided) = divided(problem.boxes, run)? {
         run.count(Tally { moves: 1, kept: 0, work: divided.nodes.len() as u64 });
         if cost::internal_area(&divided) < cost::internal_area(&start) {
-            (start, front) = (divided, usize::MAX);
+            start = divided;
+            // A division has its largest nodes anywhere, not only at the front.
+            front = usize::MAX;
         }
     }
     // A time-limited search does not evaluate the initial tree: reinsertion never makes it worse,
@@ -93,7 +96,7 @@ pub(super) fn search<'p, A: Metric>(
         run.count(Tally { moves: 1, kept: 0, work: start.nodes.len() as u64 });
     }
     let mut tree = Siblings::new(start);
-    let still = reinsert_largest(&mut tree, front, end, run);
+    let is_local_optimum = reinsert_largest(&mut tree, front, end, run);
     let tree = tree.into_tree();
     let mut best = match before {
         Some(mut best) => {
@@ -102,7 +105,7 @@ pub(super) fn search<'p, A: Metric>(
         }
         None => Incumbent::begin_unbounded(Kept::new(tree, problem), problem, run),
     };
-    if !still {
+    if !is_local_optimum {
         return Ok(SmallBudget::Tree(best.tree));
     }
     if began.is_some() {
