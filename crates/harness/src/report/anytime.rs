@@ -1,11 +1,10 @@
-//! Error against run time: the gap of the incumbent to the exact optimum or the best known cost,
-//! along all three axes.
+//! Error against run time: the gap of the incumbent to the exact optimum or the best known cost.
 
 use super::config::check_file;
 use super::data::ratio;
 use super::output::text_table;
 use super::prelude::*;
-use super::progress::{ProgressAxis, Series, WORST, series};
+use super::progress::{Series, WORST, series};
 use crate::statistics::{median, quartiles, range};
 use bvh_config::{OutOfRange, above};
 
@@ -29,13 +28,12 @@ bvh_config::config! { serde;
 }
 
 /// One corner of a curve, which is flat up to the next, or its end, as written to
-/// `timing_FILE.csv`, `FILE_evaluations.csv` and `FILE_work.csv`, where FILE is `anytime` unless
-/// the report says otherwise.
+/// `timing_FILE.csv`, where FILE is `anytime` unless the report has another name.
 #[derive(Clone, Copy, Serialize)]
 pub(super) struct Point<'a> {
     scene: &'a str,
     method: &'a str,
-    x: f64,
+    seconds: f64,
     gap_quartile_1: f64,
     gap_median: f64,
     gap_quartile_3: f64,
@@ -55,36 +53,25 @@ impl Config {
         let mut output = Output::new(&self.source, &self.title);
         let caption = "Cost of the incumbent over the best known cost of the scene, minus 1: median and quartiles over \
                        repetitions. Points are builders. A curve falls through the floor where it is the best known.";
-        for axis in ProgressAxis::of(rows, &self.methods) {
-            // Over work and evaluations the curves have nearly the same shapes, and no page shows
-            // them: their points are enough.
-            let is_drawn = axis == ProgressAxis::Seconds;
-            let mut points = Vec::new();
-            let mut panels = Vec::new();
-            for scene in rows.scenes() {
-                // A scene without a reference has no gaps.
-                let Some(reference) = rows.reference(scene) else { continue };
-                let mut layers = Vec::new();
-                for method in &self.methods {
-                    let runs = series(rows, scene, method, axis);
-                    let curve = curve(scene, method, &runs, reference.cost);
-                    if is_drawn {
-                        layers.extend(draw(method, &curve));
-                    }
-                    points.extend(curve);
-                }
-                panels.push(panel(
-                    rows.shown(scene),
-                    axis.axis(),
-                    Axis::log("gap to the best known"),
-                    layers,
-                ));
+        let mut points = Vec::new();
+        let mut panels = Vec::new();
+        for scene in rows.scenes() {
+            // A scene without a reference has no gaps.
+            let Some(reference) = rows.reference(scene) else { continue };
+            let mut layers = Vec::new();
+            for method in &self.methods {
+                let runs = series(rows, scene, method);
+                let curve = curve(scene, method, &runs, reference.cost);
+                layers.extend(draw(method, &curve));
+                points.extend(curve);
             }
-            if is_drawn {
-                output.add_figure(axis.file(&self.file), caption, self.panels_per_row, panels);
-            }
-            axis.add_csv(&mut output, &self.file, &corners(&points))?;
+            let x = Axis::log("time (s)");
+            let y = Axis::log("gap to the best known");
+            panels.push(panel(rows.shown(scene), x, y, layers));
         }
+        let file = format!("timing_{}", self.file);
+        output.add_figure(&file, caption, self.panels_per_row, panels);
+        output.add_csv(file, &corners(&points))?;
         self.add_table(&mut output, rows);
         output.reading = self.reading(rows);
         Ok(output)
@@ -142,7 +129,7 @@ impl Config {
         let mut table = text_table(header.iter().map(String::as_str));
         for scene in rows.scenes() {
             for method in &self.methods {
-                let runs = series(rows, scene, method, ProgressAxis::Seconds);
+                let runs = series(rows, scene, method);
                 let cell = |&at: &f64| {
                     let cost = median(&incumbents(&runs, at)).filter(|cost| cost.is_finite());
                     cost.map_or_else(String::new, |cost| percent(cost / rows.base_cost(scene)))
@@ -163,12 +150,12 @@ fn percent(ratio: f64) -> String {
     format!("{:+.2} %", 100.0 * (ratio - 1.0))
 }
 
-/// Returns the costs of the incumbents of all runs at `at`, the worst cost where a run has none
-/// yet, so that their median never rises.
+/// Returns the costs of the incumbents of all runs after `at` seconds, the worst cost where a run
+/// has none yet, so that their median never rises.
 fn incumbents(runs: &[Series], at: f64) -> Vec<f64> {
     let incumbent = |run: &Series| {
         run.iter()
-            .take_while(|(x, _)| *x <= at)
+            .take_while(|(seconds, _)| *seconds <= at)
             .last()
             .map(|point| point.1)
     };
@@ -177,8 +164,8 @@ fn incumbents(runs: &[Series], at: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Median and quartiles of the gap from the first x at which every run has an incumbent to the last
-/// event.
+/// Median and quartiles of the gap from the first moment at which every run has an incumbent to the
+/// last event.
 fn curve<'a>(scene: &'a str, method: &'a str, runs: &[Series], reference: f64) -> Vec<Point<'a>> {
     let first = runs
         .iter()
@@ -199,10 +186,10 @@ fn curve<'a>(scene: &'a str, method: &'a str, runs: &[Series], reference: f64) -
         // The last place is the end itself, which rounding of the power would miss.
         if step == steps { last } else { first * 10f64.powf(f64::from(step) / PER_DECADE) }
     };
-    let point = |x: f64| {
+    let point = |seconds: f64| {
         let [gap_quartile_1, gap_median, gap_quartile_3] =
-            quartiles(&incumbents(runs, x)).map(|cost| ratio(cost, reference) - 1.0);
-        Point { scene, method, x, gap_quartile_1, gap_median, gap_quartile_3 }
+            quartiles(&incumbents(runs, seconds)).map(|cost| ratio(cost, reference) - 1.0);
+        Point { scene, method, seconds, gap_quartile_1, gap_median, gap_quartile_3 }
     };
     (0..=steps).map(place).map(point).collect()
 }
@@ -226,7 +213,7 @@ fn corners<'a>(points: &[Point<'a>]) -> Vec<Point<'a>> {
 fn draw(method: &str, points: &[Point]) -> Vec<Layer> {
     let medians: Vec<(f64, f64)> = points
         .iter()
-        .map(|point| (point.x, point.gap_median))
+        .map(|point| (point.seconds, point.gap_median))
         .collect();
     // A builder has one event, and a staircase of one corner would be invisible.
     if points.len() == 1 {
@@ -234,7 +221,7 @@ fn draw(method: &str, points: &[Point]) -> Vec<Layer> {
     }
     let band = points
         .iter()
-        .map(|point| (point.x, point.gap_quartile_1, point.gap_quartile_3))
+        .map(|point| (point.seconds, point.gap_quartile_1, point.gap_quartile_3))
         .collect();
     vec![Layer::new(method, Marks::StepBand(band)), Layer::new(method, Marks::Steps(medians))]
 }

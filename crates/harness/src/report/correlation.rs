@@ -18,8 +18,8 @@ bvh_config::config! { serde;
         source: String;
         /// Heading.
         title: String;
-        /// Labels of the methods, the paper's own case first. Trees of each method are compared with
-        /// each other only.
+        /// Labels of the methods, the paper's own case first. Trees of each method are compared
+        /// with each other only.
         methods: Vec<String>, in OneOrMore;
         /// The paper's words on the correlation over the trees of the first method.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -43,8 +43,8 @@ pub(super) struct Correlation<'a> {
     query: &'a str,
     trees: usize,
     pearson: Option<f64>,
-    /// Lower end of the 95 % interval of `pearson`, by Fisher's transformation; empty for fewer than
-    /// four trees.
+    /// Lower end of the 95 % interval of `pearson`, by Fisher's transformation; empty for fewer
+    /// than four trees.
     pearson_low: Option<f64>,
     /// Upper end of this interval.
     pearson_high: Option<f64>,
@@ -141,7 +141,6 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
         &correlations,
         columns,
     )?;
-    output.reading = reading(&correlations, &config.methods, &costs);
     Ok(output)
 }
 
@@ -256,24 +255,6 @@ fn draw(
     let x = Axis::linear("Goldsmith–Salmon cost");
     let y = Axis::linear("box tests per ray");
     panel(format!("{scene}: {family}, {query}{rank}"), x, y, methods.iter().map(points).collect())
-}
-
-/// Returns a sentence on the rank correlations of every cost by method.
-fn reading(rows: &[Correlation], methods: &[String], costs: &[Cost]) -> String {
-    let of_method = |method: &String| {
-        let own: Vec<&Correlation> = rows
-            .iter()
-            .filter(|row| row.method == method)
-            .collect();
-        let costs = costs.iter().map(|(cost, _)| cost.as_str());
-        let costs = spans(costs, &own, |row| row.cost, |row| row.spearman, 2);
-        Some(format!("{method}: {costs}"))
-    };
-    let methods: Vec<String> = methods.iter().filter_map(of_method).collect();
-    format!(
-        "Rank correlation of tests per ray with each cost, over scenes and kinds of rays. {}.",
-        methods.join("; ")
-    )
 }
 
 #[cfg(test)]

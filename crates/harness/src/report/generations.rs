@@ -67,7 +67,6 @@ struct Progress {
 
 /// The final costs of the runs on a scene.
 struct Final {
-    runs: usize,
     low: f64,
     median: f64,
     high: f64,
@@ -94,7 +93,6 @@ impl Config {
             panels.push(draw(&rows.shown(scene), runs.runs.len(), &own));
             generations.extend(own);
             let Some(end) = runs.end(rows.base_cost(scene)) else { continue };
-            output.reading += &end.reading(&rows.shown(scene));
             output
                 .paper
                 .extend(self.compare(&rows.shown(scene), &runs, &end));
@@ -265,18 +263,6 @@ impl<'a> Runs<'a> {
             .collect();
         let (low, high) = range(costs.iter().copied())?;
         let average = self.random.iter().sum::<f64>() / self.random.len() as f64;
-        Some(Final { runs: costs.len(), low, median: median(&costs)?, high, average, base })
-    }
-}
-
-impl Final {
-    fn reading(&self, scene: &str) -> String {
-        let Self { runs, low, median, high, average, base } = self;
-        format!(
-            "{scene}: final cost {median:.2} ({low:.2} to {high:.2} over {runs} runs), {:.3} of the average order's \
-             cost and {:.3} of Müller–Fellner's. ",
-            median / average,
-            median / base
-        )
+        Some(Final { low, median: median(&costs)?, high, average, base })
     }
 }

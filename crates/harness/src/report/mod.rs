@@ -15,6 +15,7 @@ pub mod paper;
 mod prelude;
 mod progress;
 pub mod query;
+mod query_check;
 mod query_column;
 mod query_figure;
 pub mod query_measure;
@@ -101,11 +102,11 @@ reports! {
     "distribution" => Distribution(distribution::Config: methods) by distribution::write;
     /// Costs against tests per ray over the trees of each method; every repetition is one tree.
     "correlation" => Correlation(correlation::Config: methods) by correlation::write;
-    /// Error against run time and against work.
+    /// Error against run time.
     "anytime" => Anytime(anytime::Config: methods) by anytime::Config::write;
     /// Gaps to the exact optimum of small scenes.
     "gaps" => Gaps(gaps::Config: methods, optimum) by gaps::Config::write;
-    /// Medians, quartiles, primal integrals, and time and work until targets are reached.
+    /// Medians, quartiles, and seconds until targets are reached.
     "numbers" => Numbers(numbers::Config: methods) by numbers::Config::write;
     /// Tests of rays in trees that are trained on rays.
     "ray_cost" => RayCost(ray_cost::Config: base, pairs) by ray_cost::Config::write;
@@ -119,8 +120,8 @@ impl Report {
         self.needs_references()
     }
 
-    /// Returns the labels of the methods whose single trials the report reads; `history.csv` suffices
-    /// for all others.
+    /// Returns the labels of the methods whose single trials the report reads; `history.csv`
+    /// suffices for all others.
     pub fn trial_methods(&self) -> Vec<&str> {
         match self {
             Self::Trials(config) => config

@@ -1,13 +1,12 @@
-//! Medians and quartiles of costs and gaps, primal integrals, lower bounds, and times until targets
-//! are reached, by method and scene.
+//! Medians and quartiles of costs and gaps, lower bounds, and times until targets are reached, by
+//! method and scene.
 
 use super::data::ratio;
 use super::prelude::*;
-use super::progress::{ProgressAxis, Series, longest_of_all, series};
 use super::target::Target;
 use super::to_target;
 use crate::rows::ReferenceRow;
-use crate::statistics::{median, primal_integral, quartiles, range};
+use crate::statistics::{quartiles, range};
 use bvh_config::Nested;
 
 bvh_config::config! { serde;
@@ -17,7 +16,7 @@ bvh_config::config! { serde;
         title: String;
         /// Labels of the methods.
         methods: Vec<String>, in OneOrMore;
-        /// Costs to be reached, for a table of the seconds and the work that the methods need.
+        /// Costs to be reached, for a table of the seconds that the methods need.
         /// Default none.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         targets: Vec<Target> = vec![], in Nested;
@@ -30,21 +29,12 @@ pub(super) struct Numbers<'a> {
     scene: &'a str,
     method: &'a str,
     runs: usize,
-    /// Lower quartile of cost over base, over repetitions.
-    cost_over_base_quartile_1: f64,
-    /// Median of cost over base.
+    /// Median of cost over base, over repetitions.
     cost_over_base_median: f64,
-    /// Upper quartile of cost over base.
-    cost_over_base_quartile_3: f64,
     /// `exact optimum` or `best known`.
     reference: &'static str,
     /// The cost that gaps are measured from.
     reference_cost: f64,
-    /// The method that found the reference. If it did so in this experiment, its own gaps are too
-    /// small.
-    reference_method: String,
-    /// True if the reference was found in this experiment.
-    reference_of_this_experiment: bool,
     gap_quartile_1: f64,
     gap_median: f64,
     gap_quartile_3: f64,
@@ -52,13 +42,6 @@ pub(super) struct Numbers<'a> {
     lower_bound: Option<f64>,
     /// `lower_bound` over `reference_cost`.
     lower_bound_over_reference: Option<f64>,
-    /// Median cost over the lower bound, minus 1; the gap to the optimum is at most this.
-    proven_gap_median: Option<f64>,
-    /// Mean gap over the evaluations of the longest run of any method on the scene; median over
-    /// runs.
-    primal_integral_evaluations: f64,
-    /// The same mean gap over work.
-    primal_integral_work: f64,
 }
 
 /// The seconds of one method on one scene, as written to `timing_numbers.csv`.
@@ -69,10 +52,6 @@ pub(super) struct Timing<'a> {
     seconds_quartile_1: f64,
     seconds_median: f64,
     seconds_quartile_3: f64,
-    /// The end of the longest run of any method on the scene.
-    horizon_seconds: f64,
-    /// Mean gap up to `horizon_seconds`; median over runs.
-    primal_integral: f64,
 }
 
 impl Config {
@@ -80,25 +59,10 @@ impl Config {
         let mut numbers = Vec::new();
         let mut timing = Vec::new();
         for scene in rows.scenes() {
-            // Without a reference there are neither gaps nor integrals to report.
+            // Without a reference there are no gaps to report.
             let Some(reference) = rows.reference(scene) else { continue };
-            let horizons =
-                ProgressAxis::ALL.map(|axis| longest_of_all(rows, scene, &self.methods, axis));
             for method in &self.methods {
-                let integral = |at: usize| {
-                    let runs = series(rows, scene, method, ProgressAxis::ALL[at]);
-                    let integral =
-                        |run: &Series| primal_integral(run, reference.cost, horizons[at]);
-                    median(
-                        &runs
-                            .iter()
-                            .filter_map(integral)
-                            .collect::<Vec<_>>(),
-                    )
-                    .unwrap_or(f64::NAN)
-                };
-                let [primal_integral, evaluations, work] = [0, 1, 2].map(integral);
-                numbers.push(of_costs(rows, scene, method, reference, [evaluations, work]));
+                numbers.push(of_costs(rows, scene, method, reference));
                 let [seconds_quartile_1, seconds_median, seconds_quartile_3] =
                     quartiles(&rows.seconds_of(scene, method));
                 timing.push(Timing {
@@ -107,8 +71,6 @@ impl Config {
                     seconds_quartile_1,
                     seconds_median,
                     seconds_quartile_3,
-                    horizon_seconds: horizons[0],
-                    primal_integral,
                 });
             }
         }
@@ -119,8 +81,8 @@ impl Config {
         let columns = "scene method runs cost_over_base_median gap_quartile_1 gap_median gap_quartile_3 \
                        lower_bound_over_reference";
         output.show(explanation, &numbers, columns)?;
-        let explanation = "The primal integral is the mean gap over the longest run's time:";
-        output.show(explanation, &timing, "scene method seconds_median primal_integral")?;
+        let columns = "scene method seconds_quartile_1 seconds_median seconds_quartile_3";
+        output.show("Seconds of the runs:", &timing, columns)?;
         // The figure shows bounds; medians alone are in the table.
         if !rows.bounds.is_empty() {
             let caption = "Over the least known cost of the scene: the proven lower bound, below which no tree is, and the median \
@@ -178,34 +140,26 @@ impl Config {
     }
 }
 
-/// Returns the costs of a method's runs on a scene. `integrals` are over evaluations and over work.
+/// Returns the costs of a method's runs on a scene.
 fn of_costs<'a>(
     rows: &Rows,
     scene: &'a str,
     method: &'a str,
     reference: &ReferenceRow,
-    integrals: [f64; 2],
 ) -> Numbers<'a> {
     let costs: Vec<f64> = rows
         .runs_of(scene, method)
         .map(|run| run.cost)
         .collect();
     let quartiles = quartiles(&costs);
-    let over_base = quartiles.map(|cost| ratio(cost, rows.base_cost(scene)));
     let gaps = quartiles.map(|cost| ratio(cost, reference.cost) - 1.0);
     Numbers {
         scene,
         method,
         runs: costs.len(),
-        cost_over_base_quartile_1: over_base[0],
-        cost_over_base_median: over_base[1],
-        cost_over_base_quartile_3: over_base[2],
+        cost_over_base_median: ratio(quartiles[1], rows.base_cost(scene)),
         reference: if reference.is_optimum() { "exact optimum" } else { "best known" },
         reference_cost: reference.cost,
-        reference_method: reference.method.clone(),
-        reference_of_this_experiment: rows
-            .runs_of(scene, &reference.method)
-            .any(|run| run.seed == reference.seed && run.cost <= reference.cost),
         gap_quartile_1: gaps[0],
         gap_median: gaps[1],
         gap_quartile_3: gaps[2],
@@ -213,10 +167,5 @@ fn of_costs<'a>(
         lower_bound_over_reference: reference
             .lower_bound
             .map(|bound| ratio(bound, reference.cost)),
-        proven_gap_median: reference
-            .lower_bound
-            .map(|bound| ratio(quartiles[1], bound) - 1.0),
-        primal_integral_evaluations: integrals[0],
-        primal_integral_work: integrals[1],
     }
 }

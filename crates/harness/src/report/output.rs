@@ -6,7 +6,6 @@ use super::query::Row;
 use crate::Error;
 use crate::rows::store::Store;
 use crate::rows::to_bytes;
-use crate::statistics::range;
 use comfy_table::{Table, presets};
 use figures::{Axis, Figure, Layer, Panel};
 use serde::Serialize;
@@ -192,25 +191,6 @@ pub fn each<T>(items: impl IntoIterator<Item = T>, say: impl FnMut(T) -> Option<
         .filter_map(say)
         .collect::<Vec<_>>()
         .join(", ")
-}
-
-/// Returns the range of the rows' values for each name, rounded to `decimals`: `a 0.91 to 1.20, b
-/// 1.02 to 1.10`. Names without values are skipped.
-pub fn spans<'n, R>(
-    names: impl IntoIterator<Item = &'n str>,
-    rows: &[R],
-    name_of: impl Fn(&R) -> &str,
-    value: impl Fn(&R) -> Option<f64>,
-    decimals: usize,
-) -> String {
-    each(names, |name| {
-        let (low, high) = range(
-            rows.iter()
-                .filter(|row| name_of(row) == name)
-                .filter_map(&value),
-        )?;
-        Some(format!("{name} {low:.decimals$} to {high:.decimals$}"))
-    })
 }
 
 /// Groups names by their numbers of cases out of `total`: `‘a’, ‘b’ for all 7 scenes; ‘c’ for 3 of 7

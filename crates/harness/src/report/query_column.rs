@@ -84,12 +84,12 @@ struct Compared {
 }
 
 impl Column {
-    /// Computes the value of a group, for its errors alone.
-    pub(super) fn try_on(&self, group: &Group) -> Result<(), QueryError> {
+    /// Computes the value of a group of one row, for its errors alone.
+    pub(super) fn try_on(&self, row: &Row) -> Result<(), QueryError> {
         match self.value.strip_prefix("text ") {
-            Some(column) => query::only_text(&group.rows, column).map(|_| ()),
+            Some(column) => query::only_text(&[row], column).map(|_| ()),
             None => Measure::parse(&self.value)?
-                .of_rows(&group.rows)
+                .of_rows(&[row])
                 .map(|_| ()),
         }
     }

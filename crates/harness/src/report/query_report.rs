@@ -1,7 +1,6 @@
 //! A table of some rows of a CSV file, by the language of [`query`]: selected,
 //! grouped, aggregated, compared with a base, and drawn.
 
-use super::config::check_file;
 use super::data::distinct;
 use super::output::table_bytes;
 use super::paper::{PaperRow, ratios};
@@ -9,9 +8,8 @@ use super::prelude::*;
 use super::query::{self, Conditions, QueryError, Row, number_in};
 use super::query_column::{Column, Group};
 use super::query_figure::Drawing;
-use crate::rows;
 use crate::statistics::range;
-use bvh_config::{Nested, OutOfRange};
+use bvh_config::Nested;
 
 bvh_config::config! { serde;
     /// A table of some rows of a CSV file, and a figure of it.
@@ -218,76 +216,6 @@ impl Config {
         });
         format!("{}: {spans}.", capitalised(&column.label()))
     }
-
-    fn faults_of_queries(&self) -> Vec<OutOfRange> {
-        let mut faults = check_file(&self.file);
-        let mut joined = vec![("rows", &self.rows)];
-        if !self.join.is_empty() {
-            joined.push(("join", &self.join));
-        }
-        // A row that any number would fit into.
-        let mut row = Row::new();
-        for (key, name) in joined {
-            let mut names = Vec::new();
-            for (file, columns) in rows::files() {
-                names.push(*file);
-                if file == name {
-                    row.extend(
-                        columns
-                            .iter()
-                            .map(|&column| (column.into(), "1".into())),
-                    );
-                }
-            }
-            if !names.contains(&name.as_str()) {
-                faults.push(OutOfRange::new(key, format!("{name:?}"), names.join(", ")));
-            }
-        }
-        for (key, result) in self.attempts(&row) {
-            match result {
-                Err(QueryError::Malformed { found, accepted, .. }) => {
-                    faults.push(OutOfRange::new(key, format!("{found:?}"), accepted));
-                }
-                // The columns of an unknown file are unknown, too.
-                Err(QueryError::Column { column, accepted }) if !row.is_empty() => {
-                    faults.push(OutOfRange::new(key, format!("{column:?}"), accepted));
-                }
-                _ => {}
-            }
-        }
-        faults
-    }
-
-    /// Applies every part of the query to a row, and returns the result of each with its key.
-    fn attempts(&self, row: &Row) -> Vec<(String, Result<(), QueryError>)> {
-        let has = |columns: &[&str]| {
-            columns
-                .iter()
-                .try_for_each(|column| query::cell(row, column).map(|_| ()))
-        };
-        let has_all = |conditions: &str| {
-            let conditions = Conditions::parse(conditions)?;
-            has(&conditions.columns().collect::<Vec<_>>())
-        };
-        let mut attempts = vec![
-            ("select".to_owned(), has_all(&self.select)),
-            ("base".to_owned(), has_all(&self.base)),
-        ];
-        for (index, column) in self.by.iter().enumerate() {
-            attempts.push((format!("by[{index}]"), has(&[column])));
-        }
-        let group = Group { key: Row::new(), rows: vec![row], base: vec![row] };
-        for (index, column) in self.columns.iter().enumerate() {
-            attempts.push((format!("columns[{index}].value"), column.try_on(&group)));
-            let paired_by: Vec<&str> = column
-                .paired_by
-                .iter()
-                .map(String::as_str)
-                .collect();
-            attempts.push((format!("columns[{index}].paired_by"), has(&paired_by)));
-        }
-        attempts
-    }
 }
 
 /// Returns the rows that agree with the key in all columns but the `free` ones, and that meet the
@@ -322,7 +250,6 @@ fn capitalised(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bvh_config::Check;
     use std::fs;
 
     /// Makes the report of a spec's table over two files, in which `b` costs less than `a` and less
@@ -376,39 +303,6 @@ mod tests {
         assert_eq!(csv(&output), expected);
         let [row] = &output.paper[..] else { panic!("one number of the paper") };
         assert_eq!((row.quantity.as_str(), row.ours_low), ("cost, a over b", Some(0.5)));
-    }
-
-    #[test]
-    fn files_and_columns_that_runs_do_not_write_are_rejected_by_key() {
-        let faults = |change: &str| {
-            let mut config: toml::Table =
-                "source = 's'\ntitle = 't'\nfile = 'x'\nrows = 'runs.csv'\n\
-                by = ['scene']\ncolumns = [{ name = 'c', value = 'max cost / work' }]"
-                    .parse()
-                    .unwrap();
-            config.extend(change.parse::<toml::Table>().unwrap());
-            let config: Config = config.try_into().unwrap();
-            let keys = config.faults().into_iter().map(|fault| fault.key);
-            keys.collect::<Vec<String>>()
-        };
-        assert_eq!(faults(""), Vec::<String>::new());
-        for (change, key) in [
-            ("rows = '../runs.csv'", "rows"),
-            ("join = 'costs.csv'", "join"),
-            ("select = 'method=a, seconds=1'", "select"),
-            ("select = 'method'", "select"),
-            ("base = 'threads=1'", "base"),
-            ("by = ['scene', 'rays']", "by[1]"),
-            ("columns = [{ name = 'c', value = 'max seconds' }]", "columns[0].value"),
-            ("columns = [{ name = 'c', value = 'max cost - work' }]", "columns[0].value"),
-            (
-                "columns = [{ name = 'c', value = 'text scene', paired_by = ['round'] }]",
-                "columns[0].paired_by",
-            ),
-        ] {
-            assert_eq!(faults(change), [key], "{change}");
-        }
-        assert_eq!(faults("join = 'timing.csv'\nbase = 'threads=1'"), Vec::<String>::new());
     }
 
     #[test]

@@ -1,13 +1,12 @@
-//! Error against run time in one table: seconds and work until every method is within a distance of
-//! the best known.
+//! Error against run time in one table: seconds until every method is within a distance of the best
+//! known.
 
 use super::prelude::*;
-use super::progress::{ProgressAxis, Series, WORST, reached, series};
+use super::progress::{Series, WORST, reached, series};
 use super::target::Target;
 use crate::statistics::order_quantile;
 
-/// One method and target on one scene, as written to `timing_to_target.csv`,
-/// `to_target_evaluations.csv` and `to_target_work.csv`.
+/// One method and target on one scene, as written to `timing_to_target.csv`.
 #[derive(Serialize)]
 pub(super) struct Reached<'a> {
     scene: &'a str,
@@ -22,7 +21,7 @@ pub(super) struct Reached<'a> {
     quantile_90: Option<f64>,
 }
 
-/// Adds the seconds and the work until `methods` reach `targets`, and returns a sentence on the
+/// Adds the seconds until `methods` reach `targets`, and returns a sentence on the
 /// first method to reach each target.
 pub(super) fn add(
     output: &mut Output,
@@ -30,30 +29,23 @@ pub(super) fn add(
     targets: &[Target],
     rows: &Rows,
 ) -> Result<String, Error> {
-    let mut sentence = String::new();
-    for axis in [ProgressAxis::Seconds, ProgressAxis::Work] {
-        let mut table = Vec::new();
-        for scene in rows.scenes() {
-            let runs_of_methods: Vec<Vec<Series>> = methods
-                .iter()
-                .map(|method| series(rows, scene, method, axis))
-                .collect();
-            for target in targets {
-                let Some(cost) = target.cost(rows, scene) else { continue };
-                for (method, runs) in methods.iter().zip(&runs_of_methods) {
-                    table.push(Reached::new(scene, target, method, runs, cost));
-                }
+    let mut table = Vec::new();
+    for scene in rows.scenes() {
+        let runs_of_methods: Vec<Vec<Series>> = methods
+            .iter()
+            .map(|method| series(rows, scene, method))
+            .collect();
+        for target in targets {
+            let Some(cost) = target.cost(rows, scene) else { continue };
+            for (method, runs) in methods.iter().zip(&runs_of_methods) {
+                table.push(Reached::new(scene, target, method, runs, cost));
             }
         }
-        axis.add_csv(output, "to_target", &table)?;
-        let explanation = format!("{} until the target is reached, over all runs:", axis.label());
-        let columns = "scene target method runs solved median quantile_90";
-        output.show(&explanation, &table, columns)?;
-        if axis == ProgressAxis::Seconds {
-            sentence = reading(targets, &table);
-        }
     }
-    Ok(sentence)
+    output.add_csv("timing_to_target", &table)?;
+    let columns = "scene target method runs solved median quantile_90";
+    output.show("Seconds until the target is reached, over all runs:", &table, columns)?;
+    Ok(reading(targets, &table))
 }
 
 impl<'a> Reached<'a> {

@@ -287,45 +287,14 @@ fn has_finished_runs(partial: &Path) -> Result<bool, Error> {
 mod tests {
     use super::*;
 
+    // The tests `faults` and `protection` run the program on folders that are in use, unfinished or
+    // blocked.
+
     fn run() -> FinishedRun {
         let file = |name: &str, text: &str| (name.to_owned(), text.as_bytes().to_vec());
         FinishedRun {
             files: [file("runs.csv", "a,b\n1,2\n"), file("history.csv", "a\n1\n")].into(),
         }
-    }
-
-    #[test]
-    fn a_second_writer_is_refused() {
-        let out = tempfile::tempdir().unwrap();
-        let open = || Store::open(&out.path().join("x"), "", Existing::Keep);
-        let first = open().unwrap();
-        assert!(matches!(open(), Err(Error::Busy(_))));
-        drop(first);
-        assert!(open().is_ok());
-    }
-
-    #[test]
-    fn finished_runs_are_resumed_by_the_same_spec_only_and_discarded_only_if_asked() {
-        let out = tempfile::tempdir().unwrap();
-        let open = |resolved, existing| Store::open(&out.path().join("x"), resolved, existing);
-        open("a", Existing::Keep)
-            .unwrap()
-            .keep(0, &run())
-            .unwrap();
-        assert!(matches!(open("b", Existing::Resume), Err(Error::Usage(_))));
-        assert!(matches!(open("a", Existing::Keep), Err(Error::Usage(_))));
-        assert!(
-            open("a", Existing::Resume)
-                .unwrap()
-                .has(0)
-                .unwrap()
-        );
-        assert!(
-            !open("a", Existing::Replace)
-                .unwrap()
-                .has(0)
-                .unwrap()
-        );
     }
 
     #[test]
@@ -351,15 +320,5 @@ mod tests {
         // The run is done again, and what was damaged is replaced.
         store.keep(0, &run()).unwrap();
         assert!(store.has(0).unwrap());
-    }
-
-    #[test]
-    fn a_file_where_the_folder_should_be_is_named() {
-        let out = tempfile::tempdir().unwrap();
-        fs::write(out.path().join("x"), "").unwrap();
-        let message = Store::open(&out.path().join("x"), "", Existing::Keep)
-            .unwrap_err()
-            .to_string();
-        assert!(message.contains("cannot create the folder"), "{message}");
     }
 }

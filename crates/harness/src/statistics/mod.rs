@@ -1,5 +1,4 @@
-//! Statistics: quantiles, the expected best of several trials, the primal integral, correlations,
-//! time-to-target fits.
+//! Statistics: quantiles, intervals, the expected best of several trials, correlations.
 
 pub mod best_of;
 
@@ -145,34 +144,6 @@ const STUDENT: [f64; 20] = [
     2.145, 2.131, 2.120, 2.110, 2.101, 2.093, 2.086,
 ];
 
-/// Returns the primal integral (Berthold 2013) up to `horizon`, divided by `horizon`: the mean
-/// primal gap |cost − reference| / max(cost, reference) over that time, with a gap of 1 before the
-/// first incumbent.
-///
-/// `incumbents` are times and costs, ascending in time. A search that starts with the reference has
-/// 0, a search that finds nothing has 1. `None` unless the horizon is above 0.
-pub fn primal_integral(incumbents: &[(f64, f64)], reference: f64, horizon: f64) -> Option<f64> {
-    let mut since = 0.0;
-    // Before its first incumbent a search has the worst gap.
-    let mut gap = 1.0;
-    let mut integral = 0.0;
-    for &(time, cost) in incumbents
-        .iter()
-        .take_while(|(time, _)| *time < horizon)
-    {
-        integral += gap * (time - since);
-        since = time;
-        gap = primal_gap(cost, reference);
-    }
-    (horizon > 0.0).then(|| (integral + gap * (horizon - since)) / horizon)
-}
-
-fn primal_gap(cost: f64, reference: f64) -> f64 {
-    let greater = cost.max(reference);
-    // Two costs of 0 are equal, although their ratio is undefined.
-    if greater > 0.0 { (cost - reference).abs() / greater } else { 0.0 }
-}
-
 /// Returns Pearson's correlation of pairs; `None` for fewer than two, or if either side is
 /// constant.
 pub fn pearson(pairs: &[(f64, f64)]) -> Option<f64> {
@@ -291,16 +262,6 @@ mod tests {
         );
         assert_eq!(order_quantile(&[], 0.5), None);
         assert_eq!(median(&[f64::INFINITY; 3]), Some(f64::INFINITY));
-    }
-
-    #[test]
-    fn the_primal_integral_is_the_area_under_the_gap() {
-        // Gap 1 until 2, then 1/2 until 6, then 0.
-        let incumbents = [(2.0, 20.0), (6.0, 10.0)];
-        assert_eq!(primal_integral(&incumbents, 10.0, 8.0), Some((2.0 + 0.5 * 4.0) / 8.0));
-        assert_eq!(primal_integral(&incumbents, 10.0, 4.0), Some((2.0 + 0.5 * 2.0) / 4.0));
-        assert_eq!(primal_integral(&[], 10.0, 4.0), Some(1.0));
-        assert_eq!(primal_integral(&incumbents, 10.0, 0.0), None);
     }
 
     #[test]

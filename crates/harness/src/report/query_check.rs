@@ -1,0 +1,118 @@
+//! Rejects queries for files and columns that no run writes, before anything runs.
+
+use super::config::check_file;
+use super::query::{self, Conditions, QueryError, Row};
+use super::query_report::Config;
+use crate::rows;
+use bvh_config::OutOfRange;
+
+impl Config {
+    /// Returns the parts of the query that cannot be read, and the files and columns that no run
+    /// writes.
+    pub(super) fn faults_of_queries(&self) -> Vec<OutOfRange> {
+        let mut faults = check_file(&self.file);
+        let mut joined = vec![("rows", &self.rows)];
+        if !self.join.is_empty() {
+            joined.push(("join", &self.join));
+        }
+        // A row that any number would fit into.
+        let mut row = Row::new();
+        let mut are_known = true;
+        for (key, name) in joined {
+            if let Some((_, columns)) = rows::files().find(|(file, _)| file == name) {
+                let cells = columns
+                    .iter()
+                    .map(|&column| (column.into(), "1".into()));
+                row.extend(cells);
+                continue;
+            }
+            are_known = false;
+            let names: Vec<&str> = rows::files().map(|(file, _)| *file).collect();
+            faults.push(OutOfRange::new(key, format!("{name:?}"), names.join(", ")));
+        }
+        for (key, result) in self.attempts(&row) {
+            match result {
+                Err(QueryError::Malformed { found, accepted, .. }) => {
+                    faults.push(OutOfRange::new(key, format!("{found:?}"), accepted));
+                }
+                // The columns of an unknown file are unknown, too.
+                Err(QueryError::Column { column, accepted }) if are_known => {
+                    faults.push(OutOfRange::new(key, format!("{column:?}"), accepted));
+                }
+                _ => {}
+            }
+        }
+        faults
+    }
+
+    /// Applies every part of the query to a row, and returns the result of each with its key.
+    fn attempts(&self, row: &Row) -> Vec<(String, Result<(), QueryError>)> {
+        let has = |columns: &[&str]| {
+            columns
+                .iter()
+                .try_for_each(|column| query::cell(row, column).map(|_| ()))
+        };
+        let has_all = |conditions: &str| {
+            let conditions = Conditions::parse(conditions)?;
+            has(&conditions.columns().collect::<Vec<_>>())
+        };
+        let mut attempts = vec![
+            ("select".to_owned(), has_all(&self.select)),
+            ("base".to_owned(), has_all(&self.base)),
+        ];
+        for (index, column) in self.by.iter().enumerate() {
+            attempts.push((format!("by[{index}]"), has(&[column])));
+        }
+        for (index, column) in self.columns.iter().enumerate() {
+            attempts.push((format!("columns[{index}].value"), column.try_on(row)));
+            let paired_by: Vec<&str> = column
+                .paired_by
+                .iter()
+                .map(String::as_str)
+                .collect();
+            attempts.push((format!("columns[{index}].paired_by"), has(&paired_by)));
+        }
+        attempts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_config::Check;
+
+    #[test]
+    fn files_and_columns_that_runs_do_not_write_are_rejected_by_key() {
+        let faults = |change: &str| {
+            let mut config: toml::Table =
+                "source = 's'\ntitle = 't'\nfile = 'x'\nrows = 'runs.csv'\n\
+                by = ['scene']\ncolumns = [{ name = 'c', value = 'max cost / work' }]"
+                    .parse()
+                    .unwrap();
+            config.extend(change.parse::<toml::Table>().unwrap());
+            let config: Config = config.try_into().unwrap();
+            let keys = config.faults().into_iter().map(|fault| fault.key);
+            keys.collect::<Vec<String>>()
+        };
+        assert_eq!(faults(""), Vec::<String>::new());
+        for (change, key) in [
+            ("rows = '../runs.csv'", "rows"),
+            ("join = 'costs.csv'", "join"),
+            // The columns of an unknown file are unknown, too.
+            ("join = 'costs.csv'\nbase = 'threads=1'", "join"),
+            ("select = 'method=a, seconds=1'", "select"),
+            ("select = 'method'", "select"),
+            ("base = 'threads=1'", "base"),
+            ("by = ['scene', 'rays']", "by[1]"),
+            ("columns = [{ name = 'c', value = 'max seconds' }]", "columns[0].value"),
+            ("columns = [{ name = 'c', value = 'max cost - work' }]", "columns[0].value"),
+            (
+                "columns = [{ name = 'c', value = 'text scene', paired_by = ['round'] }]",
+                "columns[0].paired_by",
+            ),
+        ] {
+            assert_eq!(faults(change), [key], "{change}");
+        }
+        assert_eq!(faults("join = 'timing.csv'\nbase = 'threads=1'"), Vec::<String>::new());
+    }
+}
