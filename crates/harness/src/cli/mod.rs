@@ -1,7 +1,6 @@
 //! The commands of the program, one file each: arguments in, files and terminal output out.
 
 pub mod compare;
-pub mod explain;
 pub mod jobs;
 pub mod merge;
 pub mod new;

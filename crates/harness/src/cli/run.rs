@@ -2,7 +2,6 @@
 //! reports again.
 
 use crate::Error;
-use crate::cli::explain;
 use crate::rows::store::Existing;
 use crate::run::execute::{Extent, Verbosity, execute};
 use crate::run::finish::Summary;
@@ -58,9 +57,6 @@ pub struct RunArgs {
     /// Print a line about every run on standard error: method, scene, repetition, seed, seconds.
     #[arg(long, conflicts_with = "quiet")]
     pub verbose: bool,
-    /// Print first the steps that each scene makes unnecessary, and why they are skipped.
-    #[arg(long)]
-    pub explain: bool,
 }
 
 /// Runs all experiments and prints their tables.
@@ -97,9 +93,6 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let extent = Extent { existing, selection, verbosity: verbosity(args) };
     let mut differences = 0;
     for experiment in &experiments {
-        if args.explain {
-            print_line(&explain::experiment(experiment)?);
-        }
         if args.check {
             differences += compare(args, experiment, interrupted)?;
             continue;
