@@ -119,10 +119,7 @@ fn angle(text: &str) -> Result<f64, String> {
 impl RenderArgs {
     fn options(&self, scene: &Scene) -> Options {
         let (width, height) = self.size;
-        let bounds = scene
-            .boxes
-            .iter()
-            .fold(Aabb::EMPTY, |all, b| all.union(b));
+        let bounds = Aabb::union_of(&scene.boxes);
         let automatic = framing::automatic(scene, &bounds, f64::from(width) / f64::from(height));
         // The automatic eye fits the automatic angle; any other pair gets the default angle.
         let view = match (self.from, self.at) {

@@ -27,6 +27,13 @@ impl Aabb {
             .fold(Self::EMPTY, Self::extended_to)
     }
 
+    /// Returns the smallest box around `boxes`, or [`Aabb::EMPTY`] if there are none.
+    pub fn union_of<'a>(boxes: impl IntoIterator<Item = &'a Self>) -> Self {
+        boxes
+            .into_iter()
+            .fold(Self::EMPTY, |union, aabb| union.union(aabb))
+    }
+
     /// Returns the smallest box around this box and `point`, with NaN along every axis where one of
     /// them is NaN.
     fn extended_to(self, point: Vec3) -> Self {
@@ -196,6 +203,9 @@ mod tests {
     fn the_empty_box_is_neutral_and_has_no_area() {
         let b = Aabb::from(([-1.0, 0.0, 2.0], [3.0, 0.5, 2.0]));
         assert_eq!(Aabb::EMPTY.union(&b), b);
+        assert_eq!(Aabb::union_of([]), Aabb::EMPTY);
+        let all = Aabb::from(([-1.0, 0.0, 1.0], [3.0, 4.0, 2.0]));
+        assert_eq!(Aabb::union_of(&[b, Aabb::from(([0.0, 0.0, 1.0], [1.0, 4.0, 1.0]))]), all);
         assert_eq!(Aabb::EMPTY.half_area(), 0.0);
         assert!(b.contains(&Aabb::EMPTY));
     }

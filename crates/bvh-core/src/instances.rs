@@ -32,7 +32,7 @@ use crate::{
     Aabb, Bvh, Hit, InvalidBvh, Ray, Slabs, WideBvh, any_hit_by, nearest_hit_by, validate,
 };
 use alloc::vec::Vec;
-use glam::{Affine3A, DAffine3, DMat3, DVec3};
+use glam::{Affine3A, DAffine3};
 
 /// A transformed copy of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,20 +84,7 @@ impl Instance {
         if part.root.is_none() {
             return Err(InvalidInstances::Empty(instance));
         }
-        let matrix = self
-            .transform
-            .matrix3
-            .to_cols_array()
-            .map(f64::from);
-        let translation = self
-            .transform
-            .translation
-            .to_array()
-            .map(f64::from);
-        let transform = DAffine3::from_mat3_translation(
-            DMat3::from_cols_array(&matrix),
-            DVec3::from_array(translation),
-        );
+        let transform = self.transform.as_daffine3();
         let inverse = transform.inverse();
         // The box of the transformed box, column by column (Arvo 1990, 'Transforming axis-aligned
         // bounding boxes'). `size` bounds every intermediate result.

@@ -3,7 +3,7 @@
 use crate::exact::{self, Line, Verdict};
 use crate::{Aabb, Ray, clip_to_box};
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec3, Vec3};
+use glam::{Affine3A, DVec3, Vec3};
 
 /// A triangle in world units. Rays can hit both sides.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -121,6 +121,18 @@ impl Triangle {
         let weights = [cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax];
         let sum: f64 = weights.iter().sum();
         (sum != 0.0).then(|| weights.map(|weight| weight / sum))
+    }
+
+    /// Returns the triangle moved by a transform, such as the transform of an
+    /// [`Instance`](crate::Instance). Corners are computed in f64 and rounded once.
+    #[must_use]
+    pub fn transformed(&self, transform: &Affine3A) -> Self {
+        let transform = transform.as_daffine3();
+        Self(self.0.map(|corner| {
+            transform
+                .transform_point3(corner.as_dvec3())
+                .as_vec3()
+        }))
     }
 
     /// Returns the unit vector perpendicular to the triangle, on the side from which its corners

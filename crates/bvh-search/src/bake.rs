@@ -1,7 +1,7 @@
 //! The everyday calls: the best tree for a given time, with every parameter at its default.
 
-use crate::{Budget, Deadline, Outcome, Problem, SearchError, best, optimize, solve};
-use bvh_core::{Aabb, Bvh};
+use crate::{Budget, Deadline, FindError, Outcome, Problem, SearchError, best, optimize, solve};
+use bvh_core::{Aabb, Bvh, Instance, Instances, WideBvh};
 use std::time::Duration;
 
 /// Returns the best tree over `boxes` that [`best`](crate::best) finds in about `time`, from the
@@ -22,6 +22,30 @@ use std::time::Duration;
 pub fn bake(boxes: &[Aabb], time: Duration) -> Result<Outcome, SearchError> {
     let deadline = Deadline::after(time);
     solve(&best::Config::default(), &Problem::new(boxes), 1, Budget::UNLIMITED, &deadline)
+}
+
+/// Returns a scene of instances with the best tree over them that [`best`](crate::best) finds in about
+/// `time`. The trees of the parts are as they are.
+///
+/// ```
+/// use bvh_search::prelude::*;
+/// let triangles = [Triangle::from([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])];
+/// let tree = bake(&boxes(&triangles), Duration::ZERO)?.tree;
+/// let part = WideBvh::new(&tree, &triangles)?;
+/// let row = (0..9u8).map(|i| Affine3A::from_translation(Vec3::X * f32::from(i)));
+/// let instances: Vec<Instance> = row.map(|transform| Instance { part: 0, transform }).collect();
+/// let scene = bake_instances(vec![part], instances, Duration::from_millis(10))?;
+/// let hit = scene.nearest_hit(&Ray::half_line([4.2, 0.2, 3.0], [0.0, 0.0, -1.0])?);
+/// assert_eq!(hit, Some(InstanceHit { t: 3.0, instance: 4, triangle: 0 }));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn bake_instances(
+    parts: Vec<WideBvh>,
+    instances: Vec<Instance>,
+    time: Duration,
+) -> Result<Instances, FindError> {
+    let top = bake(&Instance::boxes(&instances, &parts)?, time)?.tree;
+    Ok(Instances::new(parts, instances, top)?)
 }
 
 /// Improves a tree over `boxes` for about `time`: a tree from another library, or one that has been

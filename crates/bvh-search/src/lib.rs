@@ -28,7 +28,7 @@ mod tuning;
 
 pub use annealing::ruin_recreate;
 #[cfg(feature = "std")]
-pub use bake::{bake, improve};
+pub use bake::{bake, bake_instances, improve};
 pub use baselines::{LocalSearch, iterated, rebuild, rotation, treelet};
 pub use bvh_build;
 pub use bvh_core;

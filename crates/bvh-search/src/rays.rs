@@ -10,7 +10,8 @@ use bvh_core::Triangle;
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::glam::Vec3;
 use bvh_core::{
-    Aabb, Bvh, DensityError, Primitive, Primitives, Ray, RayDensity, Segment, nearest_hit,
+    Aabb, Bvh, DensityError, InvalidInstances, Primitive, Primitives, Ray, RayDensity, Segment,
+    nearest_hit,
 };
 use rand::{RngExt, SeedableRng};
 #[cfg(feature = "std")]
@@ -35,6 +36,9 @@ pub enum FindError {
     /// The rays are invalid.
     #[error("rays: {0}")]
     Rays(#[from] DensityError),
+    /// An instance is invalid.
+    #[error(transparent)]
+    Instances(#[from] InvalidInstances),
 }
 
 /// Returns the best tree over `triangles` that [`best`](crate::best) finds in about `time` for rays
@@ -119,7 +123,7 @@ fn guarded(
     segments: &[Segment],
     others: impl FnOnce(usize) -> Vec<Segment>,
 ) -> Result<RayDensity, DensityError> {
-    RayDensity::of_rays(&bounds(boxes), &with_others(segments, others), AREA_WEIGHT)
+    RayDensity::of_rays(&Aabb::union_of(boxes), &with_others(segments, others), AREA_WEIGHT)
 }
 
 /// Returns as many segments as leave room for those that `others` returns for their number, and these.
@@ -135,7 +139,7 @@ fn with_others(segments: &[Segment], others: impl FnOnce(usize) -> Vec<Segment>)
 fn from_anywhere<P: Primitive>(objects: &[P], boxes: &[Aabb], count: usize) -> Vec<Segment> {
     // A search rejects the same boxes with a better message.
     let Ok(tree) = muller_fellner::Config::default().build(boxes) else { return vec![] };
-    traced(&tree, objects, &bounds(boxes), count, &|| false)
+    traced(&tree, objects, &Aabb::union_of(boxes), count, &|| false)
 }
 
 /// Returns the segments of `count` rays, up to their nearest hits: from random points of the scene's box
@@ -165,9 +169,9 @@ fn traced<P: Primitive>(
             _ => None,
         };
         // A ray without a hit ends outside the scene.
-        let end = ray.at(hit.map_or(2.0 * extent.length(), |hit| hit.t));
-        if end.is_finite() {
-            segments.push(Segment { from: ray.origin().to_array(), to: end.to_array() });
+        let end = hit.map_or(2.0 * extent.length(), |hit| hit.t);
+        if ray.at(end).is_finite() {
+            segments.push(Segment::of_ray(&ray, end));
         }
     }
     segments
@@ -182,13 +186,6 @@ fn random_direction(rng: &mut Stream) -> Vec3 {
             return point / squared.sqrt();
         }
     }
-}
-
-/// Returns the box around all boxes.
-fn bounds(boxes: &[Aabb]) -> Aabb {
-    boxes
-        .iter()
-        .fold(Aabb::EMPTY, |bounds, aabb| bounds.union(aabb))
 }
 
 #[cfg(test)]

@@ -25,9 +25,7 @@ pub(crate) fn built(builder: &dyn Builder, boxes: &[Aabb]) -> Working {
 /// Returns the density of rays from a corner of the scene to the corners of all objects; `None` if
 /// the scene has no extent.
 pub(crate) fn density(boxes: &[Aabb]) -> Option<RayDensity> {
-    let bounds = boxes
-        .iter()
-        .fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
+    let bounds = Aabb::union_of(boxes);
     let to = boxes.iter().flat_map(|aabb| [aabb.min, aabb.max]);
     let segments = to.map(|to| Segment { from: bounds.min.to_array(), to: to.to_array() });
     RayDensity::of_rays(&bounds, &segments.collect::<Vec<_>>(), 0.1).ok()

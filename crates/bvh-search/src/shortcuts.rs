@@ -33,9 +33,7 @@ impl Facts {
                 .windows(2)
                 .filter(|pair| pair[0] == pair[1])
                 .count(),
-            bounds: boxes
-                .iter()
-                .fold(Aabb::EMPTY, |all, b| all.union(b)),
+            bounds: Aabb::union_of(boxes),
             flat: Presorted::without_area(boxes),
             in_order: sorted.in_order(),
             same_orders: sorted.same_orders(),

@@ -61,11 +61,7 @@ impl Presorted {
     /// Returns whether the box around all objects has no area, so that every tree costs nothing;
     /// true without boxes. O(n).
     pub fn without_area(boxes: &[Aabb]) -> bool {
-        boxes
-            .iter()
-            .fold(Aabb::EMPTY, |all, b| all.union(b))
-            .half_area()
-            == 0.0
+        Aabb::union_of(boxes).half_area() == 0.0
     }
 
     /// Returns, per axis, whether the objects were already in order, for example because all box

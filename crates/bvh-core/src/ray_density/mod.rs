@@ -41,7 +41,7 @@ mod crossings;
 mod x86;
 
 use crate::cost::Measure;
-use crate::{Aabb, Bvh, Node, PackedAabb};
+use crate::{Aabb, Bvh, Node, PackedAabb, Ray};
 use alloc::vec::Vec;
 use crossings::{CELLS, Crossings, index};
 use glam::{DVec3, Vec3};
@@ -67,6 +67,14 @@ pub struct Segment {
     pub from: [f32; 3],
     /// The end of the ray: its hit, or the point where it leaves the scene.
     pub to: [f32; 3],
+}
+
+impl Segment {
+    /// Returns the part of a ray up to the distance `end`, in multiples of the direction's length. A hit
+    /// beyond the range of f32 gives a segment that is not finite, which a density rejects.
+    pub fn of_ray(ray: &Ray, end: f32) -> Self {
+        Self { from: ray.origin().to_array(), to: ray.at(end).to_array() }
+    }
 }
 
 /// The reason why a density cannot be made.

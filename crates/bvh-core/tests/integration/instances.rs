@@ -6,7 +6,7 @@ use bvh_core::{
     Aabb, Bvh, Instance, InstanceHit, Instances, InvalidInstances, Ray, Triangle, WideBvh,
     nearest_hit,
 };
-use glam::{Affine3A, DAffine3, DMat3, DVec3, Mat3A, Quat, Vec3, Vec3A};
+use glam::{Affine3A, Mat3A, Quat, Vec3, Vec3A};
 
 /// Parts as triangles and in the wide layout, and instances of the parts.
 struct Scene {
@@ -46,15 +46,8 @@ impl Scene {
         let mut flat = Vec::new();
         let mut names = Vec::new();
         for (instance, Instance { part, transform }) in (0..).zip(&self.instances) {
-            let matrix = DMat3::from_cols_array(&transform.matrix3.to_cols_array().map(f64::from));
-            let shift = DVec3::from_array(transform.translation.to_array().map(f64::from));
-            let moved = DAffine3::from_mat3_translation(matrix, shift);
             for (id, triangle) in (0..).zip(&self.triangles[*part as usize]) {
-                flat.push(Triangle(
-                    triangle
-                        .0
-                        .map(|p| moved.transform_point3(p.as_dvec3()).as_vec3()),
-                ));
+                flat.push(triangle.transformed(transform));
                 names.push((instance, id));
             }
         }
@@ -175,10 +168,7 @@ fn filters_see_every_hit_that_the_answer_needs_and_no_rejected_hit_is_an_answer(
     let transforms = (0..40).map(|_| transform(&mut random)).collect();
     let scene = scene(vec![ball(2), grid_box(3)], transforms, &mut random);
     let scenes = scene.all(&mut random);
-    let bounds = Instance::boxes(&scene.instances, &scene.parts)
-        .unwrap()
-        .iter()
-        .fold(Aabb::EMPTY, |bounds, aabb| bounds.union(aabb));
+    let bounds = Aabb::union_of(&Instance::boxes(&scene.instances, &scene.parts).unwrap());
     let is_accepted = |hit: InstanceHit| (hit.triangle + hit.instance).is_multiple_of(3);
     let mut hits = 0;
     for ray in rays(&bounds, 2000, &mut random) {

@@ -346,9 +346,7 @@ mod tests {
     fn the_closed_box_has_two_triangles_per_square_and_the_cubes_bounds() {
         let triangles = closed_box(48);
         assert_eq!(triangles.len(), 48);
-        let bounds = boxes(&triangles)
-            .iter()
-            .fold(Aabb::EMPTY, |a, b| a.union(b));
+        let bounds = Aabb::union_of(&boxes(&triangles));
         assert_eq!(bounds, Aabb::from(([-1.0; 3], [1.0; 3])));
     }
 

@@ -4,10 +4,10 @@
 //! origin ends a ray. The surface area costs assume other rays: lines through the whole box that no
 //! hit ends.
 
-use super::random::{Family, random_ray};
+use super::random::{Family, Kind, random_ray};
 use crate::trace::{Accelerator, Query};
 use bvh_config::config;
-use bvh_core::{Aabb, Bvh, Primitives, TestCounts};
+use bvh_core::{Aabb, Bvh, Primitives, Ray, TestCounts, WideBvh};
 use bvh_search::Stream;
 use rand::SeedableRng;
 use rayon::prelude::*;
@@ -22,6 +22,26 @@ config! {
         /// The number of rays.
         count: u64 = 10_000, in 1..;
     }
+}
+
+/// Returns the tests of nodes and of blocks of triangles per ray in a layout; NaN without rays. They do
+/// not depend on the machine.
+pub fn tests_per_ray(wide: &WideBvh, kind: Kind, rays: &[Ray]) -> [f64; 2] {
+    let mut counts = TestCounts::default();
+    for ray in rays {
+        // A renderer stops a shadow ray at the first hit that it finds, so only these rays are any-hit
+        // queries.
+        if kind == Kind::Shadow {
+            wide.any_hit_counted(ray, &mut counts);
+        } else {
+            wide.nearest_hit_counted(ray, &mut counts);
+        }
+    }
+    let rays = rays.len() as f64;
+    [
+        counts.boxes as f64 / (WideBvh::BOXES_OF_NODE as f64 * rays),
+        counts.objects as f64 / (WideBvh::OBJECTS_OF_BLOCK as f64 * rays),
+    ]
 }
 
 /// Sums over some rays. They are integers, so that the order of addition does not matter.

@@ -9,8 +9,8 @@ mod segments;
 
 pub use camera::{Camera, View, frame};
 pub use density::{TRAINED, density};
-pub use empirical_cost::{EmpiricalCost, Mean, RandomRays, empirical_cost};
-pub use random::{Family, Kind, Viewpoint, in_box, random_ray, rays};
+pub use empirical_cost::{EmpiricalCost, Mean, RandomRays, empirical_cost, tests_per_ray};
+pub use random::{Family, Kind, Viewpoint, in_box, on_sphere, random_ray, rays};
 pub use segments::{
     OF_ANYTHING, Pose, RenderedRays, TracedRay, check_count, of_anything, of_inside, of_renderer,
 };

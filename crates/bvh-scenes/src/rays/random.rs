@@ -51,7 +51,7 @@ pub fn random_ray(family: Family, root: &Aabb, rng: &mut Stream) -> Option<Ray> 
 
 /// Returns a uniform point on the unit sphere: the direction of a uniform point in the unit ball,
 /// which needs no function that differs between machines.
-pub(super) fn on_sphere(rng: &mut Stream) -> DVec3 {
+pub fn on_sphere(rng: &mut Stream) -> DVec3 {
     loop {
         let unit = DVec3::from_array(rng.random());
         let point = unit * 2.0 - 1.0;

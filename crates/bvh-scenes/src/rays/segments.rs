@@ -221,12 +221,10 @@ impl<'a> Tracing<'a> {
     }
 
     fn keep(&mut self, kind: Kind, ray: Ray, end: f32) {
-        let from = ray.origin();
-        let to = ray.at(end);
         // In the largest scenes the end of a ray may overflow.
-        if to.is_finite() {
-            let segment = Segment { from: from.to_array(), to: to.to_array() };
-            self.rays.push(TracedRay { kind, ray, segment });
+        if ray.at(end).is_finite() {
+            self.rays
+                .push(TracedRay { kind, ray, segment: Segment::of_ray(&ray, end) });
         }
     }
 

@@ -61,10 +61,7 @@ pub fn render(
     options: &Options,
     tile_done: &(dyn Fn() -> bool + Sync),
 ) -> Option<Film> {
-    let bounds = scene
-        .boxes
-        .iter()
-        .fold(Aabb::EMPTY, |all, b| all.union(b));
+    let bounds = Aabb::union_of(&scene.boxes);
     let width = options.width;
     let height = options.height;
     let up = scene.up();

@@ -157,9 +157,7 @@ fn no_search_goes_below_the_exact_optimum_of_the_measure_and_best_reaches_it() {
 #[test]
 fn trees_for_a_sample_of_rays_are_entered_less_often_than_trees_by_area() {
     let boxes = boxes(2000);
-    let bounds = boxes
-        .iter()
-        .fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
+    let bounds = Aabb::union_of(&boxes);
     let size = bounds.max - bounds.min;
     // A camera in one corner: no ray has a uniform direction.
     let segments: Vec<Segment> = (0..20_000)

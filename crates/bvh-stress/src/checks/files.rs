@@ -73,7 +73,7 @@ pub fn files_as_people_write_them() -> Verdict {
         .map_err(Broken::case)?;
     ensure!((mesh.triangles.len(), mesh.unused_vertices) == (2, 1), "{mesh:?}");
     let boxes = Primitives::Triangles(mesh.triangles).boxes();
-    let bounds = boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(b));
+    let bounds = Aabb::union_of(&boxes);
     ensure!(
         bounds == Aabb::from(([0.0; 3], [1.0, 1.0, 0.0])),
         "an unused vertex counts: {bounds:?}"

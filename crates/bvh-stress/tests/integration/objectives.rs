@@ -63,9 +63,7 @@ fn every_case_holds_with_the_visits_of_rays_instead_of_area() {
     let mut without_density = 0;
     for (case, triangles) in scenes(2000) {
         let boxes = stiff::boxes(&triangles);
-        let bounds = boxes
-            .iter()
-            .fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
+        let bounds = Aabb::union_of(&boxes);
         let segments: Vec<Segment> = tracing::rays(&triangles, 3000, 1)
             .iter()
             .map(|ray| Segment {

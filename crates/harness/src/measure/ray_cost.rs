@@ -3,11 +3,11 @@
 
 use bvh_build::{Builder, muller_fellner};
 use bvh_config::{OutOfRange, config};
-use bvh_core::{Bvh, Ray, RayDensity, Segment, TestCounts, WideBvh};
+use bvh_core::{Bvh, Ray, RayDensity, Segment, WideBvh};
 use bvh_scenes::Scene;
 use bvh_scenes::rays::{
     Family, Kind, OF_ANYTHING, Pose, RenderedRays, TRAINED, TracedRay, Viewpoint, check_count,
-    density, in_box, of_anything, of_inside, of_renderer, random_ray,
+    density, in_box, of_anything, of_inside, of_renderer, random_ray, tests_per_ray,
 };
 use bvh_search::{Stream, ray_density};
 use rand::SeedableRng;
@@ -233,21 +233,7 @@ impl TestRays {
     /// Returns the tests of nodes and of blocks of triangles per ray in a layout. They do not
     /// depend on the machine.
     pub fn tests(&self, wide: &WideBvh) -> [f64; 2] {
-        let mut counts = TestCounts::default();
-        for ray in &self.rays {
-            // A renderer stops a shadow ray at the first hit that it finds, so only these rays are
-            // any-hit queries.
-            if self.kind == Kind::Shadow {
-                wide.any_hit_counted(ray, &mut counts);
-            } else {
-                wide.nearest_hit_counted(ray, &mut counts);
-            }
-        }
-        let rays = self.rays.len() as f64;
-        [
-            counts.boxes as f64 / (WideBvh::BOXES_OF_NODE as f64 * rays),
-            counts.objects as f64 / (WideBvh::OBJECTS_OF_BLOCK as f64 * rays),
-        ]
+        tests_per_ray(wide, self.kind, &self.rays)
     }
 }
 

@@ -195,9 +195,7 @@ pub fn scaled(triangles: &[Triangle], factor: f32) -> Vec<Triangle> {
 /// Returns difficult rays: axis-parallel with both zeros, in face planes, along edges, through
 /// vertices, edges and centres, from inside, from a corner, with short and with zero-length ranges.
 pub fn rays(triangles: &[Triangle], n: usize, random: &mut Random) -> Vec<Ray> {
-    let bounds = boxes(triangles)
-        .iter()
-        .fold(Aabb::EMPTY, |a, b| a.union(b));
+    let bounds = Aabb::union_of(&boxes(triangles));
     let size = bounds.extent().max_element() as f32;
     let unit = Vec3::splat(size);
     let mut rays = Vec::new();

@@ -127,9 +127,7 @@ impl Config {
         check_scene(boxes)?;
         self.check()?;
         let n = boxes.len();
-        let bounds = boxes
-            .iter()
-            .fold(Aabb::EMPTY, |all, b| all.union(b));
+        let bounds = Aabb::union_of(boxes);
         let mut tree = KdTree { bounds, cells: vec![], objects: vec![], depth: 0 };
         if n == 0 {
             return Ok(tree);
