@@ -57,13 +57,13 @@ pub fn searched<T: Send>(
     search: impl FnOnce(Budget, &dyn Observer) -> T + Send,
 ) -> PyResult<(T, PyResult<()>)> {
     let seconds = if work.is_none() { Some(seconds.unwrap_or(1.0)) } else { seconds };
-    let limit =
-        match seconds {
-            Some(seconds) => Some(Duration::try_from_secs_f64(seconds).map_err(|_| {
-                invalid(format!("seconds is {seconds:?}; accepted: 0 to 1e19"))
-            })?),
-            None => None,
-        };
+    let limit = match seconds {
+        Some(seconds) => Some(
+            Duration::try_from_secs_f64(seconds)
+                .map_err(|_| invalid(format!("seconds is {seconds:?}; accepted: 0 to 1e19")))?,
+        ),
+        None => None,
+    };
     let budget = Budget { max_work: work, ..Budget::UNLIMITED };
     let start = Instant::now();
     let watch = &Watch {

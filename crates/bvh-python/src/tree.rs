@@ -366,7 +366,7 @@ fn found(
     raised?;
     found.map(Tree::new).map_err(|error| match error {
         FindError::Rays(_) => invalid(error),
-        FindError::Search(_) => invalid_argument(name, error),
+        FindError::Search(_) | FindError::Instances(_) => invalid_argument(name, error),
     })
 }
 
