@@ -123,7 +123,7 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 --threa
     /// any number of threads. Smaller trees end slightly lower as a whole at equal work.
     LEAST_LARGE_SUBTREES: u32 = 8, "subtrees";
     /// Maximum number of subtrees.
-    MOST_SUBTREES: u64 = 4096, "subtrees";
+    MOST_SUBTREES: u32 = 4096, "subtrees";
     /// Subtrees per thread; several unequal subtrees balance the threads.
     SUBTREES_PER_THREAD: u32 = 4, "subtrees";
     /// Maximum size of trees that are recombined after a cancellation. Recombination takes about a

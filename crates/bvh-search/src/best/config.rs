@@ -3,6 +3,7 @@
 use crate::annealing::ruin_recreate::{Ruin, Scale};
 use crate::local::initial::Start;
 use crate::run::Run;
+use crate::tuning::MOST_SUBTREES;
 use bvh_config::{Nested, above};
 use std::ops::Bound::{Excluded, Included};
 
@@ -37,7 +38,7 @@ bvh_config::config! {
         /// threads. 1 is the whole tree, which is slightly better at equal work. 0 means four
         /// subtrees per thread for a time limit with several threads, one per 32 768 objects for a
         /// budget of work if they are at least eight, and otherwise 1.
-        pieces: u32 = 0, in 0..=4096;
+        pieces: u32 = 0, in 0..=MOST_SUBTREES;
         /// Minimum work per object of an annealing run whose temperatures are relative to the
         /// [top](Scale::Top) of a move, overriding the move's `scale`. Long runs end lower with it,
         /// short runs higher.

@@ -1,7 +1,7 @@
 //! From an initial tree to the end of the budget: the choice of annealing runs and their schedules.
 
 use super::config::{Config, Horizon};
-use super::improvement::{AnnealingRun, Improvement, TRIALS, cost};
+use super::improvement::{Improvement, ScheduledRun, TRIALS, cost};
 use super::plan::{Planned, plan};
 use crate::annealing::cool;
 use crate::annealing::references::Divider;
@@ -101,7 +101,7 @@ impl Improvement<'_, '_, '_, '_> {
             }
             let schedule = self.schedule(hot, work, end, length);
             let is_first = number == 0;
-            self.anneal(tree, &AnnealingRun { number, schedule, length: each, is_first });
+            self.anneal(tree, &ScheduledRun { number, schedule, length: each, is_first });
         }
     }
 
@@ -112,7 +112,7 @@ impl Improvement<'_, '_, '_, '_> {
         for number in 0..MOST_GENERATIONS {
             let work = self.left.min((length * self.n as f64) as u64);
             let schedule = self.schedule(self.config.hot(length), work, 1.0, length);
-            self.anneal(tree, &AnnealingRun { number, schedule, length, is_first: false });
+            self.anneal(tree, &ScheduledRun { number, schedule, length, is_first: false });
             length *= self.config.growth;
         }
     }
@@ -177,7 +177,7 @@ impl Improvement<'_, '_, '_, '_> {
             let end = began + (1.0 - began) * TRIAL * (number + 1) as f64;
             let schedule = self.schedule(self.config.hot(length), work as u64, end, length);
             let number = TRIALS + number as u64;
-            self.anneal(tree, &AnnealingRun { number, schedule, length, is_first: true });
+            self.anneal(tree, &ScheduledRun { number, schedule, length, is_first: true });
         }
         // A cancelled search continues from neither.
         if self.run.stopped().is_none() && cost(&other, self.by_layout) < cost(tree, self.by_layout)
@@ -207,7 +207,7 @@ impl Improvement<'_, '_, '_, '_> {
         if self.config.pieces > 0 {
             return self.config.pieces;
         }
-        let large = (self.n / LARGE_SUBTREE).min(MOST_SUBTREES) as u32;
+        let large = (self.n / LARGE_SUBTREE).min(u64::from(MOST_SUBTREES)) as u32;
         let by_threads = SUBTREES_PER_THREAD * threads().min(1024) as u32;
         let timed = self.run.observer().progress().is_some();
         // Without a clock the number of threads must not change the tree.

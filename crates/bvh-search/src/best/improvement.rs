@@ -16,8 +16,8 @@ use bvh_core::{Aabb, Bvh};
 /// follow the numbers of all other runs, so that no random stream is used twice.
 pub(super) const TRIALS: u64 = 1 << 20;
 
-/// An annealing run to make.
-pub(super) struct AnnealingRun {
+/// An annealing run to make, with its schedule.
+pub(super) struct ScheduledRun {
     /// Number of the run, which selects its random streams.
     pub number: u64,
     pub schedule: Schedule,
@@ -72,8 +72,8 @@ impl Improvement<'_, '_, '_, '_> {
     /// Makes one annealing run from `tree` and recombines the tree with the result. The first run
     /// of a plan replaces the tree instead, if it ends better. If it does not and time is limited,
     /// the time was too short for annealing, and recombination is skipped, too.
-    pub(super) fn anneal(&mut self, tree: &mut Working<impl Metric>, planned: &AnnealingRun) {
-        let AnnealingRun { number, ref schedule, length, is_first } = *planned;
+    pub(super) fn anneal(&mut self, tree: &mut Working<impl Metric>, planned: &ScheduledRun) {
+        let ScheduledRun { number, ref schedule, length, is_first } = *planned;
         if self.run.stopped().is_some() || schedule.quota.work == 0 {
             return;
         }

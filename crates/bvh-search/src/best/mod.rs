@@ -149,16 +149,16 @@ impl Config {
         let morton = morton.map_or_else(|| MortonOrder::new(boxes), Ok)?;
         let clustered =
             watched(run.observer(), |watch| morton.build_watched(&CLUSTERING, None, watch))?;
-        // The objective evaluates a clustering by area, too. Only the cheapest tree is kept, because the
-        // division of a large scene needs most of the memory of the search.
+        // Only the cheapest tree is kept, because the division of a large scene needs most of the memory of
+        // the search.
         run.keep_aside(Kept::new(clustered, problem));
-        // A large division takes tenths of a second before it looks at its watch.
-        let is_over = boxes.len() > RECOMBINED_AT_ONCE && run.observer().cancelled();
-        let started =
-            if is_over { Err(BuildError::Cancelled) } else { watched(run.observer(), build) };
-        let started = started?;
-        // A cancelled search ends with the tree aside. The evaluation of another takes a quarter of a
-        // second.
+        // A large division takes tenths of a second before it looks at its watch. A cancelled search ends
+        // with the tree aside.
+        if boxes.len() > RECOMBINED_AT_ONCE && run.observer().cancelled() {
+            return Err(BuildError::Cancelled.into());
+        }
+        let started = watched(run.observer(), build)?;
+        // The evaluation takes a quarter of a second where it is dear.
         if is_dear(problem) && run.observer().cancelled() {
             return Err(BuildError::Cancelled.into());
         }
