@@ -42,19 +42,15 @@ impl LayoutCost {
     /// Returns the costs of a node with two children, whose box has this size.
     #[inline(always)]
     pub fn join(size: f64, left: &Self, right: &Self) -> Self {
-        const NEVER: f64 = f64::INFINITY;
-        let [a, b, c, d, e, f, g] = right.as_children;
-        let right_children = [a, b, c, d, e, f, g, NEVER];
-        // `split[k - 2]` is the cost as k children. The last entries exceed the children of a node
-        // and are ignored; a fixed length lets the compiler unroll the loops.
-        let mut split = [NEVER; 14];
-        for (first, cost) in left.as_children.iter().enumerate() {
-            for (second, other) in right_children.iter().enumerate() {
-                let sum = cost + other;
-                let least = &mut split[first + second];
-                *least = if sum < *least { sum } else { *least };
-            }
-        }
+        // A leaf costs the same as any number of children. Half of all nodes are leaves, and the least
+        // sum with a constant needs one addition instead of the search for it.
+        let split = if left.is_constant() {
+            right.plus(left.value())
+        } else if right.is_constant() {
+            left.plus(right.value())
+        } else {
+            left.split_with(right)
+        };
         let objects = left.objects + right.objects;
         let as_node = split[6] + size * f64::from(NODE_COST);
         let as_leaf = leaf_cost(size, objects);
@@ -66,6 +62,39 @@ impl LayoutCost {
             as_children[k] = if exactly < fewer { exactly } else { fewer };
         }
         Self { as_children, objects }
+    }
+
+    /// Returns whether more children lower the cost.
+    #[inline(always)]
+    fn is_constant(&self) -> bool {
+        // Rows never rise.
+        self.as_children[0] == self.as_children[6]
+    }
+
+    /// Returns the costs together with another subtree of constant cost, as 2 to 8 children.
+    #[inline(always)]
+    fn plus(&self, constant: f64) -> [f64; 7] {
+        self.as_children.map(|cost| cost + constant)
+    }
+
+    /// Returns the least costs together with another subtree, as 2 to 8 children.
+    #[inline(always)]
+    fn split_with(&self, other: &Self) -> [f64; 7] {
+        const NEVER: f64 = f64::INFINITY;
+        let [a, b, c, d, e, f, g] = other.as_children;
+        let other_children = [a, b, c, d, e, f, g, NEVER];
+        // The last entries exceed the children of a node and are dropped; a fixed length lets the
+        // compiler unroll the loops.
+        let mut split = [NEVER; 14];
+        for (first, cost) in self.as_children.iter().enumerate() {
+            for (second, other) in other_children.iter().enumerate() {
+                let sum = cost + other;
+                let least = &mut split[first + second];
+                *least = if sum < *least { sum } else { *least };
+            }
+        }
+        let [a, b, c, d, e, f, g, ..] = split;
+        [a, b, c, d, e, f, g]
     }
 
     /// Returns the cost of the subtree as one child or as the root: a wide node or a leaf.
@@ -84,43 +113,90 @@ fn leaf_cost(size: f64, objects: u32) -> f64 {
 /// root's half area: nodes and blocks of triangles, each weighted by the half area of its box, in
 /// world units squared. Nodes with more than two children are halved first. O(nodes).
 pub fn layout_area(tree: &Bvh) -> f64 {
-    layout(tree, None)
+    layout_cost(tree, None, &|first, second| {
+        first();
+        second();
+    })
 }
 
 /// Returns the same as [`layout_area`], with the measure instead of the half area. O(nodes).
 pub fn layout_measure(tree: &Bvh, measure: &dyn Measure) -> f64 {
-    layout(tree, Some(measure))
+    layout_cost(tree, Some(measure), &|first, second| {
+        first();
+        second();
+    })
+}
+
+/// A function that calls two functions, one after the other or at once, and returns when both have
+/// returned. This crate starts no threads; with `rayon`, `&|a, b| _ = rayon::join(a, b)` calls both
+/// at once.
+pub type CallBoth<'a> = &'a (dyn Fn(&mut (dyn FnMut() + Send), &mut (dyn FnMut() + Send)) + Sync);
+
+/// Returns the same as [`layout_area`], or as [`layout_measure`] with a measure. Passes the two
+/// subtrees of nodes near the root to `both`; the result is the same, bit by bit, however it calls
+/// them. O(nodes).
+pub fn layout_cost(tree: &Bvh, measure: Option<&dyn Measure>, both: CallBoth) -> f64 {
+    if tree.nodes.is_empty() {
+        return 0.0;
+    }
+    let tree = binary(tree);
+    row(&tree, 0, LEVELS_AT_ONCE, measure, both).value()
+}
+
+/// The number of levels whose subtrees are passed to `both`: enough for many threads and for
+/// unequal subtrees.
+const LEVELS_AT_ONCE: u32 = 10;
+
+/// Returns the row of a node in a binary tree; `levels` below it are computed at once.
+fn row(
+    tree: &Bvh,
+    index: usize,
+    levels: u32,
+    measure: Option<&dyn Measure>,
+    both: CallBoth,
+) -> LayoutCost {
+    let node = &tree.nodes[index];
+    let children = node.children();
+    if levels == 0 || children.is_empty() {
+        return row_alone(tree, index, measure);
+    }
+    let [mut left, mut right] = [LayoutCost::leaf(0.0, 0); 2];
+    both(&mut || left = row(tree, children.start, levels - 1, measure, both), &mut || {
+        right = row(tree, children.start + 1, levels - 1, measure, both)
+    });
+    LayoutCost::join(size(node, measure), &left, &right)
+}
+
+#[inline(always)]
+fn size(node: &Node, measure: Option<&dyn Measure>) -> f64 {
+    match measure {
+        Some(measure) => measure.of(&PackedAabb::from(&node.aabb)),
+        None => node.aabb.half_area(),
+    }
 }
 
 #[cfg(feature = "std")]
 crate::with_vector_instructions! {
-    layout = layout_plain(tree: &Bvh, measure: Option<&dyn Measure>) -> f64
+    row_alone = row_alone_plain(tree: &Bvh, root: usize, measure: Option<&dyn Measure>) -> LayoutCost
 }
 #[cfg(not(feature = "std"))]
-use layout_plain as layout;
+use row_alone_plain as row_alone;
 
+/// Returns the row of a node in a binary tree, computed by this thread.
 #[inline(always)]
-fn layout_plain(tree: &Bvh, measure: Option<&dyn Measure>) -> f64 {
-    let size = |node: &Node| match measure {
-        Some(measure) => measure.of(&PackedAabb::from(&node.aabb)),
-        None => node.aabb.half_area(),
-    };
-    let tree = binary(tree);
+fn row_alone_plain(tree: &Bvh, root: usize, measure: Option<&dyn Measure>) -> LayoutCost {
     // Children before parents, so that the rows of a path suffice: a row for every node would take
     // twice the memory of the tree.
     let mut rows: Vec<LayoutCost> = Vec::new();
-    let mut pending = Vec::new();
-    if !tree.nodes.is_empty() {
-        pending.push((0, false));
-    }
+    let mut pending = alloc::vec![(root, false)];
     while let Some((index, has_rows)) = pending.pop() {
         let node = &tree.nodes[index];
         let children = node.children();
         if children.is_empty() {
-            rows.push(LayoutCost::leaf(size(node), node.prims().len() as u32));
+            rows.push(LayoutCost::leaf(size(node, measure), node.prims().len() as u32));
         } else if has_rows {
             let both = rows.len() - 2;
-            let joined = LayoutCost::join(size(node), &rows[both], &rows[both + 1]);
+            let joined = LayoutCost::join(size(node, measure), &rows[both], &rows[both + 1]);
             rows.truncate(both);
             rows.push(joined);
         } else {
@@ -128,5 +204,28 @@ fn layout_plain(tree: &Bvh, measure: Option<&dyn Measure>) -> f64 {
             pending.extend(children.rev().map(|child| (child, false)));
         }
     }
-    rows.first().map_or(0.0, LayoutCost::value)
+    // Every node below the root has been joined.
+    rows[0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_constant_row_needs_no_search_for_the_least_sum(
+            leaf in (0.0..10f64, 1u32..20),
+            mut costs in prop::array::uniform7(0.0..10f64),
+        ) {
+            let leaf = LayoutCost::leaf(leaf.0, leaf.1);
+            costs.sort_unstable_by(|a, b| b.total_cmp(a));
+            let other = LayoutCost { as_children: costs, objects: 9 };
+            prop_assert!(leaf.is_constant());
+            let expected = leaf.split_with(&other);
+            prop_assert_eq!(other.plus(leaf.value()), expected);
+            prop_assert_eq!(other.split_with(&leaf), expected);
+        }
+    }
 }

@@ -46,6 +46,17 @@ pub(crate) fn map<I: Send, T: Send>(tasks: Vec<I>, task: impl Fn(I) -> T + Send 
     tasks.into_iter().map(task).collect()
 }
 
+/// Calls two functions. Each may run on another thread.
+pub(crate) fn call_both(first: &mut (dyn FnMut() + Send), second: &mut (dyn FnMut() + Send)) {
+    #[cfg(feature = "rayon")]
+    rayon::join(first, second);
+    #[cfg(not(feature = "rayon"))]
+    {
+        first();
+        second();
+    }
+}
+
 /// The number of threads that share the tasks.
 pub(crate) fn threads() -> usize {
     #[cfg(feature = "rayon")]

@@ -2,7 +2,7 @@
 //! instances that its nodes place, into a folder.
 
 use super::BakeArgs;
-use super::plan::{Baked, Figures, Plan, Prepared};
+use super::plan::{Figures, Plan, Prepared};
 use super::watch::gain;
 use crate::Error;
 use crate::csv_table;
@@ -102,12 +102,12 @@ pub(super) fn bake_part(
     interrupted: &AtomicBool,
 ) -> Result<(), Error> {
     let (bake, greedy) = plan.begin(scene, None, Prepared::default(), interrupted)?;
-    let Baked { tree, work, figures } = bake.search(greedy, interrupted)?;
+    let baked = bake.search(greedy, interrupted)?;
     if interruption == Interruption::Discards && interrupted.load(Relaxed) {
         return Ok(());
     }
-    bake.save(&tree, work, path, files::Reserved::new(path, 0)?)?;
-    let Some(Figures { cost, base, .. }) = figures else { return Ok(()) };
+    bake.save(&baked, path, files::Reserved::new(path, 0)?)?;
+    let Some(Figures { cost, base, .. }) = baked.figures else { return Ok(()) };
     let count = scene.boxes.len();
     let gain = gain(cost, base);
     print_line(&format!(

@@ -305,24 +305,25 @@ fn search_and_save(
     reserved: Reserved,
     interrupted: &AtomicBool,
 ) -> Result<(), Error> {
-    let Baked { tree, work, figures } = bake.search(greedy, interrupted)?;
-    let bytes = bake.save(&tree, work, out, reserved)?;
-    match figures {
+    let baked = bake.search(greedy, interrupted)?;
+    let (bytes, cost_for_lines) = bake.save(&baked, out, reserved)?;
+    match &baked.figures {
         Some(figures) if !interrupted.load(Relaxed) => {
-            print_line(&summary(bake, &tree, work, &figures));
+            print_line(&summary(bake, &baked, figures, cost_for_lines));
             print_line(&format!("{}: {bytes} bytes", out.display()));
             Ok(())
         }
         figures => {
-            let cost = figures.map(|figures| figures.cost);
+            let cost = figures.as_ref().map(|figures| figures.cost);
             Err(Error::Stopped { path: out.to_owned(), cost })
         }
     }
 }
 
-/// Describes the result of a bake.
-fn summary(bake: &Bake, tree: &Bvh, work: u64, figures: &Figures) -> String {
+/// Describes the result of a bake, with its figures and the cost of its tree for random lines.
+fn summary(bake: &Bake, baked: &Baked, figures: &Figures, cost_for_lines: f64) -> String {
     let Bake { plan, scene, .. } = *bake;
+    let Baked { tree, work, .. } = baked;
     let Figures { cost, base, before, moves, stop, seconds, .. } = figures;
     let objects = scene.boxes.len();
     let method = plan.method.name();
@@ -330,10 +331,10 @@ fn summary(bake: &Bake, tree: &Bvh, work: u64, figures: &Figures) -> String {
         format!("{} ({}), {objects} objects, {method}, seed {}", scene.name, scene.kind, plan.seed),
         format!("{} {cost}, {} Müller–Fellner's {base}", bake.unit(), gain(*cost, *base)),
     ];
-    if let Some([cost, greedy]) = bake.costs_elsewhere(tree, figures) {
+    if let Some(greedy) = figures.base_elsewhere {
         lines.push(format!(
             "risk: a tree for rays may be worse for others; for random lines it is {} Müller–Fellner's",
-            gain(cost, greedy)
+            gain(cost_for_lines, greedy)
         ));
     }
     if let Some(before) = before {

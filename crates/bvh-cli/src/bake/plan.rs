@@ -6,8 +6,8 @@ use super::watch::{Interrupted, Watch};
 use crate::Error;
 use crate::rays::Rays;
 use bvh_core::cost::{Measure, Objective};
-use bvh_core::file::{self, Header, Origin};
-use bvh_core::{Aabb, Bvh, Node, RayDensity, Triangle};
+use bvh_core::file::{self, FileError, Header, Origin};
+use bvh_core::{Aabb, Bvh, Node, RayDensity, Triangle, validate_references};
 use bvh_scenes::tree_file::TreeFileError;
 use bvh_scenes::{Scene, is_allocatable};
 use bvh_search::{
@@ -171,7 +171,10 @@ impl Bake<'_> {
                 .map(|density| density as &dyn Measure),
             ..Problem::new(&self.scene.boxes)
         };
-        let base_elsewhere = self.cost_elsewhere(&greedy);
+        let base_elsewhere = self
+            .density
+            .is_some()
+            .then(|| self.plan.objective.cost(&greedy));
         // Gains are relative to the greedy tree, by the cost that the search minimises.
         let greedy = Kept::new(greedy, &problem);
         let base = greedy.cost;
@@ -221,47 +224,65 @@ impl Bake<'_> {
         Ok(best::unless_behind(found, fallback))
     }
 
-    /// Writes the file of a tree that took this `work`. Returns its number of bytes.
+    /// Writes the file of a search's tree. Returns its number of bytes and the cost in its header.
     pub fn save(
         &self,
-        tree: &Bvh,
-        work: u64,
+        baked: &Baked,
         path: &Path,
         reserved: Reserved,
-    ) -> Result<usize, Error> {
+    ) -> Result<(usize, f64), Error> {
+        let Baked { tree, work, figures } = baked;
+        let Scene { boxes, primitives, .. } = self.scene;
+        // Somebody may wait for the file of a large tree after Ctrl-C, so everything that its header
+        // needs is computed at once.
+        let (cost, (validated, visits)) = rayon::join(
+            || self.cost_for_lines(tree, figures.as_ref()),
+            || rayon::join(|| validate_references(tree, boxes, primitives), || self.visits(tree)),
+        );
+        validated
+            .map_err(FileError::from)
+            .map_err(TreeFileError::of(path))?;
         // The work of all bakes that led to this tree, one after the other.
         let spent = self.start.map_or(0, |start| start.work);
-        let visits = self
-            .density
-            .as_ref()
-            .map_or_else(Vec::new, |density| visits(density, tree));
         let origin = Origin {
             method: &self.plan.name,
             seed: self.plan.seed,
-            work: spent.saturating_add(work),
+            work: spent.saturating_add(*work),
             visits: &visits,
             objective: self.plan.objective,
         };
-        let sections = file::sections(tree, &self.scene.boxes, &self.scene.primitives, &origin)
-            .map_err(TreeFileError::of(path))?;
+        let sections =
+            file::sections(tree, boxes, cost, &origin).map_err(TreeFileError::of(path))?;
         let sections = sections.each_ref().map(|section| &**section);
         reserved.write_sections(&sections)?;
-        Ok(sections.iter().map(|section| section.len()).sum())
+        let bytes = sections.iter().map(|section| section.len()).sum();
+        Ok((bytes, cost))
     }
 
-    /// Returns the cost of a tree for random lines, if the search is for other rays.
-    fn cost_elsewhere(&self, tree: &Bvh) -> Option<f64> {
-        self.density
-            .is_some()
-            .then(|| self.plan.objective.cost(tree))
+    /// Returns the cost of a tree for random lines, whichever rays the search was for.
+    fn cost_for_lines(&self, tree: &Bvh, figures: Option<&Figures>) -> f64 {
+        let objective = self.plan.objective;
+        match figures {
+            // Half a second in large scenes; other costs take a hundredth.
+            Some(figures) if self.density.is_none() && objective == Objective::Layout => {
+                figures.cost
+            }
+            _ => {
+                let for_lines = Problem { objective, ..Problem::new(&self.scene.boxes) };
+                for_lines.cost(tree)
+            }
+        }
     }
 
-    /// Returns the costs of the best tree and of the greedy tree for random lines, if the search was
-    /// for other rays.
-    pub fn costs_elsewhere(&self, tree: &Bvh, figures: &Figures) -> Option<[f64; 2]> {
-        self.cost_elsewhere(tree)
-            .zip(figures.base_elsewhere)
-            .map(<[f64; 2]>::from)
+    /// Returns the visits of all nodes; none if the search was not for rays.
+    fn visits(&self, tree: &Bvh) -> Vec<f32> {
+        const NODES_PER_TASK: usize = 1 << 16;
+        let Some(density) = &self.density else { return Vec::new() };
+        let root = tree.root_aabb().unwrap_or(Aabb::EMPTY);
+        tree.nodes
+            .par_chunks(NODES_PER_TASK)
+            .flat_map_iter(|nodes| density.visits_of(&root, nodes))
+            .collect()
     }
 
     /// Names the cost that the search minimises.
@@ -274,17 +295,6 @@ impl Bake<'_> {
             (_, None) => "internal area",
         }
     }
-}
-
-/// Returns the visits of all nodes, computed by all threads, because somebody may wait for the file
-/// of a large tree after Ctrl-C.
-fn visits(density: &RayDensity, tree: &Bvh) -> Vec<f32> {
-    const NODES_PER_TASK: usize = 1 << 16;
-    let root = tree.root_aabb().unwrap_or(Aabb::EMPTY);
-    tree.nodes
-        .par_chunks(NODES_PER_TASK)
-        .flat_map_iter(|nodes| density.visits_of(&root, nodes))
-        .collect()
 }
 
 /// The result of a search.
@@ -304,7 +314,7 @@ pub struct Figures {
     /// The cost of the greedy tree.
     pub base: f64,
     /// The cost of the greedy tree for random lines, if the search was for other rays.
-    base_elsewhere: Option<f64>,
+    pub base_elsewhere: Option<f64>,
     /// The cost of the tree that the search continued from.
     pub before: Option<f64>,
     /// The number of moves tried.

@@ -32,10 +32,15 @@ fn a_bake_divides_objects_where_it_pays_and_minimises_the_cost_of_the_layout() {
     assert_eq!(layout["objective"], "cost of the wide layout, by area");
     let scene = Scene::load("pinecon2").unwrap();
     let costs = ["layout.bvh", "whole.bvh"].map(|file| {
-        let (tree, _) = tree_file::load(&at.join(file), &scene).unwrap();
+        let (tree, header) = tree_file::load(&at.join(file), &scene).unwrap();
+        assert_eq!(header.cost.to_bits(), header.objective.cost(&tree).to_bits(), "{file}");
         bvh_core::cost::layout_area(&tree)
     });
     assert!(costs[0] < costs[1], "{costs:?}");
+    // A tree for rays is recorded with its cost for random lines.
+    bake("rays.bvh", &["--rays", "default"]);
+    let (tree, header) = tree_file::load(&at.join("rays.bvh"), &scene).unwrap();
+    assert_eq!(header.cost.to_bits(), bvh_core::cost::layout_area(&tree).to_bits());
     bake("further.bvh", &["--references", "1.3", "--from", "split.bvh"]);
     said(at, &["render", "pinecon2", "--accel", "split.bvh", "--out", "a.png", "--size", "16x16"]);
     let args = ["bake", "pinecon2", "--budget", "1Mwork", "--out", "no.bvh", "--references", "nan"];

@@ -115,6 +115,12 @@ pub fn save(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, File
     saved(tree, boxes, origin)
 }
 
+/// Returns the file of a valid tree.
+fn saved(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, FileError> {
+    let cost = origin.objective.cost(tree);
+    Ok(sections(tree, boxes, cost, origin)?.concat())
+}
+
 /// Returns the file of a tree whose `objects` may be divided among leaves. Rejects a tree that is
 /// not [valid](validate_references()); otherwise the same as [`save`].
 pub fn save_references(
@@ -130,25 +136,14 @@ pub fn save_references(
 /// Returns the sections of the same file as [`save_references`], to be written one after the other:
 /// the header, the nodes, the object ids and the visits. On little-endian machines all but the header
 /// are the tree's memory, which a file of gigabytes does not need twice.
+///
+/// The caller has [validated](validate_references()) the tree and knows its cost under the origin's
+/// objective. Neither is checked here, because each takes as long as everything else, and several
+/// threads can do both at once. Rejects visits that no measure gives.
 pub fn sections<'a>(
     tree: &'a Bvh,
     boxes: &[Aabb],
-    objects: &dyn Clip,
-    origin: &Origin<'a>,
-) -> Result<[Cow<'a, [u8]>; 4], FileError> {
-    validate_references(tree, boxes, objects)?;
-    sections_of_valid(tree, boxes, origin)
-}
-
-/// Returns the file of a valid tree.
-fn saved(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, FileError> {
-    Ok(sections_of_valid(tree, boxes, origin)?.concat())
-}
-
-/// Returns the sections of the file of a valid tree.
-fn sections_of_valid<'a>(
-    tree: &'a Bvh,
-    boxes: &[Aabb],
+    cost: f64,
     origin: &Origin<'a>,
 ) -> Result<[Cow<'a, [u8]>; 4], FileError> {
     let Origin { method, seed, work, objective, visits } = *origin;
@@ -160,7 +155,7 @@ fn sections_of_valid<'a>(
         objects: boxes.len(),
         references: tree.prim_ids.len(),
         objective,
-        cost: objective.cost(tree),
+        cost,
         seed,
         work,
         scene: boxes_checksum(boxes),

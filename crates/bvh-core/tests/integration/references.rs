@@ -7,10 +7,11 @@ use crate::support::{
 use bvh_core::{
     Aabb, Bvh, Clip, Hit, InvalidBvh, Kernel, Node, Ray, Shear, Triangle, WideBvh, any_hit_by,
     collapse_leaves,
-    cost::{SahConstants, layout_area},
+    cost::{SahConstants, layout_area, layout_cost},
     nearest_hit_by, query, validate, validate_references,
 };
 use glam::Vec3;
+use std::thread;
 
 /// Divides leaves of `tree` at random planes, and divides parts again. Returns the tree, and the
 /// object, axis and coordinate of each plane.
@@ -247,7 +248,15 @@ fn the_cost_of_a_layout_is_known_before_it_is_made() {
             }
             let wide = WideBvh::new(&tree, &triangles).unwrap();
             let found = wide.expected_visits();
-            let expected = layout_area(&tree) / root_area;
+            let area = layout_area(&tree);
+            let by_threads = layout_cost(&tree, None, &|first, second| {
+                thread::scope(|scope| {
+                    scope.spawn(first);
+                    second();
+                });
+            });
+            assert_eq!(by_threads.to_bits(), area.to_bits());
+            let expected = area / root_area;
             assert!((found - expected).abs() <= 1e-4 * expected, "{n}: {found} {expected}");
         }
     }

@@ -1,5 +1,6 @@
 //! The problem that a search solves, and the shortcuts that keep its answer.
 
+use crate::parallel;
 use bvh_build::{BuildError, Watch, spatial};
 use bvh_core::cost::{self, Measure, Objective};
 use bvh_core::{Aabb, Bvh, Clip};
@@ -84,10 +85,12 @@ impl<'a> Problem<'a> {
     pub fn cost(&self, tree: &Bvh) -> f64 {
         match (self.judge, self.splits, self.measure) {
             (Some(judge), ..) => judge.judge(tree),
-            (None, Some(_), Some(measure)) if self.objective != Objective::Layout => {
-                cost::total_measure(tree, measure)
+            // The costs of a large layout take half a second, which a caller who has cancelled may wait for.
+            _ if self.objective == Objective::Layout => {
+                cost::layout_cost(tree, self.measure, &parallel::call_both)
             }
-            (None, Some(_), None) if self.objective != Objective::Layout => cost::total_area(tree),
+            (None, Some(_), Some(measure)) => cost::total_measure(tree, measure),
+            (None, Some(_), None) => cost::total_area(tree),
             (None, _, Some(measure)) => self.objective.cost_by(tree, measure),
             (None, _, None) => self.objective.cost(tree),
         }
