@@ -28,8 +28,10 @@
 //! # Ok::<(), bvh_core::InvalidInstances>(())
 //! ```
 
+use crate::wide::{Answers, OfInstances, lay_out_instances, vector};
 use crate::{
-    Aabb, Bvh, Hit, InvalidBvh, Ray, Slabs, WideBvh, any_hit_by, nearest_hit_by, validate,
+    Aabb, Bvh, Coherence, Hit, InvalidBvh, Kernel, Ray, Slabs, WideBvh, any_hit_by, nearest_hit_by,
+    validate,
 };
 use alloc::vec::Vec;
 use glam::{Affine3A, DAffine3};
@@ -120,7 +122,7 @@ fn place_all(instances: &[Instance], parts: &[WideBvh]) -> Result<Vec<Placed>, I
 
 /// An instance that is prepared for rays.
 #[derive(Clone, Copy, Debug)]
-struct Placed {
+pub(crate) struct Placed {
     part: u32,
     to_local: DAffine3,
     aabb: Aabb,
@@ -155,6 +157,15 @@ pub struct InstanceHit {
 }
 
 impl InstanceHit {
+    /// The value that a batch writes for a ray without a hit.
+    pub const MISS: Self = Self { t: f32::INFINITY, instance: u32::MAX, triangle: u32::MAX };
+
+    /// Returns whether this is [`MISS`](Self::MISS).
+    #[inline]
+    pub fn is_miss(&self) -> bool {
+        self.instance == u32::MAX
+    }
+
     fn new(instance: u32, Hit { t, object: triangle }: Hit) -> Self {
         Self { t, instance, triangle }
     }
@@ -166,6 +177,9 @@ pub struct Instances {
     parts: Vec<WideBvh>,
     placed: Vec<Placed>,
     top: Bvh,
+    /// The same tree for batches, and the largest size of a coordinate of a part.
+    wide_top: WideBvh,
+    largest_of_parts: f32,
 }
 
 impl Instances {
@@ -180,7 +194,14 @@ impl Instances {
         let placed = place_all(&instances, &parts)?;
         let boxes: Vec<Aabb> = placed.iter().map(|placed| placed.aabb).collect();
         validate(&top, &boxes)?;
-        Ok(Self { parts, placed, top })
+        let used = placed
+            .iter()
+            .map(|placed| &parts[placed.part as usize]);
+        let wide_top = lay_out_instances(&top, &boxes, used);
+        let largest_of_parts = parts
+            .iter()
+            .fold(0.0f32, |largest, part| largest.max(part.largest));
+        Ok(Self { parts, placed, top, wide_top, largest_of_parts })
     }
 
     /// Returns the parts, for other instances of the same parts.
@@ -251,6 +272,67 @@ impl Instances {
         self.any(ray, |part, instance, local_ray| {
             part.any_hit_where(local_ray, |hit| accept(InstanceHit::new(instance, hit)))
         })
+    }
+
+    /// [`nearest_hit`](Self::nearest_hit) of every ray, into as many `hits`; [`InstanceHit::MISS`] for a ray
+    /// that hits nothing. `coherence` changes the speed alone, no answer.
+    ///
+    /// # Panics
+    /// If `rays` and `hits` are not equally many.
+    pub fn nearest_hits(&self, rays: &[Ray], hits: &mut [InstanceHit], coherence: Coherence) {
+        assert_eq!(rays.len(), hits.len(), "a hit for every ray");
+        self.trace(rays, &mut OfInstances { scene: self, answers: hits }, coherence);
+    }
+
+    /// [`any_hit`](Self::any_hit) of every ray, into as many `hits`.
+    ///
+    /// # Panics
+    /// If `rays` and `hits` are not equally many.
+    pub fn any_hits(&self, rays: &[Ray], hits: &mut [bool], coherence: Coherence) {
+        assert_eq!(rays.len(), hits.len(), "an answer for every ray");
+        self.trace(rays, &mut OfInstances { scene: self, answers: hits }, coherence);
+    }
+
+    /// Answers a batch by rays in flight, or ray by ray.
+    #[inline]
+    fn trace<A: Answers>(&self, rays: &[Ray], answers: &mut A, coherence: Coherence) {
+        if self.wide_top.kernel != Kernel::Portable {
+            // SAFETY: the kernel is available and the stack need small enough, as `lay_out_instances` saw.
+            return unsafe { vector::trace(&self.wide_top, rays, answers, coherence) };
+        }
+        for (number, ray) in rays.iter().enumerate() {
+            answers.alone(number, &self.wide_top, ray);
+        }
+    }
+
+    /// Returns the ray in the coordinates of an instance's part, and the distance at which it enters the
+    /// instance's box; `None` if it does not before `t_max`.
+    #[inline(always)]
+    pub(crate) fn enter(&self, instance: u32, ray: &Ray, t_max: f32) -> Option<(Ray, f32)> {
+        let placed = &self.placed[instance as usize];
+        let entry = Slabs::new(ray, &self.wide_top.bounds).entry(&placed.aabb);
+        if entry > t_max {
+            return None;
+        }
+        Some((placed.local(ray, t_max)?, entry))
+    }
+
+    /// Returns the part of an instance.
+    #[inline(always)]
+    pub(crate) fn part_of(&self, instance: u32) -> &WideBvh {
+        &self.parts[self.placed[instance as usize].part as usize]
+    }
+
+    /// Returns the instances as they are prepared for rays.
+    #[inline(always)]
+    pub(crate) fn placed(&self) -> &[Placed] {
+        &self.placed
+    }
+
+    /// Returns the largest size of a coordinate of any part.
+    #[inline(always)]
+    pub(crate) fn largest_of_parts(&self) -> f32 {
+        self.largest_of_parts
     }
 
     /// Returns whether `ray` hits any instance, where `hits` returns whether it hits an instance's part.

@@ -2,7 +2,7 @@
 
 use super::lanes::Lanes;
 use super::layout::WideBvh;
-use crate::{Hit, Ray};
+use crate::{Hit, InstanceHit, Instances, Ray};
 
 /// Answers to the rays of a batch, by the number of the ray.
 pub(crate) trait Answers {
@@ -10,6 +10,15 @@ pub(crate) trait Answers {
     const ANY: bool;
     /// True if [`accepts`](Self::accepts) may reject hits.
     const FILTERS: bool = false;
+
+    /// True if leaves of the layout at whose root rays start are instances of a scene.
+    const IN_INSTANCES: bool = false;
+
+    /// Returns the scene of these instances.
+    #[inline(always)]
+    fn scene(&self) -> Option<&Instances> {
+        None
+    }
 
     /// Returns whether a hit of the ray with this number counts.
     #[inline(always)]
@@ -20,6 +29,13 @@ pub(crate) trait Answers {
 
     /// Writes the answer for a ray whose traversal ended at this distance with this object, `u32::MAX` for none.
     fn write(&mut self, number: usize, t: f32, object: u32);
+
+    /// Writes the answer for a ray among instances, likewise, with the instance of the object.
+    #[inline(always)]
+    fn write_instance(&mut self, number: usize, t: f32, instance: u32, object: u32) {
+        let _ = instance;
+        self.write(number, t, object);
+    }
 
     /// Writes the answers for rays side by side, likewise.
     #[inline(always)]
@@ -130,5 +146,58 @@ impl<A: Answers> Answers for Filtered<'_, A> {
                 .unwrap_or(Hit::MISS);
             self.write(number, hit.t, hit.object);
         }
+    }
+}
+
+/// Answers from the instances of a scene.
+pub(crate) struct OfInstances<'a, A> {
+    pub(crate) scene: &'a Instances,
+    pub(crate) answers: A,
+}
+
+impl Answers for OfInstances<'_, &mut [InstanceHit]> {
+    const ANY: bool = false;
+    const IN_INSTANCES: bool = true;
+
+    #[inline(always)]
+    fn scene(&self) -> Option<&Instances> {
+        Some(self.scene)
+    }
+
+    #[inline(always)]
+    fn write(&mut self, number: usize, _: f32, _: u32) {
+        self.answers[number] = InstanceHit::MISS;
+    }
+
+    #[inline(always)]
+    fn write_instance(&mut self, number: usize, t: f32, instance: u32, object: u32) {
+        let t = distance(t, object);
+        self.answers[number] = InstanceHit { t, instance, triangle: object };
+    }
+
+    fn alone(&mut self, number: usize, _: &WideBvh, ray: &Ray) {
+        self.answers[number] = self
+            .scene
+            .nearest_hit(ray)
+            .unwrap_or(InstanceHit::MISS);
+    }
+}
+
+impl Answers for OfInstances<'_, &mut [bool]> {
+    const ANY: bool = true;
+    const IN_INSTANCES: bool = true;
+
+    #[inline(always)]
+    fn scene(&self) -> Option<&Instances> {
+        Some(self.scene)
+    }
+
+    #[inline(always)]
+    fn write(&mut self, number: usize, _: f32, object: u32) {
+        self.answers[number] = object != u32::MAX;
+    }
+
+    fn alone(&mut self, number: usize, _: &WideBvh, ray: &Ray) {
+        self.answers[number] = self.scene.any_hit(ray);
     }
 }

@@ -26,7 +26,7 @@ pub(crate) unsafe fn trace<K: Instructions, A: Answers>(
 ) {
     // SAFETY: the caller's promises.
     unsafe {
-        if coherence == Coherence::Incoherent {
+        if coherence == Coherence::Incoherent || A::IN_INSTANCES {
             return K::in_flight(wide, rays, answers, 0..rays.len());
         }
         let mut packet = Packet::<K>::new();

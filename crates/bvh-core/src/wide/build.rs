@@ -1,13 +1,11 @@
 //! The wide layout of least expected cost of a given tree.
 
 use super::decide::{Costs, Decision, areas, children, decide};
-use super::kernel::Kernel;
-use super::layout::{WideBvh, largest};
+use super::layout::WideBvh;
 use super::node::{Child, WideNode};
 use super::triangles::TriangleBlock;
 use crate::collapse::{binary, binary_visited, collect};
 use crate::{Aabb, Bvh, Triangle};
-use alloc::borrow::Cow;
 use alloc::{vec, vec::Vec};
 
 /// By how much each subtree promises to stop a ray, in relation to the expected time of tracing a ray through it. Rays that
@@ -71,15 +69,7 @@ pub(crate) fn widen(
     block_cost: f32,
 ) -> WideBvh {
     let bounds = tree.root_aabb().unwrap_or(Aabb::EMPTY);
-    let mut wide = WideBvh {
-        bounds,
-        root: None,
-        nodes: Cow::default(),
-        blocks: Cow::default(),
-        largest: largest(&bounds),
-        kernel: Kernel::Portable,
-        stack_need: 0,
-    };
+    let mut wide = WideBvh::without_nodes(bounds);
     if tree.nodes.is_empty() {
         return wide;
     }
@@ -105,30 +95,49 @@ pub(crate) fn widen(
     // A vector that grows would take up to three times its memory while it is copied.
     let (node_count, most_blocks) = sizes(tree, &decisions);
     let mut ids = Vec::new();
-    let mut nodes = Vec::with_capacity(node_count);
     let mut all_blocks = Vec::with_capacity(most_blocks);
+    let leaf = |subtree| {
+        let child = Child::leaf(all_blocks.len() as u32);
+        ids.clear();
+        collect(tree, subtree, &mut ids);
+        if split {
+            // Several parts of one triangle in one leaf are the triangle.
+            ids.sort_unstable();
+            ids.dedup();
+        }
+        ids.retain(|&id| !triangles[id as usize].is_degenerate());
+        if ids.is_empty() {
+            return None;
+        }
+        all_blocks.extend(TriangleBlock::chain(&ids, triangles));
+        Some(child)
+    };
+    lay_out_nodes(&mut wide, tree, &decisions, &promise, node_count, leaf);
+    wide.blocks = all_blocks.into();
+    wide
+}
+
+/// Lays out the nodes, the root and the `stack_need` as decided; children of more promise are in later
+/// lanes. `leaf` lays out a leaf, and returns `None` if there is nothing in it.
+pub(super) fn lay_out_nodes(
+    wide: &mut WideBvh,
+    tree: &Bvh,
+    decisions: &[Decision],
+    promise: &[f32],
+    node_count: usize,
+    mut leaf: impl FnMut(usize) -> Option<Child>,
+) {
+    let mut nodes = Vec::with_capacity(node_count);
     // Subtrees, and the lane that is to name each; none names the root.
     let mut open = vec![(0, None, 0)];
     while let Some((subtree, place, waiting)) = open.pop() {
         let child = if decisions[subtree].is_leaf {
-            let child = Child::leaf(all_blocks.len() as u32);
-            ids.clear();
-            collect(tree, subtree, &mut ids);
-            if split {
-                // Several parts of one triangle in one leaf are the triangle.
-                ids.sort_unstable();
-                ids.dedup();
-            }
-            ids.retain(|&id| !triangles[id as usize].is_degenerate());
-            if ids.is_empty() {
-                continue;
-            }
-            all_blocks.extend(TriangleBlock::chain(&ids, triangles));
+            let Some(child) = leaf(subtree) else { continue };
             child
         } else {
             let index = nodes.len();
             nodes.push(WideNode::EMPTY);
-            let (mut children, lanes) = children(tree, &decisions, subtree);
+            let (mut children, lanes) = children(tree, decisions, subtree);
             children[..lanes].sort_by(|&a, &b| promise[a].total_cmp(&promise[b]));
             let waiting = waiting + 7;
             open.extend((0..lanes).map(|lane| (children[lane], Some((index, lane)), waiting)));
@@ -145,8 +154,6 @@ pub(crate) fn widen(
         }
     }
     wide.nodes = nodes.into();
-    wide.blocks = all_blocks.into();
-    wide
 }
 
 #[cfg(test)]

@@ -18,9 +18,12 @@ use super::answer::Answers;
 use super::instructions::Instructions;
 use super::lanes::Lanes;
 use super::layout::WideBvh;
+use super::node::Child;
 use super::prepared::{Prepared, Ready};
 use super::source::Source;
-use super::traversal::{self, END, Traversal};
+use super::traversal::{self, Traversal};
+use crate::Ray;
+use crate::instances::Placed;
 use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 use core::ops::Range;
@@ -105,6 +108,7 @@ impl List {
 
 /// The rays of a batch that are in flight, that are prepared, and that are neither.
 struct Flight<'a, K, S, A> {
+    /// The layout at whose root rays start.
     wide: &'a WideBvh,
     rays: S,
     answers: &'a mut A,
@@ -129,6 +133,18 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             let first = self.from;
             for i in 0..K::FLIGHT {
                 self.start(first, traversals.add(i));
+            }
+            if A::IN_INSTANCES {
+                while self.at_nodes.count + self.at_leaves.count + self.at_end.count > 0 {
+                    self.visit_nodes();
+                    if self.at_leaves.count >= K::FLIGHT / 2 || self.at_nodes.count == 0 {
+                        self.visit_leaves(first);
+                    }
+                    if self.at_end.count >= K::Rays::N || self.at_nodes.count == 0 {
+                        self.cross(first);
+                    }
+                }
+                return;
             }
             while self.at_nodes.count + self.at_leaves.count > 0 {
                 self.visit_nodes();
@@ -155,7 +171,10 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             self.waiting &= self.waiting - 1;
             let traversal = &mut *traversal;
             let ray = self.ready.get_unchecked(next).assume_init();
-            traversal.start(ray, self.wide.root.unwrap_or(END));
+            traversal.start(ray, self.wide);
+            if A::IN_INSTANCES {
+                traversal.start_outside();
+            }
             self.enlist(traversal);
         }
     }
@@ -199,9 +218,10 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
         // SAFETY: every list has a place for every traversal.
         unsafe {
             self.at_nodes.append(traversal, child.is_node());
+            let is_at_end = child.is_instance_or_mark();
             self.at_leaves
-                .append(traversal, !child.is_node() & (child != END));
-            self.at_end.append(traversal, child == END);
+                .append(traversal, !child.is_node() & !is_at_end);
+            self.at_end.append(traversal, is_at_end);
         }
     }
 
@@ -210,7 +230,6 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
     /// one ray fills half of its window of instructions.
     #[inline(always)]
     unsafe fn visit_nodes(&mut self) {
-        let nodes = self.wide.nodes.as_ptr();
         let count = self.at_nodes.count;
         let mut entries = [const { MaybeUninit::<K::Boxes>::uninit() }; FLIGHT];
         let mut masks = [0; FLIGHT];
@@ -219,21 +238,21 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
         unsafe {
             for i in 0..count {
                 let traversal = &*self.at_nodes.get(i);
-                let node = &*nodes.add(traversal.child.index());
+                let node = &*traversal.nodes.add(traversal.child.index());
                 let (entry, mask) = traversal.ray.boxes::<K>(node, traversal.t);
                 entries.get_unchecked_mut(i).write(entry);
                 *masks.get_unchecked_mut(i) = mask;
             }
             for i in 0..count {
                 let traversal = &mut *self.at_nodes.get(i);
-                let node = &*nodes.add(traversal.child.index());
+                let node = &*traversal.nodes.add(traversal.child.index());
                 let entry = entries.get_unchecked(i).assume_init();
                 traversal.enter::<K, A>(node, entry, *masks.get_unchecked(i));
             }
             self.at_nodes.count = 0;
             for i in 0..count {
                 let traversal = &mut *self.at_nodes.get(i);
-                traversal.fetch::<K>(self.wide);
+                traversal.fetch::<K>(self.placed());
                 self.enlist(traversal);
             }
         }
@@ -241,7 +260,6 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
 
     #[inline(always)]
     unsafe fn visit_leaves(&mut self, first: usize) {
-        let blocks = self.wide.blocks.as_ptr();
         // SAFETY: as for nodes; a block that is not its leaf's last is followed by another.
         unsafe {
             let count = self.at_leaves.count;
@@ -251,7 +269,7 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             for i in (0..count).step_by(quarters) {
                 let at = |k: usize| self.at_leaves.get((i + k).min(count - 1));
                 let four = [at(0), at(1), at(2), at(3)];
-                let found = traversal::candidates::<K::Rays>(four, blocks);
+                let found = traversal::candidates::<K::Rays>(four);
                 for (k, &traversal) in four.iter().enumerate().take(quarters) {
                     hopeful.append(traversal, (found >> (4 * k) & 0b1111 != 0) & (i + k < count));
                 }
@@ -262,9 +280,9 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
                 if A::FILTERS {
                     // A traversal that only fills the lanes must not show its hits twice.
                     let rays = &four[..quarters.min(hopeful.count - i)];
-                    traversal::decide_accepted::<K::Rays>(rays, blocks, first, self.answers);
+                    traversal::decide_accepted::<K::Rays>(rays, first, self.answers);
                 } else {
-                    traversal::decide::<K::Rays>(four, blocks);
+                    traversal::decide::<K::Rays>(four);
                 }
                 if !A::ANY {
                     for &traversal in four.iter().take(quarters) {
@@ -274,8 +292,8 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             }
             for i in 0..count {
                 let traversal = &mut *self.at_leaves.get(i);
-                traversal.leave_block::<A>(blocks);
-                traversal.fetch::<K>(self.wide);
+                traversal.leave_block::<A>();
+                traversal.fetch::<K>(self.placed());
                 self.enlist(traversal);
             }
         }
@@ -296,5 +314,128 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
                 self.start(first, traversal);
             }
         }
+    }
+
+    /// Has every ray at the end of an instance leave it, and every ray at an instance enter it; writes the
+    /// answers of rays at their end, and starts others in their place.
+    #[inline(always)]
+    unsafe fn cross(&mut self, first: usize) {
+        let count = self.at_end.count;
+        self.at_end.count = 0;
+        let mut entering = Entering::NONE;
+        // SAFETY: the caller's promises; every ray is started.
+        unsafe {
+            for i in 0..count {
+                let traversal = &mut *self.at_end.get(i);
+                if traversal.child == Child::LEAVE && !traversal.leave_instance(self.wide) {
+                    self.finish_alone(first, traversal);
+                    continue;
+                }
+                if traversal.child == Child::END {
+                    let (t, instance, object) = traversal.nearest_of_all::<A>();
+                    let number = first + traversal.ray.number as usize;
+                    self.answers
+                        .write_instance(number, t, instance, object);
+                    self.start(first, traversal);
+                    continue;
+                }
+                if traversal.child.is_instance_or_mark() {
+                    let ray = self
+                        .rays
+                        .ray(first + traversal.ray.number as usize);
+                    let instance = traversal.child.instance_index();
+                    if let Some(scene) = self.answers.scene()
+                        && let Some((local_ray, entry)) = scene.enter(instance, &ray, traversal.t)
+                    {
+                        entering.add(traversal, local_ray, entry);
+                        if entering.count == K::Rays::N {
+                            self.enter(first, &mut entering);
+                        }
+                        continue;
+                    }
+                    traversal.pop();
+                }
+                traversal.fetch::<K>(self.placed());
+                self.enlist(traversal);
+            }
+            if entering.count > 0 {
+                self.enter(first, &mut entering);
+            }
+        }
+    }
+
+    /// Has rays enter the instances at which they are.
+    #[inline(always)]
+    unsafe fn enter(&mut self, first: usize, entering: &mut Entering) {
+        let count = core::mem::replace(&mut entering.count, 0);
+        let Some(scene) = self.answers.scene() else { return };
+        let mut prepared = [const { MaybeUninit::<Prepared>::uninit() }; RAYS];
+        // SAFETY: so many rays have been added; there is room for as many as there are lanes.
+        unsafe {
+            let rays = core::slice::from_raw_parts(entering.rays.as_ptr().cast::<Ray>(), count);
+            let ready = Ready::new(rays.lanes_up_to::<K::Rays>(0, count), scene.largest_of_parts());
+            ready.write(0, prepared.as_mut_ptr().cast());
+            for (i, prepared) in prepared.iter().enumerate().take(count) {
+                let traversal = &mut *entering.traversals[i];
+                if ready.in_range >> i & 1 == 0 {
+                    self.finish_alone(first, traversal);
+                    continue;
+                }
+                if let Some(scene) = self.answers.scene() {
+                    let part = scene.part_of(traversal.child.instance_index());
+                    traversal.enter_instance(prepared.assume_init(), entering.entries[i], part);
+                }
+                traversal.fetch::<K>(self.placed());
+                self.enlist(traversal);
+            }
+        }
+    }
+
+    /// Answers a ray by itself, and starts another in its place.
+    #[cold]
+    #[inline(never)]
+    unsafe fn finish_alone(&mut self, first: usize, traversal: &mut Traversal) {
+        let number = first + traversal.ray.number as usize;
+        self.answers
+            .alone(number, self.wide, &self.rays.ray(number));
+        // SAFETY: the caller's promises.
+        unsafe { self.start(first, traversal) };
+    }
+
+    /// Returns the instances that leaves of the layout name, or none.
+    #[inline(always)]
+    fn placed(&self) -> &[Placed] {
+        match self.answers.scene() {
+            Some(scene) => scene.placed(),
+            None => &[],
+        }
+    }
+}
+
+/// Rays that are about to enter instances.
+struct Entering {
+    traversals: [*mut Traversal; RAYS],
+    /// The rays in the coordinates of the instances' parts.
+    rays: [MaybeUninit<Ray>; RAYS],
+    /// The distances at which the rays enter the instances' boxes.
+    entries: [f32; RAYS],
+    count: usize,
+}
+
+impl Entering {
+    const NONE: Self = Self {
+        traversals: [core::ptr::null_mut(); RAYS],
+        rays: [const { MaybeUninit::uninit() }; RAYS],
+        entries: [0.0; RAYS],
+        count: 0,
+    };
+
+    /// Adds a ray.
+    #[inline(always)]
+    fn add(&mut self, traversal: *mut Traversal, local_ray: Ray, entry: f32) {
+        self.traversals[self.count] = traversal;
+        self.rays[self.count].write(local_ray);
+        self.entries[self.count] = entry;
+        self.count += 1;
     }
 }

@@ -54,6 +54,21 @@ pub(super) fn largest(bounds: &Aabb) -> f32 {
         .max_element()
 }
 
+impl WideBvh {
+    /// Returns the layout of nothing within these bounds, for the portable kernel.
+    pub(super) fn without_nodes(bounds: Aabb) -> Self {
+        Self {
+            bounds,
+            root: None,
+            nodes: Cow::default(),
+            blocks: Cow::default(),
+            largest: largest(&bounds),
+            kernel: Kernel::Portable,
+            stack_need: 0,
+        }
+    }
+}
+
 /// Copies all arrays: a clone may outlive the bytes that a view borrows.
 impl Clone for WideBvh {
     fn clone(&self) -> Self {

@@ -32,6 +32,7 @@ mod prepared;
 mod ray_lanes;
 mod refit;
 mod source;
+mod top;
 mod traversal;
 mod triangles;
 // The kernels of the target, or none.
@@ -43,8 +44,9 @@ mod triangles;
     ),
     path = "simd128/mod.rs"
 )]
-mod vector;
+pub(crate) mod vector;
 
+pub(crate) use answer::{Answers, OfInstances};
 pub use coherence::Coherence;
 pub(crate) use decide::{BLOCK_COST, NODE_COST, areas, children, decide};
 pub use kernel::Kernel;
@@ -53,6 +55,7 @@ use layout::largest;
 pub use nearest::Closest;
 pub(crate) use node::{Child, WideNode};
 pub use refit::RefitError;
+pub(crate) use top::lay_out_instances;
 pub(crate) use triangles::TriangleBlock;
 
 use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate_references};
@@ -181,7 +184,9 @@ impl WideBvh {
     }
 
     fn choose(&mut self, available: Kernel) {
-        self.kernel = if self.stack_need <= STACK { available } else { Kernel::Portable };
+        // A child with a greater index than blocks have is an instance.
+        let is_vector = self.stack_need <= STACK && self.blocks.len() <= Child::INSTANCE as usize;
+        self.kernel = if is_vector { available } else { Kernel::Portable };
     }
 
     /// [`nearest_hit`](Self::nearest_hit) by [`Kernel::Portable`], with its tests counted: eight boxes

@@ -10,11 +10,9 @@ use super::pairs::Pairs;
 use super::prepared::Prepared;
 use super::triangles::TriangleBlock;
 use crate::Hit;
+use crate::instances::Placed;
 use crate::triangle::AXES;
 use core::mem::MaybeUninit;
-
-/// The child at the bottom of every stack.
-pub(crate) const END: Child = Child::leaf(u32::MAX);
 
 /// The traversal of the layout by one ray.
 #[repr(C, align(64))]
@@ -24,12 +22,29 @@ pub(super) struct Traversal {
     pub(super) t: f32,
     pub(super) object: u32,
     top: *mut Pending,
-    /// The node or the block of triangles to visit next, or [`END`].
+    /// The node or the block of triangles to visit next, or [`END`](Child::END).
     pub(super) child: Child,
+    /// The arrays of the layout in which the ray is.
+    pub(super) nodes: *const WideNode,
+    pub(super) blocks: *const TriangleBlock,
+    /// Written while the scene has instances.
+    outside: MaybeUninit<Outside>,
     stack: Stack,
 }
 
-/// [`END`], the children that wait, the next block of the same leaf, and room for stores of whole
+/// The state of a ray outside of the instance in which it is.
+struct Outside {
+    ray: Prepared,
+    /// The nearest hit so far, or the end of the ray and `u32::MAX`.
+    t: f32,
+    instance: u32,
+    object: u32,
+    /// The instance in which the ray is, and the distance at which it enters the instance's box.
+    entered: u32,
+    entry: f32,
+}
+
+/// [`END`](Child::END), the children that wait, the next block of the same leaf, and room for stores of whole
 /// registers.
 #[repr(C, align(64))]
 struct Stack([MaybeUninit<Pending>; STACK + 24]);
@@ -41,17 +56,100 @@ struct Stack([MaybeUninit<Pending>; STACK + 24]);
 impl Traversal {
     /// Starts a ray at the root.
     #[inline(always)]
-    pub(super) unsafe fn start(&mut self, ray: Prepared, root: Child) {
+    pub(super) unsafe fn start(&mut self, ray: Prepared, wide: &WideBvh) {
         self.t = ray.t_max;
         self.object = u32::MAX;
         self.ray = ray;
-        self.child = root;
-        self.stack.0[0].write(u64::from(END.bits()));
+        self.is_in(wide);
+        self.stack.0[0].write(u64::from(Child::END.bits()));
         // SAFETY: the stack has more than one place.
         self.top = unsafe { self.bottom().add(1) };
     }
 
-    /// The address of [`END`] on the stack.
+    /// Goes on at the root of a layout.
+    #[inline(always)]
+    fn is_in(&mut self, wide: &WideBvh) {
+        self.child = wide.root.unwrap_or(Child::END);
+        self.nodes = wide.nodes.as_ptr();
+        self.blocks = wide.blocks.as_ptr();
+    }
+
+    /// Keeps the state of a ray that has been started, so that it can enter instances.
+    #[inline(always)]
+    pub(super) fn start_outside(&mut self) {
+        let Self { ray, t, .. } = *self;
+        let none = u32::MAX;
+        let outside = Outside { ray, t, instance: none, object: none, entered: none, entry: 0.0 };
+        self.outside.write(outside);
+    }
+
+    /// Goes on in an instance of a part, where this is the ray.
+    #[inline(always)]
+    pub(super) unsafe fn enter_instance(&mut self, ray: Prepared, entry: f32, part: &WideBvh) {
+        let number = self.ray.number;
+        // SAFETY: the caller's promise: the state outside is kept; the stack has room for the mark.
+        unsafe {
+            let outside = self.outside.assume_init_mut();
+            outside.entered = self.child.instance_index();
+            outside.entry = entry;
+            *self.top = u64::from(Child::LEAVE.bits());
+            self.top = self.top.add(1);
+        }
+        self.ray = ray;
+        self.ray.number = number;
+        self.is_in(part);
+    }
+
+    /// Keeps the nearest hit in the instance if it precedes those before, and goes on in the layout of
+    /// all instances. Returns false if the hit is in front of the instance's box, where a tree that visits
+    /// the box later would skip it.
+    #[inline(always)]
+    pub(super) unsafe fn leave_instance(&mut self, all: &WideBvh) -> bool {
+        // SAFETY: the caller's promise: the state outside is kept.
+        let outside = unsafe { self.outside.assume_init_mut() };
+        if self.object != u32::MAX {
+            if self.t < outside.entry {
+                return false;
+            }
+            let before = Hit { t: outside.t, object: outside.instance };
+            if (Hit { t: self.t, object: outside.entered }).precedes(&before) {
+                outside.t = self.t;
+                outside.instance = outside.entered;
+                outside.object = self.object;
+            }
+        }
+        self.t = outside.t;
+        self.ray = outside.ray;
+        self.object = u32::MAX;
+        self.nodes = all.nodes.as_ptr();
+        // SAFETY: the caller's promises.
+        unsafe { self.pop() };
+        true
+    }
+
+    /// Returns the nearest hit of a ray among all instances at its end: the distance, the instance and
+    /// the triangle.
+    #[inline(always)]
+    pub(super) unsafe fn nearest_of_all<A: Answers>(&self) -> (f32, u32, u32) {
+        if A::ANY {
+            return (self.t, self.object, self.object);
+        }
+        // SAFETY: the caller's promise: the state outside is kept.
+        let outside = unsafe { self.outside.assume_init_ref() };
+        (outside.t, outside.instance, outside.object)
+    }
+
+    /// Goes on to what waits.
+    #[inline(always)]
+    pub(super) unsafe fn pop(&mut self) {
+        // SAFETY: the caller's promise: the stack holds at least an end.
+        unsafe {
+            self.top = self.top.sub(1);
+            self.child = Child::from_bits(*self.top as u32);
+        }
+    }
+
+    /// The address of [`END`](Child::END) on the stack.
     #[inline(always)]
     fn bottom(&mut self) -> *mut Pending {
         self.stack.0.as_mut_ptr().cast()
@@ -65,7 +163,7 @@ impl Traversal {
         entry: K::Boxes,
         mask: u32,
     ) {
-        // SAFETY: the stack holds at least `END`, and has room for eight children.
+        // SAFETY: the stack holds at least an end, and has room for eight children.
         unsafe {
             let top = self.top;
             self.top = top.add(mask.count_ones() as usize).sub(1);
@@ -92,32 +190,35 @@ impl Traversal {
     /// Goes on from a block of triangles: to the next one of the leaf, to what waits, or to the end
     /// if any hit will do and there is one.
     #[inline(always)]
-    pub(super) unsafe fn leave_block<A: Answers>(&mut self, blocks: *const TriangleBlock) {
+    pub(super) unsafe fn leave_block<A: Answers>(&mut self) {
         // SAFETY: a block that is not its leaf's last is followed by another; the stack holds at
-        // least `END`, and has room for one more.
+        // least an end, and has room for one more.
         unsafe {
             let block = self.child.index();
-            let is_last = (*blocks.add(block)).is_last();
+            let is_last = (*self.blocks.add(block)).is_last();
             *self.top = u64::from(Child::leaf(block as u32 + 1).bits());
             self.top = self.top.add(usize::from(!is_last));
             if A::ANY && self.object != u32::MAX {
                 self.top = self.bottom().add(1);
             }
-            self.top = self.top.sub(1);
-            self.child = Child::from_bits(*self.top as u32);
+            self.pop();
         }
     }
 
-    /// Has the next node or block of triangles fetched.
+    /// Has the next node, block of triangles, or instance of those at `placed` fetched.
     #[inline(always)]
-    pub(super) unsafe fn fetch<K: Instructions>(&self, wide: &WideBvh) {
+    pub(super) unsafe fn fetch<K: Instructions>(&self, placed: &[Placed]) {
         let child = self.child;
+        let mut index = child.index();
         let (array, size) = if child.is_node() {
-            (wide.nodes.as_ptr().cast::<u8>(), size_of::<WideNode>())
+            (self.nodes.cast::<u8>(), size_of::<WideNode>())
+        } else if !placed.is_empty() && child.is_instance_or_mark() {
+            index = child.instance_index() as usize;
+            (placed.as_ptr().cast::<u8>(), size_of::<Placed>())
         } else {
-            (wide.blocks.as_ptr().cast::<u8>(), size_of::<TriangleBlock>())
+            (self.blocks.cast::<u8>(), size_of::<TriangleBlock>())
         };
-        let lines = array.wrapping_add(child.index().wrapping_mul(size));
+        let lines = array.wrapping_add(index.wrapping_mul(size));
         for line in 0..4 {
             // SAFETY: a prefetch may name any address.
             unsafe { K::prefetch(lines.wrapping_add(64 * line)) };
@@ -135,26 +236,22 @@ unsafe fn pairs<L: Lanes>(four: [*mut Traversal; 4]) -> Pairs<L> {
 /// Returns a bit for each triangle that the line of its ray may meet, of the block at which each ray
 /// is: four bits per ray.
 #[inline(always)]
-pub(super) unsafe fn candidates<L: Lanes>(
-    four: [*mut Traversal; 4],
-    blocks: *const TriangleBlock,
-) -> u32 {
+pub(super) unsafe fn candidates<L: Lanes>(four: [*mut Traversal; 4]) -> u32 {
     // SAFETY: the caller's promises.
-    unsafe { pairs::<L>(four).candidates(&corners(four, blocks)) }
+    unsafe { pairs::<L>(four).candidates(&corners(four)) }
 }
 
 /// Returns the corners of the block at which each ray is, along the axes of its shear.
 #[inline(always)]
-unsafe fn corners<L: Lanes>(
-    four: [*mut Traversal; 4],
-    blocks: *const TriangleBlock,
-) -> [[L; 3]; 3] {
+unsafe fn corners<L: Lanes>(four: [*mut Traversal; 4]) -> [[L; 3]; 3] {
     // SAFETY: the caller's promises; axes are below 3.
     unsafe {
         let lanes = |i: usize, corner: usize, axis: usize| {
             let traversal = &*four[i];
             let axis = AXES[traversal.ray.largest_axis as usize % 3][axis];
-            let block = blocks.wrapping_add(traversal.child.index());
+            let block = traversal
+                .blocks
+                .wrapping_add(traversal.child.index());
             block
                 .cast::<f32>()
                 .wrapping_add((3 * corner + axis) * TriangleBlock::LANES)
@@ -178,18 +275,20 @@ unsafe fn corners<L: Lanes>(
 /// Gives every ray the nearest hit among the hit it has and those in the block at which it is, by
 /// [`Hit::precedes`](crate::Hit::precedes) and without a branch.
 #[inline(always)]
-pub(super) unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4], blocks: *const TriangleBlock) {
+pub(super) unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4]) {
     // SAFETY: the caller's promises; ids are four aligned lanes, and so are the fields of a traversal
     // from its distance on.
     unsafe {
         let row = |i: usize| (&raw const (*four[i]).t);
         let before = L::load_quarters([row(0), row(1), row(2), row(3)]);
         let t_max = before.spread::<0>();
-        let (inside, t) = pairs::<L>(four).decide(&corners(four, blocks), t_max);
+        let (inside, t) = pairs::<L>(four).decide(&corners(four), t_max);
         let ids = |i: usize| {
-            (*blocks.wrapping_add((*four[i]).child.index()))
-                .ids()
-                .cast()
+            (*(*four[i])
+                .blocks
+                .wrapping_add((*four[i]).child.index()))
+            .ids()
+            .cast()
         };
         let ids = L::load_quarters([ids(0), ids(1), ids(2), ids(3)])
             & L::splat_bits(!TriangleBlock::LAST);
@@ -218,7 +317,6 @@ pub(super) unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4], blocks: *const 
 #[inline(always)]
 pub(super) unsafe fn decide_accepted<L: Lanes>(
     four: &[*mut Traversal],
-    blocks: *const TriangleBlock,
     first: usize,
     answers: &mut impl Answers,
 ) {
@@ -227,13 +325,13 @@ pub(super) unsafe fn decide_accepted<L: Lanes>(
         let rays: [*mut Traversal; 4] = core::array::from_fn(|i| four[i.min(four.len() - 1)]);
         let ends = rays.map(|ray| &raw const (*ray).t);
         let t_max = L::load_quarters(ends).spread::<0>();
-        let (inside, t) = pairs::<L>(rays).decide(&corners(rays, blocks), t_max);
+        let (inside, t) = pairs::<L>(rays).decide(&corners(rays), t_max);
         let inside = inside.bits();
         let mut distances = [0.0; 16];
         t.store(distances.as_mut_ptr());
         for (i, &traversal) in four.iter().enumerate() {
             let traversal = &mut *traversal;
-            let block = &*blocks.add(traversal.child.index());
+            let block = &*traversal.blocks.add(traversal.child.index());
             for lane in 0..TriangleBlock::LANES {
                 let number = TriangleBlock::LANES * i + lane;
                 let nearest = Hit { t: traversal.t, object: traversal.object };

@@ -38,4 +38,4 @@ pub(super) unsafe fn all_hits_of(_: &WideBvh, _: &[Ray], _: &mut Vec<Found>) -> 
 pub(super) unsafe fn closest_points(_: &WideBvh, _: &[Vec3], _: &mut [Option<Closest>]) {}
 
 /// Is never called.
-pub(super) unsafe fn trace<A: Answers>(_: &WideBvh, _: impl Source, _: &mut A, _: Coherence) {}
+pub(crate) unsafe fn trace<A: Answers>(_: &WideBvh, _: impl Source, _: &mut A, _: Coherence) {}

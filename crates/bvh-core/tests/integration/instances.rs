@@ -1,10 +1,11 @@
 //! Instances give the same answers as the scene with all triangles written out, and as their parts,
 //! for any tree over the instances.
 
-use crate::support::{Random, SHAPES, ball, boxes, grid_box, soup, tree};
+use crate::support::layouts::bundles;
+use crate::support::{self, Random, SHAPES, ball, boxes, chain, grid_box, soup, tree};
 use bvh_core::{
-    Aabb, Bvh, Instance, InstanceHit, Instances, InvalidInstances, Ray, Triangle, WideBvh,
-    nearest_hit,
+    Aabb, Bvh, Coherence, Instance, InstanceHit, Instances, InvalidInstances, Kernel, Ray,
+    Triangle, WideBvh, nearest_hit,
 };
 use glam::{Affine3A, Mat3A, Quat, Vec3, Vec3A};
 
@@ -191,6 +192,115 @@ fn filters_see_every_hit_that_the_answer_needs_and_no_rejected_hit_is_an_answer(
         }
     }
     assert!(hits > 200, "{hits}");
+}
+
+/// Mirrors, nests, flattens and enlarges a part near the origin, so that boxes overlap and contain each
+/// other.
+fn nested_transform(random: &mut Random) -> Affine3A {
+    let size = random.of(&[0.01, 0.3, 1.0, 1.0, 1.0, 8.0]);
+    let sign = random.of(&[-1.0, 1.0]);
+    let scale = Vec3::new(size * sign, size, size * random.of(&[1.0, 1.0, 1e-3]));
+    let turn = match random.below(3) {
+        0 => Quat::IDENTITY,
+        _ => Quat::from_axis_angle(random.point().normalize(), random.unit() * 6.0),
+    };
+    let shift = random.point() * random.of(&[0.0, 1.0, 5.0]);
+    Affine3A::from_scale_rotation_translation(scale, turn, shift)
+}
+
+/// Rays of every kind: towards edges and corners in bundles, difficult ones, from far away, and of extreme
+/// lengths, which vector kernels leave to others.
+fn rays_of_every_kind(flat: &[Triangle], random: &mut Random) -> Vec<Ray> {
+    let mut all = bundles(flat, 60, random);
+    all.extend(support::rays(flat, 600, random));
+    for scale in [1e4, 1e7, 1e20] {
+        for _ in 0..60 {
+            let origin = random.point() * scale;
+            let Triangle([a, ..]) = random.of(flat);
+            all.extend(Ray::half_line(origin, (a - origin) / scale));
+            all.extend(Ray::new(a, random.point() * scale, 0.0, 1.0 / scale));
+        }
+    }
+    all
+}
+
+/// Checks that batches of many lengths have the answers of the single calls.
+fn check_batches(scene: &Instances, rays: &[Ray]) -> usize {
+    let nearest: Vec<_> = rays
+        .iter()
+        .map(|ray| bits(scene.nearest_hit(ray)))
+        .collect();
+    let any: Vec<bool> = rays
+        .iter()
+        .map(|ray| scene.any_hit(ray))
+        .collect();
+    for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+        for (first, end) in [(0, rays.len()), (0, 0), (3, 4), (5, 68), (1, 200)] {
+            let batch = &rays[first..end];
+            let mut hits = vec![InstanceHit { t: 7.0, instance: 7, triangle: 7 }; batch.len()];
+            scene.nearest_hits(batch, &mut hits, coherence);
+            for (number, hit) in (first..).zip(hits) {
+                let found = bits((!hit.is_miss()).then_some(hit));
+                assert_eq!(found, nearest[number], "{coherence:?}, {:?}", rays[number]);
+            }
+            for stale in [false, true] {
+                let mut hits = vec![stale; batch.len()];
+                scene.any_hits(batch, &mut hits, coherence);
+                assert_eq!(hits, any[first..end], "{coherence:?}");
+            }
+        }
+    }
+    any.iter().filter(|&&is_hit| is_hit).count()
+}
+
+#[test]
+fn batches_have_the_answers_of_single_calls_bit_by_bit() {
+    let mut random = Random(5);
+    let mut hits = 0;
+    for count in [1, 2, 7, 40, 90] {
+        let transforms = (0..count)
+            .map(|_| nested_transform(&mut random))
+            .collect();
+        let parts = vec![ball(2), grid_box(2), soup(30, &mut random)];
+        let mut scene = scene(parts, transforms, &mut random);
+        let (flat, _) = scene.flat();
+        let rays = rays_of_every_kind(&flat, &mut random);
+        let available = Kernel::ALL
+            .into_iter()
+            .filter(|kernel| kernel.is_available());
+        for kernel in available {
+            for part in &mut scene.parts {
+                *part = part.clone().with_kernel(kernel).unwrap();
+            }
+            for scene in scene.all(&mut random) {
+                hits += check_batches(&scene, &rays);
+            }
+        }
+    }
+    assert!(hits > 10_000, "{hits}");
+}
+
+#[test]
+fn batches_of_deep_trees_and_of_parts_with_several_kernels_have_the_answers_of_single_calls() {
+    let mut random = Random(6);
+    let transforms = (0..80)
+        .map(|_| nested_transform(&mut random))
+        .collect();
+    let mut scene = scene(vec![ball(1), grid_box(2)], transforms, &mut random);
+    let (flat, _) = scene.flat();
+    let rays = rays_of_every_kind(&flat, &mut random);
+    let boxes = Instance::boxes(&scene.instances, &scene.parts).unwrap();
+    let deep = Instances::new(scene.parts.clone(), scene.instances.clone(), chain(&boxes)).unwrap();
+    assert!(check_batches(&deep, &rays) > 100);
+    scene.parts[1] = scene.parts[1]
+        .clone()
+        .with_kernel(Kernel::Portable)
+        .unwrap();
+    for scene in scene.all(&mut random) {
+        assert!(check_batches(&scene, &rays) > 100);
+    }
+    let empty = Instances::new(scene.parts, vec![], Bvh::default()).unwrap();
+    assert_eq!(check_batches(&empty, &rays), 0);
 }
 
 /// Returns a point whose coordinates are integers from 0 to `end` − 1.

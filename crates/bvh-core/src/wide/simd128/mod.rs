@@ -66,7 +66,7 @@ pub(super) unsafe fn closest_points(
 }
 
 /// [`batch::trace`].
-pub(super) unsafe fn trace<A: Answers>(
+pub(crate) unsafe fn trace<A: Answers>(
     wide: &WideBvh,
     rays: impl Source,
     answers: &mut A,

@@ -118,7 +118,7 @@ pub(super) unsafe fn closest_points(
 /// # Safety
 /// As for [`one_ray`], and there is an answer for every ray.
 #[inline(always)]
-pub(super) unsafe fn trace<A: Answers>(
+pub(crate) unsafe fn trace<A: Answers>(
     wide: &WideBvh,
     rays: impl Source,
     answers: &mut A,
