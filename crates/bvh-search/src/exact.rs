@@ -10,7 +10,7 @@
 //! covers the whole tree.
 
 use crate::run::{Problem, Run, Search, SearchError, Shortcut};
-use crate::tree::{Area, Subsets};
+use crate::tree::{Area, Measured, Subsets};
 use bvh_build::BuildError;
 use bvh_config::Accepts;
 use bvh_core::{Aabb, Bvh, Node, PackedAabb, check_boxes};
@@ -38,7 +38,7 @@ impl Search for Config {
         let mut subsets = Subsets::new(n as u32);
         let leaves = problem.boxes.iter().map(PackedAabb::from);
         match problem.measure {
-            Some(measure) => subsets.solve(leaves, measure),
+            Some(measure) => subsets.solve(leaves, Measured::new(measure)),
             None => subsets.solve(leaves, Area),
         };
         let tree = if n == 0 { Bvh::default() } else { tree(problem.boxes, &subsets) };

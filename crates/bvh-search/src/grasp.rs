@@ -21,12 +21,12 @@ pub use crate::candidates::Candidates;
 use crate::candidates::Randomised;
 use crate::parallel::{KEPT_NODES, map_init};
 use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Tally, stream, watched};
-use crate::tree::{Area, Metric, Working};
+use crate::tree::{Area, Measured, Metric, Working};
 use bvh_build::top_down::Workspace;
 use bvh_build::{BuildError, Presorted, Watch, muller_fellner};
 use bvh_config::Nested;
 use bvh_core::Bvh;
-use bvh_core::cost::{self, Measure};
+use bvh_core::cost::Measure;
 
 bvh_config::config! {
     /// The construction, and the number of trees.
@@ -76,10 +76,8 @@ impl Config {
             return Ok(0);
         }
         match problem.measure {
-            Some(measure) => {
-                self.improve_by(measure, tree, cost::internal_measure(tree, measure), observer)
-            }
-            None => self.improve_by(Area, tree, cost::internal_area(tree), observer),
+            Some(measure) => self.improve_by(Measured::new(measure), tree, observer),
+            None => self.improve_by(Area, tree, observer),
         }
     }
 
@@ -87,10 +85,9 @@ impl Config {
         &self,
         metric: impl Metric,
         tree: &mut Bvh,
-        area: f64,
         observer: &dyn Observer,
     ) -> Result<u64, SearchError> {
-        let mut working = Working::from_bvh(tree, area, metric)?;
+        let mut working = Working::from_bvh(tree, metric.internal(tree), metric)?;
         let Tally { work, .. } = self
             .local_search
             .improve(&mut working, Quota::ENDLESS, observer);

@@ -302,8 +302,8 @@ impl<'a> Divider<'a> {
 }
 
 /// Returns the cost of leaves of this size.
-fn leaf_cost<A: Metric>(_: &Working<A>, area: f64) -> f64 {
-    A::LEAF * area
+fn leaf_cost<A: Metric>(tree: &Working<A>, area: f64) -> f64 {
+    tree.metric().leaf_cost() * area
 }
 
 with_vector_instructions! {

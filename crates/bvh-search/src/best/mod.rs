@@ -26,7 +26,7 @@ use crate::local::reinsertion;
 use crate::run::{
     Budget, Found, Kept, Observer, Outcome, Problem, Run, SearchError, StopReason, solve, watched,
 };
-use crate::tree::{Metric, WithLeaves, Working, search_by_metric};
+use crate::tree::{Metric, Working, search_by_metric};
 use crate::tuning::{
     CLUSTERING, CLUSTERING_MUCH_CHEAPER, EVALUATED_AT_ONCE, RECOMBINED_AT_ONCE, SECURED_FROM,
 };
@@ -109,22 +109,22 @@ impl Config {
         }
         // The search for small budgets supports the area only.
         let small = match problem.measure {
-            None if self.start.is_none() => small_budget::search(problem, metric, run)?,
+            None if self.start.is_none() => small_budget::search(problem, run)?,
             _ => SmallBudget::Large(None),
         };
-        let (mut best, mut tree) = match small {
+        let mut best = match small {
             SmallBudget::Tree(tree) => return Ok(tree),
-            SmallBudget::LocalOptimum(best, tree) => (best, tree),
+            SmallBudget::LocalOptimum(best) => best,
             SmallBudget::Large(morton) => {
                 let best = Incumbent::begin(self.initial(morton, problem, run)?, problem, run);
                 // The working form of a large tree takes half a second.
                 if run.stopped() == Some(StopReason::Cancelled) {
                     return Ok(best.tree);
                 }
-                let tree = best.working(metric)?;
-                (best, tree)
+                best
             }
         };
+        let mut tree = best.working(metric)?;
         improve(self, (&mut tree, None), seed, problem, &mut best, run);
         Ok(best.tree)
     }
@@ -185,7 +185,7 @@ impl Config {
             return Ok(best.tree);
         }
         if problem.splits.is_some() {
-            let metric = WithLeaves(metric);
+            let metric = metric.with_leaves();
             let mut tree = best.working(metric)?;
             let working = |tree: &Bvh| Working::from_bvh(tree, metric.internal(tree), metric);
             let other_working = other.as_ref().map(working).transpose()?;

@@ -15,6 +15,7 @@ use std::collections::HashMap;
 /// Clades are identified by 128-bit sums of scattered keys. Among a billion clades, the probability
 /// that any two different clades collide is below 10⁻²⁰.
 pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
+    let leaf_cost = trees[0].metric().leaf_cost();
     // Every node of every tree, as number of objects, tree and index. The sort below then visits
     // smaller clades first, and ties in the order of the trees, which makes the result
     // deterministic.
@@ -29,7 +30,7 @@ pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
             let node = &tree.nodes[index as usize];
             let [left, right] = node.children.map(|child| child as usize);
             keys[index as usize] = if node.is_leaf() {
-                (key_of_leaf::<A>(node), 1)
+                (key_of_leaf(node, leaf_cost), 1)
             } else {
                 (keys[left].0.wrapping_add(keys[right].0), keys[left].1 + keys[right].1)
             };
@@ -49,7 +50,7 @@ pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
         let node = &trees[which as usize].nodes[index as usize];
         let clades = &clade_of[which as usize];
         let cost = if node.is_leaf() {
-            A::LEAF * node.area
+            leaf_cost * node.area
         } else {
             let [left, right] = node
                 .children
@@ -83,9 +84,9 @@ pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
 
 /// Returns a key for a leaf: its object, and the part of the object if the object may have several
 /// leaves.
-fn key_of_leaf<A: Metric>(node: &Node) -> u128 {
+fn key_of_leaf(node: &Node, leaf_cost: f64) -> u128 {
     let object = key(node.children[1]);
-    if A::LEAF == 0.0 {
+    if leaf_cost == 0.0 {
         return object;
     }
     let [low, high] = node.aabb.planes();

@@ -12,7 +12,7 @@ use crate::local::initial::construction;
 use crate::local::reinsertion::pass;
 use crate::parallel::threads;
 use crate::run::{Kept, Observer, Problem, Run, SearchError, Tally, watched};
-use crate::tree::{Linked, Metric, Siblings, Working};
+use crate::tree::{Linked, Siblings};
 use crate::tuning::{
     ANNEAL_FROM_TIME, ANNEAL_FROM_WORK, BUILDS, CLUSTERING, COLD_MEMORY, FINISH_TIME, FIRST_PASS,
     FRONT, MOVES_PER_READING, SAMPLED_FROM, SAMPLED_PART, SAMPLES, SEVERAL_THREADS, TOP_DOWN_BELOW,
@@ -24,7 +24,7 @@ use bvh_core::{Aabb, Bvh, cost};
 
 /// The result of a small budget.
 #[allow(clippy::large_enum_variant, reason = "one is made per search, and taken apart at once")]
-pub(super) enum SmallBudget<'p, A> {
+pub(super) enum SmallBudget<'p> {
     /// The budget is not small. Holds the objects in Morton order, if a time limit required the
     /// sort.
     Large(Option<MortonOrder>),
@@ -32,15 +32,14 @@ pub(super) enum SmallBudget<'p, A> {
     Tree(Bvh),
     /// Reinsertion reached a local optimum before the end of the budget, so the search can
     /// continue.
-    LocalOptimum(Incumbent<'p>, Working<A>),
+    LocalOptimum(Incumbent<'p>),
 }
 
 /// Searches within a small budget.
-pub(super) fn search<'p, A: Metric>(
+pub(super) fn search<'p>(
     problem: &Problem<'p>,
-    metric: A,
     run: &mut Run,
-) -> Result<SmallBudget<'p, A>, SearchError> {
+) -> Result<SmallBudget<'p>, SearchError> {
     let observer = run.observer();
     let n = problem.boxes.len();
     let began = observer.progress();
@@ -111,8 +110,7 @@ pub(super) fn search<'p, A: Metric>(
     if began.is_some() {
         best.bound(run);
     }
-    let tree = best.working(metric)?;
-    Ok(SmallBudget::LocalOptimum(best, tree))
+    Ok(SmallBudget::LocalOptimum(best))
 }
 
 /// Returns the top-down division; `None` if the observer cancels first.

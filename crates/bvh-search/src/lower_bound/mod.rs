@@ -44,7 +44,7 @@
 mod clusters;
 mod smallest_box;
 
-use crate::parallel::map_init;
+use crate::parallel::map_numbers;
 use crate::run::Observer;
 use bvh_build::BuildError;
 use bvh_core::{Aabb, PackedAabb, cost::Sum};
@@ -75,48 +75,39 @@ pub fn internal_area(
     if n < 2 {
         return Ok(0.0);
     }
-    let nearest = map_init(
-        n,
-        || (),
-        |(), object| clusters.smallest_box(clusters.leaf(object), 2, effort, observer),
-    );
+    let nearest =
+        map_numbers(n, |object| clusters.smallest_box(clusters.leaf(object), 2, effort, observer));
     let weights = weights(&nearest);
     clusters.set_weights(&weights);
     let classes = Classes::new(clusters.weight());
     let bands: Vec<Grouped> = bands(clusters.weight())
         .map(|from| {
             let groups = clusters.groups(from / SEEDS_PER_SIZE);
-            let areas = map_init(
-                groups.len(),
-                || (),
-                |(), group| clusters.smallest_box(groups[group], from, effort, observer),
-            );
+            let areas = map_numbers(groups.len(), |group| {
+                clusters.smallest_box(groups[group], from, effort, observer)
+            });
             clusters.grouped(from, &groups, &areas)
         })
         .collect();
-    let shares = map_init(
-        n,
-        || (),
-        |(), object| {
-            if observer.cancelled() {
-                return 0.0;
-            }
-            // Any set of two objects or more needs at least the box with the nearest neighbour.
-            let mut areas = vec![nearest[object]; classes.first.len()];
-            for band in &bands {
-                let class = classes
-                    .first
-                    .partition_point(|&first| first < band.from);
-                let area = band.area(object);
-                areas[class..]
-                    .iter_mut()
-                    .for_each(|least| *least = least.max(area));
-            }
-            // The last class holds the weight of all objects, whose only box is the scene's.
-            *areas.last_mut().unwrap_or(&mut 0.0) = clusters.area();
-            weights[object] as f64 * classes.least_path(weights[object], &areas)
-        },
-    );
+    let shares = map_numbers(n, |object| {
+        if observer.cancelled() {
+            return 0.0;
+        }
+        // Any set of two objects or more needs at least the box with the nearest neighbour.
+        let mut areas = vec![nearest[object]; classes.first.len()];
+        for band in &bands {
+            let class = classes
+                .first
+                .partition_point(|&first| first < band.from);
+            let area = band.area(object);
+            areas[class..]
+                .iter_mut()
+                .for_each(|least| *least = least.max(area));
+        }
+        // The last class holds the weight of all objects, whose only box is the scene's.
+        *areas.last_mut().unwrap_or(&mut 0.0) = clusters.area();
+        weights[object] as f64 * classes.least_path(weights[object], &areas)
+    });
     if observer.cancelled() {
         return Ok(of_largest(boxes));
     }

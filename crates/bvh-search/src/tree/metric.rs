@@ -8,16 +8,31 @@ use bvh_core::{Bvh, PackedAabb};
 
 /// The size of a box: finite, not negative, and no smaller for a box that contains another.
 pub(crate) trait Metric: Copy + Send + Sync {
+    /// The same sizes for trees that divide objects among leaves.
+    type WithLeaves: Metric;
+    /// Returns the metric that counts leaves as much as inner nodes, as the surface area heuristic
+    /// does with equal constants.
+    fn with_leaves(self) -> Self::WithLeaves;
     /// The cost of a leaf per unit of its size, relative to an inner node; 0 where every tree has
     /// the same leaves.
-    const LEAF: f64 = 0.0;
+    #[inline(always)]
+    fn leaf_cost(self) -> f64 {
+        0.0
+    }
     /// The size of a box that is not empty.
     fn of(self, aabb: &PackedAabb) -> f64;
-    /// The total size of the boxes of all inner nodes, and of the leaves weighted by `LEAF`.
+    /// The total size of the boxes of all inner nodes, and of the leaves times their
+    /// [cost](Self::leaf_cost).
     fn internal(self, tree: &Bvh) -> f64;
 }
 
 impl Metric for Area {
+    type WithLeaves = AreaWithLeaves;
+
+    fn with_leaves(self) -> AreaWithLeaves {
+        AreaWithLeaves
+    }
+
     #[inline(always)]
     fn of(self, aabb: &PackedAabb) -> f64 {
         aabb.half_area()
@@ -28,37 +43,80 @@ impl Metric for Area {
     }
 }
 
-impl Metric for &dyn Measure {
+/// The half area for trees that divide objects among leaves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AreaWithLeaves;
+
+impl Metric for AreaWithLeaves {
+    type WithLeaves = Self;
+
+    fn with_leaves(self) -> Self {
+        self
+    }
+
+    #[inline(always)]
+    fn leaf_cost(self) -> f64 {
+        1.0
+    }
+
     #[inline(always)]
     fn of(self, aabb: &PackedAabb) -> f64 {
-        Measure::of(self, aabb)
+        aabb.half_area()
     }
 
     fn internal(self, tree: &Bvh) -> f64 {
-        cost::internal_measure(tree, self)
+        of_all_nodes(self, tree)
     }
 }
 
-/// Another metric for trees that divide objects among leaves. Leaves and inner nodes count equally,
-/// as in the surface area heuristic with equal constants.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct WithLeaves<A>(pub A);
+/// The caller's measure. Its cost of leaves is known at run time only: a measure takes much longer
+/// than the multiplication, and a type for either cost would compile every search once more.
+#[derive(Clone, Copy)]
+pub(crate) struct Measured<'a> {
+    measure: &'a dyn Measure,
+    leaf_cost: f64,
+}
 
-impl<A: Metric> Metric for WithLeaves<A> {
-    const LEAF: f64 = 1.0;
+impl<'a> Measured<'a> {
+    /// Counts inner nodes only.
+    pub fn new(measure: &'a dyn Measure) -> Self {
+        Self { measure, leaf_cost: 0.0 }
+    }
+}
+
+impl Metric for Measured<'_> {
+    type WithLeaves = Self;
+
+    fn with_leaves(self) -> Self {
+        Self { leaf_cost: 1.0, ..self }
+    }
+
+    #[inline(always)]
+    fn leaf_cost(self) -> f64 {
+        self.leaf_cost
+    }
 
     #[inline(always)]
     fn of(self, aabb: &PackedAabb) -> f64 {
-        self.0.of(aabb)
+        self.measure.of(aabb)
     }
 
     fn internal(self, tree: &Bvh) -> f64 {
-        tree.nodes
-            .iter()
-            .map(|node| self.0.of(&PackedAabb::from(&node.aabb)))
-            .collect::<Sum>()
-            .value()
+        if self.leaf_cost > 0.0 {
+            of_all_nodes(self, tree)
+        } else {
+            cost::internal_measure(tree, self.measure)
+        }
     }
+}
+
+/// Returns the total size of the boxes of all nodes, leaves included.
+fn of_all_nodes(metric: impl Metric, tree: &Bvh) -> f64 {
+    tree.nodes
+        .iter()
+        .map(|node| metric.of(&PackedAabb::from(&node.aabb)))
+        .collect::<Sum>()
+        .value()
 }
 
 /// Implements [`Search`](crate::Search) by the type's method `search_by`, which is generic over the
@@ -73,7 +131,9 @@ macro_rules! search_by_metric {
                 run: &mut Run,
             ) -> crate::run::Found {
                 match problem.measure {
-                    Some(measure) => self.search_by(measure, problem, seed, run),
+                    Some(measure) => {
+                        self.search_by(crate::tree::Measured::new(measure), problem, seed, run)
+                    }
                     None => self.search_by(crate::tree::Area, problem, seed, run),
                 }
             }

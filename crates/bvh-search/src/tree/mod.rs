@@ -21,7 +21,9 @@ mod subsets;
 use bvh_core::PackedAabb;
 use bvh_core::cost::Sum;
 pub(crate) use linked::Linked;
-pub(crate) use metric::{Area, Metric, WithLeaves, search_by_metric};
+#[cfg(test)]
+pub(crate) use metric::AreaWithLeaves;
+pub(crate) use metric::{Area, Measured, Metric, search_by_metric};
 pub(crate) use position::{PositionSearch, Scope};
 pub(crate) use shape::Shape;
 pub(crate) use siblings::Siblings;
@@ -125,7 +127,7 @@ impl<M: Metric> Working<M> {
         self.nodes.len() / 2
     }
 
-    /// The total area of all inner nodes, and of the leaves weighted by `LEAF`, updated
+    /// The total area of all inner nodes, and of the leaves times their cost, updated
     /// incrementally by a compensated sum: every change adds a single rounding error.
     pub fn area(&self) -> f64 {
         self.area.value() + self.added
@@ -135,17 +137,17 @@ impl<M: Metric> Working<M> {
     pub fn internal_area(&self) -> f64 {
         self.nodes
             .iter()
-            .filter_map(|node| Self::part(node))
+            .filter_map(|node| self.part(node))
             .collect::<Sum>()
             .value()
     }
 
     /// Returns the node's part of the tree's area; `None` if its kind has none.
     #[inline(always)]
-    fn part(node: &Node) -> Option<f64> {
+    fn part(&self, node: &Node) -> Option<f64> {
         match node.is_leaf() {
             false => Some(node.area),
-            true if M::LEAF > 0.0 => Some(M::LEAF * node.area),
+            true if self.metric.leaf_cost() > 0.0 => Some(self.metric.leaf_cost() * node.area),
             true => None,
         }
     }
@@ -275,7 +277,7 @@ impl<M: Metric> Working<M> {
         let node = self.write(leaf);
         let before = node.area;
         (node.children, node.aabb, node.area) = ([NONE, object], aabb, area);
-        self.added += M::LEAF * (area - before);
+        self.added += self.metric.leaf_cost() * (area - before);
     }
 
     /// The box around two nodes.

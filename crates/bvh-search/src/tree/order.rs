@@ -53,7 +53,7 @@ impl<M: Metric> Working<M> {
         let mut area = Sum::default();
         for (place, &index) in (0..).zip(&order) {
             places[index as usize] = place;
-            if let Some(part) = Self::part(&self.nodes[index as usize]) {
+            if let Some(part) = self.part(&self.nodes[index as usize]) {
                 area.add(part);
             }
         }
@@ -132,7 +132,7 @@ impl<M: Metric> Working<M> {
             let node = self.nodes[old as usize];
             nodes.push(Node { parent, stamp: 0, ..node });
             nodes[parent as usize].children[side] = index;
-            if let Some(part) = Self::part(&node) {
+            if let Some(part) = self.part(&node) {
                 area.add(part);
             }
             if !node.is_leaf() {

@@ -52,7 +52,7 @@ impl<M: Metric> Working<M> {
             .nodes
             .iter()
             .skip(1)
-            .filter_map(|node| Self::part(node))
+            .filter_map(|node| self.part(node))
             .collect();
         self.restart(area);
     }

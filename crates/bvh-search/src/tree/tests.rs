@@ -4,7 +4,6 @@ use super::*;
 use crate::run::stream;
 use crate::scatter::{built, density};
 use bvh_build::muller_fellner;
-use bvh_core::cost::Measure;
 use bvh_core::{Aabb, validate};
 use rand::RngExt;
 use std::cell::Cell;
@@ -155,7 +154,7 @@ fn undoing_restores_every_bit() {
 fn the_best_place_is_the_best_of_all_whether_the_node_is_out_or_only_thought_to_be() {
     let (boxes, tree) = scene(60);
     let density = density(&boxes).unwrap();
-    let measure: &dyn Measure = &density;
+    let measure = Measured::new(&density);
     let bvh = tree.to_bvh();
     assert_best_places(Working::from_bvh(&bvh, measure.internal(&bvh), measure).unwrap());
     assert_best_places(tree);

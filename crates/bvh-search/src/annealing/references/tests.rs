@@ -1,7 +1,7 @@
 use super::*;
 use crate::run::stream;
 use crate::scatter::scatter;
-use crate::tree::{Area, WithLeaves};
+use crate::tree::AreaWithLeaves;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{layout_area, total_area};
 use bvh_core::{Triangle, validate_references};
@@ -30,7 +30,7 @@ fn passes_divide_and_reunite_within_the_limit_and_every_reference_saves_its_pric
             .build(&boxes)
             .unwrap();
         let mut before = cost(&start);
-        let mut tree = Working::from_bvh(&start, total_area(&start), WithLeaves(Area)).unwrap();
+        let mut tree = Working::from_bvh(&start, total_area(&start), AreaWithLeaves).unwrap();
         let mut most_seen = 0;
         // With fewer allowed references than the tree has, nothing is divided, and leaves that
         // pay little are still reunited.
