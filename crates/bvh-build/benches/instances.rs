@@ -159,7 +159,7 @@ fn main() {
     }
     println!("{:<38} {:>12} {:>12} {:>8}", "scene and rays", "flat, M/s", "instances", "ratio");
     for copies in copies {
-        for (name, distance) in [("sparse", 4.0), ("packed", 1.5)] {
+        for (name, distance) in [("sparse", 4.0), ("packed", 2.2)] {
             let pair = Pair::new(copies, distance);
             let coherent = format!("{copies} {name}, coherent");
             pair.compare(&coherent, &pair.camera(), Coherence::Coherent);

@@ -75,11 +75,20 @@ impl Instance {
     /// builder.
     pub fn boxes(instances: &[Self], parts: &[WideBvh]) -> Result<Vec<Aabb>, InvalidInstances> {
         let placed = place_all(instances, parts)?;
-        Ok(placed.iter().map(|placed| placed.aabb).collect())
+        Ok(placed
+            .iter()
+            .map(|placed| placed.bounds)
+            .collect())
     }
 
-    /// Checks the instance and prepares it for rays. `instance` is its index, for errors.
-    fn place(&self, instance: usize, parts: &[WideBvh]) -> Result<Placed, InvalidInstances> {
+    /// Checks the instance and prepares it for rays. `instance` is its index, for errors, and `outlines`
+    /// are the outlines of the parts.
+    fn place(
+        &self,
+        instance: usize,
+        parts: &[WideBvh],
+        outlines: &[Vec<Aabb>],
+    ) -> Result<Placed, InvalidInstances> {
         let Some(part) = parts.get(self.part as usize) else {
             return Err(InvalidInstances::Part { instance, part: self.part, parts: parts.len() });
         };
@@ -88,35 +97,48 @@ impl Instance {
         }
         let transform = self.transform.as_daffine3();
         let inverse = transform.inverse();
-        // The box of the transformed box, column by column (Arvo 1990, 'Transforming axis-aligned
-        // bounding boxes'). `size` bounds every intermediate result.
-        let mut min = transform.translation;
-        let mut max = transform.translation;
-        let mut size = transform.translation.abs();
-        for axis in 0..3 {
-            let column = transform.matrix3.col(axis);
-            let a = column * f64::from(part.bounds.min[axis]);
-            let b = column * f64::from(part.bounds.max[axis]);
-            min += a.min(b);
-            max += a.max(b);
-            size += a.abs().max(b.abs());
-        }
-        // Rounding moves a hit by less than this: the rounding of the ray's origin near the part,
-        // and of the corners of this box.
-        let margin = size * f64::from(Slabs::MARGIN);
-        let aabb = Aabb { min: (min - margin).as_vec3(), max: (max + margin).as_vec3() };
-        if !inverse.is_finite() || transform.matrix3.determinant() == 0.0 || aabb.check().is_err() {
+        let bounds = transformed(&transform, &part.bounds);
+        if !inverse.is_finite() || transform.matrix3.determinant() == 0.0 || bounds.check().is_err()
+        {
             return Err(InvalidInstances::Transform(instance));
         }
-        Ok(Placed { part: self.part, to_local: inverse, aabb })
+        // A turned box has a box of up to five times its volume; the boxes of many small ones fit better.
+        let mut outline = Aabb::EMPTY;
+        for aabb in &outlines[self.part as usize] {
+            outline = outline.union(&transformed(&transform, aabb));
+        }
+        let aabb = Aabb { min: outline.min.max(bounds.min), max: outline.max.min(bounds.max) };
+        Ok(Placed { part: self.part, to_local: inverse, aabb, bounds })
     }
+}
+
+/// Returns a box around a transformed box in which a ray moved by the inverse transform has its hits.
+fn transformed(transform: &DAffine3, aabb: &Aabb) -> Aabb {
+    // The box of the transformed box, column by column (Arvo 1990, 'Transforming axis-aligned
+    // bounding boxes'). `size` bounds every intermediate result.
+    let mut min = transform.translation;
+    let mut max = transform.translation;
+    let mut size = transform.translation.abs();
+    for axis in 0..3 {
+        let column = transform.matrix3.col(axis);
+        let a = column * f64::from(aabb.min[axis]);
+        let b = column * f64::from(aabb.max[axis]);
+        min += a.min(b);
+        max += a.max(b);
+        size += a.abs().max(b.abs());
+    }
+    // Rounding moves a hit by less than this: the rounding of the ray's origin near the part,
+    // and of the corners of this box.
+    let margin = size * f64::from(Slabs::MARGIN);
+    Aabb { min: (min - margin).as_vec3(), max: (max + margin).as_vec3() }
 }
 
 /// Prepares all instances for rays.
 fn place_all(instances: &[Instance], parts: &[WideBvh]) -> Result<Vec<Placed>, InvalidInstances> {
+    let outlines: Vec<Vec<Aabb>> = parts.iter().map(WideBvh::outline).collect();
     let numbered = instances.iter().enumerate();
     numbered
-        .map(|(index, instance)| instance.place(index, parts))
+        .map(|(index, instance)| instance.place(index, parts, &outlines))
         .collect()
 }
 
@@ -125,10 +147,24 @@ fn place_all(instances: &[Instance], parts: &[WideBvh]) -> Result<Vec<Placed>, I
 pub(crate) struct Placed {
     part: u32,
     to_local: DAffine3,
+    /// A box in which all hits of the instance are, and the box that trees over instances have.
     aabb: Aabb,
+    bounds: Aabb,
 }
 
 impl Placed {
+    /// The transform from the scene's coordinates to the part's.
+    #[inline(always)]
+    pub(crate) fn to_local(&self) -> &DAffine3 {
+        &self.to_local
+    }
+
+    /// The instance's box in the scene's coordinates.
+    #[inline(always)]
+    pub(crate) fn aabb(&self) -> &Aabb {
+        &self.aabb
+    }
+
     /// Returns the ray in the part's coordinates, up to `t_max`; `None` if the transform makes its
     /// direction vanish or overflow.
     #[inline(always)]
@@ -192,8 +228,12 @@ impl Instances {
         top: Bvh,
     ) -> Result<Self, InvalidInstances> {
         let placed = place_all(&instances, &parts)?;
+        let bounds: Vec<Aabb> = placed
+            .iter()
+            .map(|placed| placed.bounds)
+            .collect();
+        validate(&top, &bounds)?;
         let boxes: Vec<Aabb> = placed.iter().map(|placed| placed.aabb).collect();
-        validate(&top, &boxes)?;
         let used = placed
             .iter()
             .map(|placed| &parts[placed.part as usize]);
@@ -327,6 +367,12 @@ impl Instances {
     #[inline(always)]
     pub(crate) fn placed(&self) -> &[Placed] {
         &self.placed
+    }
+
+    /// Returns the box around all instances.
+    #[inline(always)]
+    pub(crate) fn bounds(&self) -> Aabb {
+        self.wide_top.bounds
     }
 
     /// Returns the largest size of a coordinate of any part.

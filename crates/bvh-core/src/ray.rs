@@ -45,7 +45,7 @@ pub enum InvalidRay {
 impl Ray {
     /// The range of a direction's largest component. The reciprocal of a component outside could
     /// lose precision.
-    const DIRECTION_RANGE: core::ops::RangeInclusive<f32> = pow2(-100)..=pow2(100);
+    pub(crate) const DIRECTION_RANGE: core::ops::RangeInclusive<f32> = pow2(-100)..=pow2(100);
 
     /// Makes the ray from `origin` in `direction` over `t_min..=t_max`. Distances `t` are in
     /// multiples of the direction's length, which need not be 1. An infinite `t_max` becomes the

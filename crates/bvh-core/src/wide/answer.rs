@@ -1,7 +1,9 @@
 //! The two questions about a ray: its nearest hit, or whether it has any hit.
 
+use super::instructions::Instructions;
 use super::lanes::Lanes;
 use super::layout::WideBvh;
+use super::packet::Packet;
 use crate::{Hit, InstanceHit, Instances, Ray};
 
 /// Answers to the rays of a batch, by the number of the ray.
@@ -35,6 +37,40 @@ pub(crate) trait Answers {
     fn write_instance(&mut self, number: usize, t: f32, instance: u32, object: u32) {
         let _ = instance;
         self.write(number, t, object);
+    }
+
+    /// Writes the answers for rays side by side among instances, likewise.
+    #[inline(always)]
+    fn write_instance_lanes<L: Lanes>(&mut self, first: usize, t: L, instance: L, object: L) {
+        const { assert!(L::N <= 16) };
+        let mut numbers = [[0.0; 16]; 3];
+        // SAFETY: there is room for sixteen.
+        unsafe {
+            t.store(numbers[0].as_mut_ptr());
+            instance.store(numbers[1].as_mut_ptr());
+            object.store(numbers[2].as_mut_ptr());
+        }
+        for lane in 0..L::N {
+            let [t, instance, object] = numbers.map(|lanes| lanes[lane]);
+            self.write_instance(first + lane, t, instance.to_bits(), object.to_bits());
+        }
+    }
+
+    /// Traces the rays of a packet that enter an instance, as
+    /// [`Packet::visit_instance`] does.
+    ///
+    /// # Safety
+    /// As for [`batch::trace`](super::batch::trace).
+    #[inline(always)]
+    unsafe fn visit_instance<K: Instructions>(
+        &self,
+        _packet: &mut Packet<K>,
+        _instance: u32,
+        _first: usize,
+        _entered: u32,
+        _planes: &[[f32; 2]; 3],
+    ) -> bool {
+        false
     }
 
     /// Writes the answers for rays side by side, likewise.
@@ -149,14 +185,55 @@ impl<A: Answers> Answers for Filtered<'_, A> {
     }
 }
 
+/// Answers of rays among instances, by the number of the ray.
+pub(crate) trait InstanceAnswers {
+    /// As [`Answers::ANY`].
+    const ANY: bool;
+
+    /// Writes the answer for a ray whose traversal ended at this distance with this object of this
+    /// instance, `u32::MAX` for none.
+    fn write(&mut self, number: usize, t: f32, instance: u32, object: u32);
+
+    /// Traces one ray by itself, and writes its answer.
+    fn alone(&mut self, number: usize, scene: &Instances, ray: &Ray);
+}
+
+impl InstanceAnswers for &mut [InstanceHit] {
+    const ANY: bool = false;
+
+    #[inline(always)]
+    fn write(&mut self, number: usize, t: f32, instance: u32, object: u32) {
+        self[number] = InstanceHit { t: distance(t, object), instance, triangle: object };
+    }
+
+    fn alone(&mut self, number: usize, scene: &Instances, ray: &Ray) {
+        self[number] = scene
+            .nearest_hit(ray)
+            .unwrap_or(InstanceHit::MISS);
+    }
+}
+
+impl InstanceAnswers for &mut [bool] {
+    const ANY: bool = true;
+
+    #[inline(always)]
+    fn write(&mut self, number: usize, _: f32, _: u32, object: u32) {
+        self[number] = object != u32::MAX;
+    }
+
+    fn alone(&mut self, number: usize, scene: &Instances, ray: &Ray) {
+        self[number] = scene.any_hit(ray);
+    }
+}
+
 /// Answers from the instances of a scene.
 pub(crate) struct OfInstances<'a, A> {
     pub(crate) scene: &'a Instances,
     pub(crate) answers: A,
 }
 
-impl Answers for OfInstances<'_, &mut [InstanceHit]> {
-    const ANY: bool = false;
+impl<A: InstanceAnswers> Answers for OfInstances<'_, A> {
+    const ANY: bool = A::ANY;
     const IN_INSTANCES: bool = true;
 
     #[inline(always)]
@@ -165,39 +242,31 @@ impl Answers for OfInstances<'_, &mut [InstanceHit]> {
     }
 
     #[inline(always)]
-    fn write(&mut self, number: usize, _: f32, _: u32) {
-        self.answers[number] = InstanceHit::MISS;
+    unsafe fn visit_instance<K: Instructions>(
+        &self,
+        packet: &mut Packet<K>,
+        instance: u32,
+        first: usize,
+        entered: u32,
+        planes: &[[f32; 2]; 3],
+    ) -> bool {
+        // SAFETY: the caller's promises.
+        unsafe { packet.visit_instance::<Self>(self.scene, instance, first, entered, planes) }
+    }
+
+    /// Writes a miss: hits have instances.
+    #[inline(always)]
+    fn write(&mut self, number: usize, t: f32, object: u32) {
+        self.answers.write(number, t, u32::MAX, object);
     }
 
     #[inline(always)]
     fn write_instance(&mut self, number: usize, t: f32, instance: u32, object: u32) {
-        let t = distance(t, object);
-        self.answers[number] = InstanceHit { t, instance, triangle: object };
-    }
-
-    fn alone(&mut self, number: usize, _: &WideBvh, ray: &Ray) {
-        self.answers[number] = self
-            .scene
-            .nearest_hit(ray)
-            .unwrap_or(InstanceHit::MISS);
-    }
-}
-
-impl Answers for OfInstances<'_, &mut [bool]> {
-    const ANY: bool = true;
-    const IN_INSTANCES: bool = true;
-
-    #[inline(always)]
-    fn scene(&self) -> Option<&Instances> {
-        Some(self.scene)
+        self.answers.write(number, t, instance, object);
     }
 
     #[inline(always)]
-    fn write(&mut self, number: usize, _: f32, object: u32) {
-        self.answers[number] = object != u32::MAX;
-    }
-
     fn alone(&mut self, number: usize, _: &WideBvh, ray: &Ray) {
-        self.answers[number] = self.scene.any_hit(ray);
+        self.answers.alone(number, self.scene, ray);
     }
 }

@@ -26,7 +26,9 @@ pub(crate) unsafe fn trace<K: Instructions, A: Answers>(
 ) {
     // SAFETY: the caller's promises.
     unsafe {
-        if coherence == Coherence::Incoherent || A::IN_INSTANCES {
+        // A packet begins at a node.
+        let is_instance = A::IN_INSTANCES && wide.root.is_none_or(|root| !root.is_node());
+        if coherence == Coherence::Incoherent || is_instance {
             return K::in_flight(wide, rays, answers, 0..rays.len());
         }
         let mut packet = Packet::<K>::new();
@@ -61,7 +63,9 @@ unsafe fn rest<K: Instructions, A: Answers>(
     answers: &mut A,
     numbers: Range<usize>,
 ) {
-    if numbers.len() >= MANY {
+    // One by one, rays come to instances much more slowly.
+    let is_many = numbers.len() >= MANY || A::IN_INSTANCES && !numbers.is_empty();
+    if is_many {
         // SAFETY: the caller's promises.
         unsafe { K::in_flight(wide, rays, answers, numbers) };
     } else {

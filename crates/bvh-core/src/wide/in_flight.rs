@@ -322,7 +322,7 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
     unsafe fn cross(&mut self, first: usize) {
         let count = self.at_end.count;
         self.at_end.count = 0;
-        let mut entering = Entering::NONE;
+        let mut entering = Entering::none();
         // SAFETY: the caller's promises; every ray is started.
         unsafe {
             for i in 0..count {
@@ -372,18 +372,24 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
         let mut prepared = [const { MaybeUninit::<Prepared>::uninit() }; RAYS];
         // SAFETY: so many rays have been added; there is room for as many as there are lanes.
         unsafe {
-            let rays = core::slice::from_raw_parts(entering.rays.as_ptr().cast::<Ray>(), count);
-            let ready = Ready::new(rays.lanes_up_to::<K::Rays>(0, count), scene.largest_of_parts());
+            // The last ray fills the lanes that have none.
+            for lane in count..K::Rays::N {
+                entering.rays[lane] = entering.rays[count - 1];
+            }
+            let rays = entering.rays.as_ptr().cast::<Ray>();
+            let rays = core::slice::from_raw_parts(rays, K::Rays::N);
+            let ready = Ready::new(rays.lanes::<K::Rays>(0), scene.largest_of_parts());
             ready.write(0, prepared.as_mut_ptr().cast());
             for (i, prepared) in prepared.iter().enumerate().take(count) {
-                let traversal = &mut *entering.traversals[i];
+                let traversal = &mut *entering.traversals[i].assume_init();
                 if ready.in_range >> i & 1 == 0 {
                     self.finish_alone(first, traversal);
                     continue;
                 }
+                let entry = entering.entries[i].assume_init();
                 if let Some(scene) = self.answers.scene() {
                     let part = scene.part_of(traversal.child.instance_index());
-                    traversal.enter_instance(prepared.assume_init(), entering.entries[i], part);
+                    traversal.enter_instance(prepared.assume_init(), entry, part);
                 }
                 traversal.fetch::<K>(self.placed());
                 self.enlist(traversal);
@@ -414,28 +420,32 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
 
 /// Rays that are about to enter instances.
 struct Entering {
-    traversals: [*mut Traversal; RAYS],
+    traversals: [MaybeUninit<*mut Traversal>; RAYS],
     /// The rays in the coordinates of the instances' parts.
     rays: [MaybeUninit<Ray>; RAYS],
     /// The distances at which the rays enter the instances' boxes.
-    entries: [f32; RAYS],
+    entries: [MaybeUninit<f32>; RAYS],
     count: usize,
 }
 
 impl Entering {
-    const NONE: Self = Self {
-        traversals: [core::ptr::null_mut(); RAYS],
-        rays: [const { MaybeUninit::uninit() }; RAYS],
-        entries: [0.0; RAYS],
-        count: 0,
-    };
+    /// Returns no rays.
+    #[inline(always)]
+    fn none() -> Self {
+        Self {
+            traversals: [MaybeUninit::uninit(); RAYS],
+            rays: [MaybeUninit::uninit(); RAYS],
+            entries: [MaybeUninit::uninit(); RAYS],
+            count: 0,
+        }
+    }
 
     /// Adds a ray.
     #[inline(always)]
     fn add(&mut self, traversal: *mut Traversal, local_ray: Ray, entry: f32) {
-        self.traversals[self.count] = traversal;
+        self.traversals[self.count].write(traversal);
         self.rays[self.count].write(local_ray);
-        self.entries[self.count] = entry;
+        self.entries[self.count].write(entry);
         self.count += 1;
     }
 }

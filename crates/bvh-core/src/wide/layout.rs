@@ -5,6 +5,8 @@ use super::node::{Child, WideNode};
 use super::triangles::TriangleBlock;
 use crate::Aabb;
 use alloc::borrow::Cow;
+use alloc::collections::VecDeque;
+use alloc::vec::Vec;
 
 /// An immutable copy of a [`Bvh`](crate::Bvh) and its triangles, for tracing only.
 ///
@@ -54,7 +56,31 @@ pub(super) fn largest(bounds: &Aabb) -> f32 {
         .max_element()
 }
 
+/// The maximum number of boxes in an outline. Boxes of instances are computed from all of them.
+const OUTLINE: usize = 64;
+
 impl WideBvh {
+    /// Returns boxes around all triangles, fewer than [`OUTLINE`] and eight: the subtrees of the layout from
+    /// the root down.
+    pub(crate) fn outline(&self) -> Vec<Aabb> {
+        let Some(root) = self.root else { return Vec::new() };
+        let mut leaves = Vec::new();
+        let mut open = VecDeque::from([(self.bounds, root)]);
+        while let Some((aabb, child)) = open.pop_front() {
+            if !child.is_node() || leaves.len() + open.len() >= OUTLINE {
+                leaves.push(aabb);
+                continue;
+            }
+            let node = &self.nodes[child.index()];
+            for lane in 0..WideNode::LANES {
+                if let Some(aabb) = node.lane_box(lane) {
+                    open.push_back((aabb, node.children[lane]));
+                }
+            }
+        }
+        leaves
+    }
+
     /// Returns the layout of nothing within these bounds, for the portable kernel.
     pub(super) fn without_nodes(bounds: Aabb) -> Self {
         Self {

@@ -22,24 +22,26 @@ pub(crate) const VECTORS: usize = 64 / 8;
 
 /// A packet of vectors of rays that [cohere](RayLanes::cohere), all of the same octant.
 pub(crate) struct Packet<K: Instructions> {
-    vectors: [MaybeUninit<Vector<K::Rays>>; VECTORS],
-    count: usize,
+    pub(super) vectors: [MaybeUninit<Vector<K::Rays>>; VECTORS],
+    pub(super) count: usize,
     /// One bit per axis: set where the rays run backwards.
     octant: u32,
     bounds: RayBounds<K::Rays>,
 }
 
 /// Rays of a packet side by side.
-struct Vector<L> {
+pub(super) struct Vector<L> {
     /// The distance to a plane is `plane · scale + shift`.
     scale: [L; 3],
     shift: [L; 3],
     t_min: L,
     /// The nearest hits so far, or the ends of the rays and `u32::MAX`.
-    t: L,
-    object: L,
+    pub(super) t: L,
+    pub(super) object: L,
+    /// The instances of the objects, if leaves are instances.
+    pub(super) instance: L,
     /// The rays, and whether `pairs` has been made from them. Many packets meet no triangle.
-    rays: RayLanes<L>,
+    pub(super) rays: RayLanes<L>,
     axes: [usize; 3],
     is_sheared: bool,
     pairs: MaybeUninit<Pairs<L>>,
@@ -98,6 +100,7 @@ impl<K: Instructions> Packet<K> {
             t_min: rays.t_min,
             t: rays.t_max,
             object: none,
+            instance: none,
             axes: rays.axes(),
             rays,
             is_sheared: false,
@@ -122,7 +125,12 @@ impl<K: Instructions> Packet<K> {
             }
             for vector in &self.vectors[..self.count] {
                 let vector = vector.assume_init_ref();
-                answers.write_lanes(vector.first, vector.t, vector.object);
+                if A::IN_INSTANCES {
+                    let Vector { first, t, instance, object, .. } = *vector;
+                    answers.write_instance_lanes(first, t, instance, object);
+                } else {
+                    answers.write_lanes(vector.first, vector.t, vector.object);
+                }
             }
             self.count = 0;
             self.bounds = RayBounds::none();
@@ -197,14 +205,20 @@ impl<K: Instructions> Packet<K> {
                     if child.is_node() {
                         break Parent { node: child.index() as u32, vector: i as u32 };
                     }
-                    let block = blocks.add(child.index());
-                    let mut is_hit = self.visit_leaf(i, entered, block, answers);
-                    for i in i + 1..self.count {
-                        let entered = self.enter(i, &planes);
-                        if entered != 0 {
-                            is_hit |= self.visit_leaf(i, entered, block, answers);
+                    let is_hit = if A::IN_INSTANCES {
+                        let instance = child.instance_index();
+                        answers.visit_instance(self, instance, i, entered, &planes)
+                    } else {
+                        let block = blocks.add(child.index());
+                        let mut is_hit = self.visit_leaf(i, entered, block, answers);
+                        for i in i + 1..self.count {
+                            let entered = self.enter(i, &planes);
+                            if entered != 0 {
+                                is_hit |= self.visit_leaf(i, entered, block, answers);
+                            }
                         }
-                    }
+                        is_hit
+                    };
                     if is_hit {
                         farthest = self.farthest();
                         end = key_of(farthest);
@@ -232,7 +246,7 @@ impl<K: Instructions> Packet<K> {
 
     /// Returns a bit per ray of a vector that enters the box of these planes before its nearest hit.
     #[inline(always)]
-    unsafe fn enter(&self, vector: usize, planes: &[[f32; 2]; 3]) -> u32 {
+    pub(super) unsafe fn enter(&self, vector: usize, planes: &[[f32; 2]; 3]) -> u32 {
         // SAFETY: the caller's promise: the vector is counted.
         unsafe {
             let vector = self

@@ -8,7 +8,8 @@ use super::node::Child;
 use crate::collapse::binary;
 use crate::{Aabb, Bvh, Node};
 
-/// Lays out a valid tree over the boxes of instances, each of which is a leaf of its own, for rays that go
+/// Lays out a valid tree over the boxes of instances, or over boxes around them, with a leaf for each
+/// instance for rays that go
 /// on in `parts`: the parts of the instances. The layout has the kernel of the parts if all have the
 /// same and its stack suffices, otherwise the portable one. O(instances + parts).
 pub(crate) fn lay_out_instances<'p>(
@@ -20,7 +21,8 @@ pub(crate) fn lay_out_instances<'p>(
     if tree.nodes.is_empty() {
         return wide;
     }
-    let tree = one_per_leaf(tree, boxes);
+    let mut tree = one_per_leaf(tree, boxes);
+    tree.refit(boxes);
     let tree = binary(&tree);
     let visits = areas(&tree);
     // A node is cheap compared with an instance, so a box for each instance pays.

@@ -1,0 +1,140 @@
+//! Packets of rays through instances: the rays of a packet that enter an instance are moved into its part
+//! together, and are a packet there.
+
+use super::answer::Answers;
+use super::instructions::Instructions;
+use super::lanes::{Lanes, Mask};
+use super::packet::{Packet, VECTORS};
+use crate::Instances;
+use core::marker::PhantomData;
+use core::mem::MaybeUninit;
+
+/// The maximum number of rays in a packet.
+const RAYS: usize = 8 * VECTORS;
+
+impl<K: Instructions> Packet<K> {
+    /// Traces the rays that enter an instance in its part. `entered` has a bit per ray of the vector
+    /// `first` that enters the box of these planes, and earlier vectors do not enter it. Returns whether
+    /// any ray has a new nearest hit.
+    ///
+    /// # Safety
+    /// As for [`trace`](super::batch::trace).
+    #[inline(always)]
+    pub(super) unsafe fn visit_instance<A: Answers>(
+        &mut self,
+        scene: &Instances,
+        instance: u32,
+        first: usize,
+        mut entered: u32,
+        planes: &[[f32; 2]; 3],
+    ) -> bool {
+        let placed = &scene.placed()[instance as usize];
+        let part = scene.part_of(instance);
+        let mut found = InPart::<A>::NONE;
+        let mut entries = [const { MaybeUninit::<K::Rays>::uninit() }; VECTORS];
+        let mut visited = 0u32;
+        // SAFETY: the caller's promises; vectors below the count are written.
+        unsafe {
+            let mut moved_packet = Packet::<K>::new();
+            for i in first..self.count {
+                if i > first {
+                    entered = self.enter(i, planes);
+                }
+                if entered == 0 {
+                    continue;
+                }
+                let vector = self.vectors[i].assume_init_ref();
+                let (entry, enters) = vector.rays.entry(&scene.bounds(), placed.aabb());
+                let enters = enters & entry.le(vector.t) & Mask::from_bits(entered);
+                if enters.bits() == 0 {
+                    continue;
+                }
+                let (mut moved, is_valid) = vector.rays.moved(placed.to_local());
+                let enters = enters & is_valid;
+                // The range of the other rays is empty.
+                moved.t_max = Lanes::select(enters, vector.t, K::Rays::splat(-1.0));
+                entries[i].write(entry);
+                visited |= 1 << i;
+                let number = i * K::Rays::N;
+                if let Some(scale) = moved.cohere(part.largest) {
+                    if !moved_packet.takes(moved.octant()) {
+                        moved_packet.trace(part, &mut found);
+                    }
+                    moved_packet.add(moved, scale, number);
+                    continue;
+                }
+                let mut left = enters.bits();
+                while left != 0 {
+                    let lane = left.trailing_zeros() as usize;
+                    left &= left - 1;
+                    found.alone(number + lane, part, &moved.ray(lane));
+                }
+            }
+            if !moved_packet.is_empty() {
+                moved_packet.trace(part, &mut found);
+            }
+            let mut is_hit = false;
+            while visited != 0 {
+                let i = visited.trailing_zeros() as usize;
+                visited &= visited - 1;
+                let vector = self.vectors[i].assume_init_mut();
+                let number = i * K::Rays::N;
+                let object = K::Rays::load_unaligned(found.objects.as_ptr().add(number));
+                let t = K::Rays::load_unaligned(found.distances.as_ptr().add(number));
+                // A hit in front of the instance's box would depend on the tree: a tree that visits the
+                // box later would skip it.
+                let t = t.max(entries[i].assume_init());
+                let own = K::Rays::splat_bits(instance);
+                let precedes = t.lt(vector.t) | t.eq(vector.t) & own.below(vector.instance);
+                let hits = object.below(K::Rays::splat_bits(u32::MAX));
+                let hits = if A::ANY { hits } else { hits & precedes };
+                if hits.bits() != 0 {
+                    is_hit = true;
+                    // A ray that has its answer ends before it begins.
+                    let t = if A::ANY { K::Rays::splat(-1.0) } else { t };
+                    vector.t = Lanes::select(hits, t, vector.t);
+                    vector.object = Lanes::select(hits, object, vector.object);
+                    vector.instance = Lanes::select(hits, own, vector.instance);
+                }
+            }
+            is_hit
+        }
+    }
+}
+
+/// The answers of the rays of a packet in one instance, by their places in the packet.
+struct InPart<A> {
+    distances: [f32; RAYS],
+    /// Bits of ids, `u32::MAX` for none.
+    objects: [f32; RAYS],
+    answers: PhantomData<A>,
+}
+
+impl<A> InPart<A> {
+    const NONE: Self = Self {
+        distances: [0.0; RAYS],
+        objects: [f32::from_bits(u32::MAX); RAYS],
+        answers: PhantomData,
+    };
+}
+
+impl<A: Answers> Answers for InPart<A> {
+    const ANY: bool = A::ANY;
+
+    #[inline(always)]
+    fn write(&mut self, number: usize, t: f32, object: u32) {
+        self.distances[number] = t;
+        self.objects[number] = f32::from_bits(object);
+    }
+
+    #[inline(always)]
+    fn write_lanes<L: Lanes>(&mut self, first: usize, t: L, object: L) {
+        let distances = &mut self.distances[first..][..L::N];
+        let objects = &mut self.objects[first..][..L::N];
+        // SAFETY: there is room for as many as there are lanes.
+        unsafe {
+            t.store(distances.as_mut_ptr());
+            object.store(objects.as_mut_ptr());
+        }
+    }
+}
