@@ -221,7 +221,7 @@ pub struct Instances {
 impl Instances {
     /// Makes a scene of `instances` of `parts`, with a tree over the [boxes of the
     /// instances](Instance::boxes). If instances move, they need a refitted or new tree, but no new
-    /// parts. O(instances).
+    /// parts. O(parts + instances), where an instance has at most 64 boxes to be transformed.
     pub fn new(
         parts: Vec<WideBvh>,
         instances: Vec<Instance>,
@@ -315,7 +315,30 @@ impl Instances {
     }
 
     /// [`nearest_hit`](Self::nearest_hit) of every ray, into as many `hits`; [`InstanceHit::MISS`] for a ray
-    /// that hits nothing. `coherence` changes the speed alone, no answer.
+    /// that hits nothing. Answers are those of single calls, bit by bit, and distances are in multiples
+    /// of the lengths of the rays' directions.
+    ///
+    /// Coherent rays pass through the tree over the instances in packets of 64. Those that enter an
+    /// instance are moved into its part together, and are a packet there. All other rays are in flight
+    /// through both levels: each visits its instances in the order in which it enters them.
+    ///
+    /// ```
+    /// # use bvh_core::{Aabb, Bvh, Coherence, Instance, InstanceHit, Instances, Node, Ray, Triangle, WideBvh, boxes};
+    /// # use glam::{Affine3A, Vec3};
+    /// # let triangles = [Triangle::from([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])];
+    /// # let tree = Bvh { nodes: vec![Node::leaf(boxes(&triangles)[0], 0, 1)], prim_ids: vec![0] };
+    /// # let parts = vec![WideBvh::new(&tree, &triangles)?];
+    /// # let moved = |z| Instance { part: 0, transform: Affine3A::from_translation(Vec3::Z * z) };
+    /// # let instances = vec![moved(0.0), moved(4.0)];
+    /// # let boxes = Instance::boxes(&instances, &parts)?;
+    /// # let top = Bvh { nodes: vec![Node::leaf(boxes[0].union(&boxes[1]), 0, 2)], prim_ids: vec![0, 1] };
+    /// let scene = Instances::new(parts, instances, top)?;
+    /// let down = |x| Ray::half_line([x, 0.2, 9.0], [0.0, 0.0, -1.0]).unwrap();
+    /// let mut hits = [InstanceHit::MISS; 2];
+    /// scene.nearest_hits(&[down(0.2), down(7.0)], &mut hits, Coherence::Coherent);
+    /// assert_eq!(hits, [InstanceHit { t: 5.0, instance: 1, triangle: 0 }, InstanceHit::MISS]);
+    /// # Ok::<(), bvh_core::InvalidInstances>(())
+    /// ```
     ///
     /// # Panics
     /// If `rays` and `hits` are not equally many.
