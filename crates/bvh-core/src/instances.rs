@@ -146,25 +146,14 @@ fn place_all(instances: &[Instance], parts: &[WideBvh]) -> Result<Vec<Placed>, I
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placed {
     part: u32,
-    to_local: DAffine3,
+    /// The transform from the scene's coordinates to the part's.
+    pub(crate) to_local: DAffine3,
     /// A box in which all hits of the instance are, and the box that trees over instances have.
-    aabb: Aabb,
+    pub(crate) aabb: Aabb,
     bounds: Aabb,
 }
 
 impl Placed {
-    /// The transform from the scene's coordinates to the part's.
-    #[inline(always)]
-    pub(crate) fn to_local(&self) -> &DAffine3 {
-        &self.to_local
-    }
-
-    /// The instance's box in the scene's coordinates.
-    #[inline(always)]
-    pub(crate) fn aabb(&self) -> &Aabb {
-        &self.aabb
-    }
-
     /// Returns the ray in the part's coordinates, up to `t_max`; `None` if the transform makes its
     /// direction vanish or overflow.
     #[inline(always)]

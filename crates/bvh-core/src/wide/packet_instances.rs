@@ -36,7 +36,12 @@ impl<K: Instructions> Packet<K> {
         // SAFETY: the caller's promises; vectors below the count are written.
         unsafe {
             let mut moved_packet = Packet::<K>::new();
-            for i in first..self.count {
+            for (i, entry_of_vector) in entries
+                .iter_mut()
+                .enumerate()
+                .take(self.count)
+                .skip(first)
+            {
                 if i > first {
                     entered = self.enter(i, planes);
                 }
@@ -44,16 +49,16 @@ impl<K: Instructions> Packet<K> {
                     continue;
                 }
                 let vector = self.vectors[i].assume_init_ref();
-                let (entry, enters) = vector.rays.entry(&scene.bounds(), placed.aabb());
+                let (entry, enters) = vector.rays.entry(&scene.bounds(), &placed.aabb);
                 let enters = enters & entry.le(vector.t) & Mask::from_bits(entered);
                 if enters.bits() == 0 {
                     continue;
                 }
-                let (mut moved, is_valid) = vector.rays.moved(placed.to_local());
+                let (mut moved, is_valid) = vector.rays.moved(&placed.to_local);
                 let enters = enters & is_valid;
                 // The range of the other rays is empty.
                 moved.t_max = Lanes::select(enters, vector.t, K::Rays::splat(-1.0));
-                entries[i].write(entry);
+                entry_of_vector.write(entry);
                 visited |= 1 << i;
                 let number = i * K::Rays::N;
                 if let Some(scale) = moved.cohere(part.largest) {

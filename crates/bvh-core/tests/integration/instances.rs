@@ -211,10 +211,10 @@ fn nested_transform(random: &mut Random) -> Affine3A {
 /// Rays of every kind: towards edges and corners in bundles, difficult ones, from far away, and of extreme
 /// lengths, which vector kernels leave to others.
 fn rays_of_every_kind(flat: &[Triangle], random: &mut Random) -> Vec<Ray> {
-    let mut all = bundles(flat, 60, random);
-    all.extend(support::rays(flat, 600, random));
+    let mut all = bundles(flat, 20, random);
+    all.extend(support::rays(flat, 200, random));
     for scale in [1e4, 1e7, 1e20] {
-        for _ in 0..60 {
+        for _ in 0..20 {
             let origin = random.point() * scale;
             let Triangle([a, ..]) = random.of(flat);
             all.extend(Ray::half_line(origin, (a - origin) / scale));
@@ -277,7 +277,7 @@ fn batches_have_the_answers_of_single_calls_bit_by_bit() {
             }
         }
     }
-    assert!(hits > 10_000, "{hits}");
+    assert!(hits > 4000, "{hits}");
 }
 
 #[test]
