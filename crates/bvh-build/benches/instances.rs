@@ -87,7 +87,7 @@ fn main() {
     if copies.is_empty() {
         copies.extend(COPIES);
     }
-    println!("{:<38} {:>12} {:>12} {:>8}", "scene and rays", "flat, M/s", "instances", "ratio");
+    print_head("flat, M/s", "instances, M/s");
     for copies in copies {
         for (name, distance) in [("sparse", 4.0), ("packed", 2.2)] {
             let pair = Pair::new(copies, distance);
