@@ -338,9 +338,13 @@ unsafe fn accepted<L: Lanes>(
     t: L,
     object: u32,
 ) -> L::Mask {
+    let found = hits.bits();
+    if found == 0 {
+        return hits;
+    }
     let mut distances = [0.0; 16];
-    let mut left = hits.bits();
-    let mut accepted = left;
+    let mut left = found;
+    let mut accepted = found;
     // SAFETY: there is room for sixteen lanes; the processor has the instructions.
     unsafe {
         t.store(distances.as_mut_ptr());
@@ -352,7 +356,7 @@ unsafe fn accepted<L: Lanes>(
                 accepted ^= 1 << lane;
             }
         }
-        Mask::from_bits(accepted)
+        if accepted == found { hits } else { Mask::from_bits(accepted) }
     }
 }
 

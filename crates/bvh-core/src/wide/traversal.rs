@@ -320,31 +320,65 @@ pub(super) unsafe fn decide_accepted<L: Lanes>(
     first: usize,
     answers: &mut impl Answers,
 ) {
+    let last = four.len() - 1;
+    let rays = [four[0], four[1.min(last)], four[2.min(last)], four[3.min(last)]];
     // SAFETY: the caller's promises; `four` has a traversal at least.
     unsafe {
-        let rays: [*mut Traversal; 4] = core::array::from_fn(|i| four[i.min(four.len() - 1)]);
-        let ends = rays.map(|ray| &raw const (*ray).t);
-        let t_max = L::load_quarters(ends).spread::<0>();
-        let (inside, t) = pairs::<L>(rays).decide(&corners(rays), t_max);
-        let inside = inside.bits();
-        let mut distances = [0.0; 16];
-        t.store(distances.as_mut_ptr());
+        let before = [nearest(rays[0]), nearest(rays[1]), nearest(rays[2]), nearest(rays[3])];
+        decide::<L>(rays);
+        // Filters accept most hits, so that the nearest one in the block is asked for first.
         for (i, &traversal) in four.iter().enumerate() {
-            let traversal = &mut *traversal;
-            let block = &*traversal.blocks.add(traversal.child.index());
-            for lane in 0..TriangleBlock::LANES {
-                let number = TriangleBlock::LANES * i + lane;
-                let nearest = Hit { t: traversal.t, object: traversal.object };
-                let hit = Hit { t: distances[number], object: block.id(lane) };
-                // An unused lane repeats a triangle, which may have been rejected.
-                let is_new = inside >> number & 1 != 0 && !hit.is_miss() && hit.precedes(&nearest);
-                if is_new && answers.accepts(first + traversal.ray.number as usize, hit) {
-                    traversal.t = hit.t;
-                    traversal.object = hit.object;
-                }
+            let hit = nearest(traversal);
+            let number = first + (*traversal).ray.number as usize;
+            if hit != before[i] && !answers.accepts(number, hit) {
+                (*traversal).t = before[i].t;
+                (*traversal).object = before[i].object;
+                decide_others::<L>(traversal, hit.object, number, answers);
             }
         }
     }
+}
+
+/// Gives a ray the nearest hit that the answers accept, as [`decide_accepted`] does, where they have
+/// rejected one object.
+#[inline(always)]
+unsafe fn decide_others<L: Lanes>(
+    traversal: *mut Traversal,
+    rejected: u32,
+    number: usize,
+    answers: &mut impl Answers,
+) {
+    // SAFETY: the caller's promises.
+    unsafe {
+        let ray = [traversal; 4];
+        let end = &raw const (*traversal).t;
+        let t_max = L::load_quarters([end; 4]).spread::<0>();
+        let (inside, t) = pairs::<L>(ray).decide(&corners(ray), t_max);
+        let mut distances = [0.0; 16];
+        t.store(distances.as_mut_ptr());
+        let block = &*(*traversal)
+            .blocks
+            .add((*traversal).child.index());
+        let mut left = inside.bits() & 0b1111;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let hit = Hit { t: distances[lane], object: block.id(lane) };
+            // An unused lane repeats a triangle, which may have been rejected.
+            let is_new = hit.object != rejected && !hit.is_miss();
+            if is_new && hit.precedes(&nearest(traversal)) && answers.accepts(number, hit) {
+                (*traversal).t = hit.t;
+                (*traversal).object = hit.object;
+            }
+        }
+    }
+}
+
+/// Returns the nearest hit of a ray so far.
+#[inline(always)]
+unsafe fn nearest(traversal: *const Traversal) -> Hit {
+    // SAFETY: the caller's promise: the traversal exists.
+    unsafe { Hit { t: (*traversal).t, object: (*traversal).object } }
 }
 
 /// Returns the lower of two ids.
