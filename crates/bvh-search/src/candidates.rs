@@ -3,7 +3,7 @@
 //! Ng & Trifonov 2003, section 3.4.
 
 use crate::run::Stream;
-use bvh_build::top_down::{Split, SplitCost, SplitRule, Sweep};
+use bvh_build::top_down::{Shortlist, Split, SplitRule};
 use bvh_config::{Accepts, Check, OutOfRange};
 use rand::RngExt;
 
@@ -35,35 +35,38 @@ pub(crate) struct Randomised {
     candidates: Candidates,
     noise: Option<f64>,
     rng: Stream,
-    list: Vec<Split>,
 }
 
 impl Randomised {
     pub fn new(candidates: Candidates, noise: Option<f64>, rng: Stream) -> Self {
-        Self { candidates, noise, rng, list: Vec::new() }
+        Self { candidates, noise, rng }
     }
 }
 
 impl SplitRule for Randomised {
-    /// Draws before scanning the node, so the scan finds only the candidates that the draw can
+    /// Draws before the node is scanned, so the scan finds only the candidates that the draw can
     /// choose.
-    #[inline(always)]
-    fn choose<C: SplitCost>(&mut self, node: &mut Sweep<'_, C>) -> Split {
-        let Self { candidates, noise, rng, list } = self;
-        if noise.is_some_and(|noise| !rng.random_bool(noise)) {
-            return node.best();
+    fn shortlist(&mut self) -> Shortlist {
+        if self
+            .noise
+            .is_some_and(|noise| !self.rng.random_bool(noise))
+        {
+            return Shortlist::Best;
         }
-        match *candidates {
-            Candidates::AxisBest if noise.is_none() => {
-                return node.axis_best(rng.random_range(0..3u8));
+        match self.candidates {
+            Candidates::AxisBest if self.noise.is_none() => {
+                Shortlist::AxisBest(self.rng.random_range(0..3u8))
             }
-            Candidates::AxisBest => node.axis_bests(list),
-            Candidates::KBest(k) => node.k_best(k as usize, list),
-            Candidates::Within(alpha) => node.within(alpha, list),
+            Candidates::AxisBest => Shortlist::AxisBests,
+            Candidates::KBest(k) => Shortlist::KBest(k as usize),
+            Candidates::Within(alpha) => Shortlist::Within(alpha),
         }
-        // With noise, this draw is for candidates other than the best, unless the list has no
-        // other.
-        let first = u32::from(noise.is_some() && list.len() > 1);
-        list[rng.random_range(first..list.len() as u32) as usize]
+    }
+
+    /// Draws one of the candidates. With noise, the draw is for candidates other than the best,
+    /// unless the list has no other.
+    fn choose(&mut self, list: &[Split]) -> usize {
+        let first = u32::from(self.noise.is_some() && list.len() > 1);
+        self.rng.random_range(first..list.len() as u32) as usize
     }
 }

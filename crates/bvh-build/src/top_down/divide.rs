@@ -11,6 +11,8 @@
 use super::presort::PARALLEL_OBJECTS;
 use super::presort::{Presorted, note_same_orders};
 use super::rule::SplitRule;
+#[cfg(feature = "rayon")]
+use super::rule::TakeBest;
 use super::split_cost::SplitCost;
 use super::stall::{LEAST_STALLED, is_stall};
 use super::sweep::{Block, Split, Sweep, union_of};
@@ -37,6 +39,7 @@ struct Scratch {
     goes_left: Vec<u8>,
     goes_right: Vec<u32>,
     blocks: [Vec<Block>; 3],
+    shortlist: Vec<Split>,
     stack: Vec<Frame>,
 }
 
@@ -98,9 +101,9 @@ impl<C: SplitCost> Division<'_, C> {
     /// Divides by `rule` into `tree` on one thread and reuses the memory of tree and workspace. O(n
     /// log n); for split costs without a [limit](SplitCost::most_stalls) on stalls O(n²), if every
     /// split separates a single object. Clears the tree if the watch cancels.
-    pub fn on_one_thread<R: SplitRule>(
+    pub fn on_one_thread(
         &self,
-        rule: &mut R,
+        rule: &mut dyn SplitRule,
         workspace: &mut Workspace,
         tree: &mut Bvh,
     ) -> Result<(), BuildError> {
@@ -110,18 +113,17 @@ impl<C: SplitCost> Division<'_, C> {
         self.finish(tree)
     }
 
-    /// Divides like [`on_one_thread`](Self::on_one_thread), on the threads of the current rayon
-    /// pool, with the same bytes. Every task gets a copy of `rule`.
+    /// Divides by the best splits on the threads of the current rayon pool, into the same bytes as
+    /// [`on_one_thread`](Self::on_one_thread).
     #[cfg(feature = "rayon")]
-    pub fn on_all_threads<R: SplitRule + Copy + Send + Sync>(
+    pub fn on_all_threads(
         &self,
-        rule: R,
         workspace: &mut Workspace,
         tree: &mut Bvh,
     ) -> Result<(), BuildError> {
         if let Some((task, scratch)) = prepare(self.scene, workspace, tree) {
             let scratches = &Mutex::new(vec![std::mem::take(scratch)]);
-            rayon::scope(|scope| spawn(scope, self, scratches, task, rule));
+            rayon::scope(|scope| spawn(scope, self, scratches, task));
         }
         self.finish(tree)
     }
@@ -139,12 +141,11 @@ impl<C: SplitCost> Division<'_, C> {
 
 /// Builds a task's subtree, parts of it in separate tasks.
 #[cfg(feature = "rayon")]
-fn spawn<'s, C: SplitCost, R: SplitRule + Copy + Send + Sync + 's>(
+fn spawn<'s, C: SplitCost>(
     scope: &rayon::Scope<'s>,
     division: &'s Division<'s, C>,
     scratches: &'s Mutex<Vec<Scratch>>,
     mut task: Task<'s>,
-    mut rule: R,
 ) {
     // The pool allocates at most one set of buffers per thread. Buffers have no invariant, so a
     // poisoned lock does no harm.
@@ -163,17 +164,17 @@ fn spawn<'s, C: SplitCost, R: SplitRule + Copy + Send + Sync + 's>(
         if pace.ends_after(task.objects()) {
             return;
         }
-        let (left, right) = split_task(division, task, &mut rule, &mut scratch);
+        let (left, right) = split_task(division, task, &mut scratch);
         let (larger, smaller) =
             if left.objects() > right.objects() { (left, right) } else { (right, left) };
         if smaller.objects() >= PARALLEL_OBJECTS {
-            scope.spawn(move |scope| spawn(scope, division, scratches, smaller, rule));
+            scope.spawn(move |scope| spawn(scope, division, scratches, smaller));
         } else {
-            build(division, smaller, &mut rule, &mut scratch);
+            build(division, smaller, &mut TakeBest, &mut scratch);
         }
         task = larger;
     }
-    build(division, task, &mut rule, &mut scratch);
+    build(division, task, &mut TakeBest, &mut scratch);
     pooled().push(scratch);
 }
 
@@ -211,15 +212,14 @@ impl Task<'_> {
 
 /// Divides the task's node, of two or more objects, writes its children and returns them as tasks.
 #[cfg(feature = "rayon")]
-fn split_task<'a, C: SplitCost, R: SplitRule>(
+fn split_task<'a, C: SplitCost>(
     division: &Division<'_, C>,
     task: Task<'a>,
-    rule: &mut R,
     scratch: &mut Scratch,
 ) -> (Task<'a>, Task<'a>) {
     let Task { below, below_at, objects_at, orders: [x, y, z], known } = task;
     let (left, [known_left, known_right]) =
-        split_node_fast(division, [x, y, z], known, rule, scratch);
+        split_node(division, [x, y, z], known, &mut TakeBest, scratch);
     let (children, below) = below.split_at_mut(2);
     let (below_left, below_right) = below.split_at_mut(2 * left - 2);
     let [x, y, z] = [x, y, z].map(|order| order.split_at_mut(left));
@@ -250,25 +250,18 @@ fn split_task<'a, C: SplitCost, R: SplitRule>(
 }
 
 with_vector_instructions! {
-    /// Runs [`build_plain`] with the processor's vector instructions.
-    build = build_plain<C: SplitCost, R: SplitRule>(
-        division: &Division<'_, C>, task: Task<'_>, rule: &mut R, scratch: &mut Scratch)
-}
-
-with_vector_instructions! {
-    /// Runs [`split_node`] with the processor's vector instructions.
-    #[cfg(feature = "rayon")]
-    split_node_fast = split_node<C: SplitCost, R: SplitRule>(
-        division: &Division<'_, C>, orders: [&mut [u32]; 3], known: Known, rule: &mut R, scratch: &mut Scratch)
+    /// Runs [`split_node_plain`] with the processor's vector instructions.
+    split_node = split_node_plain<C: SplitCost>(
+        division: &Division<'_, C>, orders: [&mut [u32]; 3], known: Known, rule: &mut dyn SplitRule,
+        scratch: &mut Scratch)
         -> (usize, [Known; 2])
 }
 
 /// Builds everything below a task's node, left subtrees first, with an explicit stack.
-#[inline(always)]
-fn build_plain<C: SplitCost, R: SplitRule>(
+fn build<C: SplitCost>(
     division: &Division<'_, C>,
     task: Task<'_>,
-    rule: &mut R,
+    rule: &mut dyn SplitRule,
     scratch: &mut Scratch,
 ) {
     let Task { below: nodes, below_at, objects_at, orders: [x, y, z], known } = task;
@@ -321,11 +314,11 @@ fn build_plain<C: SplitCost, R: SplitRule>(
 /// Lets the rule split a node of two or more objects and partitions its orders. Returns the number
 /// of objects on the left and the facts about both sides.
 #[inline(always)]
-fn split_node<C: SplitCost, R: SplitRule>(
+fn split_node_plain<C: SplitCost>(
     division: &Division<'_, C>,
     orders: [&mut [u32]; 3],
     Known { aabb, mut same_as, stalls: mut known_stalls }: Known,
-    rule: &mut R,
+    rule: &mut dyn SplitRule,
     scratch: &mut Scratch,
 ) -> (usize, [Known; 2]) {
     if division.skip_same_order {
@@ -340,7 +333,7 @@ fn split_node<C: SplitCost, R: SplitRule>(
         aabb,
         blocks: &mut scratch.blocks,
     };
-    let mut split = rule.choose(&mut sweep);
+    let mut split = sweep.choose(rule, &mut scratch.shortlist);
     let mut side_boxes = sweep.side_boxes(&split);
     if let Some(most) = division.split_cost.most_stalls() {
         let is_last = known_stalls >= most;

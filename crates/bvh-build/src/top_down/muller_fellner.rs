@@ -138,16 +138,16 @@ impl Divide for Greedy<'_> {
 }
 
 /// The arguments of [`Config::construct`].
-struct ByRule<'a, R> {
+struct ByRule<'a> {
     scene: &'a Presorted,
-    rule: &'a mut R,
+    rule: &'a mut dyn SplitRule,
     skip_same_order: bool,
     watch: &'a Watch<'a>,
     workspace: &'a mut Workspace,
     tree: &'a mut Bvh,
 }
 
-impl<R: SplitRule> Divide for ByRule<'_, R> {
+impl Divide for ByRule<'_> {
     fn by<C: SplitCost>(self, split_cost: &C) -> Result<(), BuildError> {
         let Self { scene, rule, skip_same_order, watch, workspace, tree } = self;
         Division { scene, split_cost, skip_same_order, watch }.on_one_thread(rule, workspace, tree)
@@ -195,7 +195,7 @@ impl Config {
         &self,
         scene: &Presorted,
         measure: Option<&dyn Measure>,
-        rule: &mut impl SplitRule,
+        rule: &mut dyn SplitRule,
         (workspace, tree): (&mut Workspace, &mut Bvh),
         watch: &Watch,
     ) -> Result<(), BuildError> {
@@ -228,7 +228,7 @@ fn greedy<C: SplitCost>(division: &Division<C>, tree: &mut Bvh) -> Result<(), Bu
     let workspace = &mut Workspace::default();
     #[cfg(feature = "rayon")]
     if division.scene.len() >= PARALLEL_OBJECTS && rayon::current_num_threads() > 1 {
-        return division.on_all_threads(TakeBest, workspace, tree);
+        return division.on_all_threads(workspace, tree);
     }
     division.on_one_thread(&mut TakeBest, workspace, tree)
 }

@@ -1,6 +1,7 @@
 //! The candidate splits of one node: every position along every axis, evaluated by two scans per
 //! axis.
 
+use super::rule::{Shortlist, SplitRule};
 use super::split_cost::{Linear, SplitCost};
 use bvh_core::PackedAabb;
 use std::cmp::Ordering;
@@ -65,7 +66,7 @@ impl Block {
 
 /// The objects of one node in the order of each axis, ready to be scanned. At least two objects.
 #[derive(Debug)]
-pub struct Sweep<'a, C> {
+pub(super) struct Sweep<'a, C> {
     pub(super) boxes: &'a [PackedAabb],
     pub(super) split_cost: &'a C,
     pub(super) orders: [&'a [u32]; 3],
@@ -79,14 +80,81 @@ pub struct Sweep<'a, C> {
 }
 
 impl<C: SplitCost> Sweep<'_, C> {
-    /// Returns the best candidate of all axes. O(n).
+    /// Returns the split that the rule chooses from its shortlist. `list` is a buffer. O(n) unless
+    /// the shortlist is long.
     #[inline(always)]
-    pub fn best(&mut self) -> Split {
+    pub fn choose(&mut self, rule: &mut dyn SplitRule, list: &mut Vec<Split>) -> Split {
+        let shortlist = rule.shortlist();
+        list.clear();
+        if let Shortlist::KBest(k) = shortlist {
+            self.collect(k, f64::INFINITY, list);
+        } else {
+            let best = self.bests(shortlist, list);
+            match shortlist {
+                Shortlist::Within(alpha) => {
+                    self.collect(usize::MAX, best.cost * (1.0 + alpha), list);
+                    // A best cost of 0, or a rounded limit, excludes the best candidate itself.
+                    if !list.contains(&best) {
+                        list.push(best);
+                    }
+                }
+                Shortlist::AxisBests => {}
+                _ => return best,
+            }
+            list.sort_unstable_by(Split::rank);
+        }
+        list[rule.choose(list)]
+    }
+
+    /// Returns the best candidate, of one axis if the shortlist is about one. If it is about each
+    /// axis, adds the best candidate of each axis to `list` instead.
+    #[inline(always)]
+    fn bests(&mut self, shortlist: Shortlist, list: &mut Vec<Split>) -> Split {
+        let is_of_each = matches!(shortlist, Shortlist::AxisBests);
+        let only = match shortlist {
+            Shortlist::AxisBest(axis) => Some(self.same_as[axis as usize]),
+            _ => None,
+        };
         let mut best = Split::NONE;
-        for axis in self.distinct_axes() {
-            best = self.improve(axis, best);
+        for axis in 0..3 {
+            // Identical orders have identical candidates, and ties prefer the lower axis.
+            let same = self.same_as[axis as usize];
+            if only.map_or(same == axis, |only| only == axis) {
+                // The loop calls the scan once, whatever the shortlist, because the scan is large
+                // and inlined.
+                best = self.improve(axis, if is_of_each { Split::NONE } else { best });
+            }
+            if is_of_each {
+                list.push(if same == axis { best } else { list[same as usize] });
+            }
         }
         best
+    }
+
+    /// Adds the `k` best candidates of all axes to `list`, best first. If `k` is `usize::MAX`, adds
+    /// all that cost less than `limit` instead, in any order. Expected O(n) for small `k`, O(n·k)
+    /// at worst.
+    #[inline(always)]
+    fn collect(&mut self, k: usize, limit: f64, list: &mut Vec<Split>) {
+        let bound = |list: &[Split]| if list.len() < k { limit } else { list[k - 1].cost };
+        for axis in self.distinct_axes() {
+            self.scan::<false>(axis, bound(list), |candidate| {
+                if k == usize::MAX {
+                    if candidate.cost < limit {
+                        list.push(candidate);
+                    }
+                } else if candidate.cost <= bound(list) {
+                    let mut index = list.len();
+                    while index > 0 && candidate.rank(&list[index - 1]).is_lt() {
+                        index -= 1;
+                    }
+                    // Insertion keeps the list sorted; k is small.
+                    list.insert(index, candidate);
+                    list.truncate(k);
+                }
+                bound(list)
+            });
+        }
     }
 
     /// Returns the balanced split, with at least one in [`BALANCED`] objects on either side, of
@@ -110,25 +178,6 @@ impl<C: SplitCost> Sweep<'_, C> {
         best
     }
 
-    /// Returns the best candidate of one axis. O(n).
-    #[inline(always)]
-    pub fn axis_best(&mut self, axis: u8) -> Split {
-        self.improve(self.same_as[axis as usize], Split::NONE)
-    }
-
-    /// Fills `list` with the best candidate of each axis, the best of all first. O(n).
-    #[inline(always)]
-    pub fn axis_bests(&mut self, list: &mut Vec<Split>) {
-        list.clear();
-        for axis in 0..3 {
-            let same = self.same_as[axis as usize];
-            // An axis with the order of a lower axis has the same best candidate.
-            let best = if same == axis { self.axis_best(axis) } else { list[same as usize] };
-            list.push(best);
-        }
-        list.sort_unstable_by(Split::rank);
-    }
-
     /// Returns the better of `best` and the best candidate of `axis`.
     #[inline(always)]
     fn improve(&mut self, axis: u8, mut best: Split) -> Split {
@@ -141,53 +190,8 @@ impl<C: SplitCost> Sweep<'_, C> {
         best
     }
 
-    /// Fills `list` with the `k` best candidates of all axes, best first, or with all if there are
-    /// fewer. Expected O(n) for small `k`, O(n·k) at worst.
-    #[inline(always)]
-    pub fn k_best(&mut self, k: usize, list: &mut Vec<Split>) {
-        list.clear();
-        let bound = |list: &[Split]| if list.len() < k { f64::INFINITY } else { list[k - 1].cost };
-        for axis in self.distinct_axes() {
-            self.scan::<false>(axis, bound(list), |candidate| {
-                if candidate.cost <= bound(list) {
-                    let mut index = list.len();
-                    while index > 0 && candidate.rank(&list[index - 1]).is_lt() {
-                        index -= 1;
-                    }
-                    // Insertion keeps the list sorted; k is small.
-                    list.insert(index, candidate);
-                    list.truncate(k);
-                }
-                bound(list)
-            });
-        }
-    }
-
-    /// Fills `list` with the best candidate and all others that cost less than (1 + `alpha`) times
-    /// as much, best first. O(n log n) at worst.
-    #[inline(always)]
-    pub fn within(&mut self, alpha: f64, list: &mut Vec<Split>) {
-        list.clear();
-        let best = self.best();
-        let limit = best.cost * (1.0 + alpha);
-        for axis in self.distinct_axes() {
-            self.scan::<false>(axis, limit, |candidate| {
-                if candidate.cost < limit {
-                    list.push(candidate);
-                }
-                limit
-            });
-        }
-        // A best cost of 0, or a rounded limit, excludes the best candidate itself.
-        if !list.contains(&best) {
-            list.push(best);
-        }
-        list.sort_unstable_by(Split::rank);
-    }
-
     /// Returns the number of objects in the node.
     #[inline(always)]
-    #[allow(clippy::len_without_is_empty)] // never empty
     pub fn len(&self) -> usize {
         self.orders[0].len()
     }

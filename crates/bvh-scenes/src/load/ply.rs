@@ -9,7 +9,8 @@ use ply_rs_bw::ply::{
 };
 use std::path::Path;
 
-/// A position, with NaN where the file has no coordinate.
+/// A position, with NaN where the file has no coordinate. Elements that are neither vertices nor
+/// faces are read as positions, too, and dropped: a type for them would compile the parser again.
 struct Vertex([f32; 3]);
 
 impl PropertyAccess for Vertex {
@@ -24,9 +25,10 @@ impl PropertyAccess for Vertex {
         else {
             return PropertyAccessResult::Ignored;
         };
+        // A list stays without a coordinate, which only a vertex needs.
         match property.to_f32_lossy() {
             Some(coordinate) => self.0[axis] = coordinate,
-            None => return PropertyAccessResult::UnsupportedType,
+            None => return PropertyAccessResult::Ignored,
         }
         PropertyAccessResult::Set
     }
@@ -57,19 +59,10 @@ impl PropertyAccess for Face {
     }
 }
 
-/// An element that is neither a vertex nor a face.
-struct Other;
-
-impl PropertyAccess for Other {
-    fn new() -> Self {
-        Self
-    }
-}
-
 /// Reads the bytes of a PLY file; `path` only names it in errors.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     let mut reader = Reader::new(bytes);
-    let header = Parser::<Other>::new()
+    let header = Parser::<Vertex>::new()
         .read_header(&mut reader)
         .map_err(|error| fault(path, None, &error))?;
     let mut vertices = Vec::new();
@@ -94,7 +87,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
             "vertex" => vertices = elements::<Vertex>(&mut reader, element, &header, path)?,
             "face" => faces = elements::<Face>(&mut reader, element, &header, path)?,
             // Other elements must be read as well, because their length is not known in advance.
-            _ => drop(elements::<Other>(&mut reader, element, &header, path)?),
+            _ => drop(elements::<Vertex>(&mut reader, element, &header, path)?),
         }
     }
     mesh(&vertices, &faces, path)

@@ -91,7 +91,7 @@ fn ring() -> MeshBuilder {
             .map(|(r, z)| on_circle(r, fraction(k, 6) + 0.02, z))
             .into();
         let side = on_circle(1.0, fraction(k, 6) + 0.27, 0.0);
-        ring.sweep(&path, side, &circle(0.045, 9), |i| 1.0 - 0.06 * i as f64);
+        ring.sweep(&path, side, &circle(0.045, 9), &|i| 1.0 - 0.06 * i as f64);
     }
 
     // Halo stones in a circle, then pavé rows over both shoulders, beads between neighbours.
@@ -148,7 +148,7 @@ fn surface(away: f64, across: f64) -> f64 {
 fn shank(mesh: &mut MeshBuilder) {
     let dome = 9;
     let steps = 72;
-    mesh.grid(dome + 2, steps, |i, j| {
+    mesh.grid(dome + 2, steps, &|i, j| {
         // The cubic spacing puts most of the steps near the head, where the shoulders are.
         let s = 2.0 * fraction(j, steps) - 1.0;
         let away = 0.5 * s * (0.45 + 0.55 * s * s);
@@ -215,7 +215,7 @@ fn on_wave(t: f64) -> DVec3 {
 /// A padded top over a plain box.
 fn cushion(mesh: &mut MeshBuilder) {
     mesh.cuboid(DVec3::new(-CUSHION, -CUSHION, -0.9), DVec3::new(CUSHION, CUSHION, -0.35));
-    mesh.grid(20, 20, |i, j| {
+    mesh.grid(20, 20, &|i, j| {
         let x = CUSHION * (2.0 * fraction(i, 20) - 1.0);
         let y = CUSHION * (2.0 * fraction(j, 20) - 1.0);
         DVec3::new(x, y, padding(x, y))

@@ -59,7 +59,7 @@ impl Parts {
     fn new() -> Self {
         let mut tile = MeshBuilder::default();
         // A barrel tile of length 1 down the slope, slightly conical.
-        tile.grid(3, 1, |i, j| {
+        tile.grid(3, 1, &|i, j| {
             let (c, s) = cos_sin(0.5 * fraction(i, 3));
             let width = 0.15 - 0.02 * j as f64;
             DVec3::new(width * c, j as f64 * 1.06, width * s)
@@ -92,7 +92,7 @@ fn column() -> MeshBuilder {
         // Leaves in two rows, curling outwards at the tip.
         let (low, tall) = if k % 2 == 0 { (1.87, 0.22) } else { (1.93, 0.24) };
         let mut leaf = MeshBuilder::default();
-        leaf.grid(2, 4, |i, j| {
+        leaf.grid(2, 4, &|i, j| {
             let u = fraction(i, 2) - 0.5;
             let v = fraction(j, 4);
             let width = 0.085 * (1.0 - v * v * v) + 0.012;
@@ -125,7 +125,7 @@ fn arcade_arch() -> MeshBuilder {
         let profile =
             [(0.0, 0.0), (0.0, 0.05), (-0.07, 0.09), (-0.12, 0.05), (-0.2, 0.07), (-0.24, 0.0)];
         let outwards = profile.map(|(x, y)| (x, if face > 0.0 { -y } else { y }));
-        arch.sweep(&path, DVec3::Y, &outwards, |_| 1.0);
+        arch.sweep(&path, DVec3::Y, &outwards, &|_| 1.0);
     }
     arch
 }
@@ -138,7 +138,7 @@ fn vault() -> MeshBuilder {
     for k in 0..4 {
         // One web: from the groin (|y| = x) to the wall arch at x = half, courses parallel to y.
         let mut web = MeshBuilder::default();
-        web.grid(6, 6, |i, j| {
+        web.grid(6, 6, &|i, j| {
             let (c, s) = cos_sin(0.25 * fraction(j, 6));
             let reach = half * c;
             let y = (2.0 * fraction(i, 6) - 1.0) * reach;
@@ -152,7 +152,7 @@ fn vault() -> MeshBuilder {
             .map(|(c, s)| about_z(turns) * DVec3::new(half * SQRT_2 * c, 0.0, half * s - 0.02))
             .collect();
         let rib = [(0.05, -0.07), (0.09, 0.0), (0.05, 0.07), (-0.03, 0.07), (-0.03, -0.07)];
-        vault.sweep(&path, about_z(turns) * DVec3::Y, &rib, |_| 1.0);
+        vault.sweep(&path, about_z(turns) * DVec3::Y, &rib, &|_| 1.0);
     }
     vault.place(&boss(), &upright(0.05, 0.0, 0.0, half - 0.2));
     vault
@@ -177,7 +177,7 @@ fn walk(parts: &Parts, bays: usize) -> MeshBuilder {
         &[DVec3::new(start, 0.0, PARAPET), DVec3::new(end, 0.0, PARAPET)],
         DVec3::Z,
         &[(0.36, 0.0), (0.36, 0.06), (0.31, 0.1), (-0.31, 0.1), (-0.36, 0.06), (-0.36, 0.0)],
-        |_| 1.0,
+        &|_| 1.0,
     );
     for bay in 0..=bays {
         let x = start + BAY * bay as f64;
@@ -256,7 +256,7 @@ fn paving(mesh: &mut MeshBuilder, x: f64, bay: usize) {
         let next = middle + on_circle(half, fraction(k + 1, 4), 0.0);
         mesh.triangle(tip, corner(k, half), next);
     }
-    mesh.grid(tiles, tiles, |i, j| {
+    mesh.grid(tiles, tiles, &|i, j| {
         let u = fraction(i, tiles) - 0.5;
         let v = fraction(j, tiles) - 0.5;
         middle + DVec3::new((u - v) * half, (u + v) * half, 0.0)
@@ -274,7 +274,7 @@ fn roof(mesh: &mut MeshBuilder, parts: &Parts, half: f64) {
     let along = |x: f64| DVec3::X * x;
     let low = half - eaves.y;
     let high = half - ridge.y;
-    mesh.grid(5, 1, |i, j| {
+    mesh.grid(5, 1, &|i, j| {
         let side = 2.0 * fraction(i, 5) - 1.0;
         if j == 0 { eaves + along(side * low) } else { ridge + along(side * high) }
     });
@@ -282,7 +282,7 @@ fn roof(mesh: &mut MeshBuilder, parts: &Parts, half: f64) {
     let beam = [(0.05, -0.12), (0.05, -0.02), (-0.05, -0.02), (-0.05, -0.12)];
     for k in 0..rafters {
         let foot = eaves + along(low * (2.0 * fraction(2 * k + 1, 2 * rafters) - 1.0));
-        mesh.sweep(&[foot, foot + up * (slope - 0.1)], normal, &beam, |_| 1.0);
+        mesh.sweep(&[foot, foot + up * (slope - 0.1)], normal, &beam, &|_| 1.0);
     }
     let rows = 6;
     let columns = (2.0 * high / 0.5) as usize;
@@ -306,13 +306,13 @@ fn roof(mesh: &mut MeshBuilder, parts: &Parts, half: f64) {
 fn court(mesh: &mut MeshBuilder, half: DVec3) {
     let inner = half - DVec3::new(0.25, 0.25, 0.0);
     let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
-    mesh.grid(3, 2, |i, j| {
+    mesh.grid(3, 2, &|i, j| {
         at(inner.x * (2.0 * fraction(i, 3) - 1.0), inner.y * (j as f64 - 1.0), -0.1)
     });
     for (turns, length) in [(0.037, 14.0), (0.287, 11.0)] {
         let mut path = MeshBuilder::default();
         let stones = 18;
-        path.grid(stones, 2, |i, j| {
+        path.grid(stones, 2, &|i, j| {
             at((2.0 * fraction(i, stones) - 1.0) * length, 0.7 * (j as f64 - 1.0), -0.06)
         });
         mesh.place(&path, &upright(turns, 2.1, -1.4, 0.0));
@@ -356,7 +356,7 @@ fn well() -> MeshBuilder {
         .map(|k| cos_sin(0.5 * fraction(k, 20)))
         .map(|(c, s)| DVec3::new(0.83 * c, 0.0, 1.36 + 1.9 * libm::sqrt(s)))
         .collect();
-    well.sweep(&yoke, DVec3::Y, &circle(0.035, 7), |_| 1.0);
+    well.sweep(&yoke, DVec3::Y, &circle(0.035, 7), &|_| 1.0);
     let mut link = MeshBuilder::default();
     let ring: Vec<_> = (0..=6)
         .map(|i| on_circle(0.012, fraction(i, 6), 0.0))

@@ -83,7 +83,7 @@ struct Plan {
 /// One gravity's floor, flights, landings and arcade; up is z.
 fn storey(plan: &Plan) -> MeshBuilder {
     let mut storey = MeshBuilder::default();
-    storey.grid(3, 2, |i, j| DVec3::new(fraction(i, 3), fraction(j, 2), 0.0) * ROOM);
+    storey.grid(3, 2, &|i, j| DVec3::new(fraction(i, 3), fraction(j, 2), 0.0) * ROOM);
 
     // The first flight leads along x to a landing, the second along y to a gallery, and the third
     // down at an oblique angle.
@@ -210,7 +210,7 @@ fn balustrade(mesh: &mut MeshBuilder, feet: &[DVec3]) {
     };
     let rail =
         [(0.16, -0.08), (0.16, 0.06), (0.07, 0.14), (-0.07, 0.14), (-0.16, 0.06), (-0.16, -0.08)];
-    mesh.sweep(&[first + up, last + up], DVec3::Z, &rail, |_| 1.0);
+    mesh.sweep(&[first + up, last + up], DVec3::Z, &rail, &|_| 1.0);
     for (end, turns) in [(first, 0.03), (last, 0.07)] {
         let mut newel = MeshBuilder::default();
         newel.revolve(
@@ -231,7 +231,7 @@ fn gate(radius: f64, half_width: f64, pier: f64, segments: usize) -> MeshBuilder
         .map(|k| cos_sin(0.5 * fraction(k, segments)))
         .map(|(c, s)| DVec3::new(radius * c, -0.5, radius * s))
         .collect();
-    arch.sweep(&path, DVec3::Y, &[(0.0, 0.0), (0.0, -0.12), (-0.12, -0.2), (-0.24, 0.0)], |_| 1.0);
+    arch.sweep(&path, DVec3::Y, &[(0.0, 0.0), (0.0, -0.12), (-0.12, -0.2), (-0.24, 0.0)], &|_| 1.0);
     gate.place(&arch, &placed(DMat3::IDENTITY, DVec3::Z * pier));
     for (low, high) in [(-half_width, -radius), (radius, half_width)] {
         gate.cuboid(DVec3::new(low, -0.5, 0.0), DVec3::new(high, 0.5, pier - 0.2));
@@ -282,6 +282,6 @@ fn spiral(steps: usize) -> MeshBuilder {
         rod.revolve(&[(0.06, -RAIL), (0.06, 0.0)], 5);
         spiral.place(&rod, &placed(about_z(k as f64 * per_step), top));
     }
-    spiral.sweep(&rail, DVec3::Z, &circle(0.14, 7), |_| 1.0);
+    spiral.sweep(&rail, DVec3::Z, &circle(0.14, 7), &|_| 1.0);
     spiral
 }

@@ -100,7 +100,7 @@ fn terrain(mesh: &mut MeshBuilder) {
             let aside = corner.y - course(corner.x);
             let near = (corner.x - 1500.0).abs() < 620.0 && (-150.0..460.0).contains(&aside);
             let parts = if near { 4 } else { 1 };
-            mesh.grid(parts, parts, |a, b| {
+            mesh.grid(parts, parts, &|a, b| {
                 let x = corner.x + size.x * fraction(a, parts);
                 let y = corner.y + size.y * fraction(b, parts);
                 DVec3::new(x, y, ground(x, y))
@@ -114,13 +114,13 @@ fn railway(mesh: &mut MeshBuilder) {
     let steps = 64;
     let at = |k: usize| SIZE.0 * fraction(k, steps);
     let bed = [(-14.0, TRACK - 9.0), (-6.0, TRACK - 0.6), (6.0, TRACK - 0.6), (14.0, TRACK - 9.0)];
-    mesh.grid(steps, bed.len() - 1, |k, row| beside(at(k), bed[row].0, bed[row].1));
+    mesh.grid(steps, bed.len() - 1, &|k, row| beside(at(k), bed[row].0, bed[row].1));
     let rail = [(0.035, 0.0), (0.035, 0.16), (-0.035, 0.16), (-0.035, 0.0)];
     for aside in [-2.8, -1.3, 1.3, 2.8] {
         let path: Vec<_> = (0..=steps)
             .map(|k| beside(at(k), aside, TRACK))
             .collect();
-        mesh.sweep(&path, DVec3::Z, &rail, |_| 1.0);
+        mesh.sweep(&path, DVec3::Z, &rail, &|_| 1.0);
     }
     let mut sleeper = MeshBuilder::default();
     sleeper.cuboid(DVec3::new(-0.13, -1.3, -0.2), DVec3::new(0.13, 1.3, 0.0));
@@ -186,7 +186,7 @@ fn station(mesh: &mut MeshBuilder) {
         let (c, s) = cos_sin(0.5 * t);
         DVec3::new(x, -reach * c, 7.0 + 0.62 * reach * s)
     };
-    station.grid(24, ribs - 1, |i, j| {
+    station.grid(24, ribs - 1, &|i, j| {
         vault(fraction(i, 24), length * (fraction(j, ribs - 1) - 0.5), half)
     });
     for j in 0..ribs {
@@ -198,7 +198,7 @@ fn station(mesh: &mut MeshBuilder) {
             &path,
             DVec3::X,
             &[(-0.2, -0.12), (0.2, -0.12), (0.2, 0.12), (-0.2, 0.12)],
-            |_| 1.0,
+            &|_| 1.0,
         );
         for y in [-half, half] {
             let mut post = MeshBuilder::default();
@@ -338,7 +338,7 @@ fn power_line(mesh: &mut MeshBuilder) {
                 .map(|i| fraction(i, 8))
                 .map(|t| end(k).lerp(end(k + 1), t) - DVec3::Z * (36.0 * t * (1.0 - t)))
                 .collect();
-            mesh.sweep(&path, DVec3::Z, &circle(0.03, 3), |_| 1.0);
+            mesh.sweep(&path, DVec3::Z, &circle(0.03, 3), &|_| 1.0);
         }
     }
 }

@@ -34,8 +34,8 @@ impl MeshBuilder {
     }
 
     /// Adds a surface of `columns` × `rows` quadrilaterals with the corners `point(i, j)`, `i <=
-    /// columns`, `j <= rows`.
-    pub fn grid(&mut self, columns: usize, rows: usize, point: impl Fn(usize, usize) -> DVec3) {
+    /// columns`, `j <= rows`. Not generic, because every call would compile it again.
+    pub fn grid(&mut self, columns: usize, rows: usize, point: &dyn Fn(usize, usize) -> DVec3) {
         for j in 0..rows {
             for i in 0..columns {
                 self.quad(point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1));
@@ -46,7 +46,7 @@ impl MeshBuilder {
     /// Adds the surface of revolution of a `(radius, z)` profile about the z axis, with `segments`
     /// sides.
     pub fn revolve(&mut self, profile: &[(f64, f64)], segments: usize) {
-        self.grid(segments, profile.len().saturating_sub(1), |i, j| {
+        self.grid(segments, profile.len().saturating_sub(1), &|i, j| {
             let (radius, z) = profile[j];
             on_circle(radius, fraction(i, segments), z)
         });
@@ -60,7 +60,7 @@ impl MeshBuilder {
         path: &[DVec3],
         side: DVec3,
         profile: &[(f64, f64)],
-        scale: impl Fn(usize) -> f64,
+        scale: &dyn Fn(usize) -> f64,
     ) {
         let Some(last) = path.len().checked_sub(1) else {
             return;
@@ -71,7 +71,7 @@ impl MeshBuilder {
             let (x, y) = profile[i % profile.len()];
             path[k] + (across * x + tangent.cross(across) * y) * scale(k)
         };
-        self.grid(profile.len(), last, corner);
+        self.grid(profile.len(), last, &corner);
         for k in [0, last] {
             let cap: Vec<_> = (0..profile.len()).map(|i| corner(i, k)).collect();
             self.polygon(&cap);
@@ -80,7 +80,7 @@ impl MeshBuilder {
 
     /// Adds a straight round bar of `sides` sides between two points that differ in x or y.
     pub fn bar(&mut self, from: DVec3, to: DVec3, radius: f64, sides: usize) {
-        self.sweep(&[from, to], DVec3::Z, &circle(radius, sides), |_| 1.0);
+        self.sweep(&[from, to], DVec3::Z, &circle(radius, sides), &|_| 1.0);
     }
 
     /// Adds the 12 triangles of a box parallel to the axes.
@@ -118,12 +118,12 @@ impl MeshBuilder {
             DVec3::new(radius * c, y, radius * s)
         };
         for y in [-0.5 * thickness, 0.5 * thickness] {
-            self.grid(segments, 1, |i, j| {
+            self.grid(segments, 1, &|i, j| {
                 let arc = front(i, y);
                 if j == 0 { arc } else { DVec3::new(arc.x, y, top) }
             });
             for (inner, outer) in [(radius, half_width), (-half_width, -radius)] {
-                self.grid(1, 1, |i, j| {
+                self.grid(1, 1, &|i, j| {
                     DVec3::new(
                         if i == 0 { inner } else { outer },
                         y,
@@ -132,7 +132,7 @@ impl MeshBuilder {
                 });
             }
         }
-        self.grid(segments, 1, |i, j| front(i, if j == 0 { -0.5 } else { 0.5 } * thickness));
+        self.grid(segments, 1, &|i, j| front(i, if j == 0 { -0.5 } else { 0.5 } * thickness));
     }
 
     /// Adds a copy of `part`, moved by `placement`.

@@ -32,7 +32,7 @@ pub fn triangles() -> Vec<Triangle> {
         .map(|k| fraction(k, 6))
         .map(|t| DVec3::new(0.07 * t * t, 0.02 * t, -0.25 * t))
         .collect();
-    cone.sweep(&stem, DVec3::Y, &circle(0.035, 8), |k| 1.0 - 0.07 * k as f64);
+    cone.sweep(&stem, DVec3::Y, &circle(0.035, 8), &|k| 1.0 - 0.07 * k as f64);
 
     for i in 0..SCALES {
         // Scales are denser towards the tip, where they are smaller.
@@ -77,7 +77,7 @@ fn scale(index: usize) -> MeshBuilder {
 
 /// Adds a blade's face, `lift` above the middle surface.
 fn blade(mesh: &mut MeshBuilder, columns: usize, rows: usize, lift: f64) {
-    mesh.grid(columns, rows, |i, j| face(fraction(i, columns), fraction(j, rows), lift));
+    mesh.grid(columns, rows, &|i, j| face(fraction(i, columns), fraction(j, rows), lift));
 }
 
 /// The blade's surface: `u` across in 0..=1, `v` from root to tip; widest two thirds up, cupped and
