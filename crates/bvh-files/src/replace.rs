@@ -1,7 +1,8 @@
 //! Replaces files as a whole: the new file is written next to the old one, synced, and renamed.
 
 use std::fs::{self, File};
-use std::io::{self, Seek, Write};
+use std::io::{self, Seek, SeekFrom, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
@@ -80,6 +81,8 @@ const PIECE: usize = 1 << 21;
 pub struct Reserved {
     path: PathBuf,
     unfinished: NamedTempFile,
+    /// The bytes that have been written ahead.
+    ahead: Range<u64>,
 }
 
 impl Reserved {
@@ -116,7 +119,35 @@ impl Reserved {
             .try_for_each(|length| unfinished.write_all(&zeros[..length]))
             .and_then(|()| if bytes > 0 { unfinished.as_file().sync_all() } else { Ok(()) })
             .map_err(WriteError::of(&path, "reserve the file's space"))?;
-        Ok(Self { path, unfinished })
+        Ok(Self { path, unfinished, ahead: 0..0 })
+    }
+
+    /// Writes and syncs sections that begin at byte `start` of the file, while the caller still computes
+    /// the others. [`write_sections`](Self::write_sections) must get the same sections at the same place,
+    /// and does not write them again.
+    pub fn write_ahead(&mut self, start: u64, sections: &[&[u8]]) -> Result<(), WriteError> {
+        self.replace_lost()?;
+        let file = self.unfinished.as_file_mut();
+        let end = file
+            .seek(SeekFrom::Start(start))
+            .and_then(|_| {
+                sections
+                    .iter()
+                    .try_for_each(|section| file.write_all(section))
+            })
+            .and_then(|()| file.sync_data())
+            .and_then(|()| file.stream_position())
+            .map_err(WriteError::of(&self.path, "write the file"))?;
+        self.ahead = start..end;
+        Ok(())
+    }
+
+    /// Creates the unfinished file again if the user has removed it during hours of search.
+    fn replace_lost(&mut self) -> Result<(), WriteError> {
+        if !self.unfinished.path().exists() {
+            *self = Self::new(&self.path, 0)?;
+        }
+        Ok(())
     }
 
     /// Writes the bytes, syncs the file, and renames it. At any moment the file at the path is the
@@ -126,13 +157,10 @@ impl Reserved {
     }
 
     /// Writes the sections one after the other like [`write`](Self::write).
-    pub fn write_sections(self, sections: &[&[u8]]) -> Result<(), WriteError> {
-        let Self { path, mut unfinished } = self;
-        // The user may have removed the file during hours of search.
-        if !unfinished.path().exists() {
-            unfinished = Self::new(&path, 0)?.unfinished;
-        }
-        overwrite(unfinished.as_file_mut(), sections)
+    pub fn write_sections(mut self, sections: &[&[u8]]) -> Result<(), WriteError> {
+        self.replace_lost()?;
+        let Self { path, mut unfinished, ahead } = self;
+        overwrite(unfinished.as_file_mut(), sections, &ahead)
             .map_err(WriteError::of(&path, "write the file"))?;
         let folder = path.parent().map(Path::to_owned);
         let file = unfinished
@@ -162,14 +190,19 @@ fn kept(failed: tempfile::PersistError) -> io::Error {
     io::Error::new(error.kind(), message)
 }
 
-fn overwrite(file: &mut File, sections: &[&[u8]]) -> io::Result<()> {
-    file.rewind()?;
+/// Writes the sections to the beginning of the file, except those whose bytes are `ahead`.
+fn overwrite(file: &mut File, sections: &[&[u8]], ahead: &Range<u64>) -> io::Result<()> {
+    let mut start = 0;
     for section in sections {
-        file.write_all(section)?;
+        let end = start + section.len() as u64;
+        if start < ahead.start || end > ahead.end {
+            file.seek(SeekFrom::Start(start))?;
+            file.write_all(section)?;
+        }
+        start = end;
     }
     // The reserved space may be larger than the contents.
-    let length = file.stream_position()?;
-    file.set_len(length)?;
+    file.set_len(start)?;
     file.sync_all()
 }
 
@@ -189,6 +222,26 @@ mod tests {
         let reserved = Reserved::new(&path, 1000).unwrap();
         reserved.write(b"new").unwrap();
         assert_eq!((fs::read(&path).unwrap(), count(&folder)), (b"new".to_vec(), 1));
+    }
+
+    #[test]
+    fn sections_that_were_written_ahead_are_not_written_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.bvh");
+        let sections = [&b"head"[..], b"one", b"two", b"end"];
+        let mut reserved = Reserved::new(&path, 1000).unwrap();
+        reserved.write_ahead(4, &sections[1..3]).unwrap();
+        // Other bytes at their place show which sections are written.
+        let shown = [&b"HEAD"[..], b"ONE", b"TWO", b"END"];
+        reserved.write_sections(&shown).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"HEADonetwoEND");
+        // The user removes the unfinished file after its sections were written.
+        let mut reserved = Reserved::new(&path, 1000).unwrap();
+        reserved.write_ahead(4, &sections[1..3]).unwrap();
+        fs::remove_file(reserved.unfinished.path()).unwrap();
+        reserved.write_sections(&shown).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"HEADONETWOEND");
+        assert_eq!(count(&folder), 1);
     }
 
     fn count(folder: &tempfile::TempDir) -> usize {

@@ -17,8 +17,10 @@ use bvh_search::{
 use bvh_terminal::files::Reserved;
 use bvh_terminal::interrupt;
 use rayon::prelude::*;
+use std::panic::resume_unwind;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::thread::{self, ScopedJoinHandle};
 
 /// A search for the best tree of any scene.
 #[derive(Clone)]
@@ -229,16 +231,35 @@ impl Bake<'_> {
         &self,
         baked: &Baked,
         path: &Path,
-        reserved: Reserved,
+        mut reserved: Reserved,
     ) -> Result<(usize, f64), Error> {
         let Baked { tree, work, figures } = baked;
         let Scene { boxes, primitives, .. } = self.scene;
-        // Somebody may wait for the file of a large tree after Ctrl-C, so everything that its header
-        // needs is computed at once.
-        let (cost, (validated, visits)) = rayon::join(
-            || self.cost_for_lines(tree, figures.as_ref()),
-            || rayon::join(|| validate_references(tree, boxes, primitives), || self.visits(tree)),
-        );
+        // Somebody may wait for the file of a large tree after Ctrl-C, so most of it is written while
+        // the rest is computed, all at once. The thread that writes waits for the disk, which no thread
+        // of the pool should do.
+        let (written, cost, validated, visits) = thread::scope(|scope| {
+            let reserved = &mut reserved;
+            let writer = (tree.nodes.len() >= WRITTEN_AHEAD).then(|| {
+                scope.spawn(|| {
+                    let body = file::body(tree);
+                    let body = body.each_ref().map(|section| &**section);
+                    reserved.write_ahead(Header::BYTES as u64, &body)
+                })
+            });
+            let (cost, (validated, visits)) = rayon::join(
+                || self.cost_for_lines(tree, figures.as_ref()),
+                || {
+                    rayon::join(
+                        || validate_references(tree, boxes, primitives),
+                        || self.visits(tree),
+                    )
+                },
+            );
+            let written = writer.map_or(Ok(()), joined);
+            (written, cost, validated, visits)
+        });
+        written?;
         validated
             .map_err(FileError::from)
             .map_err(TreeFileError::of(path))?;
@@ -295,6 +316,17 @@ impl Bake<'_> {
             (_, None) => "internal area",
         }
     }
+}
+
+/// The number of nodes from which a tree is written while its header is computed. A smaller file is
+/// on the disk at once.
+const WRITTEN_AHEAD: usize = 1 << 18;
+
+/// Waits for a thread, and continues its panic.
+fn joined<T>(thread: ScopedJoinHandle<T>) -> T {
+    thread
+        .join()
+        .unwrap_or_else(|panic| resume_unwind(panic))
 }
 
 /// The result of a search.

@@ -133,6 +133,12 @@ pub fn save_references(
     saved(tree, boxes, origin)
 }
 
+/// Returns the nodes and the object ids as bytes: the file from byte [`Header::BYTES`] on. They can be
+/// written while the header is being computed.
+pub fn body(tree: &Bvh) -> [Cow<'_, [u8]>; 2] {
+    [le_bytes(&tree.nodes), le_bytes(&tree.prim_ids)]
+}
+
 /// Returns the sections of the same file as [`save_references`], to be written one after the other:
 /// the header, the nodes, the object ids and the visits. On little-endian machines all but the header
 /// are the tree's memory, which a file of gigabytes does not need twice.
@@ -164,14 +170,14 @@ pub fn sections<'a>(
         has_visits: !visits.is_empty(),
     };
     let mut header = header.encode()?;
-    let body = [le_bytes(&tree.nodes), le_bytes(&tree.prim_ids), le_bytes(visits)];
+    let [nodes, prim_ids] = body(tree);
+    let visits = le_bytes(visits);
     let mut hasher = Hasher::new();
-    for section in &body {
+    for section in [&nodes, &prim_ids, &visits] {
         hasher.update(section);
     }
     hasher.update(&header[..Header::CHECKSUM.start]);
     header[Header::CHECKSUM].copy_from_slice(&hasher.finalize().to_le_bytes());
-    let [nodes, prim_ids, visits] = body;
     Ok([header.into(), nodes, prim_ids, visits])
 }
 

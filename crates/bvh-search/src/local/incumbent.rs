@@ -69,7 +69,7 @@ impl<'p> Incumbent<'p> {
     /// it.
     pub fn begin_unbounded(kept: Kept, problem: &Problem<'p>, run: &mut Run) -> Self {
         let Kept { tree, cost } = kept;
-        let area = area(problem, &tree, cost);
+        let area = area(problem, &tree, cost, run);
         run.record(cost, tree.nodes.len() as u64);
         Self { problem: *problem, area, tree, lower_bound: f64::NEG_INFINITY }
     }
@@ -110,7 +110,7 @@ impl<'p> Incumbent<'p> {
         let cost = self.problem.cost(&candidate);
         let improved = run.improve(cost);
         if improved {
-            self.area = area(&self.problem, &candidate, cost);
+            self.area = area(&self.problem, &candidate, cost, run);
             self.tree = candidate;
             // Only a new incumbent can meet the bound.
             self.stop_if_optimal(run);
@@ -142,7 +142,12 @@ impl<'p> Incumbent<'p> {
 }
 
 /// Returns the total that the working form of a tree of this cost calls the area.
-fn area(problem: &Problem, tree: &Bvh, cost: f64) -> f64 {
+fn area(problem: &Problem, tree: &Bvh, cost: f64, run: &Run) -> f64 {
+    // The measures of a large tree take a quarter of a second, and a cancelled search continues from no
+    // tree.
+    if problem.measure.is_some() && run.observer().cancelled() {
+        return f64::INFINITY;
+    }
     match *problem {
         Problem { splits: Some(_), measure, .. } => measure
             .map_or_else(|| cost::total_area(tree), |measure| cost::total_measure(tree, measure)),
