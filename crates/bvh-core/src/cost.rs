@@ -7,7 +7,9 @@
 
 use crate::{Aabb, Bvh, Node, NodeKind, PackedAabb};
 
-pub use crate::layout_cost::{CallBoth, LayoutCost, layout_area, layout_cost, layout_measure};
+pub use crate::layout_cost::{
+    CallBoth, LayoutCost, LayoutTree, layout_area, layout_cost, layout_measure, layout_row,
+};
 pub use crate::overlap::{EndPointOverlap, Overlap, end_point_overlap};
 
 /// The cost that a search minimises and that results report in the column `cost`.

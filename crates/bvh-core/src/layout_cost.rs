@@ -20,7 +20,7 @@
 use crate::collapse::binary;
 use crate::cost::Measure;
 use crate::wide::{BLOCK_COST, NODE_COST, TriangleBlock};
-use crate::{Bvh, Node, PackedAabb};
+use crate::{Bvh, PackedAabb};
 use alloc::vec::Vec;
 
 /// The costs of a subtree as parts of a wide layout, in the unit of its boxes' sizes.
@@ -139,69 +139,92 @@ pub fn layout_cost(tree: &Bvh, measure: Option<&dyn Measure>, both: CallBoth) ->
     if tree.nodes.is_empty() {
         return 0.0;
     }
-    let tree = binary(tree);
-    row(&tree, 0, LEVELS_AT_ONCE, measure, both).value()
+    layout_row(&Measured { tree: &binary(tree), measure }, 0, both).value()
 }
 
-/// The number of levels whose subtrees are passed to `both`: enough for many threads and for
-/// unequal subtrees.
-const LEVELS_AT_ONCE: u32 = 10;
+/// A tree with two children per inner node, whose nodes have sizes and are identified by index.
+pub trait LayoutTree: Sync {
+    /// Returns the size of a node's box.
+    fn size(&self, node: usize) -> f64;
+    /// Returns the two children of a node; the number of objects of a leaf as an error.
+    fn children(&self, node: usize) -> Result<[usize; 2], u32>;
+}
 
-/// Returns the row of a node in a binary tree; `levels` below it are computed at once.
-fn row(
-    tree: &Bvh,
-    index: usize,
-    levels: u32,
-    measure: Option<&dyn Measure>,
-    both: CallBoth,
-) -> LayoutCost {
-    let node = &tree.nodes[index];
-    let children = node.children();
-    if levels == 0 || children.is_empty() {
-        return row_alone(tree, index, measure);
+/// A binary tree with the half areas of its boxes or with another measure.
+struct Measured<'a> {
+    tree: &'a Bvh,
+    measure: Option<&'a dyn Measure>,
+}
+
+impl LayoutTree for Measured<'_> {
+    #[inline(always)]
+    fn size(&self, node: usize) -> f64 {
+        let aabb = &self.tree.nodes[node].aabb;
+        match self.measure {
+            Some(measure) => measure.of(&PackedAabb::from(aabb)),
+            None => aabb.half_area(),
+        }
+    }
+
+    #[inline(always)]
+    fn children(&self, node: usize) -> Result<[usize; 2], u32> {
+        let node = &self.tree.nodes[node];
+        if node.is_leaf() {
+            return Err(node.prims().len() as u32);
+        }
+        let first = node.children().start;
+        Ok([first, first + 1])
+    }
+}
+
+/// Returns the costs of a node as parts of a wide layout. Passes the two subtrees of nodes near it to
+/// `both`. O(nodes below it).
+pub fn layout_row(tree: &impl LayoutTree, node: usize, both: CallBoth) -> LayoutCost {
+    /// The number of levels whose subtrees are passed to `both`: enough for many threads and for
+    /// unequal subtrees.
+    const LEVELS_AT_ONCE: u32 = 10;
+    row(tree, node, LEVELS_AT_ONCE, both)
+}
+
+/// Returns the row of a node; the subtrees of so many `levels` from it are computed at once.
+fn row(tree: &impl LayoutTree, node: usize, levels: u32, both: CallBoth) -> LayoutCost {
+    let Ok([first, second]) = tree.children(node) else {
+        return row_alone(tree, node);
+    };
+    if levels == 0 {
+        return row_alone(tree, node);
     }
     let [mut left, mut right] = [LayoutCost::leaf(0.0, 0); 2];
-    both(&mut || left = row(tree, children.start, levels - 1, measure, both), &mut || {
-        right = row(tree, children.start + 1, levels - 1, measure, both)
+    both(&mut || left = row(tree, first, levels - 1, both), &mut || {
+        right = row(tree, second, levels - 1, both)
     });
-    LayoutCost::join(size(node, measure), &left, &right)
-}
-
-#[inline(always)]
-fn size(node: &Node, measure: Option<&dyn Measure>) -> f64 {
-    match measure {
-        Some(measure) => measure.of(&PackedAabb::from(&node.aabb)),
-        None => node.aabb.half_area(),
-    }
+    LayoutCost::join(tree.size(node), &left, &right)
 }
 
 #[cfg(feature = "std")]
 crate::with_vector_instructions! {
-    row_alone = row_alone_plain(tree: &Bvh, root: usize, measure: Option<&dyn Measure>) -> LayoutCost
+    row_alone = row_alone_plain<T: LayoutTree>(tree: &T, root: usize) -> LayoutCost
 }
 #[cfg(not(feature = "std"))]
 use row_alone_plain as row_alone;
 
-/// Returns the row of a node in a binary tree, computed by this thread.
+/// Returns the row of a node, computed by this thread.
 #[inline(always)]
-fn row_alone_plain(tree: &Bvh, root: usize, measure: Option<&dyn Measure>) -> LayoutCost {
+fn row_alone_plain<T: LayoutTree>(tree: &T, root: usize) -> LayoutCost {
     // Children before parents, so that the rows of a path suffice: a row for every node would take
     // twice the memory of the tree.
     let mut rows: Vec<LayoutCost> = Vec::new();
     let mut pending = alloc::vec![(root, false)];
-    while let Some((index, has_rows)) = pending.pop() {
-        let node = &tree.nodes[index];
-        let children = node.children();
-        if children.is_empty() {
-            rows.push(LayoutCost::leaf(size(node, measure), node.prims().len() as u32));
-        } else if has_rows {
-            let both = rows.len() - 2;
-            let joined = LayoutCost::join(size(node, measure), &rows[both], &rows[both + 1]);
-            rows.truncate(both);
-            rows.push(joined);
-        } else {
-            pending.push((index, true));
-            pending.extend(children.rev().map(|child| (child, false)));
+    while let Some((node, has_rows)) = pending.pop() {
+        match tree.children(node) {
+            Err(objects) => rows.push(LayoutCost::leaf(tree.size(node), objects)),
+            Ok(_) if has_rows => {
+                let both = rows.len() - 2;
+                let joined = LayoutCost::join(tree.size(node), &rows[both], &rows[both + 1]);
+                rows.truncate(both);
+                rows.push(joined);
+            }
+            Ok([first, second]) => pending.extend([(node, true), (second, false), (first, false)]),
         }
     }
     // Every node below the root has been joined.

@@ -1,7 +1,9 @@
 //! The best tree of a local search. The working form is converted only when it is better.
 
 use super::pass::TOLERANCE;
+use crate::annealing::layout::cost_by_threads;
 use crate::lower_bound;
+use crate::parallel;
 use crate::run::{Kept, Observer, Problem, Quota, Run, SearchError, Shortcut, Tally, watched};
 use crate::tree::{Metric, Working};
 use bvh_build::{Builder, Watch};
@@ -102,12 +104,30 @@ impl<'p> Incumbent<'p> {
             self.tree = Bvh::default();
             run.drop_aside(tree.area() * (1.0 + CERTAIN));
         }
-        may_be_better && self.offer_tree(tree.to_bvh(), run)
+        if !may_be_better {
+            return false;
+        }
+        let is_by_sizes = measure.is_some() && judge.is_none() && objective == Objective::Layout;
+        if !is_by_sizes {
+            return self.offer_tree(tree.to_bvh(), run);
+        }
+        // The nodes have their measures already. A cancelled search waits for both results.
+        let mut cost = 0.0;
+        let mut candidate = Bvh::default();
+        parallel::call_both(&mut || cost = cost_by_threads(tree), &mut || {
+            candidate = tree.to_bvh()
+        });
+        debug_assert_eq!(cost.to_bits(), self.problem.cost(&candidate).to_bits());
+        self.offer_kept(Kept { tree: candidate, cost }, run)
     }
 
     /// Like [`offer`](Self::offer), for a valid tree that needs no conversion.
     pub fn offer_tree(&mut self, candidate: Bvh, run: &mut Run) -> bool {
-        let cost = self.problem.cost(&candidate);
+        self.offer_kept(Kept::new(candidate, &self.problem), run)
+    }
+
+    fn offer_kept(&mut self, kept: Kept, run: &mut Run) -> bool {
+        let Kept { tree: candidate, cost } = kept;
         let improved = run.improve(cost);
         if improved {
             self.area = area(&self.problem, &candidate, cost, run);

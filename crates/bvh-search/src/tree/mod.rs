@@ -109,16 +109,17 @@ impl<M: Metric> Working<M> {
 
     /// Begins again with the nodes as they are. O(n).
     pub fn forget_changes(&mut self) {
-        let mut internal = Sum::default();
+        let leaf_cost = self.metric.leaf_cost();
+        let mut parts = Sum::default();
         // Once over the nodes of a large tree takes a tenth of a second.
         for node in &mut self.nodes {
             node.stamp = 0;
-            if let Some(part) = Self::part(node) {
-                internal.add(part);
+            if let Some(part) = part(node, leaf_cost) {
+                parts.add(part);
             }
         }
         let mut area = Sum::default();
-        area.add(internal.value());
+        area.add(parts.value());
         self.restart(area);
     }
 
@@ -139,6 +140,7 @@ impl<M: Metric> Working<M> {
     }
 
     /// [`area`](Self::area), recomputed. O(n).
+    #[cfg(test)]
     pub fn internal_area(&self) -> f64 {
         self.nodes
             .iter()
@@ -150,11 +152,7 @@ impl<M: Metric> Working<M> {
     /// Returns the node's part of the tree's area; `None` if its kind has none.
     #[inline(always)]
     fn part(&self, node: &Node) -> Option<f64> {
-        match node.is_leaf() {
-            false => Some(node.area),
-            true if self.metric.leaf_cost() > 0.0 => Some(self.metric.leaf_cost() * node.area),
-            true => None,
-        }
+        part(node, self.metric.leaf_cost())
     }
 
     /// Begins a change, which can be undone until the next change begins.
@@ -319,6 +317,16 @@ impl<M: Metric> Working<M> {
         (self.area, self.added, self.change) = (Sum::default(), 0.0, 0);
         self.area.add(area.value());
         self.journal.clear();
+    }
+}
+
+/// Returns the node's part of the area of a tree with this cost of leaves; `None` if its kind has none.
+#[inline(always)]
+fn part(node: &Node, leaf_cost: f64) -> Option<f64> {
+    match node.is_leaf() {
+        false => Some(node.area),
+        true if leaf_cost > 0.0 => Some(leaf_cost * node.area),
+        true => None,
     }
 }
 
