@@ -14,6 +14,15 @@ pub fn read(format: &str, bytes: &[u8]) -> Result<Vec<Segment>, String> {
         let count = numbers.len();
         return Err(format!("there are {count} numbers; accepted: six for each segment"));
     }
+    // The search would find these faults too, but only after the first tree of the scene.
+    if segments.is_empty() {
+        return Err("there are no segments; accepted: one or more".to_owned());
+    }
+    for (index, segment) in segments.iter().enumerate() {
+        if !segment.iter().all(|number| number.is_finite()) {
+            return Err(format!("segment {index} is {segment:?}; accepted: finite `f32`"));
+        }
+    }
     let segment = |&[a, b, c, d, e, f]: &[f32; 6]| Segment { from: [a, b, c], to: [d, e, f] };
     Ok(segments.iter().map(segment).collect())
 }
@@ -165,6 +174,17 @@ mod tests {
                 "csv",
                 b"1,2,3,4,5,6.5.0\n1,2,3,4,5,6".to_vec(),
                 "line 1 is \"1,2,3,4,5,6.5.0\"; accepted: six numbers",
+            ),
+            (
+                "csv",
+                b"x,y,z,to x,to y,to z\n".to_vec(),
+                "there are no segments; accepted: one or more",
+            ),
+            ("bin", vec![], "there are no segments; accepted: one or more"),
+            (
+                "csv",
+                b"1,2,3,4,5,6\n1,2,3,4,nan,1e40".to_vec(),
+                "segment 1 is [1.0, 2.0, 3.0, 4.0, NaN, inf]; accepted: finite `f32`",
             ),
             ("npy", b"PK".to_vec(), "the file is not an array of numpy"),
             (
