@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod arrays;
+mod locations;
 mod search;
 mod tracer;
 mod tree;
@@ -10,10 +11,7 @@ mod tree;
 #[pyo3::pymodule(name = "_bvh_search")]
 mod module {
     #[pymodule_export]
-    use crate::{
-        tracer::{Tracer, locations},
-        tree::Tree,
-    };
+    use crate::{locations::locations, tracer::Tracer, tree::Tree};
 
     #[pymodule_export]
     #[allow(non_upper_case_globals, reason = "Python's name")]

@@ -37,14 +37,16 @@
 //! every box with every ray.
 
 mod crossings;
+mod segment;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod x86;
 
 use crate::cost::Measure;
-use crate::{Aabb, Bvh, Node, PackedAabb, Ray};
+use crate::{Aabb, Bvh, Node, PackedAabb};
 use alloc::vec::Vec;
 use crossings::{CELLS, Crossings, index};
 use glam::{DVec3, Vec3};
+pub use segment::{DensityError, Segment};
 
 /// The binary logarithm of [`FRACTIONS`].
 const FRACTION_BITS: u32 = 9;
@@ -59,50 +61,6 @@ const FRACTIONS_OF_ENTRY: f64 = (1u64 << (3 * FRACTION_BITS)) as f64;
 /// that rays enter is underestimated by up to a sixth, and trees for rays from a camera in the
 /// kitchen save half as many tests. Twice the length overestimates the number.
 const LENGTHENED: f64 = 0.25;
-
-/// The part of a ray between its start and its end, in world units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Segment {
-    /// The start of the ray.
-    pub from: [f32; 3],
-    /// The end of the ray: its hit, or the point where it leaves the scene.
-    pub to: [f32; 3],
-}
-
-impl Segment {
-    /// Returns the part of a ray up to the distance `end`, in multiples of the direction's length. A hit
-    /// beyond the range of f32 gives a segment that is not finite, which a density rejects.
-    pub fn of_ray(ray: &Ray, end: f32) -> Self {
-        Self { from: ray.origin().to_array(), to: ray.at(end).to_array() }
-    }
-}
-
-/// The reason why a density cannot be made.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum DensityError {
-    /// A segment has a coordinate that is NaN or infinite.
-    #[error("segment {index} has a coordinate that is not finite")]
-    NotFinite {
-        /// Index of the segment.
-        index: usize,
-    },
-    /// There are no segments, or too many to count them exactly.
-    #[error("{segments} segments; accepted: 1 to {most}", most = RayDensity::MOST_SEGMENTS)]
-    Count {
-        /// The number of segments.
-        segments: usize,
-    },
-    /// No segment meets the scene.
-    #[error("none of the segments meets the bounds of the scene")]
-    NoneMeets,
-    /// The weight of area is out of range.
-    #[error("the weight of area is {0}; accepted: 0 to 1")]
-    AreaWeight(f64),
-    /// The bounds are empty or not finite.
-    #[error("the bounds of the scene are empty or not finite")]
-    Bounds,
-}
 
 /// The expected number of segments that enter a box, mixed with the box's area; see the
 /// [module](self).
