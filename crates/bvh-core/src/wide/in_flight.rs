@@ -14,16 +14,15 @@
 //! No branch depends on one ray: its next step decides the list that it is appended to, and the order
 //! of hits and the children behind them are found without branches, too.
 
+mod crossing;
+
 use super::answer::Answers;
 use super::instructions::Instructions;
 use super::lanes::Lanes;
 use super::layout::WideBvh;
-use super::node::Child;
 use super::prepared::{Prepared, Ready};
 use super::source::Source;
 use super::traversal::{self, Traversal};
-use crate::Ray;
-use crate::instances::Placed;
 use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 use core::ops::Range;
@@ -314,138 +313,5 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
                 self.start(first, traversal);
             }
         }
-    }
-
-    /// Has every ray at the end of an instance leave it, and every ray at an instance enter it; writes the
-    /// answers of rays at their end, and starts others in their place.
-    #[inline(always)]
-    unsafe fn cross(&mut self, first: usize) {
-        let count = self.at_end.count;
-        self.at_end.count = 0;
-        let mut entering = Entering::none();
-        // SAFETY: the caller's promises; every ray is started.
-        unsafe {
-            for i in 0..count {
-                let traversal = &mut *self.at_end.get(i);
-                if traversal.child == Child::LEAVE && !traversal.leave_instance(self.wide) {
-                    self.finish_alone(first, traversal);
-                    continue;
-                }
-                if traversal.child == Child::END {
-                    let (t, instance, object) = traversal.nearest_of_all::<A>();
-                    let number = first + traversal.ray.number as usize;
-                    self.answers
-                        .write_instance(number, t, instance, object);
-                    self.start(first, traversal);
-                    continue;
-                }
-                if traversal.child.is_instance_or_mark() {
-                    let ray = self
-                        .rays
-                        .ray(first + traversal.ray.number as usize);
-                    let instance = traversal.child.instance_index();
-                    if let Some(scene) = self.answers.scene()
-                        && let Some((local_ray, entry)) = scene.enter(instance, &ray, traversal.t)
-                    {
-                        entering.add(traversal, local_ray, entry);
-                        if entering.count == K::Rays::N {
-                            self.enter(first, &mut entering);
-                        }
-                        continue;
-                    }
-                    traversal.pop();
-                }
-                traversal.fetch::<K>(self.placed());
-                self.enlist(traversal);
-            }
-            if entering.count > 0 {
-                self.enter(first, &mut entering);
-            }
-        }
-    }
-
-    /// Has rays enter the instances at which they are.
-    #[inline(always)]
-    unsafe fn enter(&mut self, first: usize, entering: &mut Entering) {
-        let count = core::mem::replace(&mut entering.count, 0);
-        let Some(scene) = self.answers.scene() else { return };
-        let mut prepared = [const { MaybeUninit::<Prepared>::uninit() }; RAYS];
-        // SAFETY: so many rays have been added; there is room for as many as there are lanes.
-        unsafe {
-            // The last ray fills the lanes that have none.
-            for lane in count..K::Rays::N {
-                entering.rays[lane] = entering.rays[count - 1];
-            }
-            let rays = entering.rays.as_ptr().cast::<Ray>();
-            let rays = core::slice::from_raw_parts(rays, K::Rays::N);
-            let ready = Ready::new(rays.lanes::<K::Rays>(0), scene.largest_of_parts());
-            ready.write(0, prepared.as_mut_ptr().cast());
-            for (i, prepared) in prepared.iter().enumerate().take(count) {
-                let traversal = &mut *entering.traversals[i].assume_init();
-                if ready.in_range >> i & 1 == 0 {
-                    self.finish_alone(first, traversal);
-                    continue;
-                }
-                let entry = entering.entries[i].assume_init();
-                if let Some(scene) = self.answers.scene() {
-                    let part = scene.part_of(traversal.child.instance_index());
-                    traversal.enter_instance(prepared.assume_init(), entry, part);
-                }
-                traversal.fetch::<K>(self.placed());
-                self.enlist(traversal);
-            }
-        }
-    }
-
-    /// Answers a ray by itself, and starts another in its place.
-    #[cold]
-    #[inline(never)]
-    unsafe fn finish_alone(&mut self, first: usize, traversal: &mut Traversal) {
-        let number = first + traversal.ray.number as usize;
-        self.answers
-            .alone(number, self.wide, &self.rays.ray(number));
-        // SAFETY: the caller's promises.
-        unsafe { self.start(first, traversal) };
-    }
-
-    /// Returns the instances that leaves of the layout name, or none.
-    #[inline(always)]
-    fn placed(&self) -> &[Placed] {
-        match self.answers.scene() {
-            Some(scene) => scene.placed(),
-            None => &[],
-        }
-    }
-}
-
-/// Rays that are about to enter instances.
-struct Entering {
-    traversals: [MaybeUninit<*mut Traversal>; RAYS],
-    /// The rays in the coordinates of the instances' parts.
-    rays: [MaybeUninit<Ray>; RAYS],
-    /// The distances at which the rays enter the instances' boxes.
-    entries: [MaybeUninit<f32>; RAYS],
-    count: usize,
-}
-
-impl Entering {
-    /// Returns no rays.
-    #[inline(always)]
-    fn none() -> Self {
-        Self {
-            traversals: [MaybeUninit::uninit(); RAYS],
-            rays: [MaybeUninit::uninit(); RAYS],
-            entries: [MaybeUninit::uninit(); RAYS],
-            count: 0,
-        }
-    }
-
-    /// Adds a ray.
-    #[inline(always)]
-    fn add(&mut self, traversal: *mut Traversal, local_ray: Ray, entry: f32) {
-        self.traversals[self.count].write(traversal);
-        self.rays[self.count].write(local_ray);
-        self.entries[self.count].write(entry);
-        self.count += 1;
     }
 }
