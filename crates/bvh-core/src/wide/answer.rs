@@ -1,9 +1,7 @@
 //! The two questions about a ray: its nearest hit, or whether it has any hit.
 
-use super::instructions::Instructions;
 use super::lanes::Lanes;
 use super::layout::WideBvh;
-use super::packet::Packet;
 use crate::{Hit, InstanceHit, Instances, Ray};
 
 /// Answers to the rays of a batch, by the number of the ray.
@@ -54,23 +52,6 @@ pub(crate) trait Answers {
             let [t, instance, object] = numbers.map(|lanes| lanes[lane]);
             self.write_instance(first + lane, t, instance.to_bits(), object.to_bits());
         }
-    }
-
-    /// Traces the rays of a packet that enter an instance, as
-    /// [`Packet::visit_instance`] does.
-    ///
-    /// # Safety
-    /// As for [`batch::trace`](super::batch::trace).
-    #[inline(always)]
-    unsafe fn visit_instance<K: Instructions>(
-        &self,
-        _packet: &mut Packet<K>,
-        _instance: u32,
-        _first: usize,
-        _entered: u32,
-        _planes: &[[f32; 2]; 3],
-    ) -> bool {
-        false
     }
 
     /// Writes the answers for rays side by side, likewise.
@@ -239,19 +220,6 @@ impl<A: InstanceAnswers> Answers for OfInstances<'_, A> {
     #[inline(always)]
     fn scene(&self) -> Option<&Instances> {
         Some(self.scene)
-    }
-
-    #[inline(always)]
-    unsafe fn visit_instance<K: Instructions>(
-        &self,
-        packet: &mut Packet<K>,
-        instance: u32,
-        first: usize,
-        entered: u32,
-        planes: &[[f32; 2]; 3],
-    ) -> bool {
-        // SAFETY: the caller's promises.
-        unsafe { packet.visit_instance::<Self>(self.scene, instance, first, entered, planes) }
     }
 
     /// Writes a miss: hits have instances.

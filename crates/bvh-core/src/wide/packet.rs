@@ -205,20 +205,27 @@ impl<K: Instructions> Packet<K> {
                     if child.is_node() {
                         break Parent { node: child.index() as u32, vector: i as u32 };
                     }
-                    let is_hit = if A::IN_INSTANCES {
-                        let instance = child.instance_index();
-                        answers.visit_instance(self, instance, i, entered, &planes)
-                    } else {
-                        let block = blocks.add(child.index());
-                        let mut is_hit = self.visit_leaf(i, entered, block, answers);
-                        for i in i + 1..self.count {
-                            let entered = self.enter(i, &planes);
-                            if entered != 0 {
-                                is_hit |= self.visit_leaf(i, entered, block, answers);
+                    let is_hit =
+                        if A::IN_INSTANCES {
+                            let instance = child.instance_index();
+                            match answers.scene() {
+                                Some(scene) if A::ANY => self
+                                    .visit_instance::<true>(scene, instance, i, entered, &planes),
+                                Some(scene) => self
+                                    .visit_instance::<false>(scene, instance, i, entered, &planes),
+                                None => false,
                             }
-                        }
-                        is_hit
-                    };
+                        } else {
+                            let block = blocks.add(child.index());
+                            let mut is_hit = self.visit_leaf(i, entered, block, answers);
+                            for i in i + 1..self.count {
+                                let entered = self.enter(i, &planes);
+                                if entered != 0 {
+                                    is_hit |= self.visit_leaf(i, entered, block, answers);
+                                }
+                            }
+                            is_hit
+                        };
                     if is_hit {
                         farthest = self.farthest();
                         end = key_of(farthest);

@@ -6,7 +6,6 @@ use super::instructions::Instructions;
 use super::lanes::{Lanes, Mask};
 use super::packet::{Packet, VECTORS};
 use crate::Instances;
-use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 
 /// The maximum number of rays in a packet.
@@ -20,7 +19,7 @@ impl<K: Instructions> Packet<K> {
     /// # Safety
     /// As for [`trace`](super::batch::trace).
     #[inline(always)]
-    pub(super) unsafe fn visit_instance<A: Answers>(
+    pub(super) unsafe fn visit_instance<const ANY: bool>(
         &mut self,
         scene: &Instances,
         instance: u32,
@@ -30,7 +29,7 @@ impl<K: Instructions> Packet<K> {
     ) -> bool {
         let placed = &scene.placed()[instance as usize];
         let part = scene.part_of(instance);
-        let mut found = InPart::<A>::NONE;
+        let mut found = InPart::<ANY>::NONE;
         let mut entries = [const { MaybeUninit::<K::Rays>::uninit() }; VECTORS];
         let mut visited = 0u32;
         // SAFETY: the caller's promises; vectors below the count are written.
@@ -92,11 +91,11 @@ impl<K: Instructions> Packet<K> {
                 let own = K::Rays::splat_bits(instance);
                 let precedes = t.lt(vector.t) | t.eq(vector.t) & own.below(vector.instance);
                 let hits = object.below(K::Rays::splat_bits(u32::MAX));
-                let hits = if A::ANY { hits } else { hits & precedes };
+                let hits = if ANY { hits } else { hits & precedes };
                 if hits.bits() != 0 {
                     is_hit = true;
                     // A ray that has its answer ends before it begins.
-                    let t = if A::ANY { K::Rays::splat(-1.0) } else { t };
+                    let t = if ANY { K::Rays::splat(-1.0) } else { t };
                     vector.t = Lanes::select(hits, t, vector.t);
                     vector.object = Lanes::select(hits, object, vector.object);
                     vector.instance = Lanes::select(hits, own, vector.instance);
@@ -108,23 +107,18 @@ impl<K: Instructions> Packet<K> {
 }
 
 /// The answers of the rays of a packet in one instance, by their places in the packet.
-struct InPart<A> {
+struct InPart<const ANY: bool> {
     distances: [f32; RAYS],
     /// Bits of ids, `u32::MAX` for none.
     objects: [f32; RAYS],
-    answers: PhantomData<A>,
 }
 
-impl<A> InPart<A> {
-    const NONE: Self = Self {
-        distances: [0.0; RAYS],
-        objects: [f32::from_bits(u32::MAX); RAYS],
-        answers: PhantomData,
-    };
+impl<const ANY: bool> InPart<ANY> {
+    const NONE: Self = Self { distances: [0.0; RAYS], objects: [f32::from_bits(u32::MAX); RAYS] };
 }
 
-impl<A: Answers> Answers for InPart<A> {
-    const ANY: bool = A::ANY;
+impl<const ANY: bool> Answers for InPart<ANY> {
+    const ANY: bool = ANY;
 
     #[inline(always)]
     fn write(&mut self, number: usize, t: f32, object: u32) {

@@ -5,9 +5,8 @@
 //! rows of costs of the nodes that it has written and of their ancestors, from the lowest up: about
 //! a hundred per move.
 
-use crate::parallel;
 use crate::tree::{ANCHOR, Metric, NONE, Working};
-use bvh_core::cost::{LayoutCost, LayoutTree, layout_row};
+use bvh_core::cost::LayoutCost;
 use bvh_core::with_vector_instructions;
 
 /// A row of costs for every node of a tree, and the rows that undo a change.
@@ -132,28 +131,6 @@ impl Layout {
         }
         false
     }
-}
-
-impl<M: Metric> LayoutTree for Working<M> {
-    #[inline(always)]
-    fn size(&self, node: usize) -> f64 {
-        self.nodes[node].area
-    }
-
-    #[inline(always)]
-    fn children(&self, node: usize) -> Result<[usize; 2], u32> {
-        let node = &self.nodes[node];
-        if node.is_leaf() {
-            return Err(1);
-        }
-        Ok(node.children.map(|child| child as usize))
-    }
-}
-
-/// Returns the cost of the layout of a tree by the sizes that its nodes have, on all threads. O(nodes).
-pub(crate) fn cost_by_threads(tree: &Working<impl Metric>) -> f64 {
-    tree.root()
-        .map_or(0.0, |root| layout_row(tree, root as usize, &parallel::call_both).value())
 }
 
 with_vector_instructions! {

@@ -1,7 +1,6 @@
 //! The best tree of a local search. The working form is converted only when it is better.
 
 use super::pass::TOLERANCE;
-use crate::annealing::layout::cost_by_threads;
 use crate::lower_bound;
 use crate::parallel;
 use crate::run::{Kept, Observer, Problem, Quota, Run, SearchError, Shortcut, Tally, watched};
@@ -114,9 +113,7 @@ impl<'p> Incumbent<'p> {
         // The nodes have their measures already. A cancelled search waits for both results.
         let mut cost = 0.0;
         let mut candidate = Bvh::default();
-        parallel::call_both(&mut || cost = cost_by_threads(tree), &mut || {
-            candidate = tree.to_bvh()
-        });
+        parallel::call_both(&mut || cost = tree.layout_cost(), &mut || candidate = tree.to_bvh());
         debug_assert_eq!(cost.to_bits(), self.problem.cost(&candidate).to_bits());
         self.offer_kept(Kept { tree: candidate, cost }, run)
     }

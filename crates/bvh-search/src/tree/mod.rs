@@ -10,6 +10,7 @@
 //! move allocates memory.
 
 mod convert;
+mod layout_cost;
 mod linked;
 mod metric;
 mod order;
