@@ -15,7 +15,6 @@ mod exact;
 mod expansion;
 pub mod export;
 pub mod file;
-mod instances;
 mod layout_cost;
 mod leave;
 mod mesh;
@@ -40,7 +39,6 @@ pub use clip::Clip;
 pub use collapse::collapse_leaves;
 pub use components::{Distances, InvalidRays, RayComponents};
 pub use export::FirstCountNode;
-pub use instances::{Instance, InstanceHit, Instances, InvalidInstances};
 pub use mesh::MeshError;
 pub use packed::PackedAabb;
 pub use primitives::{Primitive, Primitives, boxes};
@@ -54,6 +52,9 @@ pub use traverse::{
 };
 pub use triangle::{Shear, Triangle};
 pub use validate::{InvalidBvh, validate, validate_references};
-pub use wide::{Closest, Coherence, Kernel, RefitError, WideBvh};
+pub use wide::{
+    Closest, Coherence, Instance, InstanceHit, Instances, InvalidInstances, Kernel, RefitError,
+    WideBvh,
+};
 
 pub use glam;

@@ -10,12 +10,12 @@
 #[cfg(feature = "rayon")]
 use super::presort::PARALLEL_OBJECTS;
 use super::presort::{Presorted, note_same_orders};
-use super::rule::SplitRule;
 #[cfg(feature = "rayon")]
 use super::rule::TakeBest;
+use super::rule::{Split, SplitRule};
 use super::split_cost::SplitCost;
 use super::stall::{LEAST_STALLED, is_stall};
-use super::sweep::{Block, Split, Sweep, union_of};
+use super::sweep::{Block, Sweep, union_of};
 use crate::watch::Pace;
 use crate::{BuildError, Watch};
 use bvh_core::{Aabb, Bvh, Node, PackedAabb, with_vector_instructions};

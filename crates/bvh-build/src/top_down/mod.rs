@@ -13,6 +13,5 @@ mod sweep;
 
 pub use divide::{Division, Workspace};
 pub use presort::{PARALLEL_OBJECTS, Presorted};
-pub use rule::{Shortlist, SplitRule, TakeBest};
+pub use rule::{Shortlist, Split, SplitRule, TakeBest};
 pub use split_cost::{AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, SplitCost};
-pub use sweep::Split;

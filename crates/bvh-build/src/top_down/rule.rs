@@ -1,6 +1,34 @@
 //! The rule that picks one of the candidate splits of a node.
 
-use super::sweep::Split;
+use std::cmp::Ordering;
+
+/// A candidate: the first `left` objects in the order of `axis` against the rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Split {
+    /// The cost by the build's [`SplitCost`](super::SplitCost); lower is better.
+    pub cost: f64,
+    /// 0, 1 or 2.
+    pub axis: u8,
+    /// Number of objects on the left side, at least 1.
+    pub left: u32,
+    /// |objects left − objects right|.
+    pub(super) imbalance: u32,
+}
+
+impl Split {
+    pub(super) const NONE: Self =
+        Self { cost: f64::INFINITY, axis: u8::MAX, left: 0, imbalance: u32::MAX };
+
+    /// Orders candidates by cost, then by balance, then by axis, then by position. The order is
+    /// total, so the result does not depend on the order of the scan, and input without area is
+    /// halved.
+    #[inline]
+    pub(super) fn rank(&self, other: &Self) -> Ordering {
+        self.cost.total_cmp(&other.cost).then_with(|| {
+            (self.imbalance, self.axis, self.left).cmp(&(other.imbalance, other.axis, other.left))
+        })
+    }
+}
 
 /// The candidates of a node among which a rule chooses.
 #[derive(Clone, Copy, Debug, PartialEq)]

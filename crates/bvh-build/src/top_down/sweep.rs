@@ -1,37 +1,9 @@
 //! The candidate splits of one node: every position along every axis, evaluated by two scans per
 //! axis.
 
-use super::rule::{Shortlist, SplitRule};
+use super::rule::{Shortlist, Split, SplitRule};
 use super::split_cost::{Linear, SplitCost};
 use bvh_core::PackedAabb;
-use std::cmp::Ordering;
-
-/// A candidate: the first `left` objects in the order of `axis` against the rest.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Split {
-    /// The cost by the build's [`SplitCost`]; lower is better.
-    pub cost: f64,
-    /// 0, 1 or 2.
-    pub axis: u8,
-    /// Number of objects on the left side, at least 1.
-    pub left: u32,
-    /// |objects left − objects right|.
-    imbalance: u32,
-}
-
-impl Split {
-    const NONE: Self = Self { cost: f64::INFINITY, axis: u8::MAX, left: 0, imbalance: u32::MAX };
-
-    /// Orders candidates by cost, then by balance, then by axis, then by position. The order is
-    /// total, so the result does not depend on the order of the scan, and input without area is
-    /// halved.
-    #[inline]
-    fn rank(&self, other: &Self) -> Ordering {
-        self.cost.total_cmp(&other.cost).then_with(|| {
-            (self.imbalance, self.axis, self.left).cmp(&(other.imbalance, other.axis, other.left))
-        })
-    }
-}
 
 /// Objects per block of a scan; nodes with up to twice this number form one block. Blocks of 8 and
 /// of 32 were slower.

@@ -1,8 +1,9 @@
 //! The two questions about a ray: its nearest hit, or whether it has any hit.
 
+use super::instances::{InstanceHit, Instances};
 use super::lanes::Lanes;
 use super::layout::WideBvh;
-use crate::{Hit, InstanceHit, Instances, Ray};
+use crate::{Hit, Ray};
 
 /// Answers to the rays of a batch, by the number of the ray.
 pub(crate) trait Answers {

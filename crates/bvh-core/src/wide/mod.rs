@@ -18,6 +18,7 @@ mod crossed_leaves;
 mod culling;
 mod decide;
 mod in_flight;
+mod instances;
 mod instructions;
 mod kernel;
 mod lanes;
@@ -46,18 +47,17 @@ mod triangles;
     ),
     path = "simd128/mod.rs"
 )]
-pub(crate) mod vector;
+mod vector;
 
-pub(crate) use answer::{Answers, OfInstances};
 pub use coherence::Coherence;
 pub(crate) use decide::{BLOCK_COST, NODE_COST, areas, children, decide};
+pub use instances::{Instance, InstanceHit, Instances, InvalidInstances};
 pub use kernel::Kernel;
 pub use layout::WideBvh;
 use layout::largest;
 pub use nearest::Closest;
 pub(crate) use node::{Child, WideNode};
 pub use refit::RefitError;
-pub(crate) use top::lay_out_instances;
 pub(crate) use triangles::TriangleBlock;
 
 use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate_references};

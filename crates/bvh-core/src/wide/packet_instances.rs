@@ -2,10 +2,10 @@
 //! together, and are a packet there.
 
 use super::answer::Answers;
+use super::instances::Instances;
 use super::instructions::Instructions;
 use super::lanes::{Lanes, Mask};
 use super::packet::{Packet, VECTORS};
-use crate::Instances;
 use core::mem::MaybeUninit;
 
 /// The maximum number of rays in a packet.

@@ -1,6 +1,7 @@
 //! The state of one ray in flight, and its steps: into a node, onto the stack, through triangles.
 
 use super::answer::Answers;
+use super::instances::Placed;
 use super::instructions::{Instructions, Pending};
 use super::kernel::STACK;
 use super::lanes::{Lanes, Mask};
@@ -10,7 +11,6 @@ use super::pairs::Pairs;
 use super::prepared::Prepared;
 use super::triangles::TriangleBlock;
 use crate::Hit;
-use crate::instances::Placed;
 use crate::triangle::AXES;
 use core::mem::MaybeUninit;
 

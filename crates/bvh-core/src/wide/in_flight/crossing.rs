@@ -2,6 +2,7 @@
 //! at a time, and goes on there. A mark on its stack brings it back.
 
 use super::super::answer::Answers;
+use super::super::instances::Placed;
 use super::super::instructions::Instructions;
 use super::super::lanes::Lanes;
 use super::super::node::Child;
@@ -10,7 +11,6 @@ use super::super::source::Source;
 use super::super::traversal::Traversal;
 use super::{Flight, RAYS};
 use crate::Ray;
-use crate::instances::Placed;
 use core::mem::MaybeUninit;
 
 impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {

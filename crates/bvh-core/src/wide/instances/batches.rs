@@ -1,7 +1,8 @@
 //! Batches of rays through instances.
 
+use super::super::answer::{Answers, OfInstances};
+use super::super::vector;
 use super::Placed;
-use crate::wide::{Answers, OfInstances, vector};
 use crate::{Aabb, Coherence, InstanceHit, Instances, Kernel, Ray, Slabs, WideBvh};
 
 impl Instances {

@@ -30,10 +30,9 @@
 
 mod batches;
 
-use crate::wide::lay_out_instances;
-use crate::{
-    Aabb, Bvh, Hit, InvalidBvh, Ray, Slabs, WideBvh, any_hit_by, nearest_hit_by, validate,
-};
+use super::layout::WideBvh;
+use super::top::lay_out_instances;
+use crate::{Aabb, Bvh, Hit, InvalidBvh, Ray, Slabs, any_hit_by, nearest_hit_by, validate};
 use alloc::vec::Vec;
 use glam::{Affine3A, DAffine3};
 
