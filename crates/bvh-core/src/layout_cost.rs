@@ -113,18 +113,18 @@ fn leaf_cost(size: f64, objects: u32) -> f64 {
 /// root's half area: nodes and blocks of triangles, each weighted by the half area of its box, in
 /// world units squared. Nodes with more than two children are halved first. O(nodes).
 pub fn layout_area(tree: &Bvh) -> f64 {
-    layout_cost(tree, None, &|first, second| {
-        first();
-        second();
-    })
+    layout_cost(tree, None, &call_in_turn)
 }
 
 /// Returns the same as [`layout_area`], with the measure instead of the half area. O(nodes).
 pub fn layout_measure(tree: &Bvh, measure: &dyn Measure) -> f64 {
-    layout_cost(tree, Some(measure), &|first, second| {
-        first();
-        second();
-    })
+    layout_cost(tree, Some(measure), &call_in_turn)
+}
+
+/// Calls two functions one after the other.
+fn call_in_turn(first: &mut (dyn FnMut() + Send), second: &mut (dyn FnMut() + Send)) {
+    first();
+    second();
 }
 
 /// A function that calls two functions, one after the other or at once, and returns when both have

@@ -74,21 +74,19 @@ impl Instance {
     /// Returns the boxes of all instances in the scene's coordinates, in the same order, for any
     /// builder.
     pub fn boxes(instances: &[Self], parts: &[WideBvh]) -> Result<Vec<Aabb>, InvalidInstances> {
-        let placed = place_all(instances, parts)?;
-        Ok(placed
-            .iter()
-            .map(|placed| placed.bounds)
-            .collect())
+        let numbered = instances.iter().enumerate();
+        numbered
+            .map(|(index, instance)| Ok(instance.check(index, parts)?.1))
+            .collect()
     }
 
-    /// Checks the instance and prepares it for rays. `instance` is its index, for errors, and `outlines`
-    /// are the outlines of the parts.
-    fn place(
+    /// Checks the instance, and returns its inverse transform and its box. `instance` is its index, for
+    /// errors.
+    fn check(
         &self,
         instance: usize,
         parts: &[WideBvh],
-        outlines: &[Vec<Aabb>],
-    ) -> Result<Placed, InvalidInstances> {
+    ) -> Result<(DAffine3, Aabb), InvalidInstances> {
         let Some(part) = parts.get(self.part as usize) else {
             return Err(InvalidInstances::Part { instance, part: self.part, parts: parts.len() });
         };
@@ -102,13 +100,25 @@ impl Instance {
         {
             return Err(InvalidInstances::Transform(instance));
         }
+        Ok((inverse, bounds))
+    }
+
+    /// Checks the instance and prepares it for rays. `outlines` are the outlines of the parts.
+    fn place(
+        &self,
+        instance: usize,
+        parts: &[WideBvh],
+        outlines: &[Vec<Aabb>],
+    ) -> Result<Placed, InvalidInstances> {
+        let (to_local, bounds) = self.check(instance, parts)?;
+        let transform = self.transform.as_daffine3();
         // A turned box has a box of up to five times its volume; the boxes of many small ones fit better.
         let mut outline = Aabb::EMPTY;
         for aabb in &outlines[self.part as usize] {
             outline = outline.union(&transformed(&transform, aabb));
         }
         let aabb = Aabb { min: outline.min.max(bounds.min), max: outline.max.min(bounds.max) };
-        Ok(Placed { part: self.part, to_local: inverse, aabb, bounds })
+        Ok(Placed { part: self.part, to_local, aabb, bounds })
     }
 }
 
@@ -277,7 +287,7 @@ impl Instances {
         let test = |instance: u32, t_max: f32| {
             let placed = &self.placed[instance as usize];
             let local_ray = placed.local(ray, t_max)?;
-            let found = find(&self.parts[placed.part as usize], instance, &local_ray)?;
+            let found = find(self.part_of(instance), instance, &local_ray)?;
             // A hit in front of the instance's box would depend on the tree: a tree that visits the box
             // later would skip it.
             let t = found.t.max(slabs.entry(&placed.aabb));
@@ -317,9 +327,7 @@ impl Instances {
             }
             placed
                 .local(ray, ray.t_max())
-                .is_some_and(|local_ray| {
-                    hits(&self.parts[placed.part as usize], instance, &local_ray)
-                })
+                .is_some_and(|local_ray| hits(self.part_of(instance), instance, &local_ray))
         };
         any_hit_by(&self.top, ray, test, &mut ())
     }

@@ -9,8 +9,7 @@ use crate::collapse::binary;
 use crate::{Aabb, Bvh, Node};
 
 /// Lays out a valid tree over the boxes of instances, or over boxes around them, with a leaf for each
-/// instance for rays that go
-/// on in `parts`: the parts of the instances. The layout has the kernel of the parts if all have the
+/// instance. Rays go on in `parts`: the parts of the instances. The layout has the kernel of the parts if all have the
 /// same and its stack suffices, otherwise the portable one. O(instances + parts).
 pub(crate) fn lay_out_instances<'p>(
     tree: &Bvh,
