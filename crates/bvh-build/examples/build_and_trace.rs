@@ -4,7 +4,8 @@
 
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{
-    Ray, Shear, TestCounts, Triangle, WideBvh, any_hit, boxes, cost, nearest_hit, nearest_hit_by,
+    PreparedRay, Ray, TestCounts, Triangle, WideBvh, any_hit, boxes, cost, nearest_hit,
+    nearest_hit_by,
 };
 use std::error::Error;
 
@@ -39,8 +40,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Find the triangle below a point, and count the tests.
     let down = Ray::half_line([20.3, 10.0, 41.8], [0.0, -1.0, 0.0])?;
     let hit = nearest_hit(&tree, &triangles, &down).ok_or("nothing below")?;
-    let shear = Shear::new(&down);
-    let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
+    let prepared = PreparedRay::new(&down);
+    let test = |id: u32, t_max| triangles[id as usize].intersect(&prepared, t_max);
     let mut counts = TestCounts::default();
     nearest_hit_by(&tree, &down, test, &mut counts);
     println!(

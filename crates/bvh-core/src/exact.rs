@@ -56,17 +56,13 @@
 //! above E the line misses. With all three above E, or below −E, it crosses, and the determinant is
 //! not zero.
 //!
-//! The distance is computed from depths relative to the first corner, where errors of `u`, `v`, `w`
-//! count little:
-//!
-//! ```text
-//!   t d_z = A_z + (v (B_z − A_z) + w (C_z − A_z)) / D,      D = u + v + w
-//! ```
-//!
-//! The weights `v / D` and `w / D` are off by 4E / D each. With Z the larger |B_z − A_z|, |C_z −
-//! A_z| this moves `t d_z` by 8 EZ / D; all roundings together are below 40 εR. The bound `(16 EZ /
-//! |D| + 2⁻⁴⁷R) / |d_z|` covers both. If both ends of this interval round to one f32, that f32 is
-//! the rounded distance, because rounding is monotone.
+//! The distance is the quotient of the formula above, with the edges `b − a` and `c − a` as they are, not relative to the
+//! origin: near the origin this has far smaller errors than interpolation between depths. `A · n` is a sum of six products of
+//! three differences. Each difference is off by ε of itself, and its way through two products and three sums adds 5ε: with N the
+//! sum of the absolute products, `A · n` is off by less than 8.1 εN, and in the same way `d · n` by less than 8.1 εM. With
+//! `64 εM ≤ |d · n|` the computed quotient t is off by less than (8.1 ε (N + |t| M) / |d · n|) · 8/7 + ε|t|, which is less than the
+//! bound `16 ε (N + |t| M) / |d · n|`. If both ends of this interval round to one f32, that f32 is the rounded distance, because
+//! rounding is monotone.
 //!
 //! Nothing overflows or underflows: coordinates are multiples of 2⁻¹⁴⁹ below 2¹²⁹, all values above
 //! are between 2⁻⁷⁵⁰ and 2⁷⁵⁰ or zero.
@@ -82,6 +78,7 @@
 
 use crate::Ray;
 use crate::expansion::Expansion;
+use crate::triangle::{AXES, largest_axis};
 use glam::Vec3;
 
 /// The answer of a layer with rounding errors about a line and a triangle.
@@ -112,9 +109,7 @@ impl Line {
     pub(crate) fn new(ray: &Ray) -> Self {
         let origin = ray.origin();
         let direction = ray.direction();
-        let size = direction.abs();
-        let largest = if size.z > size.x.max(size.y) { 2 } else { usize::from(size.y > size.x) };
-        let axes = [(largest + 1) % 3, (largest + 2) % 3, largest];
+        let axes = AXES[largest_axis(ray)];
         Self {
             origin: axes.map(|axis| f64::from(origin[axis])),
             direction: axes.map(|axis| f64::from(direction[axis])),
@@ -135,6 +130,15 @@ impl Line {
         [relative(a), relative(b), relative(c)]
     }
 
+    /// Returns the difference of two corners, in the order of `axes`.
+    #[inline(always)]
+    fn edge(&self, from: Vec3, to: Vec3) -> [f64; 3] {
+        let from: &[f32; 3] = from.as_ref();
+        let to: &[f32; 3] = to.as_ref();
+        self.axes
+            .map(|axis| f64::from(to[axis]) - f64::from(from[axis]))
+    }
+
     /// Returns the edge values `u`, `v`, `w`, multiplied by `d_z`, and the bound of their errors.
     #[inline(always)]
     fn edges(&self, corners: &[[f64; 3]; 3]) -> ([f64; 3], f64) {
@@ -147,6 +151,11 @@ impl Line {
         let spread = largest([a, b, c].as_flattened());
         let cross = |p: [f64; 2], q: [f64; 2]| p[0] * q[1] - p[1] * q[0];
         ([cross(c, b), cross(a, c), cross(b, a)], error * (spread + error))
+    }
+
+    /// Returns the edge values, computed in f64 and multiplied by `d_z`.
+    pub(crate) fn weights(&self, triangle: &[Vec3; 3]) -> [f64; 3] {
+        self.edges(&self.relative(triangle)).0
     }
 
     /// Decides in f64 if the error bound permits.
@@ -163,15 +172,18 @@ impl Line {
         if !is_inside {
             return Verdict::Unsure;
         }
-        let [az, bz, cz] = corners.map(|corner| corner[2]);
-        let dz = self.direction[2];
-        let reach = largest(corners.as_flattened());
-        let determinant = u + v + w;
-        let b_depth = bz - az;
-        let c_depth = cz - az;
-        let t = (az * determinant + (v * b_depth + w * c_depth)) / (determinant * dz);
-        let depth = larger(b_depth.abs(), c_depth.abs());
-        let slack = (16.0 * edge_error * depth / determinant.abs() + reach * ERROR) / dz.abs();
+        let [first, second, third] = *triangle;
+        let to_second = self.edge(first, second);
+        let to_third = self.edge(first, third);
+        let (normal, products) = normal(&to_second, &to_third);
+        let along = dot(&self.direction, &normal);
+        let along_error = ERROR * dot(&self.direction.map(f64::abs), &products);
+        if along_error > along.abs() {
+            return Verdict::Unsure;
+        }
+        let t = dot(&corners[0], &normal) / along;
+        let error = ERROR * dot(&corners[0].map(f64::abs), &products) + t.abs() * along_error;
+        let slack = 0.25 * error / along.abs();
         let low = t - slack;
         let high = t + slack;
         if high < 0.0 {
@@ -359,6 +371,19 @@ fn middle_above(number: f32) -> f64 {
     let next = number.next_up();
     let next = if next.is_finite() { f64::from(next) } else { BEYOND };
     0.5 * (f64::from(number) + next)
+}
+
+/// Returns the cross product, and the same with sums of absolute products instead of differences.
+#[inline(always)]
+fn normal([px, py, pz]: &[f64; 3], [qx, qy, qz]: &[f64; 3]) -> ([f64; 3], [f64; 3]) {
+    let pairs = [[py * qz, pz * qy], [pz * qx, px * qz], [px * qy, py * qx]];
+    (pairs.map(|[a, b]| a - b), pairs.map(|[a, b]| a.abs() + b.abs()))
+}
+
+/// Returns the scalar product.
+#[inline(always)]
+fn dot(p: &[f64; 3], q: &[f64; 3]) -> f64 {
+    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
 /// Returns the largest absolute value.

@@ -9,24 +9,23 @@ const ROUNDING: f64 = 1.0 / (1 << 24) as f64;
 impl Triangle {
     /// Returns an origin for rays that leave the triangle at `point`, on the side toward which `side`
     /// points. No ray from there whose direction points to this side, or along the plane, hits the
-    /// triangle again: neither in real arithmetic nor by any kernel, which round corners. Returns the
-    /// rounded point for a triangle without area. `point` is in the triangle up to rounding, and sizes are
+    /// triangle again. Returns the rounded point for a triangle without area. `point` is in the triangle up to rounding, and sizes are
     /// between 2⁻¹⁰⁰ and 2¹⁰⁰.
     ///
     /// The origin is farther from the plane than 24 εR, ε = 2⁻²⁴, where R is the largest component of
-    /// the corners relative to the origin. Kernels round each corner relative to the origin, shear it
-    /// with a rounded slope, and compute with the result in f64: they hit a triangle whose corners are
-    /// moved by less than 4 εR in each component. All its points are nearer to the plane than 7 εR,
-    /// and all points of the ray are farther.
+    /// the corners relative to the origin. In real arithmetic, in which every kernel answers, any
+    /// distance would do. This one also suffices for other tracers that round corners relative to the
+    /// origin and the slope of the ray to f32: they hit a triangle whose corners are moved by less than
+    /// 4 εR in each component. All its points are nearer to the plane than 7 εR.
     ///
     /// ```
-    /// # use bvh_core::{Ray, Triangle};
+    /// # use bvh_core::{PreparedRay, Ray, Triangle};
     /// let triangle = Triangle::from([[0.0, 0.0, 0.1], [1.0, 0.0, 0.3], [0.0, 1.0, 0.7]]);
     /// let ray = Ray::half_line([0.3, 0.2, 5.0], [0.0, 0.0, -1.0])?;
     /// let normal = triangle.normal().unwrap();
     /// let origin = triangle.leave(triangle.closest_point([0.3, 0.2, 0.28]), normal);
     /// let reflected = Ray::half_line(origin, normal)?;
-    /// assert_eq!(triangle.hit_exactly(&reflected, f32::MAX), None);
+    /// assert_eq!(triangle.intersect(&PreparedRay::new(&reflected), f32::MAX), None);
     /// # Ok::<(), bvh_core::InvalidRay>(())
     /// ```
     pub fn leave(&self, point: DVec3, side: Vec3) -> Vec3 {

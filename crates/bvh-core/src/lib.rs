@@ -50,7 +50,7 @@ pub use traverse::{
     Counter, TestCounts, any_hit, any_hit_by, any_hit_of_all, nearest_hit, nearest_hit_by,
     nearest_hit_of_all,
 };
-pub use triangle::{Shear, Triangle};
+pub use triangle::{PreparedRay, Triangle};
 pub use validate::{InvalidBvh, validate, validate_references};
 pub use wide::{
     Closest, Coherence, Instance, InstanceHit, Instances, InvalidInstances, Kernel, RefitError,

@@ -1,6 +1,6 @@
 //! The geometry of a scene's objects.
 
-use crate::{Aabb, Ray, Shear, Sphere, Triangle};
+use crate::{Aabb, PreparedRay, Ray, Sphere, Triangle};
 use alloc::vec::Vec;
 
 /// An object of any kind that has a box and that can be tested against rays.
@@ -21,20 +21,20 @@ pub trait Primitive {
 }
 
 impl Primitive for Triangle {
-    type Prepared = Shear;
+    type Prepared = PreparedRay;
 
     fn aabb(&self) -> Aabb {
         Triangle::aabb(self)
     }
 
     #[inline(always)]
-    fn prepare(ray: &Ray) -> Shear {
-        Shear::new(ray)
+    fn prepare(ray: &Ray) -> PreparedRay {
+        PreparedRay::new(ray)
     }
 
     #[inline(always)]
-    fn intersect(&self, shear: &Shear, t_max: f32) -> Option<f32> {
-        Triangle::intersect(self, shear, t_max)
+    fn intersect(&self, prepared: &PreparedRay, t_max: f32) -> Option<f32> {
+        Triangle::intersect(self, prepared, t_max)
     }
 }
 

@@ -7,12 +7,14 @@ use glam::{Vec3, Vec4, Vec4Swizzles};
 ///
 /// Three properties make the answer of a traversal independent of its tree:
 ///
-/// 1. *Conservative.* The interval of a box contains the exact interval. The exit grows by
-///    [`Slabs::FAR`], which covers the rounding of entry and exit (the bound 1 + 2γ(3) of Pharr,
-///    Jakob & Humphreys, Physically Based Rendering, 3.9.2, and the multiplication itself). The box
-///    grows by [`Slabs::MARGIN`] of the scene's distance from the origin, which covers the rounding
-///    of a vertex by [`Triangle::intersect`](crate::Triangle::intersect) (Woop, Benthin & Wald
-///    2013, section 4, who enlarge each box by the distance of that box).
+/// 1. *Conservative.* If the ray is in the box at a distance t ≥ 0 in real arithmetic, the interval of
+///    the box contains t rounded to f32. The box grows by R · [`Slabs::MARGIN`] = 8uR, where u = 2⁻²⁴ and
+///    R is the largest coordinate of the scene relative to the origin; at least 7.9uR remain after the
+///    sum with the origin is rounded. The difference from a plane and the reciprocal of the direction
+///    are off by at most u of themselves, and no difference exceeds R. So the product before its own
+///    rounding is at most t for an entry and at least t for an exit, and rounding is monotone. A
+///    reciprocal that would overflow is `f32::MAX`, which moves an entry nearer. An exit is then at least
+///    7.9uR · `f32::MAX`, and t ≤ R / D, where D ≥ 2⁻¹⁰⁰ is the direction's largest component.
 /// 2. *Monotone.* The interval of a box inside another box is inside the other's interval, bit by
 ///    bit: each operation rounds monotonically.
 /// 3. *Defined.* Reciprocals are finite and the margin is never zero, so no 0 · ∞ occurs, and a ray
@@ -33,7 +35,7 @@ impl Slabs {
     pub const FAR: f32 = 1.0 + 8.0 * (f32::EPSILON / 2.0);
 
     /// The growth of boxes, in multiples of the largest coordinate of the scene relative to the
-    /// ray's origin. The rounding of a sheared vertex is below 6u of that coordinate.
+    /// ray's origin.
     pub const MARGIN: f32 = 8.0 * (f32::EPSILON / 2.0);
 
     /// Prepares `ray` for boxes inside `bounds`, which may be a scene's root box or an object's

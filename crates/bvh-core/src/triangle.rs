@@ -1,7 +1,7 @@
 //! Triangles, and a watertight ray test: no ray passes through the edge between two triangles.
 
 use crate::exact::{self, Line, Verdict};
-use crate::{Aabb, Ray, clip_to_box};
+use crate::{Aabb, Ray};
 use bytemuck::{Pod, Zeroable};
 use glam::{Affine3A, DVec3, Vec3};
 
@@ -20,52 +20,27 @@ impl From<[[f32; 3]; 3]> for Triangle {
 /// The axes of the shear, indexed by the axis of the direction's largest component.
 pub(crate) static AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
 
-/// A ray prepared for tests against triangles: the shear that turns its direction into the axis
-/// `z`.
-#[derive(Clone, Copy, Debug)]
-pub struct Shear {
-    pub(crate) ray: Ray,
-    /// The axes that become x, y and z; z is the direction's largest component.
-    pub(crate) axes: [usize; 3],
-    /// The ray's origin along these axes.
-    pub(crate) origin: [f32; 3],
-    /// The movement in x and in y per step along z, both at most 1 in size.
-    pub(crate) slope: [f32; 2],
-    /// The direction along z.
-    pub(crate) depth: f64,
+/// Returns the axis of the direction's largest component, the lowest on ties, without a branch that
+/// the processor could not predict.
+#[inline(always)]
+pub(crate) fn largest_axis(ray: &Ray) -> usize {
+    let [x, y, z] = ray.direction().abs().to_array();
+    let axis = usize::from(y > x);
+    if z > x.max(y) { 2 } else { axis }
 }
 
-impl Shear {
+/// A ray prepared for tests against triangles.
+#[derive(Clone, Copy, Debug)]
+pub struct PreparedRay {
+    ray: Ray,
+    line: Line,
+}
+
+impl PreparedRay {
     /// Prepares a ray.
     #[inline(always)]
     pub fn new(ray: &Ray) -> Self {
-        let origin = ray.origin().to_array();
-        let direction = ray.direction().to_array();
-        let size = direction.map(f32::abs);
-        // The lowest axis on ties, without a branch that the processor could not predict.
-        let z = usize::from(size[1] > size[0]);
-        let z = if size[2] > size[0].max(size[1]) { 2 } else { z };
-        let axes @ [kx, ky, kz] = AXES[z];
-        Self {
-            ray: *ray,
-            axes,
-            origin: [origin[kx], origin[ky], origin[kz]],
-            slope: [direction[kx] / direction[kz], direction[ky] / direction[kz]],
-            depth: f64::from(direction[kz]),
-        }
-    }
-
-    /// Transforms a point to the ray's coordinates, where points on the ray have x = y = 0. The
-    /// wide layout uses the same operations in the same order, so both give the same bits.
-    #[inline(always)]
-    fn apply(&self, p: &Vec3) -> [f32; 3] {
-        let p: &[f32; 3] = p.as_ref();
-        let [kx, ky, kz] = self.axes;
-        let [ox, oy, oz] = self.origin;
-        let x = p[kx] - ox;
-        let y = p[ky] - oy;
-        let z = p[kz] - oz;
-        [x - self.slope[0] * z, y - self.slope[1] * z, z]
+        Self { ray: *ray, line: Line::new(ray) }
     }
 }
 
@@ -114,11 +89,7 @@ impl Triangle {
     /// triangle's plane. Their sum is 1. They interpolate values of the corners, such as normals,
     /// at a hit. Returns `None` for a ray in the plane.
     pub fn barycentrics(&self, ray: &Ray) -> Option<[f64; 3]> {
-        let shear = Shear::new(ray);
-        let [[ax, ay, _], [bx, by, _], [cx, cy, _]] = self
-            .0
-            .map(|corner| shear.apply(&corner).map(f64::from));
-        let weights = [cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax];
+        let weights = Line::new(ray).weights(&self.0);
         let sum: f64 = weights.iter().sum();
         (sum != 0.0).then(|| weights.map(|weight| weight / sum))
     }
@@ -162,31 +133,30 @@ impl Triangle {
     /// The ray's line must cross the closed triangle, and the ray must not be parallel to its
     /// plane. A triangle behind the origin is not hit, however near. No distance is −0.
     ///
-    /// A reference for tests. Traversals call [`intersect`](Self::intersect), which rounds the
-    /// corners relative to the ray. Its distances may differ in the last digits, and its answers at
-    /// the triangle's border. Next to an edge this function computes with expansions, which takes
-    /// longer.
+    /// The test is watertight: a ray through a common edge of two triangles hits at least one of them.
+    /// No ray hits a degenerate triangle. f64 decides nearly all triangles. Next to an edge, or where a
+    /// distance is nearly the middle between two `f32`, expansions decide, which takes microseconds.
     ///
     /// Source: Shewchuk 1997, 'Adaptive precision floating-point arithmetic and fast robust
     /// geometric predicates'.
     ///
     /// ```
-    /// use bvh_core::{Ray, Triangle};
+    /// use bvh_core::{PreparedRay, Ray, Triangle};
     /// let triangle = Triangle::from([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]]);
     /// let ray = Ray::half_line([0.5, 0.5, 0.0], [0.0, 0.0, 3.0]).unwrap();
-    /// assert_eq!(triangle.hit_exactly(&ray, 9.0), Some(1.0 / 3.0));
+    /// assert_eq!(triangle.intersect(&PreparedRay::new(&ray), 9.0), Some(1.0 / 3.0));
     /// ```
-    pub fn hit_exactly(&self, ray: &Ray, t_max: f32) -> Option<f32> {
-        let t = match Line::new(ray).filter(&self.0) {
+    pub fn intersect(&self, prepared: &PreparedRay, t_max: f32) -> Option<f32> {
+        let t = match prepared.line.filter(&self.0) {
             Verdict::Miss => return None,
             Verdict::Hit(t) => t,
-            Verdict::Unsure => exact::distance(ray, &self.0)?,
+            Verdict::Unsure => exact::distance(&prepared.ray, &self.0)?,
         };
-        (ray.t_min() <= t && t <= t_max).then_some(t)
+        (prepared.ray.t_min() <= t && t <= t_max).then_some(t)
     }
 
     /// Returns the distance at which the ray crosses the triangle, in real arithmetic, if that distance is
-    /// in the ray's range. The same as [`hit_exactly`](Self::hit_exactly), but of the triangles that
+    /// in the ray's range. The same as [`intersect`](Self::intersect), but of the triangles that
     /// meet in an edge or a corner, the ray crosses only those that it would cross if its origin were moved
     /// by (ε, ε², ε³) with an infinitely small ε > 0. The line of a ray crosses a closed mesh an even
     /// number of times.
@@ -203,62 +173,6 @@ impl Triangle {
     pub fn crossing(&self, ray: &Ray) -> Option<f32> {
         let t = Line::new(ray).crossing(ray, &self.0)?;
         (ray.t_min() <= t && t <= ray.t_max()).then_some(t)
-    }
-
-    /// Returns the distance at which the ray hits the triangle if that distance is in the ray's
-    /// range and at most `t_max`.
-    ///
-    /// The test is watertight: a ray through a common edge of two triangles hits at least one of
-    /// them, because both use the same sheared vertices and the side of an edge is exact. A ray in
-    /// a triangle's plane does not hit the triangle. No ray hits a degenerate triangle, or a
-    /// triangle whose coordinates relative to the origin overflow. The distance is inside the
-    /// interval of the triangle's box (see [`clip_to_box`]).
-    ///
-    /// Source: Woop, Benthin & Wald 2013, 'Watertight ray/triangle intersection'. Differs from the
-    /// paper: f64 decides every candidate, not only candidates with an edge value of zero. This
-    /// costs nothing measurable, because f32 rejects most triangles exactly, and it makes the
-    /// distance as precise as the sheared vertices.
-    #[inline]
-    pub fn intersect(&self, shear: &Shear, t_max: f32) -> Option<f32> {
-        let [a, b, c] = &self.0;
-        let [ax, ay, _] = shear.apply(a);
-        let [bx, by, _] = shear.apply(b);
-        let [cx, cy, _] = shear.apply(c);
-        // Rounding is monotone, so the difference of rounded products has the right sign or is 0.
-        let u = cx * by - cy * bx;
-        let v = ax * cy - ay * cx;
-        let w = bx * ay - by * ax;
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
-            return None;
-        }
-        self.decide(shear, t_max)
-    }
-
-    /// Completes the test for the few triangles that the edge values in f32 do not reject.
-    #[inline(never)]
-    pub(crate) fn decide(&self, shear: &Shear, t_max: f32) -> Option<f32> {
-        let [a, b, c] = &self.0;
-        let double = |[x, y, z]: [f32; 3]| (f64::from(x), f64::from(y), f64::from(z));
-        let (ax, ay, az) = double(shear.apply(a));
-        let (bx, by, bz) = double(shear.apply(b));
-        let (cx, cy, cz) = double(shear.apply(c));
-        // Products of two f32 are exact in f64.
-        let u = cx * by - cy * bx;
-        let v = ax * cy - ay * cx;
-        let w = bx * ay - by * ax;
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
-            return None;
-        }
-        let determinant = u + v + w;
-        if determinant == 0.0 {
-            return None;
-        }
-        let t = (u * az + v * bz + w * cz) / (determinant * shear.depth);
-        if t < f64::from(shear.ray.t_min()) {
-            return None;
-        }
-        // The rounding of the shear can give collinear corners an area.
-        clip_to_box(&shear.ray, &self.aabb(), t as f32, t_max).filter(|_| !self.is_degenerate())
     }
 }
 
@@ -285,7 +199,7 @@ mod tests {
     const CORNER: Triangle = Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]);
 
     fn hit(triangle: Triangle, origin: Vec3, direction: Vec3) -> Option<f32> {
-        triangle.intersect(&Shear::new(&Ray::half_line(origin, direction).unwrap()), f32::MAX)
+        triangle.intersect(&PreparedRay::new(&Ray::half_line(origin, direction).unwrap()), f32::MAX)
     }
 
     #[test]

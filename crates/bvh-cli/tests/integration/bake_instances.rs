@@ -2,7 +2,7 @@
 //! flat scene.
 
 use crate::support::{glb, names, refused, said};
-use bvh_core::{Instance, Instances, Ray, Shear, Triangle, WideBvh, boxes, file};
+use bvh_core::{Instance, Instances, PreparedRay, Ray, Triangle, WideBvh, boxes, file};
 use bvh_scenes::Scene;
 use glam::{Affine3A, Vec3};
 use std::fs;
@@ -96,11 +96,11 @@ fn a_scene_of_instances_is_baked_mesh_by_mesh_and_answers_like_the_flat_scene() 
         let middle = (corners.iter().sum::<Vec3>() / 3.0).round();
         let away = Vec3::new(number(2 * i), number(2 * i + 1), 128.0);
         let ray = Ray::half_line((middle + away).to_array(), (-away / 128.0).to_array()).unwrap();
-        let shear = Shear::new(&ray);
+        let prepared = PreparedRay::new(&ray);
         let all = flat
             .iter()
             .enumerate()
-            .filter_map(|(id, triangle)| Some((triangle.intersect(&shear, ray.t_max())?, id)));
+            .filter_map(|(id, triangle)| Some((triangle.intersect(&prepared, ray.t_max())?, id)));
         // Several triangles may have the same distance; the one with the lowest id is the answer.
         let expected = all.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let found = scene.nearest_hit(&ray);

@@ -54,8 +54,7 @@ impl WideBvh {
     /// closed mesh is therefore even, and a half line that begins inside has an odd number. All
     /// kernels give the hits of [`Triangle::crossing`](crate::Triangle::crossing), bit by bit.
     ///
-    /// [`nearest_hit`](Self::nearest_hit) rounds corners relative to the ray, and distances and hits at
-    /// a border may therefore differ from it in the last digits.
+    /// The distances are those of [`nearest_hit`](Self::nearest_hit).
     ///
     /// ```
     /// # use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle, WideBvh};

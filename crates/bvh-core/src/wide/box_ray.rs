@@ -31,8 +31,8 @@
 //!    the margin remain, which suffices here and in step 3.
 //! 5. *Overflow.* Rays with S ≥ 2⁶⁰, S · K ≥ 2¹²⁰ or S < 2⁻⁹⁰ are left to the portable kernel.
 //!
-//! `Slabs` moves a hit's distance into the interval of the triangle's box. Hence a near distance is at
-//! most the distance of any accepted hit, and needs no margin compared with the nearest hit so far.
+//! The interval of `Slabs` for a triangle's own box contains the rounded distance of a hit. Hence a near
+//! distance is at most the distance of any hit, and needs no margin compared with the nearest hit so far.
 //!
 //! Interval arithmetic takes the least and the greatest product over all origins and all scales of a
 //! packet by the same operations, with the largest S. Rounding is monotone: the bounds are not beyond

@@ -54,9 +54,15 @@ pub(crate) trait Lanes:
     /// The greater; of two zeros, or a NaN and a number, `other`.
     fn max(self, other: Self) -> Self;
 
-    /// `self · factor + term`, rounded once, or twice where no instruction fuses them. Only tests of
-    /// boxes use it, whose margin covers both.
+    /// `self · factor + term`, rounded once, or twice where no instruction fuses them. The error bounds of
+    /// tests that use it cover both.
     fn mul_add(self, factor: Self, term: Self) -> Self;
+
+    /// `self · factor − term`, as [`mul_add`](Self::mul_add).
+    #[inline(always)]
+    fn mul_sub(self, factor: Self, term: Self) -> Self {
+        self * factor - term
+    }
 
     /// Where `self < other`; not where either is NaN.
     fn lt(self, other: Self) -> Self::Mask;
@@ -173,7 +179,7 @@ pub(crate) trait DoubleLanes:
     /// The greater, as [`Lanes::max`].
     fn max(self, other: Self) -> Self;
 
-    /// `self · factor − term` where the product is exact, so that it is the same fused or not.
+    /// `self · factor − term`, rounded once or twice. The error bounds of tests that use it cover both.
     fn mul_sub(self, factor: Self, term: Self) -> Self;
 
     /// Where `self < other`.

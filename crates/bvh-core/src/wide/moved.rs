@@ -13,8 +13,8 @@ impl<L: Lanes> RayLanes<L> {
         // SAFETY: values exist.
         unsafe {
             let reach = self
-                .reach(bounds, 0)
-                .max(self.reach(bounds, 1).max(self.reach(bounds, 2)));
+                .far_plane(bounds, 0)
+                .max(self.far_plane(bounds, 1).max(self.far_plane(bounds, 2)));
             let reach = reach * L::splat(Slabs::MARGIN);
             let mut entry = self.t_min;
             let mut exit = L::splat(f32::INFINITY);
@@ -34,7 +34,7 @@ impl<L: Lanes> RayLanes<L> {
 
     /// Returns the farthest distance of an origin from the bounds' planes across an axis.
     #[inline(always)]
-    fn reach(&self, bounds: &Aabb, axis: usize) -> L {
+    fn far_plane(&self, bounds: &Aabb, axis: usize) -> L {
         let origin = self.origin[axis];
         // SAFETY: values exist.
         let (min, max) = unsafe { (L::splat(bounds.min[axis]), L::splat(bounds.max[axis])) };

@@ -6,10 +6,11 @@ use super::kernel::STACK;
 use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
 use super::node::Child;
-use super::pairs::Pairs;
+use super::pairs::{Pairs, SINGLE_ERROR, doubled};
 use super::portable::walk;
 use super::triangles::TriangleBlock;
-use crate::{Hit, Ray, Shear};
+use crate::triangle::{AXES, largest_axis};
+use crate::{Hit, Ray};
 use core::hint::black_box;
 use core::mem::MaybeUninit;
 
@@ -31,7 +32,13 @@ pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
     ray: &Ray,
     accept: impl FnMut(Hit) -> bool,
 ) -> Hit {
-    let mut leaves = FirstHits { ray, leaf_ray: MaybeUninit::uninit(), is_prepared: false, accept };
+    let mut leaves = FirstHits {
+        ray,
+        largest: wide.largest,
+        leaf_ray: MaybeUninit::uninit(),
+        is_prepared: false,
+        accept,
+    };
     // SAFETY: the caller's promises.
     match unsafe { traverse::<K, ANY>(wide, ray, &mut leaves) } {
         Some(hit) => hit,
@@ -142,6 +149,7 @@ fn portable<const ANY: bool>(
 /// Keeps the nearest hit among those that `accept` accepts.
 struct FirstHits<'r, L, A> {
     ray: &'r Ray,
+    largest: f32,
     leaf_ray: MaybeUninit<LeafRay<L>>,
     is_prepared: bool,
     accept: A,
@@ -153,7 +161,8 @@ impl<L: Lanes, A: FnMut(Hit) -> bool> Leaves<L> for FirstHits<'_, L, A> {
         // SAFETY: the caller's promise; the ray is prepared before its use.
         unsafe {
             if !self.is_prepared {
-                self.leaf_ray.write(LeafRay::new(self.ray));
+                self.leaf_ray
+                    .write(LeafRay::new(self.ray, self.largest));
                 self.is_prepared = true;
             }
             self.leaf_ray
@@ -171,23 +180,28 @@ struct LeafRay<L> {
 
 impl<L: Lanes> LeafRay<L> {
     #[inline(always)]
-    unsafe fn new(ray: &Ray) -> Self {
+    unsafe fn new(ray: &Ray, largest: f32) -> Self {
         // Most rays in the open meet no leaf: without this the compiler does a part of this work for all.
         let ray = black_box(ray);
-        let shear = Shear::new(ray);
-        let inverse = ray.inverse_direction().to_array();
-        let [x, y, z] = shear.axes;
-        let [ox, oy, oz] = shear.origin;
+        let origin = ray.origin().to_array();
+        let direction = ray.direction().to_array();
+        let reach = ray.origin().abs().max_element() + largest;
+        let axes = AXES[largest_axis(ray)];
         // SAFETY: the caller's promise: the processor has the instructions.
         unsafe {
+            let [x, y, z] = axes;
+            let dx = direction[x];
+            let dy = direction[y];
+            let dz = direction[z];
             let pairs = Pairs {
-                origin: [L::splat(ox), L::splat(oy), L::splat(oz)],
-                inverse: [L::splat(inverse[x]), L::splat(inverse[y]), L::splat(inverse[z])],
-                slope: [L::splat(shear.slope[0]), L::splat(shear.slope[1])],
-                depth: L::splat(shear.depth as f32),
+                origin: [L::splat(origin[x]), L::splat(origin[y]), L::splat(origin[z])],
+                direction: [L::splat(dx), L::splat(dy), L::splat(dz)],
+                slope: [L::splat(dx / dz), L::splat(dy / dz)],
+                reach: L::splat(reach),
+                error: L::splat(reach * SINGLE_ERROR),
                 t_min: L::splat(ray.t_min()),
             };
-            Self { pairs, axes: shear.axes }
+            Self { pairs, axes }
         }
     }
 
@@ -202,10 +216,13 @@ impl<L: Lanes> LeafRay<L> {
         // SAFETY: the caller's promise: the processor has the instructions; axes are below 3.
         unsafe {
             let corners = block.corners_along::<L>(self.axes);
-            if self.pairs.candidates(&corners) == 0 {
+            let (candidates, spread) = self.pairs.candidates(&corners);
+            if candidates == 0 {
                 return false;
             }
-            let (inside, t) = self.pairs.decide(&corners, L::splat(nearest.t));
+            let (inside, t) =
+                self.pairs
+                    .decide(&corners, &doubled(&corners), spread, L::splat(nearest.t));
             let mut hits = inside.bits();
             if hits == 0 {
                 return false;

@@ -153,7 +153,7 @@ impl<K: Instructions> Packet<K> {
             let mut end = key_of(farthest);
             if !root.is_node() {
                 for i in 0..self.count {
-                    self.visit_leaf(i, u32::MAX, blocks.add(root.index()), answers);
+                    self.visit_leaf(i, u32::MAX, blocks.add(root.index()), wide.largest, answers);
                 }
                 return;
             }
@@ -205,27 +205,28 @@ impl<K: Instructions> Packet<K> {
                     if child.is_node() {
                         break Parent { node: child.index() as u32, vector: i as u32 };
                     }
-                    let is_hit =
-                        if A::IN_INSTANCES {
-                            let instance = child.instance_index();
-                            match answers.scene() {
-                                Some(scene) if A::ANY => self
-                                    .visit_instance::<true>(scene, instance, i, entered, &planes),
-                                Some(scene) => self
-                                    .visit_instance::<false>(scene, instance, i, entered, &planes),
-                                None => false,
+                    let is_hit = if A::IN_INSTANCES {
+                        let instance = child.instance_index();
+                        match answers.scene() {
+                            Some(scene) if A::ANY => {
+                                self.visit_instance::<true>(scene, instance, i, entered, &planes)
                             }
-                        } else {
-                            let block = blocks.add(child.index());
-                            let mut is_hit = self.visit_leaf(i, entered, block, answers);
-                            for i in i + 1..self.count {
-                                let entered = self.enter(i, &planes);
-                                if entered != 0 {
-                                    is_hit |= self.visit_leaf(i, entered, block, answers);
-                                }
+                            Some(scene) => {
+                                self.visit_instance::<false>(scene, instance, i, entered, &planes)
                             }
-                            is_hit
-                        };
+                            None => false,
+                        }
+                    } else {
+                        let block = blocks.add(child.index());
+                        let mut is_hit = self.visit_leaf(i, entered, block, wide.largest, answers);
+                        for i in i + 1..self.count {
+                            let entered = self.enter(i, &planes);
+                            if entered != 0 {
+                                is_hit |= self.visit_leaf(i, entered, block, wide.largest, answers);
+                            }
+                        }
+                        is_hit
+                    };
                     if is_hit {
                         farthest = self.farthest();
                         end = key_of(farthest);
@@ -280,6 +281,7 @@ impl<K: Instructions> Packet<K> {
         vector: usize,
         entered: u32,
         block: *const TriangleBlock,
+        largest: f32,
         answers: &mut A,
     ) -> bool {
         // SAFETY: the caller's promises; a block that is not its leaf's last is followed by another.
@@ -291,7 +293,7 @@ impl<K: Instructions> Packet<K> {
             if !vector.is_sheared {
                 vector
                     .pairs
-                    .write(vector.rays.sheared(vector.axes));
+                    .write(vector.rays.sheared(vector.axes, largest));
                 vector.is_sheared = true;
             }
             let pairs = vector.pairs.assume_init_ref();
@@ -300,11 +302,13 @@ impl<K: Instructions> Packet<K> {
             loop {
                 for lane in 0..(*block).len() {
                     let corners = (*block).splat_corners::<K::Rays>(lane, vector.axes);
-                    let candidates = pairs.candidates(&corners) & entered;
+                    let (candidates, spread) = pairs.candidates(&corners);
+                    let candidates = candidates & entered;
                     if candidates == 0 {
                         continue;
                     }
-                    let (inside, t) = pairs.decide(&corners, vector.t);
+                    let doubled = (*block).splat_doubles::<K::Rays>(lane, vector.axes);
+                    let (inside, t) = pairs.decide(&corners, &doubled, spread, vector.t);
                     let inside = inside & Mask::from_bits(candidates);
                     let object = K::Rays::splat_bits((*block).id(lane));
                     let hits = if A::ANY {

@@ -5,7 +5,7 @@ use super::node::{Child, WideNode};
 use super::triangles::TriangleBlock;
 use crate::slabs::margin;
 use crate::stack::Stack;
-use crate::{Aabb, Counter, Hit, Ray, Shear, Slabs};
+use crate::{Aabb, Counter, Hit, PreparedRay, Ray, Slabs};
 
 /// A child that the ray enters at `entry`, to be visited later.
 #[derive(Clone, Copy)]
@@ -94,15 +94,12 @@ pub(crate) fn walk<const ANY: bool>(
     counter: &mut impl Counter,
     mut accept: impl FnMut(Hit) -> bool,
 ) -> Option<Hit> {
-    let shear = Shear::new(ray);
+    let prepared = PreparedRay::new(ray);
     let visit = |block: &TriangleBlock, nearest: &mut Hit| {
         let mut is_nearer = false;
-        let mut lanes = block.candidates(&shear);
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
+        for lane in 0..TriangleBlock::LANES {
             if let Some((object, triangle)) = block.triangle(lane)
-                && let Some(t) = triangle.decide(&shear, nearest.t)
+                && let Some(t) = triangle.intersect(&prepared, nearest.t)
             {
                 let hit = Hit { t, object };
                 if hit.precedes(nearest) && accept(hit) {

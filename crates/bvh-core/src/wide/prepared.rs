@@ -4,7 +4,7 @@ use super::box_ray::MARGIN;
 use super::instructions::Instructions;
 use super::lanes::{Lanes, Mask};
 use super::node::WideNode;
-use super::pairs::Pairs;
+use super::pairs::{Pairs, SINGLE_ERROR};
 use super::ray_lanes::RayLanes;
 use crate::Aabb;
 
@@ -16,6 +16,7 @@ pub(crate) struct Ready<L> {
     far_shift: [L; 3],
     /// One bit per ray: unset for a ray that the portable kernel must trace.
     pub(crate) in_range: u32,
+    reach: L,
 }
 
 /// One ray as boxes and triangles are tested with it: two cache lines, in rows of four lanes.
@@ -28,11 +29,12 @@ pub(crate) struct Prepared {
     pub(crate) near_shift: [f32; 3],
     pub(crate) t_max: f32,
     pub(crate) far_shift: [f32; 3],
-    /// As in [`Pairs`], and in the shear's order of axes, up to `inverse`.
+    /// As in [`Pairs`], and in the shear's order of axes, up to `x_slope`.
     depth: f32,
     origin: [f32; 3],
     y_slope: f32,
-    inverse: [f32; 3],
+    direction: [f32; 2],
+    reach: f32,
     x_slope: f32,
     /// The bytes of a node before the planes that the ray meets first, by axis.
     pub(crate) near: [u32; 3],
@@ -62,7 +64,7 @@ impl<L: Lanes> Ready<L> {
                 near_shift[axis] = zero - (rays.origin[axis] + margin) * scale[axis];
                 far_shift[axis] = zero - (rays.origin[axis] - margin) * scale[axis];
             }
-            Self { rays, scale, near_shift, far_shift, in_range: in_range.bits() }
+            Self { rays, scale, near_shift, far_shift, in_range: in_range.bits(), reach: size }
         }
     }
 
@@ -98,7 +100,6 @@ impl<L: Lanes> Ready<L> {
     pub(crate) unsafe fn write(&self, first: u32, to: *mut Prepared) {
         let (second, third) = self.rays.largest();
         let origin = in_order(self.rays.origin, second, third);
-        let inverse = in_order(self.rays.inverse, second, third);
         let [dx, dy, depth] = in_order(self.rays.direction, second, third);
         // SAFETY: values exist; the rest is the caller's promise.
         unsafe {
@@ -116,7 +117,7 @@ impl<L: Lanes> Ready<L> {
             write_row(to, 1, self.near_shift, self.rays.t_max);
             write_row(to, 2, self.far_shift, depth);
             write_row(to, 3, origin, dy / depth);
-            write_row(to, 4, inverse, dx / depth);
+            write_row(to, 4, [dx, dy, self.reach], dx / depth);
             write_row(to, 5, near, axis);
             write_row(to, 6, far, bits(0));
             for (lane, number) in (first..).enumerate().take(L::N) {
@@ -184,12 +185,13 @@ impl Prepared {
             let begin = row(0);
             let far = row(2);
             let origin = row(3);
-            let inverse = row(4);
+            let direction = row(4);
             Pairs {
                 origin: [origin.spread::<0>(), origin.spread::<1>(), origin.spread::<2>()],
-                inverse: [inverse.spread::<0>(), inverse.spread::<1>(), inverse.spread::<2>()],
-                slope: [inverse.spread::<3>(), origin.spread::<3>()],
-                depth: far.spread::<3>(),
+                direction: [direction.spread::<0>(), direction.spread::<1>(), far.spread::<3>()],
+                slope: [direction.spread::<3>(), origin.spread::<3>()],
+                reach: direction.spread::<2>(),
+                error: direction.spread::<2>() * L::splat(SINGLE_ERROR),
                 t_min: begin.spread::<3>(),
             }
         }

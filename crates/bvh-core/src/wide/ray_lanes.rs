@@ -2,7 +2,7 @@
 
 use super::box_ray::{CLAMP, MARGIN, SHIFTS, SIZES};
 use super::lanes::{Lanes, Mask};
-use super::pairs::Pairs;
+use super::pairs::{Pairs, SINGLE_ERROR};
 use crate::triangle::AXES;
 
 /// One ray per lane. Vectors of three are by axis.
@@ -49,8 +49,7 @@ impl<L: Lanes> RayLanes<L> {
         unsafe {
             let [x, y, z] = self.inverse;
             let limit = x.abs().min(y.abs()).min(z.abs()) * L::splat(CLAMP);
-            let [ox, oy, oz] = self.origin;
-            let size = ox.abs().max(oy.abs()).max(oz.abs()) + L::splat(largest);
+            let size = self.reach(largest);
             let shift = size * limit;
             let in_range = size.lt(L::splat(SIZES.end))
                 & L::splat(SIZES.start).le(size)
@@ -79,15 +78,27 @@ impl<L: Lanes> RayLanes<L> {
         cohere.then_some(scale)
     }
 
-    /// Returns the rays as triangles are tested with them.
+    /// The largest size of a coordinate of the origin, plus `largest`.
     #[inline(always)]
-    pub(crate) fn sheared(&self, [x, y, z]: [usize; 3]) -> Pairs<L> {
-        let Self { origin, direction, inverse, t_min, .. } = self;
+    fn reach(&self, largest: f32) -> L {
+        let [x, y, z] = self.origin;
+        // SAFETY: a value exists.
+        x.abs().max(y.abs()).max(z.abs()) + unsafe { L::splat(largest) }
+    }
+
+    /// Returns the rays as triangles are tested with them whose coordinates are at most `largest`.
+    #[inline(always)]
+    pub(crate) fn sheared(&self, [x, y, z]: [usize; 3], largest: f32) -> Pairs<L> {
+        let Self { origin, direction, t_min, .. } = self;
+        let reach = self.reach(largest);
+        // SAFETY: a value exists.
+        let part = unsafe { L::splat(SINGLE_ERROR) };
         Pairs {
             origin: [origin[x], origin[y], origin[z]],
-            inverse: [inverse[x], inverse[y], inverse[z]],
+            direction: [direction[x], direction[y], direction[z]],
             slope: [direction[x] / direction[z], direction[y] / direction[z]],
-            depth: direction[z],
+            reach,
+            error: reach * part,
             t_min: *t_min,
         }
     }

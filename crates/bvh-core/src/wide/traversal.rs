@@ -7,7 +7,7 @@ use super::kernel::STACK;
 use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
-use super::pairs::Pairs;
+use super::pairs::{Pairs, doubled};
 use super::prepared::Prepared;
 use super::triangles::TriangleBlock;
 use crate::Hit;
@@ -238,7 +238,7 @@ unsafe fn pairs<L: Lanes>(four: [*mut Traversal; 4]) -> Pairs<L> {
 #[inline(always)]
 pub(super) unsafe fn candidates<L: Lanes>(four: [*mut Traversal; 4]) -> u32 {
     // SAFETY: the caller's promises.
-    unsafe { pairs::<L>(four).candidates(&corners(four)) }
+    unsafe { pairs::<L>(four).candidates(&corners(four)).0 }
 }
 
 /// Returns the corners of the block at which each ray is, along the axes of its shear.
@@ -282,7 +282,10 @@ pub(super) unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4]) {
         let row = |i: usize| (&raw const (*four[i]).t);
         let before = L::load_quarters([row(0), row(1), row(2), row(3)]);
         let t_max = before.spread::<0>();
-        let (inside, t) = pairs::<L>(four).decide(&corners(four), t_max);
+        let corners = corners::<L>(four);
+        let pairs = pairs::<L>(four);
+        let spread = pairs.spread_of(&corners);
+        let (inside, t) = pairs.decide(&corners, &doubled(&corners), spread, t_max);
         let ids = |i: usize| {
             (*(*four[i])
                 .blocks
@@ -353,7 +356,10 @@ unsafe fn decide_others<L: Lanes>(
         let ray = [traversal; 4];
         let end = &raw const (*traversal).t;
         let t_max = L::load_quarters([end; 4]).spread::<0>();
-        let (inside, t) = pairs::<L>(ray).decide(&corners(ray), t_max);
+        let corners = corners::<L>(ray);
+        let pairs = pairs::<L>(ray);
+        let spread = pairs.spread_of(&corners);
+        let (inside, t) = pairs.decide(&corners, &doubled(&corners), spread, t_max);
         let mut distances = [0.0; 16];
         t.store(distances.as_mut_ptr());
         let block = &*(*traversal)

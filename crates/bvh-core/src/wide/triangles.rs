@@ -1,7 +1,7 @@
 //! Triangles side by side, for tests of one ray against all of them.
 
-use super::lanes::Lanes;
-use crate::{MAX_OBJECTS, Shear, Triangle};
+use super::lanes::{DoubleLanes, Lanes};
+use crate::{MAX_OBJECTS, Triangle};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -83,37 +83,6 @@ impl TriangleBlock {
         self.ids[0] & Self::LAST != 0
     }
 
-    /// Returns a bit per triangle that the ray's line may meet. [`Triangle::intersect`] rejects all other
-    /// triangles by the sides of their edges, which are computed here by the same operations.
-    #[inline(always)]
-    pub(crate) fn candidates(&self, shear: &Shear) -> u32 {
-        let [kx, ky, kz] = shear.axes;
-        let sheared = |corner: &[[f32; Self::LANES]; 3]| {
-            let mut x = [0.0; Self::LANES];
-            let mut y = [0.0; Self::LANES];
-            for lane in 0..Self::LANES {
-                let z = corner[kz][lane] - shear.origin[2];
-                x[lane] = (corner[kx][lane] - shear.origin[0]) - shear.slope[0] * z;
-                y[lane] = (corner[ky][lane] - shear.origin[1]) - shear.slope[1] * z;
-            }
-            (x, y)
-        };
-        let [a, b, c] = &self.corners;
-        let (ax, ay) = sheared(a);
-        let (bx, by) = sheared(b);
-        let (cx, cy) = sheared(c);
-        let mut candidates = 0;
-        for i in 0..Self::LANES {
-            let u = cx[i] * by[i] - cy[i] * bx[i];
-            let v = ax[i] * cy[i] - ay[i] * cx[i];
-            let w = bx[i] * ay[i] - by[i] * ax[i];
-            let negative = (u < 0.0) | (v < 0.0) | (w < 0.0);
-            let positive = (u > 0.0) | (v > 0.0) | (w > 0.0);
-            candidates |= u32::from(!(negative & positive)) << i;
-        }
-        candidates
-    }
-
     /// Returns the corners of all four triangles along these axes.
     ///
     /// # Safety
@@ -149,6 +118,30 @@ impl TriangleBlock {
             let lanes = self.corners.as_ptr().cast::<f32>().add(lane);
             let of = |corner: usize, axis: usize| {
                 L::splat(*lanes.add((3 * corner + axes[axis]) * Self::LANES))
+            };
+            [
+                [of(0, 0), of(0, 1), of(0, 2)],
+                [of(1, 0), of(1, 1), of(1, 2)],
+                [of(2, 0), of(2, 1), of(2, 2)],
+            ]
+        }
+    }
+
+    /// Returns the corners of the triangle in a lane along these axes in f64, each coordinate in all lanes.
+    ///
+    /// # Safety
+    /// As for [`splat_corners`](Self::splat_corners).
+    #[inline(always)]
+    pub(crate) unsafe fn splat_doubles<L: Lanes>(
+        &self,
+        lane: usize,
+        axes: [usize; 3],
+    ) -> [[L::Double; 3]; 3] {
+        // SAFETY: the caller's promises.
+        unsafe {
+            let lanes = self.corners.as_ptr().cast::<f32>().add(lane);
+            let of = |corner: usize, axis: usize| {
+                L::Double::splat(f64::from(*lanes.add((3 * corner + axes[axis]) * Self::LANES)))
             };
             [
                 [of(0, 0), of(0, 1), of(0, 2)],

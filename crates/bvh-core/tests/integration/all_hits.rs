@@ -2,7 +2,7 @@
 //! for rays through edges and corners.
 
 use crate::support::{Random, SHAPES, ball, boxes, grid_box, rays, scaled, soup, tree};
-use bvh_core::{Hit, Kernel, Ray, Triangle, WideBvh};
+use bvh_core::{Hit, Kernel, PreparedRay, Ray, Triangle, WideBvh};
 use glam::{Quat, Vec3};
 use num_bigint::{BigInt, Sign};
 
@@ -238,8 +238,10 @@ fn crossings_are_those_of_a_moved_origin_in_exact_arithmetic() {
         for ray in rays_through(&triangles, inside, 40, &mut random) {
             for _ in 0..12 {
                 let triangle = random.of(&triangles);
-                let expected =
-                    is_crossed(&ray, &triangle) && triangle.hit_exactly(&ray, f32::MAX).is_some();
+                let expected = is_crossed(&ray, &triangle)
+                    && triangle
+                        .intersect(&PreparedRay::new(&ray), f32::MAX)
+                        .is_some();
                 assert_eq!(
                     triangle.crossing(&ray).is_some(),
                     expected,
@@ -259,11 +261,13 @@ fn check_exactly(name: &str, triangles: &[Triangle], ray: &Ray, hits: &[Hit]) {
     for hit in hits {
         let triangle = triangles[hit.object as usize];
         assert!(is_crossed(ray, &triangle), "{name}: {ray:?} {triangle:?}");
-        assert_eq!(triangle.hit_exactly(ray, f32::MAX), Some(hit.t));
+        assert_eq!(triangle.intersect(&PreparedRay::new(ray), f32::MAX), Some(hit.t));
     }
     for (object, triangle) in (0..).zip(triangles) {
         // A triangle that the ray touches and does not cross.
-        if triangle.hit_exactly(ray, f32::MAX).is_some()
+        if triangle
+            .intersect(&PreparedRay::new(ray), f32::MAX)
+            .is_some()
             && !hits.iter().any(|hit| hit.object == object)
         {
             assert!(!is_crossed(ray, triangle), "{name}: {ray:?} {triangle:?}");

@@ -1,7 +1,7 @@
 //! Hits and distances agree with real arithmetic, rounded once: a comparison with exact rationals.
 
 use crate::support::Random;
-use bvh_core::{Ray, Triangle};
+use bvh_core::{PreparedRay, Ray, Triangle};
 use glam::Vec3;
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -104,7 +104,7 @@ fn expected(ray: &Ray, triangle: &Triangle) -> Option<f32> {
 
 /// Compares one ray and one triangle. Returns whether the ray hits.
 fn check(ray: &Ray, triangle: &Triangle) -> bool {
-    let found = triangle.hit_exactly(ray, ray.t_max());
+    let found = triangle.intersect(&PreparedRay::new(ray), ray.t_max());
     let expected = expected(ray, triangle);
     assert_eq!(
         found.map(f32::to_bits),
@@ -287,7 +287,7 @@ fn a_range_that_ends_at_the_rounded_distance_has_the_hit_and_one_that_ends_befor
             let ray = Ray::new(ray.origin(), ray.direction(), t_min, t_max).unwrap();
             check(&ray, &triangle)
         };
-        if let Some(t) = triangle.hit_exactly(&ray, ray.t_max()) {
+        if let Some(t) = triangle.intersect(&PreparedRay::new(&ray), ray.t_max()) {
             hits += 1;
             assert!(in_range(t, t));
             assert!(!in_range(t.next_up(), f32::MAX));
@@ -314,7 +314,7 @@ fn a_triangle_behind_the_origin_is_not_hit_however_little() {
         (f32::MAX, 0.5, None),
     ] {
         let ray = Ray::half_line([0.1, 0.2, 0.0], [0.0, 0.0, length]).unwrap();
-        let found = sheet(z).hit_exactly(&ray, f32::MAX);
+        let found = sheet(z).intersect(&PreparedRay::new(&ray), f32::MAX);
         assert_eq!(found.map(f32::to_bits), expected.map(f32::to_bits), "{z:e} {length:e}");
         check(&ray, &sheet(z));
     }
@@ -331,7 +331,7 @@ fn triangles_with_a_corner_that_is_not_finite_are_never_hit() {
             for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
                 let mut corners = corners;
                 corners[corner][axis] = bad;
-                assert_eq!(Triangle(corners).hit_exactly(&ray, f32::MAX), None);
+                assert_eq!(Triangle(corners).intersect(&PreparedRay::new(&ray), f32::MAX), None);
             }
         }
     }

@@ -2,13 +2,13 @@
 
 use crate::support::layouts::{bundles, layouts};
 use crate::support::{Random, rays, soup};
-use bvh_core::{Coherence, Hit, Ray, Shear, Triangle};
+use bvh_core::{Coherence, Hit, PreparedRay, Ray, Triangle};
 
 /// Returns all hits of a ray, in the order of their objects.
 fn all_hits(triangles: &[Triangle], ray: &Ray) -> Vec<Hit> {
-    let shear = Shear::new(ray);
+    let prepared = PreparedRay::new(ray);
     let hit = |(object, triangle): (u32, &Triangle)| {
-        let t = triangle.intersect(&shear, ray.t_max())?;
+        let t = triangle.intersect(&prepared, ray.t_max())?;
         Some(Hit { t, object })
     };
     (0..).zip(triangles).filter_map(hit).collect()

@@ -2,7 +2,7 @@
 
 use crate::support::{Random, SHAPES};
 use bvh_core::query::{self, Frustum, Near, Region};
-use bvh_core::{Aabb, Bvh, Hit, Ray, Shear, Sphere, Triangle, validate};
+use bvh_core::{Aabb, Bvh, Hit, PreparedRay, Ray, Sphere, Triangle, validate};
 use glam::Vec3;
 use proptest::prelude::*;
 use std::collections::BTreeSet;
@@ -142,7 +142,7 @@ proptest! {
     #[test]
     fn all_hits_along_a_ray_are_found(triangles in triangles(), from in point(), to in point(), t_max in 0.0f32..3.0) {
         let Ok(ray) = Ray::new(from, to - from, 0.0, t_max) else { return Ok(()) };
-        let shear = Shear::new(&ray);
+        let prepared = PreparedRay::new(&ray);
         let mut met = BTreeSet::new();
         query::along(&tree(&triangles), &ray, |object| -> ControlFlow<()> {
             met.insert(object);
@@ -151,7 +151,7 @@ proptest! {
         let keep = |object: u32| !object.is_multiple_of(3);
         let mut expected = Vec::new();
         for (object, triangle) in (0..).zip(&triangles) {
-            if let Some(t) = triangle.intersect(&shear, t_max) {
+            if let Some(t) = triangle.intersect(&prepared, t_max) {
                 prop_assert!(met.contains(&object), "{}", object);
                 if keep(object) {
                     expected.push(Hit { t, object });

@@ -5,8 +5,8 @@ use crate::support::{
     Random, SHAPES, ball, bits, boxes, brute_force, grid_box, rays, scaled, soup, tree,
 };
 use bvh_core::{
-    Aabb, Bvh, Clip, Hit, InvalidBvh, Kernel, Node, Ray, Shear, Triangle, WideBvh, any_hit_by,
-    collapse_leaves,
+    Aabb, Bvh, Clip, Hit, InvalidBvh, Kernel, Node, PreparedRay, Ray, Triangle, WideBvh,
+    any_hit_by, collapse_leaves,
     cost::{SahConstants, layout_area, layout_cost},
     nearest_hit_by, query, validate, validate_references,
 };
@@ -119,8 +119,8 @@ fn check(
     ray: &Ray,
     expected: Option<Hit>,
 ) {
-    let shear = Shear::new(ray);
-    let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
+    let prepared = PreparedRay::new(ray);
+    let test = |id: u32, t_max| triangles[id as usize].intersect(&prepared, t_max);
     let found = nearest_hit_by(tree, ray, test, &mut ());
     assert_eq!(bits(found), bits(expected), "{case}, {ray:?}");
     let found = any_hit_by(tree, ray, |id| test(id, ray.t_max()).is_some(), &mut ());

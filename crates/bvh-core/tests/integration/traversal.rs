@@ -4,7 +4,7 @@ use crate::support::{
     Random, SHAPES, ball, bits, boxes, chain, grid_box, rays, scaled, soup, tree,
 };
 use bvh_core::{
-    Aabb, Bvh, Hit, Ray, Shear, Sphere, TestCounts, Triangle, WideBvh, any_hit, any_hit_by,
+    Aabb, Bvh, Hit, PreparedRay, Ray, Sphere, TestCounts, Triangle, WideBvh, any_hit, any_hit_by,
     any_hit_of_all, clip_to_box, collapse_leaves, cost::SahConstants, nearest_hit, nearest_hit_by,
     nearest_hit_of_all, validate,
 };
@@ -12,8 +12,8 @@ use glam::Vec3;
 
 /// Returns the nearest hit by testing every triangle.
 fn brute_force(triangles: &[Triangle], ray: &Ray) -> Option<Hit> {
-    let shear = Shear::new(ray);
-    let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
+    let prepared = PreparedRay::new(ray);
+    let test = |id: u32, t_max| triangles[id as usize].intersect(&prepared, t_max);
     let objects = triangles.len() as u32;
     let nearest = nearest_hit_of_all(objects, ray, test, &mut ());
     let any = any_hit_of_all(objects, |id| test(id, ray.t_max()).is_some(), &mut ());
@@ -130,10 +130,10 @@ fn no_ray_leaves_a_closed_mesh_through_an_edge_or_a_vertex() {
             for origin in [origin, Vec3::ZERO, close] {
                 let direction = (target - origin) * random.of(&[1.0, 1e5]);
                 let ray = Ray::half_line(origin, direction).unwrap();
-                let shear = Shear::new(&ray);
+                let prepared = PreparedRay::new(&ray);
                 let test = |id: u32| {
                     triangles[id as usize]
-                        .intersect(&shear, ray.t_max())
+                        .intersect(&prepared, ray.t_max())
                         .is_some()
                 };
                 assert!(any_hit_by(&tree, &ray, test, &mut ()), "{name} leaks {ray:?}");
@@ -163,10 +163,10 @@ fn no_ray_slips_between_the_boxes_beside_a_long_edge() {
             let start = -aside / rise * height + (random.unit() - 0.5) * 2e-7;
             let origin = turned(axis, start, random.unit() - 0.5, -height);
             let ray = Ray::half_line(origin, turned(axis, aside, 1.0, rise)).unwrap();
-            let shear = Shear::new(&ray);
+            let prepared = PreparedRay::new(&ray);
             let test = |id: u32| {
                 triangles[id as usize]
-                    .intersect(&shear, ray.t_max())
+                    .intersect(&prepared, ray.t_max())
                     .is_some()
             };
             assert!(any_hit_by(&tree, &ray, test, &mut ()), "axis {axis}: {ray:?}");

@@ -4,8 +4,8 @@
 use super::kd_tree::KdTree;
 use super::unpruned;
 use bvh_core::{
-    Bvh, Counter, Hit, Primitives, Ray, Shear, TestCounts, WideBvh, any_hit_by, any_hit_of_all,
-    nearest_hit_by, nearest_hit_of_all,
+    Bvh, Counter, Hit, PreparedRay, Primitives, Ray, TestCounts, WideBvh, any_hit_by,
+    any_hit_of_all, nearest_hit_by, nearest_hit_of_all,
 };
 use std::borrow::Cow;
 
@@ -166,8 +166,8 @@ impl<'a> Accelerator<'a> {
                 wide.nearest_hit_counted(ray, counter)
             }
             (structure, Primitives::Triangles(triangles)) => {
-                let shear = Shear::new(ray);
-                let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
+                let prepared = PreparedRay::new(ray);
+                let test = |id: u32, t_max| triangles[id as usize].intersect(&prepared, t_max);
                 structure.nearest_hit(triangles.len(), ray, test, counter)
             }
             (structure, Primitives::Spheres(spheres)) => {
@@ -198,9 +198,9 @@ impl<'a> Accelerator<'a> {
         // To visit all objects, the tests report no hit, so that the traversal continues.
         match self.objects {
             Primitives::Triangles(triangles) => {
-                let shear = Shear::new(ray);
+                let prepared = PreparedRay::new(ray);
                 let test = |id: u32| {
-                    let hit = triangles[id as usize].intersect(&shear, ray.t_max());
+                    let hit = triangles[id as usize].intersect(&prepared, ray.t_max());
                     found |= hit.is_some();
                     found && ends_at_hit
                 };

@@ -3,7 +3,7 @@
 use crate::promise::{Broken, Verdict, ensure};
 use crate::tracing;
 use bvh_build::{Builder, muller_fellner};
-use bvh_core::{Aabb, Primitives, Shear, Triangle, file};
+use bvh_core::{Aabb, PreparedRay, Primitives, Triangle, file};
 use bvh_scenes::load::mesh::Mesh;
 use bvh_scenes::{builtin::stiff, load::obj};
 use std::path::Path;
@@ -17,10 +17,10 @@ pub fn degenerate_are_counted() -> Verdict {
         .count();
     ensure!(degenerate == 30, "{degenerate} of 60 are degenerate");
     for ray in tracing::rays(&triangles, 2000, 17) {
-        let shear = Shear::new(&ray);
+        let prepared = PreparedRay::new(&ray);
         let hit = triangles
             .iter()
-            .find(|t| t.is_degenerate() && t.intersect(&shear, f32::MAX).is_some());
+            .find(|t| t.is_degenerate() && t.intersect(&prepared, f32::MAX).is_some());
         ensure!(hit.is_none(), "{ray:?} hits {hit:?}");
     }
     let mesh = read(&to_obj(&triangles)).map_err(Broken::case)?;

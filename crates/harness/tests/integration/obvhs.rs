@@ -6,7 +6,7 @@ use ::obvhs::cwbvh::{CwBvh, node::CwBvhNode};
 use ::obvhs::ray::RayHit;
 use ::obvhs::{BvhBuildParams, aabb};
 use bvh_core::export::{CompressedBvh, CompressedNode};
-use bvh_core::{Aabb, Bvh, FirstCountNode, Ray, Shear, Triangle, nearest_hit, validate};
+use bvh_core::{Aabb, Bvh, FirstCountNode, PreparedRay, Ray, Triangle, nearest_hit, validate};
 
 /// Makes small triangles at pseudo-random points.
 fn triangles(n: u32) -> Vec<Triangle> {
@@ -121,6 +121,6 @@ fn a_tree_of_obvhs_survives_a_round_trip_and_traces_the_same_hits() {
 
 /// Returns the distance of a triangle, or infinity as `obvhs` expects it for a miss.
 fn distance(triangles: &[Triangle], ray: &Ray, id: u32) -> f32 {
-    let hit = triangles[id as usize].intersect(&Shear::new(ray), f32::MAX);
+    let hit = triangles[id as usize].intersect(&PreparedRay::new(ray), f32::MAX);
     hit.unwrap_or(f32::INFINITY)
 }

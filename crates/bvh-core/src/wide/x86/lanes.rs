@@ -159,6 +159,7 @@ impl Lanes for F32x4 {
         min(a, b) -> Self = Self(_mm_min_ps(a.0, b.0));
         max(a, b) -> Self = Self(_mm_max_ps(a.0, b.0));
         mul_add(a, b, c) -> Self = Self(_mm_fmadd_ps(a.0, b.0, c.0));
+        mul_sub(a, b, c) -> Self = Self(_mm_fmsub_ps(a.0, b.0, c.0));
         lt(a, b) -> Mask4 = Mask4(_mm_cmp_ps::<_CMP_LT_OQ>(a.0, b.0));
         le(a, b) -> Mask4 = Mask4(_mm_cmp_ps::<_CMP_LE_OQ>(a.0, b.0));
         eq(a, b) -> Mask4 = Mask4(_mm_cmp_ps::<_CMP_EQ_OQ>(a.0, b.0));
@@ -214,6 +215,7 @@ impl Lanes for F32x8 {
         min(a, b) -> Self = Self(_mm256_min_ps(a.0, b.0));
         max(a, b) -> Self = Self(_mm256_max_ps(a.0, b.0));
         mul_add(a, b, c) -> Self = Self(_mm256_fmadd_ps(a.0, b.0, c.0));
+        mul_sub(a, b, c) -> Self = Self(_mm256_fmsub_ps(a.0, b.0, c.0));
         lt(a, b) -> Mask8 = Mask8(_mm256_cmp_ps::<_CMP_LT_OQ>(a.0, b.0));
         le(a, b) -> Mask8 = Mask8(_mm256_cmp_ps::<_CMP_LE_OQ>(a.0, b.0));
         eq(a, b) -> Mask8 = Mask8(_mm256_cmp_ps::<_CMP_EQ_OQ>(a.0, b.0));
@@ -272,6 +274,7 @@ impl Lanes for F32x16 {
         min(a, b) -> Self = Self(_mm512_min_ps(a.0, b.0));
         max(a, b) -> Self = Self(_mm512_max_ps(a.0, b.0));
         mul_add(a, b, c) -> Self = Self(_mm512_fmadd_ps(a.0, b.0, c.0));
+        mul_sub(a, b, c) -> Self = Self(_mm512_fmsub_ps(a.0, b.0, c.0));
         lt(a, b) -> u16 = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a.0, b.0);
         le(a, b) -> u16 = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a.0, b.0);
         eq(a, b) -> u16 = _mm512_cmp_ps_mask::<_CMP_EQ_OQ>(a.0, b.0);

@@ -2,7 +2,7 @@
 
 pub mod layouts;
 
-use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Shear, Triangle, nearest_hit_of_all};
+use bvh_core::{Aabb, Bvh, Hit, Node, PreparedRay, Ray, Triangle, nearest_hit_of_all};
 use glam::Vec3;
 use std::collections::VecDeque;
 
@@ -241,8 +241,8 @@ pub fn rays(triangles: &[Triangle], n: usize, random: &mut Random) -> Vec<Ray> {
 
 /// Returns the answer of testing every triangle.
 pub fn brute_force(triangles: &[Triangle], ray: &Ray) -> Option<Hit> {
-    let shear = Shear::new(ray);
-    let test = |id: u32, t_max| triangles[id as usize].intersect(&shear, t_max);
+    let prepared = PreparedRay::new(ray);
+    let test = |id: u32, t_max| triangles[id as usize].intersect(&prepared, t_max);
     nearest_hit_of_all(triangles.len() as u32, ray, test, &mut ())
 }
 
