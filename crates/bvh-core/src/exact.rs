@@ -158,31 +158,35 @@ impl Line {
         self.edges(&self.relative(triangle)).0
     }
 
-    /// Decides in f64 if the error bound permits.
+    /// Decides in f64 if the error bounds permit.
     #[inline(always)]
     pub(crate) fn filter(&self, triangle: &[Vec3; 3]) -> Verdict {
         let corners = self.relative(triangle);
-        let ([u, v, w], edge_error) = self.edges(&corners);
+        let ([u, v, w], error) = self.edges(&corners);
         let least = u.min(v).min(w);
         let most = u.max(v).max(w);
-        if least < -edge_error && most > edge_error {
+        if least < -error && most > error {
             return Verdict::Miss;
         }
-        let is_inside = least > edge_error || most < -edge_error;
-        if !is_inside {
-            return Verdict::Unsure;
+        if least > error || most < -error {
+            return self.plane(&corners[0], triangle);
         }
-        let [first, second, third] = *triangle;
-        let to_second = self.edge(first, second);
-        let to_third = self.edge(first, third);
+        Verdict::Unsure
+    }
+
+    /// Decides in f64 where the line crosses the triangle's plane if the error bounds permit.
+    #[inline(always)]
+    fn plane(&self, corner: &[f64; 3], [first, second, third]: &[Vec3; 3]) -> Verdict {
+        let to_second = self.edge(*first, *second);
+        let to_third = self.edge(*first, *third);
         let (normal, products) = normal(&to_second, &to_third);
         let along = dot(&self.direction, &normal);
         let along_error = ERROR * dot(&self.direction.map(f64::abs), &products);
-        if along_error > along.abs() {
+        if along == 0.0 || along_error > along.abs() {
             return Verdict::Unsure;
         }
-        let t = dot(&corners[0], &normal) / along;
-        let error = ERROR * dot(&corners[0].map(f64::abs), &products) + t.abs() * along_error;
+        let t = dot(corner, &normal) / along;
+        let error = ERROR * dot(&corner.map(f64::abs), &products) + t.abs() * along_error;
         let slack = 0.25 * error / along.abs();
         let low = t - slack;
         let high = t + slack;
@@ -199,6 +203,40 @@ impl Line {
             };
         }
         Verdict::Unsure
+    }
+
+    /// Returns the rounded distance at which the ray's line crosses the triangle at or in front of the
+    /// origin, by exact arithmetic where f64 does not suffice. Does not allocate.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn distance(&self, ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
+        let volumes = Volumes::new(ray, triangle)?;
+        let corners = self.relative(triangle);
+        let (edges, error) = self.edges(&corners);
+        // The edge values in f64 are multiplied by the depth.
+        let above = if self.direction[2] < 0.0 { -1 } else { 1 };
+        let mut sides =
+            edges.map(|edge| above * (i32::from(edge > error) - i32::from(edge < -error)));
+        if sides.contains(&-1) && sides.contains(&1) {
+            return None;
+        }
+        // Most rays that come here pass through one edge or corner, at a distance that f64 knows.
+        let verdict = self.plane(&corners[0], triangle);
+        if verdict == Verdict::Miss {
+            return None;
+        }
+        for (edge, side) in sides.iter_mut().enumerate() {
+            if *side == 0 {
+                *side = volumes.edge(edge).sign();
+            }
+        }
+        if sides.contains(&-1) && sides.contains(&1) {
+            return None;
+        }
+        match verdict {
+            Verdict::Hit(t) => Some(t),
+            _ => volumes.rounded_distance(),
+        }
     }
 
     /// Returns the rounded distance at which the ray crosses the triangle at or in front of the origin,
@@ -218,24 +256,11 @@ impl Line {
 #[inline(never)]
 fn crossing(ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
     let volumes = Volumes::new(ray, triangle)?;
-    let [u, v, w] = volumes.sides(triangle);
+    let [u, v, w] = volumes.sides();
     let is_crossed = u != 0 && u == v && v == w;
     is_crossed
-        .then(|| round_quotient(&volumes.along_normal(), &volumes.determinant()))
+        .then(|| volumes.rounded_distance())
         .flatten()
-}
-
-/// Returns the rounded distance at which the ray's line crosses the triangle at or in front of the
-/// origin, by exact arithmetic. Does not allocate.
-#[cold]
-#[inline(never)]
-pub(crate) fn distance(ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
-    let volumes = Volumes::new(ray, triangle)?;
-    let signs = volumes.edges().map(|edge| edge.sign());
-    if signs.contains(&-1) && signs.contains(&1) {
-        return None;
-    }
-    round_quotient(&volumes.along_normal(), &volumes.determinant())
 }
 
 type Vector<const N: usize> = [Expansion<N>; 3];
@@ -256,16 +281,19 @@ fn cross(p: &Vector<2>, q: &Vector<2>) -> Vector<16> {
 }
 
 /// The exact values that decide whether a ray hits a triangle.
-struct Volumes {
+struct Volumes<'a> {
     direction: Vec3,
+    triangle: &'a [Vec3; 3],
     /// The corners relative to the origin.
     corners: [Vector<2>; 3],
-    normal: Vector<16>,
 }
 
-impl Volumes {
+/// The first and the second corner of the edges `u`, `v`, `w`.
+const EDGES: [[usize; 2]; 3] = [[2, 1], [0, 2], [1, 0]];
+
+impl<'a> Volumes<'a> {
     /// Prepares exact values; `None` if a coordinate is not finite.
-    fn new(ray: &Ray, triangle: &[Vec3; 3]) -> Option<Self> {
+    fn new(ray: &Ray, triangle: &'a [Vec3; 3]) -> Option<Self> {
         let [a, b, c] = *triangle;
         let origin = ray.origin();
         let direction = ray.direction();
@@ -274,26 +302,27 @@ impl Volumes {
             .all(|point| point.is_finite());
         is_finite.then(|| Self {
             direction,
+            triangle,
             corners: [a, b, c].map(|corner| difference(corner, origin)),
-            normal: cross(&difference(b, a), &difference(c, a)),
         })
     }
 
-    /// Returns `u`, `v` and `w`.
-    fn edges(&self) -> [Expansion<96>; 3] {
-        let [a, b, c] = &self.corners;
-        [(c, b), (a, c), (b, a)].map(|(p, q)| self.along_direction(&cross(p, q)))
+    /// Returns `u`, `v` or `w`.
+    fn edge(&self, edge: usize) -> Expansion<96> {
+        let [first, second] = EDGES[edge];
+        self.along_direction(&cross(&self.corners[first], &self.corners[second]))
     }
 
     /// Returns the sides of the edges on which the ray is, never 0 for an edge that is not parallel to it: the
     /// signs of `u`, `v` and `w` after the origin has moved by (ε, ε², ε³) with an infinitely small ε > 0.
-    fn sides(&self, &[a, b, c]: &[Vec3; 3]) -> [i32; 3] {
-        let [u, v, w] = self.edges().map(|edge| edge.sign());
-        [(u, c, b), (v, a, c), (w, b, a)].map(|(side, from, to)| {
+    fn sides(&self) -> [i32; 3] {
+        [0, 1, 2].map(|number| {
+            let side = self.edge(number).sign();
             if side != 0 {
                 return side;
             }
-            let edge = difference(to, from);
+            let [first, second] = EDGES[number];
+            let edge = difference(self.triangle[second], self.triangle[first]);
             let direction = self.direction.to_array().map(f64::from);
             [(1, 2), (2, 0), (0, 1)]
                 .into_iter()
@@ -308,9 +337,11 @@ impl Volumes {
         })
     }
 
-    /// Returns `d · n`, which is −(u + v + w).
-    fn determinant(&self) -> Expansion<96> {
-        self.along_direction(&self.normal)
+    /// Returns the distance of the triangle's plane, rounded once; `None` as [`round_quotient`].
+    fn rounded_distance(&self) -> Option<f32> {
+        let [a, b, c] = *self.triangle;
+        let normal = cross(&difference(b, a), &difference(c, a));
+        round_quotient(&self.along(&normal), &self.along_direction(&normal))
     }
 
     /// Returns the product of the direction and a vector.
@@ -322,10 +353,10 @@ impl Volumes {
         sum
     }
 
-    /// Returns `A · n`.
-    fn along_normal(&self) -> Expansion<192> {
+    /// Returns the product of the first corner and a vector.
+    fn along(&self, vector: &Vector<16>) -> Expansion<192> {
         let mut sum = Expansion::ZERO;
-        for (component, along) in self.normal.iter().zip(&self.corners[0]) {
+        for (component, along) in vector.iter().zip(&self.corners[0]) {
             sum.add_product(component, along);
         }
         sum

@@ -1,6 +1,6 @@
 //! Triangles, and a watertight ray test: no ray passes through the edge between two triangles.
 
-use crate::exact::{self, Line, Verdict};
+use crate::exact::{Line, Verdict};
 use crate::{Aabb, Ray};
 use bytemuck::{Pod, Zeroable};
 use glam::{Affine3A, DVec3, Vec3};
@@ -150,7 +150,7 @@ impl Triangle {
         let t = match prepared.line.filter(&self.0) {
             Verdict::Miss => return None,
             Verdict::Hit(t) => t,
-            Verdict::Unsure => exact::distance(&prepared.ray, &self.0)?,
+            Verdict::Unsure => prepared.line.distance(&prepared.ray, &self.0)?,
         };
         (prepared.ray.t_min() <= t && t <= t_max).then_some(t)
     }

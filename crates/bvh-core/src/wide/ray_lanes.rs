@@ -49,7 +49,7 @@ impl<L: Lanes> RayLanes<L> {
         unsafe {
             let [x, y, z] = self.inverse;
             let limit = x.abs().min(y.abs()).min(z.abs()) * L::splat(CLAMP);
-            let size = self.reach(largest);
+            let size = self.reach_up_to(largest);
             let shift = size * limit;
             let in_range = size.lt(L::splat(SIZES.end))
                 & L::splat(SIZES.start).le(size)
@@ -80,7 +80,7 @@ impl<L: Lanes> RayLanes<L> {
 
     /// The largest size of a coordinate of the origin, plus `largest`.
     #[inline(always)]
-    fn reach(&self, largest: f32) -> L {
+    fn reach_up_to(&self, largest: f32) -> L {
         let [x, y, z] = self.origin;
         // SAFETY: a value exists.
         x.abs().max(y.abs()).max(z.abs()) + unsafe { L::splat(largest) }
@@ -90,7 +90,7 @@ impl<L: Lanes> RayLanes<L> {
     #[inline(always)]
     pub(crate) fn sheared(&self, [x, y, z]: [usize; 3], largest: f32) -> Pairs<L> {
         let Self { origin, direction, t_min, .. } = self;
-        let reach = self.reach(largest);
+        let reach = self.reach_up_to(largest);
         // SAFETY: a value exists.
         let part = unsafe { L::splat(SINGLE_ERROR) };
         Pairs {
