@@ -12,9 +12,10 @@ impl<L: Lanes> RayLanes<L> {
     pub(super) fn entry(&self, bounds: &Aabb, aabb: &Aabb) -> (L, L::Mask) {
         // SAFETY: values exist.
         unsafe {
-            let reach = self
-                .far_plane(bounds, 0)
-                .max(self.far_plane(bounds, 1).max(self.far_plane(bounds, 2)));
+            let reach = self.far_plane(bounds, 0).max(
+                self.far_plane(bounds, 1)
+                    .max(self.far_plane(bounds, 2)),
+            );
             let reach = reach * L::splat(Slabs::MARGIN);
             let mut entry = self.t_min;
             let mut exit = L::splat(f32::INFINITY);
