@@ -78,7 +78,7 @@
 
 use crate::Ray;
 use crate::expansion::Expansion;
-use crate::triangle::{AXES, largest_axis};
+use crate::ray::{AXES, largest_axis};
 use glam::Vec3;
 
 /// The answer of a layer with rounding errors about a line and a triangle.

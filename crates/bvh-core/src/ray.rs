@@ -196,6 +196,18 @@ pub(crate) const fn pow2(k: i32) -> f32 {
     f32::from_bits(((k + 127) as u32) << 23)
 }
 
+/// The axes of the shear, indexed by the axis of the direction's largest component.
+pub(crate) static AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+
+/// Returns the axis of the direction's largest component, the lowest on ties, without a branch that
+/// the processor could not predict.
+#[inline(always)]
+pub(crate) fn largest_axis(ray: &Ray) -> usize {
+    let [x, y, z] = ray.direction().abs().to_array();
+    let axis = usize::from(y > x);
+    if z > x.max(y) { 2 } else { axis }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -17,18 +17,6 @@ impl From<[[f32; 3]; 3]> for Triangle {
     }
 }
 
-/// The axes of the shear, indexed by the axis of the direction's largest component.
-pub(crate) static AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
-
-/// Returns the axis of the direction's largest component, the lowest on ties, without a branch that
-/// the processor could not predict.
-#[inline(always)]
-pub(crate) fn largest_axis(ray: &Ray) -> usize {
-    let [x, y, z] = ray.direction().abs().to_array();
-    let axis = usize::from(y > x);
-    if z > x.max(y) { 2 } else { axis }
-}
-
 /// A ray prepared for tests against triangles.
 #[derive(Clone, Copy, Debug)]
 pub struct PreparedRay {

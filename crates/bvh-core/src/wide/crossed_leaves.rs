@@ -4,7 +4,7 @@ use super::lanes::{DoubleLanes, Lanes, Mask};
 use super::one_ray::Leaves;
 use super::triangles::TriangleBlock;
 use crate::exact::{ERROR, Line};
-use crate::triangle::AXES;
+use crate::ray::AXES;
 use crate::{Hit, Ray};
 use alloc::vec::Vec;
 

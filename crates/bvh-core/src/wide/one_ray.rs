@@ -9,7 +9,7 @@ use super::node::Child;
 use super::pairs::{Pairs, SINGLE_ERROR, doubled};
 use super::portable::walk;
 use super::triangles::TriangleBlock;
-use crate::triangle::{AXES, largest_axis};
+use crate::ray::{AXES, largest_axis};
 use crate::{Hit, Ray};
 use core::hint::black_box;
 use core::mem::MaybeUninit;

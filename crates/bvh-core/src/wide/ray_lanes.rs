@@ -3,7 +3,7 @@
 use super::box_ray::{CLAMP, MARGIN, SHIFTS, SIZES};
 use super::lanes::{Lanes, Mask};
 use super::pairs::{Pairs, SINGLE_ERROR};
-use crate::triangle::AXES;
+use crate::ray::AXES;
 
 /// One ray per lane. Vectors of three are by axis.
 #[derive(Clone, Copy)]

@@ -11,7 +11,7 @@ use super::pairs::{Pairs, doubled};
 use super::prepared::Prepared;
 use super::triangles::TriangleBlock;
 use crate::Hit;
-use crate::triangle::AXES;
+use crate::ray::AXES;
 use core::mem::MaybeUninit;
 
 /// The traversal of the layout by one ray.
