@@ -11,7 +11,7 @@ const UNIT: u32 = 298;
 const UNIT_F64: u32 = 1074;
 
 /// Returns a finite number in units of 2^-149.
-fn whole(x: f32) -> BigInt {
+pub(crate) fn whole(x: f32) -> BigInt {
     let bits = x.to_bits();
     let exponent = bits >> 23 & 0xff;
     let fraction = bits & 0x7f_ffff;

@@ -1,6 +1,7 @@
 //! Compares every kernel of the wide layout, ray by ray and in batches with both hints, with
 //! testing every triangle; and makes rays where rounding decides.
 
+use crate::exact_distance::is_rounded_distance;
 use crate::promise::{Broken, ensure};
 use crate::tracing::{self, bits, wide_layouts};
 use bvh_core::{Coherence, Distances, Hit, Primitives, Ray, RayComponents, Triangle, WideBvh};
@@ -14,8 +15,9 @@ use rand::{RngExt, SeedableRng};
 /// once, and far more.
 const LENGTHS: [usize; 12] = [1, 3, 16, 15, 17, 33, 7, 23, 25, 65, 257, 1023];
 
-/// Checks P3, bit by bit, for the layouts of two trees and every kernel of this processor. Returns
-/// the number of rays that hit.
+/// Checks that the distances of testing every triangle are the real ones, rounded once, and P3, bit by
+/// bit, for the layouts of two trees and every kernel of this processor. Returns the number of rays
+/// that hit.
 pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
     let objects = Primitives::Triangles(triangles.to_vec());
     let brute_force = Accelerator::new(&objects, Structure::Brute);
@@ -23,6 +25,13 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
         .iter()
         .map(|ray| brute_force.nearest_hit(ray))
         .collect();
+    for (ray, hit) in rays.iter().zip(&expected) {
+        if let Some(hit) = hit {
+            let triangle = &triangles[hit.object as usize];
+            let is_exact = is_rounded_distance(ray, triangle, hit.t);
+            ensure!(is_exact, P3: "{ray:?} gives {hit:?}, whose distance is another one");
+        }
+    }
     for (kernel, wide) in wide_layouts(triangles).map_err(Broken::case)? {
         let nearest: Vec<_> = rays
             .iter()

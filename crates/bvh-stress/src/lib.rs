@@ -22,6 +22,7 @@ mod case;
 mod cell;
 mod checks;
 pub mod exact_area;
+pub mod exact_distance;
 pub mod examine;
 pub mod kernels;
 mod promise;
