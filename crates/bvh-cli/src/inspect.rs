@@ -96,6 +96,9 @@ pub fn inspect(args: &InspectArgs, interrupted: &AtomicBool) -> Result<(), Error
         .as_deref()
         .map(|name| args.files.load(name))
         .transpose()?;
+    if let (Some(named), Some(rays), Some(scene)) = (&args.rays, &rays, &scene) {
+        rays.check(named, scene)?;
+    }
     let (tree, mut facts) = examine(&args.file, scene.as_ref())?;
     if let (Some(rays), Some(scene)) = (rays, &scene) {
         let tests = rays.expected_tests(&tree, scene, interrupted)?;

@@ -3,13 +3,13 @@
 use crate::{Error, recorded};
 use bvh_config::fault;
 use bvh_core::cost::Objective;
-use bvh_core::{Bvh, RayDensity, Segment};
+use bvh_core::{Aabb, Bvh, RayDensity, Segment};
 use bvh_scenes::rays::{RenderedRays, TRAINED, density, of_anything, of_renderer};
 use bvh_scenes::{Scene, read_text};
 use bvh_search::ray_density_through;
 use bvh_terminal::arguments::input_file;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// The rays that train a tree.
@@ -50,6 +50,26 @@ impl Rays {
         fault::parse(&text, &path.to_string_lossy())
             .map(Self::Rendered)
             .map_err(|message| Error::Rays { file: path.to_owned(), message })
+    }
+
+    /// Rejects recorded rays of the file `named` if no ray meets the scene. The search could not find
+    /// that out: it adds rays from anywhere in the scene.
+    pub fn check(&self, named: &str, scene: &Scene) -> Result<(), Error> {
+        let Self::Recorded(segments) = self else { return Ok(()) };
+        let bounds = Aabb::union_of(&scene.boxes);
+        // A search rejects a scene without objects, with a better message.
+        if RayDensity::counts_any(&bounds, segments) != Ok(false) {
+            return Ok(());
+        }
+        let message = format!(
+            "none of the {} segments meets the box of scene {}, {} to {}; accepted: one or more \
+             segments that do",
+            segments.len(),
+            scene.name,
+            bounds.min,
+            bounds.max
+        );
+        Err(Error::Rays { file: PathBuf::from(named), message })
     }
 
     /// Returns the rays' density in a scene, or `None` soon after `interrupted` becomes true; `tree`

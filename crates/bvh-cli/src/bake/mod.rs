@@ -273,6 +273,9 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let scene = args.files.load(&args.scene)?;
     let objects = scene.boxes.len();
     plan::check_memory(&scene.name, objects, most_references, plan::BYTES_PER_LOADED)?;
+    if let (Some(named), Some(rays)) = (&args.rays, &plan.rays) {
+        rays.check(named, &scene)?;
+    }
     if args.explain {
         let text = explain::scene(&scene).map_err(Error::search(&scene.name, "--explain"))?;
         print_line(&text);

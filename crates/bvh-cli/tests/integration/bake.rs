@@ -92,6 +92,20 @@ fn a_bake_for_rays_saves_the_number_of_visits_of_each_node() {
     }
 }
 
+#[test]
+fn recorded_rays_that_all_miss_the_scene_are_rejected_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let away = "1000,1000,1000,1001,1002,1003\n".repeat(9);
+    fs::write(at.join("away.csv"), &away).unwrap();
+    fs::write(at.join("one.csv"), away + "-50,1,0.5,50,1,0.5\n").unwrap();
+    let args = ["bake", "escher", "--budget=100s", "--out=x.bvh", "--rays=away.csv"];
+    let parts = ["away.csv: none of the 9 segments meets the box of scene escher", "accepted: one"];
+    refused(at, &args, 2, &parts);
+    assert_eq!(names(at), ["away.csv", "one.csv"]);
+    said(at, &["bake", "escher", "--budget=10kwork", "--out=x.bvh", "--rays=one.csv"]);
+}
+
 /// A walk through escher's stairs.
 const WALK: &str = "count = 5000
 bounces = 2

@@ -83,6 +83,46 @@ pub struct RayDensity {
     area_weight: f64,
 }
 
+/// The place of a grid in the world.
+struct Grid {
+    /// The lower corner of the grid, in world units.
+    low: DVec3,
+    cells_per_unit: DVec3,
+}
+
+impl Grid {
+    /// Makes the grid of a scene with these bounds.
+    fn new(bounds: &Aabb) -> Result<Self, DensityError> {
+        let min = bounds.min.as_dvec3();
+        let max = bounds.max.as_dvec3();
+        let extent = max - min;
+        if !(min.is_finite() && max.is_finite() && extent.min_element() >= 0.0) {
+            return Err(DensityError::Bounds);
+        }
+        // A flat scene gets some thickness, so that rays cross its cells.
+        let thickness = (extent.max_element() / 1024.0).max(f64::MIN_POSITIVE * 1e20);
+        let padding = (DVec3::splat(thickness) - extent).max(DVec3::ZERO);
+        let cells_per_unit = DVec3::splat(CELLS as f64) / (extent + padding);
+        Ok(Self { low: min - 0.5 * padding, cells_per_unit })
+    }
+
+    /// Returns the ends of a segment in cells, extended by `extension` cells along the segment's main
+    /// axis; `None` if the segment is not finite.
+    fn in_cells(&self, segment: &Segment, extension: f64) -> Option<[DVec3; 2]> {
+        let start = DVec3::from(segment.from.map(f64::from));
+        let end = DVec3::from(segment.to.map(f64::from));
+        if !start.is_finite() || !end.is_finite() {
+            return None;
+        }
+        let from = (start - self.low) * self.cells_per_unit;
+        let to = (end - self.low) * self.cells_per_unit;
+        let length = (to - from).abs().max_element();
+        // A segment of length 0 has no direction and is not extended.
+        let direction = (to - from) / length.max(f64::MIN_POSITIVE);
+        Some([from - extension * direction, to + extension * direction])
+    }
+}
+
 /// The signed counts at the eight grid points of a cell, in half a cache line.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
@@ -157,44 +197,40 @@ impl RayDensity {
         if segments.is_empty() || segments.len() > Self::MOST_SEGMENTS {
             return Err(DensityError::Count { segments: segments.len() });
         }
-        let min = bounds.min.as_dvec3();
-        let max = bounds.max.as_dvec3();
-        let extent = max - min;
-        if !(min.is_finite() && max.is_finite() && extent.min_element() >= 0.0) {
-            return Err(DensityError::Bounds);
-        }
-        // A flat scene gets some thickness, so that rays cross its cells.
-        let thickness = (extent.max_element() / 1024.0).max(f64::MIN_POSITIVE * 1e20);
-        let padding = (DVec3::splat(thickness) - extent).max(DVec3::ZERO);
-        let low = min - 0.5 * padding;
-        let cells_per_unit = DVec3::splat(CELLS as f64) / (extent + padding);
+        let grid = Grid::new(bounds)?;
         let mut crossings = Crossings::new();
         for (index, segment) in segments.iter().enumerate() {
-            let start = DVec3::from(segment.from.map(f64::from));
-            let end = DVec3::from(segment.to.map(f64::from));
-            if !start.is_finite() || !end.is_finite() {
-                return Err(DensityError::NotFinite { index });
-            }
-            let from = (start - low) * cells_per_unit;
-            let to = (end - low) * cells_per_unit;
-            let length = (to - from).abs().max_element();
-            // A segment of length 0 has no direction and is not extended.
-            let direction = (to - from) / length.max(f64::MIN_POSITIVE);
-            crossings.record(from - extension * direction, to + extension * direction);
+            let [from, to] = grid
+                .in_cells(segment, extension)
+                .ok_or(DensityError::NotFinite { index })?;
+            crossings.record(from, to);
         }
         if crossings.segments == 0 {
             return Err(DensityError::NoneMeets);
         }
         let entries_of_root = FRACTIONS_OF_ENTRY * f64::from(crossings.segments);
         Ok(Self {
-            low,
-            scale: cells_per_unit * f64::from(FRACTIONS),
+            low: grid.low,
+            scale: grid.cells_per_unit * f64::from(FRACTIONS),
             corners: crossings.corner_tables(),
             cells: crossings.cell_table(),
             segments: crossings.segments,
             entry_weight: (1.0 - area_weight) * bounds.half_area() / entries_of_root,
             area_weight,
         })
+    }
+
+    /// Returns whether [`of_rays`](Self::of_rays) would count any of these segments, without making
+    /// the density. O(segments before the first that counts).
+    ///
+    /// # Errors
+    /// Returns a [`DensityError`] if the bounds are empty or not finite.
+    pub fn counts_any(bounds: &Aabb, segments: &[Segment]) -> Result<bool, DensityError> {
+        let grid = Grid::new(bounds)?;
+        Ok(segments
+            .iter()
+            .filter_map(|segment| grid.in_cells(segment, LENGTHENED))
+            .any(|[from, to]| Crossings::would_record(from, to)))
     }
 
     /// Returns the number of segments that meet the bounds.
