@@ -7,6 +7,7 @@
 
 use crate::{Aabb, Bvh, Node, NodeKind, PackedAabb};
 
+pub(crate) use crate::layout_cost::call_in_turn;
 pub use crate::layout_cost::{
     CallBoth, LayoutCost, LayoutTree, layout_area, layout_cost, layout_measure, layout_row,
 };

@@ -122,7 +122,7 @@ pub fn layout_measure(tree: &Bvh, measure: &dyn Measure) -> f64 {
 }
 
 /// Calls two functions one after the other.
-fn call_in_turn(first: &mut (dyn FnMut() + Send), second: &mut (dyn FnMut() + Send)) {
+pub(crate) fn call_in_turn(first: &mut (dyn FnMut() + Send), second: &mut (dyn FnMut() + Send)) {
     first();
     second();
 }

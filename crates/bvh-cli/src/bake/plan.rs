@@ -5,7 +5,7 @@ use super::starts::{Division, greedy};
 use super::watch::{Interrupted, Watch};
 use crate::Error;
 use crate::rays::Rays;
-use bvh_core::cost::{Measure, Objective};
+use bvh_core::cost::{CallBoth, Measure, Objective};
 use bvh_core::file::{self, FileError, Header, Origin};
 use bvh_core::{Aabb, Bvh, Node, RayDensity, Triangle, validate_references};
 use bvh_scenes::tree_file::TreeFileError;
@@ -272,8 +272,9 @@ impl Bake<'_> {
             visits: &visits,
             objective: self.plan.objective,
         };
+        let both: CallBoth = &|first, second| _ = rayon::join(first, second);
         let sections =
-            file::sections(tree, boxes, cost, &origin).map_err(TreeFileError::of(path))?;
+            file::sections(tree, boxes, cost, &origin, both).map_err(TreeFileError::of(path))?;
         let sections = sections.each_ref().map(|section| &**section);
         reserved.write_sections(&sections)?;
         let bytes = sections.iter().map(|section| section.len()).sum();
@@ -300,10 +301,13 @@ impl Bake<'_> {
         const NODES_PER_TASK: usize = 1 << 16;
         let Some(density) = &self.density else { return Vec::new() };
         let root = tree.root_aabb().unwrap_or(Aabb::EMPTY);
-        tree.nodes
+        let visits: Vec<Vec<f32>> = tree
+            .nodes
             .par_chunks(NODES_PER_TASK)
-            .flat_map_iter(|nodes| density.visits_of(&root, nodes))
-            .collect()
+            .map(|nodes| density.visits_of(&root, nodes))
+            .collect();
+        // One copy of whole chunks; an iterator over all of them would move number by number.
+        visits.concat()
     }
 
     /// Names the cost that the search minimises.

@@ -80,8 +80,8 @@ pub use error::FileError;
 pub use header::Header;
 pub use layout::{WideView, load_layout, save_layout, view_layout};
 
-use crate::cost::Objective;
-use crate::validate::{FastPath, Leaves, check_structure, find_fault};
+use crate::cost::{CallBoth, Objective, call_in_turn};
+use crate::validate::{FastPath, Leaves, check_structure, find_fault, for_each};
 use crate::{Aabb, Bvh, BvhView, Clip, InvalidBvh, Node, validate, validate_references};
 use alloc::borrow::Cow;
 use alloc::vec::Vec;
@@ -118,7 +118,7 @@ pub fn save(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, File
 /// Returns the file of a valid tree.
 fn saved(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, FileError> {
     let cost = origin.objective.cost(tree);
-    Ok(sections(tree, boxes, cost, origin)?.concat())
+    Ok(sections(tree, boxes, cost, origin, &call_in_turn)?.concat())
 }
 
 /// Returns the file of a tree whose `objects` may be divided among leaves. Rejects a tree that is
@@ -145,17 +145,35 @@ pub fn body(tree: &Bvh) -> [Cow<'_, [u8]>; 2] {
 ///
 /// The caller has [validated](validate_references()) the tree and knows its cost under the origin's
 /// objective. Neither is checked here, because each takes as long as everything else, and several
-/// threads can do both at once. Rejects visits that no measure gives.
+/// threads can do both at once. Passes to `both` the check of the visits with the scene's checksum, and
+/// the file's checksum. Rejects visits that no measure gives.
 pub fn sections<'a>(
     tree: &'a Bvh,
     boxes: &[Aabb],
     cost: f64,
     origin: &Origin<'a>,
+    both: CallBoth,
 ) -> Result<[Cow<'a, [u8]>; 4], FileError> {
     let Origin { method, seed, work, objective, visits } = *origin;
-    if !visits.is_empty() {
-        check_visits(&tree.nodes, visits)?;
-    }
+    let [nodes, prim_ids] = body(tree);
+    let visit_bytes = le_bytes(visits);
+    let mut checked = Ok(());
+    let mut scene = 0;
+    let mut hasher = Hasher::new();
+    both(
+        &mut || {
+            if !visits.is_empty() {
+                checked = check_visits(&tree.nodes, visits);
+            }
+            scene = boxes_checksum(boxes);
+        },
+        &mut || {
+            for section in [&nodes, &prim_ids, &visit_bytes] {
+                hasher.update(section);
+            }
+        },
+    );
+    checked?;
     let header = Header {
         nodes: tree.nodes.len(),
         objects: boxes.len(),
@@ -164,21 +182,15 @@ pub fn sections<'a>(
         cost,
         seed,
         work,
-        scene: boxes_checksum(boxes),
+        scene,
         bounds: tree.root_aabb().unwrap_or(Aabb::EMPTY),
         method: method.into(),
         has_visits: !visits.is_empty(),
     };
     let mut header = header.encode()?;
-    let [nodes, prim_ids] = body(tree);
-    let visits = le_bytes(visits);
-    let mut hasher = Hasher::new();
-    for section in [&nodes, &prim_ids, &visits] {
-        hasher.update(section);
-    }
     hasher.update(&header[..Header::CHECKSUM.start]);
     header[Header::CHECKSUM].copy_from_slice(&hasher.finalize().to_le_bytes());
-    Ok([header.into(), nodes, prim_ids, visits])
+    Ok([header.into(), nodes, prim_ids, visit_bytes])
 }
 
 /// Rejects visits that no measure can give. Measures are monotone, so no child has more visits than
@@ -190,12 +202,16 @@ fn check_visits(nodes: &[Node], visits: &[f32]) -> Result<(), FileError> {
     if !visits.is_empty() {
         check_range(visits, 0, 1.0)?;
     }
-    for (parent, node) in nodes.iter().enumerate() {
-        for child in node.children() {
-            check_range(visits, child, visits[parent])?;
-        }
-    }
-    Ok(())
+    for_each(
+        nodes,
+        |node| !node.is_leaf(),
+        |parent, node| {
+            for child in node.children() {
+                check_range(visits, child, visits[parent])?;
+            }
+            Ok(())
+        },
+    )
 }
 
 /// Rejects visits of a node that are not between 0 and `most`.

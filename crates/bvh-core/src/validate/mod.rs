@@ -58,14 +58,38 @@ pub enum InvalidBvh {
 pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
     check_structure(tree.into(), boxes.len())?;
     check_nesting(tree)?;
-    for_each(tree, Node::is_leaf, |index, leaf| {
-        for &object in &tree.prim_ids[leaf.prims()] {
-            if !leaf.aabb.contains(&boxes[object as usize]) {
-                return Err(InvalidBvh::ObjectOutside { node: index, object: object as usize });
+    check_objects(tree, boxes)
+}
+
+/// Rejects a tree in which an object's box is not inside the object's leaf's box.
+fn check_objects(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
+    const AT_ONCE: usize = 64;
+    let mut references = Vec::with_capacity(AT_ONCE);
+    let mut copies = Vec::with_capacity(AT_ONCE);
+    let mut check = |references: &mut Vec<(usize, u32)>| {
+        // The boxes are anywhere in memory. Nothing waits for a copy, so the processor loads many of
+        // them at once.
+        copies.clear();
+        for &(_, object) in &*references {
+            copies.push(boxes[object as usize]);
+        }
+        for ((node, object), aabb) in references.drain(..).zip(&copies) {
+            if !tree.nodes[node].aabb.contains(aabb) {
+                return Err(InvalidBvh::ObjectOutside { node, object: object as usize });
             }
         }
         Ok(())
-    })
+    };
+    for_each(&tree.nodes, Node::is_leaf, |index, leaf| {
+        for &object in &tree.prim_ids[leaf.prims()] {
+            references.push((index, object));
+            if references.len() == AT_ONCE {
+                check(&mut references)?;
+            }
+        }
+        Ok(())
+    })?;
+    check(&mut references)
 }
 
 /// Checks a tree in which an object may be in several leaves. The boxes of these leaves together
@@ -117,7 +141,7 @@ pub fn validate_references(
 /// Rejects a tree in which a child's box is not inside its parent's box.
 fn check_nesting(tree: &Bvh) -> Result<(), InvalidBvh> {
     let is_inner = |node: &Node| !node.is_leaf();
-    for_each(tree, is_inner, |index, node| {
+    for_each(&tree.nodes, is_inner, |index, node| {
         for child in node.children() {
             if !node.aabb.contains(&tree.nodes[child].aabb) {
                 return Err(InvalidBvh::ChildOutside { node: index, child });
@@ -127,15 +151,15 @@ fn check_nesting(tree: &Bvh) -> Result<(), InvalidBvh> {
     })
 }
 
-/// Passes every node of one kind to `check`, with its index.
-fn for_each(
-    tree: &Bvh,
+/// Passes every node of one kind to `check`, with its index in `nodes`.
+pub(crate) fn for_each<E>(
+    nodes: &[Node],
     is_chosen: impl Fn(&Node) -> bool,
-    mut check: impl FnMut(usize, &Node) -> Result<(), InvalidBvh>,
-) -> Result<(), InvalidBvh> {
+    mut check: impl FnMut(usize, &Node) -> Result<(), E>,
+) -> Result<(), E> {
     const AT_ONCE: usize = 64;
     let mut chosen = [0; AT_ONCE];
-    for (chunk, nodes) in tree.nodes.chunks(AT_ONCE).enumerate() {
+    for (chunk, nodes) in nodes.chunks(AT_ONCE).enumerate() {
         // The processor cannot predict the kind of a node, and a wrong prediction ends the loads that
         // it has begun ahead. The nodes are therefore chosen without a branch.
         let mut count = 0;

@@ -134,7 +134,9 @@ impl Improvement<'_, '_, '_, '_> {
                     run.count(tally);
                 }
                 rounds += 1;
-                if by_layout && rounds % ROUNDS_PER_LOOK == 0
+                // A cancelled search offers its tree below, once.
+                let is_cancelled = run.stopped() == Some(StopReason::Cancelled);
+                if by_layout && rounds % ROUNDS_PER_LOOK == 0 && !is_cancelled
                     || !by_layout && tree.area() < best.area() * (1.0 - WORTH_AN_EVENT)
                 {
                     best.offer(tree, run);

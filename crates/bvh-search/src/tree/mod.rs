@@ -124,6 +124,13 @@ impl<M: Metric> Working<M> {
         self.restart(area);
     }
 
+    /// Adds to the area what moves in copies of subtrees have added, to a rounding error. Their nodes
+    /// have the stamp 0.
+    pub fn add_area(&mut self, added: f64) {
+        self.begin();
+        self.area.add(added);
+    }
+
     /// The root, unless there are no objects.
     pub fn root(&self) -> Option<u32> {
         Some(self.nodes[0].children[0]).filter(|&root| root != NONE)
