@@ -74,7 +74,8 @@ pub(crate) unsafe fn trace<K: Instructions>(
     // SAFETY: the caller's promises; there is room for the last lanes.
     unsafe {
         for first in (0..rays.len()).step_by(K::Rays::N) {
-            let lanes = rays.lanes_up_to::<K::Rays>(first, rays.len());
+            let source = Source::Rays(rays);
+            let lanes = source.lanes_up_to::<K::Rays>(first, rays.len());
             let ready = Ready::new(lanes, wide.largest);
             ready.write(first as u32, prepared[first].as_mut_ptr());
             let entered = ready.enter(&wide.bounds);

@@ -1,12 +1,12 @@
 //! Batches of rays: packets where the rays are coherent, otherwise many rays in flight.
 
-use super::answer::Answers;
+use super::answer::Batch;
 use super::coherence::Coherence;
+use super::in_flight;
 use super::instructions::Instructions;
 use super::lanes::Lanes;
 use super::layout::WideBvh;
 use super::packet::Packet;
-use super::source::Source;
 use core::ops::Range;
 
 /// The minimum run of rays between packets that is traced in flight rather than ray by ray.
@@ -18,18 +18,16 @@ const MANY: usize = 128;
 /// The processor has the instructions of `K`, and the caller is compiled with them; there is an answer for every ray; the
 /// references of `wide` are sound and its `stack_need` is at most [`STACK`](super::kernel::STACK).
 #[inline(always)]
-pub(crate) unsafe fn trace<K: Instructions, A: Answers>(
+pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
     wide: &WideBvh,
-    rays: impl Source,
-    answers: &mut A,
+    batch: &mut Batch,
     coherence: Coherence,
 ) {
+    let rays = batch.rays;
     // SAFETY: the caller's promises.
     unsafe {
-        // A packet begins at a node.
-        let is_instance = A::IN_INSTANCES && wide.root.is_none_or(|root| !root.is_node());
-        if coherence == Coherence::Incoherent || is_instance {
-            return K::in_flight(wide, rays, answers, 0..rays.len());
+        if coherence == Coherence::Incoherent {
+            return in_flight::trace::<K, ANY>(wide, batch, 0..rays.len());
         }
         let mut packet = Packet::<K>::new();
         // The rays from `first_of_rest` up to `next` fit no packet, and wait for `rest`.
@@ -39,38 +37,38 @@ pub(crate) unsafe fn trace<K: Instructions, A: Answers>(
             let lanes = rays.lanes::<K::Rays>(next);
             if let Some(scale) = lanes.cohere(wide.largest) {
                 if !packet.takes(lanes.octant()) {
-                    packet.trace(wide, answers);
+                    packet.trace::<ANY>(wide, batch);
                 }
                 packet.add(lanes, scale, next);
-                rest::<K, A>(wide, rays, answers, first_of_rest..next);
+                rest::<K, ANY>(wide, batch, first_of_rest..next);
                 first_of_rest = next + K::Rays::N;
             }
             next += K::Rays::N;
         }
         if !packet.is_empty() {
-            packet.trace(wide, answers);
+            packet.trace::<ANY>(wide, batch);
         }
-        rest::<K, A>(wide, rays, answers, first_of_rest..rays.len());
+        rest::<K, ANY>(wide, batch, first_of_rest..rays.len());
     }
 }
 
 /// Traces the rays between two packets. A few rays at the edge of something are nearly coherent and
 /// faster one by one; a long run of them is faster in flight.
 #[inline(always)]
-unsafe fn rest<K: Instructions, A: Answers>(
+unsafe fn rest<K: Instructions, const ANY: bool>(
     wide: &WideBvh,
-    rays: impl Source,
-    answers: &mut A,
+    batch: &mut Batch,
     numbers: Range<usize>,
 ) {
     // One by one, rays come to instances much more slowly.
-    let is_many = numbers.len() >= MANY || A::IN_INSTANCES && !numbers.is_empty();
+    let is_many = numbers.len() >= MANY || batch.scene.is_some() && !numbers.is_empty();
     if is_many {
         // SAFETY: the caller's promises.
-        unsafe { K::in_flight(wide, rays, answers, numbers) };
+        unsafe { in_flight::trace::<K, ANY>(wide, batch, numbers) };
     } else {
         for number in numbers {
-            answers.alone(number, wide, &rays.ray(number));
+            let ray = batch.rays.ray(number);
+            batch.alone::<ANY>(number, wide, &ray);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The public calls for batches of rays, one after the other in memory or by component.
 
-use super::answer::{Answers, Filtered};
+use super::answer::{Accept, Batch};
 use super::coherence::Coherence;
 use super::layout::WideBvh;
 use super::source::Source;
@@ -14,7 +14,7 @@ impl WideBvh {
     /// If `rays` and `hits` are not equally many.
     pub fn nearest_hits(&self, rays: &[Ray], mut hits: &mut [Hit], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "a hit for every ray");
-        self.trace(rays, &mut hits, coherence);
+        self.trace::<false>(Batch::new(Source::Rays(rays), &mut hits), coherence);
     }
 
     /// [`any_hit`](Self::any_hit) of every ray, into as many `hits`.
@@ -23,7 +23,7 @@ impl WideBvh {
     /// If `rays` and `hits` are not equally many.
     pub fn any_hits(&self, rays: &[Ray], mut hits: &mut [bool], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "an answer for every ray");
-        self.trace(rays, &mut hits, coherence);
+        self.trace::<true>(Batch::new(Source::Rays(rays), &mut hits), coherence);
     }
 
     /// [`nearest_hit_where`](Self::nearest_hit_where) of every ray, into as many `hits`. `accept` sees
@@ -48,12 +48,13 @@ impl WideBvh {
     pub fn nearest_hits_where(
         &self,
         rays: &[Ray],
-        hits: &mut [Hit],
+        mut hits: &mut [Hit],
         coherence: Coherence,
         mut accept: impl FnMut(usize, Hit) -> bool,
     ) {
         assert_eq!(rays.len(), hits.len(), "a hit for every ray");
-        self.trace_nearest_where(rays, hits, coherence, &mut accept);
+        let batch = Batch::new(Source::Rays(rays), &mut hits);
+        self.trace_where::<false>(batch, &mut accept, coherence);
     }
 
     /// [`any_hit_where`](Self::any_hit_where) of every ray, as
@@ -64,33 +65,24 @@ impl WideBvh {
     pub fn any_hits_where(
         &self,
         rays: &[Ray],
-        hits: &mut [bool],
+        mut hits: &mut [bool],
         coherence: Coherence,
         mut accept: impl FnMut(usize, Hit) -> bool,
     ) {
         assert_eq!(rays.len(), hits.len(), "an answer for every ray");
-        self.trace_any_where(rays, hits, coherence, &mut accept);
+        let batch = Batch::new(Source::Rays(rays), &mut hits);
+        self.trace_where::<true>(batch, &mut accept, coherence);
     }
 
-    // Not generic, so that the kernels are compiled here and not by every crate that calls them.
-    fn trace_nearest_where(
+    // Not generic over the function, so that the kernels are compiled here and not by every crate that
+    // calls them.
+    fn trace_where<'a, const ANY: bool>(
         &self,
-        rays: &[Ray],
-        answers: &mut [Hit],
+        batch: Batch<'a>,
+        accept: &'a mut Accept<'a>,
         coherence: Coherence,
-        accept: &mut dyn FnMut(usize, Hit) -> bool,
     ) {
-        self.trace(rays, &mut Filtered { answers, accept }, coherence);
-    }
-
-    fn trace_any_where(
-        &self,
-        rays: &[Ray],
-        answers: &mut [bool],
-        coherence: Coherence,
-        accept: &mut dyn FnMut(usize, Hit) -> bool,
-    ) {
-        self.trace(rays, &mut Filtered { answers, accept }, coherence);
+        self.trace::<ANY>(Batch { accept: Some(accept), ..batch }, coherence);
     }
 
     /// [`nearest_hits`](Self::nearest_hits) of rays by component, whose answers are by component, too: infinite and `u32::MAX` for a ray that
@@ -107,7 +99,8 @@ impl WideBvh {
     ) {
         assert_eq!(rays.len(), distances.len(), "a distance for every ray");
         assert_eq!(rays.len(), objects.len(), "an object for every ray");
-        self.trace(rays, &mut (distances, objects), coherence);
+        let mut answers = (distances, objects);
+        self.trace::<false>(Batch::new(Source::Components(rays), &mut answers), coherence);
     }
 
     /// [`any_hits`](Self::any_hits) of rays by component.
@@ -121,17 +114,19 @@ impl WideBvh {
         coherence: Coherence,
     ) {
         assert_eq!(rays.len(), hits.len(), "an answer for every ray");
-        self.trace(rays, &mut hits, coherence);
+        self.trace::<true>(Batch::new(Source::Components(rays), &mut hits), coherence);
     }
 
-    #[inline]
-    fn trace<A: Answers>(&self, rays: impl Source, answers: &mut A, coherence: Coherence) {
+    /// Answers a batch by the layout's kernel.
+    pub(super) fn trace<const ANY: bool>(&self, mut batch: Batch, coherence: Coherence) {
         if self.kernel != Kernel::Portable {
-            // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
-            return unsafe { vector::trace(self, rays, answers, coherence) };
+            // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` and
+            // `lay_out_instances` saw.
+            return unsafe { vector::trace::<ANY>(self, &mut batch, coherence) };
         }
-        for number in 0..rays.len() {
-            answers.alone(number, self, &rays.ray(number));
+        for number in 0..batch.rays.len() {
+            let ray = batch.rays.ray(number);
+            batch.alone::<ANY>(number, self, &ray);
         }
     }
 }

@@ -94,6 +94,15 @@ impl<L: Lanes> Culling<L> {
         }
     }
 
+    /// Returns the planes of a box that contains everything, by axis.
+    #[inline(always)]
+    pub(super) fn all_space(&self) -> [[f32; 2]; 3] {
+        let far = self
+            .margin
+            .map(|margin| f32::INFINITY.copysign(margin));
+        [[-far[0], far[0]], [-far[1], far[1]], [-far[2], far[2]]]
+    }
+
     /// Returns the near and the far plane of the child in a lane, by axis, moved by the margin.
     ///
     /// # Safety

@@ -16,12 +16,11 @@
 
 mod crossing;
 
-use super::answer::Answers;
-use super::instructions::Instructions;
+use super::answer::Batch;
+use super::instructions::{Instructions, Part};
 use super::lanes::Lanes;
 use super::layout::WideBvh;
 use super::prepared::{Prepared, Ready};
-use super::source::Source;
 use super::traversal::{self, Traversal};
 use core::marker::PhantomData;
 use core::mem::MaybeUninit;
@@ -41,41 +40,55 @@ const MOST: usize = 1 << 31;
 /// # Safety
 /// As for [`batch::trace`](super::batch::trace).
 #[inline(always)]
-pub(crate) unsafe fn trace<K: Instructions, A: Answers>(
+pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
     wide: &WideBvh,
-    rays: impl Source,
-    answers: &mut A,
+    batch: &mut Batch,
     numbers: Range<usize>,
 ) {
     const { assert!(K::FLIGHT <= FLIGHT && K::Rays::N <= RAYS) };
     // No triangle has an area. The flight below expects that every ray visits something.
     if wide.root.is_none() {
         for number in numbers {
-            answers.write(number, f32::INFINITY, u32::MAX);
+            batch.write(number, f32::INFINITY, u32::MAX, u32::MAX);
         }
         return;
     }
+    let flight = Flight::<K, ANY> {
+        wide,
+        batch,
+        from: numbers.start,
+        end: numbers.start,
+        ready: [MaybeUninit::uninit(); RAYS],
+        waiting: 0,
+        at_nodes: List::EMPTY,
+        at_leaves: List::EMPTY,
+        at_end: List::EMPTY,
+        idle: List::EMPTY,
+        instructions: PhantomData,
+    };
     // SAFETY: the caller's promises.
-    unsafe {
+    unsafe { K::call(Trace { flight, last: numbers.end }) };
+}
+
+/// A flight of all rays up to the last number.
+struct Trace<'a, 'b, K, const ANY: bool> {
+    flight: Flight<'a, 'b, K, ANY>,
+    last: usize,
+}
+
+impl<K: Instructions, const ANY: bool> Part for Trace<'_, '_, K, ANY> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run(self) {
+        let Self { mut flight, last } = self;
         let mut traversals = MaybeUninit::<[Traversal; FLIGHT]>::uninit();
-        let mut flight = Flight {
-            wide,
-            rays,
-            answers,
-            from: numbers.start,
-            end: numbers.start,
-            ready: [MaybeUninit::uninit(); RAYS],
-            waiting: 0,
-            at_nodes: List::EMPTY,
-            at_leaves: List::EMPTY,
-            at_end: List::EMPTY,
-            instructions: PhantomData::<K>,
-        };
         // Rays are numbered by 32 bits.
-        while flight.end < numbers.end {
+        while flight.end < last {
             flight.from = flight.end;
-            flight.end = numbers.end.min(flight.from + MOST);
-            flight.trace(traversals.as_mut_ptr().cast());
+            flight.end = last.min(flight.from + MOST);
+            // SAFETY: the caller's promises.
+            unsafe { flight.trace(traversals.as_mut_ptr().cast()) };
         }
     }
 }
@@ -106,11 +119,10 @@ impl List {
 }
 
 /// The rays of a batch that are in flight, that are prepared, and that are neither.
-struct Flight<'a, K, S, A> {
+struct Flight<'a, 'b, K, const ANY: bool> {
     /// The layout at whose root rays start.
     wide: &'a WideBvh,
-    rays: S,
-    answers: &'a mut A,
+    batch: &'a mut Batch<'b>,
     /// The numbers of the rays that have not been prepared.
     from: usize,
     end: usize,
@@ -120,10 +132,12 @@ struct Flight<'a, K, S, A> {
     at_nodes: List,
     at_leaves: List,
     at_end: List,
+    /// The places of rays whose answers are written.
+    idle: List,
     instructions: PhantomData<K>,
 }
 
-impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
+impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
     /// Traces all rays.
     #[inline(always)]
     unsafe fn trace(&mut self, traversals: *mut Traversal) {
@@ -131,50 +145,54 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
         unsafe {
             let first = self.from;
             for i in 0..K::FLIGHT {
-                self.start(first, traversals.add(i));
+                self.idle.append(traversals.add(i), true);
             }
-            if A::IN_INSTANCES {
-                while self.at_nodes.count + self.at_leaves.count + self.at_end.count > 0 {
-                    self.visit_nodes();
-                    if self.at_leaves.count >= K::FLIGHT / 2 || self.at_nodes.count == 0 {
-                        self.visit_leaves(first);
-                    }
-                    if self.at_end.count >= K::Rays::N || self.at_nodes.count == 0 {
-                        self.cross(first);
-                    }
+            loop {
+                self.start_idle(first);
+                if self.at_nodes.count + self.at_leaves.count + self.at_end.count == 0 {
+                    return;
                 }
-                return;
-            }
-            while self.at_nodes.count + self.at_leaves.count > 0 {
                 self.visit_nodes();
-                if self.at_leaves.count >= K::FLIGHT / 2 || self.at_nodes.count == 0 {
+                let leaves_wait = self.at_leaves.count >= K::FLIGHT / 2 || self.at_nodes.count == 0;
+                if leaves_wait {
                     self.visit_leaves(first);
-                    self.finish(first);
+                }
+                if self.batch.scene.is_none() {
+                    if leaves_wait {
+                        self.finish(first);
+                    }
+                } else if self.at_end.count >= K::Rays::N || self.at_nodes.count == 0 {
+                    self.cross(first);
                 }
             }
         }
     }
 
-    /// Starts the next ray, if there is one; number 0 is ray number `first` of its batch.
+    /// Starts the next rays in the idle places, as far as there are rays; number 0 is ray number `first`
+    /// of its batch.
     #[inline(always)]
-    unsafe fn start(&mut self, first: usize, traversal: *mut Traversal) {
-        // SAFETY: `ready` is written where `waiting` has a bit.
-        unsafe {
+    unsafe fn start_idle(&mut self, first: usize) {
+        let count = core::mem::replace(&mut self.idle.count, 0);
+        for i in 0..count {
             while self.waiting == 0 {
                 if self.from == self.end {
                     return;
                 }
-                self.prepare(first);
+                // SAFETY: the caller's promises.
+                unsafe { self.prepare(first) };
             }
             let next = self.waiting.trailing_zeros() as usize;
             self.waiting &= self.waiting - 1;
-            let traversal = &mut *traversal;
-            let ray = self.ready.get_unchecked(next).assume_init();
-            traversal.start(ray, self.wide);
-            if A::IN_INSTANCES {
-                traversal.start_outside();
+            // SAFETY: so many places are idle; `ready` is written where `waiting` had a bit.
+            unsafe {
+                let traversal = &mut *self.idle.get(i);
+                let ray = self.ready.get_unchecked(next).assume_init();
+                traversal.start(ray, self.wide);
+                if self.batch.scene.is_some() {
+                    traversal.start_outside();
+                }
+                self.enlist(traversal);
             }
-            self.enlist(traversal);
         }
     }
 
@@ -185,10 +203,10 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
         let count = (self.end - from).min(K::Rays::N);
         self.from += count;
         let there = u32::MAX >> (32 - count);
+        let rays = self.batch.rays;
         // SAFETY: the caller's promises; `ready` has room for sixteen.
         let in_range = unsafe {
-            let ready =
-                Ready::new(self.rays.lanes_up_to::<K::Rays>(from, self.end), self.wide.largest);
+            let ready = Ready::new(rays.lanes_up_to::<K::Rays>(from, self.end), self.wide.largest);
             self.waiting = there & ready.in_range & ready.enter(&self.wide.bounds);
             if self.waiting != 0 {
                 ready.write((from - first) as u32, self.ready.as_mut_ptr().cast());
@@ -201,11 +219,11 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             let number = from + lane as usize;
             others &= others - 1;
             if in_range >> lane & 1 == 0 {
-                self.answers
-                    .alone(number, self.wide, &self.rays.ray(number));
+                self.batch
+                    .alone::<ANY>(number, self.wide, &rays.ray(number));
             } else {
-                self.answers
-                    .write(number, f32::INFINITY, u32::MAX);
+                self.batch
+                    .write(number, f32::INFINITY, u32::MAX, u32::MAX);
             }
         }
     }
@@ -246,12 +264,13 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
                 let traversal = &mut *self.at_nodes.get(i);
                 let node = &*traversal.nodes.add(traversal.child.index());
                 let entry = entries.get_unchecked(i).assume_init();
-                traversal.enter::<K, A>(node, entry, *masks.get_unchecked(i));
+                traversal.enter::<K, ANY>(node, entry, *masks.get_unchecked(i));
             }
             self.at_nodes.count = 0;
+            let placed = self.placed();
             for i in 0..count {
                 let traversal = &mut *self.at_nodes.get(i);
-                traversal.fetch::<K>(self.placed());
+                traversal.fetch::<K>(placed);
                 self.enlist(traversal);
             }
         }
@@ -276,41 +295,41 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             for i in (0..hopeful.count).step_by(quarters) {
                 let at = |k: usize| hopeful.get((i + k).min(hopeful.count - 1));
                 let four = [at(0), at(1), at(2), at(3)];
-                if A::FILTERS {
+                if let Some(accept) = &mut self.batch.accept {
                     // A traversal that only fills the lanes must not show its hits twice.
                     let rays = &four[..quarters.min(hopeful.count - i)];
-                    traversal::decide_accepted::<K::Rays>(rays, first, self.answers);
+                    traversal::decide_accepted::<K::Rays>(rays, first, accept);
                 } else {
                     traversal::decide::<K::Rays>(four);
                 }
-                if !A::ANY {
+                if !ANY {
                     for &traversal in four.iter().take(quarters) {
                         (*traversal).drop_farther::<K>();
                     }
                 }
             }
+            let placed = self.placed();
             for i in 0..count {
                 let traversal = &mut *self.at_leaves.get(i);
-                traversal.leave_block::<A>();
-                traversal.fetch::<K>(self.placed());
+                traversal.leave_block::<ANY>();
+                traversal.fetch::<K>(placed);
                 self.enlist(traversal);
             }
         }
     }
 
-    /// Writes the answers of rays at their end, and starts others in their place.
+    /// Writes the answers of rays at their end.
     #[inline(always)]
     unsafe fn finish(&mut self, first: usize) {
-        // SAFETY: the caller's promises.
-        unsafe {
-            let count = self.at_end.count;
-            self.at_end.count = 0;
-            for i in 0..count {
+        let count = core::mem::replace(&mut self.at_end.count, 0);
+        for i in 0..count {
+            // SAFETY: so many rays are at their end, and their places become idle.
+            unsafe {
                 let traversal = self.at_end.get(i);
                 let Traversal { ray, t, object, .. } = &*traversal;
-                self.answers
-                    .write(first + ray.number as usize, *t, *object);
-                self.start(first, traversal);
+                self.batch
+                    .write(first + ray.number as usize, *t, u32::MAX, *object);
+                self.idle.append(traversal, true);
             }
         }
     }

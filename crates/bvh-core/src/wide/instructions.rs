@@ -1,21 +1,29 @@
 //! The operations of an instruction set that the kernels need besides its lanes.
 
-use super::answer::Answers;
 use super::lanes::Lanes;
-use super::layout::WideBvh;
 use super::node::{Child, WideNode};
-use super::source::Source;
-use core::ops::Range;
 
 /// A child to visit later: the bits of its entry, of which the last three are any, above those of the child. Entries
 /// are not negative, so that their bits are ordered as they are.
 pub(crate) type Pending = u64;
 
+/// A part of a kernel that is compiled once and called, so that its callers stay small.
+pub(crate) trait Part {
+    /// The result.
+    type Output;
+
+    /// Runs the part.
+    ///
+    /// # Safety
+    /// The processor has the instructions of the part; it is always inlined.
+    unsafe fn run(self) -> Self::Output;
+}
+
 /// An instruction set. Every function is inlined into one that is compiled with its instructions, or it is very slow.
 ///
 /// All functions are unsafe for the same reasons: the processor has the instructions, and there is room for eight places more than
 /// are written.
-pub(crate) trait Instructions {
+pub(crate) trait Instructions: Sized {
     /// A register of one number per child of a node.
     type Boxes: Lanes;
     /// A register of one number per triangle of a block.
@@ -47,13 +55,8 @@ pub(crate) trait Instructions {
     /// Has a line of memory fetched, which may be anywhere.
     unsafe fn prefetch(line: *const u8);
 
-    /// [`in_flight::trace`](super::in_flight::trace), not inlined.
-    unsafe fn in_flight<A: Answers>(
-        wide: &WideBvh,
-        rays: impl Source,
-        answers: &mut A,
-        numbers: Range<usize>,
-    );
+    /// Runs a part of a kernel in a function of its own that is compiled with the instructions.
+    unsafe fn call<P: Part>(part: P) -> P::Output;
 
     /// Removes the children behind `nearest` from a stack that is aligned to 64 bytes. Returns its new
     /// end.

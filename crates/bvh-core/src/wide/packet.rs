@@ -4,9 +4,9 @@
 //! Source: Wald, Boulos & Shirley 2007, 'Ray tracing deformable scenes using dynamic bounding volume hierarchies'; Overbeck,
 //! Ramamoorthi & Mark 2008, 'Large ray packets for real-time Whitted ray tracing' (ranged traversal).
 
-use super::answer::Answers;
+use super::answer::{Accept, Batch};
 use super::culling::Culling;
-use super::instructions::Instructions;
+use super::instructions::{Instructions, Part};
 use super::kernel::STACK;
 use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
@@ -110,40 +110,49 @@ impl<K: Instructions> Packet<K> {
         self.count += 1;
     }
 
-    /// Traces the packet, writes its answers, and empties it. Where [`Answers::ANY`] a ray ends at its first hit, which need not
+    /// Traces the packet, writes its answers, and empties it. With `ANY` a ray ends at its first hit, which need not
     /// be the nearest.
     ///
     /// # Safety
     /// As for [`trace`](super::batch::trace).
     #[inline(always)]
-    pub(crate) unsafe fn trace<A: Answers>(&mut self, wide: &WideBvh, answers: &mut A) {
-        // SAFETY: the caller's promises; as many vectors are written as are counted.
-        unsafe {
-            let culling = Culling::<K::Boxes>::new(&self.bounds, self.octant, wide.largest);
-            if let Some(root) = wide.root {
-                self.traverse(wide, root, &culling, answers);
-            }
-            for vector in &self.vectors[..self.count] {
+    pub(crate) unsafe fn trace<const ANY: bool>(&mut self, wide: &WideBvh, batch: &mut Batch) {
+        // SAFETY: the caller's promises.
+        unsafe { K::call(Trace::<K, ANY> { packet: self, wide, batch }) };
+    }
+
+    /// Writes the answers.
+    #[inline(always)]
+    unsafe fn write(&self, batch: &mut Batch) {
+        const { assert!(K::Rays::N <= 16) };
+        let mut distances = [0.0; 16];
+        let mut instances = [0; 16];
+        let mut objects = [0; 16];
+        for vector in &self.vectors[..self.count] {
+            // SAFETY: as many vectors are written as are counted; there is room for sixteen lanes.
+            let first = unsafe {
                 let vector = vector.assume_init_ref();
-                if A::IN_INSTANCES {
-                    let Vector { first, t, instance, object, .. } = *vector;
-                    answers.write_instance_lanes(first, t, instance, object);
-                } else {
-                    answers.write_lanes(vector.first, vector.t, vector.object);
-                }
-            }
-            self.count = 0;
-            self.bounds = RayBounds::none();
+                vector.t.store(distances.as_mut_ptr());
+                vector
+                    .instance
+                    .store(instances.as_mut_ptr().cast());
+                vector.object.store(objects.as_mut_ptr().cast());
+                vector.first
+            };
+            let lanes = ..K::Rays::N;
+            batch
+                .answers
+                .write(first, &distances[lanes], &instances[lanes], &objects[lanes]);
         }
     }
 
     #[inline(always)]
-    unsafe fn traverse<A: Answers>(
+    unsafe fn traverse<const ANY: bool>(
         &mut self,
         wide: &WideBvh,
         root: Child,
         culling: &Culling<K::Boxes>,
-        answers: &mut A,
+        batch: &mut Batch,
     ) {
         // SAFETY: the references of the layout are sound, and its stacks large enough.
         unsafe {
@@ -151,33 +160,50 @@ impl<K: Instructions> Packet<K> {
             let blocks = wide.blocks.as_ptr();
             let mut farthest = self.bounds.end();
             let mut end = key_of(farthest);
-            if !root.is_node() {
-                for i in 0..self.count {
-                    self.visit_leaf(i, u32::MAX, blocks.add(root.index()), wide.largest, answers);
-                }
-                return;
-            }
             let mut keys = MaybeUninit::<[u32; STACK + 8]>::uninit();
             let mut parents = MaybeUninit::<[Parent; STACK + 8]>::uninit();
             let keys = keys.as_mut_ptr().cast::<u32>();
             let parents = parents.as_mut_ptr().cast::<Parent>();
             let mut top = 0;
-            let mut parent = Parent { node: root.index() as u32, vector: 0 };
+            let mut child = root;
+            // The first vector that enters the child, its rays that do, and the planes of the child.
+            let mut first = 0;
+            let mut entered = u32::MAX;
+            let mut planes = culling.all_space();
             loop {
-                let node = &*nodes.add(parent.node as usize);
-                let (entry, mask) = culling.cull::<K>(node, farthest);
-                if mask != 0 {
-                    if A::ANY {
-                        K::compress_keys(entry, mask, keys.add(top));
+                if child.is_node() {
+                    let parent = Parent { node: child.index() as u32, vector: first as u32 };
+                    let node = &*nodes.add(child.index());
+                    let (entry, mask) = culling.cull::<K>(node, farthest);
+                    if mask != 0 {
+                        if ANY {
+                            K::compress_keys(entry, mask, keys.add(top));
+                        } else {
+                            K::sort_keys(entry, mask, keys.add(top));
+                        }
+                        for i in 0..8 {
+                            *parents.add(top + i) = parent;
+                        }
+                        top += mask.count_ones() as usize;
+                    }
+                } else {
+                    let is_hit = if let Some(scene) = batch.scene {
+                        let instance = child.instance_index();
+                        self.visit_instance::<ANY>(scene, instance, first, entered, &planes)
                     } else {
-                        K::sort_keys(entry, mask, keys.add(top));
+                        let block = blocks.add(child.index());
+                        let accept = &mut batch.accept;
+                        self.visit_leaf::<ANY>(first, entered, &planes, block, wide.largest, accept)
+                    };
+                    if is_hit {
+                        farthest = self.farthest();
+                        end = key_of(farthest);
+                        if ANY && farthest < 0.0 {
+                            return;
+                        }
                     }
-                    for i in 0..8 {
-                        *parents.add(top + i) = parent;
-                    }
-                    top += mask.count_ones() as usize;
                 }
-                parent = loop {
+                child = loop {
                     if top == 0 {
                         return;
                     }
@@ -189,50 +215,17 @@ impl<K: Instructions> Packet<K> {
                     let lane = (!key & 7) as usize;
                     let waiting = *parents.add(top);
                     let node = &*nodes.add(waiting.node as usize);
-                    let planes = culling.planes(node, lane);
-                    let mut i = waiting.vector as usize;
-                    let entered = loop {
-                        let entered = self.enter(i, &planes);
-                        if entered != 0 || i + 1 == self.count {
+                    planes = culling.planes(node, lane);
+                    first = waiting.vector as usize;
+                    entered = loop {
+                        let entered = self.enter(first, &planes);
+                        if entered != 0 || first + 1 == self.count {
                             break entered;
                         }
-                        i += 1;
+                        first += 1;
                     };
-                    if entered == 0 {
-                        continue;
-                    }
-                    let child = *node.children.get_unchecked(lane);
-                    if child.is_node() {
-                        break Parent { node: child.index() as u32, vector: i as u32 };
-                    }
-                    let is_hit = if A::IN_INSTANCES {
-                        let instance = child.instance_index();
-                        match answers.scene() {
-                            Some(scene) if A::ANY => {
-                                self.visit_instance::<true>(scene, instance, i, entered, &planes)
-                            }
-                            Some(scene) => {
-                                self.visit_instance::<false>(scene, instance, i, entered, &planes)
-                            }
-                            None => false,
-                        }
-                    } else {
-                        let block = blocks.add(child.index());
-                        let mut is_hit = self.visit_leaf(i, entered, block, wide.largest, answers);
-                        for i in i + 1..self.count {
-                            let entered = self.enter(i, &planes);
-                            if entered != 0 {
-                                is_hit |= self.visit_leaf(i, entered, block, wide.largest, answers);
-                            }
-                        }
-                        is_hit
-                    };
-                    if is_hit {
-                        farthest = self.farthest();
-                        end = key_of(farthest);
-                        if A::ANY && farthest < 0.0 {
-                            return;
-                        }
+                    if entered != 0 {
+                        break *node.children.get_unchecked(lane);
                     }
                 };
             }
@@ -273,16 +266,44 @@ impl<K: Instructions> Packet<K> {
         }
     }
 
+    /// Tests the triangles of a leaf with the rays that enter it. `entered` has a bit per ray of the
+    /// vector `first` that enters the box of these planes, and earlier vectors do not enter it. Returns
+    /// whether any ray has a new nearest hit.
+    #[inline(always)]
+    unsafe fn visit_leaf<const ANY: bool>(
+        &mut self,
+        first: usize,
+        mut entered: u32,
+        planes: &[[f32; 2]; 3],
+        block: *const TriangleBlock,
+        largest: f32,
+        accept: &mut Option<&mut Accept>,
+    ) -> bool {
+        let mut is_hit = false;
+        for i in first..self.count {
+            // SAFETY: the caller's promises; so many vectors are counted.
+            unsafe {
+                if i > first {
+                    entered = self.enter(i, planes);
+                }
+                if entered != 0 {
+                    is_hit |= self.test::<ANY>(i, entered, block, largest, accept);
+                }
+            }
+        }
+        is_hit
+    }
+
     /// Tests the triangles of a leaf with the rays of a vector that entered it. Returns whether any ray
     /// has a new nearest hit.
     #[inline(always)]
-    unsafe fn visit_leaf<A: Answers>(
+    unsafe fn test<const ANY: bool>(
         &mut self,
         vector: usize,
         entered: u32,
         block: *const TriangleBlock,
         largest: f32,
-        answers: &mut A,
+        accept: &mut Option<&mut Accept>,
     ) -> bool {
         // SAFETY: the caller's promises; a block that is not its leaf's last is followed by another.
         unsafe {
@@ -311,24 +332,23 @@ impl<K: Instructions> Packet<K> {
                     let (inside, t) = pairs.decide(&corners, &doubled, spread, vector.t);
                     let inside = inside & Mask::from_bits(candidates);
                     let object = K::Rays::splat_bits((*block).id(lane));
-                    let hits = if A::ANY {
+                    let mut hits = if ANY {
                         inside
                     } else {
                         t.lt(vector.t) & inside
                             | t.eq(vector.t) & inside & object.below(vector.object)
                     };
-                    let hits = if A::FILTERS {
-                        accepted(answers, vector.first, hits, t, (*block).id(lane))
-                    } else {
-                        hits
-                    };
-                    if hits.bits() != 0 {
-                        is_hit = true;
-                        // A ray that has its answer ends before it begins.
-                        let t = if A::ANY { K::Rays::splat(-1.0) } else { t };
-                        vector.t = Lanes::select(hits, t, vector.t);
-                        vector.object = Lanes::select(hits, object, vector.object);
+                    if hits.bits() == 0 {
+                        continue;
                     }
+                    if let Some(accept) = accept {
+                        hits = accepted(accept, vector.first, hits, t, (*block).id(lane));
+                    }
+                    is_hit |= hits.bits() != 0;
+                    // A ray that has its answer ends before it begins.
+                    let t = if ANY { K::Rays::splat(-1.0) } else { t };
+                    vector.t = Lanes::select(hits, t, vector.t);
+                    vector.object = Lanes::select(hits, object, vector.object);
                 }
                 if (*block).is_last() {
                     return is_hit;
@@ -339,20 +359,43 @@ impl<K: Instructions> Packet<K> {
     }
 }
 
-/// Returns the hits with one object that the answers accept. The ray of the first lane is number
+/// A packet to trace.
+struct Trace<'p, 'a, K: Instructions, const ANY: bool> {
+    packet: &'p mut Packet<K>,
+    wide: &'p WideBvh,
+    batch: &'p mut Batch<'a>,
+}
+
+impl<K: Instructions, const ANY: bool> Part for Trace<'_, '_, K, ANY> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run(self) {
+        let Self { packet, wide, batch } = self;
+        // SAFETY: the caller's promises.
+        unsafe {
+            let culling = Culling::<K::Boxes>::new(&packet.bounds, packet.octant, wide.largest);
+            if let Some(root) = wide.root {
+                packet.traverse::<ANY>(wide, root, &culling, batch);
+            }
+            packet.write(batch);
+            packet.count = 0;
+            packet.bounds = RayBounds::none();
+        }
+    }
+}
+
+/// Returns the hits with one object that `accept` accepts. The ray of the first lane is number
 /// `first` of its batch.
 #[inline(always)]
 unsafe fn accepted<L: Lanes>(
-    answers: &mut impl Answers,
+    accept: &mut Accept,
     first: usize,
     hits: L::Mask,
     t: L,
     object: u32,
 ) -> L::Mask {
     let found = hits.bits();
-    if found == 0 {
-        return hits;
-    }
     let mut distances = [0.0; 16];
     let mut left = found;
     let mut accepted = found;
@@ -363,7 +406,7 @@ unsafe fn accepted<L: Lanes>(
             let lane = left.trailing_zeros() as usize;
             left &= left - 1;
             let hit = Hit { t: distances[lane], object };
-            if !answers.accepts(first + lane, hit) {
+            if !accept(first + lane, hit) {
                 accepted ^= 1 << lane;
             }
         }

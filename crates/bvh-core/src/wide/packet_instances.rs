@@ -1,11 +1,12 @@
 //! Packets of rays through instances: the rays of a packet that enter an instance are moved into its part
 //! together, and are a packet there.
 
-use super::answer::Answers;
+use super::answer::{Answers, Batch};
 use super::instances::Instances;
-use super::instructions::Instructions;
+use super::instructions::{Instructions, Part};
 use super::lanes::{Lanes, Mask};
 use super::packet::{Packet, VECTORS};
+use super::source::Source;
 use core::mem::MaybeUninit;
 
 /// The maximum number of rays in a packet.
@@ -24,12 +25,36 @@ impl<K: Instructions> Packet<K> {
         scene: &Instances,
         instance: u32,
         first: usize,
-        mut entered: u32,
+        entered: u32,
         planes: &[[f32; 2]; 3],
     ) -> bool {
+        let visit = Visit::<K, ANY> { packet: self, scene, instance, first, entered, planes };
+        // SAFETY: the caller's promises.
+        unsafe { K::call(visit) }
+    }
+}
+
+/// A visit of a packet to an instance.
+struct Visit<'a, K: Instructions, const ANY: bool> {
+    packet: &'a mut Packet<K>,
+    scene: &'a Instances,
+    instance: u32,
+    first: usize,
+    entered: u32,
+    planes: &'a [[f32; 2]; 3],
+}
+
+impl<K: Instructions, const ANY: bool> Part for Visit<'_, K, ANY> {
+    type Output = bool;
+
+    #[inline(always)]
+    unsafe fn run(self) -> bool {
+        let Self { packet, scene, instance, first, mut entered, planes } = self;
         let placed = &scene.placed()[instance as usize];
         let part = scene.part_of(instance);
-        let mut found = InPart::<ANY>::NONE;
+        let mut found = InPart::NONE;
+        // The packet brings its own rays.
+        let mut in_part = Batch::new(Source::Rays(&[]), &mut found);
         let mut entries = [const { MaybeUninit::<K::Rays>::uninit() }; VECTORS];
         let mut visited = 0u32;
         // SAFETY: the caller's promises; vectors below the count are written.
@@ -38,16 +63,16 @@ impl<K: Instructions> Packet<K> {
             for (i, entry_of_vector) in entries
                 .iter_mut()
                 .enumerate()
-                .take(self.count)
+                .take(packet.count)
                 .skip(first)
             {
                 if i > first {
-                    entered = self.enter(i, planes);
+                    entered = packet.enter(i, planes);
                 }
                 if entered == 0 {
                     continue;
                 }
-                let vector = self.vectors[i].assume_init_ref();
+                let vector = packet.vectors[i].assume_init_ref();
                 let (entry, enters) = vector.rays.entry(&scene.bounds(), &placed.aabb);
                 let enters = enters & entry.le(vector.t) & Mask::from_bits(entered);
                 if enters.bits() == 0 {
@@ -62,7 +87,7 @@ impl<K: Instructions> Packet<K> {
                 let number = i * K::Rays::N;
                 if let Some(scale) = moved.cohere(part.largest) {
                     if !moved_packet.takes(moved.octant()) {
-                        moved_packet.trace(part, &mut found);
+                        moved_packet.trace::<ANY>(part, &mut in_part);
                     }
                     moved_packet.add(moved, scale, number);
                     continue;
@@ -71,19 +96,19 @@ impl<K: Instructions> Packet<K> {
                 while left != 0 {
                     let lane = left.trailing_zeros() as usize;
                     left &= left - 1;
-                    found.alone(number + lane, part, &moved.ray(lane));
+                    in_part.alone::<ANY>(number + lane, part, &moved.ray(lane));
                 }
             }
             if !moved_packet.is_empty() {
-                moved_packet.trace(part, &mut found);
+                moved_packet.trace::<ANY>(part, &mut in_part);
             }
             let mut is_hit = false;
             while visited != 0 {
                 let i = visited.trailing_zeros() as usize;
                 visited &= visited - 1;
-                let vector = self.vectors[i].assume_init_mut();
+                let vector = packet.vectors[i].assume_init_mut();
                 let number = i * K::Rays::N;
-                let object = K::Rays::load_unaligned(found.objects.as_ptr().add(number));
+                let object = K::Rays::load_unaligned(found.objects.as_ptr().add(number).cast());
                 let t = K::Rays::load_unaligned(found.distances.as_ptr().add(number));
                 // A hit in front of the instance's box would depend on the tree: a tree that visits the
                 // box later would skip it.
@@ -107,33 +132,19 @@ impl<K: Instructions> Packet<K> {
 }
 
 /// The answers of the rays of a packet in one instance, by their places in the packet.
-struct InPart<const ANY: bool> {
+struct InPart {
     distances: [f32; RAYS],
-    /// Bits of ids, `u32::MAX` for none.
-    objects: [f32; RAYS],
+    /// Ids, `u32::MAX` for none.
+    objects: [u32; RAYS],
 }
 
-impl<const ANY: bool> InPart<ANY> {
-    const NONE: Self = Self { distances: [0.0; RAYS], objects: [f32::from_bits(u32::MAX); RAYS] };
+impl InPart {
+    const NONE: Self = Self { distances: [0.0; RAYS], objects: [u32::MAX; RAYS] };
 }
 
-impl<const ANY: bool> Answers for InPart<ANY> {
-    const ANY: bool = ANY;
-
-    #[inline(always)]
-    fn write(&mut self, number: usize, t: f32, object: u32) {
-        self.distances[number] = t;
-        self.objects[number] = f32::from_bits(object);
-    }
-
-    #[inline(always)]
-    fn write_lanes<L: Lanes>(&mut self, first: usize, t: L, object: L) {
-        let distances = &mut self.distances[first..][..L::N];
-        let objects = &mut self.objects[first..][..L::N];
-        // SAFETY: there is room for as many as there are lanes.
-        unsafe {
-            t.store(distances.as_mut_ptr());
-            object.store(objects.as_mut_ptr());
-        }
+impl Answers for InPart {
+    fn write(&mut self, first: usize, distances: &[f32], _: &[u32], objects: &[u32]) {
+        self.distances[first..][..objects.len()].copy_from_slice(distances);
+        self.objects[first..][..objects.len()].copy_from_slice(objects);
     }
 }

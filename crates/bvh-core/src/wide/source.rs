@@ -6,18 +6,47 @@ use crate::components::Distances;
 use crate::{Ray, RayComponents};
 
 /// Rays in memory, by their numbers.
-pub(crate) trait Source: Copy {
+#[derive(Clone, Copy)]
+pub(crate) enum Source<'a> {
+    /// Rays one after the other.
+    Rays(&'a [Ray]),
+    /// Rays by component.
+    Components(&'a RayComponents<'a>),
+}
+
+impl Source<'_> {
     /// Returns the number of rays.
-    fn len(self) -> usize;
+    #[inline(always)]
+    pub(crate) fn len(self) -> usize {
+        match self {
+            Self::Rays(rays) => rays.len(),
+            Self::Components(rays) => rays.len(),
+        }
+    }
 
     /// Returns the ray with a number.
-    fn ray(self, number: usize) -> Ray;
+    #[inline(always)]
+    pub(crate) fn ray(self, number: usize) -> Ray {
+        match self {
+            Self::Rays(rays) => rays[number],
+            Self::Components(rays) => rays.ray(number),
+        }
+    }
 
     /// Returns one ray per lane, from number `first` on.
     ///
     /// # Safety
     /// The processor has the instructions, and there are so many rays.
-    unsafe fn lanes<L: Lanes>(self, first: usize) -> RayLanes<L>;
+    #[inline(always)]
+    pub(crate) unsafe fn lanes<L: Lanes>(self, first: usize) -> RayLanes<L> {
+        // SAFETY: the caller's promises.
+        unsafe {
+            match self {
+                Self::Rays(rays) => lanes_of_rays(rays, first),
+                Self::Components(rays) => lanes_of_components(rays, first),
+            }
+        }
+    }
 
     /// Returns the same as [`lanes`](Self::lanes), where the last ray before `end` fills the lanes that
     /// have none.
@@ -25,84 +54,65 @@ pub(crate) trait Source: Copy {
     /// # Safety
     /// The processor has the instructions, and there is a ray.
     #[inline(always)]
-    unsafe fn lanes_up_to<L: Lanes>(self, first: usize, end: usize) -> RayLanes<L> {
+    pub(crate) unsafe fn lanes_up_to<L: Lanes>(self, first: usize, end: usize) -> RayLanes<L> {
         // SAFETY: the caller's promises.
         unsafe {
             if first + L::N <= end {
                 return self.lanes(first);
             }
             let padded: [Ray; 16] = core::array::from_fn(|i| self.ray((first + i).min(end - 1)));
-            padded.as_slice().lanes(0)
+            lanes_of_rays(&padded, 0)
         }
     }
 }
 
-impl Source for &[Ray] {
-    #[inline(always)]
-    fn len(self) -> usize {
-        <[Ray]>::len(self)
-    }
-
-    #[inline(always)]
-    fn ray(self, number: usize) -> Ray {
-        self[number]
-    }
-
-    #[inline(always)]
-    unsafe fn lanes<L: Lanes>(self, first: usize) -> RayLanes<L> {
-        // SAFETY: the caller's promises; a ray is three vectors of four lanes.
-        unsafe {
-            let rays = self.as_ptr().add(first);
-            let [ox, oy, oz, t_min] = transpose(rays, 0);
-            let [dx, dy, dz, t_max] = transpose(rays, 1);
-            let [ix, iy, iz, _] = transpose(rays, 2);
-            RayLanes {
-                origin: [ox, oy, oz],
-                direction: [dx, dy, dz],
-                inverse: [ix, iy, iz],
-                t_min,
-                t_max,
-            }
+/// Returns one ray per lane, from number `first` on.
+///
+/// # Safety
+/// The processor has the instructions, and there are so many rays.
+#[inline(always)]
+pub(crate) unsafe fn lanes_of_rays<L: Lanes>(rays: &[Ray], first: usize) -> RayLanes<L> {
+    // SAFETY: the caller's promises; a ray is three vectors of four lanes.
+    unsafe {
+        let rays = rays.as_ptr().add(first);
+        let [ox, oy, oz, t_min] = transpose(rays, 0);
+        let [dx, dy, dz, t_max] = transpose(rays, 1);
+        let [ix, iy, iz, _] = transpose(rays, 2);
+        RayLanes {
+            origin: [ox, oy, oz],
+            direction: [dx, dy, dz],
+            inverse: [ix, iy, iz],
+            t_min,
+            t_max,
         }
     }
 }
 
-impl Source for &RayComponents<'_> {
-    #[inline(always)]
-    fn len(self) -> usize {
-        RayComponents::len(self)
-    }
-
-    #[inline(always)]
-    fn ray(self, number: usize) -> Ray {
-        RayComponents::ray(self, number)
-    }
-
-    #[inline(always)]
-    unsafe fn lanes<L: Lanes>(self, first: usize) -> RayLanes<L> {
-        let [[ox, oy, oz], [dx, dy, dz]] = self.slices();
-        let [t_min, t_max] = self.ranges();
-        // SAFETY: the caller's promises; slices are equally long.
-        unsafe {
-            let component = |slice: &[f32]| L::load_unaligned(slice.as_ptr().add(first));
-            let distance = |distances: Distances<'_>| match distances {
-                Distances::All(distance) => L::splat(distance),
-                Distances::Each(distances) => component(distances),
-            };
-            let direction = [component(dx), component(dy), component(dz)];
-            let zero = L::splat(0.0);
-            let one = L::splat(1.0);
-            let most = L::splat(f32::MAX);
-            let least = L::splat(f32::MIN);
-            // The same operations as in `Ray`, so that the bits agree.
-            let inverse = |direction: L| (one / direction).max(least).min(most);
-            RayLanes {
-                origin: [component(ox), component(oy), component(oz)],
-                direction,
-                inverse: [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])],
-                t_min: distance(t_min).max(zero) + zero,
-                t_max: distance(t_max).min(most) + zero,
-            }
+/// Returns one ray per lane, likewise.
+#[inline(always)]
+unsafe fn lanes_of_components<L: Lanes>(rays: &RayComponents, first: usize) -> RayLanes<L> {
+    let [[ox, oy, oz], [dx, dy, dz]] = rays.slices();
+    let [t_min, t_max] = rays.ranges();
+    // SAFETY: the caller's promises; slices are equally long.
+    unsafe {
+        let component = |slice: &[f32]| L::load_unaligned(slice.as_ptr().add(first));
+        let distance = |distances: Distances<'_>| match distances {
+            Distances::All(distance) => L::splat(distance),
+            Distances::Each(distances) => component(distances),
+        };
+        let direction = [component(dx), component(dy), component(dz)];
+        let zero = L::splat(0.0);
+        let one = L::splat(1.0);
+        let most = L::splat(f32::MAX);
+        let least = L::splat(f32::MIN);
+        // The same operations as in `Ray`, so that the bits agree.
+        let inverse = |direction: L| (one / direction).max(least).min(most);
+        RayLanes {
+            origin: [component(ox), component(oy), component(oz)],
+            direction,
+            inverse: [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])],
+            t_min: distance(t_min).max(zero) + zero,
+            t_max: distance(t_max).min(most) + zero,
         }
     }
 }

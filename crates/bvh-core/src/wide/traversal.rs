@@ -1,6 +1,6 @@
 //! The state of one ray in flight, and its steps: into a node, onto the stack, through triangles.
 
-use super::answer::Answers;
+use super::answer::Accept;
 use super::instances::Placed;
 use super::instructions::{Instructions, Pending};
 use super::kernel::STACK;
@@ -130,8 +130,8 @@ impl Traversal {
     /// Returns the nearest hit of a ray among all instances at its end: the distance, the instance and
     /// the triangle.
     #[inline(always)]
-    pub(super) unsafe fn nearest_of_all<A: Answers>(&self) -> (f32, u32, u32) {
-        if A::ANY {
+    pub(super) unsafe fn nearest_of_all<const ANY: bool>(&self) -> (f32, u32, u32) {
+        if ANY {
             return (self.t, self.object, self.object);
         }
         // SAFETY: the caller's promise: the state outside is kept.
@@ -157,7 +157,7 @@ impl Traversal {
 
     /// Pushes the entered children, and goes on to the nearest of them, or else to what waits.
     #[inline(always)]
-    pub(super) unsafe fn enter<K: Instructions, A: Answers>(
+    pub(super) unsafe fn enter<K: Instructions, const ANY: bool>(
         &mut self,
         node: &WideNode,
         entry: K::Boxes,
@@ -167,7 +167,7 @@ impl Traversal {
         unsafe {
             let top = self.top;
             self.top = top.add(mask.count_ones() as usize).sub(1);
-            if A::ANY {
+            if ANY {
                 K::compress(node, mask, top);
                 self.child = Child::from_bits(*self.top as u32);
             } else {
@@ -190,7 +190,7 @@ impl Traversal {
     /// Goes on from a block of triangles: to the next one of the leaf, to what waits, or to the end
     /// if any hit will do and there is one.
     #[inline(always)]
-    pub(super) unsafe fn leave_block<A: Answers>(&mut self) {
+    pub(super) unsafe fn leave_block<const ANY: bool>(&mut self) {
         // SAFETY: a block that is not its leaf's last is followed by another; the stack holds at
         // least an end, and has room for one more.
         unsafe {
@@ -198,7 +198,7 @@ impl Traversal {
             let is_last = (*self.blocks.add(block)).is_last();
             *self.top = u64::from(Child::leaf(block as u32 + 1).bits());
             self.top = self.top.add(usize::from(!is_last));
-            if A::ANY && self.object != u32::MAX {
+            if ANY && self.object != u32::MAX {
                 self.top = self.bottom().add(1);
             }
             self.pop();
@@ -315,13 +315,13 @@ pub(super) unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4]) {
     }
 }
 
-/// Gives every ray the nearest hit that the answers accept, among the hit it has and those in the block
+/// Gives every ray the nearest hit that `accept` accepts, among the hit it has and those in the block
 /// at which it is. The rays are numbered from `first` on.
 #[inline(always)]
 pub(super) unsafe fn decide_accepted<L: Lanes>(
     four: &[*mut Traversal],
     first: usize,
-    answers: &mut impl Answers,
+    accept: &mut Accept,
 ) {
     let last = four.len() - 1;
     let rays = [four[0], four[1.min(last)], four[2.min(last)], four[3.min(last)]];
@@ -333,23 +333,23 @@ pub(super) unsafe fn decide_accepted<L: Lanes>(
         for (i, &traversal) in four.iter().enumerate() {
             let hit = nearest(traversal);
             let number = first + (*traversal).ray.number as usize;
-            if hit != before[i] && !answers.accepts(number, hit) {
+            if hit != before[i] && !accept(number, hit) {
                 (*traversal).t = before[i].t;
                 (*traversal).object = before[i].object;
-                decide_others::<L>(traversal, hit.object, number, answers);
+                decide_others::<L>(traversal, hit.object, number, accept);
             }
         }
     }
 }
 
-/// Gives a ray the nearest hit that the answers accept, as [`decide_accepted`] does, where they have
+/// Gives a ray the nearest hit that `accept` accepts, as [`decide_accepted`] does, where `accept` has
 /// rejected one object.
 #[inline(always)]
 unsafe fn decide_others<L: Lanes>(
     traversal: *mut Traversal,
     rejected: u32,
     number: usize,
-    answers: &mut impl Answers,
+    accept: &mut Accept,
 ) {
     // SAFETY: the caller's promises.
     unsafe {
@@ -372,7 +372,7 @@ unsafe fn decide_others<L: Lanes>(
             let hit = Hit { t: distances[lane], object: block.id(lane) };
             // An unused lane repeats a triangle, which may have been rejected.
             let is_new = hit.object != rejected && !hit.is_miss();
-            if is_new && hit.precedes(&nearest(traversal)) && answers.accepts(number, hit) {
+            if is_new && hit.precedes(&nearest(traversal)) && accept(number, hit) {
                 (*traversal).t = hit.t;
                 (*traversal).object = hit.object;
             }

@@ -1,11 +1,10 @@
 //! A target without vector kernels.
 
 use super::all_in_flight::{Found, MOST};
-use super::answer::Answers;
+use super::answer::Batch;
 use super::crossed_leaves::AllHits;
 use super::layout::WideBvh;
 use super::nearest::Closest;
-use super::source::Source;
 use crate::{Coherence, Hit, Kernel, Ray};
 use alloc::vec::Vec;
 use glam::Vec3;
@@ -38,4 +37,4 @@ pub(super) unsafe fn all_hits_of(_: &WideBvh, _: &[Ray], _: &mut Vec<Found>) -> 
 pub(super) unsafe fn closest_points(_: &WideBvh, _: &[Vec3], _: &mut [Option<Closest>]) {}
 
 /// Is never called.
-pub(crate) unsafe fn trace<A: Answers>(_: &WideBvh, _: impl Source, _: &mut A, _: Coherence) {}
+pub(crate) unsafe fn trace<const ANY: bool>(_: &WideBvh, _: &mut Batch, _: Coherence) {}

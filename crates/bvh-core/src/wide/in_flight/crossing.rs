@@ -1,21 +1,20 @@
 //! Rays in flight through instances: a ray that comes to an instance is moved into its part, several rays
 //! at a time, and goes on there. A mark on its stack brings it back.
 
-use super::super::answer::Answers;
 use super::super::instances::Placed;
 use super::super::instructions::Instructions;
 use super::super::lanes::Lanes;
 use super::super::node::Child;
 use super::super::prepared::{Prepared, Ready};
-use super::super::source::Source;
+use super::super::source::lanes_of_rays;
 use super::super::traversal::Traversal;
 use super::{Flight, RAYS};
 use crate::Ray;
 use core::mem::MaybeUninit;
 
-impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
+impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
     /// Has every ray at the end of an instance leave it, and every ray at an instance enter it; writes the
-    /// answers of rays at their end, and starts others in their place.
+    /// answers of rays at their end.
     #[inline(always)]
     pub(super) unsafe fn cross(&mut self, first: usize) {
         let count = self.at_end.count;
@@ -30,19 +29,19 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
                     continue;
                 }
                 if traversal.child == Child::END {
-                    let (t, instance, object) = traversal.nearest_of_all::<A>();
+                    let (t, instance, object) = traversal.nearest_of_all::<ANY>();
                     let number = first + traversal.ray.number as usize;
-                    self.answers
-                        .write_instance(number, t, instance, object);
-                    self.start(first, traversal);
+                    self.batch.write(number, t, instance, object);
+                    self.idle.append(traversal, true);
                     continue;
                 }
                 if traversal.child.is_instance_or_mark() {
                     let ray = self
+                        .batch
                         .rays
                         .ray(first + traversal.ray.number as usize);
                     let instance = traversal.child.instance_index();
-                    if let Some(scene) = self.answers.scene()
+                    if let Some(scene) = self.batch.scene
                         && let Some((local_ray, entry)) = scene.enter(instance, &ray, traversal.t)
                     {
                         entering.add(traversal, local_ray, entry);
@@ -66,7 +65,7 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
     #[inline(always)]
     unsafe fn enter(&mut self, first: usize, entering: &mut Entering) {
         let count = core::mem::replace(&mut entering.count, 0);
-        let Some(scene) = self.answers.scene() else { return };
+        let Some(scene) = self.batch.scene else { return };
         let mut prepared = [const { MaybeUninit::<Prepared>::uninit() }; RAYS];
         // SAFETY: so many rays have been added; there is room for as many as there are lanes.
         unsafe {
@@ -76,7 +75,7 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
             }
             let rays = entering.rays.as_ptr().cast::<Ray>();
             let rays = core::slice::from_raw_parts(rays, K::Rays::N);
-            let ready = Ready::new(rays.lanes::<K::Rays>(0), scene.largest_of_parts());
+            let ready = Ready::new(lanes_of_rays::<K::Rays>(rays, 0), scene.largest_of_parts());
             ready.write(0, prepared.as_mut_ptr().cast());
             for (i, prepared) in prepared.iter().enumerate().take(count) {
                 let traversal = &mut *entering.traversals[i].assume_init();
@@ -85,31 +84,32 @@ impl<K: Instructions, S: Source, A: Answers> Flight<'_, K, S, A> {
                     continue;
                 }
                 let entry = entering.entries[i].assume_init();
-                if let Some(scene) = self.answers.scene() {
-                    let part = scene.part_of(traversal.child.instance_index());
-                    traversal.enter_instance(prepared.assume_init(), entry, part);
-                }
+                let part = scene.part_of(traversal.child.instance_index());
+                traversal.enter_instance(prepared.assume_init(), entry, part);
                 traversal.fetch::<K>(self.placed());
                 self.enlist(traversal);
             }
         }
     }
 
-    /// Answers a ray by itself, and starts another in its place.
+    /// Answers a ray by itself.
     #[cold]
     #[inline(never)]
     unsafe fn finish_alone(&mut self, first: usize, traversal: &mut Traversal) {
         let number = first + traversal.ray.number as usize;
-        self.answers
-            .alone(number, self.wide, &self.rays.ray(number));
-        // SAFETY: the caller's promises.
-        unsafe { self.start(first, traversal) };
+        let ray = self.batch.rays.ray(number);
+        self.batch.alone::<ANY>(number, self.wide, &ray);
+        // SAFETY: the ray is on no list.
+        unsafe { self.idle.append(traversal, true) };
     }
 
     /// Returns the instances that leaves of the layout name, or none.
     #[inline(always)]
-    pub(super) fn placed(&self) -> &[Placed] {
-        match self.answers.scene() {
+    pub(super) fn placed<'s>(&self) -> &'s [Placed]
+    where
+        Self: 's,
+    {
+        match self.batch.scene {
             Some(scene) => scene.placed(),
             None => &[],
         }

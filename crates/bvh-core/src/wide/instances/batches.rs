@@ -1,9 +1,9 @@
 //! Batches of rays through instances.
 
-use super::super::answer::{Answers, OfInstances};
-use super::super::vector;
+use super::super::answer::Batch;
+use super::super::source::Source;
 use super::Placed;
-use crate::{Aabb, Coherence, InstanceHit, Instances, Kernel, Ray, Slabs, WideBvh};
+use crate::{Aabb, Coherence, InstanceHit, Instances, Ray, Slabs, WideBvh};
 
 impl Instances {
     /// [`nearest_hit`](Self::nearest_hit) of every ray, into as many `hits`; [`InstanceHit::MISS`] for a ray
@@ -34,30 +34,22 @@ impl Instances {
     ///
     /// # Panics
     /// If `rays` and `hits` are not equally many.
-    pub fn nearest_hits(&self, rays: &[Ray], hits: &mut [InstanceHit], coherence: Coherence) {
+    pub fn nearest_hits(&self, rays: &[Ray], mut hits: &mut [InstanceHit], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "a hit for every ray");
-        self.trace(rays, &mut OfInstances { scene: self, answers: hits }, coherence);
+        let batch = Batch::new(Source::Rays(rays), &mut hits);
+        self.wide_top
+            .trace::<false>(Batch { scene: Some(self), ..batch }, coherence);
     }
 
     /// [`any_hit`](Self::any_hit) of every ray, into as many `hits`.
     ///
     /// # Panics
     /// If `rays` and `hits` are not equally many.
-    pub fn any_hits(&self, rays: &[Ray], hits: &mut [bool], coherence: Coherence) {
+    pub fn any_hits(&self, rays: &[Ray], mut hits: &mut [bool], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "an answer for every ray");
-        self.trace(rays, &mut OfInstances { scene: self, answers: hits }, coherence);
-    }
-
-    /// Answers a batch by rays in flight, or ray by ray.
-    #[inline]
-    fn trace<A: Answers>(&self, rays: &[Ray], answers: &mut A, coherence: Coherence) {
-        if self.wide_top.kernel != Kernel::Portable {
-            // SAFETY: the kernel is available and the stack need small enough, as `lay_out_instances` saw.
-            return unsafe { vector::trace(&self.wide_top, rays, answers, coherence) };
-        }
-        for (number, ray) in rays.iter().enumerate() {
-            answers.alone(number, &self.wide_top, ray);
-        }
+        let batch = Batch::new(Source::Rays(rays), &mut hits);
+        self.wide_top
+            .trace::<true>(Batch { scene: Some(self), ..batch }, coherence);
     }
 
     /// Returns the ray in the coordinates of an instance's part, and the distance at which it enters the

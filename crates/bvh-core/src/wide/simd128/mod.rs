@@ -6,19 +6,17 @@ mod lanes;
 mod registers;
 
 use super::all_in_flight::{Found, MOST};
-use super::answer::Answers;
+use super::answer::Batch;
 use super::crossed_leaves::AllHits;
-use super::instructions::{Instructions, Pending};
+use super::instructions::{Instructions, Part, Pending};
 use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
 use super::nearest::Closest;
 use super::node::{Child, WideNode};
-use super::source::Source;
-use super::{all_in_flight, batch, closest_lanes, in_flight, one_ray};
+use super::{all_in_flight, batch, closest_lanes, one_ray};
 use crate::{Coherence, Hit, Kernel, Ray};
 use alloc::vec::Vec;
 use core::cmp::Reverse;
-use core::ops::Range;
 use glam::Vec3;
 use lanes::Singles;
 
@@ -66,14 +64,13 @@ pub(super) unsafe fn closest_points(
 }
 
 /// [`batch::trace`].
-pub(crate) unsafe fn trace<A: Answers>(
+pub(crate) unsafe fn trace<const ANY: bool>(
     wide: &WideBvh,
-    rays: impl Source,
-    answers: &mut A,
+    batch: &mut Batch,
     coherence: Coherence,
 ) {
     // SAFETY: the caller's promises.
-    unsafe { batch::trace::<Simd128, A>(wide, rays, answers, coherence) }
+    unsafe { batch::trace::<Simd128, ANY>(wide, batch, coherence) }
 }
 
 /// The entered lanes, the lowest first.
@@ -148,13 +145,8 @@ impl Instructions for Simd128 {
     unsafe fn prefetch(_: *const u8) {}
 
     #[inline(never)]
-    unsafe fn in_flight<A: Answers>(
-        wide: &WideBvh,
-        rays: impl Source,
-        answers: &mut A,
-        numbers: Range<usize>,
-    ) {
-        // SAFETY: the caller's promises.
-        unsafe { in_flight::trace::<Self, A>(wide, rays, answers, numbers) }
+    unsafe fn call<P: Part>(part: P) -> P::Output {
+        // SAFETY: the caller's promise.
+        unsafe { part.run() }
     }
 }

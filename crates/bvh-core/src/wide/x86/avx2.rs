@@ -2,14 +2,11 @@
 
 use super::lanes::{F32x4, F32x8, Mask8};
 use super::sort;
-use crate::wide::answer::Answers;
-use crate::wide::instructions::{Instructions, Pending};
+use crate::wide::instructions::{Instructions, Part, Pending};
 use crate::wide::lanes::{Lanes as _, Mask as _};
 use crate::wide::layout::WideBvh;
 use crate::wide::node::{Child, WideNode};
-use crate::wide::source::Source;
 use core::arch::x86_64::*;
-use core::ops::Range;
 
 pub(crate) struct Avx2;
 

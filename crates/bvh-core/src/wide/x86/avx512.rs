@@ -2,13 +2,10 @@
 
 use super::lanes::{F32x4, F32x8, F32x16};
 use super::sort;
-use crate::wide::answer::Answers;
-use crate::wide::instructions::{Instructions, Pending, last_pending};
+use crate::wide::instructions::{Instructions, Part, Pending, last_pending};
 use crate::wide::layout::WideBvh;
 use crate::wide::node::{Child, WideNode};
-use crate::wide::source::Source;
 use core::arch::x86_64::*;
-use core::ops::Range;
 
 pub(crate) struct Avx512;
 

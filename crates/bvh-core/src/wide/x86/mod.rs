@@ -6,11 +6,10 @@ mod lanes;
 mod sort;
 
 use super::all_in_flight::{Found, MOST};
-use super::answer::Answers;
+use super::answer::Batch;
 use super::crossed_leaves::AllHits;
 use super::layout::WideBvh;
 use super::nearest::Closest;
-use super::source::Source;
 use crate::{Coherence, Hit, Kernel, Ray};
 use alloc::vec::Vec;
 use glam::Vec3;
@@ -118,17 +117,16 @@ pub(super) unsafe fn closest_points(
 /// # Safety
 /// As for [`one_ray`], and there is an answer for every ray.
 #[inline(always)]
-pub(crate) unsafe fn trace<A: Answers>(
+pub(crate) unsafe fn trace<const ANY: bool>(
     wide: &WideBvh,
-    rays: impl Source,
-    answers: &mut A,
+    batch: &mut Batch,
     coherence: Coherence,
 ) {
     // SAFETY: the caller's promises.
     unsafe {
         match wide.kernel {
-            Kernel::Avx512 => avx512::trace(wide, rays, answers, coherence),
-            _ => avx2::trace(wide, rays, answers, coherence),
+            Kernel::Avx512 => avx512::trace::<ANY>(wide, batch, coherence),
+            _ => avx2::trace::<ANY>(wide, batch, coherence),
         }
     }
 }
@@ -184,28 +182,21 @@ macro_rules! entry_points {
 
         /// [`batch::trace`](crate::wide::batch::trace).
         #[target_feature(enable = $features)]
-        pub(crate) unsafe fn trace<A: Answers>(
+        pub(crate) unsafe fn trace<const ANY: bool>(
             wide: &WideBvh,
-            rays: impl Source,
-            answers: &mut A,
+            batch: &mut crate::wide::answer::Batch,
             coherence: crate::Coherence,
         ) {
             // SAFETY: this function is compiled with the instructions; the rest is the caller's promise.
-            unsafe { crate::wide::batch::trace::<$instructions, A>(wide, rays, answers, coherence) }
+            unsafe { crate::wide::batch::trace::<$instructions, ANY>(wide, batch, coherence) }
         }
 
-        /// [`in_flight::trace`](crate::wide::in_flight::trace).
+        /// Runs a part of the kernel.
         #[target_feature(enable = $features)]
-        unsafe fn in_flight<A: Answers>(
-            wide: &WideBvh,
-            rays: impl Source,
-            answers: &mut A,
-            numbers: Range<usize>,
-        ) {
+        #[inline(never)]
+        unsafe fn call<P: Part>(part: P) -> P::Output {
             // SAFETY: this function is compiled with the instructions; the rest is the caller's promise.
-            unsafe {
-                crate::wide::in_flight::trace::<$instructions, A>(wide, rays, answers, numbers)
-            }
+            unsafe { part.run() }
         }
     };
 }
@@ -221,14 +212,9 @@ macro_rules! common_instructions {
         }
 
         #[inline(always)]
-        unsafe fn in_flight<A: Answers>(
-            wide: &WideBvh,
-            rays: impl Source,
-            answers: &mut A,
-            numbers: Range<usize>,
-        ) {
-            // SAFETY: the processor has the instructions, and there is an answer for every ray.
-            unsafe { in_flight(wide, rays, answers, numbers) }
+        unsafe fn call<P: Part>(part: P) -> P::Output {
+            // SAFETY: the caller's promise: the processor has the instructions.
+            unsafe { call(part) }
         }
     };
 }
