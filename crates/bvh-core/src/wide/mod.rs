@@ -29,6 +29,7 @@ mod node;
 mod one_ray;
 mod packet;
 mod packet_instances;
+mod packet_leaves;
 mod pairs;
 mod portable;
 mod prepared;

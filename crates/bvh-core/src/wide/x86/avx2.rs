@@ -1,6 +1,7 @@
 //! The AVX2 kernel: eight boxes at once with fused multiply-add, entered children sorted without a branch.
 
-use super::lanes::{F32x4, F32x8, Mask8};
+use super::lanes::{F32x4, F32x8};
+use super::masks::Mask8;
 use super::sort;
 use crate::wide::instructions::{Instructions, Part, Pending};
 use crate::wide::lanes::{Lanes as _, Mask as _};

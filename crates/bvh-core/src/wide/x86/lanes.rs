@@ -4,7 +4,8 @@
 //! and what makes one out of nothing is unsafe for its caller.
 #![allow(clippy::undocumented_unsafe_blocks)]
 
-use crate::wide::lanes::{DoubleLanes, Lanes, Mask};
+use super::masks::{Mask4, Mask8, WideMask4};
+use crate::wide::lanes::{DoubleLanes, Lanes};
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Sub};
 
@@ -108,16 +109,6 @@ pub(crate) struct F32x8(pub(crate) __m256);
 /// Sixteen numbers.
 #[derive(Clone, Copy)]
 pub(crate) struct F32x16(pub(crate) __m512);
-
-/// Sets of lanes: all bits of a lane, or none.
-#[derive(Clone, Copy)]
-pub(crate) struct Mask4(__m128);
-#[derive(Clone, Copy)]
-pub(crate) struct Mask8(pub(crate) __m256);
-
-/// A set of lanes of f64, likewise.
-#[derive(Clone, Copy)]
-pub(crate) struct WideMask4(__m256d);
 
 /// Numbers of f64.
 #[derive(Clone, Copy)]
@@ -392,58 +383,5 @@ impl<T: DoubleLanes> DoubleLanes for Two<T> {
         lt(a, b) -> Self::Mask = Two(a.0.lt(b.0), a.1.lt(b.1));
         le(a, b) -> Self::Mask = Two(a.0.le(b.0), a.1.le(b.1));
         eq(a, b) -> Self::Mask = Two(a.0.eq(b.0), a.1.eq(b.1));
-    }
-}
-
-impl Mask for Mask4 {
-    #[inline(always)]
-    fn bits(self) -> u32 {
-        unsafe { _mm_movemask_ps(self.0) as u32 }
-    }
-    #[inline(always)]
-    unsafe fn from_bits(bits: u32) -> Self {
-        unsafe {
-            let lanes = _mm_setr_epi32(1, 2, 4, 8);
-            let set = _mm_and_si128(_mm_set1_epi32(bits as i32), lanes);
-            Self(_mm_castsi128_ps(_mm_cmpeq_epi32(set, lanes)))
-        }
-    }
-    #[inline(always)]
-    fn and_not(self, other: Self) -> Self {
-        unsafe { Self(_mm_andnot_ps(other.0, self.0)) }
-    }
-}
-
-impl Mask for Mask8 {
-    #[inline(always)]
-    fn bits(self) -> u32 {
-        unsafe { _mm256_movemask_ps(self.0) as u32 }
-    }
-    #[inline(always)]
-    unsafe fn from_bits(bits: u32) -> Self {
-        unsafe {
-            let lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-            let set = _mm256_and_si256(_mm256_set1_epi32(bits as i32), lanes);
-            Self(_mm256_castsi256_ps(_mm256_cmpeq_epi32(set, lanes)))
-        }
-    }
-    #[inline(always)]
-    fn and_not(self, other: Self) -> Self {
-        unsafe { Self(_mm256_andnot_ps(other.0, self.0)) }
-    }
-}
-
-impl Mask for u16 {
-    #[inline(always)]
-    fn bits(self) -> u32 {
-        u32::from(self)
-    }
-    #[inline(always)]
-    unsafe fn from_bits(bits: u32) -> Self {
-        bits as Self
-    }
-    #[inline(always)]
-    fn and_not(self, other: Self) -> Self {
-        self & !other
     }
 }

@@ -3,6 +3,7 @@
 mod avx2;
 mod avx512;
 mod lanes;
+mod masks;
 mod sort;
 
 use super::all_in_flight::{Found, MOST};
