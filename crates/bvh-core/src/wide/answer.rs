@@ -10,10 +10,19 @@ pub(crate) type Accept<'a> = dyn FnMut(usize, Hit) -> bool + 'a;
 
 /// The place of the answers to the rays of a batch, by the number of the ray.
 pub(crate) trait Answers {
-    /// Writes the answers for consecutive rays from number `first` on: the distances at which their
-    /// traversals ended, and the hit objects with the instances of these, `u32::MAX` for none. Slices
-    /// are equally long.
-    fn write(&mut self, first: usize, distances: &[f32], instances: &[u32], objects: &[u32]);
+    /// Writes the answer for a ray: the distance at which its traversal ended, and the hit object with
+    /// the instance of this object, `u32::MAX` for none.
+    fn write(&mut self, number: usize, t: f32, instance: u32, object: u32);
+
+    /// Writes the answers for consecutive rays from number `first` on, likewise. Slices are equally long.
+    fn write_lanes(&mut self, first: usize, distances: &[f32], instances: &[u32], objects: &[u32]) {
+        let lanes = distances
+            .iter()
+            .zip(instances.iter().zip(objects));
+        for (lane, (&t, (&instance, &object))) in lanes.enumerate() {
+            self.write(first + lane, t, instance, object);
+        }
+    }
 }
 
 /// A batch of rays and of their answers.
@@ -35,13 +44,6 @@ impl<'a> Batch<'a> {
         Self { rays, answers, accept: None, scene: None }
     }
 
-    /// Writes the answer for one ray.
-    #[inline(always)]
-    pub(crate) fn write(&mut self, number: usize, t: f32, instance: u32, object: u32) {
-        self.answers
-            .write(number, &[t], &[instance], &[object]);
-    }
-
     /// Traces one ray by itself, and writes its answer. With `ANY` the first hit that is found ends the
     /// ray.
     pub(crate) fn alone<const ANY: bool>(&mut self, number: usize, wide: &WideBvh, ray: &Ray) {
@@ -54,7 +56,7 @@ impl<'a> Batch<'a> {
                 scene.nearest_hit(ray)
             };
             let InstanceHit { t, instance, triangle } = hit.unwrap_or(InstanceHit::MISS);
-            return self.write(number, t, instance, triangle);
+            return self.answers.write(number, t, instance, triangle);
         }
         let any = Hit { t: 0.0, object: 0 };
         let hit = match (&mut self.accept, ANY) {
@@ -66,7 +68,7 @@ impl<'a> Batch<'a> {
                 .then_some(any),
         };
         let Hit { t, object } = hit.unwrap_or(Hit::MISS);
-        self.write(number, t, u32::MAX, object);
+        self.answers.write(number, t, u32::MAX, object);
     }
 }
 
@@ -77,42 +79,27 @@ fn distance(t: f32, object: u32) -> f32 {
 }
 
 impl Answers for &mut [Hit] {
-    fn write(&mut self, first: usize, distances: &[f32], _: &[u32], objects: &[u32]) {
-        let hits = &mut self[first..][..objects.len()];
-        for (hit, (&t, &object)) in hits.iter_mut().zip(distances.iter().zip(objects)) {
-            *hit = Hit { t: distance(t, object), object };
-        }
+    fn write(&mut self, number: usize, t: f32, _: u32, object: u32) {
+        self[number] = Hit { t: distance(t, object), object };
     }
 }
 
 impl Answers for &mut [bool] {
-    fn write(&mut self, first: usize, _: &[f32], _: &[u32], objects: &[u32]) {
-        let hits = &mut self[first..][..objects.len()];
-        for (is_hit, &object) in hits.iter_mut().zip(objects) {
-            *is_hit = object != u32::MAX;
-        }
+    fn write(&mut self, number: usize, _: f32, _: u32, object: u32) {
+        self[number] = object != u32::MAX;
     }
 }
 
 /// Distances and objects in separate slices.
 impl Answers for (&mut [f32], &mut [u32]) {
-    fn write(&mut self, first: usize, distances: &[f32], _: &[u32], objects: &[u32]) {
-        let own = &mut self.0[first..][..objects.len()];
-        for (own, (&t, &object)) in own.iter_mut().zip(distances.iter().zip(objects)) {
-            *own = distance(t, object);
-        }
-        self.1[first..][..objects.len()].copy_from_slice(objects);
+    fn write(&mut self, number: usize, t: f32, _: u32, object: u32) {
+        self.0[number] = distance(t, object);
+        self.1[number] = object;
     }
 }
 
 impl Answers for &mut [InstanceHit] {
-    fn write(&mut self, first: usize, distances: &[f32], instances: &[u32], objects: &[u32]) {
-        let hits = &mut self[first..][..objects.len()];
-        let found = distances
-            .iter()
-            .zip(instances.iter().zip(objects));
-        for (hit, (&t, (&instance, &object))) in hits.iter_mut().zip(found) {
-            *hit = InstanceHit { t: distance(t, object), instance, triangle: object };
-        }
+    fn write(&mut self, number: usize, t: f32, instance: u32, object: u32) {
+        self[number] = InstanceHit { t: distance(t, object), instance, triangle: object };
     }
 }

@@ -49,34 +49,52 @@ pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
     // No triangle has an area. The flight below expects that every ray visits something.
     if wide.root.is_none() {
         for number in numbers {
-            batch.write(number, f32::INFINITY, u32::MAX, u32::MAX);
+            batch
+                .answers
+                .write(number, f32::INFINITY, u32::MAX, u32::MAX);
         }
         return;
     }
-    let flight = Flight::<K, ANY> {
-        wide,
-        batch,
-        from: numbers.start,
-        end: numbers.start,
-        ready: [MaybeUninit::uninit(); RAYS],
-        waiting: 0,
-        at_nodes: List::EMPTY,
-        at_leaves: List::EMPTY,
-        at_end: List::EMPTY,
-        idle: List::EMPTY,
-        instructions: PhantomData,
-    };
+    // Instances are a second body, not a branch: the branch costs rays without instances a tenth.
     // SAFETY: the caller's promises.
-    unsafe { K::call(Trace { flight, last: numbers.end }) };
+    unsafe {
+        if batch.scene.is_some() {
+            K::call(Trace::<K, ANY, true>::new(wide, batch, numbers));
+        } else {
+            K::call(Trace::<K, ANY, false>::new(wide, batch, numbers));
+        }
+    }
 }
 
-/// A flight of all rays up to the last number.
-struct Trace<'a, 'b, K, const ANY: bool> {
-    flight: Flight<'a, 'b, K, ANY>,
+/// A flight of all rays up to the last number. With `IN_INSTANCES` leaves of the layout are instances.
+struct Trace<'a, 'b, K, const ANY: bool, const IN_INSTANCES: bool> {
+    flight: Flight<'a, 'b, K, ANY, IN_INSTANCES>,
     last: usize,
 }
 
-impl<K: Instructions, const ANY: bool> Part for Trace<'_, '_, K, ANY> {
+impl<'a, 'b, K, const ANY: bool, const IN_INSTANCES: bool> Trace<'a, 'b, K, ANY, IN_INSTANCES> {
+    #[inline(always)]
+    fn new(wide: &'a WideBvh, batch: &'a mut Batch<'b>, numbers: Range<usize>) -> Self {
+        let flight = Flight {
+            wide,
+            batch,
+            from: numbers.start,
+            end: numbers.start,
+            ready: [MaybeUninit::uninit(); RAYS],
+            waiting: 0,
+            at_nodes: List::EMPTY,
+            at_leaves: List::EMPTY,
+            at_end: List::EMPTY,
+            idle: List::EMPTY,
+            instructions: PhantomData,
+        };
+        Self { flight, last: numbers.end }
+    }
+}
+
+impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool> Part
+    for Trace<'_, '_, K, ANY, IN_INSTANCES>
+{
     type Output = ();
 
     #[inline(always)]
@@ -119,7 +137,7 @@ impl List {
 }
 
 /// The rays of a batch that are in flight, that are prepared, and that are neither.
-struct Flight<'a, 'b, K, const ANY: bool> {
+struct Flight<'a, 'b, K, const ANY: bool, const IN_INSTANCES: bool> {
     /// The layout at whose root rays start.
     wide: &'a WideBvh,
     batch: &'a mut Batch<'b>,
@@ -137,7 +155,9 @@ struct Flight<'a, 'b, K, const ANY: bool> {
     instructions: PhantomData<K>,
 }
 
-impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
+impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
+    Flight<'_, '_, K, ANY, IN_INSTANCES>
+{
     /// Traces all rays.
     #[inline(always)]
     unsafe fn trace(&mut self, traversals: *mut Traversal) {
@@ -157,7 +177,7 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
                 if leaves_wait {
                     self.visit_leaves(first);
                 }
-                if self.batch.scene.is_none() {
+                if !IN_INSTANCES {
                     if leaves_wait {
                         self.finish(first);
                     }
@@ -188,7 +208,7 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
                 let traversal = &mut *self.idle.get(i);
                 let ray = self.ready.get_unchecked(next).assume_init();
                 traversal.start(ray, self.wide);
-                if self.batch.scene.is_some() {
+                if IN_INSTANCES {
                     traversal.start_outside();
                 }
                 self.enlist(traversal);
@@ -223,6 +243,7 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
                     .alone::<ANY>(number, self.wide, &rays.ray(number));
             } else {
                 self.batch
+                    .answers
                     .write(number, f32::INFINITY, u32::MAX, u32::MAX);
             }
         }
@@ -328,6 +349,7 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
                 let traversal = self.at_end.get(i);
                 let Traversal { ray, t, object, .. } = &*traversal;
                 self.batch
+                    .answers
                     .write(first + ray.number as usize, *t, u32::MAX, *object);
                 self.idle.append(traversal, true);
             }

@@ -140,7 +140,7 @@ impl<K: Instructions> Packet<K> {
             let lanes = ..K::Rays::N;
             batch
                 .answers
-                .write(first, &distances[lanes], &instances[lanes], &objects[lanes]);
+                .write_lanes(first, &distances[lanes], &instances[lanes], &objects[lanes]);
         }
     }
 

@@ -143,8 +143,8 @@ impl InPart {
 }
 
 impl Answers for InPart {
-    fn write(&mut self, first: usize, distances: &[f32], _: &[u32], objects: &[u32]) {
-        self.distances[first..][..objects.len()].copy_from_slice(distances);
-        self.objects[first..][..objects.len()].copy_from_slice(objects);
+    fn write(&mut self, number: usize, t: f32, _: u32, object: u32) {
+        self.distances[number] = t;
+        self.objects[number] = object;
     }
 }

@@ -12,7 +12,9 @@ use super::{Flight, RAYS};
 use crate::Ray;
 use core::mem::MaybeUninit;
 
-impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
+impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
+    Flight<'_, '_, K, ANY, IN_INSTANCES>
+{
     /// Has every ray at the end of an instance leave it, and every ray at an instance enter it; writes the
     /// answers of rays at their end.
     #[inline(always)]
@@ -31,7 +33,9 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
                 if traversal.child == Child::END {
                     let (t, instance, object) = traversal.nearest_of_all::<ANY>();
                     let number = first + traversal.ray.number as usize;
-                    self.batch.write(number, t, instance, object);
+                    self.batch
+                        .answers
+                        .write(number, t, instance, object);
                     self.idle.append(traversal, true);
                     continue;
                 }
@@ -110,8 +114,8 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
         Self: 's,
     {
         match self.batch.scene {
-            Some(scene) => scene.placed(),
-            None => &[],
+            Some(scene) if IN_INSTANCES => scene.placed(),
+            _ => &[],
         }
     }
 }
