@@ -79,12 +79,6 @@ impl<L: Lanes> Pairs<L> {
         (!(least.lt(zero - error) & error.lt(most)).bits(), spread)
     }
 
-    /// Returns the spread of each pair.
-    #[inline(always)]
-    pub(crate) fn spread_of(&self, corners: &[[L; 3]; 3]) -> L {
-        self.spread(&self.roughly_sheared(corners))
-    }
-
     #[inline(always)]
     fn spread(&self, [a, b, c]: &[[L; 2]; 3]) -> L {
         let a = a[0].abs().max(a[1].abs());
@@ -138,6 +132,13 @@ impl<L: Lanes> Pairs<L> {
             return self.decide_exactly(corners, t_max, !decided, is_hit, rounded);
         }
         (is_hit & self.t_min.le(rounded) & rounded.le(t_max), rounded)
+    }
+
+    /// Returns the same as [`decide`](Self::decide) for pairs whose candidates were found elsewhere.
+    #[inline(always)]
+    pub(crate) fn decide_alone(&self, corners: &[[L; 3]; 3], t_max: L) -> (L::Mask, L) {
+        let spread = self.spread(&self.roughly_sheared(corners));
+        self.decide(corners, &doubled(corners), spread, t_max)
     }
 
     /// Returns the corners of each triangle relative to the ray, sheared in f32.

@@ -7,7 +7,7 @@ use super::kernel::STACK;
 use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
-use super::pairs::{Pairs, doubled};
+use super::pairs::Pairs;
 use super::prepared::Prepared;
 use super::triangles::TriangleBlock;
 use crate::Hit;
@@ -283,9 +283,7 @@ pub(super) unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4]) {
         let before = L::load_quarters([row(0), row(1), row(2), row(3)]);
         let t_max = before.spread::<0>();
         let corners = corners::<L>(four);
-        let pairs = pairs::<L>(four);
-        let spread = pairs.spread_of(&corners);
-        let (inside, t) = pairs.decide(&corners, &doubled(&corners), spread, t_max);
+        let (inside, t) = pairs::<L>(four).decide_alone(&corners, t_max);
         let ids = |i: usize| {
             (*(*four[i])
                 .blocks
@@ -357,9 +355,7 @@ unsafe fn decide_others<L: Lanes>(
         let end = &raw const (*traversal).t;
         let t_max = L::load_quarters([end; 4]).spread::<0>();
         let corners = corners::<L>(ray);
-        let pairs = pairs::<L>(ray);
-        let spread = pairs.spread_of(&corners);
-        let (inside, t) = pairs.decide(&corners, &doubled(&corners), spread, t_max);
+        let (inside, t) = pairs::<L>(ray).decide_alone(&corners, t_max);
         let mut distances = [0.0; 16];
         t.store(distances.as_mut_ptr());
         let block = &*(*traversal)
