@@ -58,38 +58,14 @@ pub enum InvalidBvh {
 pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
     check_structure(tree.into(), boxes.len())?;
     check_nesting(tree)?;
-    check_objects(tree, boxes)
-}
-
-/// Rejects a tree in which an object's box is not inside the object's leaf's box.
-fn check_objects(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
-    const AT_ONCE: usize = 64;
-    let mut references = Vec::with_capacity(AT_ONCE);
-    let mut copies = Vec::with_capacity(AT_ONCE);
-    let mut check = |references: &mut Vec<(usize, u32)>| {
-        // The boxes are anywhere in memory. Nothing waits for a copy, so the processor loads many of
-        // them at once.
-        copies.clear();
-        for &(_, object) in &*references {
-            copies.push(boxes[object as usize]);
-        }
-        for ((node, object), aabb) in references.drain(..).zip(&copies) {
-            if !tree.nodes[node].aabb.contains(aabb) {
-                return Err(InvalidBvh::ObjectOutside { node, object: object as usize });
-            }
-        }
-        Ok(())
-    };
     for_each(&tree.nodes, Node::is_leaf, |index, leaf| {
         for &object in &tree.prim_ids[leaf.prims()] {
-            references.push((index, object));
-            if references.len() == AT_ONCE {
-                check(&mut references)?;
+            if !leaf.aabb.contains(&boxes[object as usize]) {
+                return Err(InvalidBvh::ObjectOutside { node: index, object: object as usize });
             }
         }
         Ok(())
-    })?;
-    check(&mut references)
+    })
 }
 
 /// Checks a tree in which an object may be in several leaves. The boxes of these leaves together
