@@ -2,8 +2,8 @@
 //!
 //! `cargo bench -p bvh-build --bench filters`
 //!
-//! Both contenders trace in turns on one thread; the ratio is the median over the rounds. The scene is the
-//! packed scene of the benchmark `instances`, written out.
+//! Both contenders trace in turns on one thread; the ratio is the median over the rounds. The scene
+//! is the packed scene of the benchmark `instances`, written out.
 
 mod balls;
 

@@ -1,11 +1,12 @@
-//! Batches of rays through instances, in relation to the same batches through the same scene written
-//! out as triangles.
+//! Batches of rays through instances, in relation to the same batches through the same scene
+//! written out as triangles.
 //!
 //! `cargo bench -p bvh-build --bench instances [-- COPIES...]`
 //!
-//! The scenes are copies of one bumpy ball, turned and scaled at random: *sparse*, where most rays pass
-//! between copies, and *packed*, where neighbours touch and their boxes overlap. Both sides have trees by
-//! Müller–Fellner. Both contenders trace in turns on one thread; the ratio is the median over the rounds.
+//! The scenes are copies of one bumpy ball, turned and scaled at random: *sparse*, where most rays
+//! pass between copies, and *packed*, where neighbours touch and their boxes overlap. Both sides
+//! have trees by Müller–Fellner. Both contenders trace in turns on one thread; the ratio is the
+//! median over the rounds.
 
 mod balls;
 

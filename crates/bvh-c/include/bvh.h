@@ -73,8 +73,8 @@ typedef struct {
     uint32_t object;
 } BvhHit;
 
-// A hit with the surface there. Without a hit, `t` is infinity, `object` is UINT32_MAX, and all other
-// numbers are 0.
+// A hit with the surface there. Without a hit, `t` is infinity, `object` is UINT32_MAX, and all
+// other numbers are 0.
 typedef struct {
     // The distance, in multiples of the direction's length.
     float t;
@@ -89,8 +89,8 @@ typedef struct {
     float normal[3];
 } BvhSurfaceHit;
 
-// The point of the triangles that is closest to a given point. Without one, `distance` is infinity,
-// `object` is UINT32_MAX, and the point is NaN.
+// The point of the triangles that is closest to a given point. Without one, `distance` is
+// infinity, `object` is UINT32_MAX, and the point is NaN.
 typedef struct {
     // The closest point.
     double point[3];
@@ -200,29 +200,29 @@ BvhStatus bvh_tracer_nearest_hits(const BvhTracer *tracer, const BvhRay *rays, s
 // `tracer` is a tracer; `rays` and `hits` point to `count` elements each.
 BvhStatus bvh_tracer_any_hits(const BvhTracer *tracer, const BvhRay *rays, size_t count, int32_t coherent, uint8_t *hits);
 
-// Writes the nearest hits of `count` rays with the surfaces there to `hits`. `coherent` has the meaning
-// that it has in `bvh_tracer_nearest_hits`.
+// Writes the nearest hits of `count` rays with the surfaces there to `hits`. `coherent` has the
+// meaning that it has in `bvh_tracer_nearest_hits`.
 //
 // `tracer` is a tracer; `rays` and `hits` point to `count` elements each.
 BvhStatus bvh_tracer_surface_hits(const BvhTracer *tracer, const BvhRay *rays, size_t count, int32_t coherent, BvhSurfaceHit *hits);
 
-// Writes all hits of `count` rays to `hits`, ray after ray and the nearest first, the number of each
-// ray's hits to `counts`, and the number of all hits to `total`. Each crossing of the surface counts
-// once, although triangles share edges and corners. Only the first `capacity` hits are written; if
-// `total` is greater, call again with room for them.
+// Writes all hits of `count` rays to `hits`, ray after ray and the nearest first, the number of
+// each ray's hits to `counts`, and the number of all hits to `total`. Each crossing of the surface
+// counts once, although triangles share edges and corners. Only the first `capacity` hits are
+// written; if `total` is greater, call again with room for them.
 //
-// `tracer` is a tracer; `rays` and `counts` point to `count` elements each, `hits` points to `capacity`
-// elements, and `total` points to a size.
+// `tracer` is a tracer; `rays` and `counts` point to `count` elements each, `hits` points to
+// `capacity` elements, and `total` points to a size.
 BvhStatus bvh_tracer_all_hits(const BvhTracer *tracer, const BvhRay *rays, size_t count, BvhHit *hits, size_t capacity, uint32_t *counts, size_t *total);
 
-// Writes the closest points of the triangles to `count` points, 3 floats each. Triangles without area do
-// not count.
+// Writes the closest points of the triangles to `count` points, 3 floats each. Triangles without
+// area do not count.
 //
 // `tracer` is a tracer; `points` points to 3 * `count` floats, and `closest` to `count` elements.
 BvhStatus bvh_tracer_closest_points(const BvhTracer *tracer, const float *points, size_t count, BvhClosest *closest);
 
-// Writes to `inside` whether each of `count` points, 3 floats each, is inside the mesh: 1 or 0. The
-// answer is exact for closed meshes; a point on the surface may count as either.
+// Writes to `inside` whether each of `count` points, 3 floats each, is inside the mesh: 1 or 0.
+// The answer is exact for closed meshes; a point on the surface may count as either.
 //
 // `tracer` is a tracer; `points` points to 3 * `count` floats, and `inside` to `count` bytes.
 BvhStatus bvh_tracer_contains(const BvhTracer *tracer, const float *points, size_t count, uint8_t *inside);

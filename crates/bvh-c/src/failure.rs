@@ -109,8 +109,8 @@ pub(crate) unsafe fn given<'a, T>(name: &str, pointer: *const T) -> Result<&'a T
 /// Converts a pointer into a mutable reference, and rejects null and wrong alignment.
 ///
 /// # Safety
-/// `pointer` is null or not aligned, or points to a `T` that nobody else uses while the result is in
-/// use.
+/// `pointer` is null or not aligned, or points to a `T` that nobody else uses while the result is
+/// in use.
 pub(crate) unsafe fn given_mut<'a, T>(name: &str, pointer: *mut T) -> Result<&'a mut T, Failure> {
     check_alignment(name, pointer)?;
     // SAFETY: an aligned pointer that is not null points to a `T` that nobody else uses meanwhile.

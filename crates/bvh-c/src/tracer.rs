@@ -36,8 +36,8 @@ pub struct BvhHit {
     pub object: u32,
 }
 
-/// A hit with the surface there. Without a hit, `t` is infinity, `object` is UINT32_MAX, and all other
-/// numbers are 0.
+/// A hit with the surface there. Without a hit, `t` is infinity, `object` is UINT32_MAX, and all
+/// other numbers are 0.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BvhSurfaceHit {
@@ -54,8 +54,8 @@ pub struct BvhSurfaceHit {
     pub normal: [f32; 3],
 }
 
-/// The point of the triangles that is closest to a given point. Without one, `distance` is infinity,
-/// `object` is UINT32_MAX, and the point is NaN.
+/// The point of the triangles that is closest to a given point. Without one, `distance` is
+/// infinity, `object` is UINT32_MAX, and the point is NaN.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BvhClosest {
@@ -149,8 +149,8 @@ pub unsafe extern "C" fn bvh_tracer_any_hits(
     })
 }
 
-/// Writes the nearest hits of `count` rays with the surfaces there to `hits`. `coherent` has the meaning
-/// that it has in `bvh_tracer_nearest_hits`.
+/// Writes the nearest hits of `count` rays with the surfaces there to `hits`. `coherent` has the
+/// meaning that it has in `bvh_tracer_nearest_hits`.
 ///
 /// `tracer` is a tracer; `rays` and `hits` point to `count` elements each.
 #[unsafe(no_mangle)]
@@ -193,13 +193,13 @@ pub unsafe extern "C" fn bvh_tracer_surface_hits(
     })
 }
 
-/// Writes all hits of `count` rays to `hits`, ray after ray and the nearest first, the number of each
-/// ray's hits to `counts`, and the number of all hits to `total`. Each crossing of the surface counts
-/// once, although triangles share edges and corners. Only the first `capacity` hits are written; if
-/// `total` is greater, call again with room for them.
+/// Writes all hits of `count` rays to `hits`, ray after ray and the nearest first, the number of
+/// each ray's hits to `counts`, and the number of all hits to `total`. Each crossing of the surface
+/// counts once, although triangles share edges and corners. Only the first `capacity` hits are
+/// written; if `total` is greater, call again with room for them.
 ///
-/// `tracer` is a tracer; `rays` and `counts` point to `count` elements each, `hits` points to `capacity`
-/// elements, and `total` points to a size.
+/// `tracer` is a tracer; `rays` and `counts` point to `count` elements each, `hits` points to
+/// `capacity` elements, and `total` points to a size.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvh_tracer_all_hits(
     tracer: *const BvhTracer,
@@ -238,8 +238,8 @@ pub unsafe extern "C" fn bvh_tracer_all_hits(
     })
 }
 
-/// Writes the closest points of the triangles to `count` points, 3 floats each. Triangles without area do
-/// not count.
+/// Writes the closest points of the triangles to `count` points, 3 floats each. Triangles without
+/// area do not count.
 ///
 /// `tracer` is a tracer; `points` points to 3 * `count` floats, and `closest` to `count` elements.
 #[unsafe(no_mangle)]
@@ -275,8 +275,8 @@ pub unsafe extern "C" fn bvh_tracer_closest_points(
     })
 }
 
-/// Writes to `inside` whether each of `count` points, 3 floats each, is inside the mesh: 1 or 0. The
-/// answer is exact for closed meshes; a point on the surface may count as either.
+/// Writes to `inside` whether each of `count` points, 3 floats each, is inside the mesh: 1 or 0.
+/// The answer is exact for closed meshes; a point on the surface may count as either.
 ///
 /// `tracer` is a tracer; `points` points to 3 * `count` floats, and `inside` to `count` bytes.
 #[unsafe(no_mangle)]

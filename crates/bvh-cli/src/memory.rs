@@ -1,8 +1,8 @@
 //! The allocator of the program: the system's, which asks Linux for huge pages for large blocks.
 //!
-//! A search visits the nodes of a tree in random order, and a tree of 5 million triangles takes half a
-//! gigabyte. In pages of 4 KiB, page faults and the release of the pages take most of the time between
-//! Ctrl-C and the end of such a bake.
+//! A search visits the nodes of a tree in random order, and a tree of 5 million triangles takes
+//! half a gigabyte. In pages of 4 KiB, page faults and the release of the pages take most of the
+//! time between Ctrl-C and the end of such a bake.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 
@@ -36,8 +36,8 @@ unsafe impl GlobalAlloc for HugePages {
     }
 
     unsafe fn realloc(&self, block: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        // SAFETY: the block is from the system's allocator with this layout, and the caller's size is
-        // valid.
+        // SAFETY: the block is from the system's allocator with this layout, and the caller's size
+        // is valid.
         let block = unsafe { System.realloc(block, layout, size) };
         advise(block, size);
         block

@@ -52,8 +52,8 @@ impl Rays {
             .map_err(|message| Error::Rays { file: path.to_owned(), message })
     }
 
-    /// Rejects recorded rays of the file `named` if no ray meets the scene. The search could not find
-    /// that out: it adds rays from anywhere in the scene.
+    /// Rejects recorded rays of the file `named` if no ray meets the scene. The search could not
+    /// find that out: it adds rays from anywhere in the scene.
     pub fn check(&self, named: &str, scene: &Scene) -> Result<(), Error> {
         let Self::Recorded(segments) = self else { return Ok(()) };
         let bounds = Aabb::union_of(&scene.boxes);
@@ -72,8 +72,8 @@ impl Rays {
         Err(Error::Rays { file: PathBuf::from(named), message })
     }
 
-    /// Returns the rays' density in a scene, or `None` soon after `interrupted` becomes true; `tree`
-    /// is any valid tree over the scene.
+    /// Returns the rays' density in a scene, or `None` soon after `interrupted` becomes true;
+    /// `tree` is any valid tree over the scene.
     pub fn density(
         &self,
         scene: &Scene,

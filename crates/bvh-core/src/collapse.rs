@@ -94,8 +94,8 @@ pub(crate) fn binary(tree: &Bvh) -> Cow<'_, Bvh> {
 }
 
 fn is_binary(tree: &Bvh) -> bool {
-    // The most nodes that a valid tree can have are one leaf per reference and two children per inner
-    // node. Once over the nodes of a large tree takes 50 ms.
+    // The most nodes that a valid tree can have are one leaf per reference and two children per
+    // inner node. Once over the nodes of a large tree takes 50 ms.
     let has_most_nodes = tree.nodes.len() + 1 == 2 * tree.prim_ids.len();
     has_most_nodes
         || tree

@@ -56,13 +56,15 @@
 //! above E the line misses. With all three above E, or below −E, it crosses, and the determinant is
 //! not zero.
 //!
-//! The distance is the quotient of the formula above, with the edges `b − a` and `c − a` as they are, not relative to the
-//! origin: near the origin this has far smaller errors than interpolation between depths. `A · n` is a sum of six products of
-//! three differences. Each difference is off by ε of itself, and its way through two products and three sums adds 5ε: with N the
-//! sum of the absolute products, `A · n` is off by less than 8.1 εN, and in the same way `d · n` by less than 8.1 εM. With
-//! `64 εM ≤ |d · n|` the computed quotient t is off by less than (8.1 ε (N + |t| M) / |d · n|) · 8/7 + ε|t|, which is less than the
-//! bound `16 ε (N + |t| M) / |d · n|`. If both ends of this interval round to one f32, that f32 is the rounded distance, because
-//! rounding is monotone.
+//! The distance is the quotient of the formula above, with the edges `b − a` and `c − a` as they
+//! are, not relative to the origin: near the origin this has far smaller errors than interpolation
+//! between depths. `A · n` is a sum of six products of three differences. Each difference is off by
+//! ε of itself, and its way through two products and three sums adds 5ε: with N the sum of the
+//! absolute products, `A · n` is off by less than 8.1 εN, and in the same way `d · n` by less than
+//! 8.1 εM. With `64 εM ≤ |d · n|` the computed quotient t is off by less than (8.1 ε (N + |t| M) /
+//! |d · n|) · 8/7 + ε|t|, which is less than the bound `16 ε (N + |t| M) / |d · n|`. If both ends
+//! of this interval round to one f32, that f32 is the rounded distance, because rounding is
+//! monotone.
 //!
 //! Nothing overflows or underflows: coordinates are multiples of 2⁻¹⁴⁹ below 2¹²⁹, all values above
 //! are between 2⁻⁷⁵⁰ and 2⁷⁵⁰ or zero.
@@ -205,8 +207,8 @@ impl Line {
         Verdict::Unsure
     }
 
-    /// Returns the rounded distance at which the ray's line crosses the triangle at or in front of the
-    /// origin, by exact arithmetic where f64 does not suffice. Does not allocate.
+    /// Returns the rounded distance at which the ray's line crosses the triangle at or in front of
+    /// the origin, by exact arithmetic where f64 does not suffice. Does not allocate.
     #[cold]
     #[inline(never)]
     pub(crate) fn distance(&self, ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
@@ -239,8 +241,9 @@ impl Line {
         }
     }
 
-    /// Returns the rounded distance at which the ray crosses the triangle at or in front of the origin,
-    /// by the rule of [`Triangle::crossing`](crate::Triangle::crossing). `self` is the line of `ray`.
+    /// Returns the rounded distance at which the ray crosses the triangle at or in front of the
+    /// origin, by the rule of [`Triangle::crossing`](crate::Triangle::crossing). `self` is the line
+    /// of `ray`.
     #[inline(always)]
     pub(crate) fn crossing(&self, ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
         match self.filter(triangle) {
@@ -313,8 +316,9 @@ impl<'a> Volumes<'a> {
         self.along_direction(&cross(&self.corners[first], &self.corners[second]))
     }
 
-    /// Returns the sides of the edges on which the ray is, never 0 for an edge that is not parallel to it: the
-    /// signs of `u`, `v` and `w` after the origin has moved by (ε, ε², ε³) with an infinitely small ε > 0.
+    /// Returns the sides of the edges on which the ray is, never 0 for an edge that is not parallel
+    /// to it: the signs of `u`, `v` and `w` after the origin has moved by (ε, ε², ε³) with an
+    /// infinitely small ε > 0.
     fn sides(&self) -> [i32; 3] {
         [0, 1, 2].map(|number| {
             let side = self.edge(number).sign();

@@ -42,8 +42,8 @@ impl LayoutCost {
     /// Returns the costs of a node with two children, whose box has this size.
     #[inline(always)]
     pub fn join(size: f64, left: &Self, right: &Self) -> Self {
-        // A leaf costs the same as any number of children. Half of all nodes are leaves, and the least
-        // sum with a constant needs one addition instead of the search for it.
+        // A leaf costs the same as any number of children. Half of all nodes are leaves, and the
+        // least sum with a constant needs one addition instead of the search for it.
         let split = if left.is_constant() {
             right.plus(left.value())
         } else if right.is_constant() {
@@ -177,8 +177,8 @@ impl LayoutTree for Measured<'_> {
     }
 }
 
-/// Returns the costs of a node as parts of a wide layout. Passes the two subtrees of nodes near it to
-/// `both`. O(nodes below it).
+/// Returns the costs of a node as parts of a wide layout. Passes the two subtrees of nodes near it
+/// to `both`. O(nodes below it).
 pub fn layout_row(tree: &impl LayoutTree, node: usize, both: CallBoth) -> LayoutCost {
     /// The number of levels whose subtrees are passed to `both`: enough for many threads and for
     /// unequal subtrees.

@@ -13,9 +13,9 @@
 //! | the object nearest to a point | [`nearest`] | about O(log n) for objects that are spread out |
 //! | the k objects nearest to a point | [`k_nearest`] | about O(k + log n) for such objects |
 //!
-//! All queries use the tree. The [wide layout](crate::WideBvh) is faster, but omits triangles without
-//! area. Its [`all_hits`](crate::WideBvh::all_hits) counts each crossing of a surface once, although
-//! triangles share edges; [`closest_points`](crate::WideBvh::closest_points) and
+//! All queries use the tree. The [wide layout](crate::WideBvh) is faster, but omits triangles
+//! without area. Its [`all_hits`](crate::WideBvh::all_hits) counts each crossing of a surface once,
+//! although triangles share edges; [`closest_points`](crate::WideBvh::closest_points) and
 //! [`contains`](crate::WideBvh::contains) answer batches of points.
 //!
 //! ```

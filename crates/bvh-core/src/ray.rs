@@ -72,8 +72,8 @@ impl Ray {
 
     /// Makes a ray like [`new`](Self::new), without the checks, for callers who know that they
     /// would pass: a finite origin, a direction whose largest component is between 2⁻¹⁰⁰ and 2¹⁰⁰,
-    /// `0 <= t_min`, and no NaN. Otherwise answers may be wrong, but nothing is undefined. A `t_min`
-    /// below 0 counts as 0.
+    /// `0 <= t_min`, and no NaN. Otherwise answers may be wrong, but nothing is undefined. A
+    /// `t_min` below 0 counts as 0.
     #[inline]
     pub fn assume_valid(
         origin: impl Into<Vec3>,

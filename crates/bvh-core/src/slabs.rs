@@ -7,14 +7,15 @@ use glam::{Vec3, Vec4, Vec4Swizzles};
 ///
 /// Three properties make the answer of a traversal independent of its tree:
 ///
-/// 1. *Conservative.* If the ray is in the box at a distance t ≥ 0 in real arithmetic, the interval of
-///    the box contains t rounded to f32. The box grows by R · [`Slabs::MARGIN`] = 8uR, where u = 2⁻²⁴ and
-///    R is the largest coordinate of the scene relative to the origin; at least 7.9uR remain after the
-///    sum with the origin is rounded. The difference from a plane and the reciprocal of the direction
-///    are off by at most u of themselves, and no difference exceeds R. So the product before its own
-///    rounding is at most t for an entry and at least t for an exit, and rounding is monotone. A
-///    reciprocal that would overflow is `f32::MAX`, which moves an entry nearer. An exit is then at least
-///    7.9uR · `f32::MAX`, and t ≤ R / D, where D ≥ 2⁻¹⁰⁰ is the direction's largest component.
+/// 1. *Conservative.* If the ray is in the box at a distance t ≥ 0 in real arithmetic, the interval
+///    of the box contains t rounded to f32. The box grows by R · [`Slabs::MARGIN`] = 8uR, where u =
+///    2⁻²⁴ and R is the largest coordinate of the scene relative to the origin; at least 7.9uR
+///    remain after the sum with the origin is rounded. The difference from a plane and the
+///    reciprocal of the direction are off by at most u of themselves, and no difference exceeds R.
+///    So the product before its own rounding is at most t for an entry and at least t for an exit,
+///    and rounding is monotone. A reciprocal that would overflow is `f32::MAX`, which moves an
+///    entry nearer. An exit is then at least 7.9uR · `f32::MAX`, and t ≤ R / D, where D ≥ 2⁻¹⁰⁰ is
+///    the direction's largest component.
 /// 2. *Monotone.* The interval of a box inside another box is inside the other's interval, bit by
 ///    bit: each operation rounds monotonically.
 /// 3. *Defined.* Reciprocals are finite and the margin is never zero, so no 0 · ∞ occurs, and a ray

@@ -54,8 +54,8 @@ impl Triangle {
         point + self.offset_from(point)
     }
 
-    /// Returns the vector from `point` to the nearest point of the triangle. Triangles with a common edge
-    /// or corner compute the same bits for a nearest point on it.
+    /// Returns the vector from `point` to the nearest point of the triangle. Triangles with a
+    /// common edge or corner compute the same bits for a nearest point on it.
     pub(crate) fn offset_from(&self, point: DVec3) -> DVec3 {
         let [a, b, c] = self.0.map(|corner| corner.as_dvec3() - point);
         let normal = (b - a).cross(c - a);
@@ -121,9 +121,10 @@ impl Triangle {
     /// The ray's line must cross the closed triangle, and the ray must not be parallel to its
     /// plane. A triangle behind the origin is not hit, however near. No distance is −0.
     ///
-    /// The test is watertight: a ray through a common edge of two triangles hits at least one of them.
-    /// No ray hits a degenerate triangle. f64 decides nearly all triangles. Next to an edge, or where a
-    /// distance is nearly the middle between two `f32`, expansions decide, which takes microseconds.
+    /// The test is watertight: a ray through a common edge of two triangles hits at least one of
+    /// them. No ray hits a degenerate triangle. f64 decides nearly all triangles. Next to an edge,
+    /// or where a distance is nearly the middle between two `f32`, expansions decide, which takes
+    /// microseconds.
     ///
     /// Source: Shewchuk 1997, 'Adaptive precision floating-point arithmetic and fast robust
     /// geometric predicates'.
@@ -143,11 +144,11 @@ impl Triangle {
         (prepared.ray.t_min() <= t && t <= t_max).then_some(t)
     }
 
-    /// Returns the distance at which the ray crosses the triangle, in real arithmetic, if that distance is
-    /// in the ray's range. The same as [`intersect`](Self::intersect), but of the triangles that
-    /// meet in an edge or a corner, the ray crosses only those that it would cross if its origin were moved
-    /// by (ε, ε², ε³) with an infinitely small ε > 0. The line of a ray crosses a closed mesh an even
-    /// number of times.
+    /// Returns the distance at which the ray crosses the triangle, in real arithmetic, if that
+    /// distance is in the ray's range. The same as [`intersect`](Self::intersect), but of the
+    /// triangles that meet in an edge or a corner, the ray crosses only those that it would cross
+    /// if its origin were moved by (ε, ε², ε³) with an infinitely small ε > 0. The line of a ray
+    /// crosses a closed mesh an even number of times.
     ///
     /// Source: Edelsbrunner & Mücke 1990, 'Simulation of simplicity'.
     ///
@@ -164,7 +165,8 @@ impl Triangle {
     }
 }
 
-/// Returns the point of a segment nearest to zero, the same bits for both directions of the segment.
+/// Returns the point of a segment nearest to zero, the same bits for both directions of the
+/// segment.
 fn nearest_of_edge(from: DVec3, to: DVec3) -> DVec3 {
     let is_ordered = from.to_array() <= to.to_array();
     let (from, to) = if is_ordered { (from, to) } else { (to, from) };

@@ -122,9 +122,9 @@ impl Reserved {
         Ok(Self { path, unfinished, ahead: 0..0 })
     }
 
-    /// Writes and syncs sections that begin at byte `start` of the file, while the caller still computes
-    /// the others. [`write_sections`](Self::write_sections) must get the same sections at the same place,
-    /// and does not write them again.
+    /// Writes and syncs sections that begin at byte `start` of the file, while the caller still
+    /// computes the others. [`write_sections`](Self::write_sections) must get the same sections at
+    /// the same place, and does not write them again.
     pub fn write_ahead(&mut self, start: u64, sections: &[&[u8]]) -> Result<(), WriteError> {
         self.replace_lost()?;
         let file = self.unfinished.as_file_mut();

@@ -42,8 +42,8 @@ type Kinds = (&'static str, &'static str);
 const REAL_NUMBERS: Kinds = ("biuf", "real numbers");
 const INTEGERS: Kinds = ("iu", "integers");
 
-/// Converts anything that numpy accepts as an array of some kinds to `dtype`, which is the type `T`,
-/// aligned and in row order, and checks its shape.
+/// Converts anything that numpy accepts as an array of some kinds to `dtype`, which is the type
+/// `T`, aligned and in row order, and checks its shape.
 fn numbers<'py, T: Element>(
     name: &str,
     argument: &Bound<'py, PyAny>,
@@ -167,8 +167,8 @@ pub fn boxes(argument: &Bound<PyAny>) -> PyResult<Objects> {
     Ok(Objects::Boxes(boxes.to_vec()))
 }
 
-/// The origins or directions of rays, in either precision: `float64` is rounded ray by ray, without a
-/// copy of the array.
+/// The origins or directions of rays, in either precision: `float64` is rounded ray by ray, without
+/// a copy of the array.
 enum Vectors<'py> {
     Single(PyReadonlyArrayDyn<'py, f32>),
     Double(PyReadonlyArrayDyn<'py, f64>),

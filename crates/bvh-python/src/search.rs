@@ -49,8 +49,8 @@ impl Observer for Watch {
     }
 }
 
-/// Runs `search` within its limits. Returns its result, and the exception that a signal handler or the
-/// function `progress` has raised meanwhile.
+/// Runs `search` within its limits. Returns its result, and the exception that a signal handler or
+/// the function `progress` has raised meanwhile.
 pub fn searched<T: Send>(
     py: Python,
     Limits { seconds, work, progress }: Limits,

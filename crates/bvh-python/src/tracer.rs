@@ -11,19 +11,18 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// The triangles of a tree in a layout for fast traversal. Later improvements and updates of the tree
-/// do not change the tracer.
+/// The triangles of a tree in a layout for fast traversal. Later improvements and updates of the
+/// tree do not change the tracer.
 ///
-/// Rays have `origins` and `directions` of the shape `(m, 3)`. `t_min` and `t_max`, by default 0 and
-/// infinity, are one number or have the shape `(m,)`. Distances are in multiples of the directions'
-/// lengths. Set `coherent` if consecutive rays begin close to each other and have similar directions:
-/// it changes the speed and no answer. An invalid ray, with a direction that is zero or a number that
-/// is not finite, raises a `ValueError`; with `invalid="miss"` it hits nothing.
+/// Rays have `origins` and `directions` of the shape `(m, 3)`. `t_min` and `t_max`, by default 0
+/// and infinity, are one number or have the shape `(m,)`. Distances are in multiples of the
+/// directions' lengths. Set `coherent` if consecutive rays begin close to each other and have
+/// similar directions: it changes the speed and no answer. An invalid ray, with a direction that is
+/// zero or a number that is not finite, raises a `ValueError`; with `invalid="miss"` it hits
+/// nothing.
 ///
-/// >>> import numpy as np
-/// >>> from bvh_search import Tracer, Tree
-/// >>> square = Tree.from_mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
-/// >>> tracer = Tracer(square)
+/// >>> import numpy as np >>> from bvh_search import Tracer, Tree >>> square = Tree.from_mesh([[0,
+/// 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]) >>> tracer = Tracer(square)
 #[pyclass(frozen, module = "bvh_search")]
 pub struct Tracer {
     wide: WideBvh,
@@ -44,8 +43,8 @@ impl Tracer {
         Ok(Self { wide: wide.map_err(invalid)?, source })
     }
 
-    /// Returns the distances of the nearest hits and the triangles' indices. A ray without a hit has
-    /// infinity and −1.
+    /// Returns the distances of the nearest hits and the triangles' indices. A ray without a hit
+    /// has infinity and −1.
     ///
     /// >>> tracer.nearest([[0.25, 0.5, 3], [2, 2, 3]], [[0, 0, -1], [0, 0, -1]])
     /// (array([ 3., inf], dtype=float32), array([ 1, -1], dtype=int32))
@@ -122,9 +121,9 @@ impl Tracer {
         Ok(hits.into_pyarray(py))
     }
 
-    /// Returns all hits, ray after ray and the nearest first: distances, triangles, and the indices of
-    /// the rays. Each crossing of the surface counts once, although triangles share edges and corners, so
-    /// the number of hits of a line with a closed mesh is even.
+    /// Returns all hits, ray after ray and the nearest first: distances, triangles, and the indices
+    /// of the rays. Each crossing of the surface counts once, although triangles share edges and
+    /// corners, so the number of hits of a line with a closed mesh is even.
     ///
     /// >>> tracer.all([[0.5, 0.5, 3], [2, 2, 3]], [[0, 0, -1], [0, 0, -1]])
     /// (array([3.], dtype=float32), array([0], dtype=int32), array([0]))
@@ -202,8 +201,8 @@ impl Tracer {
         Ok(counts.into_pyarray(py))
     }
 
-    /// Returns whether each point, `(m, 3)`, is inside the mesh. The answer is exact for closed meshes; a
-    /// point on the surface may count as either.
+    /// Returns whether each point, `(m, 3)`, is inside the mesh. The answer is exact for closed
+    /// meshes; a point on the surface may count as either.
     ///
     /// >>> tracer.contains([[0.5, 0.5, 1]])
     /// array([False])
@@ -217,8 +216,9 @@ impl Tracer {
     }
 
     /// Returns the closest points of the triangles to each point, `(m, 3)`, in `float64`, with the
-    /// triangles' indices and the distances. Among triangles at the same distance the lowest index wins. A
-    /// point that is not finite has NaN, −1 and infinity. Triangles without area do not count.
+    /// triangles' indices and the distances. Among triangles at the same distance the lowest index
+    /// wins. A point that is not finite has NaN, −1 and infinity. Triangles without area do not
+    /// count.
     ///
     /// >>> tracer.closest([[0.5, 0.25, 2]])
     /// (array([[0.5 , 0.25, 0.  ]]), array([0], dtype=int32), array([2.]))
@@ -250,8 +250,8 @@ impl Tracer {
         Ok((closest, objects.into_pyarray(py), distances.into_pyarray(py)))
     }
 
-    /// Returns the distance of each point, `(m, 3)`, from the triangles, negative for points that the mesh
-    /// contains.
+    /// Returns the distance of each point, `(m, 3)`, from the triangles, negative for points that
+    /// the mesh contains.
     ///
     /// >>> tracer.signed_distance([[0.5, 0.25, 2]])
     /// array([2.])
@@ -269,9 +269,9 @@ impl Tracer {
         Ok(distances.into_pyarray(py))
     }
 
-    /// Returns the weights `u` and `v` of the second and third corner at hits, and the unit normals of the
-    /// triangles, on the side from which their corners run counterclockwise. `triangle` has one index per
-    /// ray; where it is −1 all numbers are 0.
+    /// Returns the weights `u` and `v` of the second and third corner at hits, and the unit normals
+    /// of the triangles, on the side from which their corners run counterclockwise. `triangle` has
+    /// one index per ray; where it is −1 all numbers are 0.
     ///
     /// >>> tracer.surface([[0.5, 0.25, 3]], [[0, 0, -1]], [0])
     /// (array([0.25]), array([0.25]), array([[0., 0., 1.]], dtype=float32))

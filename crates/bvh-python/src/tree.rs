@@ -18,21 +18,19 @@ use std::io;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock, TryLockError};
 
-/// A tree with its objects. `from_mesh`, `from_triangles`, `from_boxes` and `load` create trees; `len`
-/// is the number of objects. Trees can be copied and pickled.
+/// A tree with its objects. `from_mesh`, `from_triangles`, `from_boxes` and `load` create trees;
+/// `len` is the number of objects. Trees can be copied and pickled.
 ///
 /// Searches have these arguments. They end after `seconds`, by default 1, or after `work` nodes
-/// created or visited. With `work` and without `seconds`, the same `seed` gives the same tree on every
-/// machine. `progress(seconds, cost)` is called about twenty times per second with the elapsed time and
-/// the lowest cost so far; if it raises an exception, the search ends. `rays` are recorded rays of the
-/// shape `(m, 2, 3)`, from their origins to their hits: the tree is then for rays like these.
-/// `references` above 1, up to 16, divides triangles among leaves, on average into that many parts
-/// each.
+/// created or visited. With `work` and without `seconds`, the same `seed` gives the same tree on
+/// every machine. `progress(seconds, cost)` is called about twenty times per second with the
+/// elapsed time and the lowest cost so far; if it raises an exception, the search ends. `rays` are
+/// recorded rays of the shape `(m, 2, 3)`, from their origins to their hits: the tree is then for
+/// rays like these. `references` above 1, up to 16, divides triangles among leaves, on average into
+/// that many parts each.
 ///
-/// >>> from bvh_search import Tree
-/// >>> square = Tree.from_mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], work=100)
-/// >>> len(square)
-/// 2
+/// >>> from bvh_search import Tree >>> square = Tree.from_mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0],
+/// [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], work=100) >>> len(square) 2
 #[pyclass(frozen, module = "bvh_search")]
 pub struct Tree {
     /// The tree. A thread must not call Python while it holds this lock: Python may switch to a
@@ -75,8 +73,8 @@ impl Tree {
 
 #[pymethods]
 impl Tree {
-    /// Searches for the best tree over the triangles of a mesh: vertices, `(v, 3)`, and faces, `(n, 3)`,
-    /// of three vertices each. `update` moves the vertices later.
+    /// Searches for the best tree over the triangles of a mesh: vertices, `(v, 3)`, and faces, `(n,
+    /// 3)`, of three vertices each. `update` moves the vertices later.
     ///
     /// >>> mesh = Tree.from_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], work=100)
     #[staticmethod]
@@ -206,8 +204,9 @@ impl Tree {
         raised
     }
 
-    /// Moves the vertices, `(v, 3)`, of a tree from `from_mesh`. The nodes remain and their boxes become
-    /// tight, in milliseconds; `improve` may find better nodes. Tracers of the tree do not change.
+    /// Moves the vertices, `(v, 3)`, of a tree from `from_mesh`. The nodes remain and their boxes
+    /// become tight, in milliseconds; `improve` may find better nodes. Tracers of the tree do not
+    /// change.
     ///
     /// >>> mesh.update([[0, 0, 1], [1, 0, 1], [0, 1, 1]])
     fn update(&self, vertices: &Bound<PyAny>) -> PyResult<()> {

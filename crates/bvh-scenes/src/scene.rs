@@ -81,8 +81,8 @@ pub const SPHERES: [(&str, usize); 3] =
 /// The largest number of objects of a generated scene. A bake of as many needs 35 gigabytes.
 const MOST_GENERATED: usize = 100_000_000;
 
-/// Returns whether the process may have a block of this many bytes: whether its limits permit it, and
-/// the system does not reject it as larger than all memory. Touches no memory.
+/// Returns whether the process may have a block of this many bytes: whether its limits permit it,
+/// and the system does not reject it as larger than all memory. Touches no memory.
 pub fn is_allocatable(bytes: usize) -> bool {
     let mut block: Vec<u8> = Vec::new();
     let result = block.try_reserve_exact(bytes);
@@ -173,8 +173,8 @@ impl Scene {
         })
     }
 
-    /// Returns the number of objects of a scene that [`load`](Self::load) would generate by this name;
-    /// `None` for all other names.
+    /// Returns the number of objects of a scene that [`load`](Self::load) would generate by this
+    /// name; `None` for all other names.
     pub fn generated_objects(name: &str) -> Option<usize> {
         match Subset::parse(name)? {
             (id, Subset::Spaced(objects)) => {

@@ -24,8 +24,8 @@ pub fn bake(boxes: &[Aabb], time: Duration) -> Result<Outcome, SearchError> {
     solve(&best::Config::default(), &Problem::new(boxes), 1, Budget::UNLIMITED, &deadline)
 }
 
-/// Returns a scene of instances with the best tree over them that [`best`](crate::best) finds in about
-/// `time`. The trees of the parts are as they are.
+/// Returns a scene of instances with the best tree over them that [`best`](crate::best) finds in
+/// about `time`. The trees of the parts are as they are.
 ///
 /// ```
 /// use bvh_search::prelude::*;

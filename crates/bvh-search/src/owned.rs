@@ -19,7 +19,8 @@ pub enum Objects {
 /// The choices of a search for an [`OwnedTree`].
 #[derive(Clone, Copy, Debug)]
 pub struct Options<'a> {
-    /// The average number of parts into which shapes may be divided among leaves; 1 keeps them whole.
+    /// The average number of parts into which shapes may be divided among leaves; 1 keeps them
+    /// whole.
     pub references: f64,
     /// The seed of the random numbers.
     pub seed: u64,
@@ -89,8 +90,9 @@ impl OwnedTree {
         Ok(())
     }
 
-    /// Moves the tree to the same objects at other places: every box becomes tight again, and the nodes
-    /// remain. The growth of a [cost](Self::cost) tells when a search is worth its time. O(n).
+    /// Moves the tree to the same objects at other places: every box becomes tight again, and the
+    /// nodes remain. The growth of a [cost](Self::cost) tells when a search is worth its time.
+    /// O(n).
     ///
     /// # Errors
     /// Returns the first object that has no valid box; the tree is then unchanged.
@@ -107,8 +109,8 @@ impl OwnedTree {
         Ok(())
     }
 
-    /// Returns the layout of the tree that traces rays, for the rays of its search if there are any;
-    /// `None` for objects that are not triangles.
+    /// Returns the layout of the tree that traces rays, for the rays of its search if there are
+    /// any; `None` for objects that are not triangles.
     pub fn layout(&self) -> Option<Result<WideBvh, InvalidBvh>> {
         let triangles = self.triangles()?;
         Some(match &self.density {

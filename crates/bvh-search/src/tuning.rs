@@ -119,8 +119,8 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 --threa
     WORTH_LARGE_SUBTREES: f64 = 64.0, "work per object";
     /// Minimum size of large subtrees.
     LARGE_SUBTREE: u64 = 1 << 15, "objects";
-    /// Minimum number of large subtrees for which a search without a clock anneals them separately, on
-    /// any number of threads. Smaller trees end slightly lower as a whole at equal work.
+    /// Minimum number of large subtrees for which a search without a clock anneals them separately,
+    /// on any number of threads. Smaller trees end slightly lower as a whole at equal work.
     LEAST_LARGE_SUBTREES: u32 = 8, "subtrees";
     /// Maximum number of subtrees.
     MOST_SUBTREES: u32 = 4096, "subtrees";

@@ -8,9 +8,9 @@ use num_bigint::{BigInt, Sign};
 /// A vector in units of 2^-149, of which every f32 is an integer multiple.
 type Vector = [BigInt; 3];
 
-/// Returns whether `t` is the distance at which the ray's line meets the plane of the triangle, rounded
-/// once to the nearest f32, ties to even. False for a line in the plane, and for a plane behind the
-/// origin.
+/// Returns whether `t` is the distance at which the ray's line meets the plane of the triangle,
+/// rounded once to the nearest f32, ties to even. False for a line in the plane, and for a plane
+/// behind the origin.
 pub fn is_rounded_distance(ray: &Ray, triangle: &Triangle, t: f32) -> bool {
     let [a, b, c] = triangle.0.map(vector);
     let origin = vector(ray.origin());

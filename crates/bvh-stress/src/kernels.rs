@@ -15,9 +15,9 @@ use rand::{RngExt, SeedableRng};
 /// once, and far more.
 const LENGTHS: [usize; 12] = [1, 3, 16, 15, 17, 33, 7, 23, 25, 65, 257, 1023];
 
-/// Checks that the distances of testing every triangle are the real ones, rounded once, and P3, bit by
-/// bit, for the layouts of two trees and every kernel of this processor. Returns the number of rays
-/// that hit.
+/// Checks that the distances of testing every triangle are the real ones, rounded once, and P3, bit
+/// by bit, for the layouts of two trees and every kernel of this processor. Returns the number of
+/// rays that hit.
 pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
     let objects = Primitives::Triangles(triangles.to_vec());
     let brute_force = Accelerator::new(&objects, Structure::Brute);

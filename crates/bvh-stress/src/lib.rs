@@ -1,8 +1,8 @@
 //! Stiff and extreme cases S01 to S45 for builders, searches, traversals and readers of files, and
 //! checks of the promises that all of them keep.
 //!
-//! [`Promise`] lists the general promises, and [`CASES`] the cases, some of which promise more about
-//! their own scene. A [`Case`] is checked by [`Case::of_method`], [`Case::of_traversal`] and
+//! [`Promise`] lists the general promises, and [`CASES`] the cases, some of which promise more
+//! about their own scene. A [`Case`] is checked by [`Case::of_method`], [`Case::of_traversal`] and
 //! [`Case::of_part`]. The checks themselves work on any tree: [`examine::check_outcome`] on the
 //! outcome of a search, [`transform`] on scenes, [`kernels`] and [`tracing`] on rays.
 //!

@@ -122,8 +122,8 @@ impl Ruled {
         }
     }
 
-    /// Returns the value's coordinate, which may be outside the shown part; `None` if the axis cannot
-    /// show the value.
+    /// Returns the value's coordinate, which may be outside the shown part; `None` if the axis
+    /// cannot show the value.
     pub fn coordinate(&self, value: f64) -> Option<f64> {
         let possible = value.abs() <= LARGEST && (value > 0.0 || !self.log);
         possible.then(|| if self.log { libm::log10(value) } else { value })
@@ -135,8 +135,8 @@ impl Ruled {
             .filter(|&at| (-1e-3..=1.001).contains(&self.fraction(at)))
     }
 
-    /// Returns the shown coordinate nearest to the value; the lower end for a finite value without a
-    /// logarithm.
+    /// Returns the shown coordinate nearest to the value; the lower end for a finite value without
+    /// a logarithm.
     pub fn nearest(&self, value: f64) -> Option<f64> {
         let at = self
             .coordinate(value)
@@ -189,8 +189,8 @@ impl Ruled {
             if factor == 0 { String::new() } else { format!("×10{}", superscript(factor)) };
     }
 
-    /// Adds ticks at powers of ten, and at their multiples if there are few powers. Returns false if
-    /// there are too few of both.
+    /// Adds ticks at powers of ten, and at their multiples if there are few powers. Returns false
+    /// if there are too few of both.
     fn rule_decades(&mut self, most: usize) -> bool {
         let first = (self.low - 1e-9).ceil() as i32;
         let last = (self.high + 1e-9).floor() as i32;

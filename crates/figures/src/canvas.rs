@@ -155,8 +155,8 @@ pub(super) fn svg(
     Ok(document)
 }
 
-/// Joins successive lines of one style, such as the dashes of a line, into one element. The document
-/// shrinks to a fifth.
+/// Joins successive lines of one style, such as the dashes of a line, into one element. The
+/// document shrinks to a fifth.
 fn joined(svg: &str) -> String {
     let mut joined = String::with_capacity(svg.len());
     let mut open: Option<&str> = None;

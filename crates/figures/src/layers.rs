@@ -189,8 +189,8 @@ impl Layers<'_, '_> {
         Ok(())
     }
 
-    /// Draws points, smaller if there are many, and one marker for points that look the same. A line
-    /// of a single point would be invisible, so it gets a marker too.
+    /// Draws points, smaller if there are many, and one marker for points that look the same. A
+    /// line of a single point would be invisible, so it gets a marker too.
     fn points(&self) -> Result<(), Fault> {
         let x = self.x;
         let y = self.y;
@@ -232,7 +232,8 @@ impl Layers<'_, '_> {
             .try_for_each(|(name, at)| self.marker(at, self.strokes.of(name).1, radius, edge))
     }
 
-    /// Returns the unbroken parts of a line or staircase. Points outside the panel move to its edge.
+    /// Returns the unbroken parts of a line or staircase. Points outside the panel move to its
+    /// edge.
     fn paths(&self, layer: &Layer) -> Vec<Vec<Point>> {
         let (Marks::Line(points) | Marks::Steps(points)) = &layer.marks else { return Vec::new() };
         let stairs = matches!(layer.marks, Marks::Steps(_));
@@ -274,8 +275,8 @@ impl Layers<'_, '_> {
         kept
     }
 
-    /// Returns places for markers along a path: every [`APART`] pixels from an offset on, or the middle
-    /// of a short path.
+    /// Returns places for markers along a path: every [`APART`] pixels from an offset on, or the
+    /// middle of a short path.
     fn along(&self, path: &[Point], offset: f64) -> Vec<Point> {
         let pixel = |at: &Point| {
             (self.x.fraction(at.0) * self.frame.width, self.y.fraction(at.1) * self.frame.height)

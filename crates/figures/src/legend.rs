@@ -24,8 +24,8 @@ struct Entry {
     area: bool,
 }
 
-/// The entries: series in order of appearance, then reference lines. Columns have equal widths and are
-/// filled row by row.
+/// The entries: series in order of appearance, then reference lines. Columns have equal widths and
+/// are filled row by row.
 pub(super) struct Legend {
     entries: Vec<Entry>,
     columns: usize,

@@ -4,8 +4,8 @@
 //! of embedded fonts and draws it with plotters. The same picture gives the same bytes on every
 //! machine.
 //!
-//! Figures are 800 pixels wide with text of 12 pixels and more, the size of a README. Series differ in
-//! colour and in dash or marker, so that they survive printing in grey.
+//! Figures are 800 pixels wide with text of 12 pixels and more, the size of a README. Series differ
+//! in colour and in dash or marker, so that they survive printing in grey.
 
 mod axis;
 mod canvas;
@@ -25,7 +25,8 @@ pub use model::{Axis, COLOURS, Figure, FigureError, Layer, Marks, Panel, Scale};
 ///
 /// # Errors
 ///
-/// [`FigureError::Draw`] if plotters fails, [`FigureError::Font`] if the embedded fonts are damaged.
+/// [`FigureError::Draw`] if plotters fails, [`FigureError::Font`] if the embedded fonts are
+/// damaged.
 pub fn svg(figure: &Figure) -> Result<String, FigureError> {
     figure::svg(figure)
 }

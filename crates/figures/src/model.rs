@@ -25,8 +25,8 @@ pub struct Figure {
 /// Number of looks, from 0 on, that differ in colour.
 pub const COLOURS: usize = 12;
 
-/// One pair of axes with layers. Bands are drawn first, then bars, reference lines, lines and points;
-/// within a kind, the first layer is at the bottom.
+/// One pair of axes with layers. Bands are drawn first, then bars, reference lines, lines and
+/// points; within a kind, the first layer is at the bottom.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Panel {
     /// The title, printed bold above the panel; may be empty.
@@ -62,7 +62,8 @@ pub enum Scale {
     Linear,
     /// Equal ratios are equal distances; values of 0 and below have no position.
     Log,
-    /// Each name has a place of width 1, from the left or bottom; the value i, from 0, is its middle.
+    /// Each name has a place of width 1, from the left or bottom; the value i, from 0, is its
+    /// middle.
     Category(Vec<String>),
 }
 
@@ -104,22 +105,23 @@ pub struct Layer {
     pub marks: Marks,
 }
 
-/// The marks of a layer in data units. Points that an axis cannot show, because they are not finite or
-/// not positive on a logarithmic axis, are skipped and interrupt a line.
+/// The marks of a layer in data units. Points that an axis cannot show, because they are not finite
+/// or not positive on a logarithmic axis, are skipped and interrupt a line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Marks {
     /// Straight lines through the points `(x, y)` in drawing order.
     Line(Vec<(f64, f64)>),
     /// A staircase through `(x, y)`, x ascending: y holds until the next x, and the last point ends
-    /// the last step. On a logarithmic axis it falls to the floor at the first y that is 0 or below.
+    /// the last step. On a logarithmic axis it falls to the floor at the first y that is 0 or
+    /// below.
     Steps(Vec<(f64, f64)>),
     /// Markers at `(x, y)`.
     Points(Vec<(f64, f64)>),
-    /// A translucent area between two lines: `(x, lower, upper)`, x ascending. A lower value of 0 or
-    /// below reaches the floor of a logarithmic axis.
+    /// A translucent area between two lines: `(x, lower, upper)`, x ascending. A lower value of 0
+    /// or below reaches the floor of a logarithmic axis.
     Band(Vec<(f64, f64, f64)>),
-    /// A translucent area like [`Marks::Band`] between two staircases: both values hold until the next
-    /// x.
+    /// A translucent area like [`Marks::Band`] between two staircases: both values hold until the
+    /// next x.
     StepBand(Vec<(f64, f64, f64)>),
     /// One bar per category of a category x axis. Bars of several layers are next to each other.
     Bars {

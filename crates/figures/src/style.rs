@@ -35,8 +35,8 @@ const PALETTE: [RGBColor; COLOURS] = [
 
 /// Lengths of a dash and of the gap after it in pixels; `None` for a solid line.
 type Dash = Option<(f64, f64)>;
-/// The dashes of series. Four successive series share a dash, and the next series of the same colour
-/// has another.
+/// The dashes of series. Four successive series share a dash, and the next series of the same
+/// colour has another.
 const DASHES: [Dash; 3] = [None, Some((9.0, 3.0)), Some((3.0, 2.5))];
 /// The dash of reference lines.
 const REFERENCE_DASH: Dash = Some((5.0, 4.0));
@@ -72,7 +72,8 @@ impl Stroke {
         }
     }
 
-    /// Returns the marker around the origin as a polygon with about the area of a disc of this radius.
+    /// Returns the marker around the origin as a polygon with about the area of a disc of this
+    /// radius.
     pub fn outline(&self, radius: f64) -> Vec<(i32, i32)> {
         let (points, inner, first) = self.marker;
         let outer = radius * (1.6 - 0.6 * inner);
@@ -95,7 +96,8 @@ const UNNAMED: Stroke = Stroke { colour: GREY, dash: None, marker: MARKERS[0] };
 /// The strokes of all series of a figure, in order of their first appearance.
 pub(super) struct Strokes {
     pub series: Vec<(String, Stroke)>,
-    /// True if lines carry markers: colours and dashes alone distinguish only four lines at a glance.
+    /// True if lines carry markers: colours and dashes alone distinguish only four lines at a
+    /// glance.
     pub marked_lines: bool,
 }
 

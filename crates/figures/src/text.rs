@@ -105,8 +105,8 @@ impl Fonts {
             .fold(0.0, f64::max)
     }
 
-    /// Breaks a text at blanks into lines of at most `width` pixels. A wider word is broken anywhere.
-    /// An empty text has no lines.
+    /// Breaks a text at blanks into lines of at most `width` pixels. A wider word is broken
+    /// anywhere. An empty text has no lines.
     pub fn wrap(&self, text: &str, width: f64, style: Type) -> Vec<String> {
         let mut lines: Vec<String> = Vec::new();
         let mut line = String::new();

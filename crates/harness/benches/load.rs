@@ -98,8 +98,8 @@ fn loads(scene: &Scene, path: &Path) {
 
 fn map(path: &Path) -> Mmap {
     let file = File::open(path).expect("the file");
-    // SAFETY: the file is in a temporary folder of this process, which never writes to it while it is
-    // mapped.
+    // SAFETY: the file is in a temporary folder of this process, which never writes to it while it
+    // is mapped.
     unsafe { Mmap::map(&file) }.expect("a mapping")
 }
 

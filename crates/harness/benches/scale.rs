@@ -168,7 +168,8 @@ impl Phases {
         });
     }
 
-    /// Bakes for `seconds` as the program does, which builds the greedy tree before the time begins.
+    /// Bakes for `seconds` as the program does, which builds the greedy tree before the time
+    /// begins.
     fn bake(&mut self, boxes: &[Aabb], base: f64, seconds: u64, threads: usize) -> Bvh {
         let config = best::Config { horizon: Some(Horizon::Known), ..Default::default() };
         let plural = if threads == 1 { "" } else { "s" };

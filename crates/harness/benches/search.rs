@@ -1,7 +1,8 @@
 //! `best` against the clock: percent below greedy Müller–Fellner, one triangle per leaf, after each
 //! limit in seconds.
 //!
-//! `cargo bench -p harness --bench search -- [--seconds 0.1,1,10,60] [--threads 1,2] [--seed N] SCENE...`
+//! `cargo bench -p harness --bench search -- [--seconds 0.1,1,10,60] [--threads 1,2] [--seed N]
+//! SCENE...`
 //!
 //! The time includes the build and the final conversion. The numbers of threads alternate. Runs on
 //! more than one thread have 0.6 of the limit, and should reach the cost of one thread after the

@@ -1,5 +1,5 @@
-//! Numbers in running prose come from committed CSV files: `docs/numbers.toml` names the sentences and
-//! the queries.
+//! Numbers in running prose come from committed CSV files: `docs/numbers.toml` names the sentences
+//! and the queries.
 //!
 //! `UPDATE_DOCS=1 cargo test -p harness --test numbers` writes the values into the pages.
 
@@ -54,7 +54,8 @@ fn split(text: &str) -> (Vec<&str>, Vec<&str>) {
     (fixed, names)
 }
 
-/// Returns the length of the beginning of `page` that reads as `fixed`. White space equals any other.
+/// Returns the length of the beginning of `page` that reads as `fixed`. White space equals any
+/// other.
 fn length_of_match(page: &str, fixed: &str) -> Option<usize> {
     let mut at = 0;
     let mut characters = fixed.chars().peekable();

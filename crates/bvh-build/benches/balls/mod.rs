@@ -87,7 +87,8 @@ pub fn print_head(first: &str, second: &str) {
     println!("{:<38} {:>14} {:>14} {:>8}", "scene and rays", first, second, "ratio");
 }
 
-/// Runs both in turns, and prints millions of rays per second and the median of the ratios of speeds.
+/// Runs both in turns, and prints millions of rays per second and the median of the ratios of
+/// speeds.
 pub fn compare(name: &str, rays: usize, mut first: impl FnMut(), mut second: impl FnMut()) {
     let mut speeds = [const { Vec::new() }; 3];
     for round in 0..=ROUNDS {
@@ -119,8 +120,8 @@ pub fn layout(triangles: &[Triangle]) -> WideBvh {
     WideBvh::new(&tree, triangles).expect("a tree over the triangles")
 }
 
-/// Returns an octahedron whose faces are divided into four as often as `levels` says, pushed to a sphere
-/// of about radius 1 with bumps.
+/// Returns an octahedron whose faces are divided into four as often as `levels` says, pushed to a
+/// sphere of about radius 1 with bumps.
 pub fn ball(levels: usize) -> Vec<Triangle> {
     let mut triangles = Vec::new();
     for octant in 0..8 {

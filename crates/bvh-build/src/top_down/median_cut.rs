@@ -1,8 +1,8 @@
 //! Median cut: halves the objects of a node at the median of their box centres.
 //!
-//! Kay & Kajiya 1986, 'Ray tracing complex scenes', alternate the axes. Chang's CSS 552 report stops
-//! at 10 % of all objects; it names the 'local axis', which is 'also world axis', and no rule that
-//! chooses among the three.
+//! Kay & Kajiya 1986, 'Ray tracing complex scenes', alternate the axes. Chang's CSS 552 report
+//! stops at 10 % of all objects; it names the 'local axis', which is 'also world axis', and no rule
+//! that chooses among the three.
 //!
 //! Differs from the sources: an odd object goes to the left half; equal centres are ordered by
 //! index.

@@ -1,8 +1,9 @@
 //! The choices of a bake without `--budget`: the work, the cost, the rays and the split references
 //! that suit the scene.
 //!
-//! Short searches try the combinations of the choices that are open. Rays that trained no tree judge
-//! the trees. Chosen is the simplest combination that is within [`TOLERANCE`] of the best one.
+//! Short searches try the combinations of the choices that are open. Rays that trained no tree
+//! judge the trees. Chosen is the simplest combination that is within [`TOLERANCE`] of the best
+//! one.
 
 use super::plan::Prepared;
 use super::starts::{Division, greedy};
@@ -273,8 +274,8 @@ impl<'a, 'b> Trials<'a, 'b> {
         })
     }
 
-    /// Returns the expected tests of the judging rays in the tree of a short search; infinitely many
-    /// after an interruption.
+    /// Returns the expected tests of the judging rays in the tree of a short search; infinitely
+    /// many after an interruption.
     fn expected_tests(&self, choices: &Choices) -> Result<f64, Error> {
         let Self { method, scene, seed, interrupted, greedy, .. } = self;
         // A trial of no work takes seconds in large scenes.

@@ -51,9 +51,10 @@ pub struct BakeArgs {
     /// Seed of the random numbers.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Minimise the cost of rays instead of area: `default` for rays that need no camera, a TOML file
-    /// that describes the rays of a renderer, or a file of recorded segments: six numbers each, from the
-    /// origin to the hit, as an array of numpy, lines of CSV, or little-endian `f32`.
+    /// Minimise the cost of rays instead of area: `default` for rays that need no camera, a TOML
+    /// file that describes the rays of a renderer, or a file of recorded segments: six numbers
+    /// each, from the origin to the hit, as an array of numpy, lines of CSV, or little-endian
+    /// `f32`.
     #[arg(long, value_name = "default|FILE.toml|.npy|.csv|.bin")]
     pub rays: Option<String>,
     /// The cost to minimise: `area`, the internal area, which suits every tracer; or `layout`, the
@@ -157,8 +158,8 @@ impl BakeArgs {
         Plan { effort: Effort::Work(decide::work(objects)), ..plan }
     }
 
-    /// Makes the choices that the arguments leave open if there is no budget, and prints the reasons.
-    /// Also returns the results of the decision that the bake needs.
+    /// Makes the choices that the arguments leave open if there is no budget, and prints the
+    /// reasons. Also returns the results of the decision that the bake needs.
     fn decided<'a>(
         &self,
         plan: Plan,

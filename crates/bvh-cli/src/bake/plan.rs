@@ -41,8 +41,8 @@ pub struct Plan {
     pub name: String,
 }
 
-/// Returns the size in bytes of the largest file of a tree over a scene with at most so many references
-/// per object.
+/// Returns the size in bytes of the largest file of a tree over a scene with at most so many
+/// references per object.
 pub fn most_bytes(scene: &Scene, references: f64) -> usize {
     // A tree with n leaves has fewer than 2n nodes; each node may have a number of visits.
     let reference = 2 * (size_of::<Node>() + size_of::<f32>()) + size_of::<u32>();
@@ -52,15 +52,15 @@ pub fn most_bytes(scene: &Scene, references: f64) -> usize {
 /// The most bytes per object that a bake has allocated at once, the scene included, of which `best`
 /// with two threads needs most: `bytes_per_object` of `results/scale`.
 const BYTES_PER_OBJECT: usize = 365;
-/// The most bytes per permitted reference that a bake with divided objects has allocated at once, which
-/// the division needs: five million triangles with 1.2 references each.
+/// The most bytes per permitted reference that a bake with divided objects has allocated at once,
+/// which the division needs: five million triangles with 1.2 references each.
 const BYTES_PER_REFERENCE: usize = 550;
 /// The bytes per object of a loaded scene.
 pub const BYTES_PER_LOADED: usize = size_of::<Triangle>() + size_of::<Aabb>();
 
-/// Rejects a scene with so many objects if the process cannot have the memory of a bake with at most so
-/// many `references` per object, of which a loaded scene has `per_loaded` bytes per object. An
-/// allocation that fails in the middle of the work would end the program without a result.
+/// Rejects a scene with so many objects if the process cannot have the memory of a bake with at
+/// most so many `references` per object, of which a loaded scene has `per_loaded` bytes per object.
+/// An allocation that fails in the middle of the work would end the program without a result.
 pub fn check_memory(
     scene: &str,
     objects: usize,
@@ -104,8 +104,8 @@ impl Plan {
         (self.references * scene.boxes.len() as f64) as usize
     }
 
-    /// Begins a bake with the `prepared` results, and returns the bake with the greedy tree. The time
-    /// of the bake starts after the greedy tree is built.
+    /// Begins a bake with the `prepared` results, and returns the bake with the greedy tree. The
+    /// time of the bake starts after the greedy tree is built.
     pub fn begin<'a>(
         &'a self,
         scene: &'a Scene,
@@ -235,9 +235,9 @@ impl Bake<'_> {
     ) -> Result<(usize, f64), Error> {
         let Baked { tree, work, figures } = baked;
         let Scene { boxes, primitives, .. } = self.scene;
-        // Somebody may wait for the file of a large tree after Ctrl-C, so most of it is written while
-        // the rest is computed, all at once. The thread that writes waits for the disk, which no thread
-        // of the pool should do.
+        // Somebody may wait for the file of a large tree after Ctrl-C, so most of it is written
+        // while the rest is computed, all at once. The thread that writes waits for the disk, which
+        // no thread of the pool should do.
         let (written, cost, validated, visits) = thread::scope(|scope| {
             let reserved = &mut reserved;
             let writer = (tree.nodes.len() >= WRITTEN_AHEAD).then(|| {

@@ -38,8 +38,8 @@ pub enum FileError {
         /// The version found.
         found: u32,
     },
-    /// A node of a wide layout has a box that is not finite, or names a child that does not exist or has
-    /// another parent, or the node has no parent.
+    /// A node of a wide layout has a box that is not finite, or names a child that does not exist
+    /// or has another parent, or the node has no parent.
     #[error("node {node} of the layout has no parent, or names a wrong child")]
     Layout {
         /// The node.

@@ -15,11 +15,12 @@
 //! | 124..128 | `u32` | CRC-32 of the bytes from 128 to the end, then of bytes 0..124 |
 //! | 128.. | | the nodes, 256 bytes each, then the blocks, 160 bytes each |
 //!
-//! A node has eight lanes: `f32[6][8]` with the lower x, y, z, then the upper x, y, z of all lanes, NaN in
-//! unused ones; `u32[8]` children; 32 zeros. A child is the index of a node, which comes after its
-//! parent, or 2^31 and the index of a leaf's first block. A block has four lanes, the used ones first:
-//! `f32[3][3][4]` corners by corner and axis, unused lanes repeating the last used one; `u32[4]` object
-//! ids, 2^32 − 1 in unused lanes. 2^30 is added to the first id of a leaf's last block.
+//! A node has eight lanes: `f32[6][8]` with the lower x, y, z, then the upper x, y, z of all lanes,
+//! NaN in unused ones; `u32[8]` children; 32 zeros. A child is the index of a node, which comes
+//! after its parent, or 2^31 and the index of a leaf's first block. A block has four lanes, the
+//! used ones first: `f32[3][3][4]` corners by corner and axis, unused lanes repeating the last used
+//! one; `u32[4]` object ids, 2^32 − 1 in unused lanes. 2^30 is added to the first id of a leaf's
+//! last block.
 
 use super::header::{Fields, Header};
 use super::{FileError, cast, copied, le_bytes};
@@ -98,8 +99,9 @@ pub fn load_layout(bytes: &[u8]) -> Result<WideBvh, FileError> {
     file.checked(Cow::Owned(copied(file.nodes)), Cow::Owned(copied(file.blocks)))
 }
 
-/// Returns the layout in `bytes` without a copy. Their address must be a multiple of 64, which mapped
-/// files ensure. For any bytes, forged ones included, traversals end and stay in bounds. O(bytes).
+/// Returns the layout in `bytes` without a copy. Their address must be a multiple of 64, which
+/// mapped files ensure. For any bytes, forged ones included, traversals end and stay in bounds.
+/// O(bytes).
 pub fn view_layout(bytes: &[u8]) -> Result<WideView<'_>, FileError> {
     let file = LayoutFile::open(bytes)?;
     let nodes = cast(file.nodes)?;
@@ -194,8 +196,8 @@ impl<'a> LayoutFile<'a> {
     }
 }
 
-/// The references that have been checked: each node and each leaf is named once, so no traversal visits
-/// anything twice.
+/// The references that have been checked: each node and each leaf is named once, so no traversal
+/// visits anything twice.
 struct Structure {
     /// The depth of each node that has been named; 0 before.
     depths: Vec<u32>,

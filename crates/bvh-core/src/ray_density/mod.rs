@@ -106,8 +106,8 @@ impl Grid {
         Ok(Self { low: min - 0.5 * padding, cells_per_unit })
     }
 
-    /// Returns the ends of a segment in cells, extended by `extension` cells along the segment's main
-    /// axis; `None` if the segment is not finite.
+    /// Returns the ends of a segment in cells, extended by `extension` cells along the segment's
+    /// main axis; `None` if the segment is not finite.
     fn in_cells(&self, segment: &Segment, extension: f64) -> Option<[DVec3; 2]> {
         let start = DVec3::from(segment.from.map(f64::from));
         let end = DVec3::from(segment.to.map(f64::from));

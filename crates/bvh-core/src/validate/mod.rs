@@ -136,8 +136,8 @@ pub(crate) fn for_each<E>(
     const AT_ONCE: usize = 64;
     let mut chosen = [0; AT_ONCE];
     for (chunk, nodes) in nodes.chunks(AT_ONCE).enumerate() {
-        // The processor cannot predict the kind of a node, and a wrong prediction ends the loads that
-        // it has begun ahead. The nodes are therefore chosen without a branch.
+        // The processor cannot predict the kind of a node, and a wrong prediction ends the loads
+        // that it has begun ahead. The nodes are therefore chosen without a branch.
         let mut count = 0;
         for (place, node) in nodes.iter().enumerate() {
             chosen[count] = place;

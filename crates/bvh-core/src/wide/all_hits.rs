@@ -20,20 +20,21 @@
 //! There is an ε₀ > 0 such that, for every ε below it, all signs of a finite mesh are the signs of
 //! the moved line. Such a line meets no corner and no edge: it is on one side of every edge or, if
 //! `d × (Q − P) = 0`, parallel to it and to its triangles. Therefore it crosses the *interior* of
-//! exactly the triangles that the rule accepts. A line that meets no edge crosses a closed mesh, where
-//! an even number of triangles shares every edge, an even number of times. A half line crosses the
-//! mesh an odd number of times if and only if it begins inside, and so does the ray: if the origin is
-//! not on the surface, every distance has the sign of the moved line's distance. A triangle without
-//! area is never crossed and changes no parity, so T-junctions that such triangles close are closed.
+//! exactly the triangles that the rule accepts. A line that meets no edge crosses a closed mesh,
+//! where an even number of triangles shares every edge, an even number of times. A half line
+//! crosses the mesh an odd number of times if and only if it begins inside, and so does the ray: if
+//! the origin is not on the surface, every distance has the sign of the moved line's distance. A
+//! triangle without area is never crossed and changes no parity, so T-junctions that such triangles
+//! close are closed.
 //!
 //! Neighbours compute the same sign for a common edge, negated if their corners run in the same
 //! direction of rotation: swapping `P` and `Q` negates all four numbers.
 //!
 //! # Sources
 //!
-//! Edelsbrunner & Mücke 1990, 'Simulation of simplicity'. Differs from the paper: only the ray's origin
-//! is perturbed, so three terms suffice. [`exact`](crate::exact) has the filter in f64 and its bounds;
-//! no rounding decides an answer.
+//! Edelsbrunner & Mücke 1990, 'Simulation of simplicity'. Differs from the paper: only the ray's
+//! origin is perturbed, so three terms suffice. [`exact`](crate::exact) has the filter in f64 and
+//! its bounds; no rounding decides an answer.
 
 use super::all_in_flight::{self, Found};
 use super::crossed_leaves::{AllHits, SlopedLine};
@@ -46,12 +47,12 @@ use alloc::vec::Vec;
 use glam::Vec3;
 
 impl WideBvh {
-    /// Returns the hits of the ray in its range, each crossing of a surface once, the nearest first;
-    /// among hits at the same distance the lowest id first.
+    /// Returns the hits of the ray in its range, each crossing of a surface once, the nearest
+    /// first; among hits at the same distance the lowest id first.
     ///
     /// Through an edge or a corner, the ray hits only the triangles that it would hit if its origin
-    /// were moved by (ε, ε², ε³) with an infinitely small ε > 0. The number of hits of a line with a
-    /// closed mesh is therefore even, and a half line that begins inside has an odd number. All
+    /// were moved by (ε, ε², ε³) with an infinitely small ε > 0. The number of hits of a line with
+    /// a closed mesh is therefore even, and a half line that begins inside has an odd number. All
     /// kernels give the hits of [`Triangle::crossing`](crate::Triangle::crossing), bit by bit.
     ///
     /// The distances are those of [`nearest_hit`](Self::nearest_hit).
@@ -75,8 +76,8 @@ impl WideBvh {
         hits
     }
 
-    /// Appends [all hits](Self::all_hits) of every ray to `hits`, ray after ray, and writes the number of
-    /// hits of each ray.
+    /// Appends [all hits](Self::all_hits) of every ray to `hits`, ray after ray, and writes the
+    /// number of hits of each ray.
     ///
     /// # Panics
     /// Panics if `rays` and `counts` are not equally many.
@@ -105,9 +106,9 @@ impl WideBvh {
     }
 
     /// Writes whether every point is inside the mesh: whether the half line from the point along +x
-    /// has an odd number of [hits](Self::all_hits). The answer is exact for closed meshes. A point on the
-    /// surface counts as inside or outside, and of two solids with a common face and opposite sides
-    /// of it one contains the point. A point that is not finite is outside.
+    /// has an odd number of [hits](Self::all_hits). The answer is exact for closed meshes. A point
+    /// on the surface counts as inside or outside, and of two solids with a common face and
+    /// opposite sides of it one contains the point. A point that is not finite is outside.
     ///
     /// # Panics
     /// Panics if `points` and `inside` are not equally many.
@@ -151,8 +152,8 @@ impl WideBvh {
             return;
         }
         let first = hits.len();
-        // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw; callers pass parts
-        // of no more rays.
+        // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw; callers
+        // pass parts of no more rays.
         let others = unsafe { vector::all_hits_of(self, rays, found) };
         for (number, ray) in (0..).zip(rays) {
             if others[number / 64] >> (number % 64) & 1 == 1 {
@@ -196,7 +197,8 @@ impl WideBvh {
         hits.truncate(kept);
     }
 
-    /// Appends the hits of a ray, in no order; the hits of a divided triangle once for each of its leaves.
+    /// Appends the hits of a ray, in no order; the hits of a divided triangle once for each of its
+    /// leaves.
     fn append_hits(&self, ray: &Ray, hits: &mut Vec<Hit>) {
         let line = Line::new(ray);
         let sloped = SlopedLine::new(ray, self.largest);
@@ -213,8 +215,8 @@ impl WideBvh {
     }
 }
 
-/// Sorts the hits of one ray and moves each to the front once: a divided triangle is in several leaves,
-/// every time at the same distance. Returns the number of different hits.
+/// Sorts the hits of one ray and moves each to the front once: a divided triangle is in several
+/// leaves, every time at the same distance. Returns the number of different hits.
 #[inline]
 fn sort_hits(hits: &mut [Hit]) -> usize {
     if hits.len() < 2 {

@@ -1,17 +1,17 @@
 //! All hits of many rays, with many rays in flight.
 //!
-//! A search for all hits cuts nothing off, so the order of visits does not matter. A visit of a node
-//! puts the inner children that the ray enters on the ray's stack, and the leaves on a list of pairs
-//! that all rays share:
+//! A search for all hits cuts nothing off, so the order of visits does not matter. A visit of a
+//! node puts the inner children that the ray enters on the ray's stack, and the leaves on a list of
+//! pairs that all rays share:
 //!
 //! ```text
 //!   at a node: boxes ─┬─> inner children: the ray's stack ─> the ray's next node
 //!                     └─> leaves: pairs of a ray and a block ─> candidates ─> decisions ─> hits
 //! ```
 //!
-//! Steps of different rays and of different pairs do not depend on each other, and no step has a branch
-//! that is hard to predict. One ray alone waits for memory, and for the processor to recover from
-//! such branches.
+//! Steps of different rays and of different pairs do not depend on each other, and no step has a
+//! branch that is hard to predict. One ray alone waits for memory, and for the processor to recover
+//! from such branches.
 
 use super::crossed_leaves::{Decision, LineLanes, SlopedLine};
 use super::instructions::{Instructions, Pending};
@@ -49,15 +49,16 @@ pub(crate) struct Found {
     pub(super) hit: Hit,
 }
 
-/// A block of triangles, as the bits of a [`Child`], and above them the number of a ray that entered it.
+/// A block of triangles, as the bits of a [`Child`], and above them the number of a ray that
+/// entered it.
 type Pair = u64;
 
-/// Appends the hits of the rays to `found`, in no order; the hits of a divided triangle once for each of
-/// its leaves. Returns the rays that the portable kernel must trace, a bit per ray.
+/// Appends the hits of the rays to `found`, in no order; the hits of a divided triangle once for
+/// each of its leaves. Returns the rays that the portable kernel must trace, a bit per ray.
 ///
 /// # Safety
-/// The processor has the instructions of `K`, and the caller is compiled with them; the references of
-/// `wide` are sound and its `stack_need` is at most [`STACK`]; there are at most [`MOST`] rays.
+/// The processor has the instructions of `K`, and the caller is compiled with them; the references
+/// of `wide` are sound and its `stack_need` is at most [`STACK`]; there are at most [`MOST`] rays.
 #[inline(always)]
 pub(crate) unsafe fn trace<K: Instructions>(
     wide: &WideBvh,
@@ -146,8 +147,8 @@ unsafe fn visit_nodes<K: Instructions>(
     let mut count = K::FLIGHT.min(waiting.len());
     let (first, mut waiting) = waiting.split_at(count);
     let nodes = pairs.wide.nodes.as_ptr();
-    // SAFETY: the references of the layout are sound, and its stacks large enough; nothing is popped
-    // after `END`; a prefetch may name any address.
+    // SAFETY: the references of the layout are sound, and its stacks large enough; nothing is
+    // popped after `END`; a prefetch may name any address.
     unsafe {
         for (i, &number) in first.iter().enumerate() {
             active[i] = traversals[i].as_mut_ptr();
@@ -242,12 +243,13 @@ impl Pairs<'_> {
     /// As for [`trace`].
     #[inline(always)]
     unsafe fn test<K: Instructions>(&mut self) {
-        /// The number of pairs between the one that is tested and the one that is fetched from memory.
+        /// The number of pairs between the one that is tested and the one that is fetched from
+        /// memory.
         const AHEAD: usize = 8;
         let blocks = self.wide.blocks.as_ptr();
         let block_of = |pair: Pair| blocks.wrapping_add(Child::from_bits(pair as u32).index());
-        // SAFETY: pairs name rays in flight and blocks of the layout; after a block that is not the last
-        // of its leaf comes another; a prefetch may name any address.
+        // SAFETY: pairs name rays in flight and blocks of the layout; after a block that is not the
+        // last of its leaf comes another; a prefetch may name any address.
         unsafe {
             while self.count > 0 {
                 let mut hopeful = [0; PAIRS];

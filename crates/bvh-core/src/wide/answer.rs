@@ -10,11 +10,12 @@ pub(crate) type Accept<'a> = dyn FnMut(usize, Hit) -> bool + 'a;
 
 /// The place of the answers to the rays of a batch, by the number of the ray.
 pub(crate) trait Answers {
-    /// Writes the answer for a ray: the distance at which its traversal ended, and the hit object with
-    /// the instance of this object, `u32::MAX` for none.
+    /// Writes the answer for a ray: the distance at which its traversal ended, and the hit object
+    /// with the instance of this object, `u32::MAX` for none.
     fn write(&mut self, number: usize, t: f32, instance: u32, object: u32);
 
-    /// Writes the answers for consecutive rays from number `first` on, likewise. Slices are equally long.
+    /// Writes the answers for consecutive rays from number `first` on, likewise. Slices are equally
+    /// long.
     fn write_lanes(&mut self, first: usize, distances: &[f32], instances: &[u32], objects: &[u32]) {
         let lanes = distances
             .iter()
@@ -26,8 +27,8 @@ pub(crate) trait Answers {
 }
 
 /// A batch of rays and of their answers.
-// Not generic over any of these: each kernel would be compiled once more for every kind of rays and of
-// answers. A call through a pointer per ray, or per vector of rays, takes no measurable time.
+// Not generic over any of these: each kernel would be compiled once more for every kind of rays and
+// of answers. A call through a pointer per ray, or per vector of rays, takes no measurable time.
 pub(crate) struct Batch<'a> {
     pub(crate) rays: Source<'a>,
     pub(crate) answers: &'a mut dyn Answers,
@@ -44,8 +45,8 @@ impl<'a> Batch<'a> {
         Self { rays, answers, accept: None, scene: None }
     }
 
-    /// Traces one ray by itself, and writes its answer. With `ANY` the first hit that is found ends the
-    /// ray.
+    /// Traces one ray by itself, and writes its answer. With `ANY` the first hit that is found ends
+    /// the ray.
     pub(crate) fn alone<const ANY: bool>(&mut self, number: usize, wide: &WideBvh, ray: &Ray) {
         if let Some(scene) = self.scene {
             let hit = if ANY {

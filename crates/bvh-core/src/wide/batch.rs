@@ -15,8 +15,9 @@ const MANY: usize = 128;
 /// Answers all rays: coherent rays in packets, other rays in flight.
 ///
 /// # Safety
-/// The processor has the instructions of `K`, and the caller is compiled with them; there is an answer for every ray; the
-/// references of `wide` are sound and its `stack_need` is at most [`STACK`](super::kernel::STACK).
+/// The processor has the instructions of `K`, and the caller is compiled with them; there is an
+/// answer for every ray; the references of `wide` are sound and its `stack_need` is at most
+/// [`STACK`](super::kernel::STACK).
 #[inline(always)]
 pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
     wide: &WideBvh,

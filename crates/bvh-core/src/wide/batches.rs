@@ -8,7 +8,8 @@ use super::vector;
 use crate::{Hit, Kernel, Ray, RayComponents};
 
 impl WideBvh {
-    /// [`nearest_hit`](Self::nearest_hit) of every ray, into as many `hits`; [`Hit::MISS`] for a ray that meets nothing.
+    /// [`nearest_hit`](Self::nearest_hit) of every ray, into as many `hits`; [`Hit::MISS`] for a
+    /// ray that meets nothing.
     ///
     /// # Panics
     /// If `rays` and `hits` are not equally many.
@@ -26,8 +27,8 @@ impl WideBvh {
         self.trace::<true>(Batch::new(Source::Rays(rays), &mut hits), coherence);
     }
 
-    /// [`nearest_hit_where`](Self::nearest_hit_where) of every ray, into as many `hits`. `accept` sees
-    /// the number of the ray, too, and hits in no order.
+    /// [`nearest_hit_where`](Self::nearest_hit_where) of every ray, into as many `hits`. `accept`
+    /// sees the number of the ray, too, and hits in no order.
     ///
     /// # Panics
     /// If `rays` and `hits` are not equally many.
@@ -74,8 +75,8 @@ impl WideBvh {
         self.trace_where::<true>(batch, &mut accept, coherence);
     }
 
-    // Not generic over the function, so that the kernels are compiled here and not by every crate that
-    // calls them.
+    // Not generic over the function, so that the kernels are compiled here and not by every crate
+    // that calls them.
     fn trace_where<'a, const ANY: bool>(
         &self,
         batch: Batch<'a>,
@@ -85,8 +86,8 @@ impl WideBvh {
         self.trace::<ANY>(Batch { accept: Some(accept), ..batch }, coherence);
     }
 
-    /// [`nearest_hits`](Self::nearest_hits) of rays by component, whose answers are by component, too: infinite and `u32::MAX` for a ray that
-    /// meets nothing.
+    /// [`nearest_hits`](Self::nearest_hits) of rays by component, whose answers are by component,
+    /// too: infinite and `u32::MAX` for a ray that meets nothing.
     ///
     /// # Panics
     /// If `rays`, `distances` and `objects` are not equally many.

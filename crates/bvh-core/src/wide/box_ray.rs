@@ -1,42 +1,44 @@
 //! The box test of the vector kernels, and the proof that it is conservative.
 //!
-//! Every kernel computes the distances to the planes of a box as `plane · scale + shift`, and visits
-//! a box whose greatest near distance is at most its least far distance. The test decides which boxes
-//! are visited, never an answer. It must be *conservative*: whenever the interval that `Slabs`
-//! computes for a triangle's own box has a distance `t <= t_max`, every box around the triangle
-//! passes.
+//! Every kernel computes the distances to the planes of a box as `plane · scale + shift`, and
+//! visits a box whose greatest near distance is at most its least far distance. The test decides
+//! which boxes are visited, never an answer. It must be *conservative*: whenever the interval that
+//! `Slabs` computes for a triangle's own box has a distance `t <= t_max`, every box around the
+//! triangle passes.
 //!
 //! Names, for one axis: u = 2⁻²⁴; o, d and i are the origin, the direction and its reciprocal; D is
-//! the largest component of the direction; S is the largest component of the origin plus the largest
-//! coordinate of the scene. Take i > 0, since the other sign mirrors every step. `Slabs` has a margin
-//! m of at most 10uS + 2⁻¹²⁶. With L = o + m and U = o − m, rounded, it computes for a lower plane
-//! p > L at least (p − L) · i · (1 − 2u) − 2⁻¹⁴⁹, for another lower plane nothing positive, and for
-//! an upper plane at most (p − U) · i · (1 + 12u) + 2⁻¹⁴⁸. The test here uses the margin M = 32uS,
-//! and computes (p − L') · s and (p − U') · s with L' = o + M, U' = o − M and a scale s.
+//! the largest component of the direction; S is the largest component of the origin plus the
+//! largest coordinate of the scene. Take i > 0, since the other sign mirrors every step. `Slabs`
+//! has a margin m of at most 10uS + 2⁻¹²⁶. With L = o + m and U = o − m, rounded, it computes for a
+//! lower plane p > L at least (p − L) · i · (1 − 2u) − 2⁻¹⁴⁹, for another lower plane nothing
+//! positive, and for an upper plane at most (p − U) · i · (1 + 12u) + 2⁻¹⁴⁸. The test here uses the
+//! margin M = 32uS, and computes (p − L') · s and (p − U') · s with L' = o + M, U' = o − M and a
+//! scale s.
 //!
-//! 1. *Shift.* M is added to the origin or to the plane, which rounds by at most uS, and the product
-//!    of origin and scale rounds by at most uS · s. With the rounding of L, all of these move a plane
-//!    by less than 4uS. Hence L' and L differ by at least (32 − 10 − 4)uS = 18uS, and so do U' and U.
+//! 1. *Shift.* M is added to the origin or to the plane, which rounds by at most uS, and the
+//!    product of origin and scale rounds by at most uS · s. With the rounding of L, all of these
+//!    move a plane by less than 4uS. Hence L' and L differ by at least (32 − 10 − 4)uS = 18uS, and
+//!    so do U' and U.
 //! 2. *Relative errors.* The factors of `Slabs` and the last rounding here amount to 3u on a near
 //!    distance and 13u on a far one. No plane is farther from the origin than S. So these factors
 //!    move no plane by more than 14uS, and 4uS of the margin remain.
-//! 3. *Underflow.* Errors of subnormal numbers are below 2⁻¹⁴⁶ together. Rays with S / D < 2⁻¹²⁰ are
-//!    left to the portable kernel; for all others the remaining margin is at least
-//!    4uS / D = 2⁻¹⁴² in distance.
-//! 4. *Clamp.* Where |d| is far smaller than D, i · o could overflow. Hence |s| is i clamped to
-//!    K = 2²⁴ / D. Near distances only become nearer. A far plane p that `Slabs` has in front of the
+//! 3. *Underflow.* Errors of subnormal numbers are below 2⁻¹⁴⁶ together. Rays with S / D < 2⁻¹²⁰
+//!    are left to the portable kernel; for all others the remaining margin is at least 4uS / D =
+//!    2⁻¹⁴² in distance.
+//! 4. *Clamp.* Where |d| is far smaller than D, i · o could overflow. Hence |s| is i clamped to K =
+//!    2²⁴ / D. Near distances only become nearer. A far plane p that `Slabs` has in front of the
 //!    origin has p ≥ U, and then (p − U') · K ≥ 4uS · K = 4S / D, which no distance exceeds that
-//!    `Slabs` accepts on the axis of D.
-//!    Where no instruction fuses, the product of plane and scale rounds by another uS · s. Then 3uS of
-//!    the margin remain, which suffices here and in step 3.
+//!    `Slabs` accepts on the axis of D. Where no instruction fuses, the product of plane and scale
+//!    rounds by another uS · s. Then 3uS of the margin remain, which suffices here and in step 3.
 //! 5. *Overflow.* Rays with S ≥ 2⁶⁰, S · K ≥ 2¹²⁰ or S < 2⁻⁹⁰ are left to the portable kernel.
 //!
-//! The interval of `Slabs` for a triangle's own box contains the rounded distance of a hit. Hence a near
-//! distance is at most the distance of any hit, and needs no margin compared with the nearest hit so far.
+//! The interval of `Slabs` for a triangle's own box contains the rounded distance of a hit. Hence a
+//! near distance is at most the distance of any hit, and needs no margin compared with the nearest
+//! hit so far.
 //!
-//! Interval arithmetic takes the least and the greatest product over all origins and all scales of a
-//! packet by the same operations, with the largest S. Rounding is monotone: the bounds are not beyond
-//! the distances of any ray of the packet by more than the steps above allow.
+//! Interval arithmetic takes the least and the greatest product over all origins and all scales of
+//! a packet by the same operations, with the largest S. Rounding is monotone: the bounds are not
+//! beyond the distances of any ray of the packet by more than the steps above allow.
 
 use super::lanes::Lanes;
 use super::node::WideNode;
@@ -65,8 +67,8 @@ struct FusedRay {
 }
 
 impl FusedRay {
-    /// Prepares `ray` for boxes whose coordinates are at most `largest`. Returns `None` for the rare
-    /// ray that the portable kernel must trace.
+    /// Prepares `ray` for boxes whose coordinates are at most `largest`. Returns `None` for the
+    /// rare ray that the portable kernel must trace.
     #[inline(always)]
     fn new(ray: &Ray, largest: f32, margin: f32) -> Option<Self> {
         let [origin, _, inverse] = ray.vectors();
@@ -102,8 +104,8 @@ pub(crate) struct BoxRay<L> {
 }
 
 impl<L: Lanes> BoxRay<L> {
-    /// Prepares `ray` for boxes whose coordinates are at most `largest`. Returns `None` for the rare
-    /// ray that the portable kernel must trace.
+    /// Prepares `ray` for boxes whose coordinates are at most `largest`. Returns `None` for the
+    /// rare ray that the portable kernel must trace.
     ///
     /// # Safety
     /// The processor has the instructions.
@@ -134,8 +136,8 @@ impl<L: Lanes> BoxRay<L> {
         }
     }
 
-    /// Returns the distances at which the ray enters and leaves the eight boxes of a node, the latter
-    /// at most `t_max`.
+    /// Returns the distances at which the ray enters and leaves the eight boxes of a node, the
+    /// latter at most `t_max`.
     ///
     /// # Safety
     /// The processor has the instructions.
@@ -182,7 +184,8 @@ mod tests {
         for case in 0..400_000 {
             let scale = pow2([0, -60, 40, -89][case % 4]);
             let size = Vec3::new(random(), random(), random()) * scale;
-            // A plane close to the origin and others on the far side: the margins are largest, and nothing else helps.
+            // A plane close to the origin and others on the far side: the margins are largest, and
+            // nothing else helps.
             let origin = Vec3::new(-random().abs() - 0.5, random(), random()) * scale;
             let near_origin = origin * (1.0 + random() * 2.5e-6 * [1.0, 1e3][case / 4 % 2]);
             let bounds = Aabb::around([near_origin, size * 0.001, -origin]);

@@ -8,14 +8,15 @@ use crate::collapse::{binary, binary_visited, collect};
 use crate::{Aabb, Bvh, Triangle};
 use alloc::{vec, vec::Vec};
 
-/// By how much each subtree promises to stop a ray, in relation to the expected time of tracing a ray through it. Rays that
-/// ask for any hit visit the child of most promise first, which is in the last lane.
+/// By how much each subtree promises to stop a ray, in relation to the expected time of tracing a
+/// ray through it. Rays that ask for any hit visit the child of most promise first, which is in the
+/// last lane.
 ///
-/// A line meets triangles of the total area A inside a box of half area B on average A / B times; a ray is stopped by a
-/// fraction of such lines that grows with it and is less than 1.
+/// A line meets triangles of the total area A inside a box of half area B on average A / B times; a
+/// ray is stopped by a fraction of such lines that grows with it and is less than 1.
 ///
-/// Source: Ogaki & Derouet-Jourdan 2014, 'An N-ary BVH child node sorting technique for occlusion test'. Differs from the paper:
-/// no rays are sampled.
+/// Source: Ogaki & Derouet-Jourdan 2014, 'An N-ary BVH child node sorting technique for occlusion
+/// test'. Differs from the paper: no rays are sampled.
 fn promise(tree: &Bvh, triangles: &[Triangle], visits: &[f32], costs: &[Costs]) -> Vec<f32> {
     let mut areas = vec![0.0f64; tree.nodes.len()];
     for (index, node) in tree.nodes.iter().enumerate().rev() {
@@ -60,8 +61,9 @@ fn sizes(tree: &Bvh, decisions: &[Decision]) -> (usize, usize) {
     sizes
 }
 
-/// The wide layout of least expected cost for rays that enter the nodes of `tree` as often as `visits` says, by default for
-/// random lines, where testing a block takes `block_cost`. `tree` must be valid over the triangles' boxes.
+/// The wide layout of least expected cost for rays that enter the nodes of `tree` as often as
+/// `visits` says, by default for random lines, where testing a block takes `block_cost`. `tree`
+/// must be valid over the triangles' boxes.
 pub(crate) fn widen(
     tree: &Bvh,
     triangles: &[Triangle],
@@ -117,8 +119,8 @@ pub(crate) fn widen(
     wide
 }
 
-/// Lays out the nodes, the root and the `stack_need` as decided; children of more promise are in later
-/// lanes. `leaf` lays out a leaf, and returns `None` if there is nothing in it.
+/// Lays out the nodes, the root and the `stack_need` as decided; children of more promise are in
+/// later lanes. `leaf` lays out a leaf, and returns `None` if there is nothing in it.
 pub(super) fn lay_out_nodes(
     wide: &mut WideBvh,
     tree: &Bvh,
@@ -210,7 +212,8 @@ mod tests {
         }
     }
 
-    /// Checks that the layout has the least cost for rays that enter a box as often as its size says.
+    /// Checks that the layout has the least cost for rays that enter a box as often as its size
+    /// says.
     fn check_optimal(tree: &Bvh, wide: &WideBvh, size: impl Fn(&Aabb) -> f64) {
         let cost_of_leaf = |aabb: &Aabb, objects: f64| {
             size(aabb) * f64::from(BLOCK_COST) * (objects / TriangleBlock::LANES as f64).ceil()

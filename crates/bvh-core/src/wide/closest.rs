@@ -17,11 +17,11 @@ struct Pending {
 
 impl WideBvh {
     /// Returns the closest point of the triangles, in f64; among triangles at the same distance the
-    /// lowest id wins. Returns `None` for a point that is not finite, and if no triangle has an area:
-    /// the layout omits triangles without area.
+    /// lowest id wins. Returns `None` for a point that is not finite, and if no triangle has an
+    /// area: the layout omits triangles without area.
     ///
-    /// The answer is the answer of [`Triangle::closest_point`](crate::Triangle::closest_point) for every
-    /// triangle. About O(log n) for a point near triangles that are spread out.
+    /// The answer is the answer of [`Triangle::closest_point`](crate::Triangle::closest_point) for
+    /// every triangle. About O(log n) for a point near triangles that are spread out.
     ///
     /// ```
     /// # use bvh_core::{Aabb, Bvh, Node, Triangle, WideBvh};
@@ -56,9 +56,9 @@ impl WideBvh {
         }
     }
 
-    /// Writes the distance of every point from the [closest point](Self::closest_point), negative if the
-    /// mesh [contains](Self::contains) the point: the sign follows from parity, and is right for
-    /// closed meshes. Infinite where there is no closest point.
+    /// Writes the distance of every point from the [closest point](Self::closest_point), negative
+    /// if the mesh [contains](Self::contains) the point: the sign follows from parity, and is right
+    /// for closed meshes. Infinite where there is no closest point.
     ///
     /// # Panics
     /// Panics if `points` and `distances` are not equally many.
@@ -110,8 +110,8 @@ impl WideBvh {
     }
 }
 
-/// Returns lower bounds of the squared distances of a point from the boxes of a node; NaN for unused
-/// lanes.
+/// Returns lower bounds of the squared distances of a point from the boxes of a node; NaN for
+/// unused lanes.
 #[inline(always)]
 fn bounds(node: &WideNode, point: Vec3) -> [f64; WideNode::LANES] {
     /// Covers the rounding in f64.

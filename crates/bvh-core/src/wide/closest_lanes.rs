@@ -14,8 +14,8 @@ use glam::{DVec3, Vec3};
 /// Writes the closest point of every point.
 ///
 /// # Safety
-/// The processor has the instructions of `K`, and the caller is compiled with them; the references of
-/// `wide` are sound and its `stack_need` is at most [`STACK`].
+/// The processor has the instructions of `K`, and the caller is compiled with them; the references
+/// of `wide` are sound and its `stack_need` is at most [`STACK`].
 #[inline(always)]
 pub(crate) unsafe fn trace<K: Instructions>(
     wide: &WideBvh,
@@ -41,8 +41,8 @@ unsafe fn one<K: Instructions>(wide: &WideBvh, root: Child, point: Vec3) -> Opti
     let base = stack.as_mut_ptr().cast::<Pending>();
     let mut top = base;
     let mut child = root;
-    // SAFETY: references are sound, and the stack has room for `stack_need` children and one register
-    // more.
+    // SAFETY: references are sound, and the stack has room for `stack_need` children and one
+    // register more.
     unsafe {
         let boxes = PointLanes::<K::Boxes>::new(point, wide.largest);
         let triangles = TargetLanes::<K::Block>::new(nearest.target);
@@ -93,8 +93,8 @@ unsafe fn one<K: Instructions>(wide: &WideBvh, root: Child, point: Vec3) -> Opti
 /// A point as boxes are tested with it: in f32, multiplied by a power of two that makes the largest
 /// coordinate about 1, so that no square overflows.
 ///
-/// The computed square of a distance exceeds the real one by at most 2⁻²⁰ of it, and by at most 2⁻¹⁴⁰
-/// where numbers are subnormal. [`limit`](Self::limit) adds more than both.
+/// The computed square of a distance exceeds the real one by at most 2⁻²⁰ of it, and by at most
+/// 2⁻¹⁴⁰ where numbers are subnormal. [`limit`](Self::limit) adds more than both.
 struct PointLanes<L> {
     scaled: [L; 3],
     scale: L,
@@ -118,7 +118,8 @@ impl<L: Lanes> PointLanes<L> {
         }
     }
 
-    /// Returns bounds of the scaled squared distances from the boxes of a node; NaN for unused lanes.
+    /// Returns bounds of the scaled squared distances from the boxes of a node; NaN for unused
+    /// lanes.
     #[inline(always)]
     unsafe fn bounds(&self, node: &WideNode) -> L {
         // SAFETY: the caller's promise: the processor has the instructions; planes are aligned.
@@ -164,11 +165,12 @@ impl<L: Lanes> TargetLanes<L> {
         }
     }
 
-    /// Offers the triangles of a block that are as near as the nearest so far. Returns whether there are
-    /// any.
+    /// Offers the triangles of a block that are as near as the nearest so far. Returns whether
+    /// there are any.
     #[inline(always)]
     unsafe fn visit(&self, block: &TriangleBlock, nearest: &mut Nearest) -> bool {
-        // SAFETY: the caller's promise: the processor has the instructions; there is room for four numbers.
+        // SAFETY: the caller's promise: the processor has the instructions; there is room for four
+        // numbers.
         unsafe {
             let [a, b, c] = block.corners_along::<L>([0, 1, 2]);
             let offset = offset(self.relative(a), self.relative(b), self.relative(c));
@@ -199,8 +201,8 @@ impl<L: Lanes> TargetLanes<L> {
     }
 }
 
-/// Returns the vectors to the nearest points of triangles: the operations of `Triangle::offset_from`, bit by
-/// bit.
+/// Returns the vectors to the nearest points of triangles: the operations of
+/// `Triangle::offset_from`, bit by bit.
 #[inline(always)]
 fn offset<D: DoubleLanes>(a: Vector<D>, b: Vector<D>, c: Vector<D>) -> Vector<D> {
     let normal = cross(minus(b, a), minus(c, a));

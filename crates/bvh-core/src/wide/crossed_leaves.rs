@@ -37,8 +37,8 @@ impl AllHits<'_> {
 impl<L: Lanes> Leaves<L> for AllHits<'_> {
     #[inline(always)]
     unsafe fn visit(&mut self, block: &TriangleBlock, _: &mut Hit) -> bool {
-        // SAFETY: the caller's promise. The lanes are the same for all blocks; the compiler keeps them in
-        // registers.
+        // SAFETY: the caller's promise. The lanes are the same for all blocks; the compiler keeps
+        // them in registers.
         let candidates = unsafe { LineLanes::<L>::new(&self.sloped).candidates(block) };
         self.test(block, candidates);
         false
@@ -97,9 +97,9 @@ struct Edges<D> {
     most: D,
 }
 
-/// With R at least the coordinates of corners relative to the origin and ε = 2⁻⁵³, a sheared coordinate
-/// is at most 2.1 R, its error below 7 εR, and the error of an edge value below 80 εR². The tests leave
-/// all triangles within E = 512 εR² to [`Line::crossing`].
+/// With R at least the coordinates of corners relative to the origin and ε = 2⁻⁵³, a sheared
+/// coordinate is at most 2.1 R, its error below 7 εR, and the error of an edge value below 80 εR².
+/// The tests leave all triangles within E = 512 εR² to [`Line::crossing`].
 ///
 /// The distance is, as in [`exact`](crate::exact),
 ///
@@ -107,11 +107,11 @@ struct Edges<D> {
 ///   t d_z = A_z + (v (B_z − A_z) + w (C_z − A_z)) / D,      D = u + v + w
 /// ```
 ///
-/// D is off by less than 300 εR², and more than 3 E if all values are above E, so the weights `v / D`
-/// and `w / D` are off by less than 80 εR² / D + 300 εR² / D < E / D each. With Z the larger |B_z −
-/// A_z|, |C_z − A_z| this moves `t d_z` by less than 2.1 EZ / D; all roundings, those of the last two
-/// products with the inverse of `d_z` included, are below 50 εR. The bound (4 EZ / |D| + 64 εR) / |d_z|
-/// covers both.
+/// D is off by less than 300 εR², and more than 3 E if all values are above E, so the weights `v /
+/// D` and `w / D` are off by less than 80 εR² / D + 300 εR² / D < E / D each. With Z the larger
+/// |B_z − A_z|, |C_z − A_z| this moves `t d_z` by less than 2.1 EZ / D; all roundings, those of the
+/// last two products with the inverse of `d_z` included, are below 50 εR. The bound (4 EZ / |D| +
+/// 64 εR) / |d_z| covers both.
 impl<L: Lanes> LineLanes<L> {
     /// Copies the line to all lanes.
     ///

@@ -47,7 +47,8 @@ impl<L: Lanes> Culling<L> {
                 let is_backwards = octant >> axis & 1 != 0;
                 culling.near[axis] = axis + 3 * usize::from(is_backwards);
                 culling.far[axis] = axis + 3 * usize::from(!is_backwards);
-                // Distances grow with the plane minus the origin if the scale is positive, else the other way.
+                // Distances grow with the plane minus the origin if the scale is positive, else the
+                // other way.
                 let (near, far) = if is_backwards {
                     culling.margin[axis] = -margin;
                     (lowest - margin, highest + margin)
@@ -63,8 +64,9 @@ impl<L: Lanes> Culling<L> {
         }
     }
 
-    /// Returns the least distance at which any ray may enter each child, and a bit per child that some
-    /// ray may enter before `farthest`: the bounds of `(plane − origin) · scale` over all rays.
+    /// Returns the least distance at which any ray may enter each child, and a bit per child that
+    /// some ray may enter before `farthest`: the bounds of `(plane − origin) · scale` over all
+    /// rays.
     ///
     /// # Safety
     /// The processor has the instructions.

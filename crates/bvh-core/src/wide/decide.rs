@@ -1,4 +1,5 @@
-//! Decides which nodes of a tree become wide nodes, leaves or nothing, by dynamic programming from the leaves up.
+//! Decides which nodes of a tree become wide nodes, leaves or nothing, by dynamic programming from
+//! the leaves up.
 
 use super::triangles::TriangleBlock;
 use crate::{Bvh, NodeKind};
@@ -9,8 +10,8 @@ pub(crate) const NODE_COST: f32 = 1.0;
 /// Expected time of testing a block. Rays were no faster with half of it or twice as much.
 pub(crate) const BLOCK_COST: f32 = 1.0;
 
-/// The slots of a wide node that the two children of a subtree get: of the first child in the low half, of the second in the
-/// high half; 0 for a subtree that is one child itself.
+/// The slots of a wide node that the two children of a subtree get: of the first child in the low
+/// half, of the second in the high half; 0 for a subtree that is one child itself.
 type Slots = u8;
 
 /// How a subtree becomes children of a wide node.
@@ -30,12 +31,14 @@ impl Decision {
     }
 }
 
-/// The least expected time of a subtree in at most 1 to 7 slots, times the root's area; last, in the 8 slots of a wide node.
+/// The least expected time of a subtree in at most 1 to 7 slots, times the root's area; last, in
+/// the 8 slots of a wide node.
 pub(crate) type Costs = [f32; 8];
 
-/// Decides for every node of `tree`, each of which has two children or none. `leaf_cost` is the expected time of testing a leaf
-/// of so many objects, if there may be one. O(n).
-// Costs take most of the memory. They are separate, so that the layout is made after they are dropped.
+/// Decides for every node of `tree`, each of which has two children or none. `leaf_cost` is the
+/// expected time of testing a leaf of so many objects, if there may be one. O(n).
+// Costs take most of the memory. They are separate, so that the layout is made after they are
+// dropped.
 pub(crate) fn decide(
     tree: &Bvh,
     visits: &[f32],
@@ -78,7 +81,8 @@ pub(crate) fn decide(
     (decisions, costs)
 }
 
-/// Returns the least cost of two siblings together in 2 to 8 slots, and how they share the slots, both from index 1 on.
+/// Returns the least cost of two siblings together in 2 to 8 slots, and how they share the slots,
+/// both from index 1 on.
 fn share(a: &Costs, b: &Costs) -> (Costs, [Slots; 8]) {
     let mut costs = [0.0; 8];
     let mut shares = [0; 8];
@@ -98,7 +102,8 @@ fn share(a: &Costs, b: &Costs) -> (Costs, [Slots; 8]) {
     (costs, shares)
 }
 
-/// The roots of the subtrees that become the children of the wide node of `subtree`, which is no leaf, and how many there are.
+/// The roots of the subtrees that become the children of the wide node of `subtree`, which is no
+/// leaf, and how many there are.
 pub(crate) fn children(tree: &Bvh, decisions: &[Decision], subtree: usize) -> ([usize; 8], usize) {
     // At most 8 slots are shared out: no more than 8 parts wait at any time.
     let mut parts = [(subtree, decisions[subtree].slots(8)); 8];

@@ -11,8 +11,8 @@
 //!            └─> at the end: write the answer, start another ─┘
 //! ```
 //!
-//! No branch depends on one ray: its next step decides the list that it is appended to, and the order
-//! of hits and the children behind them are found without branches, too.
+//! No branch depends on one ray: its next step decides the list that it is appended to, and the
+//! order of hits and the children behind them are found without branches, too.
 
 mod crossing;
 
@@ -66,7 +66,8 @@ pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
     }
 }
 
-/// A flight of all rays up to the last number. With `IN_INSTANCES` leaves of the layout are instances.
+/// A flight of all rays up to the last number. With `IN_INSTANCES` leaves of the layout are
+/// instances.
 struct Trace<'a, 'b, K, const ANY: bool, const IN_INSTANCES: bool> {
     flight: Flight<'a, 'b, K, ANY, IN_INSTANCES>,
     last: usize,
@@ -120,8 +121,8 @@ struct List {
 impl List {
     const EMPTY: Self = Self { rays: [core::ptr::null_mut(); FLIGHT], count: 0 };
 
-    /// Appends a ray if it `belongs` here, without a branch. While a list is gone through it may be filled again from its
-    /// beginning.
+    /// Appends a ray if it `belongs` here, without a branch. While a list is gone through it may be
+    /// filled again from its beginning.
     #[inline(always)]
     unsafe fn append(&mut self, traversal: *mut Traversal, belongs: bool) {
         // SAFETY: a list is never full when a ray is not in it.
@@ -188,8 +189,8 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
         }
     }
 
-    /// Starts the next rays in the idle places, as far as there are rays; number 0 is ray number `first`
-    /// of its batch.
+    /// Starts the next rays in the idle places, as far as there are rays; number 0 is ray number
+    /// `first` of its batch.
     #[inline(always)]
     unsafe fn start_idle(&mut self, first: usize) {
         let count = core::mem::replace(&mut self.idle.count, 0);
@@ -216,7 +217,8 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
         }
     }
 
-    /// Prepares the next rays, traces those that cannot be, and answers those that miss the box around everything.
+    /// Prepares the next rays, traces those that cannot be, and answers those that miss the box
+    /// around everything.
     #[inline(always)]
     unsafe fn prepare(&mut self, first: usize) {
         let from = self.from;
@@ -263,9 +265,9 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
         }
     }
 
-    /// Visits the nodes at which rays are, in three passes. A pass over many rays has short chains of
-    /// dependent operations, so that the processor works on several rays at once; the whole visit of
-    /// one ray fills half of its window of instructions.
+    /// Visits the nodes at which rays are, in three passes. A pass over many rays has short chains
+    /// of dependent operations, so that the processor works on several rays at once; the whole
+    /// visit of one ray fills half of its window of instructions.
     #[inline(always)]
     unsafe fn visit_nodes(&mut self) {
         let count = self.at_nodes.count;

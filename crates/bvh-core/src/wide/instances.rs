@@ -80,8 +80,8 @@ impl Instance {
             .collect()
     }
 
-    /// Checks the instance, and returns its inverse transform and its box. `instance` is its index, for
-    /// errors.
+    /// Checks the instance, and returns its inverse transform and its box. `instance` is its index,
+    /// for errors.
     fn check(
         &self,
         instance: usize,
@@ -112,7 +112,8 @@ impl Instance {
     ) -> Result<Placed, InvalidInstances> {
         let (to_local, bounds) = self.check(instance, parts)?;
         let transform = self.transform.as_daffine3();
-        // A turned box has a box of up to five times its volume; the boxes of many small ones fit better.
+        // A turned box has a box of up to five times its volume; the boxes of many small ones fit
+        // better.
         let mut outline = Aabb::EMPTY;
         for aabb in &outlines[self.part as usize] {
             outline = outline.union(&transformed(&transform, aabb));
@@ -122,7 +123,8 @@ impl Instance {
     }
 }
 
-/// Returns a box around a transformed box in which a ray moved by the inverse transform has its hits.
+/// Returns a box around a transformed box in which a ray moved by the inverse transform has its
+/// hits.
 fn transformed(transform: &DAffine3, aabb: &Aabb) -> Aabb {
     // The box of the transformed box, column by column (Arvo 1990, 'Transforming axis-aligned
     // bounding boxes'). `size` bounds every intermediate result.
@@ -263,8 +265,8 @@ impl Instances {
         self.nearest(ray, |part, _, local_ray| part.nearest_hit(local_ray))
     }
 
-    /// Returns the nearest hit that `accept` accepts, for example where a texture is opaque. `accept`
-    /// sees hits in no order, and only as many as the answer needs.
+    /// Returns the nearest hit that `accept` accepts, for example where a texture is opaque.
+    /// `accept` sees hits in no order, and only as many as the answer needs.
     pub fn nearest_hit_where(
         &self,
         ray: &Ray,
@@ -288,8 +290,8 @@ impl Instances {
             let placed = &self.placed[instance as usize];
             let local_ray = placed.local(ray, t_max)?;
             let found = find(self.part_of(instance), instance, &local_ray)?;
-            // A hit in front of the instance's box would depend on the tree: a tree that visits the box
-            // later would skip it.
+            // A hit in front of the instance's box would depend on the tree: a tree that visits the
+            // box later would skip it.
             let t = found.t.max(slabs.entry(&placed.aabb));
             let hit = Hit { t, object: instance };
             if t <= t_max && nearest.is_none_or(|(nearest, _)| hit.precedes(&nearest)) {
@@ -306,22 +308,24 @@ impl Instances {
         self.any(ray, |part, _, local_ray| part.any_hit(local_ray))
     }
 
-    /// Returns whether `ray` has a hit that `accept` accepts, for example for shadows of cut-out leaves.
+    /// Returns whether `ray` has a hit that `accept` accepts, for example for shadows of cut-out
+    /// leaves.
     pub fn any_hit_where(&self, ray: &Ray, mut accept: impl FnMut(InstanceHit) -> bool) -> bool {
         self.any(ray, |part, instance, local_ray| {
             part.any_hit_where(local_ray, |hit| accept(InstanceHit::new(instance, hit)))
         })
     }
 
-    /// Returns whether `ray` hits any instance, where `hits` returns whether it hits an instance's part.
+    /// Returns whether `ray` hits any instance, where `hits` returns whether it hits an instance's
+    /// part.
     #[inline(always)]
     fn any(&self, ray: &Ray, mut hits: impl FnMut(&WideBvh, u32, &Ray) -> bool) -> bool {
         let Some(bounds) = self.top.root_aabb() else { return false };
         let slabs = Slabs::new(ray, &bounds);
         let test = |instance: u32| {
             let placed = &self.placed[instance as usize];
-            // The nearest hit is never in front of the instance's box. If the ray ends before the box,
-            // no hit counts here either.
+            // The nearest hit is never in front of the instance's box. If the ray ends before the
+            // box, no hit counts here either.
             if slabs.entry(&placed.aabb) > ray.t_max() {
                 return false;
             }

@@ -3,8 +3,8 @@
 use super::lanes::Lanes;
 use super::node::{Child, WideNode};
 
-/// A child to visit later: the bits of its entry, of which the last three are any, above those of the child. Entries
-/// are not negative, so that their bits are ordered as they are.
+/// A child to visit later: the bits of its entry, of which the last three are any, above those of
+/// the child. Entries are not negative, so that their bits are ordered as they are.
 pub(crate) type Pending = u64;
 
 /// A part of a kernel that is compiled once and called, so that its callers stay small.
@@ -19,10 +19,11 @@ pub(crate) trait Part {
     unsafe fn run(self) -> Self::Output;
 }
 
-/// An instruction set. Every function is inlined into one that is compiled with its instructions, or it is very slow.
+/// An instruction set. Every function is inlined into one that is compiled with its instructions,
+/// or it is very slow.
 ///
-/// All functions are unsafe for the same reasons: the processor has the instructions, and there is room for eight places more than
-/// are written.
+/// All functions are unsafe for the same reasons: the processor has the instructions, and there is
+/// room for eight places more than are written.
 pub(crate) trait Instructions: Sized {
     /// A register of one number per child of a node.
     type Boxes: Lanes;
@@ -38,8 +39,9 @@ pub(crate) trait Instructions: Sized {
     /// Returns a bit per child whose entry is at most its exit.
     unsafe fn entered(entry: Self::Boxes, exit: Self::Boxes) -> u32;
 
-    /// Writes the keys of the entered children, the nearest last: the bits of the entry, of which the last three are the
-    /// inverted lane. Entries are not negative, so that keys are ordered as they are, and distinct.
+    /// Writes the keys of the entered children, the nearest last: the bits of the entry, of which
+    /// the last three are the inverted lane. Entries are not negative, so that keys are ordered as
+    /// they are, and distinct.
     unsafe fn sort_keys(entry: Self::Boxes, mask: u32, to: *mut u32);
 
     /// Writes the keys of the entered children in the order of their lanes.
@@ -58,8 +60,8 @@ pub(crate) trait Instructions: Sized {
     /// Runs a part of a kernel in a function of its own that is compiled with the instructions.
     unsafe fn call<P: Part>(part: P) -> P::Output;
 
-    /// Removes the children behind `nearest` from a stack that is aligned to 64 bytes. Returns its new
-    /// end.
+    /// Removes the children behind `nearest` from a stack that is aligned to 64 bytes. Returns its
+    /// new end.
     #[inline(always)]
     unsafe fn drop_farther(base: *mut Pending, top: *mut Pending, nearest: f32) -> *mut Pending {
         let last = last_pending(nearest);

@@ -1,6 +1,7 @@
 //! The implementations of the wide layout's traversal, and which of them this processor can run.
 
-/// An implementation of the traversal of a [`WideBvh`](crate::WideBvh). All give the same answers, bit by bit.
+/// An implementation of the traversal of a [`WideBvh`](crate::WideBvh). All give the same answers,
+/// bit by bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kernel {
     /// Code for any machine; counts its tests on request.
@@ -18,5 +19,6 @@ impl Kernel {
     pub const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Simd128, Self::Portable];
 }
 
-/// Entries of the stack of a vector kernel's traversal; layouts that could need more are left to the portable kernel.
+/// Entries of the stack of a vector kernel's traversal; layouts that could need more are left to
+/// the portable kernel.
 pub(crate) const STACK: usize = 256;

@@ -1,12 +1,13 @@
-//! Lanes as a type: numbers side by side in one register. Kernels are written once over [`Lanes`]; instruction sets are its
-//! implementations.
+//! Lanes as a type: numbers side by side in one register. Kernels are written once over [`Lanes`];
+//! instruction sets are its implementations.
 
 use core::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Sub};
 
 /// `N` numbers of f32, or of u32 where an operation says so.
 ///
-/// A value exists only where the processor has the instructions: what makes one out of nothing is unsafe, what takes one is
-/// not. Every function is inlined into one that is compiled with these instructions, or it is very slow.
+/// A value exists only where the processor has the instructions: what makes one out of nothing is
+/// unsafe, what takes one is not. Every function is inlined into one that is compiled with these
+/// instructions, or it is very slow.
 pub(crate) trait Lanes:
     Copy
     + Add<Output = Self>
@@ -54,8 +55,8 @@ pub(crate) trait Lanes:
     /// The greater; of two zeros, or a NaN and a number, `other`.
     fn max(self, other: Self) -> Self;
 
-    /// `self · factor + term`, rounded once, or twice where no instruction fuses them. The error bounds of
-    /// tests that use it cover both.
+    /// `self · factor + term`, rounded once, or twice where no instruction fuses them. The error
+    /// bounds of tests that use it cover both.
     fn mul_add(self, factor: Self, term: Self) -> Self;
 
     /// `self · factor − term`, as [`mul_add`](Self::mul_add).
@@ -179,7 +180,8 @@ pub(crate) trait DoubleLanes:
     /// The greater, as [`Lanes::max`].
     fn max(self, other: Self) -> Self;
 
-    /// `self · factor − term`, rounded once or twice. The error bounds of tests that use it cover both.
+    /// `self · factor − term`, rounded once or twice. The error bounds of tests that use it cover
+    /// both.
     fn mul_sub(self, factor: Self, term: Self) -> Self;
 
     /// Where `self < other`.

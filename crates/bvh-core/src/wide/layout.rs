@@ -10,9 +10,10 @@ use alloc::vec::Vec;
 
 /// An immutable copy of a [`Bvh`](crate::Bvh) and its triangles, for tracing only.
 ///
-/// Gives the answers of [`nearest_hit`](crate::nearest_hit) with [`Triangle::intersect`](crate::Triangle::intersect)
-/// over the same triangles, bit by bit, on every machine and with every [`Kernel`]; the fastest one that the processor
-/// has is chosen when the layout is made.
+/// Gives the answers of [`nearest_hit`](crate::nearest_hit) with
+/// [`Triangle::intersect`](crate::Triangle::intersect) over the same triangles, bit by bit, on
+/// every machine and with every [`Kernel`]; the fastest one that the processor has is chosen when
+/// the layout is made.
 ///
 /// ```
 /// use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle, WideBvh};
@@ -60,8 +61,8 @@ pub(super) fn largest(bounds: &Aabb) -> f32 {
 const OUTLINE: usize = 64;
 
 impl WideBvh {
-    /// Returns boxes around all triangles, fewer than [`OUTLINE`] and eight: the subtrees of the layout from
-    /// the root down.
+    /// Returns boxes around all triangles, fewer than [`OUTLINE`] and eight: the subtrees of the
+    /// layout from the root down.
     pub(crate) fn outline(&self) -> Vec<Aabb> {
         let Some(root) = self.root else { return Vec::new() };
         let mut leaves = Vec::new();

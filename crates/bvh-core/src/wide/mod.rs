@@ -1,4 +1,5 @@
-//! A tree of triangles laid out for speed: eight children per node and four triangles per leaf block, tested at once.
+//! A tree of triangles laid out for speed: eight children per node and four triangles per leaf
+//! block, tested at once.
 
 // Some machines have no vector kernel, and then its parts are unused.
 #![cfg_attr(not(all(feature = "std", target_arch = "x86_64")), allow(dead_code))]
@@ -73,22 +74,24 @@ impl WideBvh {
     /// Objects that are tested, and counted, at every block of triangles of a leaf.
     pub const OBJECTS_OF_BLOCK: u64 = TriangleBlock::LANES as u64;
 
-    /// Lays out `tree`, valid over the boxes of `triangles`, with any number of children per node. O(n) time and
-    /// memory.
+    /// Lays out `tree`, valid over the boxes of `triangles`, with any number of children per node.
+    /// O(n) time and memory.
     ///
-    /// Which nodes of the tree survive, and which subtrees become one leaf, is decided exactly by dynamic programming:
-    /// the result has the least expected time for a random line among all that can be made by leaving nodes out.
+    /// Which nodes of the tree survive, and which subtrees become one leaf, is decided exactly by
+    /// dynamic programming: the result has the least expected time for a random line among all that
+    /// can be made by leaving nodes out.
     ///
-    /// Source: Ylitie, Karras & Laine 2017, 'Efficient incoherent ray traversal on GPUs through compressed wide BVHs',
-    /// section 4.1. Differs from the paper: boxes in full precision; leaves of any size, paid per block of four.
+    /// Source: Ylitie, Karras & Laine 2017, 'Efficient incoherent ray traversal on GPUs through
+    /// compressed wide BVHs', section 4.1. Differs from the paper: boxes in full precision; leaves
+    /// of any size, paid per block of four.
     pub fn new(tree: &Bvh, triangles: &[Triangle]) -> Result<Self, InvalidBvh> {
         Self::made(tree, triangles, None, BLOCK_COST)
     }
 
-    /// Lays out `tree` as [`new`](Self::new) does, but for rays that enter each node as often as `visits`
-    /// reports, rather than for random lines. Visits have any unit; [`RayDensity::visits`] returns them,
-    /// and tree files keep them. Inner nodes with many children are divided as if their parts had nothing
-    /// in common.
+    /// Lays out `tree` as [`new`](Self::new) does, but for rays that enter each node as often as
+    /// `visits` reports, rather than for random lines. Visits have any unit; [`RayDensity::visits`]
+    /// returns them, and tree files keep them. Inner nodes with many children are divided as if
+    /// their parts had nothing in common.
     ///
     /// [`RayDensity::visits`]: crate::RayDensity::visits
     ///
@@ -103,9 +106,9 @@ impl WideBvh {
         Self::made(tree, triangles, Some(visits), BLOCK_COST)
     }
 
-    /// Lays out `tree` as [`new`](Self::new) does, for a machine on which the test of a block of four
-    /// triangles lasts as long as visits to `block_cost` nodes. `new` assumes one node; half and twice as
-    /// much made no difference where we measured it.
+    /// Lays out `tree` as [`new`](Self::new) does, for a machine on which the test of a block of
+    /// four triangles lasts as long as visits to `block_cost` nodes. `new` assumes one node; half
+    /// and twice as much made no difference where we measured it.
     ///
     /// # Panics
     /// If `block_cost` is not positive and finite.
@@ -136,8 +139,8 @@ impl WideBvh {
         Ok(wide)
     }
 
-    /// Returns the nearest triangle that `ray` meets in its range. Of several at the same distance, the
-    /// one with the lowest id is nearest.
+    /// Returns the nearest triangle that `ray` meets in its range. Of several at the same distance,
+    /// the one with the lowest id is nearest.
     pub fn nearest_hit(&self, ray: &Ray) -> Option<Hit> {
         self.one_ray::<false>(ray, |_| true)
     }
@@ -147,7 +150,8 @@ impl WideBvh {
         self.one_ray::<true>(ray, |_| true).is_some()
     }
 
-    /// Returns the nearest hit, or with `ANY` the first one found, among those that `accept` accepts.
+    /// Returns the nearest hit, or with `ANY` the first one found, among those that `accept`
+    /// accepts.
     #[inline]
     fn one_ray<const ANY: bool>(&self, ray: &Ray, accept: impl FnMut(Hit) -> bool) -> Option<Hit> {
         if self.kernel == Kernel::Portable {
@@ -168,8 +172,8 @@ impl WideBvh {
         Some(self)
     }
 
-    /// Returns the layout of these arrays, whose references are sound, with `depth` nodes on the longest
-    /// way.
+    /// Returns the layout of these arrays, whose references are sound, with `depth` nodes on the
+    /// longest way.
     pub(crate) fn from_arrays(
         bounds: Aabb,
         root: Option<Child>,
@@ -192,9 +196,9 @@ impl WideBvh {
         self.kernel = if is_vector { available } else { Kernel::Portable };
     }
 
-    /// [`nearest_hit`](Self::nearest_hit) by [`Kernel::Portable`], with its tests counted: eight boxes
-    /// for each node and four objects for each block of triangles, including unused places. Counts are
-    /// the same on every machine.
+    /// [`nearest_hit`](Self::nearest_hit) by [`Kernel::Portable`], with its tests counted: eight
+    /// boxes for each node and four objects for each block of triangles, including unused places.
+    /// Counts are the same on every machine.
     #[inline(never)]
     pub fn nearest_hit_counted(&self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
         walk::<false>(self, ray, counter, |_| true)
@@ -206,8 +210,9 @@ impl WideBvh {
         walk::<true>(self, ray, counter, |_| true).is_some()
     }
 
-    /// Returns the nearest hit that `accept` accepts, for example where a texture is opaque. `accept` sees
-    /// hits in no order, and only as many as the answer needs: all of them if it accepts none.
+    /// Returns the nearest hit that `accept` accepts, for example where a texture is opaque.
+    /// `accept` sees hits in no order, and only as many as the answer needs: all of them if it
+    /// accepts none.
     ///
     /// ```
     /// # use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle, WideBvh};
@@ -229,13 +234,14 @@ impl WideBvh {
         self.nearest_accepted(ray, &mut accept)
     }
 
-    /// Returns whether `ray` has a hit that `accept` accepts, for example for shadows of cut-out leaves.
+    /// Returns whether `ray` has a hit that `accept` accepts, for example for shadows of cut-out
+    /// leaves.
     pub fn any_hit_where(&self, ray: &Ray, mut accept: impl FnMut(Hit) -> bool) -> bool {
         self.any_accepted(ray, &mut accept)
     }
 
-    // Not generic over the filter: a generic kernel would be compiled, perhaps without optimisation, by
-    // every crate that calls it.
+    // Not generic over the filter: a generic kernel would be compiled, perhaps without
+    // optimisation, by every crate that calls it.
     fn nearest_accepted(&self, ray: &Ray, accept: &mut dyn FnMut(Hit) -> bool) -> Option<Hit> {
         self.one_ray::<false>(ray, accept)
     }

@@ -6,8 +6,8 @@ use crate::{Aabb, Ray, Slabs};
 use glam::{DAffine3, Vec3};
 
 impl<L: Lanes> RayLanes<L> {
-    /// Returns the distances at which the rays enter a box, as [`Slabs::entry`] returns them for rays
-    /// prepared for a scene with these bounds, and the rays that enter it.
+    /// Returns the distances at which the rays enter a box, as [`Slabs::entry`] returns them for
+    /// rays prepared for a scene with these bounds, and the rays that enter it.
     #[inline(always)]
     pub(super) fn entry(&self, bounds: &Aabb, aabb: &Aabb) -> (L, L::Mask) {
         // SAFETY: values exist.
@@ -42,8 +42,8 @@ impl<L: Lanes> RayLanes<L> {
         (min - origin).abs().max((max - origin).abs())
     }
 
-    /// Returns the rays in other coordinates over the same ranges, and those that have a valid direction
-    /// and origin there.
+    /// Returns the rays in other coordinates over the same ranges, and those that have a valid
+    /// direction and origin there.
     #[inline(always)]
     pub(super) fn moved(&self, to_local: &DAffine3) -> (Self, L::Mask) {
         let mut origin = self.origin;

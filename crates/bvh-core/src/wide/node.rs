@@ -7,7 +7,8 @@ use bytemuck::{Pod, Zeroable};
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(crate) struct WideNode {
-    /// Lower x, y, z, then upper x, y, z, of all children; NaN in unused lanes, so that no ray enters them.
+    /// Lower x, y, z, then upper x, y, z, of all children; NaN in unused lanes, so that no ray
+    /// enters them.
     pub(crate) planes: [[f32; 8]; 6],
     pub(crate) children: [Child; 8],
     pub(crate) padding: [u32; 8],
@@ -40,7 +41,8 @@ pub(crate) struct Child(u32);
 
 impl Child {
     const LEAF: u32 = 1 << 31;
-    /// The number of instances that have a child, and of blocks of a layout that may be an instance's.
+    /// The number of instances that have a child, and of blocks of a layout that may be an
+    /// instance's.
     pub(crate) const INSTANCE: u32 = 1 << 30;
     /// The end of every ray.
     pub(crate) const END: Self = Self::leaf(u32::MAX);

@@ -14,9 +14,9 @@ use crate::{Hit, Ray};
 use core::hint::black_box;
 use core::mem::MaybeUninit;
 
-/// Aligns the frame of the function that holds it. Otherwise the compiler keeps vectors of 32 bytes at
-/// odd multiples of 16, depending on where its caller's frame ends, and then every other vector crosses
-/// a line of the cache. That costs a ray which misses everything 5 of 14 ns.
+/// Aligns the frame of the function that holds it. Otherwise the compiler keeps vectors of 32 bytes
+/// at odd multiples of 16, depending on where its caller's frame ends, and then every other vector
+/// crosses a line of the cache. That costs a ray which misses everything 5 of 14 ns.
 #[repr(align(64))]
 struct Aligned<T>(T);
 
@@ -24,8 +24,8 @@ struct Aligned<T>(T);
 /// without any the object is `u32::MAX`.
 ///
 /// # Safety
-/// The processor has the instructions of `K`, and the caller is compiled with them; the references of
-/// `wide` are sound and its `stack_need` is at most [`STACK`].
+/// The processor has the instructions of `K`, and the caller is compiled with them; the references
+/// of `wide` are sound and its `stack_need` is at most [`STACK`].
 #[inline(always)]
 pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
     wide: &WideBvh,
@@ -55,8 +55,8 @@ pub(crate) trait Leaves<L> {
     unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool;
 }
 
-/// Visits the leaves that the ray enters up to the nearest hit, or with `ANY` up to the first hit that
-/// is found, in no order. Returns `None` for a ray that the portable kernel must trace.
+/// Visits the leaves that the ray enters up to the nearest hit, or with `ANY` up to the first hit
+/// that is found, in no order. Returns `None` for a ray that the portable kernel must trace.
 ///
 /// # Safety
 /// As for [`trace`].
@@ -181,7 +181,8 @@ struct LeafRay<L> {
 impl<L: Lanes> LeafRay<L> {
     #[inline(always)]
     unsafe fn new(ray: &Ray, largest: f32) -> Self {
-        // Most rays in the open meet no leaf: without this the compiler does a part of this work for all.
+        // Most rays in the open meet no leaf: without this the compiler does a part of this work
+        // for all.
         let ray = black_box(ray);
         let origin = ray.origin().to_array();
         let direction = ray.direction().to_array();

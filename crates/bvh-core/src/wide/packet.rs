@@ -1,8 +1,10 @@
-//! Packets of coherent rays: nodes are culled for all rays at once by interval arithmetic, and a child that is left is tested
-//! vector by vector from the first that entered its parent; the first one that enters it will do.
+//! Packets of coherent rays: nodes are culled for all rays at once by interval arithmetic, and a
+//! child that is left is tested vector by vector from the first that entered its parent; the first
+//! one that enters it will do.
 //!
-//! Source: Wald, Boulos & Shirley 2007, 'Ray tracing deformable scenes using dynamic bounding volume hierarchies'; Overbeck,
-//! Ramamoorthi & Mark 2008, 'Large ray packets for real-time Whitted ray tracing' (ranged traversal).
+//! Source: Wald, Boulos & Shirley 2007, 'Ray tracing deformable scenes using dynamic bounding
+//! volume hierarchies'; Overbeck, Ramamoorthi & Mark 2008, 'Large ray packets for real-time Whitted
+//! ray tracing' (ranged traversal).
 
 use super::answer::Batch;
 use super::culling::Culling;
@@ -108,8 +110,8 @@ impl<K: Instructions> Packet<K> {
         self.count += 1;
     }
 
-    /// Traces the packet, writes its answers, and empties it. With `ANY` a ray ends at its first hit, which need not
-    /// be the nearest.
+    /// Traces the packet, writes its answers, and empties it. With `ANY` a ray ends at its first
+    /// hit, which need not be the nearest.
     ///
     /// # Safety
     /// As for [`trace`](super::batch::trace).
@@ -164,7 +166,8 @@ impl<K: Instructions> Packet<K> {
             let parents = parents.as_mut_ptr().cast::<Parent>();
             let mut top = 0;
             let mut child = root;
-            // The first vector that enters the child, its rays that do, and the planes of the child.
+            // The first vector that enters the child, its rays that do, and the planes of the
+            // child.
             let mut first = 0;
             let mut entered = u32::MAX;
             let mut planes = culling.all_space();
@@ -243,7 +246,8 @@ impl<K: Instructions> Packet<K> {
         }
     }
 
-    /// Returns a bit per ray of a vector that enters the box of these planes before its nearest hit.
+    /// Returns a bit per ray of a vector that enters the box of these planes before its nearest
+    /// hit.
     #[inline(always)]
     pub(super) unsafe fn enter(&self, vector: usize, planes: &[[f32; 2]; 3]) -> u32 {
         // SAFETY: the caller's promise: the vector is counted.

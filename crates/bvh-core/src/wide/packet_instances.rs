@@ -1,5 +1,5 @@
-//! Packets of rays through instances: the rays of a packet that enter an instance are moved into its part
-//! together, and are a packet there.
+//! Packets of rays through instances: the rays of a packet that enter an instance are moved into
+//! its part together, and are a packet there.
 
 use super::answer::{Answers, Batch};
 use super::instances::Instances;
@@ -13,9 +13,9 @@ use core::mem::MaybeUninit;
 const RAYS: usize = 8 * VECTORS;
 
 impl<K: Instructions> Packet<K> {
-    /// Traces the rays that enter an instance in its part. `entered` has a bit per ray of the vector
-    /// `first` that enters the box of these planes, and earlier vectors do not enter it. Returns whether
-    /// any ray has a new nearest hit.
+    /// Traces the rays that enter an instance in its part. `entered` has a bit per ray of the
+    /// vector `first` that enters the box of these planes, and earlier vectors do not enter it.
+    /// Returns whether any ray has a new nearest hit.
     ///
     /// # Safety
     /// As for [`trace`](super::batch::trace).
@@ -110,8 +110,8 @@ impl<K: Instructions, const ANY: bool> Part for Visit<'_, K, ANY> {
                 let number = i * K::Rays::N;
                 let object = K::Rays::load_unaligned(found.objects.as_ptr().add(number).cast());
                 let t = K::Rays::load_unaligned(found.distances.as_ptr().add(number));
-                // A hit in front of the instance's box would depend on the tree: a tree that visits the
-                // box later would skip it.
+                // A hit in front of the instance's box would depend on the tree: a tree that visits
+                // the box later would skip it.
                 let t = t.max(entries[i].assume_init());
                 let own = K::Rays::splat_bits(instance);
                 let precedes = t.lt(vector.t) | t.eq(vector.t) & own.below(vector.instance);

@@ -8,9 +8,9 @@ use super::triangles::TriangleBlock;
 use crate::Hit;
 
 impl<K: Instructions> Packet<K> {
-    /// Tests the triangles of a leaf with the rays that enter it. `entered` has a bit per ray of the
-    /// vector `first` that enters the box of these planes, and earlier vectors do not enter it. Returns
-    /// whether any ray has a new nearest hit.
+    /// Tests the triangles of a leaf with the rays that enter it. `entered` has a bit per ray of
+    /// the vector `first` that enters the box of these planes, and earlier vectors do not enter it.
+    /// Returns whether any ray has a new nearest hit.
     #[inline(always)]
     pub(super) unsafe fn visit_leaf<const ANY: bool>(
         &mut self,
@@ -36,8 +36,8 @@ impl<K: Instructions> Packet<K> {
         is_hit
     }
 
-    /// Tests the triangles of a leaf with the rays of a vector that entered it. Returns whether any ray
-    /// has a new nearest hit.
+    /// Tests the triangles of a leaf with the rays of a vector that entered it. Returns whether any
+    /// ray has a new nearest hit.
     #[inline(always)]
     unsafe fn test<const ANY: bool>(
         &mut self,
@@ -47,7 +47,8 @@ impl<K: Instructions> Packet<K> {
         largest: f32,
         accept: &mut Option<&mut Accept>,
     ) -> bool {
-        // SAFETY: the caller's promises; a block that is not its leaf's last is followed by another.
+        // SAFETY: the caller's promises; a block that is not its leaf's last is followed by
+        // another.
         unsafe {
             let vector = self
                 .vectors

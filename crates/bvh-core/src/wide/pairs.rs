@@ -1,8 +1,9 @@
-//! The exact test of a triangle, for pairs of a ray and a triangle side by side: one ray and several triangles, several rays and
-//! one triangle, or anything between.
+//! The exact test of a triangle, for pairs of a ray and a triangle side by side: one ray and
+//! several triangles, several rays and one triangle, or anything between.
 //!
-//! The answers are those of [`exact`](crate::exact): the triangles that the line crosses in real arithmetic, and the distances,
-//! rounded once. Three layers decide; each leaves to the next what its error bound leaves open.
+//! The answers are those of [`exact`](crate::exact): the triangles that the line crosses in real
+//! arithmetic, and the distances, rounded once. Three layers decide; each leaves to the next what
+//! its error bound leaves open.
 //!
 //! ```text
 //!   f32          sheared corners, error bound   most triangles       ──> miss
@@ -14,27 +15,31 @@
 //!
 //! # The bounds
 //!
-//! Let R be at least the coordinates of corners relative to the origin, z the axis of the direction's largest component, m
-//! the largest computed |x|, |y| of the sheared corners. The names are those of [`exact`](crate::exact).
+//! Let R be at least the coordinates of corners relative to the origin, z the axis of the
+//! direction's largest component, m the largest computed |x|, |y| of the sheared corners. The names
+//! are those of [`exact`](crate::exact).
 //!
-//! *f32*, u = 2⁻²⁴. A difference from the origin is off by uR, its product with the slope by 3uR, and the sheared coordinate
-//! by less than 4.1uR + um < 6.3uR. The edge value is off by less than 4 · 6.3uRm + 2 (6.3uR)² from its operands, and by
-//! 4um² < 8.5uRm from its own roundings: in total less than E = e (m + e) with e = 64uR. Underflow adds less than 2⁻¹²⁶, the
-//! last term of the bound in the code. The sum m + e is the *spread*: no real |x|, |y| exceeds it.
+//! *f32*, u = 2⁻²⁴. A difference from the origin is off by uR, its product with the slope by 3uR,
+//! and the sheared coordinate by less than 4.1uR + um < 6.3uR. The edge value is off by less than 4
+//! · 6.3uRm + 2 (6.3uR)² from its operands, and by 4um² < 8.5uRm from its own roundings: in total
+//! less than E = e (m + e) with e = 64uR. Underflow adds less than 2⁻¹²⁶, the last term of the
+//! bound in the code. The sum m + e is the *spread*: no real |x|, |y| exceeds it.
 //!
-//! *f64*, ε = 2⁻⁵³. Corners are sheared by multiplication with d_z, so S = spread · |d_z| is at least the largest |x|, |y|, and
-//! the edge values are within E = e (S + e) with e = 64εR|d_z|, as in [`exact`](crate::exact). The distance is computed from
-//! depths relative to the first corner, where errors of `u`, `v`, `w` count little:
+//! *f64*, ε = 2⁻⁵³. Corners are sheared by multiplication with d_z, so S = spread · |d_z| is at
+//! least the largest |x|, |y|, and the edge values are within E = e (S + e) with e = 64εR|d_z|, as
+//! in [`exact`](crate::exact). The distance is computed from depths relative to the first corner,
+//! where errors of `u`, `v`, `w` count little:
 //!
 //! ```text
 //!   t = (A_z D + v (B_z − A_z) + w (C_z − A_z)) / (D d_z),      D = u + v + w
 //! ```
 //!
-//! The weights `v / D` and `w / D` are off by 4E / D each. With Z the larger |B_z − A_z|, |C_z − A_z| this moves `t d_z` by
-//! 8EZ / D; all other roundings are below 50εR. The bound (16EZ / |D| + 64εR) / |d_z| covers both, and if D < 6E, where weights
-//! are off by more, it exceeds Z. If both ends of this interval round to one f32, that f32 is the rounded distance, because
-//! rounding is monotone. This layer leaves more open next to the origin than the filter in [`exact`](crate::exact), which is
-//! asked next.
+//! The weights `v / D` and `w / D` are off by 4E / D each. With Z the larger |B_z − A_z|, |C_z −
+//! A_z| this moves `t d_z` by 8EZ / D; all other roundings are below 50εR. The bound (16EZ / |D| +
+//! 64εR) / |d_z| covers both, and if D < 6E, where weights are off by more, it exceeds Z. If both
+//! ends of this interval round to one f32, that f32 is the rounded distance, because rounding is
+//! monotone. This layer leaves more open next to the origin than the filter in
+//! [`exact`](crate::exact), which is asked next.
 
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use crate::exact::ERROR;
@@ -43,8 +48,8 @@ use crate::{PreparedRay, Ray, Triangle};
 /// e of f32, in multiples of R.
 pub(crate) const SINGLE_ERROR: f32 = 64.0 * (f32::EPSILON / 2.0);
 
-/// The rays of the pairs. Vectors, of corners too, are in the shear's order of axes: the direction's largest component is the
-/// last.
+/// The rays of the pairs. Vectors, of corners too, are in the shear's order of axes: the
+/// direction's largest component is the last.
 #[derive(Clone, Copy)]
 pub(crate) struct Pairs<L> {
     pub(crate) origin: [L; 3],
@@ -59,8 +64,8 @@ pub(crate) struct Pairs<L> {
 }
 
 impl<L: Lanes> Pairs<L> {
-    /// Returns a bit per pair whose triangle the ray's line may meet, decided in f32, and the spread of each
-    /// pair for [`decide`](Self::decide).
+    /// Returns a bit per pair whose triangle the ray's line may meet, decided in f32, and the
+    /// spread of each pair for [`decide`](Self::decide).
     #[inline(always)]
     pub(crate) fn candidates(&self, corners: &[[L; 3]; 3]) -> (u32, L) {
         // SAFETY: values exist.
@@ -87,8 +92,8 @@ impl<L: Lanes> Pairs<L> {
         a.max(b).max(c) + self.error
     }
 
-    /// Returns the pairs whose triangle the ray hits at most at `t_max`, and the distances. No triangle is degenerate.
-    /// `doubled` are the same corners in f64.
+    /// Returns the pairs whose triangle the ray hits at most at `t_max`, and the distances. No
+    /// triangle is degenerate. `doubled` are the same corners in f64.
     #[inline(always)]
     pub(crate) fn decide(
         &self,
@@ -134,7 +139,8 @@ impl<L: Lanes> Pairs<L> {
         (is_hit & self.t_min.le(rounded) & rounded.le(t_max), rounded)
     }
 
-    /// Returns the same as [`decide`](Self::decide) for pairs whose candidates were found elsewhere.
+    /// Returns the same as [`decide`](Self::decide) for pairs whose candidates were found
+    /// elsewhere.
     #[inline(always)]
     pub(crate) fn decide_alone(&self, corners: &[[L; 3]; 3], t_max: L) -> (L::Mask, L) {
         let spread = self.spread(&self.roughly_sheared(corners));

@@ -1,4 +1,5 @@
-//! The portable kernel: traversal of the wide layout by safe code for any machine, which can count its tests.
+//! The portable kernel: traversal of the wide layout by safe code for any machine, which can count
+//! its tests.
 
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
@@ -45,9 +46,9 @@ impl WideRay {
         }
     }
 
-    /// The nearest of the children that the ray enters before `t_max`, and the number of the others, which are written
-    /// to `others`, the nearest last; with `ANY` the one in the last lane is taken for the nearest. `None` if the ray
-    /// enters none.
+    /// The nearest of the children that the ray enters before `t_max`, and the number of the
+    /// others, which are written to `others`, the nearest last; with `ANY` the one in the last lane
+    /// is taken for the nearest. `None` if the ray enters none.
     #[inline(always)]
     fn enter<const ANY: bool>(
         &self,
@@ -71,7 +72,8 @@ impl WideRay {
         let mut count = 0;
         for lane in 0..8 {
             if entry[lane] <= exit[lane] * Slabs::FAR && entry[lane] <= t_max {
-                // Insertion; the higher lane is nearer on ties, for example where the ray begins in both boxes.
+                // Insertion; the higher lane is nearer on ties, for example where the ray begins in
+                // both boxes.
                 let mut at = count;
                 while !ANY && at > 0 && others[at - 1].entry < entry[lane] {
                     others[at] = others[at - 1];
@@ -117,8 +119,9 @@ pub(crate) fn walk<const ANY: bool>(
     (!nearest.is_miss()).then_some(nearest)
 }
 
-/// Visits the leaves that the ray enters up to the nearest hit, or with `ANY` up to the first hit that
-/// is found, in no order. `visit` tests a block, and returns whether the nearest hit is a new one.
+/// Visits the leaves that the ray enters up to the nearest hit, or with `ANY` up to the first hit
+/// that is found, in no order. `visit` tests a block, and returns whether the nearest hit is a new
+/// one.
 #[inline(always)]
 pub(crate) fn traverse<const ANY: bool>(
     wide: &WideBvh,

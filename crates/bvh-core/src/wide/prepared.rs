@@ -1,4 +1,5 @@
-//! Rays made ready for rays in flight: what the tests of boxes and triangles need of one, together in memory.
+//! Rays made ready for rays in flight: what the tests of boxes and triangles need of one, together
+//! in memory.
 
 use super::box_ray::MARGIN;
 use super::instructions::Instructions;
@@ -198,7 +199,8 @@ impl Prepared {
     }
 }
 
-/// Components in the order of each ray's shear: y z x, or z x y if y is the largest, or x y z if z is.
+/// Components in the order of each ray's shear: y z x, or z x y if y is the largest, or x y z if z
+/// is.
 #[inline(always)]
 fn in_order<L: Lanes>([x, y, z]: [L; 3], second: L::Mask, third: L::Mask) -> [L; 3] {
     [

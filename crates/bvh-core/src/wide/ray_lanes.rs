@@ -41,8 +41,8 @@ impl<L: Lanes> RayLanes<L> {
         (x.lt(y).and_not(third), third)
     }
 
-    /// The rays within the bounds of [`box_ray`](super::box_ray), the largest size of a coordinate for each, and the
-    /// reciprocals of the directions made so small that nothing overflows.
+    /// The rays within the bounds of [`box_ray`](super::box_ray), the largest size of a coordinate
+    /// for each, and the reciprocals of the directions made so small that nothing overflows.
     #[inline(always)]
     pub(crate) fn bounded(&self, largest: f32) -> (L::Mask, L, [L; 3]) {
         // SAFETY: values exist.
@@ -61,7 +61,8 @@ impl<L: Lanes> RayLanes<L> {
         }
     }
 
-    /// The bounded reciprocals, if all rays are in range, run to the same sides, and mostly along the same axis.
+    /// The bounded reciprocals, if all rays are in range, run to the same sides, and mostly along
+    /// the same axis.
     #[inline(always)]
     pub(crate) fn cohere(&self, largest: f32) -> Option<[L; 3]> {
         let all = u32::MAX >> (32 - L::N);

@@ -21,10 +21,11 @@ pub enum RefitError {
 }
 
 impl WideBvh {
-    /// Moves the layout to the same triangles at other places: corners and boxes are those of `triangles`, nodes and leaves
-    /// remain. The answers are exact, as those of a new layout; the time to find them grows with the
-    /// [cost](Self::expected_visits). Of split references every part gets the box of its whole triangle. O(n), and much
-    /// faster than a new layout. A refused layout is unchanged.
+    /// Moves the layout to the same triangles at other places: corners and boxes are those of
+    /// `triangles`, nodes and leaves remain. The answers are exact, as those of a new layout; the
+    /// time to find them grows with the [cost](Self::expected_visits). Of split references every
+    /// part gets the box of its whole triangle. O(n), and much faster than a new layout. A refused
+    /// layout is unchanged.
     pub fn refit(&mut self, triangles: &[Triangle]) -> Result<(), RefitError> {
         let mut is_new = vec![true; triangles.len()];
         for block in self.blocks.iter() {
@@ -89,9 +90,9 @@ impl WideBvh {
         &blocks[..end]
     }
 
-    /// How many nodes and blocks of triangles a random line through the layout's box is expected to visit: what
-    /// [`new`](Self::new) makes least. Its growth by [`refit`](Self::refit) says when a new or
-    /// improved tree is worth its time. 0 for a scene without area. O(nodes + blocks).
+    /// How many nodes and blocks of triangles a random line through the layout's box is expected to
+    /// visit: what [`new`](Self::new) makes least. Its growth by [`refit`](Self::refit) says when a
+    /// new or improved tree is worth its time. 0 for a scene without area. O(nodes + blocks).
     pub fn expected_visits(&self) -> f64 {
         let visits = |(aabb, child): (Aabb, Child)| {
             aabb.half_area() * if child.is_node() { 1.0 } else { self.leaf(child).len() as f64 }

@@ -48,8 +48,8 @@ impl Source<'_> {
         }
     }
 
-    /// Returns the same as [`lanes`](Self::lanes), where the last ray before `end` fills the lanes that
-    /// have none.
+    /// Returns the same as [`lanes`](Self::lanes), where the last ray before `end` fills the lanes
+    /// that have none.
     ///
     /// # Safety
     /// The processor has the instructions, and there is a ray.

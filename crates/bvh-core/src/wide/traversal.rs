@@ -44,8 +44,8 @@ struct Outside {
     entry: f32,
 }
 
-/// [`END`](Child::END), the children that wait, the next block of the same leaf, and room for stores of whole
-/// registers.
+/// [`END`](Child::END), the children that wait, the next block of the same leaf, and room for
+/// stores of whole registers.
 #[repr(C, align(64))]
 struct Stack([MaybeUninit<Pending>; STACK + 24]);
 
@@ -100,9 +100,9 @@ impl Traversal {
         self.is_in(part);
     }
 
-    /// Keeps the nearest hit in the instance if it precedes those before, and goes on in the layout of
-    /// all instances. Returns false if the hit is in front of the instance's box, where a tree that visits
-    /// the box later would skip it.
+    /// Keeps the nearest hit in the instance if it precedes those before, and goes on in the layout
+    /// of all instances. Returns false if the hit is in front of the instance's box, where a tree
+    /// that visits the box later would skip it.
     #[inline(always)]
     pub(super) unsafe fn leave_instance(&mut self, all: &WideBvh) -> bool {
         // SAFETY: the caller's promise: the state outside is kept.
@@ -127,8 +127,8 @@ impl Traversal {
         true
     }
 
-    /// Returns the nearest hit of a ray among all instances at its end: the distance, the instance and
-    /// the triangle.
+    /// Returns the nearest hit of a ray among all instances at its end: the distance, the instance
+    /// and the triangle.
     #[inline(always)]
     pub(super) unsafe fn nearest_of_all<const ANY: bool>(&self) -> (f32, u32, u32) {
         if ANY {
@@ -233,8 +233,8 @@ unsafe fn pairs<L: Lanes>(four: [*mut Traversal; 4]) -> Pairs<L> {
     unsafe { Prepared::pairs([&(*four[0]).ray, &(*four[1]).ray, &(*four[2]).ray, &(*four[3]).ray]) }
 }
 
-/// Returns a bit for each triangle that the line of its ray may meet, of the block at which each ray
-/// is: four bits per ray.
+/// Returns a bit for each triangle that the line of its ray may meet, of the block at which each
+/// ray is: four bits per ray.
 #[inline(always)]
 pub(super) unsafe fn candidates<L: Lanes>(four: [*mut Traversal; 4]) -> u32 {
     // SAFETY: the caller's promises.
@@ -276,8 +276,8 @@ unsafe fn corners<L: Lanes>(four: [*mut Traversal; 4]) -> [[L; 3]; 3] {
 /// [`Hit::precedes`](crate::Hit::precedes) and without a branch.
 #[inline(always)]
 pub(super) unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4]) {
-    // SAFETY: the caller's promises; ids are four aligned lanes, and so are the fields of a traversal
-    // from its distance on.
+    // SAFETY: the caller's promises; ids are four aligned lanes, and so are the fields of a
+    // traversal from its distance on.
     unsafe {
         let row = |i: usize| (&raw const (*four[i]).t);
         let before = L::load_quarters([row(0), row(1), row(2), row(3)]);
@@ -313,8 +313,8 @@ pub(super) unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4]) {
     }
 }
 
-/// Gives every ray the nearest hit that `accept` accepts, among the hit it has and those in the block
-/// at which it is. The rays are numbered from `first` on.
+/// Gives every ray the nearest hit that `accept` accepts, among the hit it has and those in the
+/// block at which it is. The rays are numbered from `first` on.
 #[inline(always)]
 pub(super) unsafe fn decide_accepted<L: Lanes>(
     four: &[*mut Traversal],
@@ -340,8 +340,8 @@ pub(super) unsafe fn decide_accepted<L: Lanes>(
     }
 }
 
-/// Gives a ray the nearest hit that `accept` accepts, as [`decide_accepted`] does, where `accept` has
-/// rejected one object.
+/// Gives a ray the nearest hit that `accept` accepts, as [`decide_accepted`] does, where `accept`
+/// has rejected one object.
 #[inline(always)]
 unsafe fn decide_others<L: Lanes>(
     traversal: *mut Traversal,

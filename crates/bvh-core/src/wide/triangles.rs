@@ -39,7 +39,8 @@ impl TriangleBlock {
     pub(crate) fn move_to(&mut self, triangles: &[Triangle]) {
         let mut last = self.id(0);
         for lane in 0..Self::LANES {
-            // Unused lanes repeat the last triangle: what they find, that one finds too, and its id is less.
+            // Unused lanes repeat the last triangle: what they find, that one finds too, and its id
+            // is less.
             last = if self.id(lane) == Self::UNUSED { last } else { self.id(lane) };
             for (lanes, corner) in self
                 .corners
@@ -103,7 +104,8 @@ impl TriangleBlock {
         }
     }
 
-    /// Returns the corners of the triangle in a lane along these axes, each coordinate in all lanes.
+    /// Returns the corners of the triangle in a lane along these axes, each coordinate in all
+    /// lanes.
     ///
     /// # Safety
     /// The processor has the instructions; axes are below 3, and `lane` is one.
@@ -127,7 +129,8 @@ impl TriangleBlock {
         }
     }
 
-    /// Returns the corners of the triangle in a lane along these axes in f64, each coordinate in all lanes.
+    /// Returns the corners of the triangle in a lane along these axes in f64, each coordinate in
+    /// all lanes.
     ///
     /// # Safety
     /// As for [`splat_corners`](Self::splat_corners).

@@ -192,7 +192,8 @@ fn of_two_boxes_with_a_common_face_one_contains_each_point_of_it() {
     );
 }
 
-/// The exponent of ε: with K bits for each of its powers, ε is less than any exact value of the test.
+/// The exponent of ε: with K bits for each of its powers, ε is less than any exact value of the
+/// test.
 const K: usize = 1000;
 
 /// Returns `x · 2^149`.
@@ -204,8 +205,8 @@ fn integer(x: f32) -> BigInt {
     if x.is_sign_negative() { -size } else { size }
 }
 
-/// Returns whether the line of the ray crosses the inside of the triangle in exact arithmetic, after
-/// the origin has been moved by (ε, ε², ε³).
+/// Returns whether the line of the ray crosses the inside of the triangle in exact arithmetic,
+/// after the origin has been moved by (ε, ε², ε³).
 fn is_crossed(ray: &Ray, triangle: &Triangle) -> bool {
     let direction = ray.direction().to_array().map(integer);
     let origin = ray

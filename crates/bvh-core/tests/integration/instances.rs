@@ -194,8 +194,8 @@ fn filters_see_every_hit_that_the_answer_needs_and_no_rejected_hit_is_an_answer(
     assert!(hits > 200, "{hits}");
 }
 
-/// Mirrors, nests, flattens and enlarges a part near the origin, so that boxes overlap and contain each
-/// other.
+/// Mirrors, nests, flattens and enlarges a part near the origin, so that boxes overlap and contain
+/// each other.
 fn nested_transform(random: &mut Random) -> Affine3A {
     let size = random.of(&[0.01, 0.3, 1.0, 1.0, 1.0, 8.0]);
     let sign = random.of(&[-1.0, 1.0]);
@@ -208,8 +208,8 @@ fn nested_transform(random: &mut Random) -> Affine3A {
     Affine3A::from_scale_rotation_translation(scale, turn, shift)
 }
 
-/// Rays of every kind: towards edges and corners in bundles, difficult ones, from far away, and of extreme
-/// lengths, which vector kernels leave to others.
+/// Rays of every kind: towards edges and corners in bundles, difficult ones, from far away, and of
+/// extreme lengths, which vector kernels leave to others.
 fn rays_of_every_kind(flat: &[Triangle], random: &mut Random) -> Vec<Ray> {
     let mut all = bundles(flat, 20, random);
     all.extend(support::rays(flat, 200, random));

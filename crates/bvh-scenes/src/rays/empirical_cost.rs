@@ -24,13 +24,13 @@ config! {
     }
 }
 
-/// Returns the tests of nodes and of blocks of triangles per ray in a layout; NaN without rays. They do
-/// not depend on the machine.
+/// Returns the tests of nodes and of blocks of triangles per ray in a layout; NaN without rays.
+/// They do not depend on the machine.
 pub fn tests_per_ray(wide: &WideBvh, kind: Kind, rays: &[Ray]) -> [f64; 2] {
     let mut counts = TestCounts::default();
     for ray in rays {
-        // A renderer stops a shadow ray at the first hit that it finds, so only these rays are any-hit
-        // queries.
+        // A renderer stops a shadow ray at the first hit that it finds, so only these rays are
+        // any-hit queries.
         if kind == Kind::Shadow {
             wide.any_hit_counted(ray, &mut counts);
         } else {

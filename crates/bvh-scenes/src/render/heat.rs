@@ -54,8 +54,8 @@ pub fn range(film: &Film, rays_per_pixel: u32) -> Range {
     Range { min, median, top, max }
 }
 
-/// Returns the pixels of a film's heat map and of the key below it. `range` is the film's [`range`],
-/// or has the top of another film with which this one is compared.
+/// Returns the pixels of a film's heat map and of the key below it. `range` is the film's
+/// [`range`], or has the top of another film with which this one is compared.
 pub fn map(film: &Film, rays_per_pixel: u32, range: &Range) -> Result<Vec<[u8; 3]>, BadFont> {
     // A picture without tests has the top 0, and its colours would be 0 / 0.
     let top = range.top.max(f64::MIN_POSITIVE) * f64::from(rays_per_pixel);

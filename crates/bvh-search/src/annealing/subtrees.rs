@@ -188,8 +188,9 @@ fn improve_each<A: Metric>(
         done += tally;
         added += added_here;
     }
-    // The sum over the nodes of a large tree takes a tenth of a second, for which a cancelled search has
-    // no time. All others need it, because the sum of the differences gathers the errors of all rounds.
+    // The sum over the nodes of a large tree takes a tenth of a second, for which a cancelled
+    // search has no time. All others need it, because the sum of the differences gathers the errors
+    // of all rounds.
     if observer.cancelled() {
         tree.add_area(added);
     } else {

@@ -130,10 +130,10 @@ impl Config {
     }
 
     /// Builds the initial tree. Unless the configuration names a builder, also builds a clustering,
-    /// which takes a fraction of the time. If the clustering or the caller's tree is much cheaper, it
-    /// becomes the initial tree; otherwise the cheaper of the two is kept aside, so no budget ends above
-    /// the start of the smallest budgets. The work of a clustering counts only if it is used, like the
-    /// work of the [`fallback`].
+    /// which takes a fraction of the time. If the clustering or the caller's tree is much cheaper,
+    /// it becomes the initial tree; otherwise the cheaper of the two is kept aside, so no budget
+    /// ends above the start of the smallest budgets. The work of a clustering counts only if it is
+    /// used, like the work of the [`fallback`].
     fn initial(
         &self,
         morton: Option<MortonOrder>,
@@ -149,11 +149,11 @@ impl Config {
         let morton = morton.map_or_else(|| MortonOrder::new(boxes), Ok)?;
         let clustered =
             watched(run.observer(), |watch| morton.build_watched(&CLUSTERING, None, watch))?;
-        // Only the cheapest tree is kept, because the division of a large scene needs most of the memory of
-        // the search.
+        // Only the cheapest tree is kept, because the division of a large scene needs most of the
+        // memory of the search.
         run.keep_aside(Kept::new(clustered, problem));
-        // A large division takes tenths of a second before it looks at its watch. A cancelled search ends
-        // with the tree aside.
+        // A large division takes tenths of a second before it looks at its watch. A cancelled
+        // search ends with the tree aside.
         if boxes.len() > RECOMBINED_AT_ONCE && run.observer().cancelled() {
             return Err(BuildError::Cancelled.into());
         }

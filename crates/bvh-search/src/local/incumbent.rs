@@ -92,8 +92,8 @@ impl<'p> Incumbent<'p> {
         // The incremental area rejects most trees without the conversion. The layout's cost does
         // not follow the area, so every tree is converted for it.
         let may_be_better = tree.area() < self.area || self.problem.objective == Objective::Layout;
-        // A tree that is better by more than rounding errors is certain to be kept, so the memory of
-        // the trees that it replaces is free before the conversion needs as much.
+        // A tree that is better by more than rounding errors is certain to be kept, so the memory
+        // of the trees that it replaces is free before the conversion needs as much.
         let Problem { objective, measure, splits, judge, .. } = self.problem;
         let is_plain = measure.is_none() && splits.is_none() && judge.is_none();
         if is_plain
@@ -160,8 +160,8 @@ impl<'p> Incumbent<'p> {
 
 /// Returns the total that the working form of a tree of this cost calls the area.
 fn area(problem: &Problem, tree: &Bvh, cost: f64, run: &Run) -> f64 {
-    // The measures of a large tree take a quarter of a second, and a cancelled search continues from no
-    // tree.
+    // The measures of a large tree take a quarter of a second, and a cancelled search continues
+    // from no tree.
     if problem.measure.is_some() && run.observer().cancelled() {
         return f64::INFINITY;
     }

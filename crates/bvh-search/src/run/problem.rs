@@ -85,7 +85,8 @@ impl<'a> Problem<'a> {
     pub fn cost(&self, tree: &Bvh) -> f64 {
         match (self.judge, self.splits, self.measure) {
             (Some(judge), ..) => judge.judge(tree),
-            // The costs of a large layout take half a second, which a caller who has cancelled may wait for.
+            // The costs of a large layout take half a second, which a caller who has cancelled may
+            // wait for.
             _ if self.objective == Objective::Layout => {
                 cost::layout_cost(tree, self.measure, &parallel::call_both)
             }

@@ -124,8 +124,8 @@ impl<M: Metric> Working<M> {
         self.restart(area);
     }
 
-    /// Adds to the area what moves in copies of subtrees have added, to a rounding error. Their nodes
-    /// have the stamp 0.
+    /// Adds to the area what moves in copies of subtrees have added, to a rounding error. Their
+    /// nodes have the stamp 0.
     pub fn add_area(&mut self, added: f64) {
         self.begin();
         self.area.add(added);
@@ -328,7 +328,8 @@ impl<M: Metric> Working<M> {
     }
 }
 
-/// Returns the node's part of the area of a tree with this cost of leaves; `None` if its kind has none.
+/// Returns the node's part of the area of a tree with this cost of leaves; `None` if its kind has
+/// none.
 #[inline(always)]
 fn part(node: &Node, leaf_cost: f64) -> Option<f64> {
     match node.is_leaf() {

@@ -1,8 +1,8 @@
 //! The fuzz targets on a stable compiler: the kept inputs and mutations of them.
 //!
-//! `FUZZ_SECONDS=600 cargo test -p bvh-stress --test integration NAME` runs for longer, each time with
-//! different mutations. An input that breaks a promise is printed; a file in `fuzz/corpus/NAME`
-//! keeps it as a test.
+//! `FUZZ_SECONDS=600 cargo test -p bvh-stress --test integration NAME` runs for longer, each time
+//! with different mutations. An input that breaks a promise is printed; a file in
+//! `fuzz/corpus/NAME` keeps it as a test.
 
 #[path = "../../fuzz/src/lib.rs"]
 mod targets;

@@ -214,8 +214,8 @@ fn drawing(svg: &str) -> &str {
     svg.find("<svg").map_or("", |start| &svg[start..])
 }
 
-/// Returns a table in a box that scrolls if the table is too wide or too long for the page. The first
-/// cell of a row is its header.
+/// Returns a table in a box that scrolls if the table is too wide or too long for the page. The
+/// first cell of a row is its header.
 fn table(explanation: &str, table: &Table) -> String {
     let cells = |row: &Row| {
         row.cell_iter()

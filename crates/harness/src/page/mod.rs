@@ -152,8 +152,8 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
     })
 }
 
-/// Returns the verdict and the answers if numbers are compared with the paper's, otherwise the first
-/// report's reading.
+/// Returns the verdict and the answers if numbers are compared with the paper's, otherwise the
+/// first report's reading.
 fn verdict(outputs: &[Output]) -> Verdict {
     let compared = outputs
         .iter()

@@ -1,4 +1,5 @@
-//! Correlations of costs with the tests of rays, over the trees that one method builds on one scene.
+//! Correlations of costs with the tests of rays, over the trees that one method builds on one
+//! scene.
 //!
 //! Trees of different methods are never pooled: a ranking of binary and n-ary trees together mostly
 //! separates the two kinds (Simpson 1951).

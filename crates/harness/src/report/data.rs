@@ -171,7 +171,8 @@ impl Rows {
         )
     }
 
-    /// Returns the measurements with random rays of one kind in the trees of one method on one scene.
+    /// Returns the measurements with random rays of one kind in the trees of one method on one
+    /// scene.
     pub fn rays_of(&self, scene: &str, method: &str, kind: (&str, &str)) -> Vec<&RayRow> {
         let own = |row: &&RayRow| {
             row.scene == scene

@@ -1,5 +1,5 @@
-//! Figures 2 to 4 of the paper: cost against generation, with the median run, the range of all runs,
-//! and random picking.
+//! Figures 2 to 4 of the paper: cost against generation, with the median run, the range of all
+//! runs, and random picking.
 
 use super::paper::{PaperRow, Verdict, ratios};
 use super::prelude::*;

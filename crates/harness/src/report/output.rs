@@ -193,8 +193,8 @@ pub fn each<T>(items: impl IntoIterator<Item = T>, say: impl FnMut(T) -> Option<
         .join(", ")
 }
 
-/// Groups names by their numbers of cases out of `total`: `‘a’, ‘b’ for all 7 scenes; ‘c’ for 3 of 7
-/// scenes; ‘d’ for none`.
+/// Groups names by their numbers of cases out of `total`: `‘a’, ‘b’ for all 7 scenes; ‘c’ for 3 of
+/// 7 scenes; ‘d’ for none`.
 pub fn tally<'a>(
     counts: impl IntoIterator<Item = (&'a str, usize)>,
     total: usize,

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// One row of `paper.csv`: a statement of the paper and our result. Absolute costs are not compared,
-/// because the scenes are not the paper's.
+/// One row of `paper.csv`: a statement of the paper and our result. Absolute costs are not
+/// compared, because the scenes are not the paper's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PaperRow {
     /// The place in the paper.
@@ -80,9 +80,9 @@ impl PaperRow {
         Self { paper: paper.into(), ours: ours.into(), verdict, rule: rule.into(), ..self }
     }
 
-    /// Adds the paper's and our ratio to base, and the verdict on them. Our ratio has an interval if
-    /// it depends on chance. The ratios agree if the whole interval is within the relative distance
-    /// `tolerance` of the paper's ratio and on the same side of 1.
+    /// Adds the paper's and our ratio to base, and the verdict on them. Our ratio has an interval
+    /// if it depends on chance. The ratios agree if the whole interval is within the relative
+    /// distance `tolerance` of the paper's ratio and on the same side of 1.
     #[must_use]
     pub fn compare_ratios(
         self,
@@ -189,8 +189,8 @@ impl Verdict {
         }
     }
 
-    /// Compares our ratio to base with the paper's: by the relative distance `tolerance`, and by the
-    /// side of the base.
+    /// Compares our ratio to base with the paper's: by the relative distance `tolerance`, and by
+    /// the side of the base.
     fn of_ratios(paper: f64, ours: f64, tolerance: f64) -> Self {
         // The paper prints four digits, so a ratio this close to the base is on neither side.
         let side =

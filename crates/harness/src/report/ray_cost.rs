@@ -1,4 +1,5 @@
-//! Tests of rays in trees that are trained on rays, relative to a tree that is searched for by area.
+//! Tests of rays in trees that are trained on rays, relative to a tree that is searched for by
+//! area.
 
 use super::data::distinct;
 use super::prelude::*;

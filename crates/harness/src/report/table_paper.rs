@@ -17,7 +17,8 @@ impl Config {
         Some(row.compare_ratios(paper, ours, interval, self.tolerance))
     }
 
-    /// Compares a number of the paper with the closest of the columns that read it in different ways.
+    /// Compares a number of the paper with the closest of the columns that read it in different
+    /// ways.
     fn compare_readings(&self, rows: &Rows, scene: &str, cells: &[Cell]) -> Option<PaperRow> {
         let distance = |cell: &&Cell| {
             cell.paper_over_base
@@ -97,9 +98,9 @@ impl Config {
             .collect()
     }
 
-    /// Returns the sentence that compares with the paper: the numbers of scenes whose whole interval
-    /// is above or below the base, or the numbers of the paper's ratios that a reading comes close
-    /// to.
+    /// Returns the sentence that compares with the paper: the numbers of scenes whose whole
+    /// interval is above or below the base, or the numbers of the paper's ratios that a reading
+    /// comes close to.
     pub(super) fn answer(&self, cells: &[Cell]) -> Option<String> {
         cells
             .iter()

@@ -13,8 +13,8 @@ bvh_config::config! { serde;
         title: String;
         /// Labels of the methods to compare.
         methods: Vec<String>, in OneOrMore;
-        /// Number of trials whose best is compared, and at which figures end. Use fewer than are run:
-        /// the expectation needs a pool to draw from.
+        /// Number of trials whose best is compared, and at which figures end. Use fewer than are
+        /// run: the expectation needs a pool to draw from.
         best_of: usize = 100, in 1..;
         /// The method that the paper found best.
         #[serde(skip_serializing_if = "Option::is_none")]

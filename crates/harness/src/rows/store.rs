@@ -109,8 +109,8 @@ pub struct Store {
 
 impl Store {
     /// Creates and locks `folder`. If it has finished runs of an interrupted experiment, `existing`
-    /// decides: they are resumed, which requires the same resolved spec, or discarded, or the folder
-    /// is rejected.
+    /// decides: they are resumed, which requires the same resolved spec, or discarded, or the
+    /// folder is rejected.
     pub fn open(folder: &Path, resolved: &str, existing: Existing) -> Result<Self, Error> {
         let (folder, partial) = (folder.to_owned(), folder.join(".partial"));
         fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;

@@ -1,4 +1,5 @@
-//! Turns finished runs into results: joins their rows, updates the references and makes the reports.
+//! Turns finished runs into results: joins their rows, updates the references and makes the
+//! reports.
 
 use crate::Error;
 use crate::report;

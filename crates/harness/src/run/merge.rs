@@ -14,7 +14,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-/// One part of an experiment, made with `--run` or `--shard`. Its folder stays locked as long as this lives.
+/// One part of an experiment, made with `--run` or `--shard`. Its folder stays locked as long as
+/// this lives.
 struct Part {
     partial: PathBuf,
     resolved: String,

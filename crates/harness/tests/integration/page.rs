@@ -1,4 +1,5 @@
-//! The page of all results: what each experiment answers comes first, and whatever the page leads to is there.
+//! The page of all results: what each experiment answers comes first, and whatever the page leads
+//! to is there.
 
 use crate::support::{TABLE, folder_with, refused, said};
 use std::fs;

@@ -1,5 +1,5 @@
-//! The committed comparisons with the paper: one row for each number, a reason for every difference, and answers that follow from the
-//! committed rows.
+//! The committed comparisons with the paper: one row for each number, a reason for every
+//! difference, and answers that follow from the committed rows.
 
 use harness::report::paper::{PaperRow, Verdict};
 use harness::rows::read;

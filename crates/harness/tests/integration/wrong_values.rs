@@ -66,7 +66,8 @@ fn read(spec: &Value) -> Result<Experiment, (u8, String)> {
         .map_err(|error| (error.exit_code(), error.to_string()))
 }
 
-/// Returns a valid spec with the table at `path` and few other ones, and the path of the table in it.
+/// Returns a valid spec with the table at `path` and few other ones, and the path of the table in
+/// it.
 ///
 /// The test reads every spec thousands of times, and most of the time would go into methods and
 /// reports that no value concerns.
@@ -271,8 +272,8 @@ fn a_wrong_value_under_any_key_of_a_spec_is_rejected_by_name() {
     assert!(found.is_empty(), "\n{}", found.into_iter().collect::<Vec<_>>().join("\n"));
 }
 
-/// Checks that a text is rejected with the name of its file, or that the resolved spec reads back as
-/// itself.
+/// Checks that a text is rejected with the name of its file, or that the resolved spec reads back
+/// as itself.
 fn check_text(text: &str, quick: bool) {
     let path = Path::new("spec.toml");
     match Experiment::parse(path, text, &Overrides { quick, ..Default::default() }) {

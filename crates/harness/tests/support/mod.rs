@@ -53,7 +53,8 @@ pub fn experiments() -> Vec<(String, String)> {
     names(&folder).into_iter().map(read).collect()
 }
 
-/// A page of the documentation is what it is made to be by the test `by`, which rewrites it where `UPDATE_DOCS` is set.
+/// A page of the documentation is what it is made to be by the test `by`, which rewrites it where
+/// `UPDATE_DOCS` is set.
 pub fn assert_current(path: &Path, made: &str, by: &str) {
     if std::env::var_os("UPDATE_DOCS").is_some() {
         fs::write(path, made).unwrap();

@@ -66,8 +66,8 @@ impl Build<'_> {
             whole[first][0] = whole[first][0].union(&reference.aabb);
             whole[last][1] = whole[last][1].union(&reference.aabb);
         }
-        // A side costs at least as much as with the references alone that no plane cuts. If no plane
-        // divides anything for less than `most` even so, the parts need not be clipped.
+        // A side costs at least as much as with the references alone that no plane cuts. If no
+        // plane divides anything for less than `most` even so, the parts need not be clipped.
         let mut behind = vec![Aabb::EMPTY; bins + 1];
         for bin in (0..bins).rev() {
             behind[bin] = behind[bin + 1].union(&whole[bin][0]);

@@ -1,5 +1,5 @@
-//! Rays in flight through instances: a ray that comes to an instance is moved into its part, several rays
-//! at a time, and goes on there. A mark on its stack brings it back.
+//! Rays in flight through instances: a ray that comes to an instance is moved into its part,
+//! several rays at a time, and goes on there. A mark on its stack brings it back.
 
 use super::super::instances::Placed;
 use super::super::instructions::Instructions;
@@ -15,8 +15,8 @@ use core::mem::MaybeUninit;
 impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
     Flight<'_, '_, K, ANY, IN_INSTANCES>
 {
-    /// Has every ray at the end of an instance leave it, and every ray at an instance enter it; writes the
-    /// answers of rays at their end.
+    /// Has every ray at the end of an instance leave it, and every ray at an instance enter it;
+    /// writes the answers of rays at their end.
     #[inline(always)]
     pub(super) unsafe fn cross(&mut self, first: usize) {
         let count = self.at_end.count;

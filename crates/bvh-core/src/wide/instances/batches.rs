@@ -6,13 +6,13 @@ use super::Placed;
 use crate::{Aabb, Coherence, InstanceHit, Instances, Ray, Slabs, WideBvh};
 
 impl Instances {
-    /// [`nearest_hit`](Self::nearest_hit) of every ray, into as many `hits`; [`InstanceHit::MISS`] for a ray
-    /// that hits nothing. Answers are those of single calls, bit by bit, and distances are in multiples
-    /// of the lengths of the rays' directions.
+    /// [`nearest_hit`](Self::nearest_hit) of every ray, into as many `hits`; [`InstanceHit::MISS`]
+    /// for a ray that hits nothing. Answers are those of single calls, bit by bit, and distances
+    /// are in multiples of the lengths of the rays' directions.
     ///
     /// Coherent rays pass through the tree over the instances in packets of 64. Those that enter an
-    /// instance are moved into its part together, and are a packet there. All other rays are in flight
-    /// through both levels: each visits its instances in the order in which it enters them.
+    /// instance are moved into its part together, and are a packet there. All other rays are in
+    /// flight through both levels: each visits its instances in the order in which it enters them.
     ///
     /// ```
     /// # use bvh_core::{Aabb, Bvh, Coherence, Instance, InstanceHit, Instances, Node, Ray, Triangle, WideBvh, boxes};
@@ -52,8 +52,8 @@ impl Instances {
             .trace::<true>(Batch { scene: Some(self), ..batch }, coherence);
     }
 
-    /// Returns the ray in the coordinates of an instance's part, and the distance at which it enters the
-    /// instance's box; `None` if it does not before `t_max`.
+    /// Returns the ray in the coordinates of an instance's part, and the distance at which it
+    /// enters the instance's box; `None` if it does not before `t_max`.
     #[inline(always)]
     pub(crate) fn enter(&self, instance: u32, ray: &Ray, t_max: f32) -> Option<(Ray, f32)> {
         let placed = &self.placed[instance as usize];

@@ -1,6 +1,7 @@
 //! Four numbers to a register of 128 bits, in one register or two, as [`Lanes`].
 //!
-//! Every instruction here is safe to call, since the module is compiled only for targets that have all of them.
+//! Every instruction here is safe to call, since the module is compiled only for targets that have
+//! all of them.
 #![allow(clippy::undocumented_unsafe_blocks, unused_unsafe)]
 
 use super::registers::*;

@@ -1,4 +1,5 @@
-//! The kernel in registers of 128 bits, two for eight numbers: NEON on 64-bit ARM, and SIMD128 in WebAssembly.
+//! The kernel in registers of 128 bits, two for eight numbers: NEON on 64-bit ARM, and SIMD128 in
+//! WebAssembly.
 
 mod lanes;
 #[cfg_attr(target_arch = "aarch64", path = "neon.rs")]

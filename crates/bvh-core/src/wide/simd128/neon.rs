@@ -1,5 +1,5 @@
-//! Registers of NEON, by the names that [`lanes`](super::lanes) uses. Masks are registers of numbers
-//! whose lanes have all bits or none.
+//! Registers of NEON, by the names that [`lanes`](super::lanes) uses. Masks are registers of
+//! numbers whose lanes have all bits or none.
 // Instructions name the types between which registers are transmuted.
 #![allow(clippy::missing_transmute_annotations, clippy::useless_transmute)]
 

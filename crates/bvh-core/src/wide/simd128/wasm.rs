@@ -1,5 +1,5 @@
-//! Registers of WebAssembly's SIMD128, by the names that [`lanes`](super::lanes) uses. Masks are registers whose lanes have all
-//! bits or none.
+//! Registers of WebAssembly's SIMD128, by the names that [`lanes`](super::lanes) uses. Masks are
+//! registers whose lanes have all bits or none.
 
 use core::arch::wasm32::*;
 

@@ -1,4 +1,5 @@
-//! The AVX2 kernel: eight boxes at once with fused multiply-add, entered children sorted without a branch.
+//! The AVX2 kernel: eight boxes at once with fused multiply-add, entered children sorted without a
+//! branch.
 
 use super::lanes::{F32x4, F32x8};
 use super::masks::Mask8;

@@ -1,7 +1,7 @@
 //! Registers of AVX2 and AVX-512 as [`Lanes`].
 //!
-//! Why every call of an instruction here is safe: a value of these types exists only where the processor has the instructions,
-//! and what makes one out of nothing is unsafe for its caller.
+//! Why every call of an instruction here is safe: a value of these types exists only where the
+//! processor has the instructions, and what makes one out of nothing is unsafe for its caller.
 #![allow(clippy::undocumented_unsafe_blocks)]
 
 use super::masks::{Mask4, Mask8, WideMask4};

@@ -1,7 +1,8 @@
 //! Sets of lanes of AVX2 and AVX-512 as [`Mask`].
 //!
 //! Every call of an instruction here is safe because a value of these types exists only where the
-//! processor has the instructions, and because the function that makes one out of nothing is unsafe.
+//! processor has the instructions, and because the function that makes one out of nothing is
+//! unsafe.
 #![allow(clippy::undocumented_unsafe_blocks)]
 
 use crate::wide::lanes::Mask;

@@ -143,7 +143,8 @@ macro_rules! entry_points {
             ray: &crate::Ray,
             accept: impl FnMut(crate::Hit) -> bool,
         ) -> crate::Hit {
-            // SAFETY: this function is compiled with the instructions; the rest is the caller's promise.
+            // SAFETY: this function is compiled with the instructions; the rest is the caller's
+            // promise.
             unsafe { crate::wide::one_ray::trace::<$instructions, ANY>(wide, ray, accept) }
         }
 
@@ -154,7 +155,8 @@ macro_rules! entry_points {
             ray: &crate::Ray,
             leaves: &mut crate::wide::crossed_leaves::AllHits,
         ) -> bool {
-            // SAFETY: this function is compiled with the instructions; the rest is the caller's promise.
+            // SAFETY: this function is compiled with the instructions; the rest is the caller's
+            // promise.
             unsafe { crate::wide::one_ray::traverse::<$instructions, true>(wide, ray, leaves) }
                 .is_some()
         }
@@ -166,7 +168,8 @@ macro_rules! entry_points {
             rays: &[crate::Ray],
             found: &mut alloc::vec::Vec<crate::wide::all_in_flight::Found>,
         ) -> [u64; crate::wide::all_in_flight::MOST / 64] {
-            // SAFETY: this function is compiled with the instructions; the rest is the caller's promise.
+            // SAFETY: this function is compiled with the instructions; the rest is the caller's
+            // promise.
             unsafe { crate::wide::all_in_flight::trace::<$instructions>(wide, rays, found) }
         }
 
@@ -177,7 +180,8 @@ macro_rules! entry_points {
             points: &[glam::Vec3],
             closest: &mut [Option<crate::wide::Closest>],
         ) {
-            // SAFETY: this function is compiled with the instructions; the rest is the caller's promise.
+            // SAFETY: this function is compiled with the instructions; the rest is the caller's
+            // promise.
             unsafe { crate::wide::closest_lanes::trace::<$instructions>(wide, points, closest) }
         }
 
@@ -188,7 +192,8 @@ macro_rules! entry_points {
             batch: &mut crate::wide::answer::Batch,
             coherence: crate::Coherence,
         ) {
-            // SAFETY: this function is compiled with the instructions; the rest is the caller's promise.
+            // SAFETY: this function is compiled with the instructions; the rest is the caller's
+            // promise.
             unsafe { crate::wide::batch::trace::<$instructions, ANY>(wide, batch, coherence) }
         }
 
@@ -196,7 +201,8 @@ macro_rules! entry_points {
         #[target_feature(enable = $features)]
         #[inline(never)]
         unsafe fn call<P: Part>(part: P) -> P::Output {
-            // SAFETY: this function is compiled with the instructions; the rest is the caller's promise.
+            // SAFETY: this function is compiled with the instructions; the rest is the caller's
+            // promise.
             unsafe { part.run() }
         }
     };
