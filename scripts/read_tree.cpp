@@ -16,7 +16,7 @@ struct Header {
     double cost, traversal, intersection;
     float bounds[6];
     char method[64];
-    uint64_t references;  // version 4
+    uint64_t references;
     uint32_t flags, zeros[2], checksum;
 };
 struct Node {
@@ -46,11 +46,10 @@ int main(int argc, char** argv) {
     std::vector<char> bytes((std::istreambuf_iterator<char>(file)), {});
     Header header{};
     if (bytes.size() >= sizeof header) std::memcpy(&header, bytes.data(), sizeof header);
-    const uint64_t references = header.version == 4 ? header.references : header.objects;
-    const bool visits = header.version == 3 || (header.version == 4 && header.flags & 1);
-    if (std::memcmp(header.magic, "\x89" "BVH\r\n\x1a\n", 8) || header.version < 2 || header.version > 4 || header.endianness != 0x01020304 ||
-        bytes.size() != sizeof header + (visits ? 36 : 32) * header.nodes + 4 * references) {
-        return std::fprintf(stderr, "not a tree file of version 2 to 4, or cut\n"), 1;
+    const bool visits = header.flags & 1;
+    if (std::memcmp(header.magic, "\x89" "BVH\r\n\x1a\n", 8) || header.version != 4 || header.endianness != 0x01020304 ||
+        bytes.size() != sizeof header + (visits ? 36 : 32) * header.nodes + 4 * header.references) {
+        return std::fprintf(stderr, "not a tree file of version 4, or cut\n"), 1;
     }
     const uint32_t body = crc32(bytes.data() + sizeof header, bytes.size() - sizeof header);
     if (crc32(bytes.data(), 188, body) != header.checksum) return std::fprintf(stderr, "damaged\n"), 1;

@@ -6,10 +6,10 @@ import sys
 import zlib
 
 data = open(sys.argv[1], "rb").read()
-if len(data) < 192 or data[:8] != b"\x89BVH\r\n\x1a\n" or struct.unpack_from("<2I", data, 8) not in [(version, 0x01020304) for version in (2, 3, 4)]:
-    sys.exit("not a tree file of version 2 to 4")
+if len(data) < 192 or data[:8] != b"\x89BVH\r\n\x1a\n" or struct.unpack_from("<2I", data, 8) != (4, 0x01020304):
+    sys.exit("not a tree file of version 4")
 objective, scene, count, objects, seed, work, cost = struct.unpack_from("<2I4Qd", data, 16)
-references, flags = struct.unpack_from("<QI", data, 168) if data[8] == 4 else (objects, data[8] == 3)
+references, flags = struct.unpack_from("<QI", data, 168)
 visits = count if flags else 0
 if len(data) != 192 + 32 * count + 4 * references + 4 * visits:
     sys.exit("cut or extended")

@@ -52,7 +52,8 @@ impl World {
         for _ in 0..=BOUNCES {
             let hit = scene.nearest_hit_where(&ray, |hit| self.is_opaque(&ray, hit));
             let end = hit.map_or(self.far / ray.direction().length(), |hit| hit.t);
-            traced.push(TracedRay { kind, ray, segment: Segment::of_ray(&ray, end) });
+            let segment = Segment::of_ray(&ray, end);
+            traced.extend(segment.map(|segment| TracedRay { kind, ray, segment }));
             let Some(triangle) = hit.map(|hit| self.triangle(hit)) else { break };
             let Some(normal) = triangle.normal() else { break };
             let normal = if normal.dot(ray.direction()) < 0.0 { normal } else { -normal };
@@ -65,7 +66,8 @@ impl World {
             {
                 // A shadow ray is recorded up to the light: any object on the way may end it.
                 let segment = Segment::of_ray(&ray, 1.0);
-                traced.push(TracedRay { kind: Kind::Shadow, ray, segment });
+                let kind = Kind::Shadow;
+                traced.extend(segment.map(|segment| TracedRay { kind, ray, segment }));
                 let is_lit = !scene.any_hit_where(&ray, |hit| self.is_opaque(&ray, hit));
                 light += if is_lit { weight * cosine } else { 0.0 };
             }

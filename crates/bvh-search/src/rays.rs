@@ -170,9 +170,7 @@ fn traced<P: Primitive>(
         };
         // A ray without a hit ends outside the scene.
         let end = hit.map_or(2.0 * extent.length(), |hit| hit.t);
-        if ray.at(end).is_finite() {
-            segments.push(Segment::of_ray(&ray, end));
-        }
+        segments.extend(Segment::of_ray(&ray, end));
     }
     segments
 }

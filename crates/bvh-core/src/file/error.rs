@@ -2,8 +2,8 @@
 
 use crate::InvalidBvh;
 
-/// The latest version of the format.
-pub(super) const LATEST: u32 = 4;
+/// The version of the format.
+pub(super) const VERSION: u32 = 4;
 
 /// The reason why bytes are rejected as a tree file, or why a tree cannot be written.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -14,10 +14,10 @@ pub enum FileError {
     /// The file is shorter than a header.
     #[error("the file ends within its header")]
     Header,
-    /// The file has an earlier version of the format that is no longer read.
+    /// The file has an earlier version of the format, of which none was released.
     #[error(
         "the tree was written by version {found} of the format; this program reads version {}: bake it again",
-        LATEST
+        VERSION
     )]
     OldVersion {
         /// The version found.
@@ -26,7 +26,7 @@ pub enum FileError {
     /// The file has a later version of the format.
     #[error(
         "the tree was written by version {found} of the format; this program reads version {}: update the program",
-        LATEST
+        VERSION
     )]
     NewVersion {
         /// The version found.

@@ -1,12 +1,13 @@
 //! The header of a tree file, its first 192 bytes: format, sizes, cost, origin, and the checksum of
 //! the scene.
 
-use super::error::{FileError, LATEST};
+use super::error::{FileError, VERSION};
 use crate::cost::{Objective, SahConstants};
 use crate::{Aabb, MAX_OBJECTS, Node};
 use alloc::borrow::ToOwned;
 use alloc::string::String;
 use alloc::vec::Vec;
+use core::cmp::Ordering;
 
 /// The header of a tree file. [The format](super) documents the position of each field.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,20 +44,14 @@ impl Header {
     /// The first eight bytes of every tree file, modelled on PNG's: a transfer that converts line
     /// ends or clears high bits changes them.
     pub const MAGIC: [u8; 8] = *b"\x89BVH\r\n\x1a\n";
-    /// The latest version of the format. It is written for trees whose objects are divided among
-    /// leaves, and for trees whose cost is the cost of the wide layout. Other trees are written as
-    /// version 2, or 3 with visits. All three versions are read.
-    pub const VERSION: u32 = LATEST;
-    const WITH_VISITS: u32 = 3;
-    const PLAIN: u32 = 2;
-    /// The flag of a file of version 4 that has visits.
+    /// The version of the format, the only one that is written and read.
+    pub const VERSION: u32 = VERSION;
+    /// The flag of a file that has visits.
     const VISITS: u32 = 1;
     /// A number whose stored bytes identify the byte order of the file.
     pub(super) const ENDIANNESS: u32 = 0x0102_0304;
     /// The bytes of the root's box. They equal the box in the first node.
     pub(super) const BOUNDS: core::ops::Range<usize> = 80..104;
-    /// The offset of the fields of version 4.
-    const REFERENCES: usize = 168;
     /// The last field, the checksum of every other byte of the file.
     pub(super) const CHECKSUM: core::ops::Range<usize> = 188..192;
 
@@ -102,8 +97,7 @@ impl Header {
         };
         let mut bytes = Vec::with_capacity(Self::BYTES);
         bytes.extend_from_slice(&Self::MAGIC);
-        let version = self.version();
-        for word in [version, Self::ENDIANNESS, objective, self.scene] {
+        for word in [Self::VERSION, Self::ENDIANNESS, objective, self.scene] {
             bytes.extend_from_slice(&word.to_le_bytes());
         }
         for word in [self.nodes as u64, self.objects as u64, self.seed, self.work] {
@@ -117,26 +111,14 @@ impl Header {
                 bytes.extend_from_slice(&coordinate.to_le_bytes());
             }
         }
-        bytes.extend_from_slice(name);
-        bytes.resize(Self::REFERENCES, 0);
-        if version == Self::VERSION {
-            let flags = if self.has_visits { Self::VISITS } else { 0 };
-            bytes.extend_from_slice(&(self.references as u64).to_le_bytes());
-            bytes.extend_from_slice(&flags.to_le_bytes());
-        }
+        let mut padded_name = [0; 64];
+        padded_name[..name.len()].copy_from_slice(name);
+        bytes.extend_from_slice(&padded_name);
+        let flags = if self.has_visits { Self::VISITS } else { 0 };
+        bytes.extend_from_slice(&(self.references as u64).to_le_bytes());
+        bytes.extend_from_slice(&flags.to_le_bytes());
         bytes.resize(Self::BYTES, 0);
         Ok(bytes)
-    }
-
-    /// Returns the first version that can store everything in the file.
-    fn version(&self) -> u32 {
-        if self.references != self.objects || self.objective == Objective::Layout {
-            Self::VERSION
-        } else if self.has_visits {
-            Self::WITH_VISITS
-        } else {
-            Self::PLAIN
-        }
     }
 
     /// Reads all fields except the checksum.
@@ -154,7 +136,7 @@ impl Header {
         if mark == Self::ENDIANNESS.to_be_bytes() {
             return Err(FileError::Endianness);
         }
-        let version = supported_version(u32::from_le_bytes(version))?;
+        check_version(u32::from_le_bytes(version))?;
         if mark != Self::ENDIANNESS.to_le_bytes() {
             return Err(FileError::Field("endianness mark"));
         }
@@ -168,7 +150,7 @@ impl Header {
         if !(cost.is_finite() && cost >= 0.0) {
             return Err(FileError::Field("cost"));
         }
-        let objective = decode_objective(objective, version, traversal, intersection)?;
+        let objective = decode_objective(objective, traversal, intersection)?;
         let mut corners = [[0.0; 3]; 2];
         for coordinate in corners.as_flattened_mut() {
             *coordinate = f32::from_le_bytes(fields.need()?);
@@ -176,15 +158,8 @@ impl Header {
         let padded_name: [u8; 64] = fields.need()?;
         let (name, padding) = split_name(&padded_name);
         let method = core::str::from_utf8(name).map_err(|_| FileError::Method)?;
-        let [stored_references] = fields.words()?;
+        let [references] = fields.words()?;
         let flags = fields.word()?;
-        // Versions 2 and 3 have zeros instead of these two fields.
-        let (references, has_visits, unused) = match version {
-            Self::VERSION => {
-                (stored_references, flags & Self::VISITS != 0, u64::from(flags & !Self::VISITS))
-            }
-            _ => (objects, version == Self::WITH_VISITS, stored_references | u64::from(flags)),
-        };
         // Every object has a reference, and there are none without objects.
         let fits = (objects..=MAX_OBJECTS as u64).contains(&references);
         if !fits || (objects == 0 && references > 0) {
@@ -196,7 +171,8 @@ impl Header {
         }
         let reserved: [u8; 8] = fields.need()?;
         let _checksum: [u8; 4] = fields.need()?;
-        if reserved != [0; 8] || unused != 0 || padding.iter().any(|&byte| byte != 0) {
+        let has_other_flags = flags & !Self::VISITS != 0;
+        if reserved != [0; 8] || has_other_flags || padding.iter().any(|&byte| byte != 0) {
             return Err(FileError::Field("padding"));
         }
         Ok(Self {
@@ -210,26 +186,23 @@ impl Header {
             scene,
             bounds: Aabb::from(corners),
             method: method.to_owned(),
-            has_visits,
+            has_visits: flags & Self::VISITS != 0,
         })
     }
 }
 
-/// Rejects versions that this crate does not read.
-fn supported_version(found: u32) -> Result<u32, FileError> {
-    if found < Header::PLAIN {
-        Err(FileError::OldVersion { found })
-    } else if found > Header::VERSION {
-        Err(FileError::NewVersion { found })
-    } else {
-        Ok(found)
+/// Rejects other versions than the only one that this crate reads.
+fn check_version(found: u32) -> Result<(), FileError> {
+    match found.cmp(&VERSION) {
+        Ordering::Less => Err(FileError::OldVersion { found }),
+        Ordering::Equal => Ok(()),
+        Ordering::Greater => Err(FileError::NewVersion { found }),
     }
 }
 
 /// Returns the objective with this number. Constants must be 0 unless the objective uses them.
 fn decode_objective(
     number: u32,
-    version: u32,
     traversal: f64,
     intersection: f64,
 ) -> Result<Objective, FileError> {
@@ -239,7 +212,7 @@ fn decode_objective(
         0 => Objective::InternalArea,
         1 => Objective::GoldsmithSalmon,
         2 => return Ok(Objective::Sah(constants)),
-        3 if version == Header::VERSION => Objective::Layout,
+        3 => Objective::Layout,
         _ => return Err(FileError::Field("objective")),
     };
     // Bits, because −0 is not what `encode` writes.

@@ -17,15 +17,14 @@
 //!
 //! # Format
 //!
-//! There are versions 2 to 4, and each file has the first version that can store it. All numbers
-//! are little-endian, floats are IEEE 754, and sections follow each other without gaps.
+//! All numbers are little-endian, floats are IEEE 754, and sections follow each other without gaps.
 //!
 //! | bytes | type | field |
 //! |---|---|---|
 //! | 0..8 | `u8[8]` | magic number, `89 42 56 48 0d 0a 1a 0a` |
-//! | 8..12 | `u32` | version: 2; 3 with visits; 4 with more references than objects, or the cost of the layout |
+//! | 8..12 | `u32` | version: 4 |
 //! | 12..16 | `u32` | endianness mark, 0x01020304: the bytes `04 03 02 01` |
-//! | 16..20 | `u32` | objective: 0 internal area, 1 Goldsmith–Salmon, 2 surface area heuristic, 3 (version 4) wide layout |
+//! | 16..20 | `u32` | objective: 0 internal area, 1 Goldsmith–Salmon, 2 surface area heuristic, 3 wide layout |
 //! | 20..24 | `u32` | checksum of the scene's boxes, each min x, y, z, max x, y, z as `f32` |
 //! | 24..32 | `u64` | number of nodes |
 //! | 32..40 | `u64` | number of objects |
@@ -36,8 +35,8 @@
 //! | 72..80 | `f64` | its intersection constant, otherwise 0 |
 //! | 80..104 | `f32[6]` | the root's box, min then max; min +∞ and max −∞ without objects |
 //! | 104..168 | `u8[64]` | name of the method, UTF-8, padded with zeros |
-//! | 168..176 | `u64` | version 4: number of references, the object ids in all leaves; otherwise 0 |
-//! | 176..180 | `u32` | version 4: 1 if there are visits, otherwise 0; in other versions 0 |
+//! | 168..176 | `u64` | number of references, the object ids in all leaves |
+//! | 176..180 | `u32` | 1 if there are visits, otherwise 0 |
 //! | 180..188 | | zeros |
 //! | 188..192 | `u32` | checksum of the file: of the bytes from 192 to the end, then of bytes 0..188 |
 //! | 192.. | | the nodes, 32 bytes each, then a `u32` object id per reference, then the visits if there are any, an `f32` per node |
@@ -53,8 +52,8 @@
 //! enter the node's box, by the measure of boxes that the tree was searched with. No child has more
 //! visits than its parent.
 //!
-//! Node 0 is the root. Siblings are adjacent and come after their parent. The object ids are a
-//! permutation; in version 4 every object occurs once or more.
+//! Node 0 is the root. Siblings are adjacent and come after their parent. Every object id occurs once,
+//! or more often if its object is divided among leaves.
 //!
 //! Both checksums are the CRC-32 of zlib, gzip and PNG (reversed polynomial 0xedb88320), which
 //! standard libraries have: `zlib.crc32` in Python. It detects every change confined to 32
@@ -62,8 +61,7 @@
 //! the checks of the tree's structure do. `scripts/read_tree.py` and `scripts/read_tree.cpp` of the
 //! repository read this format.
 //!
-//! Version 1 had a different checksum and could also hold wide layouts. This crate rejects it with
-//! [`FileError::OldVersion`].
+//! Versions 1 to 3 were never released. This crate rejects them with [`FileError::OldVersion`].
 //!
 //! # Loading without copying
 //!

@@ -13,10 +13,20 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// Returns the part of a ray up to the distance `end`, in multiples of the direction's length. A hit
-    /// beyond the range of f32 gives a segment that is not finite, which a density rejects.
-    pub fn of_ray(ray: &Ray, end: f32) -> Self {
-        Self { from: ray.origin().to_array(), to: ray.at(end).to_array() }
+    /// Returns the part of a ray up to the distance `end`, in multiples of the direction's length. `None`
+    /// if the end is beyond the range of f32, because a density accepts finite segments only.
+    ///
+    /// ```
+    /// # use bvh_core::{Ray, Segment};
+    /// let ray = Ray::half_line([1.0, 0.0, 0.0], [2.0, 0.0, 0.0])?;
+    /// assert_eq!(Segment::of_ray(&ray, 3.0).map(|segment| segment.to), Some([7.0, 0.0, 0.0]));
+    /// assert_eq!(Segment::of_ray(&ray, f32::MAX), None);
+    /// # Ok::<(), bvh_core::InvalidRay>(())
+    /// ```
+    pub fn of_ray(ray: &Ray, end: f32) -> Option<Self> {
+        let to = ray.at(end);
+        to.is_finite()
+            .then(|| Self { from: ray.origin().to_array(), to: to.to_array() })
     }
 }
 

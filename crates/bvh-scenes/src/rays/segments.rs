@@ -222,9 +222,8 @@ impl<'a> Tracing<'a> {
 
     fn keep(&mut self, kind: Kind, ray: Ray, end: f32) {
         // In the largest scenes the end of a ray may overflow.
-        if ray.at(end).is_finite() {
-            self.rays
-                .push(TracedRay { kind, ray, segment: Segment::of_ray(&ray, end) });
+        if let Some(segment) = Segment::of_ray(&ray, end) {
+            self.rays.push(TracedRay { kind, ray, segment });
         }
     }
 

@@ -45,16 +45,18 @@ struct Line([u8; 64]);
 /// length.
 fn correct_header(bytes: &mut [u8], counts: bool, visits: bool) {
     bytes[..8].copy_from_slice(&Header::MAGIC);
-    bytes[8..12].copy_from_slice(&(Header::VERSION - u32::from(!visits)).to_le_bytes());
+    bytes[8..12].copy_from_slice(&Header::VERSION.to_le_bytes());
     bytes[12..16].copy_from_slice(&[4, 3, 2, 1]);
     if counts {
         let nodes = u64::from(bytes[24]);
         let rest = (bytes.len() - Header::BYTES) as u64;
         let objects = rest.saturating_sub(nodes * if visits { 36 } else { 32 }) / 4;
-        for (at, count) in [(24, nodes), (32, objects)] {
+        // Each object has one reference.
+        for (at, count) in [(24, nodes), (32, objects), (168, objects)] {
             bytes[at..at + 8].copy_from_slice(&count.to_le_bytes());
         }
     }
+    bytes[176..180].copy_from_slice(&u32::from(visits).to_le_bytes());
 }
 
 /// Writes the CRC-32, computed bit by bit from its definition, over the bytes that `bvh_core::file`
