@@ -35,6 +35,7 @@ pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
         let mut first_of_rest = 0;
         let mut next = 0;
         while next + K::Rays::N <= rays.len() {
+            rays.prefetch::<K>(next + K::PACKET);
             let lanes = rays.lanes::<K::Rays>(next);
             if let Some(scale) = lanes.cohere(wide.largest) {
                 if !packet.takes(lanes.octant()) {

@@ -228,6 +228,7 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
         let rays = self.batch.rays;
         // SAFETY: the caller's promises; `ready` has room for sixteen.
         let in_range = unsafe {
+            rays.prefetch::<K>(self.from + K::Rays::N);
             let ready = Ready::new(rays.lanes_up_to::<K::Rays>(from, self.end), self.wide.largest);
             self.waiting = there & ready.in_range & ready.enter(&self.wide.bounds);
             if self.waiting != 0 {

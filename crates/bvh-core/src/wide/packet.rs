@@ -12,7 +12,7 @@ use super::instructions::{Instructions, Part};
 use super::kernel::STACK;
 use super::lanes::{Lanes, Mask as _};
 use super::layout::WideBvh;
-use super::node::Child;
+use super::node::{Child, WideNode};
 use super::pairs::Pairs;
 use super::ray_lanes::{RayBounds, RayLanes};
 use core::mem::MaybeUninit;
@@ -186,6 +186,7 @@ impl<K: Instructions> Packet<K> {
                             *parents.add(top + i) = parent;
                         }
                         top += mask.count_ones() as usize;
+                        fetch::<K>(wide, node, mask);
                     }
                 } else {
                     let is_hit = if let Some(scene) = batch.scene {
@@ -265,6 +266,36 @@ impl<K: Instructions> Packet<K> {
                 exit = exit.min(far);
             }
             entry.le(exit).bits()
+        }
+    }
+}
+
+/// Has the beginnings of some children fetched, because the packet comes to most of them soon.
+///
+/// # Safety
+/// The processor has the instructions.
+#[inline(always)]
+unsafe fn fetch<K: Instructions>(wide: &WideBvh, node: &WideNode, mut mask: u32) {
+    /// A block of triangles is three lines, a node four.
+    const LINES: usize = 3;
+    while mask != 0 {
+        let lane = mask.trailing_zeros() as usize & 7;
+        mask &= mask - 1;
+        let child = node.children[lane];
+        let beginning = if child.is_node() {
+            wide.nodes
+                .as_ptr()
+                .wrapping_add(child.index())
+                .cast::<u8>()
+        } else {
+            wide.blocks
+                .as_ptr()
+                .wrapping_add(child.index())
+                .cast::<u8>()
+        };
+        for line in 0..LINES {
+            // SAFETY: a prefetch may name any address.
+            unsafe { K::prefetch(beginning.wrapping_add(64 * line)) };
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Rays of a batch in memory: rays one after the other, or components in slices.
 
+use super::instructions::Instructions;
 use super::lanes::Lanes;
 use super::ray_lanes::RayLanes;
 use crate::components::Distances;
@@ -30,6 +31,23 @@ impl Source<'_> {
         match self {
             Self::Rays(rays) => rays[number],
             Self::Components(rays) => rays.ray(number),
+        }
+    }
+
+    /// Has the rays that follow number `first` fetched that are as many as a vector's. They need not
+    /// exist. While a packet is traced, the processor does not see that the rays of the next one follow.
+    ///
+    /// # Safety
+    /// The processor has the instructions.
+    #[inline(always)]
+    pub(crate) unsafe fn prefetch<K: Instructions>(self, first: usize) {
+        const LINE: usize = 64;
+        // Components are streams, which the processor recognises.
+        let Self::Rays(rays) = self else { return };
+        let next = rays.as_ptr().wrapping_add(first).cast::<u8>();
+        for line in 0..(K::Rays::N * size_of::<Ray>()).div_ceil(LINE) {
+            // SAFETY: a prefetch may name any address.
+            unsafe { K::prefetch(next.wrapping_add(line * LINE)) };
         }
     }
 
