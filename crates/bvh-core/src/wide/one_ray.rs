@@ -6,7 +6,7 @@ use super::kernel::STACK;
 use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
 use super::node::Child;
-use super::pairs::{Pairs, SINGLE_ERROR, doubled};
+use super::pairs::{Pairs, Plane, SINGLE_ERROR};
 use super::portable::walk;
 use super::triangles::TriangleBlock;
 use crate::ray::{AXES, largest_axis};
@@ -217,13 +217,15 @@ impl<L: Lanes> LeafRay<L> {
         // SAFETY: the caller's promise: the processor has the instructions; axes are below 3.
         unsafe {
             let corners = block.corners_along::<L>(self.axes);
-            let (candidates, spread) = self.pairs.candidates(&corners);
-            if candidates == 0 {
+            let candidates = self.pairs.candidates(&corners);
+            if candidates.possible == 0 {
                 return false;
             }
-            let (inside, t) =
-                self.pairs
-                    .decide(&corners, &doubled(&corners), spread, L::splat(nearest.t));
+            let plane = Plane::of_lanes(&corners);
+            let t_max = L::splat(nearest.t);
+            let (inside, t) = self
+                .pairs
+                .decide(&corners, &plane, &candidates, t_max);
             let mut hits = inside.bits();
             if hits == 0 {
                 return false;

@@ -4,6 +4,7 @@ use super::answer::Accept;
 use super::instructions::Instructions;
 use super::lanes::{Lanes, Mask};
 use super::packet::Packet;
+use super::pairs::Plane;
 use super::triangles::TriangleBlock;
 use crate::Hit;
 
@@ -66,14 +67,14 @@ impl<K: Instructions> Packet<K> {
             loop {
                 for lane in 0..(*block).len() {
                     let corners = (*block).splat_corners::<K::Rays>(lane, vector.axes);
-                    let (candidates, spread) = pairs.candidates(&corners);
-                    let candidates = candidates & entered;
-                    if candidates == 0 {
+                    let mut candidates = pairs.candidates(&corners);
+                    candidates.possible &= entered;
+                    if candidates.possible == 0 {
                         continue;
                     }
-                    let doubled = (*block).splat_doubles::<K::Rays>(lane, vector.axes);
-                    let (inside, t) = pairs.decide(&corners, &doubled, spread, vector.t);
-                    let inside = inside & Mask::from_bits(candidates);
+                    let plane = Plane::of_triangle(&(*block).doubles(lane, vector.axes));
+                    let (inside, t) = pairs.decide(&corners, &plane, &candidates, vector.t);
+                    let inside = inside & Mask::from_bits(entered);
                     let object = K::Rays::splat_bits((*block).id(lane));
                     let mut hits = if ANY {
                         inside

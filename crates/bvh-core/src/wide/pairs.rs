@@ -1,16 +1,17 @@
 //! The exact test of a triangle, for pairs of a ray and a triangle side by side: one ray and
 //! several triangles, several rays and one triangle, or anything between.
 //!
-//! The answers are those of [`exact`](crate::exact): the triangles that the line crosses in real
-//! arithmetic, and the distances, rounded once. Three layers decide; each leaves to the next what
-//! its error bound leaves open.
+//! The answers are those of [`exact`](crate::exact): the triangles that the line crosses in real arithmetic, and the distances,
+//! rounded once. Each layer leaves to the next what its error bound leaves open.
 //!
 //! ```text
-//!   f32          sheared corners, error bound   most triangles       ──> miss
-//!    │ perhaps
-//!   f64          likewise                       nearly all others    ──> miss, or rounded distance
-//!    │ perhaps
-//!   expansions   exact                          what remains         ──> miss, or rounded distance
+//!   does the line cross the triangle?        at which distance?
+//!
+//!   f32          nearly all triangles        f64          nearly all that are crossed
+//!    │ perhaps                                │ perhaps
+//!   f64          nearly all others            │
+//!    │ perhaps                                │
+//!    └───────────> expansions, exact <────────┘
 //! ```
 //!
 //! # The bounds
@@ -19,31 +20,38 @@
 //! direction's largest component, m the largest computed |x|, |y| of the sheared corners. The names
 //! are those of [`exact`](crate::exact).
 //!
-//! *f32*, u = 2⁻²⁴. A difference from the origin is off by uR, its product with the slope by 3uR,
-//! and the sheared coordinate by less than 4.1uR + um < 6.3uR. The edge value is off by less than 4
-//! · 6.3uRm + 2 (6.3uR)² from its operands, and by 4um² < 8.5uRm from its own roundings: in total
-//! less than E = e (m + e) with e = 64uR. Underflow adds less than 2⁻¹²⁶, the last term of the
-//! bound in the code. The sum m + e is the *spread*: no real |x|, |y| exceeds it.
+//! *f32*, u = 2⁻²⁴. A difference from the origin is off by uR, its product with the slope by 3uR, and the sheared coordinate
+//! by less than 4.1uR + um < 6.3uR. The edge value is off by less than 4 · 6.3uRm + 2 (6.3uR)² from its operands, and by
+//! 4um² < 8.5uRm from its own roundings: in total less than E = e (m + e) with e = 64uR. Underflow adds less than 2⁻¹²⁶, the
+//! last term of the bound in the code. The sum m + e is the *spread*: no real |x|, |y| exceeds it.
+//! If all edge values are above E, or all below −E, the line crosses the triangle.
 //!
-//! *f64*, ε = 2⁻⁵³. Corners are sheared by multiplication with d_z, so S = spread · |d_z| is at
-//! least the largest |x|, |y|, and the edge values are within E = e (S + e) with e = 64εR|d_z|, as
-//! in [`exact`](crate::exact). The distance is computed from depths relative to the first corner,
-//! where errors of `u`, `v`, `w` count little:
+//! *f64*, ε = 2⁻⁵³. Corners are sheared by multiplication with d_z, so S = spread · |d_z| is at least the largest |x|, |y|, and
+//! the edge values are within E = e (S + e) with e = 64εR|d_z|, as in [`exact`](crate::exact).
+//!
+//! *Distance*. With the normal N = (B − A) × (C − A), computed in f64,
 //!
 //! ```text
-//!   t = (A_z D + v (B_z − A_z) + w (C_z − A_z)) / (D d_z),      D = u + v + w
+//!   t = h / s,      h = N · (A − O),      s = N · d
 //! ```
 //!
-//! The weights `v / D` and `w / D` are off by 4E / D each. With Z the larger |B_z − A_z|, |C_z −
-//! A_z| this moves `t d_z` by 8EZ / D; all other roundings are below 50εR. The bound (16EZ / |D| +
-//! 64εR) / |d_z| covers both, and if D < 6E, where weights are off by more, it exceeds Z. If both
-//! ends of this interval round to one f32, that f32 is the rounded distance, because rounding is
-//! monotone. This layer leaves more open next to the origin than the filter in
-//! [`exact`](crate::exact), which is asked next.
+//! Let M be twice the product of the largest |B − A| and the largest |C − A| along an axis: no component of N exceeds it, and
+//! the computed ones are off by 4εM. Let P be the largest |A − O| along an axis plus both of these sides. Then h is off by
+//! Δh = 3 (4 + 1 + 3) εMP, and s by Δs = 3 (4 + 3) εM|d_z|. Where the line crosses the triangle, |t d_z| is at most P. With the
+//! computed h′ and s′,
+//!
+//! ```text
+//!   h′ / s′ − t = (h′ − h − t (s′ − s)) / s′
+//! ```
+//!
+//! is at most (24 + 21) εMP / |s′|, and the division adds 2ε|h′ / s′|, which is at most 6εMP / |s′|, because |h| is at most
+//! 3MP. The bound 64εMP / |s′| covers the sum. If both ends of this interval round to one f32, that f32 is the rounded
+//! distance, because rounding is monotone.
 
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use crate::exact::ERROR;
 use crate::{PreparedRay, Ray, Triangle};
+use core::ops::{Mul, Sub};
 
 /// e of f32, in multiples of R.
 pub(crate) const SINGLE_ERROR: f32 = 64.0 * (f32::EPSILON / 2.0);
@@ -63,11 +71,32 @@ pub(crate) struct Pairs<L> {
     pub(crate) t_min: L,
 }
 
+/// The answers of the layer in f32.
+pub(crate) struct Candidates<L> {
+    /// A bit per pair whose triangle the ray's line may cross.
+    pub(crate) possible: u32,
+    /// A bit per pair whose triangle the ray's line certainly crosses.
+    certain: u32,
+    /// The spread of each pair.
+    spread: L,
+}
+
+/// The planes of triangles, a triangle per lane. Vectors are in the shear's order of axes.
+pub(crate) struct Plane<L: Lanes> {
+    /// The first corners.
+    corner: [L::Double; 3],
+    /// The normals, of any length.
+    normal: [L::Double; 3],
+    /// M, the bound of the normals' components.
+    size: L::Double,
+    /// The sum of the largest |B − A| and the largest |C − A| along an axis.
+    sides: L,
+}
+
 impl<L: Lanes> Pairs<L> {
-    /// Returns a bit per pair whose triangle the ray's line may meet, decided in f32, and the
-    /// spread of each pair for [`decide`](Self::decide).
+    /// Finds the pairs whose triangle the ray's line may cross, in f32.
     #[inline(always)]
-    pub(crate) fn candidates(&self, corners: &[[L; 3]; 3]) -> (u32, L) {
+    pub(crate) fn candidates(&self, corners: &[[L; 3]; 3]) -> Candidates<L> {
         // SAFETY: values exist.
         let (zero, underflow) = unsafe { (L::splat(0.0), L::splat(f32::MIN_POSITIVE)) };
         let [a, b, c] = self.roughly_sheared(corners);
@@ -81,7 +110,11 @@ impl<L: Lanes> Pairs<L> {
         let most = u.max(v).max(w);
         let spread = self.spread(&[a, b, c]);
         let error = self.error.mul_add(spread, underflow);
-        (!(least.lt(zero - error) & error.lt(most)).bits(), spread)
+        let below = zero - error;
+        let all = u32::MAX >> (32 - L::N);
+        let possible = all & !(least.lt(below) & error.lt(most)).bits();
+        let certain = (error.lt(least) | most.lt(below)).bits();
+        Candidates { possible, certain, spread }
     }
 
     #[inline(always)]
@@ -92,59 +125,85 @@ impl<L: Lanes> Pairs<L> {
         a.max(b).max(c) + self.error
     }
 
-    /// Returns the pairs whose triangle the ray hits at most at `t_max`, and the distances. No
-    /// triangle is degenerate. `doubled` are the same corners in f64.
+    /// Returns the candidates whose triangle the ray hits at most at `t_max`, and the distances. No triangle is
+    /// degenerate. `plane` are the planes of the triangles.
     #[inline(always)]
     pub(crate) fn decide(
         &self,
         corners: &[[L; 3]; 3],
-        doubled: &[[L::Double; 3]; 3],
-        spread: L,
+        plane: &Plane<L>,
+        candidates: &Candidates<L>,
         t_max: L,
     ) -> (L::Mask, L) {
+        let possible = candidates.possible;
+        let (is_hit, is_behind, t) = self.meet(&corners[0], plane);
+        // SAFETY: a value exists.
+        let mut crossed = unsafe { L::Mask::from_bits(candidates.certain & possible) };
+        let mut unsure = possible & !(crossed & (is_hit | is_behind)).bits();
+        if unsure != 0 {
+            let (is_inside, is_outside) = self.cross(corners, candidates.spread);
+            // SAFETY: a value exists.
+            crossed = is_inside & unsafe { L::Mask::from_bits(possible) };
+            unsure = possible & !(is_outside | is_inside & (is_hit | is_behind)).bits();
+            if unsure != 0 {
+                return self.decide_exactly(corners, t_max, unsure, is_hit & crossed, t);
+            }
+        }
+        (is_hit & crossed & self.t_min.le(t) & t.le(t_max), t)
+    }
+
+    /// Returns the pairs whose ray meets the plane at the returned rounded distance, and those whose ray meets
+    /// it before its origin, where the ray's line crosses the triangle.
+    #[inline(always)]
+    fn meet(&self, first: &[L; 3], plane: &Plane<L>) -> (L::Mask, L::Mask, L) {
         // SAFETY: values exist.
-        let [zero, one, sixteen, part] = unsafe { constants([0.0, 1.0, 16.0, ERROR]) };
-        let dz = self.direction[2].double();
-        let depth_error = self.reach.double() * part;
-        let coordinate_error = depth_error * size(dz);
-        let error = coordinate_error * (spread.double() * size(dz) + coordinate_error);
-        let [ax, ay, az] = self.sheared(&doubled[0]);
-        let [bx, by, bz] = self.sheared(&doubled[1]);
-        let [cx, cy, cz] = self.sheared(&doubled[2]);
+        let [zero, one, part]: [L::Double; 3] = unsafe { constants([0.0, 1.0, ERROR]) };
+        let [nx, ny, nz] = plane.normal;
+        let x = plane.corner[0] - self.origin[0].double();
+        let y = plane.corner[1] - self.origin[1].double();
+        let z = plane.corner[2] - self.origin[2].double();
+        let reach = longest(&self.origin, first) + plane.sides;
+        let [dx, dy, dz] = self.direction.map(L::double);
+        let height = nz.mul_add(z, ny.mul_add(y, nx * x));
+        let speed = nz.mul_add(dz, ny.mul_add(dy, nx * dx));
+        let inverse = one / speed;
+        let t = height * inverse;
+        let slack = part * plane.size * reach.double() * size(inverse);
+        let low = t - slack;
+        let high = t + slack;
+        let rounded = L::single(high);
+        let is_hit = L::narrow(zero.le(low)) & L::single(low).eq(rounded);
+        (is_hit, L::narrow(high.lt(zero)), rounded)
+    }
+
+    /// Returns the pairs whose triangle the ray's line certainly crosses, and those whose triangle it
+    /// certainly does not, decided in f64.
+    #[inline(always)]
+    fn cross(&self, corners: &[[L; 3]; 3], spread: L) -> (L::Mask, L::Mask) {
+        // SAFETY: values exist.
+        let [zero, part]: [L::Double; 2] = unsafe { constants([0.0, ERROR]) };
+        let depth = size(self.direction[2].double());
+        let coordinate_error = self.reach.double() * part * depth;
+        let error = coordinate_error * (spread.double() * depth + coordinate_error);
+        let [ax, ay] = self.sheared(&corners[0]);
+        let [bx, by] = self.sheared(&corners[1]);
+        let [cx, cy] = self.sheared(&corners[2]);
         let u = cx.mul_sub(by, cy * bx);
         let v = ax.mul_sub(cy, ay * cx);
         let w = bx.mul_sub(ay, by * ax);
         let least = u.min(v).min(w);
         let most = u.max(v).max(w);
         let below = zero - error;
-        let is_outside = least.lt(below) & error.lt(most);
         let is_inside = error.lt(least) | most.lt(below);
-        let determinant = u + v + w;
-        let b_depth = bz - az;
-        let c_depth = cz - az;
-        let inverse = one / (determinant * dz);
-        let t = (az * determinant + (v * b_depth + w * c_depth)) * inverse;
-        let difference = size(b_depth).max(size(c_depth));
-        let slack =
-            (sixteen * error * difference + depth_error * size(determinant)) * size(inverse);
-        let low = t - slack;
-        let high = t + slack;
-        let rounded = L::single(high);
-        let is_hit = L::narrow(is_inside & zero.le(low)) & L::single(low).eq(rounded);
-        let is_miss = L::narrow(is_outside | is_inside & high.lt(zero));
-        let decided = (is_hit | is_miss).bits();
-        if decided != u32::MAX >> (32 - L::N) {
-            return self.decide_exactly(corners, t_max, !decided, is_hit, rounded);
-        }
-        (is_hit & self.t_min.le(rounded) & rounded.le(t_max), rounded)
+        let is_outside = least.lt(below) & error.lt(most);
+        (L::narrow(is_inside), L::narrow(is_outside))
     }
 
     /// Returns the same as [`decide`](Self::decide) for pairs whose candidates were found
     /// elsewhere.
     #[inline(always)]
     pub(crate) fn decide_alone(&self, corners: &[[L; 3]; 3], t_max: L) -> (L::Mask, L) {
-        let spread = self.spread(&self.roughly_sheared(corners));
-        self.decide(corners, &doubled(corners), spread, t_max)
+        self.decide(corners, &Plane::of_lanes(corners), &self.candidates(corners), t_max)
     }
 
     /// Returns the corners of each triangle relative to the ray, sheared in f32.
@@ -162,17 +221,16 @@ impl<L: Lanes> Pairs<L> {
         ]
     }
 
-    /// Returns a corner of each triangle relative to the ray, sheared in f64, and its depth.
+    /// Returns a corner of each triangle relative to the ray, sheared in f64.
     #[inline(always)]
-    fn sheared(&self, corner: &[L::Double; 3]) -> [L::Double; 3] {
+    fn sheared(&self, corner: &[L; 3]) -> [L::Double; 2] {
         let depth = self.direction[2].double();
-        let z = corner[2] - self.origin[2].double();
-        let x = corner[0] - self.origin[0].double();
-        let y = corner[1] - self.origin[1].double();
+        let x = corner[0].double() - self.origin[0].double();
+        let y = corner[1].double() - self.origin[1].double();
+        let z = corner[2].double() - self.origin[2].double();
         [
             x.mul_sub(depth, self.direction[0].double() * z),
             y.mul_sub(depth, self.direction[1].double() * z),
-            z,
         ]
     }
 
@@ -221,9 +279,9 @@ impl<L: Lanes> Pairs<L> {
 /// # Safety
 /// The processor has the instructions.
 #[inline(always)]
-unsafe fn constants<D: DoubleLanes>([a, b, c, d]: [f64; 4]) -> [D; 4] {
+unsafe fn constants<D: DoubleLanes, const N: usize>(numbers: [f64; N]) -> [D; N] {
     // SAFETY: the caller's promise.
-    unsafe { [D::splat(a), D::splat(b), D::splat(c), D::splat(d)] }
+    numbers.map(|number| unsafe { D::splat(number) })
 }
 
 /// Returns the absolute value.
@@ -236,10 +294,70 @@ fn size<D: DoubleLanes>(x: D) -> D {
 
 /// Returns the corners in f64.
 #[inline(always)]
-pub(crate) fn doubled<L: Lanes>([a, b, c]: &[[L; 3]; 3]) -> [[L::Double; 3]; 3] {
+fn doubled<L: Lanes>([a, b, c]: &[[L; 3]; 3]) -> [[L::Double; 3]; 3] {
     [
         [a[0].double(), a[1].double(), a[2].double()],
         [b[0].double(), b[1].double(), b[2].double()],
         [c[0].double(), c[1].double(), c[2].double()],
     ]
+}
+
+impl<L: Lanes> Plane<L> {
+    /// Returns the planes of triangles in lanes.
+    #[inline(always)]
+    pub(crate) fn of_lanes(corners: &[[L; 3]; 3]) -> Self {
+        let [a, b, c] = corners;
+        let first = longest(a, b);
+        let second = longest(a, c);
+        let [a, b, c] = doubled(corners);
+        let size = (first.double() + first.double()) * second.double();
+        Self { corner: a, normal: normal(&a, &b, &c), size, sides: first + second }
+    }
+
+    /// Returns the plane of one triangle in all lanes.
+    ///
+    /// # Safety
+    /// The processor has the instructions.
+    #[inline(always)]
+    pub(crate) unsafe fn of_triangle([a, b, c]: &[[f64; 3]; 3]) -> Self {
+        let [x, y, z] = normal(a, b, c);
+        let side = |p: &[f64; 3]| {
+            let x = (p[0] - a[0]).abs();
+            let y = (p[1] - a[1]).abs();
+            let z = (p[2] - a[2]).abs();
+            x.max(y).max(z)
+        };
+        let first = side(b);
+        let second = side(c);
+        // SAFETY: the caller's promise.
+        unsafe {
+            Self {
+                corner: constants(*a),
+                normal: constants([x, y, z]),
+                size: L::Double::splat(2.0 * first * second),
+                sides: L::splat((first + second) as f32),
+            }
+        }
+    }
+}
+
+/// Returns the cross product of two sides of a triangle.
+#[inline(always)]
+fn normal<D: Copy + Sub<Output = D> + Mul<Output = D>>(
+    a: &[D; 3],
+    b: &[D; 3],
+    c: &[D; 3],
+) -> [D; 3] {
+    let [x, y, z] = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
+    let [p, q, r] = [c[0] - a[0], c[1] - a[1], c[2] - a[2]];
+    [y * r - z * q, z * p - x * r, x * q - y * p]
+}
+
+/// Returns the largest distance of two points along an axis.
+#[inline(always)]
+fn longest<L: Lanes>(a: &[L; 3], b: &[L; 3]) -> L {
+    let x = (b[0] - a[0]).abs();
+    let y = (b[1] - a[1]).abs();
+    let z = (b[2] - a[2]).abs();
+    x.max(y).max(z)
 }

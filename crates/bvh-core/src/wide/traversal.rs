@@ -238,7 +238,11 @@ unsafe fn pairs<L: Lanes>(four: [*mut Traversal; 4]) -> Pairs<L> {
 #[inline(always)]
 pub(super) unsafe fn candidates<L: Lanes>(four: [*mut Traversal; 4]) -> u32 {
     // SAFETY: the caller's promises.
-    unsafe { pairs::<L>(four).candidates(&corners(four)).0 }
+    unsafe {
+        pairs::<L>(four)
+            .candidates(&corners(four))
+            .possible
+    }
 }
 
 /// Returns the corners of the block at which each ray is, along the axes of its shear.

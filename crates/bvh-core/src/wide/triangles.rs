@@ -1,6 +1,6 @@
 //! Triangles side by side, for tests of one ray against all of them.
 
-use super::lanes::{DoubleLanes, Lanes};
+use super::lanes::Lanes;
 use crate::{MAX_OBJECTS, Triangle};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -129,22 +129,17 @@ impl TriangleBlock {
         }
     }
 
-    /// Returns the corners of the triangle in a lane along these axes in f64, each coordinate in
-    /// all lanes.
+    /// Returns the corners of the triangle in a lane along these axes.
     ///
     /// # Safety
-    /// As for [`splat_corners`](Self::splat_corners).
+    /// Axes are below 3, and `lane` is one.
     #[inline(always)]
-    pub(crate) unsafe fn splat_doubles<L: Lanes>(
-        &self,
-        lane: usize,
-        axes: [usize; 3],
-    ) -> [[L::Double; 3]; 3] {
+    pub(crate) unsafe fn doubles(&self, lane: usize, axes: [usize; 3]) -> [[f64; 3]; 3] {
         // SAFETY: the caller's promises.
         unsafe {
             let lanes = self.corners.as_ptr().cast::<f32>().add(lane);
             let of = |corner: usize, axis: usize| {
-                L::Double::splat(f64::from(*lanes.add((3 * corner + axes[axis]) * Self::LANES)))
+                f64::from(*lanes.add((3 * corner + axes[axis]) * Self::LANES))
             };
             [
                 [of(0, 0), of(0, 1), of(0, 2)],

@@ -258,6 +258,11 @@ impl<const R: usize> DoubleLanes for Doubles<R> {
     }
 
     #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        self * factor + term
+    }
+
+    #[inline(always)]
     fn mul_sub(self, factor: Self, term: Self) -> Self {
         self * factor - term
     }

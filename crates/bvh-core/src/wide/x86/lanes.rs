@@ -313,6 +313,7 @@ impl DoubleLanes for F64x4 {
     functions! {
         min(a, b) -> Self = Self(_mm256_min_pd(a.0, b.0));
         max(a, b) -> Self = Self(_mm256_max_pd(a.0, b.0));
+        mul_add(a, b, c) -> Self = Self(_mm256_fmadd_pd(a.0, b.0, c.0));
         mul_sub(a, b, c) -> Self = Self(_mm256_fmsub_pd(a.0, b.0, c.0));
         lt(a, b) -> WideMask4 = WideMask4(_mm256_cmp_pd::<_CMP_LT_OQ>(a.0, b.0));
         le(a, b) -> WideMask4 = WideMask4(_mm256_cmp_pd::<_CMP_LE_OQ>(a.0, b.0));
@@ -337,6 +338,7 @@ impl DoubleLanes for F64x8 {
     functions! {
         min(a, b) -> Self = Self(_mm512_min_pd(a.0, b.0));
         max(a, b) -> Self = Self(_mm512_max_pd(a.0, b.0));
+        mul_add(a, b, c) -> Self = Self(_mm512_fmadd_pd(a.0, b.0, c.0));
         mul_sub(a, b, c) -> Self = Self(_mm512_fmsub_pd(a.0, b.0, c.0));
         lt(a, b) -> u8 = _mm512_cmp_pd_mask::<_CMP_LT_OQ>(a.0, b.0);
         le(a, b) -> u8 = _mm512_cmp_pd_mask::<_CMP_LE_OQ>(a.0, b.0);
@@ -379,6 +381,7 @@ impl<T: DoubleLanes> DoubleLanes for Two<T> {
     functions! {
         min(a, b) -> Self = Self(a.0.min(b.0), a.1.min(b.1));
         max(a, b) -> Self = Self(a.0.max(b.0), a.1.max(b.1));
+        mul_add(a, b, c) -> Self = Self(a.0.mul_add(b.0, c.0), a.1.mul_add(b.1, c.1));
         mul_sub(a, b, c) -> Self = Self(a.0.mul_sub(b.0, c.0), a.1.mul_sub(b.1, c.1));
         lt(a, b) -> Self::Mask = Two(a.0.lt(b.0), a.1.lt(b.1));
         le(a, b) -> Self::Mask = Two(a.0.le(b.0), a.1.le(b.1));
