@@ -52,8 +52,8 @@
 //! enter the node's box, by the measure of boxes that the tree was searched with. No child has more
 //! visits than its parent.
 //!
-//! Node 0 is the root. Siblings are adjacent and come after their parent. Every object id occurs once,
-//! or more often if its object is divided among leaves.
+//! Node 0 is the root. Siblings are adjacent and come after their parent. Every object id occurs
+//! once, or more often if its object is divided among leaves.
 //!
 //! Both checksums are the CRC-32 of zlib, gzip and PNG (reversed polynomial 0xedb88320), which
 //! standard libraries have: `zlib.crc32` in Python. It detects every change confined to 32
@@ -68,7 +68,8 @@
 //! On little-endian machines [`TreeFile::view`] borrows the bytes. Their address must be a multiple
 //! of 4, which mapped files ensure. [`load`] copies and works everywhere.
 //!
-//! [`save_layout`] and [`view_layout`] do the same for wide layouts, which have a format of their own.
+//! [`save_layout`] and [`view_layout`] do the same for wide layouts, which have a format of their
+//! own.
 
 mod error;
 mod header;
@@ -131,20 +132,20 @@ pub fn save_references(
     saved(tree, boxes, origin)
 }
 
-/// Returns the nodes and the object ids as bytes: the file from byte [`Header::BYTES`] on. They can be
-/// written while the header is being computed.
+/// Returns the nodes and the object ids as bytes: the file from byte [`Header::BYTES`] on. They can
+/// be written while the header is being computed.
 pub fn body(tree: &Bvh) -> [Cow<'_, [u8]>; 2] {
     [le_bytes(&tree.nodes), le_bytes(&tree.prim_ids)]
 }
 
 /// Returns the sections of the same file as [`save_references`], to be written one after the other:
-/// the header, the nodes, the object ids and the visits. On little-endian machines all but the header
-/// are the tree's memory, which a file of gigabytes does not need twice.
+/// the header, the nodes, the object ids and the visits. On little-endian machines all but the
+/// header are the tree's memory, which a file of gigabytes does not need twice.
 ///
 /// The caller has [validated](validate_references()) the tree and knows its cost under the origin's
 /// objective. Neither is checked here, because each takes as long as everything else, and several
-/// threads can do both at once. Passes to `both` the check of the visits with the scene's checksum, and
-/// the file's checksum. Rejects visits that no measure gives.
+/// threads can do both at once. Passes to `both` the check of the visits with the scene's checksum,
+/// and the file's checksum. Rejects visits that no measure gives.
 pub fn sections<'a>(
     tree: &'a Bvh,
     boxes: &[Aabb],

@@ -13,8 +13,9 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// Returns the part of a ray up to the distance `end`, in multiples of the direction's length. `None`
-    /// if the end is beyond the range of f32, because a density accepts finite segments only.
+    /// Returns the part of a ray up to the distance `end`, in multiples of the direction's length.
+    /// `None` if the end is beyond the range of f32, because a density accepts finite segments
+    /// only.
     ///
     /// ```
     /// # use bvh_core::{Ray, Segment};

@@ -183,7 +183,8 @@ pub(crate) trait DoubleLanes:
     /// `self · factor + term`, as [`mul_sub`](Self::mul_sub).
     fn mul_add(self, factor: Self, term: Self) -> Self;
 
-    /// `self · factor − term`, rounded once or twice. The error bounds of tests that use it cover both.
+    /// `self · factor − term`, rounded once or twice. The error bounds of tests that use it cover
+    /// both.
     fn mul_sub(self, factor: Self, term: Self) -> Self;
 
     /// Where `self < other`.

@@ -1,8 +1,9 @@
 //! The exact test of a triangle, for pairs of a ray and a triangle side by side: one ray and
 //! several triangles, several rays and one triangle, or anything between.
 //!
-//! The answers are those of [`exact`](crate::exact): the triangles that the line crosses in real arithmetic, and the distances,
-//! rounded once. Each layer leaves to the next what its error bound leaves open.
+//! The answers are those of [`exact`](crate::exact): the triangles that the line crosses in real
+//! arithmetic, and the distances, rounded once. Each layer leaves to the next what its error bound
+//! leaves open.
 //!
 //! ```text
 //!   does the line cross the triangle?        at which distance?
@@ -20,14 +21,16 @@
 //! direction's largest component, m the largest computed |x|, |y| of the sheared corners. The names
 //! are those of [`exact`](crate::exact).
 //!
-//! *f32*, u = 2⁻²⁴. A difference from the origin is off by uR, its product with the slope by 3uR, and the sheared coordinate
-//! by less than 4.1uR + um < 6.3uR. The edge value is off by less than 4 · 6.3uRm + 2 (6.3uR)² from its operands, and by
-//! 4um² < 8.5uRm from its own roundings: in total less than E = e (m + e) with e = 64uR. Underflow adds less than 2⁻¹²⁶, the
-//! last term of the bound in the code. The sum m + e is the *spread*: no real |x|, |y| exceeds it.
-//! If all edge values are above E, or all below −E, the line crosses the triangle.
+//! *f32*, u = 2⁻²⁴. A difference from the origin is off by uR, its product with the slope by 3uR,
+//! and the sheared coordinate by less than 4.1uR + um < 6.3uR. The edge value is off by less than 4
+//! · 6.3uRm + 2 (6.3uR)² from its operands, and by 4um² < 8.5uRm from its own roundings: in total
+//! less than E = e (m + e) with e = 64uR. Underflow adds less than 2⁻¹²⁶, the last term of the
+//! bound in the code. The sum m + e is the *spread*: no real |x|, |y| exceeds it. If all edge
+//! values are above E, or all below −E, the line crosses the triangle.
 //!
-//! *f64*, ε = 2⁻⁵³. Corners are sheared by multiplication with d_z, so S = spread · |d_z| is at least the largest |x|, |y|, and
-//! the edge values are within E = e (S + e) with e = 64εR|d_z|, as in [`exact`](crate::exact).
+//! *f64*, ε = 2⁻⁵³. Corners are sheared by multiplication with d_z, so S = spread · |d_z| is at
+//! least the largest |x|, |y|, and the edge values are within E = e (S + e) with e = 64εR|d_z|, as
+//! in [`exact`](crate::exact).
 //!
 //! *Distance*. With the normal N = (B − A) × (C − A), computed in f64,
 //!
@@ -35,18 +38,19 @@
 //!   t = h / s,      h = N · (A − O),      s = N · d
 //! ```
 //!
-//! Let M be twice the product of the largest |B − A| and the largest |C − A| along an axis: no component of N exceeds it, and
-//! the computed ones are off by 4εM. Let P be the largest |A − O| along an axis plus both of these sides. Then h is off by
-//! Δh = 3 (4 + 1 + 3) εMP, and s by Δs = 3 (4 + 3) εM|d_z|. Where the line crosses the triangle, |t d_z| is at most P. With the
-//! computed h′ and s′,
+//! Let M be twice the product of the largest |B − A| and the largest |C − A| along an axis: no
+//! component of N exceeds it, and the computed ones are off by 4εM. Let P be the largest |A − O|
+//! along an axis plus both of these sides. Then h is off by Δh = 3 (4 + 1 + 3) εMP, and s by Δs = 3
+//! (4 + 3) εM|d_z|. Where the line crosses the triangle, |t d_z| is at most P. With the computed h′
+//! and s′,
 //!
 //! ```text
 //!   h′ / s′ − t = (h′ − h − t (s′ − s)) / s′
 //! ```
 //!
-//! is at most (24 + 21) εMP / |s′|, and the division adds 2ε|h′ / s′|, which is at most 6εMP / |s′|, because |h| is at most
-//! 3MP. The bound 64εMP / |s′| covers the sum. If both ends of this interval round to one f32, that f32 is the rounded
-//! distance, because rounding is monotone.
+//! is at most (24 + 21) εMP / |s′|, and the division adds 2ε|h′ / s′|, which is at most 6εMP /
+//! |s′|, because |h| is at most 3MP. The bound 64εMP / |s′| covers the sum. If both ends of this
+//! interval round to one f32, that f32 is the rounded distance, because rounding is monotone.
 
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use crate::exact::ERROR;
@@ -125,8 +129,8 @@ impl<L: Lanes> Pairs<L> {
         a.max(b).max(c) + self.error
     }
 
-    /// Returns the candidates whose triangle the ray hits at most at `t_max`, and the distances. No triangle is
-    /// degenerate. `plane` are the planes of the triangles.
+    /// Returns the candidates whose triangle the ray hits at most at `t_max`, and the distances. No
+    /// triangle is degenerate. `plane` are the planes of the triangles.
     #[inline(always)]
     pub(crate) fn decide(
         &self,
@@ -152,8 +156,8 @@ impl<L: Lanes> Pairs<L> {
         (is_hit & crossed & self.t_min.le(t) & t.le(t_max), t)
     }
 
-    /// Returns the pairs whose ray meets the plane at the returned rounded distance, and those whose ray meets
-    /// it before its origin, where the ray's line crosses the triangle.
+    /// Returns the pairs whose ray meets the plane at the returned rounded distance, and those
+    /// whose ray meets it before its origin, where the ray's line crosses the triangle.
     #[inline(always)]
     fn meet(&self, first: &[L; 3], plane: &Plane<L>) -> (L::Mask, L::Mask, L) {
         // SAFETY: values exist.
@@ -176,8 +180,8 @@ impl<L: Lanes> Pairs<L> {
         (is_hit, L::narrow(high.lt(zero)), rounded)
     }
 
-    /// Returns the pairs whose triangle the ray's line certainly crosses, and those whose triangle it
-    /// certainly does not, decided in f64.
+    /// Returns the pairs whose triangle the ray's line certainly crosses, and those whose triangle
+    /// it certainly does not, decided in f64.
     #[inline(always)]
     fn cross(&self, corners: &[[L; 3]; 3], spread: L) -> (L::Mask, L::Mask) {
         // SAFETY: values exist.

@@ -34,8 +34,9 @@ impl Source<'_> {
         }
     }
 
-    /// Has the rays that follow number `first` fetched that are as many as a vector's. They need not
-    /// exist. While a packet is traced, the processor does not see that the rays of the next one follow.
+    /// Has the rays that follow number `first` fetched that are as many as a vector's. They need
+    /// not exist. While a packet is traced, the processor does not see that the rays of the next
+    /// one follow.
     ///
     /// # Safety
     /// The processor has the instructions.
