@@ -13,13 +13,22 @@ use glam::Vec3;
 use nalgebra::{Point3, Vector3};
 use std::time::Instant;
 
-/// An object's box, and its corners if it is a triangle.
+/// An object as the library stores it. Only the tracing of rays reads the corners.
 #[derive(Clone)]
 struct Shape {
     aabb: TheirAabb<f32, 3>,
     corners: [Point3<f32>; 3],
+    /// The object's index in the scene. The library keeps the order of the shapes, but its iterators
+    /// return shapes without their indices.
     object: u32,
+    /// The index of the shape's leaf, which the library writes.
     node: usize,
+}
+
+impl Shape {
+    fn new(object: u32, aabb: Aabb, corners: [Vec3; 3]) -> Self {
+        Self { aabb: to_their_box(aabb), corners: corners.map(to_their_point), object, node: 0 }
+    }
 }
 
 impl Bounded<f32, 3> for Shape {
@@ -38,37 +47,36 @@ impl BHShape<f32, 3> for Shape {
     }
 }
 
-fn point(p: Vec3) -> Point3<f32> {
-    Point3::new(p.x, p.y, p.z)
+fn to_their_point(point: Vec3) -> Point3<f32> {
+    Point3::new(point.x, point.y, point.z)
 }
 
-fn shapes<'a>(boxes: impl Iterator<Item = (Aabb, [Vec3; 3])> + 'a) -> Vec<Shape> {
-    let shape = |(object, (aabb, corners)): (u32, (Aabb, [Vec3; 3]))| Shape {
-        aabb: TheirAabb { min: point(aabb.min), max: point(aabb.max) },
-        corners: corners.map(point),
-        object,
-        node: 0,
-    };
-    (0..).zip(boxes).map(shape).collect()
+fn to_our_point(point: Point3<f32>) -> Vec3 {
+    Vec3::new(point.x, point.y, point.z)
 }
 
-/// Converts a ray to the library's type, which normalises its direction.
-fn ray(ray: &Ray) -> TheirRay<f32, 3> {
-    let direction = ray.direction();
-    TheirRay::new(point(ray.origin()), Vector3::new(direction.x, direction.y, direction.z))
+fn to_their_box(aabb: Aabb) -> TheirAabb<f32, 3> {
+    TheirAabb { min: to_their_point(aabb.min), max: to_their_point(aabb.max) }
+}
+
+fn to_our_box(aabb: TheirAabb<f32, 3>) -> Aabb {
+    Aabb { min: to_our_point(aabb.min), max: to_our_point(aabb.max) }
 }
 
 /// Converts a tree to our type.
 ///
 /// The library keeps the boxes of children in their parent, and none for the root or in leaves.
 /// Here an inner node gets the union of its children's boxes, and a leaf its object's box.
-fn to_ours(theirs: &TheirBvh<f32, 3>, boxes: &[Aabb]) -> Bvh {
-    let corner = |p: Point3<f32>| Vec3::new(p.x, p.y, p.z);
-    let aabb = |b: TheirAabb<f32, 3>| Aabb { min: corner(b.min), max: corner(b.max) };
-    let unknown = Node::leaf(Aabb::EMPTY, 0, 0);
-    let mut nodes = vec![unknown; boxes.len().min(1)];
+fn to_our_tree(theirs: &TheirBvh<f32, 3>, boxes: &[Aabb]) -> Bvh {
+    if boxes.is_empty() {
+        return Bvh::default();
+    }
+    // Both children of a node get their places at once, so that siblings are adjacent.
+    let reserved = Node::leaf(Aabb::EMPTY, 0, 0);
+    let mut nodes = vec![reserved];
     let mut prim_ids = Vec::new();
-    let mut open = vec![(0, 0); nodes.len()];
+    // Nodes to be converted: the index of the library's node, and the index of its reserved place.
+    let mut open = vec![(0, 0)];
     while let Some((from, to)) = open.pop() {
         nodes[to] = match theirs.nodes[from] {
             BvhNode::Leaf { shape_index, .. } => {
@@ -77,9 +85,10 @@ fn to_ours(theirs: &TheirBvh<f32, 3>, boxes: &[Aabb]) -> Bvh {
             }
             BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } => {
                 let first = nodes.len();
-                nodes.extend([unknown; 2]);
+                nodes.extend([reserved; 2]);
                 open.extend([(child_r_index, first + 1), (child_l_index, first)]);
-                Node::inner(aabb(child_l_aabb).union(&aabb(child_r_aabb)), first as u32, 2)
+                let aabb = to_our_box(child_l_aabb).union(&to_our_box(child_r_aabb));
+                Node::inner(aabb, first as u32, 2)
             }
         };
     }
@@ -88,58 +97,97 @@ fn to_ours(theirs: &TheirBvh<f32, 3>, boxes: &[Aabb]) -> Bvh {
 
 /// Builds on one thread; the library's leaves have one object.
 pub(super) fn build(boxes: &[Aabb]) -> Built {
-    // Building reads no corners.
-    let mut shapes = shapes(boxes.iter().map(|&aabb| (aabb, [aabb.min; 3])));
+    let mut shapes: Vec<Shape> = (0..)
+        .zip(boxes)
+        .map(|(object, &aabb)| Shape::new(object, aabb, [aabb.min; 3]))
+        .collect();
     let start = Instant::now();
     let theirs = TheirBvh::build(&mut shapes);
     let seconds = start.elapsed().as_secs_f64();
-    Built::tight(to_ours(&theirs, boxes), seconds, boxes)
+    Built::tight(to_our_tree(&theirs, boxes), seconds, boxes)
 }
 
-/// The iterator by distance, ended at the first box that begins behind the nearest hit: the
-/// library's only traversal that is ordered and works at any depth. Its triangle test sees front
-/// sides only, so each triangle is tested both ways round.
+/// A ray of ours and the same ray as the library's type, which has a unit direction and no range.
+struct PreparedRay {
+    theirs: TheirRay<f32, 3>,
+    /// The length of our direction: the library's distances over ours.
+    length: f32,
+    /// The range in the library's distances.
+    low: f32,
+    high: f32,
+}
+
+impl PreparedRay {
+    fn new(ray: &Ray) -> Self {
+        let direction = ray.direction();
+        let length = direction.length();
+        Self {
+            theirs: TheirRay::new(
+                to_their_point(ray.origin()),
+                Vector3::new(direction.x, direction.y, direction.z),
+            ),
+            length,
+            low: ray.t_min() * length,
+            high: ray.t_max() * length,
+        }
+    }
+
+    /// Returns the library's distance of the triangle, infinite if the ray's line misses it.
+    #[inline(always)]
+    fn distance(&self, shape: &Shape) -> f32 {
+        let [a, b, c] = &shape.corners;
+        // The library's test sees front sides only, and our rays hit both sides.
+        let front = self.theirs.intersects_triangle(a, b, c).distance;
+        if front.is_finite() {
+            return front;
+        }
+        self.theirs.intersects_triangle(a, c, b).distance
+    }
+
+    /// Returns whether the ray enters the shape's box behind `limit`, a distance of the library.
+    #[inline(always)]
+    fn enters_behind(&self, shape: &Shape, limit: f32) -> bool {
+        self.theirs
+            .intersection_slice_for_aabb(&shape.aabb)
+            .is_some_and(|(entry, _)| entry > limit)
+    }
+
+    /// Returns the nearest hit in the ray's range, or for [`Query::Any`] the first one found, by the
+    /// library's iterator over boxes in the order of their distances. The search ends at the first
+    /// box behind the nearest hit. This traversal is the library's only one that is ordered and works
+    /// at any depth.
+    #[inline(always)]
+    fn hit(&self, tree: &TheirBvh<f32, 3>, shapes: &[Shape], query: Query) -> Option<Hit> {
+        let mut nearest = None;
+        let mut high = self.high;
+        for shape in tree.nearest_traverse_iterator(&self.theirs, shapes) {
+            let distance = self.distance(shape);
+            if distance >= self.low && distance <= high {
+                nearest = Some(Hit { t: distance / self.length, object: shape.object });
+                high = distance;
+                if query == Query::Any {
+                    break;
+                }
+            } else if self.enters_behind(shape, high) {
+                break;
+            }
+        }
+        nearest
+    }
+}
+
+/// Builds the library's tree over triangles and returns its traversal.
 pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
-    let mut shapes = shapes(
-        triangles
-            .iter()
-            .map(|triangle| (triangle.aabb(), triangle.0)),
-    );
+    let mut shapes: Vec<Shape> = (0..)
+        .zip(triangles)
+        .map(|(object, triangle)| Shape::new(object, triangle.aabb(), triangle.0))
+        .collect();
     let start = Instant::now();
     let tree = TheirBvh::build(&mut shapes);
     let preparation_seconds = start.elapsed().as_secs_f64();
-    let meets = |shape: &Shape, ray: &TheirRay<f32, 3>| {
-        let [a, b, c] = &shape.corners;
-        // The library culls back sides, and our rays hit both sides.
-        let front = ray.intersects_triangle(a, b, c).distance;
-        if front.is_finite() { front } else { ray.intersects_triangle(a, c, b).distance }
-    };
     let trace = move |batch: &Batch, hits: &mut [Option<Hit>]| {
-        // Distances along unit vectors are converted.
-        let theirs =
-            |ray: &Ray| (self::ray(ray), ray.direction().length(), ray.t_min(), ray.t_max());
-        let rays: Vec<_> = batch.rays.iter().map(theirs).collect();
-        Ok(timed(&rays, hits, |(ray, length, t_min, t_max)| {
-            let mut nearest: Option<Hit> = None;
-            let low = t_min * length;
-            let mut high = t_max * length;
-            for shape in tree.nearest_traverse_iterator(ray, &shapes) {
-                let distance = meets(shape, ray);
-                if distance >= low && distance <= high {
-                    nearest = Some(Hit { t: distance / length, object: shape.object });
-                    high = distance;
-                    if batch.query == Query::Any {
-                        break;
-                    }
-                } else if ray
-                    .intersection_slice_for_aabb(&shape.aabb)
-                    .is_some_and(|(entry, _)| entry > high)
-                {
-                    break;
-                }
-            }
-            nearest
-        }))
+        let rays: Vec<PreparedRay> = batch.rays.iter().map(PreparedRay::new).collect();
+        Ok(timed(&rays, hits, |ray| ray.hit(&tree, &shapes, batch.query)))
     };
     Contender {
         layout: "binary, their own".into(),

@@ -29,6 +29,7 @@ fn parameters(config: &Obvhs) -> BvhBuildParams {
     parameters
 }
 
+/// Returns the library's tree over boxes and the time by the library's stopwatch.
 fn build_over(boxes: &[Aabb], parameters: BvhBuildParams) -> (Bvh2, Duration) {
     let theirs: Vec<aabb::Aabb> = boxes
         .iter()
@@ -38,7 +39,8 @@ fn build_over(boxes: &[Aabb], parameters: BvhBuildParams) -> (Bvh2, Duration) {
     (binary::build_bvh2(&theirs, parameters, &mut time), time)
 }
 
-fn to_ours(theirs: &Bvh2, boxes: &[Aabb]) -> Bvh {
+/// Converts a tree to our type.
+fn to_our_tree(theirs: &Bvh2, boxes: &[Aabb]) -> Bvh {
     if boxes.is_empty() {
         return Bvh::default();
     }
@@ -56,8 +58,8 @@ fn to_ours(theirs: &Bvh2, boxes: &[Aabb]) -> Bvh {
         .unwrap_or_else(|error| panic!("obvhs built no tree: {error}"))
 }
 
-fn ray(ray: &Ray, t_max: f32) -> TheirRay {
-    TheirRay::new(ray.origin().into(), ray.direction().into(), ray.t_min(), t_max)
+fn to_their_ray(ray: &Ray) -> TheirRay {
+    TheirRay::new(ray.origin().into(), ray.direction().into(), ray.t_min(), ray.t_max())
 }
 
 /// Builds over boxes, with one object per leaf and no split triangles. The library's stopwatch
@@ -66,7 +68,7 @@ pub(super) fn build(config: &Obvhs, boxes: &[Aabb]) -> Built {
     let parameters =
         BvhBuildParams { max_prims_per_leaf: 1, pre_split: false, ..parameters(config) };
     let (theirs, time) = build_over(boxes, parameters);
-    Built::tight(to_ours(&theirs, boxes), time.as_secs_f64(), boxes)
+    Built::tight(to_our_tree(&theirs, boxes), time.as_secs_f64(), boxes)
 }
 
 /// Makes a [`Trace`](crate::measure::contender::Trace) from a tree over `triangles` in the order of
@@ -89,8 +91,8 @@ macro_rules! traced_by {
 }
 
 /// Returns the preset's binary tree and its compressed eight-wide tree, with triangles in the order
-/// of leaves, as the library recommends. It expects unit directions; ours have unit length up to
-/// rounding.
+/// of leaves, as the library recommends. It expects rays with unit directions; ours have unit length
+/// up to rounding.
 pub(super) fn contenders(config: &Obvhs, triangles: &[Triangle]) -> Vec<Contender<'static>> {
     let theirs: Vec<TheirTriangle> = triangles
         .iter()
@@ -111,6 +113,7 @@ pub(super) fn contenders(config: &Obvhs, triangles: &[Triangle]) -> Vec<Contende
     ]
 }
 
+/// Returns the triangles in the order of `ids`, prepared for the library's test.
 fn in_order(triangles: &[TheirTriangle], ids: &[u32]) -> Vec<RtTriangle> {
     ids.iter()
         .map(|&id| (&triangles[id as usize]).into())
@@ -127,6 +130,8 @@ fn contender(layout: &str, time: Duration, trace: Trace<'static>) -> Contender<'
     }
 }
 
+/// Traces a batch by one of the library's trees, as [`Trace`] says. `traverse` answers one ray, an
+/// any-hit query if its first argument is true; `ids` are the objects in the order of the leaves.
 #[inline(always)]
 fn trace(
     batch: &Batch,
@@ -134,11 +139,7 @@ fn trace(
     traverse: impl Fn(bool, TheirRay, &mut RayHit) -> bool,
     ids: &[u32],
 ) -> Vec<f64> {
-    let rays: Vec<TheirRay> = batch
-        .rays
-        .iter()
-        .map(|ray| self::ray(ray, ray.t_max()))
-        .collect();
+    let rays: Vec<TheirRay> = batch.rays.iter().map(to_their_ray).collect();
     if batch.query == Query::Any {
         return timed(&rays, hits, |&ray| {
             traverse(true, ray, &mut RayHit::none()).then_some(Hit { t: 0.0, object: 0 })
