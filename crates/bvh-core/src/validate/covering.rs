@@ -7,15 +7,18 @@
 use crate::{Aabb, Clip};
 use alloc::vec::Vec;
 
-/// The number of cells per leaf after which a covering is rejected. Divisions by planes, as
-/// builders and searches make them, need a few cells. A forged file must not keep the check busy
-/// forever.
-const CELLS_PER_LEAF: usize = 256;
+/// The number of cuts per leaf after which a covering is rejected, so that a forged file cannot keep
+/// the check busy forever. Leaves that builders and searches make by dividing an object at planes
+/// need a few cuts each.
+const CUTS_PER_LEAF: usize = 256;
 
-/// Returns whether every part of `object`, whose box is `full`, is in one of `leaves`, compared
-/// without tolerance.
+/// Returns whether every part of `object`, whose box is `full`, is in one of the boxes `leaves`,
+/// compared without tolerance. Also returns false for a covering that needs more cuts than
+/// [`CUTS_PER_LEAF`] allows.
+///
+/// O(leaves²): every cut compares its part with every leaf.
 pub(super) fn is_covered(objects: &dyn Clip, object: u32, full: &Aabb, leaves: &[Aabb]) -> bool {
-    let mut cells_left = CELLS_PER_LEAF * leaves.len();
+    let mut cuts_left = CUTS_PER_LEAF * leaves.len();
     let mut open: Vec<Aabb> = alloc::vec![*full];
     while let Some(region) = open.pop() {
         // Clip tightly, because a slightly enlarged part might extend beyond the leaf that was made
@@ -24,18 +27,20 @@ pub(super) fn is_covered(objects: &dyn Clip, object: u32, full: &Aabb, leaves: &
         if part == Aabb::EMPTY || leaves.iter().any(|leaf| leaf.contains(&part)) {
             continue;
         }
+        // A part that no face cuts is outside all leaves, or in the gap between them.
         let Some((axis, plane)) = face_through(&part, leaves) else { return false };
-        if cells_left == 0 {
+        if cuts_left == 0 {
             return false;
         }
-        cells_left -= 1;
+        cuts_left -= 1;
         open.extend(part.halves(axis, plane));
     }
     true
 }
 
-/// Returns a face, as axis and coordinate, that cuts `part`. Chooses the box that shares most with
-/// `part`, so that few cuts are needed.
+/// Returns the axis and the coordinate of a face that cuts `part`; `None` if no face does. Of the
+/// leaves that have such a face it takes the one with the largest intersection with `part`, so that
+/// few cuts are needed.
 fn face_through(part: &Aabb, leaves: &[Aabb]) -> Option<(usize, f32)> {
     let mut best = None;
     let mut largest = -1.0;
@@ -44,13 +49,13 @@ fn face_through(part: &Aabb, leaves: &[Aabb]) -> Option<(usize, f32)> {
         if common == Aabb::EMPTY {
             continue;
         }
-        // The sum of the sides instead of the area: flat parts have a size too.
+        // An intersection that is only a line has no area, but a sum of its sides.
         let extent = common.extent();
         let size = extent.x + extent.y + extent.z;
         if size <= largest {
             continue;
         }
-        if let Some(face) = face_of(leaf, part) {
+        if let Some(face) = face_of_leaf(part, leaf) {
             best = Some(face);
             largest = size;
         }
@@ -58,8 +63,8 @@ fn face_through(part: &Aabb, leaves: &[Aabb]) -> Option<(usize, f32)> {
     best
 }
 
-/// Returns the first face of a leaf's box that cuts `part`.
-fn face_of(leaf: &Aabb, part: &Aabb) -> Option<(usize, f32)> {
+/// Returns the axis and the coordinate of the first face of one leaf that cuts `part`.
+fn face_of_leaf(part: &Aabb, leaf: &Aabb) -> Option<(usize, f32)> {
     for axis in 0..3 {
         for plane in [leaf.min[axis], leaf.max[axis]] {
             if part.min[axis] < plane && plane < part.max[axis] {
