@@ -37,6 +37,7 @@
 //! its bounds; no rounding decides an answer.
 
 use super::all_in_flight::{self, Found};
+use super::answer::ANY_HIT;
 use super::crossed_leaves::{AllHits, SlopedLine};
 use super::layout::WideBvh;
 use super::portable;
@@ -207,7 +208,7 @@ impl WideBvh {
         let is_traced =
             self.kernel != Kernel::Portable && unsafe { vector::all_hits(self, ray, &mut leaves) };
         if !is_traced {
-            portable::traverse::<true>(self, ray, &mut (), |block, _| {
+            portable::traverse::<ANY_HIT>(self, ray, &mut (), |block, _| {
                 leaves.test(block, (1 << block.len()) - 1);
                 false
             });

@@ -5,6 +5,12 @@ use super::layout::WideBvh;
 use super::source::Source;
 use crate::{Hit, Ray};
 
+/// The value of the parameter `ANY` of a traversal that ends a ray at the first hit that is found.
+pub(crate) const ANY_HIT: bool = true;
+
+/// The value of `ANY` of a traversal that finds a ray's nearest hit.
+pub(crate) const NEAREST_HIT: bool = false;
+
 /// Returns whether a hit of the ray with this number counts.
 pub(crate) type Accept<'a> = dyn FnMut(usize, Hit) -> bool + 'a;
 
@@ -32,9 +38,10 @@ pub(crate) trait Answers {
 pub(crate) struct Batch<'a> {
     pub(crate) rays: Source<'a>,
     pub(crate) answers: &'a mut dyn Answers,
-    /// All hits count without it. Hits in instances always do.
+    /// Decides which hits count. Without it all hits count, and hits in instances always do.
     pub(crate) accept: Option<&'a mut Accept<'a>>,
-    /// The scene, if leaves of the layout at whose root rays start are instances.
+    /// The scene whose instances are the leaves of the traced layout; `None` if its leaves are
+    /// triangles.
     pub(crate) scene: Option<&'a Instances>,
 }
 
@@ -43,6 +50,16 @@ impl<'a> Batch<'a> {
     #[inline]
     pub(crate) fn new(rays: Source<'a>, answers: &'a mut dyn Answers) -> Self {
         Self { rays, answers, accept: None, scene: None }
+    }
+
+    /// Returns a batch whose hits all count, in the layout of a scene's tree over instances.
+    #[inline]
+    pub(crate) fn through_instances(
+        scene: &'a Instances,
+        rays: &'a [Ray],
+        answers: &'a mut dyn Answers,
+    ) -> Self {
+        Self { rays: Source::Rays(rays), answers, accept: None, scene: Some(scene) }
     }
 
     /// Traces one ray by itself, and writes its answer. With `ANY` the first hit that is found ends
@@ -79,6 +96,7 @@ fn distance(t: f32, object: u32) -> f32 {
     if object == u32::MAX { f32::INFINITY } else { t }
 }
 
+// Slices have no known size, which a trait object needs, so references to slices are the answers.
 impl Answers for &mut [Hit] {
     fn write(&mut self, number: usize, t: f32, _: u32, object: u32) {
         self[number] = Hit { t: distance(t, object), object };

@@ -1,6 +1,6 @@
 //! The public calls for batches of rays, one after the other in memory or by component.
 
-use super::answer::{Accept, Batch};
+use super::answer::{ANY_HIT, Accept, Batch, NEAREST_HIT};
 use super::coherence::Coherence;
 use super::layout::WideBvh;
 use super::source::Source;
@@ -8,27 +8,27 @@ use super::vector;
 use crate::{Hit, Kernel, Ray, RayComponents};
 
 impl WideBvh {
-    /// [`nearest_hit`](Self::nearest_hit) of every ray, into as many `hits`; [`Hit::MISS`] for a
-    /// ray that meets nothing.
+    /// Writes the [nearest hit](Self::nearest_hit) of every ray to `hits`; [`Hit::MISS`] for a ray
+    /// that meets nothing.
     ///
     /// # Panics
     /// If `rays` and `hits` are not equally many.
     pub fn nearest_hits(&self, rays: &[Ray], mut hits: &mut [Hit], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "a hit for every ray");
-        self.trace::<false>(Batch::new(Source::Rays(rays), &mut hits), coherence);
+        self.trace::<NEAREST_HIT>(Batch::new(Source::Rays(rays), &mut hits), coherence);
     }
 
-    /// [`any_hit`](Self::any_hit) of every ray, into as many `hits`.
+    /// Writes to `hits` whether each ray meets [any triangle](Self::any_hit).
     ///
     /// # Panics
     /// If `rays` and `hits` are not equally many.
     pub fn any_hits(&self, rays: &[Ray], mut hits: &mut [bool], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "an answer for every ray");
-        self.trace::<true>(Batch::new(Source::Rays(rays), &mut hits), coherence);
+        self.trace::<ANY_HIT>(Batch::new(Source::Rays(rays), &mut hits), coherence);
     }
 
-    /// [`nearest_hit_where`](Self::nearest_hit_where) of every ray, into as many `hits`. `accept`
-    /// sees the number of the ray, too, and hits in no order.
+    /// Writes the [nearest accepted hit](Self::nearest_hit_where) of every ray to `hits`. `accept`
+    /// also sees the index of the ray in `rays`, and sees hits in no order.
     ///
     /// # Panics
     /// If `rays` and `hits` are not equally many.
@@ -55,11 +55,11 @@ impl WideBvh {
     ) {
         assert_eq!(rays.len(), hits.len(), "a hit for every ray");
         let batch = Batch::new(Source::Rays(rays), &mut hits);
-        self.trace_where::<false>(batch, &mut accept, coherence);
+        self.trace_where::<NEAREST_HIT>(batch, &mut accept, coherence);
     }
 
-    /// [`any_hit_where`](Self::any_hit_where) of every ray, as
-    /// [`nearest_hits_where`](Self::nearest_hits_where).
+    /// Writes to `hits` whether each ray has [an accepted hit](Self::any_hit_where). `accept` is
+    /// called as by [`nearest_hits_where`](Self::nearest_hits_where).
     ///
     /// # Panics
     /// If `rays` and `hits` are not equally many.
@@ -72,7 +72,7 @@ impl WideBvh {
     ) {
         assert_eq!(rays.len(), hits.len(), "an answer for every ray");
         let batch = Batch::new(Source::Rays(rays), &mut hits);
-        self.trace_where::<true>(batch, &mut accept, coherence);
+        self.trace_where::<ANY_HIT>(batch, &mut accept, coherence);
     }
 
     // Not generic over the function, so that the kernels are compiled here and not by every crate
@@ -86,8 +86,9 @@ impl WideBvh {
         self.trace::<ANY>(Batch { accept: Some(accept), ..batch }, coherence);
     }
 
-    /// [`nearest_hits`](Self::nearest_hits) of rays by component, whose answers are by component,
-    /// too: infinite and `u32::MAX` for a ray that meets nothing.
+    /// Writes the [nearest hits](Self::nearest_hits) of rays by component, by component, too:
+    /// distances in multiples of the lengths of the rays' directions, and objects. A ray that meets
+    /// nothing gets infinity and `u32::MAX`.
     ///
     /// # Panics
     /// If `rays`, `distances` and `objects` are not equally many.
@@ -101,10 +102,10 @@ impl WideBvh {
         assert_eq!(rays.len(), distances.len(), "a distance for every ray");
         assert_eq!(rays.len(), objects.len(), "an object for every ray");
         let mut answers = (distances, objects);
-        self.trace::<false>(Batch::new(Source::Components(rays), &mut answers), coherence);
+        self.trace::<NEAREST_HIT>(Batch::new(Source::Components(rays), &mut answers), coherence);
     }
 
-    /// [`any_hits`](Self::any_hits) of rays by component.
+    /// Writes [whether rays by component meet any triangle](Self::any_hits) to `hits`.
     ///
     /// # Panics
     /// If `rays` and `hits` are not equally many.
@@ -115,7 +116,7 @@ impl WideBvh {
         coherence: Coherence,
     ) {
         assert_eq!(rays.len(), hits.len(), "an answer for every ray");
-        self.trace::<true>(Batch::new(Source::Components(rays), &mut hits), coherence);
+        self.trace::<ANY_HIT>(Batch::new(Source::Components(rays), &mut hits), coherence);
     }
 
     /// Answers a batch by the layout's kernel.

@@ -214,8 +214,9 @@ pub struct Instances {
     parts: Vec<WideBvh>,
     placed: Vec<Placed>,
     top: Bvh,
-    /// The same tree for batches, and the largest size of a coordinate of a part.
+    /// The same tree for batches.
     wide_top: WideBvh,
+    /// The largest absolute value of a coordinate of any part, in the part's coordinates.
     largest_of_parts: f32,
 }
 

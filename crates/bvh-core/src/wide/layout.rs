@@ -39,7 +39,7 @@ pub struct WideBvh {
     /// Borrowed in a [`WideView`](crate::file::WideView) alone.
     pub(crate) nodes: Cow<'static, [WideNode]>,
     pub(crate) blocks: Cow<'static, [TriangleBlock]>,
-    /// The largest size of a coordinate; for the vector kernels.
+    /// The largest absolute value of a coordinate; for the vector kernels.
     #[cfg_attr(not(all(feature = "std", target_arch = "x86_64")), allow(dead_code))]
     pub(crate) largest: f32,
     /// The kernel that traces it. The processor has its instructions.
@@ -48,7 +48,7 @@ pub struct WideBvh {
     pub(crate) stack_need: usize,
 }
 
-/// Returns the largest size of a coordinate of a box.
+/// Returns the largest absolute value of a coordinate of a box.
 pub(super) fn largest(bounds: &Aabb) -> f32 {
     bounds
         .min

@@ -65,6 +65,7 @@ pub(crate) use triangles::TriangleBlock;
 use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate_references};
 use alloc::borrow::Cow;
 use alloc::vec::Vec;
+use answer::{ANY_HIT, NEAREST_HIT};
 use kernel::STACK;
 use portable::walk;
 
@@ -142,12 +143,12 @@ impl WideBvh {
     /// Returns the nearest triangle that `ray` meets in its range. Of several at the same distance,
     /// the one with the lowest id is nearest.
     pub fn nearest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.one_ray::<false>(ray, |_| true)
+        self.one_ray::<NEAREST_HIT>(ray, |_| true)
     }
 
     /// Returns whether `ray` meets any triangle in its range.
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        self.one_ray::<true>(ray, |_| true).is_some()
+        self.one_ray::<ANY_HIT>(ray, |_| true).is_some()
     }
 
     /// Returns the nearest hit, or with `ANY` the first one found, among those that `accept`
@@ -196,18 +197,19 @@ impl WideBvh {
         self.kernel = if is_vector { available } else { Kernel::Portable };
     }
 
-    /// [`nearest_hit`](Self::nearest_hit) by [`Kernel::Portable`], with its tests counted: eight
-    /// boxes for each node and four objects for each block of triangles, including unused places.
-    /// Counts are the same on every machine.
+    /// Returns the [nearest hit](Self::nearest_hit) by [`Kernel::Portable`], and counts the tests:
+    /// eight boxes for each node and four objects for each block of triangles, including unused
+    /// places. Counts are the same on every machine.
     #[inline(never)]
     pub fn nearest_hit_counted(&self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
-        walk::<false>(self, ray, counter, |_| true)
+        walk::<NEAREST_HIT>(self, ray, counter, |_| true)
     }
 
-    /// [`any_hit`](Self::any_hit) by [`Kernel::Portable`], with its tests counted likewise.
+    /// Returns whether `ray` meets [any triangle](Self::any_hit) by [`Kernel::Portable`], and counts
+    /// the tests as [`nearest_hit_counted`](Self::nearest_hit_counted) does.
     #[inline(never)]
     pub fn any_hit_counted(&self, ray: &Ray, counter: &mut impl Counter) -> bool {
-        walk::<true>(self, ray, counter, |_| true).is_some()
+        walk::<ANY_HIT>(self, ray, counter, |_| true).is_some()
     }
 
     /// Returns the nearest hit that `accept` accepts, for example where a texture is opaque.
@@ -243,11 +245,11 @@ impl WideBvh {
     // Not generic over the filter: a generic kernel would be compiled, perhaps without
     // optimisation, by every crate that calls it.
     fn nearest_accepted(&self, ray: &Ray, accept: &mut dyn FnMut(Hit) -> bool) -> Option<Hit> {
-        self.one_ray::<false>(ray, accept)
+        self.one_ray::<NEAREST_HIT>(ray, accept)
     }
 
     fn any_accepted(&self, ray: &Ray, accept: &mut dyn FnMut(Hit) -> bool) -> bool {
-        self.one_ray::<true>(ray, accept).is_some()
+        self.one_ray::<ANY_HIT>(ray, accept).is_some()
     }
 
     /// The number of bytes of nodes and triangles.

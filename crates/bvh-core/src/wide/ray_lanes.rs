@@ -41,8 +41,9 @@ impl<L: Lanes> RayLanes<L> {
         (x.lt(y).and_not(third), third)
     }
 
-    /// The rays within the bounds of [`box_ray`](super::box_ray), the largest size of a coordinate
-    /// for each, and the reciprocals of the directions made so small that nothing overflows.
+    /// The rays within the bounds of [`box_ray`](super::box_ray), the largest absolute value of a
+    /// coordinate for each, and the reciprocals of the directions made so small that nothing
+    /// overflows.
     #[inline(always)]
     pub(crate) fn bounded(&self, largest: f32) -> (L::Mask, L, [L; 3]) {
         // SAFETY: values exist.
@@ -79,7 +80,7 @@ impl<L: Lanes> RayLanes<L> {
         cohere.then_some(scale)
     }
 
-    /// The largest size of a coordinate of the origin, plus `largest`.
+    /// The largest absolute value of a coordinate of the origin, plus `largest`.
     #[inline(always)]
     fn reach_up_to(&self, largest: f32) -> L {
         let [x, y, z] = self.origin;

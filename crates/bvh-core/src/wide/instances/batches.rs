@@ -1,14 +1,13 @@
 //! Batches of rays through instances.
 
-use super::super::answer::Batch;
-use super::super::source::Source;
 use super::Placed;
+use crate::wide::answer::{ANY_HIT, Batch, NEAREST_HIT};
 use crate::{Aabb, Coherence, InstanceHit, Instances, Ray, Slabs, WideBvh};
 
 impl Instances {
-    /// [`nearest_hit`](Self::nearest_hit) of every ray, into as many `hits`; [`InstanceHit::MISS`]
-    /// for a ray that hits nothing. Answers are those of single calls, bit by bit, and distances
-    /// are in multiples of the lengths of the rays' directions.
+    /// Writes the [nearest hit](Self::nearest_hit) of every ray to `hits`; [`InstanceHit::MISS`]
+    /// for a ray that hits nothing. The answers of a batch are, bit by bit, the answers of single
+    /// calls, and distances are in multiples of the lengths of the rays' directions.
     ///
     /// Coherent rays pass through the tree over the instances in packets of 64. Those that enter an
     /// instance are moved into its part together, and are a packet there. All other rays are in
@@ -36,24 +35,24 @@ impl Instances {
     /// If `rays` and `hits` are not equally many.
     pub fn nearest_hits(&self, rays: &[Ray], mut hits: &mut [InstanceHit], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "a hit for every ray");
-        let batch = Batch::new(Source::Rays(rays), &mut hits);
+        let batch = Batch::through_instances(self, rays, &mut hits);
         self.wide_top
-            .trace::<false>(Batch { scene: Some(self), ..batch }, coherence);
+            .trace::<NEAREST_HIT>(batch, coherence);
     }
 
-    /// [`any_hit`](Self::any_hit) of every ray, into as many `hits`.
+    /// Writes to `hits` whether each ray hits a triangle of [any instance](Self::any_hit).
     ///
     /// # Panics
     /// If `rays` and `hits` are not equally many.
     pub fn any_hits(&self, rays: &[Ray], mut hits: &mut [bool], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "an answer for every ray");
-        let batch = Batch::new(Source::Rays(rays), &mut hits);
-        self.wide_top
-            .trace::<true>(Batch { scene: Some(self), ..batch }, coherence);
+        let batch = Batch::through_instances(self, rays, &mut hits);
+        self.wide_top.trace::<ANY_HIT>(batch, coherence);
     }
 
     /// Returns the ray in the coordinates of an instance's part, and the distance at which it
-    /// enters the instance's box; `None` if it does not before `t_max`.
+    /// enters the instance's box. Returns `None` if the ray does not enter the box up to `t_max`, or
+    /// if the instance's transform makes its direction vanish or overflow.
     #[inline(always)]
     pub(crate) fn enter(&self, instance: u32, ray: &Ray, t_max: f32) -> Option<(Ray, f32)> {
         let placed = &self.placed[instance as usize];
@@ -82,7 +81,7 @@ impl Instances {
         self.wide_top.bounds
     }
 
-    /// Returns the largest size of a coordinate of any part.
+    /// Returns the largest absolute value of a coordinate of any part, in the part's coordinates.
     #[inline(always)]
     pub(crate) fn largest_of_parts(&self) -> f32 {
         self.largest_of_parts

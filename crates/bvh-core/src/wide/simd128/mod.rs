@@ -7,7 +7,7 @@ mod lanes;
 mod registers;
 
 use super::all_in_flight::{Found, MOST};
-use super::answer::Batch;
+use super::answer::{ANY_HIT, Batch};
 use super::crossed_leaves::AllHits;
 use super::instructions::{Instructions, Part, Pending};
 use super::lanes::{Lanes, Mask};
@@ -41,7 +41,7 @@ pub(super) unsafe fn one_ray<const ANY: bool>(
 /// [`one_ray::traverse`] for all hits. Returns whether it could trace the ray.
 pub(super) unsafe fn all_hits(wide: &WideBvh, ray: &Ray, leaves: &mut AllHits) -> bool {
     // SAFETY: the target has the instructions; the rest is the caller's promise.
-    unsafe { one_ray::traverse::<Simd128, true>(wide, ray, leaves) }.is_some()
+    unsafe { one_ray::traverse::<Simd128, ANY_HIT>(wide, ray, leaves) }.is_some()
 }
 
 /// [`all_in_flight::trace`].

@@ -157,8 +157,12 @@ macro_rules! entry_points {
         ) -> bool {
             // SAFETY: this function is compiled with the instructions; the rest is the caller's
             // promise.
-            unsafe { crate::wide::one_ray::traverse::<$instructions, true>(wide, ray, leaves) }
-                .is_some()
+            unsafe {
+                crate::wide::one_ray::traverse::<$instructions, { crate::wide::answer::ANY_HIT }>(
+                    wide, ray, leaves,
+                )
+            }
+            .is_some()
         }
 
         /// [`all_in_flight::trace`](crate::wide::all_in_flight::trace).
