@@ -10,108 +10,163 @@ use crate::tree::{ANCHOR, Metric, NONE, Node, Working};
 use std::collections::HashMap;
 
 /// Returns the best tree over the clades of `trees`, one tree or more over the same objects.
-/// O(total size).
+/// O(n log n), where n is the number of nodes of all trees together.
 ///
 /// Clades are identified by 128-bit sums of scattered keys. Among a billion clades, the probability
 /// that any two different clades collide is below 10⁻²⁰.
 pub(super) fn recombine<A: Metric>(trees: &[&Working<A>]) -> Working<A> {
-    let leaf_cost = trees[0].metric().leaf_cost();
-    // Every node of every tree, as number of objects, tree and index. The sort below then visits
-    // smaller clades first, and ties in the order of the trees, which makes the result
-    // deterministic.
-    let mut by_size: Vec<(u32, u32, u32)> = Vec::new();
-    let mut clade_of: Vec<Vec<u32>> = Vec::new();
-    let mut number = HashMap::new(); // only looked up by key, so that its order has no effect
-    for (which, tree) in (0..).zip(trees) {
-        let order = tree.preorder();
-        let mut keys = vec![(0u128, 0u32); tree.nodes.len()];
-        let mut clades = vec![NONE; tree.nodes.len()];
-        for &index in order.iter().rev() {
-            let node = &tree.nodes[index as usize];
-            let [left, right] = node.children.map(|child| child as usize);
-            keys[index as usize] = if node.is_leaf() {
-                (key_of_leaf(node, leaf_cost), 1)
-            } else {
-                (keys[left].0.wrapping_add(keys[right].0), keys[left].1 + keys[right].1)
-            };
-            let (key, size) = keys[index as usize];
-            // Clades are numbered in the order of their first occurrence.
-            let next = number.len() as u32;
-            clades[index as usize] = *number.entry(key).or_insert(next);
-            by_size.push((size, which, index));
+    let clades = Clades::of(trees);
+    let divisions = best_divisions(trees, &clades);
+    Working::from_nodes(assemble(trees, &clades, &divisions), trees[0].metric())
+}
+
+/// A node of one of the trees. Nodes with fewer objects come first, and among equals the nodes of
+/// earlier trees, which makes the result deterministic.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Occurrence {
+    /// The number of objects below the node.
+    objects: u32,
+    tree: u32,
+    node: u32,
+}
+
+/// The clades of several trees, numbered from 0 in the order in which they were found.
+struct Clades {
+    /// Every node of every tree, in order.
+    occurrences: Vec<Occurrence>,
+    /// The number of the clade below each node, by tree and node.
+    numbers: Vec<Vec<u32>>,
+    /// The number of different clades.
+    count: usize,
+}
+
+impl Clades {
+    fn of<A: Metric>(trees: &[&Working<A>]) -> Self {
+        let mut occurrences = Vec::new();
+        let mut numbers = Vec::with_capacity(trees.len());
+        // Nothing iterates over the map, so that its random order has no effect.
+        let mut number_by_key: HashMap<u128, u32> = HashMap::new();
+        for (tree, working) in (0..).zip(trees) {
+            let leaf_cost = working.metric().leaf_cost();
+            let mut keys = vec![0_u128; working.nodes.len()];
+            let mut objects = vec![0_u32; working.nodes.len()];
+            let mut numbers_of_tree = vec![NONE; working.nodes.len()];
+            // Children come after their parent in preorder, and here before it.
+            for &node in working.preorder().iter().rev() {
+                let index = node as usize;
+                if working.nodes[index].is_leaf() {
+                    keys[index] = key_of_leaf(&working.nodes[index], leaf_cost);
+                    objects[index] = 1;
+                } else {
+                    let [left, right] = working.nodes[index].children;
+                    keys[index] = keys[left as usize].wrapping_add(keys[right as usize]);
+                    objects[index] = objects[left as usize] + objects[right as usize];
+                }
+                let next = number_by_key.len() as u32;
+                numbers_of_tree[index] = *number_by_key.entry(keys[index]).or_insert(next);
+                occurrences.push(Occurrence { objects: objects[index], tree, node });
+            }
+            numbers.push(numbers_of_tree);
         }
-        clade_of.push(clades);
+        occurrences.sort_unstable();
+        Self { occurrences, numbers, count: number_by_key.len() }
     }
-    by_size.sort_unstable();
-    // Per clade: cost of the best division, including the area of the clade's box, and the node
-    // that has the division. Parts are smaller than the clade, so their costs are final.
-    let mut best = vec![(f64::INFINITY, 0, NONE); number.len()];
-    for (_, which, index) in by_size {
-        let node = &trees[which as usize].nodes[index as usize];
-        let clades = &clade_of[which as usize];
+
+    /// Returns the number of the clade below a node.
+    fn number(&self, tree: u32, node: u32) -> u32 {
+        self.numbers[tree as usize][node as usize]
+    }
+}
+
+/// The cheapest division of a clade: the node at which a tree has the division.
+#[derive(Clone, Copy)]
+struct Division {
+    tree: u32,
+    node: u32,
+    /// The total area of the best subtree over the clade, the clade's own box included.
+    cost: f64,
+}
+
+/// Returns the cheapest division of every clade, by its number.
+fn best_divisions<A: Metric>(trees: &[&Working<A>], clades: &Clades) -> Vec<Division> {
+    let leaf_cost = trees[0].metric().leaf_cost();
+    let mut divisions = vec![Division { tree: 0, node: NONE, cost: f64::INFINITY }; clades.count];
+    // The parts of a clade have fewer objects than the clade, so their costs are final.
+    for &Occurrence { tree, node: index, .. } in &clades.occurrences {
+        let node = &trees[tree as usize].nodes[index as usize];
         let cost = if node.is_leaf() {
             leaf_cost * node.area
         } else {
             let [left, right] = node
                 .children
-                .map(|child| best[clades[child as usize] as usize].0);
+                .map(|child| divisions[clades.number(tree, child) as usize].cost);
             node.area + left + right
         };
-        let best = &mut best[clades[index as usize] as usize];
-        if cost < best.0 {
-            *best = (cost, which, index);
+        let best = &mut divisions[clades.number(tree, index) as usize];
+        if cost < best.cost {
+            *best = Division { tree, node: index, cost };
         }
     }
+    divisions
+}
+
+/// Returns the nodes of the tree that has the best division of every clade, the anchor first.
+fn assemble<A: Metric>(
+    trees: &[&Working<A>],
+    clades: &Clades,
+    divisions: &[Division],
+) -> Vec<Node> {
     let mut nodes = vec![trees[0].nodes[ANCHOR as usize]];
+    // Clades whose subtrees remain to be made, each with its parent and its side of the parent.
+    let mut open: Vec<(u32, u32, usize)> = Vec::new();
     // All trees are over the same objects, so their roots are the same clade.
-    let root = trees[0]
-        .root()
-        .map(|root| (clade_of[0][root as usize], ANCHOR, 0));
-    let mut stack: Vec<(u32, u32, usize)> = root.into_iter().collect();
-    while let Some((clade, parent, side)) = stack.pop() {
-        let (_, which, index) = best[clade as usize];
-        let node = trees[which as usize].nodes[index as usize];
+    if let Some(root) = trees[0].root() {
+        open.push((clades.number(0, root), ANCHOR, 0));
+    }
+    while let Some((clade, parent, side)) = open.pop() {
+        let Division { tree, node, .. } = divisions[clade as usize];
+        let copied = trees[tree as usize].nodes[node as usize];
         let to = nodes.len() as u32;
         nodes[parent as usize].children[side] = to;
-        nodes.push(Node { parent, ..node });
-        if !node.is_leaf() {
-            let clades = &clade_of[which as usize];
-            stack.extend([1, 0].map(|side| (clades[node.children[side] as usize], to, side)));
+        nodes.push(Node { parent, ..copied });
+        if !copied.is_leaf() {
+            let [left, right] = copied.children;
+            open.push((clades.number(tree, right), to, 1));
+            open.push((clades.number(tree, left), to, 0));
         }
     }
-    Working::from_nodes(nodes, trees[0].metric())
+    nodes
 }
 
 /// Returns a key for a leaf: its object, and the part of the object if the object may have several
 /// leaves.
 fn key_of_leaf(node: &Node, leaf_cost: f64) -> u128 {
-    let object = key(node.children[1]);
+    // The multiplier of a well-known linear congruential generator. It is odd, so multiplication
+    // loses no bits.
+    const FACTOR: u128 = 0x2d99_7879_26d4_6932_a4c1_f326_80f7_0c55;
+    let mut key = scattered(node.children[1]);
     if leaf_cost == 0.0 {
-        return object;
+        return key;
     }
-    let [low, high] = node.aabb.planes();
-    [low[0], low[1], low[2], high[0], high[1], high[2]]
-        .into_iter()
-        .fold(object, |sum, plane| {
-            // Multiplying between the planes makes the key depend on their order, and an odd factor
-            // loses no bits.
-            sum.rotate_left(21)
-                .wrapping_mul(0x2d99_787926d46932a4c1f32680f70c55)
-                ^ key(plane.to_bits())
-        })
+    for [x, y, z, _] in node.aabb.planes() {
+        for plane in [x, y, z] {
+            // Multiplication between the planes makes the key depend on their order.
+            key = key.rotate_left(21).wrapping_mul(FACTOR) ^ scattered(plane.to_bits());
+        }
+    }
+    key
 }
 
-/// Returns a key for an object, scattered over 128 bits by two rounds of SplitMix64 (Steele, Lea &
-/// Flood 2014).
-fn key(object: u32) -> u128 {
+/// Returns a number scattered over 128 bits by two rounds of SplitMix64 (Steele, Lea & Flood 2014).
+fn scattered(number: u32) -> u128 {
     const GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
-    let number = 2 * u64::from(object) + 1;
-    let low = split_mix(number.wrapping_mul(GAMMA));
-    let high = split_mix((number + 1).wrapping_mul(GAMMA));
+    let first = 2 * u64::from(number) + 1;
+    let low = split_mix(first.wrapping_mul(GAMMA));
+    let high = split_mix((first + 1).wrapping_mul(GAMMA));
     u128::from(high) << 64 | u128::from(low)
 }
 
-/// The output function of SplitMix64.
+/// Returns the output of SplitMix64 for a state.
 fn split_mix(state: u64) -> u64 {
     let state = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let state = (state ^ (state >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
