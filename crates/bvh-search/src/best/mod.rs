@@ -19,6 +19,7 @@ mod improvement;
 mod plan;
 mod recombine;
 mod small_budget;
+mod time_limit;
 
 use crate::exact;
 use crate::local::incumbent::Incumbent;

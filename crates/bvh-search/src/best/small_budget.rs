@@ -5,18 +5,17 @@
 //! the root hold most of the area that can be saved. With larger budgets, annealing from a top-down
 //! division ends lower.
 //!
-//! Time limits are multiples of the duration of the Morton sort, which always runs first.
+//! Under a time limit, the Morton sort tells how long the other steps will take (`time_limit`).
 
+use super::time_limit::TimeLimit;
 use crate::local::incumbent::Incumbent;
 use crate::local::initial::construction;
 use crate::local::reinsertion::pass;
-use crate::parallel::threads;
-use crate::run::{Kept, Observer, Problem, Run, SearchError, Tally, watched};
+use crate::run::{Kept, Problem, Run, SearchError, Tally, watched};
 use crate::tree::{Linked, Siblings};
 use crate::tuning::{
-    ANNEAL_FROM_TIME, ANNEAL_FROM_WORK, BUILDS, CLUSTERING, COLD_MEMORY, FINISH_TIME, FIRST_PASS,
-    FRONT, MOVES_PER_READING, SAMPLED_FROM, SAMPLED_PART, SAMPLES, SEVERAL_THREADS, TOP_DOWN_BELOW,
-    TWO_STARTS_FROM_TIME, WARM_SAMPLE,
+    ANNEAL_FROM_WORK, CLUSTERING, FIRST_PASS, FRONT, MOVES_PER_READING, SAMPLED_FROM, SAMPLED_PART,
+    SAMPLES, TOP_DOWN_BELOW,
 };
 use bvh_build::ploc::MortonOrder;
 use bvh_build::{BuildError, Builder};
@@ -35,7 +34,8 @@ pub(super) enum SmallBudget<'p> {
     LocalOptimum(Incumbent<'p>),
 }
 
-/// Searches within a small budget.
+/// Searches within a small budget. Builds one tree or two, and improves the better one by
+/// reinsertion as far as the budget reaches.
 pub(super) fn search<'p>(
     problem: &Problem<'p>,
     run: &mut Run,
@@ -49,86 +49,57 @@ pub(super) fn search<'p>(
         return Ok(SmallBudget::Large(None));
     }
     let morton = MortonOrder::new(problem.boxes)?;
-    let mut has_two_starts = false;
-    let mut end = f64::INFINITY;
-    if let (Some(began), Some(sorted)) = (began, observer.progress()) {
-        // A coarse clock may not have advanced; the bound avoids a division by zero.
-        let sort = (sorted - began).max(1e-9);
-        let times = (1.0 - began) / sort;
-        let by_threads = if threads() > 1 { SEVERAL_THREADS } else { 1.0 };
-        let [two_starts_from, annealing_from] =
-            [TWO_STARTS_FROM_TIME, ANNEAL_FROM_TIME].map(|times| times * by_threads);
-        if times >= annealing_from
-            || times >= annealing_from / COLD_MEMORY
-                && (1.0 - began) / warm_sort(problem, observer)? >= annealing_from
-        {
+    let limit = TimeLimit::after_sort(began, observer);
+    if let Some(limit) = &limit {
+        if limit.is_enough_for_annealing(problem, observer)? {
             return Ok(SmallBudget::Large(Some(morton)));
         }
-        if let Some((_, config)) = BUILDS
-            .into_iter()
-            .find(|(enough, _)| times < *enough)
-        {
-            let tree = Kept::new(morton.build(&config)?, problem);
+        if let Some(clustering) = limit.only_build() {
+            let tree = Kept::new(morton.build(&clustering)?, problem);
             return Ok(SmallBudget::Tree(Incumbent::begin_unbounded(tree, problem, run).tree));
         }
-        // Stop early enough to order and evaluate the tree.
-        has_two_starts = times >= two_starts_from;
-        end = 1.0 - FINISH_TIME * sort;
     }
+    let has_two_starts = limit
+        .as_ref()
+        .is_some_and(TimeLimit::is_enough_for_two_starts);
+    let start = initial(morton, has_two_starts, problem, run)?;
+    Ok(improved(start, limit.as_ref(), problem, run))
+}
+
+/// The tree from which reinsertion starts.
+struct Start {
+    tree: Bvh,
+    /// The k largest nodes are sought among the first `front` · k nodes.
+    front: usize,
+}
+
+/// Builds the initial tree: a clustering, or with `has_two_starts` the cheaper one of a clustering
+/// and a top-down division.
+fn initial(
+    morton: MortonOrder,
+    has_two_starts: bool,
+    problem: &Problem,
+    run: &mut Run,
+) -> Result<Start, SearchError> {
     let tries_division = has_two_starts && top_down_may_be_better(&morton, problem, run)?;
-    let mut start = morton.build(&CLUSTERING)?;
-    let mut front = FRONT;
-    if tries_division && let Some(divided) = divided(problem.boxes, run)? {
+    let clustered = morton.build(&CLUSTERING)?;
+    if tries_division && let Some(divided) = build_top_down(problem.boxes, run)? {
         run.count(Tally { moves: 1, kept: 0, work: divided.nodes.len() as u64 });
-        if cost::internal_area(&divided) < cost::internal_area(&start) {
-            start = divided;
+        if cost::internal_area(&divided) < cost::internal_area(&clustered) {
             // A division has its largest nodes anywhere, not only at the front.
-            front = usize::MAX;
+            return Ok(Start { tree: divided, front: usize::MAX });
         }
     }
-    // A time-limited search does not evaluate the initial tree: reinsertion never makes it worse,
-    // and the evaluation would take the time of many moves.
-    let mut before = None;
-    if began.is_none() {
-        before = Some(Incumbent::begin(Kept::new(start.clone(), problem), problem, run));
-    } else {
-        run.count(Tally { moves: 1, kept: 0, work: start.nodes.len() as u64 });
-    }
-    let mut tree = Siblings::new(start);
-    let is_local_optimum = reinsert_largest(&mut tree, front, end, run);
-    let tree = tree.into_tree();
-    let mut best = match before {
-        Some(mut best) => {
-            best.offer_tree(tree, run);
-            best
-        }
-        None => Incumbent::begin_unbounded(Kept::new(tree, problem), problem, run),
-    };
-    if !is_local_optimum {
-        return Ok(SmallBudget::Tree(best.tree));
-    }
-    if began.is_some() {
-        best.bound(run);
-    }
-    Ok(SmallBudget::LocalOptimum(best))
+    Ok(Start { tree: clustered, front: FRONT })
 }
 
 /// Returns the top-down division; `None` if the observer cancels first.
-fn divided(boxes: &[Aabb], run: &Run) -> Result<Option<Bvh>, SearchError> {
+fn build_top_down(boxes: &[Aabb], run: &Run) -> Result<Option<Bvh>, SearchError> {
     match watched(run.observer(), |watch| construction().build_watched(boxes, None, watch)) {
+        Ok(tree) => Ok(Some(tree)),
         Err(BuildError::Cancelled) => Ok(None),
-        built => Ok(Some(built?)),
+        Err(error) => Err(error.into()),
     }
-}
-
-/// Estimates the duration of the sort in warm memory, in which the later steps run, as a fraction
-/// of all time.
-fn warm_sort(problem: &Problem, observer: &dyn Observer) -> Result<f64, SearchError> {
-    let boxes = &problem.boxes[..problem.boxes.len().div_ceil(WARM_SAMPLE)];
-    let began = observer.progress().unwrap_or(0.0);
-    MortonOrder::new(boxes)?;
-    let took = observer.progress().unwrap_or(0.0) - began;
-    Ok((took * problem.boxes.len() as f64 / boxes.len() as f64).max(1e-9))
 }
 
 /// Returns whether a top-down build is worth its time: it must be better than clustering on samples
@@ -142,30 +113,68 @@ fn top_down_may_be_better(
     if order.len() < SAMPLED_FROM {
         return Ok(true);
     }
-    let mut divided = 0.0;
-    let mut clustered = 0.0;
+    let mut area_divided = 0.0;
+    let mut area_clustered = 0.0;
     for stretch in order.chunks(order.len().div_ceil(SAMPLES)) {
         let objects = &stretch[..stretch.len() / SAMPLED_PART];
         let boxes: Vec<Aabb> = objects
             .iter()
             .map(|&object| problem.boxes[object as usize])
             .collect();
-        let Some(tree) = self::divided(&boxes, run)? else { return Ok(false) };
-        divided += cost::internal_area(&tree);
-        clustered += cost::internal_area(&CLUSTERING.build(&boxes)?);
+        let Some(divided) = build_top_down(&boxes, run)? else { return Ok(false) };
+        area_divided += cost::internal_area(&divided);
+        area_clustered += cost::internal_area(&CLUSTERING.build(&boxes)?);
         run.count(Tally { moves: 2, kept: 0, work: 4 * boxes.len() as u64 });
     }
-    Ok(divided < TOP_DOWN_BELOW * clustered)
+    Ok(area_divided < TOP_DOWN_BELOW * area_clustered)
+}
+
+/// Improves the initial tree by reinsertion until a local optimum, or until the time or work is used
+/// up.
+fn improved<'p>(
+    start: Start,
+    limit: Option<&TimeLimit>,
+    problem: &Problem<'p>,
+    run: &mut Run,
+) -> SmallBudget<'p> {
+    let Start { tree, front } = start;
+    // A time-limited search does not evaluate the initial tree: reinsertion never makes it worse,
+    // and the evaluation would take the time of many moves.
+    let mut before = None;
+    if limit.is_none() {
+        before = Some(Incumbent::begin(Kept::new(tree.clone(), problem), problem, run));
+    } else {
+        run.count(Tally { moves: 1, kept: 0, work: tree.nodes.len() as u64 });
+    }
+    let end = limit.map_or(f64::INFINITY, TimeLimit::end_of_reinsertion);
+    let mut siblings = Siblings::new(tree);
+    let is_local_optimum = reinsert_largest(&mut siblings, front, end, run);
+    let tree = siblings.into_tree();
+    let mut best = match before {
+        Some(mut best) => {
+            best.offer_tree(tree, run);
+            best
+        }
+        None => Incumbent::begin_unbounded(Kept::new(tree, problem), problem, run),
+    };
+    if !is_local_optimum {
+        return SmallBudget::Tree(best.tree);
+    }
+    if limit.is_some() {
+        best.bound(run);
+    }
+    SmallBudget::LocalOptimum(best)
 }
 
 /// Reinserts more and more of the largest nodes, until the observer's progress reaches `end` or the
-/// run stops. Returns whether it reached a local optimum first.
+/// run stops. Returns whether it reached a local optimum first. `front` has the meaning that it has
+/// in [`select_largest`].
 fn reinsert_largest(tree: &mut Siblings, front: usize, end: f64, run: &mut Run) -> bool {
-    let observer: &dyn Observer = run.observer();
+    let observer = run.observer();
     let mut part = FIRST_PASS;
     let mut order = Vec::new();
     loop {
-        largest(tree, part, front, &mut order);
+        select_largest(tree, part, front, &mut order);
         let mut kept = 0;
         for some in order.chunks(MOVES_PER_READING) {
             if run.stopped().is_some() || observer.progress().is_some_and(|now| now >= end) {
@@ -183,9 +192,10 @@ fn reinsert_largest(tree: &mut Siblings, front: usize, end: f64, run: &mut Run) 
     }
 }
 
-/// Selects the k largest nodes, the largest first and equal nodes by index, where k is about the
-/// fraction `part` of all nodes. Examines only the first `front` · k nodes.
-fn largest(tree: &Siblings, part: f64, front: usize, order: &mut Vec<u32>) {
+/// Writes the k largest nodes to `order`, the largest first and equal nodes by index, where k is
+/// about the fraction `part` of all nodes. Examines only the first `front` · k nodes.
+/// O(`front` · k + k log k).
+fn select_largest(tree: &Siblings, part: f64, front: usize, order: &mut Vec<u32>) {
     let nodes = tree.len() - 1;
     let count = ((part * nodes as f64) as usize).clamp(1, nodes);
     let examined = 1..=count.saturating_mul(front).min(nodes) as u32;
@@ -208,24 +218,25 @@ fn largest(tree: &Siblings, part: f64, front: usize, order: &mut Vec<u32>) {
 mod tests {
     use super::*;
     use crate::best;
-    use crate::run::{Budget, solve};
+    use crate::run::{Budget, Observer, solve};
     use crate::scatter::scatter;
     use bvh_build::ploc;
     use bvh_core::validate;
     use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-    /// A clock whose time is over after a number of readings.
-    struct Asked {
-        times: u32,
-        asked: AtomicU32,
+    /// A clock whose time is over after `most` readings.
+    struct CountingClock {
+        most: u32,
+        readings: AtomicU32,
     }
 
-    impl Observer for Asked {
+    impl Observer for CountingClock {
         fn progress(&self) -> Option<f64> {
-            Some(f64::from(self.asked.fetch_add(1, Relaxed)) / f64::from(self.times))
+            Some(f64::from(self.readings.fetch_add(1, Relaxed)) / f64::from(self.most))
         }
+
         fn cancelled(&self) -> bool {
-            self.asked.load(Relaxed) >= self.times
+            self.readings.load(Relaxed) >= self.most
         }
     }
 
@@ -247,8 +258,8 @@ mod tests {
     #[test]
     fn every_short_time_gives_a_valid_tree() {
         let boxes = scatter(300);
-        for times in 1..100 {
-            let clock = Asked { times, asked: AtomicU32::new(0) };
+        for most in 1..100 {
+            let clock = CountingClock { most, readings: AtomicU32::new(0) };
             let found = solve(
                 &best::Config::default(),
                 &Problem::new(&boxes),
@@ -282,7 +293,7 @@ mod tests {
         all.sort_by(|&a, &b| tree.area(b).total_cmp(&tree.area(a)));
         let mut order = Vec::new();
         for part in [0.001, 0.1, 0.5, 1.0] {
-            largest(&tree, part, usize::MAX, &mut order);
+            select_largest(&tree, part, usize::MAX, &mut order);
             assert_eq!(order, all[..order.len()]);
         }
         assert_eq!(order.len(), all.len());
