@@ -140,7 +140,7 @@ impl<'a> Divider<'a> {
         let position = (area < limit)
             .then(|| {
                 self.search
-                    .detached(tree, Scope::ALL, (&whole, area), sibling, limit)
+                    .position_of_detached(tree, Scope::ALL, (&whole, area), sibling, limit)
             })
             .flatten();
         let Some(position) = position else {
@@ -211,10 +211,13 @@ impl<'a> Divider<'a> {
             // The other part will cost at least its area, which tightens the limit of the first
             // search.
             let rest = if side == 0 { areas[1] } else { 0.0 };
-            let Some(position) =
-                self.search
-                    .detached(tree, Scope::ALL, (&part, area), sibling, limit - rest)
-            else {
+            let Some(position) = self.search.position_of_detached(
+                tree,
+                Scope::ALL,
+                (&part, area),
+                sibling,
+                limit - rest,
+            ) else {
                 tree.undo();
                 return false;
             };

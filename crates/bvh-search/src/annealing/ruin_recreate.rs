@@ -270,9 +270,9 @@ impl Mover for RuinMover<'_> {
             // `least` covered this subtree with its own area; its exact position replaces that
             // bound now.
             limit += area;
-            let Some(position) = self
-                .search
-                .detached(tree, positions, (&aabb, area), first, limit)
+            let Some(position) =
+                self.search
+                    .position_of_detached(tree, positions, (&aabb, area), first, limit)
             else {
                 tree.undo();
                 return false;

@@ -49,19 +49,25 @@ impl Config {
         run: &mut Run,
     ) -> Found {
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
-        best.improve(&mut tree, self.sweeps, run, |tree, number, quota, observer| {
-            let mut order = tree.preorder();
-            match self.order {
-                Order::ByArea => sort_by_area(tree, &mut order),
-                Order::Random => order.shuffle(&mut stream(seed, number.into())),
-            }
+        best.improve(&mut tree, self.sweeps, run, |tree, passes, quota, observer| {
+            let order = self.nodes_in_order(tree, seed, passes);
             pass(tree, &order, quota, observer)
         });
         Ok(best.tree)
     }
+
+    /// Returns all nodes of a tree in the order in which the pass after `passes` others tries them.
+    fn nodes_in_order(&self, tree: &Working<impl Metric>, seed: u64, passes: u32) -> Vec<u32> {
+        let mut nodes = tree.preorder();
+        match self.order {
+            Order::ByArea => sort_by_area(tree, &mut nodes),
+            Order::Random => nodes.shuffle(&mut stream(seed, passes.into())),
+        }
+        nodes
+    }
 }
 
-/// Tries every node once, the largest first.
+/// Performs one [`pass`] over all nodes, the largest first.
 pub(crate) fn pass_by_area(
     tree: &mut Working<impl Metric>,
     quota: Quota,
@@ -86,8 +92,10 @@ pub(crate) fn to_local_optimum(
 }
 
 with_vector_instructions! {
-    /// Tries to improve the position of every node of `order` once. Stops early when the quota is
-    /// used up or the observer cancels.
+    /// Moves each node of `order` to its best position if that saves more than [`TOLERANCE`], one
+    /// after the other. Stops early when the quota is used up or the observer cancels. Returns the
+    /// number of nodes tried and moved, and of nodes visited; one search for a position visits the
+    /// whole tree at worst.
     pub(crate) pass = pass_plain<T: Linked>(
         tree: &mut T, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally
 }
@@ -101,29 +109,29 @@ fn pass_plain<T: Linked>(
 ) -> Tally {
     let mut done = Tally::default();
     let mut search = PositionSearch::default();
-    let mut poll = WORK_PER_POLL;
+    let mut work_at_poll = WORK_PER_POLL;
     for &node in order {
-        // The search counts its own visits; both together are the work of the pass.
-        let so_far = Tally { work: done.work + search.visits, ..done };
-        if quota.is_reached(&so_far) {
+        if quota.is_reached(&done) {
             break;
         }
-        if so_far.work >= poll {
+        if done.work >= work_at_poll {
             if observer.cancelled() {
                 break;
             }
-            poll = so_far.work + WORK_PER_POLL;
+            work_at_poll = done.work + WORK_PER_POLL;
         }
-        // The root cannot move.
-        if tree.parent(node) == T::ABOVE {
+        let is_root = tree.parent(node) == T::ABOVE;
+        if is_root {
             continue;
         }
         done.moves += 1;
-        if let (Some(position), _) = search.attached(tree, node, TOLERANCE) {
+        let visits_before = search.visits;
+        let (position, _) = search.position_of_attached(tree, node, TOLERANCE);
+        done.work += search.visits - visits_before;
+        if let Some(position) = position {
             done.work += tree.reinsert(node, position.sibling);
             done.kept += 1;
         }
     }
-    done.work += search.visits;
     done
 }

@@ -110,7 +110,7 @@ impl PositionSearch {
     /// `limit`. The scope is the whole tree, or its box contains the item's box. The search begins
     /// at `first` inside the scope, or at the scope's root if `first` is itself detached.
     #[inline(always)]
-    pub fn detached(
+    pub fn position_of_detached(
         &mut self,
         tree: &Working<impl Metric>,
         scope: Scope,
@@ -147,7 +147,7 @@ impl PositionSearch {
     /// The boxes of ancestors count *without* the node here, so their current boxes are the unions
     /// with B.
     #[inline(always)]
-    pub fn attached<T: Linked>(
+    pub fn position_of_attached<T: Linked>(
         &mut self,
         tree: &T,
         node: u32,

@@ -289,7 +289,7 @@ mod tests {
             for _ in 0..200 {
                 let node = rng.random_range(1..tree.len() as u32);
                 let before = cost::internal_area(&tree.tree);
-                let (found, current) = search.attached(&tree, node, 0.0);
+                let (found, current) = search.position_of_attached(&tree, node, 0.0);
                 let least = positions(&tree, node).into_iter().map(|place| {
                     let mut moved = tree.clone();
                     moved.reinsert(node, place);

@@ -166,7 +166,7 @@ fn assert_best_places(mut tree: Working<impl Metric>) {
     for _ in 0..300 {
         let node = any(&tree, &mut rng);
         let start = tree.area();
-        let (found, current) = search.attached(&tree, node, 0.0);
+        let (found, current) = search.position_of_attached(&tree, node, 0.0);
         tree.begin();
         let (saved, sibling, _) = tree.detach(node);
         assert!((saved - current).abs() <= 1e-12 * saved);
@@ -180,14 +180,14 @@ fn assert_best_places(mut tree: Working<impl Metric>) {
         let area = tree.nodes[node as usize].area;
         for first in [sibling, NONE, any(&tree, &mut rng)] {
             let place = search
-                .detached(&tree, Scope::ALL, (&aabb, area), first, f64::INFINITY)
+                .position_of_detached(&tree, Scope::ALL, (&aabb, area), first, f64::INFINITY)
                 .unwrap();
             assert!((place.cost - least).abs() <= 1e-12 * least, "{} {least}", place.cost);
         }
         let below = least * (1.0 - 1e-9);
         assert!(
             search
-                .detached(&tree, Scope::ALL, (&aabb, area), sibling, below)
+                .position_of_detached(&tree, Scope::ALL, (&aabb, area), sibling, below)
                 .is_none()
         );
         assert!((found.map_or(current, |place| place.cost) - least).abs() <= 1e-12 * least);
@@ -246,7 +246,7 @@ fn the_best_place_in_a_region_is_the_best_there_and_costs_what_it_adds() {
         });
         for first in [sibling, NONE] {
             let place = search
-                .detached(&tree, region, (&aabb, area), first, f64::INFINITY)
+                .position_of_detached(&tree, region, (&aabb, area), first, f64::INFINITY)
                 .unwrap();
             assert!(inside(&place.sibling));
             assert!((place.cost - least).abs() <= 1e-12 * least, "{} {least}", place.cost);
