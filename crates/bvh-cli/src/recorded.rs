@@ -2,12 +2,18 @@
 
 use bvh_core::Segment;
 
-/// Reads segments in the format `npy`, `csv` or `bin`. Returns the fault of an invalid file.
+/// Reads segments, in the scene's coordinates, from a file in the format `npy` or `csv`; in any other
+/// format the file is little-endian `f32`. Numbers in f64 are rounded to f32.
+///
+/// # Errors
+///
+/// Returns a message for a file that is damaged, has no segments or has a number that is not finite.
+/// Messages count lines from 1, as editors do, and segments from 0, as arrays do.
 pub fn read(format: &str, bytes: &[u8]) -> Result<Vec<Segment>, String> {
     let numbers = match format {
-        "npy" => npy(bytes)?,
-        "csv" => csv(bytes)?,
-        _ => floats(bytes)?,
+        "npy" => read_npy(bytes)?,
+        "csv" => read_csv(bytes)?,
+        _ => read_floats(bytes)?,
     };
     let (segments, rest) = numbers.as_chunks::<6>();
     if !rest.is_empty() {
@@ -23,103 +29,104 @@ pub fn read(format: &str, bytes: &[u8]) -> Result<Vec<Segment>, String> {
             return Err(format!("segment {index} is {segment:?}; accepted: finite `f32`"));
         }
     }
-    let segment = |&[a, b, c, d, e, f]: &[f32; 6]| Segment { from: [a, b, c], to: [d, e, f] };
     Ok(segments.iter().map(segment).collect())
 }
 
+fn segment(&[x, y, z, to_x, to_y, to_z]: &[f32; 6]) -> Segment {
+    Segment { from: [x, y, z], to: [to_x, to_y, to_z] }
+}
+
 /// Reads little-endian `f32`.
-fn floats(bytes: &[u8]) -> Result<Vec<f32>, String> {
-    let (numbers, rest) = bytes.as_chunks();
+fn read_floats(bytes: &[u8]) -> Result<Vec<f32>, String> {
+    let (floats, rest) = bytes.as_chunks();
     if !rest.is_empty() {
+        // The caller rejects whole numbers that are no whole segments of 24 bytes.
         return Err(format!("there are {} bytes; accepted: a multiple of 24", bytes.len()));
     }
-    Ok(numbers
+    Ok(floats
         .iter()
-        .map(|&number| f32::from_le_bytes(number))
+        .map(|&float| f32::from_le_bytes(float))
         .collect())
 }
 
 /// Reads lines of six numbers, separated by commas. The first line may be a header, which has no
-/// number.
-fn csv(bytes: &[u8]) -> Result<Vec<f32>, String> {
+/// number, and lines may be blank.
+fn read_csv(bytes: &[u8]) -> Result<Vec<f32>, String> {
     let text = str::from_utf8(bytes).map_err(|_| "the file is not UTF-8".to_owned())?;
     // Spreadsheets begin UTF-8 with this mark, which would make the first number a word.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut numbers = Vec::new();
-    for (number, line) in (1..).zip(text.lines()) {
+    for (line_number, line) in (1..).zip(text.lines()) {
         let fields: Vec<Option<f32>> = line
             .split(',')
             .map(|field| field.trim().parse().ok())
             .collect();
-        let is_header = number == 1 && fields.iter().all(Option::is_none);
-        match fields
-            .iter()
-            .copied()
-            .collect::<Option<Vec<f32>>>()
-        {
-            Some(fields) if fields.len() == 6 => numbers.extend(fields),
-            None if is_header || line.trim().is_empty() => {}
-            _ => return Err(format!("line {number} is {line:?}; accepted: six numbers")),
+        let is_header = line_number == 1 && fields.iter().all(Option::is_none);
+        if is_header || line.trim().is_empty() {
+            continue;
         }
+        let &[Some(x), Some(y), Some(z), Some(to_x), Some(to_y), Some(to_z)] = &fields[..] else {
+            return Err(format!("line {line_number} is {line:?}; accepted: six numbers"));
+        };
+        numbers.extend([x, y, z, to_x, to_y, to_z]);
     }
     Ok(numbers)
 }
 
 /// Reads an array of numpy: `float32` or `float64`, little-endian, in row order.
-fn npy(bytes: &[u8]) -> Result<Vec<f32>, String> {
-    let invalid = || "the file is not an array of numpy".to_owned();
-    let rest = bytes
-        .strip_prefix(b"\x93NUMPY")
-        .ok_or_else(invalid)?;
-    let (&[major, _], rest) = rest
-        .split_first_chunk::<2>()
-        .ok_or_else(invalid)?;
-    let (length, rest) = if major == 1 {
-        let (length, rest) = rest.split_first_chunk().ok_or_else(invalid)?;
-        (usize::from(u16::from_le_bytes(*length)), rest)
-    } else {
-        let (length, rest) = rest.split_first_chunk().ok_or_else(invalid)?;
-        (u32::from_le_bytes(*length) as usize, rest)
-    };
-    let (header, data) = rest
-        .split_at_checked(length)
-        .ok_or_else(invalid)?;
-    let header: String = str::from_utf8(header)
-        .map_err(|_| invalid())?
-        .split_whitespace()
-        .collect();
-    let segments = match shape(&header).as_deref() {
-        Some(&[segments, 6] | &[segments, 2, 3]) if header.contains("'fortran_order':False") => {
-            segments
-        }
+fn read_npy(bytes: &[u8]) -> Result<Vec<f32>, String> {
+    let (header, data) = split_npy(bytes).ok_or("the file is not an array of numpy")?;
+    let is_in_rows = header.contains("'fortran_order':False");
+    let segments = match npy_shape(&header).as_deref() {
+        Some(&[segments, 6] | &[segments, 2, 3]) if is_in_rows => segments,
         _ => {
             return Err(format!(
                 "the array is {header}; accepted: (n, 6) or (n, 2, 3) in row order"
             ));
         }
     };
-    let size: usize = match &header {
-        header if header.contains("'descr':'<f4'") => size_of::<f32>(),
-        header if header.contains("'descr':'<f8'") => size_of::<f64>(),
-        _ => return Err(format!("the array is {header}; accepted: float32 or float64")),
-    };
+    let is_single = header.contains("'descr':'<f4'");
+    let is_double = header.contains("'descr':'<f8'");
+    if !is_single && !is_double {
+        return Err(format!("the array is {header}; accepted: float32 or float64"));
+    }
+    let size = if is_single { size_of::<f32>() } else { size_of::<f64>() };
     // A copy that was cut off would otherwise train the tree for a part of its rays.
     if segments.checked_mul(6 * size) != Some(data.len()) {
         let bytes = data.len();
         return Err(format!("the array is {header} and has {bytes} bytes of data"));
     }
-    if size == size_of::<f32>() {
-        return floats(data);
+    if is_single {
+        return read_floats(data);
     }
-    let (numbers, _) = data.as_chunks();
-    Ok(numbers
+    // The length is right, so no bytes remain.
+    let (doubles, _) = data.as_chunks();
+    Ok(doubles
         .iter()
-        .map(|&number| f64::from_le_bytes(number) as f32)
+        .map(|&double| f64::from_le_bytes(double) as f32)
         .collect())
 }
 
+/// Splits an array of numpy into its header, without spaces, and its data. Returns `None` if the
+/// bytes are no such array. The format is described in `numpy.lib.format`.
+fn split_npy(bytes: &[u8]) -> Option<(String, &[u8])> {
+    let rest = bytes.strip_prefix(b"\x93NUMPY")?;
+    let (&[major, _minor], rest) = rest.split_first_chunk()?;
+    // The length of the header has two bytes in version 1, and four in later ones.
+    let (length, rest) = if major == 1 {
+        let (&length, rest) = rest.split_first_chunk()?;
+        (usize::from(u16::from_le_bytes(length)), rest)
+    } else {
+        let (&length, rest) = rest.split_first_chunk()?;
+        (u32::from_le_bytes(length) as usize, rest)
+    };
+    let (header, data) = rest.split_at_checked(length)?;
+    let header = str::from_utf8(header).ok()?;
+    Some((header.split_whitespace().collect(), data))
+}
+
 /// Returns the shape in the header of an array of numpy, from which spaces are removed.
-fn shape(header: &str) -> Option<Vec<usize>> {
+fn npy_shape(header: &str) -> Option<Vec<usize>> {
     let (_, rest) = header.split_once("'shape':(")?;
     let (shape, _) = rest.split_once(')')?;
     shape
