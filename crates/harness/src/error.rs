@@ -79,8 +79,8 @@ pub enum Error {
     )]
     Differs { differences: usize },
     /// A finished run whose files no longer match their checksums.
-    #[error("{}: {file} is damaged or missing", .part.display())]
-    Damaged { part: PathBuf, file: String },
+    #[error("{}: {file} is damaged or missing", .run.display())]
+    Damaged { run: PathBuf, file: String },
     /// Parts of an experiment that cannot be joined.
     #[error("{experiment}: {message}")]
     Merge { experiment: String, message: String },

@@ -1,86 +1,22 @@
 //! The folder of one experiment's results: one writer at a time, finished runs kept one by one,
 //! files replaced whole.
 //!
-//! Until all runs are finished, each finished one is a folder `.partial/NNNNNN/` with its own rows.
-//! The folder is written under another name, synced, and renamed, so that every finished run
-//! survives a crash, a full disk or `kill -9`. At the end the rows of all runs are joined in the
+//! Until all runs are finished, each finished one is *kept* as a folder `.partial/NNNNNN/` with its
+//! own rows. The folder is written under another name, synced, and renamed, so that every finished
+//! run survives a crash, a full disk or `kill -9`. At the end the rows of all runs are joined in the
 //! order of the spec, so that their bytes do not depend on the order in which runs finish.
 
+use super::finished_run::{CONTENTS, FinishedRun};
 use super::lock::lock_folder;
 use super::{Row, read_if_any, to_bytes};
 use crate::Error;
-use bvh_scenes::fnv1a;
 use bvh_terminal::files;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs::{self, File};
+use std::io;
 use std::path::{Path, PathBuf};
 
-/// The file in which a kept run lists its other files, one a line: name, number of bytes and
-/// checksum.
-const CONTENTS: &str = "contents.txt";
-
-/// The rows of one finished run: one CSV file for every kind of rows that it has.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct FinishedRun {
-    files: BTreeMap<String, Vec<u8>>,
-}
-
-impl FinishedRun {
-    /// Adds rows of one kind, once per kind; none leave no file.
-    pub fn add<R: Row>(&mut self, rows: &[R]) -> Result<(), Error> {
-        if !rows.is_empty() {
-            self.files
-                .insert(R::FILE.into(), to_bytes(rows, Path::new(R::FILE))?);
-        }
-        Ok(())
-    }
-
-    /// Reads a kept run. Rejects a run whose files differ from the written ones.
-    pub fn read(part: &Path) -> Result<Self, Error> {
-        let damaged = |file: &str| Error::Damaged { part: part.to_owned(), file: file.to_owned() };
-        let contents = fs::read_to_string(part.join(CONTENTS)).map_err(|_| damaged(CONTENTS))?;
-        let mut files = BTreeMap::new();
-        for name in files::names(part)?
-            .into_iter()
-            .filter(|name| name != CONTENTS)
-        {
-            let path = part.join(&name);
-            files.insert(name, fs::read(&path).map_err(Error::io(&path, "read the file"))?);
-        }
-        let run = Self { files };
-        let found = run.contents();
-        let [expected, found] =
-            [&contents, &found].map(|text| text.lines().collect::<BTreeSet<&str>>());
-        match expected.symmetric_difference(&found).next() {
-            Some(line) => Err(damaged(line.split(' ').next().unwrap_or_default())),
-            // Every run has rows.
-            None if expected.is_empty() => Err(damaged(CONTENTS)),
-            None => Ok(run),
-        }
-    }
-
-    /// Returns the text of the file [`CONTENTS`].
-    fn contents(&self) -> String {
-        let line = |(name, bytes): (&String, &Vec<u8>)| {
-            format!("{name} {} {:016x}\n", bytes.len(), fnv1a(bytes.iter().copied()))
-        };
-        self.files.iter().map(line).collect()
-    }
-
-    /// Returns the first file without seconds in which two runs differ.
-    pub fn difference<'a>(&'a self, other: &'a Self) -> Option<&'a str> {
-        let names = self
-            .files
-            .keys()
-            .chain(other.files.keys())
-            .map(String::as_str);
-        names
-            .filter(|name| !name.starts_with("timing"))
-            .find(|&name| self.files.get(name) != other.files.get(name))
-    }
-}
-
-/// The treatment of results that exist already.
+/// The treatment of results that are in the folder already.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Existing {
     /// They stay. A repetition of the same runs goes into a folder next to them; other runs are
@@ -93,8 +29,12 @@ pub enum Existing {
     Replace,
 }
 
-/// The file in the folder of a part that tells where its runs come from.
+/// The file in `.partial/` that tells on which machine, and of which part of the experiment, its
+/// runs come from.
 pub const PART_PROVENANCE: &str = "provenance.toml";
+
+/// The file in `.partial/` with the resolved spec of its runs.
+const SPEC: &str = "resolved.toml";
 
 /// The name of `.partial/` while it is removed.
 const REMOVED: &str = ".removed";
@@ -108,45 +48,65 @@ pub struct Store {
 }
 
 impl Store {
-    /// Creates and locks `folder`. If it has finished runs of an interrupted experiment, `existing`
-    /// decides: they are resumed, which requires the same resolved spec, or discarded, or the
-    /// folder is rejected.
+    /// Creates and locks `folder` for the experiment whose resolved spec is the text `resolved`. If
+    /// the folder has finished runs of an interrupted experiment, `existing` decides: they are
+    /// resumed, which requires the same resolved spec, or discarded, or the folder is rejected.
+    ///
+    /// # Errors
+    ///
+    /// If another harness has locked the folder, if its finished runs may be neither resumed nor
+    /// discarded, or if the folder cannot be read or written.
     pub fn open(folder: &Path, resolved: &str, existing: Existing) -> Result<Self, Error> {
-        let (folder, partial) = (folder.to_owned(), folder.join(".partial"));
+        let folder = folder.to_owned();
+        let partial = folder.join(".partial");
         fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;
         let lock = lock_folder(&folder)?;
-        let removed = folder.join(REMOVED);
-        if removed.exists() {
-            remove(&removed)?;
-        }
+        remove_if_any(&folder.join(REMOVED))?;
+        let store = Self { folder, partial, _lock: lock };
         // The spec is kept with the runs, because a run of another spec must never be resumed.
-        let spec = partial.join("resolved.toml");
-        let found = fs::read_to_string(&spec).ok();
-        let rejected = |what: &str| Err(Error::Usage(format!("{}: {what}", folder.display())));
+        let spec = store.partial.join(SPEC);
+        let found = match existing {
+            Existing::Replace => None,
+            Existing::Keep | Existing::Resume => read_text_if_any(&spec)?,
+        };
         match (existing, found) {
-            (Existing::Resume, Some(found)) if found == resolved => {}
+            (Existing::Resume, Some(found)) if found == resolved => return Ok(store),
             (Existing::Resume, Some(_)) => {
-                return rejected(
+                return Err(store.rejected(
                     "the interrupted experiment had another spec, scene or seed; --force discards it",
-                );
+                ));
             }
-            (Existing::Keep, Some(_)) if has_finished_runs(&partial)? => {
-                return rejected(
-                    "there are finished runs of an interrupted experiment; --resume does the rest, --force \
-                     discards them",
-                );
+            (Existing::Keep, Some(_)) if has_finished_runs(&store.partial)? => {
+                return Err(store.rejected(
+                    "there are finished runs of an interrupted experiment; --resume does the rest, \
+                     --force discards them",
+                ));
             }
-            _ => {
-                if partial.is_dir() {
-                    fs::rename(&partial, &removed)
-                        .map_err(Error::io(&partial, "rename the folder"))?;
-                    remove(&removed)?;
-                }
-                fs::create_dir_all(&partial).map_err(Error::io(&partial, "create the folder"))?;
-                files::write(&spec, resolved.as_bytes())?;
-            }
+            _ => {}
         }
-        Ok(Self { folder, partial, _lock: lock })
+        store.discard_runs()?;
+        fs::create_dir_all(&store.partial)
+            .map_err(Error::io(&store.partial, "create the folder"))?;
+        files::write(&spec, resolved.as_bytes())?;
+        Ok(store)
+    }
+
+    /// Returns the error that the folder is rejected, with the reason.
+    fn rejected(&self, reason: &str) -> Error {
+        Error::Usage(format!("{}: {reason}", self.folder.display()))
+    }
+
+    /// Removes `.partial/`, if there is one.
+    fn discard_runs(&self) -> Result<(), Error> {
+        if !self.partial.is_dir() {
+            return Ok(());
+        }
+        // Renamed first, so that an interrupted removal leaves nothing that looks like finished
+        // runs.
+        let removed = self.folder.join(REMOVED);
+        fs::rename(&self.partial, &removed)
+            .map_err(Error::io(&self.partial, "rename the folder"))?;
+        remove(&removed)
     }
 
     /// The folder of the results.
@@ -154,8 +114,9 @@ impl Store {
         &self.folder
     }
 
-    fn part(&self, index: usize) -> PathBuf {
-        self.partial.join(part_name(index))
+    /// Returns the folder that run `index` has once it is kept.
+    fn run_folder(&self, index: usize) -> PathBuf {
+        self.partial.join(run_folder_name(index))
     }
 
     /// Returns true if run `index` has been kept.
@@ -164,59 +125,52 @@ impl Store {
     ///
     /// If its files are damaged.
     pub fn has(&self, index: usize) -> Result<bool, Error> {
-        let part = self.part(index);
-        if part.is_dir() { FinishedRun::read(&part).map(|_| true) } else { Ok(false) }
+        let run_folder = self.run_folder(index);
+        if !run_folder.is_dir() {
+            return Ok(false);
+        }
+        FinishedRun::read(&run_folder)?;
+        Ok(true)
     }
 
     /// Keeps run `index`. Replaces a damaged copy of it.
     pub fn keep(&self, index: usize, run: &FinishedRun) -> Result<(), Error> {
-        let part = self.part(index);
-        let unfinished = part.with_extension("unfinished");
+        let run_folder = self.run_folder(index);
+        let unfinished = run_folder.with_extension("unfinished");
         // A killed harness may have left half a folder under either name.
-        for old in [&unfinished, &part] {
-            if old.exists() {
-                fs::remove_dir_all(old).map_err(Error::io(old, "remove the folder"))?;
-            }
-        }
-        fs::create_dir(&unfinished).map_err(Error::io(&unfinished, "create the folder"))?;
-        for (name, bytes) in &run.files {
-            files::write_synced(&unfinished.join(name), bytes)?;
-        }
-        files::write_synced(&unfinished.join(CONTENTS), run.contents().as_bytes())?;
-        fs::rename(&unfinished, &part).map_err(Error::io(&part, "rename the folder"))
+        remove_if_any(&unfinished)?;
+        remove_if_any(&run_folder)?;
+        run.write(&unfinished)?;
+        fs::rename(&unfinished, &run_folder).map_err(Error::io(&run_folder, "rename the folder"))
     }
 
     /// Returns the rows of one kind of the kept run `index`; none if it has no such rows.
     pub fn rows<R: Row>(&self, index: usize) -> Result<Vec<R>, Error> {
-        read_if_any(&self.part(index))
+        read_if_any(&self.run_folder(index))
     }
 
-    /// Joins all `runs` kept runs into the CSV files.
+    /// Joins the CSV files of runs 0 to `runs` − 1, which have been kept, in this order.
     pub fn join(&self, runs: usize) -> Result<(), Error> {
-        let parts: Vec<(PathBuf, BTreeSet<String>)> = (0..runs)
-            .map(|index| self.part(index))
-            .map(|part| Ok((part.clone(), files::names(&part)?)))
-            .collect::<Result<_, Error>>()?;
-        let names: BTreeSet<&String> = parts
-            .iter()
-            .flat_map(|(_, names)| names)
-            .collect();
-        let names = names.into_iter().filter(|name| *name != CONTENTS);
-        for name in names {
+        // By name, the folders of the runs that have such a file.
+        let mut folders_by_name: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
+        for index in 0..runs {
+            let run_folder = self.run_folder(index);
+            for name in files::names(&run_folder)? {
+                folders_by_name
+                    .entry(name)
+                    .or_default()
+                    .push(run_folder.clone());
+            }
+        }
+        folders_by_name.remove(CONTENTS);
+        for (name, run_folders) in folders_by_name {
             let mut joined = Vec::new();
-            for (part, _) in parts
-                .iter()
-                .filter(|(_, names)| names.contains(name))
-            {
-                let path = part.join(name);
+            for run_folder in run_folders {
+                let path = run_folder.join(&name);
                 let bytes = fs::read(&path).map_err(Error::io(&path, "read the file"))?;
-                // Every part begins with the same header line.
-                let header = bytes
-                    .iter()
-                    .position(|&byte| byte == b'\n')
-                    .map_or(bytes.len(), |end| end + 1);
-                // A header in the middle would be read as a row.
-                joined.extend_from_slice(if joined.is_empty() { &bytes } else { &bytes[header..] });
+                // All runs have the same header, which would be a row in the middle of the file.
+                let added = if joined.is_empty() { &bytes } else { without_header(&bytes) };
+                joined.extend_from_slice(added);
             }
             files::write(&self.folder.join(name), &joined)?;
         }
@@ -233,7 +187,7 @@ impl Store {
         Ok(files::write(&self.folder.join(name), bytes)?)
     }
 
-    /// The file next to the finished runs of a part that has their provenance.
+    /// Returns the path of the file [`PART_PROVENANCE`].
     pub fn part_provenance(&self) -> PathBuf {
         self.partial.join(PART_PROVENANCE)
     }
@@ -241,12 +195,7 @@ impl Store {
     /// Removes the kept runs, which only an interrupted experiment needs. The lock file stays:
     /// removing it would race.
     pub fn finish(self) -> Result<(), Error> {
-        // Renamed first, so that an interrupted removal leaves nothing that looks like finished
-        // runs.
-        let removed = self.folder.join(REMOVED);
-        fs::rename(&self.partial, &removed)
-            .map_err(Error::io(&self.partial, "rename the folder"))?;
-        remove(&removed)
+        self.discard_runs()
     }
 }
 
@@ -268,8 +217,30 @@ fn remove(folder: &Path) -> Result<(), Error> {
     fs::remove_dir_all(folder).map_err(Error::io(folder, "remove the folder"))
 }
 
+/// Returns the text of a file; `None` if there is no such file.
+fn read_text_if_any(path: &Path) -> Result<Option<String>, Error> {
+    match fs::read_to_string(path) {
+        Ok(text) => Ok(Some(text)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(Error::io(path, "read the file")(error)),
+    }
+}
+
+/// Removes a folder and everything in it, if there is one.
+fn remove_if_any(folder: &Path) -> Result<(), Error> {
+    if folder.exists() { remove(folder) } else { Ok(()) }
+}
+
+/// Returns the lines of a CSV file below its header.
+fn without_header(bytes: &[u8]) -> &[u8] {
+    match bytes.iter().position(|&byte| byte == b'\n') {
+        Some(end) => &bytes[end + 1..],
+        None => &[],
+    }
+}
+
 /// Returns the name of the folder of the kept run `index`.
-pub fn part_name(index: usize) -> String {
+pub fn run_folder_name(index: usize) -> String {
     format!("{index:06}")
 }
 
@@ -278,9 +249,15 @@ pub fn is_unfinished(folder: &Path) -> bool {
     folder.join(".partial").exists()
 }
 
+/// Returns true if a folder `.partial/` has kept runs.
 fn has_finished_runs(partial: &Path) -> Result<bool, Error> {
-    let is_run = |name: &String| !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_digit());
-    Ok(files::names(partial)?.iter().any(is_run))
+    let names = files::names(partial)?;
+    Ok(names.iter().any(|name| is_run_folder_name(name)))
+}
+
+/// Returns true if a name is one of [`run_folder_name`].
+fn is_run_folder_name(name: &str) -> bool {
+    !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_digit())
 }
 
 #[cfg(test)]
@@ -291,10 +268,7 @@ mod tests {
     // blocked.
 
     fn run() -> FinishedRun {
-        let file = |name: &str, text: &str| (name.to_owned(), text.as_bytes().to_vec());
-        FinishedRun {
-            files: [file("runs.csv", "a,b\n1,2\n"), file("history.csv", "a\n1\n")].into(),
-        }
+        FinishedRun::of_texts([("runs.csv", "a,b\n1,2\n"), ("history.csv", "a\n1\n")])
     }
 
     #[test]
@@ -303,22 +277,41 @@ mod tests {
         let store = Store::open(&out.path().join("x"), "", Existing::Keep).unwrap();
         type Damage = fn(&Path);
         let damages: [(&str, Damage); 6] = [
-            ("runs.csv", |part| fs::remove_file(part.join("runs.csv")).unwrap()),
-            ("runs.csv", |part| fs::write(part.join("runs.csv"), "").unwrap()),
-            ("runs.csv", |part| fs::write(part.join("runs.csv"), "a,b\n").unwrap()),
-            ("history.csv", |part| fs::write(part.join("history.csv"), "a\n2\n").unwrap()),
-            ("rays.csv", |part| fs::write(part.join("rays.csv"), "a\n").unwrap()),
-            (CONTENTS, |part| fs::remove_file(part.join(CONTENTS)).unwrap()),
+            ("runs.csv", |run| fs::remove_file(run.join("runs.csv")).unwrap()),
+            ("runs.csv", |run| fs::write(run.join("runs.csv"), "").unwrap()),
+            ("runs.csv", |run| fs::write(run.join("runs.csv"), "a,b\n").unwrap()),
+            ("history.csv", |run| fs::write(run.join("history.csv"), "a\n2\n").unwrap()),
+            ("rays.csv", |run| fs::write(run.join("rays.csv"), "a\n").unwrap()),
+            (CONTENTS, |run| fs::remove_file(run.join(CONTENTS)).unwrap()),
         ];
         for (file, damage) in damages {
             store.keep(0, &run()).unwrap();
             assert!(store.has(0).unwrap());
-            damage(&store.part(0));
+            damage(&store.run_folder(0));
             let message = store.has(0).unwrap_err().to_string();
             assert!(message.contains(file) && message.contains("000000"), "{message}");
         }
         // The run is done again, and what was damaged is replaced.
         store.keep(0, &run()).unwrap();
         assert!(store.has(0).unwrap());
+    }
+
+    #[test]
+    fn finished_runs_are_not_discarded_because_their_spec_cannot_be_read() {
+        let out = tempfile::tempdir().unwrap();
+        let folder = out.path().join("x");
+        Store::open(&folder, "", Existing::Keep)
+            .unwrap()
+            .keep(0, &run())
+            .unwrap();
+        let spec = folder.join(".partial").join(SPEC);
+        fs::write(&spec, [0xff]).unwrap();
+        for existing in [Existing::Keep, Existing::Resume] {
+            let error = Store::open(&folder, "", existing).unwrap_err();
+            assert!(matches!(error, Error::Io { path, .. } if path == spec));
+        }
+        assert!(folder.join(".partial/000000/runs.csv").is_file());
+        Store::open(&folder, "", Existing::Replace).unwrap();
+        assert!(!folder.join(".partial/000000").exists());
     }
 }

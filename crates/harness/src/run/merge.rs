@@ -2,8 +2,9 @@
 //! writes.
 
 use crate::Error;
+use crate::rows::finished_run::FinishedRun;
 use crate::rows::lock::lock_folder;
-use crate::rows::store::{self, Existing, FinishedRun, Store};
+use crate::rows::store::{self, Existing, Store};
 use crate::run::finish::conclude;
 use crate::run::provenance::Provenance;
 use crate::run::reference::BestKnown;
@@ -205,7 +206,7 @@ fn owners(
     for index in 0..resolved.run_count() {
         let mut copies = parts
             .iter()
-            .map(|part| part.partial.join(store::part_name(index)))
+            .map(|part| part.partial.join(store::run_folder_name(index)))
             .filter(|copy| copy.is_dir());
         let Some(owner) = copies.next() else {
             missing.push(index);

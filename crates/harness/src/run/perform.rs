@@ -7,7 +7,7 @@ use crate::Error;
 use crate::contestant::{Contestant, Labelled};
 use crate::peers::Built;
 use crate::rows::BoundRow;
-use crate::rows::store::FinishedRun;
+use crate::rows::finished_run::FinishedRun;
 use crate::spec::Experiment;
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::{Bvh, validate_references};
