@@ -2,13 +2,13 @@
 
 use bvh_core::Segment;
 
-/// Reads segments, in the scene's coordinates, from a file in the format `npy` or `csv`; in any other
-/// format the file is little-endian `f32`. Numbers in f64 are rounded to f32.
+/// Reads segments, in the scene's coordinates, from a file in the format `npy` or `csv`; in any
+/// other format the file is little-endian `f32`. Numbers in f64 are rounded to f32.
 ///
 /// # Errors
 ///
-/// Returns a message for a file that is damaged, has no segments or has a number that is not finite.
-/// Messages count lines from 1, as editors do, and segments from 0, as arrays do.
+/// Returns a message for a file that is damaged, has no segments or has a number that is not
+/// finite. Messages count lines from 1, as editors do, and segments from 0, as arrays do.
 pub fn read(format: &str, bytes: &[u8]) -> Result<Vec<Segment>, String> {
     let numbers = match format {
         "npy" => read_npy(bytes)?,

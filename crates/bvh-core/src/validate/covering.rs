@@ -7,9 +7,9 @@
 use crate::{Aabb, Clip};
 use alloc::vec::Vec;
 
-/// The number of cuts per leaf after which a covering is rejected, so that a forged file cannot keep
-/// the check busy forever. Leaves that builders and searches make by dividing an object at planes
-/// need a few cuts each.
+/// The number of cuts per leaf after which a covering is rejected, so that a forged file cannot
+/// keep the check busy forever. Leaves that builders and searches make by dividing an object at
+/// planes need a few cuts each.
 const CUTS_PER_LEAF: usize = 256;
 
 /// Returns whether every part of `object`, whose box is `full`, is in one of the boxes `leaves`,

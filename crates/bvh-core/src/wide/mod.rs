@@ -205,8 +205,8 @@ impl WideBvh {
         walk::<NEAREST_HIT>(self, ray, counter, |_| true)
     }
 
-    /// Returns whether `ray` meets [any triangle](Self::any_hit) by [`Kernel::Portable`], and counts
-    /// the tests as [`nearest_hit_counted`](Self::nearest_hit_counted) does.
+    /// Returns whether `ray` meets [any triangle](Self::any_hit) by [`Kernel::Portable`], and
+    /// counts the tests as [`nearest_hit_counted`](Self::nearest_hit_counted) does.
     #[inline(never)]
     pub fn any_hit_counted(&self, ray: &Ray, counter: &mut impl Counter) -> bool {
         walk::<ANY_HIT>(self, ray, counter, |_| true).is_some()

@@ -129,8 +129,8 @@ fn top_down_may_be_better(
     Ok(area_divided < TOP_DOWN_BELOW * area_clustered)
 }
 
-/// Improves the initial tree by reinsertion until a local optimum, or until the time or work is used
-/// up.
+/// Improves the initial tree by reinsertion until a local optimum, or until the time or work is
+/// used up.
 fn improved<'p>(
     start: Start,
     limit: Option<&TimeLimit>,

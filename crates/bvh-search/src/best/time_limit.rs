@@ -11,8 +11,8 @@ use crate::tuning::{
 };
 use bvh_build::ploc::{self, MortonOrder};
 
-/// The shortest duration of a sort, as a fraction of all time. A coarse clock may not advance during
-/// a sort, and sort times divide by its duration.
+/// The shortest duration of a sort, as a fraction of all time. A coarse clock may not advance
+/// during a sort, and sort times divide by its duration.
 const SHORTEST_SORT: f64 = 1e-9;
 
 /// The time of a search with a clock. Its unit, a *sort time*, is the duration of the Morton sort.
@@ -24,8 +24,8 @@ pub(super) struct TimeLimit {
 }
 
 impl TimeLimit {
-    /// Reads the clock after the sort that began at the fraction `began` of all time. Returns `None`
-    /// without a clock.
+    /// Reads the clock after the sort that began at the fraction `began` of all time. Returns
+    /// `None` without a clock.
     pub fn after_sort(began: Option<f64>, observer: &dyn Observer) -> Option<Self> {
         let began = began?;
         let sort = (observer.progress()? - began).max(SHORTEST_SORT);
@@ -70,8 +70,8 @@ impl TimeLimit {
         None
     }
 
-    /// Returns the fraction of all time at which reinsertion must end, so that the tree can still be
-    /// ordered and evaluated.
+    /// Returns the fraction of all time at which reinsertion must end, so that the tree can still
+    /// be ordered and evaluated.
     pub fn end_of_reinsertion(&self) -> f64 {
         1.0 - FINISH_TIME * self.sort
     }

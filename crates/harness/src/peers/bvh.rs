@@ -18,8 +18,8 @@ use std::time::Instant;
 struct Shape {
     aabb: TheirAabb<f32, 3>,
     corners: [Point3<f32>; 3],
-    /// The object's index in the scene. The library keeps the order of the shapes, but its iterators
-    /// return shapes without their indices.
+    /// The object's index in the scene. The library keeps the order of the shapes, but its
+    /// iterators return shapes without their indices.
     object: u32,
     /// The index of the shape's leaf, which the library writes.
     node: usize,
@@ -152,10 +152,10 @@ impl PreparedRay {
             .is_some_and(|(entry, _)| entry > limit)
     }
 
-    /// Returns the nearest hit in the ray's range, or for [`Query::Any`] the first one found, by the
-    /// library's iterator over boxes in the order of their distances. The search ends at the first
-    /// box behind the nearest hit. This traversal is the library's only one that is ordered and works
-    /// at any depth.
+    /// Returns the nearest hit in the ray's range, or for [`Query::Any`] the first one found, by
+    /// the library's iterator over boxes in the order of their distances. The search ends at the
+    /// first box behind the nearest hit. This traversal is the library's only one that is ordered
+    /// and works at any depth.
     #[inline(always)]
     fn hit(&self, tree: &TheirBvh<f32, 3>, shapes: &[Shape], query: Query) -> Option<Hit> {
         let mut nearest = None;

@@ -91,8 +91,8 @@ macro_rules! traced_by {
 }
 
 /// Returns the preset's binary tree and its compressed eight-wide tree, with triangles in the order
-/// of leaves, as the library recommends. It expects rays with unit directions; ours have unit length
-/// up to rounding.
+/// of leaves, as the library recommends. It expects rays with unit directions; ours have unit
+/// length up to rounding.
 pub(super) fn contenders(config: &Obvhs, triangles: &[Triangle]) -> Vec<Contender<'static>> {
     let theirs: Vec<TheirTriangle> = triangles
         .iter()

@@ -3,8 +3,8 @@
 //!
 //! Until all runs are finished, each finished one is *kept* as a folder `.partial/NNNNNN/` with its
 //! own rows. The folder is written under another name, synced, and renamed, so that every finished
-//! run survives a crash, a full disk or `kill -9`. At the end the rows of all runs are joined in the
-//! order of the spec, so that their bytes do not depend on the order in which runs finish.
+//! run survives a crash, a full disk or `kill -9`. At the end the rows of all runs are joined in
+//! the order of the spec, so that their bytes do not depend on the order in which runs finish.
 
 use super::finished_run::{CONTENTS, FinishedRun};
 use super::lock::lock_folder;

@@ -51,8 +51,8 @@ impl Instances {
     }
 
     /// Returns the ray in the coordinates of an instance's part, and the distance at which it
-    /// enters the instance's box. Returns `None` if the ray does not enter the box up to `t_max`, or
-    /// if the instance's transform makes its direction vanish or overflow.
+    /// enters the instance's box. Returns `None` if the ray does not enter the box up to `t_max`,
+    /// or if the instance's transform makes its direction vanish or overflow.
     #[inline(always)]
     pub(crate) fn enter(&self, instance: u32, ray: &Ray, t_max: f32) -> Option<(Ray, f32)> {
         let placed = &self.placed[instance as usize];
