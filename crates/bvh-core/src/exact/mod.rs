@@ -78,10 +78,12 @@
 //! predicates' (filters and expansions). Differs from Woop et al.: the shear decides no answer,
 //! because the next layer decides every answer within the errors of the shear.
 
+mod volumes;
+
 use crate::Ray;
-use crate::expansion::Expansion;
 use crate::ray::{AXES, largest_axis};
 use glam::Vec3;
+use volumes::{Volumes, crossing};
 
 /// The answer of a layer with rounding errors about a line and a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -252,160 +254,6 @@ impl Line {
             Verdict::Unsure => crossing(ray, triangle),
         }
     }
-}
-
-/// Returns the rounded distance of [`Line::crossing`] by exact arithmetic. Does not allocate.
-#[cold]
-#[inline(never)]
-fn crossing(ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
-    let volumes = Volumes::new(ray, triangle)?;
-    let [u, v, w] = volumes.sides();
-    let is_crossed = u != 0 && u == v && v == w;
-    is_crossed
-        .then(|| volumes.rounded_distance())
-        .flatten()
-}
-
-type Vector<const N: usize> = [Expansion<N>; 3];
-
-/// Returns the exact difference of two points.
-fn difference(p: Vec3, q: Vec3) -> Vector<2> {
-    [0, 1, 2].map(|axis| Expansion::difference(p[axis], q[axis]))
-}
-
-/// Returns the exact cross product.
-fn cross(p: &Vector<2>, q: &Vector<2>) -> Vector<16> {
-    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
-        let mut component = Expansion::ZERO;
-        component.add_product(&p[i], &q[j]);
-        component.subtract_product(&p[j], &q[i]);
-        component
-    })
-}
-
-/// The exact values that decide whether a ray hits a triangle.
-struct Volumes<'a> {
-    direction: Vec3,
-    triangle: &'a [Vec3; 3],
-    /// The corners relative to the origin.
-    corners: [Vector<2>; 3],
-}
-
-/// The first and the second corner of the edges `u`, `v`, `w`.
-const EDGES: [[usize; 2]; 3] = [[2, 1], [0, 2], [1, 0]];
-
-impl<'a> Volumes<'a> {
-    /// Prepares exact values; `None` if a coordinate is not finite.
-    fn new(ray: &Ray, triangle: &'a [Vec3; 3]) -> Option<Self> {
-        let [a, b, c] = *triangle;
-        let origin = ray.origin();
-        let direction = ray.direction();
-        let is_finite = [a, b, c, origin, direction]
-            .iter()
-            .all(|point| point.is_finite());
-        is_finite.then(|| Self {
-            direction,
-            triangle,
-            corners: [a, b, c].map(|corner| difference(corner, origin)),
-        })
-    }
-
-    /// Returns `u`, `v` or `w`.
-    fn edge(&self, edge: usize) -> Expansion<96> {
-        let [first, second] = EDGES[edge];
-        self.along_direction(&cross(&self.corners[first], &self.corners[second]))
-    }
-
-    /// Returns the sides of the edges on which the ray is, never 0 for an edge that is not parallel
-    /// to it: the signs of `u`, `v` and `w` after the origin has moved by (ε, ε², ε³) with an
-    /// infinitely small ε > 0.
-    fn sides(&self) -> [i32; 3] {
-        [0, 1, 2].map(|number| {
-            let side = self.edge(number).sign();
-            if side != 0 {
-                return side;
-            }
-            let [first, second] = EDGES[number];
-            let edge = difference(self.triangle[second], self.triangle[first]);
-            let direction = self.direction.to_array().map(f64::from);
-            [(1, 2), (2, 0), (0, 1)]
-                .into_iter()
-                .map(|(i, j)| {
-                    let mut component: Expansion<8> = Expansion::ZERO;
-                    component.add_scaled(&edge[j], direction[i]);
-                    component.add_scaled(&edge[i], -direction[j]);
-                    component.sign()
-                })
-                .find(|&sign| sign != 0)
-                .unwrap_or(0)
-        })
-    }
-
-    /// Returns the distance of the triangle's plane, rounded once; `None` as [`round_quotient`].
-    fn rounded_distance(&self) -> Option<f32> {
-        let [a, b, c] = *self.triangle;
-        let normal = cross(&difference(b, a), &difference(c, a));
-        round_quotient(&self.along(&normal), &self.along_direction(&normal))
-    }
-
-    /// Returns the product of the direction and a vector.
-    fn along_direction(&self, vector: &Vector<16>) -> Expansion<96> {
-        let mut sum = Expansion::ZERO;
-        for (component, along) in vector.iter().zip(self.direction.to_array()) {
-            sum.add_scaled(component, f64::from(along));
-        }
-        sum
-    }
-
-    /// Returns the product of the first corner and a vector.
-    fn along(&self, vector: &Vector<16>) -> Expansion<192> {
-        let mut sum = Expansion::ZERO;
-        for (component, along) in vector.iter().zip(&self.corners[0]) {
-            sum.add_product(component, along);
-        }
-        sum
-    }
-}
-
-/// Returns the quotient, rounded to the nearest f32, ties to even; `None` if it is negative, if the
-/// denominator is zero, or if the quotient rounds to infinity.
-fn round_quotient(numerator: &Expansion<192>, denominator: &Expansion<96>) -> Option<f32> {
-    let sign = denominator.sign();
-    if sign == 0 || numerator.sign() * sign < 0 {
-        return None;
-    }
-    // The relative error of this quotient is below 2⁻³⁸, so it rounds to the right f32 or to a
-    // neighbour.
-    let near = ((numerator.approximate() / denominator.approximate()) as f32).min(f32::MAX);
-    // The side of `middle` on which the exact quotient is: −1, 0 or 1.
-    let side = |middle: f64| {
-        let mut difference: Expansion<384> = numerator.widened();
-        difference.add_scaled(denominator, -middle);
-        difference.sign() * sign
-    };
-    let is_odd = near.to_bits() & 1 == 1;
-    let above = side(middle_above(near));
-    if above > 0 || (above == 0 && is_odd) {
-        let up = near.next_up();
-        return up.is_finite().then_some(up);
-    }
-    if near > 0.0 {
-        let below = side(middle_above(near.next_down()));
-        if below < 0 || (below == 0 && is_odd) {
-            return Some(near.next_down());
-        }
-    }
-    // Turn −0 into +0.
-    Some(near + 0.0)
-}
-
-/// Returns the middle between a number that is not negative and the next f32. The number after the
-/// largest f32 is 2¹²⁸.
-fn middle_above(number: f32) -> f64 {
-    const BEYOND: f64 = 2.0 * (1_u128 << 127) as f64;
-    let next = number.next_up();
-    let next = if next.is_finite() { f64::from(next) } else { BEYOND };
-    0.5 * (f64::from(number) + next)
 }
 
 /// Returns the cross product, and the same with sums of absolute products instead of differences.
