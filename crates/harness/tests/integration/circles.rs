@@ -1,10 +1,10 @@
-//! Imports lead only downwards between the rooms of a crate, in the order of ARCHITECTURE.md, and
+//! Imports lead only downwards between the layers of a crate, in the order of ARCHITECTURE.md, and
 //! files import each other in no circle.
 //!
-//! A room is a file or folder at the top of a crate's sources. The test follows paths that begin
-//! with `crate`, `super`, or the name of a child module, through re-exports, to the file that
-//! defines the item. It ignores re-exports themselves, unit tests, and items that a module defines
-//! for the files of its folder.
+//! A layer consists of *top modules*, the files and folders at the top of a crate's sources. The
+//! test follows paths that begin with `crate`, `super`, or the name of a child module, through
+//! re-exports, to the file that defines the item. It ignores re-exports themselves, unit tests, and
+//! items that a module defines for the files of its folder.
 
 use crate::support::top;
 use std::collections::{BTreeMap, BTreeSet};
@@ -177,10 +177,10 @@ fn edges(folder: &Path) -> BTreeSet<(Module, Module)> {
     edges
 }
 
-/// Returns the crates whose rooms ARCHITECTURE.md lists, each with its floors from the top down.
-fn floors(page: &str) -> Vec<(String, Vec<Vec<String>>)> {
+/// Returns the crates of ARCHITECTURE.md, each with the top modules of its layers from the top down.
+fn layers(page: &str) -> Vec<(String, Vec<Vec<String>>)> {
     let block = page
-        .split("```floors\n")
+        .split("```layers\n")
         .nth(1)
         .unwrap()
         .split("```")
@@ -188,7 +188,7 @@ fn floors(page: &str) -> Vec<(String, Vec<Vec<String>>)> {
         .unwrap();
     // An indented line continues the crate above.
     let lines = block.replace("\n ", " ");
-    let floor = |names: &str| {
+    let layer = |names: &str| {
         names
             .split_whitespace()
             .map(|name| name.trim_end_matches(',').to_owned())
@@ -198,12 +198,12 @@ fn floors(page: &str) -> Vec<(String, Vec<Vec<String>>)> {
         .lines()
         .map(|line| line.split_once(' ').unwrap());
     crates
-        .map(|(name, floors)| (name.to_owned(), floors.split(" → ").map(floor).collect()))
+        .map(|(name, layers)| (name.to_owned(), layers.split(" → ").map(layer).collect()))
         .collect()
 }
 
-/// Returns the rooms of a crate: the files and folders at the top of its sources.
-fn rooms(folder: &Path) -> BTreeSet<String> {
+/// Returns the top modules of a crate.
+fn top_modules(folder: &Path) -> BTreeSet<String> {
     let mut found = BTreeMap::new();
     modules(folder, &Module::new(), &mut found);
     found
@@ -212,18 +212,18 @@ fn rooms(folder: &Path) -> BTreeSet<String> {
         .collect()
 }
 
-/// Returns all imports from a room to one that is not on a lower floor.
-fn rising(edges: &BTreeSet<(Module, Module)>, floors: &[Vec<String>]) -> Vec<String> {
-    let floor = |room: &String| {
-        floors
+/// Returns all imports from a top module to one that is not in a lower layer.
+fn rising(edges: &BTreeSet<(Module, Module)>, layers: &[Vec<String>]) -> Vec<String> {
+    let layer = |module: &String| {
+        layers
             .iter()
-            .position(|rooms| rooms.contains(room))
+            .position(|modules| modules.contains(module))
     };
     let mut rising = Vec::new();
     for (from, to) in edges {
-        // The root of a crate is no room.
-        let ([from_room, ..], [to_room, ..]) = (&from[..], &to[..]) else { continue };
-        if from_room != to_room && floor(to_room) <= floor(from_room) {
+        // The root of a crate is in no layer.
+        let ([from_top, ..], [to_top, ..]) = (&from[..], &to[..]) else { continue };
+        if from_top != to_top && layer(to_top) <= layer(from_top) {
             rising.push(format!("{} uses {}", from.join("/"), to.join("/")));
         }
     }
@@ -231,18 +231,18 @@ fn rising(edges: &BTreeSet<(Module, Module)>, floors: &[Vec<String>]) -> Vec<Str
 }
 
 #[test]
-fn rooms_import_only_rooms_on_lower_floors() {
+fn top_modules_import_only_from_lower_layers() {
     let page = fs::read_to_string(top().join("ARCHITECTURE.md")).unwrap();
-    let listed = floors(&page);
-    for (name, floors) in &listed {
+    let listed = layers(&page);
+    for (name, layers) in &listed {
         let folder = top().join("crates").join(name).join("src");
-        let known: BTreeSet<String> = floors.iter().flatten().cloned().collect();
+        let known: BTreeSet<String> = layers.iter().flatten().cloned().collect();
         assert_eq!(
             known,
-            rooms(&folder),
-            "{name}: the rooms of ARCHITECTURE.md, and those of the sources"
+            top_modules(&folder),
+            "{name}: the top modules of ARCHITECTURE.md, and of the sources"
         );
-        let rising = rising(&edges(&folder), floors);
+        let rising = rising(&edges(&folder), layers);
         assert!(rising.is_empty(), "{name}:\n{}", rising.join("\n"));
     }
     // Every crate of the workspace is listed.
@@ -267,16 +267,16 @@ fn rooms_import_only_rooms_on_lower_floors() {
 }
 
 #[test]
-fn an_import_of_a_room_above_is_found() {
+fn an_import_from_a_layer_above_is_found() {
     let folder = tempfile::tempdir().unwrap();
     let write = |file: &str, text: &str| fs::write(folder.path().join(file), text).unwrap();
     write("lib.rs", "pub mod above;\nmod below;\npub use below::Low;\n");
     write("above.rs", "use crate::Low;\npub struct High(Low);\n");
     write("below.rs", "pub struct Low;\n");
-    let floors = [vec!["above".to_owned()], vec!["below".to_owned()]];
-    assert_eq!(rising(&edges(folder.path()), &floors), [""; 0]);
+    let layers = [vec!["above".to_owned()], vec!["below".to_owned()]];
+    assert_eq!(rising(&edges(folder.path()), &layers), [""; 0]);
     write("below.rs", "use crate::above::High;\npub struct Low;\nfn f(_: High) {}\n");
-    assert_eq!(rising(&edges(folder.path()), &floors), ["below uses above"]);
+    assert_eq!(rising(&edges(folder.path()), &layers), ["below uses above"]);
 }
 
 #[test]

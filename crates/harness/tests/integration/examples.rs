@@ -13,8 +13,8 @@ use std::fs;
 #[test]
 fn every_block_has_a_language_whose_examples_are_run() {
     for block in blocks() {
-        // The floors are read by the test `circles`.
-        let languages = ["c", "floors", "python", "rust", "rust,no_run", "sh", "text", "toml"];
+        // The layers are read by the test `circles`.
+        let languages = ["c", "layers", "python", "rust", "rust,no_run", "sh", "text", "toml"];
         assert!(
             languages.contains(&block.language.as_str()),
             "{}: `{}`",
