@@ -32,6 +32,6 @@ while todo:
     todo += [(first, objects[:middle]), (first + 1, objects[middle:])]
 
 body = b"".join(struct.pack("<6f2I", *node) for node in nodes) + struct.pack("<%dI" % len(ids), *ids)
-head = struct.pack("<8s4I", b"\x89BVH\r\n\x1a\n", 2, 0x01020304, 0, zlib.crc32(data))
-head += struct.pack("<4Q3d6f64s20x", len(nodes), len(boxes), seed, 0, area, 0.0, 0.0, *nodes[0][:6], b"median")
+head = struct.pack("<8s4I", b"\x89BVH\r\n\x1a\n", 4, 0x01020304, 0, zlib.crc32(data))
+head += struct.pack("<4Q3d6f64sQI8x", len(nodes), len(boxes), seed, 0, area, 0.0, 0.0, *nodes[0][:6], b"median", len(ids), 0)
 open(sys.argv[2], "wb").write(head + struct.pack("<I", zlib.crc32(head, zlib.crc32(body))) + body)
