@@ -50,7 +50,7 @@ pub fn most_bytes(scene: &Scene, references: f64) -> usize {
 }
 
 /// The most bytes per object that a bake has allocated at once, the scene included, of which `best`
-/// with two threads needs most: `bytes_per_object` of `results/scale`.
+/// with two threads needs most: the greatest `bytes_per_object` of `results/scale`, as a test checks.
 const BYTES_PER_OBJECT: usize = 365;
 /// The most bytes per permitted reference that a bake with divided objects has allocated at once,
 /// which the division needs: five million triangles with 1.2 references each.
@@ -359,4 +359,32 @@ pub struct Figures {
     pub stop: StopReason,
     /// The time since the bake began.
     pub seconds: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_memory_that_a_bake_asks_for_is_the_most_that_one_was_measured_to_take() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../results/scale/timing_scale.csv");
+        let mut reader = csv::Reader::from_path(path).unwrap();
+        let headers = reader.headers().unwrap().clone();
+        let column = |name: &str| {
+            headers
+                .iter()
+                .position(|header| header == name)
+                .unwrap()
+        };
+        let phase = column("phase");
+        let bytes = column("bytes_per_object");
+        let mut most = 0.0f64;
+        for row in reader.records() {
+            let row = row.unwrap();
+            if row[phase].starts_with("bake") {
+                most = most.max(row[bytes].parse().unwrap());
+            }
+        }
+        assert_eq!(BYTES_PER_OBJECT, most.ceil() as usize);
+    }
 }
