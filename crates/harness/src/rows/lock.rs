@@ -41,18 +41,3 @@ fn lock_file(folder: &Path) -> Result<(PathBuf, File), Error> {
     let lock = lock.map_err(Error::io(&path, "create the file"))?;
     Ok((path, lock))
 }
-
-#[cfg(all(test, unix))]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_lock_is_never_taken_through_a_link() {
-        let folder = tempfile::tempdir().unwrap();
-        let precious = folder.path().join("precious");
-        fs::write(&precious, "kept").unwrap();
-        std::os::unix::fs::symlink(&precious, folder.path().join(".lock")).unwrap();
-        assert!(matches!(lock_folder(folder.path()), Err(Error::Io { .. })));
-        assert_eq!(fs::read(&precious).unwrap(), b"kept");
-    }
-}

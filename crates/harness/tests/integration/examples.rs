@@ -4,9 +4,9 @@
 
 #[path = "../../../bvh-terminal/tests/program/pages.rs"]
 mod pages;
-use crate::support::{ended, folder_with, run, text, top};
+use crate::support::{ended, run, top};
 use bvh_scenes::Scene;
-use pages::{Called, UNREADABLE, blocks, blocks_in, commands};
+use pages::{Called, blocks, blocks_in, commands};
 use std::collections::BTreeSet;
 use std::fs;
 
@@ -135,17 +135,5 @@ fn check_files(command: &[String], place: &str) {
     for (flag, package) in command.iter().zip(&command[1..]) {
         let is_there = flag != "-p" || top().join("crates").join(package).is_dir();
         assert!(is_there, "{place}: no package {package}");
-    }
-}
-
-#[test]
-fn what_is_not_read_is_found() {
-    let folder = folder_with("spec.toml", "");
-    for wrong in [
-        &["spec.toml", "--shardd", "1/8"][..],
-        &["spec.toml", "--shard", "0/8"],
-        &["merge", "parts"],
-    ] {
-        assert!(text(&run(folder.path(), wrong).stderr).contains(UNREADABLE), "{wrong:?}");
     }
 }

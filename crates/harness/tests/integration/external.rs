@@ -156,31 +156,3 @@ fn what_a_program_has_started_ends_with_it_however_the_program_ends() {
         }
     }
 }
-
-#[cfg(target_os = "linux")]
-#[test]
-fn a_tree_of_64_gigabytes_is_rejected_by_its_header() {
-    let folder = folder("truncate -s 64G \"$2\"", "");
-    refused(
-        folder.path(),
-        &["spec.toml"],
-        1,
-        &["method theirs", "its tree is invalid", "not a tree file"],
-    );
-}
-
-#[test]
-fn the_example_in_python_builds_a_tree() {
-    if !Command::new("python3")
-        .arg("--version")
-        .output()
-        .is_ok_and(|output| output.status.success())
-    {
-        return eprintln!("python3 is not here");
-    }
-    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scripts/external_method.py");
-    let folder = folder(&format!("exec python3 '{}' \"$@\"", example.display()), "");
-    said(folder.path(), &["spec.toml"]);
-    let rows = columns(folder.path(), ["method", "cost_over_base", "nodes", "stop"]);
-    assert!(rows[2][2] == "149" && rows[2][1].parse::<f64>().unwrap() < 3.0, "{rows:?}");
-}

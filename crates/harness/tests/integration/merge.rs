@@ -20,11 +20,6 @@ fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_di
     refused(&["merge", "one", "three", "--out", "merged"], 1, &missing);
     refused(&["merge", "one", "whole", "--out", "merged"], 2, &["whole", "--shard"]);
     refused(&["merge", "one", "nowhere", "--out", "merged"], 1, &["nowhere"]);
-    refused(
-        &["spec.toml", "--shard", "4/3", "--out", "merged"],
-        2,
-        &["--shard", "4/3", "from 1 to N"],
-    );
 
     // Two parts may hold the same run, as long as its results agree.
     part("2/3", "two");
