@@ -121,18 +121,16 @@ fn experiment(section: &Section) -> String {
         .iter()
         .map(|output| report(section, output))
         .collect();
-    let known = |figure: &&Drawing| {
-        section.outputs.iter().any(|output| {
-            output
-                .figures
-                .iter()
-                .any(|(name, _)| *name == figure.name)
-        })
+    let is_of_a_report = |figure: &Drawing| {
+        section
+            .outputs
+            .iter()
+            .any(|output| has_drawn(output, figure))
     };
     let others: String = section
         .figures
         .iter()
-        .filter(|figure| !known(figure))
+        .filter(|figure| !is_of_a_report(figure))
         .map(|drawn| figure(section, drawn))
         .collect();
     let Provenance { command, revision, rustc, cpu, threads, date, parts, .. } =
@@ -168,13 +166,10 @@ fn links(links: &[Link]) -> String {
 
 /// One report: its reading, figures and tables.
 fn report(section: &Section, output: &Output) -> String {
-    let drawn = section.figures.iter().filter(|drawn| {
-        output
-            .figures
-            .iter()
-            .any(|(name, _)| *name == drawn.name)
-    });
-    let figures: String = drawn
+    let figures: String = section
+        .figures
+        .iter()
+        .filter(|drawn| has_drawn(output, drawn))
         .map(|drawn| figure(section, drawn))
         .collect();
     let tables: String = output
@@ -191,6 +186,14 @@ fn report(section: &Section, output: &Output) -> String {
         format!("\n<p>{}</p>", escaped(reading))
     };
     format!("\n<h3>{}</h3>{reading}{figures}{tables}", escaped(&output.heading))
+}
+
+/// Returns true if the figure is one of the report.
+fn has_drawn(output: &Output, figure: &Drawing) -> bool {
+    output
+        .figures
+        .iter()
+        .any(|(name, _)| *name == figure.name)
 }
 
 fn figure_id(section: &Section, figure: &Drawing) -> String {

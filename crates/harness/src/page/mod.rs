@@ -7,10 +7,10 @@ use crate::report::output::Output;
 use crate::report::paper::Outcome;
 use crate::run::finish::outputs;
 use crate::run::provenance::Provenance;
-use crate::run::resolved::Resolved;
+use crate::run::resolved::{Resolved, read_toml};
+use ::figures::Figure;
 use bvh_scenes::SceneKind;
 use bvh_terminal::files;
-use serde::de::DeserializeOwned;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
@@ -96,10 +96,9 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
             .iter()
             .filter_map(move |file| Some((file, file.strip_suffix(suffix)?.to_owned())))
     };
-    let drawn: Vec<&String> = outputs
+    let drawn: Vec<&(String, Figure)> = outputs
         .iter()
         .flat_map(|output| &output.figures)
-        .map(|(name, _)| name)
         .collect();
     let mut figures = Vec::new();
     for (file, name) in ending(".svg") {
@@ -116,13 +115,13 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
     figures.sort_by_key(|figure| {
         drawn
             .iter()
-            .position(|name| **name == figure.name)
+            .position(|(name, _)| *name == figure.name)
             .unwrap_or(drawn.len())
     });
-    let first = outputs
-        .iter()
-        .flat_map(|output| &output.figures)
-        .next();
+    let miniature = drawn
+        .first()
+        .map(|(_, figure)| ::figures::miniature(figure))
+        .transpose()?;
     let specs =
         spec_file(name, &provenance).map(|path| Link { name: "spec".into(), to: way(out, &path) });
     let resolved = Link { name: "spec with all defaults".into(), ..link("resolved.toml") };
@@ -136,9 +135,7 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
         of_paper: outputs
             .iter()
             .any(|output| output.outcome.is_some()),
-        miniature: first
-            .map(|(_, figure)| figures::miniature(figure))
-            .transpose()?,
+        miniature,
         outputs,
         figures,
         specs: specs
@@ -221,8 +218,4 @@ fn way(page: &Path, file: &Path) -> String {
 
 fn read(path: &Path) -> Result<String, Error> {
     fs::read_to_string(path).map_err(Error::io(path, "read the file"))
-}
-
-fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
-    toml::from_str(&read(path)?).map_err(Error::toml(path))
 }

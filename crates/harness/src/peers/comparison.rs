@@ -5,7 +5,7 @@ use crate::measure::layout::{COMPILED, is_repeat, is_single};
 use crate::measure::speed::Traced;
 use crate::processor::PROCESSOR;
 use crate::rows::{PeerRayRow, RayRatioRow};
-use crate::statistics::{geometric_mean, range};
+use crate::statistics::{self, geometric_mean, range};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The library of our own contenders.
@@ -116,18 +116,13 @@ pub fn rows(speeds: &[Speed]) -> Vec<PeerRayRow> {
         PeerRayRow {
             scene: MEAN.into(),
             million_per_s: geometric_mean(&speeds),
-            build_seconds: mean_build_seconds(of_group.iter().map(|row| row.build_seconds)),
+            build_seconds: statistics::mean(of_group.iter().map(|row| row.build_seconds)),
             disagreements: of_group.iter().map(|row| row.disagreements).sum(),
             ..of_group[0].clone()
         }
     };
     let means: Vec<PeerRayRow> = complete.iter().map(mean).collect();
     [rows, means].concat()
-}
-
-fn mean_build_seconds(seconds: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let count = seconds.len() as f64;
-    seconds.sum::<f64>() / count
 }
 
 /// Returns true for the modes that ours are compared with.
@@ -157,13 +152,11 @@ pub fn ratios(speeds: &[Speed]) -> Vec<RayRatioRow> {
     {
         // Ratios are formed within one instruction set, to which all contenders are held.
         let key = [&speed.row.instructions, &speed.row.mode, &speed.row.rays].map(String::as_str);
-        groups.entry(key).or_insert_with(|| {
+        let group = groups.entry(key).or_insert_with(|| {
             order.push(key);
             Vec::new()
         });
-        groups
-            .entry(key)
-            .and_modify(|group| group.push(speed));
+        group.push(speed);
     }
     let mut rows = Vec::new();
     for key in order {
@@ -270,7 +263,7 @@ fn mean_ratio(scenes: &[OverFastest]) -> Option<RayRatioRow> {
         ratio,
         least_turn,
         greatest_turn,
-        build_seconds: mean_build_seconds(scenes.iter().map(|over| over.row.build_seconds)),
+        build_seconds: statistics::mean(scenes.iter().map(|over| over.row.build_seconds)),
         carried_by: carrier.row.scene.clone(),
         ratio_without: (!without.is_empty()).then(|| geometric_mean(&without)),
         ..carrier.row.clone()

@@ -2,7 +2,7 @@
 
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
-use crate::statistics::{quantile, range, sorted};
+use crate::statistics::{mean, quantile, range, sorted};
 use bvh_config::above;
 use bvh_scenes::SceneKind;
 
@@ -139,7 +139,7 @@ fn fraction_below(costs: &[f64], limit: f64) -> f64 {
 
 fn summarise<'a>(scene: &'a str, method: &'a str, costs: &[f64], base_cost: f64) -> Summary<'a> {
     let (n, at) = (costs.len() as f64, |q| quantile(costs, q).unwrap_or(f64::NAN));
-    let mean_cost = costs.iter().sum::<f64>() / n;
+    let mean_cost = mean(costs.iter().copied());
     let variance = costs
         .iter()
         .map(|cost| (cost - mean_cost).powi(2))

@@ -4,7 +4,7 @@
 use super::paper::{PaperRow, Verdict, ratios};
 use super::prelude::*;
 use crate::rows::TrialRow;
-use crate::statistics::{expected_best_of, median, range};
+use crate::statistics::{expected_best_of, mean, median, range};
 use bvh_config::{OutOfRange, above};
 use std::collections::BTreeMap;
 
@@ -262,7 +262,7 @@ impl<'a> Runs<'a> {
             .filter_map(|run| Some(run.last()?.incumbent))
             .collect();
         let (low, high) = range(costs.iter().copied())?;
-        let average = self.random.iter().sum::<f64>() / self.random.len() as f64;
+        let average = mean(self.random.iter().copied());
         Some(Final { low, median: median(&costs)?, high, average, base })
     }
 }

@@ -124,16 +124,10 @@ impl Report {
     /// suffices for all others.
     pub fn trial_methods(&self) -> Vec<&str> {
         match self {
-            Self::Trials(config) => config
-                .methods
-                .iter()
-                .map(String::as_str)
-                .collect(),
-            Self::Distribution(config) => config
-                .methods
-                .iter()
-                .map(String::as_str)
-                .collect(),
+            Self::Trials(trials::Config { methods, .. })
+            | Self::Distribution(distribution::Config { methods, .. }) => {
+                methods.iter().map(String::as_str).collect()
+            }
             Self::Generations(config) => vec![&config.method, &config.baseline],
             Self::Table(config) => config.trial_methods(),
             _ => vec![],
@@ -280,12 +274,10 @@ fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, usize)>
 
 /// Returns the answers of all reports in their order.
 fn answers(outputs: &[Output]) -> Vec<Answer> {
-    let mut answers: Vec<Answer> = Vec::new();
-    for output in outputs {
-        let Some(answer) = &output.answer else { continue };
-        answers.push(Answer { source: output.heading.clone(), answer: answer.clone() });
-    }
-    answers
+    let answer = |output: &Output| {
+        Some(Answer { source: output.heading.clone(), answer: output.answer.clone()? })
+    };
+    outputs.iter().filter_map(answer).collect()
 }
 
 /// Collects the comparisons with the paper of all reports. A number of the paper counts once, even

@@ -194,27 +194,21 @@ fn compared<'a>(rows: &'a Rows, row: &'a TestRow, base: &str) -> Option<Compared
 /// Compares the second method of a pair with the first, on all scenes and for all rays.
 fn paired<'a>(rows: &'a Rows, [first, second]: &'a [String; 2]) -> Vec<Paired<'a>> {
     let pair = |row: &'a TestRow| {
-        let Compared { tests_over_base, over_base_low: low, over_base_high: high, .. } =
-            compared(rows, row, first)?;
-        let verdict = match low.zip(high) {
-            Some((_, high)) if high < 1.0 => Verdict::Fewer,
-            Some((low, _)) if low > 1.0 => Verdict::More,
-            _ => Verdict::Inconclusive,
-        };
-        let TestRow { scene, judged_on, camera, .. } = row;
-        let method = second.as_str();
-        let against = first.as_str();
-        let tests_over_other = tests_over_base;
+        let over = compared(rows, row, first)?;
         Some(Paired {
-            scene,
-            method,
-            against,
-            judged_on,
-            camera,
-            tests_over_other,
-            low,
-            high,
-            verdict,
+            scene: &row.scene,
+            method: second,
+            against: first,
+            judged_on: &row.judged_on,
+            camera: &row.camera,
+            tests_over_other: over.tests_over_base,
+            low: over.over_base_low,
+            high: over.over_base_high,
+            verdict: match over.over_base_low.zip(over.over_base_high) {
+                Some((_, high)) if high < 1.0 => Verdict::Fewer,
+                Some((low, _)) if low > 1.0 => Verdict::More,
+                _ => Verdict::Inconclusive,
+            },
         })
     };
     rows.tests
@@ -252,15 +246,12 @@ fn means<'a>(table: &[Compared<'a>]) -> Vec<Compared<'a>> {
             .iter()
             .map(|row| row.tests_over_base)
             .collect();
-        let tests = None;
-        let over_base_low = None;
-        let over_base_high = None;
         Compared {
             scene: ALL,
-            tests,
+            tests: None,
             tests_over_base: geometric_mean(&ratios),
-            over_base_low,
-            over_base_high,
+            over_base_low: None,
+            over_base_high: None,
             ..*own[0]
         }
     };

@@ -220,21 +220,14 @@ impl Config {
     /// Returns a sentence on the scenes on which each column is below the base, and on the least
     /// ratio.
     fn reading(&self, cells: &[Cell]) -> String {
-        let of = |column: &Column| -> Vec<&Cell> {
-            cells
-                .iter()
-                .filter(|cell| cell.column == column.name)
-                .collect()
-        };
         let below = |column: &Column| {
-            of(column)
-                .iter()
+            of_column(cells, column)
                 .filter(|cell| cell.cost_over_base < 1.0)
                 .count()
         };
         let others = || self.columns.iter().skip(1);
         let counts = others().map(|column| (column.name.as_str(), below(column)));
-        let compared = others().flat_map(of);
+        let compared = others().flat_map(|column| of_column(cells, column));
         let Some(least) = compared.min_by(|a, b| a.cost_over_base.total_cmp(&b.cost_over_base))
         else {
             return String::new();
@@ -242,7 +235,7 @@ impl Config {
         let scenes = self
             .columns
             .first()
-            .map_or(0, |base| of(base).len());
+            .map_or(0, |base| of_column(cells, base).count());
         let Cell { column, scene, cost_over_base, .. } = least;
         let counts = tally(counts, scenes, "scenes");
         format!(
@@ -268,11 +261,19 @@ fn is_cut(cells: &[Cell]) -> bool {
             .any(|cell| cell.cost_over_base > MOST_OF_PAPER * theirs)
 }
 
-/// Returns the cell of a column on a scene.
-fn find<'c, 'a>(cells: &'c [Cell<'a>], scene: &str, column: &Column) -> Option<&'c Cell<'a>> {
+/// Returns the cells of a column.
+pub(super) fn of_column<'c, 'a>(
+    cells: &'c [Cell<'a>],
+    column: &Column,
+) -> impl Iterator<Item = &'c Cell<'a>> {
     cells
         .iter()
-        .find(|cell| cell.scene == scene && cell.column == column.name)
+        .filter(|cell| cell.column == column.name)
+}
+
+/// Returns the cell of a column on a scene.
+fn find<'c, 'a>(cells: &'c [Cell<'a>], scene: &str, column: &Column) -> Option<&'c Cell<'a>> {
+    of_column(cells, column).find(|cell| cell.scene == scene)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
 use super::sides::Sides;
-use super::table::{Cell, Column, Config};
+use super::table::{Cell, Column, Config, of_column};
 use std::cmp::Ordering;
 
 impl Config {
@@ -84,18 +84,13 @@ impl Config {
                 .filter_map(|scene| self.compare_readings(rows, scene, cells))
                 .collect();
         }
-        let of_column = |column: &Column| {
-            let own = cells
-                .iter()
-                .filter(|cell| cell.column == column.name);
-            own.filter_map(|cell| self.compare(rows, column, cell))
-                .collect::<Vec<_>>()
-        };
-        self.columns
-            .iter()
-            .skip(1)
-            .flat_map(of_column)
-            .collect()
+        let mut compared = Vec::new();
+        for column in self.columns.iter().skip(1) {
+            compared.extend(
+                of_column(cells, column).filter_map(|cell| self.compare(rows, column, cell)),
+            );
+        }
+        compared
     }
 
     /// Returns the sentence that compares with the paper: the numbers of scenes whose whole
@@ -105,20 +100,12 @@ impl Config {
         cells
             .iter()
             .find(|cell| cell.paper_over_base.is_some())?;
-        let of = |column: &Column| {
-            cells
-                .iter()
-                .filter(|cell| cell.column == column.name)
-                .collect::<Vec<_>>()
-        };
         if self.are_readings() {
-            let papers = of(self.columns.get(1)?)
-                .iter()
+            let papers = of_column(cells, self.columns.get(1)?)
                 .filter(|cell| cell.paper_over_base.is_some())
                 .count();
             let close = |column: &Column| {
-                of(column)
-                    .into_iter()
+                of_column(cells, column)
                     .filter(|cell| is_close(cell, self.tolerance))
                     .count()
             };
@@ -147,7 +134,7 @@ impl Config {
             ends.unwrap_or((cell.cost_over_base, cell.cost_over_base))
         };
         let say =
-            |column: &Column| Sides::of(of(column).into_iter().map(interval)).say(&column.name);
+            |column: &Column| Sides::of(of_column(cells, column).map(interval)).say(&column.name);
         let each = self.columns.iter().skip(1).map(say);
         Some(each.collect::<Vec<_>>().join(" "))
     }

@@ -1,8 +1,8 @@
 //! Compares fresh results with committed ones: the resolved spec key by key, CSV files row by row,
 //! and figures byte by byte. Files with times are not compared.
 
+use super::resolved::read_toml;
 use crate::Error;
-use bvh_scenes::read_text;
 use bvh_terminal::files;
 use csv::StringRecord;
 use std::collections::BTreeSet;
@@ -91,8 +91,7 @@ fn compare_specs(
 }
 
 fn read_spec(folder: &Path, skipped_scenes: &[String]) -> Result<Table, Error> {
-    let path = folder.join("resolved.toml");
-    let mut spec: Table = toml::from_str(&read_text(&path)?).map_err(Error::toml(&path))?;
+    let mut spec: Table = read_toml(&folder.join("resolved.toml"))?;
     if let Some(Value::Array(scenes)) = spec.get_mut("scenes") {
         scenes.retain(|scene| {
             let name = scene.get("name").and_then(Value::as_str);

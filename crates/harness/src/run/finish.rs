@@ -7,7 +7,7 @@ use crate::report::output::Output;
 use crate::rows::store::{self, Existing, Store};
 use crate::run::provenance::Provenance;
 use crate::run::reference::{self, BestKnown};
-use crate::run::resolved::{Resolved, to_toml};
+use crate::run::resolved::{Resolved, read_toml, to_toml};
 use crate::spec::Experiment;
 use bvh_scenes::read_text;
 use std::path::{Path, PathBuf};
@@ -84,8 +84,7 @@ pub fn outputs(experiment: &Experiment, folder: &Path) -> Result<Vec<Output>, Er
 /// Makes the reports of a finished experiment again, with the spec that its folder holds. Writes
 /// nothing.
 pub fn remade(folder: &Path) -> Result<Vec<Output>, Error> {
-    let path = folder.join("resolved.toml");
-    let resolved: Resolved = toml::from_str(&read_text(&path)?).map_err(Error::toml(&path))?;
+    let resolved: Resolved = read_toml(&folder.join("resolved.toml"))?;
     outputs(&resolved.experiment, folder)
 }
 
@@ -117,8 +116,7 @@ pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
     let resolved = Resolved { experiment: experiment.clone(), scenes: recorded.scenes };
     let store = Store::open(&folder, &recorded_spec, Existing::Keep)?;
     // The rows are still the output of the program that ran, so its provenance is kept.
-    let path = folder.join("provenance.toml");
-    let provenance: Provenance = toml::from_str(&read_text(&path)?).map_err(Error::toml(&path))?;
+    let provenance: Provenance = read_toml(&folder.join("provenance.toml"))?;
     let made = report(&resolved, BestKnown::Improve(out), &provenance, &store);
     // A failing report leaves finished results, not an interrupted experiment.
     store.finish()?;

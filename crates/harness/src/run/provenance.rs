@@ -1,10 +1,9 @@
 //! The origin of results: revision, compiler, processor, threads, date. It has a separate file, as
 //! it is not reproducible.
 
-use super::resolved::to_toml;
+use super::resolved::{read_toml, to_toml};
 use crate::Error;
 use crate::processor::PROCESSOR;
-use bvh_scenes::read_text;
 use bvh_terminal::files;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -82,12 +81,7 @@ impl Provenance {
 
     /// Reads the file of a part, if there is one.
     pub fn of_part(path: &Path) -> Result<Option<Self>, Error> {
-        if !path.is_file() {
-            return Ok(None);
-        }
-        toml::from_str(&read_text(path)?)
-            .map(Some)
-            .map_err(Error::toml(path))
+        if path.is_file() { read_toml(path).map(Some) } else { Ok(None) }
     }
 
     /// Returns the processors of the results, with repetitions.

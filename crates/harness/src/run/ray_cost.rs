@@ -8,6 +8,7 @@ use crate::measure::ray_cost::{Config, TestRays, TrainedOn, test_rays};
 use crate::rows::store::Store;
 use crate::rows::{LayoutRow, RunTestRow, TestRow, VisitRow};
 use crate::spec::Experiment;
+use crate::statistics::mean;
 use bvh_core::cost::{self, Objective};
 use bvh_core::{Bvh, WideBvh};
 use bvh_search::Observer;
@@ -198,11 +199,6 @@ fn layout_row(runs: &[Run], layouts: &[WideBvh]) -> LayoutRow {
         collapsed_sah: mean(trees.map(collapsed_sah)),
         layout_over_root: mean(layout_over_root),
     }
-}
-
-fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let n = values.len() as f64;
-    values.sum::<f64>() / n
 }
 
 /// The standard error of the mean number of all tests, if there are several repetitions.

@@ -3,9 +3,11 @@
 use crate::Error;
 use crate::spec::Experiment;
 use bvh_scenes::load::OutsideFiles;
-use bvh_scenes::{Scene, subset};
+use bvh_scenes::{Scene, read_text, subset};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
+use std::path::Path;
 
 /// Contents of `resolved.toml`.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -103,6 +105,11 @@ pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>),
         }
         None => Ok((scenes, skipped_scenes)),
     }
+}
+
+/// Reads a TOML file that a harness has written.
+pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
+    toml::from_str(&read_text(path)?).map_err(Error::toml(path))
 }
 
 /// Serialises `value` as TOML.

@@ -102,6 +102,12 @@ pub fn expected_best_of(pool: &[f64], m: usize) -> Option<f64> {
 /// Half the width of the normal distribution's central 95 % interval, in standard deviations.
 const NORMAL_95: f64 = 1.959_963_984_540_054;
 
+/// Returns the mean of values; NaN if there are no values.
+pub fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let n = values.len() as f64;
+    values.sum::<f64>() / n
+}
+
 /// Returns the geometric mean of positive values; NaN if there are no values.
 pub fn geometric_mean(values: &[f64]) -> f64 {
     (values.iter().map(|value| value.ln()).sum::<f64>() / values.len() as f64).exp()
@@ -112,7 +118,7 @@ pub fn geometric_mean(values: &[f64]) -> f64 {
 /// Fewer than two values have no interval, and no values have no mean.
 pub fn mean_interval(values: &[f64]) -> Option<(f64, Option<(f64, f64)>)> {
     let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
+    let mean = mean(values.iter().copied());
     let freedom = values.len().checked_sub(1)?;
     // One value says nothing about the spread.
     let Some(factor) = student(values.len()) else { return Some((mean, None)) };
