@@ -13,6 +13,7 @@ mod queries;
 mod support;
 
 use queries::answer;
+use regex_lite::{Captures, Regex};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::fs;
@@ -24,28 +25,15 @@ const OPENING: &str = "<!-- pivot ";
 
 /// Returns the text with every table as the committed results have it.
 fn renewed(text: &str) -> String {
-    let mut out = String::new();
-    let mut rest = text;
-    while let Some(start) = rest.find(OPENING) {
-        let open = start
-            + rest[start..]
-                .find(" -->")
-                .expect("a comment ends")
-            + 4;
-        let close = open
-            + rest[open..]
-                .find("<!-- end -->")
-                .unwrap_or_else(|| panic!("no end: {}", &rest[start..open]));
+    let table = Regex::new(r"(?s)(<!-- pivot (.*?) -->).*?<!-- end -->").unwrap();
+    let ends = table.find_iter(text).count();
+    assert_eq!(ends, text.matches(OPENING).count(), "every table has an end");
+    let renew = |found: &Captures| {
         // A long query goes on in the next line.
-        let words: Vec<&str> = rest[start + OPENING.len()..open - 4]
-            .split_whitespace()
-            .collect();
-        let query = words.join(" ");
-        out.push_str(&rest[..open]);
-        out.push_str(&answer(&query));
-        rest = &rest[close..];
-    }
-    out + rest
+        let query: Vec<&str> = found[2].split_whitespace().collect();
+        format!("{}{}<!-- end -->", &found[1], answer(&query.join(" ")))
+    };
+    table.replace_all(text, renew).into_owned()
 }
 
 /// The pages at the top, of `docs/`, and of `results/`.

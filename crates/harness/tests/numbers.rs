@@ -7,8 +7,8 @@ mod queries;
 mod support;
 
 use queries::answer;
+use regex_lite::Regex;
 use std::fs;
-use std::ops::Range;
 use support::{assert_current, top};
 
 /// A piece of prose: its text with a name in braces for every number, and a query for every name.
@@ -37,111 +37,44 @@ fn all_prose() -> Vec<Prose> {
     entries.into_iter().map(prose).collect()
 }
 
-/// The fixed parts of a text, and the names in braces between them.
-fn split(text: &str) -> (Vec<&str>, Vec<&str>) {
-    let mut fixed = Vec::new();
+/// What a name for a number stands for. A full stop behind the number belongs to the sentence.
+const NUMBER: &str = r"([\d.−-]*[\d−-])";
+
+/// What a name for words stands for: they never cross the end of a paragraph or of an item of a
+/// list.
+const WORDS: &str = r"((?:[^\n]|\n[^\n-])+?)";
+
+/// The end of a paragraph or of an item, to which words go on if nothing fixed is behind them.
+const END: &str = r"(?:\n\n|\n- |\n?\z)";
+
+/// Returns the expression that finds a text on a page, with a group for each name in braces, and
+/// these names.
+fn pattern(text: &str, is_for_words: impl Fn(&str) -> bool) -> (Regex, Vec<&str>) {
+    let mut parts = text.split('{');
+    let mut expression = fixed(parts.next().unwrap_or_default());
     let mut names = Vec::new();
-    let mut rest = text;
-    while let Some((before, after)) = rest.split_once('{') {
-        let (name, behind) = after
+    for part in parts {
+        let (name, behind) = part
             .split_once('}')
             .unwrap_or_else(|| panic!("{text}: a brace is not closed"));
-        fixed.push(before);
         names.push(name);
-        rest = behind;
-    }
-    fixed.push(rest);
-    (fixed, names)
-}
-
-/// Returns the length of the beginning of `page` that reads as `fixed`. White space equals any
-/// other.
-fn length_of_match(page: &str, fixed: &str) -> Option<usize> {
-    let mut at = 0;
-    let mut characters = fixed.chars().peekable();
-    while let Some(character) = characters.next() {
-        let rest = &page[at..];
-        if character.is_whitespace() {
-            while characters
-                .next_if(|next| next.is_whitespace())
-                .is_some()
-            {}
-            let space = rest.len() - rest.trim_start().len();
-            if space == 0 {
-                return None;
-            }
-            at += space;
+        if is_for_words(name) {
+            expression += WORDS;
+            expression += if behind.is_empty() { END } else { "" };
         } else {
-            at += rest
-                .strip_prefix(character)
-                .map(|_| character.len_utf8())?;
+            expression += NUMBER;
         }
+        expression += &fixed(behind);
     }
-    Some(at)
+    (Regex::new(&expression).unwrap(), names)
 }
 
-/// A text as it is looked for on a page.
-struct Pattern<'a> {
-    fixed: Vec<&'a str>,
-    names: Vec<&'a str>,
-    /// True for each name that is for words; all others are for numbers.
-    are_words: Vec<bool>,
-}
-
-impl<'a> Pattern<'a> {
-    fn new(text: &'a str, is_for_words: impl Fn(&str) -> bool) -> Self {
-        let (fixed, names) = split(text);
-        let are_words = names
-            .iter()
-            .map(|name| is_for_words(name))
-            .collect();
-        Self { fixed, names, are_words }
-    }
-
-    /// Returns where the values are on the page; nothing if the text is not there.
-    fn find(&self, page: &str) -> Option<Vec<Range<usize>>> {
-        let mut starts = page.char_indices().map(|(start, _)| start);
-        starts.find_map(|start| self.values_at(page, start))
-    }
-
-    fn values_at(&self, page: &str, start: usize) -> Option<Vec<Range<usize>>> {
-        let mut at = start + length_of_match(&page[start..], self.fixed[0])?;
-        let mut found = Vec::new();
-        for (part, are_words) in self.fixed[1..].iter().zip(&self.are_words) {
-            let length = match are_words {
-                true => length_of_words(&page[at..], part)?,
-                false => length_of_number(&page[at..])?,
-            };
-            found.push(at..at + length);
-            at += length;
-            at += length_of_match(&page[at..], part)?;
-        }
-        Some(found)
-    }
-}
-
-fn length_of_number(page: &str) -> Option<usize> {
-    let is_of_number = |character: char| character.is_ascii_digit() || ".-−".contains(character);
-    let length = page
-        .find(|character| !is_of_number(character))
-        .unwrap_or(page.len());
-    // A full stop behind the number belongs to the sentence.
-    let number = page[..length].trim_end_matches('.');
-    (!number.is_empty()).then_some(number.len())
-}
-
-/// Returns the length of the words in front of the fixed part `behind`. Without one, they go on to
-/// the end of their paragraph or of their item in a list, which they never cross.
-fn length_of_words(page: &str, behind: &str) -> Option<usize> {
-    let ends = ["\n\n", "\n- "].map(|end| page.find(end).unwrap_or(page.len()));
-    let longest = ends.into_iter().min()?;
-    if behind.is_empty() {
-        return Some(longest);
-    }
-    let mut lengths = page[..longest]
-        .char_indices()
-        .map(|(length, _)| length);
-    lengths.find(|length| length_of_match(&page[*length..], behind).is_some())
+/// Returns the expression for a fixed part of a text. White space equals any other.
+fn fixed(text: &str) -> String {
+    let white_space = Regex::new(r"\s+").unwrap();
+    white_space
+        .replace_all(&regex_lite::escape(text), r"\s+")
+        .into_owned()
 }
 
 fn reads_alike(shown: &str, made: &str) -> bool {
@@ -161,21 +94,22 @@ fn the_prose_shows_the_committed_numbers() {
                 .and_then(toml::Value::as_str)
                 .unwrap_or_else(|| panic!("docs/numbers.toml: {text}: no query for {name}"))
         };
-        let pattern = Pattern::new(&text, |name| query(name).ends_with(" | text"));
-        let places = pattern
-            .find(&shown)
+        let (pattern, names) = pattern(&text, |name| query(name).ends_with(" | text"));
+        let found = pattern
+            .captures(&shown)
             .unwrap_or_else(|| panic!("{page} lacks: {text}"));
         let mut made = shown.clone();
         // From the back, because a replacement moves everything behind it.
-        for (place, name) in places.into_iter().zip(&pattern.names).rev() {
+        for (index, name) in names.iter().enumerate().rev() {
+            let place = found.get(index + 1).unwrap();
             let value = answer(query(name));
-            if !reads_alike(&shown[place.clone()], &value) {
-                made.replace_range(place, &value);
+            if !reads_alike(place.as_str(), &value) {
+                made.replace_range(place.range(), &value);
             }
         }
         let unused: Vec<_> = queries
             .keys()
-            .filter(|key| !pattern.names.contains(&key.as_str()))
+            .filter(|key| !names.contains(&key.as_str()))
             .collect();
         assert!(unused.is_empty(), "docs/numbers.toml: {text}: nobody needs {unused:?}");
         assert_current(&path, &made, "numbers");
@@ -186,9 +120,14 @@ fn the_prose_shows_the_committed_numbers() {
 fn a_text_is_found_across_lines() {
     let page = "Trees are 8 to\n25 % cheaper. So are 7.5.\n\nIn words: Nothing.\n\nIn words: None\nof two. That is all.\n\nEnd.";
     let values = |text: &'static str| {
-        let places = Pattern::new(text, |name| name == "answer").find(page)?;
-        let texts = places.into_iter().map(|place| &page[place]);
-        Some(texts.collect::<Vec<_>>())
+        let (pattern, _) = pattern(text, |name| name == "answer");
+        let found = pattern.captures(page)?;
+        let places = found.iter().skip(1).flatten();
+        Some(
+            places
+                .map(|place| place.as_str())
+                .collect::<Vec<_>>(),
+        )
     };
     assert_eq!(values("are {low} to {high} % cheaper"), Some(vec!["8", "25"]));
     assert_eq!(values("So are {more}."), Some(vec!["7.5"]));
