@@ -64,17 +64,8 @@ fn a_scene_of_instances_is_baked_mesh_by_mesh_and_answers_like_the_flat_scene() 
     let at = folder.path();
     let (glb, meshes) = forest();
     fs::write(at.join("forest.glb"), glb).unwrap();
-    let bake = [
-        "bake",
-        "forest.glb",
-        "--instances",
-        "--budget",
-        "2Mwork",
-        "--references",
-        "1.1",
-        "--out",
-        "baked",
-    ];
+    let bake =
+        ["bake", "forest.glb", "--instances", "--budget=2Mwork", "--references=1.1", "--out=baked"];
     let said = said(at, &bake);
     assert!(said.contains("instances.csv: 5 instances of 2 meshes"), "{said}");
     assert_eq!(names(&at.join("baked")), ["instances.csv", "mesh_0.bvh", "mesh_1.bvh", "top.bvh"]);

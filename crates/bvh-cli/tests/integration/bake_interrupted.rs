@@ -65,17 +65,9 @@ fn a_bake_that_is_interrupted_early_is_not_behind_plain_reinsertion() {
     let folder = tempfile::tempdir().unwrap();
     let cost = |file: &str| cost(folder.path(), file);
     let begin = Instant::now();
-    let args = [
-        "bake",
-        "konistil",
-        "--method",
-        "reinsertion",
-        "--budget",
-        "1000Gwork",
-        "--out",
-        "plain.bvh",
-    ];
-    said(folder.path(), &args);
+    let plain =
+        ["bake", "konistil", "--method=reinsertion", "--budget=1000Gwork", "--out=plain.bvh"];
+    said(folder.path(), &plain);
     // The time suffices for reinsertion and the trees built before it, also on a busy machine. The
     // heat of a long search has not paid by then.
     let plain = cost("plain.bvh");
