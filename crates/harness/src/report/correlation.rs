@@ -262,6 +262,7 @@ fn draw(
 mod tests {
     use super::*;
     use crate::report::data::run;
+    use crate::report::query::Row;
     use crate::rows::RayRow;
 
     /// Rows of two methods, whose costs predict nothing within either, though the second is dearer
@@ -294,45 +295,31 @@ mod tests {
         rows
     }
 
-    #[test]
-    fn trees_of_different_methods_are_never_ranked_together() {
+    /// Makes the report of both methods, of which the paper's case is the first.
+    fn output() -> Output {
         let config = Config {
             methods: vec!["orders".into(), "splits".into()],
             paper_says: Some("very strong".into()),
             ..Config::default()
         };
-        let output = config_output(&config);
-        let csv = String::from_utf8(output.csv[0].1.clone()).unwrap();
-        let mut reader = csv::Reader::from_reader(csv.as_bytes());
-        let header = reader.headers().unwrap().clone();
-        let at = |name: &str| {
-            header
-                .iter()
-                .position(|column| column == name)
-                .unwrap()
-        };
-        let records: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
-        let own = records
-            .iter()
-            .filter(|record| &record[at("cost")] == "goldsmith_salmon");
+        write(&config, &two_families()).unwrap()
+    }
+
+    #[test]
+    fn trees_of_different_methods_are_never_ranked_together() {
+        let output = output();
+        let mut reader = csv::Reader::from_reader(&output.csv[0].1[..]);
+        let rows: Vec<Row> = reader.deserialize().map(Result::unwrap).collect();
+        let own = rows.iter().filter(|row| row["cost"] == OF_AREA);
         let own: Vec<(&str, f64)> = own
-            .map(|record| (&record[at("method")], record[at("spearman")].parse().unwrap()))
+            .map(|row| (row["method"].as_str(), row["spearman"].parse().unwrap()))
             .collect();
         assert_eq!(own, [("orders", 0.0), ("splits", 0.0)]);
     }
 
     #[test]
     fn the_papers_words_hold_only_by_the_trees_of_its_own_case() {
-        let config = Config {
-            methods: vec!["orders".into(), "splits".into()],
-            paper_says: Some("very strong".into()),
-            ..Config::default()
-        };
-        let [row] = &config_output(&config).paper[..] else { panic!("one scene, one row") };
+        let [row] = &output().paper[..] else { panic!("one scene, one row") };
         assert_eq!((row.ours.as_str(), row.verdict), ("0.00", Verdict::Inconclusive));
-    }
-
-    fn config_output(config: &Config) -> Output {
-        write(config, &two_families()).unwrap()
     }
 }

@@ -1,7 +1,7 @@
 //! The archive of the best known trees: the committed rows are true, and only better trees are
 //! added.
 
-use crate::support::{folder_with, refused, said, save, text};
+use crate::support::{folder_with, refused, said, save, text, top};
 use bvh_build::{Builder, median_cut};
 use bvh_core::{Bvh, cost};
 use bvh_scenes::Scene;
@@ -9,11 +9,10 @@ use bvh_scenes::tree_file;
 use bvh_search::{Budget, Problem, best, optimize};
 use harness::run::{archive, reference};
 use std::fs;
-use std::path::Path;
 
 #[test]
 fn every_tree_of_the_archive_is_valid_has_the_recorded_cost_and_is_the_best_known() {
-    let results = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../results");
+    let results = top().join("results");
     let rows = archive::rows(&results).unwrap();
     assert_eq!(
         fs::read_dir(results.join("trees"))

@@ -1,17 +1,17 @@
 //! The committed comparisons with the paper: one row for each number, a reason for every
 //! difference, and answers that follow from the committed rows.
 
+use crate::support::top;
 use harness::report::paper::{PaperRow, Verdict};
 use harness::rows::read;
 use harness::run::finish::remade;
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The folders of committed results that compare something with the paper.
 fn compared_folders() -> Vec<PathBuf> {
-    let results = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../results");
-    let folders = fs::read_dir(results)
+    let folders = fs::read_dir(top().join("results"))
         .unwrap()
         .map(|folder| folder.unwrap().path());
     folders

@@ -1,6 +1,7 @@
 //! Experiments with pictures, as their users meet them.
 
 use crate::support::{folder_with, said};
+use harness::rows::{self, RenderRow};
 use std::fs;
 
 #[test]
@@ -30,8 +31,7 @@ columns = [
     let shown = said(folder.path(), &["spec.toml"]);
     assert!(shown.contains("18.21") && shown.contains("speed_up"), "{shown}");
     let results = folder.path().join("results/spec");
-    let mut reader = csv::Reader::from_path(results.join("renders.csv")).unwrap();
-    let rows: Vec<harness::rows::RenderRow> = reader.deserialize().map(Result::unwrap).collect();
+    let rows: Vec<RenderRow> = rows::read(&results.join("renders.csv")).unwrap();
     assert_eq!(rows.len(), 2 * (2 + 2 * 2));
     for scene in rows.chunks(6) {
         assert!(

@@ -1,15 +1,11 @@
 //! Everything that a release publishes has one version, and the oldest Rust is declared once.
 
+use crate::support::top;
 use std::fs;
-use std::path::{Path, PathBuf};
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
 
 /// Returns the value of the first line of `file` that begins with `key`, without quotes.
 fn value(file: &str, key: &str) -> String {
-    let text = fs::read_to_string(root().join(file)).unwrap();
+    let text = fs::read_to_string(top().join(file)).unwrap();
     let line = text
         .lines()
         .find_map(|line| line.strip_prefix(key));
@@ -28,7 +24,7 @@ fn whatever_is_published_has_the_version_of_the_workspace() {
         assert_eq!(value(file, "version = "), version, "{file}");
     }
     assert_eq!(value("CITATION.cff", "version: "), version);
-    let workspace = fs::read_to_string(root().join("Cargo.toml")).unwrap();
+    let workspace = fs::read_to_string(top().join("Cargo.toml")).unwrap();
     for line in workspace
         .lines()
         .filter(|line| line.contains("path = \"crates/bvh-"))

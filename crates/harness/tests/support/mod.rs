@@ -7,8 +7,8 @@ mod program;
 use bvh_core::Bvh;
 use bvh_core::file::{self, Origin};
 use bvh_scenes::Scene;
+use harness::report::query::{self, Row};
 pub use program::*;
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
@@ -83,12 +83,8 @@ pub fn reproducible(folder: &Path) -> Vec<(String, Vec<u8>)> {
 }
 
 /// The rows of a CSV file by column names.
-pub fn rows(path: &Path) -> Vec<BTreeMap<String, String>> {
-    csv::Reader::from_path(path)
-        .unwrap()
-        .deserialize()
-        .map(Result::unwrap)
-        .collect()
+pub fn rows(path: &Path) -> Vec<Row> {
+    query::read(path).unwrap()
 }
 
 /// Saves a tree over the scene's objects in a file.
