@@ -120,6 +120,10 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
     // The completed fraction of the work or time, and the fraction per unit of work.
     let mut fraction = 0.0;
     let mut rate = 1.0 / work as f64;
+    // The order of a large tree takes tenths of a second before the sort looks.
+    if observer.cancelled() {
+        return;
+    }
     // Moves find their nodes near each other in memory only after a sort.
     tree.sort_in_preorder_unless(&|| observer.cancelled());
     if observer.cancelled() {

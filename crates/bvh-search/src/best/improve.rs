@@ -133,17 +133,25 @@ impl Improvement<'_, '_, '_, '_> {
             return;
         }
         self.is_secured = true;
+        // The shape and the working form of a large tree take most of a second.
+        let observer = self.run.observer();
+        if observer.cancelled() {
+            return;
+        }
         if self.divider.is_none() {
             // A working form is a large part of all memory, so the tree itself is searched.
             let before = tree.shape();
-            if self.best.refill(tree).is_ok() {
+            if matches!(self.best.refill_unless_cancelled(tree, observer), Ok(true)) {
                 self.reinsert(tree);
             }
             // After a cancellation nobody continues from the tree.
             if self.run.stopped().is_none() {
                 tree.reshape(&before, self.boxes);
             }
-        } else if let Ok(mut aside) = self.best.working(tree.metric()) {
+        } else if let Ok(Some(mut aside)) = self
+            .best
+            .working_unless_cancelled(tree.metric(), observer)
+        {
             self.reinsert(&mut aside);
         }
     }

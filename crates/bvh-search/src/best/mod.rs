@@ -125,7 +125,9 @@ impl Config {
                 best
             }
         };
-        let mut tree = best.working(metric)?;
+        let Some(mut tree) = best.working_unless_cancelled(metric, run.observer())? else {
+            return Ok(best.tree);
+        };
         improve(self, (&mut tree, None), seed, problem, &mut best, run);
         Ok(best.tree)
     }
@@ -187,7 +189,9 @@ impl Config {
         }
         if problem.splits.is_some() {
             let metric = metric.with_leaves();
-            let mut tree = best.working(metric)?;
+            let Some(mut tree) = best.working_unless_cancelled(metric, run.observer())? else {
+                return Ok(best.tree);
+            };
             let working = |tree: &Bvh| Working::from_bvh(tree, metric.internal(tree), metric);
             let other_working = other.as_ref().map(working).transpose()?;
             if let Some(other) = other {
@@ -195,7 +199,10 @@ impl Config {
             }
             improve(self, (&mut tree, other_working), seed, problem, &mut best, run);
         } else {
-            improve(self, (&mut best.working(metric)?, None), seed, problem, &mut best, run);
+            let Some(mut tree) = best.working_unless_cancelled(metric, run.observer())? else {
+                return Ok(best.tree);
+            };
+            improve(self, (&mut tree, None), seed, problem, &mut best, run);
         }
         Ok(best.tree)
     }

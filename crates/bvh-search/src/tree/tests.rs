@@ -2,11 +2,13 @@
 
 use super::*;
 use crate::run::stream;
-use crate::scatter::{built, density};
+use crate::scatter::{built, density, scatter};
 use bvh_build::muller_fellner;
+use bvh_core::cost::Measure;
 use bvh_core::{Aabb, validate};
 use rand::RngExt;
 use std::cell::Cell;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 fn scene(n: usize) -> (Vec<Aabb>, Working) {
     let mut rng = stream(1, 0);
@@ -49,6 +51,32 @@ fn any(tree: &Working<impl Metric>, rng: &mut impl RngExt) -> u32 {
         if tree.nodes[node as usize].parent != ANCHOR {
             return node;
         }
+    }
+}
+
+#[test]
+fn a_conversion_that_is_cancelled_ends_before_it_measures_most_boxes() {
+    let boxes = scatter(200_000);
+    let flat = built(&muller_fellner::Config::default(), &boxes).to_bvh();
+    let measured = AtomicU32::new(0);
+    let measure = Counted(&measured);
+    let metric = Measured::new(&measure);
+    let is_over = || measured.load(Relaxed) > 0;
+    let working = Working::from_bvh_unless(&flat, 0.0, metric, &is_over).unwrap();
+    assert!(working.is_none());
+    assert!(measured.load(Relaxed) < 100_000);
+    let working = Working::from_bvh_unless(&flat, 0.0, metric, &|| false).unwrap();
+    assert_eq!(working.unwrap().to_bvh(), flat);
+}
+
+/// The half area, with the number of boxes that were measured.
+#[derive(Debug)]
+struct Counted<'a>(&'a AtomicU32);
+
+impl Measure for Counted<'_> {
+    fn of(&self, aabb: &PackedAabb) -> f64 {
+        self.0.fetch_add(1, Relaxed);
+        aabb.half_area()
     }
 }
 
