@@ -6,13 +6,15 @@
 //! FILE | CONDITIONS | ROWS × COLUMNS | SHOWN | FORMAT    a table
 //!
 //! SHOWN    MEASURE [LOW, HIGH] (COLUMN)         an interval and a further column, both optional
+//!          MEASURE over CONDITIONS by COLUMNS   of one value: each row's number over the least
+//!                                               number of other rows that agree in the columns
 //! FORMAT   DECIMALS [below | above | percent]   percent below one, above one, or of a fraction
 //!          text                                 cells as they are; all rows have the same one
 //! ```
 //! A file with `/*/` in its path stands for all such files: results by processor.
 
 use super::support::top;
-use harness::report::query::{self, QueryError, Row, distinct, group, only_text};
+use harness::report::query::{self, QueryError, Row, distinct, group, number_in, only_text};
 use harness::report::query_measure::Measure;
 use std::fs;
 use std::path::PathBuf;
@@ -45,7 +47,14 @@ pub fn answer(query: &str) -> String {
     let parts: Vec<&str> = query.split(" | ").collect();
     let answer = match parts[..] {
         [file, conditions, measure, format] => {
-            let rows = rows(file, conditions);
+            let mut rows = rows(file, conditions);
+            let measure = match measure.split_once(" over ") {
+                Some((measure, others)) => {
+                    divide(&mut rows, measure, file, others);
+                    measure
+                }
+                None => measure,
+            };
             show(&rows.iter().collect::<Vec<_>>(), measure, format)
         }
         [file, conditions, axes, measure, format] => {
@@ -57,6 +66,36 @@ pub fn answer(query: &str) -> String {
     let text = answer.unwrap_or_else(|error| panic!("{query}: {error}"));
     assert!(!text.is_empty(), "{query}: no value");
     text
+}
+
+/// Divides the number of each row by the least one among other rows of the file, `CONDITIONS by
+/// COLUMNS`, that agree in the columns.
+fn divide(rows: &mut [Row], measure: &str, file: &str, others: &str) {
+    let (conditions, columns) = others
+        .rsplit_once(" by ")
+        .unwrap_or_else(|| panic!("over {others}: expected over CONDITIONS by COLUMNS"));
+    let columns: Vec<&str> = columns.split(" + ").collect();
+    let (_, column) = measure
+        .split_once(' ')
+        .unwrap_or_else(|| panic!("{measure}: expected AGGREGATE COLUMN"));
+    divide_by_least(rows, column, &self::rows(file, conditions), &columns);
+}
+
+fn divide_by_least(rows: &mut [Row], column: &str, others: &[Row], columns: &[&str]) {
+    for row in rows {
+        let names: Vec<String> = columns
+            .iter()
+            .map(|name| row[*name].clone())
+            .collect();
+        let least = group(others, columns, &names)
+            .into_iter()
+            .filter_map(|other| number_in(other, column))
+            .reduce(f64::min)
+            .unwrap_or_else(|| panic!("no number of {column} to divide by for {names:?}"));
+        if let Some(value) = number_in(row, column) {
+            row.insert(column.into(), (value / least).to_string());
+        }
+    }
 }
 
 /// Writes a number in a format.
@@ -217,4 +256,19 @@ fn values_are_written_in_their_format_and_a_table_has_empty_cells_where_no_row_i
     assert!(message.contains("\"two\" is no format"), "{message}");
     let table = pivot(&rows, "scene × method", "only cost", "0").unwrap();
     assert_eq!(table, "| scene | x, y | z |\n|---|---|---|\n| a | 2 | 3 |\n| b |  | 5 |");
+}
+
+#[test]
+fn a_number_is_divided_by_the_least_one_of_the_rows_that_agree() {
+    let text = "scene,method,cost\na,x,2\na,y,4\na,z,8\nb,x,3\nb,y,2\nb,z,9\n";
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let rows: Vec<Row> = reader.deserialize().map(Result::unwrap).collect();
+    let mut divided = query::select(rows.clone(), "method=z").unwrap();
+    let others = query::select(rows, "method=x or y").unwrap();
+    divide_by_least(&mut divided, "cost", &others, &["scene"]);
+    let costs: Vec<&str> = divided
+        .iter()
+        .map(|row| row["cost"].as_str())
+        .collect();
+    assert_eq!(costs, ["4", "4.5"]);
 }
