@@ -1,6 +1,5 @@
 //! A series of Metropolis moves while the temperature falls.
 
-use super::node_sampler::NodeSampler;
 use crate::run::{Observer, Quota, Stream, Tally};
 use crate::tree::{Metric, Working};
 use crate::tuning::MOVES_PER_TEMPERATURE;
@@ -8,14 +7,21 @@ use bvh_core::with_vector_instructions;
 
 /// Makes moves of one kind.
 pub(crate) trait Mover {
+    /// Begins a series of moves on a tree in preorder, near these nodes, or anywhere if there are
+    /// none, and returns true. Returns false if `is_over` returns true while a large tree is
+    /// prepared; then no move can be made. O(n), in the memory of an earlier series.
+    fn begin(
+        &mut self,
+        tree: &Working<impl Metric>,
+        near: Vec<u32>,
+        is_over: &dyn Fn() -> bool,
+    ) -> bool;
     /// Changes the tree, and undoes the change unless Metropolis accepts it. Returns whether it was
     /// accepted.
     fn step(&mut self, tree: &mut Working<impl Metric>, temperature: f64, rng: &mut Stream)
     -> bool;
     /// Nodes visited by all moves so far.
     fn work(&self) -> u64;
-    /// Draws the nodes at which moves begin.
-    fn sampler(&mut self) -> &mut NodeSampler;
 }
 
 /// Work of a move after which the observer is polled at once, so that less than a millisecond
@@ -23,7 +29,7 @@ pub(crate) trait Mover {
 const LONG_MOVE: u64 = 1 << 11;
 
 with_vector_instructions! {
-    /// Makes moves until the quota is used up, while the temperature falls geometrically from `hot`
+    /// Makes moves of a series that has begun until the quota is used up, while the temperature falls geometrically from `hot`
     /// to `cold`.
     pub(crate) cool = cool_plain<M: Mover>(
         mover: &mut M, tree: &mut Working<impl Metric>, heat: [f64; 2], quota: Quota, rng: &mut Stream, observer: &dyn Observer)

@@ -6,9 +6,9 @@ use crate::tuning::{LEAST_WINDOWS, MOVES_PER_WINDOW, SHORT_RUN, WINDOW, WINDOW_O
 use rand::RngExt;
 use std::ops::Range;
 
-/// Draws nodes of a tree in preorder, each in proportion to the square root of its parent's area at
-/// the first draw. Weights by the area of the node itself would never draw degenerate boxes; equal
-/// weights would waste moves on tiny nodes.
+/// Draws nodes of a tree in preorder, each in proportion to the square root of its parent's area
+/// at the beginning. Weights by the area of the node itself would never draw degenerate boxes;
+/// equal weights would waste moves on tiny nodes.
 ///
 /// In large trees, consecutive draws come from one *window*, nodes that are neighbours in the tree,
 /// so that moves find their nodes in a cache. The next window is the golden section of all nodes
@@ -21,14 +21,16 @@ pub(crate) struct NodeSampler {
     sums: Vec<f64>,
     /// The current window, by position.
     window: Range<usize>,
-    /// The fraction of the total weight at the window's middle, 0 to 1.
-    middle: f64,
-    /// True if the run is so short that small windows would not cover the tree.
+    /// The fraction of the total weight at the window's middle, 0 to 1, after the first draw.
+    middle: Option<f64>,
+    /// True if the run is so short that small windows would not cover all nodes.
     short_run: bool,
     /// Remaining draws in this window.
     draws: u32,
 }
 
+/// The number of nodes after which weighing may end early. They take about a millisecond.
+const NODES_PER_LOOK: usize = 1 << 16;
 /// The golden section.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
@@ -38,16 +40,39 @@ impl NodeSampler {
         Self { short_run: per_object < SHORT_RUN, ..Self::default() }
     }
 
-    /// Builds a sampler that draws only these nodes, or all nodes if `only` is empty.
-    pub fn among(only: Vec<u32>) -> Self {
-        Self { only, ..Self::default() }
+    /// Weighs the nodes of a tree, and returns true; then only these nodes will be drawn, or all
+    /// nodes if `only` is empty. Returns false if `is_over` returns true before the nodes of a large
+    /// tree are weighed. O(n).
+    pub fn begin(
+        &mut self,
+        tree: &Working<impl Metric>,
+        only: Vec<u32>,
+        is_over: &dyn Fn() -> bool,
+    ) -> bool {
+        self.only = only;
+        self.middle = None;
+        self.draws = 0;
+        let all = if self.only.is_empty() { tree.nodes.len() - 1 } else { self.only.len() };
+        self.sums.clear();
+        self.sums.reserve(all + 1);
+        let mut sum = 0.0;
+        self.sums.push(sum);
+        for position in 0..all {
+            if position % NODES_PER_LOOK == NODES_PER_LOOK - 1 && is_over() {
+                return false;
+            }
+            sum += weight(tree, self.node(position));
+            self.sums.push(sum);
+        }
+        true
     }
 
-    /// Draws a node of the tree, which must have the same nodes as at the first draw.
+    /// Draws a node of the tree, which must have the same nodes as at the
+    /// [beginning](Self::begin).
     #[inline(always)]
-    pub fn draw(&mut self, tree: &Working<impl Metric>, rng: &mut Stream) -> u32 {
+    pub fn draw(&mut self, rng: &mut Stream) -> u32 {
         if self.draws == 0 {
-            self.next_window(tree, rng);
+            self.next_window(rng);
         }
         self.draws -= 1;
         self.node(self.position(self.window.clone(), rng.random()))
@@ -74,34 +99,25 @@ impl NodeSampler {
 
     /// Chooses the next window.
     #[inline(never)]
-    fn next_window(&mut self, tree: &Working<impl Metric>, rng: &mut Stream) {
+    fn next_window(&mut self, rng: &mut Stream) {
+        let before = match self.middle {
+            Some(middle) => middle,
+            None => rng.random(),
+        };
+        self.middle = Some(before);
         // The weights keep their values until the next round: updating the sums after every move
         // would take O(n).
-        if self.sums.is_empty() {
-            self.weigh(tree);
-            self.middle = rng.random();
-        }
         let all = self.sums.len() - 1;
         (self.window, self.draws) = (0..all, u32::MAX);
-        let reach = if self.short_run { WINDOW_OF_SHORT_RUNS * WINDOW } else { WINDOW };
+        let is_short = self.short_run && self.only.is_empty();
+        let reach = if is_short { WINDOW_OF_SHORT_RUNS * WINDOW } else { WINDOW };
         // Smaller trees fit into a near cache and need no windows.
         if all >= LEAST_WINDOWS * reach {
-            self.middle = (self.middle + GOLDEN).fract();
-            let middle = self.position(0..all, self.middle);
+            let fraction = (before + GOLDEN).fract();
+            self.middle = Some(fraction);
+            let middle = self.position(0..all, fraction);
             (self.window, self.draws) =
                 (middle.saturating_sub(reach)..(middle + reach).min(all), MOVES_PER_WINDOW);
-        }
-    }
-
-    /// Sums up the weights. O(n).
-    fn weigh(&mut self, tree: &Working<impl Metric>) {
-        let all = if self.only.is_empty() { tree.nodes.len() - 1 } else { self.only.len() };
-        self.sums.reserve(all + 1);
-        let mut sum = 0.0;
-        self.sums.push(sum);
-        for position in 0..all {
-            sum += weight(tree, self.node(position));
-            self.sums.push(sum);
         }
     }
 }
@@ -126,10 +142,12 @@ mod tests {
     use bvh_core::Aabb;
 
     /// How often each node was drawn.
-    fn drawn(sampler: &mut NodeSampler, tree: &Working, times: u32) -> Vec<u32> {
+    fn drawn(only: Vec<u32>, tree: &Working, times: u32) -> Vec<u32> {
+        let mut sampler = NodeSampler::default();
         let mut counts = vec![0; tree.nodes.len()];
         let mut rng = stream(6, 0);
-        (0..times).for_each(|_| counts[sampler.draw(tree, &mut rng) as usize] += 1);
+        assert!(sampler.begin(tree, only, &|| false));
+        (0..times).for_each(|_| counts[sampler.draw(&mut rng) as usize] += 1);
         counts
     }
 
@@ -146,7 +164,7 @@ mod tests {
             };
             let total = nodes.iter().map(weight).sum::<f64>();
             let times = 400_000;
-            let counts = drawn(&mut NodeSampler::among(only), &tree, times);
+            let counts = drawn(only, &tree, times);
             assert_eq!(
                 counts.iter().sum::<u32>(),
                 nodes
@@ -169,7 +187,7 @@ mod tests {
     #[test]
     fn every_part_of_a_large_tree_is_drawn_from_at_some_time() {
         let tree = built(&muller_fellner::Config::default(), &scatter(40_000));
-        let counts = drawn(&mut NodeSampler::default(), &tree, 2_000_000);
+        let counts = drawn(vec![], &tree, 2_000_000);
         assert!(
             counts[1..]
                 .chunks(512)
@@ -183,7 +201,7 @@ mod tests {
             .map(|_| Aabb::from(([1.0; 3], [1.0; 3])))
             .collect();
         let tree = built(&muller_fellner::Config::default(), &points);
-        let counts = drawn(&mut NodeSampler::default(), &tree, 100_000);
+        let counts = drawn(vec![], &tree, 100_000);
         assert!(
             counts[1..]
                 .iter()

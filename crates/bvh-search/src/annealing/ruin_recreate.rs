@@ -104,7 +104,7 @@ pub(crate) struct RuinMover<'a> {
     side: Side,
     removed: Removed,
     /// The layout whose cost judges the moves, unless the tree's area does.
-    layout: Option<Layout>,
+    pub(super) layout: Option<Layout>,
     /// Nodes visited outside of the position search.
     work: u64,
 }
@@ -209,8 +209,17 @@ impl Mover for RuinMover<'_> {
                 .map_or(0, |layout| layout.visits)
     }
 
-    fn sampler(&mut self) -> &mut NodeSampler {
-        &mut self.sampler
+    fn begin(
+        &mut self,
+        tree: &Working<impl Metric>,
+        near: Vec<u32>,
+        is_over: &dyn Fn() -> bool,
+    ) -> bool {
+        self.sampler.begin(tree, near, is_over)
+            && self
+                .layout
+                .as_mut()
+                .is_none_or(|layout| layout.fill_unless(tree, is_over))
     }
 
     #[inline(always)]
@@ -221,7 +230,7 @@ impl Mover for RuinMover<'_> {
         rng: &mut Stream,
     ) -> bool {
         let ruin = self.ruin;
-        let mut top = self.sampler.draw(tree, rng);
+        let mut top = self.sampler.draw(rng);
         let levels = rng.random_range(1..=ruin.climb);
         let mut above = tree.nodes[top as usize].parent;
         for _ in 0..levels {
@@ -233,9 +242,6 @@ impl Mover for RuinMover<'_> {
         }
         let scope = Scope::of(tree, above, top);
         let Node { aabb: top_box, area: top_area, .. } = tree.nodes[top as usize];
-        if let Some(layout) = &mut self.layout {
-            layout.prepare(tree);
-        }
         tree.begin();
         self.removed.clear();
         if rng.random::<f64>() < ruin.slabs {

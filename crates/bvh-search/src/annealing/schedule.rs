@@ -13,7 +13,7 @@
 //! ```
 
 use super::metropolis::Mover;
-use super::subtrees;
+use super::subtrees::{self, Round};
 use crate::local::incumbent::Incumbent;
 use crate::local::initial::Start;
 use crate::run::{Observer, Problem, Quota, Run, SearchError, Tally};
@@ -129,14 +129,17 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
     if observer.cancelled() {
         return;
     }
+    // Every round uses the memory of the one before: fresh memory for the rows of costs of ten
+    // million nodes takes more than a second.
+    let mut whole = mover();
     while fraction < 1.0 {
         let step = rate * next as f64;
         let heat = [fraction, fraction + step].map(temperature);
         let is_last = began.is_none() && fraction + LAST_ROUND * step >= 1.0;
         let end = if is_last { work } else { work.min(done.work + next) };
         let quota = Quota { work: end, moves }.less(&done);
-        let tally =
-            subtrees::cool(&mover, tree, heat, quota, schedule.subtrees, [seed, streams], observer);
+        let cooling = Round { heat, quota, count: schedule.subtrees, streams: [seed, streams] };
+        let tally = subtrees::cool(&cooling, &mover, &mut whole, tree, observer);
         streams += subtrees::STREAMS;
         done += tally;
         round(tree, tally);
@@ -173,7 +176,6 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::annealing::node_sampler::NodeSampler;
     use crate::annealing::{ruin_recreate, single};
     use crate::run::Stream;
     use crate::scatter::{built, scatter};
@@ -204,8 +206,13 @@ mod tests {
         fn work(&self) -> u64 {
             self.inner.work()
         }
-        fn sampler(&mut self) -> &mut NodeSampler {
-            self.inner.sampler()
+        fn begin(
+            &mut self,
+            tree: &Working<impl Metric>,
+            near: Vec<u32>,
+            is_over: &dyn Fn() -> bool,
+        ) -> bool {
+            self.inner.begin(tree, near, is_over)
         }
     }
 

@@ -150,8 +150,13 @@ impl Mover for SingleMover<'_> {
         self.work
     }
 
-    fn sampler(&mut self) -> &mut NodeSampler {
-        &mut self.sampler
+    fn begin(
+        &mut self,
+        tree: &Working<impl Metric>,
+        near: Vec<u32>,
+        is_over: &dyn Fn() -> bool,
+    ) -> bool {
+        self.sampler.begin(tree, near, is_over)
     }
 
     #[inline(always)]
@@ -162,7 +167,7 @@ impl Mover for SingleMover<'_> {
         rng: &mut Stream,
     ) -> bool {
         self.work += 1;
-        let node = self.sampler.draw(tree, rng);
+        let node = self.sampler.draw(rng);
         // The root has no other position.
         if tree.nodes[node as usize].parent == ANCHOR {
             return false;

@@ -6,7 +6,7 @@
 //! everywhere.
 
 use super::metropolis::{self, Mover};
-use super::node_sampler::{self, NodeSampler};
+use super::node_sampler;
 use crate::local::reinsertion;
 use crate::parallel;
 use crate::run::{Observer, Quota, Tally, stream};
@@ -19,21 +19,32 @@ use rand::RngExt;
 /// Random streams per round: one for the whole tree, one for every subtree.
 pub(crate) const STREAMS: u64 = 1 << 24;
 
-/// Makes one round of annealing: first on about `count` subtrees, if more than one, then on the
-/// whole tree, where moves begin near the nodes outside all subtrees. The `tree` is in preorder
-/// before, and after unless the observer cancels.
+/// One round of annealing.
+pub(crate) struct Round {
+    /// The first and the last temperature.
+    pub heat: [f64; 2],
+    pub quota: Quota,
+    /// The number of subtrees, about.
+    pub count: u32,
+    /// The seed, and the number of the first random stream.
+    pub streams: [u64; 2],
+}
+
+/// Makes one round of annealing: first on the subtrees, if more than one, each with a new `mover`,
+/// then on the whole tree, where moves begin near the nodes outside all subtrees. The `tree` is in
+/// preorder before, and after unless the observer cancels.
 pub(crate) fn cool<M: Mover>(
+    round: &Round,
     mover: &(impl Fn() -> M + Sync),
+    whole: &mut M,
     tree: &mut Working<impl Metric>,
-    heat: [f64; 2],
-    quota: Quota,
-    count: u32,
-    [seed, first]: [u64; 2],
     observer: &dyn Observer,
 ) -> Tally {
+    let Round { heat, quota, count, streams: [seed, first] } = *round;
+    let is_over = || observer.cancelled();
     let mut rng = stream(seed, first);
-    let mut whole = mover();
     let mut done = Tally::default();
+    let mut near = Vec::new();
     if count > 1 && tree.objects() as f64 >= f64::from(count) * f64::from(LEAST_SUBTREE) {
         // A different size in every round moves the borders, across which nothing moves.
         let smaller = SMALLEST_SUBTREES + (1.0 - SMALLEST_SUBTREES) * rng.random::<f64>();
@@ -52,14 +63,20 @@ pub(crate) fn cool<M: Mover>(
             // threads.
             let rng = &mut stream(seed, first + 1 + number as u64);
             let quota = quota_of(&cut.subtrees[number]);
-            metropolis::cool(&mut mover(), small, heat, quota, rng, observer)
+            let mut mover = mover();
+            if !mover.begin(small, Vec::new(), &is_over) {
+                return Tally::default();
+            }
+            metropolis::cool(&mut mover, small, heat, quota, rng, observer)
         });
-        *whole.sampler() = NodeSampler::among(cut.starts);
+        near = cut.starts;
     }
-    done += metropolis::cool(&mut whole, tree, heat, quota.less(&done), &mut rng, observer);
+    if whole.begin(tree, near, &is_over) {
+        done += metropolis::cool(whole, tree, heat, quota.less(&done), &mut rng, observer);
+    }
     // A cancelled search must return soon, and every later round would sort first.
     if !observer.cancelled() {
-        tree.sort_in_preorder_unless(&|| observer.cancelled());
+        tree.sort_in_preorder_unless(&is_over);
     }
     done
 }

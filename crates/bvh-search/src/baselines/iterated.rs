@@ -60,6 +60,9 @@ impl Config {
             number += 1;
             let mut tally = Tally::default();
             let observer = run.observer();
+            if !mover.begin(&other, Vec::new(), &|| observer.cancelled()) {
+                break;
+            }
             while tally.moves < kicks && (tally.moves % 1024 > 0 || !observer.cancelled()) {
                 // The highest temperature accepts every move, so the move becomes a perturbation.
                 tally.kept += u64::from(mover.step(&mut other, f64::MAX, &mut rng));

@@ -2,7 +2,6 @@
 
 use super::config::Config;
 use super::recombine::recombine;
-use crate::annealing::layout::Layout;
 use crate::annealing::references::Divider;
 use crate::annealing::ruin_recreate::RuinMover;
 use crate::annealing::schedule::{Schedule, anneal};
@@ -177,7 +176,7 @@ impl Improvement<'_, '_, '_, '_> {
 
 /// Returns the cost of a tree. O(n).
 pub(super) fn cost(tree: &Working<impl Metric>, by_layout: bool) -> f64 {
-    if by_layout { Layout::default().cost(tree) } else { tree.area() }
+    if by_layout { tree.layout_cost() } else { tree.area() }
 }
 
 /// An observer that also cancels when the progress reaches `end`.

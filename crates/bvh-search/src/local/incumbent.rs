@@ -2,7 +2,6 @@
 
 use super::pass::TOLERANCE;
 use crate::lower_bound;
-use crate::parallel;
 use crate::run::{Kept, Observer, Problem, Quota, Run, SearchError, Shortcut, Tally, watched};
 use crate::tree::{Metric, Working};
 use bvh_build::{Builder, Watch};
@@ -113,16 +112,17 @@ impl<'p> Incumbent<'p> {
         // The incremental area rejects most trees without the conversion. The layout's cost does
         // not follow the area, so every tree is converted for it.
         let may_be_better = tree.area() < self.area || self.problem.objective == Objective::Layout;
-        // A tree that is better by more than rounding errors is certain to be kept, so the memory
-        // of the trees that it replaces is free before the conversion needs as much.
+        // A tree that is better by more than rounding errors is certain to be kept, so it takes the
+        // memory of the tree that it replaces.
         let Problem { objective, measure, splits, judge, .. } = self.problem;
         let is_plain = measure.is_none() && splits.is_none() && judge.is_none();
         if is_plain
             && objective == Objective::InternalArea
             && tree.area() < run.incumbent().min(self.area) * (1.0 - CERTAIN)
         {
-            self.tree = Bvh::default();
             run.drop_aside(tree.area() * (1.0 + CERTAIN));
+            let memory = std::mem::take(&mut self.tree);
+            return self.offer_tree(tree.to_bvh_in(memory), run);
         }
         if !may_be_better {
             return false;
@@ -131,10 +131,12 @@ impl<'p> Incumbent<'p> {
         if !is_by_sizes {
             return self.offer_tree(tree.to_bvh(), run);
         }
-        // The nodes have their measures already. A cancelled search waits for both results.
-        let mut cost = 0.0;
-        let mut candidate = Bvh::default();
-        parallel::call_both(&mut || cost = tree.layout_cost(), &mut || candidate = tree.to_bvh());
+        // The nodes have their measures already, so the cost is known before the conversion.
+        let cost = tree.layout_cost();
+        if cost >= run.incumbent() {
+            return false;
+        }
+        let candidate = tree.to_bvh_in(std::mem::take(&mut self.tree));
         debug_assert_eq!(cost.to_bits(), self.problem.cost(&candidate).to_bits());
         self.offer_kept(Kept { tree: candidate, cost }, run)
     }

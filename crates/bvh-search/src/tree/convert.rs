@@ -83,12 +83,19 @@ impl<M: Metric> Working<M> {
 
     /// Returns the flat tree, with adjacent children, left before right, and objects in leaf order.
     pub fn to_bvh(&self) -> Bvh {
-        let mut tree = Bvh::default();
+        self.to_bvh_in(Bvh::default())
+    }
+
+    /// Returns the flat tree like [`to_bvh`](Self::to_bvh), in the memory of another tree. The first
+    /// use of fresh memory takes several times as long as the conversion.
+    pub fn to_bvh_in(&self, mut tree: Bvh) -> Bvh {
+        tree.nodes.clear();
+        tree.prim_ids.clear();
         let Some(root) = self.root() else { return tree };
         let count = self.nodes.len() - 1;
         let placeholder = BvhNode::leaf(Aabb::EMPTY, 0, 0);
-        tree.nodes = vec![placeholder; count];
-        tree.prim_ids = Vec::with_capacity(self.objects());
+        tree.nodes.resize(count, placeholder);
+        tree.prim_ids.reserve(self.objects());
         let mut free = 1;
         let mut stack = Vec::with_capacity(64);
         let mut next = Some((root, 0));
