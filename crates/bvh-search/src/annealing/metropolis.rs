@@ -29,10 +29,10 @@ pub(crate) trait Mover {
 const LONG_MOVE: u64 = 1 << 11;
 
 with_vector_instructions! {
-    /// Makes moves of a series that has begun until the quota is used up, while the temperature falls geometrically from `hot`
-    /// to `cold`.
+    /// Begins a series of moves near these nodes, and makes moves until the quota is used up, while
+    /// the temperature falls geometrically from `hot` to `cold`.
     pub(crate) cool = cool_plain<M: Mover>(
-        mover: &mut M, tree: &mut Working<impl Metric>, heat: [f64; 2], quota: Quota, rng: &mut Stream, observer: &dyn Observer)
+        mover: &mut M, tree: &mut Working<impl Metric>, near: Vec<u32>, heat: [f64; 2], quota: Quota, rng: &mut Stream, observer: &dyn Observer)
         -> Tally
 }
 
@@ -40,12 +40,16 @@ with_vector_instructions! {
 fn cool_plain<M: Mover>(
     mover: &mut M,
     tree: &mut Working<impl Metric>,
+    near: Vec<u32>,
     [hot, cold]: [f64; 2],
     quota: Quota,
     rng: &mut Stream,
     observer: &dyn Observer,
 ) -> Tally {
     let mut tally = Tally::default();
+    if !mover.begin(tree, near, &|| observer.cancelled()) {
+        return tally;
+    }
     let before = mover.work();
     let mut temperature = hot;
     loop {

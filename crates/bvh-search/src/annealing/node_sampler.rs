@@ -52,6 +52,8 @@ impl NodeSampler {
         self.only = only;
         self.middle = None;
         self.draws = 0;
+        // The weights keep their values until the next round: updating the sums after every move
+        // would take O(n).
         let all = if self.only.is_empty() { tree.nodes.len() - 1 } else { self.only.len() };
         self.sums.clear();
         self.sums.reserve(all + 1);
@@ -105,8 +107,6 @@ impl NodeSampler {
             None => rng.random(),
         };
         self.middle = Some(before);
-        // The weights keep their values until the next round: updating the sums after every move
-        // would take O(n).
         let all = self.sums.len() - 1;
         (self.window, self.draws) = (0..all, u32::MAX);
         let is_short = self.short_run && self.only.is_empty();

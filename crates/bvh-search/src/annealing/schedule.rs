@@ -162,6 +162,8 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
             }
         }
     }
+    // The final passes need memory, too.
+    drop(whole);
     if schedule.to_local_optimum {
         let tally = subtrees::to_local_optimum(
             tree,

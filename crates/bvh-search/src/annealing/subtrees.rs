@@ -41,7 +41,6 @@ pub(crate) fn cool<M: Mover>(
     observer: &dyn Observer,
 ) -> Tally {
     let Round { heat, quota, count, streams: [seed, first] } = *round;
-    let is_over = || observer.cancelled();
     let mut rng = stream(seed, first);
     let mut done = Tally::default();
     let mut near = Vec::new();
@@ -63,20 +62,14 @@ pub(crate) fn cool<M: Mover>(
             // threads.
             let rng = &mut stream(seed, first + 1 + number as u64);
             let quota = quota_of(&cut.subtrees[number]);
-            let mut mover = mover();
-            if !mover.begin(small, Vec::new(), &is_over) {
-                return Tally::default();
-            }
-            metropolis::cool(&mut mover, small, heat, quota, rng, observer)
+            metropolis::cool(&mut mover(), small, Vec::new(), heat, quota, rng, observer)
         });
         near = cut.starts;
     }
-    if whole.begin(tree, near, &is_over) {
-        done += metropolis::cool(whole, tree, heat, quota.less(&done), &mut rng, observer);
-    }
+    done += metropolis::cool(whole, tree, near, heat, quota.less(&done), &mut rng, observer);
     // A cancelled search must return soon, and every later round would sort first.
     if !observer.cancelled() {
-        tree.sort_in_preorder_unless(&is_over);
+        tree.sort_in_preorder_unless(&|| observer.cancelled());
     }
     done
 }

@@ -3,10 +3,10 @@
 use super::config::{Config, Horizon};
 use super::improvement::{Improvement, ScheduledRun, TRIALS, cost};
 use super::plan::{Planned, plan};
+use crate::annealing::cool;
 use crate::annealing::references::Divider;
 use crate::annealing::ruin_recreate::RuinMover;
 use crate::annealing::schedule::Schedule;
-use crate::annealing::{Mover, cool};
 use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion;
 use crate::parallel::threads;
@@ -240,10 +240,7 @@ impl Improvement<'_, '_, '_, '_> {
         let heat = [self.config.cold; 2];
         let began = observer.progress();
         let mut mover = RuinMover::new(&self.config.ruin, PROBE as f64, self.by_layout);
-        let mut tally = Tally::default();
-        if mover.begin(tree, Vec::new(), &|| observer.cancelled()) {
-            tally = cool(&mut mover, tree, heat, quota, &mut rng, observer);
-        }
+        let tally = cool(&mut mover, tree, Vec::new(), heat, quota, &mut rng, observer);
         let in_time = match (began, observer.progress()) {
             (Some(began), Some(now)) => {
                 tally.work as f64 * (1.0 - now).max(0.0) / (now - began).max(1e-9)

@@ -133,7 +133,8 @@ impl<'p> Incumbent<'p> {
         }
         // The nodes have their measures already, so the cost is known before the conversion.
         let cost = tree.layout_cost();
-        if cost >= run.incumbent() {
+        let is_better = cost < run.incumbent();
+        if !is_better {
             return false;
         }
         let candidate = tree.to_bvh_in(std::mem::take(&mut self.tree));
