@@ -19,11 +19,15 @@ pub(crate) struct Expansion<const N: usize> {
 }
 
 impl<const N: usize> Expansion<N> {
-    pub(crate) const ZERO: Self = Self { terms: [0.0; N], len: 0 };
+    /// Returns zero. A constant would be copied, terms that nobody reads included.
+    #[inline(always)]
+    pub(crate) fn zero() -> Self {
+        Self { terms: [0.0; N], len: 0 }
+    }
 
     /// Returns `self` with room for more terms.
     pub(crate) fn widened<const M: usize>(&self) -> Expansion<M> {
-        let mut wide = Expansion::ZERO;
+        let mut wide = Expansion::zero();
         wide.terms[..self.len].copy_from_slice(self.terms());
         wide.len = self.len;
         wide
@@ -108,9 +112,14 @@ impl Expansion<2> {
     /// Returns the exact difference of two numbers.
     pub(crate) fn difference(a: f32, b: f32) -> Self {
         let (sum, rest) = two_sum(f64::from(a), -f64::from(b));
-        let mut difference = Self::ZERO;
-        difference.add(rest);
-        difference.add(sum);
+        let mut difference = Self::zero();
+        // The rounding error is never adjacent to the sum.
+        for term in [rest, sum] {
+            if term != 0.0 {
+                difference.terms[difference.len] = term;
+                difference.len += 1;
+            }
+        }
         difference
     }
 }

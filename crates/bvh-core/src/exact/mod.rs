@@ -231,7 +231,7 @@ impl Line {
         }
         for (edge, side) in sides.iter_mut().enumerate() {
             if *side == 0 {
-                *side = volumes.edge(edge).sign();
+                *side = volumes.side(edge);
             }
         }
         if sides.contains(&-1) && sides.contains(&1) {

@@ -17,21 +17,26 @@ pub(super) fn crossing(ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
         .flatten()
 }
 
-type Vector<const N: usize> = [Expansion<N>; 3];
+/// An exact difference of two points.
+type Vector = [Expansion<2>; 3];
 
 /// Returns the exact difference of two points.
-fn difference(p: Vec3, q: Vec3) -> Vector<2> {
-    [0, 1, 2].map(|axis| Expansion::difference(p[axis], q[axis]))
+#[inline]
+fn difference(p: Vec3, q: Vec3) -> Vector {
+    let mut vector = [Expansion::zero(); 3];
+    for (axis, component) in vector.iter_mut().enumerate() {
+        *component = Expansion::difference(p[axis], q[axis]);
+    }
+    vector
 }
 
-/// Returns the exact cross product.
-fn cross(p: &Vector<2>, q: &Vector<2>) -> Vector<16> {
-    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
-        let mut component = Expansion::ZERO;
-        component.add_product(&p[i], &q[j]);
-        component.subtract_product(&p[j], &q[i]);
-        component
-    })
+/// Adds one component of the exact cross product. Returned products would be copied from function to
+/// function, which took longer than the arithmetic.
+fn add_cross(sum: &mut Expansion<16>, p: &Vector, q: &Vector, axis: usize) {
+    let i = (axis + 1) % 3;
+    let j = (axis + 2) % 3;
+    sum.add_product(&p[i], &q[j]);
+    sum.subtract_product(&p[j], &q[i]);
 }
 
 /// The exact values that decide whether a ray hits a triangle.
@@ -39,7 +44,7 @@ pub(super) struct Volumes<'a> {
     direction: Vec3,
     triangle: &'a [Vec3; 3],
     /// The corners relative to the origin.
-    corners: [Vector<2>; 3],
+    corners: [Vector; 3],
 }
 
 /// The first and the second corner of the edges `u`, `v`, `w`.
@@ -54,17 +59,23 @@ impl<'a> Volumes<'a> {
         let is_finite = [a, b, c, origin, direction]
             .iter()
             .all(|point| point.is_finite());
-        is_finite.then(|| Self {
-            direction,
-            triangle,
-            corners: [a, b, c].map(|corner| difference(corner, origin)),
-        })
+        if !is_finite {
+            return None;
+        }
+        let corners = [difference(a, origin), difference(b, origin), difference(c, origin)];
+        Some(Self { direction, triangle, corners })
     }
 
-    /// Returns `u`, `v` or `w`.
-    pub(super) fn edge(&self, edge: usize) -> Expansion<96> {
+    /// Returns the sign of `u`, `v` or `w`.
+    pub(super) fn side(&self, edge: usize) -> i32 {
         let [first, second] = EDGES[edge];
-        self.along_direction(&cross(&self.corners[first], &self.corners[second]))
+        let mut volume: Expansion<96> = Expansion::zero();
+        for axis in 0..3 {
+            let mut normal = Expansion::zero();
+            add_cross(&mut normal, &self.corners[first], &self.corners[second], axis);
+            volume.add_scaled(&normal, f64::from(self.direction[axis]));
+        }
+        volume.sign()
     }
 
     /// Returns the sides of the edges on which the ray is, never 0 for an edge that is not parallel
@@ -72,7 +83,7 @@ impl<'a> Volumes<'a> {
     /// infinitely small ε > 0.
     fn sides(&self) -> [i32; 3] {
         [0, 1, 2].map(|number| {
-            let side = self.edge(number).sign();
+            let side = self.side(number);
             if side != 0 {
                 return side;
             }
@@ -82,7 +93,7 @@ impl<'a> Volumes<'a> {
             [(1, 2), (2, 0), (0, 1)]
                 .into_iter()
                 .map(|(i, j)| {
-                    let mut component: Expansion<8> = Expansion::ZERO;
+                    let mut component: Expansion<8> = Expansion::zero();
                     component.add_scaled(&edge[j], direction[i]);
                     component.add_scaled(&edge[i], -direction[j]);
                     component.sign()
@@ -95,26 +106,17 @@ impl<'a> Volumes<'a> {
     /// Returns the distance of the triangle's plane, rounded once; `None` as [`round_quotient`].
     pub(super) fn rounded_distance(&self) -> Option<f32> {
         let [a, b, c] = *self.triangle;
-        let normal = cross(&difference(b, a), &difference(c, a));
-        round_quotient(&self.along(&normal), &self.along_direction(&normal))
-    }
-
-    /// Returns the product of the direction and a vector.
-    fn along_direction(&self, vector: &Vector<16>) -> Expansion<96> {
-        let mut sum = Expansion::ZERO;
-        for (component, along) in vector.iter().zip(self.direction.to_array()) {
-            sum.add_scaled(component, f64::from(along));
+        let to_second = difference(b, a);
+        let to_third = difference(c, a);
+        let mut height = Expansion::zero();
+        let mut speed = Expansion::zero();
+        for axis in 0..3 {
+            let mut normal = Expansion::zero();
+            add_cross(&mut normal, &to_second, &to_third, axis);
+            height.add_product(&normal, &self.corners[0][axis]);
+            speed.add_scaled(&normal, f64::from(self.direction[axis]));
         }
-        sum
-    }
-
-    /// Returns the product of the first corner and a vector.
-    fn along(&self, vector: &Vector<16>) -> Expansion<192> {
-        let mut sum = Expansion::ZERO;
-        for (component, along) in vector.iter().zip(&self.corners[0]) {
-            sum.add_product(component, along);
-        }
-        sum
+        round_quotient(&height, &speed)
     }
 }
 
