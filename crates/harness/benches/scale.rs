@@ -8,9 +8,10 @@
 //! The program counts the bytes that it requests from its allocator; counting adds about 1 % to the
 //! times. Mapped files are not counted.
 
-use bvh_build::{Builder, muller_fellner, ploc};
+use bvh_build::{Builder, Watch, muller_fellner, ploc, spatial};
+use bvh_core::cost::{self, SahConstants};
 use bvh_core::file::{self, Origin, TreeFile};
-use bvh_core::{Aabb, Bvh, WideBvh, cost, validate};
+use bvh_core::{Aabb, Bvh, WideBvh, validate};
 use bvh_scenes::{Scene, load};
 use bvh_search::best::{self, Horizon};
 use bvh_search::{Budget, Deadline, Kept, Problem, solve_or_keep};
@@ -134,6 +135,13 @@ impl Phases {
         });
         self.cost(&clustered, base);
         drop(clustered);
+        let triangles = scene.triangles().expect("triangles");
+        self.phase("build with spatial splits", || {
+            let most = boxes.len() * 6 / 5;
+            spatial::Config::default()
+                .build_watched(most, boxes, &triangles, &Watch::default())
+                .expect("finite boxes")
+        });
         self.peers(&scene, base);
         drop(self.bake(boxes, base, 10, 1));
         drop(self.bake(boxes, base, 10, 2));
@@ -160,7 +168,9 @@ impl Phases {
             validate(&baked, boxes).expect("a valid tree");
             [cost::internal_area(&baked), cost::goldsmith_salmon(&baked)]
         });
-        let triangles = scene.triangles().expect("triangles");
+        self.phase("inspect, overlap", || {
+            cost::end_point_overlap(&baked, triangles, &SahConstants::default())
+        });
         self.phase("wide layout", || {
             WideBvh::new(&baked, triangles)
                 .expect("a layout")

@@ -134,3 +134,25 @@ fn objects_as_large_as_the_scene_are_divided_in_little_time_into_a_tree_about_as
         }
     }
 }
+
+#[test]
+fn spatial_splits_of_objects_as_large_as_the_scene_visit_each_reference_a_few_hundred_times() {
+    for n in [5000, 20_000] {
+        let triangles = soup(n);
+        let boxes = boxes(&triangles);
+        let most = boxes.len() * 6 / 5;
+        let divide = |watch: &Watch| {
+            spatial::Config::default().build_watched(most, &boxes, &triangles.as_slice(), watch)
+        };
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .build()
+            .unwrap();
+        let (tree, questions) = pool.install(|| asked(usize::MAX, divide));
+        assert!(tree.unwrap().prim_ids.len() <= most);
+        let visits = (questions * OBJECTS_PER_POLL) as f64 / most as f64;
+        // A division that separates one reference after the other would visit each n / 2 times.
+        let limit = 30.0 * f64::from(n).log2();
+        assert!(visits < limit, "{n}: {visits} visits per reference, of {limit}");
+    }
+}

@@ -167,3 +167,32 @@ fn a_clock_ends_no_search_above_the_tree_that_its_caller_has() {
         }
     }
 }
+
+#[test]
+fn a_clock_ends_the_best_above_no_tree_that_it_has_evaluated_nor_above_its_fast_builds() {
+    // A clock that ends at once leaves time for the first only.
+    let fast = [(1, 0), (5, 1)].map(|(radius, near_rounds)| ploc::Config { radius, near_rounds });
+    let method = Method::Best(best::Config::default());
+    for (name, boxes) in scenes() {
+        let limit = fast
+            .iter()
+            .map(|build| cost::internal_area(&build.build(&boxes).unwrap()))
+            .fold(0.0, f64::max);
+        for most in [1, 3, 10, 100, 1000] {
+            let clock = Questions { asked: AtomicU64::new(0), most };
+            let found =
+                solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &clock).unwrap();
+            validate(&found.tree, &boxes).unwrap();
+            let least = found
+                .history
+                .iter()
+                .map(|event| event.cost)
+                .fold(limit, f64::min);
+            assert!(
+                at_most(found.cost, least),
+                "{name}, {most} questions: {} above {least}",
+                found.cost
+            );
+        }
+    }
+}

@@ -250,6 +250,20 @@ rows! {
         megabytes_per_s: Option<f64>,
     }
 
+    /// One row of `timing_interrupt.csv`: one bake that was interrupted.
+    InterruptRow in "timing_interrupt.csv" {
+        scene: String,
+        objects: usize,
+        /// The processor that was measured.
+        processor: String,
+        /// The number of recorded rays that the tree was searched for; 0 for a bake by area.
+        segments: usize,
+        /// The time from the start of the program to the signal.
+        after_seconds: f64,
+        /// The time from the signal to the end of the program, the file of the tree included.
+        seconds: f64,
+    }
+
     /// One row of `bounds.csv`: a proven lower bound of a scene.
     BoundRow in "bounds.csv" {
         scene: String,

@@ -1,0 +1,120 @@
+//! The seconds from Ctrl-C to the end of `bvh bake`, the file of the best tree so far included.
+//!
+//! `cargo bench -p harness --bench interrupt` bakes a city of five million triangles, by area and
+//! for a million recorded rays, interrupts each bake at several times, and writes
+//! `results/interrupt/timing_interrupt.csv`. About ten minutes.
+
+use bvh_scenes::Scene;
+use bvh_search::Stream;
+use harness::processor::PROCESSOR;
+use harness::rows::{InterruptRow, Row, read_if_any, to_bytes};
+use rand::{RngExt, SeedableRng};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+const FOLDER: &str = "results/interrupt";
+const SCENE: &str = "city:5000000";
+const SEGMENTS: usize = 1_000_000;
+/// Bakes are interrupted in the greedy build, in the first passes of reinsertion and far into the
+/// search; fractions keep the signals off the ends of phases that take whole seconds.
+const AFTER: [f64; 6] = [4.3, 9.1, 17.7, 24.2, 33.9, 46.4];
+
+fn main() {
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    std::env::set_current_dir(&top).expect("the project's folder");
+    let program = program();
+    let scene = Scene::load(SCENE).expect("a scene");
+    let objects = scene.boxes.len();
+    let folder = tempfile::tempdir().expect("a folder");
+    let recorded = folder.path().join("rays.bin");
+    fs::write(&recorded, segments(&scene)).expect("a file");
+    // Another scene of this size beside the bake would change what is measured.
+    drop(scene);
+    let processor = PROCESSOR.name();
+    let mut rows = Vec::new();
+    for segments in [0, SEGMENTS] {
+        let recorded = (segments > 0).then_some(recorded.as_path());
+        for after_seconds in AFTER {
+            let seconds = interrupted(&program, folder.path(), recorded, after_seconds);
+            println!("{SCENE}, {segments} segments, after {after_seconds} s: {seconds:.2} s");
+            let scene = SCENE.to_owned();
+            let processor = processor.clone();
+            rows.push(InterruptRow { scene, objects, processor, segments, after_seconds, seconds });
+        }
+    }
+    write(rows);
+}
+
+/// Builds the program `bvh` and returns its path.
+fn program() -> PathBuf {
+    let built = Command::new(env!("CARGO"))
+        .args(["build", "--release", "--package", "bvh-cli"])
+        .status();
+    assert!(built.expect("cargo").success(), "bvh-cli was not built");
+    let this = std::env::current_exe().expect("this program");
+    let release = this
+        .ancestors()
+        .nth(2)
+        .expect("the folder above `deps`");
+    release.join(format!("bvh{}", std::env::consts::EXE_SUFFIX))
+}
+
+/// Returns the contents of a file of segments between random points of a scene.
+fn segments(scene: &Scene) -> Vec<u8> {
+    let bounds = scene
+        .boxes
+        .iter()
+        .copied()
+        .reduce(|all, aabb| all.union(&aabb))
+        .expect("objects");
+    let mut rng = Stream::seed_from_u64(1);
+    let mut bytes = Vec::with_capacity(24 * SEGMENTS);
+    for _ in 0..2 * SEGMENTS {
+        for axis in 0..3 {
+            let position = rng.random_range(bounds.min[axis]..=bounds.max[axis]);
+            bytes.extend(position.to_le_bytes());
+        }
+    }
+    bytes
+}
+
+/// Begins a bake and interrupts it. Returns the seconds from the signal to the end of the program.
+fn interrupted(program: &Path, folder: &Path, recorded: Option<&Path>, after: f64) -> f64 {
+    let tree = folder.join("tree.bvh");
+    let mut bake = Command::new(program);
+    bake.args(["bake", SCENE, "--budget", "10m", "--out"])
+        .arg(&tree)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    if let Some(recorded) = recorded {
+        bake.arg("--rays").arg(recorded);
+    }
+    let mut child = bake.spawn().expect("bvh");
+    std::thread::sleep(Duration::from_secs_f64(after));
+    let signal = Instant::now();
+    let sent = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
+    assert!(sent.expect("kill").success(), "the bake had ended");
+    let status = child.wait().expect("the bake");
+    let seconds = signal.elapsed().as_secs_f64();
+    assert_eq!(status.code(), Some(130), "the bake ended otherwise than by the signal");
+    // Without a greedy tree yet, there is no file.
+    if tree.exists() {
+        fs::remove_file(&tree).expect("the file of the tree");
+    }
+    seconds
+}
+
+/// Replaces the rows of this processor in the file.
+fn write(measured: Vec<InterruptRow>) {
+    let folder = Path::new(FOLDER);
+    fs::create_dir_all(folder).expect("a folder for results");
+    let mut rows: Vec<InterruptRow> = read_if_any(folder).expect("rows");
+    rows.retain(|row| row.processor != PROCESSOR.name());
+    rows.extend(measured);
+    let path = folder.join(InterruptRow::FILE);
+    fs::write(&path, to_bytes(&rows, &path).expect("rows")).expect("a file");
+}
