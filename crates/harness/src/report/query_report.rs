@@ -11,6 +11,9 @@ use super::query_figure::Drawing;
 use crate::statistics::range;
 use bvh_config::Nested;
 
+/// The most values of a key that a reading lists.
+const LISTED: usize = 6;
+
 bvh_config::config! { serde;
     /// A table of some rows of a CSV file, and a figure of it.
     pub struct Config {
@@ -159,7 +162,8 @@ impl Config {
                     let scene = row
                         .get("scene")
                         .map_or_else(String::new, |scene| rows.shown(scene));
-                    let quantity = format!("{}, {}", column.label(), self.subject(row));
+                    let subject = self.subject(row, &self.by);
+                    let quantity = format!("{}, {subject}", column.label());
                     let low = number_in(row, &format!("{}_low", column.name));
                     let high = number_in(row, &format!("{}_high", column.name));
                     let paper = of_paper.value / of_paper.over;
@@ -177,9 +181,10 @@ impl Config {
         Ok(compared)
     }
 
-    /// Names a row of the table, without its scene, and the base that it is compared with.
-    fn subject(&self, row: &Row) -> String {
-        let names = self.by.iter().filter(|column| *column != "scene");
+    /// Names a row of the table by these columns, without its scene, and the base that it is compared
+    /// with.
+    fn subject(&self, row: &Row, by: &[String]) -> String {
+        let names = by.iter().filter(|column| *column != "scene");
         let own: Vec<&str> = names.map(|column| row[column].as_str()).collect();
         let own = own.join(", ");
         match (row.get("against"), Conditions::parse(&self.base)) {
@@ -191,30 +196,49 @@ impl Config {
         }
     }
 
-    /// Returns the span of the first quotient over scenes, for every other value of the key.
+    /// Returns the span over scenes of the first quotient or correlation, for every other value of
+    /// the key; of more than [`LISTED`] values, for the two with the extremes.
     fn reading(&self, table: &[Row]) -> String {
-        let is_ratio = |column: &&Column| column.ratio.is_some();
-        let Some(column) = self.columns.iter().find(is_ratio) else { return String::new() };
+        let Some(column) = self
+            .columns
+            .iter()
+            .find(|column| column.is_read())
+        else {
+            return String::new();
+        };
+        // A column with one value for each scene distinguishes no row from another.
+        let mut by = self.by.clone();
+        by.retain(|column| column == "method" || has_several(table, column));
         let subjects: Vec<String> = table
             .iter()
-            .map(|row| self.subject(row))
+            .map(|row| self.subject(row, &by))
             .collect();
-        let all = distinct(subjects.iter().map(String::as_str));
-        let spans = each(all, |subject| {
+        let mut spans: Vec<(&str, f64, f64)> = Vec::new();
+        for subject in distinct(subjects.iter().map(String::as_str)) {
             let rows_of_subject = table
                 .iter()
                 .zip(&subjects)
                 .filter(|(_, of_row)| *of_row == subject);
             let values = rows_of_subject.filter_map(|(row, _)| number_in(row, &column.name));
-            let (low, high) = range(values)?;
+            let Some((low, high)) = range(values) else { continue };
             // The base compared with itself says nothing.
             let (own, base) = subject
                 .split_once(" over ")
                 .unwrap_or((subject, ""));
-            let is_base = own == base || own.starts_with(&format!("{base}, "));
-            (!is_base).then(|| format!("{subject} {low:.3} to {high:.3}"))
-        });
-        format!("{}: {spans}.", capitalised(&column.label()))
+            if own != base && !own.starts_with(&format!("{base}, ")) {
+                spans.push((subject, low, high));
+            }
+        }
+        let said =
+            |&(subject, low, high): &(&str, f64, f64)| format!("{subject} {low:.3} to {high:.3}");
+        let label = capitalised(&column.label());
+        if spans.len() <= LISTED {
+            return format!("{label}: {}.", each(&spans, |span| Some(said(span))));
+        }
+        let least = spans.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        let most = spans.iter().max_by(|a, b| a.2.total_cmp(&b.2));
+        let extremes = each(least.into_iter().chain(most), |span| Some(said(span)));
+        format!("{label}, the least and the most of {}: {extremes}.", spans.len())
     }
 }
 
@@ -237,6 +261,15 @@ fn find<'r>(
         }
     }
     Ok(found)
+}
+
+/// Returns whether two rows of the same scene have different values in this column.
+fn has_several(table: &[Row], column: &str) -> bool {
+    table.iter().any(|row| {
+        table
+            .iter()
+            .any(|other| row.get("scene") == other.get("scene") && row[column] != other[column])
+    })
 }
 
 fn capitalised(text: &str) -> String {
@@ -288,6 +321,19 @@ mod tests {
                         s,a,1,1,1,inconclusive\ns,b,0.625,0.5,0.75,lower\n";
         assert_eq!(csv(&output), expected);
         assert_eq!(output.reading, "R: b over a 0.625 to 0.625.");
+    }
+
+    #[test]
+    fn a_column_with_one_value_for_each_scene_names_no_row_of_a_reading() {
+        let row = |scene: &str, picture: &str| -> Row {
+            [("scene", scene), ("picture", picture)]
+                .map(|(column, value)| (column.to_owned(), value.to_owned()))
+                .into_iter()
+                .collect()
+        };
+        let same = [row("s", "5ccc"), row("s", "5ccc"), row("t", "a0")];
+        assert!(!has_several(&same, "picture"));
+        assert!(has_several(&[row("s", "5ccc"), row("s", "a0")], "picture"));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 
 use crate::support::{TABLE, folder_with, refused, said};
 use std::fs;
+use std::path::Path;
 
 /// The texts between `before` and `after` in the page.
 fn between<'a>(page: &'a str, before: &str, after: &str) -> Vec<&'a str> {
@@ -63,4 +64,29 @@ fn the_page_of_all_results_answers_first_and_leads_to_files_that_are_there_but_n
         }
     }
     refused(folder.path(), &["report", "--results", "."], 2, &["no finished experiment"]);
+}
+
+#[test]
+fn every_committed_experiment_answers_in_words() {
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("page.html");
+    said(&top, &["report", "--out", out.to_str().unwrap()]);
+    let page = fs::read_to_string(out).unwrap();
+    let answers = between(&page, "<li id=\"answer-", "</li>");
+    assert!(answers.len() > 30, "{}", answers.len());
+    for answer in answers {
+        assert!(!answer.contains("No verdict is stated."), "{answer}");
+        // Checksums distinguish rows, and tell a reader nothing.
+        let text = answer.rsplit("</svg>").next().unwrap();
+        let is_checksum = |word: &&str| {
+            word.len() >= 8
+                && word.bytes().all(|byte| byte.is_ascii_hexdigit())
+                && word.bytes().any(|byte| byte.is_ascii_lowercase())
+        };
+        let checksum = text
+            .split(|c: char| !c.is_ascii_alphanumeric())
+            .find(is_checksum);
+        assert_eq!(checksum, None, "{answer}");
+    }
 }
