@@ -6,6 +6,7 @@
 mod queries;
 mod support;
 
+use harness::report::query;
 use queries::answer;
 use regex_lite::Regex;
 use std::fs;
@@ -135,4 +136,93 @@ fn a_text_is_found_across_lines() {
     assert_eq!(values("of two. {answer}"), Some(vec!["That is all."]));
     assert_eq!(values("are {low} to {high} % dearer"), None);
     assert_eq!(values("cheaper{none} So"), None);
+}
+
+/// Our trees whose comparisons with the fastest rival have the verdict, by the extremes of all
+/// turns: greedy first, in the order of the file.
+fn trees_by_verdict(file: &str, instructions: &str, against: &str, rays: &str) -> [Vec<String>; 3] {
+    let rows = query::read(&top().join("results/peers").join(file)).unwrap();
+    let calls = if against == "single calls" { ": wide" } else { ": wide, batches" };
+    let mut by_verdict = [Vec::new(), Vec::new(), Vec::new()];
+    for row in rows {
+        let is_asked = row["scene"] == "geometric mean"
+            && row["processor"].ends_with(&format!(", {instructions}"))
+            && row["against"] == against
+            && row["rays"] == rays;
+        let Some(tree) = row["mode"]
+            .strip_suffix(calls)
+            .filter(|_| is_asked)
+        else {
+            continue;
+        };
+        let least: f64 = row["least_turn"].parse().unwrap();
+        let greatest: f64 = row["greatest_turn"].parse().unwrap();
+        let verdict = if greatest < 1.0 { 0 } else { 1 + usize::from(least > 1.0) };
+        by_verdict[verdict].push(tree.to_owned());
+    }
+    assert_eq!(by_verdict.iter().map(Vec::len).sum::<usize>(), 12, "{file}, {against}, {rays}");
+    by_verdict
+}
+
+const CAMERA: &str = "best for the camera, 1.2";
+const ANY_RAYS: &str = "best for any rays, 1.2";
+const GREEDY: [&str; 2] = ["Müller–Fellner", "agglomerative"];
+
+/// Asserts that the README has a sentence, line breaks aside.
+fn readme_says(sentence: &str) {
+    let readme = fs::read_to_string(top().join("README.md")).unwrap();
+    let words: Vec<&str> = readme.split_whitespace().collect();
+    assert!(words.join(" ").contains(sentence), "{sentence}");
+}
+
+#[test]
+fn the_readme_says_which_rays_embree_traces_faster_with_avx_512() {
+    let file = "amd-epyc-25-17/timing_ratios.csv";
+    let of = |rays: &str| trees_by_verdict(file, "AVX-512", "any mode", rays);
+    readme_says(
+        "Embree's packets trace primary and shadow rays faster than our batches in the mean over \
+         four scenes in nearly all of our trees. In the tree for the camera both comparisons are \
+         inconclusive, and so are shadow rays in `best, 2 M`.",
+    );
+    let [slower, inconclusive, _] = of("primary");
+    assert_eq!(inconclusive, [CAMERA]);
+    assert_eq!(slower.len(), 11);
+    let [slower, inconclusive, _] = of("shadow");
+    assert_eq!(inconclusive, ["best, 2 M", CAMERA]);
+    assert_eq!(slower.len(), 10);
+}
+
+#[test]
+fn the_readme_says_in_which_trees_bounce_rays_are_slower() {
+    readme_says(
+        "On our greedy trees they are slower than Embree's in the mean. On the processor without \
+         AVX-512 they are slower in the mean on all our trees but the one for the camera, where \
+         the comparison is inconclusive, and incoherent rays are slower on greedy ones.",
+    );
+    let with = "amd-epyc-25-17/timing_ratios.csv";
+    let without = "amd-epyc-25-1/timing_ratios.csv";
+    assert_eq!(trees_by_verdict(with, "AVX-512", "any mode", "bounce")[0], GREEDY);
+    let [slower, inconclusive, _] = trees_by_verdict(without, "AVX2", "any mode", "bounce");
+    assert_eq!(inconclusive, [CAMERA]);
+    assert_eq!(slower.len(), 11);
+    assert_eq!(trees_by_verdict(without, "AVX2", "any mode", "incoherent")[0], GREEDY);
+}
+
+#[test]
+fn the_readme_says_where_single_calls_are_slower() {
+    readme_says(
+        "One call per ray, other libraries are as fast or faster with most of our trees, and on \
+         the processor without AVX-512 faster in the mean with all of them, except that shadow \
+         rays in the trees for the camera and for any rays are inconclusive.",
+    );
+    for rays in ["incoherent", "primary", "bounce", "shadow"] {
+        let file = "amd-epyc-25-17/timing_ratios.csv";
+        let [.., faster] = trees_by_verdict(file, "AVX-512", "single calls", rays);
+        assert!(faster.len() <= 2, "{rays}: {faster:?}");
+        let file = "amd-epyc-25-1/timing_ratios.csv";
+        let [_, inconclusive, faster] = trees_by_verdict(file, "AVX2", "single calls", rays);
+        let expected: &[&str] = if rays == "shadow" { &[ANY_RAYS, CAMERA] } else { &[] };
+        assert_eq!(inconclusive, expected, "{rays}");
+        assert!(faster.is_empty(), "{rays}: {faster:?}");
+    }
 }

@@ -55,6 +55,31 @@ fn a_run_writes_rows_figures_and_provenance_and_prints_the_table() {
 }
 
 #[test]
+fn runs_whose_times_are_the_result_alternate_between_methods_one_at_a_time() {
+    let folder = folder_with(
+        "spec.toml",
+        "question = 'Which is faster?'\nscenes = ['escher:50', 'spheres75']\nrepetitions = 3\n\
+         sequential = true\nmethods = [{ method = 'muller_fellner' }, { method = 'median_cut' }]\n",
+    );
+    let output = run(folder.path(), &["spec.toml", "--verbose"]);
+    let lines = text(&output.stderr);
+    let performed: Vec<&str> = lines
+        .lines()
+        .filter_map(|line| line.split(": ").nth(2))
+        .filter_map(|line| line.split(", seed").next())
+        .collect();
+    let mut expected = Vec::new();
+    for scene in ["escher:50", "spheres75"] {
+        for repetition in 0..3 {
+            for method in ["muller_fellner", "median_cut"] {
+                expected.push(format!("{method} on {scene}, repetition {repetition}"));
+            }
+        }
+    }
+    assert_eq!(performed, expected, "{lines}");
+}
+
+#[test]
 fn any_number_of_threads_writes_the_same_bytes() {
     let folder = folder();
     let results: Vec<_> = ["1", "2", "3"]
