@@ -5,7 +5,7 @@ use crate::support::top;
 use harness::report::paper::{PaperRow, Verdict};
 use harness::rows::read;
 use harness::run::finish::remade;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::PathBuf;
 
@@ -82,4 +82,29 @@ fn the_committed_answers_are_those_that_the_rules_give_on_the_committed_rows() {
         answered += 1;
     }
     assert!(answered > 9, "{answered} answers");
+}
+
+#[test]
+fn every_number_that_the_paper_prints_for_a_source_is_compared() {
+    let mut compared: BTreeMap<String, usize> = BTreeMap::new();
+    for folder in compared_folders() {
+        let rows: Vec<PaperRow> = read(&folder.join("paper.csv")).unwrap();
+        for row in rows {
+            let source = row.source.split(':').next().unwrap();
+            *compared.entry(source.to_owned()).or_default() += 1;
+        }
+    }
+    let expected = [
+        ("Figure 1", 3),
+        ("Figure 2", 3),
+        ("Figure 3", 3),
+        ("Figure 4", 2),
+        ("Section 3.4", 1),
+        ("Section 4", 10),
+        ("Table 2", 5),
+        ("Table 3", 10),
+        ("Table 4", 10),
+    ];
+    let expected = expected.map(|(source, rows)| (source.to_owned(), rows));
+    assert_eq!(compared, BTreeMap::from(expected));
 }
