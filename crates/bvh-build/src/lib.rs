@@ -3,7 +3,6 @@
 
 mod error;
 pub mod goldsmith_salmon;
-
 pub mod ploc;
 pub mod top_down;
 mod watch;

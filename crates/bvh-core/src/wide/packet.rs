@@ -1,6 +1,6 @@
-//! Packets of coherent rays: nodes are culled for all rays at once by interval arithmetic, and a
-//! child that is left is tested vector by vector from the first that entered its parent; the first
-//! one that enters it will do.
+//! Packets of coherent rays. Interval arithmetic culls the children of a node for all rays at once.
+//! The vectors of rays test a child that is left one after the other, from the first vector that
+//! entered the parent until one enters the child.
 //!
 //! Source: Wald, Boulos & Shirley 2007, 'Ray tracing deformable scenes using dynamic bounding
 //! volume hierarchies'; Overbeck, Ramamoorthi & Mark 2008, 'Large ray packets for real-time Whitted
