@@ -96,7 +96,7 @@ tuned! { "bvh bake SCENE --references 1.2 --budget 100Mwork --out FILE" {
 }}
 
 // `best`, from a second on.
-tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 --threads 1,2 SCENE..." {
+tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 SCENE..." {
     /// Minimum gain for which the incumbent is converted and reported during an annealing run.
     WORTH_AN_EVENT: f64 = 1e-3, "fraction of the cost";
     /// Longest useful annealing run of the smallest scenes. Beyond it, two runs end lower than one.

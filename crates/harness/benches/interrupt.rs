@@ -4,10 +4,12 @@
 //! for a million recorded rays, interrupts each bake at several times, and writes
 //! `results/interrupt/timing_interrupt.csv`. About ten minutes.
 
+mod measured;
+
 use bvh_scenes::Scene;
 use bvh_search::Stream;
 use harness::processor::PROCESSOR;
-use harness::rows::{InterruptRow, Row, read_if_any, to_bytes};
+use harness::rows::InterruptRow;
 use rand::{RngExt, SeedableRng};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -44,7 +46,7 @@ fn main() {
             rows.push(InterruptRow { scene, objects, processor, segments, after_seconds, seconds });
         }
     }
-    write(rows);
+    measured::replace(FOLDER, rows, key);
 }
 
 /// Builds the program `bvh` and returns its path.
@@ -108,13 +110,6 @@ fn interrupted(program: &Path, folder: &Path, recorded: Option<&Path>, after: f6
     seconds
 }
 
-/// Replaces the rows of this processor in the file.
-fn write(measured: Vec<InterruptRow>) {
-    let folder = Path::new(FOLDER);
-    fs::create_dir_all(folder).expect("a folder for results");
-    let mut rows: Vec<InterruptRow> = read_if_any(folder).expect("rows");
-    rows.retain(|row| row.processor != PROCESSOR.name());
-    rows.extend(measured);
-    let path = folder.join(InterruptRow::FILE);
-    fs::write(&path, to_bytes(&rows, &path).expect("rows")).expect("a file");
+fn key(row: &InterruptRow) -> (String, usize, String) {
+    (row.processor.clone(), row.objects, row.scene.clone())
 }

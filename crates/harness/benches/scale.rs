@@ -8,6 +8,8 @@
 //! The program counts the bytes that it requests from its allocator; counting adds about 1 % to the
 //! times. Mapped files are not counted.
 
+mod measured;
+
 use bvh_build::{Builder, Watch, muller_fellner, ploc, spatial};
 use bvh_core::cost::{self, SahConstants};
 use bvh_core::file::{self, Origin, TreeFile};
@@ -16,7 +18,7 @@ use bvh_scenes::{Scene, load};
 use bvh_search::best::{self, Horizon};
 use bvh_search::{Budget, Deadline, Kept, Problem, solve_or_keep};
 use harness::processor::PROCESSOR;
-use harness::rows::{Row, ScaleRow, read_if_any, to_bytes};
+use harness::rows::ScaleRow;
 use memmap2::Mmap;
 use peak_alloc::PeakAlloc;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -44,8 +46,12 @@ fn main() {
     for name in names {
         let mut phases = Phases { scene: name, objects: 0, rows: Vec::new() };
         pool(1).install(|| phases.measure());
-        phases.write();
+        measured::replace(FOLDER, phases.rows, key);
     }
+}
+
+fn key(row: &ScaleRow) -> (String, usize, String) {
+    (row.processor.clone(), row.objects, row.scene.clone())
 }
 
 fn pool(threads: usize) -> ThreadPool {
@@ -215,20 +221,6 @@ impl Phases {
 
     #[cfg(not(feature = "peers"))]
     fn peers(&mut self, _scene: &Scene, _base: f64) {}
-
-    /// Replaces the rows of this scene in the file.
-    fn write(self) {
-        let folder = Path::new(FOLDER);
-        fs::create_dir_all(folder).expect("a folder for results");
-        let mut rows: Vec<ScaleRow> = read_if_any(folder).expect("rows");
-        rows.retain(|row| row.scene != self.scene || row.processor != PROCESSOR.name());
-        rows.extend(self.rows);
-        rows.sort_by(|a, b| {
-            (&a.processor, a.objects, &a.scene).cmp(&(&b.processor, b.objects, &b.scene))
-        });
-        let path = folder.join(ScaleRow::FILE);
-        fs::write(&path, to_bytes(&rows, &path).expect("rows")).expect("a file");
-    }
 }
 
 /// Writes a binary PLY file in which every triangle has three vertices of its own.

@@ -1,26 +1,32 @@
-//! `best` against the clock: percent below greedy Müller–Fellner, one triangle per leaf, after each
-//! limit in seconds.
+//! `best` against the clock on one thread and on two: cost over the cost of greedy Müller–Fellner, one
+//! triangle per leaf, after each limit in seconds.
 //!
-//! `cargo bench -p harness --bench search -- [--seconds 0.1,1,10,60] [--threads 1,2] [--seed N]
-//! SCENE...`
+//! `cargo bench -p harness --bench search -- [--seconds 0.1,1,10,60] [--seeds 5] SCENE...` writes
+//! `results/threads/timing_threads.csv`, and keeps its rows of other scenes and processors.
 //!
-//! The time includes the build and the final conversion. The numbers of threads alternate. Runs on
-//! more than one thread have 0.6 of the limit, and should reach the cost of one thread after the
-//! full limit.
+//! The time includes the build and the final conversion. The runs of one limit alternate: one
+//! thread, two threads, and one thread with 1.8 times the time, whose cost two threads should reach.
 
 mod clock;
+mod measured;
 
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost;
 use bvh_scenes::Scene;
 use clap::Parser;
+use harness::processor::PROCESSOR;
+use harness::rows::ThreadsRow;
+use std::path::Path;
 
-/// The fraction of the limit for runs on more than one thread.
-const LESS_TIME: f64 = 0.6;
+/// Every run by its name, its threads, and its time as a multiple of the limit.
+const RUNS: [(&str, usize, f64); 3] =
+    [("1 thread", 1, 1.0), ("2 threads", 2, 1.0), ("1 thread, 1.8 times the time", 1, 1.8)];
 
 /// The fraction of the limit that the search may plan with; the conversion of its result needs the
 /// rest.
 const PLANNED: f64 = 0.97;
+
+const FOLDER: &str = "results/threads";
 
 #[derive(Parser)]
 struct Args {
@@ -30,46 +36,62 @@ struct Args {
     /// Limits, in seconds.
     #[arg(long, value_delimiter = ',', default_value = "0.1,1,10,60")]
     seconds: Vec<f64>,
-    /// Numbers of threads.
-    #[arg(long, value_delimiter = ',', default_value = "1,2")]
-    threads: Vec<usize>,
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
+    /// Number of runs of each kind.
+    #[arg(long, default_value_t = 5)]
+    seeds: u64,
     /// Cargo passes this to every benchmark.
     #[arg(long, hide = true)]
     bench: bool,
 }
 
 fn main() {
-    let Args { scenes, seconds, threads, seed, .. } = Args::parse();
-    println!(
-        "{:<24} {:>7} {:>7} {:>10} {:>10}",
-        "scene", "threads", "limit/s", "taken/s", "below/%"
-    );
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    std::env::set_current_dir(&top).expect("the project's folder");
+    let Args { scenes, seconds, seeds, .. } = Args::parse();
     for name in scenes {
         match Scene::load(&name) {
-            Ok(scene) => measure(&scene, &seconds, &threads, seed),
+            Ok(scene) => measured::replace(FOLDER, measure(&scene, &seconds, seeds), key),
             Err(error) => println!("{error}"),
         }
     }
 }
 
-fn measure(scene: &Scene, seconds: &[f64], threads: &[usize], seed: u64) {
+fn measure(scene: &Scene, seconds: &[f64], seeds: u64) -> Vec<ThreadsRow> {
     let greedy = muller_fellner::Config::default()
         .build(&scene.boxes)
         .expect("finite boxes");
     let base = cost::internal_area(&greedy);
+    let mut rows = Vec::new();
     for &limit in seconds {
-        for &threads in threads {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .expect("a pool of threads");
-            let limit = if threads > 1 { LESS_TIME * limit } else { limit };
-            let (taken, area) = pool.install(|| clock::best(scene, PLANNED * limit, seed));
-            let below = 100.0 * (1.0 - area / base);
-            let name = scene.name.rsplit('/').next().unwrap_or_default();
-            println!("{name:<24} {threads:>7} {limit:>7.2} {taken:>10.3} {below:>10.3}");
+        for seed in 1..=seeds {
+            for (run, threads, factor) in RUNS {
+                let pool = rayon::ThreadPoolBuilder::new()
+                    .num_threads(threads)
+                    .build()
+                    .expect("a pool of threads");
+                let planned = PLANNED * factor * limit;
+                let (seconds, area) = pool.install(|| clock::best(scene, planned, seed));
+                let row = ThreadsRow {
+                    scene: scene.name.clone(),
+                    objects: scene.boxes.len(),
+                    processor: PROCESSOR.name(),
+                    limit_seconds: limit,
+                    run: run.to_string(),
+                    seed,
+                    seconds,
+                    cost_over_base: area / base,
+                };
+                println!(
+                    "{:<24} {limit:>6.2} s, seed {seed}, {run}: {:.5} of greedy's cost",
+                    row.scene, row.cost_over_base
+                );
+                rows.push(row);
+            }
         }
     }
+    rows
+}
+
+fn key(row: &ThreadsRow) -> (String, usize, String) {
+    (row.processor.clone(), row.objects, row.scene.clone())
 }

@@ -9,6 +9,7 @@ mod support;
 use harness::report::query;
 use queries::answer;
 use regex_lite::Regex;
+use std::collections::BTreeMap;
 use std::fs;
 use support::{assert_current, top};
 
@@ -170,9 +171,13 @@ const GREEDY: [&str; 2] = ["Müller–Fellner", "agglomerative"];
 
 /// Asserts that the README has a sentence, line breaks aside.
 fn readme_says(sentence: &str) {
-    let readme = fs::read_to_string(top().join("README.md")).unwrap();
-    let words: Vec<&str> = readme.split_whitespace().collect();
-    assert!(words.join(" ").contains(sentence), "{sentence}");
+    page_says("README.md", sentence);
+}
+
+fn page_says(page: &str, sentence: &str) {
+    let text = fs::read_to_string(top().join(page)).unwrap();
+    let words: Vec<&str> = text.split_whitespace().collect();
+    assert!(words.join(" ").contains(sentence), "{page}: {sentence}");
 }
 
 #[test]
@@ -225,4 +230,32 @@ fn the_readme_says_where_single_calls_are_slower() {
         assert_eq!(inconclusive, expected, "{rays}");
         assert!(faster.is_empty(), "{rays}: {faster:?}");
     }
+}
+
+#[test]
+fn the_benchmarks_say_what_a_second_thread_is_worth() {
+    page_says(
+        "docs/BENCHMARKS.md",
+        "A second thread is worth less than it should be: in all nine rows, the median of two \
+         threads is above the median of one thread with 1.8 times the time.",
+    );
+    let path = top().join("results/threads/timing_threads.csv");
+    let mut medians = BTreeMap::new();
+    for row in query::read(&path).unwrap() {
+        let limit = (row["scene"].clone(), row["limit_seconds"].clone());
+        let costs: &mut Vec<f64> = medians
+            .entry((limit, row["run"].clone()))
+            .or_default();
+        costs.push(row["cost_over_base"].parse().unwrap());
+        costs.sort_by(f64::total_cmp);
+    }
+    let mut rows = 0;
+    for ((limit, run), costs) in &medians {
+        if run == "2 threads" {
+            let longer = &medians[&(limit.clone(), "1 thread, 1.8 times the time".to_owned())];
+            assert!(costs[costs.len() / 2] > longer[longer.len() / 2], "{limit:?}");
+            rows += 1;
+        }
+    }
+    assert_eq!(rows, 9);
 }

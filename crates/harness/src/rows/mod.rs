@@ -250,6 +250,40 @@ rows! {
         megabytes_per_s: Option<f64>,
     }
 
+    /// One row of `timing_threads.csv`: one run of `best` against the clock.
+    ThreadsRow in "timing_threads.csv" {
+        scene: String,
+        objects: usize,
+        /// The processor that was measured.
+        processor: String,
+        /// The limit of a run of factor 1.
+        limit_seconds: f64,
+        /// The threads, and the time limit as a multiple of `limit_seconds` unless it is 1.
+        run: String,
+        seed: u64,
+        /// Wall time of the run.
+        seconds: f64,
+        /// Internal area over the greedy tree's.
+        cost_over_base: f64,
+    }
+
+    /// One row of `timing_subtrees.csv`: one run of `best` with a budget of work.
+    SubtreesRow in "timing_subtrees.csv" {
+        scene: String,
+        objects: usize,
+        /// The processor that was measured.
+        processor: String,
+        /// The number of subtrees that are annealed at once.
+        subtrees: u32,
+        /// The threads, and whether their seconds are expected by Amdahl's law or measured.
+        threads: String,
+        seed: u64,
+        /// Wall time of the run.
+        seconds: f64,
+        /// Internal area over the greedy tree's.
+        cost_over_base: f64,
+    }
+
     /// One row of `timing_interrupt.csv`: one bake that was interrupted.
     InterruptRow in "timing_interrupt.csv" {
         scene: String,
