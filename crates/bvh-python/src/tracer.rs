@@ -21,8 +21,11 @@ use std::sync::Arc;
 /// zero or a number that is not finite, raises a `ValueError`; with `invalid="miss"` it hits
 /// nothing.
 ///
-/// >>> import numpy as np >>> from bvh_search import Tracer, Tree >>> square = Tree.from_mesh([[0,
-/// 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]) >>> tracer = Tracer(square)
+/// >>> import numpy as np
+/// >>> from bvh_search import Tracer, Tree
+/// >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+/// >>> square = Tree.from_mesh(corners, [[0, 1, 2], [0, 2, 3]])
+/// >>> tracer = Tracer(square)
 #[pyclass(frozen, module = "bvh_search")]
 pub struct Tracer {
     wide: WideBvh,

@@ -29,8 +29,11 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock, TryLockError};
 /// rays like these. `references` above 1, up to 16, divides triangles among leaves, on average into
 /// that many parts each.
 ///
-/// >>> from bvh_search import Tree >>> square = Tree.from_mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0],
-/// [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], work=100) >>> len(square) 2
+/// >>> from bvh_search import Tree
+/// >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+/// >>> square = Tree.from_mesh(corners, [[0, 1, 2], [0, 2, 3]], work=100)
+/// >>> len(square)
+/// 2
 #[pyclass(frozen, module = "bvh_search")]
 pub struct Tree {
     /// The tree. A thread must not call Python while it holds this lock: Python may switch to a

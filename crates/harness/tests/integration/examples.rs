@@ -51,6 +51,28 @@ fn every_block_of_rust_is_a_doctest() {
     }
 }
 
+/// Nightly runs the examples in the Python module's comments. A rewrapped comment can join two of
+/// them, which every commit can see.
+#[test]
+fn every_python_example_in_a_comment_has_a_line_of_its_own() {
+    let mut examples = 0;
+    for entry in fs::read_dir(top().join("crates/bvh-python/src")).unwrap() {
+        let file = entry.unwrap().path();
+        let text = fs::read_to_string(&file).unwrap();
+        for line in text
+            .lines()
+            .map(str::trim_start)
+            .filter(|line| line.starts_with("///") && line.contains(">>> "))
+        {
+            let example = line.strip_prefix("/// >>> ");
+            let has_own_line = example.is_some_and(|example| !example.contains(">>> "));
+            assert!(has_own_line, "{}: {line}", file.display());
+            examples += 1;
+        }
+    }
+    assert!(examples >= 20, "{examples}");
+}
+
 /// A scene with fewer triangles than the scenes of examples.
 const SMALL: &str = "escher:60";
 
