@@ -11,6 +11,9 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::sync::Arc;
 
+/// The distances of hits, and the indices of their triangles.
+type Hits<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<i32>>);
+
 /// The triangles of a tree in a layout for fast traversal. Later improvements and updates of the
 /// tree do not change the tracer.
 ///
@@ -61,7 +64,7 @@ impl Tracer {
         t_max: Option<&Bound<'py, PyAny>>,
         coherent: bool,
         invalid: &str,
-    ) -> PyResult<(Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<i32>>)> {
+    ) -> PyResult<Hits<'py>> {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source()?;
