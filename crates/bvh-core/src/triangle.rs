@@ -1,6 +1,6 @@
 //! Triangles, and a watertight ray test: no ray passes through the edge between two triangles.
 
-use crate::exact::{Line, Verdict};
+use crate::exact::{Line, Verdict, is_degenerate};
 use crate::{Aabb, Ray};
 use bytemuck::{Pod, Zeroable};
 use glam::{Affine3A, DVec3, Vec3};
@@ -107,11 +107,10 @@ impl Triangle {
             .map(|normal| normal.as_vec3())
     }
 
-    /// Returns whether the corners coincide or are collinear. Such a triangle is never hit. The
-    /// answer is exact if the differences of the coordinates are exact in f64.
+    /// Returns whether the corners coincide or are collinear, in real arithmetic. Such a triangle is
+    /// never hit. A triangle with a corner that is not finite is not degenerate.
     pub fn is_degenerate(&self) -> bool {
-        let [a, b, c] = self.0.map(Vec3::as_dvec3);
-        (b - a).cross(c - a) == DVec3::ZERO
+        is_degenerate(&self.0)
     }
 
     /// Returns the distance at which the ray hits the triangle, in real arithmetic, if that

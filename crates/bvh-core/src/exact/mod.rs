@@ -256,6 +256,20 @@ impl Line {
     }
 }
 
+/// Returns whether a triangle has no area; false if a corner is not finite. Each rounding of the
+/// normal in f64, of two differences, a product and their difference, is off by ε of the sum of the
+/// absolute products, which the bound 64ε covers.
+pub(crate) fn is_degenerate(triangle: &[Vec3; 3]) -> bool {
+    let [a, b, c] = triangle.map(|corner| corner.to_array().map(f64::from));
+    let edge = |from: [f64; 3], to: [f64; 3]| [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
+    let (normal, products) = normal(&edge(a, b), &edge(a, c));
+    let has_area = normal
+        .iter()
+        .zip(products)
+        .any(|(component, sum)| component.abs() > ERROR * sum);
+    !has_area && volumes::is_degenerate(triangle)
+}
+
 /// Returns the cross product, and the same with sums of absolute products instead of differences.
 #[inline(always)]
 fn normal([px, py, pz]: &[f64; 3], [qx, qy, qz]: &[f64; 3]) -> ([f64; 3], [f64; 3]) {

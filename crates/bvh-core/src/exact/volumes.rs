@@ -120,6 +120,22 @@ impl<'a> Volumes<'a> {
     }
 }
 
+/// Returns whether a triangle has no area, by exact arithmetic; false if a corner is not finite.
+#[cold]
+#[inline(never)]
+pub(super) fn is_degenerate(triangle: &[Vec3; 3]) -> bool {
+    let [a, b, c] = *triangle;
+    let to_second = difference(b, a);
+    let to_third = difference(c, a);
+    let is_finite = triangle.iter().all(|corner| corner.is_finite());
+    is_finite
+        && (0..3).all(|axis| {
+            let mut normal = Expansion::zero();
+            add_cross(&mut normal, &to_second, &to_third, axis);
+            normal.sign() == 0
+        })
+}
+
 /// Returns the quotient, rounded to the nearest f32, ties to even; `None` if it is negative, if the
 /// denominator is zero, or if the quotient rounds to infinity.
 fn round_quotient(numerator: &Expansion<192>, denominator: &Expansion<96>) -> Option<f32> {

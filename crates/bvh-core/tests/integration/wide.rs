@@ -326,6 +326,22 @@ fn a_layout_whose_triangles_cannot_be_followed_says_so_and_stays_as_it_was() {
 }
 
 #[test]
+fn triangles_whose_area_f64_rounds_to_zero_are_hit() {
+    // The real area is not zero: the first corner is 2⁻³¹ beside the line of the others.
+    let long = 1.0 + f32::EPSILON;
+    let triangle = Triangle::from([
+        [-1.0 / (1_u32 << 31) as f32, 0.0, 0.0],
+        [1.0, 1.0, 0.0],
+        [long, long, 0.0],
+    ]);
+    let ray = Ray::half_line([1.0, 1.0, 1.0], [0.0, 0.0, -1.0]).unwrap();
+    assert!(!triangle.is_degenerate());
+    for (kernel, layout) in layouts(&[triangle], &mut Random(1)) {
+        assert_eq!(layout.nearest_hit(&ray), Some(Hit { t: 1.0, object: 0 }), "{kernel:?}");
+    }
+}
+
+#[test]
 fn triangles_without_area_are_left_out_and_never_hit() {
     let mut random = Random(4);
     let flat = |p: Vec3, q: Vec3| Triangle([p, q, (p + q) * 0.5]);
