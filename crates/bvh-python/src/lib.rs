@@ -3,6 +3,7 @@
 mod arrays;
 mod locations;
 mod search;
+mod threads;
 mod tracer;
 mod tree;
 

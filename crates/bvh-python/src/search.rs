@@ -1,6 +1,7 @@
 //! Searches that let other Python threads run, and that end with their time or after Ctrl-C.
 
 use crate::arrays::invalid;
+use crate::threads::pool;
 use bvh_search::Event;
 use bvh_search::{Observer, prelude::*};
 use pyo3::prelude::*;
@@ -81,10 +82,11 @@ pub fn searched<T: Send>(
     };
     // Python runs signal handlers on its main thread only. The calling thread may be the main
     // thread, so a second thread searches while this one waits for signals.
+    let pool = &pool(py)?;
     Ok(py.detach(|| {
         thread::scope(|scope| {
             let (sender, receiver) = channel();
-            scope.spawn(move || sender.send(search(budget, watch)));
+            scope.spawn(move || sender.send(pool.install(|| search(budget, watch))));
             let mut raised = Ok(());
             loop {
                 match receiver.recv_timeout(NOTICE) {

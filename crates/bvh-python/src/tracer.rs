@@ -2,6 +2,7 @@
 //! threads.
 
 use crate::arrays::{RayArrays, RaySource, integers, invalid, invalid_ray, points};
+use crate::threads::detached;
 use crate::tree::Tree;
 use bvh_search::OwnedTree;
 use bvh_search::bvh_core::InvalidRay;
@@ -68,31 +69,30 @@ impl Tracer {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source()?;
-        let (t, objects) = py
-            .detach(|| {
-                let mut t = vec![0.0; source.rays];
-                let mut objects = vec![0; source.rays];
-                let parts = t
-                    .par_chunks_mut(BATCH)
-                    .zip(objects.par_chunks_mut(BATCH));
-                parts
-                    .enumerate()
-                    .try_for_each(|(batch, (t, objects))| {
-                        let rays = batch_of(source, batch)?;
-                        let mut hits = [Hit::MISS; BATCH];
-                        let hits = &mut hits[..rays.len()];
-                        self.wide
-                            .nearest_hits(&rays, hits, coherence(coherent));
-                        for ((hit, t), object) in hits.iter().zip(t).zip(objects) {
-                            *t = hit.t;
-                            // The cast turns the id of a miss, `u32::MAX`, into −1.
-                            *object = hit.object as i32;
-                        }
-                        Ok(())
-                    })?;
-                Ok((t, objects))
-            })
-            .map_err(invalid_ray)?;
+        let (t, objects) = detached(py, || {
+            let mut t = vec![0.0; source.rays];
+            let mut objects = vec![0; source.rays];
+            let parts = t
+                .par_chunks_mut(BATCH)
+                .zip(objects.par_chunks_mut(BATCH));
+            parts
+                .enumerate()
+                .try_for_each(|(batch, (t, objects))| {
+                    let rays = batch_of(source, batch)?;
+                    let mut hits = [Hit::MISS; BATCH];
+                    let hits = &mut hits[..rays.len()];
+                    self.wide
+                        .nearest_hits(&rays, hits, coherence(coherent));
+                    for ((hit, t), object) in hits.iter().zip(t).zip(objects) {
+                        *t = hit.t;
+                        // The cast turns the id of a miss, `u32::MAX`, into −1.
+                        *object = hit.object as i32;
+                    }
+                    Ok(())
+                })?;
+            Ok((t, objects))
+        })?
+        .map_err(invalid_ray)?;
         Ok((t.into_pyarray(py), objects.into_pyarray(py)))
     }
 
@@ -114,16 +114,15 @@ impl Tracer {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source()?;
-        let hits = py
-            .detach(|| {
-                answers(source.rays, false, |batch, hits| {
-                    let rays = batch_of(source, batch)?;
-                    self.wide
-                        .any_hits(&rays, hits, coherence(coherent));
-                    Ok(())
-                })
+        let hits = detached(py, || {
+            answers(source.rays, false, |batch, hits| {
+                let rays = batch_of(source, batch)?;
+                self.wide
+                    .any_hits(&rays, hits, coherence(coherent));
+                Ok(())
             })
-            .map_err(invalid_ray)?;
+        })?
+        .map_err(invalid_ray)?;
         Ok(hits.into_pyarray(py))
     }
 
@@ -147,35 +146,34 @@ impl Tracer {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source()?;
-        let (t, objects, numbers) = py
-            .detach(|| {
-                let batches = (0..source.rays.div_ceil(BATCH)).into_par_iter();
-                let found: Vec<(Vec<Hit>, Vec<u32>)> = batches
-                    .map(|batch| {
-                        let rays = batch_of(source, batch)?;
-                        let mut hits = Vec::with_capacity(2 * rays.len());
-                        let mut counts = vec![0; rays.len()];
-                        self.wide
-                            .all_hits_of(&rays, &mut hits, &mut counts);
-                        Ok((hits, counts))
-                    })
-                    .collect::<Result<_, _>>()?;
-                let hits = found.iter().map(|(hits, _)| hits.len()).sum();
-                let mut t = Vec::with_capacity(hits);
-                let mut objects = Vec::with_capacity(hits);
-                let mut numbers = Vec::with_capacity(hits);
-                let mut number = 0;
-                for (hits, counts) in found {
-                    t.extend(hits.iter().map(|hit| hit.t));
-                    objects.extend(hits.iter().map(|hit| hit.object as i32));
-                    for count in counts {
-                        numbers.extend((0..count).map(|_| number));
-                        number += 1;
-                    }
+        let (t, objects, numbers) = detached(py, || {
+            let batches = (0..source.rays.div_ceil(BATCH)).into_par_iter();
+            let found: Vec<(Vec<Hit>, Vec<u32>)> = batches
+                .map(|batch| {
+                    let rays = batch_of(source, batch)?;
+                    let mut hits = Vec::with_capacity(2 * rays.len());
+                    let mut counts = vec![0; rays.len()];
+                    self.wide
+                        .all_hits_of(&rays, &mut hits, &mut counts);
+                    Ok((hits, counts))
+                })
+                .collect::<Result<_, _>>()?;
+            let hits = found.iter().map(|(hits, _)| hits.len()).sum();
+            let mut t = Vec::with_capacity(hits);
+            let mut objects = Vec::with_capacity(hits);
+            let mut numbers = Vec::with_capacity(hits);
+            let mut number = 0;
+            for (hits, counts) in found {
+                t.extend(hits.iter().map(|hit| hit.t));
+                objects.extend(hits.iter().map(|hit| hit.object as i32));
+                for count in counts {
+                    numbers.extend((0..count).map(|_| number));
+                    number += 1;
                 }
-                Ok((t, objects, numbers))
-            })
-            .map_err(invalid_ray)?;
+            }
+            Ok((t, objects, numbers))
+        })?
+        .map_err(invalid_ray)?;
         Ok((t.into_pyarray(py), objects.into_pyarray(py), numbers.into_pyarray(py)))
     }
 
@@ -195,15 +193,14 @@ impl Tracer {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source()?;
-        let counts = py
-            .detach(|| {
-                answers(source.rays, 0, |batch, counts| {
-                    self.wide
-                        .count_hits(&batch_of(source, batch)?, counts);
-                    Ok(())
-                })
+        let counts = detached(py, || {
+            answers(source.rays, 0, |batch, counts| {
+                self.wide
+                    .count_hits(&batch_of(source, batch)?, counts);
+                Ok(())
             })
-            .map_err(invalid_ray)?;
+        })?
+        .map_err(invalid_ray)?;
         Ok(counts.into_pyarray(py))
     }
 
@@ -215,9 +212,9 @@ impl Tracer {
     fn contains<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let py = points.py();
         let points = self::points(points)?;
-        let inside = py.detach(|| {
+        let inside = detached(py, || {
             of_points(&points, false, |points, inside| self.wide.contains(points, inside))
-        });
+        })?;
         Ok(inside.into_pyarray(py))
     }
 
@@ -236,7 +233,7 @@ impl Tracer {
     {
         let py = points.py();
         let points = self::points(points)?;
-        let (closest, objects, distances) = py.detach(|| {
+        let (closest, objects, distances) = detached(py, || {
             let closest = of_points(&points, None, |points, closest| {
                 self.wide.closest_points(points, closest)
             });
@@ -249,7 +246,7 @@ impl Tracer {
                 distances.push(closest.map_or(f64::INFINITY, |closest| closest.distance));
             }
             (positions, objects, distances)
-        });
+        })?;
         let closest = closest
             .into_pyarray(py)
             .reshape([points.len(), 3])?;
@@ -267,11 +264,11 @@ impl Tracer {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let py = points.py();
         let points = self::points(points)?;
-        let distances = py.detach(|| {
+        let distances = detached(py, || {
             of_points(&points, 0.0, |points, distances| {
                 self.wide.signed_distances(points, distances);
             })
-        });
+        })?;
         Ok(distances.into_pyarray(py))
     }
 
@@ -302,24 +299,23 @@ impl Tracer {
                 format!("triangle: accepted: an index below {} per ray, or -1", triangles.len());
             return Err(invalid(message));
         }
-        let surfaces = py
-            .detach(|| {
-                answers(source.rays, ([0.0; 2], [0.0; 3]), |batch, surfaces| {
-                    let rays = batch_of(source, batch)?;
-                    for ((ray, &index), surface) in rays
-                        .iter()
-                        .zip(&indices[batch * BATCH..])
-                        .zip(surfaces)
-                    {
-                        if let Some(triangle) = triangles.get(index as usize) {
-                            let [_, u, v] = triangle.barycentrics(ray).unwrap_or_default();
-                            *surface = ([u, v], triangle.normal().unwrap_or_default().to_array());
-                        }
+        let surfaces = detached(py, || {
+            answers(source.rays, ([0.0; 2], [0.0; 3]), |batch, surfaces| {
+                let rays = batch_of(source, batch)?;
+                for ((ray, &index), surface) in rays
+                    .iter()
+                    .zip(&indices[batch * BATCH..])
+                    .zip(surfaces)
+                {
+                    if let Some(triangle) = triangles.get(index as usize) {
+                        let [_, u, v] = triangle.barycentrics(ray).unwrap_or_default();
+                        *surface = ([u, v], triangle.normal().unwrap_or_default().to_array());
                     }
-                    Ok(())
-                })
+                }
+                Ok(())
             })
-            .map_err(invalid_ray)?;
+        })?
+        .map_err(invalid_ray)?;
         let u: Vec<f64> = surfaces.iter().map(|([u, _], _)| *u).collect();
         let v: Vec<f64> = surfaces.iter().map(|([_, v], _)| *v).collect();
         let normals: Vec<f32> = surfaces

@@ -5,7 +5,10 @@ import doctest
 import importlib
 import importlib.util
 import inspect
+import os
 import pickle
+import signal
+import time
 
 import numpy as np
 import pytest
@@ -125,6 +128,33 @@ def test_a_search_follows_seed_work_rays_and_progress():
 
     with pytest.raises(LookupError, match="enough"):
         tree.improve(60, progress=stop)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+def test_a_child_process_searches_and_traces_after_its_parent_did():
+    vertices, faces = box()
+    origins = np.tile([0.0, 0.0, 3.0], (100_000, 1))
+    directions = np.tile([0.0, 0.0, -1.0], (100_000, 1))
+
+    def answers():
+        tracer = Tracer(Tree.from_mesh(vertices, faces, seconds=0.05))
+        return tracer.nearest(origins, directions)[0]
+
+    before = answers()
+    child = os.fork()
+    if child == 0:
+        # Nothing of the test's own process may go on in the child.
+        os._exit(0 if (answers() == before).all() else 1)
+    deadline = time.monotonic() + 60
+    status = None
+    while status is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+        ended, code = os.waitpid(child, os.WNOHANG)
+        status = code if ended else None
+    if status is None:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    assert status == 0
 
 
 def test_a_scene_has_open3ds_answers():
