@@ -110,6 +110,14 @@ impl Reserved {
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let mut unfinished = create_locked(|| builder.tempfile_in(folder))
             .map_err(WriteError::of(&path, "write the file: cannot create a file there"))?;
+        // Whoever may not read the old file may not read the new one.
+        #[cfg(unix)]
+        if let Ok(old) = fs::metadata(&path) {
+            unfinished
+                .as_file()
+                .set_permissions(old.permissions())
+                .map_err(WriteError::of(&path, "give the new file the old one's permissions"))?;
+        }
         remove_leftovers(folder, &prefix);
         // Written zeros reserve space on every file system; a mere length may be a hole.
         let zeros = vec![0; bytes.min(PIECE)];
@@ -222,6 +230,23 @@ mod tests {
         let reserved = Reserved::new(&path, 1000).unwrap();
         reserved.write(b"new").unwrap();
         assert_eq!((fs::read(&path).unwrap(), count(&folder)), (b"new".to_vec(), 1));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_new_file_has_the_permissions_of_the_old_one() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.bvh");
+        fs::write(&path, "old").unwrap();
+        for mode in [0o600, 0o666, 0o444] {
+            fs::set_permissions(&path, PermissionsExt::from_mode(mode)).unwrap();
+            Reserved::new(&path, 10)
+                .unwrap()
+                .write(b"new")
+                .unwrap();
+            assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, mode);
+        }
     }
 
     #[test]

@@ -284,6 +284,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let start = match &args.from {
         Some(path) => {
             let (tree, header) = tree_file::load(path, &scene)?;
+            check_references(path, tree.prim_ids.len(), objects, most_references)?;
             Some(Start { tree, work: header.work })
         }
         None => None,
@@ -299,6 +300,21 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         );
     }
     search_and_save(&bake, greedy, &out, reserved, interrupted)
+}
+
+/// Rejects a start with more references than the bake may keep.
+fn check_references(from: &Path, found: usize, objects: usize, most: f64) -> Result<(), Error> {
+    if found <= objects || found <= (most * objects as f64) as usize {
+        return Ok(());
+    }
+    let percent = (100 * found).div_ceil(objects);
+    Err(Error::Usage(format!(
+        "--from {}: the tree has {found} references to {objects} objects; accepted: --references \
+         {}.{:02} or more",
+        from.display(),
+        percent / 100,
+        percent % 100
+    )))
 }
 
 /// Searches, writes the best tree, and prints its cost.

@@ -42,6 +42,13 @@ fn a_bake_divides_objects_where_it_pays_and_minimises_the_cost_of_the_layout() {
     let (tree, header) = tree_file::load(&at.join("rays.bvh"), &scene).unwrap();
     assert_eq!(header.cost.to_bits(), bvh_core::cost::layout_area(&tree).to_bits());
     bake("further.bvh", &["--references", "1.3", "--from", "split.bvh"]);
+    let accepted = (100.0 * references / objects).ceil() / 100.0;
+    let args = ["bake", "pinecon2", "--budget", "1Mwork", "--out", "no.bvh", "--from", "split.bvh"];
+    let words = format!(
+        "--from split.bvh: the tree has {references} references to {objects} objects; accepted: \
+         --references {accepted:.2} or more"
+    );
+    refused(at, &args, 2, &[&words]);
     said(at, &["render", "pinecon2", "--accel", "split.bvh", "--out", "a.png", "--size", "16x16"]);
     let args = ["bake", "pinecon2", "--budget", "1Mwork", "--out", "no.bvh", "--references", "nan"];
     refused(at, &args, 2, &["--references NaN; accepted: 1 to 16"]);
