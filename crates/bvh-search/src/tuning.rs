@@ -41,6 +41,8 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 1,10,60 SCENE..." {
     WINDOW: usize = 512, "nodes";
     /// Enlargement of the window in short runs; small windows would not cover the tree.
     WINDOW_OF_SHORT_RUNS: usize = 8, "factor";
+    /// Work of each copy of a tree between two exchanges of accepted moves.
+    WORK_PER_TURN: u64 = 1 << 17, "work";
     /// Work below which a run is short. A move takes about 200, so 64 per object visit every node
     /// about once.
     SHORT_RUN: f64 = 64.0, "work per object";
@@ -124,6 +126,14 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 SCENE..
     LEAST_LARGE_SUBTREES: u32 = 8, "subtrees";
     /// Maximum number of subtrees.
     MOST_SUBTREES: u32 = 4096, "subtrees";
+    /// Minimum size of a tree that is copied for several threads. In smaller trees, accepted moves of
+    /// one turn exclude each other more often.
+    COPIED_FROM: u64 = 1 << 14, "objects";
+    /// Maximum number of threads for which a tree is copied. Every copy repeats the accepted moves of
+    /// all.
+    MOST_COPIES: usize = 8, "threads";
+    /// Work of every copy but the first. It waits for the others, and repeats their moves.
+    WORK_OF_A_COPY: f64 = 0.8, "fraction of the work of one thread";
     /// Subtrees per thread; several unequal subtrees balance the threads.
     SUBTREES_PER_THREAD: u32 = 4, "subtrees";
     /// Maximum size of trees that are recombined after a cancellation. Recombination takes about a

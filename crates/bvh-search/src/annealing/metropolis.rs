@@ -6,7 +6,7 @@ use crate::tuning::MOVES_PER_TEMPERATURE;
 use bvh_core::with_vector_instructions;
 
 /// Makes moves of one kind.
-pub(crate) trait Mover {
+pub(crate) trait Mover: Send {
     /// Begins a series of moves on a tree in preorder, near these nodes, or anywhere if there are
     /// none, and returns true. Returns false if `is_over` returns true while a large tree is
     /// prepared; then no move can be made. O(n), in the memory of an earlier series.
@@ -22,6 +22,21 @@ pub(crate) trait Mover {
     -> bool;
     /// Nodes visited by all moves so far.
     fn work(&self) -> u64;
+    /// The reinsertions of the last move, which was accepted; `None` if they cannot be repeated on a
+    /// copy of the tree.
+    fn last_move(&self) -> Option<Reinsertions<'_>> {
+        None
+    }
+}
+
+/// A move, as a copy of the tree can repeat it.
+pub(crate) struct Reinsertions<'a> {
+    /// The roots of the subtrees, in the order of their removal.
+    pub removed: &'a [u32],
+    /// The same roots, each with its new sibling, in the order of their insertion.
+    pub inserted: &'a [[u32; 2]],
+    /// The area that the move may add.
+    pub limit: f64,
 }
 
 /// Work of a move after which the observer is polled at once, so that less than a millisecond
@@ -46,10 +61,25 @@ fn cool_plain<M: Mover>(
     rng: &mut Stream,
     observer: &dyn Observer,
 ) -> Tally {
-    let mut tally = Tally::default();
     if !mover.begin(tree, near, &|| observer.cancelled()) {
-        return tally;
+        return Tally::default();
     }
+    moves(mover, tree, [hot, cold], quota, rng, observer, |_, _| ())
+}
+
+/// Makes moves until the quota is used up, while the temperature falls geometrically. Calls
+/// `accepted` after each move that is accepted.
+#[inline(always)]
+pub(super) fn moves<M: Mover, A: Metric>(
+    mover: &mut M,
+    tree: &mut Working<A>,
+    [hot, cold]: [f64; 2],
+    quota: Quota,
+    rng: &mut Stream,
+    observer: &dyn Observer,
+    mut accepted: impl FnMut(&M, &mut Working<A>),
+) -> Tally {
+    let mut tally = Tally::default();
     let before = mover.work();
     let mut temperature = hot;
     loop {
@@ -72,7 +102,10 @@ fn cool_plain<M: Mover>(
         } else if long_move && observer.cancelled() {
             return tally;
         }
-        tally.kept += u64::from(mover.step(tree, temperature, rng));
         tally.moves += 1;
+        if mover.step(tree, temperature, rng) {
+            tally.kept += 1;
+            accepted(mover, tree);
+        }
     }
 }

@@ -5,6 +5,7 @@
 //! `schedule` lowers the temperature. There are two kinds of moves, each a separate method: single
 //! reinsertions, here, and [`ruin_recreate`].
 
+mod copies;
 pub(crate) mod layout;
 mod metropolis;
 mod node_sampler;

@@ -6,7 +6,7 @@
 //! sizes.
 
 use super::layout::Layout;
-use super::metropolis::Mover;
+use super::metropolis::{Mover, Reinsertions};
 use super::node_sampler::NodeSampler;
 use super::schedule::{AnnealingRun, check_fall};
 use super::side::Side;
@@ -114,6 +114,12 @@ pub(crate) struct RuinMover<'a> {
 struct Removed {
     /// Roots of the subtrees, each with its former sibling.
     roots: Vec<(u32, u32)>,
+    /// The roots in the order of their removal.
+    order: Vec<u32>,
+    /// The roots, each with its new sibling, in the order of their insertion.
+    inserted: Vec<[u32; 2]>,
+    /// The area that the move may add.
+    limit: f64,
     /// The area that their removal saves.
     saved: f64,
     /// The total area of the roots: a lower bound of the cost of their new positions.
@@ -123,6 +129,8 @@ struct Removed {
 impl Removed {
     fn clear(&mut self) {
         self.roots.clear();
+        self.order.clear();
+        self.inserted.clear();
         (self.saved, self.least) = (0.0, 0.0);
     }
 
@@ -133,6 +141,7 @@ impl Removed {
         self.saved += saved;
         self.least += tree.nodes[node as usize].area;
         self.roots.push((node, sibling));
+        self.order.push(node);
         visits
     }
 }
@@ -209,6 +218,15 @@ impl Mover for RuinMover<'_> {
                 .map_or(0, |layout| layout.visits)
     }
 
+    fn last_move(&self) -> Option<Reinsertions<'_>> {
+        // The layout's costs would have to be repeated, too.
+        if self.layout.is_some() {
+            return None;
+        }
+        let Removed { order, inserted, limit, .. } = &self.removed;
+        Some(Reinsertions { removed: order, inserted, limit: *limit })
+    }
+
     fn begin(
         &mut self,
         tree: &Working<impl Metric>,
@@ -253,7 +271,7 @@ impl Mover for RuinMover<'_> {
         // Every removed subtree is inside the top's former box, and a scope must contain the boxes
         // of its items.
         let positions = if near { scope.around(tree, &top_box) } else { Scope::ALL };
-        let Removed { roots, saved, least } = &mut self.removed;
+        let Removed { roots, order: _, inserted, limit: most, saved, least } = &mut self.removed;
         // The order decides which subtree chooses first; a fixed order would always favour the same
         // ones.
         roots.shuffle(rng);
@@ -265,6 +283,7 @@ impl Mover for RuinMover<'_> {
             Scale::Top => top_area,
         };
         let worse = -temperature * scale * libm::log(chance);
+        *most = worse;
         // A tree of larger area may have a cheaper layout, so the area only rejects moves that are
         // far above the limit.
         let mut limit =
@@ -284,6 +303,7 @@ impl Mover for RuinMover<'_> {
                 return false;
             };
             self.work += tree.attach(node, position.sibling).1;
+            inserted.push([node, position.sibling]);
             limit -= position.cost;
         }
         let most = LAYOUT_HEAT * worse;

@@ -12,6 +12,7 @@
 //!   cold                  └─────── passes of reinsertion to a local optimum
 //! ```
 
+use super::copies::Copies;
 use super::metropolis::Mover;
 use super::subtrees::{self, Round};
 use crate::local::incumbent::Incumbent;
@@ -36,6 +37,9 @@ pub(crate) struct Schedule {
     pub end: f64,
     /// Number of subtrees that are annealed at once, at least 1.
     pub subtrees: u32,
+    /// Number of copies on which moves are made at once, at least 1. With several, `subtrees` holds
+    /// for the final passes only.
+    pub copies: u32,
     /// True if passes of reinsertion follow. They lower the area, which is not always the
     /// objective.
     pub to_local_optimum: bool,
@@ -66,7 +70,8 @@ impl AnnealingRun<'_> {
             self.work_per_object
                 .saturating_mul(problem.boxes.len() as u64),
         );
-        let schedule = Schedule { hot, cold, quota, end: 1.0, subtrees: 1, to_local_optimum: true };
+        let schedule =
+            Schedule { hot, cold, quota, end: 1.0, subtrees: 1, copies: 1, to_local_optimum: true };
         let observer = run.observer();
         anneal(mover, &schedule, &mut tree, [seed, 0], observer, &mut |tree, tally| {
             run.count(tally);
@@ -111,7 +116,7 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
     let factor = schedule.cold / schedule.hot;
     let temperature = |fraction: f64| schedule.hot * libm::pow(factor, fraction.min(1.0));
     let began = observer.progress();
-    let [short, long] = WORK_PER_ROUND.map(|work| work * n);
+    let [short, long] = WORK_PER_ROUND.map(|work| work * n * u64::from(schedule.copies));
     let mut next = (work / ROUNDS).clamp(short, long).min(work);
     // The rate of work is still unknown, so the first round under a time limit is short.
     if began.is_some() {
@@ -132,14 +137,21 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
     // Every round uses the memory of the one before: fresh memory for the rows of costs of ten
     // million nodes takes more than a second.
     let mut whole = mover();
+    let mut copies = Copies::new();
     while fraction < 1.0 {
         let step = rate * next as f64;
         let heat = [fraction, fraction + step].map(temperature);
         let is_last = began.is_none() && fraction + LAST_ROUND * step >= 1.0;
         let end = if is_last { work } else { work.min(done.work + next) };
         let quota = Quota { work: end, moves }.less(&done);
-        let cooling = Round { heat, quota, count: schedule.subtrees, streams: [seed, streams] };
-        let tally = subtrees::cool(&cooling, &mover, &mut whole, tree, observer);
+        let streams_here = [seed, streams];
+        let tally = if schedule.copies > 1 {
+            let cooling = Round { heat, quota, count: schedule.copies, streams: streams_here };
+            copies.cool(&cooling, &mover, &mut whole, tree, observer)
+        } else {
+            let cooling = Round { heat, quota, count: schedule.subtrees, streams: streams_here };
+            subtrees::cool(&cooling, &mover, &mut whole, tree, observer)
+        };
         streams += subtrees::STREAMS;
         done += tally;
         round(tree, tally);
@@ -164,6 +176,7 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
     }
     // The final passes need memory, too.
     drop(whole);
+    drop(copies);
     if schedule.to_local_optimum {
         let tally = subtrees::to_local_optimum(
             tree,
@@ -222,8 +235,15 @@ mod tests {
         let boxes = scatter(60);
         let mut tree = built(&muller_fellner::Config::default(), &boxes);
         let quota = Quota { moves: 300_000, work: u64::MAX / 1024 };
-        let schedule =
-            Schedule { hot: 0.5, cold: 0.4, quota, end: 1.0, subtrees: 1, to_local_optimum: true };
+        let schedule = Schedule {
+            hot: 0.5,
+            cold: 0.4,
+            quota,
+            end: 1.0,
+            subtrees: 1,
+            copies: 1,
+            to_local_optimum: true,
+        };
         let moves = AtomicU64::new(0);
         let mover = || Checked { inner: inner(), moves: &moves };
         anneal(mover, &schedule, &mut tree, [1, 0], &(), &mut |_, _| ());

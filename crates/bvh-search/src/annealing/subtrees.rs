@@ -188,7 +188,6 @@ fn improve_each<A: Metric>(
         let before = small.area();
         let tally = improve(number, &mut small);
         let added = small.area() - before;
-        small.sort_in_preorder();
         subtree.put_back(nodes, &small);
         (tally, added)
     });
@@ -223,14 +222,31 @@ impl Subtree {
         Working::from_nodes(copy, metric)
     }
 
-    /// Copies a tree in preorder to the nodes of the subtree that it was taken from.
+    /// Copies a tree, in preorder, to the nodes of the subtree that it was taken from.
     fn put_back(&self, nodes: &mut [Node], small: &Working<impl Metric>) {
-        // The root's link leads out of the subtree and must survive the copy.
-        let parent = nodes[0].parent;
-        for (old, new) in nodes.iter_mut().zip(&small.nodes[1..]) {
-            *old = moved(new, |index| index + self.root - 1);
+        // The root's link leads out of the subtree.
+        let above = nodes[0].parent;
+        let mut next = 0;
+        // Pending nodes: index in the tree, parent and side in the subtree.
+        let mut stack: Vec<(u32, usize, usize)> = small
+            .root()
+            .map(|root| (root, 0, 0))
+            .into_iter()
+            .collect();
+        while let Some((index, parent, side)) = stack.pop() {
+            let place = self.root + next as u32;
+            let node = small.nodes[index as usize];
+            nodes[next] = Node { parent: self.root + parent as u32, stamp: 0, ..node };
+            if next > 0 {
+                nodes[parent].children[side] = place;
+            }
+            if !node.is_leaf() {
+                stack.extend([(node.children[1], next, 1), (node.children[0], next, 0)]);
+            }
+            next += 1;
         }
-        nodes[0].parent = parent;
+        debug_assert_eq!(next, nodes.len());
+        nodes[0].parent = above;
     }
 }
 

@@ -39,6 +39,12 @@ bvh_config::config! {
         /// subtrees per thread for a time limit with several threads, one per 32 768 objects for a
         /// budget of work if they are at least eight, and otherwise 1.
         pieces: u32 = 0, in 0..=MOST_SUBTREES;
+        /// Number of copies of the tree on which moves are made at once, which limits the number of
+        /// useful threads; overrides `pieces`. Every copy needs the memory of a tree and repeats the
+        /// accepted moves of all. 0 means one per thread for a time limit with two to eight threads,
+        /// 16 384 to 262 143 objects, and the area as the objective, and otherwise 1. Trees judged
+        /// by their layout and divided objects are never copied.
+        copies: u32 = 0, in 0..=64;
         /// Minimum work per object of an annealing run whose temperatures are relative to the
         /// [top](Scale::Top) of a move, overriding the move's `scale`. Long runs end lower with it,
         /// short runs higher.

@@ -13,9 +13,9 @@ use crate::parallel::threads;
 use crate::run::{Problem, Quota, Run, Stream, Tally, stream};
 use crate::tree::{Metric, Working};
 use crate::tuning::{
-    FINISH_AT_MOST, FINISH_WORK, LARGE_SUBTREE, LEAST_LARGE_SUBTREES, MOST_GENERATIONS,
-    MOST_SUBTREES, PROBE, SECURED_FROM, SUBTREES_PER_THREAD, TRIAL, WORTH_LARGE_SUBTREES,
-    WORTH_SUBTREES,
+    COPIED_FROM, FINISH_AT_MOST, FINISH_WORK, LARGE_SUBTREE, LEAST_LARGE_SUBTREES, MOST_COPIES,
+    MOST_GENERATIONS, MOST_SUBTREES, PROBE, SECURED_FROM, SUBTREES_PER_THREAD, TRIAL,
+    WORK_OF_A_COPY, WORTH_LARGE_SUBTREES, WORTH_SUBTREES,
 };
 use bvh_core::cost::Objective;
 
@@ -77,7 +77,9 @@ impl Improvement<'_, '_, '_, '_> {
             self.run.count(tally);
             let now = observer.progress().unwrap_or(1.0);
             end_of_all = 1.0 - (1.0 - now) * (FINISH_WORK * n as f64 / in_time).min(FINISH_AT_MOST);
-            length = length.min(in_time / n as f64);
+            // The probe measures one copy.
+            let others = f64::from(self.copies(in_time / n as f64) - 1);
+            length = length.min((1.0 + WORK_OF_A_COPY * others) * in_time / n as f64);
             self.secure(tree, length);
         }
         let all = self.left;
@@ -205,6 +207,7 @@ impl Improvement<'_, '_, '_, '_> {
             quota,
             end,
             subtrees: self.subtrees(length),
+            copies: self.copies(length),
             to_local_optimum: !self.by_layout,
         }
     }
@@ -226,6 +229,27 @@ impl Improvement<'_, '_, '_, '_> {
         };
         let worth = if large >= subtrees { WORTH_LARGE_SUBTREES } else { WORTH_SUBTREES };
         if length >= worth { subtrees } else { 1 }
+    }
+
+    /// Returns the number of copies that are annealed at once in a run of a search with `length`
+    /// work per object.
+    fn copies(&self, length: f64) -> u32 {
+        // Neither the costs of a layout nor changes of references are repeated on copies.
+        if self.by_layout || self.divider.is_some() {
+            return 1;
+        }
+        if self.config.copies > 0 {
+            return self.config.copies;
+        }
+        let is_timed = self.run.observer().progress().is_some();
+        let is_copied = COPIED_FROM..LARGE_SUBTREE * u64::from(LEAST_LARGE_SUBTREES);
+        // Without a clock the number of threads must not change the tree.
+        let is_worth = is_timed
+            && self.config.pieces == 0
+            && is_copied.contains(&self.n)
+            && length >= WORTH_SUBTREES
+            && threads() <= MOST_COPIES;
+        if is_worth { threads() as u32 } else { 1 }
     }
 
     /// Makes moves at the lowest temperature. Also returns the work that fits into the rest of the

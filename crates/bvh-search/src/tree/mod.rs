@@ -9,6 +9,7 @@
 //! special case. A detached subtree keeps its parent node, and attaching reuses that node, so no
 //! move allocates memory.
 
+mod checkpoint;
 mod convert;
 mod layout_cost;
 mod linked;
@@ -21,6 +22,7 @@ mod subsets;
 
 use bvh_core::PackedAabb;
 use bvh_core::cost::Sum;
+pub(crate) use checkpoint::Checkpoint;
 pub(crate) use linked::Linked;
 #[cfg(test)]
 pub(crate) use metric::AreaWithLeaves;

@@ -107,6 +107,27 @@ fn subtrees_annealed_in_parallel_do_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
+fn copies_annealed_in_parallel_do_not_depend_on_the_number_of_threads() {
+    let boxes = scatter(1500, 2);
+    let run_on = |threads, copies| {
+        let method = Method::Best(best::Config { copies, ..Default::default() });
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| run(&method, &boxes, 2_000_000))
+    };
+    let one = run_on(1, 3);
+    validate(&one.tree, &boxes).unwrap();
+    assert!((1_990_000..2_010_000).contains(&one.work), "{}", one.work);
+    for threads in [2, 3] {
+        let other = run_on(threads, 3);
+        assert_eq!((&one.tree, &one.history), (&other.tree, &other.history));
+    }
+    assert_ne!(one.cost, run_on(1, 1).cost);
+}
+
+#[test]
 fn budgets_end_a_search_where_they_say() {
     let boxes = scatter(1000, 4);
     for method in methods() {
@@ -178,12 +199,12 @@ fn the_best_ends_when_the_time_does_and_its_pieces_are_a_valid_tree() {
         }
     }
     let boxes = scatter(3000, 7);
-    for pieces in [1, 8] {
-        let config = Method::Best(best::Config { pieces, ..Default::default() });
+    for (pieces, copies) in [(1, 1), (8, 1), (1, 3)] {
+        let config = Method::Best(best::Config { pieces, copies, ..Default::default() });
         let clock = Clock(0.into());
         let outcome = solve(&config, &Problem::new(&boxes), 1, Budget::UNLIMITED, &clock).unwrap();
         validate(&outcome.tree, &boxes).unwrap();
-        assert!((4000..5100).contains(&clock.0.into_inner()), "{pieces}");
+        assert!((4000..5100).contains(&clock.0.into_inner()), "{pieces}, {copies}");
         assert!(outcome.cost < run(&config, &boxes, 1_000_000).cost);
     }
 }
