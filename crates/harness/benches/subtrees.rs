@@ -1,12 +1,13 @@
-//! `best` with a budget of work by the number of subtrees that are annealed at once: cost over the
-//! cost of greedy Müller–Fellner, and seconds on one thread and on two.
+//! `best` with a budget of work by the number of subtrees, or of copies of the tree, that are
+//! annealed at once: cost over the cost of greedy Müller–Fellner, and seconds on one thread and on
+//! two.
 //!
-//! `cargo bench -p harness --bench subtrees -- [--subtrees 1,8,64,512] [--million-work 400] [--seeds
-//! 3] SCENE...` writes `results/threads/timing_subtrees.csv`, and keeps its rows of other scenes and
-//! processors.
+//! `cargo bench -p harness --bench subtrees -- [--subtrees 1,8,64,512] [--copies 2,8] [--million-work
+//! 400] [--seeds 3] SCENE...` writes `results/threads/timing_subtrees.csv`, and keeps its rows of
+//! other scenes and processors.
 //!
 //! One thread and two alternate, and their trees are the same. The seconds of more threads are
-//! expected by Amdahl's law from these two, so far as there are that many subtrees.
+//! expected by Amdahl's law from these two, so far as there are that many subtrees or copies.
 
 mod measured;
 
@@ -33,6 +34,9 @@ struct Args {
     /// Numbers of subtrees.
     #[arg(long, value_delimiter = ',', default_value = "1,8,64,512")]
     subtrees: Vec<u32>,
+    /// Numbers of copies.
+    #[arg(long, value_delimiter = ',', default_value = "2,8")]
+    copies: Vec<u32>,
     /// The work of a run, in millions of nodes.
     #[arg(long, default_value_t = 400)]
     million_work: u64,
@@ -62,16 +66,25 @@ fn measure(scene: &Scene, args: &Args) -> Vec<SubtreesRow> {
         .expect("finite boxes");
     let base = cost::internal_area(&greedy);
     let mut rows = Vec::new();
+    let by_subtrees = args.subtrees.iter().map(|&count| (count, 1));
+    let by_copies = args.copies.iter().map(|&count| (1, count));
+    let parts: Vec<(u32, u32)> = by_subtrees.chain(by_copies).collect();
     for seed in 1..=args.seeds {
-        for &subtrees in &args.subtrees {
-            let (one, area) = run(scene, args.million_work, subtrees, seed, 1);
-            let (two, area_of_two) = run(scene, args.million_work, subtrees, seed, 2);
+        for &(subtrees, copies) in &parts {
+            let config = best::Config { pieces: subtrees, copies, ..Default::default() };
+            let at_once = match (subtrees, copies) {
+                (1, 1) => "the whole tree".to_string(),
+                (1, copies) => format!("{copies} copies"),
+                (subtrees, _) => format!("{subtrees} subtrees"),
+            };
+            let (one, area) = run(scene, args.million_work, &config, seed, 1);
+            let (two, area_of_two) = run(scene, args.million_work, &config, seed, 2);
             assert_eq!(area.to_bits(), area_of_two.to_bits(), "threads change the tree");
             let row = |threads: String, seconds: f64| SubtreesRow {
                 scene: scene.name.clone(),
                 objects: scene.boxes.len(),
                 processor: PROCESSOR.name(),
-                subtrees,
+                at_once: at_once.clone(),
                 threads,
                 seed,
                 seconds,
@@ -80,12 +93,11 @@ fn measure(scene: &Scene, args: &Args) -> Vec<SubtreesRow> {
             rows.push(row("1".to_string(), one));
             rows.push(row("2".to_string(), two));
             for threads in EXPECTED {
-                let seconds = expected(one, two, threads.min(subtrees as usize));
+                let seconds = expected(one, two, threads.min(subtrees.max(copies) as usize));
                 rows.push(row(format!("{threads}, expected"), seconds));
             }
             println!(
-                "{:<24} {subtrees:>4} subtrees, seed {seed}: {one:.2} s, {two:.2} s, {:.5} of \
-                 greedy's cost",
+                "{:<24} {at_once:>14}, seed {seed}: {one:.2} s, {two:.2} s, {:.5} of greedy's cost",
                 scene.name,
                 area / base
             );
@@ -95,16 +107,21 @@ fn measure(scene: &Scene, args: &Args) -> Vec<SubtreesRow> {
 }
 
 /// Returns the seconds of a run on `threads` threads and the internal area of its tree.
-fn run(scene: &Scene, million_work: u64, subtrees: u32, seed: u64, threads: usize) -> (f64, f64) {
+fn run(
+    scene: &Scene,
+    million_work: u64,
+    config: &best::Config,
+    seed: u64,
+    threads: usize,
+) -> (f64, f64) {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
         .expect("a pool of threads");
-    let config = best::Config { pieces: subtrees, ..Default::default() };
     let budget = Budget { max_work: Some(million_work * 1_000_000), ..Budget::UNLIMITED };
     let problem = Problem::new(&scene.boxes);
     let began = Instant::now();
-    let outcome = pool.install(|| solve(&config, &problem, seed, budget, &()));
+    let outcome = pool.install(|| solve(config, &problem, seed, budget, &()));
     let seconds = began.elapsed().as_secs_f64();
     (seconds, cost::internal_area(&outcome.expect("finite boxes").tree))
 }

@@ -45,7 +45,7 @@ bvh_config::config! {
         descent: Descent = Descent::Cost;
         /// True if an object may also be paired with an inner node, at 2 · S(N ∪ object) plus the
         /// growth of the nodes above. Goldsmith & Salmon pair with leaves only. Over random orders
-        /// of six scenes the mean costs of both are the same within 4.1 %.
+        /// of six scenes the mean cost is 0.5 to 4.1 % lower with inner nodes.
         pair_inner: bool = false;
     }
 }

@@ -273,8 +273,8 @@ rows! {
         objects: usize,
         /// The processor that was measured.
         processor: String,
-        /// The number of subtrees that are annealed at once.
-        subtrees: u32,
+        /// The subtrees, or the copies of the whole tree, that are annealed at once.
+        at_once: String,
         /// The threads, and whether their seconds are expected by Amdahl's law or measured.
         threads: String,
         seed: u64,
