@@ -61,6 +61,9 @@ impl PropertyAccess for Face {
 
 /// Reads the bytes of a PLY file; `path` only names it in errors.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
+    let bytes = bytes
+        .strip_prefix(b"\xef\xbb\xbf")
+        .unwrap_or(bytes);
     let mut reader = Reader::new(bytes);
     let header = Parser::<Vertex>::new()
         .read_header(&mut reader)
@@ -120,7 +123,28 @@ fn fault(path: &Path, within: Option<(&ElementDef, &Header)>, error: &ParseError
         .line()
         .and_then(|line| full.strip_prefix(&format!("Line {line}: ")))
         .unwrap_or(&full);
-    Fault::new(path, place, message)
+    // The parser's words for a line that it does not know are those of its grammar.
+    let unknown = message
+        .split_once("String: ")
+        .and_then(|(_, rest)| rest.split_once("\n\tError: "));
+    match unknown {
+        Some((line, _)) => {
+            let message = format!("`{}`; expected a line of a PLY header", beginning(line));
+            Fault::new(path, place, message)
+        }
+        None => Fault::new(path, place, message),
+    }
+}
+
+/// Returns the beginning of a line, which may be binary, with escapes.
+fn beginning(line: &str) -> String {
+    // Some of the parser's errors quote the line with its end.
+    line.trim_matches('\'')
+        .trim_end()
+        .chars()
+        .take(60)
+        .flat_map(char::escape_debug)
+        .collect()
 }
 
 fn element_fault(path: &Path, element: &str, number: usize, message: String) -> Fault {

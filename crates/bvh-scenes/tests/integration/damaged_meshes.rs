@@ -16,7 +16,7 @@ fn a_fault_is_named_with_its_line_or_element_and_what_would_be_accepted() {
     let change = |from: &str, to: &str| with(json.as_bytes(), from, to);
     let mut nan = stl_binary();
     nan[84 + 50 + 20..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
-    let cases: [(Vec<u8>, &str, &[&str]); 22] = [
+    let cases: [(Vec<u8>, &str, &[&str]); 25] = [
         (with(&ply, "1 1 0.5", "1 nan 0.5"), "a.ply", &["a.ply:14: ", "nan"]),
         (with(&ply, "1 1 0.5", "1 1e99 0.5"), "a.ply", &["vertex 2", "inf"]),
         (with(&ply, "1 1 0.5", "1 one 0.5"), "a.ply", &["a.ply:14: ", "one"]),
@@ -29,7 +29,12 @@ fn a_fault_is_named_with_its_line_or_element_and_what_would_be_accepted() {
             "a.ply",
             &["element vertex", "room for"],
         ),
-        (with(&ply, "format ascii", "format octal"), "a.ply", &["a.ply:2: "]),
+        (
+            with(&ply, "format ascii", "format octal"),
+            "a.ply",
+            &["a.ply:2: `format octal 1.0`; expected a line of a PLY header"],
+        ),
+        (with(&ply, "ply\n", "p\0ly\n"), "a.ply", &["`p\\0ly`; expected a line of a PLY header"]),
         (ply_binary(false)[..190].to_vec(), "a.ply", &["a.ply: element vertex"]),
         (
             with(&stl, "vertex 1 0e0 0\r", "vertex 1 0 inf\r"),
@@ -52,6 +57,16 @@ fn a_fault_is_named_with_its_line_or_element_and_what_would_be_accepted() {
             &["meshes[0].primitives[0] at nodes[0]", "accessors[1]", "7 items"],
         ),
         (change(r#""byteOffset": 48"#, r#""byteOffset": 46"#), "a.gltf", &["index", "below 4"]),
+        (
+            change(r#""version": "2.0""#, r#""version": "1.0""#),
+            "a.gltf",
+            &["a.gltf: asset: version `1.0`; expected 2.0"],
+        ),
+        (
+            change(r#""version": "2.0""#, r#""version": "2.1", "minVersion": "2.1""#),
+            "a.gltf",
+            &["a.gltf: asset: version `2.1`; expected 2.0"],
+        ),
         (change("5126", "5123"), "a.gltf", &["accessors[0]", "F32"]),
         (
             change(r#""byteLength": 60"#, r#""byteLength": 61"#),

@@ -26,7 +26,7 @@ fn every_format_gives_the_same_triangles_under_any_file_name() {
 #[test]
 fn text_formats_may_begin_with_a_byte_order_mark() {
     for (name, _, bytes) in samples() {
-        if ["square.obj", "text.stl", "square.gltf"].contains(&name) {
+        if ["square.obj", "text.ply", "text.stl", "square.gltf"].contains(&name) {
             let marked = [b"\xef\xbb\xbf", &bytes[..]].concat();
             assert_eq!(parse(&marked, Path::new(name)).unwrap(), Mesh::new(square()), "{name}");
         }

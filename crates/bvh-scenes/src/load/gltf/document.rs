@@ -53,6 +53,20 @@ pub(super) fn document<'a>(
         ),
     };
     let root = Root::from_slice(json).map_err(|error| Fault::new(path, Place::File, error))?;
+    let asset = &root.asset;
+    let version = asset
+        .min_version
+        .as_ref()
+        .unwrap_or(&asset.version);
+    // A file of a later minor version is read unless it says that it needs this version.
+    let is_known = match asset.min_version {
+        Some(_) => version == "2.0",
+        None => version.starts_with("2."),
+    };
+    if !is_known {
+        let message = format!("version `{version}`; expected 2.0");
+        return Err(Fault::new(path, Place::Element("asset".into()), message));
+    }
     if let Some(unknown) = root
         .extensions_required
         .iter()
