@@ -197,10 +197,11 @@ impl<M: Mover, A: Metric> Copy<'_, M, A> {
         let mut visits = 0;
         if !self.has_led {
             self.tree.take_back(&mut self.checkpoint);
-            visits += repeat_all(self.tree, leading);
+            // The leader keeps these moves without a test, which rounding could decide otherwise.
+            visits += repeat_all(self.tree, leading, |_| f64::INFINITY);
         }
         for accepted in others {
-            visits += repeat_all(self.tree, accepted);
+            visits += repeat_all(self.tree, accepted, |one| one.limit);
         }
         visits
     }
@@ -221,16 +222,21 @@ impl Accepted {
     }
 }
 
-/// Repeats those accepted moves that still fit. Returns the number of nodes visited.
+/// Repeats those accepted moves that still fit within their `limit`. Returns the number of nodes
+/// visited.
 #[inline(always)]
-fn repeat_all(tree: &mut Working<impl Metric>, accepted: &Accepted) -> u64 {
+fn repeat_all(
+    tree: &mut Working<impl Metric>,
+    accepted: &Accepted,
+    limit: impl Fn(&AcceptedMove) -> f64,
+) -> u64 {
     let mut visits = 0;
     let mut removed = &accepted.removed[..];
     let mut inserted = &accepted.inserted[..];
     for one in &accepted.moves {
         let (removed_here, removed_later) = removed.split_at(one.removed);
         let (inserted_here, inserted_later) = inserted.split_at(one.inserted);
-        if !repeat(tree, removed_here, inserted_here, one.limit, &mut visits) {
+        if !repeat(tree, removed_here, inserted_here, limit(one), &mut visits) {
             tree.undo();
         }
         removed = removed_later;
@@ -321,7 +327,7 @@ mod tests {
             let one =
                 AcceptedMove { removed: removed.len(), inserted: inserted.len(), limit: -1e9 };
             let accepted = Accepted { moves: vec![one], removed, inserted };
-            repeat_all(&mut tree, &accepted);
+            repeat_all(&mut tree, &accepted, |one| one.limit);
             assert_eq!(tree.to_bvh(), before);
         }
     }

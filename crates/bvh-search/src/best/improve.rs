@@ -1,6 +1,7 @@
 //! From an initial tree to the end of the budget: the choice of annealing runs and their schedules.
 
 use super::config::{Config, Horizon};
+use super::copies;
 use super::improvement::{Improvement, ScheduledRun, TRIALS, cost};
 use super::plan::{Planned, plan};
 use crate::annealing::cool;
@@ -13,9 +14,9 @@ use crate::parallel::threads;
 use crate::run::{Problem, Quota, Run, Stream, Tally, stream};
 use crate::tree::{Metric, Working};
 use crate::tuning::{
-    COPIED_FROM, FINISH_AT_MOST, FINISH_WORK, LARGE_SUBTREE, LEAST_LARGE_SUBTREES, MOST_COPIES,
-    MOST_GENERATIONS, MOST_SUBTREES, PROBE, SECURED_FROM, SUBTREES_PER_THREAD, TRIAL,
-    WORK_OF_A_COPY, WORTH_LARGE_SUBTREES, WORTH_SUBTREES,
+    FINISH_AT_MOST, FINISH_WORK, LARGE_SUBTREE, LEAST_LARGE_SUBTREES, MOST_GENERATIONS,
+    MOST_SUBTREES, PROBE, SECURED_FROM, SUBTREES_PER_THREAD, TRIAL, WORK_OF_A_COPY,
+    WORTH_LARGE_SUBTREES, WORTH_SUBTREES,
 };
 use bvh_core::cost::Objective;
 
@@ -242,14 +243,12 @@ impl Improvement<'_, '_, '_, '_> {
             return self.config.copies;
         }
         let is_timed = self.run.observer().progress().is_some();
-        let is_copied = COPIED_FROM..LARGE_SUBTREE * u64::from(LEAST_LARGE_SUBTREES);
         // Without a clock the number of threads must not change the tree.
-        let is_worth = is_timed
-            && self.config.pieces == 0
-            && is_copied.contains(&self.n)
-            && length >= WORTH_SUBTREES
-            && threads() <= MOST_COPIES;
-        if is_worth { threads() as u32 } else { 1 }
+        if is_timed && self.config.pieces == 0 && length >= WORTH_SUBTREES {
+            copies(self.n, threads())
+        } else {
+            1
+        }
     }
 
     /// Makes moves at the lowest temperature. Also returns the work that fits into the rest of the

@@ -29,7 +29,8 @@ use crate::run::{
 };
 use crate::tree::{Metric, Working, search_by_metric};
 use crate::tuning::{
-    CLUSTERING, CLUSTERING_MUCH_CHEAPER, EVALUATED_AT_ONCE, RECOMBINED_AT_ONCE, SECURED_FROM,
+    CLUSTERING, CLUSTERING_MUCH_CHEAPER, COPIED_FROM, EVALUATED_AT_ONCE, LARGE_SUBTREE,
+    LEAST_LARGE_SUBTREES, MOST_COPIES, RECOMBINED_AT_ONCE, SECURED_FROM,
 };
 use bvh_build::ploc::MortonOrder;
 use bvh_build::{BuildError, Builder, Watch};
@@ -54,6 +55,13 @@ pub fn fallback(
         return Ok(None);
     }
     solve(&reinsertion::Config::default(), problem, 0, Budget::UNLIMITED, observer).map(Some)
+}
+
+/// Returns the number of copies of a tree of so many objects that a search within a time limit
+/// anneals at once on so many threads, by default. Each but the first needs 256 bytes per object.
+pub fn copies(objects: u64, threads: usize) -> u32 {
+    let is_copied = COPIED_FROM..LARGE_SUBTREE * u64::from(LEAST_LARGE_SUBTREES);
+    if is_copied.contains(&objects) && threads <= MOST_COPIES { threads as u32 } else { 1 }
 }
 
 /// Returns the outcome of a search, with the [`fallback`]'s tree if it costs less, which happens
