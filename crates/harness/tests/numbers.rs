@@ -234,28 +234,49 @@ fn the_readme_says_where_single_calls_are_slower() {
 
 #[test]
 fn the_benchmarks_say_what_a_second_thread_is_worth() {
+    let path = top().join("results/threads/timing_threads.csv");
+    // The costs of all seeds by row of the table and run.
+    let mut costs: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
+    for row in query::read(&path).unwrap() {
+        let limit = format!("{} {}", row["scene"], row["limit_seconds"]);
+        let cost = row["cost_over_base"].parse().unwrap();
+        costs
+            .entry((row["run"].clone(), limit))
+            .or_default()
+            .push(cost);
+    }
+    let median = |costs: &[f64]| {
+        let mut sorted = costs.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        sorted[sorted.len() / 2]
+    };
+    // The numbers of rows and of pairs in which two threads end below another run, and of all.
+    let compared = |other: &str| {
+        let mut counts = [0; 4];
+        for ((run, limit), two) in &costs {
+            if run == "2 threads" {
+                let other = &costs[&(other.to_owned(), limit.clone())];
+                counts[0] += usize::from(median(two) < median(other));
+                counts[1] += 1;
+                counts[2] += two
+                    .iter()
+                    .zip(other)
+                    .filter(|(two, other)| two < other)
+                    .count();
+                counts[3] += two.len();
+            }
+        }
+        counts
+    };
+    let [rows_one, rows, pairs_one, pairs] = compared("1 thread");
+    let [rows_longer, _, pairs_longer, _] = compared("1 thread, 1.8 times the time");
     page_says(
         "docs/BENCHMARKS.md",
-        "A second thread is worth less than it should be: in all nine rows, the median of two \
-         threads is above the median of one thread with 1.8 times the time.",
+        &format!(
+            "The median of two threads is below the median of one thread in {rows_one} of {rows} \
+             rows, and below the median of one thread with 1.8 times the time in {rows_longer}. Of \
+             {pairs} pairs of one seed, two threads end below one in {pairs_one}, and below 1.8 \
+             times the time in {pairs_longer}."
+        ),
     );
-    let path = top().join("results/threads/timing_threads.csv");
-    let mut medians = BTreeMap::new();
-    for row in query::read(&path).unwrap() {
-        let limit = (row["scene"].clone(), row["limit_seconds"].clone());
-        let costs: &mut Vec<f64> = medians
-            .entry((limit, row["run"].clone()))
-            .or_default();
-        costs.push(row["cost_over_base"].parse().unwrap());
-        costs.sort_by(f64::total_cmp);
-    }
-    let mut rows = 0;
-    for ((limit, run), costs) in &medians {
-        if run == "2 threads" {
-            let longer = &medians[&(limit.clone(), "1 thread, 1.8 times the time".to_owned())];
-            assert!(costs[costs.len() / 2] > longer[longer.len() / 2], "{limit:?}");
-            rows += 1;
-        }
-    }
-    assert_eq!(rows, 9);
 }
