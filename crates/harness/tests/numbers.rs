@@ -201,8 +201,9 @@ fn the_readme_says_which_rays_embree_traces_faster_with_avx_512() {
 fn the_readme_says_in_which_trees_bounce_rays_are_slower() {
     readme_says(
         "On our greedy trees they are slower than Embree's in the mean. On the processor without \
-         AVX-512 they are slower in the mean on all our trees but the one for the camera, where \
-         the comparison is inconclusive, and incoherent rays are slower on greedy ones.",
+         AVX-512 (older kernels) they are slower in the mean on all our trees but the one for the \
+         camera, where the comparison is inconclusive, and incoherent rays are slower on greedy \
+         ones.",
     );
     let with = "amd-epyc-25-17/timing_ratios.csv";
     let without = "amd-epyc-25-1/timing_ratios.csv";

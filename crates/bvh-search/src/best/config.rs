@@ -35,9 +35,9 @@ bvh_config::config! {
         /// Minimum work per object of a long annealing run, which short runs follow.
         reheats_from: f64 = 7000.0, in (Excluded(0.0), Included(f64::INFINITY));
         /// Number of disjoint subtrees that are annealed at once, which limits the number of useful
-        /// threads. 1 is the whole tree, which is slightly better at equal work. 0 means four
-        /// subtrees per thread for a time limit with several threads, one per 32 768 objects for a
-        /// budget of work if they are at least eight, and otherwise 1.
+        /// threads. 1 is the whole tree. 0 means four subtrees per thread for a time limit with
+        /// several threads, one per 32 768 objects for a budget of work if they are at least eight,
+        /// and otherwise 1.
         pieces: u32 = 0, in 0..=MOST_SUBTREES;
         /// Number of copies of the tree on which moves are made at once, which limits the number of
         /// useful threads; overrides `pieces`. Every copy needs the memory of a tree and repeats the

@@ -256,7 +256,7 @@ fn answer(lists: &[(String, &str)], last: &[&Point], paper: &str) -> String {
         .filter(|point| point.interval().1 < 1.0)
         .count();
     let below = if below == 0 {
-        "no interval lies below greedy".into()
+        "no interval lies below greedy, the list of k = 1".into()
     } else {
         format!("{below} lie below greedy")
     };
@@ -322,7 +322,7 @@ mod tests {
         let said = answer(&lists, &[], "k = 5");
         assert_eq!(
             said,
-            "The paper's k = 5 is not among the best on any scene: best are k = 2 or k = 30 on a, k = 2 on b and c; no interval lies below greedy."
+            "The paper's k = 5 is not among the best on any scene: best are k = 2 or k = 30 on a, k = 2 on b and c; no interval lies below greedy, the list of k = 1."
         );
         assert!(
             answer(&lists, &[], "k = 30")
