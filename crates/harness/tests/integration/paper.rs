@@ -9,13 +9,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::PathBuf;
 
-/// The folders of committed results that compare something with the paper.
+/// The folders of committed results that compare something with the paper. A repetition beside
+/// finished results, `NAME.new`, is not committed.
 fn compared_folders() -> Vec<PathBuf> {
     let folders = fs::read_dir(top().join("results"))
         .unwrap()
         .map(|folder| folder.unwrap().path());
     folders
-        .filter(|folder| folder.join("paper.csv").is_file())
+        .filter(|folder| folder.extension().is_none() && folder.join("paper.csv").is_file())
         .collect()
 }
 
