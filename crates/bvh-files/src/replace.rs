@@ -85,14 +85,34 @@ pub struct Reserved {
     ahead: Range<u64>,
 }
 
+/// The number of characters of a file's name in the name of its unfinished file, which has 18 bytes
+/// more and may have 255. A character has at most four bytes.
+const LONGEST_PREFIX: usize = 59;
+
+/// The most links behind each other that a file system follows.
+const MOST_LINKS: usize = 40;
+
+/// Returns the file that a path leads to, even if the file does not exist yet. Renaming onto a
+/// symbolic link would replace the link instead of its target. A loop of links remains a link.
+fn behind_links(path: &Path) -> PathBuf {
+    if let Ok(found) = fs::canonicalize(path) {
+        return found;
+    }
+    let mut path = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        let Ok(target) = fs::read_link(&path) else { break };
+        path = path.with_file_name("").join(target);
+    }
+    path
+}
+
 impl Reserved {
     /// Reserves `bytes` bytes in a file with a temporary name next to `path`.
     pub fn new(path: &Path, bytes: usize) -> Result<Self, WriteError> {
-        // Renaming onto a symbolic link would replace the link instead of its target.
-        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let path = behind_links(path);
         let name = path
             .file_name()
-            .filter(|_| path.is_file() || !path.exists());
+            .filter(|_| path.is_file() || (!path.exists() && !path.is_symlink()));
         let Some(name) = name else {
             return Err(WriteError::of(&path, "replace the file")(io::Error::other(
                 "not a regular file",
@@ -102,7 +122,9 @@ impl Reserved {
             .parent()
             .filter(|parent| !parent.as_os_str().is_empty())
             .unwrap_or(Path::new("."));
-        let prefix = format!("{}.", name.to_string_lossy());
+        let name = name.to_string_lossy();
+        let beginning: String = name.chars().take(LONGEST_PREFIX).collect();
+        let prefix = format!("{beginning}.");
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix).suffix(UNFINISHED);
         // Temporary files are private by default; this one becomes an ordinary file.
@@ -230,6 +252,37 @@ mod tests {
         let reserved = Reserved::new(&path, 1000).unwrap();
         reserved.write(b"new").unwrap();
         assert_eq!((fs::read(&path).unwrap(), count(&folder)), (b"new".to_vec(), 1));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_to_a_missing_file_stays_and_a_loop_of_links_is_rejected() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        symlink("second", at("first")).unwrap();
+        symlink(at("missing"), at("second")).unwrap();
+        Reserved::new(&at("first"), 10)
+            .unwrap()
+            .write(b"new")
+            .unwrap();
+        assert_eq!(fs::read(at("missing")).unwrap(), b"new");
+        assert!(at("first").is_symlink() && at("second").is_symlink());
+        symlink("a", at("b")).unwrap();
+        symlink("b", at("a")).unwrap();
+        assert!(Reserved::new(&at("a"), 10).is_err());
+        assert!(at("a").is_symlink());
+    }
+
+    #[test]
+    fn a_name_may_be_as_long_as_the_file_system_permits() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a".repeat(255));
+        Reserved::new(&path, 10)
+            .unwrap()
+            .write(b"new")
+            .unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
     }
 
     #[cfg(unix)]
