@@ -80,9 +80,9 @@ pub fn searched<T: Send>(
         }
         Ok(())
     };
+    let pool = &pool(py)?;
     // Python runs signal handlers on its main thread only. The calling thread may be the main
     // thread, so a second thread searches while this one waits for signals.
-    let pool = &pool(py)?;
     Ok(py.detach(|| {
         thread::scope(|scope| {
             let (sender, receiver) = channel();

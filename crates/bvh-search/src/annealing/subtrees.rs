@@ -226,26 +226,14 @@ impl Subtree {
     fn put_back(&self, nodes: &mut [Node], small: &Working<impl Metric>) {
         // The root's link leads out of the subtree.
         let above = nodes[0].parent;
-        let mut next = 0;
-        // Pending nodes: index in the tree, parent and side in the subtree.
-        let mut stack: Vec<(u32, usize, usize)> = small
-            .root()
-            .map(|root| (root, 0, 0))
-            .into_iter()
-            .collect();
-        while let Some((index, parent, side)) = stack.pop() {
-            let place = self.root + next as u32;
-            let node = small.nodes[index as usize];
-            nodes[next] = Node { parent: self.root + parent as u32, stamp: 0, ..node };
-            if next > 0 {
-                nodes[parent].children[side] = place;
+        small.visit_in_preorder(|node, place, parent, side| {
+            let parent = parent + self.root - 1;
+            nodes[place as usize - 1] = Node { parent, stamp: 0, ..*node };
+            // The place of the small tree's anchor is not in the subtree.
+            if place > 1 {
+                nodes[(parent - self.root) as usize].children[side] = place + self.root - 1;
             }
-            if !node.is_leaf() {
-                stack.extend([(node.children[1], next, 1), (node.children[0], next, 0)]);
-            }
-            next += 1;
-        }
-        debug_assert_eq!(next, nodes.len());
+        });
         nodes[0].parent = above;
     }
 }

@@ -1,6 +1,6 @@
 //! Several changes that are undone together.
 
-use super::{ANCHOR, Metric, NONE, Node, Working};
+use super::{ANCHOR, Metric, NONE, Node, Working, contains};
 use bvh_core::cost::Sum;
 
 /// The state of a tree before some changes.
@@ -46,10 +46,7 @@ impl<M: Metric> Working<M> {
     #[inline(always)]
     pub fn is_attached(&self, node: u32, mut detached: impl Iterator<Item = u32>) -> bool {
         let Node { aabb, parent, .. } = self.nodes[node as usize];
-        let may_be_below = |root: u32| {
-            let around = &self.nodes[root as usize].aabb;
-            around.union(&aabb) == *around
-        };
+        let may_be_below = |root: u32| contains(&self.nodes[root as usize].aabb, &aabb);
         parent != NONE && (!detached.any(may_be_below) || self.leads_to_anchor(parent))
     }
 

@@ -330,6 +330,12 @@ impl<M: Metric> Working<M> {
     }
 }
 
+/// Returns whether one box contains another.
+#[inline(always)]
+fn contains(whole: &PackedAabb, part: &PackedAabb) -> bool {
+    whole.union(part) == *whole
+}
+
 /// Returns the node's part of the area of a tree with this cost of leaves; `None` if its kind has
 /// none.
 #[inline(always)]

@@ -116,29 +116,39 @@ impl<M: Metric> Working<M> {
         self.restart(area);
     }
 
-    pub(super) fn sort_into_spare(&mut self) {
-        let mut nodes = std::mem::take(&mut self.spare);
-        nodes.reserve(self.nodes.len());
-        nodes.push(Node { stamp: 0, ..self.nodes[0] });
-        // Pending nodes: old index, new parent, side.
+    /// Calls a function with every node except the anchor in preorder: the node, its place, which
+    /// is 1 for the root, the place of its parent, and its side there. O(n).
+    #[inline(always)]
+    pub fn visit_in_preorder(&self, mut visit: impl FnMut(&Node, u32, u32, usize)) {
+        // Pending nodes: index, place of the parent, side.
         let mut stack: Vec<(u32, u32, usize)> = self
             .root()
             .map(|root| (root, ANCHOR, 0))
             .into_iter()
             .collect();
-        let mut area = Sum::default();
-        while let Some((old, parent, side)) = stack.pop() {
-            let index = nodes.len() as u32;
-            let node = self.nodes[old as usize];
-            nodes.push(Node { parent, stamp: 0, ..node });
-            nodes[parent as usize].children[side] = index;
-            if let Some(part) = self.part(&node) {
-                area.add(part);
-            }
+        let mut place = 0;
+        while let Some((index, parent, side)) = stack.pop() {
+            place += 1;
+            let node = &self.nodes[index as usize];
+            visit(node, place, parent, side);
             if !node.is_leaf() {
-                stack.extend([(node.children[1], index, 1), (node.children[0], index, 0)]);
+                stack.extend([(node.children[1], place, 1), (node.children[0], place, 0)]);
             }
         }
+    }
+
+    pub(super) fn sort_into_spare(&mut self) {
+        let mut nodes = std::mem::take(&mut self.spare);
+        nodes.reserve(self.nodes.len());
+        nodes.push(Node { stamp: 0, ..self.nodes[0] });
+        let mut area = Sum::default();
+        self.visit_in_preorder(|node, place, parent, side| {
+            nodes.push(Node { parent, stamp: 0, ..*node });
+            nodes[parent as usize].children[side] = place;
+            if let Some(part) = self.part(node) {
+                area.add(part);
+            }
+        });
         self.spare = std::mem::replace(&mut self.nodes, nodes);
         self.spare.clear();
         self.restart(area);

@@ -26,7 +26,7 @@
 //! tight from the start.
 
 use super::linked::Linked;
-use super::{ANCHOR, Metric, NONE, Working};
+use super::{ANCHOR, Metric, NONE, Working, contains};
 use bvh_core::PackedAabb;
 
 /// Finds positions. Holds the buffers of a search and counts the nodes that it visits.
@@ -85,8 +85,7 @@ impl Scope {
         while scope.above != ANCHOR {
             let root = scope.above;
             scope = Self::of(tree, tree.nodes[root as usize].parent, root);
-            let whole = &tree.nodes[root as usize].aabb;
-            if whole.union(aabb) == *whole {
+            if contains(&tree.nodes[root as usize].aabb, aabb) {
                 break;
             }
         }

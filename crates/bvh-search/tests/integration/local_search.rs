@@ -84,18 +84,22 @@ fn every_method_improves_on_its_start_and_the_best_most() {
     assert!(iterated <= reinsertion);
 }
 
+fn run_on_threads(threads: usize, config: best::Config, boxes: &[Aabb], work: u64) -> Outcome {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .unwrap();
+    pool.install(|| run(&Method::Best(config), boxes, work))
+}
+
 #[test]
 fn subtrees_annealed_in_parallel_do_not_depend_on_the_number_of_threads() {
     // A large scene is cut into subtrees unasked, and then ends elsewhere than as a whole.
     for (objects, pieces, work) in [(1500, 8, 2_000_000), (1 << 18, 0, 80 << 18)] {
         let boxes = scatter(objects, 2);
         let run_on = |threads, pieces| {
-            let method = Method::Best(best::Config { pieces, ..Default::default() });
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .unwrap();
-            pool.install(|| run(&method, &boxes, work))
+            let config = best::Config { pieces, ..Default::default() };
+            run_on_threads(threads, config, &boxes, work)
         };
         let one = run_on(1, pieces);
         for threads in [2, 3] {
@@ -110,12 +114,8 @@ fn subtrees_annealed_in_parallel_do_not_depend_on_the_number_of_threads() {
 fn copies_annealed_in_parallel_do_not_depend_on_the_number_of_threads() {
     let boxes = scatter(1500, 2);
     let run_on = |threads, copies| {
-        let method = Method::Best(best::Config { copies, ..Default::default() });
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        pool.install(|| run(&method, &boxes, 2_000_000))
+        let config = best::Config { copies, ..Default::default() };
+        run_on_threads(threads, config, &boxes, 2_000_000)
     };
     let one = run_on(1, 3);
     validate(&one.tree, &boxes).unwrap();
