@@ -6,6 +6,7 @@
 
 mod buffers;
 mod document;
+mod references;
 
 use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Place};
 use buffers::Buffers;

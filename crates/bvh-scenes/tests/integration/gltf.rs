@@ -181,3 +181,32 @@ fn files_in_the_folder_of_the_scene_and_below_are_read() {
         assert_eq!(load(&folder.path().join("scene.gltf")).unwrap(), triangle(), "{name}");
     }
 }
+
+#[test]
+fn an_index_of_33_bits_is_not_taken_for_its_lower_32() {
+    let whole = json(CHUNK, r#", "scene": 0"#);
+    let wrapped = |number: u64| (number + (1 << 32)).to_string();
+    for (key, number) in [
+        ("POSITION", 0),
+        ("buffer", 0),
+        ("bufferView", 0),
+        ("componentType", 5126),
+        ("mesh", 0),
+        ("scene", 0),
+    ] {
+        let old = format!(r#""{key}": {number}"#);
+        let new = format!(r#""{key}": {}"#, wrapped(number));
+        assert_eq!(whole.matches(&old).count(), 1, "{key}");
+        let damaged = glb(whole.replace(&old, &new), &corner_bytes());
+        let message = parse(&damaged, Path::new("a.glb"))
+            .unwrap_err()
+            .to_string();
+        let expected = format!("a.glb: {}; expected at most 4294967295", wrapped(number));
+        assert!(message.starts_with(&expected), "{message}");
+    }
+    let damaged = whole.replace(r#"{"nodes": [0]}"#, r#"{"nodes": [4294967296]}"#);
+    assert!(parse(&glb(damaged, &corner_bytes()), Path::new("a.glb")).is_err());
+    // Numbers that are no reference may be as large as they like.
+    let large = r#", "scene": 0, "extras": {"mesh": 4294967296}"#;
+    assert!(parse(&glb(json(CHUNK, large), &corner_bytes()), Path::new("a.glb")).is_ok());
+}

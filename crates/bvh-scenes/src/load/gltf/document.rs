@@ -1,7 +1,9 @@
 //! The JSON of a glTF or GLB file, and the binary chunk next to it.
 
 use super::super::mesh::{Fault, Place};
+use super::references::References;
 use gltf_json::Root;
+use gltf_json::deserialize::from_slice;
 use std::path::Path;
 
 /// Extensions that a file may require, because none of them changes its triangles: lights,
@@ -52,7 +54,9 @@ pub(super) fn document<'a>(
             None,
         ),
     };
-    let root = Root::from_slice(json).map_err(|error| Fault::new(path, Place::File, error))?;
+    let root = from_slice::<References>(json)
+        .and_then(|_| Root::from_slice(json))
+        .map_err(|error| Fault::new(path, Place::File, error))?;
     let asset = &root.asset;
     let version = asset
         .min_version
