@@ -50,21 +50,20 @@ impl Observer for Watch {
     }
 }
 
+fn duration(seconds: f64) -> PyResult<Duration> {
+    Duration::try_from_secs_f64(seconds)
+        .map_err(|_| invalid(format!("seconds is {seconds:?}; accepted: 0 to 1e19")))
+}
+
 /// Runs `search` within its limits. Returns its result, and the exception that a signal handler or
 /// the function `progress` has raised meanwhile.
-pub fn searched<T: Send>(
+pub fn run<T: Send>(
     py: Python,
     Limits { seconds, work, progress }: Limits,
     search: impl FnOnce(Budget, &dyn Observer) -> T + Send,
 ) -> PyResult<(T, PyResult<()>)> {
     let seconds = if work.is_none() { Some(seconds.unwrap_or(1.0)) } else { seconds };
-    let limit = match seconds {
-        Some(seconds) => Some(
-            Duration::try_from_secs_f64(seconds)
-                .map_err(|_| invalid(format!("seconds is {seconds:?}; accepted: 0 to 1e19")))?,
-        ),
-        None => None,
-    };
+    let limit = seconds.map(duration).transpose()?;
     let budget = Budget { max_work: work, ..Budget::UNLIMITED };
     let start = Instant::now();
     let watch = &Watch {

@@ -2,7 +2,7 @@
 //! nodes.
 
 use crate::arrays::{boxes, invalid, mesh, moved_mesh, segments, triangles};
-use crate::search::{Limits, searched};
+use crate::search::{self, Limits};
 use bvh_files::WriteError;
 use bvh_files::tree_file::{self, TreeFileError};
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
@@ -199,7 +199,7 @@ impl Tree {
         let owned = self.owned();
         let limits = Limits { seconds, work, progress };
         let (improvement, raised) =
-            searched(py, limits, |budget, observer| owned.improvement_within(budget, observer))?;
+            search::run(py, limits, |budget, observer| owned.improvement_within(budget, observer))?;
         drop(owned);
         let improvement = improvement.map_err(invalid)?;
         // The gains are applied before a KeyboardInterrupt is raised.
@@ -361,7 +361,7 @@ fn found(
     if !(1.0..=16.0).contains(&references) {
         return Err(invalid(format!("references is {references}; accepted: 1 to 16")));
     }
-    let (found, raised) = searched(py, limits, |budget, observer| {
+    let (found, raised) = search::run(py, limits, |budget, observer| {
         let options = Options { references, seed, budget, rays };
         OwnedTree::find_with(objects, &options, observer)
     })?;

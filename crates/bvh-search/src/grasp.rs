@@ -49,19 +49,20 @@ bvh_config::config! {
 }
 
 impl Config {
-    /// Makes the construction number `trial` and writes it into the buffers' tree.
+    /// Makes the construction number `trial` and writes it into `tree`.
     fn construct(
         &self,
         scene: &Presorted,
         measure: Option<&dyn Measure>,
         (seed, trial): (u64, u64),
-        buffers: (&mut Workspace, &mut Bvh),
+        workspace: &mut Workspace,
+        tree: &mut Bvh,
         watch: &Watch,
     ) -> Result<(), BuildError> {
         let Self { candidates, noise, .. } = *self;
         let mut rule = Randomised::new(candidates, noise, stream(seed, trial));
         self.construction
-            .construct(scene, measure, &mut rule, buffers, watch)
+            .construct(scene, measure, &mut rule, workspace, tree, watch)
     }
 
     /// Improves a tree to a local optimum; leaves it unchanged if the observer cancels first.
@@ -105,14 +106,15 @@ impl Config {
         scene: &Presorted,
         problem: &Problem,
         (seed, trial): (u64, u64),
-        (workspace, tree): (&mut Workspace, &mut Bvh),
+        workspace: &mut Workspace,
+        tree: &mut Bvh,
         observer: &dyn Observer,
     ) -> Result<Option<Trial>, SearchError> {
         if trial > 0 && observer.cancelled() {
             return Ok(None);
         }
         let constructed = watched(observer, |watch| {
-            self.construct(scene, problem.measure, (seed, trial), (workspace, &mut *tree), watch)
+            self.construct(scene, problem.measure, (seed, trial), workspace, tree, watch)
         });
         match constructed {
             Err(BuildError::Cancelled) if trial > 0 => return Ok(None),
@@ -155,8 +157,7 @@ impl Search for Config {
             let results = map_init((end - next) as usize, Default::default, |buffers, index| {
                 let (workspace, tree): &mut (Workspace, Bvh) = buffers;
                 let number = (seed, next + index as u64);
-                let mut trial =
-                    self.attempt(&scene, problem, number, (workspace, tree), observer)?;
+                let mut trial = self.attempt(&scene, problem, number, workspace, tree, observer)?;
                 if let Some(trial) = trial.as_mut().filter(|trial| trial.cost < limit) {
                     trial.tree = Some(std::mem::take(tree));
                 }

@@ -76,10 +76,9 @@ fn one_thread(scene: &Scene) {
         let mut workspace = Workspace::default();
         let mut tree = Bvh::default();
         for _ in 0..TRIALS {
-            let buffers = (&mut workspace, &mut tree);
             let rule = &mut bvh_build::top_down::TakeBest;
             config
-                .construct(&scene, None, rule, buffers, &Watch::default())
+                .construct(&scene, None, rule, &mut workspace, &mut tree, &Watch::default())
                 .expect("nobody cancels");
             std::hint::black_box(bvh_core::cost::internal_area(&tree));
         }

@@ -71,7 +71,8 @@ pub struct MadeUpCosts {
 }
 
 impl MadeUpCosts {
-    fn of(self, objects: usize) -> Vec<f32> {
+    /// Returns the costs of so many objects.
+    fn costs(self, objects: usize) -> Vec<f32> {
         let mut costs = vec![1.0; objects];
         for (object, cost) in costs.iter_mut().enumerate() {
             if object.is_multiple_of(self.every as usize) {
@@ -87,11 +88,9 @@ impl Check for Heuristic {
         match self {
             Self::AreaTimesPower(power) => (0.0..=1.0).faults("area_times_power", power),
             Self::AreaTimesCost(MadeUpCosts { every, cost }) => {
-                let [every, cost] = [
-                    (1..).faults("area_times_cost.every", every),
-                    (0.0..=1e6).faults("area_times_cost.cost", cost),
-                ];
-                [every, cost].concat()
+                let mut faults = (1..).faults("area_times_cost.every", every);
+                faults.extend((0.0..=1e6).faults("area_times_cost.cost", cost));
+                faults
             }
             _ => vec![],
         }
@@ -111,16 +110,18 @@ impl Builder for Config {
         self.check()?;
         let mut tree = Bvh::default();
         let greedy = Greedy { config: self, scene: &scene, watch, tree: &mut tree };
-        self.by_heuristic(scene.len(), measure, greedy)?;
+        self.divide_by_heuristic(scene.len(), measure, greedy)?;
         Ok(tree)
     }
 }
 
 /// A division that is ready except for its split cost.
 trait Divide {
-    fn by<C: SplitCost>(self, split_cost: &C) -> Result<(), BuildError>;
+    /// Divides by this split cost.
+    fn divide<C: SplitCost>(self, split_cost: &C) -> Result<(), BuildError>;
 }
 
+/// A division by the best splits.
 struct Greedy<'a> {
     config: &'a Config,
     scene: &'a Presorted,
@@ -129,7 +130,7 @@ struct Greedy<'a> {
 }
 
 impl Divide for Greedy<'_> {
-    fn by<C: SplitCost>(self, split_cost: &C) -> Result<(), BuildError> {
+    fn divide<C: SplitCost>(self, split_cost: &C) -> Result<(), BuildError> {
         let skip_same_order = self.config.skip_same_order;
         let division =
             Division { scene: self.scene, split_cost, skip_same_order, watch: self.watch };
@@ -137,7 +138,7 @@ impl Divide for Greedy<'_> {
     }
 }
 
-/// The arguments of [`Config::construct`].
+/// A division by any rule.
 struct ByRule<'a> {
     scene: &'a Presorted,
     rule: &'a mut dyn SplitRule,
@@ -148,21 +149,21 @@ struct ByRule<'a> {
 }
 
 impl Divide for ByRule<'_> {
-    fn by<C: SplitCost>(self, split_cost: &C) -> Result<(), BuildError> {
+    fn divide<C: SplitCost>(self, split_cost: &C) -> Result<(), BuildError> {
         let Self { scene, rule, skip_same_order, watch, workspace, tree } = self;
         Division { scene, split_cost, skip_same_order, watch }.on_one_thread(rule, workspace, tree)
     }
 }
 
-/// Divides by this split cost, with the measure if there is one.
-fn by_cost(
+/// Divides by this split cost, of the measure instead of half areas if there is one.
+fn divide_by(
     cost: &impl SplitCost,
     measure: Option<&dyn Measure>,
     division: impl Divide,
 ) -> Result<(), BuildError> {
     match measure {
-        Some(measure) => division.by(&ByMeasure { cost, measure }),
-        None => division.by(cost),
+        Some(measure) => division.divide(&ByMeasure { cost, measure }),
+        None => division.divide(cost),
     }
 }
 
@@ -196,28 +197,30 @@ impl Config {
         scene: &Presorted,
         measure: Option<&dyn Measure>,
         rule: &mut dyn SplitRule,
-        (workspace, tree): (&mut Workspace, &mut Bvh),
+        workspace: &mut Workspace,
+        tree: &mut Bvh,
         watch: &Watch,
     ) -> Result<(), BuildError> {
         let skip_same_order = self.skip_same_order;
         let division = ByRule { scene, rule, skip_same_order, watch, workspace, tree };
-        self.by_heuristic(scene.len(), measure, division)
+        self.divide_by_heuristic(scene.len(), measure, division)
     }
 
-    fn by_heuristic(
+    /// Divides by the split cost of the heuristic.
+    fn divide_by_heuristic(
         &self,
         objects: usize,
         measure: Option<&dyn Measure>,
         division: impl Divide,
     ) -> Result<(), BuildError> {
         match self.heuristic {
-            Heuristic::AreaTimesCount => by_cost(&AreaTimesCount, measure, division),
+            Heuristic::AreaTimesCount => divide_by(&AreaTimesCount, measure, division),
             Heuristic::AreaTimesPower(p) => {
-                by_cost(&AreaTimesPower::new(objects, p), measure, division)
+                divide_by(&AreaTimesPower::new(objects, p), measure, division)
             }
-            Heuristic::AreaOnly(reading) => by_cost(&reading, measure, division),
-            Heuristic::AreaTimesCost(costs) => {
-                by_cost(&AreaTimesWeight(&costs.of(objects)), measure, division)
+            Heuristic::AreaOnly(reading) => divide_by(&reading, measure, division),
+            Heuristic::AreaTimesCost(made_up) => {
+                divide_by(&AreaTimesWeight(&made_up.costs(objects)), measure, division)
             }
         }
     }

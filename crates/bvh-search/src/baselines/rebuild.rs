@@ -226,10 +226,10 @@ impl Config {
         let mut rule = Randomised::new(self.candidates, Some(self.noise), rng);
         let mut other = Bvh::default();
         let scene = Presorted::new(&boxes)?;
-        let buffers = (&mut Workspace::default(), &mut other);
+        let workspace = &mut Workspace::default();
         let constructed = watched(observer, |watch| {
             self.construction
-                .construct(&scene, measure, &mut rule, buffers, watch)
+                .construct(&scene, measure, &mut rule, workspace, &mut other, watch)
         });
         match constructed {
             Err(BuildError::Cancelled) => return Ok((None, Tally::default())),

@@ -237,16 +237,16 @@ impl Build<'_> {
         if self.extra == 0 || left.intersection(right).half_area() <= self.least_overlap {
             return Ok(by_objects);
         }
-        let spatial = self.best_plane(aabb, references, by_objects.cost);
-        let spatial = spatial.and_then(|plane| self.spatial_split(references, plane));
-        Ok(match spatial.filter(|spatial| spatial.cost < by_objects.cost) {
-            Some(spatial) => {
-                let [left, right] = spatial.references.each_ref().map(Vec::len);
+        let plane = self.best_plane(aabb, references, by_objects.cost);
+        let by_plane = plane.and_then(|plane| self.spatial_split(references, plane));
+        match by_plane {
+            Some(by_plane) if by_plane.cost < by_objects.cost => {
+                let [left, right] = by_plane.references.each_ref().map(Vec::len);
                 self.extra -= left + right - references.len();
-                spatial
+                Ok(by_plane)
             }
-            None => by_objects,
-        })
+            _ => Ok(by_objects),
+        }
     }
 }
 
@@ -300,8 +300,8 @@ mod tests {
         let whole = muller_fellner::Config::default()
             .build(&boxes)
             .unwrap();
-        let whole = cost::total_area(&whole);
-        assert!(before < 0.97 * whole, "{before} of {whole}");
+        let whole_cost = cost::total_area(&whole);
+        assert!(before < 0.97 * whole_cost, "{before} of {whole_cost}");
     }
 
     #[test]
