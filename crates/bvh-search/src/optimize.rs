@@ -156,6 +156,6 @@ impl From<'_> {
     ) -> Found {
         let tree = Kept::new(self.tree.clone(), problem);
         self.config
-            .improved((tree, None), metric, problem, seed, run)
+            .improved(tree, None, metric, problem, seed, run)
     }
 }

@@ -99,7 +99,8 @@ impl Config {
                 let construct = |index: usize| {
                     let rng = stream(seed, first + index as u64);
                     self.construct(
-                        (&tree, problem.measure),
+                        &tree,
+                        problem.measure,
                         &subtrees[index],
                         share,
                         rng,
@@ -212,7 +213,8 @@ impl Config {
     /// work.
     fn construct<A: Metric>(
         &self,
-        (tree, measure): (&Working<A>, Option<&dyn Measure>),
+        tree: &Working<A>,
+        measure: Option<&dyn Measure>,
         subtree: &Subtree,
         quota: Quota,
         rng: Stream,
@@ -325,7 +327,7 @@ mod tests {
             let before = tree.area();
             for subtree in &subtrees {
                 let found = config
-                    .construct((&tree, None), subtree, Quota::ENDLESS, stream(1, number + 1), &())
+                    .construct(&tree, None, subtree, Quota::ENDLESS, stream(1, number + 1), &())
                     .unwrap();
                 let Some(other) = found.0 else { continue };
                 tree.begin();

@@ -25,7 +25,8 @@ use bvh_core::cost::Objective;
 /// chooses the better of the two.
 pub(crate) fn improve<A: Metric>(
     config: &Config,
-    (tree, other): (&mut Working<A>, Option<Working<A>>),
+    tree: &mut Working<A>,
+    other: Option<Working<A>>,
     seed: u64,
     problem: &Problem,
     best: &mut Incumbent,

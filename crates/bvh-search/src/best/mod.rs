@@ -110,7 +110,7 @@ impl Config {
         if problem.splits.is_some() || problem.objective == Objective::Layout {
             let tree = self.initial(None, problem, run)?;
             let other = division(problem, run.observer())?;
-            return self.improved((tree, other), metric, problem, seed, run);
+            return self.improved(tree, other, metric, problem, seed, run);
         }
         let (_, work) = self.horizon(problem.boxes.len() as u64, run);
         if let Some(optimum) = exact::instead(problem, work, run)? {
@@ -136,7 +136,7 @@ impl Config {
         let Some(mut tree) = best.working_unless_cancelled(metric, run.observer())? else {
             return Ok(best.tree);
         };
-        improve(self, (&mut tree, None), seed, problem, &mut best, run);
+        improve(self, &mut tree, None, seed, problem, &mut best, run);
         Ok(best.tree)
     }
 
@@ -185,7 +185,8 @@ impl Config {
     /// trial shows that the other tree is better, improves the other tree instead.
     pub(crate) fn improved<A: Metric>(
         &self,
-        (tree, other): (Kept, Option<Bvh>),
+        tree: Kept,
+        other: Option<Bvh>,
         metric: A,
         problem: &Problem,
         seed: u64,
@@ -205,12 +206,12 @@ impl Config {
             if let Some(other) = other {
                 run.keep_aside(Kept::new(other, problem));
             }
-            improve(self, (&mut tree, other_working), seed, problem, &mut best, run);
+            improve(self, &mut tree, other_working, seed, problem, &mut best, run);
         } else {
             let Some(mut tree) = best.working_unless_cancelled(metric, run.observer())? else {
                 return Ok(best.tree);
             };
-            improve(self, (&mut tree, None), seed, problem, &mut best, run);
+            improve(self, &mut tree, None, seed, problem, &mut best, run);
         }
         Ok(best.tree)
     }
