@@ -22,8 +22,9 @@
 //! one; `u32[4]` object ids, 2^32 − 1 in unused lanes. 2^30 is added to the first id of a leaf's
 //! last block.
 
+use super::FileError;
 use super::header::{Fields, Header};
-use super::{FileError, cast, copied, le_bytes};
+use super::words::{cast, copied, le_bytes};
 use crate::wide::{Child, TriangleBlock, WideNode};
 use crate::{Aabb, WideBvh};
 use alloc::borrow::Cow;

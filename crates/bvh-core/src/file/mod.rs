@@ -74,6 +74,7 @@
 mod error;
 mod header;
 mod layout;
+mod words;
 
 pub use error::FileError;
 pub use header::Header;
@@ -84,9 +85,9 @@ use crate::validate::{FastPath, Leaves, check_structure, find_fault, for_each};
 use crate::{Aabb, Bvh, BvhView, Clip, InvalidBvh, Node, validate, validate_references};
 use alloc::borrow::Cow;
 use alloc::vec::Vec;
-use bytemuck::Pod;
 use core::ops::Range;
 use crc32fast::Hasher;
+use words::{cast, copied, le_bytes};
 
 /// The origin of a tree, as the header of its file records it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -367,44 +368,6 @@ impl<'a> TreeFile<'a> {
             check_structure(tree, objects)
         }
     }
-}
-
-/// Returns the bytes of values that consist of four-byte words, little-endian on any machine.
-fn le_bytes<T: Pod>(values: &[T]) -> Cow<'_, [u8]> {
-    let bytes: &[u8] = bytemuck::cast_slice(values);
-    if cfg!(target_endian = "little") {
-        Cow::Borrowed(bytes)
-    } else {
-        let (words, _) = bytes.as_chunks::<4>();
-        Cow::Owned(
-            words
-                .iter()
-                .flat_map(|&[a, b, c, d]| [d, c, b, a])
-                .collect(),
-        )
-    }
-}
-
-/// Borrows bytes as values that consist of four-byte words.
-fn cast<T: Pod>(bytes: &[u8]) -> Result<&[T], FileError> {
-    if cfg!(target_endian = "big") {
-        return Err(FileError::Machine);
-    }
-    // An empty slice may have any address, and `bytemuck` would reject it as misaligned.
-    if bytes.is_empty() {
-        return Ok(&[]);
-    }
-    bytemuck::try_cast_slice(bytes).map_err(|_| FileError::Alignment(align_of::<T>()))
-}
-
-/// Copies bytes to values that consist of four-byte words.
-fn copied<T: Pod>(bytes: &[u8]) -> Vec<T> {
-    let mut values = alloc::vec![T::zeroed(); bytes.len() / size_of::<T>()];
-    bytemuck::cast_slice_mut::<T, u8>(&mut values).copy_from_slice(bytes);
-    for word in bytemuck::cast_slice_mut::<T, u32>(&mut values) {
-        *word = u32::from_le(*word);
-    }
-    values
 }
 
 #[cfg(test)]
