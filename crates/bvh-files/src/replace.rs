@@ -27,6 +27,8 @@ pub struct Reserved {
     unfinished: NamedTempFile,
     /// The bytes that have been written ahead.
     ahead: Range<u64>,
+    /// True if a file that somebody else creates meanwhile is not replaced.
+    only_new: bool,
 }
 
 impl Reserved {
@@ -42,7 +44,15 @@ impl Reserved {
             .try_for_each(|length| unfinished.write_all(&zeros[..length]))
             .and_then(|()| if bytes > 0 { unfinished.as_file().sync_all() } else { Ok(()) })
             .map_err(WriteError::of(&path, "reserve the file's space"))?;
-        Ok(Self { path, unfinished, ahead: 0..0 })
+        Ok(Self { path, unfinished, ahead: 0..0, only_new: false })
+    }
+
+    /// Reserves like [`new`](Self::new) for a name that nobody gave, at which there is no file. If
+    /// somebody creates one meanwhile, it stays: writing then fails, and keeps the bytes under
+    /// another name, which the error names.
+    pub fn new_file(path: &Path, bytes: usize) -> Result<Self, WriteError> {
+        let reserved = Self::new(path, bytes)?;
+        Ok(Self { only_new: true, ..reserved })
     }
 
     /// Writes and syncs sections that begin at byte `start` of the file, while the caller still
@@ -68,7 +78,8 @@ impl Reserved {
     /// Creates the unfinished file again if the user has removed it during hours of search.
     fn replace_lost(&mut self) -> Result<(), WriteError> {
         if !self.unfinished.path().exists() {
-            *self = Self::new(&self.path, 0)?;
+            let again = Self::new(&self.path, 0)?;
+            *self = Self { only_new: self.only_new, ..again };
         }
         Ok(())
     }
@@ -82,13 +93,14 @@ impl Reserved {
     /// Writes the sections one after the other like [`write`](Self::write).
     pub fn write_sections(mut self, sections: &[&[u8]]) -> Result<(), WriteError> {
         self.replace_lost()?;
-        let Self { path, mut unfinished, ahead } = self;
+        let Self { path, mut unfinished, ahead, only_new } = self;
         overwrite(unfinished.as_file_mut(), sections, &ahead)
             .map_err(WriteError::of(&path, "write the file"))?;
         let folder = path.parent().map(Path::to_owned);
-        let file = unfinished
-            .persist(&path)
-            .map_err(|failed| WriteError::of(&path, "replace the file")(kept(failed)))?;
+        let persisted =
+            if only_new { unfinished.persist_noclobber(&path) } else { unfinished.persist(&path) };
+        let file =
+            persisted.map_err(|failed| WriteError::of(&path, "replace the file")(kept(failed)))?;
         // On Windows a lock keeps others from reading, and may outlast the file that holds it.
         let _ = file.unlock();
         // Syncing the folder makes the new name outlast a loss of power. Where that is impossible,
@@ -220,6 +232,24 @@ mod tests {
                 .contains(&kept.display().to_string()),
             "{error}"
         );
+    }
+
+    #[test]
+    fn a_file_that_somebody_creates_at_a_name_that_nobody_gave_stays_and_both_are_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.bvh");
+        let reserved = Reserved::new_file(&path, 10).unwrap();
+        fs::write(&path, "notes").unwrap();
+        let error = reserved.write(b"found in hours").unwrap_err();
+        assert_eq!(fs::read(&path).unwrap(), b"notes");
+        let mut entries = fs::read_dir(folder.path()).unwrap().flatten();
+        let kept = entries
+            .find(|entry| entry.path() != path)
+            .unwrap()
+            .path();
+        assert_eq!(fs::read(&kept).unwrap(), b"found in hours");
+        let name = kept.display().to_string();
+        assert!(error.to_string().contains(&name), "{error}");
     }
 
     #[test]

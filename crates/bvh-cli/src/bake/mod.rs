@@ -2,6 +2,7 @@
 
 mod decide;
 mod effort;
+mod from;
 pub mod instances;
 pub mod parts;
 mod plan;
@@ -14,7 +15,6 @@ use crate::scene_files::SceneFiles;
 use bvh_core::Bvh;
 use bvh_core::cost::Objective;
 use bvh_core::file::Header;
-use bvh_scenes::tree_file;
 use bvh_scenes::{Scene, explain};
 use bvh_search::best::{self, Horizon};
 use bvh_search::{Method, StopReason};
@@ -24,7 +24,7 @@ use bvh_terminal::output::print_line;
 use clap::Args;
 use decide::{Choices, Decided, Open, decide};
 use effort::Effort;
-use plan::{Bake, Baked, Figures, Plan, Prepared, Start};
+use plan::{Bake, Baked, Figures, Plan, Prepared};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use watch::gain;
@@ -114,6 +114,12 @@ impl BakeArgs {
     /// Returns the file or folder to write.
     fn out(&self) -> Result<PathBuf, Error> {
         Ok(output_or_free("--out", self.out.as_ref(), || self.name_after_scene())?)
+    }
+
+    /// Reserves the file to write.
+    fn reserved(&self, out: &Path, bytes: usize) -> Result<Reserved, Error> {
+        let reserve = if self.out.is_some() { Reserved::new } else { Reserved::new_file };
+        Ok(reserve(out, bytes)?)
     }
 
     /// Returns the name that an output has if none is given.
@@ -281,17 +287,14 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         let text = explain::scene(&scene).map_err(Error::search(&scene.name, "--explain"))?;
         print_line(&text);
     }
-    let start = match &args.from {
-        Some(path) => {
-            let (tree, header) = tree_file::load(path, &scene)?;
-            check_references(path, tree.prim_ids.len(), objects, most_references)?;
-            Some(Start { tree, work: header.work })
-        }
-        None => None,
-    };
+    let start = args
+        .from
+        .as_ref()
+        .map(|path| from::start(path, &scene, most_references))
+        .transpose()?;
     let plan = args.with_budget(plan, objects);
     // Reserving the file first reports a full disk before the search and not after it.
-    let reserved = Reserved::new(&out, plan::most_bytes(&scene, most_references))?;
+    let reserved = args.reserved(&out, plan::most_bytes(&scene, most_references))?;
     let (plan, prepared) = args.decided(plan, &scene, interrupted)?;
     let (bake, greedy) = plan.begin(&scene, start.as_ref(), prepared, interrupted)?;
     if args.explain && bake.is_whole() {
@@ -300,21 +303,6 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         );
     }
     search_and_save(&bake, greedy, &out, reserved, interrupted)
-}
-
-/// Rejects a start with more references than the bake may keep.
-fn check_references(from: &Path, found: usize, objects: usize, most: f64) -> Result<(), Error> {
-    if found <= objects || found <= (most * objects as f64) as usize {
-        return Ok(());
-    }
-    let percent = (100 * found).div_ceil(objects);
-    Err(Error::Usage(format!(
-        "--from {}: the tree has {found} references to {objects} objects; accepted: --references \
-         {}.{:02} or more",
-        from.display(),
-        percent / 100,
-        percent % 100
-    )))
 }
 
 /// Searches, writes the best tree, and prints its cost.

@@ -10,7 +10,6 @@ use bvh_scenes::tree_file;
 use bvh_scenes::{Scene, fnv1a};
 use bvh_search::{Budget, Problem, best, solve};
 use bvh_terminal::arguments::output_file;
-use bvh_terminal::files::Reserved;
 use bvh_terminal::output::print_line;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -82,7 +81,7 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
     if args.part.is_some() {
         return Ok(());
     }
-    let reserved = Reserved::new(&out, super::plan::most_bytes(&scene, plan.references))?;
+    let reserved = args.reserved(&out, super::plan::most_bytes(&scene, plan.references))?;
     let start = join(&scene, &parts, &folder)?;
     let plan = Plan { effort: plan.effort.share(1.0 - SHARE_OF_PARTS), ..plan };
     let (bake, greedy) = plan.begin(&scene, Some(&start), Prepared::default(), interrupted)?;

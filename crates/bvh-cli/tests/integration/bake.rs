@@ -3,6 +3,7 @@
 use crate::support::{
     begin, cost, ended, facts, names, number, refused, run_on_a_small_disk, said,
 };
+use bvh_core::{Aabb, Bvh, Node};
 use bvh_scenes::Scene;
 use bvh_scenes::tree_file;
 use std::fs;
@@ -169,6 +170,8 @@ fn invalid_bakes_and_inspections_are_rejected_and_change_no_file() {
     fs::write(path("flipped.bvh"), flipped).unwrap();
     fs::write(path("file"), "").unwrap();
     fs::create_dir(path("folder")).unwrap();
+    let three = Scene::load("spheres75:3").unwrap();
+    fs::write(path("wide.bvh"), wide_file(&three.boxes)).unwrap();
     let into = |out: &'static str| vec!["bake", "spheres75", "--budget=0s", "--out", out];
     let kept = |more: &[&'static str]| [&into("good.bvh")[..], more].concat();
     for (args, parts) in [
@@ -179,6 +182,10 @@ fn invalid_bakes_and_inspections_are_rejected_and_change_no_file() {
         (kept(&["--from", "cut.bvh"]), &["cut.bvh", "cut or extended"]),
         (kept(&["--from", "flipped.bvh"]), &["flipped.bvh", "checksum"]),
         (kept(&["--from", "file"]), &["file", "not a tree file"]),
+        (
+            vec!["bake", "spheres75:3", "--budget=0s", "--out=good.bvh", "--from=wide.bvh"],
+            &["--from wide.bvh", "inner node 0 has 3 children", "nodes with two"],
+        ),
         (kept(&["--from", "x.bvh"]), &["x.bvh", "no such file"]),
         (vec!["bake", "sofa", "--budget=1s", "--out=good.bvh"], &["sofa", "accepted: bijou"]),
         (vec!["bake", "spheres75", "--budget=ten", "--out=good.bvh"], &["ten", "10s", "50Mwork"]),
@@ -189,7 +196,42 @@ fn invalid_bakes_and_inspections_are_rejected_and_change_no_file() {
         refused(folder.path(), &args, 2, parts);
     }
     assert_eq!(fs::read(path("good.bvh")).unwrap(), good);
-    assert_eq!(names(folder.path()).len(), 5, "nothing was left behind");
+    assert_eq!(names(folder.path()).len(), 6, "nothing was left behind");
+}
+
+/// Returns the file of a tree of one node and its leaves.
+fn wide_file(boxes: &[Aabb]) -> Vec<u8> {
+    let count = boxes.len() as u32;
+    let bounds = boxes
+        .iter()
+        .fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
+    let mut tree =
+        Bvh { nodes: vec![Node::inner(bounds, 1, count)], prim_ids: (0..count).collect() };
+    for (&aabb, object) in boxes.iter().zip(0..) {
+        tree.nodes.push(Node::leaf(aabb, object, 1));
+    }
+    bvh_core::file::save(&tree, boxes, &bvh_core::file::Origin::default()).unwrap()
+}
+
+#[test]
+fn a_file_that_somebody_creates_at_the_name_after_the_scene_stays_and_the_tree_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bake = begin(folder.path(), &["bake", "spheres75", "--budget", "1s"]);
+    // The bake has reserved its file once the unfinished one exists.
+    while names(folder.path()).is_empty() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let notes = folder.path().join("spheres75.bvh");
+    fs::write(&notes, "notes").unwrap();
+    assert_eq!(bake.wait().unwrap().code(), Some(1));
+    assert_eq!(fs::read(&notes).unwrap(), b"notes");
+    let names = names(folder.path());
+    let kept = names
+        .iter()
+        .find(|name| name.ends_with(".kept"))
+        .unwrap();
+    let scene = Scene::load("spheres75").unwrap();
+    tree_file::load(&folder.path().join(kept), &scene).unwrap();
 }
 
 #[test]

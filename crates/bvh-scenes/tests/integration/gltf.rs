@@ -210,3 +210,14 @@ fn an_index_of_33_bits_is_not_taken_for_its_lower_32() {
     let large = r#", "scene": 0, "extras": {"mesh": 4294967296}"#;
     assert!(parse(&glb(json(CHUNK, large), &corner_bytes()), Path::new("a.glb")).is_ok());
 }
+
+#[test]
+fn a_glb_file_shorter_than_its_header_says_is_rejected_as_a_part() {
+    let whole = glb(json(CHUNK, ""), &corner_bytes());
+    for length in [13, whole.len() - 36, whole.len() - 1] {
+        let message = parse(&whole[..length], Path::new("a.glb"))
+            .unwrap_err()
+            .to_string();
+        assert!(message.contains("expected a GLB file, and whole"), "{message}");
+    }
+}

@@ -90,6 +90,10 @@ fn chunks(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
     if bytes.get(4..8)? != [2, 0, 0, 0] {
         return None;
     }
+    let length = u32::from_le_bytes(*bytes.get(8..)?.first_chunk()?) as usize;
+    if bytes.len() < length {
+        return None;
+    }
     // The file's header has 12 bytes, and each chunk's header has 8.
     let json = chunk(bytes, 12, b"JSON")?;
     Some((json, chunk(bytes, 20 + json.len(), b"BIN\0")))
