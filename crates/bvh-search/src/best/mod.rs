@@ -32,7 +32,7 @@ use crate::tuning::{
     CLUSTERING, CLUSTERING_MUCH_CHEAPER, COPIED_FROM, EVALUATED_AT_ONCE, LARGE_SUBTREE,
     LEAST_LARGE_SUBTREES, MOST_COPIES, RECOMBINED_AT_ONCE, SECURED_FROM,
 };
-use bvh_build::ploc::MortonOrder;
+use bvh_build::ploc::{self, MortonOrder};
 use bvh_build::{BuildError, Builder, Watch};
 use bvh_core::Bvh;
 use bvh_core::cost::Objective;
@@ -141,10 +141,10 @@ impl Config {
     }
 
     /// Builds the initial tree. Unless the configuration names a builder, also builds a clustering,
-    /// which takes a fraction of the time. If the clustering or the caller's tree is much cheaper,
-    /// it becomes the initial tree; otherwise the cheaper of the two is kept aside, so no budget
-    /// ends above the start of the smallest budgets. The work of a clustering counts only if it is
-    /// used, like the work of the [`fallback`].
+    /// which takes a fraction of the time. If the clustering or the caller's tree is much cheaper, a
+    /// more thorough clustering is built, and the cheapest becomes the initial tree. Otherwise the
+    /// cheaper of the two is kept aside, so no budget ends above the start of the smallest budgets.
+    /// The work of a clustering counts only if it is used, like the work of the [`fallback`].
     fn initial(
         &self,
         morton: Option<MortonOrder>,
@@ -174,11 +174,20 @@ impl Config {
             return Err(BuildError::Cancelled.into());
         }
         let started = Kept::new(started, problem);
-        if let Some(aside) = run.take_aside_below(CLUSTERING_MUCH_CHEAPER * started.cost) {
-            run.keep_aside(started);
-            return Ok(aside);
-        }
-        Ok(started)
+        let Some(aside) = run.take_aside_below(CLUSTERING_MUCH_CHEAPER * started.cost) else {
+            return Ok(started);
+        };
+        drop(started);
+        // A cancelled search ends with the tree aside.
+        run.keep_aside(aside);
+        // Where objects are as large as the scene, a larger neighbourhood pays, too.
+        let thorough = ploc::Config::default();
+        let thorough = watched(run.observer(), |watch| thorough.build_watched(boxes, None, watch))?;
+        let thorough = Kept::new(thorough, problem);
+        Ok(match run.take_aside_below(thorough.cost) {
+            Some(aside) => aside,
+            None => thorough,
+        })
     }
 
     /// Improves a tree with one reference per leaf, and its references if they may change. If a

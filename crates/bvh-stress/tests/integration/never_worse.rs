@@ -112,6 +112,40 @@ fn no_budget_of_the_best_ends_above_the_fastest_builder() {
     }
 }
 
+/// Returns the least cost of the builders that a user would try instead of a search.
+fn cheapest_build(boxes: &[Aabb]) -> f64 {
+    let greedy = muller_fellner::Config::default().build(boxes);
+    let agglomerative = ploc::Config::default().build(boxes);
+    let fastest = ploc::Config { radius: 5, near_rounds: 1 }.build(boxes);
+    let trees = [greedy, agglomerative, fastest];
+    trees
+        .iter()
+        .map(|tree| cost::internal_area(tree.as_ref().unwrap()))
+        .fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn more_work_on_objects_as_large_as_the_scene_gives_no_worse_tree() {
+    let boxes = soup(8000);
+    let cheapest = cheapest_build(&boxes);
+    for method in Method::all()
+        .iter()
+        .filter(|method| ["best", "reinsertion", "annealing"].contains(&method.name()))
+    {
+        let mut before = f64::INFINITY;
+        for work in [0, 5, 25, 125, 625] {
+            let cost = solved(method, &Problem::new(&boxes), work, &()).cost;
+            let here = format!("{}, {work} per object", method.name());
+            assert!(cost <= before, "{here}: {cost} after {before}");
+            // Smaller budgets do not pay for the cheapest builder, and other methods for one only.
+            if method.name() == "best" && work >= 25 {
+                assert!(cost <= cheapest, "{here}: {cost} above {cheapest}");
+            }
+            before = cost;
+        }
+    }
+}
+
 #[test]
 fn local_searches_begin_no_more_than_a_little_above_the_greedy_tree() {
     for (name, boxes) in scenes() {
