@@ -27,6 +27,7 @@ use bvh_build::{BuildError, Presorted, Watch, muller_fellner};
 use bvh_config::Nested;
 use bvh_core::Bvh;
 use bvh_core::cost::Measure;
+use std::sync::{Mutex, PoisonError};
 
 bvh_config::config! {
     /// The construction, and the number of trees.
@@ -151,14 +152,18 @@ impl Search for Config {
             let end = self
                 .trials
                 .min(next.saturating_add(run.evaluations_left(construction).min(most)));
-            // Only trees below the incumbent at the start of the batch can win, so only these are
-            // kept.
+            // Only trees below the incumbent, and below the trials before them, can win, so only
+            // these are kept.
             let limit = run.incumbent();
+            let costs = Mutex::default();
             let results = map_init((end - next) as usize, Default::default, |buffers, index| {
                 let (workspace, tree): &mut (Workspace, Bvh) = buffers;
                 let number = (seed, next + index as u64);
                 let mut trial = self.attempt(&scene, problem, number, workspace, tree, observer)?;
-                if let Some(trial) = trial.as_mut().filter(|trial| trial.cost < limit) {
+                if let Some(trial) = &mut trial
+                    && trial.cost < limit
+                    && can_win(&costs, index, trial.cost)
+                {
                     trial.tree = Some(std::mem::take(tree));
                 }
                 Ok::<_, SearchError>(trial)
@@ -180,6 +185,19 @@ impl Search for Config {
         }
         Ok(best)
     }
+}
+
+/// Returns whether no trial before this one in its batch costs as little, as far as their `costs`
+/// are known. A later trial may be dropped, because the budget ends before it.
+fn can_win(costs: &Mutex<Vec<(usize, f64)>>, index: usize, cost: f64) -> bool {
+    let mut costs = costs
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner);
+    let loses = costs
+        .iter()
+        .any(|&(other, of_other)| other < index && of_other <= cost);
+    costs.push((index, cost));
+    !loses
 }
 
 /// Number of trials between two checks of the budget, without local search.
