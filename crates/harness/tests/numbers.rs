@@ -3,6 +3,7 @@
 //!
 //! `UPDATE_DOCS=1 cargo test -p harness --test numbers` writes the values into the pages.
 
+mod claims;
 mod queries;
 mod support;
 

@@ -1,0 +1,199 @@
+//! Words of the pages that no query writes, each with the committed rows that it rests on.
+
+use crate::queries::answer;
+use crate::support::top;
+use crate::{page_says, readme_says};
+use bvh_scenes::Scene;
+use harness::report::query::{self, Row, number_in};
+
+/// Returns the rows of a committed CSV file that meet all conditions; at least one.
+fn rows(file: &str, conditions: &str) -> Vec<Row> {
+    let all = query::read(&top().join("results").join(file)).unwrap();
+    let rows = query::select(all, conditions).unwrap();
+    assert!(!rows.is_empty(), "{file}: no row with {conditions}");
+    rows
+}
+
+/// Returns a column of these rows in ascending order.
+fn sorted(file: &str, conditions: &str, column: &str) -> Vec<f64> {
+    let mut numbers: Vec<f64> = rows(file, conditions)
+        .iter()
+        .map(|row| number_in(row, column).unwrap())
+        .collect();
+    numbers.sort_by(f64::total_cmp);
+    numbers
+}
+
+#[test]
+fn two_long_runs_are_below_all_short_ones_and_the_third_is_below_their_median() {
+    page_says(
+        "docs/PAPER.md",
+        "Two long runs are below all short ones, and the third is below their median",
+    );
+    let long = sorted("figure4/runs.csv", "method=genetic", "cost");
+    let short = sorted("figure2/runs.csv", "method=genetic", "cost");
+    assert_eq!((long.len(), short.len()), (3, 5));
+    assert!(long[1] < short[0] && long[2] > short[0] && long[2] < short[2], "{long:?} {short:?}");
+}
+
+#[test]
+fn all_genetic_runs_end_below_the_best_of_about_as_many_random_orders() {
+    for figure in ["figure2", "figure3"] {
+        let file = format!("{figure}/generations.csv");
+        let [last] = &rows(&file, "generation=100")[..] else { panic!("{file}: one last row") };
+        let highest = number_in(last, "highest_cost").unwrap();
+        let of_orders = number_in(last, "random_picking_cost").unwrap();
+        assert!(highest < of_orders, "{figure}: {highest} and {of_orders}");
+    }
+}
+
+#[test]
+fn other_libraries_divide_triangles_in_less_than_half_a_second() {
+    readme_says(
+        "Embree's high quality and tinybvh's SBVH divide triangles in less than half a second, \
+         without a budget.",
+    );
+    for processor in ["amd-epyc-25-1", "amd-epyc-25-17"] {
+        let file = format!("peers/{processor}/timing_rays.csv");
+        let mut compared = 0;
+        for row in rows(&file, "library=embree or tinybvh") {
+            let mode = &row["mode"];
+            if mode.contains("high") || mode.contains("splits") {
+                assert!(number_in(&row, "build_seconds").unwrap() < 0.5, "{row:?}");
+                compared += 1;
+            }
+        }
+        assert!(compared > 50, "{processor}: {compared} rows");
+    }
+}
+
+/// Returns whether a build of the same scene is no dearer and no slower, and better in one.
+fn is_on_front(row: &Row, rows: &[Row]) -> bool {
+    let [seconds, cost] = ["build_seconds", "cost_over_base"].map(|column| number_in(row, column));
+    !rows.iter().any(|other| {
+        let of_other = number_in(other, "build_seconds");
+        let cost_of_other = number_in(other, "cost_over_base");
+        let is_no_worse = of_other <= seconds && cost_of_other <= cost;
+        other["scene"] == row["scene"]
+            && is_no_worse
+            && (of_other < seconds || cost_of_other < cost)
+    })
+}
+
+#[test]
+fn below_ten_milliseconds_most_trees_on_the_front_are_from_obvhs() {
+    readme_says(
+        "Below ten milliseconds most of the trees on the front of cost and time are from obvhs \
+         (AMD EPYC, family 25, models 1 and 17).",
+    );
+    for processor in ["amd-epyc-25-1", "amd-epyc-25-17"] {
+        let rows = rows(&format!("peers/{processor}/timing_pareto.csv"), "*");
+        let mut front = 0;
+        let mut from_obvhs = 0;
+        for row in &rows {
+            let is_fast = number_in(row, "build_seconds").unwrap() < 0.01;
+            if is_fast && is_on_front(row, &rows) {
+                front += 1;
+                from_obvhs += usize::from(row["method"].starts_with("obvhs"));
+            }
+        }
+        assert!(2 * from_obvhs > front, "{processor}: {from_obvhs} of {front}");
+    }
+}
+
+#[test]
+fn with_little_noise_all_scenes_but_a_smooth_mesh_gain_and_no_amount_is_best() {
+    readme_says(
+        "With 1 % noise the best of 100 costs less than greedy on all scenes but one, a smooth \
+         mesh, where it is inconclusive.",
+    );
+    page_says("docs/PAPER.md", "Between 0.3, 1 and 3 % the intervals overlap on every scene");
+    let amounts = ["0.3 %", "1 %", "3 %"];
+    let of_amount =
+        amounts.map(|amount| rows("noise/table.csv", &format!("column={amount}, best_of=100")));
+    for index in 0..of_amount[0].len() {
+        let here = of_amount.each_ref().map(|rows| &rows[index]);
+        let scene = &here[0]["scene"];
+        assert!(here.iter().all(|row| row["scene"] == *scene));
+        let lows = here.map(|row| number_in(row, "low_over_base").unwrap());
+        let highs = here.map(|row| number_in(row, "high_over_base").unwrap());
+        let greatest_low = lows.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let least_high = highs.into_iter().fold(f64::INFINITY, f64::min);
+        assert!(greatest_low <= least_high, "{scene}: {lows:?} {highs:?}");
+        let of_one_percent = lows[1]..=highs[1];
+        assert_eq!(of_one_percent.contains(&1.0), scene == "spot", "{scene}");
+        assert!(lows[1] < 1.0, "{scene}");
+    }
+}
+
+#[test]
+fn lists_by_value_cost_less_than_greedy() {
+    readme_says("Lists by value (α = 0.01), which the paper did not run, cost less than greedy.");
+    let highs = sorted("value_lists/trials.csv", "method=α = 0.01, trials=100", "expected_high");
+    assert!(*highs.last().unwrap() < 1.0, "{highs:?}");
+}
+
+#[test]
+fn best_for_ten_seconds_comes_near_the_best_known_tree_later_than_shorter_plans() {
+    page_says(
+        "docs/METHODS.md",
+        "`best, 10 s` comes within 1 % of the best known tree later than `best, no end`, and than \
+         `best, 1 s` where that comes so near",
+    );
+    let rows = rows("anytime/timing_to_target.csv", "target=best known +1 %");
+    let median = |scene: &str, method: &str| {
+        let row = rows
+            .iter()
+            .find(|row| row["scene"] == scene && row["method"] == method);
+        number_in(row.unwrap(), "median")
+    };
+    for row in rows
+        .iter()
+        .filter(|row| row["method"] == "best, 10 s")
+    {
+        let scene = row["scene"].as_str();
+        let planned = number_in(row, "median").unwrap();
+        assert!(median(scene, "best, no end").unwrap() < planned, "{scene}");
+        assert!(median(scene, "best, 1 s").is_none_or(|short| short < planned), "{scene}");
+    }
+}
+
+#[test]
+fn two_stand_ins_have_the_papers_sizes() {
+    let size = |name: &str| Scene::load(name).unwrap().boxes.len();
+    let escher = size("escher");
+    let others = ["bijou", "cloister", "konistil", "pinecon2"].map(size);
+    assert!(others.iter().all(|&other| other > escher));
+    assert_eq!(others.iter().max(), Some(&size("cloister")));
+    for objects in [escher, size("pinecon2")] {
+        assert!((9500..=10_500).contains(&objects), "{objects}");
+    }
+}
+
+#[test]
+fn the_minute_and_its_shorter_runs_are_of_the_processor_that_the_pages_name() {
+    for experiment in ["anytime", "anytime_long"] {
+        let path = top().join(format!("results/{experiment}/provenance.toml"));
+        let provenance: toml::Table = std::fs::read_to_string(path)
+            .unwrap()
+            .parse()
+            .unwrap();
+        let cpu = provenance["cpu"].as_str().unwrap();
+        assert!(cpu.starts_with("AMD EPYC (family 25, model 17)"), "{experiment}: {cpu}");
+        let build = provenance["build"].as_str().unwrap();
+        assert!(build.contains("target features fxsr,sse,sse2,"), "{experiment}: {build}");
+    }
+}
+
+#[test]
+fn the_paper_page_counts_the_scenes_in_which_a_method_differs_from_itself() {
+    let differing = answer(
+        "leave_out/timing_omissions.csv | method=build, against=build\\, again, \
+         ratio_median_verdict!=inconclusive | count scene | 0",
+    );
+    let scenes = answer(
+        "leave_out/timing_omissions.csv | method=build, against=build\\, again | count scene | 0",
+    );
+    let sentence = format!("in {differing} of {scenes} scenes a method differs from itself");
+    page_says("docs/PAPER.md", &sentence);
+}
