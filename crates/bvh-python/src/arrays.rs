@@ -1,7 +1,7 @@
 //! Converts and checks numpy arrays. Errors name the argument, the value found and the values
 //! accepted.
 
-use bvh_search::bvh_core::{InvalidRay, Primitives};
+use bvh_search::bvh_core::{InvalidRay, MeshError, Primitives};
 use bvh_search::{Objects, prelude::*};
 use numpy::{Element, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -16,7 +16,7 @@ pub fn invalid(message: impl Display) -> PyErr {
 
 /// Converts anything that numpy accepts as an array to `float32` in row order, and checks its
 /// shape.
-fn floats<'py>(
+pub fn floats<'py>(
     name: &str,
     argument: &Bound<'py, PyAny>,
     accepted: &str,
@@ -110,12 +110,37 @@ fn check_elements(
 pub fn triangles(argument: &Bound<PyAny>) -> PyResult<Objects> {
     let array = floats("triangles", argument, "(n, 3, 3)", |shape| matches!(shape, [_, 3, 3]))?;
     let triangles: &[Triangle] = bytemuck::cast_slice(array.as_slice()?);
-    Ok(Objects::Shapes(Primitives::Triangles(triangles.to_vec())))
+    Ok(shapes(triangles.to_vec()))
 }
 
-/// Reads the vertices of a mesh, `(v, 3)`, and its faces, `(n, 3)`.
-pub fn mesh(vertices: &Bound<PyAny>, faces: &Bound<PyAny>) -> PyResult<(Objects, Vec<[u32; 3]>)> {
-    let faces = integers("faces", faces, "(n, 3)", |shape| matches!(shape, [_, 3]))?;
+/// Makes objects that can be divided.
+pub fn shapes(triangles: Vec<Triangle>) -> Objects {
+    Objects::Shapes(Primitives::Triangles(triangles))
+}
+
+/// The names of the arguments that are a mesh.
+#[derive(Clone, Copy)]
+pub struct MeshNames {
+    pub vertices: &'static str,
+    pub faces: &'static str,
+}
+
+/// The arguments of `Tree.from_mesh` and `Tree.update`.
+pub const MESH: MeshNames = MeshNames { vertices: "vertices", faces: "faces" };
+
+/// Reads the vertices of a mesh, `(v, 3)`, and its faces, `(n, 3)`. Returns triangles and faces.
+pub fn mesh(
+    names: MeshNames,
+    vertices: &Bound<PyAny>,
+    faces: &Bound<PyAny>,
+) -> PyResult<(Vec<Triangle>, Vec<[u32; 3]>)> {
+    let faces = integers(names.faces, faces, "(n, 3)", |shape| matches!(shape, [_, 3]))?;
+    let vertices = positions(names, vertices)?;
+    let accepted = vertices.shape()[0];
+    let outside = |face: usize, vertex: i64| {
+        let found = format!("{}: face {face} names vertex {vertex}", names.faces);
+        invalid(format!("{found}; accepted: indices below {accepted}"))
+    };
     let mut indices = Vec::with_capacity(faces.shape()[0]);
     for (face, corners) in faces
         .as_slice()?
@@ -126,20 +151,51 @@ pub fn mesh(vertices: &Bound<PyAny>, faces: &Bound<PyAny>) -> PyResult<(Objects,
     {
         let mut index = [0; 3];
         for (index, &corner) in index.iter_mut().zip(corners) {
-            *index = u32::try_from(corner)
-                .map_err(|_| invalid(format!("faces: face {face} names vertex {corner}")))?;
+            *index = u32::try_from(corner).map_err(|_| outside(face, corner))?;
         }
         indices.push(index);
     }
-    Ok((moved_mesh(vertices, &indices)?, indices))
+    let triangles =
+        triangles_of(names, &vertices, &indices, |face, vertex| outside(face, i64::from(vertex)))?;
+    Ok((triangles, indices))
 }
 
 /// Reads the vertices of a mesh with known faces.
 pub fn moved_mesh(vertices: &Bound<PyAny>, faces: &[[u32; 3]]) -> PyResult<Objects> {
-    let vertices = floats("vertices", vertices, "(v, 3)", |shape| matches!(shape, [_, 3]))?;
+    let vertices = positions(MESH, vertices)?;
+    let found = vertices.shape()[0];
+    // The faces are known to be right, so the vertices are too few.
+    let missing = |face: usize, vertex: u32| {
+        let accepted = format!("a row for vertex {vertex}, which face {face} names");
+        invalid(format!("{} has shape ({found}, 3); accepted: {accepted}", MESH.vertices))
+    };
+    triangles_of(MESH, &vertices, faces, missing).map(shapes)
+}
+
+fn positions<'py>(
+    names: MeshNames,
+    vertices: &Bound<'py, PyAny>,
+) -> PyResult<PyReadonlyArrayDyn<'py, f32>> {
+    floats(names.vertices, vertices, "(v, 3)", |shape| matches!(shape, [_, 3]))
+}
+
+/// Makes the triangles of a mesh. `unknown` creates the error of a face, by its number, that names
+/// a vertex which does not exist.
+fn triangles_of(
+    names: MeshNames,
+    vertices: &PyReadonlyArrayDyn<f32>,
+    faces: &[[u32; 3]],
+    unknown: impl Fn(usize, u32) -> PyErr,
+) -> PyResult<Vec<Triangle>> {
     let (vertices, _) = vertices.as_slice()?.as_chunks::<3>();
-    let triangles = Triangle::from_mesh(vertices, faces).map_err(invalid)?;
-    Ok(Objects::Shapes(Primitives::Triangles(triangles)))
+    Triangle::from_mesh(vertices, faces).map_err(|error| match error {
+        MeshError::Index { triangle, index, .. } => unknown(triangle, index),
+        MeshError::NotFinite { triangle, index, found } => {
+            let found = format!("vertex {index} of face {triangle} is {found}");
+            invalid(format!("{}: {found}; accepted: finite coordinates", names.vertices))
+        }
+        MeshError::TooMany(_) => invalid(format!("{}: {error}", names.faces)),
+    })
 }
 
 /// Reads recorded rays: segments of the shape `(m, 2, 3)`.

@@ -1,7 +1,11 @@
 #![doc = include_str!("../README.md")]
 
 mod arrays;
+mod improver;
 mod locations;
+mod pickle;
+mod scalars;
+mod scene;
 mod search;
 mod threads;
 mod tracer;
@@ -12,7 +16,7 @@ mod tree;
 #[pyo3::pymodule(name = "_bvh_search")]
 mod module {
     #[pymodule_export]
-    use crate::{locations::locations, tracer::Tracer, tree::Tree};
+    use crate::{locations::locations, scene::corners, scene::rows, tracer::Tracer, tree::Tree};
 
     #[pymodule_export]
     #[allow(non_upper_case_globals, reason = "Python's name")]

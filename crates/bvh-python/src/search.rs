@@ -1,6 +1,7 @@
 //! Searches that let other Python threads run, and that end with their time or after Ctrl-C.
 
 use crate::arrays::invalid;
+use crate::scalars::SECONDS;
 use crate::threads::pool;
 use bvh_search::Event;
 use bvh_search::{Observer, prelude::*};
@@ -52,7 +53,7 @@ impl Observer for Watch {
 
 fn duration(seconds: f64) -> PyResult<Duration> {
     Duration::try_from_secs_f64(seconds)
-        .map_err(|_| invalid(format!("seconds is {seconds:?}; accepted: 0 to 1e19")))
+        .map_err(|_| invalid(format!("seconds is {seconds:?}; accepted: {SECONDS}")))
 }
 
 /// Runs `search` within its limits. Returns its result, and the exception that a signal handler or

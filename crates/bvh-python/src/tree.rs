@@ -1,25 +1,29 @@
 //! The class `Tree`: trees over arrays, found, improved, measured, saved, loaded, and copied as
 //! nodes.
 
-use crate::arrays::{boxes, invalid, mesh, moved_mesh, segments, triangles};
+use crate::arrays::{MESH, boxes, invalid, mesh, moved_mesh, segments, shapes, triangles};
+use crate::improver::Improver;
+use crate::pickle::{self, State};
+use crate::scalars::{self, REFERENCES};
 use crate::search::{self, Limits};
 use bvh_files::WriteError;
 use bvh_files::tree_file::{self, TreeFileError};
+use bvh_search::bvh_core::Segment;
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
-use bvh_search::bvh_core::{Primitives, Segment};
-use bvh_search::prelude::{Aabb, Triangle, Vec3};
 use bvh_search::{FindError, Objects, Options, OwnedTree};
 use numpy::{IntoPyArray, PyArray1};
-use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
 use std::fmt::Display;
 use std::io;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError, RwLock, TryLockError};
+use std::sync::{Arc, PoisonError, RwLock, RwLockWriteGuard};
 
 /// A tree with its objects. `from_mesh`, `from_triangles`, `from_boxes` and `load` create trees;
-/// `len` is the number of objects. Trees can be copied and pickled.
+/// `len` is the number of objects.
+///
+/// Trees can be copied and pickled. A copy is like the tree in everything. A pickle keeps the tree,
+/// its objects and its faces, but forgets the `rays`, the `seed` and the `references` of its
+/// search, as a file does: `improve` then minimises the cost for random lines.
 ///
 /// Searches have these arguments. They end after `seconds`, by default 1, or after `work` nodes
 /// created or visited. With `work` and without `seconds`, the same `seed` gives the same tree on
@@ -37,12 +41,14 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock, TryLockError};
 #[pyclass(frozen, module = "bvh_search")]
 pub struct Tree {
     /// The tree. A thread must not call Python while it holds this lock: Python may switch to a
-    /// second thread, which would wait for the lock and never switch back.
+    /// second thread, which would wait for the lock and never switch back. Only a thread that holds
+    /// the interpreter's lock locks this, and so does a thread that forks. No fork therefore copies
+    /// a locked lock.
     owned: RwLock<Arc<OwnedTree>>,
     /// The corners of the triangles of a mesh.
     faces: Option<Arc<Vec<[u32; 3]>>>,
-    /// The lock of the thread that improves the tree.
-    improving: Mutex<()>,
+    /// Whether a thread improves or moves the tree.
+    improver: Improver,
 }
 
 impl Tree {
@@ -52,7 +58,7 @@ impl Tree {
 
     /// Returns a tree that shares its objects until one of the two changes.
     pub fn shared(owned: Arc<OwnedTree>) -> Self {
-        Self { owned: RwLock::new(owned), faces: None, improving: Mutex::new(()) }
+        Self { owned: RwLock::new(owned), faces: None, improver: Improver::nobody() }
     }
 
     /// Returns the current tree.
@@ -64,13 +70,11 @@ impl Tree {
             .clone()
     }
 
-    /// Changes the tree.
-    fn change<T>(&self, change: impl FnOnce(&mut OwnedTree) -> T) -> T {
-        let mut owned = self
-            .owned
+    /// Returns the tree to change or to replace.
+    fn locked(&self, _holds_interpreter: Python) -> RwLockWriteGuard<'_, Arc<OwnedTree>> {
+        self.owned
             .write()
-            .unwrap_or_else(PoisonError::into_inner);
-        change(Arc::make_mut(&mut owned))
+            .unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -86,18 +90,18 @@ impl Tree {
     fn from_mesh(
         vertices: &Bound<PyAny>,
         faces: &Bound<PyAny>,
-        seconds: Option<f64>,
-        references: f64,
-        seed: u64,
-        work: Option<u64>,
+        #[pyo3(from_py_with = scalars::seconds)] seconds: Option<f64>,
+        #[pyo3(from_py_with = scalars::references)] references: f64,
+        #[pyo3(from_py_with = scalars::seed)] seed: u64,
+        #[pyo3(from_py_with = scalars::work)] work: Option<u64>,
         progress: Option<Py<PyAny>>,
         rays: Option<&Bound<PyAny>>,
     ) -> PyResult<Self> {
-        let (objects, faces) = mesh(vertices, faces)?;
+        let (triangles, faces) = mesh(MESH, vertices, faces)?;
         let limits = Limits { seconds, work, progress };
         let rays = segments(rays)?;
         let py = vertices.py();
-        let mut tree = found(py, "vertices", objects, references, seed, &rays, limits)?;
+        let mut tree = found(py, "vertices", shapes(triangles), references, seed, &rays, limits)?;
         tree.faces = Some(Arc::new(faces));
         Ok(tree)
     }
@@ -110,10 +114,10 @@ impl Tree {
     #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
     fn from_triangles(
         triangles: &Bound<PyAny>,
-        seconds: Option<f64>,
-        references: f64,
-        seed: u64,
-        work: Option<u64>,
+        #[pyo3(from_py_with = scalars::seconds)] seconds: Option<f64>,
+        #[pyo3(from_py_with = scalars::references)] references: f64,
+        #[pyo3(from_py_with = scalars::seed)] seed: u64,
+        #[pyo3(from_py_with = scalars::work)] work: Option<u64>,
         progress: Option<Py<PyAny>>,
         rays: Option<&Bound<PyAny>>,
     ) -> PyResult<Self> {
@@ -130,9 +134,9 @@ impl Tree {
     #[pyo3(signature = (boxes, seconds = None, *, seed = 1, work = None, progress = None, rays = None))]
     fn from_boxes(
         boxes: &Bound<PyAny>,
-        seconds: Option<f64>,
-        seed: u64,
-        work: Option<u64>,
+        #[pyo3(from_py_with = scalars::seconds)] seconds: Option<f64>,
+        #[pyo3(from_py_with = scalars::seed)] seed: u64,
+        #[pyo3(from_py_with = scalars::work)] work: Option<u64>,
         progress: Option<Py<PyAny>>,
         rays: Option<&Bound<PyAny>>,
     ) -> PyResult<Self> {
@@ -186,16 +190,11 @@ impl Tree {
     fn improve(
         &self,
         py: Python,
-        seconds: Option<f64>,
-        work: Option<u64>,
+        #[pyo3(from_py_with = scalars::seconds)] seconds: Option<f64>,
+        #[pyo3(from_py_with = scalars::work)] work: Option<u64>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<()> {
-        // Waiting for the lock here would block the interpreter and with it the other thread.
-        let _improving = match self.improving.try_lock() {
-            Ok(guard) => guard,
-            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
-            Err(TryLockError::WouldBlock) => return Err(PyRuntimeError::new_err(IMPROVING)),
-        };
+        let _improving = self.improver.begin()?;
         let owned = self.owned();
         let limits = Limits { seconds, work, progress };
         let (improvement, raised) =
@@ -203,7 +202,7 @@ impl Tree {
         drop(owned);
         let improvement = improvement.map_err(invalid)?;
         // The gains are applied before a KeyboardInterrupt is raised.
-        self.change(|owned| owned.apply(improvement));
+        Arc::make_mut(&mut self.locked(py)).apply(improvement);
         raised
     }
 
@@ -217,15 +216,18 @@ impl Tree {
             return Err(invalid("the tree has no faces; accepted: a tree from Tree.from_mesh"));
         };
         let objects = moved_mesh(vertices, faces)?;
-        let _improving = match self.improving.try_lock() {
-            Ok(guard) => guard,
-            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
-            Err(TryLockError::WouldBlock) => return Err(PyRuntimeError::new_err(IMPROVING)),
-        };
-        vertices
-            .py()
-            .detach(|| self.change(|owned| owned.refit(objects)))
-            .map_err(|error| invalid_argument("vertices", error))
+        let _improving = self.improver.begin()?;
+        let owned = self.owned();
+        let py = vertices.py();
+        // A copy is moved, because the tree must not be locked while another thread may fork.
+        let moved = py
+            .detach(|| {
+                let mut moved = OwnedTree::clone(&owned);
+                moved.refit(objects).map(|()| moved)
+            })
+            .map_err(|error| invalid_argument("vertices", error))?;
+        *self.locked(py) = Arc::new(moved);
+        Ok(())
     }
 
     /// Returns a cost of the tree: `internal_area`, which searches minimise, `goldsmith_salmon`,
@@ -277,50 +279,29 @@ impl Tree {
         ids.into_pyarray(py)
     }
 
+    fn __copy__(&self) -> Self {
+        Self { faces: self.faces.clone(), ..Self::shared(self.owned()) }
+    }
+
+    /// Both trees share what neither can change.
+    fn __deepcopy__(&self, _memo: &Bound<PyAny>) -> Self {
+        self.__copy__()
+    }
+
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, State<'py>)> {
-        let owned = self.owned();
-        let bytes = |numbers: &[u8]| PyBytes::new(py, numbers);
-        let tree = owned.save().map_err(invalid)?;
-        let faces = self
-            .faces
-            .as_ref()
-            .map(|faces| bytes(bytemuck::cast_slice(faces)));
-        let (shape, objects) = match owned.triangles() {
-            Some(triangles) => ("triangles", bytes(bytemuck::cast_slice(triangles))),
-            None => ("boxes", bytes(bytemuck::cast_slice(owned.boxes()))),
-        };
+        let faces = self.faces.as_ref().map(|faces| faces.as_slice());
         let restore = py.get_type::<Self>().getattr("_restore")?;
-        Ok((restore, (shape, objects, bytes(&tree), faces)))
+        Ok((restore, pickle::state(py, &self.owned(), faces)?))
     }
 
     /// Makes the tree of a pickle.
     #[staticmethod]
     fn _restore(shape: &str, objects: &[u8], tree: &[u8], faces: Option<&[u8]>) -> PyResult<Self> {
-        let floats: Vec<[f32; 3]> = numbers(objects)?;
-        let corners: &[Vec3] = bytemuck::cast_slice(&floats);
-        let objects = match shape {
-            "triangles" => {
-                let (triangles, _) = corners.as_chunks();
-                Objects::Shapes(Primitives::Triangles(
-                    triangles.iter().copied().map(Triangle).collect(),
-                ))
-            }
-            _ => {
-                let (boxes, _) = corners.as_chunks();
-                Objects::Boxes(
-                    boxes
-                        .iter()
-                        .map(|&[min, max]| Aabb { min, max })
-                        .collect(),
-                )
-            }
-        };
-        let mut restored = Self::new(OwnedTree::load(objects, tree).map_err(invalid)?);
-        restored.faces = match faces {
-            Some(faces) => Some(Arc::new(numbers(faces)?)),
-            None => None,
-        };
-        Ok(restored)
+        let owned = pickle::tree(shape, objects, tree)?;
+        let faces = faces
+            .map(|faces| pickle::faces(&owned, faces))
+            .transpose()?;
+        Ok(Self { faces: faces.map(Arc::new), ..Self::new(owned) })
     }
 
     fn __len__(&self) -> usize {
@@ -333,22 +314,6 @@ impl Tree {
     }
 }
 
-/// The message about a second improvement at the same time.
-const IMPROVING: &str =
-    "another thread is improving this tree; accepted: `improve` when its call has returned";
-
-/// The arguments that restore a tree: the kind of objects, the objects, the file and the faces.
-type State<'py> =
-    (&'static str, Bound<'py, PyBytes>, Bound<'py, PyBytes>, Option<Bound<'py, PyBytes>>);
-
-/// Reads numbers of a pickle, whose bytes may begin anywhere.
-fn numbers<T: bytemuck::AnyBitPattern>(bytes: &[u8]) -> PyResult<Vec<T>> {
-    bytes
-        .chunks(size_of::<T>())
-        .map(|bytes| bytemuck::try_pod_read_unaligned(bytes).map_err(invalid))
-        .collect()
-}
-
 fn found(
     py: Python,
     name: &str,
@@ -359,7 +324,7 @@ fn found(
     limits: Limits,
 ) -> PyResult<Tree> {
     if !(1.0..=16.0).contains(&references) {
-        return Err(invalid(format!("references is {references}; accepted: 1 to 16")));
+        return Err(invalid(format!("references is {references}; accepted: {REFERENCES}")));
     }
     let (found, raised) = search::run(py, limits, |budget, observer| {
         let options = Options { references, seed, budget, rays };

@@ -5,10 +5,7 @@ import doctest
 import importlib
 import importlib.util
 import inspect
-import os
 import pickle
-import signal
-import time
 
 import numpy as np
 import pytest
@@ -108,6 +105,39 @@ def test_trees_and_tracers_are_copied_and_pickled():
         Tree.from_mesh(vertices, [[0, 1, 2], [0, -1, 2]])
 
 
+def test_copies_keep_the_rays_of_the_search_and_change_alone():
+    low = RANDOM.uniform(0, 10, (3000, 1, 3))
+    triangles = (low + RANDOM.uniform(0, 1, (3000, 3, 3))).astype(np.float32)
+    rays = RANDOM.uniform(0, 2, (500, 2, 3))
+    tree = Tree.from_triangles(triangles, work=300_000, rays=rays, seed=5, references=1.2)
+    twins = [copy.copy(tree), copy.deepcopy(tree), copy.deepcopy([tree, tree])[1]]
+    before = tree.nodes()
+    twins[0].improve(work=300_000)
+    # Only the improved tree has changed.
+    assert len(twins[0].nodes()) != len(before) or (twins[0].nodes() != before).any()
+    for other in (tree, *twins[1:]):
+        np.testing.assert_array_equal(other.nodes(), before)
+    # The same search over the same tree has the same result.
+    for other in (tree, *twins[1:]):
+        other.improve(work=300_000)
+        np.testing.assert_array_equal(other.nodes(), twins[0].nodes())
+
+
+def test_copies_keep_the_faces_and_move_alone():
+    vertices, faces = box()
+    tree = Tree.from_mesh(vertices, faces, work=1000)
+    inside = [[0, 0, 0]], [[1, 0.1, 0.2]]
+    for twin in (copy.copy(tree), copy.deepcopy(tree)):
+        tracer = Tracer(twin)
+        twin.update(3 * vertices)
+        assert twin.cost() == pytest.approx(9 * tree.cost())
+        for moved in (Tracer(twin), copy.copy(Tracer(twin)), copy.deepcopy(Tracer(twin))):
+            assert moved.nearest(*inside)[0].tolist() == [3]
+        # A tracer and its copies remain at the old places.
+        for old in (tracer, copy.copy(tracer), copy.deepcopy(tracer), Tracer(tree)):
+            assert old.nearest(*inside)[0].tolist() == [1]
+
+
 def test_a_search_follows_seed_work_rays_and_progress():
     low = RANDOM.uniform(0, 10, (3000, 3))
     boxes = np.stack([low, low + RANDOM.uniform(0, 1, (3000, 3))], axis=1)
@@ -128,33 +158,6 @@ def test_a_search_follows_seed_work_rays_and_progress():
 
     with pytest.raises(LookupError, match="enough"):
         tree.improve(60, progress=stop)
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
-def test_a_child_process_searches_and_traces_after_its_parent_did():
-    vertices, faces = box()
-    origins = np.tile([0.0, 0.0, 3.0], (100_000, 1))
-    directions = np.tile([0.0, 0.0, -1.0], (100_000, 1))
-
-    def answers():
-        tracer = Tracer(Tree.from_mesh(vertices, faces, seconds=0.05))
-        return tracer.nearest(origins, directions)[0]
-
-    before = answers()
-    child = os.fork()
-    if child == 0:
-        # Nothing of the test's own process may go on in the child.
-        os._exit(0 if (answers() == before).all() else 1)
-    deadline = time.monotonic() + 60
-    status = None
-    while status is None and time.monotonic() < deadline:
-        time.sleep(0.01)
-        ended, code = os.waitpid(child, os.WNOHANG)
-        status = code if ended else None
-    if status is None:
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-    assert status == 0
 
 
 def test_a_scene_has_open3ds_answers():

@@ -19,6 +19,9 @@ _Progress = Callable[[float, float], object]
 
 @final
 class Tree:
+    """A copy is like the tree in everything. A pickle keeps the tree, its objects and its faces, but
+    forgets the `rays`, the `seed` and the `references` of its search."""
+
     @staticmethod
     def from_mesh(
         vertices: ArrayLike,

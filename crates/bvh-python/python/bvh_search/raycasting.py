@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._bvh_search import Tracer, Tree
+from ._bvh_search import Tracer, Tree, corners, rows
 
 __all__ = ["RaycastingScene"]
 
@@ -13,7 +13,8 @@ class RaycastingScene:
 
     Rays have the shape `(..., 6)`: origin, then direction. Points have the shape `(..., 3)`. Answers
     are numpy arrays of the same leading shape. Geometries are numbered in the order of `add_triangles`.
-    The tree is found at the first query, in about `seconds`.
+    The tree is found at the first query, in about `seconds`. Arrays of other shapes, and meshes that
+    `Tree.from_mesh` would refuse, raise a `ValueError`.
 
     >>> from bvh_search import RaycastingScene
     >>> scene = RaycastingScene(seconds=0.1)
@@ -40,9 +41,7 @@ class RaycastingScene:
         if triangle_indices is None:
             mesh = vertex_positions
             vertex_positions, triangle_indices = mesh.vertices, mesh.faces
-        vertices = np.asarray(vertex_positions, dtype=np.float32)
-        triangles = vertices[np.asarray(triangle_indices, dtype=np.int64)]
-        self._triangles.append(triangles.reshape((-1, 3, 3)))
+        self._triangles.append(corners(vertex_positions, triangle_indices))
         self._made = None
         return len(self._triangles) - 1
 
@@ -56,7 +55,7 @@ class RaycastingScene:
 
     @staticmethod
     def _split(rays):
-        rays = np.asarray(rays, dtype=np.float32)
+        rays = rows("rays", rays, 6)
         flat = rays.reshape((-1, 6))
         return rays.shape[:-1], flat[:, :3], flat[:, 3:]
 
@@ -75,8 +74,8 @@ class RaycastingScene:
         >>> scene.cast_rays([0.25, 0.25, 2, 0, 0, 1])["geometry_ids"]
         array(1, dtype=uint32)
         """
-        tracer, first = self._scene()
         shape, origins, directions = self._split(rays)
+        tracer, first = self._scene()
         t, triangle = tracer.nearest(origins, directions, coherent=True, invalid="miss")
         u, v, normals = tracer.surface(origins, directions, triangle)
         geometry, primitive = self._ids(triangle, first)
@@ -116,8 +115,8 @@ class RaycastingScene:
         >>> scene.list_intersections([[0.25, 0.25, -1, 0, 0, 1]])["t_hit"]
         array([1., 6.], dtype=float32)
         """
-        tracer, first = self._scene()
         _, origins, directions = self._split(rays)
+        tracer, first = self._scene()
         t, triangle, ray = tracer.all(origins, directions, invalid="miss")
         u, v, _ = tracer.surface(origins[ray], directions[ray], triangle)
         geometry, primitive = self._ids(triangle, first)
@@ -132,7 +131,7 @@ class RaycastingScene:
 
     @staticmethod
     def _points(query_points):
-        points = np.asarray(query_points, dtype=np.float32)
+        points = rows("query_points", query_points, 3)
         return points.shape[:-1], points.reshape((-1, 3))
 
     def compute_closest_points(self, query_points):
@@ -142,8 +141,8 @@ class RaycastingScene:
         >>> scene.compute_closest_points([[0.25, 0.25, 4]])["points"]
         array([[0.25, 0.25, 5.  ]], dtype=float32)
         """
-        tracer, first = self._scene()
         shape, points = self._points(query_points)
+        tracer, first = self._scene()
         closest, triangle, _ = tracer.closest(points)
         geometry, primitive = self._ids(triangle, first)
         # The weights and normals of a hit there, along any direction.

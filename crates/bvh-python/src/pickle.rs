@@ -1,0 +1,61 @@
+//! The bytes in the pickle of a tree. A pickle may be forged, so every part is checked.
+
+use crate::arrays::{invalid, shapes};
+use bvh_search::{Objects, OwnedTree};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+/// The arguments that restore a tree: the kind of objects, the objects, the file and the faces.
+pub type State<'py> =
+    (&'static str, Bound<'py, PyBytes>, Bound<'py, PyBytes>, Option<Bound<'py, PyBytes>>);
+
+/// Returns the parts of a tree and of its mesh.
+pub fn state<'py>(
+    py: Python<'py>,
+    owned: &OwnedTree,
+    faces: Option<&[[u32; 3]]>,
+) -> PyResult<State<'py>> {
+    let bytes = |numbers: &[u8]| PyBytes::new(py, numbers);
+    let tree = owned.save().map_err(invalid)?;
+    let (shape, objects) = match owned.triangles() {
+        Some(triangles) => ("triangles", bytes(bytemuck::cast_slice(triangles))),
+        None => ("boxes", bytes(bytemuck::cast_slice(owned.boxes()))),
+    };
+    let faces = faces.map(|faces| bytes(bytemuck::cast_slice(faces)));
+    Ok((shape, objects, bytes(&tree), faces))
+}
+
+/// Restores a tree.
+pub fn tree(shape: &str, objects: &[u8], tree: &[u8]) -> PyResult<OwnedTree> {
+    let objects = match shape {
+        "triangles" => shapes(numbers("objects", objects)?),
+        "boxes" => Objects::Boxes(numbers("objects", objects)?),
+        _ => return Err(invalid(format!("shape is {shape:?}; accepted: triangles, boxes"))),
+    };
+    OwnedTree::load(objects, tree).map_err(|error| invalid(format!("tree: {error}")))
+}
+
+/// Restores the faces of a mesh, whose triangles are the objects of the tree.
+pub fn faces(owned: &OwnedTree, faces: &[u8]) -> PyResult<Vec<[u32; 3]>> {
+    let faces: Vec<[u32; 3]> = numbers("faces", faces)?;
+    let accepted = owned.triangles().map_or(0, <[_]>::len);
+    if faces.len() != accepted {
+        let found = faces.len();
+        return Err(invalid(format!("faces has {found} faces; accepted: {accepted}, as objects")));
+    }
+    Ok(faces)
+}
+
+/// Reads numbers of a pickle, whose bytes may begin anywhere.
+fn numbers<T: bytemuck::AnyBitPattern>(name: &str, bytes: &[u8]) -> PyResult<Vec<T>> {
+    if !bytes.len().is_multiple_of(size_of::<T>()) {
+        let (found, accepted) = (bytes.len(), size_of::<T>());
+        return Err(invalid(format!(
+            "{name} has {found} bytes; accepted: multiples of {accepted}"
+        )));
+    }
+    Ok(bytes
+        .chunks(size_of::<T>())
+        .map(bytemuck::pod_read_unaligned)
+        .collect())
+}

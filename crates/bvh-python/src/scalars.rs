@@ -1,0 +1,69 @@
+//! Converts and checks arguments that are one number. Errors name the argument, the number found
+//! and the numbers accepted.
+
+use crate::arrays::invalid;
+use pyo3::conversion::FromPyObjectOwned;
+use pyo3::exceptions::{PyOverflowError, PyTypeError};
+use pyo3::prelude::*;
+
+/// The numbers of 64 bits without a sign.
+const ALL_BITS: &str = "0 to 18446744073709551615";
+
+/// The accepted times.
+pub const SECONDS: &str = "0 to 1e19";
+
+/// The accepted average numbers of parts.
+pub const REFERENCES: &str = "1 to 16";
+
+/// Reads the argument `seconds`.
+pub fn seconds(argument: &Bound<PyAny>) -> PyResult<Option<f64>> {
+    optional("seconds", argument, SECONDS)
+}
+
+/// Reads the argument `references`.
+pub fn references(argument: &Bound<PyAny>) -> PyResult<f64> {
+    number("references", argument, REFERENCES)
+}
+
+/// Reads the argument `seed`.
+pub fn seed(argument: &Bound<PyAny>) -> PyResult<u64> {
+    number("seed", argument, ALL_BITS)
+}
+
+/// Reads the argument `work`.
+pub fn work(argument: &Bound<PyAny>) -> PyResult<Option<u64>> {
+    optional("work", argument, ALL_BITS)
+}
+
+fn optional<'py, T: FromPyObjectOwned<'py, Error = PyErr>>(
+    name: &str,
+    argument: &Bound<'py, PyAny>,
+    accepted: &str,
+) -> PyResult<Option<T>> {
+    if argument.is_none() {
+        return Ok(None);
+    }
+    number(name, argument, accepted).map(Some)
+}
+
+/// Reads a number. The errors of the conversion itself do not name the argument.
+fn number<'py, T: FromPyObjectOwned<'py, Error = PyErr>>(
+    name: &str,
+    argument: &Bound<'py, PyAny>,
+    accepted: &str,
+) -> PyResult<T> {
+    argument.extract().map_err(|error: PyErr| {
+        let py = argument.py();
+        if error.is_instance_of::<PyTypeError>(py) {
+            return PyTypeError::new_err(format!("{name}: {}", error.value(py)));
+        }
+        if !error.is_instance_of::<PyOverflowError>(py) {
+            return error;
+        }
+        // Python refuses to print a number of thousands of digits.
+        let found = argument
+            .str()
+            .map_or_else(|_| "too long to print".to_owned(), |text| text.to_string());
+        invalid(format!("{name} is {found}; accepted: {accepted}"))
+    })
+}
