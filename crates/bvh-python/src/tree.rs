@@ -221,10 +221,7 @@ impl Tree {
         let py = vertices.py();
         // A copy is moved, because the tree must not be locked while another thread may fork.
         let moved = py
-            .detach(|| {
-                let mut moved = OwnedTree::clone(&owned);
-                moved.refit(objects).map(|()| moved)
-            })
+            .detach(|| owned.refitted(objects))
             .map_err(|error| invalid_argument("vertices", error))?;
         *self.locked(py) = Arc::new(moved);
         Ok(())

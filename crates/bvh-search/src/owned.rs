@@ -100,13 +100,39 @@ impl OwnedTree {
     /// # Panics
     /// Panics if the number of objects differs.
     pub fn refit(&mut self, objects: Objects) -> Result<(), bvh_core::InvalidBox> {
-        let (boxes, shapes) = boxes_of(objects);
-        assert_eq!(boxes.len(), self.boxes.len(), "the same number of objects");
-        bvh_core::check_boxes(&boxes)?;
+        let (boxes, shapes) = self.moved(objects)?;
         self.tree.refit(&boxes);
         self.boxes = boxes;
         self.shapes = shapes;
         Ok(())
+    }
+
+    /// Returns a copy of the tree, moved as by [`refit`](Self::refit), for callers whose threads
+    /// still use this one. O(n).
+    ///
+    /// # Errors
+    /// Returns the first object that has no valid box.
+    ///
+    /// # Panics
+    /// Panics if the number of objects differs.
+    pub fn refitted(&self, objects: Objects) -> Result<Self, bvh_core::InvalidBox> {
+        let (boxes, shapes) = self.moved(objects)?;
+        let mut tree = self.tree.clone();
+        tree.refit(&boxes);
+        let density = self.density.clone();
+        let Self { most, work, seed, .. } = *self;
+        Ok(Self { tree, boxes, shapes, most, work, seed, density })
+    }
+
+    /// Returns the boxes and shapes of the objects at other places.
+    fn moved(
+        &self,
+        objects: Objects,
+    ) -> Result<(Vec<Aabb>, Option<Primitives>), bvh_core::InvalidBox> {
+        let (boxes, shapes) = boxes_of(objects);
+        assert_eq!(boxes.len(), self.boxes.len(), "the same number of objects");
+        bvh_core::check_boxes(&boxes)?;
+        Ok((boxes, shapes))
     }
 
     /// Returns the layout of the tree that traces rays, for the rays of its search if there are

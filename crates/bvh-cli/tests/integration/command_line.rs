@@ -176,6 +176,8 @@ fn a_missing_folder_is_named_before_the_work() {
         &["bake", "spheres75", "--budget=1h", "--out=no/x.bvh"][..],
         &["render", "spheres7500", "--accel=brute", "--size=10000x10000", "--out=no/x.png"],
         &["inspect", "tree.bvh", "--nodes=no/x.csv"],
+        &["report", "tree.bvh", "spheres7500", "--out=no/x.html"],
+        &["bake", "spheres7500", "--parts=2", "--budget=1Gwork", "--out=no/x.bvh"],
     ] {
         refused(at, args, 2, &["no is no folder", "accepted: a path in a folder that is there"]);
     }

@@ -197,3 +197,41 @@ fn the_paper_page_counts_the_scenes_in_which_a_method_differs_from_itself() {
     let sentence = format!("in {differing} of {scenes} scenes a method differs from itself");
     page_says("docs/PAPER.md", &sentence);
 }
+
+/// Counts the hierarchies over so many objects with two children per node, by the sides of the
+/// root, of which the first holds the first object.
+fn hierarchies(objects: u64) -> u64 {
+    if objects == 1 {
+        return 1;
+    }
+    let mut count = 0;
+    let mut choices = 1;
+    for beside in 0..objects - 1 {
+        count += choices * hierarchies(1 + beside) * hierarchies(objects - 1 - beside);
+        choices = choices * (objects - 1 - beside) / (beside + 1);
+    }
+    count
+}
+
+#[test]
+fn the_number_of_hierarchies_grows_as_the_page_says() {
+    page_says("docs/PAPER.md", "f(n) = (2n − 3) f(n − 1)");
+    assert_eq!([1, 2, 3, 4].map(hierarchies), [1, 1, 3, 15]);
+    for objects in 3..12 {
+        let before = hierarchies(objects - 1);
+        assert_eq!(hierarchies(objects), (2 * objects - 3) * before);
+        assert!(hierarchies(objects) >= 2 * before);
+    }
+}
+
+#[test]
+fn every_traversal_draws_the_same_picture_of_a_scene() {
+    let mut pictures = std::collections::BTreeMap::new();
+    for row in rows("spheres/renders.csv", "*") {
+        let known = pictures
+            .entry(row["scene"].clone())
+            .or_insert_with(|| row["picture"].clone());
+        assert_eq!(*known, row["picture"], "{row:?}");
+    }
+    assert!(pictures.len() > 1);
+}
