@@ -7,6 +7,13 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::Path;
 
+/// Reserves bytes of the file to write. At a path that is not `given` by the user, a file that
+/// somebody creates meanwhile stays.
+pub fn reserve(path: &Path, given: bool, bytes: usize) -> Result<Reserved, WriteError> {
+    let reserve = if given { Reserved::new } else { Reserved::new_file };
+    reserve(path, bytes)
+}
+
 /// Writes a new file and waits until it is on the disk.
 pub fn write_synced(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     create_synced(path, bytes).map_err(Error::io(path, "write the file"))

@@ -19,7 +19,7 @@ use bvh_scenes::{Scene, explain};
 use bvh_search::best::{self, Horizon};
 use bvh_search::{Method, StopReason};
 use bvh_terminal::arguments::{FileKind, Jobs, input_file, output_file, output_or_free};
-use bvh_terminal::files::Reserved;
+use bvh_terminal::files::{Reserved, reserve};
 use bvh_terminal::output::print_line;
 use clap::Args;
 use decide::{Choices, Decided, Open, decide};
@@ -118,8 +118,7 @@ impl BakeArgs {
 
     /// Reserves the file to write.
     fn reserved(&self, out: &Path, bytes: usize) -> Result<Reserved, Error> {
-        let reserve = if self.out.is_some() { Reserved::new } else { Reserved::new_file };
-        Ok(reserve(out, bytes)?)
+        Ok(reserve(out, self.out.is_some(), bytes)?)
     }
 
     /// Returns the name that an output has if none is given.

@@ -14,7 +14,7 @@ use bvh_scenes::render::{Film, Options, heat, image, render};
 use bvh_scenes::trace::{Accelerator, Structure};
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_terminal::arguments::{FileKind, Jobs, output_file, output_or_free};
-use bvh_terminal::files;
+use bvh_terminal::files::reserve;
 use bvh_terminal::output::print_line;
 use clap::Args;
 use levels::Level;
@@ -86,7 +86,7 @@ pub fn report(args: &ReportArgs, interrupted: &AtomicBool) -> Result<(), Error> 
         heat: heat_maps(&out, &baked.film, &greedy.film)?,
         levels: [&baked.levels, &greedy.levels],
     };
-    files::write(&out, page.html().as_bytes())?;
+    reserve(&out, args.out.is_some(), 0)?.write(page.html().as_bytes())?;
     print_line(&format!("{}: {title}", out.display()));
     Ok(())
 }
