@@ -47,14 +47,16 @@ impl Format {
     /// Returns the format of a file with these bytes at this path. OBJ has no signature, so every
     /// file without another format's signature or extension counts as OBJ.
     pub fn of(bytes: &[u8], path: &Path) -> Self {
-        let text = bytes
+        let unmarked = bytes
             .strip_prefix(b"\xef\xbb\xbf")
-            .unwrap_or(bytes)
-            .trim_ascii_start();
+            .unwrap_or(bytes);
+        let text = unmarked.trim_ascii_start();
         if bytes.starts_with(b"glTF") || text.starts_with(b"{") {
             return Self::Gltf;
         }
-        if bytes.starts_with(b"ply") && bytes.get(3).is_some_and(u8::is_ascii_whitespace) {
+        if let [b'p', b'l', b'y', after, ..] = unmarked
+            && after.is_ascii_whitespace()
+        {
             return Self::Ply;
         }
         if stl::is_binary(bytes) || stl::is_text(text) {

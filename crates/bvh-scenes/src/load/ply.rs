@@ -5,8 +5,10 @@ use bvh_core::Triangle;
 use glam::Vec3;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
-    ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult,
+    ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
+    ScalarType,
 };
+use std::collections::HashSet;
 use std::path::Path;
 
 /// A position, with NaN where the file has no coordinate. Elements that are neither vertices nor
@@ -68,6 +70,8 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     let header = Parser::<Vertex>::new()
         .read_header(&mut reader)
         .map_err(|error| fault(path, None, &error))?;
+    check(&header, path)?;
+    check_names(bytes, path)?;
     let mut vertices = Vec::new();
     let mut faces = Vec::new();
     for element in header.elements.values() {
@@ -80,11 +84,8 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
                 element.properties.len(),
                 bytes.len()
             );
-            return Err(Fault::new(
-                path,
-                Place::Element(format!("element {}", element.name)),
-                format!("{found}; expected no more than the file has room for"),
-            ));
+            let message = format!("{found}; expected no more than the file has room for");
+            return Err(element_of_header(path, &element.name, message));
         }
         match element.name.as_str() {
             "vertex" => vertices = elements::<Vertex>(&mut reader, element, &header, path)?,
@@ -94,6 +95,60 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
         }
     }
     mesh(&vertices, &faces, path)
+}
+
+/// Rejects a version other than 1.0 and a list whose length has a fraction.
+fn check(header: &Header, path: &Path) -> Result<(), Fault> {
+    let version = header.version;
+    if (version.major, version.minor) != (1, 0) {
+        let message = format!("version {version}; expected 1.0");
+        return Err(Fault::new(path, Place::Element("format".into()), message));
+    }
+    for element in header.elements.values() {
+        for property in element.properties.values() {
+            let PropertyType::List(length, _) = &property.data_type else { continue };
+            if matches!(length, ScalarType::Float | ScalarType::Double) {
+                let message = format!(
+                    "the length of list {} is a {length:?}; expected an integer type",
+                    property.name
+                );
+                return Err(element_of_header(path, &element.name, message));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Rejects an element, or a property of an element, that the header declares twice. The parser
+/// keeps the last declaration and would read all bytes after it at wrong places.
+fn check_names(bytes: &[u8], path: &Path) -> Result<(), Fault> {
+    let mut elements = HashSet::new();
+    let mut properties = HashSet::new();
+    let mut element = String::new();
+    for line in bytes.split(|byte| matches!(byte, b'\n' | b'\r')) {
+        let line = String::from_utf8_lossy(line);
+        let words: Vec<&str> = line.split_ascii_whitespace().collect();
+        let is_new = match words[..] {
+            ["end_header"] => break,
+            ["element", name, ..] => {
+                name.clone_into(&mut element);
+                properties.clear();
+                elements.insert(element.clone())
+            }
+            ["property", .., name] => properties.insert(name.to_owned()),
+            _ => true,
+        };
+        if !is_new {
+            let found = format!("`{}` repeats a name", beginning(&line));
+            let message = format!("{found}; expected each name once");
+            return Err(element_of_header(path, &element, message));
+        }
+    }
+    Ok(())
+}
+
+fn element_of_header(path: &Path, element: &str, message: String) -> Fault {
+    Fault::new(path, Place::Element(format!("element {element}")), message)
 }
 
 /// Reads all elements of one kind.

@@ -16,7 +16,7 @@ fn a_fault_is_named_with_its_line_or_element_and_what_would_be_accepted() {
     let change = |from: &str, to: &str| with(json.as_bytes(), from, to);
     let mut nan = stl_binary();
     nan[84 + 50 + 20..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
-    let cases: [(Vec<u8>, &str, &[&str]); 25] = [
+    let cases: [(Vec<u8>, &str, &[&str]); 29] = [
         (with(&ply, "1 1 0.5", "1 nan 0.5"), "a.ply", &["a.ply:14: ", "nan"]),
         (with(&ply, "1 1 0.5", "1 1e99 0.5"), "a.ply", &["vertex 2", "inf"]),
         (with(&ply, "1 1 0.5", "1 one 0.5"), "a.ply", &["a.ply:14: ", "one"]),
@@ -35,6 +35,26 @@ fn a_fault_is_named_with_its_line_or_element_and_what_would_be_accepted() {
             &["a.ply:2: `format octal 1.0`; expected a line of a PLY header"],
         ),
         (with(&ply, "ply\n", "p\0ly\n"), "a.ply", &["`p\\0ly`; expected a line of a PLY header"]),
+        (
+            with(&ply, "format ascii 1.0", "format ascii 2.0"),
+            "a.ply",
+            &["a.ply: format: version 2.0; expected 1.0"],
+        ),
+        (
+            with(&ply, "list uchar int", "list float int"),
+            "a.ply",
+            &["a.ply: element face: ", "list vertex_indices is a Float; expected an integer"],
+        ),
+        (
+            with(&ply, "element face 1", "element vertex 1"),
+            "a.ply",
+            &["a.ply: element vertex: `element vertex 1` repeats a name"],
+        ),
+        (
+            with(&ply, "property float z", "property float x"),
+            "a.ply",
+            &["a.ply: element vertex: `property float x` repeats a name"],
+        ),
         (ply_binary(false)[..190].to_vec(), "a.ply", &["a.ply: element vertex"]),
         (
             with(&stl, "vertex 1 0e0 0\r", "vertex 1 0 inf\r"),

@@ -28,7 +28,9 @@ fn text_formats_may_begin_with_a_byte_order_mark() {
     for (name, _, bytes) in samples() {
         if ["square.obj", "text.ply", "text.stl", "square.gltf"].contains(&name) {
             let marked = [b"\xef\xbb\xbf", &bytes[..]].concat();
-            assert_eq!(parse(&marked, Path::new(name)).unwrap(), Mesh::new(square()), "{name}");
+            for path in [Path::new(name), Path::new("scene")] {
+                assert_eq!(parse(&marked, path).unwrap(), Mesh::new(square()), "{name}");
+            }
         }
     }
     let wrong =
