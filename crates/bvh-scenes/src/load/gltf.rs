@@ -7,6 +7,7 @@
 mod buffers;
 mod document;
 mod references;
+mod size;
 
 use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Place};
 use buffers::Buffers;
@@ -53,7 +54,9 @@ impl From<bool> for OutsideFiles {
 pub fn parse(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Mesh, Fault> {
     let (root, chunk) = document(bytes, path)?;
     let mut loader = Loader::new(path, &root, Buffers::new(path, outside, chunk));
-    for place in loader.places()? {
+    let places = loader.places()?;
+    size::check(&root, &places, path)?;
+    for place in places {
         loader.place(&place, &place.transform)?;
     }
     match loader.triangles.is_empty() {
@@ -89,6 +92,10 @@ pub fn parts(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Parts, 
     let (root, chunk) = document(bytes, path)?;
     let mut loader = Loader::new(path, &root, Buffers::new(path, outside, chunk));
     let mut places = loader.places()?;
+    let mut first_places = places.clone();
+    first_places.sort_by_key(|place| place.mesh);
+    first_places.dedup_by_key(|place| place.mesh);
+    size::check(&root, &first_places, path)?;
     let mut meshes = BTreeMap::new();
     for place in &places {
         if let Entry::Vacant(first) = meshes.entry(place.mesh) {
@@ -270,14 +277,7 @@ impl<'a> Loader<'a> {
         {
             return Err(format!("index {index}; expected 0 to below {}", points.len()));
         }
-        let count = if mode == Mode::Triangles {
-            indices.len() / 3
-        } else {
-            indices.len().saturating_sub(2)
-        };
-        if self.triangles.len() + count > MOST_TRIANGLES {
-            return Err(format!("more than {MOST_TRIANGLES} triangles in all; expected no more"));
-        }
+        let count = size::triangles(mode, indices.len());
         self.triangles.extend((0..count).map(|i| {
             let corners = match mode {
                 Mode::Triangles => [3 * i, 3 * i + 1, 3 * i + 2],

@@ -221,3 +221,13 @@ fn a_glb_file_shorter_than_its_header_says_is_rejected_as_a_part() {
         assert!(message.contains("expected a GLB file, and whole"), "{message}");
     }
 }
+
+#[test]
+fn a_file_that_promises_too_many_triangles_is_rejected_before_its_buffers_are_read() {
+    let folder = folder("missing.bin");
+    let path = folder.path().join("scene.gltf");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replace(r#""count": 3,"#, r#""count": 300000003,"#)).unwrap();
+    let message = load(&path).unwrap_err().to_string();
+    assert!(message.contains("nodes[0]: more than 100000000 triangles"), "{message}");
+}

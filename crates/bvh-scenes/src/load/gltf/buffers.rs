@@ -93,7 +93,7 @@ impl<'a> Buffers<'a> {
                 .1;
             let decoded = base64::engine::general_purpose::STANDARD.decode(encoded);
             let bytes = decoded.map_err(|error| error.to_string())?;
-            self.count(bytes.len())?;
+            self.count(bytes.len() as u64)?;
             return Ok(Rc::new(bytes));
         }
         if uri.contains("://") {
@@ -104,8 +104,11 @@ impl<'a> Buffers<'a> {
         if let Entry::Occupied(file) = self.files.entry(path.clone()) {
             return Ok(file.get().clone());
         }
+        // A file that is too long is rejected before it takes memory. The reader reports a file
+        // that is missing.
+        let length = fs::metadata(&path).map_or(0, |file| file.len());
+        self.count(length)?;
         let bytes = Rc::new(read(&path).map_err(|error| error.to_string())?);
-        self.count(bytes.len())?;
         self.files.insert(path, bytes.clone());
         Ok(bytes)
     }
@@ -130,8 +133,8 @@ impl<'a> Buffers<'a> {
     }
 
     /// Adds to the bytes read so far, and rejects more than a scene can use.
-    fn count(&mut self, bytes: usize) -> Result<(), String> {
-        self.total += bytes as u64;
+    fn count(&mut self, bytes: u64) -> Result<(), String> {
+        self.total = self.total.saturating_add(bytes);
         match self.total > MOST_BYTES {
             true => Err(format!(
                 "{} bytes with those before it; expected at most {MOST_BYTES}",
