@@ -268,4 +268,27 @@ mod tests {
         });
         assert!(trained_tests < plain_tests, "{trained_tests} {plain_tests}");
     }
+
+    #[test]
+    fn no_tree_is_trained_on_the_paths_that_judge_it() {
+        let scene = Scene::load("escher:300").unwrap();
+        let tree = muller_fellner::Config::default()
+            .build(&scene.boxes)
+            .unwrap();
+        let visits = |cameras: Cameras| {
+            let cameras = BTreeMap::from([(scene.name.clone(), cameras)]);
+            let config = Config { count: 100, trained: 1000, cameras, ..Config::default() };
+            let density = config
+                .density(TrainedOn::Camera, &scene, 1)
+                .unwrap();
+            density.visits(&tree)
+        };
+        let known = Cameras::default();
+        let elsewhere = towards_centre([[0.2, 0.3, 3.0], [0.1, 0.3, 2.0], [0.2, 0.6, 2.5]]);
+        let judged =
+            Cameras { next: elsewhere.clone(), other: elsewhere.clone(), ..Cameras::default() };
+        let trained = Cameras { same: elsewhere, ..Cameras::default() };
+        assert_eq!(visits(judged), visits(known.clone()));
+        assert_ne!(visits(trained), visits(known));
+    }
 }
