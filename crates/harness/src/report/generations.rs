@@ -278,11 +278,13 @@ impl<'a> Runs<'a> {
         );
         let half = generations[generations.len() / 2].median_run_cost;
         let gain = 100.0 * (1.0 - end.median_run_cost / half);
+        let number = costs.len();
+        let runs = if number == 1 { "run" } else { "runs" };
+        let below_greedy = count(base);
         Some(format!(
-            "Of {} runs on {shown}, {} end below the greedy tree, and {beside_picking}. In the \
-             second half of its generations the median run gains {gain:.1} %.",
-            costs.len(),
-            count(base),
+            "Of {number} {runs} on {shown}, {below_greedy} end below the greedy tree, and \
+             {beside_picking}. In the second half of its generations the median run gains \
+             {gain:.1} %.",
         ))
     }
 
@@ -321,5 +323,7 @@ mod tests {
         let expected =
             "Of 2 runs on s, 2 end below the greedy tree, and too few random orders were";
         assert_eq!(answer(&runs), format!("{expected} drawn to compare. {end}"));
+        runs.runs.pop();
+        assert!(answer(&runs).starts_with("Of 1 run on s, "));
     }
 }
