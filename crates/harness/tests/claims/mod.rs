@@ -235,3 +235,34 @@ fn every_traversal_draws_the_same_picture_of_a_scene() {
     }
     assert!(pictures.len() > 1);
 }
+
+#[test]
+fn the_pages_name_the_scenes_whose_best_known_tree_is_one_of_the_runs_shown() {
+    let mut scenes = std::collections::BTreeSet::new();
+    for experiment in ["anytime", "anytime_long"] {
+        let references =
+            rows(&format!("{experiment}/references.csv"), "objective=goldsmith_salmon");
+        for row in rows(&format!("{experiment}/runs.csv"), "*") {
+            let reference = references
+                .iter()
+                .find(|reference| reference["scene"] == row["scene"]);
+            if reference.is_some_and(|reference| reference["cost"] == row["cost"]) {
+                scenes.insert(row["scene"].clone());
+            }
+        }
+    }
+    let scenes: Vec<String> = scenes.into_iter().collect();
+    let [first, second, third] = &scenes[..] else { panic!("three scenes, not {scenes:?}") };
+    page_says(
+        "docs/METHODS.md",
+        &format!("on {first}, {second} and {third} one of the five runs that are shown"),
+    );
+    readme_says("on some scenes one of the five");
+}
+
+#[test]
+fn ctrl_c_ends_a_bake_of_five_million_triangles_within_a_second() {
+    let seconds = sorted("interrupt/timing_interrupt.csv", "scene=city:5000000", "seconds");
+    assert!(seconds.len() >= 12);
+    assert!(*seconds.last().unwrap() < 1.0, "{seconds:?}");
+}
