@@ -52,6 +52,8 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     Ok(Mesh::new(triangles))
 }
 
+/// Reads the triangles that the header promises. Bytes after them are ignored, because some programs
+/// append their own data.
 fn parse_binary(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
     let facets = promised(bytes).ok_or_else(|| {
         let message =
