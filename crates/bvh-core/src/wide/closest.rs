@@ -21,7 +21,9 @@ impl WideBvh {
     /// area: the layout omits triangles without area.
     ///
     /// The answer is the answer of [`Triangle::closest_point`](crate::Triangle::closest_point) for
-    /// every triangle. About O(log n) for a point near triangles that are spread out.
+    /// every triangle, up to the rounding in f64. Where triangles are 10¹⁵ times as large as their
+    /// distances, rounding decides which of them is the closest, and kernels may differ in it.
+    /// About O(log n) for a point near triangles that are spread out.
     ///
     /// ```
     /// # use bvh_core::{Aabb, Bvh, Node, Triangle, WideBvh};

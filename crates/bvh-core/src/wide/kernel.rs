@@ -1,7 +1,7 @@
 //! The implementations of the wide layout's traversal, and which of them this processor can run.
 
-/// An implementation of the traversal of a [`WideBvh`](crate::WideBvh). All give the same answers,
-/// bit by bit.
+/// An implementation of the traversal of a [`WideBvh`](crate::WideBvh). All answer rays by the same
+/// bits, and find the same [closest points](crate::WideBvh::closest_point) up to rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kernel {
     /// Code for any machine; counts its tests on request.

@@ -234,11 +234,12 @@ impl<'a> Loader<'a> {
 
     /// Adds the transformed triangles of a primitive. Points and lines have none.
     fn add(&mut self, primitive: &Primitive, transform: &DMat4) -> Result<(), String> {
-        let Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) =
-            primitive.mode
-        else {
-            return Ok(());
+        let Valid(mode) = primitive.mode else {
+            return Err("an unknown mode; expected 0 to 6".into());
         };
+        if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+            return Ok(());
+        }
         let positions = *primitive
             .attributes
             .get(&Valid(Semantic::Positions))

@@ -110,20 +110,26 @@ pub struct Fault {
 impl Fault {
     /// Creates a fault of the file at `path`.
     pub fn new(path: &Path, place: Place, message: impl fmt::Display) -> Self {
-        // Messages of third-party parsers may span lines and quote the file at any length.
-        let words = message
-            .to_string()
-            .split_whitespace()
-            .collect::<Vec<_>>()
-            .join(" ");
-        // A message must fit a terminal, whatever the file contains.
-        let message = if words.len() > 300 {
-            format!("{}…", words.chars().take(280).collect::<String>())
-        } else {
-            words
+        // A message must fit a terminal, whatever names and numbers the file contains.
+        let place = match place {
+            Place::Element(name) => Place::Element(shortened(&name, 80)),
+            Place::File | Place::Line(_) => place,
         };
+        let message = shortened(&message.to_string(), 300);
         Self { path: path.to_path_buf(), place, message }
     }
+}
+
+/// Returns a text on one line, cut to at most `most` characters.
+fn shortened(text: &str, most: usize) -> String {
+    // Messages of third-party parsers may span lines and quote the file at any length.
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let line = words.join(" ");
+    if line.chars().nth(most).is_none() {
+        return line;
+    }
+    let beginning: String = line.chars().take(most - 1).collect();
+    format!("{beginning}…")
 }
 
 impl fmt::Display for Place {

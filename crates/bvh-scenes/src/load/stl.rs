@@ -93,49 +93,53 @@ fn parse_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
         line += 1;
         let place = Place::Line(line);
         let text = String::from_utf8_lossy(text);
-        let mut words = text.split_whitespace();
-        match words
-            .next()
-            .map(str::to_ascii_lowercase)
-            .as_deref()
-        {
-            Some("vertex") => {
-                let found: Vec<&str> = words.collect();
-                let numbers: Vec<f32> = found
-                    .iter()
-                    .filter_map(|word| word.parse().ok())
-                    .filter(|x: &f32| x.is_finite())
-                    .collect();
-                match *numbers {
-                    [x, y, z] if found.len() == 3 => corners.push(Vec3::new(x, y, z)),
-                    _ => {
+        // A line may have several keywords, because STL knows only words.
+        let mut words = text.split_whitespace().peekable();
+        while let Some(word) = words.next() {
+            match word.to_ascii_lowercase().as_str() {
+                "vertex" => {
+                    let found: Vec<&str> = words.by_ref().take(3).collect();
+                    corners.push(corner(&found).ok_or_else(|| {
                         let found = found.join(" ");
                         let message = format!("vertex `{found}`; expected three finite numbers");
+                        Fault::new(path, place.clone(), message)
+                    })?);
+                    if corners.len() > 3 {
+                        let message = "a fourth vertex in a loop; expected three";
                         return Err(Fault::new(path, place, message));
                     }
                 }
-                if corners.len() > 3 {
-                    let message = "a fourth vertex in a loop; expected three";
-                    return Err(Fault::new(path, place, message));
-                }
-            }
-            // `endfacet` closes a loop as well, because some programs omit `endloop`.
-            Some("endloop" | "endfacet") if !corners.is_empty() => match *corners {
-                [a, b, c] => {
-                    triangles.push(Triangle([a, b, c]));
+                keyword @ ("endloop" | "endfacet") => {
+                    // `endfacet` closes a loop as well, because some programs omit `endloop`.
+                    match *corners {
+                        [] => {}
+                        [a, b, c] => triangles.push(Triangle([a, b, c])),
+                        _ => {
+                            let count = corners.len();
+                            let message = format!("a loop of {count} vertices; expected three");
+                            return Err(Fault::new(path, place, message));
+                        }
+                    }
                     corners.clear();
+                    inside &= keyword != "endfacet";
                 }
+                "facet" => {
+                    inside = true;
+                    words.next_if_eq(&"normal");
+                    while words
+                        .next_if(|word| word.parse::<f32>().is_ok())
+                        .is_some()
+                    {}
+                }
+                "outer" => {
+                    words.next_if_eq(&"loop");
+                }
+                // A name follows.
+                "solid" | "endsolid" => break,
                 _ => {
-                    let message = format!("a loop of {} vertices; expected three", corners.len());
-                    return Err(Fault::new(path, place, message));
+                    let expected = "expected a keyword of an STL file, such as facet or vertex";
+                    return Err(Fault::new(path, place, format!("`{word}`; {expected}")));
                 }
-            },
-            Some("facet") => inside = true,
-            Some("endfacet") => inside = false,
-            Some("solid" | "endsolid" | "outer" | "endloop") | None => {}
-            Some(word) => {
-                let expected = "expected a keyword of an STL file, such as facet or vertex";
-                return Err(Fault::new(path, place, format!("`{word}`; {expected}")));
             }
         }
     }
@@ -147,4 +151,11 @@ fn parse_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
         ));
     }
     Ok(triangles)
+}
+
+/// Returns the corner with these coordinates, if they are three finite numbers.
+fn corner(words: &[&str]) -> Option<Vec3> {
+    let [x, y, z] = words else { return None };
+    let corner = Vec3::new(x.parse().ok()?, y.parse().ok()?, z.parse().ok()?);
+    corner.is_finite().then_some(corner)
 }

@@ -16,7 +16,7 @@ fn a_fault_is_named_with_its_line_or_element_and_what_would_be_accepted() {
     let change = |from: &str, to: &str| with(json.as_bytes(), from, to);
     let mut nan = stl_binary();
     nan[84 + 50 + 20..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
-    let cases: [(Vec<u8>, &str, &[&str]); 29] = [
+    let cases: [(Vec<u8>, &str, &[&str]); 32] = [
         (with(&ply, "1 1 0.5", "1 nan 0.5"), "a.ply", &["a.ply:14: ", "nan"]),
         (with(&ply, "1 1 0.5", "1 1e99 0.5"), "a.ply", &["vertex 2", "inf"]),
         (with(&ply, "1 1 0.5", "1 one 0.5"), "a.ply", &["a.ply:14: ", "one"]),
@@ -49,6 +49,16 @@ fn a_fault_is_named_with_its_line_or_element_and_what_would_be_accepted() {
             with(&ply, "element face 1", "element vertex 1"),
             "a.ply",
             &["a.ply: element vertex: `element vertex 1` repeats a name"],
+        ),
+        (
+            with(&ply, "element face 1", &format!("element {} 9000", "face".repeat(1000))),
+            "a.ply",
+            &["a.ply: element facefaceface", "…"],
+        ),
+        (
+            with(&stl, "vertex 1 0e0 0\r", "vertex 1 0 0 4\r"),
+            "a.stl",
+            &["a.stl:5: `4`; expected a keyword"],
         ),
         (
             with(&ply, "property float z", "property float x"),
@@ -86,6 +96,11 @@ fn a_fault_is_named_with_its_line_or_element_and_what_would_be_accepted() {
             change(r#""version": "2.0""#, r#""version": "2.1", "minVersion": "2.1""#),
             "a.gltf",
             &["a.gltf: asset: version `2.1`; expected 2.0"],
+        ),
+        (
+            change(r#""indices": 1"#, r#""indices": 1, "mode": 99"#),
+            "a.gltf",
+            &["meshes[0].primitives[0] at nodes[0]", "mode; expected 0 to 6"],
         ),
         (change("5126", "5123"), "a.gltf", &["accessors[0]", "F32"]),
         (
