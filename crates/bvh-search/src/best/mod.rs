@@ -141,10 +141,10 @@ impl Config {
     }
 
     /// Builds the initial tree. Unless the configuration names a builder, also builds a clustering,
-    /// which takes a fraction of the time. If the clustering or the caller's tree is much cheaper, a
-    /// more thorough clustering is built, and the cheapest becomes the initial tree. Otherwise the
-    /// cheaper of the two is kept aside, so no budget ends above the start of the smallest budgets.
-    /// The work of a clustering counts only if it is used, like the work of the [`fallback`].
+    /// which takes a fraction of the time. If the clustering or the caller's tree is cheaper, a more
+    /// thorough clustering is built and kept aside, so no budget ends above it. If the first
+    /// clustering is much cheaper, the cheapest of them becomes the initial tree. The work of a
+    /// clustering counts only if it is used, like the work of the [`fallback`].
     fn initial(
         &self,
         morton: Option<MortonOrder>,
@@ -174,20 +174,18 @@ impl Config {
             return Err(BuildError::Cancelled.into());
         }
         let started = Kept::new(started, problem);
-        let Some(aside) = run.take_aside_below(CLUSTERING_MUCH_CHEAPER * started.cost) else {
+        let Some(aside) = run.take_aside_below(started.cost) else {
             return Ok(started);
         };
-        drop(started);
+        let is_much_cheaper = aside.cost < CLUSTERING_MUCH_CHEAPER * started.cost;
         // A cancelled search ends with the tree aside.
         run.keep_aside(aside);
         // Where objects are as large as the scene, a larger neighbourhood pays, too.
         let thorough = ploc::Config::default();
         let thorough = watched(run.observer(), |watch| thorough.build_watched(boxes, None, watch))?;
-        let thorough = Kept::new(thorough, problem);
-        Ok(match run.take_aside_below(thorough.cost) {
-            Some(aside) => aside,
-            None => thorough,
-        })
+        run.keep_aside(Kept::new(thorough, problem));
+        let limit = if is_much_cheaper { started.cost } else { f64::NEG_INFINITY };
+        Ok(run.take_aside_below(limit).unwrap_or(started))
     }
 
     /// Improves a tree with one reference per leaf, and its references if they may change. If a

@@ -126,22 +126,25 @@ fn cheapest_build(boxes: &[Aabb]) -> f64 {
 
 #[test]
 fn more_work_on_objects_as_large_as_the_scene_gives_no_worse_tree() {
-    let boxes = soup(8000);
-    let cheapest = cheapest_build(&boxes);
-    for method in Method::all()
-        .iter()
-        .filter(|method| ["best", "reinsertion", "annealing"].contains(&method.name()))
-    {
-        let mut before = f64::INFINITY;
-        for work in [0, 5, 25, 125, 625] {
-            let cost = solved(method, &Problem::new(&boxes), work, &()).cost;
-            let here = format!("{}, {work} per object", method.name());
-            assert!(cost <= before, "{here}: {cost} after {before}");
-            // Smaller budgets do not pay for the cheapest builder, and other methods for one only.
-            if method.name() == "best" && work >= 25 {
-                assert!(cost <= cheapest, "{here}: {cost} above {cheapest}");
+    for objects in [500, 1000, 2000, 8000] {
+        let boxes = soup(objects);
+        let cheapest = cheapest_build(&boxes);
+        for method in Method::all()
+            .iter()
+            .filter(|method| ["best", "reinsertion", "annealing"].contains(&method.name()))
+        {
+            let mut before = f64::INFINITY;
+            for work in [0, 5, 25, 50, 100, 200, 625] {
+                let cost = solved(method, &Problem::new(&boxes), work, &()).cost;
+                let here = format!("{objects} objects, {}, {work} per object", method.name());
+                assert!(cost <= before, "{here}: {cost} after {before}");
+                // Smaller budgets do not pay for the cheapest builder, and other methods for one
+                // only.
+                if method.name() == "best" && work >= 25 {
+                    assert!(cost <= cheapest, "{here}: {cost} above {cheapest}");
+                }
+                before = cost;
             }
-            before = cost;
         }
     }
 }
