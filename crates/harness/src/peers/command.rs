@@ -10,7 +10,6 @@ use bvh_scenes::ReadError;
 use bvh_scenes::tree_file::{self, TreeFileError};
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
-use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -59,7 +58,8 @@ impl Config {
         let folder = tempfile::tempdir()?;
         let boxes_path = folder.path().join("boxes");
         let tree_path = folder.path().join("tree.bvh");
-        let stderr_path = folder.path().join("stderr");
+        // Without a name, so that the program cannot replace it.
+        let mut errors = tempfile::tempfile()?;
         let box_bytes: Vec<u8> = boxes
             .iter()
             .flat_map(|aabb| [aabb.min.to_array(), aabb.max.to_array()])
@@ -76,7 +76,7 @@ impl Config {
         command
             .stdin(Stdio::null())
             .stdout(Stdio::null())
-            .stderr(File::create(&stderr_path)?);
+            .stderr(errors.try_clone()?);
         let start = Instant::now();
         let mut program =
             Program::start(&mut command, folder.path()).map_err(CommandFault::NotStarted)?;
@@ -102,7 +102,7 @@ impl Config {
         // No child of the program may write to the tree file while it is read.
         drop(program);
         if !status.success() {
-            return Err(CommandFault::Failed { status, last_line: last_line(&stderr_path)? });
+            return Err(CommandFault::Failed { status, last_line: last_line(&mut errors)? });
         }
         let tree = file::load(&tree_file::read(&tree_path)?, boxes)?;
         validate_references(&tree, boxes, objects).map_err(FileError::Tree)?;
@@ -121,14 +121,13 @@ impl From<TreeFileError> for CommandFault {
 }
 
 /// Returns the last line of a text file that is not blank.
-fn last_line(path: &Path) -> io::Result<String> {
+fn last_line(file: &mut File) -> io::Result<String> {
     // The file may be long, so only its end is read.
     const MOST_BYTES: u64 = 2048;
-    let mut file = File::open(path)?;
     let length = file.seek(SeekFrom::End(0))?;
     file.seek(SeekFrom::Start(length.saturating_sub(MOST_BYTES)))?;
     let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes)?;
+    file.take(MOST_BYTES).read_to_end(&mut bytes)?;
     // The window may begin within a character.
     let text = String::from_utf8_lossy(&bytes);
     match text.lines().rfind(|line| !line.trim().is_empty()) {

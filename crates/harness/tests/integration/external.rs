@@ -66,6 +66,11 @@ fn errors_of_programs_name_the_method_and_the_command() {
         ("mkfifo \"$2\"", "", &["wrote no file"]),
         ("echo tree > \"$2\"", "", &["its tree is invalid", "not a tree file"]),
         ("head -c 1000 good.bvh > \"$2\"", "", &["its tree is invalid", "cut or extended"]),
+        (
+            "rm -f $BVH_FOLDER/stderr; mkfifo $BVH_FOLDER/stderr; echo broken >&2; exit 3",
+            "",
+            &["exit status: 3: broken"],
+        ),
         ("sleep 60", "timeout_seconds = 0.1", &["did not end within 0.1 s"]),
     ] {
         let folder = folder(script, more);
