@@ -9,9 +9,8 @@ use crate::run::finish::outputs;
 use crate::run::provenance::Provenance;
 use crate::run::resolved::{Resolved, read_toml};
 use ::figures::Figure;
-use bvh_scenes::SceneKind;
+use bvh_scenes::{SceneKind, read_text};
 use bvh_terminal::files;
-use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 /// One experiment's folder, as read.
@@ -217,5 +216,5 @@ fn way(page: &Path, file: &Path) -> String {
 }
 
 fn read(path: &Path) -> Result<String, Error> {
-    fs::read_to_string(path).map_err(Error::io(path, "read the file"))
+    Ok(read_text(path)?)
 }

@@ -43,7 +43,8 @@ const COMMA: &str = "\u{0}";
 
 /// Reads the rows of a CSV file.
 pub fn read(path: &Path) -> Result<Vec<Row>, Error> {
-    let mut reader = csv::Reader::from_path(path).map_err(Error::csv(path))?;
+    let bytes = bvh_scenes::read(path)?;
+    let mut reader = csv::Reader::from_reader(&bytes[..]);
     let rows = reader.deserialize::<Row>();
     rows.collect::<Result<_, _>>()
         .map_err(Error::csv(path))

@@ -2,7 +2,7 @@
 
 use super::{Row, to_bytes};
 use crate::Error;
-use bvh_scenes::fnv1a;
+use bvh_scenes::{fnv1a, read_text};
 use bvh_terminal::files;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -42,13 +42,13 @@ impl FinishedRun {
     /// If a file of the run is missing, was added or differs from the written one.
     pub fn read(folder: &Path) -> Result<Self, Error> {
         let damaged = |file: &str| Error::Damaged { run: folder.to_owned(), file: file.to_owned() };
-        let contents = fs::read_to_string(folder.join(CONTENTS)).map_err(|_| damaged(CONTENTS))?;
+        let contents = read_text(&folder.join(CONTENTS)).map_err(|_| damaged(CONTENTS))?;
         let mut names = files::names(folder)?;
         names.remove(CONTENTS);
         let mut files = BTreeMap::new();
         for name in names {
-            let path = folder.join(&name);
-            files.insert(name, fs::read(&path).map_err(Error::io(&path, "read the file"))?);
+            let bytes = bvh_scenes::read(&folder.join(&name)).map_err(|_| damaged(&name))?;
+            files.insert(name, bytes);
         }
         let run = Self { files };
         let found = run.contents();

@@ -10,10 +10,10 @@ use super::finished_run::{CONTENTS, FinishedRun};
 use super::lock::lock_folder;
 use super::{Row, read_if_any, to_bytes};
 use crate::Error;
+use bvh_scenes::{ReadError, read_text};
 use bvh_terminal::files;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io;
 use std::path::{Path, PathBuf};
 
 /// The treatment of results that are in the folder already.
@@ -167,7 +167,7 @@ impl Store {
             let mut joined = Vec::new();
             for run_folder in run_folders {
                 let path = run_folder.join(&name);
-                let bytes = fs::read(&path).map_err(Error::io(&path, "read the file"))?;
+                let bytes = bvh_scenes::read(&path)?;
                 // All runs have the same header, which would be a row in the middle of the file.
                 let added = if joined.is_empty() { &bytes } else { without_header(&bytes) };
                 joined.extend_from_slice(added);
@@ -219,10 +219,10 @@ fn remove(folder: &Path) -> Result<(), Error> {
 
 /// Returns the text of a file; `None` if there is no such file.
 fn read_text_if_any(path: &Path) -> Result<Option<String>, Error> {
-    match fs::read_to_string(path) {
+    match read_text(path) {
         Ok(text) => Ok(Some(text)),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(Error::io(path, "read the file")(error)),
+        Err(ReadError::NotFound { .. }) => Ok(None),
+        Err(error) => Err(error.into()),
     }
 }
 
@@ -271,12 +271,19 @@ mod tests {
         FinishedRun::of_texts([("runs.csv", "a,b\n1,2\n"), ("history.csv", "a\n1\n")])
     }
 
+    /// Puts a device that never ends in the place of a file.
+    #[cfg(unix)]
+    fn replace_by_device(path: &Path) {
+        fs::remove_file(path).unwrap();
+        std::os::unix::fs::symlink("/dev/zero", path).unwrap();
+    }
+
     #[test]
     fn a_kept_run_whose_files_are_missing_cut_emptied_or_edited_is_refused_by_name() {
         let out = tempfile::tempdir().unwrap();
         let store = Store::open(&out.path().join("x"), "", Existing::Keep).unwrap();
         type Damage = fn(&Path);
-        let damages: [(&str, Damage); 6] = [
+        let mut damages: Vec<(&str, Damage)> = vec![
             ("runs.csv", |run| fs::remove_file(run.join("runs.csv")).unwrap()),
             ("runs.csv", |run| fs::write(run.join("runs.csv"), "").unwrap()),
             ("runs.csv", |run| fs::write(run.join("runs.csv"), "a,b\n").unwrap()),
@@ -284,6 +291,11 @@ mod tests {
             ("rays.csv", |run| fs::write(run.join("rays.csv"), "a\n").unwrap()),
             (CONTENTS, |run| fs::remove_file(run.join(CONTENTS)).unwrap()),
         ];
+        #[cfg(unix)]
+        damages.extend([
+            ("runs.csv", (|run| replace_by_device(&run.join("runs.csv"))) as Damage),
+            (CONTENTS, |run| replace_by_device(&run.join(CONTENTS))),
+        ]);
         for (file, damage) in damages {
             store.keep(0, &run()).unwrap();
             assert!(store.has(0).unwrap());
@@ -308,7 +320,7 @@ mod tests {
         fs::write(&spec, [0xff]).unwrap();
         for existing in [Existing::Keep, Existing::Resume] {
             let error = Store::open(&folder, "", existing).unwrap_err();
-            assert!(matches!(error, Error::Io { path, .. } if path == spec));
+            assert!(matches!(error, Error::Read(ReadError::NotUtf8 { path, .. }) if path == spec));
         }
         assert!(folder.join(".partial/000000/runs.csv").is_file());
         Store::open(&folder, "", Existing::Replace).unwrap();

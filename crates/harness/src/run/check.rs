@@ -6,7 +6,6 @@ use crate::Error;
 use bvh_terminal::files;
 use csv::StringRecord;
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -61,8 +60,8 @@ fn compare_figures(fresh: &Path, committed: &Path) -> Result<Vec<String>, Error>
     names.extend(untimed_files(committed, ".svg")?);
     let mut differences = Vec::new();
     for name in names {
-        let fresh_bytes = fs::read(fresh.join(&name)).ok();
-        let committed_bytes = fs::read(committed.join(&name)).ok();
+        let fresh_bytes = bvh_scenes::read(&fresh.join(&name)).ok();
+        let committed_bytes = bvh_scenes::read(&committed.join(&name)).ok();
         if fresh_bytes == committed_bytes {
             continue;
         }
@@ -206,10 +205,10 @@ fn identity(header: &StringRecord, row: &StringRecord) -> String {
 
 fn read_rows(path: &Path, skipped_scenes: &[String]) -> Result<Rows, Error> {
     // A row of another length is a difference to report, not an error.
+    let bytes = bvh_scenes::read(path)?;
     let mut reader = csv::ReaderBuilder::new()
         .flexible(true)
-        .from_path(path)
-        .map_err(Error::csv(path))?;
+        .from_reader(&bytes[..]);
     let header = reader
         .headers()
         .map_err(Error::csv(path))?
@@ -232,6 +231,7 @@ fn read_rows(path: &Path, skipped_scenes: &[String]) -> Result<Rows, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     fn differences(fresh: &str, committed: &str, skipped_scenes: &[String]) -> Vec<String> {
         let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];

@@ -10,9 +10,10 @@ use crate::run::provenance::Provenance;
 use crate::run::reference::BestKnown;
 use crate::run::resolved::Resolved;
 use crate::run::target::Target;
+use bvh_scenes::read_text;
 use bvh_terminal::files;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// One part of an experiment, made with `--run` or `--shard`. Its folder stays locked as long as
@@ -96,7 +97,7 @@ fn parts(out: &Path) -> Result<Vec<(PathBuf, Part)>, Error> {
         if spec.is_file() {
             // Locked until the end, so that no part changes meanwhile.
             let lock = lock_folder(&folder)?;
-            let resolved = fs::read_to_string(&spec).map_err(Error::io(&spec, "read the file"))?;
+            let resolved = read_text(&spec)?;
             let provenance = Provenance::of_part(&partial.join(store::PART_PROVENANCE))?;
             parts.push((name, Part { partial, resolved, provenance, _lock: lock }));
         }

@@ -36,8 +36,7 @@ impl Target {
         if existing == Existing::Replace || is_unfinished(&folder) || !recorded.is_file() {
             return Ok(Self { folder, previous: None, is_finished: false });
         }
-        let text =
-            std::fs::read_to_string(&recorded).map_err(Error::io(&recorded, "read the file"))?;
+        let text = bvh_scenes::read_text(&recorded)?;
         let found = if is_part {
             Some("has finished results")
         } else if !toml::from_str(&text).is_ok_and(|found| resolved.repeats(&found)) {
