@@ -10,7 +10,7 @@ pub mod tree_file;
 mod unfinished;
 
 pub use error::WriteError;
-pub use read::{ReadError, read, read_text};
+pub use read::{ReadError, read, read_text, regular};
 pub use replace::{Reserved, write};
 
 /// The example of the README, compiled and run as a test.

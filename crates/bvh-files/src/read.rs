@@ -61,7 +61,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, ReadError> {
 }
 
 /// Returns the number of bytes of the regular file at `path`.
-pub(crate) fn regular(path: &Path) -> Result<u64, ReadError> {
+pub fn regular(path: &Path) -> Result<u64, ReadError> {
     let file = std::fs::metadata(path).map_err(|source| failed(path, source))?;
     match file.is_file() {
         true => Ok(file.len()),

@@ -21,8 +21,7 @@ use gltf_json::root::Get;
 use gltf_json::scene::Node;
 use gltf_json::validation::Checked::Valid;
 use gltf_json::{Accessor, Index, Root};
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// The largest total size of all buffers: [`MOST_TRIANGLES`] with three positions and three indices
@@ -92,16 +91,14 @@ pub fn parts(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Parts, 
     let (root, chunk) = document(bytes, path)?;
     let mut loader = Loader::new(path, &root, Buffers::new(path, outside, chunk));
     let mut places = loader.places()?;
+    let mut placed = BTreeSet::new();
     let mut first_places = places.clone();
-    first_places.sort_by_key(|place| place.mesh);
-    first_places.dedup_by_key(|place| place.mesh);
+    first_places.retain(|place| placed.insert(place.mesh));
     size::check(&root, &first_places, path)?;
     let mut meshes = BTreeMap::new();
-    for place in &places {
-        if let Entry::Vacant(first) = meshes.entry(place.mesh) {
-            loader.place(place, &DMat4::IDENTITY)?;
-            first.insert(std::mem::take(&mut loader.triangles));
-        }
+    for place in &first_places {
+        loader.place(place, &DMat4::IDENTITY)?;
+        meshes.insert(place.mesh, std::mem::take(&mut loader.triangles));
     }
     // A mesh of points or lines gives no triangles, and a tree needs at least one object.
     meshes.retain(|_, triangles| !triangles.is_empty());

@@ -47,9 +47,7 @@ impl Format {
     /// Returns the format of a file with these bytes at this path. OBJ has no signature, so every
     /// file without another format's signature or extension counts as OBJ.
     pub fn of(bytes: &[u8], path: &Path) -> Self {
-        let unmarked = bytes
-            .strip_prefix(b"\xef\xbb\xbf")
-            .unwrap_or(bytes);
+        let unmarked = without_mark(bytes);
         let text = unmarked.trim_ascii_start();
         if bytes.starts_with(b"glTF") || text.starts_with(b"{") {
             return Self::Gltf;
@@ -72,6 +70,13 @@ impl Format {
             _ => Self::Obj,
         }
     }
+}
+
+/// Returns the bytes of a text file without a byte order mark.
+fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes
+        .strip_prefix(b"\xef\xbb\xbf")
+        .unwrap_or(bytes)
 }
 
 /// Reads the mesh file at `path`. Any bytes give a mesh with at least one triangle or an error.

@@ -1,6 +1,7 @@
 //! Triangles from PLY files, text or binary, which `ply-rs-bw` parses.
 
 use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Place};
+use super::without_mark;
 use bvh_core::Triangle;
 use glam::Vec3;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
@@ -63,9 +64,7 @@ impl PropertyAccess for Face {
 
 /// Reads the bytes of a PLY file; `path` only names it in errors.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
-    let bytes = bytes
-        .strip_prefix(b"\xef\xbb\xbf")
-        .unwrap_or(bytes);
+    let bytes = without_mark(bytes);
     let mut reader = Reader::new(bytes);
     let header = Parser::<Vertex>::new()
         .read_header(&mut reader)

@@ -4,6 +4,7 @@
 //! solids, mistakes `solid` without a name for a binary file, and names no line.
 
 use super::mesh::{Fault, Mesh, Place};
+use super::without_mark;
 use bvh_core::Triangle;
 use glam::Vec3;
 use std::path::Path;
@@ -40,9 +41,7 @@ pub fn is_text(text: &[u8]) -> bool {
 
 /// Reads the bytes of an STL file; `path` only names it in errors.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
-    let text = bytes
-        .strip_prefix(b"\xef\xbb\xbf")
-        .unwrap_or(bytes);
+    let text = without_mark(bytes);
     let is_text = !is_binary(bytes) && is_text(text.trim_ascii_start());
     let triangles = if is_text { parse_text(text, path)? } else { parse_binary(bytes, path)? };
     if triangles.is_empty() {

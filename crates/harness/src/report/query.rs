@@ -43,11 +43,7 @@ const COMMA: &str = "\u{0}";
 
 /// Reads the rows of a CSV file.
 pub fn read(path: &Path) -> Result<Vec<Row>, Error> {
-    let bytes = bvh_scenes::read(path)?;
-    let mut reader = csv::Reader::from_reader(&bytes[..]);
-    let rows = reader.deserialize::<Row>();
-    rows.collect::<Result<_, _>>()
-        .map_err(Error::csv(path))
+    crate::rows::read(path)
 }
 
 /// Returns the text of a cell.

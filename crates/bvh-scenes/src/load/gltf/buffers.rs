@@ -3,6 +3,7 @@
 use super::{MOST_BYTES, OutsideFiles};
 use crate::read;
 use base64::Engine as _;
+use bvh_files::regular;
 use gltf_json::{Buffer, Root};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -104,9 +105,8 @@ impl<'a> Buffers<'a> {
         if let Entry::Occupied(file) = self.files.entry(path.clone()) {
             return Ok(file.get().clone());
         }
-        // A file that is too long is rejected before it takes memory. The reader reports a file
-        // that is missing.
-        let length = fs::metadata(&path).map_or(0, |file| file.len());
+        // A file that is too long is rejected before it takes memory.
+        let length = regular(&path).map_err(|error| error.to_string())?;
         self.count(length)?;
         let bytes = Rc::new(read(&path).map_err(|error| error.to_string())?);
         self.files.insert(path, bytes.clone());

@@ -1,6 +1,7 @@
 //! The JSON of a glTF or GLB file, and the binary chunk next to it.
 
 use super::super::mesh::{Fault, Place};
+use super::super::without_mark;
 use super::references::References;
 use gltf_json::Root;
 use gltf_json::deserialize::from_slice;
@@ -47,12 +48,7 @@ pub(super) fn document<'a>(
             let message = "no chunk of JSON in version 2; expected a GLB file, and whole";
             Fault::new(path, Place::File, message)
         })?,
-        false => (
-            bytes
-                .strip_prefix(b"\xef\xbb\xbf")
-                .unwrap_or(bytes),
-            None,
-        ),
+        false => (without_mark(bytes), None),
     };
     let root = from_slice::<References>(json)
         .and_then(|_| Root::from_slice(json))
