@@ -98,6 +98,13 @@ fn is_dear(problem: &Problem) -> bool {
     !is_by_area && problem.boxes.len() > EVALUATED_AT_ONCE
 }
 
+/// Builds a clustering whose larger neighbourhood pays where objects are as large as the scene.
+fn thorough_clustering(problem: &Problem, run: &Run) -> Result<Kept, SearchError> {
+    let config = ploc::Config::default();
+    let build = |watch: &Watch| config.build_watched(problem.boxes, None, watch);
+    Ok(Kept::new(watched(run.observer(), build)?, problem))
+}
+
 impl Config {
     /// Anneals several subtrees in parallel, each with a separate random stream.
     fn search_by<A: Metric>(
@@ -180,12 +187,16 @@ impl Config {
         let is_much_cheaper = aside.cost < CLUSTERING_MUCH_CHEAPER * started.cost;
         // A cancelled search ends with the tree aside.
         run.keep_aside(aside);
-        // Where objects are as large as the scene, a larger neighbourhood pays, too.
-        let thorough = ploc::Config::default();
-        let thorough = watched(run.observer(), |watch| thorough.build_watched(boxes, None, watch))?;
-        run.keep_aside(Kept::new(thorough, problem));
-        let limit = if is_much_cheaper { started.cost } else { f64::NEG_INFINITY };
-        Ok(run.take_aside_below(limit).unwrap_or(started))
+        if !is_much_cheaper {
+            run.keep_aside(thorough_clustering(problem, run)?);
+            return Ok(started);
+        }
+        // A large scene has no memory for another tree beside the next clustering.
+        drop(started);
+        let thorough = thorough_clustering(problem, run)?;
+        Ok(run
+            .take_aside_below(thorough.cost)
+            .unwrap_or(thorough))
     }
 
     /// Improves a tree with one reference per leaf, and its references if they may change. If a
