@@ -55,13 +55,15 @@ impl Triangle {
     }
 
     /// Returns the vector from `point` to the nearest point of the triangle. Triangles with a
-    /// common edge or corner compute the same bits for a nearest point on it.
+    /// common edge or corner compute the same bits for a nearest point on it. Rounded or not, the
+    /// point is in the box of the corners, so no box around the triangle is farther.
     pub(crate) fn offset_from(&self, point: DVec3) -> DVec3 {
         let [a, b, c] = self.0.map(|corner| corner.as_dvec3() - point);
         let normal = (b - a).cross(c - a);
         let is_inside = |from: DVec3, to: DVec3| normal.dot(from.cross(to)) > 0.0;
         if is_inside(a, b) && is_inside(b, c) && is_inside(c, a) {
-            return normal * (normal.dot(a) / normal.length_squared());
+            let offset = normal * (normal.dot(a) / normal.length_squared());
+            return into_box(offset, lesser(lesser(a, b), c), greater(greater(a, b), c));
         }
         let mut nearest = nearest_of_edge(a, b);
         for (from, to) in [(b, c), (c, a)] {
@@ -177,8 +179,24 @@ fn nearest_of_edge(from: DVec3, to: DVec3) -> DVec3 {
     } else if along >= length_squared {
         to
     } else {
-        from + edge * (along / length_squared)
+        into_box(from + edge * (along / length_squared), lesser(from, to), greater(from, to))
     }
+}
+
+/// Returns the point of a box that is nearest to `point`. Differences of corners that are far
+/// larger than a distance cancel, and rounding would move the point far out of the box.
+fn into_box(point: DVec3, min: DVec3, max: DVec3) -> DVec3 {
+    lesser(max, greater(min, point))
+}
+
+/// Returns the lesser component along each axis, `b`'s of two zeros, as the kernels do.
+fn lesser(a: DVec3, b: DVec3) -> DVec3 {
+    DVec3::select(a.cmplt(b), a, b)
+}
+
+/// Returns the greater component along each axis, `b`'s of two zeros, as the kernels do.
+fn greater(a: DVec3, b: DVec3) -> DVec3 {
+    DVec3::select(a.cmpgt(b), a, b)
 }
 
 #[cfg(test)]

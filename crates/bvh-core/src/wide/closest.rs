@@ -20,10 +20,10 @@ impl WideBvh {
     /// lowest id wins. Returns `None` for a point that is not finite, and if no triangle has an
     /// area: the layout omits triangles without area.
     ///
-    /// The answer is the answer of [`Triangle::closest_point`](crate::Triangle::closest_point) for
-    /// every triangle, up to the rounding in f64. Where triangles are 10¹⁵ times as large as their
-    /// distances, rounding decides which of them is the closest, and kernels may differ in it.
-    /// About O(log n) for a point near triangles that are spread out.
+    /// The point is the point of [`Triangle::closest_point`](crate::Triangle::closest_point), and no
+    /// other triangle's point is closer as computed in f64. In a layout with divided triangles that
+    /// are 10¹⁵ times as large as their distances, rounding decides which of them is the closest,
+    /// and kernels may differ in it. About O(log n) for a point near triangles that are spread out.
     ///
     /// ```
     /// # use bvh_core::{Aabb, Bvh, Node, Triangle, WideBvh};

@@ -212,6 +212,7 @@ fn offset<D: DoubleLanes>(a: Vector<D>, b: Vector<D>, c: Vector<D>) -> Vector<D>
         & zero.lt(dot(normal, cross(b, c)))
         & zero.lt(dot(normal, cross(c, a)));
     let inside = times(normal, dot(normal, a) / dot(normal, normal));
+    let inside = into_box(inside, lesser(lesser(a, b), c), greater(greater(a, b), c));
     let mut nearest = nearest_of_edge(a, b);
     let mut distance = dot(nearest, nearest);
     let offset = nearest_of_edge(b, c);
@@ -240,6 +241,7 @@ fn nearest_of_edge<D: DoubleLanes>(from: Vector<D>, to: Vector<D>) -> Vector<D> 
     let length_squared = dot(edge, edge);
     let between = times(edge, along / length_squared);
     let nearest = plus(first, between);
+    let nearest = into_box(nearest, lesser(first, second), greater(first, second));
     let nearest = select(length_squared.le(along), second, nearest);
     select(along.le(zero), first, nearest)
 }
@@ -250,6 +252,22 @@ fn select<D: DoubleLanes>(mask: D::Mask, yes: Vector<D>, no: Vector<D>) -> Vecto
     let y = D::select(mask, yes[1], no[1]);
     let z = D::select(mask, yes[2], no[2]);
     [x, y, z]
+}
+
+/// Returns the points of boxes that are nearest to points.
+#[inline(always)]
+fn into_box<D: DoubleLanes>(point: Vector<D>, min: Vector<D>, max: Vector<D>) -> Vector<D> {
+    lesser(max, greater(min, point))
+}
+
+#[inline(always)]
+fn lesser<D: DoubleLanes>(a: Vector<D>, b: Vector<D>) -> Vector<D> {
+    [a[0].min(b[0]), a[1].min(b[1]), a[2].min(b[2])]
+}
+
+#[inline(always)]
+fn greater<D: DoubleLanes>(a: Vector<D>, b: Vector<D>) -> Vector<D> {
+    [a[0].max(b[0]), a[1].max(b[1]), a[2].max(b[2])]
 }
 
 #[inline(always)]

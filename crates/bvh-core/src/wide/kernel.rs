@@ -1,7 +1,8 @@
 //! The implementations of the wide layout's traversal, and which of them this processor can run.
 
 /// An implementation of the traversal of a [`WideBvh`](crate::WideBvh). All answer rays by the same
-/// bits, and find the same [closest points](crate::WideBvh::closest_point) up to rounding.
+/// bits, and find the same [closest points](crate::WideBvh::closest_point); only in a layout with
+/// divided triangles may these differ by rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kernel {
     /// Code for any machine; counts its tests on request.

@@ -61,6 +61,45 @@ fn the_closest_point_is_as_close_as_that_of_any_triangle_at_every_scale() {
     }
 }
 
+/// Returns a point whose coordinates have any exponents.
+fn point_of_any_bits(random: &mut Random) -> Vec3 {
+    loop {
+        let point = Vec3::from_array(std::array::from_fn(|_| f32::from_bits(random.bits() as u32)));
+        if point.is_finite() {
+            return point;
+        }
+    }
+}
+
+#[test]
+fn triangles_of_any_bits_are_compared_as_if_each_were_alone() {
+    let mut random = Random(2);
+    for _ in 0..200 {
+        let triangles: Vec<Triangle> = (0..40)
+            .map(|_| Triangle(std::array::from_fn(|_| point_of_any_bits(&mut random))))
+            .collect();
+        let alone: Vec<WideBvh> = triangles
+            .iter()
+            .map(|&triangle| layout(&[triangle], 0))
+            .collect();
+        let layouts = layouts(&triangles);
+        for _ in 0..10 {
+            let point = point_of_any_bits(&mut random);
+            let distances = alone
+                .iter()
+                .filter_map(|wide| wide.closest_point(point))
+                .map(|closest| closest.distance);
+            let least = distances.fold(f64::INFINITY, f64::min);
+            for wide in &layouts {
+                let found = wide.closest_point(point).unwrap();
+                assert_eq!(found.distance, least, "{point}");
+                let same = alone[found.object as usize].closest_point(point);
+                assert_eq!(same.map(|same| same.point), Some(found.point));
+            }
+        }
+    }
+}
+
 #[test]
 fn triangles_with_the_same_closest_point_tie_to_the_lowest_id() {
     let triangles = grid_box(4);
