@@ -170,7 +170,7 @@ impl Config {
             });
         let says = self.paper_says.as_ref().map(|says| {
             let ours = format!("{:.3}", end.median / end.average);
-            row(GAIN).compare(says, ours, Verdict::Inconclusive, "the paper gives no number")
+            row(GAIN).compare(says, ours, Verdict::NoVerdict, "the paper gives no number")
         });
         let interval = (end.low / end.average, end.high / end.average);
         let gain = self.paper_gain.map(|paper| {

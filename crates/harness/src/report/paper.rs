@@ -166,9 +166,12 @@ pub enum Verdict {
     /// The rule does not hold, and neither number is higher.
     #[serde(rename = "differs")]
     Differs,
-    /// Another repetition may have led to another verdict, or the paper has no number.
+    /// Another repetition may have led to another verdict.
     #[serde(rename = "inconclusive")]
     Inconclusive,
+    /// The paper has words and no number, so no data could lead to another verdict.
+    #[serde(rename = "no verdict")]
+    NoVerdict,
     /// The paper has no such statement.
     #[serde(rename = "not in the paper")]
     NotInPaper,
@@ -185,6 +188,7 @@ impl Verdict {
             Self::DiffersLower => "differs, lower",
             Self::Differs => "differs",
             Self::Inconclusive => "inconclusive",
+            Self::NoVerdict => "no verdict",
             Self::NotInPaper => "not in the paper",
         }
     }
@@ -219,6 +223,7 @@ pub struct Outcome {
     same_side: usize,
     differ: usize,
     inconclusive: usize,
+    without_verdict: usize,
 }
 
 impl Outcome {
@@ -233,12 +238,15 @@ impl Outcome {
         let agree = count(|verdict| verdict == Verdict::Agrees);
         let same_side = count(Verdict::is_same_direction);
         let inconclusive = count(|verdict| verdict == Verdict::Inconclusive);
-        Self { agree, same_side, inconclusive, differ: compared - agree - same_side - inconclusive }
+        let without_verdict = count(|verdict| verdict == Verdict::NoVerdict);
+        let differ = compared - agree - same_side - inconclusive - without_verdict;
+        Self { agree, same_side, differ, inconclusive, without_verdict }
     }
 
     /// Returns the verdict on all comparisons together, ignoring the inconclusive ones.
     pub fn name(&self) -> &'static str {
         match (self.agree, self.same_side, self.differ) {
+            (0, 0, 0) if self.inconclusive == 0 && self.without_verdict > 0 => "no verdict",
             (0, 0, 0) => "inconclusive",
             (_, 0, 0) => "agrees",
             (_, _, 0) => "same direction",
@@ -250,12 +258,13 @@ impl Outcome {
 
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { agree, same_side, differ, inconclusive } = *self;
+        let Self { agree, same_side, differ, inconclusive, without_verdict } = *self;
         let kinds = [
             ("agree", agree),
             ("same side of the base only", same_side),
             ("differ", differ),
             ("inconclusive", inconclusive),
+            ("no verdict", without_verdict),
         ];
         let some = kinds.iter().filter(|(_, count)| *count > 0);
         let some: Vec<String> = some
@@ -264,7 +273,10 @@ impl fmt::Display for Outcome {
         write!(
             f,
             "Comparisons with the paper: {} ({}).",
-            agree + same_side + differ + inconclusive,
+            kinds
+                .iter()
+                .map(|(_, count)| count)
+                .sum::<usize>(),
             some.join("; ")
         )
     }
@@ -293,7 +305,7 @@ mod tests {
     #[test]
     fn the_verdict_on_all_is_what_those_that_can_be_told_have_in_common() {
         use Verdict::{
-            Agrees, Differs, DiffersLower, Inconclusive, NotInPaper, SameDirectionLower,
+            Agrees, Differs, DiffersLower, Inconclusive, NoVerdict, NotInPaper, SameDirectionLower,
         };
         let of = |verdicts: &[Verdict]| {
             let row = |&verdict: &Verdict| PaperRow { verdict, ..PaperRow::new("", "", "", "") };
@@ -304,6 +316,9 @@ mod tests {
         assert_eq!(of(&[Differs, DiffersLower, Inconclusive]), "differs");
         assert_eq!(of(&[Differs, SameDirectionLower]), "in part");
         assert_eq!(of(&[Inconclusive, NotInPaper]), "inconclusive");
+        assert_eq!(of(&[NoVerdict, Inconclusive]), "inconclusive");
+        assert_eq!(of(&[NoVerdict, Agrees]), "agrees");
+        assert_eq!(of(&[NoVerdict, NotInPaper]), "no verdict");
     }
 
     #[test]
