@@ -124,14 +124,14 @@ fn parse_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
                 }
                 "facet" => {
                     inside = true;
-                    words.next_if_eq(&"normal");
+                    words.next_if(|word| word.eq_ignore_ascii_case("normal"));
                     while words
                         .next_if(|word| word.parse::<f32>().is_ok())
                         .is_some()
                     {}
                 }
                 "outer" => {
-                    words.next_if_eq(&"loop");
+                    words.next_if(|word| word.eq_ignore_ascii_case("loop"));
                 }
                 // A name follows.
                 "solid" | "endsolid" => break,

@@ -116,13 +116,14 @@ fn buffers_are_files_in_the_folder_of_the_file_that_names_them() {
 }
 
 #[test]
-fn text_stl_is_a_sequence_of_words_on_any_lines() {
+fn text_stl_is_a_sequence_of_words_of_any_case_on_any_lines() {
     let text = String::from_utf8(stl_text()).unwrap();
     let (first, rest) = text.split_once('\n').unwrap();
     let (facets, _) = rest.rsplit_once("endsolid").unwrap();
     let facets = facets.replace("endsolid\r\nsolid\r\n", "");
     let one_line = facets.replace("\r\n", " ");
-    for facets in [facets.as_str(), &one_line, &one_line.replace("loop ", "loop\n")] {
+    let in_capitals = facets.to_uppercase();
+    for facets in [facets.as_str(), &in_capitals, &one_line, &one_line.replace("loop ", "loop\n")] {
         let file = format!("{first}\n{facets}\nendsolid a square");
         assert_eq!(parse(file.as_bytes(), Path::new("a.stl")).unwrap(), Mesh::new(square()));
     }
