@@ -267,7 +267,7 @@ impl<'a> Runs<'a> {
     }
 
     /// Counts the runs that end below random picking and below the greedy tree, and says how much
-    /// the second half of the generations gains.
+    /// the second half of their generations gains.
     fn answer(&self, shown: &str, generations: &[Generation], base: f64) -> Option<String> {
         let costs = self.costs();
         let count = |limit: f64| costs.iter().filter(|&&cost| cost < limit).count();
@@ -276,16 +276,33 @@ impl<'a> Runs<'a> {
             || "too few random orders were drawn to compare".to_owned(),
             |cost| format!("{} below the best of as many random orders", count(cost)),
         );
-        let half = generations[generations.len() / 2].median_run_cost;
-        let gain = 100.0 * (1.0 - end.median_run_cost / half);
         let number = costs.len();
         let runs = if number == 1 { "run" } else { "runs" };
         let below_greedy = count(base);
+        let gains = self.gains_of_second_half();
+        let gain = median(&gains)?;
+        let mut spread = String::new();
+        if number > 1 {
+            let (least, most) = range(gains.iter().copied())?;
+            spread = format!(", the median of {least:.1} to {most:.1} %");
+        }
         Some(format!(
             "Of {number} {runs} on {shown}, {below_greedy} end below the greedy tree, and \
-             {beside_picking}. In the second half of its generations the median run gains \
-             {gain:.1} %.",
+             {beside_picking}. In the second half of its generations a run gains {gain:.1} \
+             %{spread}.",
         ))
+    }
+
+    /// Returns the part of its cost that every run gains in the second half of its generations, in
+    /// percent.
+    fn gains_of_second_half(&self) -> Vec<f64> {
+        let mut gains = Vec::new();
+        for run in &self.runs {
+            let Some(end) = run.last() else { continue };
+            let half = run[run.len() / 2].incumbent;
+            gains.push(100.0 * (1.0 - end.incumbent / half));
+        }
+        gains
     }
 
     fn end(&self, base: f64) -> Option<Final> {
@@ -315,7 +332,8 @@ mod tests {
             runs.answer("s", &runs.generations(), 8.0)
                 .unwrap()
         };
-        let end = "In the second half of its generations the median run gains 25.0 %.";
+        let end = "In the second half of its generations a run gains 15.6 %, the median of 6.2 to \
+                   25.0 %.";
         let expected =
             "Of 2 runs on s, 2 end below the greedy tree, and 1 below the best of as many";
         assert_eq!(answer(&runs), format!("{expected} random orders. {end}"));
@@ -325,5 +343,6 @@ mod tests {
         assert_eq!(answer(&runs), format!("{expected} drawn to compare. {end}"));
         runs.runs.pop();
         assert!(answer(&runs).starts_with("Of 1 run on s, "));
+        assert!(answer(&runs).ends_with("generations a run gains 25.0 %."));
     }
 }
