@@ -374,11 +374,11 @@ fn a_forged_file_is_rejected_or_can_be_traced_to_the_end() {
     let mut accepted = 0;
     for (boxes, tree) in [scene(11), scene_of(11, 2, 1), split_scene(11)] {
         let file = save_references(&tree, &boxes, &Filled(&boxes), &ORIGIN).unwrap();
-        for offset in (16..file.len()).step_by(4) {
+        for offset in (16..file.len()).step_by(4 * ONE_OF) {
             if Header::CHECKSUM.contains(&offset) {
                 continue;
             }
-            for word in words.iter().skip(offset % ONE_OF).step_by(ONE_OF) {
+            for word in &words {
                 let mut bytes = with_field(&file, offset, &word.to_le_bytes());
                 seal(&mut bytes);
                 if let Ok(forged) = load_any(&bytes) {
