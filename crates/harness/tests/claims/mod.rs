@@ -163,6 +163,27 @@ fn the_best_amount_of_noise_depends_on_the_scene() {
 }
 
 #[test]
+fn camera_rays_contradict_trees_of_orders_by_random_rays() {
+    page_says(
+        "docs/PAPER.md",
+        "the trees of orders by these rays take 3 to 13 % more tests than those by areas, for \
+         primary, bounce and shadow rays along the first path on escher's stand-in.",
+    );
+    let tests = |method: &str, rays: &str| {
+        let conditions = format!("scene=escher, method={method}, judged_on={rays}, camera=same");
+        let found = rows("orders_for_rays/tests.csv", &conditions);
+        let [row] = &found[..] else { panic!("{conditions}: one row") };
+        number_in(row, "node_tests").unwrap() + number_in(row, "block_tests").unwrap()
+    };
+    for method in ["Goldsmith–Salmon", "genetic"] {
+        for rays in ["primary", "bounce", "shadow"] {
+            let ratio = tests(&format!("{method}\\, rays"), rays) / tests(method, rays);
+            assert!((1.03..1.13).contains(&ratio), "{method}, {rays}: {ratio}");
+        }
+    }
+}
+
+#[test]
 fn one_genetic_run_ends_below_the_best_known_binary_tree() {
     page_says(
         "docs/PAPER.md",
