@@ -25,6 +25,14 @@ fn sorted(file: &str, conditions: &str, column: &str) -> Vec<f64> {
     numbers
 }
 
+/// Returns the cell of a column in the one row that meets all conditions.
+fn cell(file: &str, conditions: &str, column: &str) -> f64 {
+    let [cell] = sorted(file, conditions, column)[..] else {
+        panic!("{file}: one row with {conditions}")
+    };
+    cell
+}
+
 #[test]
 fn two_long_runs_are_below_all_short_ones_and_the_third_is_below_their_median() {
     page_says(
@@ -171,9 +179,9 @@ fn camera_rays_contradict_trees_of_orders_by_random_rays() {
     );
     let tests = |method: &str, rays: &str| {
         let conditions = format!("scene=escher, method={method}, judged_on={rays}, camera=same");
-        let found = rows("orders_for_rays/tests.csv", &conditions);
-        let [row] = &found[..] else { panic!("{conditions}: one row") };
-        number_in(row, "node_tests").unwrap() + number_in(row, "block_tests").unwrap()
+        let [nodes, blocks] = ["node_tests", "block_tests"]
+            .map(|column| cell("orders_for_rays/tests.csv", &conditions, column));
+        nodes + blocks
     };
     for method in ["Goldsmith–Salmon", "genetic"] {
         for rays in ["primary", "bounce", "shadow"] {
@@ -190,12 +198,8 @@ fn one_genetic_run_ends_below_the_best_known_binary_tree() {
         "one of the five genetic runs on escher's ends below the best known tree.",
     );
     let costs = sorted("anytime_orders/runs.csv", "scene=escher, method=genetic", "cost");
-    let [best_known] =
-        sorted("anytime_orders/references.csv", "scene=escher, objective=goldsmith_salmon", "cost")
-            [..]
-    else {
-        panic!("one best known tree")
-    };
+    let best_known =
+        cell("anytime_orders/references.csv", "scene=escher, objective=goldsmith_salmon", "cost");
     assert_eq!(costs.len(), 5);
     assert!(costs[0] < best_known && costs[1] > best_known, "{costs:?} {best_known}");
 }
@@ -210,11 +214,7 @@ fn more_seconds_by_area_make_shadow_rays_faster_on_one_scene_of_four() {
     for scene in ["cloister", "escher", "sponza", "kitchen"] {
         let speed = |mode: &str| {
             let row = format!("scene={scene}, library=ours, rays=shadow, mode={mode}");
-            let [speed] = sorted("peers/amd-epyc-25-1/timing_rays.csv", &row, "million_per_s")[..]
-            else {
-                panic!("{row}: one row")
-            };
-            speed
+            cell("peers/amd-epyc-25-1/timing_rays.csv", &row, "million_per_s")
         };
         if speed("best: wide\\, batches") > speed("best\\, 6.5 M: wide\\, batches") {
             faster.push(scene);
