@@ -329,28 +329,53 @@ fn more_work_by_area_does_not_save_tests_on_two_scenes() {
 
 #[test]
 fn the_layouts_tree_is_no_faster_for_primary_rays_in_batches() {
-    page_says(
-        "docs/METHODS.md",
-        "On model 1 (older kernels) its primary rays are slower in batches on all four scenes",
-    );
     page_says("docs/CHOOSING.md", "in batches primary rays gain nothing");
-    let speed = |processor: &str, scene: &str, mode: &str| {
-        let row = format!(
-            "scene={scene}, library=ours, instructions=AVX2, rays=primary, mode={mode}: wide\\, \
-             batches"
-        );
-        cell(&format!("peers/{processor}/timing_rays.csv"), &row, "million_per_s")
-    };
-    for scene in ["cloister", "escher", "sponza", "kitchen", "geometric mean"] {
-        let older = "amd-epyc-25-1";
-        assert!(
-            speed(older, scene, "best for the layout") < speed(older, scene, "best"),
-            "{scene}"
-        );
+    for processor in ["amd-epyc-25-1", "amd-epyc-25-17"] {
+        let speed = |mode: &str| {
+            let row = format!(
+                "scene=geometric mean, library=ours, instructions=AVX2, rays=primary, mode={mode}: \
+                 wide\\, batches"
+            );
+            cell(&format!("peers/{processor}/timing_rays.csv"), &row, "million_per_s")
+        };
+        assert!(speed("best for the layout") < speed("best"), "{processor}");
     }
-    let newer = "amd-epyc-25-17";
-    let mean = "geometric mean";
-    assert!(speed(newer, mean, "best for the layout") < speed(newer, mean, "best"));
+}
+
+#[test]
+fn boxes_are_not_always_saved_by_the_cost_of_the_layout() {
+    page_says("docs/CHOOSING.md", "It saves tests of nodes and blocks, not always of boxes");
+    let boxes = |method: &str| {
+        let row = format!("scene=sponza, rays=shadow, layout=wide, method={method}");
+        cell("peers/amd-epyc-25-17/traversal.csv", &row, "boxes_per_ray")
+    };
+    assert!(boxes("best for the layout") > boxes("best"));
+}
+
+#[test]
+fn longer_searches_lose_shadow_rays_on_cloister_on_both_processors() {
+    readme_says("The loss on cloister repeats on both processors, for this pair of trees");
+    let runs =
+        [("amd-epyc-25-1", "AVX2"), ("amd-epyc-25-17", "AVX2"), ("amd-epyc-25-17", "AVX-512")];
+    for (processor, instructions) in runs {
+        let speed = |mode: &str| {
+            let row = format!(
+                "scene=cloister, library=ours, instructions={instructions}, rays=shadow, \
+                 mode={mode}: wide\\, batches"
+            );
+            cell(&format!("peers/{processor}/timing_rays.csv"), &row, "million_per_s")
+        };
+        assert!(speed("best") < 0.9 * speed("best\\, 6.5 M"), "{processor}, {instructions}");
+    }
+}
+
+#[test]
+fn five_repetitions_for_a_camera_save_tests_on_the_other_path_of_escher() {
+    page_says("docs/METHODS.md", "with five repetitions of such a search all three are below 1");
+    for rays in ["primary", "bounce", "shadow"] {
+        let row = format!("scene=escher, tree=camera, camera=other, judged_on={rays}");
+        assert!(cell("splits/ray_cost.csv", &row, "over_base_high") < 1.0, "{rays}");
+    }
 }
 
 #[test]
@@ -447,21 +472,54 @@ fn the_best_of_many_lists_by_value_costs_less_than_greedy_and_a_single_trial_mor
 }
 
 #[test]
-fn all_runs_of_best_end_below_ruin_and_recreate_on_two_scenes() {
+fn the_order_of_best_and_ruin_and_recreate_is_inconclusive_after_equal_work() {
     page_says(
         "docs/PAPER.md",
-        "All runs of `best` end below all runs of ruin and recreate on escher and pinecon2; on the \
-         other five scenes the runs overlap",
+        "On escher and pinecon2 ruin and recreate ends by itself after a third of the work. On the \
+         other five scenes, with equal work, the runs of the two searches overlap, so that their \
+         order is inconclusive; by medians ruin and recreate is lower on cloister and konistil.",
     );
+    let mut lower = Vec::new();
     for scene in ["bijou", "cloister", "escher", "konistil", "pinecon2", "sponza", "kitchen"] {
-        let [best, other] = ["best", "ruin and recreate"].map(|method| {
-            sorted("local_search/runs.csv", &format!("scene={scene}, method={method}"), "cost")
-        });
-        assert_eq!((best.len(), other.len()), (5, 5));
-        let is_below = best[4] < other[0];
-        assert_eq!(is_below, scene == "escher" || scene == "pinecon2", "{scene}");
-        assert!(is_below || best[0] <= other[4], "{scene}: {best:?} {other:?}");
+        let of = |method: &str, column: &str| {
+            sorted("local_search/runs.csv", &format!("scene={scene}, method={method}"), column)
+        };
+        let work = of("ruin and recreate", "work")[4] / of("best", "work")[4];
+        if scene == "escher" || scene == "pinecon2" {
+            assert!((0.3..0.35).contains(&work), "{scene}: {work}");
+            continue;
+        }
+        assert!((work - 1.0).abs() < 0.01, "{scene}: {work}");
+        let [best, other] = ["best", "ruin and recreate"].map(|method| of(method, "cost"));
+        assert!(best[0] <= other[4] && other[0] <= best[4], "{scene}: {best:?} {other:?}");
+        if other[2] < best[2] {
+            lower.push(scene);
+        }
     }
+    assert_eq!(lower, ["cloister", "konistil"]);
+}
+
+#[test]
+fn half_of_all_short_runs_with_the_papers_rates_end_below_the_greedy_tree() {
+    page_says(
+        "docs/PAPER.md",
+        "Of 24 short runs with these settings in all experiments 12 are below it",
+    );
+    let experiments = [
+        ("figure2", "genetic"),
+        ("variations", "as the paper"),
+        ("ray_fitness", "fitness by cost"),
+        ("orders_for_rays", "genetic"),
+        ("rays", "genetic"),
+        ("anytime_orders", "genetic"),
+    ];
+    let mut costs = Vec::new();
+    for (experiment, method) in experiments {
+        let file = format!("{experiment}/runs.csv");
+        costs.extend(sorted(&file, &format!("scene=pinecon2, method={method}"), "cost_over_base"));
+    }
+    let below = costs.iter().filter(|&&cost| cost < 1.0).count();
+    assert_eq!((below, costs.len()), (12, 24));
 }
 
 #[test]
