@@ -280,7 +280,7 @@ fn trees_by_default_rays_lose_where_the_page_says_so() {
     page_says(
         "docs/METHODS.md",
         "and 1.117 and 1.073 times on the other, all conclusively. Incoherent rays take more on \
-         cloister and sponza in the trees *rays*, *camera*.",
+         cloister and sponza in the trees *rays*, *camera*",
     );
     let mut lost = Vec::new();
     let searched = "scene!=geometric mean, tree!=greedy, trained_on=default or camera or none";
