@@ -1,9 +1,13 @@
-//! Converts and checks numpy arrays. Errors name the argument, the value found and the values
+//! Converts and checks numpy arrays. Every array argument comes in through [`numbers`], whatever its
+//! type, order, strides and alignment. Errors name the argument, the value found and the values
 //! accepted.
 
 use bvh_search::bvh_core::{InvalidRay, MeshError, Primitives};
 use bvh_search::{Objects, prelude::*};
-use numpy::{Element, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{
+    Element, PyArrayDescrMethods, PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::fmt::Display;
@@ -14,25 +18,54 @@ pub fn invalid(message: impl Display) -> PyErr {
     PyValueError::new_err(message.to_string())
 }
 
-/// Converts anything that numpy accepts as an array to `float32` in row order, and checks its
-/// shape.
+/// A numpy array in row order, aligned and of native byte order. Only [`numbers`] makes one.
+///
+/// numpy's own slices are no substitute: they also give the elements of an array in column order,
+/// in that order.
+pub struct Array<'py, T: Element>(PyReadonlyArrayDyn<'py, T>);
+
+impl<'py, T: Element> Array<'py, T> {
+    pub fn shape(&self) -> &[usize] {
+        self.0.shape()
+    }
+
+    /// Returns the elements in row order.
+    pub fn elements(&self) -> PyResult<&[T]> {
+        Ok(self.0.as_slice()?)
+    }
+
+    pub fn into_numpy(self) -> Bound<'py, PyArrayDyn<T>> {
+        (*self.0).clone()
+    }
+}
+
+/// Converts anything that numpy accepts as an array to `float32`, and checks its shape.
 pub fn floats<'py>(
     name: &str,
     argument: &Bound<'py, PyAny>,
     accepted: &str,
     accepts: impl Fn(&[usize]) -> bool,
-) -> PyResult<PyReadonlyArrayDyn<'py, f32>> {
+) -> PyResult<Array<'py, f32>> {
     numbers(name, argument, ("float32", REAL_NUMBERS), accepted, accepts)
 }
 
-/// Converts anything that numpy accepts as an array of integers to `int64` in row order, and checks
-/// its shape.
+/// Converts anything that numpy accepts as an array to `float64`, and checks its shape.
+pub fn doubles<'py>(
+    name: &str,
+    argument: &Bound<'py, PyAny>,
+    accepted: &str,
+    accepts: impl Fn(&[usize]) -> bool,
+) -> PyResult<Array<'py, f64>> {
+    numbers(name, argument, ("float64", REAL_NUMBERS), accepted, accepts)
+}
+
+/// Converts anything that numpy accepts as an array of integers to `int64`, and checks its shape.
 pub fn integers<'py>(
     name: &str,
     argument: &Bound<'py, PyAny>,
     accepted: &str,
     accepts: impl Fn(&[usize]) -> bool,
-) -> PyResult<PyReadonlyArrayDyn<'py, i64>> {
+) -> PyResult<Array<'py, i64>> {
     numbers(name, argument, ("int64", INTEGERS), accepted, accepts)
 }
 
@@ -43,14 +76,14 @@ const REAL_NUMBERS: Kinds = ("biuf", "real numbers");
 const INTEGERS: Kinds = ("iu", "integers");
 
 /// Converts anything that numpy accepts as an array of some kinds to `dtype`, which is the type
-/// `T`, aligned and in row order, and checks its shape.
+/// `T`, and checks its shape. An array that is in row order already is not copied.
 fn numbers<'py, T: Element>(
     name: &str,
     argument: &Bound<'py, PyAny>,
     (dtype, kinds): (&str, Kinds),
     accepted: &str,
     accepts: impl Fn(&[usize]) -> bool,
-) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
+) -> PyResult<Array<'py, T>> {
     let py = argument.py();
     let numpy = py.import("numpy")?;
     let no_array =
@@ -60,13 +93,14 @@ fn numbers<'py, T: Element>(
         .call_method1("asanyarray", (argument,))
         .map_err(no_array)?;
     check_elements(name, &numpy, &given, kinds)?;
-    // Contiguous, aligned, and no subclass.
+    // In row order, aligned, and no subclass.
     let array = numpy
         .call_method1("require", (given, dtype, "CAE"))
         .map_err(no_array)?;
     let array: PyReadonlyArrayDyn<T> = array.extract()?;
+    assert!(array.is_c_contiguous(), "numpy converts to row order");
     if accepts(array.shape()) {
-        return Ok(array);
+        return Ok(Array(array));
     }
     let sizes: Vec<String> = array
         .shape()
@@ -109,7 +143,7 @@ fn check_elements(
 /// Reads triangles with three corners each.
 pub fn triangles(argument: &Bound<PyAny>) -> PyResult<Objects> {
     let array = floats("triangles", argument, "(n, 3, 3)", |shape| matches!(shape, [_, 3, 3]))?;
-    let triangles: &[Triangle] = bytemuck::cast_slice(array.as_slice()?);
+    let triangles: &[Triangle] = bytemuck::cast_slice(array.elements()?);
     Ok(shapes(triangles.to_vec()))
 }
 
@@ -143,7 +177,7 @@ pub fn mesh(
     };
     let mut indices = Vec::with_capacity(faces.shape()[0]);
     for (face, corners) in faces
-        .as_slice()?
+        .elements()?
         .as_chunks::<3>()
         .0
         .iter()
@@ -172,10 +206,7 @@ pub fn moved_mesh(vertices: &Bound<PyAny>, faces: &[[u32; 3]]) -> PyResult<Objec
     triangles_of(MESH, &vertices, faces, missing).map(shapes)
 }
 
-fn positions<'py>(
-    names: MeshNames,
-    vertices: &Bound<'py, PyAny>,
-) -> PyResult<PyReadonlyArrayDyn<'py, f32>> {
+fn positions<'py>(names: MeshNames, vertices: &Bound<'py, PyAny>) -> PyResult<Array<'py, f32>> {
     floats(names.vertices, vertices, "(v, 3)", |shape| matches!(shape, [_, 3]))
 }
 
@@ -183,11 +214,11 @@ fn positions<'py>(
 /// a vertex which does not exist.
 fn triangles_of(
     names: MeshNames,
-    vertices: &PyReadonlyArrayDyn<f32>,
+    vertices: &Array<f32>,
     faces: &[[u32; 3]],
     unknown: impl Fn(usize, u32) -> PyErr,
 ) -> PyResult<Vec<Triangle>> {
-    let (vertices, _) = vertices.as_slice()?.as_chunks::<3>();
+    let (vertices, _) = vertices.elements()?.as_chunks::<3>();
     Triangle::from_mesh(vertices, faces).map_err(|error| match error {
         MeshError::Index { triangle, index, .. } => unknown(triangle, index),
         MeshError::NotFinite { triangle, index, found } => {
@@ -202,7 +233,7 @@ fn triangles_of(
 pub fn segments(argument: Option<&Bound<PyAny>>) -> PyResult<Vec<Segment>> {
     let Some(argument) = argument else { return Ok(vec![]) };
     let array = floats("rays", argument, "(m, 2, 3)", |shape| matches!(shape, [_, 2, 3]))?;
-    let (segments, _) = array.as_slice()?.as_chunks::<6>();
+    let (segments, _) = array.elements()?.as_chunks::<6>();
     let segment = |&[a, b, c, d, e, f]: &[f32; 6]| Segment { from: [a, b, c], to: [d, e, f] };
     Ok(segments.iter().map(segment).collect())
 }
@@ -210,7 +241,7 @@ pub fn segments(argument: Option<&Bound<PyAny>>) -> PyResult<Vec<Segment>> {
 /// Reads points, `(m, 3)`.
 pub fn points(argument: &Bound<PyAny>) -> PyResult<Vec<Vec3>> {
     let array = floats("points", argument, "(m, 3)", |shape| matches!(shape, [_, 3]))?;
-    let points: &[Vec3] = bytemuck::cast_slice(array.as_slice()?);
+    let points: &[Vec3] = bytemuck::cast_slice(array.elements()?);
     Ok(points.to_vec())
 }
 
@@ -219,15 +250,15 @@ pub fn boxes(argument: &Bound<PyAny>) -> PyResult<Objects> {
     let array = floats("boxes", argument, "(n, 2, 3) or (n, 6)", |shape| {
         matches!(shape, [_, 2, 3] | [_, 6])
     })?;
-    let boxes: &[Aabb] = bytemuck::cast_slice(array.as_slice()?);
+    let boxes: &[Aabb] = bytemuck::cast_slice(array.elements()?);
     Ok(Objects::Boxes(boxes.to_vec()))
 }
 
 /// The origins or directions of rays, in either precision: `float64` is rounded ray by ray, without
 /// a copy of the array.
 enum Vectors<'py> {
-    Single(PyReadonlyArrayDyn<'py, f32>),
-    Double(PyReadonlyArrayDyn<'py, f64>),
+    Single(Array<'py, f32>),
+    Double(Array<'py, f64>),
 }
 
 impl<'py> Vectors<'py> {
@@ -237,14 +268,13 @@ impl<'py> Vectors<'py> {
         accepted: &str,
         accepts: impl Fn(&[usize]) -> bool,
     ) -> PyResult<Self> {
-        // Not a subclass, such as a masked array.
-        let is_array = argument.get_type().name()? == "ndarray";
-        match argument.extract::<PyReadonlyArrayDyn<f64>>() {
-            // A slice is contiguous and aligned.
-            Ok(array) if is_array && array.as_slice().is_ok() && accepts(array.shape()) => {
-                Ok(Self::Double(array))
-            }
-            _ => floats(name, argument, accepted, accepts).map(Self::Single),
+        let is_double = argument
+            .cast::<PyUntypedArray>()
+            .is_ok_and(|array| array.dtype().num() == f64::get_dtype(argument.py()).num());
+        if is_double {
+            doubles(name, argument, accepted, accepts).map(Self::Double)
+        } else {
+            floats(name, argument, accepted, accepts).map(Self::Single)
         }
     }
 
@@ -257,8 +287,8 @@ impl<'py> Vectors<'py> {
 
     fn slice(&self) -> PyResult<VectorSlice<'_>> {
         Ok(match self {
-            Self::Single(array) => VectorSlice::Single(array.as_slice()?.as_chunks().0),
-            Self::Double(array) => VectorSlice::Double(array.as_slice()?.as_chunks().0),
+            Self::Single(array) => VectorSlice::Single(array.elements()?.as_chunks().0),
+            Self::Double(array) => VectorSlice::Double(array.elements()?.as_chunks().0),
         })
     }
 }
@@ -321,7 +351,7 @@ impl<'py> RayArrays<'py> {
                 // An array without axes is one number for all rays.
                 *limit =
                     floats(name, argument, &accepted, |shape| shape.is_empty() || shape == [rays])?
-                        .as_slice()?
+                        .elements()?
                         .to_vec();
             }
         }

@@ -1,28 +1,35 @@
 //! The function `locations`: hit points in double precision.
 
-use crate::arrays::invalid;
+use crate::arrays::{doubles, floats, integers, invalid};
 use bvh_search::bvh_core::glam::DVec3;
-use numpy::{IntoPyArray, Ix2, Ix3, PyArray2, PyArrayMethods, PyReadonlyArray, PyReadonlyArray1};
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
 /// Returns the points, in `float64`, where rays cross the planes of triangles: `t`, the indices of
 /// triangles and the indices of rays are from `Tracer.all`. `triangles` has the shape `(n, 3, 3)`.
 #[pyfunction]
 pub fn locations<'py>(
-    triangles: PyReadonlyArray<'py, f64, Ix3>,
-    origins: PyReadonlyArray<'py, f64, Ix2>,
-    directions: PyReadonlyArray<'py, f64, Ix2>,
-    t: PyReadonlyArray1<'py, f32>,
-    triangle: PyReadonlyArray1<'py, i32>,
-    ray: PyReadonlyArray1<'py, i64>,
+    triangles: &Bound<'py, PyAny>,
+    origins: &Bound<'py, PyAny>,
+    directions: &Bound<'py, PyAny>,
+    t: &Bound<'py, PyAny>,
+    triangle: &Bound<'py, PyAny>,
+    ray: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let py = triangles.py();
-    let (corners, _) = triangles.as_slice()?.as_chunks::<9>();
-    let (origins, _) = origins.as_slice()?.as_chunks::<3>();
-    let (directions, _) = directions.as_slice()?.as_chunks::<3>();
-    let triangle = triangle.as_slice()?;
-    let ray = ray.as_slice()?;
-    let t = t.as_slice()?;
+    let corners = doubles("triangles", triangles, "(n, 3, 3)", |shape| matches!(shape, [_, 3, 3]))?;
+    let vectors = |name, argument| {
+        doubles(name, argument, "(m, 3)", |shape: &[usize]| matches!(shape, [_, 3]))
+    };
+    let origins = vectors("origins", origins)?;
+    let directions = vectors("directions", directions)?;
+    let t = floats("t", t, "(h,)", |shape| shape.len() == 1)?;
+    let triangle = integers("triangle", triangle, "(h,)", |shape| shape == t.shape())?;
+    let ray = integers("ray", ray, "(h,)", |shape| shape == t.shape())?;
+    let (corners, _) = corners.elements()?.as_chunks::<9>();
+    let (origins, _) = origins.elements()?.as_chunks::<3>();
+    let (directions, _) = directions.elements()?.as_chunks::<3>();
+    let (t, triangle, ray) = (t.elements()?, triangle.elements()?, ray.elements()?);
     let mut points = Vec::with_capacity(3 * t.len());
     for ((&t, &triangle), &ray) in t.iter().zip(triangle).zip(ray) {
         let missing = || invalid("locations: accepted: hits of these rays and triangles");

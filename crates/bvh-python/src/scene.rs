@@ -30,5 +30,5 @@ pub fn rows<'py>(
 ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
     let accepted = format!("(..., {length})");
     let array = floats(name, argument, &accepted, |shape| shape.last() == Some(&length))?;
-    Ok((*array).clone())
+    Ok(array.into_numpy())
 }

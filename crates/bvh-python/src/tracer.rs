@@ -291,7 +291,7 @@ impl Tracer {
         let source = arrays.source()?;
         let accepted = format!("({},), as origins", source.rays);
         let indices = integers("triangle", triangle, &accepted, |shape| shape == [source.rays])?;
-        let indices = indices.as_slice()?;
+        let indices = indices.elements()?;
         let triangles = self.source.triangles().unwrap_or(&[]);
         let is_index = |&index: &i64| (-1..triangles.len() as i64).contains(&index);
         if !indices.iter().all(is_index) {
