@@ -4,16 +4,9 @@ use std::process::Command;
 
 fn main() {
     let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".into());
-    let version = Command::new(rustc)
-        .arg("--version")
-        .output()
-        .ok()
-        .filter(|output| output.status.success());
-    let version = version.map(|output| {
-        String::from_utf8_lossy(&output.stdout)
-            .trim()
-            .to_owned()
-    });
+    let version =
+        Command::new(rustc).arg("--version").output().ok().filter(|output| output.status.success());
+    let version = version.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned());
     println!("cargo:rustc-env=HARNESS_RUSTC={}", version.as_deref().unwrap_or("unknown"));
     let set = |name| std::env::var(name).unwrap_or_else(|_| "unknown".into());
     let profile = set("PROFILE");
@@ -67,11 +60,7 @@ fn revision() -> Option<String> {
             .output()
             .ok()
             .filter(|output| output.status.success())?;
-        Some(
-            String::from_utf8_lossy(&output.stdout)
-                .trim()
-                .to_owned(),
-        )
+        Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
     // Sources that an enclosing repository does not track do not belong to its commit.
     git(&["ls-files", "--error-unmatch", "build.rs"])?;

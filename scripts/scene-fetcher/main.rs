@@ -54,11 +54,8 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let folder = PathBuf::from(
-        std::env::args_os()
-            .nth(1)
-            .ok_or("expected the folder to write to")?,
-    );
+    let folder =
+        PathBuf::from(std::env::args_os().nth(1).ok_or("expected the folder to write to")?);
     let metadata: Value = serde_json::from_reader(io::stdin())
         .map_err(|error| format!("no output of `cargo metadata` on the standard input: {error}"))?;
     fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
@@ -121,21 +118,12 @@ struct Package {
 fn find(metadata: &Value, name: &str) -> Result<Package, String> {
     metadata["packages"]
         .as_array()
-        .and_then(|packages| {
-            packages
-                .iter()
-                .find(|package| package["name"] == name)
-        })
+        .and_then(|packages| packages.iter().find(|package| package["name"] == name))
         .and_then(|package| {
             Some(Package {
                 name: format!("{name} {}", package["version"].as_str()?),
-                licence: package["license"]
-                    .as_str()
-                    .unwrap_or("not stated")
-                    .to_owned(),
-                folder: Path::new(package["manifest_path"].as_str()?)
-                    .parent()?
-                    .to_path_buf(),
+                licence: package["license"].as_str().unwrap_or("not stated").to_owned(),
+                folder: Path::new(package["manifest_path"].as_str()?).parent()?.to_path_buf(),
             })
         })
         .ok_or_else(|| format!("`cargo metadata` names no package {name}"))
@@ -144,10 +132,7 @@ fn find(metadata: &Value, name: &str) -> Result<Package, String> {
 fn read(source: &Path) -> Result<Vec<u8>, String> {
     let explain = |error: &dyn Error| format!("{}: {error}", source.display());
     let bytes = fs::read(source).map_err(|error| explain(&error))?;
-    if source
-        .extension()
-        .is_none_or(|extension| extension != "zst")
-    {
+    if source.extension().is_none_or(|extension| extension != "zst") {
         return Ok(bytes);
     }
     let mut text = Vec::new();
@@ -167,21 +152,14 @@ fn write(target: &Path, text: &[u8]) -> Result<(), String> {
 }
 
 fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes)
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect()
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// A face of n vertices counts as n − 2.
 fn triangles(text: &[u8]) -> usize {
     text.split(|&byte| byte == b'\n')
         .filter_map(|line| line.strip_prefix(b"f "))
-        .map(|face| {
-            face.split(u8::is_ascii_whitespace)
-                .filter(|word| !word.is_empty())
-                .count()
-        })
+        .map(|face| face.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).count())
         .map(|vertices| vertices.saturating_sub(2))
         .sum()
 }

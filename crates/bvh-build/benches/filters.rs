@@ -42,9 +42,7 @@ fn measure(name: &str, wide: &WideBvh, rays: &[Ray], coherence: Coherence) {
         },
         || {
             for (ray, hit) in rays.iter().zip(&mut filtered) {
-                *hit = wide
-                    .nearest_hit_where(ray, |_| true)
-                    .unwrap_or(Hit::MISS);
+                *hit = wide.nearest_hit_where(ray, |_| true).unwrap_or(Hit::MISS);
             }
         },
     );

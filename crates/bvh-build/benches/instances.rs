@@ -36,9 +36,7 @@ impl Pair {
             instances.push(Instance { part: 0, transform });
         }
         let boxes = Instance::boxes(&instances, &parts).expect("instances of the part");
-        let top = muller_fellner::Config::default()
-            .build(&boxes)
-            .expect("finite boxes");
+        let top = muller_fellner::Config::default().build(&boxes).expect("finite boxes");
         let instances = Instances::new(parts, instances, top).expect("a tree over the boxes");
         Self { instances, flat, bounds: Aabb::union_of(&boxes) }
     }
@@ -53,22 +51,15 @@ impl Pair {
             rays.len(),
             || self.flat.nearest_hits(rays, &mut hits, coherence),
             || {
-                self.instances
-                    .nearest_hits(rays, &mut instance_hits, coherence);
+                self.instances.nearest_hits(rays, &mut instance_hits, coherence);
             },
         );
         let mut flat_found = vec![false; rays.len()];
         compare(
             &format!("{name} any"),
             rays.len(),
-            || {
-                self.flat
-                    .any_hits(rays, &mut flat_found, coherence)
-            },
-            || {
-                self.instances
-                    .any_hits(rays, &mut found, coherence)
-            },
+            || self.flat.any_hits(rays, &mut flat_found, coherence),
+            || self.instances.any_hits(rays, &mut found, coherence),
         );
         let differences = hits
             .iter()

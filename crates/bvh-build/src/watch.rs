@@ -41,9 +41,7 @@ impl<'a> Watch<'a> {
         if self.ended.load(Relaxed) {
             return true;
         }
-        let cancelled = self
-            .is_cancelled
-            .is_some_and(|is_cancelled| is_cancelled());
+        let cancelled = self.is_cancelled.is_some_and(|is_cancelled| is_cancelled());
         if cancelled {
             self.ended.store(true, Relaxed);
         }
@@ -58,9 +56,7 @@ impl<'a> Watch<'a> {
 
 impl Debug for Watch<'_> {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Watch")
-            .field("ended", &self.ended)
-            .finish_non_exhaustive()
+        f.debug_struct("Watch").field("ended", &self.ended).finish_non_exhaustive()
     }
 }
 

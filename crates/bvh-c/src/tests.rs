@@ -10,10 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// Returns the corners of a staircase of right triangles.
 fn corners(count: usize) -> Vec<f32> {
-    (0..count)
-        .map(|i| i as f32)
-        .flat_map(|x| [x, 0.0, x, x + 1.5, 0.0, x, x, 1.5, x])
-        .collect()
+    (0..count).map(|i| i as f32).flat_map(|x| [x, 0.0, x, x + 1.5, 0.0, x, x, 1.5, x]).collect()
 }
 
 fn last_error() -> String {
@@ -88,9 +85,8 @@ fn trees_and_hits_equal_the_results_of_the_rust_crates() {
 fn surfaces_all_hits_closest_points_and_insides_equal_the_results_of_the_rust_crates() {
     let corners = corners(40);
     let triangles = bytes_as_triangles(&corners);
-    let segments: Vec<f32> = (0..60)
-        .flat_map(|i| [i as f32 * 0.5, 0.2, -1.0, i as f32 * 0.5, 0.2, 30.0])
-        .collect();
+    let segments: Vec<f32> =
+        (0..60).flat_map(|i| [i as f32 * 0.5, 0.2, -1.0, i as f32 * 0.5, 0.2, 30.0]).collect();
     let rays: Vec<BvhRay> = (0..1500)
         .map(|i| BvhRay {
             origin: [i as f32 * 0.03, 0.2, -1.0],
@@ -140,10 +136,7 @@ fn surfaces_all_hits_closest_points_and_insides_equal_the_results_of_the_rust_cr
     let mut first = 0;
     for (index, ray) in rays.iter().enumerate() {
         let ray = Ray::half_line(ray.origin, ray.direction).unwrap();
-        let crossed = triangles
-            .iter()
-            .filter(|triangle| triangle.crossing(&ray).is_some())
-            .count();
+        let crossed = triangles.iter().filter(|triangle| triangle.crossing(&ray).is_some()).count();
         assert_eq!(counts[index] as usize, crossed);
         let nearest = &hits[first..first + crossed];
         assert!(nearest.is_sorted_by(|a, b| a.t <= b.t));
@@ -168,10 +161,7 @@ fn surfaces_all_hits_closest_points_and_insides_equal_the_results_of_the_rust_cr
 fn bytes_as_triangles(corners: &[f32]) -> Vec<Triangle> {
     let (points, _) = corners.as_chunks::<3>();
     let (triangles, _) = points.as_chunks::<3>();
-    triangles
-        .iter()
-        .map(|&corners| Triangle::from(corners))
-        .collect()
+    triangles.iter().map(|&corners| Triangle::from(corners)).collect()
 }
 
 /// Cancels at the thousandth call.
@@ -184,9 +174,8 @@ unsafe extern "C" fn asked_enough(context: *mut c_void) -> u8 {
 
 #[test]
 fn a_search_of_hours_ends_when_the_caller_cancels_it_and_keeps_its_tree() {
-    let corners: Vec<f32> = (0..9 * 3000u32)
-        .map(|i| (i.wrapping_mul(2_654_435_761) >> 16) as f32)
-        .collect();
+    let corners: Vec<f32> =
+        (0..9 * 3000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 16) as f32).collect();
     // SAFETY: `corners` has nine floats for each of the 3000 triangles.
     let tree = unsafe { bvh_tree_from_triangles(corners.as_ptr(), 3000, 0.0, 1.0) };
     let mut asked = AtomicU64::new(0);

@@ -107,9 +107,7 @@ pub unsafe extern "C" fn bvh_tracer_nearest_hits(
         let mut found = [Hit::MISS; BATCH];
         in_batches(rays, |start, rays| {
             let found = &mut found[..rays.len()];
-            tracer
-                .wide
-                .nearest_hits(rays, found, coherence(coherent));
+            tracer.wide.nearest_hits(rays, found, coherence(coherent));
             for (to, &Hit { t, object }) in hits[start..].iter_mut().zip(&*found) {
                 *to = BvhHit { t, object };
             }
@@ -139,9 +137,7 @@ pub unsafe extern "C" fn bvh_tracer_any_hits(
         let mut found = [false; BATCH];
         in_batches(rays, |start, rays| {
             let found = &mut found[..rays.len()];
-            tracer
-                .wide
-                .any_hits(rays, found, coherence(coherent));
+            tracer.wide.any_hits(rays, found, coherence(coherent));
             for (to, &hit) in hits[start..].iter_mut().zip(&*found) {
                 *to = u8::from(hit);
             }
@@ -171,16 +167,12 @@ pub unsafe extern "C" fn bvh_tracer_surface_hits(
         let mut found = [Hit::MISS; BATCH];
         in_batches(rays, |start, rays| {
             let found = &mut found[..rays.len()];
-            tracer
-                .wide
-                .nearest_hits(rays, found, coherence(coherent));
+            tracer.wide.nearest_hits(rays, found, coherence(coherent));
             for ((to, ray), &Hit { t, object }) in hits[start..].iter_mut().zip(rays).zip(&*found) {
                 let triangle = tracer.triangles.get(object as usize);
                 let weights = triangle.and_then(|triangle| triangle.barycentrics(ray));
                 let normal = triangle.and_then(Triangle::normal);
-                let [_, u, v] = weights
-                    .unwrap_or_default()
-                    .map(|weight| weight as f32);
+                let [_, u, v] = weights.unwrap_or_default().map(|weight| weight as f32);
                 *to = BvhSurfaceHit {
                     t,
                     object,
@@ -257,10 +249,7 @@ pub unsafe extern "C" fn bvh_tracer_closest_points(
         // SAFETY: `closest` points to `count` elements that nobody else uses during the call.
         let closest = unsafe { slice_mut("closest", closest, count) }?;
         let mut found = [None; BATCH];
-        for (points, closest) in points
-            .chunks(BATCH)
-            .zip(closest.chunks_mut(BATCH))
-        {
+        for (points, closest) in points.chunks(BATCH).zip(closest.chunks_mut(BATCH)) {
             let found = &mut found[..points.len()];
             tracer.wide.closest_points(points, found);
             for (to, closest) in closest.iter_mut().zip(&*found) {

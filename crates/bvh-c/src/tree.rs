@@ -98,10 +98,7 @@ pub unsafe extern "C" fn bvh_tree_for_rays(
         let triangles = unsafe { triangles_of(corners, count) }?;
         // SAFETY: `rays` points to 6 floats for each of `ray_count` rays.
         let rays = unsafe { slice("rays", rays.cast::<[[f32; 3]; 2]>(), ray_count) }?;
-        let rays: Vec<Segment> = rays
-            .iter()
-            .map(|&[from, to]| Segment { from, to })
-            .collect();
+        let rays: Vec<Segment> = rays.iter().map(|&[from, to]| Segment { from, to }).collect();
         // Without rays the search would be by area, which nobody asks for by this name.
         if rays.is_empty() {
             return Err(Failure::invalid("ray_count is 0; accepted: 1 or more"));
@@ -142,9 +139,7 @@ pub unsafe extern "C" fn bvh_tree_improve_until(
         // SAFETY: no other thread uses the tree during the call.
         let tree = unsafe { given_mut("tree", tree) }?;
         let until = Until { deadline: deadline(seconds)?, cancelled, context };
-        tree.owned
-            .improve(&until)
-            .map_err(Failure::invalid)?;
+        tree.owned.improve(&until).map_err(Failure::invalid)?;
         tree.nodes = nodes(&tree.owned);
         Ok(())
     })
@@ -193,9 +188,7 @@ pub unsafe extern "C" fn bvh_tree_cost(
             (BvhCost::Sah, Objective::Sah(SahConstants::default())),
             (BvhCost::Layout, Objective::Layout),
         ];
-        let found = kinds
-            .iter()
-            .find(|(number, _)| *number as u32 == kind);
+        let found = kinds.iter().find(|(number, _)| *number as u32 == kind);
         let Some((_, objective)) = found else {
             return Err(Failure::invalid(format!("kind is {kind}; accepted: 0 to 3")));
         };
@@ -329,17 +322,13 @@ fn check_references(references: f64) -> Result<(), Failure> {
 }
 
 fn found(objects: Objects, references: f64, seconds: f64) -> Result<BvhTree, Failure> {
-    OwnedTree::find(objects, references, &deadline(seconds)?)
-        .map(whole)
-        .map_err(Failure::invalid)
+    OwnedTree::find(objects, references, &deadline(seconds)?).map(whole).map_err(Failure::invalid)
 }
 
 fn loaded(path: &str, objects: Objects) -> Result<BvhTree, Failure> {
     let bytes = bvh_files::tree_file::read(path.as_ref())?;
     let loaded = OwnedTree::load(objects, &bytes);
-    loaded
-        .map(whole)
-        .map_err(|error| Failure::invalid(format!("{path}: {error}")))
+    loaded.map(whole).map_err(|error| Failure::invalid(format!("{path}: {error}")))
 }
 
 fn deadline(seconds: f64) -> Result<Deadline, Failure> {
@@ -377,6 +366,5 @@ unsafe fn triangles_of(first: *const f32, count: usize) -> Result<Objects, Failu
 unsafe fn text<'a>(path: *const c_char) -> Result<&'a str, Failure> {
     // SAFETY: a pointer that is not null points to a string that ends with a zero.
     let path = unsafe { CStr::from_ptr(given("path", path)?) };
-    path.to_str()
-        .map_err(|_| Failure::invalid("path is not UTF-8"))
+    path.to_str().map_err(|_| Failure::invalid("path is not UTF-8"))
 }

@@ -15,10 +15,7 @@ pub fn manual(command: Command) -> std::io::Result<Vec<u8>> {
     let mut page = Vec::new();
     clap_mangen::Man::new(command.clone()).render(&mut page)?;
     // A hidden command is not documented anywhere.
-    for part in command
-        .get_subcommands()
-        .filter(|part| !part.is_hide_set())
-    {
+    for part in command.get_subcommands().filter(|part| !part.is_hide_set()) {
         let name = format!("bvh {}", part.get_name());
         clap_mangen::Man::new(part.clone().display_name(name)).render(&mut page)?;
     }

@@ -60,26 +60,19 @@ struct Facts(Vec<(String, String, serde_json::Value)>);
 
 impl Facts {
     fn add(&mut self, name: &str, value: impl Display + Serialize) {
-        self.0
-            .push((name.into(), value.to_string(), json!(value)));
+        self.0.push((name.into(), value.to_string(), json!(value)));
     }
 }
 
 impl Display for Facts {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        self.0
-            .iter()
-            .try_for_each(|(name, text, _)| writeln!(f, "{name}: {text}"))
+        self.0.iter().try_for_each(|(name, text, _)| writeln!(f, "{name}: {text}"))
     }
 }
 
 impl Serialize for Facts {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(
-            self.0
-                .iter()
-                .map(|(name, _, value)| (name, value)),
-        )
+        serializer.collect_map(self.0.iter().map(|(name, _, value)| (name, value)))
     }
 }
 
@@ -91,11 +84,7 @@ pub fn inspect(args: &InspectArgs, interrupted: &AtomicBool) -> Result<(), Error
         output_file("--nodes", nodes, &NODES)?;
     }
     let rays = args.rays.as_deref().map(Rays::read).transpose()?;
-    let scene = args
-        .scene
-        .as_deref()
-        .map(|name| args.files.load(name))
-        .transpose()?;
+    let scene = args.scene.as_deref().map(|name| args.files.load(name)).transpose()?;
     if let (Some(named), Some(rays), Some(scene)) = (&args.rays, &rays, &scene) {
         rays.check(named, scene)?;
     }
@@ -169,9 +158,8 @@ fn describe(header: &Header, bytes: &[u8], facts: &mut Facts) {
         }
     };
     // The version follows the magic number.
-    let version = bytes[Header::MAGIC.len()..]
-        .first_chunk()
-        .map_or(0, |bytes| u32::from_le_bytes(*bytes));
+    let version =
+        bytes[Header::MAGIC.len()..].first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
     facts.add("version", version);
     facts.add("bytes", bytes.len());
     facts.add("method", &header.method);
@@ -211,10 +199,8 @@ fn measure(tree: &Bvh, facts: &mut Facts) {
 
 /// Lists sizes with their frequencies, such as `2 × 100, 3 × 7`.
 fn histogram(counts: &BTreeMap<u32, usize>) -> String {
-    let bins: Vec<String> = counts
-        .iter()
-        .map(|(size, count)| format!("{size} × {count}"))
-        .collect();
+    let bins: Vec<String> =
+        counts.iter().map(|(size, count)| format!("{size} × {count}")).collect();
     if bins.is_empty() { "none".into() } else { bins.join(", ") }
 }
 

@@ -99,12 +99,6 @@ mod tests {
             assert!(flags.split_whitespace().any(|flag| flag == "hg"), "{flags}");
         }
         let small = vec![1u8; LARGE / 2];
-        assert_eq!(
-            small
-                .iter()
-                .map(|&byte| u32::from(byte))
-                .sum::<u32>(),
-            2 << 20
-        );
+        assert_eq!(small.iter().map(|&byte| u32::from(byte)).sum::<u32>(), 2 << 20);
     }
 }

@@ -37,9 +37,7 @@ impl Rays {
         }
         let path = Path::new(named);
         input_file("--rays", path)?;
-        let extension = path
-            .extension()
-            .and_then(|extension| extension.to_str());
+        let extension = path.extension().and_then(|extension| extension.to_str());
         if let Some(format @ ("npy" | "csv" | "bin")) = extension {
             let invalid = |message| Error::Rays { file: path.to_owned(), message };
             let bytes = fs::read(path).map_err(|error| invalid(error.to_string()))?;
@@ -113,9 +111,7 @@ impl Rays {
         let density = self.density(scene, tree, Self::JUDGING, interrupted)?;
         let density = density.ok_or(Error::Unmeasured)?;
         let tests = Objective::Layout.cost_by(tree, &density);
-        let root = tree
-            .root_aabb()
-            .map_or(0.0, |root| density.measure(&root));
+        let root = tree.root_aabb().map_or(0.0, |root| density.measure(&root));
         Ok(if root > 0.0 { tests / root } else { 0.0 })
     }
 }

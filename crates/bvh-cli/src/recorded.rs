@@ -43,10 +43,7 @@ fn read_floats(bytes: &[u8]) -> Result<Vec<f32>, String> {
         // The caller rejects whole numbers that are no whole segments of 24 bytes.
         return Err(format!("there are {} bytes; accepted: a multiple of 24", bytes.len()));
     }
-    Ok(floats
-        .iter()
-        .map(|&float| f32::from_le_bytes(float))
-        .collect())
+    Ok(floats.iter().map(|&float| f32::from_le_bytes(float)).collect())
 }
 
 /// Reads lines of six numbers, separated by commas. The first line may be a header, which has no
@@ -57,10 +54,8 @@ fn read_csv(bytes: &[u8]) -> Result<Vec<f32>, String> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut numbers = Vec::new();
     for (line_number, line) in (1..).zip(text.lines()) {
-        let fields: Vec<Option<f32>> = line
-            .split(',')
-            .map(|field| field.trim().parse().ok())
-            .collect();
+        let fields: Vec<Option<f32>> =
+            line.split(',').map(|field| field.trim().parse().ok()).collect();
         let is_header = line_number == 1 && fields.iter().all(Option::is_none);
         if is_header || line.trim().is_empty() {
             continue;
@@ -101,10 +96,7 @@ fn read_npy(bytes: &[u8]) -> Result<Vec<f32>, String> {
     }
     // The length is right, so no bytes remain.
     let (doubles, _) = data.as_chunks();
-    Ok(doubles
-        .iter()
-        .map(|&double| f64::from_le_bytes(double) as f32)
-        .collect())
+    Ok(doubles.iter().map(|&double| f64::from_le_bytes(double) as f32).collect())
 }
 
 /// Splits an array of numpy into its header, without spaces, and its data. Returns `None` if the
@@ -129,10 +121,7 @@ fn split_npy(bytes: &[u8]) -> Option<(String, &[u8])> {
 fn npy_shape(header: &str) -> Option<Vec<usize>> {
     let (_, rest) = header.split_once("'shape':(")?;
     let (shape, _) = rest.split_once(')')?;
-    shape
-        .split(',')
-        .map(|length| length.parse().ok())
-        .collect()
+    shape.split(',').map(|length| length.parse().ok()).collect()
 }
 
 #[cfg(test)]
@@ -151,14 +140,8 @@ mod tests {
     #[test]
     fn segments_come_from_all_formats() {
         let numbers = [1.0, 2.0, 3.0, 4.0, 5.0, -6.5];
-        let single: Vec<u8> = numbers
-            .iter()
-            .flat_map(|&x| (x as f32).to_le_bytes())
-            .collect();
-        let double: Vec<u8> = numbers
-            .iter()
-            .flat_map(|&x: &f64| x.to_le_bytes())
-            .collect();
+        let single: Vec<u8> = numbers.iter().flat_map(|&x| (x as f32).to_le_bytes()).collect();
+        let double: Vec<u8> = numbers.iter().flat_map(|&x: &f64| x.to_le_bytes()).collect();
         for (format, bytes) in [
             ("bin", single.clone()),
             ("csv", b"x,y,z,to x,to y,to z\n1,2,3, 4,5,-6.5\n".to_vec()),

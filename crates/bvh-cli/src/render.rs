@@ -98,10 +98,8 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 }
 
 fn point(text: &str) -> Result<DVec3, String> {
-    let numbers: Option<Vec<f64>> = text
-        .split(',')
-        .map(|number| number.trim().parse().ok())
-        .collect();
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|number| number.trim().parse().ok()).collect();
     // Rays have f32 coordinates, so that larger numbers would overflow.
     match numbers.as_deref() {
         Some(&[x, y, z]) if DVec3::new(x, y, z).as_vec3().is_finite() => Ok(DVec3::new(x, y, z)),
@@ -187,9 +185,7 @@ fn write(args: &RenderArgs, film: &Film, rays_per_pixel: u32) -> Result<(), Erro
     } else {
         image::png(film.width, &film.pixels)
     };
-    let bytes = bytes
-        .map_err(io::Error::other)
-        .map_err(Error::io(&args.out, action))?;
+    let bytes = bytes.map_err(io::Error::other).map_err(Error::io(&args.out, action))?;
     Ok(files::write(&args.out, &bytes)?)
 }
 

@@ -83,11 +83,8 @@ fn tracked<T: Check>(
             Ok(value) => {
                 let mut out_of_range = value.faults();
                 // A removed list counts as empty, which is no separate fault.
-                out_of_range.retain(|late| {
-                    !faults
-                        .iter()
-                        .any(|fault| is_within(&fault.key, &late.key))
-                });
+                out_of_range
+                    .retain(|late| !faults.iter().any(|fault| is_within(&fault.key, &late.key)));
                 faults.extend(out_of_range.into_iter().map(Fault::from));
                 return (Some(value), faults);
             }
@@ -105,9 +102,7 @@ fn tracked<T: Check>(
             faults.push(Fault { key: key.clone(), rest });
         }
         // Elements of lists stay, because a removal would change the indices of later elements.
-        let innermost = steps
-            .iter()
-            .rposition(|step| matches!(step, Segment::Map { .. }));
+        let innermost = steps.iter().rposition(|step| matches!(step, Segment::Map { .. }));
         match innermost.and_then(|last| remove(&mut table, &steps[..=last])) {
             Some(name) => removed.push((key, name)),
             None => break,
@@ -137,13 +132,9 @@ fn remove(value: &mut Value, steps: &[&Segment]) -> Option<String> {
 ///
 /// Returns all faults, one per line.
 pub fn parse<T: DeserializeOwned + Check>(text: &str, file: &str) -> Result<T, String> {
-    let table: Table = text
-        .parse()
-        .map_err(|error: toml::de::Error| error.to_string())?;
+    let table: Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
     let (config, faults) = deserialize(table);
-    config
-        .filter(|_| faults.is_empty())
-        .ok_or_else(|| say(&faults, text, file, None))
+    config.filter(|_| faults.is_empty()).ok_or_else(|| say(&faults, text, file, None))
 }
 
 /// Deserialises a table.
@@ -160,9 +151,7 @@ pub fn tagged<T: Check>(
     accepted: impl FnOnce() -> String,
 ) -> Read<T> {
     let name = table.remove(tag);
-    let found = name
-        .as_ref()
-        .map_or("missing".into(), Value::to_string);
+    let found = name.as_ref().map_or("missing".into(), Value::to_string);
     let (known, faults) = match name {
         Some(Value::String(name)) => tracked(table, |deserializer| read(&name, deserializer)),
         _ => (Some(None), vec![]),
@@ -184,10 +173,8 @@ pub fn say(faults: &[Fault], text: &str, file: &str, above: Option<&str>) -> Str
         let replaced = replaced.filter(|_| replaced != of_table);
         replaced.or_else(|| start(&fault.key))
     };
-    let mut placed: Vec<(Option<usize>, &Fault)> = faults
-        .iter()
-        .map(|fault| (place(fault), fault))
-        .collect();
+    let mut placed: Vec<(Option<usize>, &Fault)> =
+        faults.iter().map(|fault| (place(fault), fault)).collect();
     // Stable: faults without a position stay first, in their order.
     placed.sort_by_key(|(position, _)| *position);
     let mut known = HashSet::new();
@@ -196,24 +183,16 @@ pub fn say(faults: &[Fault], text: &str, file: &str, above: Option<&str>) -> Str
         Some(position) => format!("line {}: {fault}", text[..position].matches('\n').count() + 1),
         None => fault.to_string(),
     };
-    placed
-        .into_iter()
-        .map(line)
-        .collect::<Vec<_>>()
-        .join(&format!("\n{file}: "))
+    placed.into_iter().map(line).collect::<Vec<_>>().join(&format!("\n{file}: "))
 }
 
 fn in_table(table: &DeTable, key: &str) -> Option<Range<usize>> {
-    table
-        .iter()
-        .find_map(|(name, value)| match key.strip_prefix(name.get_ref().as_ref())? {
-            "" => Some(name.span()),
-            // A name may be the beginning of another; only a dot or an index continues the path.
-            rest if rest.starts_with(['.', '[']) => {
-                Some(in_value(value, rest).unwrap_or(name.span()))
-            }
-            _ => None,
-        })
+    table.iter().find_map(|(name, value)| match key.strip_prefix(name.get_ref().as_ref())? {
+        "" => Some(name.span()),
+        // A name may be the beginning of another; only a dot or an index continues the path.
+        rest if rest.starts_with(['.', '[']) => Some(in_value(value, rest).unwrap_or(name.span())),
+        _ => None,
+    })
 }
 
 fn in_value(value: &Spanned<DeValue>, key: &str) -> Option<Range<usize>> {

@@ -64,10 +64,7 @@ pub trait Check {
 
     /// Rejects the first parameter that is out of range.
     fn check(&self) -> Result<(), OutOfRange> {
-        self.faults()
-            .into_iter()
-            .next()
-            .map_or(Ok(()), Err)
+        self.faults().into_iter().next().map_or(Ok(()), Err)
     }
 }
 
@@ -96,10 +93,7 @@ pub trait Accepts<V: ?Sized> {
 
     /// Rejects a value that is not accepted.
     fn check(&self, key: &str, found: &V) -> Result<(), OutOfRange> {
-        self.faults(key, found)
-            .into_iter()
-            .next()
-            .map_or(Ok(()), Err)
+        self.faults(key, found).into_iter().next().map_or(Ok(()), Err)
     }
 
     /// Returns the accepted values in words; `None` if the type accepts no others.
@@ -121,16 +115,12 @@ pub trait Keys {
 /// configuration.
 #[cfg(feature = "schema")]
 pub fn describe_accepted<C: Keys>(schema: &mut schemars::Schema) {
-    let Some(fields) = schema
-        .get_mut("properties")
-        .and_then(|fields| fields.as_object_mut())
+    let Some(fields) = schema.get_mut("properties").and_then(|fields| fields.as_object_mut())
     else {
         return;
     };
     for (key, accepted) in C::KEYS.iter().zip(C::accepted()) {
-        let description = fields
-            .get_mut(*key)
-            .and_then(|field| field.get_mut("description"));
+        let description = fields.get_mut(*key).and_then(|field| field.get_mut("description"));
         if let (Some(words), Some(text)) = (accepted, description) {
             *text = format!("{}\nAccepted: {words}.", text.as_str().unwrap_or_default()).into();
         }
@@ -143,11 +133,7 @@ pub struct Nested;
 
 impl<C: Check> Accepts<C> for Nested {
     fn faults(&self, key: &str, found: &C) -> Vec<OutOfRange> {
-        found
-            .faults()
-            .into_iter()
-            .map(|fault| fault.below(key))
-            .collect()
+        found.faults().into_iter().map(|fault| fault.below(key)).collect()
     }
 }
 
@@ -202,15 +188,8 @@ fn in_words<N: Display>(range: &impl RangeBounds<N>) -> String {
 /// Adds the faults of combinations of fields, except for fields that are out of range themselves.
 #[doc(hidden)]
 pub fn add_together(faults: &mut Vec<OutOfRange>, together: impl IntoIterator<Item = OutOfRange>) {
-    let known: Vec<String> = faults
-        .iter()
-        .map(|fault| fault.key.clone())
-        .collect();
-    faults.extend(
-        together
-            .into_iter()
-            .filter(|late| !known.contains(&late.key)),
-    );
+    let known: Vec<String> = faults.iter().map(|fault| fault.key.clone()).collect();
+    faults.extend(together.into_iter().filter(|late| !known.contains(&late.key)));
 }
 
 /// Declares a configuration: a struct with public fields, each

@@ -39,8 +39,7 @@ numbers!(u8, u16, u32, u64, usize, i32, i64, f32 by f32::is_finite, f64 by f64::
 impl<V: Numbers> Numbers for Option<V> {
     type Number = V::Number;
     fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &V::Number)) {
-        self.iter()
-            .for_each(|inner| inner.each(key, visit));
+        self.iter().for_each(|inner| inner.each(key, visit));
     }
 }
 
@@ -70,7 +69,6 @@ impl<V: Numbers> Numbers for Vec<V> {
 impl<V: Numbers> Numbers for BTreeMap<String, V> {
     type Number = V::Number;
     fn each(&self, key: &str, visit: &mut dyn FnMut(&str, &V::Number)) {
-        self.iter()
-            .for_each(|(name, inner)| inner.each(&format!("{key}.{name}"), visit));
+        self.iter().for_each(|(name, inner)| inner.each(&format!("{key}.{name}"), visit));
     }
 }

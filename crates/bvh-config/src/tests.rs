@@ -76,10 +76,6 @@ fn a_rejection_names_the_key_the_value_and_the_accepted_values() {
         inner: vec![Inner { limit: 0.0 }],
         ..Outer::default()
     };
-    let keys: Vec<String> = outer
-        .faults()
-        .into_iter()
-        .map(|fault| fault.key)
-        .collect();
+    let keys: Vec<String> = outer.faults().into_iter().map(|fault| fault.key).collect();
     assert_eq!(keys, ["part", "sizes[0]", "sizes[2]", "inner[0].limit", "sizes"]);
 }

@@ -22,16 +22,12 @@ impl Aabb {
     /// coordinate of any point makes the box NaN along that axis, and [`check`](Self::check)
     /// rejects such a box.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
-        points
-            .into_iter()
-            .fold(Self::EMPTY, Self::extended_to)
+        points.into_iter().fold(Self::EMPTY, Self::extended_to)
     }
 
     /// Returns the smallest box around `boxes`, or [`Aabb::EMPTY`] if there are none.
     pub fn union_of<'a>(boxes: impl IntoIterator<Item = &'a Self>) -> Self {
-        boxes
-            .into_iter()
-            .fold(Self::EMPTY, |union, aabb| union.union(aabb))
+        boxes.into_iter().fold(Self::EMPTY, |union, aabb| union.union(aabb))
     }
 
     /// Returns the smallest box around this box and `point`, with NaN along every axis where one of
@@ -182,8 +178,7 @@ pub struct InvalidBox {
 /// Rejects the first box that no object may have. O(n).
 pub fn check_boxes(boxes: &[Aabb]) -> Result<(), InvalidBox> {
     for (index, aabb) in boxes.iter().enumerate() {
-        aabb.check()
-            .map_err(|reason| InvalidBox { index, reason })?;
+        aabb.check().map_err(|reason| InvalidBox { index, reason })?;
     }
     Ok(())
 }

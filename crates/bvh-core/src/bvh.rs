@@ -144,10 +144,7 @@ impl Bvh {
 
     /// Returns the number of inner nodes. O(nodes).
     pub fn inner_count(&self) -> usize {
-        self.nodes
-            .iter()
-            .filter(|node| !node.is_leaf())
-            .count()
+        self.nodes.iter().filter(|node| !node.is_leaf()).count()
     }
 
     /// Returns the number of edges from the root to the deepest leaf; 0 for a tree of at most one
@@ -184,9 +181,7 @@ impl Bvh {
     /// # Panics
     /// Under the same conditions as [`refit`](Self::refit).
     pub fn is_tight(&self, boxes: &[Aabb]) -> bool {
-        self.nodes
-            .iter()
-            .all(|node| node.aabb == self.around(node, boxes))
+        self.nodes.iter().all(|node| node.aabb == self.around(node, boxes))
     }
 
     /// Returns the box around a node's children or objects.

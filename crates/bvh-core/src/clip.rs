@@ -56,9 +56,7 @@ impl Clip for Primitives {
     fn clip(&self, object: u32, region: &Aabb) -> Aabb {
         match self {
             Self::Triangles(triangles) => triangles.as_slice().clip(object, region),
-            Self::Spheres(spheres) => spheres[object as usize]
-                .aabb()
-                .intersection(region),
+            Self::Spheres(spheres) => spheres[object as usize].aabb().intersection(region),
         }
     }
 
@@ -110,14 +108,8 @@ fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
     if kept.is_empty() {
         return Aabb::EMPTY;
     }
-    let min = kept
-        .iter()
-        .fold(DVec3::INFINITY, |min, corner| min.min(*corner))
-        - error;
-    let max = kept
-        .iter()
-        .fold(DVec3::NEG_INFINITY, |max, corner| max.max(*corner))
-        + error;
+    let min = kept.iter().fold(DVec3::INFINITY, |min, corner| min.min(*corner)) - error;
+    let max = kept.iter().fold(DVec3::NEG_INFINITY, |max, corner| max.max(*corner)) + error;
     let part = Aabb {
         min: Vec3::from_array(min.to_array().map(round_down)),
         max: -Vec3::from_array((-max).to_array().map(round_down)),

@@ -54,15 +54,9 @@ pub fn collapse_leaves(tree: &Bvh, constants: &SahConstants) -> Bvh {
             Node::leaf(node.aabb, first as u32, (collapsed.prim_ids.len() - first) as u32)
         } else {
             let first = collapsed.nodes.len();
-            collapsed
-                .nodes
-                .extend_from_slice(&tree.nodes[node.children()]);
+            collapsed.nodes.extend_from_slice(&tree.nodes[node.children()]);
             // Reversed, so that the first child is popped first.
-            open.extend(
-                node.children()
-                    .zip(first..collapsed.nodes.len())
-                    .rev(),
-            );
+            open.extend(node.children().zip(first..collapsed.nodes.len()).rev());
             Node::inner(node.aabb, first as u32, node.children().len() as u32)
         };
     }
@@ -97,11 +91,7 @@ fn is_binary(tree: &Bvh) -> bool {
     // The most nodes that a valid tree can have are one leaf per reference and two children per
     // inner node. Once over the nodes of a large tree takes 50 ms.
     let has_most_nodes = tree.nodes.len() + 1 == 2 * tree.prim_ids.len();
-    has_most_nodes
-        || tree
-            .nodes
-            .iter()
-            .all(|node| node.is_leaf() || node.children().len() == 2)
+    has_most_nodes || tree.nodes.iter().all(|node| node.is_leaf() || node.children().len() == 2)
 }
 
 /// Returns the [`binary`] tree and updates `visits`, which has one number per node. A new node gets
@@ -127,9 +117,8 @@ pub(crate) fn binary_visited<'t>(tree: &'t Bvh, visits: &mut Vec<f32>) -> Cow<'t
             }
             [node] => (node.aabb, node.children()),
             several => {
-                let aabb = several
-                    .iter()
-                    .fold(Aabb::EMPTY, |around, node| around.union(&node.aabb));
+                let aabb =
+                    several.iter().fold(Aabb::EMPTY, |around, node| around.union(&node.aabb));
                 (aabb, siblings)
             }
         };
@@ -176,10 +165,8 @@ pub(crate) mod tests {
                 let first = tree.nodes.len() as u32;
                 let middle = start + 1 + (seed + node as u32) % (end - start - 1);
                 tree.nodes[node] = Node::inner(Aabb::EMPTY, first, 2);
-                tree.nodes
-                    .push(Node::leaf(Aabb::EMPTY, start, middle - start));
-                tree.nodes
-                    .push(Node::leaf(Aabb::EMPTY, middle, end - middle));
+                tree.nodes.push(Node::leaf(Aabb::EMPTY, start, middle - start));
+                tree.nodes.push(Node::leaf(Aabb::EMPTY, middle, end - middle));
             }
             node += 1;
         }

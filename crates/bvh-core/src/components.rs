@@ -81,10 +81,7 @@ impl<'a> RayComponents<'a> {
         t_max: Distances<'a>,
     ) -> Self {
         let count = origin[0].len();
-        let are_equal = origin
-            .iter()
-            .chain(&direction)
-            .all(|component| component.len() == count);
+        let are_equal = origin.iter().chain(&direction).all(|component| component.len() == count);
         assert!(
             are_equal && t_min.is_for(count) && t_max.is_for(count),
             "slices of the same length"

@@ -48,10 +48,7 @@ impl Objective {
     /// Returns the cost of `tree` under this objective with a measure of boxes instead of their
     /// half areas. O(nodes).
     pub fn cost_by(&self, tree: &Bvh, measure: &dyn Measure) -> f64 {
-        let root = tree
-            .nodes
-            .first()
-            .map_or(0.0, |root| size_by(measure, root));
+        let root = tree.nodes.first().map_or(0.0, |root| size_by(measure, root));
         match self {
             Self::InternalArea => internal_measure(tree, measure),
             Self::GoldsmithSalmon => {
@@ -369,9 +366,8 @@ mod tests {
     #[test]
     fn a_sum_does_not_depend_on_the_order_of_its_terms() {
         // The terms span 30 orders of magnitude, so plain sums would differ.
-        let terms: Vec<f64> = (0..1000)
-            .map(|i| f64::from(i * i % 997) * 10f64.powi(i % 30))
-            .collect();
+        let terms: Vec<f64> =
+            (0..1000).map(|i| f64::from(i * i % 997) * 10f64.powi(i % 30)).collect();
         let forwards: Sum = terms.iter().copied().collect();
         let backwards: Sum = terms.iter().rev().copied().collect();
         assert_eq!(forwards.value(), backwards.value());

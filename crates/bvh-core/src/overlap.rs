@@ -87,12 +87,8 @@ impl<'a> EndPointOverlap<'a> {
     pub fn new(tree: &'a Bvh, triangles: &'a [Triangle], constants: &SahConstants) -> Self {
         let mut below = alloc::vec![0..0; tree.nodes.len()];
         let mut positions = Vec::with_capacity(tree.prim_ids.len());
-        let mut stack: Vec<(usize, bool)> = tree
-            .nodes
-            .first()
-            .map(|_| (0, false))
-            .into_iter()
-            .collect();
+        let mut stack: Vec<(usize, bool)> =
+            tree.nodes.first().map(|_| (0, false)).into_iter().collect();
         // A node is on the stack twice: before its children, and again when they are done.
         while let Some((index, children_done)) = stack.pop() {
             let node = &tree.nodes[index];
@@ -156,9 +152,8 @@ impl<'a> EndPointOverlap<'a> {
         open.push(0);
         while let Some(index) = open.pop() {
             let node = &self.tree.nodes[index];
-            let is_above = positions
-                .iter()
-                .any(|(_, position)| self.below[index].contains(position));
+            let is_above =
+                positions.iter().any(|(_, position)| self.below[index].contains(position));
             if !is_above {
                 let inside = area_inside(&polygon, &node.aabb, &aabb, area);
                 if inside == 0.0 {

@@ -43,9 +43,8 @@ impl Polygon {
     /// Returns the whole area, not half of it.
     pub fn area(&self) -> f64 {
         let fan = self.corners().windows(2).skip(1);
-        let doubled: DVec3 = fan
-            .map(|pair| (pair[0] - self.corners[0]).cross(pair[1] - self.corners[0]))
-            .sum();
+        let doubled: DVec3 =
+            fan.map(|pair| (pair[0] - self.corners[0]).cross(pair[1] - self.corners[0])).sum();
         libm::sqrt(doubled.length_squared()) / 2.0
     }
 

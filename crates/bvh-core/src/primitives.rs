@@ -93,8 +93,5 @@ impl Primitives {
 }
 
 fn select<T: Copy>(objects: &[T], indices: &[usize]) -> Vec<T> {
-    indices
-        .iter()
-        .map(|&index| objects[index])
-        .collect()
+    indices.iter().map(|&index| objects[index]).collect()
 }

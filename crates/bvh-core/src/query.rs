@@ -83,9 +83,7 @@ impl Region for Frustum {
     /// may be accepted although no point of the box is inside.
     #[inline]
     fn may_meet(&self, aabb: &Aabb) -> bool {
-        self.planes
-            .iter()
-            .all(|plane| is_partly_inside(aabb, plane))
+        self.planes.iter().all(|plane| is_partly_inside(aabb, plane))
     }
 }
 
@@ -215,9 +213,7 @@ impl PartialOrd for Near {
 impl Ord for Near {
     /// Compares distances, then ids.
     fn cmp(&self, other: &Self) -> Ordering {
-        let by_distance = self
-            .distance_squared
-            .total_cmp(&other.distance_squared);
+        let by_distance = self.distance_squared.total_cmp(&other.distance_squared);
         by_distance.then(self.object.cmp(&other.object))
     }
 }

@@ -83,9 +83,7 @@ impl Ray {
     ) -> Self {
         let origin = origin.into();
         let direction = direction.into();
-        let inverse = (1.0 / direction.extend(1.0))
-            .max(Vec4::MIN)
-            .min(Vec4::MAX);
+        let inverse = (1.0 / direction.extend(1.0)).max(Vec4::MIN).min(Vec4::MAX);
         let sizes = inverse.abs();
         let least = sizes.x.min(sizes.y).min(sizes.z);
         // Adding 0 turns −0 into +0, so no kernel returns a distance of −0.

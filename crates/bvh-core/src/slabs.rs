@@ -95,9 +95,7 @@ impl Slabs {
 #[inline(always)]
 pub(crate) fn margin(ray: &Ray, bounds: &Aabb) -> Vec3 {
     let origin = ray.origin();
-    let reach = (bounds.min - origin)
-        .abs()
-        .max((bounds.max - origin).abs());
+    let reach = (bounds.min - origin).abs().max((bounds.max - origin).abs());
     // The second term covers the rounding of the sum with the origin. The third keeps the margin
     // above zero if the origin and the reach are zero.
     reach.max_element() * Slabs::MARGIN + origin.abs() * f32::EPSILON + f32::MIN_POSITIVE

@@ -67,11 +67,7 @@ impl Sphere {
 
 /// Rounds each coordinate downwards to a finite f32.
 fn lower_corner(corner: DVec3) -> Vec3 {
-    Vec3::from(
-        corner
-            .to_array()
-            .map(|x| round_down(x).max(f32::MIN)),
-    )
+    Vec3::from(corner.to_array().map(|x| round_down(x).max(f32::MIN)))
 }
 
 #[cfg(test)]

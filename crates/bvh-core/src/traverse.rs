@@ -99,11 +99,7 @@ pub fn any_hit<'t, P: Primitive>(tree: impl Into<BvhView<'t>>, objects: &[P], ra
     any_hit_by(
         tree,
         ray,
-        |id| {
-            objects[id as usize]
-                .intersect(&prepared, ray.t_max())
-                .is_some()
-        },
+        |id| objects[id as usize].intersect(&prepared, ray.t_max()).is_some(),
         &mut (),
     )
 }

@@ -89,11 +89,7 @@ impl Triangle {
     #[must_use]
     pub fn transformed(&self, transform: &Affine3A) -> Self {
         let transform = transform.as_daffine3();
-        Self(self.0.map(|corner| {
-            transform
-                .transform_point3(corner.as_dvec3())
-                .as_vec3()
-        }))
+        Self(self.0.map(|corner| transform.transform_point3(corner.as_dvec3()).as_vec3()))
     }
 
     /// Returns the unit vector perpendicular to the triangle, on the side from which its corners
@@ -103,10 +99,7 @@ impl Triangle {
         // Scaled edges have lengths of about one, so their product neither overflows nor
         // underflows.
         let scale = (b - a).abs().max((c - a).abs()).max_element();
-        ((b - a) / scale)
-            .cross((c - a) / scale)
-            .try_normalize()
-            .map(|normal| normal.as_vec3())
+        ((b - a) / scale).cross((c - a) / scale).try_normalize().map(|normal| normal.as_vec3())
     }
 
     /// Returns whether the corners coincide or are collinear, in real arithmetic. Such a triangle is

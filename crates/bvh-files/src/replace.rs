@@ -63,11 +63,7 @@ impl Reserved {
         let file = self.unfinished.as_file_mut();
         let end = file
             .seek(SeekFrom::Start(start))
-            .and_then(|_| {
-                sections
-                    .iter()
-                    .try_for_each(|section| file.write_all(section))
-            })
+            .and_then(|_| sections.iter().try_for_each(|section| file.write_all(section)))
             .and_then(|()| file.sync_data())
             .and_then(|()| file.stream_position())
             .map_err(WriteError::of(&self.path, "write the file"))?;
@@ -221,17 +217,9 @@ mod tests {
         // The next writer removes no kept file.
         write(&path, b"later").unwrap();
         let mut entries = fs::read_dir(folder.path()).unwrap().flatten();
-        let kept = entries
-            .find(|entry| entry.path() != path)
-            .unwrap()
-            .path();
+        let kept = entries.find(|entry| entry.path() != path).unwrap().path();
         assert_eq!(fs::read(&kept).unwrap(), b"found in hours");
-        assert!(
-            error
-                .to_string()
-                .contains(&kept.display().to_string()),
-            "{error}"
-        );
+        assert!(error.to_string().contains(&kept.display().to_string()), "{error}");
     }
 
     #[test]
@@ -243,10 +231,7 @@ mod tests {
         let error = reserved.write(b"found in hours").unwrap_err();
         assert_eq!(fs::read(&path).unwrap(), b"notes");
         let mut entries = fs::read_dir(folder.path()).unwrap().flatten();
-        let kept = entries
-            .find(|entry| entry.path() != path)
-            .unwrap()
-            .path();
+        let kept = entries.find(|entry| entry.path() != path).unwrap().path();
         assert_eq!(fs::read(&kept).unwrap(), b"found in hours");
         let name = kept.display().to_string();
         assert!(error.to_string().contains(&name), "{error}");

@@ -37,19 +37,14 @@ pub fn read(path: &Path) -> Result<Vec<u8>, TreeFileError> {
     let failed = |source| ReadError::Failed { path: path.to_owned(), source };
     let mut file = File::open(path).map_err(failed)?;
     let mut bytes = Vec::new();
-    file.by_ref()
-        .take(Header::BYTES as u64)
-        .read_to_end(&mut bytes)
-        .map_err(failed)?;
+    file.by_ref().take(Header::BYTES as u64).read_to_end(&mut bytes).map_err(failed)?;
     Header::of_file(&bytes, length).map_err(TreeFileError::of(path))?;
     let rest = length.saturating_sub(bytes.len() as u64);
     // An intact file may still be larger than the memory, which is an error and no abort.
     bytes
         .try_reserve_exact(rest as usize)
         .map_err(|_| failed(io::ErrorKind::OutOfMemory.into()))?;
-    file.take(rest)
-        .read_to_end(&mut bytes)
-        .map_err(failed)?;
+    file.take(rest).read_to_end(&mut bytes).map_err(failed)?;
     Ok(bytes)
 }
 

@@ -33,17 +33,14 @@ pub fn behind_links(path: &Path) -> PathBuf {
 /// Creates the unfinished file of the file at `path`, locked, in the same folder, and with the old
 /// file's permissions. `path` must lead through no link; [`behind_links`] returns such a path.
 pub fn create(path: &Path) -> Result<NamedTempFile, WriteError> {
-    let name = path
-        .file_name()
-        .filter(|_| path.is_file() || (!path.exists() && !path.is_symlink()));
+    let name =
+        path.file_name().filter(|_| path.is_file() || (!path.exists() && !path.is_symlink()));
     let Some(name) = name else {
         let error = io::Error::other("not a regular file");
         return Err(WriteError::of(path, "replace the file")(error));
     };
-    let folder = path
-        .parent()
-        .filter(|parent| !parent.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
+    let folder =
+        path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let name = name.to_string_lossy();
     let beginning: String = name.chars().take(LONGEST_PREFIX).collect();
     let prefix = format!("{beginning}.");
@@ -116,10 +113,7 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         symlink("second", at("first")).unwrap();
         symlink(at("missing"), at("second")).unwrap();
-        Reserved::new(&at("first"), 10)
-            .unwrap()
-            .write(b"new")
-            .unwrap();
+        Reserved::new(&at("first"), 10).unwrap().write(b"new").unwrap();
         assert_eq!(fs::read(at("missing")).unwrap(), b"new");
         assert!(at("first").is_symlink() && at("second").is_symlink());
         symlink("a", at("b")).unwrap();
@@ -132,10 +126,7 @@ mod tests {
     fn a_name_may_be_as_long_as_the_file_system_permits() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a".repeat(255));
-        Reserved::new(&path, 10)
-            .unwrap()
-            .write(b"new")
-            .unwrap();
+        Reserved::new(&path, 10).unwrap().write(b"new").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
     }
 
@@ -148,10 +139,7 @@ mod tests {
         fs::write(&path, "old").unwrap();
         for mode in [0o600, 0o666, 0o444] {
             fs::set_permissions(&path, PermissionsExt::from_mode(mode)).unwrap();
-            Reserved::new(&path, 10)
-                .unwrap()
-                .write(b"new")
-                .unwrap();
+            Reserved::new(&path, 10).unwrap().write(b"new").unwrap();
             assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, mode);
         }
     }

@@ -89,24 +89,16 @@ fn numbers<'py, T: Element>(
     let no_array =
         |error: PyErr| invalid(format!("{name}: {}; accepted: {accepted}", error.value(py)));
     // `asanyarray` keeps masked arrays, whose masks the conversion below would drop silently.
-    let given = numpy
-        .call_method1("asanyarray", (argument,))
-        .map_err(no_array)?;
+    let given = numpy.call_method1("asanyarray", (argument,)).map_err(no_array)?;
     check_elements(name, &numpy, &given, kinds)?;
     // In row order, aligned, and no subclass.
-    let array = numpy
-        .call_method1("require", (given, dtype, "CAE"))
-        .map_err(no_array)?;
+    let array = numpy.call_method1("require", (given, dtype, "CAE")).map_err(no_array)?;
     let array: PyReadonlyArrayDyn<T> = array.extract()?;
     assert!(array.is_c_contiguous(), "numpy converts to row order");
     if accepts(array.shape()) {
         return Ok(Array(array));
     }
-    let sizes: Vec<String> = array
-        .shape()
-        .iter()
-        .map(usize::to_string)
-        .collect();
+    let sizes: Vec<String> = array.shape().iter().map(usize::to_string).collect();
     Err(invalid(format!("{name} has shape ({}); accepted: {accepted}", sizes.join(", "))))
 }
 
@@ -176,13 +168,7 @@ pub fn mesh(
         invalid(format!("{found}; accepted: indices below {accepted}"))
     };
     let mut indices = Vec::with_capacity(faces.shape()[0]);
-    for (face, corners) in faces
-        .elements()?
-        .as_chunks::<3>()
-        .0
-        .iter()
-        .enumerate()
-    {
+    for (face, corners) in faces.elements()?.as_chunks::<3>().0.iter().enumerate() {
         let mut index = [0; 3];
         for (index, &corner) in index.iter_mut().zip(corners) {
             *index = u32::try_from(corner).map_err(|_| outside(face, corner))?;
@@ -343,9 +329,8 @@ impl<'py> RayArrays<'py> {
             Vectors::read("directions", directions, &accepted, |shape| shape == [rays, 3])?;
         let accepted = format!("a number or ({rays},), as origins");
         let mut limits = [vec![0.0], vec![f32::INFINITY]];
-        for ((name, argument), limit) in [("t_min", t_min), ("t_max", t_max)]
-            .into_iter()
-            .zip(&mut limits)
+        for ((name, argument), limit) in
+            [("t_min", t_min), ("t_max", t_max)].into_iter().zip(&mut limits)
         {
             if let Some(argument) = argument {
                 // An array without axes is one number for all rays.

@@ -33,9 +33,8 @@ pub fn locations<'py>(
     let mut points = Vec::with_capacity(3 * t.len());
     for ((&t, &triangle), &ray) in t.iter().zip(triangle).zip(ray) {
         let missing = || invalid("locations: accepted: hits of these rays and triangles");
-        let &[ax, ay, az, bx, by, bz, cx, cy, cz] = corners
-            .get(triangle as usize)
-            .ok_or_else(missing)?;
+        let &[ax, ay, az, bx, by, bz, cx, cy, cz] =
+            corners.get(triangle as usize).ok_or_else(missing)?;
         let a = DVec3::new(ax, ay, az);
         let normal = (DVec3::new(bx, by, bz) - a).cross(DVec3::new(cx, cy, cz) - a);
         let origin = DVec3::from(*origins.get(ray as usize).ok_or_else(missing)?);

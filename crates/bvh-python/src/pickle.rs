@@ -54,8 +54,5 @@ fn numbers<T: bytemuck::AnyBitPattern>(name: &str, bytes: &[u8]) -> PyResult<Vec
             "{name} has {found} bytes; accepted: multiples of {accepted}"
         )));
     }
-    Ok(bytes
-        .chunks(size_of::<T>())
-        .map(bytemuck::pod_read_unaligned)
-        .collect())
+    Ok(bytes.chunks(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect())
 }

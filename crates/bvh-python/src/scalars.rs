@@ -61,9 +61,8 @@ fn number<'py, T: FromPyObjectOwned<'py, Error = PyErr>>(
             return error;
         }
         // Python refuses to print a number of thousands of digits.
-        let found = argument
-            .str()
-            .map_or_else(|_| "too long to print".to_owned(), |text| text.to_string());
+        let found =
+            argument.str().map_or_else(|_| "too long to print".to_owned(), |text| text.to_string());
         invalid(format!("{name} is {found}; accepted: {accepted}"))
     })
 }

@@ -16,9 +16,7 @@ pub fn corners<'py>(
 ) -> PyResult<Bound<'py, PyArray3<f32>>> {
     let (triangles, faces) = mesh(NAMES, vertex_positions, triangle_indices)?;
     let numbers: Vec<f32> = bytemuck::cast_slice(&triangles).to_vec();
-    numbers
-        .into_pyarray(vertex_positions.py())
-        .reshape([faces.len(), 3, 3])
+    numbers.into_pyarray(vertex_positions.py()).reshape([faces.len(), 3, 3])
 }
 
 /// Converts the argument called `name` to `float32` and checks that its last axis has this length.

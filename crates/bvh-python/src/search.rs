@@ -34,10 +34,7 @@ struct Watch {
 
 impl Observer for Watch {
     fn cancelled(&self) -> bool {
-        let is_late = self
-            .deadline
-            .as_ref()
-            .is_some_and(Observer::cancelled);
+        let is_late = self.deadline.as_ref().is_some_and(Observer::cancelled);
         self.pressed.load(Relaxed) || is_late
     }
 
@@ -46,8 +43,7 @@ impl Observer for Watch {
     }
 
     fn event(&self, event: &Event) {
-        self.cost
-            .store(event.incumbent.to_bits(), Relaxed);
+        self.cost.store(event.incumbent.to_bits(), Relaxed);
     }
 }
 

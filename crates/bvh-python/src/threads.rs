@@ -14,9 +14,7 @@ static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 /// Returns the pool of this process. A child process has a copy of its parent's pool but none of its
 /// threads, for which it would wait forever; it gets a new pool.
 pub fn pool(_holds_interpreter: Python) -> PyResult<Arc<ThreadPool>> {
-    let mut pool = POOL
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner);
+    let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     let process = process::id();
     if let Some((owner, pool)) = pool.as_ref()
         && *owner == process

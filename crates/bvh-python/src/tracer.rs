@@ -72,24 +72,19 @@ impl Tracer {
         let (t, objects) = detached(py, || {
             let mut t = vec![0.0; source.rays];
             let mut objects = vec![0; source.rays];
-            let parts = t
-                .par_chunks_mut(BATCH)
-                .zip(objects.par_chunks_mut(BATCH));
-            parts
-                .enumerate()
-                .try_for_each(|(batch, (t, objects))| {
-                    let rays = batch_of(source, batch)?;
-                    let mut hits = [Hit::MISS; BATCH];
-                    let hits = &mut hits[..rays.len()];
-                    self.wide
-                        .nearest_hits(&rays, hits, coherence(coherent));
-                    for ((hit, t), object) in hits.iter().zip(t).zip(objects) {
-                        *t = hit.t;
-                        // The cast turns the id of a miss, `u32::MAX`, into −1.
-                        *object = hit.object as i32;
-                    }
-                    Ok(())
-                })?;
+            let parts = t.par_chunks_mut(BATCH).zip(objects.par_chunks_mut(BATCH));
+            parts.enumerate().try_for_each(|(batch, (t, objects))| {
+                let rays = batch_of(source, batch)?;
+                let mut hits = [Hit::MISS; BATCH];
+                let hits = &mut hits[..rays.len()];
+                self.wide.nearest_hits(&rays, hits, coherence(coherent));
+                for ((hit, t), object) in hits.iter().zip(t).zip(objects) {
+                    *t = hit.t;
+                    // The cast turns the id of a miss, `u32::MAX`, into −1.
+                    *object = hit.object as i32;
+                }
+                Ok(())
+            })?;
             Ok((t, objects))
         })?
         .map_err(invalid_ray)?;
@@ -117,8 +112,7 @@ impl Tracer {
         let hits = detached(py, || {
             answers(source.rays, false, |batch, hits| {
                 let rays = batch_of(source, batch)?;
-                self.wide
-                    .any_hits(&rays, hits, coherence(coherent));
+                self.wide.any_hits(&rays, hits, coherence(coherent));
                 Ok(())
             })
         })?
@@ -153,8 +147,7 @@ impl Tracer {
                     let rays = batch_of(source, batch)?;
                     let mut hits = Vec::with_capacity(2 * rays.len());
                     let mut counts = vec![0; rays.len()];
-                    self.wide
-                        .all_hits_of(&rays, &mut hits, &mut counts);
+                    self.wide.all_hits_of(&rays, &mut hits, &mut counts);
                     Ok((hits, counts))
                 })
                 .collect::<Result<_, _>>()?;
@@ -195,8 +188,7 @@ impl Tracer {
         let source = arrays.source()?;
         let counts = detached(py, || {
             answers(source.rays, 0, |batch, counts| {
-                self.wide
-                    .count_hits(&batch_of(source, batch)?, counts);
+                self.wide.count_hits(&batch_of(source, batch)?, counts);
                 Ok(())
             })
         })?
@@ -247,9 +239,7 @@ impl Tracer {
             }
             (positions, objects, distances)
         })?;
-        let closest = closest
-            .into_pyarray(py)
-            .reshape([points.len(), 3])?;
+        let closest = closest.into_pyarray(py).reshape([points.len(), 3])?;
         Ok((closest, objects.into_pyarray(py), distances.into_pyarray(py)))
     }
 
@@ -302,10 +292,8 @@ impl Tracer {
         let surfaces = detached(py, || {
             answers(source.rays, ([0.0; 2], [0.0; 3]), |batch, surfaces| {
                 let rays = batch_of(source, batch)?;
-                for ((ray, &index), surface) in rays
-                    .iter()
-                    .zip(&indices[batch * BATCH..])
-                    .zip(surfaces)
+                for ((ray, &index), surface) in
+                    rays.iter().zip(&indices[batch * BATCH..]).zip(surfaces)
                 {
                     if let Some(triangle) = triangles.get(index as usize) {
                         let [_, u, v] = triangle.barycentrics(ray).unwrap_or_default();
@@ -318,13 +306,8 @@ impl Tracer {
         .map_err(invalid_ray)?;
         let u: Vec<f64> = surfaces.iter().map(|([u, _], _)| *u).collect();
         let v: Vec<f64> = surfaces.iter().map(|([_, v], _)| *v).collect();
-        let normals: Vec<f32> = surfaces
-            .iter()
-            .flat_map(|(_, normal)| *normal)
-            .collect();
-        let normals = normals
-            .into_pyarray(py)
-            .reshape([source.rays, 3])?;
+        let normals: Vec<f32> = surfaces.iter().flat_map(|(_, normal)| *normal).collect();
+        let normals = normals.into_pyarray(py).reshape([source.rays, 3])?;
         Ok((u.into_pyarray(py), v.into_pyarray(py), normals))
     }
 
@@ -365,9 +348,7 @@ fn of_points<T: Clone + Send + Sync>(
     answer: impl Fn(&[Vec3], &mut [T]) + Sync,
 ) -> Vec<T> {
     let mut answers = vec![filler; points.len()];
-    let parts = points
-        .par_chunks(BATCH)
-        .zip(answers.par_chunks_mut(BATCH));
+    let parts = points.par_chunks(BATCH).zip(answers.par_chunks_mut(BATCH));
     parts.for_each(|(points, answers)| answer(points, answers));
     answers
 }

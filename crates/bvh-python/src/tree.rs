@@ -64,17 +64,12 @@ impl Tree {
     /// Returns the current tree.
     pub fn owned(&self) -> Arc<OwnedTree> {
         // A poisoned lock still has a valid tree, because trees are replaced as a whole.
-        self.owned
-            .read()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone()
+        self.owned.read().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Returns the tree to change or to replace.
     fn locked(&self, _holds_interpreter: Python) -> RwLockWriteGuard<'_, Arc<OwnedTree>> {
-        self.owned
-            .write()
-            .unwrap_or_else(PoisonError::into_inner)
+        self.owned.write().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -259,12 +254,8 @@ impl Tree {
         let point = "3f4";
         let number = "u4";
         let fields = [("min", point), ("first", number), ("max", point), ("count", number)];
-        let kind = py
-            .import("numpy")?
-            .call_method1("dtype", (fields.to_vec(),))?;
-        words
-            .into_pyarray(py)
-            .call_method1("view", (kind,))
+        let kind = py.import("numpy")?.call_method1("dtype", (fields.to_vec(),))?;
+        words.into_pyarray(py).call_method1("view", (kind,))
     }
 
     /// Returns the object ids, to which leaves refer by position.
@@ -295,9 +286,7 @@ impl Tree {
     #[staticmethod]
     fn _restore(shape: &str, objects: &[u8], tree: &[u8], faces: Option<&[u8]>) -> PyResult<Self> {
         let owned = pickle::tree(shape, objects, tree)?;
-        let faces = faces
-            .map(|faces| pickle::faces(&owned, faces))
-            .transpose()?;
+        let faces = faces.map(|faces| pickle::faces(&owned, faces)).transpose()?;
         Ok(Self { faces: faces.map(Arc::new), ..Self::new(owned) })
     }
 

@@ -131,18 +131,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let old_scene = bake_instances(parts.clone(), world.instances.clone(), Duration::ZERO)?;
     let (brightness, recorded) = world.frame(&old_scene, &first)?;
     println!("first frame: {} rays, brightness {brightness:.3}", recorded.len());
-    let segments: Vec<Segment> = recorded
-        .iter()
-        .map(|traced| traced.segment)
-        .collect();
+    let segments: Vec<Segment> = recorded.iter().map(|traced| traced.segment).collect();
     let (outcome, density) = bake_for_rays(&triangles, &segments, time)?;
     let for_rays = WideBvh::for_rays(&outcome.tree, &triangles, &density.visits(&outcome.tree))?;
 
     // The camera and the flag move on. The same frame by both trees is the same picture.
-    for corner in world.parts[2]
-        .iter_mut()
-        .flat_map(|triangle| &mut triangle.0)
-    {
+    for corner in world.parts[2].iter_mut().flat_map(|triangle| &mut triangle.0) {
         corner.y += 0.1 * (0.4 + corner.x).sin();
     }
     parts[2].refit(&world.parts[2])?;

@@ -121,30 +121,21 @@ impl Scene {
     }
 
     fn load_whole(name: &str, outside: OutsideFiles) -> Result<Self, SceneError> {
-        if let Some(stand_in) = stand_ins::STAND_INS
-            .iter()
-            .find(|scene| scene.name == name)
-        {
+        if let Some(stand_in) = stand_ins::STAND_INS.iter().find(|scene| scene.name == name) {
             return Ok(Self::new(
                 name,
                 SceneKind::StandIn,
                 Primitives::Triangles((stand_in.triangles)()),
             ));
         }
-        if let Some(&(_, count)) = SPHERES
-            .iter()
-            .find(|(spheres, _)| *spheres == name)
-        {
+        if let Some(&(_, count)) = SPHERES.iter().find(|(spheres, _)| *spheres == name) {
             return Ok(Self::new(
                 name,
                 SceneKind::Procedural,
                 Primitives::Spheres(spheres::spheres(count)),
             ));
         }
-        let path = match FETCHED
-            .iter()
-            .find(|(fetched, _)| *fetched == name)
-        {
+        let path = match FETCHED.iter().find(|(fetched, _)| *fetched == name) {
             Some((_, package)) => fetched_path(name).ok_or_else(|| {
                 let message = format!(
                     "not fetched yet; run scripts/fetch-scenes, which copies it from the Rust \
@@ -164,9 +155,7 @@ impl Scene {
             .file_stem()
             .map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());
         // The remark names the scene, because an experiment loads many.
-        let remark = mesh
-            .remark()
-            .map(|remark| format!("scene {stem}: {remark}"));
+        let remark = mesh.remark().map(|remark| format!("scene {stem}: {remark}"));
         Ok(Self {
             remark,
             ..Self::new(&stem, SceneKind::File, Primitives::Triangles(mesh.triangles))
@@ -215,9 +204,7 @@ impl Scene {
             let message = format!("a subset has 1 to {all} of this scene's objects");
             return Err(SceneError { name, message });
         }
-        let primitives = self
-            .primitives
-            .select(&subset.choose(&self.boxes));
+        let primitives = self.primitives.select(&subset.choose(&self.boxes));
         Ok(Self { remark: self.remark, ..Self::new(&name, self.kind, primitives) })
     }
 
@@ -240,12 +227,8 @@ impl Scene {
 
     /// Returns a hash of all boxes, which identifies the scene in results.
     pub fn checksum(&self) -> u64 {
-        let coordinates = self.boxes.iter().flat_map(|b| {
-            b.min
-                .to_array()
-                .into_iter()
-                .chain(b.max.to_array())
-        });
+        let coordinates =
+            self.boxes.iter().flat_map(|b| b.min.to_array().into_iter().chain(b.max.to_array()));
         fnv1a(coordinates.flat_map(f32::to_le_bytes))
     }
 }
@@ -268,12 +251,8 @@ fn generator(id: &str) -> Option<stiff::Generator> {
 
 /// Lists the accepted names, as a part of an error message.
 fn known_scenes() -> String {
-    let names = stand_ins::STAND_INS
-        .iter()
-        .map(|scene| scene.name);
-    let names = names
-        .chain(SPHERES.map(|(name, _)| name))
-        .chain(FETCHED.map(|(name, _)| name));
+    let names = stand_ins::STAND_INS.iter().map(|scene| scene.name);
+    let names = names.chain(SPHERES.map(|(name, _)| name)).chain(FETCHED.map(|(name, _)| name));
     format!(
         "accepted: {}, the path of an OBJ, PLY, STL or glTF file, either of them with `:COUNT`, \
          `:random:COUNT:SEED` or `:cluster:COUNT:SEED` for a subset, or city, forest, terrain or a \
@@ -301,13 +280,7 @@ mod tests {
         assert_eq!((scene.name.as_str(), scene.boxes.len()), ("spheres75:30", 30));
         assert!((1..30).all(|i| scene.boxes[i] != scene.boxes[i - 1]));
         for wrong in ["spheres75:0", "spheres75:76"] {
-            assert!(
-                Scene::load(wrong)
-                    .unwrap_err()
-                    .to_string()
-                    .contains("1 to 75"),
-                "{wrong}"
-            );
+            assert!(Scene::load(wrong).unwrap_err().to_string().contains("1 to 75"), "{wrong}");
         }
     }
 

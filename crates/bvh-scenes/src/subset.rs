@@ -52,15 +52,10 @@ impl Subset {
     pub fn choose(&self, boxes: &[Aabb]) -> Vec<usize> {
         let all = boxes.len();
         let mut chosen = match *self {
-            Self::Spaced(count) => (0..count)
-                .map(|index| index * all / count)
-                .collect(),
+            Self::Spaced(count) => (0..count).map(|index| index * all / count).collect(),
             Self::Random(count, seed) => {
                 let mut objects: Vec<usize> = (0..all).collect();
-                objects
-                    .partial_shuffle(&mut Stream::seed_from_u64(seed), count)
-                    .0
-                    .to_vec()
+                objects.partial_shuffle(&mut Stream::seed_from_u64(seed), count).0.to_vec()
             }
             Self::Cluster(count, seed) => {
                 let middle = Stream::seed_from_u64(seed).random_range(0..all);
@@ -102,19 +97,13 @@ pub fn expand(name: &str) -> Vec<String> {
     let mut names = vec![String::new()];
     for (index, word) in name.split(':').enumerate() {
         let words: Vec<String> = match range(word).filter(|_| index > 0) {
-            Some((low, high)) => (low..=high)
-                .map(|number| number.to_string())
-                .collect(),
+            Some((low, high)) => (low..=high).map(|number| number.to_string()).collect(),
             None => vec![word.to_owned()],
         };
         let colon = if index > 0 { ":" } else { "" };
         let mut longer = Vec::new();
         for name in &names {
-            longer.extend(
-                words
-                    .iter()
-                    .map(|word| format!("{name}{colon}{word}")),
-            );
+            longer.extend(words.iter().map(|word| format!("{name}{colon}{word}")));
         }
         names = longer;
     }
@@ -160,10 +149,7 @@ mod tests {
             assert!(random.is_sorted_by(|a, b| a < b) && random.len() == 30);
             let cluster = Subset::Cluster(9, seed).choose(&boxes);
             assert!(
-                cluster
-                    .windows(2)
-                    .all(|pair| pair[1] == pair[0] + 1)
-                    && cluster.len() == 9,
+                cluster.windows(2).all(|pair| pair[1] == pair[0] + 1) && cluster.len() == 9,
                 "{cluster:?}"
             );
         }

@@ -14,9 +14,7 @@ use std::path::Path;
 /// [valid](validate_references) over these objects.
 pub fn load(path: &Path, scene: &Scene) -> Result<(Bvh, Header), TreeFileError> {
     let bytes = read(path)?;
-    let file = open(path, &bytes)?
-        .for_boxes(&scene.boxes)
-        .map_err(TreeFileError::of(path))?;
+    let file = open(path, &bytes)?.for_boxes(&scene.boxes).map_err(TreeFileError::of(path))?;
     let tree = file.tree().map_err(TreeFileError::of(path))?;
     let header = file.header().clone();
     // The checksums prove only that the file is intact: a forged tree can have right ones.

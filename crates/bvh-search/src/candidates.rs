@@ -47,10 +47,7 @@ impl SplitRule for Randomised {
     /// Draws before the node is scanned, so the scan finds only the candidates that the draw can
     /// choose.
     fn shortlist(&mut self) -> Shortlist {
-        if self
-            .noise
-            .is_some_and(|noise| !self.rng.random_bool(noise))
-        {
+        if self.noise.is_some_and(|noise| !self.rng.random_bool(noise)) {
             return Shortlist::Best;
         }
         match self.candidates {

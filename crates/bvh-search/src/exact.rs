@@ -68,9 +68,7 @@ pub(crate) fn instead(
 /// of divisions, including divisions with an empty part. `None` for more than [`MOST_OBJECTS`], and
 /// for two objects or fewer, which have only one tree.
 pub(crate) fn most_work_of_tiny(objects: usize) -> Option<u64> {
-    (3..=MOST_OBJECTS)
-        .contains(&objects)
-        .then(|| 3u64.pow(objects as u32) / 2)
+    (3..=MOST_OBJECTS).contains(&objects).then(|| 3u64.pow(objects as u32) / 2)
 }
 
 /// Builds the tree of the best divisions, over one object or more.
@@ -84,8 +82,7 @@ fn tree(boxes: &[Aabb], subsets: &Subsets) -> Bvh {
         } else {
             let first = tree.nodes.len();
             tree.nodes[node] = Node::inner(Aabb::EMPTY, first as u32, 2);
-            tree.nodes
-                .extend([Node::leaf(Aabb::EMPTY, 0, 1); 2]);
+            tree.nodes.extend([Node::leaf(Aabb::EMPTY, 0, 1); 2]);
             let [left, right] = subsets.division(set);
             // The left side is popped first, so objects are in leaf order from left to right.
             stack.extend([(first + 1, right), (first, left)]);
@@ -125,9 +122,8 @@ mod tests {
             for salt in 0..6 {
                 let boxes = scatter(100)[10 * salt..10 * salt + n].to_vec();
                 let measures = [None, density(&boxes)];
-                for measure in measures
-                    .iter()
-                    .map(|of| of.as_ref().map(|density| density as &dyn Measure))
+                for measure in
+                    measures.iter().map(|of| of.as_ref().map(|density| density as &dyn Measure))
                 {
                     let problem = Problem { measure, ..Problem::new(&boxes) };
                     let found = solve(&Config {}, &problem, 1, Budget::UNLIMITED, &()).unwrap();

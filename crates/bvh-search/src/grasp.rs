@@ -62,8 +62,7 @@ impl Config {
     ) -> Result<(), BuildError> {
         let Self { candidates, noise, .. } = *self;
         let mut rule = Randomised::new(candidates, noise, stream(seed, trial));
-        self.construction
-            .construct(scene, measure, &mut rule, workspace, tree, watch)
+        self.construction.construct(scene, measure, &mut rule, workspace, tree, watch)
     }
 
     /// Improves a tree to a local optimum; leaves it unchanged if the observer cancels first.
@@ -90,9 +89,7 @@ impl Config {
         observer: &dyn Observer,
     ) -> Result<u64, SearchError> {
         let mut working = Working::from_bvh(tree, metric.internal(tree), metric)?;
-        let Tally { work, .. } = self
-            .local_search
-            .improve(&mut working, Quota::ENDLESS, observer);
+        let Tally { work, .. } = self.local_search.improve(&mut working, Quota::ENDLESS, observer);
         if !observer.cancelled() {
             *tree = working.to_bvh();
         }
@@ -149,9 +146,8 @@ impl Search for Config {
         let mut next = 0;
         let mut best = Bvh::default();
         while next < self.trials && run.stopped().is_none() {
-            let end = self
-                .trials
-                .min(next.saturating_add(run.evaluations_left(construction).min(most)));
+            let end =
+                self.trials.min(next.saturating_add(run.evaluations_left(construction).min(most)));
             // Only trees below the incumbent, and below the trials before them, can win, so only
             // these are kept.
             let limit = run.incumbent();
@@ -190,12 +186,8 @@ impl Search for Config {
 /// Returns whether no trial before this one in its batch costs as little, as far as their `costs`
 /// are known. A later trial may be dropped, because the budget ends before it.
 fn can_win(costs: &Mutex<Vec<(usize, f64)>>, index: usize, cost: f64) -> bool {
-    let mut costs = costs
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner);
-    let loses = costs
-        .iter()
-        .any(|&(other, of_other)| other < index && of_other <= cost);
+    let mut costs = costs.lock().unwrap_or_else(PoisonError::into_inner);
+    let loses = costs.iter().any(|&(other, of_other)| other < index && of_other <= cost);
     costs.push((index, cost));
     !loses
 }
@@ -233,19 +225,15 @@ mod tests {
     #[test]
     fn rules_that_leave_no_choice_construct_the_greedy_tree() {
         let boxes = scatter(700);
-        let greedy = muller_fellner::Config::default()
-            .build(&boxes)
-            .unwrap();
+        let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
         let every = [
             Candidates::AxisBest,
             Candidates::KBest(1),
             Candidates::KBest(9),
             Candidates::Within(0.0),
         ];
-        for (candidates, noise) in every
-            .map(|candidates| (candidates, Some(0.0)))
-            .into_iter()
-            .chain([
+        for (candidates, noise) in
+            every.map(|candidates| (candidates, Some(0.0))).into_iter().chain([
                 (Candidates::KBest(1), None),
                 (Candidates::KBest(1), Some(1.0)),
                 (Candidates::Within(0.0), None),
@@ -277,10 +265,7 @@ mod tests {
         let boxes = scatter(500);
         let run = |local_search, threads: usize, max_work| {
             let config = Config { trials: 20, local_search, ..Config::default() };
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .unwrap();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let budget = Budget { max_work, ..Budget::UNLIMITED };
             pool.install(|| solve(&config, &Problem::new(&boxes), 3, budget, &()).unwrap())
         };
@@ -299,11 +284,8 @@ mod tests {
             let three = cut(3);
             assert_eq!((&one.tree, &one.history), (&three.tree, &three.history));
             // The budget ends the search with the first trial that exceeds it.
-            let within = improved
-                .history
-                .iter()
-                .take_while(|event| event.work < improved.work / 3)
-                .count();
+            let within =
+                improved.history.iter().take_while(|event| event.work < improved.work / 3).count();
             assert_eq!(one.history, improved.history[..=within]);
         }
     }
@@ -329,15 +311,9 @@ mod tests {
     fn noise_makes_trials_differ() {
         let boxes = scatter(500);
         for config in configs() {
-            let history = solve(&config, &Problem::new(&boxes), 3, Budget::UNLIMITED, &())
-                .unwrap()
-                .history;
-            assert!(
-                history
-                    .iter()
-                    .any(|event| event.cost != history[0].cost),
-                "{config:?}"
-            );
+            let history =
+                solve(&config, &Problem::new(&boxes), 3, Budget::UNLIMITED, &()).unwrap().history;
+            assert!(history.iter().any(|event| event.cost != history[0].cost), "{config:?}");
         }
     }
 }

@@ -101,9 +101,7 @@ fn one_reference_per_leaf(tree: &Bvh, problem: &Problem) -> Bvh {
         }
         index += 1;
     }
-    let split = problem
-        .splits
-        .filter(|_| tree.prim_ids.len() > problem.boxes.len());
+    let split = problem.splits.filter(|_| tree.prim_ids.len() > problem.boxes.len());
     // Children come after their parents, so a pass from the back makes boxes tight.
     for index in (0..single.nodes.len()).rev() {
         let node = single.nodes[index];
@@ -116,9 +114,7 @@ fn one_reference_per_leaf(tree: &Bvh, problem: &Problem) -> Bvh {
                 problem.boxes[single.prim_ids[first as usize] as usize]
             }
             (NodeKind::Leaf { first, .. }, Some(splits)) => {
-                let part = splits
-                    .objects
-                    .clip(single.prim_ids[first as usize], &node.aabb);
+                let part = splits.objects.clip(single.prim_ids[first as usize], &node.aabb);
                 // A degenerate object may have no part in its leaf. The leaf's box is then as tight
                 // as known.
                 if part == Aabb::EMPTY { node.aabb } else { part }
@@ -155,7 +151,6 @@ impl From<'_> {
         run: &mut Run,
     ) -> Found {
         let tree = Kept::new(self.tree.clone(), problem);
-        self.config
-            .improved(tree, None, metric, problem, seed, run)
+        self.config.improved(tree, None, metric, problem, seed, run)
     }
 }

@@ -46,10 +46,7 @@ fn collect<T: Send>(count: usize, most: usize, task: impl Fn(usize) -> T + Sync)
     run_each(count, most, &|number| *lock(&results[number]) = Some(task(number)));
     results
         .into_iter()
-        .filter_map(|slot| {
-            slot.into_inner()
-                .unwrap_or_else(PoisonError::into_inner)
-        })
+        .filter_map(|slot| slot.into_inner().unwrap_or_else(PoisonError::into_inner))
         .collect()
 }
 
@@ -59,10 +56,7 @@ fn run_each(count: usize, most: usize, task: &(dyn Fn(usize) + Sync)) {
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
-        (0..count)
-            .into_par_iter()
-            .with_max_len(most)
-            .for_each(task);
+        (0..count).into_par_iter().with_max_len(most).for_each(task);
     }
     #[cfg(not(feature = "rayon"))]
     {
@@ -78,9 +72,7 @@ fn slots<T>(contents: impl Iterator<Item = Option<T>>) -> Vec<Mutex<Option<T>>> 
 
 /// Locks a place. Its content is whole even where a task panicked.
 fn lock<T>(place: &Mutex<T>) -> MutexGuard<'_, T> {
-    place
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner)
+    place.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Calls two functions. Each may run on another thread.

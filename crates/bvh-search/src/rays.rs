@@ -215,9 +215,7 @@ mod tests {
         assert_eq!(guarded.segments(), 400);
         assert!(guarded.entries(&last) > 1.0, "{}", guarded.entries(&last));
         let segments = from_anywhere(&triangles, &boxes, 1000);
-        let ends = segments
-            .iter()
-            .map(|segment| Vec3::from(segment.to));
+        let ends = segments.iter().map(|segment| Vec3::from(segment.to));
         let is_on_a_wall = |end: &Vec3| {
             (end.x - end.x.round()).abs() < 1e-4
                 && end.y + end.z <= 9.0
@@ -246,9 +244,7 @@ mod tests {
         let most = RayDensity::MOST_SEGMENTS;
         let recorded = vec![Segment { from: [-1.0, 1.0, 1.0], to: [0.0, 1.0, 1.0] }; most];
         let shapes = Primitives::Triangles(triangles);
-        let segments = ray_density(&boxes, Some(&shapes), &recorded)
-            .unwrap()
-            .segments() as usize;
+        let segments = ray_density(&boxes, Some(&shapes), &recorded).unwrap().segments() as usize;
         // Every second one is recorded.
         assert_eq!(segments, most / 2 + most / 6);
     }
@@ -261,9 +257,7 @@ mod tests {
         let shapes = Primitives::Triangles(triangles);
         let expected = ray_density(&boxes, Some(&shapes), &recorded).unwrap();
         // The order of its objects makes this tree another one than the greedy tree.
-        let tree = median_cut::Config::default()
-            .build(&boxes)
-            .unwrap();
+        let tree = median_cut::Config::default().build(&boxes).unwrap();
         let polls = Cell::new(0);
         let over_after = |most: usize| {
             polls.set(0);

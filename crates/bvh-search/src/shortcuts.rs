@@ -29,10 +29,7 @@ impl Facts {
         let sorted = Presorted::new(boxes)?;
         Ok(Self {
             objects: boxes.len(),
-            repeated: boxes
-                .windows(2)
-                .filter(|pair| pair[0] == pair[1])
-                .count(),
+            repeated: boxes.windows(2).filter(|pair| pair[0] == pair[1]).count(),
             bounds: Aabb::union_of(boxes),
             flat: Presorted::without_area(boxes),
             in_order: sorted.in_order(),

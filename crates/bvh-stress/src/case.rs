@@ -146,18 +146,10 @@ impl SceneCase {
             Method::Exact(_) => return vec![(few.0.min(EXACT_OBJECTS), few.1)],
             builder if is_builder(builder) => Some((self.sizes[effort.builders as usize], few.1)),
             _ => effort.larger.map(|larger| {
-                (
-                    larger
-                        .objects
-                        .min(self.sizes[Size::Many as usize]),
-                    larger.work_per_object,
-                )
+                (larger.objects.min(self.sizes[Size::Many as usize]), larger.work_per_object)
             }),
         };
-        [few]
-            .into_iter()
-            .chain(further.filter(|further| further.0 > few.0))
-            .collect()
+        [few].into_iter().chain(further.filter(|further| further.0 > few.0)).collect()
     }
 }
 
@@ -166,10 +158,8 @@ pub fn methods() -> Vec<(String, Method)> {
     use bvh_build::{goldsmith_salmon, median_cut, muller_fellner, ploc, top_down::AreaOnly};
     use goldsmith_salmon::Descent;
     use muller_fellner::Heuristic;
-    let mut methods: Vec<(String, Method)> = Method::all()
-        .into_iter()
-        .map(|method| (method.name().to_owned(), method))
-        .collect();
+    let mut methods: Vec<(String, Method)> =
+        Method::all().into_iter().map(|method| (method.name().to_owned(), method)).collect();
     let readings = [
         AreaOnly::Sum,
         AreaOnly::InnerSum,
@@ -178,10 +168,8 @@ pub fn methods() -> Vec<(String, Method)> {
         AreaOnly::Difference,
         AreaOnly::Product,
     ];
-    for heuristic in readings
-        .map(Heuristic::AreaOnly)
-        .into_iter()
-        .chain([Heuristic::AreaTimesPower(0.9)])
+    for heuristic in
+        readings.map(Heuristic::AreaOnly).into_iter().chain([Heuristic::AreaTimesPower(0.9)])
     {
         let config = muller_fellner::Config { heuristic, ..Default::default() };
         methods.push((format!("muller_fellner, {heuristic:?}"), Method::MullerFellner(config)));

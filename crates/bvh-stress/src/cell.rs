@@ -34,10 +34,7 @@ impl Cell {
         match (self, other) {
             (Self::Broken(broken), _) => Self::Broken(broken),
             (Self::Kept(first), Self::Kept(other)) => {
-                let note = [first.note.as_str(), &other.note]
-                    .join(" ")
-                    .trim()
-                    .to_owned();
+                let note = [first.note.as_str(), &other.note].join(" ").trim().to_owned();
                 Self::Kept(Examined { note, ..first })
             }
             (_, other) => other,
@@ -49,31 +46,29 @@ impl Case {
     /// Performs all checks of a method; `None` if there are none. The result reports the largest
     /// size of the scene.
     pub fn of_method(&self, method: &Method, effort: &Effort) -> Option<Cell> {
-        let cells = self
-            .checks
-            .iter()
-            .filter_map(|check| match check {
-                Check::Scene(scene) => {
-                    let extents = scene.extents(method, effort).into_iter();
-                    let examined = extents.map(|(objects, work)| {
-                        examine::examine(self, scene, method, objects, work)
-                    });
-                    let all: Result<Vec<Examined>, Broken> = examined.collect();
-                    Some(all.map_or_else(Cell::Broken, |mut all| {
+        let cells = self.checks.iter().filter_map(|check| match check {
+            Check::Scene(scene) => {
+                let extents = scene.extents(method, effort).into_iter();
+                let examined = extents
+                    .map(|(objects, work)| examine::examine(self, scene, method, objects, work));
+                let all: Result<Vec<Examined>, Broken> = examined.collect();
+                Some(
+                    all.map_or_else(Cell::Broken, |mut all| {
                         Cell::Kept(all.pop().unwrap_or_default())
-                    }))
-                }
-                Check::Refused { boxes, object } => {
-                    // The exact method rejects larger scenes for their size first.
-                    let objects = if let Method::Exact(_) = method { EXACT_OBJECTS } else { 100 };
-                    let refused = examine::refuses(method, &boxes(objects), *object);
-                    Some(refused.map_or_else(Cell::Broken, Cell::Refused))
-                }
-                Check::Method(name, check) => name
-                    .is_none_or(|name| name == method.name())
-                    .then(|| check(method).into()),
-                Check::Part(..) => None,
-            });
+                    }),
+                )
+            }
+            Check::Refused { boxes, object } => {
+                // The exact method rejects larger scenes for their size first.
+                let objects = if let Method::Exact(_) = method { EXACT_OBJECTS } else { 100 };
+                let refused = examine::refuses(method, &boxes(objects), *object);
+                Some(refused.map_or_else(Cell::Broken, Cell::Refused))
+            }
+            Check::Method(name, check) => {
+                name.is_none_or(|name| name == method.name()).then(|| check(method).into())
+            }
+            Check::Part(..) => None,
+        });
         cells.reduce(Cell::and)
     }
 
@@ -85,11 +80,7 @@ impl Case {
             let rays = tracing::rays(&triangles, rays, 1);
             tracing::check(traversal, &Primitives::Triangles(triangles), &rays)
         });
-        Some(
-            traced
-                .unwrap_or_else(|_| Err(Promise::P1.broken("panicked")))
-                .into(),
-        )
+        Some(traced.unwrap_or_else(|_| Err(Promise::P1.broken("panicked"))).into())
     }
 
     /// Performs all checks of another part; `None` if there are none.

@@ -62,10 +62,7 @@ pub fn relative_error(cost: f64, exact: &BigUint) -> f64 {
 /// Returns a / b for b above 0.
 pub fn ratio(a: &BigUint, b: &BigUint) -> f64 {
     // Units of 2^-200 are far below the rounding of any ratio that is not tiny.
-    ((a << 200u32) / b)
-        .to_f64()
-        .unwrap_or(f64::INFINITY)
-        / 2f64.powi(200)
+    ((a << 200u32) / b).to_f64().unwrap_or(f64::INFINITY) / 2f64.powi(200)
 }
 
 #[cfg(test)]

@@ -58,11 +58,7 @@ fn solved(
         catch_unwind(AssertUnwindSafe(|| solve(method, &Problem::new(boxes), 1, budget, &())));
     solved.map_err(|panic| {
         let text = panic.downcast_ref::<String>().cloned();
-        let text = text.or_else(|| {
-            panic
-                .downcast_ref::<&str>()
-                .map(|&text| text.into())
-        });
+        let text = text.or_else(|| panic.downcast_ref::<&str>().map(|&text| text.into()));
         P1.broken(format!("panicked: {}", text.unwrap_or_default()))
     })
 }
@@ -91,9 +87,7 @@ pub fn examine(
             check_scale(method, &boxes, work_per_object, &outcome, k)?;
         }
     }
-    let note = scene
-        .also
-        .map_or(Ok(String::new()), |also| also(method, &boxes, &outcome))?;
+    let note = scene.also.map_or(Ok(String::new()), |also| also(method, &boxes, &outcome))?;
     let depth = outcome.tree.depth();
     let cost = outcome.cost;
     Ok(Examined { objects: boxes.len(), depth, cost, relative_error, seconds, note })
@@ -109,10 +103,7 @@ pub fn check_outcome(boxes: &[Aabb], outcome: &Outcome) -> Result<f64, Broken> {
     ensure!(costs.iter().all(|cost| cost.is_finite() && *cost >= 0.0), P7: "costs {costs:?}");
     let error = relative_error(*cost, &internal_area(tree));
     ensure!(error <= ROUNDING, P7: "the cost {cost} is off by {error:e} of the exact one");
-    let best = history
-        .iter()
-        .map(|event| event.cost)
-        .fold(f64::INFINITY, f64::min);
+    let best = history.iter().map(|event| event.cost).fold(f64::INFINITY, f64::min);
     // The incumbent must never be lost on the way.
     ensure!(best == *cost, P7: "the cost is {cost}, the best of the history {best}");
     Ok(error)
@@ -165,9 +156,7 @@ pub fn check_scale(
 pub fn refuses(method: &Method, boxes: &[Aabb], object: usize) -> Verdict {
     match solved(method, boxes, Budget::UNLIMITED)? {
         Err(error @ SearchError::Build(_))
-            if error
-                .to_string()
-                .contains(&format!("object {object} ")) =>
+            if error.to_string().contains(&format!("object {object} ")) =>
         {
             Ok(error.to_string())
         }

@@ -21,10 +21,7 @@ const LENGTHS: [usize; 12] = [1, 3, 16, 15, 17, 33, 7, 23, 25, 65, 257, 1023];
 pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
     let objects = Primitives::Triangles(triangles.to_vec());
     let brute_force = Accelerator::new(&objects, Structure::Brute);
-    let expected: Vec<_> = rays
-        .iter()
-        .map(|ray| brute_force.nearest_hit(ray))
-        .collect();
+    let expected: Vec<_> = rays.iter().map(|ray| brute_force.nearest_hit(ray)).collect();
     for (ray, hit) in rays.iter().zip(&expected) {
         if let Some(hit) = hit {
             let triangle = &triangles[hit.object as usize];
@@ -33,10 +30,7 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
         }
     }
     for (kernel, wide) in wide_layouts(triangles).map_err(Broken::case)? {
-        let nearest: Vec<_> = rays
-            .iter()
-            .map(|ray| wide.nearest_hit(ray))
-            .collect();
+        let nearest: Vec<_> = rays.iter().map(|ray| wide.nearest_hit(ray)).collect();
         let any: Vec<_> = rays.iter().map(|ray| wide.any_hit(ray)).collect();
         compare(rays, &expected, &nearest, &any)
             .map_err(|broken| broken.within(format!("{kernel:?}")))?;
@@ -54,10 +48,8 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
                     break;
                 }
             }
-            let nearest: Vec<_> = nearest
-                .iter()
-                .map(|hit| (!hit.is_miss()).then_some(*hit))
-                .collect();
+            let nearest: Vec<_> =
+                nearest.iter().map(|hit| (!hit.is_miss()).then_some(*hit)).collect();
             compare(rays, &expected, &nearest, &any)
                 .map_err(|broken| broken.within(format!("{kernel:?}, {coherence:?}")))?;
             let (nearest, any) = by_component(&wide, rays, coherence);
@@ -111,10 +103,7 @@ fn by_component(
     let mut any = vec![false; rays.len()];
     wide.nearest_hits_by_component(&components, &mut distances, &mut objects, coherence);
     wide.any_hits_by_component(&components, &mut any, coherence);
-    let hits = distances
-        .into_iter()
-        .zip(objects)
-        .map(|(t, object)| Hit { t, object });
+    let hits = distances.into_iter().zip(objects).map(|(t, object)| Hit { t, object });
     let nearest = hits.map(|hit| if hit.is_miss() { None } else { Some(hit) });
     (nearest.collect(), any)
 }
@@ -235,12 +224,6 @@ fn half_in_bundles(count: usize, seed: u64, mut make: impl FnMut(usize) -> Vec<R
 pub fn scaled(triangles: &[Triangle], exponent: i32) -> Option<Vec<Triangle>> {
     // Two steps, because 2^-140 itself is denormal and would lose bits.
     let step = 2f32.powi(exponent / 2);
-    let scaled: Vec<_> = triangles
-        .iter()
-        .map(|t| Triangle(t.0.map(|p| p * step * step)))
-        .collect();
-    scaled
-        .iter()
-        .all(|t| t.aabb().check().is_ok())
-        .then_some(scaled)
+    let scaled: Vec<_> = triangles.iter().map(|t| Triangle(t.0.map(|p| p * step * step))).collect();
+    scaled.iter().all(|t| t.aabb().check().is_ok()).then_some(scaled)
 }

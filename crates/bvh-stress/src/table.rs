@@ -40,11 +40,7 @@ const fn plain(sizes: [usize; 3]) -> Check {
 fn with_bad_object(n: usize, damage: fn(&mut Aabb)) -> Vec<Aabb> {
     // All other boxes are valid, so that the error can only be about this one.
     let mut boxes = stiff::boxes(&stiff::uniform(n));
-    boxes
-        .iter_mut()
-        .skip(BAD)
-        .take(1)
-        .for_each(damage);
+    boxes.iter_mut().skip(BAD).take(1).for_each(damage);
     boxes
 }
 

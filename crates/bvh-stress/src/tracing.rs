@@ -33,9 +33,7 @@ pub const TRAVERSALS: &[(&str, Traversal)] = &[
 ];
 
 fn build(objects: &Primitives, builder: &dyn Builder) -> Result<Bvh, String> {
-    builder
-        .build(&objects.boxes())
-        .map_err(|error| error.to_string())
+    builder.build(&objects.boxes()).map_err(|error| error.to_string())
 }
 
 /// Prepares trees with one object per leaf, with leaves merged by the surface area heuristic, and
@@ -45,9 +43,7 @@ fn over_binary_trees(objects: &Primitives) -> Result<Vec<Accelerator<'_>>, Strin
     let merged = collapse_leaves(&greedy, &SahConstants::default());
     let tenths = median_cut::Config { leaf_fraction: 0.1, ..Default::default() };
     let trees = [greedy, merged, build(objects, &tenths)?];
-    Ok(trees
-        .map(|tree| Accelerator::new(objects, Structure::Tree(Cow::Owned(tree))))
-        .into())
+    Ok(trees.map(|tree| Accelerator::new(objects, Structure::Tree(Cow::Owned(tree)))).into())
 }
 
 fn over_wide_layouts(
@@ -58,9 +54,7 @@ fn over_wide_layouts(
         return Err("only triangles have a wide layout".into());
     };
     let layouts = wide_layouts(triangles)?.into_iter();
-    Ok(layouts
-        .map(|(_, wide)| Accelerator::new(objects, structure(wide)))
-        .collect())
+    Ok(layouts.map(|(_, wide)| Accelerator::new(objects, structure(wide))).collect())
 }
 
 /// Lays out a binary tree and a tree with many children per node for every kernel of this
@@ -71,9 +65,7 @@ pub fn wide_layouts(triangles: &[Triangle]) -> Result<Vec<(Kernel, WideBvh)>, St
         [&muller_fellner::Config::default(), &goldsmith_salmon::Config::default()];
     let mut layouts = Vec::new();
     for builder in builders {
-        let tree = builder
-            .build(&boxes)
-            .map_err(|error| error.to_string())?;
+        let tree = builder.build(&boxes).map_err(|error| error.to_string())?;
         let wide = WideBvh::new(&tree, triangles).map_err(|error| error.to_string())?;
         for kernel in Kernel::ALL {
             // The processor may lack the kernel's instructions.
@@ -114,9 +106,7 @@ pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Verdic
 /// over short, empty and single-point ranges.
 pub fn rays(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
     let mut rng = Stream::seed_from_u64(seed);
-    let bounds = triangles
-        .iter()
-        .fold(Aabb::EMPTY, |b, t| b.union(&t.aabb()));
+    let bounds = triangles.iter().fold(Aabb::EMPTY, |b, t| b.union(&t.aabb()));
     // An empty scene has no bounds, and rays are needed all the same.
     let bounds = if bounds.check().is_ok() { bounds } else { Aabb::from(([0.0; 3], [1.0; 3])) };
     let mut rays = Vec::with_capacity(count);
@@ -131,10 +121,8 @@ pub fn rays(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
         let somewhere = inside(unit());
         let elsewhere = inside(unit());
         let direction = unit() * 2.0 - 1.0;
-        let Triangle([a, b, c]) = triangles
-            .choose(&mut rng)
-            .copied()
-            .unwrap_or(Triangle([somewhere; 3]));
+        let Triangle([a, b, c]) =
+            triangles.choose(&mut rng).copied().unwrap_or(Triangle([somewhere; 3]));
         // All six directions occur, so that no axis or sign is favoured.
         let along = [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z][attempt / 8 % 6];
         let beside =

@@ -28,12 +28,8 @@ pub fn scaled_area(area: f64, k: i32) -> f64 {
 /// Returns the range of k for which no coordinate times 2^k overflows or becomes denormal; it
 /// always includes 0.
 pub fn scale_range(boxes: &[Aabb]) -> RangeInclusive<i32> {
-    let coordinates = boxes.iter().flat_map(|b| {
-        b.min
-            .to_array()
-            .into_iter()
-            .chain(b.max.to_array())
-    });
+    let coordinates =
+        boxes.iter().flat_map(|b| b.min.to_array().into_iter().chain(b.max.to_array()));
     let exponents = coordinates
         // Zero stays zero at every scale.
         .filter(|&x| x != 0.0)

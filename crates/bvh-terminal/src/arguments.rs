@@ -84,9 +84,7 @@ pub fn output_file(flag: &str, path: &Path, kind: &FileKind) -> Result<(), Error
 
 /// Returns the folder of a file.
 fn folder_of(path: &Path) -> &Path {
-    path.parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-        .unwrap_or(Path::new("."))
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Returns the output that the flag gives, or otherwise the `derived` path. A path that nobody gave

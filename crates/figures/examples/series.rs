@@ -30,18 +30,13 @@ fn figure(text: &str) -> Result<Figure, Box<dyn Error>> {
         if commits.last().is_none_or(|last| last != commit) {
             commits.push(commit.to_owned());
         }
-        series
-            .entry(name)
-            .or_default()
-            .push((commits.len() - 1, count.parse()?));
+        series.entry(name).or_default().push((commits.len() - 1, count.parse()?));
     }
     let mut layers = vec![Layer::new("", Marks::HLine(1.0))];
     for (name, counts) in series {
         let first = counts[0].1;
-        let points: Vec<(f64, f64)> = counts
-            .iter()
-            .map(|(commit, count)| (*commit as f64, count / first))
-            .collect();
+        let points: Vec<(f64, f64)> =
+            counts.iter().map(|(commit, count)| (*commit as f64, count / first)).collect();
         layers.push(Layer::new(name, Marks::Line(points.clone())));
         layers.push(Layer::new(name, Marks::Points(points)));
     }

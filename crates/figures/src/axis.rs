@@ -53,21 +53,12 @@ pub(super) fn axes(panel: &Panel) -> (Ruled, Ruled, bool) {
                 points.iter().for_each(|&(x, y)| add(x, &[y]));
             }
             Marks::Band(points) | Marks::StepBand(points) => {
-                points
-                    .iter()
-                    .for_each(|&(x, low, high)| add(x, &[low, high]));
+                points.iter().for_each(|&(x, low, high)| add(x, &[low, high]));
             }
             Marks::Bars { values, spread, base } => {
-                values
-                    .iter()
-                    .zip(0..)
-                    .for_each(|(&height, i)| add(f64::from(i), &[height]));
-                other_ys.extend(
-                    spread
-                        .iter()
-                        .take(values.len())
-                        .flat_map(|&(low, high)| [low, high]),
-                );
+                values.iter().zip(0..).for_each(|(&height, i)| add(f64::from(i), &[height]));
+                other_ys
+                    .extend(spread.iter().take(values.len()).flat_map(|&(low, high)| [low, high]));
                 other_ys.push(*base);
             }
             Marks::HLine(y) => other_ys.push(*y),
@@ -91,11 +82,7 @@ impl Ruled {
         if let Scale::Category(names) = &axis.scale {
             return Self { low: -0.5, high: names.len().max(1) as f64 - 0.5, ..any };
         }
-        let shown = || {
-            values
-                .iter()
-                .filter_map(|&value| any.coordinate(value))
-        };
+        let shown = || values.iter().filter_map(|&value| any.coordinate(value));
         let least = shown().reduce(f64::min).unwrap_or(0.0);
         let most = shown().reduce(f64::max).unwrap_or(1.0);
         // A single value is in the middle of a range proportional to it, or of one decade.
@@ -110,9 +97,7 @@ impl Ruled {
         };
         let set = |end: Option<f64>| end.and_then(|value| any.coordinate(value));
         let low = set(axis.low).unwrap_or(low);
-        let high = set(axis.high)
-            .filter(|&high| high > low)
-            .unwrap_or(high);
+        let high = set(axis.high).filter(|&high| high > low).unwrap_or(high);
         // A narrower range would have ends that are equal in ten digits.
         let narrowest = (1e-9 * low.abs().max(high.abs())).max(1e-200);
         Self {
@@ -131,16 +116,13 @@ impl Ruled {
 
     /// Returns the coordinate if it is in the shown part or less than a pixel outside.
     pub fn shown(&self, value: f64) -> Option<f64> {
-        self.coordinate(value)
-            .filter(|&at| (-1e-3..=1.001).contains(&self.fraction(at)))
+        self.coordinate(value).filter(|&at| (-1e-3..=1.001).contains(&self.fraction(at)))
     }
 
     /// Returns the shown coordinate nearest to the value; the lower end for a finite value without
     /// a logarithm.
     pub fn nearest(&self, value: f64) -> Option<f64> {
-        let at = self
-            .coordinate(value)
-            .or((value.abs() <= LARGEST).then_some(self.low));
+        let at = self.coordinate(value).or((value.abs() <= LARGEST).then_some(self.low));
         at.map(|at| at.clamp(self.low, self.high))
     }
 
@@ -198,11 +180,8 @@ impl Ruled {
         let plain = first >= -3 && last < 5;
         let at = |power: i32, mantissa: i32| f64::from(power) + libm::log10(f64::from(mantissa));
         let marks = |mantissas: &'static [i32]| -> Vec<(i32, i32)> {
-            let all = (first - 1..=last).flat_map(|power| {
-                mantissas
-                    .iter()
-                    .map(move |&mantissa| (power, mantissa))
-            });
+            let all = (first - 1..=last)
+                .flat_map(|power| mantissas.iter().map(move |&mantissa| (power, mantissa)));
             all.filter(|&(power, mantissa)| (self.low..=self.high).contains(&at(power, mantissa)))
                 .collect()
         };
@@ -230,18 +209,11 @@ impl Ruled {
             .filter(|_| plain || last <= first);
         let chosen = multiples
             .filter(|ticks| ticks.len() >= 3)
-            .chain(
-                (1..=last - first)
-                    .map(every)
-                    .filter(|ticks: &Vec<_>| ticks.len() >= 2),
-            )
+            .chain((1..=last - first).map(every).filter(|ticks: &Vec<_>| ticks.len() >= 2))
             .find(|ticks| ticks.len() <= most.max(3));
         let fine =
             if self.high - self.low <= 6.0 { marks(&[2, 3, 4, 5, 6, 7, 8, 9]) } else { every(1) };
-        self.minor = fine
-            .iter()
-            .map(|&(power, mantissa)| at(power, mantissa))
-            .collect();
+        self.minor = fine.iter().map(|&(power, mantissa)| at(power, mantissa)).collect();
         self.major = chosen.iter().flatten().map(tick).collect();
         chosen.is_some()
     }
@@ -270,19 +242,14 @@ impl Ranged for Ruled {
 
 impl ValueFormatter<f64> for Ruled {
     fn format_ext(&self, at: &f64) -> String {
-        self.major
-            .iter()
-            .find(|tick| tick.0 == *at)
-            .map_or_else(String::new, |tick| tick.1.clone())
+        self.major.iter().find(|tick| tick.0 == *at).map_or_else(String::new, |tick| tick.1.clone())
     }
 }
 
 /// Formats a number with this many decimals and a true minus sign.
 fn decimal(value: f64, digits: usize) -> String {
     let text = format!("{:.digits$}", value.abs());
-    let zero = text
-        .bytes()
-        .all(|byte| byte == b'0' || byte == b'.');
+    let zero = text.bytes().all(|byte| byte == b'0' || byte == b'.');
     if value < 0.0 && !zero { format!("−{text}") } else { text }
 }
 

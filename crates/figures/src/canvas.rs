@@ -63,9 +63,7 @@ pub(super) fn font(style: Type, colour: RGBColor) -> TextStyle<'static> {
 /// Removes control characters, which XML does not allow even escaped.
 pub(super) fn printable(text: &str) -> String {
     let legal = |c: char| !c.is_control() && c != '\u{fffe}' && c != '\u{ffff}';
-    text.chars()
-        .map(|c| if legal(c) { c } else { ' ' })
-        .collect()
+    text.chars().map(|c| if legal(c) { c } else { ' ' }).collect()
 }
 
 impl Sheet<'_> {
@@ -87,11 +85,8 @@ impl Sheet<'_> {
             Align::UpCenter => (HPos::Center, FontTransform::Rotate270),
             Align::UpTo => (HPos::Right, FontTransform::Rotate270),
         };
-        let style = font(style, colour)
-            .pos(Pos::new(side, VPos::Center))
-            .transform(turn);
-        self.0
-            .draw_text(&printable(text), &style, (steps(x), steps(y)))
+        let style = font(style, colour).pos(Pos::new(side, VPos::Center)).transform(turn);
+        self.0.draw_text(&printable(text), &style, (steps(x), steps(y)))
     }
 
     /// Draws lines of text, the first just below `top`.
@@ -138,10 +133,7 @@ pub(super) fn svg(
         draw(&Sheet(area.clone())).map_err(refused)?;
         area.present().map_err(refused)?;
     }
-    let title = printable(title)
-        .replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;");
+    let title = printable(title).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let mut document = String::new();
     let _ = write!(
         document,
@@ -161,9 +153,7 @@ fn joined(svg: &str) -> String {
     let mut joined = String::with_capacity(svg.len());
     let mut open: Option<&str> = None;
     for line in svg.lines() {
-        let path = line
-            .strip_prefix("<polyline ")
-            .and_then(|rest| rest.split_once(" points=\""));
+        let path = line.strip_prefix("<polyline ").and_then(|rest| rest.split_once(" points=\""));
         if open.is_some() && open != path.map(|(style, _)| style) {
             joined.push_str("\"/>\n");
             open = None;

@@ -60,10 +60,7 @@ pub(super) fn svg(figure: &Figure) -> Result<String, FigureError> {
     let strokes = Strokes::new(figure);
     let legend = Legend::new(figure, &strokes, WIDTH - 2.0 * BORDER, &fonts);
     let head = Head::new(&figure.title, &figure.caption, &fonts);
-    let columns = figure
-        .columns
-        .clamp(1, HEIGHTS.len())
-        .min(figure.panels.len().max(1));
+    let columns = figure.columns.clamp(1, HEIGHTS.len()).min(figure.panels.len().max(1));
     let size = (WIDTH, HEIGHTS[columns - 1]);
     Plan::new(head, strokes, legend, &figure.panels, columns, size, &fonts).svg(&figure.title)
 }
@@ -73,12 +70,7 @@ pub(super) fn miniature(figure: &Figure) -> Result<String, FigureError> {
     let fonts = Fonts::new()?;
     let nothing = Figure::default();
     let legend = Legend::new(&nothing, &Strokes::new(&nothing), MINIATURE.0, &fonts);
-    let panels: Vec<Panel> = figure
-        .panels
-        .iter()
-        .take(1)
-        .map(wordless_panel)
-        .collect();
+    let panels: Vec<Panel> = figure.panels.iter().take(1).map(wordless_panel).collect();
     let strokes = Strokes::new(figure);
     Plan::new(Head::default(), strokes, legend, &panels, 1, MINIATURE, &fonts).svg(&figure.title)
 }
@@ -113,18 +105,11 @@ impl<'a> Plan<'a> {
     ) -> Self {
         let room = whole - 2.0 * BORDER;
         // Labels next to the plots determine the width left for them, and with it the lines below.
-        let mut plots: Vec<Plot> = panels
-            .iter()
-            .map(|panel| Plot::new(panel, height, fonts))
-            .collect();
-        let beside = plots
-            .iter()
-            .map(|plot| plot.left)
-            .fold(0.0, f64::max);
+        let mut plots: Vec<Plot> =
+            panels.iter().map(|panel| Plot::new(panel, height, fonts)).collect();
+        let beside = plots.iter().map(|plot| plot.left).fold(0.0, f64::max);
         let width = (room / columns as f64 - beside - GUTTER.0).max(60.0);
-        plots
-            .iter_mut()
-            .for_each(|plot| plot.fit_width(width, fonts));
+        plots.iter_mut().for_each(|plot| plot.fit_width(width, fonts));
         for upper in 0..plots.len().saturating_sub(columns) {
             let (above, below) = plots.split_at_mut(upper + 1);
             above[upper].share_x_label(&below[columns - 1]);
@@ -153,10 +138,7 @@ impl<'a> Plan<'a> {
 
     fn draw(&self, sheet: &Sheet) -> Result<(), Fault> {
         self.head.draw(sheet)?;
-        self.legend
-            .draw(sheet, (BORDER, self.head.bottom))?;
-        self.panels
-            .iter()
-            .try_for_each(|(plot, frame)| plot.draw(sheet, *frame, &self.strokes))
+        self.legend.draw(sheet, (BORDER, self.head.bottom))?;
+        self.panels.iter().try_for_each(|(plot, frame)| plot.draw(sheet, *frame, &self.strokes))
     }
 }

@@ -37,16 +37,10 @@ impl Layers<'_, '_> {
     /// Draws all layers, each kind of marks on top of the kinds before.
     pub fn draw(&self) -> Result<(), Fault> {
         let layers = self.layers;
-        layers
-            .iter()
-            .try_for_each(|layer| self.band(layer))?;
+        layers.iter().try_for_each(|layer| self.band(layer))?;
         self.bars()?;
-        layers
-            .iter()
-            .try_for_each(|layer| self.reference(layer))?;
-        layers
-            .iter()
-            .try_for_each(|layer| self.line(layer))?;
+        layers.iter().try_for_each(|layer| self.reference(layer))?;
+        layers.iter().try_for_each(|layer| self.line(layer))?;
         self.points()
     }
 
@@ -61,17 +55,12 @@ impl Layers<'_, '_> {
         for run in runs(points.iter().map(at)) {
             let side = |height: fn(&(f64, f64, f64)) -> f64| {
                 self.thinned(&stepped(
-                    run.iter()
-                        .map(|point| (point.0, height(point)))
-                        .collect(),
+                    run.iter().map(|point| (point.0, height(point))).collect(),
                     stairs,
                 ))
             };
             let upper = side(|point| point.2).into_iter().rev();
-            let outline: Vec<Point> = side(|point| point.1)
-                .into_iter()
-                .chain(upper)
-                .collect();
+            let outline: Vec<Point> = side(|point| point.1).into_iter().chain(upper).collect();
             self.area
                 .draw(&Polygon::new(outline, self.strokes.of(&layer.name).1.colour.mix(0.2)))?;
         }
@@ -82,18 +71,13 @@ impl Layers<'_, '_> {
     fn bars(&self) -> Result<(), Fault> {
         let x = self.x;
         let y = self.y;
-        let layers = || {
-            self.layers
-                .iter()
-                .filter(|layer| matches!(layer.marks, Marks::Bars { .. }))
-        };
+        let layers =
+            || self.layers.iter().filter(|layer| matches!(layer.marks, Marks::Bars { .. }));
         let width = 0.8 / layers().count().max(1) as f64;
         let mut whiskers = Vec::new();
         for (order, layer) in layers().enumerate() {
             let Marks::Bars { values, spread, base } = &layer.marks else { continue };
-            let base = y
-                .coordinate(*base)
-                .map_or(y.low, |base| base.clamp(y.low, y.high));
+            let base = y.coordinate(*base).map_or(y.low, |base| base.clamp(y.low, y.high));
             for (index, &value) in values.iter().enumerate() {
                 let left = index as f64 - 0.4 + width * order as f64;
                 let Some((_, tip)) = x.shown(index as f64).zip(y.coordinate(value)) else {
@@ -107,16 +91,11 @@ impl Layers<'_, '_> {
                     self.strokes.of(&layer.name).1.colour.filled(),
                 ))?;
                 // Whiskers are drawn after all bars, so that no bar covers one.
-                whiskers.extend(
-                    spread
-                        .get(index)
-                        .map(|&(low, high)| (left + width / 2.0, low, high)),
-                );
+                whiskers
+                    .extend(spread.get(index).map(|&(low, high)| (left + width / 2.0, low, high)));
             }
         }
-        whiskers
-            .into_iter()
-            .try_for_each(|(at, low, high)| self.whisker(at, low, high, INK))
+        whiskers.into_iter().try_for_each(|(at, low, high)| self.whisker(at, low, high, INK))
     }
 
     /// Draws an upright bar with caps at the ends that are inside the panel.
@@ -124,15 +103,10 @@ impl Layers<'_, '_> {
         let y = self.y;
         let style = pen(colour, THIN);
         let Some((from, to)) = y.nearest(low).zip(y.nearest(high)) else { return Ok(()) };
-        self.area
-            .draw(&PathElement::new(vec![(x, from), (x, to)], style))?;
-        for end in [low, high]
-            .into_iter()
-            .filter_map(|end| y.shown(end))
-        {
+        self.area.draw(&PathElement::new(vec![(x, from), (x, to)], style))?;
+        for end in [low, high].into_iter().filter_map(|end| y.shown(end)) {
             let cap = PathElement::new(vec![(steps(-3.5), 0), (steps(3.5), 0)], style);
-            self.area
-                .draw(&(EmptyElement::at((x, end)) + cap))?;
+            self.area.draw(&(EmptyElement::at((x, end)) + cap))?;
         }
         Ok(())
     }
@@ -141,12 +115,8 @@ impl Layers<'_, '_> {
         let x = self.x;
         let y = self.y;
         let ends = match layer.marks {
-            Marks::HLine(at) => y
-                .shown(at)
-                .map(|at| vec![(x.low, at), (x.high, at)]),
-            Marks::VLine(at) => x
-                .shown(at)
-                .map(|at| vec![(at, y.low), (at, y.high)]),
+            Marks::HLine(at) => y.shown(at).map(|at| vec![(x.low, at), (x.high, at)]),
+            Marks::VLine(at) => x.shown(at).map(|at| vec![(at, y.low), (at, y.high)]),
             _ => None,
         };
         ends.map_or(Ok(()), |ends| self.stroke(ends, REFERENCE_LINE, THIN))
@@ -162,9 +132,7 @@ impl Layers<'_, '_> {
                 Vec::new()
             };
             self.stroke(path, stroke, LINE)?;
-            markers
-                .into_iter()
-                .try_for_each(|at| self.marker(at, stroke, 3.5, 0.7))?;
+            markers.into_iter().try_for_each(|at| self.marker(at, stroke, 3.5, 0.7))?;
         }
         Ok(())
     }
@@ -174,8 +142,7 @@ impl Layers<'_, '_> {
         match stroke.dash {
             None => self.area.draw(&PathElement::new(path, style)),
             Some((on, off)) => {
-                self.area
-                    .draw(&DashedPathElement::new(path, steps(on), steps(off), style))
+                self.area.draw(&DashedPathElement::new(path, steps(on), steps(off), style))
             }
         }
     }
@@ -206,10 +173,7 @@ impl Layers<'_, '_> {
                     );
                 }
                 _ => {
-                    let alone = self
-                        .paths(layer)
-                        .into_iter()
-                        .filter(|path| path.len() == 1);
+                    let alone = self.paths(layer).into_iter().filter(|path| path.len() == 1);
                     all.extend(alone.flatten().map(|at| (name, at)));
                 }
             }
@@ -238,8 +202,7 @@ impl Layers<'_, '_> {
         let (Marks::Line(points) | Marks::Steps(points)) = &layer.marks else { return Vec::new() };
         let stairs = matches!(layer.marks, Marks::Steps(_));
         let shown = |axis: &Ruled, value| {
-            axis.nearest(value)
-                .filter(|_| stairs || axis.coordinate(value).is_some())
+            axis.nearest(value).filter(|_| stairs || axis.coordinate(value).is_some())
         };
         let at = |point: &Point| Some((shown(self.x, point.0)?, shown(self.y, point.1)?));
         runs(points.iter().map(at))
@@ -257,10 +220,7 @@ impl Layers<'_, '_> {
             let by_height = |one: &&Point, other: &&Point| one.1.total_cmp(&other.1);
             let low = points.iter().min_by(by_height);
             let high = points.iter().max_by(by_height);
-            for &point in [points.first(), low, high, points.last()]
-                .into_iter()
-                .flatten()
-            {
+            for &point in [points.first(), low, high, points.last()].into_iter().flatten() {
                 if let [.., before, middle] = kept[..]
                     && [before.1, middle.1] == [point.1; 2]
                     && (before.0 <= middle.0) == (middle.0 <= point.0)
@@ -308,12 +268,8 @@ impl Layers<'_, '_> {
 /// Returns the unbroken parts of a sequence.
 fn runs<T: Copy>(placed: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
     let placed: Vec<Option<T>> = placed.collect();
-    let parts = placed
-        .split(Option::is_none)
-        .map(|part| part.iter().copied().flatten().collect());
-    parts
-        .filter(|part: &Vec<T>| !part.is_empty())
-        .collect()
+    let parts = placed.split(Option::is_none).map(|part| part.iter().copied().flatten().collect());
+    parts.filter(|part: &Vec<T>| !part.is_empty()).collect()
 }
 
 /// Returns the path, or the staircase that holds each y until the next x.
@@ -321,8 +277,6 @@ fn stepped(path: Vec<Point>, stairs: bool) -> Vec<Point> {
     if !stairs {
         return path;
     }
-    let corners = path
-        .windows(2)
-        .flat_map(|ends| [ends[0], (ends[1].0, ends[0].1)]);
+    let corners = path.windows(2).flat_map(|ends| [ends[0], (ends[1].0, ends[0].1)]);
     corners.chain(path.last().copied()).collect()
 }

@@ -34,12 +34,7 @@ pub(super) struct Legend {
 
 impl Legend {
     pub fn new(figure: &Figure, strokes: &Strokes, width: f64, fonts: &Fonts) -> Self {
-        let layers = || {
-            figure
-                .panels
-                .iter()
-                .flat_map(|panel| &panel.layers)
-        };
+        let layers = || figure.panels.iter().flat_map(|panel| &panel.layers);
         let entry = |(name, stroke): &(String, Stroke)| {
             let has = |kind: fn(&Layer) -> bool| {
                 layers().any(|layer| layer.series() == Some(name) && kind(layer))
@@ -51,9 +46,7 @@ impl Legend {
         };
         let mut entries: Vec<Entry> = strokes.series.iter().map(entry).collect();
         for layer in layers() {
-            let is_new = entries
-                .iter()
-                .all(|entry| entry.name != layer.name);
+            let is_new = entries.iter().all(|entry| entry.name != layer.name);
             if layer.series().is_none() && !layer.name.trim().is_empty() && is_new {
                 let name = layer.name.clone();
                 let stroke = REFERENCE_LINE;
@@ -66,17 +59,12 @@ impl Legend {
     fn arrange(mut entries: Vec<Entry>, width: f64, fonts: &Fonts) -> Self {
         let before = SAMPLE + GAPS.0;
         let room = width - before;
-        entries
-            .iter_mut()
-            .for_each(|entry| entry.name = fonts.shorten(&entry.name, room, BODY));
+        entries.iter_mut().for_each(|entry| entry.name = fonts.shorten(&entry.name, room, BODY));
         let column_width =
             before + fonts.widest(entries.iter().map(|entry| &entry.name), BODY) + GAPS.1;
         let most = (((width + GAPS.1) / column_width).floor() as usize).max(1);
         // As even rows as possible: 4 + 4 rather than 7 + 1.
-        let columns = entries
-            .len()
-            .div_ceil(entries.len().div_ceil(most).max(1))
-            .max(1);
+        let columns = entries.len().div_ceil(entries.len().div_ceil(most).max(1)).max(1);
         Self { entries, columns, column_width }
     }
 
@@ -110,19 +98,13 @@ impl Entry {
         }
         if self.line {
             let (on, off) = self.stroke.dash.unwrap_or((SAMPLE, 1.0));
-            sheet
-                .0
-                .draw(&DashedPathElement::new(ends, steps(on), steps(off), style))?;
+            sheet.0.draw(&DashedPathElement::new(ends, steps(on), steps(off), style))?;
         }
         if self.marker {
             let x = steps(left + SAMPLE / 2.0);
             let y = steps(middle);
-            let corners: Vec<_> = self
-                .stroke
-                .outline(4.0)
-                .into_iter()
-                .map(|(dx, dy)| (x + dx, y + dy))
-                .collect();
+            let corners: Vec<_> =
+                self.stroke.outline(4.0).into_iter().map(|(dx, dy)| (x + dx, y + dy)).collect();
             sheet.0.draw(&Polygon::new(corners, colour))?;
         }
         Ok(())

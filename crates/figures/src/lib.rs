@@ -78,11 +78,7 @@ mod tests {
     }
 
     fn axes() -> Vec<Axis> {
-        let names = |count: usize| {
-            (0..count)
-                .map(|i| format!("category {i}"))
-                .collect()
-        };
+        let names = |count: usize| (0..count).map(|i| format!("category {i}")).collect();
         vec![
             Axis::linear("x"),
             Axis::log(""),
@@ -98,12 +94,7 @@ mod tests {
     fn whatever_the_data_there_is_a_picture() {
         let mut data: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
         data.extend(NASTY.iter().map(|&value| vec![(value, value)]));
-        data.push(
-            NASTY
-                .iter()
-                .flat_map(|&x| NASTY.iter().map(move |&y| (x, y)))
-                .collect(),
-        );
+        data.push(NASTY.iter().flat_map(|&x| NASTY.iter().map(move |&y| (x, y))).collect());
         for points in data {
             for x in axes() {
                 let panel = |(index, layer): (usize, Layer)| Panel {
@@ -112,11 +103,7 @@ mod tests {
                     y: axes().swap_remove(index % 5),
                     layers: if index == 0 { all_layers(&points) } else { vec![layer] },
                 };
-                let panels = all_layers(&points)
-                    .into_iter()
-                    .enumerate()
-                    .map(panel)
-                    .collect();
+                let panels = all_layers(&points).into_iter().enumerate().map(panel).collect();
                 let figure = Figure { columns: points.len() % 6, panels, ..Figure::default() };
                 let picture = svg(&figure).unwrap();
                 assert!(
@@ -137,9 +124,7 @@ mod tests {
         let says = |layers: Vec<Layer>| {
             let panel =
                 Panel { title: String::new(), x: Axis::log("x"), y: Axis::log("y"), layers };
-            svg(&Figure { panels: vec![panel], ..Figure::default() })
-                .unwrap()
-                .contains("no data")
+            svg(&Figure { panels: vec![panel], ..Figure::default() }).unwrap().contains("no data")
         };
         let line = |points| vec![Layer::new("", Marks::Line(points))];
         assert!(
@@ -150,9 +135,8 @@ mod tests {
 
     #[test]
     fn the_same_figure_gives_the_same_bytes() {
-        let points: Vec<(f64, f64)> = (0..50)
-            .map(|i| (f64::from(i), f64::from(i * i % 17)))
-            .collect();
+        let points: Vec<(f64, f64)> =
+            (0..50).map(|i| (f64::from(i), f64::from(i * i % 17))).collect();
         let panel = Panel {
             title: "t".to_owned(),
             x: Axis::linear("x"),

@@ -67,8 +67,7 @@ impl<'a> Plot<'a> {
             let room = width / names.len().max(1) as f64;
             // Names are wrapped at blanks, so a name fits if each word does.
             let fits = |name: &String| {
-                name.split_whitespace()
-                    .all(|word| fonts.width(word, SMALL) <= room - 6.0)
+                name.split_whitespace().all(|word| fonts.width(word, SMALL) <= room - 6.0)
             };
             self.upright = !names.iter().all(fits);
             // Upright names need the height of a line each; names that have no room are skipped.
@@ -77,9 +76,7 @@ impl<'a> Plot<'a> {
                 if self.upright { vec![name] } else { fonts.wrap(&name, room - 6.0, SMALL) }
             };
             let named = names.iter().zip(0..).step_by(every);
-            self.names = named
-                .map(|(name, at)| (f64::from(at), lines(name.clone())))
-                .collect();
+            self.names = named.map(|(name, at)| (f64::from(at), lines(name.clone()))).collect();
             let size = |(_, lines): &(f64, Vec<String>)| {
                 if self.upright {
                     fonts.widest(lines, SMALL)
@@ -153,12 +150,9 @@ impl<'a> Plot<'a> {
         }
         let below = bottom + self.below - BODY.line() * self.x_label.len() as f64;
         sheet.lines((centre, below), &self.x_label, BODY, INK, Align::Center)?;
-        self.y_label
-            .iter()
-            .zip(0..)
-            .try_for_each(|(line, index)| {
-                let beside = left - self.left + BODY.line() * (f64::from(index) + 0.5);
-                sheet.text((beside, middle), line, BODY, INK, Align::UpCenter)
-            })
+        self.y_label.iter().zip(0..).try_for_each(|(line, index)| {
+            let beside = left - self.left + BODY.line() * (f64::from(index) + 0.5);
+            sheet.text((beside, middle), line, BODY, INK, Align::UpCenter)
+        })
     }
 }

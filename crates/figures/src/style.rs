@@ -103,26 +103,12 @@ pub(super) struct Strokes {
 
 impl Strokes {
     pub fn new(figure: &Figure) -> Self {
-        let layers = || {
-            figure
-                .panels
-                .iter()
-                .flat_map(|panel| &panel.layers)
-        };
+        let layers = || figure.panels.iter().flat_map(|panel| &panel.layers);
         let shown = |name: &str| layers().any(|layer| layer.series() == Some(name));
         let set = |name: &str| {
-            figure
-                .looks
-                .iter()
-                .find(|(known, _)| known == name)
-                .map(|&(_, look)| look)
+            figure.looks.iter().find(|(known, _)| known == name).map(|&(_, look)| look)
         };
-        let taken = |number| {
-            figure
-                .looks
-                .iter()
-                .any(|(name, look)| *look == number && shown(name))
-        };
+        let taken = |number| figure.looks.iter().any(|(name, look)| *look == number && shown(name));
         // Series without a given look avoid the looks of series that have one.
         let mut free = (0..).filter(|&number| !taken(number));
         let mut series: Vec<(String, Stroke)> = Vec::new();
@@ -143,10 +129,7 @@ impl Strokes {
     /// Returns the place of the named series in the order of appearance, and its stroke; solid grey
     /// for a series without a name.
     pub fn of(&self, name: &str) -> (usize, Stroke) {
-        let place = self
-            .series
-            .iter()
-            .position(|(known, _)| known == name);
+        let place = self.series.iter().position(|(known, _)| known == name);
         place.map_or((0, UNNAMED), |place| (place, self.series[place].1))
     }
 }
@@ -158,11 +141,7 @@ mod tests {
 
     fn strokes(names: &[String], looks: Vec<(String, usize)>) -> Strokes {
         let line = |name: &String| Layer::new(name, Marks::Line(Vec::new()));
-        let layers = names
-            .iter()
-            .chain(names.iter().rev())
-            .map(line)
-            .collect();
+        let layers = names.iter().chain(names.iter().rev()).map(line).collect();
         let panel = Panel { layers, ..Panel::default() };
         Strokes::new(&Figure { panels: vec![panel], looks, ..Figure::default() })
     }

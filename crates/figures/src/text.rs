@@ -83,26 +83,17 @@ impl Fonts {
 
     fn advance(&self, character: char, style: Type) -> f64 {
         let Face { font, advances } = self.face(style);
-        style.size
-            * advances
-                .get(&character)
-                .copied()
-                .unwrap_or_else(|| advance(font, character))
+        style.size * advances.get(&character).copied().unwrap_or_else(|| advance(font, character))
     }
 
     /// Returns the width of a line of text in pixels, without kerning.
     pub fn width(&self, text: &str, style: Type) -> f64 {
-        text.chars()
-            .map(|character| self.advance(character, style))
-            .sum()
+        text.chars().map(|character| self.advance(character, style)).sum()
     }
 
     /// Returns the largest width among lines of text in pixels.
     pub fn widest<'a>(&self, lines: impl IntoIterator<Item = &'a String>, style: Type) -> f64 {
-        lines
-            .into_iter()
-            .map(|line| self.width(line, style))
-            .fold(0.0, f64::max)
+        lines.into_iter().map(|line| self.width(line, style)).fold(0.0, f64::max)
     }
 
     /// Breaks a text at blanks into lines of at most `width` pixels. A wider word is broken
@@ -158,9 +149,7 @@ mod tests {
         assert!(lines.len() > 1 && fonts.widest(&lines, BODY) <= 120.0);
         assert_eq!(lines.join(" "), words);
         assert_eq!(
-            fonts
-                .wrap("incomprehensibilities", 60.0, BODY)
-                .concat(),
+            fonts.wrap("incomprehensibilities", 60.0, BODY).concat(),
             "incomprehensibilities"
         );
         assert_eq!((fonts.wrap("", 60.0, BODY).len(), fonts.wrap("ab", 0.0, BODY).len()), (0, 2));

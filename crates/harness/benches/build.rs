@@ -17,10 +17,7 @@ use rand::seq::SliceRandom;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 fn pool(threads: usize) -> ThreadPool {
-    ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .expect("a pool of threads")
+    ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool of threads")
 }
 
 fn main() {
@@ -31,18 +28,12 @@ fn main() {
             Err(error) => println!("\n{error}"),
         }
     }
-    let cloister = Scene::load("cloister")
-        .expect("a built-in scene")
-        .boxes;
+    let cloister = Scene::load("cloister").expect("a built-in scene").boxes;
     let away = Vec3::new(1e4, 0.0, 0.0);
     let twice: Vec<Aabb> = cloister
         .iter()
         .copied()
-        .chain(
-            cloister
-                .iter()
-                .map(|b| Aabb { min: b.min + away, max: b.max + away }),
-        )
+        .chain(cloister.iter().map(|b| Aabb { min: b.min + away, max: b.max + away }))
         .collect();
     two_threads(&twice);
 }
@@ -60,9 +51,7 @@ fn one_thread(scene: &Scene) {
     contenders.push((
         "Goldsmith–Salmon, a random order",
         Box::new(move || {
-            insertion
-                .insert_all(&objects, &order, &mut workspace)
-                .expect("a permutation");
+            insertion.insert_all(&objects, &order, &mut workspace).expect("a permutation");
             workspace.write(&mut tree);
         }),
     ));

@@ -51,26 +51,17 @@ fn main() {
 
 /// Builds the program `bvh` and returns its path.
 fn program() -> PathBuf {
-    let built = Command::new(env!("CARGO"))
-        .args(["build", "--release", "--package", "bvh-cli"])
-        .status();
+    let built =
+        Command::new(env!("CARGO")).args(["build", "--release", "--package", "bvh-cli"]).status();
     assert!(built.expect("cargo").success(), "bvh-cli was not built");
     let this = std::env::current_exe().expect("this program");
-    let release = this
-        .ancestors()
-        .nth(2)
-        .expect("the folder above `deps`");
+    let release = this.ancestors().nth(2).expect("the folder above `deps`");
     release.join(format!("bvh{}", std::env::consts::EXE_SUFFIX))
 }
 
 /// Returns the contents of a file of segments between random points of a scene.
 fn segments(scene: &Scene) -> Vec<u8> {
-    let bounds = scene
-        .boxes
-        .iter()
-        .copied()
-        .reduce(|all, aabb| all.union(&aabb))
-        .expect("objects");
+    let bounds = scene.boxes.iter().copied().reduce(|all, aabb| all.union(&aabb)).expect("objects");
     let mut rng = Stream::seed_from_u64(1);
     let mut bytes = Vec::with_capacity(24 * SEGMENTS);
     for _ in 0..2 * SEGMENTS {
@@ -96,9 +87,7 @@ fn interrupted(program: &Path, folder: &Path, recorded: Option<&Path>, after: f6
     let mut child = bake.spawn().expect("bvh");
     std::thread::sleep(Duration::from_secs_f64(after));
     let signal = Instant::now();
-    let sent = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status();
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     assert!(sent.expect("kill").success(), "the bake had ended");
     let status = child.wait().expect("the bake");
     let seconds = signal.elapsed().as_secs_f64();

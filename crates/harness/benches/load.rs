@@ -21,10 +21,7 @@ use std::path::Path;
 const MULLER_FELLNER: &str = "Müller–Fellner, one thread";
 
 fn main() {
-    let one = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .expect("a pool of threads");
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool of threads");
     let folder = tempfile::tempdir().expect("a folder");
     for name in ["sponza", "cloister"] {
         match Scene::load(name) {
@@ -48,14 +45,8 @@ fn loads(scene: &Scene, path: &Path) {
         assert_eq!(view.expect("the tree").nodes.len(), tree.nodes.len());
     };
     let parts = || -> Vec<Contender> {
-        let touch = || {
-            _ = black_box(
-                map(path)
-                    .iter()
-                    .step_by(4096)
-                    .fold(0, |all, byte| all ^ byte),
-            )
-        };
+        let touch =
+            || _ = black_box(map(path).iter().step_by(4096).fold(0, |all, byte| all ^ byte));
         vec![
             ("  of that: map, touch every page, unmap", Box::new(touch)),
             (
@@ -71,13 +62,7 @@ fn loads(scene: &Scene, path: &Path) {
     };
     let copy = || {
         let bytes = fs::read(path).expect("the file");
-        assert_eq!(
-            file::load(&bytes, boxes)
-                .expect("the tree")
-                .nodes
-                .len(),
-            tree.nodes.len()
-        );
+        assert_eq!(file::load(&bytes, boxes).expect("the tree").nodes.len(), tree.nodes.len());
     };
     let mut contenders: Vec<Contender> = vec![
         (MULLER_FELLNER, Box::new(build)),
@@ -106,7 +91,5 @@ fn map(path: &Path) -> Mmap {
 /// Sums the bytes, the cheapest way to read all of them.
 fn sum(bytes: &[u8]) -> u64 {
     let words = bytes.as_chunks::<8>().0;
-    words
-        .iter()
-        .fold(0, |sum, word| sum.wrapping_add(u64::from_le_bytes(*word)))
+    words.iter().fold(0, |sum, word| sum.wrapping_add(u64::from_le_bytes(*word)))
 }

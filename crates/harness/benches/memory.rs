@@ -24,16 +24,9 @@ fn main() {
     std::env::set_current_dir(&top).expect("the project's folder");
     let experiment = Experiment::read(Path::new("experiments/anytime.toml"), &Overrides::default())
         .expect("a spec");
-    let one = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .expect("a pool of threads");
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool of threads");
     let mut rows = Vec::new();
-    for name in experiment
-        .scenes
-        .iter()
-        .chain(&experiment.optional_scenes)
-    {
+    for name in experiment.scenes.iter().chain(&experiment.optional_scenes) {
         match Scene::load(name) {
             Ok(scene) => one.install(|| measure(&experiment, &scene, &mut rows)),
             Err(error) => println!("{error}"),

@@ -36,10 +36,8 @@ struct Args {
 
 fn main() {
     let Args { scenes, rounds, .. } = Args::parse();
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .expect("a pool of one thread");
+    let pool =
+        rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool of one thread");
     println!(
         "{:<16} {:<18} {:>9} {:>7} {:>9} {:>7}",
         "scene", "library", "time/ms", "cost", "best/ms", "cost"
@@ -64,27 +62,17 @@ fn libraries() -> Vec<(String, Peer)> {
     let obvhs = presets.map(|(name, preset)| {
         (format!("obvhs {name}"), Peer::Obvhs(Obvhs { preset, reinsertion: None }))
     });
-    obvhs
-        .into_iter()
-        .chain([("bvh".into(), Peer::Bvh(NoSettings {}))])
-        .collect()
+    obvhs.into_iter().chain([("bvh".into(), Peer::Bvh(NoSettings {}))]).collect()
 }
 
 fn measure(scene: &Scene, rounds: usize) {
-    let greedy = muller_fellner::Config::default()
-        .build(&scene.boxes)
-        .expect("finite boxes");
+    let greedy = muller_fellner::Config::default().build(&scene.boxes).expect("finite boxes");
     let base = cost::internal_area(&greedy);
     let name = scene.name.rsplit('/').next().unwrap_or_default();
     for (library, peer) in libraries() {
-        let theirs = || {
-            peer.build(scene)
-                .expect("a library of this program")
-        };
+        let theirs = || peer.build(scene).expect("a library of this program");
         // The first builds warm memory and caches up, and their time sets the limit.
-        let mut least = (0..3)
-            .map(|_| theirs().seconds)
-            .fold(f64::INFINITY, f64::min);
+        let mut least = (0..3).map(|_| theirs().seconds).fold(f64::INFINITY, f64::min);
         let mut their_cost = f64::INFINITY;
         let mut ours = Vec::new();
         for round in 0..rounds {
@@ -94,9 +82,7 @@ fn measure(scene: &Scene, rounds: usize) {
             let (taken, area) = clock::best(scene, PLANNED * least, round as u64);
             ours.push((taken, area / base));
         }
-        let in_time = ours
-            .iter()
-            .filter(|(taken, _)| *taken <= SAME * least);
+        let in_time = ours.iter().filter(|(taken, _)| *taken <= SAME * least);
         let (taken, our_cost) = *in_time
             .min_by(|a, b| a.1.total_cmp(&b.1))
             .or(ours.iter().min_by(|a, b| a.0.total_cmp(&b.0)))

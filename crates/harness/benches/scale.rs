@@ -36,10 +36,8 @@ const DEFAULT: [&str; 3] = ["forest:1000000", "forest:8000000", "forest:20000000
 fn main() {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     std::env::set_current_dir(&top).expect("the project's folder");
-    let mut names: Vec<String> = std::env::args()
-        .skip(1)
-        .filter(|argument| !argument.starts_with("--"))
-        .collect();
+    let mut names: Vec<String> =
+        std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
     if names.is_empty() {
         names = DEFAULT.map(String::from).into();
     }
@@ -55,10 +53,7 @@ fn key(row: &ScaleRow) -> (String, usize, String) {
 }
 
 fn pool(threads: usize) -> ThreadPool {
-    ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .expect("a pool of threads")
+    ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool of threads")
 }
 
 /// The measured phases of one scene.
@@ -101,10 +96,7 @@ impl Phases {
     fn cost(&mut self, tree: &Bvh, base: f64) {
         let ratio = cost::internal_area(tree) / base;
         println!("{:<18} {:<28} {ratio:>8.4} of greedy's cost", "", "");
-        self.rows
-            .last_mut()
-            .expect("a phase")
-            .cost_over_base = Some(ratio);
+        self.rows.last_mut().expect("a phase").cost_over_base = Some(ratio);
     }
 
     fn measure(&mut self) {
@@ -127,18 +119,13 @@ impl Phases {
         let scene = self.phase("load as a scene", || Scene::load(&name).expect("a scene"));
         let boxes = &scene.boxes;
         let greedy = self.phase("build greedy", || {
-            muller_fellner::Config::default()
-                .build(boxes)
-                .expect("finite boxes")
+            muller_fellner::Config::default().build(boxes).expect("finite boxes")
         });
         let base = cost::internal_area(&greedy);
         self.cost(&greedy, base);
         drop(greedy);
-        let clustered = self.phase("build PLOC", || {
-            ploc::Config::default()
-                .build(boxes)
-                .expect("finite boxes")
-        });
+        let clustered = self
+            .phase("build PLOC", || ploc::Config::default().build(boxes).expect("finite boxes"));
         self.cost(&clustered, base);
         drop(clustered);
         let triangles = scene.triangles().expect("triangles");
@@ -165,9 +152,7 @@ impl Phases {
             // while it is mapped.
             let bytes = unsafe { Mmap::map(&file) }.expect("a mapping");
             let file = TreeFile::open(&bytes).expect("a tree file");
-            let file = file
-                .for_boxes(boxes)
-                .expect("a tree of these boxes");
+            let file = file.for_boxes(boxes).expect("a tree of these boxes");
             assert_eq!(file.view().expect("a tree").nodes.len(), baked.nodes.len());
         });
         self.phase("inspect", || {
@@ -177,11 +162,7 @@ impl Phases {
         self.phase("inspect, overlap", || {
             cost::end_point_overlap(&baked, triangles, &SahConstants::default())
         });
-        self.phase("wide layout", || {
-            WideBvh::new(&baked, triangles)
-                .expect("a layout")
-                .bytes()
-        });
+        self.phase("wide layout", || WideBvh::new(&baked, triangles).expect("a layout").bytes());
     }
 
     /// Bakes for `seconds` as the program does, which builds the greedy tree before the time
@@ -191,9 +172,7 @@ impl Phases {
         let plural = if threads == 1 { "" } else { "s" };
         let name = format!("bake {seconds} s, {threads} thread{plural}");
         let bake = || {
-            let greedy = muller_fellner::Config::default()
-                .build(boxes)
-                .expect("finite boxes");
+            let greedy = muller_fellner::Config::default().build(boxes).expect("finite boxes");
             let deadline = Deadline::after(Duration::from_secs(seconds));
             let problem = Problem::new(boxes);
             let greedy = Kept::new(greedy, &problem);
@@ -234,19 +213,15 @@ fn write_ply(scene: &Scene, path: &Path) {
         triangles.len()
     );
     out.write_all(header.as_bytes()).expect("a file");
-    for number in triangles
-        .iter()
-        .flat_map(|triangle| triangle.0)
-        .flat_map(|corner| corner.to_array())
+    for number in
+        triangles.iter().flat_map(|triangle| triangle.0).flat_map(|corner| corner.to_array())
     {
-        out.write_all(&number.to_le_bytes())
-            .expect("a file");
+        out.write_all(&number.to_le_bytes()).expect("a file");
     }
     for face in 0..triangles.len() as i32 {
         out.write_all(&[3]).expect("a file");
         for corner in 0..3 {
-            out.write_all(&(3 * face + corner).to_le_bytes())
-                .expect("a file");
+            out.write_all(&(3 * face + corner).to_le_bytes()).expect("a file");
         }
     }
     out.flush().expect("a file");

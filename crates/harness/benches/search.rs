@@ -57,9 +57,7 @@ fn main() {
 }
 
 fn measure(scene: &Scene, seconds: &[f64], seeds: u64) -> Vec<ThreadsRow> {
-    let greedy = muller_fellner::Config::default()
-        .build(&scene.boxes)
-        .expect("finite boxes");
+    let greedy = muller_fellner::Config::default().build(&scene.boxes).expect("finite boxes");
     let base = cost::internal_area(&greedy);
     let mut rows = Vec::new();
     for &limit in seconds {

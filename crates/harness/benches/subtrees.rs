@@ -61,9 +61,7 @@ fn main() {
 }
 
 fn measure(scene: &Scene, args: &Args) -> Vec<SubtreesRow> {
-    let greedy = muller_fellner::Config::default()
-        .build(&scene.boxes)
-        .expect("finite boxes");
+    let greedy = muller_fellner::Config::default().build(&scene.boxes).expect("finite boxes");
     let base = cost::internal_area(&greedy);
     let mut rows = Vec::new();
     let by_subtrees = args.subtrees.iter().map(|&count| (count, 1));
@@ -114,10 +112,8 @@ fn run(
     seed: u64,
     threads: usize,
 ) -> (f64, f64) {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .expect("a pool of threads");
+    let pool =
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool of threads");
     let budget = Budget { max_work: Some(million_work * 1_000_000), ..Budget::UNLIMITED };
     let problem = Problem::new(&scene.boxes);
     let began = Instant::now();

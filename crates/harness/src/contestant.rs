@@ -115,10 +115,8 @@ impl Labelled {
     /// Reads an entry and finds all its faults that do not depend on the rest of the spec.
     pub(crate) fn read(mut entry: Table) -> Read<Self> {
         // A method rejects unknown keys, so the keys that are not its parameters are removed first.
-        let option_table = EntryOptions::KEYS
-            .iter()
-            .filter_map(|key| entry.remove_entry(*key))
-            .collect();
+        let option_table =
+            EntryOptions::KEYS.iter().filter_map(|key| entry.remove_entry(*key)).collect();
         let (options, mut faults) = fault::deserialize::<EntryOptions>(option_table);
         let (method, method_faults) = fault::tagged(
             entry,
@@ -128,10 +126,7 @@ impl Labelled {
         );
         faults.extend(method_faults);
         let labelled = options.zip(method).map(|(mut options, method)| {
-            let label = options
-                .label
-                .take()
-                .unwrap_or_else(|| method.name().into());
+            let label = options.label.take().unwrap_or_else(|| method.name().into());
             Self { label, method, options }
         });
         (labelled, faults)

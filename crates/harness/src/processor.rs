@@ -19,9 +19,7 @@ impl Processor {
     fn parse(info: &str) -> Self {
         let name = value(info, "model name").unwrap_or_else(|| std::env::consts::ARCH.into());
         let family = value(info, "cpu family");
-        let model = family
-            .zip(value(info, "model"))
-            .map(|(family, model)| [family, model]);
+        let model = family.zip(value(info, "model")).map(|(family, model)| [family, model]);
         Self { name, model }
     }
 
@@ -37,10 +35,8 @@ impl Processor {
     /// single hyphens between words.
     pub fn folder(&self) -> String {
         let numbers = self.model.iter().flatten();
-        let words: Vec<String> = std::iter::once(&self.name)
-            .chain(numbers)
-            .map(|word| word.to_lowercase())
-            .collect();
+        let words: Vec<String> =
+            std::iter::once(&self.name).chain(numbers).map(|word| word.to_lowercase()).collect();
         let name = words.join(" ");
         let parts: Vec<&str> = name
             .split(|letter: char| !letter.is_ascii_alphanumeric())

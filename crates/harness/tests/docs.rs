@@ -43,10 +43,7 @@ fn pages() -> Vec<PathBuf> {
         let entries = fs::read_dir(folder).unwrap();
         pages.extend(entries.map(|entry| entry.unwrap().path()));
     }
-    pages.retain(|page| {
-        page.extension()
-            .is_some_and(|extension| extension == "md")
-    });
+    pages.retain(|page| page.extension().is_some_and(|extension| extension == "md"));
     pages.sort();
     pages
 }
@@ -72,9 +69,7 @@ fn the_prose_of_the_documentation_is_wrapped() {
             is_example ^= line.starts_with("```");
             let is_free = is_generated
                 || is_example
-                || ["|", "!["]
-                    .iter()
-                    .any(|start| line.starts_with(start));
+                || ["|", "!["].iter().any(|start| line.starts_with(start));
             let width = line.chars().count();
             let place = format!("{}:{}", page.display(), number + 1);
             assert!(is_free || width <= WIDTH, "{place}: {width} characters; accepted: {WIDTH}");
@@ -86,11 +81,7 @@ fn the_prose_of_the_documentation_is_wrapped() {
 fn every_link_of_the_documentation_leads_somewhere() {
     for page in pages() {
         let text = fs::read_to_string(&page).unwrap();
-        for (link, _) in text
-            .split("](")
-            .skip(1)
-            .filter_map(|rest| rest.split_once(')'))
-        {
+        for (link, _) in text.split("](").skip(1).filter_map(|rest| rest.split_once(')')) {
             let target = link.split('#').next().unwrap_or_default();
             if !target.is_empty() && !target.contains("://") {
                 assert!(page.parent().unwrap().join(target).exists(), "{}: {link}", page.display());
@@ -113,9 +104,7 @@ fn the_index_of_results_has_every_experiment_with_its_question() {
 #[test]
 fn every_experiment_is_checked_on_every_commit() {
     let run = fs::read_to_string(top().join(".ci/run")).unwrap();
-    let words: BTreeSet<&str> = run
-        .split(|c: char| !c.is_alphanumeric() && c != '_')
-        .collect();
+    let words: BTreeSet<&str> = run.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
     for (name, text) in experiments() {
         // CI does not build other libraries.
         let needs_libraries = text.contains("method = \"obvhs\"");
@@ -142,14 +131,9 @@ fn a_file_name_means_the_same_columns_in_every_experiment() {
     assert!(paths.len() > 100, "{} tables", paths.len());
     let mut headers = BTreeMap::new();
     for path in paths {
-        let header = csv::Reader::from_path(&path)
-            .unwrap()
-            .headers()
-            .unwrap()
-            .clone();
-        let known = headers
-            .entry(path.file_name().unwrap().to_owned())
-            .or_insert_with(|| header.clone());
+        let header = csv::Reader::from_path(&path).unwrap().headers().unwrap().clone();
+        let known =
+            headers.entry(path.file_name().unwrap().to_owned()).or_insert_with(|| header.clone());
         assert_eq!(*known, header, "{}", path.display());
     }
 }
@@ -162,10 +146,7 @@ fn bytes_in(folder: &Path) -> u64 {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap_or_default();
         let name = name.to_string_lossy();
-        if [".new", ".partial", ".lock", ".html"]
-            .iter()
-            .any(|ending| name.ends_with(ending))
-        {
+        if [".new", ".partial", ".lock", ".html"].iter().any(|ending| name.ends_with(ending)) {
             continue;
         }
         bytes += if path.is_dir() { bytes_in(&path) } else { path.metadata().unwrap().len() };

@@ -57,9 +57,8 @@ fn pattern(text: &str, is_for_words: impl Fn(&str) -> bool) -> (Regex, Vec<&str>
     let mut expression = fixed(parts.next().unwrap_or_default());
     let mut names = Vec::new();
     for part in parts {
-        let (name, behind) = part
-            .split_once('}')
-            .unwrap_or_else(|| panic!("{text}: a brace is not closed"));
+        let (name, behind) =
+            part.split_once('}').unwrap_or_else(|| panic!("{text}: a brace is not closed"));
         names.push(name);
         if is_for_words(name) {
             expression += WORDS;
@@ -75,15 +74,11 @@ fn pattern(text: &str, is_for_words: impl Fn(&str) -> bool) -> (Regex, Vec<&str>
 /// Returns the expression for a fixed part of a text. White space equals any other.
 fn fixed(text: &str) -> String {
     let white_space = Regex::new(r"\s+").unwrap();
-    white_space
-        .replace_all(&regex_lite::escape(text), r"\s+")
-        .into_owned()
+    white_space.replace_all(&regex_lite::escape(text), r"\s+").into_owned()
 }
 
 fn reads_alike(shown: &str, made: &str) -> bool {
-    shown
-        .split_whitespace()
-        .eq(made.split_whitespace())
+    shown.split_whitespace().eq(made.split_whitespace())
 }
 
 #[test]
@@ -98,9 +93,7 @@ fn the_prose_shows_the_committed_numbers() {
                 .unwrap_or_else(|| panic!("docs/numbers.toml: {text}: no query for {name}"))
         };
         let (pattern, names) = pattern(&text, |name| query(name).ends_with(" | text"));
-        let found = pattern
-            .captures(&shown)
-            .unwrap_or_else(|| panic!("{page} lacks: {text}"));
+        let found = pattern.captures(&shown).unwrap_or_else(|| panic!("{page} lacks: {text}"));
         let mut made = shown.clone();
         // From the back, because a replacement moves everything behind it.
         for (index, name) in names.iter().enumerate().rev() {
@@ -110,10 +103,7 @@ fn the_prose_shows_the_committed_numbers() {
                 made.replace_range(place.range(), &value);
             }
         }
-        let unused: Vec<_> = queries
-            .keys()
-            .filter(|key| !names.contains(&key.as_str()))
-            .collect();
+        let unused: Vec<_> = queries.keys().filter(|key| !names.contains(&key.as_str())).collect();
         assert!(unused.is_empty(), "docs/numbers.toml: {text}: nobody needs {unused:?}");
         assert_current(&path, &made, "numbers");
     }
@@ -126,11 +116,7 @@ fn a_text_is_found_across_lines() {
         let (pattern, _) = pattern(text, |name| name == "answer");
         let found = pattern.captures(page)?;
         let places = found.iter().skip(1).flatten();
-        Some(
-            places
-                .map(|place| place.as_str())
-                .collect::<Vec<_>>(),
-        )
+        Some(places.map(|place| place.as_str()).collect::<Vec<_>>())
     };
     assert_eq!(values("are {low} to {high} % cheaper"), Some(vec!["8", "25"]));
     assert_eq!(values("So are {more}."), Some(vec!["7.5"]));
@@ -151,10 +137,7 @@ fn trees_by_verdict(file: &str, instructions: &str, against: &str, rays: &str) -
             && row["processor"].ends_with(&format!(", {instructions}"))
             && row["against"] == against
             && row["rays"] == rays;
-        let Some(tree) = row["mode"]
-            .strip_suffix(calls)
-            .filter(|_| is_asked)
-        else {
+        let Some(tree) = row["mode"].strip_suffix(calls).filter(|_| is_asked) else {
             continue;
         };
         let least: f64 = row["least_turn"].parse().unwrap();
@@ -250,10 +233,7 @@ fn the_benchmarks_say_what_a_second_thread_is_worth() {
     for row in query::read(&path).unwrap() {
         let limit = format!("{} {}", row["scene"], row["limit_seconds"]);
         let cost = row["cost_over_base"].parse().unwrap();
-        costs
-            .entry((row["run"].clone(), limit))
-            .or_default()
-            .push(cost);
+        costs.entry((row["run"].clone(), limit)).or_default().push(cost);
     }
     let median = |costs: &[f64]| {
         let mut sorted = costs.to_vec();
@@ -268,11 +248,7 @@ fn the_benchmarks_say_what_a_second_thread_is_worth() {
                 let other = &costs[&(other.to_owned(), limit.clone())];
                 counts[0] += usize::from(median(two) < median(other));
                 counts[1] += 1;
-                counts[2] += two
-                    .iter()
-                    .zip(other)
-                    .filter(|(two, other)| two < other)
-                    .count();
+                counts[2] += two.iter().zip(other).filter(|(two, other)| two < other).count();
                 counts[3] += two.len();
             }
         }

@@ -17,14 +17,8 @@ fn fault(root: &Value, schema: &Value, value: &Value, at: &str) -> Option<String
     }
     let list = |key: &str| schema.get(key).and_then(Value::as_array);
     if let Some(choices) = list("oneOf").or(list("anyOf")) {
-        let faults: Vec<_> = choices
-            .iter()
-            .map(|choice| fault(root, choice, value, at))
-            .collect();
-        let right = faults
-            .iter()
-            .filter(|fault| fault.is_none())
-            .count();
+        let faults: Vec<_> = choices.iter().map(|choice| fault(root, choice, value, at)).collect();
+        let right = faults.iter().filter(|fault| fault.is_none()).count();
         // `oneOf` accepts exactly one alternative, `anyOf` at least one.
         let exact = right == 1 || schema.get("anyOf").is_some() && right > 1;
         return (!exact).then(|| format!("{at}: {right} choices accept it: {faults:?}"));
@@ -37,35 +31,28 @@ fn fault(root: &Value, schema: &Value, value: &Value, at: &str) -> Option<String
         return Some(format!("{at}: {value} is not {schema:.80}"));
     }
     let none = Map::new();
-    let properties = schema
-        .get("properties")
-        .and_then(Value::as_object)
-        .unwrap_or(&none);
+    let properties = schema.get("properties").and_then(Value::as_object).unwrap_or(&none);
     let fields = value.as_object().unwrap_or(&none);
     let items = schema.get("items");
     let missing = list("required")
         .into_iter()
         .flatten()
         .find(|key| !fields.contains_key(key.as_str().unwrap()));
-    missing
-        .map(|key| format!("{at}: {key} is missing"))
-        .or_else(|| {
-            let field = |(key, value): (&String, &Value)| match (
-                properties.get(key),
-                schema.get("additionalProperties"),
-            ) {
-                (Some(schema), _) => fault(root, schema, value, &format!("{at}.{key}")),
-                (None, Some(Value::Bool(false))) => Some(format!("{at}.{key} is no key")),
-                (None, Some(schema)) => fault(root, schema, value, &format!("{at}.{key}")),
-                (None, None) => None,
-            };
-            let elements = value.as_array().into_iter().flatten();
-            fields.iter().find_map(field).or_else(|| {
-                elements
-                    .zip(items.into_iter().cycle())
-                    .find_map(|(v, s)| fault(root, s, v, at))
-            })
+    missing.map(|key| format!("{at}: {key} is missing")).or_else(|| {
+        let field = |(key, value): (&String, &Value)| match (
+            properties.get(key),
+            schema.get("additionalProperties"),
+        ) {
+            (Some(schema), _) => fault(root, schema, value, &format!("{at}.{key}")),
+            (None, Some(Value::Bool(false))) => Some(format!("{at}.{key} is no key")),
+            (None, Some(schema)) => fault(root, schema, value, &format!("{at}.{key}")),
+            (None, None) => None,
+        };
+        let elements = value.as_array().into_iter().flatten();
+        fields.iter().find_map(field).or_else(|| {
+            elements.zip(items.into_iter().cycle()).find_map(|(v, s)| fault(root, s, v, at))
         })
+    })
 }
 
 fn is_of_type(value: &Value, kind: &str) -> bool {
@@ -94,9 +81,8 @@ fn the_schema_accepts_every_committed_spec_and_rejects_a_mistyped_key_anywhere()
         // The spec must be rejected with one more letter in any key that is not a name.
         for key in ["question", "methods", "trials", "kind", "title", "max_work", "quick", "label"]
         {
-            let mistyped = spec
-                .to_string()
-                .replace(&format!("\"{key}\":"), &format!("\"{key}z\":"));
+            let mistyped =
+                spec.to_string().replace(&format!("\"{key}\":"), &format!("\"{key}z\":"));
             let mistyped: Value = serde_json::from_str(&mistyped).unwrap();
             let accepted = fault(&schema, &schema, &mistyped, "").is_none();
             assert!(mistyped == spec || !accepted, "{name}: {key}");

@@ -22,9 +22,8 @@ fn scene() -> Result<Vec<Triangle>, Box<dyn Error>> {
     }
     // The last row and column of points begin no cell.
     let cells = (0..positions.len() as u32).filter(|i| i % 81 < 80 && i / 81 % 81 < 80);
-    let indices: Vec<[u32; 3]> = cells
-        .flat_map(|i| [[i, i + 1, i + 81], [i + 82, i + 81, i + 1]])
-        .collect();
+    let indices: Vec<[u32; 3]> =
+        cells.flat_map(|i| [[i, i + 1, i + 81], [i + 82, i + 81, i + 1]]).collect();
     Ok(Triangle::from_mesh(&positions, &indices)?)
 }
 
@@ -93,14 +92,10 @@ fn trace(
     }
     encoder.copy_buffer_to_buffer(&buffers[4], 0, &read, 0, 8 * count as u64);
     queue.submit([encoder.finish()]);
-    read.slice(..)
-        .map_async(wgpu::MapMode::Read, |mapped| mapped.expect("a mapped buffer"));
+    read.slice(..).map_async(wgpu::MapMode::Read, |mapped| mapped.expect("a mapped buffer"));
     device.poll(PollType::wait_indefinitely())?;
     let words: Vec<[u32; 2]> = bytemuck::pod_collect_to_vec(&read.slice(..).get_mapped_range()?);
-    Ok(words
-        .into_iter()
-        .map(|[t, object]| (f32::from_bits(t), object))
-        .collect())
+    Ok(words.into_iter().map(|[t, object]| (f32::from_bits(t), object)).collect())
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -115,15 +110,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let rays = rays()?;
     let boxes = boxes(&triangles);
     let tree = bake(&boxes, Duration::from_millis(500))?.tree;
-    let expected: Vec<Option<Hit>> = rays
-        .iter()
-        .map(|ray| nearest_hit(&tree, &triangles, ray))
-        .collect();
-    let corners: Vec<f32> = triangles
-        .iter()
-        .flat_map(|t| t.0)
-        .flat_map(|corner| corner.to_array())
-        .collect();
+    let expected: Vec<Option<Hit>> =
+        rays.iter().map(|ray| nearest_hit(&tree, &triangles, ray)).collect();
+    let corners: Vec<f32> =
+        triangles.iter().flat_map(|t| t.0).flat_map(|corner| corner.to_array()).collect();
     let mut ray_data: Vec<f32> = Vec::new();
     for ray in &rays {
         ray_data.extend(ray.origin().extend(ray.t_min()).to_array());

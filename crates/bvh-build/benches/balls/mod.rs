@@ -114,9 +114,7 @@ pub fn compare(name: &str, rays: usize, mut first: impl FnMut(), mut second: imp
 
 /// Returns the layout of the tree by Müller–Fellner.
 pub fn layout(triangles: &[Triangle]) -> WideBvh {
-    let tree = muller_fellner::Config::default()
-        .build(&boxes(triangles))
-        .expect("finite boxes");
+    let tree = muller_fellner::Config::default().build(&boxes(triangles)).expect("finite boxes");
     WideBvh::new(&tree, triangles).expect("a tree over the triangles")
 }
 
@@ -140,8 +138,5 @@ pub fn ball(levels: usize) -> Vec<Triangle> {
         let p = p.normalize();
         p * (1.0 + 0.1 * (7.0 * p.x).sin() * (5.0 * p.y).sin() * (6.0 * p.z).cos())
     };
-    triangles
-        .into_iter()
-        .map(|corners| Triangle(corners.map(bumpy)))
-        .collect()
+    triangles.into_iter().map(|corners| Triangle(corners.map(bumpy))).collect()
 }

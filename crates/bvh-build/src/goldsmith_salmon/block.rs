@@ -98,9 +98,7 @@ impl Block {
     fn containing_plain(&self, b: &[f32; 6]) -> u32 {
         let contains =
             |lane: usize| !self.is_leaf(lane) && (0..6).all(|i| b[i] <= self.bounds[i][lane]);
-        (0..LANES)
-            .map(|lane| u32::from(contains(lane)) << lane)
-            .sum()
+        (0..LANES).map(|lane| u32::from(contains(lane)) << lane).sum()
     }
 
     /// Returns the size of the union of a child and `b`.

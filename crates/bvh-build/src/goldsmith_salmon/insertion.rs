@@ -185,12 +185,7 @@ fn find_stop<R: Rule>(
         let mut least = f64::INFINITY;
         let mut next = Grown { node: NONE, area: 0.0 };
         examined += count.div_ceil(LANES);
-        for (index, block) in blocks
-            .iter()
-            .enumerate()
-            .skip(first)
-            .take(count.div_ceil(LANES))
-        {
+        for (index, block) in blocks.iter().enumerate().skip(first).take(count.div_ceil(LANES)) {
             // Only leaves follow. Each adds at least twice the object's area.
             if block.is_leaf(0) {
                 let beaten = !R::BY_AREA && least <= 2.0 * object.area;

@@ -183,8 +183,7 @@ impl Config {
         watch: &Watch,
     ) -> Result<f64, InvalidOrder> {
         check_order(order, scene.len(), &mut workspace.named)?;
-        self.insert_valid(scene, order, workspace, watch)
-            .ok_or(InvalidOrder::Cancelled)
+        self.insert_valid(scene, order, workspace, watch).ok_or(InvalidOrder::Cancelled)
     }
 
     /// Inserts a valid order; `None` if the `watch` cancels.
@@ -240,8 +239,7 @@ impl Builder for Config {
         let order: Vec<u32> = (0..boxes.len() as u32).collect();
         let mut workspace = Workspace::default();
         let mut tree = Bvh::default();
-        self.insert_valid(&scene, &order, &mut workspace, watch)
-            .ok_or(BuildError::Cancelled)?;
+        self.insert_valid(&scene, &order, &mut workspace, watch).ok_or(BuildError::Cancelled)?;
         workspace.write(&mut tree);
         Ok(tree)
     }

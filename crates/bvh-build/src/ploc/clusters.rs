@@ -83,10 +83,9 @@ impl Clusters {
         #[cfg(feature = "rayon")]
         if nearest.len() * radius >= PARALLEL_PAIRS && rayon::current_num_threads() > 1 {
             use rayon::prelude::*;
-            nearest
-                .par_chunks_mut(CHUNK)
-                .enumerate()
-                .for_each_init(Scratch::default, |scratch, (number, found)| {
+            nearest.par_chunks_mut(CHUNK).enumerate().for_each_init(
+                Scratch::default,
+                |scratch, (number, found)| {
                     if ends_at(number) {
                         return;
                     }
@@ -99,7 +98,8 @@ impl Clusters {
                         found,
                         scratch,
                     );
-                });
+                },
+            );
             return;
         }
         for (number, found) in nearest.chunks_mut(CHUNK).enumerate() {
@@ -162,10 +162,7 @@ impl Clusters {
         }
         let boxes = &mut self.boxes[..count];
         let below = &mut self.below[..count];
-        for index in joined[..pairs]
-            .iter()
-            .map(|&index| index as usize)
-        {
+        for index in joined[..pairs].iter().map(|&index| index as usize) {
             let other = index.wrapping_add_signed(nearest[index] as isize);
             // Later joins are nearer to the root, so filling from the end puts parents before
             // children.
@@ -175,11 +172,7 @@ impl Clusters {
             pair[1].write(node((boxes[other], below[other])));
             (boxes[index], below[index]) = (boxes[index].union(&boxes[other]), self.free as u32);
         }
-        for (to, index) in kept[..left]
-            .iter()
-            .map(|&index| index as usize)
-            .enumerate()
-        {
+        for (to, index) in kept[..left].iter().map(|&index| index as usize).enumerate() {
             (boxes[to], below[to]) = (boxes[index], below[index]);
         }
         self.joined_few = pairs < count.div_ceil(FEW);

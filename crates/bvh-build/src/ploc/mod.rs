@@ -69,9 +69,7 @@ impl MortonOrder {
     pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
         check_scene(boxes)?;
         let boxes: Vec<PackedAabb> = boxes.iter().map(PackedAabb::from).collect();
-        let bounds = boxes
-            .iter()
-            .fold(PackedAabb::EMPTY, |bounds, b| bounds.union(b));
+        let bounds = boxes.iter().fold(PackedAabb::EMPTY, |bounds, b| bounds.union(b));
         let order = morton::order(&boxes);
         Ok(Self { boxes, bounds, order })
     }
@@ -99,10 +97,7 @@ impl MortonOrder {
         if boxes.is_empty() {
             return Ok(Bvh::default());
         }
-        let boxes = order
-            .iter()
-            .map(|&object| boxes[object as usize])
-            .collect();
+        let boxes = order.iter().map(|&object| boxes[object as usize]).collect();
         let mut clusters = Clusters::new(boxes, &bounds);
         let mut round = 0;
         while clusters.count() > 1 {
@@ -152,13 +147,9 @@ mod tests {
     #[test]
     fn a_radius_over_all_objects_joins_the_closest_pair_first() {
         let boxes = [0.0, 100.0, 10.0, 107.0].map(|x| cube([x, 0.0, 0.0], 1.0));
-        let tree = Config { radius: 4, ..Config::default() }
-            .build(&boxes)
-            .unwrap();
-        let sides: Vec<f32> = tree.nodes[0]
-            .children()
-            .map(|child| tree.nodes[child].aabb.max.x)
-            .collect();
+        let tree = Config { radius: 4, ..Config::default() }.build(&boxes).unwrap();
+        let sides: Vec<f32> =
+            tree.nodes[0].children().map(|child| tree.nodes[child].aabb.max.x).collect();
         assert_eq!(sides, [11.0, 108.0]);
     }
 
@@ -172,9 +163,8 @@ mod tests {
     #[test]
     fn no_scene_takes_more_rounds_than_a_multiple_of_the_logarithm() {
         // Nested boxes: the smallest cluster is the nearest of every cluster.
-        let boxes: Vec<Aabb> = (1..20_000u16)
-            .map(|i| cube([-f32::from(i); 3], 2.0 * f32::from(i)))
-            .collect();
+        let boxes: Vec<Aabb> =
+            (1..20_000u16).map(|i| cube([-f32::from(i); 3], 2.0 * f32::from(i))).collect();
         let tree = Config::default().build(&boxes).unwrap();
         validate(&tree, &boxes).unwrap();
         assert!(tree.depth() < 1000, "{}", tree.depth());
@@ -186,10 +176,7 @@ mod tests {
         let boxes = scatter(5000);
         let tree = Config::default().build(&boxes).unwrap();
         for threads in [1, 3] {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .unwrap();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             assert_eq!(pool.install(|| Config::default().build(&boxes).unwrap()), tree);
         }
     }
@@ -198,10 +185,8 @@ mod tests {
     /// arrays of planes, f32, or early exits.
     fn oracle(boxes: &[Aabb], config: &Config) -> Vec<Vec<u32>> {
         let packed: Vec<PackedAabb> = boxes.iter().map(PackedAabb::from).collect();
-        let mut current: Vec<(Aabb, Vec<u32>)> = morton::order(&packed)
-            .into_iter()
-            .map(|id| (boxes[id as usize], vec![id]))
-            .collect();
+        let mut current: Vec<(Aabb, Vec<u32>)> =
+            morton::order(&packed).into_iter().map(|id| (boxes[id as usize], vec![id])).collect();
         let mut joined = Vec::new();
         let mut few = false;
         for round in 0.. {
@@ -211,18 +196,13 @@ mod tests {
             }
             let radius = if round < config.near_rounds { 1 } else { config.radius as usize };
             let key = |index: usize, other: usize| {
-                let area = current[index]
-                    .0
-                    .union(&current[other].0)
-                    .half_area();
+                let area = current[index].0.union(&current[other].0).half_area();
                 (area, index ^ other)
             };
             let nearest = |index: usize| {
                 let others = (index.saturating_sub(radius)..n.min(index + radius + 1))
                     .filter(|&other| other != index);
-                others
-                    .min_by(|&a, &b| key(index, a).partial_cmp(&key(index, b)).unwrap())
-                    .unwrap()
+                others.min_by(|&a, &b| key(index, a).partial_cmp(&key(index, b)).unwrap()).unwrap()
             };
             let mut nearest: Vec<usize> = (0..n).map(nearest).collect();
             let mutual = |nearest: &[usize], index: usize| nearest[nearest[index]] == index;
@@ -255,15 +235,11 @@ mod tests {
         for index in (0..tree.nodes.len()).rev() {
             let node = &tree.nodes[index];
             let mut ids = tree.prim_ids[node.prims()].to_vec();
-            node.children()
-                .for_each(|child| ids.extend_from_slice(&below[child]));
+            node.children().for_each(|child| ids.extend_from_slice(&below[child]));
             ids.sort_unstable();
             below[index] = ids;
         }
-        let mut inner: Vec<_> = below
-            .into_iter()
-            .filter(|ids| ids.len() > 1)
-            .collect();
+        let mut inner: Vec<_> = below.into_iter().filter(|ids| ids.len() > 1).collect();
         inner.sort();
         inner
     }
@@ -305,8 +281,7 @@ mod tests {
     fn a_plane_far_from_the_origin_for_its_size_does_not_hide_areas() {
         let flat = |x: f32| -> Vec<Aabb> {
             let rows = [0.0f32, 10.0, 11.0, 20.0, 21.0, 30.0, 31.0, 40.0].map(|row| row * 1e-10);
-            rows.map(|y| Aabb::from(([x, y, 0.0], [x, y + 1e-10, 1e-10])))
-                .to_vec()
+            rows.map(|y| Aabb::from(([x, y, 0.0], [x, y + 1e-10, 1e-10]))).to_vec()
         };
         assert_eq!(below_inner_nodes(&built(&flat(1e32))), below_inner_nodes(&built(&flat(0.0))));
         assert!(below_inner_nodes(&built(&flat(1e32))).contains(&vec![1, 2]));

@@ -8,24 +8,15 @@ use bvh_core::{PackedAabb, with_vector_instructions};
 /// centres, with the same spacing along the other sides.
 pub(super) fn order(boxes: &[PackedAabb]) -> Vec<u32> {
     let codes = codes(boxes);
-    let mut order: Vec<(u32, u32)> = codes
-        .iter()
-        .zip(0..)
-        .map(|(&code, index)| (upper_half(code), index))
-        .collect();
+    let mut order: Vec<(u32, u32)> =
+        codes.iter().zip(0..).map(|(&code, index)| (upper_half(code), index)).collect();
     // Equal upper halves are rare, so sorting 32-bit keys first and comparing lower halves later is
     // faster than sorting 64-bit keys.
     radsort::sort_by_key(&mut order, |&(half, _)| half);
-    for equal in order
-        .chunk_by_mut(|a, b| a.0 == b.0)
-        .filter(|equal| equal.len() > 1)
-    {
+    for equal in order.chunk_by_mut(|a, b| a.0 == b.0).filter(|equal| equal.len() > 1) {
         equal.sort_by_key(|&(_, index)| codes[index as usize]);
     }
-    order
-        .into_iter()
-        .map(|(_, index)| index)
-        .collect()
+    order.into_iter().map(|(_, index)| index).collect()
 }
 
 /// Returns the upper 32 bits of a code of 63 bits.

@@ -61,9 +61,8 @@ fn find_plain(
         plane[..offset].fill(f32::INFINITY);
         plane[offset + last - first..].fill(f32::INFINITY);
     }
-    let [a, b, c, d, e, f] = planes
-        .each_mut()
-        .map(|plane| &mut plane[offset..offset + last - first]);
+    let [a, b, c, d, e, f] =
+        planes.each_mut().map(|plane| &mut plane[offset..offset + last - first]);
     for (index, aabb) in boxes[first..last].iter().enumerate() {
         let [low, high] = aabb
             .planes()
@@ -71,9 +70,7 @@ fn find_plain(
         [a[index], b[index], c[index]] = [low[0], low[1], low[2]];
         [d[index], e[index], f[index]] = [high[0], high[1], high[2]];
     }
-    sides
-        .iter_mut()
-        .for_each(|side| side.resize(len + radius, 0.0));
+    sides.iter_mut().for_each(|side| side.resize(len + radius, 0.0));
     least.clear();
     // Larger than the bits of any finite area and of infinity.
     least.resize(len, i32::MAX);

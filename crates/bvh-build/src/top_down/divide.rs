@@ -149,11 +149,7 @@ fn spawn<'s, C: SplitCost>(
 ) {
     // The pool allocates at most one set of buffers per thread. Buffers have no invariant, so a
     // poisoned lock does no harm.
-    let pooled = || {
-        scratches
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner)
-    };
+    let pooled = || scratches.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     let mut scratch = pooled().pop().unwrap_or_default();
     // Marks need no reset: every object of a node is marked before the node is partitioned.
     scratch.goes_left.resize(division.scene.len(), 0);
@@ -191,8 +187,7 @@ fn prepare<'a>(
     y.clone_from(&scene.orders[1]);
     z.clone_from(&scene.orders[2]);
     scratch.goes_left.resize(n, 0);
-    tree.nodes
-        .resize((2 * n).saturating_sub(1), Node::leaf(Aabb::EMPTY, 0, 0));
+    tree.nodes.resize((2 * n).saturating_sub(1), Node::leaf(Aabb::EMPTY, 0, 0));
     let (root, below) = tree.nodes.split_first_mut()?;
     let aabb = union_of(&scene.boxes, &tree.prim_ids);
     *root =
@@ -353,12 +348,8 @@ fn split_node_plain<C: SplitCost>(
     // If all other axes have the same order, no partition is needed, and no marks.
     if (0..3).any(|other| other != axis && same_as[other] as usize == other) {
         let (to_left, to_right) = orders[axis].split_at(left);
-        to_left
-            .iter()
-            .for_each(|&object| scratch.goes_left[object as usize] = 1);
-        to_right
-            .iter()
-            .for_each(|&object| scratch.goes_left[object as usize] = 0);
+        to_left.iter().for_each(|&object| scratch.goes_left[object as usize] = 1);
+        to_right.iter().for_each(|&object| scratch.goes_left[object as usize] = 0);
     }
     for (other, order) in orders.into_iter().enumerate() {
         if other != axis && same_as[other] as usize == other {

@@ -70,9 +70,7 @@ impl Builder for Config {
                 return Err(BuildError::Cancelled);
             }
             let ids = &mut prim_ids[start..start + len];
-            let aabb = ids
-                .iter()
-                .fold(Aabb::EMPTY, |b, &id| b.union(&boxes[id as usize]));
+            let aabb = ids.iter().fold(Aabb::EMPTY, |b, &id| b.union(&boxes[id as usize]));
             if len <= max_leaf {
                 // The selection leaves no defined order within a side, and a leaf's order must be
                 // reproducible.
@@ -113,9 +111,7 @@ mod tests {
     /// Unit cubes at x = 0, 2, 4, … and y = 0, 100, 0, 100, …
     fn zigzag(n: usize) -> Vec<Aabb> {
         let low = |i: usize| [2.0 * i as f32, 100.0 * (i % 2) as f32, 0.0];
-        (0..n)
-            .map(|i| Aabb::from((low(i), low(i).map(|c| c + 1.0))))
-            .collect()
+        (0..n).map(|i| Aabb::from((low(i), low(i).map(|c| c + 1.0)))).collect()
     }
 
     #[test]
@@ -127,17 +123,14 @@ mod tests {
 
     #[test]
     fn the_longest_axis_is_cut_when_asked_for() {
-        let tree = Config { axis: CutAxis::Longest, ..Config::default() }
-            .build(&zigzag(4))
-            .unwrap();
+        let tree =
+            Config { axis: CutAxis::Longest, ..Config::default() }.build(&zigzag(4)).unwrap();
         assert_eq!(tree.prim_ids, [0, 2, 1, 3]);
     }
 
     #[test]
     fn only_x_is_cut_when_asked_for() {
-        let tree = Config { axis: CutAxis::X, ..Config::default() }
-            .build(&zigzag(5)[1..])
-            .unwrap();
+        let tree = Config { axis: CutAxis::X, ..Config::default() }.build(&zigzag(5)[1..]).unwrap();
         assert_eq!(tree.prim_ids, [0, 1, 2, 3], "along y, object 1 would be first");
     }
 
@@ -147,13 +140,10 @@ mod tests {
             let tree = Config { axis: CutAxis::Longest, leaf_fraction: fraction }
                 .build(&zigzag(75))
                 .unwrap();
-            let largest = tree
-                .nodes
-                .iter()
-                .filter_map(|node| match node.kind() {
-                    NodeKind::Leaf { count, .. } => Some(count),
-                    NodeKind::Inner { .. } => None,
-                });
+            let largest = tree.nodes.iter().filter_map(|node| match node.kind() {
+                NodeKind::Leaf { count, .. } => Some(count),
+                NodeKind::Inner { .. } => None,
+            });
             assert!(largest.max().unwrap() <= expected, "fraction {fraction}");
         }
     }

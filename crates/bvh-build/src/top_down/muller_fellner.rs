@@ -176,9 +176,8 @@ impl Config {
         if weights.len() != boxes.len() {
             return Err(BuildError::WeightCount { weights: weights.len(), objects: boxes.len() });
         }
-        if let Some(index) = weights
-            .iter()
-            .position(|weight| !(weight.is_finite() && *weight >= 0.0))
+        if let Some(index) =
+            weights.iter().position(|weight| !(weight.is_finite() && *weight >= 0.0))
         {
             return Err(BuildError::InvalidWeight { index, weight: weights[index].into() });
         }

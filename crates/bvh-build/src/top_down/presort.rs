@@ -95,11 +95,8 @@ fn sorted_along(boxes: &[Aabb], axis: usize, skip_sorted: bool, watch: &Watch) -
     if boxes.len() >= OBJECTS_PER_POLL && watch.is_cancelled() {
         return (Vec::new(), false);
     }
-    let mut keyed: Vec<(f64, u32)> = boxes
-        .iter()
-        .zip(0..)
-        .map(|(b, index)| (b.doubled_centroid()[axis], index))
-        .collect();
+    let mut keyed: Vec<(f64, u32)> =
+        boxes.iter().zip(0..).map(|(b, index)| (b.doubled_centroid()[axis], index)).collect();
     // The check ends at the first pair out of order, usually within a few objects.
     let in_order = keyed.is_sorted_by_key(|&(key, _)| key);
     if !(in_order && skip_sorted) {

@@ -79,10 +79,7 @@ impl SplitCost for AreaTimesWeight<'_> {
     }
     #[inline(always)]
     fn total_load(&self, objects: &[u32]) -> f64 {
-        objects
-            .iter()
-            .map(|&object| self.load(object))
-            .sum()
+        objects.iter().map(|&object| self.load(object)).sum()
     }
     #[inline(always)]
     fn side(&self, area: f64, load: f64) -> f64 {
@@ -101,11 +98,7 @@ impl AreaTimesPower {
     /// Makes a table of powers for up to `objects` objects, with `exponent` within 0..=1. Software
     /// computes the powers, so they are the same on every machine.
     pub fn new(objects: usize, exponent: f64) -> Self {
-        Self(
-            (0..=objects)
-                .map(|count| libm::pow(count as f64, exponent))
-                .collect(),
-        )
+        Self((0..=objects).map(|count| libm::pow(count as f64, exponent)).collect())
     }
 }
 

@@ -237,12 +237,7 @@ impl<C: SplitCost> Sweep<'_, C> {
             let lowest = value_block(boxes, *split_cost, objects, block, &mut costs);
             bound = if BEST { bound.min(lowest) } else { bound };
             if lowest <= bound {
-                for (left, &cost) in costs
-                    .iter()
-                    .enumerate()
-                    .take(objects.len())
-                    .skip(1)
-                {
+                for (left, &cost) in costs.iter().enumerate().take(objects.len()).skip(1) {
                     if cost <= bound {
                         bound = visit(candidate(cost, index * size + left));
                     }
@@ -266,12 +261,8 @@ impl<C: SplitCost> Sweep<'_, C> {
         let start = left / BLOCK * BLOCK;
         let end = order.len().min(start + BLOCK);
         [
-            block
-                .left
-                .union(&union_of(self.boxes, &order[start..left])),
-            block
-                .right
-                .union(&union_of(self.boxes, &order[left..end])),
+            block.left.union(&union_of(self.boxes, &order[start..left])),
+            block.right.union(&union_of(self.boxes, &order[left..end])),
         ]
     }
 }
@@ -287,9 +278,7 @@ fn gather_blocks<C: SplitCost>(
     blocks.clear();
     // `left` first stores the block's box, and later the box of all objects before the block.
     blocks.extend(
-        order
-            .chunks(BLOCK)
-            .map(|objects| Block { left: union_of(boxes, objects), ..Block::NONE }),
+        order.chunks(BLOCK).map(|objects| Block { left: union_of(boxes, objects), ..Block::NONE }),
     );
     let mut aabb = PackedAabb::EMPTY;
     let mut load = 0.0;
@@ -336,10 +325,7 @@ fn value_block<C: SplitCost>(
     let mut aabb = block.left;
     let mut load = block.left_load;
     let mut lowest = f64::INFINITY;
-    for (&object, cost) in objects[..objects.len() - 1]
-        .iter()
-        .zip(&mut costs[1..])
-    {
+    for (&object, cost) in objects[..objects.len() - 1].iter().zip(&mut costs[1..]) {
         aabb.grow(&boxes[object as usize]);
         load += split_cost.load(object);
         *cost = split_cost.join(split_cost.side(split_cost.size(&aabb), load), *cost);

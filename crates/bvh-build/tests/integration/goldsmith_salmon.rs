@@ -32,9 +32,7 @@ fn topology(tree: &Bvh) -> Vec<Result<usize, u32>> {
 /// Builds a tree, checks the tree and its cost, and returns both.
 fn insert(config: &Config, boxes: &[Aabb], order: &[u32], workspace: &mut Workspace) -> (Bvh, f64) {
     let scene = Scene::new(boxes).unwrap();
-    let cost = config
-        .insert_all(&scene, order, workspace)
-        .unwrap();
+    let cost = config.insert_all(&scene, order, workspace).unwrap();
     let mut tree = Bvh::default();
     workspace.write(&mut tree);
     validate(&tree, boxes).unwrap();
@@ -168,12 +166,7 @@ fn most_inner_children(tree: &Bvh) -> usize {
     let mut most = 0;
     for node in &tree.nodes {
         let children = &tree.nodes[node.children()];
-        most = most.max(
-            children
-                .iter()
-                .filter(|child| !child.is_leaf())
-                .count(),
-        );
+        most = most.max(children.iter().filter(|child| !child.is_leaf()).count());
     }
     most
 }
@@ -223,9 +216,7 @@ fn an_object_as_large_as_the_scene_stays_with_the_root() {
 fn pairing_with_inner_nodes_happens_when_allowed_and_cheaper() {
     // A cluster of six, then a far object: enlarging the node of the six costs more than a node
     // above it.
-    let mut boxes: Vec<Aabb> = (0..6)
-        .map(|i| cube([0.1 * i as f32, 0.0, 0.0], 10.0))
-        .collect();
+    let mut boxes: Vec<Aabb> = (0..6).map(|i| cube([0.1 * i as f32, 0.0, 0.0], 10.0)).collect();
     boxes.push(cube([1000.0; 3], 10.0));
     for (pair_inner, children) in [(false, 7), (true, 2)] {
         let (tree, _) = by_index(&boxes, &Config { pair_inner, ..Config::default() });
@@ -270,9 +261,7 @@ fn an_invalid_order_is_rejected_and_the_tree_is_kept() {
     let mut workspace = Workspace::default();
     let mut before = Bvh::default();
     let mut after = Bvh::default();
-    Config::default()
-        .insert_all(&scene, &[2, 0, 1], &mut workspace)
-        .unwrap();
+    Config::default().insert_all(&scene, &[2, 0, 1], &mut workspace).unwrap();
     workspace.write(&mut before);
     for (order, expected) in [
         (vec![0, 1], InvalidOrder::Length { named: 2, objects: 3 }),

@@ -34,11 +34,7 @@ fn brute_force(
     weights: &[f32],
     cost: fn([f64; 2], [f64; 2]) -> f64,
 ) -> Vec<Vec<u32>> {
-    let load = |ids: &[u32]| {
-        ids.iter()
-            .map(|&id| f64::from(weights[id as usize]))
-            .sum::<f64>()
-    };
+    let load = |ids: &[u32]| ids.iter().map(|&id| f64::from(weights[id as usize])).sum::<f64>();
     let mut stack: Vec<Vec<u32>> = vec![(0..boxes.len() as u32).collect()];
     let mut sets = Vec::new();
     while let Some(mut ids) = stack.pop() {
@@ -217,10 +213,7 @@ fn any_number_of_threads_builds_the_same_bytes() {
 
 fn valid_on_threads(threads: usize, boxes: &[Aabb]) -> Bvh {
     let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
-    builder
-        .build()
-        .unwrap()
-        .install(|| valid(&Config::default(), boxes))
+    builder.build().unwrap().install(|| valid(&Config::default(), boxes))
 }
 
 #[test]
@@ -237,11 +230,7 @@ fn a_chain_does_not_overflow_any_stack() {
 #[test]
 fn an_error_reports_the_invalid_input() {
     let boxes = scatter(3);
-    let weighted = |weights: &[f32]| {
-        Config::default()
-            .build_weighted(&boxes, weights)
-            .unwrap_err()
-    };
+    let weighted = |weights: &[f32]| Config::default().build_weighted(&boxes, weights).unwrap_err();
     assert_eq!(weighted(&[1.0]).to_string(), "1 weights were given for 3 objects");
     let negative = weighted(&[1.0, -2.0, 0.0]).to_string();
     assert!(negative.starts_with("the weight of object 1 is -2;"), "{negative}");

@@ -28,9 +28,7 @@ impl Plain {
 
     /// Returns the half area of the node's box after object `id` was added.
     fn area_with(&self, boxes: &[Aabb], id: u32) -> f64 {
-        self.aabb(boxes)
-            .union(&boxes[id as usize])
-            .half_area()
+        self.aabb(boxes).union(&boxes[id as usize]).half_area()
     }
 
     /// Returns whether this is an inner node whose box contains object `id`.
@@ -40,11 +38,7 @@ impl Plain {
 
     /// Returns Σ S · children of the full subtree.
     pub fn cost(&self, boxes: &[Aabb]) -> f64 {
-        let below: f64 = self
-            .children
-            .iter()
-            .map(|child| child.cost(boxes))
-            .sum();
+        let below: f64 = self.children.iter().map(|child| child.cost(boxes)).sum();
         self.aabb(boxes).half_area() * self.children.len() as f64 + below
     }
 
@@ -68,10 +62,7 @@ impl Plain {
         *child = child.with(&[], id, pair);
         if was_leaf {
             // A leaf became an inner node. Inner nodes are in front of leaves.
-            let front = parent
-                .children
-                .iter()
-                .position(|child| child.object.is_some());
+            let front = parent.children.iter().position(|child| child.object.is_some());
             if let Some(front) = front
                 && front < last
             {
@@ -83,11 +74,7 @@ impl Plain {
 
     /// Returns the child at which the descent for object `id` continues.
     fn next_child(&self, config: &Config, boxes: &[Aabb], id: u32) -> usize {
-        if let Some(containing) = self
-            .children
-            .iter()
-            .position(|child| child.contains(boxes, id))
-        {
+        if let Some(containing) = self.children.iter().position(|child| child.contains(boxes, id)) {
             return containing;
         }
         let mut best = (f64::INFINITY, 0);

@@ -19,9 +19,7 @@ fn soup(n: u32) -> Vec<Triangle> {
         (state >> 40) as f32 / (1 << 24) as f32
     };
     let mut corner = || std::array::from_fn(|_| random());
-    (0..n)
-        .map(|_| Triangle::from([corner(), corner(), corner()]))
-        .collect()
+    (0..n).map(|_| Triangle::from([corner(), corner(), corner()])).collect()
 }
 
 fn boxes(triangles: &[Triangle]) -> Vec<Aabb> {
@@ -58,10 +56,7 @@ fn every_builder_ends_when_its_watch_says_so_whenever_that_is() {
     let triangles = soup(150_000);
     let boxes = boxes(&triangles);
     for threads in [1, 2] {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         for (name, builder) in builders() {
             let build = |watch: &Watch| builder.build_watched(&boxes, None, watch);
             let (tree, questions) = pool.install(|| asked(usize::MAX, build));
@@ -110,15 +105,8 @@ fn objects_as_large_as_the_scene_are_divided_in_little_time_into_a_tree_about_as
  {
     for n in [5000, 20_000, 80_000] {
         let boxes = boxes(&soup(n));
-        let greedy = cost::internal_area(
-            &muller_fellner::Config::default()
-                .build(&boxes)
-                .unwrap(),
-        );
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(1)
-            .build()
-            .unwrap();
+        let greedy = cost::internal_area(&muller_fellner::Config::default().build(&boxes).unwrap());
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         for power in [0.0, 0.5, 0.9] {
             let build = |watch: &Watch| self::power(power).build_watched(&boxes, None, watch);
             let (tree, questions) = pool.install(|| asked(usize::MAX, build));
@@ -144,10 +132,7 @@ fn spatial_splits_of_objects_as_large_as_the_scene_visit_each_reference_a_few_hu
         let divide = |watch: &Watch| {
             spatial::Config::default().build_watched(most, &boxes, &triangles.as_slice(), watch)
         };
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(1)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let (tree, questions) = pool.install(|| asked(usize::MAX, divide));
         assert!(tree.unwrap().prim_ids.len() <= most);
         let visits = (questions * OBJECTS_PER_POLL) as f64 / most as f64;

@@ -43,9 +43,7 @@ pub const REFERENCES: f64 = 1.2;
 /// Returns the work of a bake of `objects` without a budget, in visited nodes.
 pub fn work(objects: usize) -> u64 {
     let objects = objects as u64;
-    (WORK_PER_OBJECT * objects)
-        .min(MOST_WORK)
-        .max(LEAST_WORK_PER_OBJECT * objects)
+    (WORK_PER_OBJECT * objects).min(MOST_WORK).max(LEAST_WORK_PER_OBJECT * objects)
 }
 
 /// Explains the [`work`] of a bake of `objects`.
@@ -131,9 +129,7 @@ pub fn decide<'a>(
     let prepared = Prepared {
         greedy: Some(trials.greedy),
         density: trials.trained.take_if(|_| choices.rays.is_some()),
-        division: trials
-            .division
-            .take_if(|_| choices.references > 1.0),
+        division: trials.division.take_if(|_| choices.references > 1.0),
     };
     Ok(Decided { choices, reasons: table.reasons(&open, row, column), prepared })
 }
@@ -168,15 +164,8 @@ struct Table {
 impl Table {
     /// Returns the row and the column of the simplest combination near the best one.
     fn simplest(&self) -> (usize, usize) {
-        let best = self
-            .tests
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min);
-        let index = self
-            .tests
-            .iter()
-            .position(|&tests| tests <= best * (1.0 + TOLERANCE));
+        let best = self.tests.iter().copied().fold(f64::INFINITY, f64::min);
+        let index = self.tests.iter().position(|&tests| tests <= best * (1.0 + TOLERANCE));
         let index = index.unwrap_or(0);
         (index / self.columns, index % self.columns)
     }
@@ -285,11 +274,7 @@ impl<'a, 'b> Trials<'a, 'b> {
         let is_divided = choices.references > 1.0;
         let problem = Problem {
             objective: choices.objective,
-            splits: self
-                .division
-                .as_ref()
-                .filter(|_| is_divided)
-                .and_then(Division::splits),
+            splits: self.division.as_ref().filter(|_| is_divided).and_then(Division::splits),
             measure: self
                 .trained
                 .as_ref()

@@ -51,16 +51,11 @@ impl FromStr for Effort {
                     _ => None,
                 };
                 let number: Option<u64> = digits.trim_end().parse().ok();
-                number
-                    .zip(unit)
-                    .and_then(|(number, unit)| number.checked_mul(unit))
-                    .map(Self::Work)
+                number.zip(unit).and_then(|(number, unit)| number.checked_mul(unit)).map(Self::Work)
             }
             // `5M` would be five months, but its author probably forgot `work`.
             None if text.contains('M') => None,
-            None => humantime::parse_duration(text)
-                .ok()
-                .map(Self::Time),
+            None => humantime::parse_duration(text).ok().map(Self::Time),
         };
         effort.ok_or_else(|| {
             "expected a time such as 10s, 500ms or 1h30m, \

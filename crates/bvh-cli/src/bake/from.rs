@@ -31,10 +31,7 @@ fn check_references(from: &Path, found: usize, objects: usize, most: f64) -> Res
 
 /// Rejects a start that no search can improve.
 fn check_binary(from: &Path, tree: &Bvh) -> Result<(), Error> {
-    let wide = tree
-        .nodes
-        .iter()
-        .position(|node| !node.is_leaf() && node.children().len() != 2);
+    let wide = tree.nodes.iter().position(|node| !node.is_leaf() && node.children().len() != 2);
     let Some(node) = wide else { return Ok(()) };
     Err(Error::Usage(format!(
         "--from {}: inner node {node} has {} children; accepted: a tree of nodes with two",

@@ -36,11 +36,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let plan = args.plan()?;
     let path = Path::new(&args.scene);
     let parts = parts(path, args.files.outside())?;
-    let stem = path
-        .file_stem()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut scenes = Vec::new();
     for (mesh, triangles) in &parts.meshes {
         let name = format!("{stem}, mesh {mesh}");
@@ -55,23 +51,12 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let table = table(&instances, &parts).map_err(Error::csv(&path))?;
     files::write(&path, &table)?;
 
-    let objects: usize = scenes
-        .iter()
-        .chain([&top])
-        .map(|scene| scene.boxes.len())
-        .sum();
+    let objects: usize = scenes.iter().chain([&top]).map(|scene| scene.boxes.len()).sum();
     let plan = args.with_budget(plan, objects);
     // The top tree's objects are boxes, which cannot be divided, and no wide layout is made of it.
     let plan_of_top = Plan { references: 1.0, objective: Objective::InternalArea, ..plan.clone() };
-    let names = parts
-        .meshes
-        .keys()
-        .map(|mesh| format!("mesh_{mesh}.bvh"))
-        .chain([TOP.into()]);
-    let given = scenes
-        .iter()
-        .map(|scene| (scene, &plan))
-        .chain([(&top, &plan_of_top)]);
+    let names = parts.meshes.keys().map(|mesh| format!("mesh_{mesh}.bvh")).chain([TOP.into()]);
+    let given = scenes.iter().map(|scene| (scene, &plan)).chain([(&top, &plan_of_top)]);
     for (name, (scene, plan)) in names.zip(given) {
         // Every tree gets a share of the budget in proportion to its number of objects.
         let part = scene.boxes.len() as f64 / objects as f64;
@@ -157,12 +142,9 @@ fn instances(parts: &gltf::Parts) -> Vec<Instance> {
 
 /// Lays out a part, whose box is the same in any tree; the fastest builder will do.
 fn lay_out(scene: &Scene) -> Result<WideBvh, String> {
-    let triangles = scene
-        .triangles()
-        .map_err(|error| error.to_string())?;
-    let tree = median_cut::Config::default()
-        .build(&scene.boxes)
-        .map_err(|error| error.to_string())?;
+    let triangles = scene.triangles().map_err(|error| error.to_string())?;
+    let tree =
+        median_cut::Config::default().build(&scene.boxes).map_err(|error| error.to_string())?;
     WideBvh::new(&tree, triangles).map_err(|error| error.to_string())
 }
 
@@ -174,10 +156,7 @@ fn top(
     parts: &gltf::Parts,
 ) -> Result<Scene, Error> {
     let name = format!("{stem}, instances");
-    let layouts = scenes
-        .iter()
-        .map(lay_out)
-        .collect::<Result<Vec<_>, String>>();
+    let layouts = scenes.iter().map(lay_out).collect::<Result<Vec<_>, String>>();
     let boxes = layouts.and_then(|layouts| {
         Instance::boxes(instances, &layouts).map_err(|invalid| match invalid {
             InvalidInstances::Transform(index) => {
@@ -191,10 +170,7 @@ fn top(
     });
     let boxes = boxes.map_err(|message| SceneError { name: name.clone(), message })?;
     // A scene needs objects, and the search reads only their boxes.
-    let triangles = boxes
-        .iter()
-        .map(|aabb| Triangle([aabb.min, aabb.max, aabb.min]))
-        .collect();
+    let triangles = boxes.iter().map(|aabb| Triangle([aabb.min, aabb.max, aabb.min])).collect();
     Ok(Scene::new(&name, SceneKind::File, Primitives::Triangles(triangles)))
 }
 

@@ -203,9 +203,7 @@ impl BakeArgs {
     /// Returns the named method. If a tree is given, rejects methods that cannot continue from it.
     fn method(&self) -> Result<Method, Error> {
         let name = &self.method;
-        let found = Method::all()
-            .into_iter()
-            .find(|method| method.name() == name);
+        let found = Method::all().into_iter().find(|method| method.name() == name);
         match found {
             None => {
                 let accepted = Method::NAMES.join(", ");
@@ -286,11 +284,8 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         let text = explain::scene(&scene).map_err(Error::search(&scene.name, "--explain"))?;
         print_line(&text);
     }
-    let start = args
-        .from
-        .as_ref()
-        .map(|path| from::start(path, &scene, most_references))
-        .transpose()?;
+    let start =
+        args.from.as_ref().map(|path| from::start(path, &scene, most_references)).transpose()?;
     let plan = args.with_budget(plan, objects);
     // Reserving the file first reports a full disk before the search and not after it.
     let reserved = args.reserved(&out, plan::most_bytes(&scene, most_references))?;

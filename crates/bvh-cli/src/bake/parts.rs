@@ -58,10 +58,8 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
         return Ok(());
     }
     let folder = out.with_extension("parts");
-    let chosen: Vec<&Part> = parts
-        .iter()
-        .filter(|part| args.part.as_ref().is_none_or(|id| *id == part.id))
-        .collect();
+    let chosen: Vec<&Part> =
+        parts.iter().filter(|part| args.part.as_ref().is_none_or(|id| *id == part.id)).collect();
     if let ([], Some(id)) = (&chosen[..], &args.part) {
         let accepted = "an identifier that --list prints for the same scene, budget and seed";
         return Err(Error::Usage(format!("--part {id}: no such part; accepted: {accepted}")));
@@ -98,10 +96,7 @@ fn parts(plan: &Plan, scene: &Scene, count: u32) -> Result<Vec<Part>, Error> {
         return Err(Error::Usage(message));
     }
     let mut parts = Vec::new();
-    for (number, objects) in cut(&scene.boxes, count as usize)
-        .into_iter()
-        .enumerate()
-    {
+    for (number, objects) in cut(&scene.boxes, count as usize).into_iter().enumerate() {
         let share = SHARE_OF_PARTS * objects.len() as f64 / all as f64;
         let plan = Plan { effort: plan.effort.share(share), ..plan.clone() };
         let Plan { effort, seed, objective, references, name, .. } = &plan;
@@ -127,9 +122,7 @@ fn cut(boxes: &[Aabb], count: usize) -> Vec<Vec<usize>> {
             parts.push(objects);
             continue;
         }
-        let centers = objects
-            .iter()
-            .map(|&object| boxes[object].doubled_centroid());
+        let centers = objects.iter().map(|&object| boxes[object].doubled_centroid());
         let low = centers.clone().reduce(|a, b| a.min(b));
         let high = centers.reduce(|a, b| a.max(b));
         let extent = high.unwrap_or_default() - low.unwrap_or_default();
@@ -161,10 +154,7 @@ fn join(scene: &Scene, parts: &[Part], folder: &Path) -> Result<Start, Error> {
     let top = solve(&best::Config::default(), &Problem::new(&boxes), 1, budget, &())
         .map_err(Error::search(&scene.name, "the tree over all parts"))?
         .tree;
-    let objects: Vec<&[usize]> = parts
-        .iter()
-        .map(|part| &part.objects[..])
-        .collect();
+    let objects: Vec<&[usize]> = parts.iter().map(|part| &part.objects[..]).collect();
     Ok(Start { tree: joined(&top, &trees, &objects), work })
 }
 
@@ -194,10 +184,7 @@ fn joined(top: &Bvh, trees: &[Bvh], objects: &[&[usize]]) -> Bvh {
             }
         }
         let ids = &trees[part].prim_ids;
-        whole.prim_ids.extend(
-            ids.iter()
-                .map(|&id| objects[part][id as usize] as u32),
-        );
+        whole.prim_ids.extend(ids.iter().map(|&id| objects[part][id as usize] as u32));
     }
     whole
 }

@@ -162,24 +162,16 @@ impl Bake<'_> {
     pub fn search(&self, greedy: Bvh, interrupted: &AtomicBool) -> Result<Baked, Error> {
         // An interrupted bake has no time for costs by rays, which take a second in large scenes.
         if interrupted.load(Relaxed) {
-            let tree = self
-                .start
-                .map_or(greedy, |start| start.tree.clone());
+            let tree = self.start.map_or(greedy, |start| start.tree.clone());
             return Ok(Baked { tree, work: 0, figures: None });
         }
         let problem = Problem {
             objective: self.plan.objective,
             splits: self.division.splits(),
-            measure: self
-                .density
-                .as_ref()
-                .map(|density| density as &dyn Measure),
+            measure: self.density.as_ref().map(|density| density as &dyn Measure),
             ..Problem::new(&self.scene.boxes)
         };
-        let base_elsewhere = self
-            .density
-            .is_some()
-            .then(|| self.plan.objective.cost(&greedy));
+        let base_elsewhere = self.density.is_some().then(|| self.plan.objective.cost(&greedy));
         // Gains are relative to the greedy tree, by the cost that the search minimises.
         let greedy = Kept::new(greedy, &problem);
         let base = greedy.cost;
@@ -263,9 +255,7 @@ impl Bake<'_> {
             (written, cost, validated, visits)
         });
         written?;
-        validated
-            .map_err(FileError::from)
-            .map_err(TreeFileError::of(path))?;
+        validated.map_err(FileError::from).map_err(TreeFileError::of(path))?;
         // The work of all bakes that led to this tree, one after the other.
         let spent = self.start.map_or(0, |start| start.work);
         let origin = Origin {
@@ -331,9 +321,7 @@ const WRITTEN_AHEAD: usize = 1 << 18;
 
 /// Waits for a thread, and continues its panic.
 fn joined<T>(thread: ScopedJoinHandle<T>) -> T {
-    thread
-        .join()
-        .unwrap_or_else(|panic| resume_unwind(panic))
+    thread.join().unwrap_or_else(|panic| resume_unwind(panic))
 }
 
 /// The result of a search.
@@ -373,12 +361,7 @@ mod tests {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../results/scale/timing_scale.csv");
         let mut reader = csv::Reader::from_path(path).unwrap();
         let headers = reader.headers().unwrap().clone();
-        let column = |name: &str| {
-            headers
-                .iter()
-                .position(|header| header == name)
-                .unwrap()
-        };
+        let column = |name: &str| headers.iter().position(|header| header == name).unwrap();
         let phase = column("phase");
         let bytes = column("bytes_per_object");
         let mut most = 0.0f64;

@@ -65,16 +65,11 @@ impl<'a> Watch<'a> {
             return;
         }
         // All threads of a search come here; the one that changes the time updates the bar.
-        let claim = self
-            .shown
-            .compare_exchange(before, now, Relaxed, Relaxed);
+        let claim = self.shown.compare_exchange(before, now, Relaxed, Relaxed);
         if claim.is_err() {
             return;
         }
-        let last = self
-            .last
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(event) = *last else { return };
         let seconds = elapsed.as_secs_f64().max(1e-9);
         let done = match self.effort {
@@ -91,18 +86,14 @@ impl<'a> Watch<'a> {
             print_error(&message);
             return;
         }
-        self.bar
-            .set_position((1000.0 * done.min(1.0)) as u64);
+        self.bar.set_position((1000.0 * done.min(1.0)) as u64);
         self.bar.set_message(message);
     }
 }
 
 impl Observer for Watch<'_> {
     fn event(&self, event: &Event) {
-        *self
-            .last
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner) = Some(*event);
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(*event);
     }
 
     fn counted(&self, _evaluations: u64, work: u64) {

@@ -18,9 +18,7 @@ pub struct Level {
 /// Returns the levels of a tree, the root's first. O(nodes).
 pub fn of(tree: &Bvh) -> Vec<Level> {
     let mut levels: Vec<Level> = Vec::new();
-    let root_area = tree
-        .root_aabb()
-        .map_or(0.0, |root| root.half_area());
+    let root_area = tree.root_aabb().map_or(0.0, |root| root.half_area());
     // The areas of a scene without area are all 0.
     let unit = root_area.max(f64::MIN_POSITIVE);
     let mut row: Vec<usize> = (0..tree.nodes.len().min(1)).collect();
@@ -38,9 +36,7 @@ pub fn of(tree: &Bvh) -> Vec<Level> {
             level.area += node.aabb.half_area() / unit;
             for (position, first) in children.clone().enumerate() {
                 for second in children.clone().skip(position + 1) {
-                    let shared = tree.nodes[first]
-                        .aabb
-                        .intersection(&tree.nodes[second].aabb);
+                    let shared = tree.nodes[first].aabb.intersection(&tree.nodes[second].aabb);
                     level.overlap += shared.half_area() / unit;
                 }
             }
@@ -66,9 +62,7 @@ mod tests {
             let min = Vec3::new(index as f32, (index % 7) as f32, (index % 3) as f32);
             boxes.push(Aabb { min, max: min + Vec3::splat(1.5) });
         }
-        let tree = median_cut::Config::default()
-            .build(&boxes)
-            .unwrap();
+        let tree = median_cut::Config::default().build(&boxes).unwrap();
         let levels = of(&tree);
         let inner: usize = levels.iter().map(|level| level.inner).sum();
         let leaves: usize = levels.iter().map(|level| level.leaves).sum();
@@ -84,9 +78,7 @@ mod tests {
     fn two_apart_children_share_nothing() {
         let boxes = [0.0, 5.0]
             .map(|x| Aabb { min: Vec3::new(x, 0.0, 0.0), max: Vec3::new(x + 1.0, 1.0, 1.0) });
-        let tree = median_cut::Config::default()
-            .build(&boxes)
-            .unwrap();
+        let tree = median_cut::Config::default().build(&boxes).unwrap();
         let levels = of(&tree);
         assert_eq!((levels.len(), levels[0].overlap, levels[1].leaves), (2, 0.0, 2));
     }

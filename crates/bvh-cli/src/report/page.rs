@@ -112,9 +112,7 @@ fn number(value: f64) -> String {
 
 /// Returns text between tags.
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// Returns a figure with a PNG file inside.
@@ -130,11 +128,8 @@ fn picture(png: &[u8], caption: &str) -> String {
 fn chart(levels: [&[Level]; 2], value: fn(&Level) -> f64) -> String {
     let (width, height, base) = CHART;
     let count = levels[0].len().max(levels[1].len()).max(1);
-    let most = levels
-        .iter()
-        .flat_map(|tree| tree.iter())
-        .map(value)
-        .fold(f64::MIN_POSITIVE, f64::max);
+    let most =
+        levels.iter().flat_map(|tree| tree.iter()).map(value).fold(f64::MIN_POSITIVE, f64::max);
     let step = width / count as f64;
     let mut text =
         format!("<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"By level\">\n");

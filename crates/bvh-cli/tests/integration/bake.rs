@@ -51,10 +51,8 @@ fn a_bake_for_rays_saves_the_number_of_visits_of_each_node() {
         });
         assert!(bytes[0] == bytes[1], "{rays}: the same bytes on any number of threads");
         let scene = Scene::load("escher").unwrap();
-        let file = bvh_core::file::TreeFile::open(&bytes[0])
-            .unwrap()
-            .for_boxes(&scene.boxes)
-            .unwrap();
+        let file =
+            bvh_core::file::TreeFile::open(&bytes[0]).unwrap().for_boxes(&scene.boxes).unwrap();
         assert_eq!(file.header().method, name);
         let tree = file.tree().unwrap();
         let visits = file.visits().unwrap().unwrap();
@@ -202,9 +200,7 @@ fn invalid_bakes_and_inspections_are_rejected_and_change_no_file() {
 /// Returns the file of a tree of one node and its leaves.
 fn wide_file(boxes: &[Aabb]) -> Vec<u8> {
     let count = boxes.len() as u32;
-    let bounds = boxes
-        .iter()
-        .fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
+    let bounds = boxes.iter().fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
     let mut tree =
         Bvh { nodes: vec![Node::inner(bounds, 1, count)], prim_ids: (0..count).collect() };
     for (&aabb, object) in boxes.iter().zip(0..) {
@@ -226,10 +222,7 @@ fn a_file_that_somebody_creates_at_the_name_after_the_scene_stays_and_the_tree_i
     assert_eq!(bake.wait().unwrap().code(), Some(1));
     assert_eq!(fs::read(&notes).unwrap(), b"notes");
     let names = names(folder.path());
-    let kept = names
-        .iter()
-        .find(|name| name.ends_with(".kept"))
-        .unwrap();
+    let kept = names.iter().find(|name| name.ends_with(".kept")).unwrap();
     let scene = Scene::load("spheres75").unwrap();
     tree_file::load(&folder.path().join(kept), &scene).unwrap();
 }

@@ -110,10 +110,7 @@ fn a_bake_of_instances_replaces_no_other_files_and_rejects_invalid_input() {
     fs::write(at.join("forest.glb"), &glb).unwrap();
     fs::write(at.join("one.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     // A scale of 0 has no inverse.
-    let scale = glb
-        .windows(9)
-        .position(|bytes| bytes == b"[-1, 1, 1")
-        .unwrap();
+    let scale = glb.windows(9).position(|bytes| bytes == b"[-1, 1, 1").unwrap();
     let mut flat = glb.clone();
     flat[scale..scale + 9].copy_from_slice(b"[ 0, 1, 1");
     fs::write(at.join("flat.glb"), flat).unwrap();

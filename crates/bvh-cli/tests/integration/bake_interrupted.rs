@@ -44,12 +44,7 @@ fn ctrl_c_while_a_bake_decides_keeps_the_greedy_tree() {
         .unwrap();
     // The budget is chosen before anything else, and the decision takes seconds after it.
     let mut first = [0; 6];
-    child
-        .stdout
-        .as_mut()
-        .unwrap()
-        .read_exact(&mut first)
-        .unwrap();
+    child.stdout.as_mut().unwrap().read_exact(&mut first).unwrap();
     assert_eq!(&first, b"budget");
     send("-INT", &child);
     let output = child.wait_with_output().unwrap();

@@ -83,10 +83,7 @@ fn an_extension_of_another_kind_is_rejected() {
 fn pipes_devices_and_folders_are_rejected_as_inputs() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let made = std::process::Command::new("mkfifo")
-        .arg("p.bvh")
-        .current_dir(at)
-        .status();
+    let made = std::process::Command::new("mkfifo").arg("p.bvh").current_dir(at).status();
     assert!(made.unwrap().success());
     fs::create_dir(at.join("folder.bvh")).unwrap();
     for (args, parts) in [
@@ -119,10 +116,7 @@ fn a_scene_that_needs_more_memory_than_the_limit_is_rejected_before_the_work() {
 #[test]
 fn a_file_of_64_gigabytes_is_rejected_by_its_header() {
     let folder = tempfile::tempdir().unwrap();
-    fs::File::create(folder.path().join("huge.bvh"))
-        .unwrap()
-        .set_len(64 << 30)
-        .unwrap();
+    fs::File::create(folder.path().join("huge.bvh")).unwrap().set_len(64 << 30).unwrap();
     refused(folder.path(), &["inspect", "huge.bvh"], 2, &["huge.bvh: not a tree file"]);
 }
 
@@ -130,20 +124,11 @@ fn a_file_of_64_gigabytes_is_rejected_by_its_header() {
 #[test]
 fn a_full_output_is_an_error_and_a_closed_pipe_is_none() {
     let folder = tempfile::tempdir().unwrap();
-    let full = fs::File::options()
-        .write(true)
-        .open("/dev/full")
-        .unwrap();
-    let output = program(folder.path(), &["scenes"])
-        .stdout(full)
-        .output()
-        .unwrap();
+    let full = fs::File::options().write(true).open("/dev/full").unwrap();
+    let output = program(folder.path(), &["scenes"]).stdout(full).output().unwrap();
     ended(&output, 1, &["standard output"]);
     for args in [&["scenes"][..], &["--help"]] {
-        let mut child = program(folder.path(), args)
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let mut child = program(folder.path(), args).stdout(Stdio::piped()).spawn().unwrap();
         drop(child.stdout.take());
         assert!(child.wait().unwrap().success(), "{args:?}");
     }

@@ -9,10 +9,7 @@ use std::fs;
 #[test]
 fn a_bake_accepts_every_printed_description_of_rays() {
     let mut descriptions = 0;
-    for block in blocks_in("toml")
-        .into_iter()
-        .filter(|block| block.text.contains("cameras = "))
-    {
+    for block in blocks_in("toml").into_iter().filter(|block| block.text.contains("cameras = ")) {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("rays.toml"), &block.text).unwrap();
         said(

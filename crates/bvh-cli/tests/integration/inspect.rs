@@ -51,9 +51,7 @@ fn the_nodes_are_written_in_full_precision() {
         let row = row.unwrap();
         let node = &tree.nodes[index];
         let corners = [node.aabb.min.to_array(), node.aabb.max.to_array()].concat();
-        let written: Vec<f32> = (5..11)
-            .map(|column| row[column].parse().unwrap())
-            .collect();
+        let written: Vec<f32> = (5..11).map(|column| row[column].parse().unwrap()).collect();
         assert_eq!(written, corners);
         let kind = if node.is_leaf() { "leaf" } else { "inner" };
         assert_eq!((&row[0], &row[2]), (index.to_string().as_str(), kind));
@@ -115,13 +113,8 @@ fn readers_in_python_and_cpp_agree_with_inspect_and_reject_damage() {
     }
     for (name, args) in &readers {
         let program = if args.is_empty() { at.join(name).into_os_string() } else { name.into() };
-        let read = |file: String| {
-            Command::new(&program)
-                .args(args)
-                .arg(at.join(file))
-                .output()
-                .unwrap()
-        };
+        let read =
+            |file: String| Command::new(&program).args(args).arg(at.join(file)).output().unwrap();
         for index in 0..trees.len() {
             let inspected = facts(&said(at, &["inspect", &format!("{index}.bvh")]));
             agree(name, &read(format!("{index}.bvh")), &inspected);

@@ -23,9 +23,7 @@ pub fn facts(text: &str) -> BTreeMap<String, String> {
 
 /// Returns the internal area of the tree in a file, which `inspect` reports.
 pub fn cost(folder: &Path, file: &str) -> f64 {
-    facts(&said(folder, &["inspect", file]))["internal area"]
-        .parse()
-        .unwrap()
+    facts(&said(folder, &["inspect", file]))["internal area"].parse().unwrap()
 }
 
 /// Returns a fact that is a number.

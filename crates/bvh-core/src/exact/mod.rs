@@ -139,8 +139,7 @@ impl Line {
     fn edge(&self, from: Vec3, to: Vec3) -> [f64; 3] {
         let from: &[f32; 3] = from.as_ref();
         let to: &[f32; 3] = to.as_ref();
-        self.axes
-            .map(|axis| f64::from(to[axis]) - f64::from(from[axis]))
+        self.axes.map(|axis| f64::from(to[axis]) - f64::from(from[axis]))
     }
 
     /// Returns the edge values `u`, `v`, `w`, multiplied by `d_z`, and the bound of their errors.
@@ -263,10 +262,8 @@ pub(crate) fn is_degenerate(triangle: &[Vec3; 3]) -> bool {
     let [a, b, c] = triangle.map(|corner| corner.to_array().map(f64::from));
     let edge = |from: [f64; 3], to: [f64; 3]| [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
     let (normal, products) = normal(&edge(a, b), &edge(a, c));
-    let has_area = normal
-        .iter()
-        .zip(products)
-        .any(|(component, sum)| component.abs() > ERROR * sum);
+    let has_area =
+        normal.iter().zip(products).any(|(component, sum)| component.abs() > ERROR * sum);
     !has_area && volumes::is_degenerate(triangle)
 }
 
@@ -286,9 +283,7 @@ fn dot(p: &[f64; 3], q: &[f64; 3]) -> f64 {
 /// Returns the largest absolute value.
 #[inline(always)]
 fn largest(numbers: &[f64]) -> f64 {
-    numbers
-        .iter()
-        .fold(0.0, |most, number| larger(most, number.abs()))
+    numbers.iter().fold(0.0, |most, number| larger(most, number.abs()))
 }
 
 /// Returns the larger of two numbers, the second if one is NaN.

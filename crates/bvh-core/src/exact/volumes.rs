@@ -12,9 +12,7 @@ pub(super) fn crossing(ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
     let volumes = Volumes::new(ray, triangle)?;
     let [u, v, w] = volumes.sides();
     let is_crossed = u != 0 && u == v && v == w;
-    is_crossed
-        .then(|| volumes.rounded_distance())
-        .flatten()
+    is_crossed.then(|| volumes.rounded_distance()).flatten()
 }
 
 /// An exact difference of two points.
@@ -56,9 +54,7 @@ impl<'a> Volumes<'a> {
         let [a, b, c] = *triangle;
         let origin = ray.origin();
         let direction = ray.direction();
-        let is_finite = [a, b, c, origin, direction]
-            .iter()
-            .all(|point| point.is_finite());
+        let is_finite = [a, b, c, origin, direction].iter().all(|point| point.is_finite());
         if !is_finite {
             return None;
         }

@@ -55,10 +55,7 @@ impl Bvh {
     /// May panic on a tree that [`validate`](crate::validate()) rejects.
     pub fn to_aila_laine(&self) -> Vec<AilaLaineNode> {
         let tree = binary(self);
-        tree.nodes
-            .iter()
-            .map(|node| packed(node, &tree))
-            .collect()
+        tree.nodes.iter().map(|node| packed(node, &tree)).collect()
     }
 
     /// Makes a tree from such nodes, in depth-first order. Nodes and ids that cannot be reached

@@ -71,10 +71,7 @@ impl CompressedNode {
     /// Stores the box of a slot, rounded outwards. All f64 operations are exact, the division by a
     /// power of two included.
     fn set_box(&mut self, slot: usize, aabb: &Aabb) {
-        let steps = DVec3::from(
-            self.exponents
-                .map(|exponent| f64::from(step(exponent))),
-        );
+        let steps = DVec3::from(self.exponents.map(|exponent| f64::from(step(exponent))));
         let origin = self.origin.as_dvec3();
         let low = (aabb.min.as_dvec3() - origin) / steps;
         let high = (aabb.max.as_dvec3() - origin) / steps;
@@ -120,9 +117,7 @@ impl CompressedBvh {
         let visits = areas(tree);
         let (decisions, _) =
             decide(tree, &visits, |objects| (objects <= LEAF as u32).then_some(1.0));
-        compressed
-            .nodes
-            .push(CompressedNode::around(&tree.nodes[0].aabb));
+        compressed.nodes.push(CompressedNode::around(&tree.nodes[0].aabb));
         // The node of `tree` for each compressed node, in the same order.
         let mut subtrees = alloc::vec![0];
         let mut index = 0;
@@ -150,9 +145,7 @@ impl CompressedBvh {
                     node.inner |= 1 << slot;
                     node.meta[slot] = 1 << 5 | (24 + slot as u8);
                     subtrees.push(child);
-                    compressed
-                        .nodes
-                        .push(CompressedNode::around(aabb));
+                    compressed.nodes.push(CompressedNode::around(aabb));
                 }
             }
             compressed.nodes[index] = node;
@@ -179,9 +172,7 @@ impl CompressedBvh {
                     Part::Node(child - 1)
                 } else {
                     // A saturated sum of a forged node is out of range, and `unpack` rejects it.
-                    let first = node
-                        .first_object
-                        .saturating_add(u32::from(meta & 31));
+                    let first = node.first_object.saturating_add(u32::from(meta & 31));
                     Part::Leaf { first, count: (meta >> 5).count_ones() }
                 };
                 parts.push((node.slot_box(slot), part));

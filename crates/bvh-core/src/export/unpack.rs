@@ -41,8 +41,7 @@ pub(super) fn unpack(
     let mut open: Vec<Pending> = Vec::new();
     let mut parts = Vec::new();
     if nodes > 0 {
-        tree.nodes
-            .push(Node::leaf(root.unwrap_or(Aabb::EMPTY), 0, 0));
+        tree.nodes.push(Node::leaf(root.unwrap_or(Aabb::EMPTY), 0, 0));
         open.push(Pending { part: Part::Node(0), parent: 0, to: 0 });
     }
     while let Some(Pending { part, parent, to }) = open.pop() {
@@ -100,8 +99,7 @@ pub(super) fn unpack(
                     return Err(InvalidBvh::ObjectCount { named, objects });
                 }
                 tree.nodes[to] = Node::leaf(tree.nodes[to].aabb, tree.prim_ids.len() as u32, count);
-                tree.prim_ids
-                    .extend_from_slice(&prim_ids[first as usize..][..count as usize]);
+                tree.prim_ids.extend_from_slice(&prim_ids[first as usize..][..count as usize]);
             }
         }
     }

@@ -75,11 +75,7 @@ pub fn save_layout(wide: &WideBvh) -> Vec<u8> {
     let length: usize = sections.iter().map(|section| section.len()).sum();
     let mut bytes = Vec::with_capacity(BYTES + length);
     bytes.extend(MAGIC);
-    bytes.extend(
-        [VERSION, Header::ENDIANNESS]
-            .map(u32::to_le_bytes)
-            .as_flattened(),
-    );
+    bytes.extend([VERSION, Header::ENDIANNESS].map(u32::to_le_bytes).as_flattened());
     for count in [wide.nodes.len(), wide.blocks.len()] {
         bytes.extend((count as u64).to_le_bytes());
     }
@@ -234,9 +230,7 @@ impl Structure {
         let are_sound = blocks.iter().all(TriangleBlock::is_sound);
         // Every leaf is named at its first block, and its last one is marked.
         let firsts = core::iter::once(true).chain(blocks.iter().map(TriangleBlock::is_last));
-        let are_named = firsts
-            .zip(&structure.is_named)
-            .all(|(first, &named)| first == named);
+        let are_named = firsts.zip(&structure.is_named).all(|(first, &named)| first == named);
         let ends = blocks.last().is_none_or(TriangleBlock::is_last);
         if !(are_sound && are_named && ends) {
             return Err(FileError::Field("blocks"));
@@ -254,9 +248,7 @@ impl Structure {
                     .get_mut(index)
                     .is_some_and(|known| core::mem::replace(known, depth) == 0)
         } else {
-            self.is_named
-                .get_mut(index)
-                .is_some_and(|known| !core::mem::replace(known, true))
+            self.is_named.get_mut(index).is_some_and(|known| !core::mem::replace(known, true))
         };
         if is_new { Ok(()) } else { Err(FileError::Layout { node: least.saturating_sub(1) }) }
     }

@@ -41,8 +41,7 @@ fn scene_of(n: u32, children: usize, leaf: usize) -> (Vec<Aabb>, Bvh) {
             let first = tree.nodes.len() as u32;
             let cut = |part: usize| (range.start + range.len() * part / parts) as u32;
             for part in 0..parts {
-                tree.nodes
-                    .push(Node::leaf(Aabb::EMPTY, cut(part), cut(part + 1) - cut(part)));
+                tree.nodes.push(Node::leaf(Aabb::EMPTY, cut(part), cut(part + 1) - cut(part)));
             }
             tree.nodes[index] = Node::inner(Aabb::EMPTY, first, parts as u32);
         }
@@ -78,8 +77,7 @@ fn split_scene(n: u32) -> (Vec<Aabb>, Bvh) {
             let [low, high] = aabb.halves(0, middle);
             let added = tree.prim_ids.len() as u32;
             tree.nodes[index] = Node::inner(aabb, tree.nodes.len() as u32, 2);
-            tree.nodes
-                .extend([Node::leaf(low, first, 1), Node::leaf(high, added, 1)]);
+            tree.nodes.extend([Node::leaf(low, first, 1), Node::leaf(high, added, 1)]);
             tree.prim_ids.push(tree.prim_ids[first as usize]);
         }
     }
@@ -93,13 +91,7 @@ fn a_tree_with_divided_objects_comes_back_and_is_rejected_if_a_part_is_missing()
     let origin = Origin { objective: Objective::Layout, ..ORIGIN };
     let bytes = save_references(&tree, &boxes, &Filled(&boxes), &origin).unwrap();
     assert_eq!(load(&bytes, &boxes), Ok(tree.clone()));
-    assert_eq!(
-        TreeFile::open(&bytes)
-            .unwrap()
-            .header()
-            .references,
-        15
-    );
+    assert_eq!(TreeFile::open(&bytes).unwrap().header().references, 15);
     let wrong_count = FileError::Tree(InvalidBvh::ObjectCount { named: 15, objects: 11 });
     assert_eq!(save(&tree, &boxes, &origin), Err(wrong_count), "objects that may not be divided");
     for (index, node) in tree.nodes.iter().enumerate() {
@@ -146,10 +138,7 @@ fn a_saved_tree_can_be_loaded_and_viewed() {
         let bytes = save(&tree, &boxes, &ORIGIN).unwrap();
         assert_eq!(load(&bytes, &boxes), Ok(tree.clone()));
         let held = aligned(&bytes);
-        let file = TreeFile::open(bytes_of(&held, bytes.len()))
-            .unwrap()
-            .for_boxes(&boxes)
-            .unwrap();
+        let file = TreeFile::open(bytes_of(&held, bytes.len())).unwrap().for_boxes(&boxes).unwrap();
         assert_eq!(file.view(), Ok((&tree).into()));
         let header = Header {
             nodes: tree.nodes.len(),

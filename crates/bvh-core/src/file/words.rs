@@ -12,12 +12,7 @@ pub(super) fn le_bytes<T: Pod>(values: &[T]) -> Cow<'_, [u8]> {
         Cow::Borrowed(bytes)
     } else {
         let (words, _) = bytes.as_chunks::<4>();
-        Cow::Owned(
-            words
-                .iter()
-                .flat_map(|&[a, b, c, d]| [d, c, b, a])
-                .collect(),
-        )
+        Cow::Owned(words.iter().flat_map(|&[a, b, c, d]| [d, c, b, a]).collect())
     }
 }
 

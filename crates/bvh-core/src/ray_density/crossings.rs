@@ -157,9 +157,7 @@ fn clip_to_grid(from: DVec3, ray: DVec3) -> Option<Clipped> {
 /// Returns the cell of a point, or the nearest cell if rounding has moved the point out of the
 /// grid.
 fn cell_at(point: DVec3) -> [usize; 3] {
-    let cell = point
-        .to_array()
-        .map(|x| x.clamp(0.0, END) as usize);
+    let cell = point.to_array().map(|x| x.clamp(0.0, END) as usize);
     cell.map(|index| index.min(CELLS - 1))
 }
 

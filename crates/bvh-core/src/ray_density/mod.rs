@@ -200,9 +200,8 @@ impl RayDensity {
         let grid = Grid::new(bounds)?;
         let mut crossings = Crossings::new();
         for (index, segment) in segments.iter().enumerate() {
-            let [from, to] = grid
-                .in_cells(segment, extension)
-                .ok_or(DensityError::NotFinite { index })?;
+            let [from, to] =
+                grid.in_cells(segment, extension).ok_or(DensityError::NotFinite { index })?;
             crossings.record(from, to);
         }
         if crossings.segments == 0 {
@@ -303,14 +302,8 @@ impl RayDensity {
     #[inline]
     fn round(&self, bounds: &Aabb) -> Rounded {
         // Coordinates are not negative, so a cast rounds down.
-        let low = self
-            .in_fractions(bounds.min)
-            .to_array()
-            .map(|x| x as u32);
-        let high = self
-            .in_fractions(bounds.max)
-            .to_array()
-            .map(round_up);
+        let low = self.in_fractions(bounds.min).to_array().map(|x| x as u32);
+        let high = self.in_fractions(bounds.max).to_array().map(round_up);
         Rounded { low, high }
     }
 
@@ -334,11 +327,8 @@ impl RayDensity {
             // The weights of the lower and of the upper grid point along each axis.
             let [x, y, z] = part.map(|part| [f64::from(FRACTIONS - part), f64::from(part)]);
             let xy = [x[0] * y[0], x[1] * y[0], x[0] * y[1], x[1] * y[1]];
-            let plane = |k: usize| {
-                (0..4)
-                    .map(|i| xy[i] * f64::from(values[4 * k + i]))
-                    .sum::<f64>()
-            };
+            let plane =
+                |k: usize| (0..4).map(|i| xy[i] * f64::from(values[4 * k + i])).sum::<f64>();
             sum += z[0] * plane(0) + z[1] * plane(1);
         }
         sum

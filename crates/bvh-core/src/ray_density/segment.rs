@@ -26,8 +26,7 @@ impl Segment {
     /// ```
     pub fn of_ray(ray: &Ray, end: f32) -> Option<Self> {
         let to = ray.at(end);
-        to.is_finite()
-            .then(|| Self { from: ray.origin().to_array(), to: to.to_array() })
+        to.is_finite().then(|| Self { from: ray.origin().to_array(), to: to.to_array() })
     }
 }
 

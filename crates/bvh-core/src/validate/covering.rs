@@ -84,8 +84,7 @@ mod tests {
     /// Returns the parts of the only object of `objects` in the two halves of `part`.
     fn halves_of_part(objects: &dyn Clip, part: &Aabb, axis: usize) -> [Aabb; 2] {
         let middle = 0.5 * (part.min[axis] + part.max[axis]);
-        part.halves(axis, middle)
-            .map(|region| objects.clip(0, &region))
+        part.halves(axis, middle).map(|region| objects.clip(0, &region))
     }
 
     #[test]
@@ -97,10 +96,7 @@ mod tests {
         let mut leaves = alloc::vec![full];
         // Every part is cut at its middle along one axis after the other.
         for axis in [0, 1, 2, 0] {
-            leaves = leaves
-                .iter()
-                .flat_map(|part| halves_of_part(&objects, part, axis))
-                .collect();
+            leaves = leaves.iter().flat_map(|part| halves_of_part(&objects, part, axis)).collect();
             leaves.retain(|part| *part != Aabb::EMPTY);
         }
         assert!(leaves.len() > 6, "{}", leaves.len());

@@ -73,10 +73,7 @@ impl<'a> FastPath<'a> {
     /// after the last one.
     fn id_at(&self, byte: usize) -> usize {
         let byte_of_ids = byte.saturating_sub(size_of_val(self.tree.nodes));
-        self.tree
-            .prim_ids
-            .len()
-            .min(byte_of_ids / size_of::<u32>())
+        self.tree.prim_ids.len().min(byte_of_ids / size_of::<u32>())
     }
 
     fn add_nodes(&mut self, range: Range<usize>) {
@@ -254,9 +251,7 @@ mod avx2 {
 /// Marks these slots if all of them exist. Returns whether all of them exist.
 #[inline(always)]
 fn mark(marks: &mut [u8], slots: &[u32]) -> bool {
-    let highest = slots
-        .iter()
-        .fold(0, |highest, &slot| highest.max(slot));
+    let highest = slots.iter().fold(0, |highest, &slot| highest.max(slot));
     let in_bounds = (highest as usize) < marks.len();
     if in_bounds {
         for &slot in slots {

@@ -102,11 +102,7 @@ pub fn validate_references(
     for parts_of_object in parts.chunk_by(|a, b| a.0 == b.0) {
         let (object, _) = parts_of_object[0];
         leaves.clear();
-        leaves.extend(
-            parts_of_object
-                .iter()
-                .map(|&(_, leaf)| tree.nodes[leaf as usize].aabb),
-        );
+        leaves.extend(parts_of_object.iter().map(|&(_, leaf)| tree.nodes[leaf as usize].aabb));
         if !covering::is_covered(objects, object, &boxes[object as usize], &leaves) {
             return Err(InvalidBvh::Uncovered { object: object as usize });
         }
@@ -192,9 +188,7 @@ pub(crate) fn find_fault(tree: BvhView, objects: usize, leaves: Leaves) -> Resul
     let mut distinct = 0;
     let mut repeated = None;
     for (index, node) in tree.nodes.iter().enumerate() {
-        node.aabb
-            .check()
-            .map_err(|reason| InvalidBvh::Box { node: index, reason })?;
+        node.aabb.check().map_err(|reason| InvalidBvh::Box { node: index, reason })?;
         match node.kind() {
             NodeKind::Inner { first, count } => {
                 let range = node.children();

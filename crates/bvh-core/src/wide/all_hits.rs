@@ -160,10 +160,7 @@ impl WideBvh {
             if others[number / 64] >> (number % 64) & 1 == 1 {
                 self.append_hits(ray, hits);
                 let number = number as u32;
-                found.extend(
-                    hits.drain(first..)
-                        .map(|hit| Found { number, hit }),
-                );
+                found.extend(hits.drain(first..).map(|hit| Found { number, hit }));
             }
         }
         counts.fill(0);

@@ -171,9 +171,7 @@ unsafe fn visit_nodes<K: Instructions>(
                 traversal.top = traversal.top.add(inner).sub(1);
                 traversal.child = Child::from_bits(*traversal.top as u32);
                 let is_at_end = traversal.child == END;
-                let line = nodes
-                    .wrapping_add(traversal.child.index())
-                    .cast::<u8>();
+                let line = nodes.wrapping_add(traversal.child.index()).cast::<u8>();
                 for offset in 0..size_of::<WideNode>() / 64 {
                     K::prefetch(line.wrapping_add(64 * offset));
                 }

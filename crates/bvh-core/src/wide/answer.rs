@@ -23,9 +23,7 @@ pub(crate) trait Answers {
     /// Writes the answers for consecutive rays from number `first` on, likewise. Slices are equally
     /// long.
     fn write_lanes(&mut self, first: usize, distances: &[f32], instances: &[u32], objects: &[u32]) {
-        let lanes = distances
-            .iter()
-            .zip(instances.iter().zip(objects));
+        let lanes = distances.iter().zip(instances.iter().zip(objects));
         for (lane, (&t, (&instance, &object))) in lanes.enumerate() {
             self.write(first + lane, t, instance, object);
         }
@@ -67,9 +65,7 @@ impl<'a> Batch<'a> {
     pub(crate) fn alone<const ANY: bool>(&mut self, number: usize, wide: &WideBvh, ray: &Ray) {
         if let Some(scene) = self.scene {
             let hit = if ANY {
-                scene
-                    .any_hit(ray)
-                    .then_some(InstanceHit { t: 0.0, instance: 0, triangle: 0 })
+                scene.any_hit(ray).then_some(InstanceHit { t: 0.0, instance: 0, triangle: 0 })
             } else {
                 scene.nearest_hit(ray)
             };
@@ -81,9 +77,9 @@ impl<'a> Batch<'a> {
             (None, false) => wide.nearest_hit(ray),
             (None, true) => wide.any_hit(ray).then_some(any),
             (Some(accept), false) => wide.nearest_hit_where(ray, |hit| accept(number, hit)),
-            (Some(accept), true) => wide
-                .any_hit_where(ray, |hit| accept(number, hit))
-                .then_some(any),
+            (Some(accept), true) => {
+                wide.any_hit_where(ray, |hit| accept(number, hit)).then_some(any)
+            }
         };
         let Hit { t, object } = hit.unwrap_or(Hit::MISS);
         self.answers.write(number, t, u32::MAX, object);

@@ -11,9 +11,6 @@ impl Kernel {
 
     /// The fastest kernel that this processor can run.
     pub fn best() -> Self {
-        Self::ALL
-            .into_iter()
-            .find(|kernel| kernel.is_available())
-            .unwrap_or(Self::Portable)
+        Self::ALL.into_iter().find(|kernel| kernel.is_available()).unwrap_or(Self::Portable)
     }
 }

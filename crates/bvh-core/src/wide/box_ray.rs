@@ -78,9 +78,7 @@ impl FusedRay {
         if !(SIZES.contains(&size) & SHIFTS.contains(&shift)) {
             return None;
         }
-        let scale = inverse
-            .max(Vec4::splat(-limit))
-            .min(Vec4::splat(limit));
+        let scale = inverse.max(Vec4::splat(-limit)).min(Vec4::splat(limit));
         let margin = Vec4::splat(size * margin).copysign(inverse);
         Some(Self {
             scale,
@@ -174,9 +172,7 @@ mod tests {
     fn planes_too_far(own_margin: f32) -> usize {
         let mut state = 1u32;
         let mut random = || {
-            state = state
-                .wrapping_mul(747_796_405)
-                .wrapping_add(2_891_336_453);
+            state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
             let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
             (word >> 8) as f32 / (1 << 23) as f32 - 1.0
         };
@@ -193,11 +189,7 @@ mod tests {
             let direction = Vec3::new(random(), random(), random())
                 * pow2([0, 30, -30, 0, 30, -30, 85][case % 7]);
             let Ok(ray) = Ray::half_line(origin, direction) else { continue };
-            let largest = bounds
-                .min
-                .abs()
-                .max(bounds.max.abs())
-                .max_element();
+            let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
             let Some(fused) = FusedRay::new(&ray, largest, own_margin) else { continue };
             let margin = margin(&ray, &bounds);
             let least_inverse = ray.inverse_direction().abs().min_element();

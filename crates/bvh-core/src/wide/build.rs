@@ -22,10 +22,7 @@ fn promise(tree: &Bvh, triangles: &[Triangle], visits: &[f32], costs: &[Costs]) 
     for (index, node) in tree.nodes.iter().enumerate().rev() {
         // A leaf tests all of a triangle, though only a part of it may be in its box.
         let own = |&id: &u32| triangles[id as usize].area();
-        areas[index] = tree.prim_ids[node.prims()]
-            .iter()
-            .map(own)
-            .sum::<f64>()
+        areas[index] = tree.prim_ids[node.prims()].iter().map(own).sum::<f64>()
             + areas[node.children()].iter().sum::<f64>();
     }
     let promise = |(index, node): (usize, &crate::Node)| {
@@ -35,11 +32,7 @@ fn promise(tree: &Bvh, triangles: &[Triangle], visits: &[f32], costs: &[Costs]) 
         let time = costs[index][0] / visits[index].max(f32::MIN_POSITIVE);
         (stopped / f64::from(time).max(f64::MIN_POSITIVE)) as f32
     };
-    tree.nodes
-        .iter()
-        .enumerate()
-        .map(promise)
-        .collect()
+    tree.nodes.iter().enumerate().map(promise).collect()
 }
 
 /// Returns the number of nodes of the layout, and the largest number of blocks that it can have.
@@ -49,9 +42,7 @@ fn sizes(tree: &Bvh, decisions: &[Decision]) -> (usize, usize) {
     while let Some(subtree) = open.pop() {
         let decision = &decisions[subtree];
         if decision.is_leaf {
-            sizes.1 += decision
-                .objects
-                .div_ceil(TriangleBlock::LANES as u32) as usize;
+            sizes.1 += decision.objects.div_ceil(TriangleBlock::LANES as u32) as usize;
         } else {
             sizes.0 += 1;
             let (children, lanes) = children(tree, decisions, subtree);
@@ -170,19 +161,13 @@ mod tests {
         let blocks = |child: Child| match child.is_node() {
             true => 0,
             false => {
-                1 + wide.blocks[child.index()..]
-                    .iter()
-                    .take_while(|block| !block.is_last())
-                    .count()
+                1 + wide.blocks[child.index()..].iter().take_while(|block| !block.is_last()).count()
             }
         };
         let root = wide.root.map(|root| (wide.bounds, blocks(root)));
-        root.into_iter()
-            .chain(wide.nodes.iter().flat_map(move |node| {
-                (0..8).filter_map(move |lane| {
-                    Some((node.lane_box(lane)?, blocks(node.children[lane])))
-                })
-            }))
+        root.into_iter().chain(wide.nodes.iter().flat_map(move |node| {
+            (0..8).filter_map(move |lane| Some((node.lane_box(lane)?, blocks(node.children[lane]))))
+        }))
     }
 
     #[test]
@@ -202,11 +187,8 @@ mod tests {
         };
         for seed in 0..6 {
             let (triangles, tree) = scene(11, seed);
-            let visits: Vec<f32> = tree
-                .nodes
-                .iter()
-                .map(|node| along_x(&node.aabb) as f32)
-                .collect();
+            let visits: Vec<f32> =
+                tree.nodes.iter().map(|node| along_x(&node.aabb) as f32).collect();
             let wide = WideBvh::for_rays(&tree, &triangles, &visits).unwrap();
             check_optimal(&tree, &wide, along_x);
         }
@@ -263,10 +245,7 @@ mod tests {
             let at = f32::from(i % 3);
             Triangle::from([[at, at, 1.0 + at], [at + 0.1, at, 1.0 + at], [at, at + 0.1, 1.0 + at]])
         };
-        let triangles: Vec<Triangle> = [wall]
-            .into_iter()
-            .chain((0..24).map(speck))
-            .collect();
+        let triangles: Vec<Triangle> = [wall].into_iter().chain((0..24).map(speck)).collect();
         let halves =
             [[[0.0; 3], [1.1, 2.0, 0.0]], [[1.0, 0.0, 0.0], [2.0, 1.1, 0.0]]].map(Aabb::from);
         let scattered = Aabb::from([[0.0, 0.0, 1.0], [2.1, 2.1, 3.0]]);
@@ -278,15 +257,11 @@ mod tests {
         ];
         for (leaves, parts) in [(whole, 1), (divided, 2)] {
             let root = Aabb::from([[0.0; 3], [2.1, 2.1, 3.0]]);
-            let prim_ids = core::iter::repeat_n(0, parts)
-                .chain(1..25)
-                .collect();
+            let prim_ids = core::iter::repeat_n(0, parts).chain(1..25).collect();
             let mut tree = Bvh { nodes: vec![Node::inner(root, 1, leaves.len() as u32)], prim_ids };
             tree.nodes.extend(leaves);
             let wide = WideBvh::new(&tree, &triangles).unwrap();
-            let lanes = (0..8)
-                .filter_map(|lane| wide.nodes[0].lane_box(lane))
-                .collect::<Vec<_>>();
+            let lanes = (0..8).filter_map(|lane| wide.nodes[0].lane_box(lane)).collect::<Vec<_>>();
             assert_eq!(lanes[0], scattered, "the last of {}", lanes.len());
             let ray = crate::Ray::half_line([0.1, 0.1, -1.0], [0.0, 0.0, 1.0]).unwrap();
             let mut counts = crate::TestCounts::default();
@@ -315,20 +290,10 @@ mod tests {
         let (triangles, _) = scene(9, 1);
         let mut tree =
             Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, 9)], prim_ids: (0..9).rev().collect() };
-        tree.refit(
-            &triangles
-                .iter()
-                .map(Triangle::aabb)
-                .collect::<Vec<_>>(),
-        );
+        tree.refit(&triangles.iter().map(Triangle::aabb).collect::<Vec<_>>());
         let wide = WideBvh::new(&tree, &triangles).unwrap();
         assert_eq!((wide.nodes.len(), wide.blocks.len()), (0, 3));
-        assert_eq!(
-            WideBvh::new(&Bvh::default(), &[])
-                .unwrap()
-                .bytes(),
-            0
-        );
+        assert_eq!(WideBvh::new(&Bvh::default(), &[]).unwrap().bytes(), 0);
         assert!(WideBvh::new(&tree, &triangles[1..]).is_err());
     }
 }

@@ -56,9 +56,7 @@ unsafe fn one<K: Instructions>(wide: &WideBvh, root: Child, point: Vec3) -> Opti
                     if mask == 0 {
                         break;
                     }
-                    child = *node
-                        .children
-                        .get_unchecked(mask.trailing_zeros() as usize);
+                    child = *node.children.get_unchecked(mask.trailing_zeros() as usize);
                     continue;
                 }
                 child = K::sort(node, bounds, mask, top);

@@ -99,9 +99,7 @@ impl<L: Lanes> Culling<L> {
     /// Returns the planes of a box that contains everything, by axis.
     #[inline(always)]
     pub(super) fn all_space(&self) -> [[f32; 2]; 3] {
-        let far = self
-            .margin
-            .map(|margin| f32::INFINITY.copysign(margin));
+        let far = self.margin.map(|margin| f32::INFINITY.copysign(margin));
         [[-far[0], far[0]], [-far[1], far[1]], [-far[2], far[2]]]
     }
 

@@ -131,8 +131,5 @@ pub(crate) fn children(tree: &Bvh, decisions: &[Decision], subtree: usize) -> ([
 pub(crate) fn areas(tree: &Bvh) -> Vec<f32> {
     let root_area = tree.nodes[0].aabb.half_area();
     let scale = if root_area > 0.0 { 1.0 / root_area } else { 0.0 };
-    tree.nodes
-        .iter()
-        .map(|node| (node.aabb.half_area() * scale) as f32)
-        .collect()
+    tree.nodes.iter().map(|node| (node.aabb.half_area() * scale) as f32).collect()
 }

@@ -49,9 +49,7 @@ pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
     // No triangle has an area. The flight below expects that every ray visits something.
     if wide.root.is_none() {
         for number in numbers {
-            batch
-                .answers
-                .write(number, f32::INFINITY, u32::MAX, u32::MAX);
+            batch.answers.write(number, f32::INFINITY, u32::MAX, u32::MAX);
         }
         return;
     }
@@ -242,12 +240,9 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
             let number = from + lane as usize;
             others &= others - 1;
             if in_range >> lane & 1 == 0 {
-                self.batch
-                    .alone::<ANY>(number, self.wide, &rays.ray(number));
+                self.batch.alone::<ANY>(number, self.wide, &rays.ray(number));
             } else {
-                self.batch
-                    .answers
-                    .write(number, f32::INFINITY, u32::MAX, u32::MAX);
+                self.batch.answers.write(number, f32::INFINITY, u32::MAX, u32::MAX);
             }
         }
     }
@@ -260,8 +255,7 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
         unsafe {
             self.at_nodes.append(traversal, child.is_node());
             let is_at_end = child.is_instance_or_mark();
-            self.at_leaves
-                .append(traversal, !child.is_node() & !is_at_end);
+            self.at_leaves.append(traversal, !child.is_node() & !is_at_end);
             self.at_end.append(traversal, is_at_end);
         }
     }
@@ -351,9 +345,7 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
             unsafe {
                 let traversal = self.at_end.get(i);
                 let Traversal { ray, t, object, .. } = &*traversal;
-                self.batch
-                    .answers
-                    .write(first + ray.number as usize, *t, u32::MAX, *object);
+                self.batch.answers.write(first + ray.number as usize, *t, u32::MAX, *object);
                 self.idle.append(traversal, true);
             }
         }

@@ -75,9 +75,7 @@ impl Instance {
     /// builder.
     pub fn boxes(instances: &[Self], parts: &[WideBvh]) -> Result<Vec<Aabb>, InvalidInstances> {
         let numbered = instances.iter().enumerate();
-        numbered
-            .map(|(index, instance)| Ok(instance.check(index, parts)?.1))
-            .collect()
+        numbered.map(|(index, instance)| Ok(instance.check(index, parts)?.1)).collect()
     }
 
     /// Checks the instance, and returns its inverse transform and its box. `instance` is its index,
@@ -149,9 +147,7 @@ fn transformed(transform: &DAffine3, aabb: &Aabb) -> Aabb {
 fn place_all(instances: &[Instance], parts: &[WideBvh]) -> Result<Vec<Placed>, InvalidInstances> {
     let outlines: Vec<Vec<Aabb>> = parts.iter().map(WideBvh::outline).collect();
     let numbered = instances.iter().enumerate();
-    numbered
-        .map(|(index, instance)| instance.place(index, parts, &outlines))
-        .collect()
+    numbered.map(|(index, instance)| instance.place(index, parts, &outlines)).collect()
 }
 
 /// An instance that is prepared for rays.
@@ -170,14 +166,8 @@ impl Placed {
     /// direction vanish or overflow.
     #[inline(always)]
     fn local(&self, ray: &Ray, t_max: f32) -> Option<Ray> {
-        let origin = self
-            .to_local
-            .transform_point3(ray.origin().as_dvec3())
-            .as_vec3();
-        let direction = self
-            .to_local
-            .transform_vector3(ray.direction().as_dvec3())
-            .as_vec3();
+        let origin = self.to_local.transform_point3(ray.origin().as_dvec3()).as_vec3();
+        let direction = self.to_local.transform_vector3(ray.direction().as_dvec3()).as_vec3();
         Ray::new(origin, direction, ray.t_min(), t_max).ok()
     }
 }
@@ -230,19 +220,12 @@ impl Instances {
         top: Bvh,
     ) -> Result<Self, InvalidInstances> {
         let placed = place_all(&instances, &parts)?;
-        let bounds: Vec<Aabb> = placed
-            .iter()
-            .map(|placed| placed.bounds)
-            .collect();
+        let bounds: Vec<Aabb> = placed.iter().map(|placed| placed.bounds).collect();
         validate(&top, &bounds)?;
         let boxes: Vec<Aabb> = placed.iter().map(|placed| placed.aabb).collect();
-        let used = placed
-            .iter()
-            .map(|placed| &parts[placed.part as usize]);
+        let used = placed.iter().map(|placed| &parts[placed.part as usize]);
         let wide_top = lay_out_instances(&top, &boxes, used);
-        let largest_of_parts = parts
-            .iter()
-            .fold(0.0f32, |largest, part| largest.max(part.largest));
+        let largest_of_parts = parts.iter().fold(0.0f32, |largest, part| largest.max(part.largest));
         Ok(Self { parts, placed, top, wide_top, largest_of_parts })
     }
 

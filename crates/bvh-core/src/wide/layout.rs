@@ -50,11 +50,7 @@ pub struct WideBvh {
 
 /// Returns the largest absolute value of a coordinate of a box.
 pub(super) fn largest(bounds: &Aabb) -> f32 {
-    bounds
-        .min
-        .abs()
-        .max(bounds.max.abs())
-        .max_element()
+    bounds.min.abs().max(bounds.max.abs()).max_element()
 }
 
 /// The maximum number of boxes in an outline. Boxes of instances are computed from all of them.

@@ -12,10 +12,9 @@ impl<L: Lanes> RayLanes<L> {
     pub(super) fn entry(&self, bounds: &Aabb, aabb: &Aabb) -> (L, L::Mask) {
         // SAFETY: values exist.
         unsafe {
-            let reach = self.far_plane(bounds, 0).max(
-                self.far_plane(bounds, 1)
-                    .max(self.far_plane(bounds, 2)),
-            );
+            let reach = self
+                .far_plane(bounds, 0)
+                .max(self.far_plane(bounds, 1).max(self.far_plane(bounds, 2)));
             let reach = reach * L::splat(Slabs::MARGIN);
             let mut entry = self.t_min;
             let mut exit = L::splat(f32::INFINITY);
@@ -60,9 +59,7 @@ impl<L: Lanes> RayLanes<L> {
                 origin[axis] = L::single(turned(to_local, axis, self.origin) + shift);
                 direction[axis] = L::single(turned(to_local, axis, self.direction));
                 // The same operations as in `Ray`, so that the bits agree.
-                inverse[axis] = (L::splat(1.0) / direction[axis])
-                    .max(L::splat(f32::MIN))
-                    .min(most);
+                inverse[axis] = (L::splat(1.0) / direction[axis]).max(L::splat(f32::MIN)).min(most);
                 is_valid =
                     is_valid & direction[axis].abs().le(longest) & origin[axis].abs().le(most);
             }

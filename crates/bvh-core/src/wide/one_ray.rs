@@ -88,9 +88,7 @@ pub(crate) unsafe fn traverse<K: Instructions, const ANY: bool>(
                     if mask == 0 {
                         break;
                     }
-                    child = *node
-                        .children
-                        .get_unchecked(mask.trailing_zeros() as usize);
+                    child = *node.children.get_unchecked(mask.trailing_zeros() as usize);
                     continue;
                 }
                 if ANY {
@@ -98,9 +96,7 @@ pub(crate) unsafe fn traverse<K: Instructions, const ANY: bool>(
                     child = *node.children.get_unchecked(last as usize);
                     let mut others = mask ^ 1 << last;
                     while others != 0 {
-                        let other = *node
-                            .children
-                            .get_unchecked(others.trailing_zeros() as usize);
+                        let other = *node.children.get_unchecked(others.trailing_zeros() as usize);
                         top.write(u64::from(other.bits()));
                         top = top.add(1);
                         others &= others - 1;
@@ -161,13 +157,10 @@ impl<L: Lanes, A: FnMut(Hit) -> bool> Leaves<L> for FirstHits<'_, L, A> {
         // SAFETY: the caller's promise; the ray is prepared before its use.
         unsafe {
             if !self.is_prepared {
-                self.leaf_ray
-                    .write(LeafRay::new(self.ray, self.largest));
+                self.leaf_ray.write(LeafRay::new(self.ray, self.largest));
                 self.is_prepared = true;
             }
-            self.leaf_ray
-                .assume_init_ref()
-                .visit(block, nearest, &mut self.accept)
+            self.leaf_ray.assume_init_ref().visit(block, nearest, &mut self.accept)
         }
     }
 }
@@ -223,9 +216,7 @@ impl<L: Lanes> LeafRay<L> {
             }
             let plane = Plane::of_lanes(&corners);
             let t_max = L::splat(nearest.t);
-            let (inside, t) = self
-                .pairs
-                .decide(&corners, &plane, &candidates, t_max);
+            let (inside, t) = self.pairs.decide(&corners, &plane, &candidates, t_max);
             let mut hits = inside.bits();
             if hits == 0 {
                 return false;

@@ -133,16 +133,12 @@ impl<K: Instructions> Packet<K> {
             let first = unsafe {
                 let vector = vector.assume_init_ref();
                 vector.t.store(distances.as_mut_ptr());
-                vector
-                    .instance
-                    .store(instances.as_mut_ptr().cast());
+                vector.instance.store(instances.as_mut_ptr().cast());
                 vector.object.store(objects.as_mut_ptr().cast());
                 vector.first
             };
             let lanes = ..K::Rays::N;
-            batch
-                .answers
-                .write_lanes(first, &distances[lanes], &instances[lanes], &objects[lanes]);
+            batch.answers.write_lanes(first, &distances[lanes], &instances[lanes], &objects[lanes]);
         }
     }
 
@@ -253,10 +249,7 @@ impl<K: Instructions> Packet<K> {
     pub(super) unsafe fn enter(&self, vector: usize, planes: &[[f32; 2]; 3]) -> u32 {
         // SAFETY: the caller's promise: the vector is counted.
         unsafe {
-            let vector = self
-                .vectors
-                .get_unchecked(vector)
-                .assume_init_ref();
+            let vector = self.vectors.get_unchecked(vector).assume_init_ref();
             let mut entry = vector.t_min;
             let mut exit = vector.t;
             for (axis, &[near, far]) in planes.iter().enumerate() {
@@ -283,15 +276,9 @@ unsafe fn fetch<K: Instructions>(wide: &WideBvh, node: &WideNode, mut mask: u32)
         mask &= mask - 1;
         let child = node.children[lane];
         let beginning = if child.is_node() {
-            wide.nodes
-                .as_ptr()
-                .wrapping_add(child.index())
-                .cast::<u8>()
+            wide.nodes.as_ptr().wrapping_add(child.index()).cast::<u8>()
         } else {
-            wide.blocks
-                .as_ptr()
-                .wrapping_add(child.index())
-                .cast::<u8>()
+            wide.blocks.as_ptr().wrapping_add(child.index()).cast::<u8>()
         };
         for line in 0..LINES {
             // SAFETY: a prefetch may name any address.

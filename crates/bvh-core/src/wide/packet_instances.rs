@@ -60,11 +60,8 @@ impl<K: Instructions, const ANY: bool> Part for Visit<'_, K, ANY> {
         // SAFETY: the caller's promises; vectors below the count are written.
         unsafe {
             let mut moved_packet = Packet::<K>::new();
-            for (i, entry_of_vector) in entries
-                .iter_mut()
-                .enumerate()
-                .take(packet.count)
-                .skip(first)
+            for (i, entry_of_vector) in
+                entries.iter_mut().enumerate().take(packet.count).skip(first)
             {
                 if i > first {
                     entered = packet.enter(i, planes);

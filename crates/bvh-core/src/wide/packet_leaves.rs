@@ -51,14 +51,9 @@ impl<K: Instructions> Packet<K> {
         // SAFETY: the caller's promises; a block that is not its leaf's last is followed by
         // another.
         unsafe {
-            let vector = self
-                .vectors
-                .get_unchecked_mut(vector)
-                .assume_init_mut();
+            let vector = self.vectors.get_unchecked_mut(vector).assume_init_mut();
             if !vector.is_sheared {
-                vector
-                    .pairs
-                    .write(vector.rays.sheared(vector.axes, largest));
+                vector.pairs.write(vector.rays.sheared(vector.axes, largest));
                 vector.is_sheared = true;
             }
             let pairs = vector.pairs.assume_init_ref();

@@ -33,9 +33,7 @@ impl WideRay {
         let origin = ray.origin();
         let inverse = ray.inverse_direction();
         let margin = margin(ray, bounds).copysign(inverse);
-        let backwards = inverse
-            .to_array()
-            .map(|x| (x.to_bits() >> 31) as usize);
+        let backwards = inverse.to_array().map(|x| (x.to_bits() >> 31) as usize);
         Self {
             near: [3 * backwards[0], 1 + 3 * backwards[1], 2 + 3 * backwards[2]],
             far: [3 - 3 * backwards[0], 4 - 3 * backwards[1], 5 - 3 * backwards[2]],

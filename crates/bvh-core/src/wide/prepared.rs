@@ -132,9 +132,7 @@ impl Prepared {
     /// Four lanes of it.
     #[inline(always)]
     fn row(&self, row: usize) -> *const f32 {
-        (&raw const *self)
-            .cast::<f32>()
-            .wrapping_add(4 * row)
+        (&raw const *self).cast::<f32>().wrapping_add(4 * row)
     }
 
     /// Returns the distances at which the ray enters the eight boxes of a node, and a bit for each
@@ -217,10 +215,7 @@ unsafe fn write_row<L: Lanes>(to: *mut Prepared, row: usize, [a, b, c]: [L; 3], 
     // SAFETY: the caller's promises.
     unsafe {
         let to = to.cast::<f32>().wrapping_add(4 * row);
-        for (i, row) in L::transpose_quarters([a, b, c, d])
-            .into_iter()
-            .enumerate()
-        {
+        for (i, row) in L::transpose_quarters([a, b, c, d]).into_iter().enumerate() {
             let to = to.wrapping_add(i * NEXT);
             row.store_quarters([
                 to,

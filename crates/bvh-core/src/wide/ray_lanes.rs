@@ -172,9 +172,7 @@ impl<L: Lanes> RayBounds<L> {
     pub(crate) fn margin(&self, largest: f32) -> f32 {
         let mut size = self.highest[0].max(self.lowest[0].abs());
         for axis in 0..3 {
-            size = size
-                .max(self.lowest[axis].abs())
-                .max(self.highest[axis].abs());
+            size = size.max(self.lowest[axis].abs()).max(self.highest[axis].abs());
         }
         (size.greatest() + largest) * MARGIN
     }

@@ -30,9 +30,8 @@ impl WideBvh {
         let mut is_new = vec![true; triangles.len()];
         for block in self.blocks.iter() {
             for (id, _) in block.triangles() {
-                let triangle = triangles
-                    .get(id as usize)
-                    .filter(|triangle| !triangle.is_degenerate());
+                let triangle =
+                    triangles.get(id as usize).filter(|triangle| !triangle.is_degenerate());
                 triangle.ok_or(RefitError::Lost(id))?;
                 is_new[id as usize] = false;
             }
@@ -60,9 +59,7 @@ impl WideBvh {
                 }
             }
         }
-        self.bounds = self
-            .root
-            .map_or(Aabb::EMPTY, |root| self.box_of(root, &around));
+        self.bounds = self.root.map_or(Aabb::EMPTY, |root| self.box_of(root, &around));
         self.largest = largest(&self.bounds);
         Ok(())
     }
@@ -83,10 +80,8 @@ impl WideBvh {
     /// The blocks of a leaf.
     fn leaf(&self, leaf: Child) -> &[TriangleBlock] {
         let blocks = &self.blocks[leaf.index()..];
-        let end = blocks
-            .iter()
-            .position(TriangleBlock::is_last)
-            .map_or(blocks.len(), |last| last + 1);
+        let end =
+            blocks.iter().position(TriangleBlock::is_last).map_or(blocks.len(), |last| last + 1);
         &blocks[..end]
     }
 
@@ -99,14 +94,9 @@ impl WideBvh {
         };
         let lanes = |node: &WideNode| {
             let of_lane = |lane| Some((node.lane_box(lane)?, node.children[lane]));
-            (0..WideNode::LANES)
-                .filter_map(of_lane)
-                .map(visits)
-                .sum::<f64>()
+            (0..WideNode::LANES).filter_map(of_lane).map(visits).sum::<f64>()
         };
-        let total = self
-            .root
-            .map_or(0.0, |root| visits((self.bounds, root)))
+        let total = self.root.map_or(0.0, |root| visits((self.bounds, root)))
             + self.nodes.iter().map(lanes).sum::<f64>();
         let area = self.bounds.half_area();
         if area > 0.0 { total / area } else { 0.0 }

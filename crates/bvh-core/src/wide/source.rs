@@ -143,9 +143,7 @@ unsafe fn transpose<L: Lanes>(rays: *const Ray, vector: usize) -> [L; 4] {
     // SAFETY: the caller's promises; quarters beyond the lanes are not loaded.
     unsafe {
         let row = |i: usize| {
-            let ray = rays
-                .cast::<f32>()
-                .wrapping_add(4 * vector + i * STEP);
+            let ray = rays.cast::<f32>().wrapping_add(4 * vector + i * STEP);
             L::load_quarters([
                 ray,
                 ray.wrapping_add(4 * STEP),

@@ -63,9 +63,7 @@ fn one_per_leaf(tree: &Bvh, boxes: &[Aabb]) -> Bvh {
         let first = divided.nodes.len() as u32;
         for place in objects.clone() {
             let aabb = boxes[tree.prim_ids[place] as usize];
-            divided
-                .nodes
-                .push(Node::leaf(aabb, place as u32, 1));
+            divided.nodes.push(Node::leaf(aabb, place as u32, 1));
         }
         divided.nodes[index] = Node::inner(node.aabb, first, objects.len() as u32);
     }

@@ -238,11 +238,7 @@ unsafe fn pairs<L: Lanes>(four: [*mut Traversal; 4]) -> Pairs<L> {
 #[inline(always)]
 pub(super) unsafe fn candidates<L: Lanes>(four: [*mut Traversal; 4]) -> u32 {
     // SAFETY: the caller's promises.
-    unsafe {
-        pairs::<L>(four)
-            .candidates(&corners(four))
-            .possible
-    }
+    unsafe { pairs::<L>(four).candidates(&corners(four)).possible }
 }
 
 /// Returns the corners of the block at which each ray is, along the axes of its shear.
@@ -253,12 +249,8 @@ unsafe fn corners<L: Lanes>(four: [*mut Traversal; 4]) -> [[L; 3]; 3] {
         let lanes = |i: usize, corner: usize, axis: usize| {
             let traversal = &*four[i];
             let axis = AXES[traversal.ray.largest_axis as usize % 3][axis];
-            let block = traversal
-                .blocks
-                .wrapping_add(traversal.child.index());
-            block
-                .cast::<f32>()
-                .wrapping_add((3 * corner + axis) * TriangleBlock::LANES)
+            let block = traversal.blocks.wrapping_add(traversal.child.index());
+            block.cast::<f32>().wrapping_add((3 * corner + axis) * TriangleBlock::LANES)
         };
         let of = |corner: usize, axis: usize| {
             L::load_quarters([
@@ -288,13 +280,8 @@ pub(super) unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4]) {
         let t_max = before.spread::<0>();
         let corners = corners::<L>(four);
         let (inside, t) = pairs::<L>(four).decide_alone(&corners, t_max);
-        let ids = |i: usize| {
-            (*(*four[i])
-                .blocks
-                .wrapping_add((*four[i]).child.index()))
-            .ids()
-            .cast()
-        };
+        let ids =
+            |i: usize| (*(*four[i]).blocks.wrapping_add((*four[i]).child.index())).ids().cast();
         let ids = L::load_quarters([ids(0), ids(1), ids(2), ids(3)])
             & L::splat_bits(!TriangleBlock::LAST);
         let none = L::splat_bits(u32::MAX);
@@ -362,9 +349,7 @@ unsafe fn decide_others<L: Lanes>(
         let (inside, t) = pairs::<L>(ray).decide_alone(&corners, t_max);
         let mut distances = [0.0; 16];
         t.store(distances.as_mut_ptr());
-        let block = &*(*traversal)
-            .blocks
-            .add((*traversal).child.index());
+        let block = &*(*traversal).blocks.add((*traversal).child.index());
         let mut left = inside.bits() & 0b1111;
         while left != 0 {
             let lane = left.trailing_zeros() as usize;

@@ -24,15 +24,13 @@ impl TriangleBlock {
     /// The blocks of one leaf of at least one triangle, none degenerate.
     pub(crate) fn chain(ids: &[u32], triangles: &[Triangle]) -> impl Iterator<Item = Self> {
         let blocks = ids.len().div_ceil(Self::LANES);
-        (1..)
-            .zip(ids.chunks(Self::LANES))
-            .map(move |(number, ids)| {
-                let mut block = Self { ids: [Self::UNUSED; Self::LANES], ..Self::zeroed() };
-                block.ids[..ids.len()].copy_from_slice(ids);
-                block.ids[0] |= if number == blocks { Self::LAST } else { 0 };
-                block.move_to(triangles);
-                block
-            })
+        (1..).zip(ids.chunks(Self::LANES)).map(move |(number, ids)| {
+            let mut block = Self { ids: [Self::UNUSED; Self::LANES], ..Self::zeroed() };
+            block.ids[..ids.len()].copy_from_slice(ids);
+            block.ids[0] |= if number == blocks { Self::LAST } else { 0 };
+            block.move_to(triangles);
+            block
+        })
     }
 
     /// Writes the corners of the triangles that the ids name.
@@ -42,11 +40,7 @@ impl TriangleBlock {
             // Unused lanes repeat the last triangle: what they find, that one finds too, and its id
             // is less.
             last = if self.id(lane) == Self::UNUSED { last } else { self.id(lane) };
-            for (lanes, corner) in self
-                .corners
-                .iter_mut()
-                .zip(triangles[last as usize].0)
-            {
+            for (lanes, corner) in self.corners.iter_mut().zip(triangles[last as usize].0) {
                 (0..3).for_each(|axis| lanes[axis][lane] = corner[axis]);
             }
         }
@@ -73,9 +67,7 @@ impl TriangleBlock {
     /// Returns the number of used lanes, which are the first.
     #[inline(always)]
     pub(crate) fn len(&self) -> usize {
-        1 + (1..Self::LANES)
-            .map(|lane| usize::from(self.ids[lane] != Self::UNUSED))
-            .sum::<usize>()
+        1 + (1..Self::LANES).map(|lane| usize::from(self.ids[lane] != Self::UNUSED)).sum::<usize>()
     }
 
     /// Returns whether this is a leaf's last block.
@@ -153,11 +145,11 @@ impl TriangleBlock {
     /// unused lanes repeat the last used one, which kernels that test all lanes rely on.
     pub(crate) fn is_sound(&self) -> bool {
         let used = self.len();
-        let are_repeated = self.corners.as_flattened().iter().all(|lanes| {
-            lanes[used..]
-                .iter()
-                .all(|x| *x == lanes[used - 1])
-        });
+        let are_repeated = self
+            .corners
+            .as_flattened()
+            .iter()
+            .all(|lanes| lanes[used..].iter().all(|x| *x == lanes[used - 1]));
         let are_ids = (0..Self::LANES).all(|lane| match lane < used {
             true => self.id(lane) < Self::LAST,
             false => self.ids[lane] == Self::UNUSED,

@@ -67,9 +67,7 @@ fn closed_meshes() -> Vec<(&'static str, Vec<Triangle>, Vec3)> {
 
 fn layout(triangles: &[Triangle], shape: usize, kernel: Kernel) -> Option<WideBvh> {
     let tree = tree(&boxes(triangles), SHAPES[shape], &mut Random(5));
-    WideBvh::new(&tree, triangles)
-        .unwrap()
-        .with_kernel(kernel)
+    WideBvh::new(&tree, triangles).unwrap().with_kernel(kernel)
 }
 
 /// Returns all crossings by testing every triangle.
@@ -90,10 +88,7 @@ fn every_kernel_finds_each_crossing_once_at_every_scale() {
         for scene in [soup(120, &mut random), ball(2), grid_box(3), junction()] {
             let triangles = scaled(&scene, libm::exp2f(exponent as f32));
             let rays = rays(&triangles, 1000, &mut random);
-            let expected: Vec<Vec<Hit>> = rays
-                .iter()
-                .map(|ray| all_of(&triangles, ray))
-                .collect();
+            let expected: Vec<Vec<Hit>> = rays.iter().map(|ray| all_of(&triangles, ray)).collect();
             for kernel in Kernel::ALL {
                 for shape in 0..SHAPES.len() {
                     let Some(wide) = layout(&triangles, shape, kernel) else { continue };
@@ -105,10 +100,7 @@ fn every_kernel_finds_each_crossing_once_at_every_scale() {
                         assert_eq!(&wide.all_hits(ray), expected, "{kernel:?}, {ray:?}");
                     }
                     wide.count_hits(&rays, &mut counts);
-                    let lengths: Vec<u32> = expected
-                        .iter()
-                        .map(|hits| hits.len() as u32)
-                        .collect();
+                    let lengths: Vec<u32> = expected.iter().map(|hits| hits.len() as u32).collect();
                     assert_eq!(counts, lengths);
                 }
             }
@@ -179,17 +171,10 @@ fn of_two_boxes_with_a_common_face_one_contains_each_point_of_it() {
         .collect();
     let contains = |triangles: &[Triangle]| {
         let mut inside = vec![false; points.len()];
-        layout(triangles, 0, Kernel::best())
-            .unwrap()
-            .contains(&points, &mut inside);
+        layout(triangles, 0, Kernel::best()).unwrap().contains(&points, &mut inside);
         inside
     };
-    assert!(
-        contains(&left)
-            .iter()
-            .zip(contains(&right))
-            .all(|(&left, right)| left != right)
-    );
+    assert!(contains(&left).iter().zip(contains(&right)).all(|(&left, right)| left != right));
 }
 
 /// The exponent of ε: with K bits for each of its powers, ε is less than any exact value of the
@@ -209,10 +194,7 @@ fn integer(x: f32) -> BigInt {
 /// after the origin has been moved by (ε, ε², ε³).
 fn is_crossed(ray: &Ray, triangle: &Triangle) -> bool {
     let direction = ray.direction().to_array().map(integer);
-    let origin = ray
-        .origin()
-        .to_array()
-        .map(|x| integer(x) << (3 * K));
+    let origin = ray.origin().to_array().map(|x| integer(x) << (3 * K));
     let [x, y, z] = origin;
     let origin = [x + (BigInt::from(1) << (2 * K)), y + (BigInt::from(1) << K), z + 1];
     let corners = triangle.0.map(|corner| {
@@ -240,9 +222,7 @@ fn crossings_are_those_of_a_moved_origin_in_exact_arithmetic() {
             for _ in 0..12 {
                 let triangle = random.of(&triangles);
                 let expected = is_crossed(&ray, &triangle)
-                    && triangle
-                        .intersect(&PreparedRay::new(&ray), f32::MAX)
-                        .is_some();
+                    && triangle.intersect(&PreparedRay::new(&ray), f32::MAX).is_some();
                 assert_eq!(
                     triangle.crossing(&ray).is_some(),
                     expected,
@@ -266,9 +246,7 @@ fn check_exactly(name: &str, triangles: &[Triangle], ray: &Ray, hits: &[Hit]) {
     }
     for (object, triangle) in (0..).zip(triangles) {
         // A triangle that the ray touches and does not cross.
-        if triangle
-            .intersect(&PreparedRay::new(ray), f32::MAX)
-            .is_some()
+        if triangle.intersect(&PreparedRay::new(ray), f32::MAX).is_some()
             && !hits.iter().any(|hit| hit.object == object)
         {
             assert!(!is_crossed(ray, triangle), "{name}: {ray:?} {triangle:?}");

@@ -78,10 +78,8 @@ fn triangles_of_any_bits_are_compared_as_if_each_were_alone() {
         let triangles: Vec<Triangle> = (0..40)
             .map(|_| Triangle(std::array::from_fn(|_| point_of_any_bits(&mut random))))
             .collect();
-        let alone: Vec<WideBvh> = triangles
-            .iter()
-            .map(|&triangle| layout(&[triangle], 0))
-            .collect();
+        let alone: Vec<WideBvh> =
+            triangles.iter().map(|&triangle| layout(&[triangle], 0)).collect();
         let layouts = layouts(&triangles);
         for _ in 0..10 {
             let point = point_of_any_bits(&mut random);
@@ -120,9 +118,7 @@ fn triangles_with_the_same_closest_point_tie_to_the_lowest_id() {
     let triangles = ball(3);
     let wide = layout(&triangles, 0);
     for corner in triangles.iter().flat_map(|triangle| triangle.0) {
-        let first = triangles
-            .iter()
-            .position(|triangle| triangle.0.contains(&corner));
+        let first = triangles.iter().position(|triangle| triangle.0.contains(&corner));
         let found = wide.closest_point(corner).unwrap();
         assert_eq!((Some(found.object as usize), found.distance), (first, 0.0));
     }
@@ -145,17 +141,13 @@ fn distances_are_negative_inside_and_infinite_without_a_closest_point() {
 /// Returns the layouts of a scene for all kernels of this machine.
 fn layouts(triangles: &[Triangle]) -> Vec<WideBvh> {
     let of_kernel = |kernel| layout(triangles, 0).with_kernel(kernel);
-    Kernel::ALL
-        .into_iter()
-        .filter_map(of_kernel)
-        .collect()
+    Kernel::ALL.into_iter().filter_map(of_kernel).collect()
 }
 
 #[test]
 fn many_triangles_without_area_have_no_closest_point() {
-    let triangles: Vec<Triangle> = (0..100u8)
-        .map(|i| Triangle([Vec3::splat(f32::from(i)); 3]))
-        .collect();
+    let triangles: Vec<Triangle> =
+        (0..100u8).map(|i| Triangle([Vec3::splat(f32::from(i)); 3])).collect();
     for wide in layouts(&triangles) {
         for point in [Vec3::ZERO, Vec3::splat(3.5), Vec3::MAX] {
             assert_eq!(wide.closest_point(point), None);

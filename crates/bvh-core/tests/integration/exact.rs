@@ -188,10 +188,7 @@ fn target(triangle: &Triangle, random: &mut Random) -> Vec3 {
 /// Returns rays towards points where the decision is hard.
 fn hard_ray(triangle: &Triangle, random: &mut Random) -> Option<Ray> {
     let [a, b, c] = triangle.0;
-    let size = triangle
-        .0
-        .iter()
-        .fold(0.0f32, |size, p| size.max(p.abs().max_element()));
+    let size = triangle.0.iter().fold(0.0f32, |size, p| size.max(p.abs().max_element()));
     let target = target(triangle, random);
     let mut axis_parallel = Vec3::ZERO;
     axis_parallel[random.below(3)] = random.of(&[1.0, -1.0, 0.125, 3.0]);

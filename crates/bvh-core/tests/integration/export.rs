@@ -12,13 +12,7 @@ fn returned(tree: &Bvh, boxes: &[Aabb]) -> [(&'static str, Bvh); 3] {
     [
         ("binary", Bvh::from_first_count(&tree.to_first_count(), &tree.prim_ids).unwrap()),
         ("Aila-Laine", Bvh::from_aila_laine(&tree.to_aila_laine(), &tree.prim_ids).unwrap()),
-        (
-            "compressed",
-            CompressedBvh::new(tree, boxes)
-                .unwrap()
-                .decode()
-                .unwrap(),
-        ),
+        ("compressed", CompressedBvh::new(tree, boxes).unwrap().decode().unwrap()),
     ]
 }
 
@@ -48,9 +42,7 @@ fn check(name: &str, tree: &Bvh, triangles: &[Triangle], random: &mut Random) ->
             assert_eq!(returned.prim_ids.len(), tree.prim_ids.len());
         }
     }
-    rays.iter()
-        .filter(|ray| any_hit(tree, triangles, ray))
-        .count()
+    rays.iter().filter(|ray| any_hit(tree, triangles, ray)).count()
 }
 
 #[test]
@@ -58,10 +50,7 @@ fn every_layout_traces_the_hits_of_the_tree_at_every_scale() {
     let mut random = Random(1);
     let mut hits = 0;
     let mut flat = soup(60, &mut random);
-    for corner in flat
-        .iter_mut()
-        .flat_map(|triangle| &mut triangle.0)
-    {
+    for corner in flat.iter_mut().flat_map(|triangle| &mut triangle.0) {
         corner.y = 0.25;
     }
     let scenes = [

@@ -16,8 +16,7 @@ fn all_hits(triangles: &[Triangle], ray: &Ray) -> Vec<Hit> {
 
 /// Returns the nearest of some hits, and of several at the same distance the one of the lowest id.
 fn nearest<'a>(hits: impl Iterator<Item = &'a Hit>) -> Option<Hit> {
-    hits.min_by(|a, b| a.t.total_cmp(&b.t).then(a.object.cmp(&b.object)))
-        .copied()
+    hits.min_by(|a, b| a.t.total_cmp(&b.t).then(a.object.cmp(&b.object))).copied()
 }
 
 #[test]
@@ -59,10 +58,7 @@ fn a_filter_of_a_batch_sees_the_number_of_the_ray_with_each_hit() {
     // Packets, single rays between them, and a length that fills no vector.
     let mut rays = rays(&triangles, 501, &mut random);
     rays.extend(bundles(&triangles, 40, &mut random));
-    let all: Vec<Vec<Hit>> = rays
-        .iter()
-        .map(|ray| all_hits(&triangles, ray))
-        .collect();
+    let all: Vec<Vec<Hit>> = rays.iter().map(|ray| all_hits(&triangles, ray)).collect();
     let is_kept = |number: usize, hit: &Hit| !(hit.object as usize + number).is_multiple_of(3);
     let expected: Vec<Hit> = (0..)
         .zip(&all)
@@ -85,10 +81,7 @@ fn a_filter_of_a_batch_sees_the_number_of_the_ray_with_each_hit() {
             });
             layout.any_hits_where(&rays, &mut any, coherence, |number, hit| is_kept(number, &hit));
             assert_eq!(hits, expected, "{case}");
-            let has_hit: Vec<bool> = expected
-                .iter()
-                .map(|hit| !hit.is_miss())
-                .collect();
+            let has_hit: Vec<bool> = expected.iter().map(|hit| !hit.is_miss()).collect();
             assert_eq!(any, has_hit, "{case}");
             let mut seen = vec![Vec::new(); rays.len()];
             layout.nearest_hits_where(&rays, &mut hits, coherence, |number, hit| {

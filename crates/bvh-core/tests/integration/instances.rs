@@ -117,13 +117,7 @@ fn turned_scaled_and_sheared_instances_answer_as_the_flat_scene() {
                 differences += usize::from(error > 1e-5);
                 let local = scenes[0].local_ray(found.instance, &ray).unwrap();
                 let part = scene.instances[found.instance as usize].part as usize;
-                assert_eq!(
-                    scene.parts[part]
-                        .nearest_hit(&local)
-                        .unwrap()
-                        .object,
-                    found.triangle
-                );
+                assert_eq!(scene.parts[part].nearest_hit(&local).unwrap().object, found.triangle);
             }
             (found, expected) => differences += usize::from(found.is_some() != expected.is_some()),
         }
@@ -227,14 +221,8 @@ fn rays_of_every_kind(flat: &[Triangle], random: &mut Random) -> Vec<Ray> {
 
 /// Checks that batches of many lengths have the answers of the single calls.
 fn check_batches(scene: &Instances, rays: &[Ray]) -> usize {
-    let nearest: Vec<_> = rays
-        .iter()
-        .map(|ray| bits(scene.nearest_hit(ray)))
-        .collect();
-    let any: Vec<bool> = rays
-        .iter()
-        .map(|ray| scene.any_hit(ray))
-        .collect();
+    let nearest: Vec<_> = rays.iter().map(|ray| bits(scene.nearest_hit(ray))).collect();
+    let any: Vec<bool> = rays.iter().map(|ray| scene.any_hit(ray)).collect();
     for coherence in [Coherence::Coherent, Coherence::Incoherent] {
         for (first, end) in [(0, rays.len()), (0, 0), (3, 4), (5, 68), (1, 200)] {
             let batch = &rays[first..end];
@@ -259,16 +247,12 @@ fn batches_have_the_answers_of_single_calls_bit_by_bit() {
     let mut random = Random(5);
     let mut hits = 0;
     for count in [1, 2, 7, 40, 90] {
-        let transforms = (0..count)
-            .map(|_| nested_transform(&mut random))
-            .collect();
+        let transforms = (0..count).map(|_| nested_transform(&mut random)).collect();
         let parts = vec![ball(2), grid_box(2), soup(30, &mut random)];
         let mut scene = scene(parts, transforms, &mut random);
         let (flat, _) = scene.flat();
         let rays = rays_of_every_kind(&flat, &mut random);
-        let available = Kernel::ALL
-            .into_iter()
-            .filter(|kernel| kernel.is_available());
+        let available = Kernel::ALL.into_iter().filter(|kernel| kernel.is_available());
         for kernel in available {
             for part in &mut scene.parts {
                 *part = part.clone().with_kernel(kernel).unwrap();
@@ -284,19 +268,14 @@ fn batches_have_the_answers_of_single_calls_bit_by_bit() {
 #[test]
 fn batches_of_deep_trees_and_of_parts_with_several_kernels_have_the_answers_of_single_calls() {
     let mut random = Random(6);
-    let transforms = (0..80)
-        .map(|_| nested_transform(&mut random))
-        .collect();
+    let transforms = (0..80).map(|_| nested_transform(&mut random)).collect();
     let mut scene = scene(vec![ball(1), grid_box(2)], transforms, &mut random);
     let (flat, _) = scene.flat();
     let rays = rays_of_every_kind(&flat, &mut random);
     let boxes = Instance::boxes(&scene.instances, &scene.parts).unwrap();
     let deep = Instances::new(scene.parts.clone(), scene.instances.clone(), chain(&boxes)).unwrap();
     assert!(check_batches(&deep, &rays) > 100);
-    scene.parts[1] = scene.parts[1]
-        .clone()
-        .with_kernel(Kernel::Portable)
-        .unwrap();
+    scene.parts[1] = scene.parts[1].clone().with_kernel(Kernel::Portable).unwrap();
     for scene in scene.all(&mut random) {
         assert!(check_batches(&scene, &rays) > 100);
     }

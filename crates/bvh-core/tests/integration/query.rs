@@ -60,9 +60,7 @@ fn is_inside(point: Vec3, (normal, d): &(Vec3, f32)) -> bool {
 fn frustum(planes: &[(Vec3, f32)]) -> Frustum {
     let mut frustum = Frustum { planes: Vec::new() };
     for (normal, d) in planes {
-        frustum
-            .planes
-            .push([normal.x, normal.y, normal.z, *d]);
+        frustum.planes.push([normal.x, normal.y, normal.z, *d]);
     }
     frustum
 }

@@ -191,12 +191,8 @@ fn rays_that_end_on_a_wall_enter_the_flat_box_around_it() {
         let height = 16.0 + f32::from(i) / 64.0;
         let ending = ending_at(&rays, height);
         let wall = wall_at(height);
-        plain_entries += RayDensity::new(&bounds(), &ending, 0.0)
-            .unwrap()
-            .entries(&wall);
-        extended_entries += RayDensity::of_rays(&bounds(), &ending, 0.0)
-            .unwrap()
-            .entries(&wall);
+        plain_entries += RayDensity::new(&bounds(), &ending, 0.0).unwrap().entries(&wall);
+        extended_entries += RayDensity::of_rays(&bounds(), &ending, 0.0).unwrap().entries(&wall);
     }
     let plain_share = plain_entries / 64.0 / 1000.0;
     let extended_share = extended_entries / 64.0 / 1000.0;
@@ -212,7 +208,5 @@ fn wall_at(height: f32) -> Aabb {
 /// Returns vertical rays that end at this height instead.
 fn ending_at(rays: &[Segment], height: f32) -> Vec<Segment> {
     let end = |ray: &Segment| [ray.to[0], height, ray.to[2]];
-    rays.iter()
-        .map(|ray| Segment { to: end(ray), ..*ray })
-        .collect()
+    rays.iter().map(|ray| Segment { to: end(ray), ..*ray }).collect()
 }

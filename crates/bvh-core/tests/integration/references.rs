@@ -33,16 +33,14 @@ fn divided(
             let somewhere = aabb.min[axis] + random.unit() * aabb.extent()[axis] as f32;
             // Planes through corners are the hard ones.
             let plane = random.of(&[somewhere, corner]);
-            let [low, high] = aabb
-                .halves(axis, plane)
-                .map(|region| triangles.clip(object, &region));
+            let [low, high] =
+                aabb.halves(axis, plane).map(|region| triangles.clip(object, &region));
             let divides = aabb.min[axis] < plane && plane < aabb.max[axis];
             if divides && low != Aabb::EMPTY && high != Aabb::EMPTY {
                 let first = tree.nodes.len() as u32;
                 let added = tree.prim_ids.len() as u32;
                 tree.nodes[index] = Node::inner(aabb, first, 2);
-                tree.nodes
-                    .push(Node::leaf(low, range.start as u32, 1));
+                tree.nodes.push(Node::leaf(low, range.start as u32, 1));
                 tree.nodes.push(Node::leaf(high, added, 1));
                 tree.prim_ids.push(object);
                 planes.push((object, axis, plane));
@@ -125,10 +123,7 @@ fn check(
     assert_eq!(bits(found), bits(expected), "{case}, {ray:?}");
     let found = any_hit_by(tree, ray, |id| test(id, ray.t_max()).is_some(), &mut ());
     assert_eq!(found, expected.is_some(), "{case}, {ray:?}");
-    let crossings = triangles
-        .iter()
-        .filter(|triangle| triangle.crossing(ray).is_some())
-        .count();
+    let crossings = triangles.iter().filter(|triangle| triangle.crossing(ray).is_some()).count();
     for wide in kernels {
         assert_eq!(wide.all_hits(ray).len(), crossings, "{case}, {ray:?}");
         assert_eq!(bits(wide.nearest_hit(ray)), bits(expected), "{case}, {ray:?}");
@@ -259,9 +254,7 @@ fn the_cost_of_a_layout_is_known_before_it_is_made() {
         triangles.retain(|triangle| !triangle.is_degenerate());
         for shape in SHAPES {
             let tree = tree(&boxes(&triangles), shape, &mut random);
-            let root_area = tree
-                .root_aabb()
-                .map_or(0.0, |root| root.half_area());
+            let root_area = tree.root_aabb().map_or(0.0, |root| root.half_area());
             if root_area == 0.0 {
                 continue;
             }

@@ -36,9 +36,7 @@ fn every_tree_answers_as_brute_force_at_every_scale() {
         for exponent in [-60, 0, 60] {
             let triangles = scaled(&scene, libm::exp2f(exponent as f32));
             let boxes = boxes(&triangles);
-            let mut trees = SHAPES
-                .map(|shape| tree(&boxes, shape, &mut random))
-                .to_vec();
+            let mut trees = SHAPES.map(|shape| tree(&boxes, shape, &mut random)).to_vec();
             trees.push(chain(&boxes));
             for index in 0..trees.len() {
                 trees.push(collapse_leaves(&trees[index], &SahConstants::default()));
@@ -98,12 +96,7 @@ fn a_chain_of_twenty_thousand_is_traced_from_both_ends() {
         let ray = Ray::half_line(Vec3::new(0.1, 0.1, z), Vec3::Z * direction).unwrap();
         let hit = nearest_hit(&tree, &triangles, &ray);
         assert_eq!(hit.map(|hit| hit.object), Some(object));
-        assert_eq!(
-            WideBvh::new(&tree, &triangles)
-                .unwrap()
-                .nearest_hit(&ray),
-            hit
-        );
+        assert_eq!(WideBvh::new(&tree, &triangles).unwrap().nearest_hit(&ray), hit);
         // No object is hit: every node is visited.
         let mut counts = TestCounts::default();
         assert!(!any_hit_by(&tree, &ray, |_| false, &mut counts));
@@ -131,11 +124,8 @@ fn no_ray_leaves_a_closed_mesh_through_an_edge_or_a_vertex() {
                 let direction = (target - origin) * random.of(&[1.0, 1e5]);
                 let ray = Ray::half_line(origin, direction).unwrap();
                 let prepared = PreparedRay::new(&ray);
-                let test = |id: u32| {
-                    triangles[id as usize]
-                        .intersect(&prepared, ray.t_max())
-                        .is_some()
-                };
+                let test =
+                    |id: u32| triangles[id as usize].intersect(&prepared, ray.t_max()).is_some();
                 assert!(any_hit_by(&tree, &ray, test, &mut ()), "{name} leaks {ray:?}");
             }
         }
@@ -164,11 +154,7 @@ fn no_ray_slips_between_the_boxes_beside_a_long_edge() {
             let origin = turned(axis, start, random.unit() - 0.5, -height);
             let ray = Ray::half_line(origin, turned(axis, aside, 1.0, rise)).unwrap();
             let prepared = PreparedRay::new(&ray);
-            let test = |id: u32| {
-                triangles[id as usize]
-                    .intersect(&prepared, ray.t_max())
-                    .is_some()
-            };
+            let test = |id: u32| triangles[id as usize].intersect(&prepared, ray.t_max()).is_some();
             assert!(any_hit_by(&tree, &ray, test, &mut ()), "axis {axis}: {ray:?}");
             assert!(
                 wide.any_hit(&ray) && wide.any_hit_counted(&ray, &mut ()),

@@ -12,10 +12,7 @@ use glam::Vec3;
 
 /// Checks all rays by all layouts, one by one and in a batch. Returns the number of rays that hit.
 fn check(name: &str, triangles: &[Triangle], layouts: &[(Kernel, WideBvh)], rays: &[Ray]) -> usize {
-    let expected: Vec<Option<Hit>> = rays
-        .iter()
-        .map(|ray| brute_force(triangles, ray))
-        .collect();
+    let expected: Vec<Option<Hit>> = rays.iter().map(|ray| brute_force(triangles, ray)).collect();
     for (kernel, wide) in layouts {
         for (ray, &expected) in rays.iter().zip(&expected) {
             let case = format!("{name}, {kernel:?}, {ray:?}");
@@ -72,15 +69,10 @@ fn batches_of_any_length_answer_as_their_rays_do() {
                 let mut any = vec![false; batch.len()];
                 wide.nearest_hits(&batch, &mut nearest, coherence);
                 wide.any_hits(&batch, &mut any, coherence);
-                let alone: Vec<Hit> = batch
-                    .iter()
-                    .map(|ray| wide.nearest_hit(ray).unwrap_or(Hit::MISS))
-                    .collect();
+                let alone: Vec<Hit> =
+                    batch.iter().map(|ray| wide.nearest_hit(ray).unwrap_or(Hit::MISS)).collect();
                 assert_eq!(nearest, alone, "{kernel:?}, {coherence:?}, {count}");
-                let alone: Vec<bool> = batch
-                    .iter()
-                    .map(|ray| wide.any_hit(ray))
-                    .collect();
+                let alone: Vec<bool> = batch.iter().map(|ray| wide.any_hit(ray)).collect();
                 assert_eq!(any, alone, "{kernel:?}, {coherence:?}, {count}");
             }
         }
@@ -177,9 +169,7 @@ fn by_component(
 fn of_batch(wide: &WideBvh, rays: &[Ray], coherence: Coherence) -> Vec<(u32, u32)> {
     let mut hits = vec![Hit::MISS; rays.len()];
     wide.nearest_hits(rays, &mut hits, coherence);
-    hits.iter()
-        .map(|hit| (hit.t.to_bits(), hit.object))
-        .collect()
+    hits.iter().map(|hit| (hit.t.to_bits(), hit.object)).collect()
 }
 
 #[test]
@@ -227,10 +217,8 @@ fn ranges_that_begin_below_zero_are_answered_as_from_zero() {
         .iter()
         .map(|ray| Ray::assume_valid(ray.origin(), ray.direction(), -1e30, f32::INFINITY))
         .collect();
-    let valid: Vec<Ray> = valid
-        .iter()
-        .map(|ray| Ray::half_line(ray.origin(), ray.direction()).unwrap())
-        .collect();
+    let valid: Vec<Ray> =
+        valid.iter().map(|ray| Ray::half_line(ray.origin(), ray.direction()).unwrap()).collect();
     for (kernel, wide) in layouts(&triangles, &mut random) {
         for coherence in [Coherence::Coherent, Coherence::Incoherent] {
             let expected = of_batch(&wide, &valid, coherence);
@@ -346,14 +334,11 @@ fn triangles_without_area_are_left_out_and_never_hit() {
     let mut random = Random(4);
     let flat = |p: Vec3, q: Vec3| Triangle([p, q, (p + q) * 0.5]);
     let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE];
-    let mut triangles: Vec<Triangle> = corners
-        .iter()
-        .flat_map(|&p| corners.iter().map(move |&q| flat(p, q)))
-        .collect();
+    let mut triangles: Vec<Triangle> =
+        corners.iter().flat_map(|&p| corners.iter().map(move |&q| flat(p, q))).collect();
     let empty = layouts(&triangles, &mut random);
     assert!(empty.iter().all(|(_, wide)| {
-        wide.nearest_hit(&Ray::half_line(-Vec3::ONE, Vec3::ONE).unwrap())
-            .is_none()
+        wide.nearest_hit(&Ray::half_line(-Vec3::ONE, Vec3::ONE).unwrap()).is_none()
     }));
     triangles.push(Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]));
     let layouts = layouts(&triangles, &mut random);

@@ -22,10 +22,7 @@ const PLOT: f64 = 40.0;
 
 /// Returns the generator of the landscape called `name`.
 pub fn by_name(name: &str) -> Option<Generator> {
-    LANDSCAPES
-        .iter()
-        .find(|(known, _)| *known == name)
-        .map(|(_, generator)| *generator)
+    LANDSCAPES.iter().find(|(known, _)| *known == name).map(|(_, generator)| *generator)
 }
 
 /// Hills and valleys with ridges down to a metre: a square grid of `count` triangles, whose last
@@ -201,11 +198,8 @@ mod tests {
             for count in [1, 2, 1000, 20_000, 100_000] {
                 let triangles = generator(count);
                 assert_eq!(triangles.len(), count, "{name}");
-                let bounds = triangles
-                    .iter()
-                    .map(Triangle::aabb)
-                    .reduce(|a, b| a.union(&b))
-                    .unwrap();
+                let bounds =
+                    triangles.iter().map(Triangle::aabb).reduce(|a, b| a.union(&b)).unwrap();
                 assert!(bounds.min.is_finite() && bounds.max.is_finite(), "{name}");
                 let ground = bounds.extent().x * bounds.extent().z;
                 assert!(ground >= before, "{name} of {count} triangles");

@@ -53,11 +53,7 @@ mod tests {
             for sphere in spheres {
                 assert!(sphere.radius > 0.0 && sphere.radius.is_finite(), "{count}: {sphere:?}");
                 assert!(
-                    sphere
-                        .center
-                        .abs()
-                        .cmple(HALF_SIZE.as_vec3())
-                        .all(),
+                    sphere.center.abs().cmple(HALF_SIZE.as_vec3()).all(),
                     "{count}: {sphere:?}"
                 );
             }
@@ -68,9 +64,8 @@ mod tests {
     fn no_machine_changes_a_bit_of_any_sphere() {
         let fingerprints = [75, 750, 7500].map(|count| {
             let spheres = spheres(count);
-            let numbers = spheres
-                .iter()
-                .flat_map(|s| [s.center.x, s.center.y, s.center.z, s.radius]);
+            let numbers =
+                spheres.iter().flat_map(|s| [s.center.x, s.center.y, s.center.z, s.radius]);
             crate::fnv1a(numbers.flat_map(f32::to_le_bytes))
         });
         let pinned = [0xfc00_d4e2_6fbf_f38a, 0xbb9c_cd48_f5fe_ee71, 0x8b82_4c8d_585f_1de7];

@@ -52,10 +52,7 @@ pub const STIFF: [(&str, Generator); 31] = [
 
 /// Returns the generator of the case `id`, such as `S34`.
 pub fn by_id(id: &str) -> Option<Generator> {
-    STIFF
-        .iter()
-        .find(|(known, _)| *known == id)
-        .map(|(_, generator)| *generator)
+    STIFF.iter().find(|(known, _)| *known == id).map(|(_, generator)| *generator)
 }
 
 /// Returns the boxes of the triangles.
@@ -115,9 +112,7 @@ pub fn identical_points(n: usize) -> Vec<Triangle> {
 
 /// S06: boxes around one centre, each larger than the one before.
 pub fn concentric(n: usize) -> Vec<Triangle> {
-    (1..=n)
-        .map(|i| cube(Vec3::splat(-(i as f32)), 2.0 * i as f32))
-        .collect()
+    (1..=n).map(|i| cube(Vec3::splat(-(i as f32)), 2.0 * i as f32)).collect()
 }
 
 /// S08: boxes of sizes 1 to 9 with centres on the x axis, in random order.
@@ -202,20 +197,14 @@ pub fn degenerate(n: usize) -> Vec<Triangle> {
 pub fn denormal(n: usize) -> Vec<Triangle> {
     let mut triangles = uniform(n);
     let unit = f32::from_bits(1);
-    triangles
-        .iter_mut()
-        .flat_map(|t| &mut t.0)
-        .for_each(|p| *p = (*p * 64.0).round() * unit);
+    triangles.iter_mut().flat_map(|t| &mut t.0).for_each(|p| *p = (*p * 64.0).round() * unit);
     triangles
 }
 
 /// S23: coordinates up to ±3e38.
 pub fn enormous(n: usize) -> Vec<Triangle> {
     let mut triangles = uniform(n);
-    triangles
-        .iter_mut()
-        .flat_map(|t| &mut t.0)
-        .for_each(|p| *p = (*p - 9.5) * (3e38 / 8.5));
+    triangles.iter_mut().flat_map(|t| &mut t.0).for_each(|p| *p = (*p - 9.5) * (3e38 / 8.5));
     triangles
 }
 
@@ -254,10 +243,7 @@ pub fn teapot_in_a_stadium(n: usize) -> Vec<Triangle> {
     let mut triangles = closed_box(STADIUM);
     // The ball is at the origin, where it keeps its detail, and not at the middle of the floor.
     let move_to = Vec3::new(0.37, -0.21, 1.0);
-    triangles
-        .iter_mut()
-        .flat_map(|t| &mut t.0)
-        .for_each(|p| *p = (*p + move_to) * 5e5);
+    triangles.iter_mut().flat_map(|t| &mut t.0).for_each(|p| *p = (*p + move_to) * 5e5);
     triangles.extend(many(n.saturating_sub(STADIUM), 27, |rng, _| {
         let corner = (point(rng, 2.0) - 1.0).normalize_or(Vec3::X) * 0.5 + Vec3::Z * 0.5;
         around(rng, corner, 0.05)
@@ -308,28 +294,18 @@ pub fn two_densities(n: usize) -> Vec<Triangle> {
 /// same centre along any axis.
 pub fn symmetric(n: usize) -> Vec<Triangle> {
     let half = uniform(n.div_ceil(2));
-    let all = half
-        .iter()
-        .flat_map(|t| [*t, Triangle(t.0.map(|p| -p))]);
+    let all = half.iter().flat_map(|t| [*t, Triangle(t.0.map(|p| -p))]);
     all.take(n).collect()
 }
 
 /// S34: the uniform scene with every triangle ten times in succession.
 pub fn tenfold(n: usize) -> Vec<Triangle> {
-    uniform(n.div_ceil(10))
-        .into_iter()
-        .flat_map(|t| [t; 10])
-        .take(n)
-        .collect()
+    uniform(n.div_ceil(10)).into_iter().flat_map(|t| [t; 10]).take(n).collect()
 }
 
 /// S45: two unit cubes whose centres are two apart.
 pub fn two_cubes(n: usize) -> Vec<Triangle> {
-    [0.0, 2.0]
-        .map(|x| cube(Vec3::X * x, 1.0))
-        .into_iter()
-        .take(n)
-        .collect()
+    [0.0, 2.0].map(|x| cube(Vec3::X * x, 1.0)).into_iter().take(n).collect()
 }
 
 #[cfg(test)]
@@ -354,11 +330,7 @@ mod tests {
     fn segments_on_a_line_have_no_area_and_do_not_touch() {
         let mut spans: Vec<Aabb> = boxes(&on_a_line(50));
         spans.sort_by(|a, b| a.min.x.total_cmp(&b.min.x));
-        assert!(
-            spans
-                .windows(2)
-                .all(|pair| pair[0].max.x <= pair[1].min.x)
-        );
+        assert!(spans.windows(2).all(|pair| pair[0].max.x <= pair[1].min.x));
         assert!(spans.iter().all(|b| b.half_area() == 0.0));
     }
 }

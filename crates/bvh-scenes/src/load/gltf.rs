@@ -169,8 +169,7 @@ impl<'a> Loader<'a> {
     fn places(&self) -> Result<Vec<Placed>, Fault> {
         let scene = match self.root.scene {
             Some(index) => Some(
-                self.get(index, "scenes")
-                    .map_err(|message| self.fault("scene".into(), message))?,
+                self.get(index, "scenes").map_err(|message| self.fault("scene".into(), message))?,
             ),
             None => self.root.scenes.first(),
         };
@@ -179,17 +178,12 @@ impl<'a> Loader<'a> {
         // Nodes are pushed in reverse, so that the stack returns them in the order of the file.
         let mut open: Vec<(Index<Node>, DMat4)> = Vec::new();
         open.extend(
-            scene
-                .iter()
-                .flat_map(|scene| &scene.nodes)
-                .rev()
-                .map(|&node| (node, DMat4::IDENTITY)),
+            scene.iter().flat_map(|scene| &scene.nodes).rev().map(|&node| (node, DMat4::IDENTITY)),
         );
         while let Some((index, parent)) = open.pop() {
             let number = index.value();
-            let node = self
-                .get(index, "nodes")
-                .map_err(|message| self.fault("scene".into(), message))?;
+            let node =
+                self.get(index, "nodes").map_err(|message| self.fault("scene".into(), message))?;
             // A forged file could have a circle of nodes, which would never end.
             if std::mem::replace(&mut reached[number], true) {
                 let message = "reached twice; expected a tree of nodes, each with one parent";
@@ -201,13 +195,7 @@ impl<'a> Loader<'a> {
                     .map_err(|message| self.fault(format!("nodes[{number}]"), message))?;
                 places.push(Placed { node: number, mesh: mesh.value(), transform });
             }
-            open.extend(
-                node.children
-                    .iter()
-                    .flatten()
-                    .rev()
-                    .map(|&child| (child, transform)),
-            );
+            open.extend(node.children.iter().flatten().rev().map(|&child| (child, transform)));
         }
         Ok(places)
     }
@@ -215,16 +203,11 @@ impl<'a> Loader<'a> {
     /// Adds the transformed triangles of a node's mesh.
     fn place(&mut self, place: &Placed, transform: &DMat4) -> Result<(), Fault> {
         let Placed { node, mesh, .. } = *place;
-        for (number, primitive) in self.root.meshes[mesh]
-            .primitives
-            .iter()
-            .enumerate()
-        {
-            self.add(primitive, transform)
-                .map_err(|message| {
-                    let place = format!("meshes[{mesh}].primitives[{number}] at nodes[{node}]");
-                    self.fault(place, message)
-                })?;
+        for (number, primitive) in self.root.meshes[mesh].primitives.iter().enumerate() {
+            self.add(primitive, transform).map_err(|message| {
+                let place = format!("meshes[{mesh}].primitives[{number}] at nodes[{node}]");
+                self.fault(place, message)
+            })?;
         }
         Ok(())
     }
@@ -249,9 +232,7 @@ impl<'a> Loader<'a> {
                 .first_chunk()
                 .map_or([f32::NAN; 3], |x| x.map(f32::from_le_bytes));
             let point = Vec3::from(point);
-            let moved = transform
-                .transform_point3(point.as_dvec3())
-                .as_vec3();
+            let moved = transform.transform_point3(point.as_dvec3()).as_vec3();
             if !moved.is_finite() {
                 return Err(format!(
                     "position {} is {point}, moved {moved}; expected finite numbers",
@@ -263,16 +244,12 @@ impl<'a> Loader<'a> {
         let types = [ComponentType::U8, ComponentType::U16, ComponentType::U32];
         let indices: Vec<u32> = match primitive.indices {
             None => (0..points.len() as u32).collect(),
-            Some(accessor) => self
-                .items(accessor, Type::Scalar, &types)?
-                .map(little_endian)
-                .collect(),
+            Some(accessor) => {
+                self.items(accessor, Type::Scalar, &types)?.map(little_endian).collect()
+            }
         };
         // Checked before any use, because the indices come from the file.
-        if let Some(index) = indices
-            .iter()
-            .find(|&&index| index as usize >= points.len())
-        {
+        if let Some(index) = indices.iter().find(|&&index| index as usize >= points.len()) {
             return Err(format!("index {index}; expected 0 to below {}", points.len()));
         }
         let count = size::triangles(mode, indices.len());
@@ -312,17 +289,15 @@ impl<'a> Loader<'a> {
             format!("{place} has no buffer view; expected one (compressed meshes cannot be read)")
         })?;
         let view = self.get(view, "bufferViews")?;
-        self.buffers
-            .need(self.root, view.buffer.value())?;
+        self.buffers.need(self.root, view.buffer.value())?;
         let size = component.size() * type_.multiplicity();
         let stride = view.byte_stride.map_or(size, |stride| stride.0);
         let buffer = self.buffers.bytes(view.buffer.value());
         let count = accessor.count.0;
-        let bytes = buffer
-            .and_then(|buffer| window(buffer, view, accessor, stride, size))
-            .ok_or_else(|| {
-                format!("{place} reaches beyond its buffer; expected {count} items in it")
-            })?;
+        let bytes =
+            buffer.and_then(|buffer| window(buffer, view, accessor, stride, size)).ok_or_else(
+                || format!("{place} reaches beyond its buffer; expected {count} items in it"),
+            )?;
         // A few accessors over the same bytes can stand for any number of items.
         self.items += count;
         if self.items > MOST_ITEMS {
@@ -350,9 +325,7 @@ fn window<'a>(
     let view_start = usize::try_from(view.byte_offset.map_or(0, |offset| offset.0)).ok()?;
     let view_length = usize::try_from(view.byte_length.0).ok()?;
     let start = usize::try_from(accessor.byte_offset.map_or(0, |offset| offset.0)).ok()?;
-    let gaps = usize::try_from(accessor.count.0)
-        .ok()?
-        .checked_sub(1)?;
+    let gaps = usize::try_from(accessor.count.0).ok()?.checked_sub(1)?;
     // The last item needs no padding after it.
     let length = stride.checked_mul(gaps)?.checked_add(size)?;
     let view_bytes = buffer.get(view_start..)?.get(..view_length)?;
@@ -360,8 +333,5 @@ fn window<'a>(
 }
 
 fn little_endian(bytes: &[u8]) -> u32 {
-    bytes
-        .iter()
-        .rev()
-        .fold(0, |number, &byte| number << 8 | u32::from(byte))
+    bytes.iter().rev().fold(0, |number, &byte| number << 8 | u32::from(byte))
 }

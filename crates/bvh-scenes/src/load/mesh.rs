@@ -45,17 +45,14 @@ impl Mesh {
 
     /// Describes the file's contents besides plain triangles in one sentence, if there are any.
     pub fn remark(&self) -> Option<String> {
-        let unknown = self
-            .unknown
-            .as_ref()
-            .and_then(|(count, line, word)| {
-                let lines = counted(
-                    *count,
-                    "line with an unknown keyword was",
-                    "lines with unknown keywords were",
-                )?;
-                Some(format!("{lines} ignored (`{word}` in line {line})"))
-            });
+        let unknown = self.unknown.as_ref().and_then(|(count, line, word)| {
+            let lines = counted(
+                *count,
+                "line with an unknown keyword was",
+                "lines with unknown keywords were",
+            )?;
+            Some(format!("{lines} ignored (`{word}` in line {line})"))
+        });
         let parts = [
             counted(
                 self.unused_vertices,

@@ -60,9 +60,8 @@ impl Format {
         if stl::is_binary(bytes) || stl::is_text(text) {
             return Self::Stl;
         }
-        let extension = path
-            .extension()
-            .map(|extension| extension.to_string_lossy().to_lowercase());
+        let extension =
+            path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         match extension.as_deref() {
             Some("ply") => Self::Ply,
             Some("stl") => Self::Stl,
@@ -74,9 +73,7 @@ impl Format {
 
 /// Returns the bytes of a text file without a byte order mark.
 fn without_mark(bytes: &[u8]) -> &[u8] {
-    bytes
-        .strip_prefix(b"\xef\xbb\xbf")
-        .unwrap_or(bytes)
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
 }
 
 /// Reads the mesh file at `path`. Any bytes give a mesh with at least one triangle or an error.

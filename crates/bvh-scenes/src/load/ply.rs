@@ -22,10 +22,7 @@ impl PropertyAccess for Vertex {
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let Some(axis) = ["x", "y", "z"]
-            .iter()
-            .position(|axis| *axis == name)
-        else {
+        let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == name) else {
             return PropertyAccessResult::Ignored;
         };
         // A list stays without a coordinate, which only a vertex needs.
@@ -173,14 +170,11 @@ fn fault(path: &Path, within: Option<(&ElementDef, &Header)>, error: &ParseError
     };
     let full = error.to_string();
     // The place already names the line.
-    let message = error
-        .line()
-        .and_then(|line| full.strip_prefix(&format!("Line {line}: ")))
-        .unwrap_or(&full);
+    let message =
+        error.line().and_then(|line| full.strip_prefix(&format!("Line {line}: "))).unwrap_or(&full);
     // The parser's words for a line that it does not know are those of its grammar.
-    let unknown = message
-        .split_once("String: ")
-        .and_then(|(_, rest)| rest.split_once("\n\tError: "));
+    let unknown =
+        message.split_once("String: ").and_then(|(_, rest)| rest.split_once("\n\tError: "));
     match unknown {
         Some((line, _)) => {
             let message = format!("`{}`; expected a line of a PLY header", beginning(line));
@@ -193,12 +187,7 @@ fn fault(path: &Path, within: Option<(&ElementDef, &Header)>, error: &ParseError
 /// Returns the beginning of a line, which may be binary, with escapes.
 fn beginning(line: &str) -> String {
     // Some of the parser's errors quote the line with its end.
-    line.trim_matches('\'')
-        .trim_end()
-        .chars()
-        .take(60)
-        .flat_map(char::escape_debug)
-        .collect()
+    line.trim_matches('\'').trim_end().chars().take(60).flat_map(char::escape_debug).collect()
 }
 
 fn element_fault(path: &Path, element: &str, number: usize, message: String) -> Fault {
@@ -222,9 +211,8 @@ fn mesh(vertices: &[Vertex], faces: &[Face], path: &Path) -> Result<Mesh, Fault>
     for (number, Face(indices)) in faces.iter().enumerate() {
         let mut corners = Vec::with_capacity(indices.len());
         for &index in indices {
-            let Some(Vertex(position)) = usize::try_from(index)
-                .ok()
-                .and_then(|index| vertices.get(index))
+            let Some(Vertex(position)) =
+                usize::try_from(index).ok().and_then(|index| vertices.get(index))
             else {
                 let message = format!("vertex {index}; expected 0 to below {}", vertices.len());
                 return Err(element_fault(path, "face", number, message));

@@ -28,12 +28,9 @@ pub fn is_binary(bytes: &[u8]) -> bool {
 
 /// Returns whether text begins like an STL file: with `solid`, and a facet within 4096 bytes.
 pub fn is_text(text: &[u8]) -> bool {
-    let mut words = text[..text.len().min(4096)]
-        .split(u8::is_ascii_whitespace)
-        .filter(|word| !word.is_empty());
-    words
-        .next()
-        .is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+    let mut words =
+        text[..text.len().min(4096)].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    words.next().is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
         && words.any(|word| {
             word.eq_ignore_ascii_case(b"facet") || word.eq_ignore_ascii_case(b"endsolid")
         })
@@ -125,10 +122,7 @@ fn parse_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
                 "facet" => {
                     inside = true;
                     words.next_if(|word| word.eq_ignore_ascii_case("normal"));
-                    while words
-                        .next_if(|word| word.parse::<f32>().is_ok())
-                        .is_some()
-                    {}
+                    while words.next_if(|word| word.parse::<f32>().is_ok()).is_some() {}
                 }
                 "outer" => {
                     words.next_if(|word| word.eq_ignore_ascii_case("loop"));

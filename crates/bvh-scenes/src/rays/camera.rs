@@ -30,10 +30,8 @@ impl View {
 /// Returns the directions of right and top in a picture whose view direction is `forward`.
 pub fn frame(forward: DVec3, up: DVec3) -> [DVec3; 2] {
     // A view straight up or down has no preferred direction, so any perpendicular one will do.
-    let right = forward
-        .cross(up)
-        .try_normalize()
-        .unwrap_or_else(|| forward.any_orthonormal_vector());
+    let right =
+        forward.cross(up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
     [right, right.cross(forward)]
 }
 
@@ -52,9 +50,7 @@ impl Camera {
     /// Creates the camera of a picture of this size in pixels. If the eye is the point in the
     /// middle of the picture, the camera looks along −z.
     pub fn new(view: &View, up: DVec3, width: u32, height: u32) -> Self {
-        let forward = (view.at - view.from)
-            .try_normalize()
-            .unwrap_or(DVec3::NEG_Z);
+        let forward = (view.at - view.from).try_normalize().unwrap_or(DVec3::NEG_Z);
         let [right, top] = frame(forward, up);
         // The tangent of the platform's library would differ between machines.
         let pixel = 2.0 * libm::tan(view.fov.to_radians() / 2.0) / f64::from(height);
@@ -79,12 +75,7 @@ mod tests {
         for at in [DVec3::X, DVec3::Y, DVec3::new(1.0, -2.0, 0.3)] {
             let camera =
                 Camera::new(&View { from: DVec3::ZERO, at, fov: 60.0 }, DVec3::Y, 640, 480);
-            assert!(
-                camera
-                    .direction(320.0, 240.0)
-                    .distance(at.normalize())
-                    < 1e-12
-            );
+            assert!(camera.direction(320.0, 240.0).distance(at.normalize()) < 1e-12);
         }
     }
 }

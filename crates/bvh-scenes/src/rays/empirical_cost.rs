@@ -169,9 +169,7 @@ mod tests {
 
     fn measured(family: Family, query: Query, count: u64, seed: u64) -> (EmpiricalCost, Bvh) {
         let scene = Scene::load("escher:2000").unwrap();
-        let tree = muller_fellner::Config::default()
-            .build(&scene.boxes)
-            .unwrap();
+        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
         let rays = RandomRays { family, query, count };
         (empirical_cost(&rays, &scene.primitives, &tree, seed), tree)
     }
@@ -187,12 +185,8 @@ mod tests {
 
     #[test]
     fn any_hit_needs_fewer_tests_than_nearest_and_nearest_fewer_than_all() {
-        let boxes = [Query::Any, Query::Nearest, Query::All].map(|query| {
-            measured(Family::Inside, query, 5_000, 4)
-                .0
-                .boxes
-                .mean
-        });
+        let boxes = [Query::Any, Query::Nearest, Query::All]
+            .map(|query| measured(Family::Inside, query, 5_000, 4).0.boxes.mean);
         assert!(boxes[0] < boxes[1] && boxes[1] < boxes[2], "{boxes:?}");
     }
 }

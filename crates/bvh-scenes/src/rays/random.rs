@@ -43,9 +43,7 @@ pub fn random_ray(family: Family, root: &Aabb, rng: &mut Stream) -> Option<Ray> 
         }
     };
     // Rounding to f32 may leave the box by one step.
-    let origin = (low + origin * size)
-        .as_vec3()
-        .clamp(root.min, root.max);
+    let origin = (low + origin * size).as_vec3().clamp(root.min, root.max);
     Ray::half_line(origin, direction.as_vec3()).ok()
 }
 
@@ -150,9 +148,7 @@ pub fn rays(
     match kind {
         Kind::Incoherent => {
             let mut rng = Stream::seed_from_u64(seed);
-            (0..count)
-                .filter_map(|_| random_ray(Family::Inside, &root, &mut rng))
-                .collect()
+            (0..count).filter_map(|_| random_ray(Family::Inside, &root, &mut rng)).collect()
         }
         Kind::Primary => primary_rays(count, &root, viewpoint),
         Kind::Bounce => {
@@ -229,9 +225,7 @@ fn primary_rays(count: u32, root: &Aabb, viewpoint: &Viewpoint) -> Vec<Ray> {
 /// Returns the side of the smallest square picture with at least `count` pixels. Its last rows may
 /// be incomplete.
 fn picture_side(count: u32) -> u32 {
-    (1..=count)
-        .find(|side| side.saturating_mul(*side) >= count)
-        .unwrap_or(count)
+    (1..=count).find(|side| side.saturating_mul(*side) >= count).unwrap_or(count)
 }
 
 /// Returns the column and the row of the first `count` pixels of a square picture, counted row by
@@ -239,19 +233,15 @@ fn picture_side(count: u32) -> u32 {
 fn pixels(side: u32, count: u32) -> impl Iterator<Item = [u32; 2]> {
     // Morton codes fill a square whose side is a power of two; the pixels outside the picture go.
     let codes = u64::from(side.next_power_of_two()).pow(2);
-    (0..codes)
-        .map(|code| [even_bits(code), even_bits(code >> 1)])
-        .filter(move |&[x, y]| {
-            let index = u64::from(y) * u64::from(side) + u64::from(x);
-            x < side && index < u64::from(count)
-        })
+    (0..codes).map(|code| [even_bits(code), even_bits(code >> 1)]).filter(move |&[x, y]| {
+        let index = u64::from(y) * u64::from(side) + u64::from(x);
+        x < side && index < u64::from(count)
+    })
 }
 
 /// Returns the number that the bits at even positions of a Morton code form.
 fn even_bits(code: u64) -> u32 {
-    (0..32)
-        .map(|bit| ((code >> (2 * bit) & 1) as u32) << bit)
-        .sum()
+    (0..32).map(|bit| ((code >> (2 * bit) & 1) as u32) << bit).sum()
 }
 
 /// Returns the ray from a point to the light.
@@ -281,10 +271,8 @@ mod tests {
                 continue;
             }
             for square in found.chunks(256) {
-                let corners: BTreeSet<[u32; 2]> = square
-                    .iter()
-                    .map(|[x, y]| [x / 16, y / 16])
-                    .collect();
+                let corners: BTreeSet<[u32; 2]> =
+                    square.iter().map(|[x, y]| [x / 16, y / 16]).collect();
                 assert_eq!(corners.len(), 1, "{side}: {corners:?}");
             }
         }

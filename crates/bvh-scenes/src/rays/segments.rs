@@ -46,11 +46,8 @@ config! {
 
 impl RenderedRays {
     fn check_cameras(&self) -> Option<OutOfRange> {
-        let numbers = self
-            .cameras
-            .iter()
-            .flat_map(|pose| [pose.eye, pose.target])
-            .chain(self.lights.clone());
+        let numbers =
+            self.cameras.iter().flat_map(|pose| [pose.eye, pose.target]).chain(self.lights.clone());
         if self.cameras.is_empty() {
             return Some(OutOfRange::new(
                 "cameras",
@@ -58,10 +55,7 @@ impl RenderedRays {
                 "at least one table with `eye` and `target`",
             ));
         }
-        if let Some(wrong) = numbers
-            .flatten()
-            .find(|number| !number.is_finite())
-        {
+        if let Some(wrong) = numbers.flatten().find(|number| !number.is_finite()) {
             return Some(OutOfRange::new("cameras and lights", wrong, "finite coordinates"));
         }
         check_count("count", self.count, 1 + self.bounces as usize + self.lights.len())
@@ -178,9 +172,8 @@ pub fn of_anything(
 pub fn of_inside(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<TracedRay> {
     let mut tracing = Tracing::new(scene, tree, seed);
     for _ in 0..count {
-        let ray = tree
-            .root_aabb()
-            .and_then(|root| random_ray(Family::Inside, &root, &mut tracing.rng));
+        let ray =
+            tree.root_aabb().and_then(|root| random_ray(Family::Inside, &root, &mut tracing.rng));
         let Some(ray) = ray else { continue };
         tracing.nearest(Kind::Incoherent, ray.origin(), ray.direction().as_dvec3());
     }
@@ -229,9 +222,8 @@ impl<'a> Tracing<'a> {
 
     /// Returns a distance at which the ray is outside the scene.
     fn beyond(&self, ray: &Ray) -> f32 {
-        let reach = (self.bounds.min - ray.origin())
-            .abs()
-            .max((self.bounds.max - ray.origin()).abs());
+        let reach =
+            (self.bounds.min - ray.origin()).abs().max((self.bounds.max - ray.origin()).abs());
         let (reach, reach_unit) = scaled_length(reach);
         let (step, step_unit) = scaled_length(ray.direction());
         2.0 * reach / step * (reach_unit / step_unit)
@@ -264,9 +256,7 @@ mod tests {
             .map(|skipped| Triangle([1, 2, 3].map(|step| corners[(skipped + step) % 4])))
             .collect();
         let scene = Scene::new("tetrahedron", SceneKind::File, Primitives::Triangles(triangles));
-        let tree = muller_fellner::Config::default()
-            .build(&scene.primitives.boxes())
-            .unwrap();
+        let tree = muller_fellner::Config::default().build(&scene.primitives.boxes()).unwrap();
         of_anything(50, &scene, &tree, 1, &|| false)
             .iter()
             .filter(|traced| traced.kind != Kind::Shadow)

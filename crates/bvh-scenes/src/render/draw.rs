@@ -111,10 +111,7 @@ mod tests {
         for (width, height) in [(1, 1), (16, 16), (17, 33), (5, 40)] {
             let options = Options { width, height, samples: 1, ..Options::default() };
             let films = [1, 3].map(|threads| {
-                let pool = rayon::ThreadPoolBuilder::new()
-                    .num_threads(threads)
-                    .build()
-                    .unwrap();
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| picture(&scene, &options))
             });
             assert_eq!(films[0].pixels.len(), (width * height) as usize);

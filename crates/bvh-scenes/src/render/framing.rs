@@ -81,9 +81,8 @@ mod tests {
                 let forward = camera.corner + camera.steps[0] * 150.0 + camera.steps[1] * 100.0;
                 let scaled = to / to.dot(forward) - forward;
                 // The corner's distance from the middle of the picture, in pixels.
-                let [x, y] = camera
-                    .steps
-                    .map(|step| (scaled.dot(step) / step.length_squared()).abs());
+                let [x, y] =
+                    camera.steps.map(|step| (scaled.dot(step) / step.length_squared()).abs());
                 assert!(x < 150.0 && y < 100.0, "{bounds:?}");
                 widest = widest.max(x / 150.0).max(y / 100.0);
             }

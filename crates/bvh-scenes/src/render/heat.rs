@@ -59,14 +59,9 @@ pub fn range(film: &Film, rays_per_pixel: u32) -> Range {
 pub fn map(film: &Film, rays_per_pixel: u32, range: &Range) -> Result<Vec<[u8; 3]>, BadFont> {
     // A picture without tests has the top 0, and its colours would be 0 / 0.
     let top = range.top.max(f64::MIN_POSITIVE) * f64::from(rays_per_pixel);
-    let mut pixels: Vec<[u8; 3]> = film
-        .tests
-        .iter()
-        .map(|&tests| colour(tests as f64 / top))
-        .collect();
-    let colours: Vec<[u8; 3]> = (0..=255)
-        .map(|part| colour(f64::from(part) / 255.0))
-        .collect();
+    let mut pixels: Vec<[u8; 3]> =
+        film.tests.iter().map(|&tests| colour(tests as f64 / top)).collect();
+    let colours: Vec<[u8; 3]> = (0..=255).map(|part| colour(f64::from(part) / 255.0)).collect();
     pixels.extend(key::draw(film.width, &colours, &labels(range))?);
     Ok(pixels)
 }

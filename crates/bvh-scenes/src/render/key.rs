@@ -58,9 +58,7 @@ fn advance(font: &FontRef, character: char) -> f64 {
 
 /// Returns the length of a text in pixels.
 fn length(font: &FontRef, text: &str) -> f64 {
-    text.chars()
-        .map(|character| advance(font, character))
-        .sum()
+    text.chars().map(|character| advance(font, character)).sum()
 }
 
 /// Writes a text that begins at the column `start`. Columns outside the picture are cut off.
@@ -70,9 +68,7 @@ fn write(font: &FontRef, text: &str, start: f64, columns: usize, pixels: &mut [[
     let mut x = start;
     for character in text.chars() {
         let place = point(x as f32, BASELINE as f32);
-        let glyph = font
-            .glyph_id(character)
-            .with_scale_and_position(PxScale::from(scale), place);
+        let glyph = font.glyph_id(character).with_scale_and_position(PxScale::from(scale), place);
         x += advance(font, character);
         // A space has no outline.
         let Some(outline) = font.outline_glyph(glyph) else { continue };
@@ -108,17 +104,11 @@ mod tests {
         for width in [1, 40, 400] {
             let pixels = draw(width, &colours, &labels).unwrap();
             assert_eq!(pixels.len(), width as usize * HEIGHT);
-            let dark = pixels[STRIP.end * width as usize..]
-                .iter()
-                .filter(|pixel| pixel[0] < 128);
+            let dark = pixels[STRIP.end * width as usize..].iter().filter(|pixel| pixel[0] < 128);
             assert_eq!(dark.count() > 200, width == 400, "{width}");
         }
         let font = FontRef::try_from_slice(FONT).unwrap();
         let known = "0123456789abcdefghijklmnopqrstuvwxyz:,";
-        assert!(
-            known
-                .chars()
-                .all(|character| font.glyph_id(character).0 != 0)
-        );
+        assert!(known.chars().all(|character| font.glyph_id(character).0 != 0));
     }
 }

@@ -29,10 +29,7 @@ impl Light {
     /// are as bright as the automatic lights.
     pub fn white(positions: &[DVec3]) -> Vec<Self> {
         let colour = DVec3::splat(1.3 / positions.len().max(1) as f64);
-        positions
-            .iter()
-            .map(|&position| Self { position, colour, reach: f64::INFINITY })
-            .collect()
+        positions.iter().map(|&position| Self { position, colour, reach: f64::INFINITY }).collect()
     }
 
     /// Returns the light that arrives at a distance.
@@ -143,10 +140,8 @@ impl<'a> World<'a> {
                         sum += image::expose(light);
                     }
                 }
-                tile.pixels
-                    .push(image::encode(sum / f64::from(samples * samples)));
-                tile.tests
-                    .push(tally.counts.boxes + tally.counts.objects);
+                tile.pixels.push(image::encode(sum / f64::from(samples * samples)));
+                tile.tests.push(tally.counts.boxes + tally.counts.objects);
                 tile.count(tally.counts, tally.rays);
             }
         }
@@ -188,10 +183,7 @@ impl<'a> World<'a> {
         tally.rays += 1;
         let hit = Ray::half_line(origin.as_vec3(), direction.as_vec3())
             .ok()
-            .and_then(|ray| {
-                self.accelerator
-                    .nearest_hit_counted(&ray, &mut tally.counts)
-            });
+            .and_then(|ray| self.accelerator.nearest_hit_counted(&ray, &mut tally.counts));
         if let Some(ground) = &self.ground
             && let Some(distance) = ground.meet(origin, direction)
             && hit.is_none_or(|hit| f64::from(hit.t) > distance)
@@ -206,11 +198,7 @@ impl<'a> World<'a> {
     fn lifted(&self, surface: &Surface, seen_from: DVec3) -> DVec3 {
         // Rounding moves a hit by a few units in the last place of the largest coordinate involved,
         // and 64 units are a safe multiple.
-        let size = surface
-            .point
-            .abs()
-            .max(seen_from.abs())
-            .max_element();
+        let size = surface.point.abs().max(seen_from.abs()).max_element();
         surface.point + surface.normal * (size * (64.0 * f64::from(f32::EPSILON)))
     }
 
@@ -257,10 +245,7 @@ impl<'a> World<'a> {
     fn is_shadowed(&self, start: DVec3, towards: DVec3, distance: f64, tally: &mut Tally) -> bool {
         tally.rays += 1;
         let ray = Ray::new(start.as_vec3(), towards.as_vec3(), 0.0, distance as f32);
-        ray.is_ok_and(|ray| {
-            self.accelerator
-                .any_hit_counted(&ray, &mut tally.counts)
-        })
+        ray.is_ok_and(|ray| self.accelerator.any_hit_counted(&ray, &mut tally.counts))
     }
 
     /// Returns the light from a direction without any surface.

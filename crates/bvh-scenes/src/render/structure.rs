@@ -52,26 +52,21 @@ pub fn by_name(name: &str, scene: &Scene) -> Result<Structure<'static>, Structur
         "brute" => Ok(Structure::Brute),
         "kdtree" => {
             let tree = kd_tree::Config::default().build(&scene.boxes);
-            tree.map(Structure::KdTree)
-                .map_err(|source| build_error(scene, name, source))
+            tree.map(Structure::KdTree).map_err(|source| build_error(scene, name, source))
         }
         "bvh" => {
             let tree = greedy(scene).map_err(|source| build_error(scene, name, source))?;
             Ok(Structure::Tree(Cow::Owned(tree)))
         }
         "wide" => {
-            let triangles = scene
-                .triangles()
-                .map_err(StructureError::Spheres)?;
+            let triangles = scene.triangles().map_err(StructureError::Spheres)?;
             let tree = greedy(scene).map_err(|source| build_error(scene, name, source))?;
             let layout = WideBvh::new(&tree, triangles);
-            layout
-                .map(Structure::Wide)
-                .map_err(|source| StructureError::Layout {
-                    scene: scene.name.clone(),
-                    name: name.into(),
-                    source,
-                })
+            layout.map(Structure::Wide).map_err(|source| StructureError::Layout {
+                scene: scene.name.clone(),
+                name: name.into(),
+                source,
+            })
         }
         _ if name.ends_with(".bvh") => {
             let (tree, _) = tree_file::load(Path::new(name), scene)?;

@@ -204,8 +204,7 @@ impl<'a> Accelerator<'a> {
                     found |= hit.is_some();
                     found && ends_at_hit
                 };
-                self.structure
-                    .any_hit(triangles.len(), ray, test, counter);
+                self.structure.any_hit(triangles.len(), ray, test, counter);
             }
             Primitives::Spheres(spheres) => {
                 let test = |id: u32| {
@@ -213,8 +212,7 @@ impl<'a> Accelerator<'a> {
                     found |= hit.is_some();
                     found && ends_at_hit
                 };
-                self.structure
-                    .any_hit(spheres.len(), ray, test, counter);
+                self.structure.any_hit(spheres.len(), ray, test, counter);
             }
         }
         found

@@ -104,9 +104,7 @@ mod tests {
     /// Returns unit cubes with their lower corners at x = 0, 2, 4, … on the x axis.
     fn row(n: usize) -> Vec<Aabb> {
         let min = |i: usize| Vec3::X * (2 * i) as f32;
-        (0..n)
-            .map(|i| Aabb { min: min(i), max: min(i) + 1.0 })
-            .collect()
+        (0..n).map(|i| Aabb { min: min(i), max: min(i) + 1.0 }).collect()
     }
 
     fn along_x() -> Ray {

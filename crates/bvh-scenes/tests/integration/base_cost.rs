@@ -11,9 +11,7 @@ fn from_objects(tree: &Bvh, boxes: &[Aabb]) -> f64 {
     let mut total = 0.0;
     let mut below = vec![Aabb::EMPTY; tree.nodes.len()];
     for (index, node) in tree.nodes.iter().enumerate().rev() {
-        let objects = tree.prim_ids[node.prims()]
-            .iter()
-            .map(|&id| boxes[id as usize]);
+        let objects = tree.prim_ids[node.prims()].iter().map(|&id| boxes[id as usize]);
         below[index] = objects
             .chain(below[node.children()].iter().copied())
             .fold(Aabb::EMPTY, |a, b| a.union(&b));
@@ -30,9 +28,7 @@ fn the_base_cost_of_every_stand_in_follows_from_its_objects_and_has_the_papers_m
     let paper = [1.710e7, 1.845e9, 4.820e5, 1.027e14, 1.361e6];
     for (stand_in, paper) in STAND_INS.iter().zip(paper) {
         let boxes = Scene::load(stand_in.name).unwrap().boxes;
-        let tree = muller_fellner::Config::default()
-            .build(&boxes)
-            .unwrap();
+        let tree = muller_fellner::Config::default().build(&boxes).unwrap();
         bvh_core::validate(&tree, &boxes).unwrap();
         let reported = cost::internal_area(&tree);
         let computed = from_objects(&tree, &boxes);

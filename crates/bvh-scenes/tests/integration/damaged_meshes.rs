@@ -173,12 +173,7 @@ fn cut_files_give_a_mesh_or_an_error() {
 fn check(bytes: &[u8], name: &str) {
     if let Ok(mesh) = parse(bytes, Path::new(name)) {
         assert!(!mesh.triangles.is_empty());
-        assert!(
-            mesh.triangles
-                .iter()
-                .flat_map(|t| t.0)
-                .all(|corner| corner.is_finite())
-        );
+        assert!(mesh.triangles.iter().flat_map(|t| t.0).all(|corner| corner.is_finite()));
     }
 }
 

@@ -10,11 +10,7 @@ use std::path::Path;
 const CORNERS: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
 fn corner_bytes() -> Vec<u8> {
-    CORNERS
-        .as_flattened()
-        .iter()
-        .flat_map(|x| x.to_le_bytes())
-        .collect()
+    CORNERS.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
 fn triangle() -> Mesh {
@@ -80,13 +76,9 @@ fn a_buffer_without_uri_is_the_binary_chunk_only_if_it_is_the_first() {
         glb(json, &corner_bytes())
     };
     assert_eq!(parse(&bytes(0), Path::new("a.glb")).unwrap(), triangle());
-    let message = parse(&bytes(1), Path::new("a.glb"))
-        .unwrap_err()
-        .to_string();
+    let message = parse(&bytes(1), Path::new("a.glb")).unwrap_err().to_string();
     assert!(message.contains("buffers[1]: no URI"), "{message}");
-    let message = parse(&bytes(2), Path::new("a.glb"))
-        .unwrap_err()
-        .to_string();
+    let message = parse(&bytes(2), Path::new("a.glb")).unwrap_err().to_string();
     assert!(message.contains("no buffers[2]"), "{message}");
 }
 
@@ -95,9 +87,8 @@ fn extras_of_any_kind_are_ignored_in_any_place() {
     let text = json(CHUNK, "");
     // Attributes contain names of accessors and nothing else.
     let places = text.match_indices('{').map(|(place, _)| place);
-    let places: Vec<usize> = places
-        .filter(|&place| !text[place..].starts_with(r#"{"POSITION"#))
-        .collect();
+    let places: Vec<usize> =
+        places.filter(|&place| !text[place..].starts_with(r#"{"POSITION"#)).collect();
     for extras in [r#""a text""#, "5", "-1.5e300", "true", "null", "[1, {}]", r#"{"a": [null]}"#] {
         for &place in &places {
             let mut text = text.clone();
@@ -130,12 +121,7 @@ fn a_buffer_outside_the_folder_of_the_scene_is_rejected_unless_it_is_allowed() {
     let file = outside.path().join("outside.bin");
     fs::write(&file, corner_bytes()).unwrap();
     let absolute = file.to_str().unwrap();
-    let folder_name = outside
-        .path()
-        .file_name()
-        .unwrap()
-        .to_str()
-        .unwrap();
+    let folder_name = outside.path().file_name().unwrap().to_str().unwrap();
     for name in [
         absolute.to_owned(),
         format!("../{folder_name}/outside.bin"),
@@ -149,9 +135,7 @@ fn a_buffer_outside_the_folder_of_the_scene_is_rejected_unless_it_is_allowed() {
     }
     // The message must not reveal whether the file exists.
     let scene_folder = folder("../no_such_file");
-    let message = load(&scene_folder.path().join("scene.gltf"))
-        .unwrap_err()
-        .to_string();
+    let message = load(&scene_folder.path().join("scene.gltf")).unwrap_err().to_string();
     assert!(message.contains("`../no_such_file` is outside"), "{message}");
     #[cfg(unix)]
     {
@@ -198,9 +182,7 @@ fn an_index_of_33_bits_is_not_taken_for_its_lower_32() {
         let new = format!(r#""{key}": {}"#, wrapped(number));
         assert_eq!(whole.matches(&old).count(), 1, "{key}");
         let damaged = glb(whole.replace(&old, &new), &corner_bytes());
-        let message = parse(&damaged, Path::new("a.glb"))
-            .unwrap_err()
-            .to_string();
+        let message = parse(&damaged, Path::new("a.glb")).unwrap_err().to_string();
         let expected = format!("a.glb: {}; expected at most 4294967295", wrapped(number));
         assert!(message.starts_with(&expected), "{message}");
     }
@@ -215,9 +197,7 @@ fn an_index_of_33_bits_is_not_taken_for_its_lower_32() {
 fn a_glb_file_shorter_than_its_header_says_is_rejected_as_a_part() {
     let whole = glb(json(CHUNK, ""), &corner_bytes());
     for length in [13, whole.len() - 36, whole.len() - 1] {
-        let message = parse(&whole[..length], Path::new("a.glb"))
-            .unwrap_err()
-            .to_string();
+        let message = parse(&whole[..length], Path::new("a.glb")).unwrap_err().to_string();
         assert!(message.contains("expected a GLB file, and whole"), "{message}");
     }
 }

@@ -74,11 +74,7 @@ fn nodes_move_their_meshes_and_their_children() {
         expected.push(Triangle(triangle.0.map(|p| p * 2.0 + Vec3::X * 10.0)));
     }
     for triangle in square() {
-        expected.push(Triangle(
-            triangle
-                .0
-                .map(|p| Vec3::new(10.0 - p.y, p.x, p.z + 5.0)),
-        ));
+        expected.push(Triangle(triangle.0.map(|p| Vec3::new(10.0 - p.y, p.x, p.z + 5.0))));
     }
     assert_eq!(mesh.triangles, expected);
 }

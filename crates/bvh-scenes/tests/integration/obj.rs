@@ -21,9 +21,7 @@ fn mesh(faces: &str) -> Mesh {
 
 /// Returns the error about the points, on lines 1 to 5, followed by `statements`.
 fn error(statements: &str) -> String {
-    read(format!("{POINTS}{statements}"))
-        .unwrap_err()
-        .to_string()
+    read(format!("{POINTS}{statements}")).unwrap_err().to_string()
 }
 
 #[test]
@@ -65,9 +63,8 @@ fn spellings_of_the_same_triangle_agree() {
         assert_eq!(read(format!("{marks}{text}")).unwrap(), expected);
     }
     assert_eq!(read([b"# caf\xe9\ng \xff\n", text.as_bytes()].concat()).unwrap(), expected);
-    let colours = text
-        .replacen("0 0 0", "0 0 0 1 0.5 nan", 1)
-        .replacen("1 0 0", "1 0 0 1 1 1 1", 1);
+    let colours =
+        text.replacen("0 0 0", "0 0 0 1 0.5 nan", 1).replacen("1 0 0", "1 0 0 1 1 1 1", 1);
     assert_eq!(read(colours).unwrap(), expected);
 }
 

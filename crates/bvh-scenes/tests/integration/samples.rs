@@ -14,10 +14,7 @@ pub fn square() -> Vec<Triangle> {
 }
 
 pub fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
-    values
-        .into_iter()
-        .flat_map(f32::to_le_bytes)
-        .collect()
+    values.into_iter().flat_map(f32::to_le_bytes).collect()
 }
 
 pub fn ply_text() -> Vec<u8> {
@@ -41,12 +38,7 @@ pub fn ply_binary(big: bool) -> Vec<u8> {
     )
     .into_bytes();
     let word = |x: u32| if big { x.to_be_bytes() } else { x.to_le_bytes() };
-    bytes.extend(
-        CORNERS
-            .as_flattened()
-            .iter()
-            .flat_map(|x| word(x.to_bits())),
-    );
+    bytes.extend(CORNERS.as_flattened().iter().flat_map(|x| word(x.to_bits())));
     for face in FACES {
         bytes.push(3);
         bytes.extend(face.into_iter().flat_map(word));
@@ -101,14 +93,8 @@ pub fn gltf_json(uri: &str, nodes: &str, primitive: &str) -> String {
 pub const INDEXED: &str = r#", "indices": 1"#;
 
 pub fn buffer() -> Vec<u8> {
-    let indices = FACES
-        .as_flattened()
-        .iter()
-        .flat_map(|&index| (index as u16).to_le_bytes());
-    floats(CORNERS.as_flattened().iter().copied())
-        .into_iter()
-        .chain(indices)
-        .collect()
+    let indices = FACES.as_flattened().iter().flat_map(|&index| (index as u16).to_le_bytes());
+    floats(CORNERS.as_flattened().iter().copied()).into_iter().chain(indices).collect()
 }
 
 pub fn data_uri() -> String {
@@ -142,16 +128,11 @@ pub fn samples() -> [(&'static str, Format, Vec<u8>); 8] {
 }
 
 pub fn error(bytes: impl AsRef<[u8]>, name: &str) -> String {
-    parse(bytes.as_ref(), Path::new(name))
-        .unwrap_err()
-        .to_string()
+    parse(bytes.as_ref(), Path::new(name)).unwrap_err().to_string()
 }
 
 /// Replaces the first occurrence of a text.
 pub fn with(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
-    let start = bytes
-        .windows(from.len())
-        .position(|window| window == from.as_bytes())
-        .expect(from);
+    let start = bytes.windows(from.len()).position(|window| window == from.as_bytes()).expect(from);
     [&bytes[..start], to.as_bytes(), &bytes[start + from.len()..]].concat()
 }

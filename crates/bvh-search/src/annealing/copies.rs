@@ -78,12 +78,8 @@ impl<M: Mover, A: Metric> Copies<M, A> {
         observer: &dyn Observer,
     ) -> Tally {
         let Round { heat: [hot, cold], quota, count, streams: [seed, first] } = *round;
-        self.others
-            .resize_with(count as usize - 1, || (tree.clone(), mover()));
-        let others = self
-            .others
-            .iter_mut()
-            .map(|(tree, mover)| (tree, mover));
+        self.others.resize_with(count as usize - 1, || (tree.clone(), mover()));
+        let others = self.others.iter_mut().map(|(tree, mover)| (tree, mover));
         let mut copies: Vec<Copy<M, A>> = std::iter::once((tree, whole))
             .chain(others)
             .zip(first + 1..)
@@ -96,8 +92,7 @@ impl<M: Mover, A: Metric> Copies<M, A> {
             })
             .collect();
         let begun = on_each(&mut copies, |copy| {
-            copy.mover
-                .begin(copy.tree, Vec::new(), &|| observer.cancelled())
+            copy.mover.begin(copy.tree, Vec::new(), &|| observer.cancelled())
         });
         let mut done = Tally::default();
         // The moves of the last turn, the leader's first.
@@ -132,8 +127,7 @@ impl<M: Mover, A: Metric> Copies<M, A> {
             copy.catch_up(&accepted);
             // A cancelled search must return soon, and every later round would sort first.
             if !observer.cancelled() {
-                copy.tree
-                    .sort_in_preorder_unless(&|| observer.cancelled());
+                copy.tree.sort_in_preorder_unless(&|| observer.cancelled());
             }
         });
         done

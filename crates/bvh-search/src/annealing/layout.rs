@@ -64,15 +64,12 @@ impl Layout {
         if node.is_leaf() {
             return LayoutCost::leaf(node.area, 1);
         }
-        let [left, right] = node
-            .children
-            .map(|child| &self.rows[child as usize]);
+        let [left, right] = node.children.map(|child| &self.rows[child as usize]);
         LayoutCost::join(node.area, left, right)
     }
 
     fn root(&self, tree: &Working<impl Metric>) -> f64 {
-        tree.root()
-            .map_or(0.0, |root| self.rows[root as usize].value())
+        tree.root().map_or(0.0, |root| self.rows[root as usize].value())
     }
 
     /// The cost of the tree after the last accepted change.
@@ -86,8 +83,7 @@ impl Layout {
     pub fn accepts(&mut self, tree: &Working<impl Metric>, most: f64) -> bool {
         if self.rows.len() < tree.nodes.len() {
             // The tree has gained leaves since the last call.
-            self.rows
-                .resize(tree.nodes.len(), LayoutCost::leaf(0.0, 0));
+            self.rows.resize(tree.nodes.len(), LayoutCost::leaf(0.0, 0));
             self.marks.resize(tree.nodes.len(), 0);
         }
         // A mark equals the current change only during this call, so marks never need to be
@@ -105,8 +101,7 @@ impl Layout {
         // Mark the ancestors first, then visit the marked nodes from the root: every row is
         // computed once, after its children, although the paths of the changed nodes overlap.
         self.stack.clear();
-        self.stack
-            .extend(tree.root().map(|root| (root, false)));
+        self.stack.extend(tree.root().map(|root| (root, false)));
         while let Some((index, children_done)) = self.stack.pop() {
             let node = &tree.nodes[index as usize];
             if !children_done && !node.is_leaf() {
@@ -115,14 +110,12 @@ impl Layout {
                     .children
                     .into_iter()
                     .filter(|&child| self.marks[child as usize] == self.change);
-                self.stack
-                    .extend(marked.map(|child| (child, false)));
+                self.stack.extend(marked.map(|child| (child, false)));
                 continue;
             }
             self.visits += 1;
             let row = self.row(tree, index);
-            self.replaced
-                .push((index, self.rows[index as usize]));
+            self.replaced.push((index, self.rows[index as usize]));
             self.rows[index as usize] = row;
         }
         let cost = self.root(tree);

@@ -83,9 +83,7 @@ impl NodeSampler {
     /// Returns the node at this position.
     #[inline(always)]
     fn node(&self, position: usize) -> u32 {
-        self.only
-            .get(position)
-            .map_or(position as u32 + 1, |&node| node)
+        self.only.get(position).map_or(position as u32 + 1, |&node| node)
     }
 
     /// Returns the position in the window at which the fraction `drawn` of its weight is reached.
@@ -127,9 +125,7 @@ impl NodeSampler {
 #[inline(always)]
 pub(crate) fn weight(tree: &Working<impl Metric>, index: u32) -> f64 {
     let parent = tree.nodes[index as usize].parent;
-    tree.nodes[if parent == ANCHOR { index } else { parent } as usize]
-        .area
-        .sqrt()
+    tree.nodes[if parent == ANCHOR { index } else { parent } as usize].area.sqrt()
         + f64::MIN_POSITIVE
 }
 
@@ -158,19 +154,14 @@ mod tests {
             let nodes: Vec<u32> = if only.is_empty() { (1..100).collect() } else { only.clone() };
             let weight = |&index: &u32| {
                 let parent = tree.nodes[index as usize].parent;
-                tree.nodes[if parent == ANCHOR { index } else { parent } as usize]
-                    .area
-                    .sqrt()
+                tree.nodes[if parent == ANCHOR { index } else { parent } as usize].area.sqrt()
             };
             let total = nodes.iter().map(weight).sum::<f64>();
             let times = 400_000;
             let counts = drawn(only, &tree, times);
             assert_eq!(
                 counts.iter().sum::<u32>(),
-                nodes
-                    .iter()
-                    .map(|&index| counts[index as usize])
-                    .sum::<u32>()
+                nodes.iter().map(|&index| counts[index as usize]).sum::<u32>()
             );
             for index in nodes {
                 let expected = f64::from(times) * weight(&index) / total;
@@ -188,25 +179,14 @@ mod tests {
     fn every_part_of_a_large_tree_is_drawn_from_at_some_time() {
         let tree = built(&muller_fellner::Config::default(), &scatter(40_000));
         let counts = drawn(vec![], &tree, 2_000_000);
-        assert!(
-            counts[1..]
-                .chunks(512)
-                .all(|part| part.iter().sum::<u32>() > 0)
-        );
+        assert!(counts[1..].chunks(512).all(|part| part.iter().sum::<u32>() > 0));
     }
 
     #[test]
     fn nodes_without_area_are_equally_likely() {
-        let points: Vec<Aabb> = (0..50)
-            .map(|_| Aabb::from(([1.0; 3], [1.0; 3])))
-            .collect();
+        let points: Vec<Aabb> = (0..50).map(|_| Aabb::from(([1.0; 3], [1.0; 3]))).collect();
         let tree = built(&muller_fellner::Config::default(), &points);
         let counts = drawn(vec![], &tree, 100_000);
-        assert!(
-            counts[1..]
-                .iter()
-                .all(|count| (700..1400).contains(count)),
-            "{counts:?}"
-        );
+        assert!(counts[1..].iter().all(|count| (700..1400).contains(count)), "{counts:?}");
     }
 }

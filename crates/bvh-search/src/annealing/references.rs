@@ -57,9 +57,7 @@ impl<'a> Divider<'a> {
         observer: &dyn Observer,
     ) -> Tally {
         self.tie(tree);
-        self.layout
-            .iter_mut()
-            .for_each(|layout| layout.fill(tree));
+        self.layout.iter_mut().for_each(|layout| layout.fill(tree));
         let tally = change(self, tree, quota, rng, observer);
         tree.sort_in_preorder();
         tally
@@ -67,12 +65,7 @@ impl<'a> Divider<'a> {
 
     /// Nodes visited so far.
     fn work(&self) -> u64 {
-        self.visits
-            + self.search.visits
-            + self
-                .layout
-                .as_ref()
-                .map_or(0, |layout| layout.visits)
+        self.visits + self.search.visits + self.layout.as_ref().map_or(0, |layout| layout.visits)
     }
 
     /// Links the leaves of every object into a ring. O(nodes).
@@ -81,16 +74,8 @@ impl<'a> Divider<'a> {
         self.ring.resize(tree.nodes.len(), NONE);
         self.spares.clear();
         self.count = tree.objects();
-        let leaves = || {
-            (0..)
-                .zip(&tree.nodes)
-                .skip(1)
-                .filter(|(_, node)| node.is_leaf())
-        };
-        let objects = leaves()
-            .map(|(_, node)| node.children[1] as usize + 1)
-            .max()
-            .unwrap_or(0);
+        let leaves = || (0..).zip(&tree.nodes).skip(1).filter(|(_, node)| node.is_leaf());
+        let objects = leaves().map(|(_, node)| node.children[1] as usize + 1).max().unwrap_or(0);
         let mut last = vec![NONE; objects];
         for (index, node) in leaves() {
             let last = &mut last[node.children[1] as usize];
@@ -112,10 +97,7 @@ impl<'a> Divider<'a> {
             return false;
         }
         let object = a.children[1];
-        let whole = self
-            .splits
-            .objects
-            .clip(object, &Aabb::from(&a.aabb.union(&b.aabb)));
+        let whole = self.splits.objects.clip(object, &Aabb::from(&a.aabb.union(&b.aabb)));
         // A degenerate object may vanish under clipping; it stays divided.
         if whole == Aabb::EMPTY {
             return false;
@@ -139,8 +121,7 @@ impl<'a> Divider<'a> {
         tree.resize_leaf(leaf, object, whole, area);
         let position = (area < limit)
             .then(|| {
-                self.search
-                    .position_of_detached(tree, Scope::ALL, (&whole, area), sibling, limit)
+                self.search.position_of_detached(tree, Scope::ALL, (&whole, area), sibling, limit)
             })
             .flatten();
         let Some(position) = position else {
@@ -240,10 +221,7 @@ impl<'a> Divider<'a> {
     /// division that saves almost nothing is no gain.
     #[inline(always)]
     fn price(&self, tree: &Working<impl Metric>) -> f64 {
-        let cost = self
-            .layout
-            .as_ref()
-            .map_or(tree.area(), Layout::current);
+        let cost = self.layout.as_ref().map_or(tree.area(), Layout::current);
         PRICE_OF_A_REFERENCE * cost / self.count as f64
     }
 
@@ -258,10 +236,7 @@ impl<'a> Divider<'a> {
     /// Otherwise undoes the change.
     #[inline(always)]
     fn accepts(&mut self, tree: &mut Working<impl Metric>, most: f64) -> bool {
-        let accepted = self
-            .layout
-            .as_mut()
-            .is_none_or(|layout| layout.accepts(tree, most));
+        let accepted = self.layout.as_mut().is_none_or(|layout| layout.accepts(tree, most));
         if !accepted {
             tree.undo();
         }
@@ -366,9 +341,7 @@ fn change_plain<A: Metric>(
     while !leaves.is_empty() && divider.count < divider.splits.most && !is_over(divider, &mut done)
     {
         let drawn = rng.random::<f64>() * sum;
-        let leaf = leaves[sums
-            .partition_point(|&sum| sum <= drawn)
-            .min(leaves.len() - 1)];
+        let leaf = leaves[sums.partition_point(|&sum| sum <= drawn).min(leaves.len() - 1)];
         done.moves += 1;
         divider.visits += 1;
         if divider.ring[leaf as usize] != NONE {

@@ -197,9 +197,7 @@ impl<'a> RuinMover<'a> {
         if tree.nodes[top as usize].is_leaf() {
             return;
         }
-        self.work += self
-            .side
-            .find(tree, top, thickness, most as usize, rng);
+        self.work += self.side.find(tree, top, thickness, most as usize, rng);
         for &node in &self.side.roots {
             if scope.root(tree) != node {
                 self.work += self.removed.take(tree, node);
@@ -210,12 +208,7 @@ impl<'a> RuinMover<'a> {
 
 impl Mover for RuinMover<'_> {
     fn work(&self) -> u64 {
-        self.work
-            + self.search.visits
-            + self
-                .layout
-                .as_ref()
-                .map_or(0, |layout| layout.visits)
+        self.work + self.search.visits + self.layout.as_ref().map_or(0, |layout| layout.visits)
     }
 
     fn last_move(&self) -> Option<Reinsertions<'_>> {
@@ -234,10 +227,7 @@ impl Mover for RuinMover<'_> {
         is_over: &dyn Fn() -> bool,
     ) -> bool {
         self.sampler.begin(tree, near, is_over)
-            && self
-                .layout
-                .as_mut()
-                .is_none_or(|layout| layout.fill_unless(tree, is_over))
+            && self.layout.as_mut().is_none_or(|layout| layout.fill_unless(tree, is_over))
     }
 
     #[inline(always)]
@@ -296,8 +286,7 @@ impl Mover for RuinMover<'_> {
             // bound now.
             limit += area;
             let Some(position) =
-                self.search
-                    .position_of_detached(tree, positions, (&aabb, area), first, limit)
+                self.search.position_of_detached(tree, positions, (&aabb, area), first, limit)
             else {
                 tree.undo();
                 return false;
@@ -307,11 +296,7 @@ impl Mover for RuinMover<'_> {
             limit -= position.cost;
         }
         let most = LAYOUT_HEAT * worse;
-        if self
-            .layout
-            .as_mut()
-            .is_some_and(|layout| !layout.accepts(tree, most))
-        {
+        if self.layout.as_mut().is_some_and(|layout| !layout.accepts(tree, most)) {
             tree.undo();
             return false;
         }

@@ -66,10 +66,8 @@ impl AnnealingRun<'_> {
     ) -> Result<Bvh, SearchError> {
         let [hot, cold] = self.heat;
         let (mut best, mut tree) = Incumbent::build(self.start, problem, metric, run)?;
-        let quota = run.left().at_most(
-            self.work_per_object
-                .saturating_mul(problem.boxes.len() as u64),
-        );
+        let quota =
+            run.left().at_most(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
         let schedule =
             Schedule { hot, cold, quota, end: 1.0, subtrees: 1, copies: 1, to_local_optimum: true };
         let observer = run.observer();

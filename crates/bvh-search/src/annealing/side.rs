@@ -39,8 +39,7 @@ impl Side {
         let (begin, end) = span(top);
         let limit = end - thickness * rng.random::<f64>() * (end - begin);
         let mut visits = 0;
-        self.stack
-            .extend(tree.nodes[top as usize].children);
+        self.stack.extend(tree.nodes[top as usize].children);
         while let Some(index) = self.stack.pop() {
             let node = &tree.nodes[index as usize];
             let (near, far) = span(index);

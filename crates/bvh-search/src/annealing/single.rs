@@ -47,10 +47,7 @@ bvh_config::config! {
 impl Config {
     fn check_together(&self) -> impl Iterator<Item = OutOfRange> {
         // Specs call the step `move`, which is a keyword in Rust.
-        Nested
-            .faults("move", &self.step)
-            .into_iter()
-            .chain(check_fall(self.hot, self.cold))
+        Nested.faults("move", &self.step).into_iter().chain(check_fall(self.hot, self.cold))
     }
 }
 

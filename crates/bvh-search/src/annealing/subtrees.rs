@@ -48,11 +48,7 @@ pub(crate) fn cool<M: Mover>(
         // A different size in every round moves the borders, across which nothing moves.
         let smaller = SMALLEST_SUBTREES + (1.0 - SMALLEST_SUBTREES) * rng.random::<f64>();
         let cut = cut(tree, smaller / f64::from(count), |index| node_sampler::weight(tree, index));
-        let in_subtrees: f64 = cut
-            .subtrees
-            .iter()
-            .map(|subtree| subtree.weight)
-            .sum();
+        let in_subtrees: f64 = cut.subtrees.iter().map(|subtree| subtree.weight).sum();
         let quota_of = |subtree: &Subtree| {
             let work = quota.work as f64 * (1.0 - cut.whole_tree) * (subtree.weight / in_subtrees);
             Quota { work: work as u64, moves: quota.moves / (cut.subtrees.len() as u64 + 1) }
@@ -128,9 +124,7 @@ fn cut(tree: &Working<impl Metric>, most: f64, weight: impl Fn(u32) -> f64) -> C
             }
         }
     }
-    let all = tree
-        .root()
-        .map_or(0.0, |root| totals[root as usize]);
+    let all = tree.root().map_or(0.0, |root| totals[root as usize]);
     // The level in a subtree, 1 for its root; 0 outside all subtrees.
     let mut depths = vec![0u8; tree.nodes.len()];
     let mut subtrees: Vec<Subtree> = vec![];
@@ -214,9 +208,7 @@ impl Subtree {
         let mut copy = Vec::with_capacity(nodes.len() + 1);
         copy.push(Node { children: [1, NONE], ..Node::ANCHOR });
         copy.extend(
-            nodes
-                .iter()
-                .map(|node| moved(node, |index| index.wrapping_sub(self.root - 1))),
+            nodes.iter().map(|node| moved(node, |index| index.wrapping_sub(self.root - 1))),
         );
         copy[1].parent = ANCHOR;
         Working::from_nodes(copy, metric)
@@ -260,17 +252,9 @@ mod tests {
             let Cut { subtrees, starts, whole_tree } = cut(&tree, most, |_| 1.0);
             let of_starts = starts.len() as f64 / 5999.0;
             assert_eq!(whole_tree, WHOLE_TREE.min(MOVES_AT_BORDERS * of_starts));
-            assert!(
-                subtrees
-                    .windows(2)
-                    .all(|pair| pair[0].root + pair[0].nodes <= pair[1].root)
-            );
-            assert!(
-                subtrees
-                    .iter()
-                    .all(|subtree| f64::from(subtree.nodes) <= most * 5999.0
-                        && starts.contains(&subtree.root))
-            );
+            assert!(subtrees.windows(2).all(|pair| pair[0].root + pair[0].nodes <= pair[1].root));
+            assert!(subtrees.iter().all(|subtree| f64::from(subtree.nodes) <= most * 5999.0
+                && starts.contains(&subtree.root)));
             assert!(
                 subtrees
                     .iter()

@@ -42,12 +42,8 @@ impl Config {
     ) -> Found {
         let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
         let n = problem.boxes.len() as u64;
-        let quota = run
-            .left()
-            .at_most(self.work_per_object.saturating_mul(n));
-        let mut total = self
-            .local_search
-            .improve(&mut tree, quota, run.observer());
+        let quota = run.left().at_most(self.work_per_object.saturating_mul(n));
+        let mut total = self.local_search.improve(&mut tree, quota, run.observer());
         run.count(total);
         best.offer(&tree, run);
         let kick = SingleMove { climb: self.climb, target: Target::Random };
@@ -71,9 +67,7 @@ impl Config {
             // The copy of the tree counts as work, too.
             tally.work = mover.work() + 2 * n;
             let left = quota.less(&total).less(&tally);
-            tally += self
-                .local_search
-                .improve(&mut other, left, run.observer());
+            tally += self.local_search.improve(&mut other, left, run.observer());
             total += tally;
             run.count(tally);
             if other.area() <= tree.area() {
@@ -100,11 +94,6 @@ mod tests {
         let config = Config { work_per_object: 3000, ..Config::default() };
         let found = solve(&config, &problem, 1, Budget::UNLIMITED, &()).unwrap();
         assert!(found.cost < first.cost, "{} {}", found.cost, first.cost);
-        assert!(
-            found
-                .history
-                .windows(2)
-                .all(|pair| pair[1].incumbent <= pair[0].incumbent)
-        );
+        assert!(found.history.windows(2).all(|pair| pair[1].incumbent <= pair[0].incumbent));
     }
 }

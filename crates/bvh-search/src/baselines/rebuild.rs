@@ -199,10 +199,7 @@ impl Config {
                 }
             }
             let Some(subtree) = found.filter(|subtree| subtree.leaves.len() >= 3) else { continue };
-            if !subtrees
-                .iter()
-                .any(|other| other.overlaps(&subtree))
-            {
+            if !subtrees.iter().any(|other| other.overlaps(&subtree)) {
                 subtrees.push(subtree);
             }
         }
@@ -230,17 +227,14 @@ impl Config {
         let scene = Presorted::new(&boxes)?;
         let workspace = &mut Workspace::default();
         let constructed = watched(observer, |watch| {
-            self.construction
-                .construct(&scene, measure, &mut rule, workspace, &mut other, watch)
+            self.construction.construct(&scene, measure, &mut rule, workspace, &mut other, watch)
         });
         match constructed {
             Err(BuildError::Cancelled) => return Ok((None, Tally::default())),
             constructed => constructed?,
         }
         let mut other = Working::from_bvh(&other, tree.metric().internal(&other), tree.metric())?;
-        let mut tally = self
-            .local_search
-            .improve(&mut other, quota, observer);
+        let mut tally = self.local_search.improve(&mut other, quota, observer);
         tally = Tally { moves: 0, kept: 0, work: tally.work + 2 * boxes.len() as u64 };
         let better = other.area() < subtree.area * (1.0 - TOLERANCE);
         Ok((better.then_some(other), tally))
@@ -253,10 +247,7 @@ fn contribution(tree: &Working<impl Metric>, index: u32) -> f64 {
     if node.is_leaf() {
         0.0
     } else {
-        node.children
-            .iter()
-            .map(|&child| tree.nodes[child as usize].area)
-            .sum()
+        node.children.iter().map(|&child| tree.nodes[child as usize].area).sum()
     }
 }
 
@@ -356,19 +347,13 @@ mod tests {
         let mut several = 0;
         for _ in 0..200 {
             let subtrees = config.select(&tree, &mut rng, 8, &mut Tally::default());
-            let mut leaves: Vec<u32> = subtrees
-                .iter()
-                .flat_map(|subtree| subtree.leaves.iter().copied())
-                .collect();
+            let mut leaves: Vec<u32> =
+                subtrees.iter().flat_map(|subtree| subtree.leaves.iter().copied()).collect();
             let count = leaves.len();
             leaves.sort_unstable();
             leaves.dedup();
             assert_eq!(leaves.len(), count);
-            assert!(
-                subtrees
-                    .iter()
-                    .all(|subtree| (3..=30).contains(&subtree.leaves.len()))
-            );
+            assert!(subtrees.iter().all(|subtree| (3..=30).contains(&subtree.leaves.len())));
             several += usize::from(subtrees.len() > 1);
         }
         assert!(several > 100);

@@ -120,9 +120,7 @@ struct Rotation([(u32, [u32; 2]); 2]);
 
 impl Rotation {
     fn apply(self, tree: &mut Working<impl Metric>) {
-        self.0
-            .into_iter()
-            .for_each(|(node, children)| tree.join(node, children));
+        self.0.into_iter().for_each(|(node, children)| tree.join(node, children));
     }
 }
 
@@ -181,19 +179,11 @@ mod tests {
             let [Some(left), Some(right)] = [0, 1].map(|side| below(top).get(side).copied()) else {
                 continue;
             };
-            let mut pairs: Vec<(u32, u32)> = below(left)
-                .into_iter()
-                .map(|below| (below, right))
-                .collect();
+            let mut pairs: Vec<(u32, u32)> =
+                below(left).into_iter().map(|below| (below, right)).collect();
+            pairs.extend(below(right).into_iter().map(|below| (below, left)));
             pairs.extend(
-                below(right)
-                    .into_iter()
-                    .map(|below| (below, left)),
-            );
-            pairs.extend(
-                below(left)
-                    .iter()
-                    .flat_map(|&a| below(right).into_iter().map(move |b| (a, b))),
+                below(left).iter().flat_map(|&a| below(right).into_iter().map(move |b| (a, b))),
             );
             for (a, b) in pairs {
                 let mut other = tree.clone();
@@ -233,9 +223,8 @@ mod tests {
             let found = tree.to_bvh();
             validate(&found, &boxes).unwrap();
             assert!(found.is_tight(&boxes));
-            let least = neighbours(&tree, &tree.preorder())
-                .into_iter()
-                .fold(f64::INFINITY, f64::min);
+            let least =
+                neighbours(&tree, &tree.preorder()).into_iter().fold(f64::INFINITY, f64::min);
             assert!(tree.area() <= least * (1.0 + 1e-11), "{} {least}", tree.area());
         }
     }
@@ -247,9 +236,7 @@ mod tests {
             if tree.nodes[top as usize].is_leaf() {
                 continue;
             }
-            let least = neighbours(&tree, &[top])
-                .into_iter()
-                .fold(tree.area(), f64::min);
+            let least = neighbours(&tree, &[top]).into_iter().fold(tree.area(), f64::min);
             let mut rotated = tree.clone();
             if let Some(rotation) = best(&tree, top) {
                 rotation.apply(&mut rotated);

@@ -152,10 +152,8 @@ impl Solver {
             *place = node.children[0];
             self.leaves.push(node.children[1]);
         }
-        let last = self
-            .leaves
-            .iter()
-            .fold(last, |last, &leaf| last.max(tree.nodes[leaf as usize].stamp));
+        let last =
+            self.leaves.iter().fold(last, |last, &leaf| last.max(tree.nodes[leaf as usize].stamp));
         let solved = self.solved[root as usize];
         solved == NEVER || last > solved
     }
@@ -163,17 +161,10 @@ impl Solver {
     /// Finds the best shape. Returns whether it is better than the present shape.
     #[inline(always)]
     fn solve(&mut self, tree: &Working<impl Metric>) -> bool {
-        let least = self.subsets.solve(
-            self.leaves
-                .iter()
-                .map(|&leaf| tree.nodes[leaf as usize].aabb),
-            tree.metric(),
-        );
-        let before: f64 = self
-            .inner
-            .iter()
-            .map(|&node| tree.nodes[node as usize].area)
-            .sum();
+        let least = self
+            .subsets
+            .solve(self.leaves.iter().map(|&leaf| tree.nodes[leaf as usize].aabb), tree.metric());
+        let before: f64 = self.inner.iter().map(|&node| tree.nodes[node as usize].area).sum();
         least < before * (1.0 - TOLERANCE)
     }
 
@@ -186,18 +177,15 @@ impl Solver {
         joints[0].0 = all;
         let mut used = 1;
         for index in 0..self.inner.len() {
-            joints[index].1 = self
-                .subsets
-                .division(joints[index].0)
-                .map(|part| {
-                    if part.is_power_of_two() {
-                        self.leaves[part.trailing_zeros() as usize]
-                    } else {
-                        joints[used].0 = part;
-                        used += 1;
-                        self.inner[used - 1]
-                    }
-                });
+            joints[index].1 = self.subsets.division(joints[index].0).map(|part| {
+                if part.is_power_of_two() {
+                    self.leaves[part.trailing_zeros() as usize]
+                } else {
+                    joints[used].0 = part;
+                    used += 1;
+                    self.inner[used - 1]
+                }
+            });
         }
         for (&node, &(_, children)) in self.inner.iter().zip(&joints).rev() {
             tree.join(node, children);

@@ -39,9 +39,7 @@ pub(crate) fn improve<A: Metric>(
     }
     let (horizon, work) = config.horizon(n, run);
     let by_layout = problem.objective == Objective::Layout;
-    let divider = problem
-        .splits
-        .map(|splits| Divider::new(splits, by_layout));
+    let divider = problem.splits.map(|splits| Divider::new(splits, by_layout));
     let mut search = Improvement {
         config,
         boxes: problem.boxes,
@@ -123,10 +121,9 @@ impl Improvement<'_, '_, '_, '_> {
 
     /// Reinserts to a local optimum and offers it to the incumbent.
     fn reinsert(&mut self, tree: &mut Working<impl Metric>) {
-        self.best
-            .improve(tree, u32::MAX, self.run, |tree, _, quota, observer| {
-                reinsertion::pass_by_area(tree, quota, observer)
-            });
+        self.best.improve(tree, u32::MAX, self.run, |tree, _, quota, observer| {
+            reinsertion::pass_by_area(tree, quota, observer)
+        });
     }
 
     /// Keeps a local optimum of reinsertion. A caller who stops a time-limited search before
@@ -152,9 +149,8 @@ impl Improvement<'_, '_, '_, '_> {
             if self.run.stopped().is_none() {
                 tree.reshape(&before, self.boxes);
             }
-        } else if let Ok(Some(mut aside)) = self
-            .best
-            .working_unless_cancelled(tree.metric(), observer)
+        } else if let Ok(Some(mut aside)) =
+            self.best.working_unless_cancelled(tree.metric(), observer)
         {
             self.reinsert(&mut aside);
         }
@@ -172,10 +168,7 @@ impl Improvement<'_, '_, '_, '_> {
         let began = observer.progress().unwrap_or(0.0);
         let work = match horizon {
             Horizon::Known if observer.progress().is_some() => {
-                let quota = self
-                    .run
-                    .left()
-                    .at_most(self.left.min(PROBE * self.n));
+                let quota = self.run.left().at_most(self.left.min(PROBE * self.n));
                 let (tally, in_time) = self.probe(tree, stream(self.seed, 0), quota);
                 self.run.count(tally);
                 self.secure(tree, in_time / n);

@@ -77,10 +77,7 @@ pub fn unless_behind(found: Outcome, fallback: Option<Outcome>) -> Outcome {
 /// Returns the division with spatial splits, if the problem allows them: the caller's division or a
 /// new one. `None` if the observer cancels first.
 fn division(problem: &Problem, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
-    let Some(splits) = problem
-        .splits
-        .filter(|splits| splits.most > problem.boxes.len())
-    else {
+    let Some(splits) = problem.splits.filter(|splits| splits.most > problem.boxes.len()) else {
         return Ok(None);
     };
     if let Some(division) = splits.division {
@@ -194,9 +191,7 @@ impl Config {
         // A large scene has no memory for another tree beside the next clustering.
         drop(started);
         let thorough = thorough_clustering(problem, run)?;
-        Ok(run
-            .take_aside_below(thorough.cost)
-            .unwrap_or(thorough))
+        Ok(run.take_aside_below(thorough.cost).unwrap_or(thorough))
     }
 
     /// Improves a tree with one reference per leaf, and its references if they may change. If a

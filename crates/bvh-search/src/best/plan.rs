@@ -16,9 +16,7 @@ pub(super) struct Planned {
 pub(super) fn plan(config: &Config, length: f64, n: u64) -> (Vec<Planned>, f64) {
     let longest = config.longest.min(WORK_PER_PAIR * n as f64);
     // Runs of equal length: a short last run would begin at a low temperature.
-    let long_runs = (length / longest)
-        .ceil()
-        .clamp(1.0, MOST_GENERATIONS as f64);
+    let long_runs = (length / longest).ceil().clamp(1.0, MOST_GENERATIONS as f64);
     let length_of_run = length / long_runs;
     let hot = config.hot(length_of_run);
     let reheats = if length_of_run < config.reheats_from { 0 } else { config.reheats };

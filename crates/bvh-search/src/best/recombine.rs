@@ -97,9 +97,8 @@ fn best_divisions<A: Metric>(trees: &[&Working<A>], clades: &Clades) -> Vec<Divi
         let cost = if node.is_leaf() {
             leaf_cost * node.area
         } else {
-            let [left, right] = node
-                .children
-                .map(|child| divisions[clades.number(tree, child) as usize].cost);
+            let [left, right] =
+                node.children.map(|child| divisions[clades.number(tree, child) as usize].cost);
             node.area + left + right
         };
         let best = &mut divisions[clades.number(tree, index) as usize];

@@ -59,9 +59,7 @@ pub(super) fn search<'p>(
             return Ok(SmallBudget::Tree(Incumbent::begin_unbounded(tree, problem, run).tree));
         }
     }
-    let has_two_starts = limit
-        .as_ref()
-        .is_some_and(TimeLimit::is_enough_for_two_starts);
+    let has_two_starts = limit.as_ref().is_some_and(TimeLimit::is_enough_for_two_starts);
     let start = initial(morton, has_two_starts, problem, run)?;
     Ok(improved(start, limit.as_ref(), problem, run))
 }
@@ -117,10 +115,8 @@ fn top_down_may_be_better(
     let mut area_clustered = 0.0;
     for stretch in order.chunks(order.len().div_ceil(SAMPLES)) {
         let objects = &stretch[..stretch.len() / SAMPLED_PART];
-        let boxes: Vec<Aabb> = objects
-            .iter()
-            .map(|&object| problem.boxes[object as usize])
-            .collect();
+        let boxes: Vec<Aabb> =
+            objects.iter().map(|&object| problem.boxes[object as usize]).collect();
         let Some(divided) = build_top_down(&boxes, run)? else { return Ok(false) };
         area_divided += cost::internal_area(&divided);
         area_clustered += cost::internal_area(&CLUSTERING.build(&boxes)?);
@@ -201,9 +197,8 @@ fn select_largest(tree: &Siblings, part: f64, front: usize, order: &mut Vec<u32>
     let examined = 1..=count.saturating_mul(front).min(nodes) as u32;
     // Areas are never negative, so their bits have the same order. Inverted bits put the largest
     // first, and the index breaks ties.
-    let mut keyed: Vec<(u64, u32)> = examined
-        .map(|index| (!tree.area(index).to_bits(), index))
-        .collect();
+    let mut keyed: Vec<(u64, u32)> =
+        examined.map(|index| (!tree.area(index).to_bits(), index)).collect();
     if count < keyed.len() {
         // Selection first makes the sort O(k log k) instead of O(n log n).
         keyed.select_nth_unstable(count);
@@ -278,9 +273,7 @@ mod tests {
         let config = best::Config { start: Some(start), ..Default::default() };
         let budget = Budget { max_work: Some(1), ..Budget::UNLIMITED };
         let found = solve(&config, &Problem::new(&boxes), 1, budget, &()).unwrap();
-        let named = bvh_build::muller_fellner::Config::default()
-            .build(&boxes)
-            .unwrap();
+        let named = bvh_build::muller_fellner::Config::default().build(&boxes).unwrap();
         assert_eq!(found.cost, cost::internal_area(&named));
     }
 

@@ -79,12 +79,8 @@ pub(super) struct Grouped {
 impl Grouped {
     /// Returns the area for one object.
     pub fn area(&self, object: usize) -> f64 {
-        let group = self
-            .groups
-            .partition_point(|group| group.0 <= object);
-        self.groups
-            .get(group)
-            .map_or(0.0, |group| group.1)
+        let group = self.groups.partition_point(|group| group.0 <= object);
+        self.groups.get(group).map_or(0.0, |group| group.1)
     }
 }
 
@@ -93,17 +89,12 @@ impl Clusters {
     /// n).
     pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
         let tree = Config { axis: CutAxis::Longest, ..Config::default() }.build(boxes)?;
-        let reaches: Vec<Reach> = tree
-            .prim_ids
-            .iter()
-            .map(|&id| Reach::from(&boxes[id as usize]))
-            .collect();
+        let reaches: Vec<Reach> =
+            tree.prim_ids.iter().map(|&id| Reach::from(&boxes[id as usize])).collect();
         let nodes = nodes(&tree, &reaches);
         let mut leaves = vec![0; boxes.len()];
-        for (index, cluster) in nodes
-            .iter()
-            .enumerate()
-            .filter(|(_, cluster)| cluster.children == 0)
+        for (index, cluster) in
+            nodes.iter().enumerate().filter(|(_, cluster)| cluster.children == 0)
         {
             leaves[cluster.objects.start] = index;
         }
@@ -129,9 +120,7 @@ impl Clusters {
 
     /// The half area of the box around all objects.
     pub fn area(&self) -> f64 {
-        self.nodes
-            .first()
-            .map_or(0.0, |root| root.half_area)
+        self.nodes.first().map_or(0.0, |root| root.half_area)
     }
 
     /// Returns the cluster of a single object.
@@ -160,9 +149,7 @@ impl Clusters {
 
     /// Returns the areas of groups, indexed by object.
     pub fn grouped(&self, from: u64, groups: &[usize], areas: &[f64]) -> Grouped {
-        let ends = groups
-            .iter()
-            .map(|&group| self.nodes[group].objects.end);
+        let ends = groups.iter().map(|&group| self.nodes[group].objects.end);
         Grouped { from, groups: ends.zip(areas.iter().copied()).collect() }
     }
 }

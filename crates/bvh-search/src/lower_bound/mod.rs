@@ -96,13 +96,9 @@ pub fn internal_area(
         // Any set of two objects or more needs at least the box with the nearest neighbour.
         let mut areas = vec![nearest[object]; classes.first.len()];
         for band in &bands {
-            let class = classes
-                .first
-                .partition_point(|&first| first < band.from);
+            let class = classes.first.partition_point(|&first| first < band.from);
             let area = band.area(object);
-            areas[class..]
-                .iter_mut()
-                .for_each(|least| *least = least.max(area));
+            areas[class..].iter_mut().for_each(|least| *least = least.max(area));
         }
         // The last class holds the weight of all objects, whose only box is the scene's.
         *areas.last_mut().unwrap_or(&mut 0.0) = clusters.area();
@@ -137,9 +133,7 @@ pub fn of_largest(boxes: &[Aabb]) -> f64 {
         sum.add(area);
     }
     let root = root.half_area();
-    [root, -least, -most]
-        .into_iter()
-        .for_each(|area| sum.add(area));
+    [root, -least, -most].into_iter().for_each(|area| sum.add(area));
     sum.value().max(root)
 }
 
@@ -200,9 +194,7 @@ impl Classes {
             .map(|to| {
                 // A step must leave room for the least weight on the other side.
                 let sources = first.partition_point(|&from| from + LEAST_WEIGHT <= last[to]);
-                (0..sources.min(to))
-                    .map(|from| rate(last[from], first[to], last[to]))
-                    .collect()
+                (0..sources.min(to)).map(|from| rate(last[from], first[to], last[to])).collect()
             })
             .collect();
         Self { first, rates }
@@ -216,9 +208,8 @@ impl Classes {
         least[start] = 0.0;
         for to in start + 1..least.len() {
             let steps = least.iter().zip(&self.rates[to]).skip(start);
-            least[to] = steps
-                .map(|(before, rate)| before + rate * areas[to])
-                .fold(f64::INFINITY, f64::min);
+            least[to] =
+                steps.map(|(before, rate)| before + rate * areas[to]).fold(f64::INFINITY, f64::min);
         }
         least.last().copied().unwrap_or(0.0)
     }
@@ -269,9 +260,7 @@ mod tests {
     }
 
     fn optimum(boxes: &[Aabb]) -> f64 {
-        solve(&exact::Config {}, &Problem::new(boxes), 1, Budget::UNLIMITED, &())
-            .unwrap()
-            .cost
+        solve(&exact::Config {}, &Problem::new(boxes), 1, Budget::UNLIMITED, &()).unwrap().cost
     }
 
     proptest! {
@@ -326,9 +315,7 @@ mod tests {
         struct After(AtomicU64);
         impl Observer for After {
             fn cancelled(&self) -> bool {
-                self.0
-                    .fetch_update(Relaxed, Relaxed, |left| Some(left.saturating_sub(1)))
-                    == Ok(0)
+                self.0.fetch_update(Relaxed, Relaxed, |left| Some(left.saturating_sub(1))) == Ok(0)
             }
         }
         let boxes = crate::scatter::scatter(3000);
@@ -344,19 +331,12 @@ mod tests {
     fn bad_boxes_are_rejected_and_extreme_ones_are_not() {
         let mut boxes = crate::scatter::scatter(50);
         for factor in [2f32.powi(-140), 2f32.powi(100)] {
-            let scaled: Vec<Aabb> = boxes
-                .iter()
-                .map(|b| Aabb { min: b.min * factor, max: b.max * factor })
-                .collect();
+            let scaled: Vec<Aabb> =
+                boxes.iter().map(|b| Aabb { min: b.min * factor, max: b.max * factor }).collect();
             let bound = internal_area(&scaled, 4, &()).unwrap();
             assert!(bound > 0.0 && bound.is_finite());
         }
         boxes[7].min.y = f32::NAN;
-        assert!(
-            internal_area(&boxes, 4, &())
-                .unwrap_err()
-                .to_string()
-                .contains("object 7")
-        );
+        assert!(internal_area(&boxes, 4, &()).unwrap_err().to_string().contains("object 7"));
     }
 }

@@ -39,18 +39,13 @@ impl Member {
     /// deterministic.
     #[inline(always)]
     fn compare(&self, other: &Self) -> Ordering {
-        self.area
-            .total_cmp(&other.area)
-            .then(self.cluster.cmp(&other.cluster))
+        self.area.total_cmp(&other.area).then(self.cluster.cmp(&other.cluster))
     }
 }
 
 #[inline(always)]
 fn total_weight(members: &[Member]) -> u64 {
-    members
-        .iter()
-        .map(|member| u64::from(member.weight))
-        .sum()
+    members.iter().map(|member| u64::from(member.weight)).sum()
 }
 
 /// All boxes that contain `must` and only `members`, weigh enough, and are smaller than the best
@@ -119,8 +114,7 @@ impl Region {
     /// Returns the box around these members, a good box of the region.
     #[inline(always)]
     fn around(&self, clusters: &Clusters) -> Reach {
-        self.nearest(clusters)
-            .fold(self.must, |union, reach| union.union(reach))
+        self.nearest(clusters).fold(self.must, |union, reach| union.union(reach))
     }
 
     /// Chooses the division of the region: the face whose move from `must` to that box costs most
@@ -172,14 +166,9 @@ fn search_plain(
     let members = neighbours(clusters, &must, weight / CLUSTERS_PER_SIZE, known);
     // Invariant: the regions together contain all boxes smaller than `known`.
     let mut regions: Vec<Region> =
-        Region::new(clusters, must, members.into_iter(), weight, &mut known)
-            .into_iter()
-            .collect();
-    let mut left = regions
-        .iter()
-        .map(|region| region.members.len() as u64)
-        .sum::<u64>()
-        * u64::from(effort);
+        Region::new(clusters, must, members.into_iter(), weight, &mut known).into_iter().collect();
+    let mut left =
+        regions.iter().map(|region| region.members.len() as u64).sum::<u64>() * u64::from(effort);
     loop {
         let least =
             (0..regions.len()).min_by(|&a, &b| regions[a].bound.total_cmp(&regions[b].bound));

@@ -105,14 +105,10 @@ fn evaluate(
     population: &mut [Individual],
     run: &mut Run,
 ) -> Result<(Individual, Option<Bvh>), SearchError> {
-    let mut changed: Vec<&mut Individual> = population
-        .iter_mut()
-        .filter(|i| !i.evaluated)
-        .collect();
-    let orders: Vec<&[u32]> = changed
-        .iter()
-        .map(|individual| individual.order.as_slice())
-        .collect();
+    let mut changed: Vec<&mut Individual> =
+        population.iter_mut().filter(|i| !i.evaluated).collect();
+    let orders: Vec<&[u32]> =
+        changed.iter().map(|individual| individual.order.as_slice()).collect();
     let Evaluated { costs, cheapest } = insertion.evaluate(&orders, run)?;
     let missing = costs.iter().filter(|cost| cost.is_none()).count();
     let work = (costs.len() - missing) as u64 * insertion.work();
@@ -127,9 +123,7 @@ fn evaluate(
         }
     }
     run.record_generation((population.len() - missing) as u64, fittest.cost, work);
-    let tree = cheapest
-        .filter(|(order, _)| *order == fittest.order)
-        .map(|(_, tree)| tree);
+    let tree = cheapest.filter(|(order, _)| *order == fittest.order).map(|(_, tree)| tree);
     Ok((fittest.clone(), tree))
 }
 
@@ -148,10 +142,7 @@ fn select(population: &[Individual], rng: &mut Stream) -> Vec<Individual> {
 
 /// Replaces the least fit individual, the last of equals, by the best individual so far.
 fn keep(best: &Individual, population: &mut [Individual]) {
-    if let Some(least_fit) = population
-        .iter_mut()
-        .max_by(|a, b| a.cost.total_cmp(&b.cost))
-    {
+    if let Some(least_fit) = population.iter_mut().max_by(|a, b| a.cost.total_cmp(&b.cost)) {
         least_fit.clone_from(best);
     }
 }
@@ -182,16 +173,11 @@ fn cross(parents: &mut [Individual], probability: f64, marks: &mut [bool], rng: 
 /// and after.
 fn child(a: &[u32], b: &[u32], cut: usize, marks: &mut [bool]) -> Vec<u32> {
     let (kept, _) = a.split_at(cut);
-    kept.iter()
-        .for_each(|&object| marks[object as usize] = true);
+    kept.iter().for_each(|&object| marks[object as usize] = true);
     let mut order = Vec::with_capacity(a.len());
     order.extend_from_slice(kept);
-    order.extend(
-        b.iter()
-            .filter(|&&object| !marks[object as usize]),
-    );
-    kept.iter()
-        .for_each(|&object| marks[object as usize] = false);
+    order.extend(b.iter().filter(|&&object| !marks[object as usize]));
+    kept.iter().for_each(|&object| marks[object as usize] = false);
     order
 }
 
@@ -203,9 +189,7 @@ fn mutate(individual: &mut Individual, mean: f64, rng: &mut Stream) {
     }
     let swaps = rng.random_range(0..=(2.0 * mean * f64::from(n)).round() as u32);
     for _ in 0..swaps {
-        individual
-            .order
-            .swap(rng.random_range(0..n) as usize, rng.random_range(0..n) as usize);
+        individual.order.swap(rng.random_range(0..n) as usize, rng.random_range(0..n) as usize);
     }
     // Two swaps may cancel out; evaluating the order again then is only a little work.
     individual.evaluated &= swaps == 0;
@@ -275,17 +259,9 @@ mod tests {
                 };
                 let outcome = solve(&config, &problem, 3, Budget::UNLIMITED, &()).unwrap();
                 assert_eq!(outcome.history.len(), 16);
+                assert!(outcome.history.iter().all(|event| event.incumbent <= event.cost));
                 assert!(
-                    outcome
-                        .history
-                        .iter()
-                        .all(|event| event.incumbent <= event.cost)
-                );
-                assert!(
-                    outcome
-                        .history
-                        .windows(2)
-                        .all(|pair| pair[1].incumbent <= pair[0].incumbent),
+                    outcome.history.windows(2).all(|pair| pair[1].incumbent <= pair[0].incumbent),
                     "{config:?}"
                 );
                 let cost = problem.objective.cost(&outcome.tree);
@@ -304,15 +280,10 @@ mod tests {
         let boxes = scatter(80);
         let problem = Problem { objective: Objective::GoldsmithSalmon, ..Problem::new(&boxes) };
         let config = Config { population: 1, generations: 50, mutation: 0.05, ..Config::default() };
-        let history = solve(&config, &problem, 3, Budget::UNLIMITED, &())
-            .unwrap()
-            .history;
+        let history = solve(&config, &problem, 3, Budget::UNLIMITED, &()).unwrap().history;
         assert!(history.last().unwrap().incumbent < history[0].cost);
         for count in [1, 2, 7] {
-            let population: Vec<Individual> = (0..count)
-                .map(f64::from)
-                .map(individual)
-                .collect();
+            let population: Vec<Individual> = (0..count).map(f64::from).map(individual).collect();
             assert_eq!(select(&population, &mut stream(1, 0)).len(), count as usize);
         }
     }
@@ -350,9 +321,7 @@ mod tests {
         let boxes = scatter(300);
         let problem = Problem { objective: Objective::GoldsmithSalmon, ..Problem::new(&boxes) };
         let config = Config { population: 20, generations: 40, ..Config::default() };
-        let history = solve(&config, &problem, 3, Budget::UNLIMITED, &())
-            .unwrap()
-            .history;
+        let history = solve(&config, &problem, 3, Budget::UNLIMITED, &()).unwrap().history;
         assert!(history.last().unwrap().incumbent < history[0].incumbent);
     }
 }

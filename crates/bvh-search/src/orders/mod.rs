@@ -47,10 +47,7 @@ impl<'p> Insertion<'p> {
         workspace: &mut Workspace,
         observer: &dyn Observer,
     ) -> Result<f64, InvalidOrder> {
-        watched(observer, |watch| {
-            self.config
-                .insert_watched(&self.scene, order, workspace, watch)
-        })
+        watched(observer, |watch| self.config.insert_watched(&self.scene, order, workspace, watch))
     }
 
     /// Returns the cost of the tree of one order, which must be a permutation of the objects;
@@ -81,8 +78,7 @@ impl<'p> Insertion<'p> {
     /// Builds the tree of one order; `None` if the observer cancels first.
     fn tree(&self, order: &[u32], observer: &dyn Observer) -> Option<Bvh> {
         let (mut workspace, mut tree) = Buffers::default();
-        self.insert(order, &mut workspace, observer)
-            .ok()?;
+        self.insert(order, &mut workspace, observer).ok()?;
         workspace.write(&mut tree);
         Some(tree)
     }

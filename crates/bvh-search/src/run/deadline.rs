@@ -38,9 +38,7 @@ impl Deadline {
     /// The elapsed fraction of the limit, 0 to 1.
     pub fn fraction(&self) -> f64 {
         // Zero elapsed over a limit of zero is NaN, and `f64::min` of NaN and 1 is 1.
-        self.elapsed()
-            .div_duration_f64(self.limit)
-            .min(1.0)
+        self.elapsed().div_duration_f64(self.limit).min(1.0)
     }
 }
 

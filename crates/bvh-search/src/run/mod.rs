@@ -134,11 +134,7 @@ impl<'a> Run<'a> {
     /// Keeps a tree that the search has built and does not improve. It becomes the outcome if it
     /// ends as the cheapest.
     pub fn keep_aside(&mut self, kept: Kept) {
-        if self
-            .aside
-            .as_ref()
-            .is_none_or(|aside| kept.cost < aside.cost)
-        {
+        if self.aside.as_ref().is_none_or(|aside| kept.cost < aside.cost) {
             self.aside = Some(kept);
         }
     }
@@ -228,9 +224,7 @@ impl<'a> Run<'a> {
     /// one before the first.
     pub fn evaluations_left(&self, work: u64) -> u64 {
         let left = self.left();
-        left.moves
-            .min(left.work.div_ceil(work.max(1)))
-            .max(u64::from(self.evaluations == 0))
+        left.moves.min(left.work.div_ceil(work.max(1))).max(u64::from(self.evaluations == 0))
     }
 }
 
@@ -301,9 +295,7 @@ pub fn solve_or_keep(
     };
     search.check()?;
     // Evaluate the known tree first: a cancelled search has no time for it at its end.
-    let known = problem
-        .known
-        .map(|tree| (problem.cost(tree), tree));
+    let known = problem.known.map(|tree| (problem.cost(tree), tree));
     // The first tree of a large scene takes seconds, which a search that is cancelled before it
     // begins does not need.
     let has_tree = known.is_some() || run.aside.is_some();

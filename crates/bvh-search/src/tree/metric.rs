@@ -112,11 +112,7 @@ impl Metric for Measured<'_> {
 
 /// Returns the total size of the boxes of all nodes, leaves included.
 fn of_all_nodes(metric: impl Metric, tree: &Bvh) -> f64 {
-    tree.nodes
-        .iter()
-        .map(|node| metric.of(&PackedAabb::from(&node.aabb)))
-        .collect::<Sum>()
-        .value()
+    tree.nodes.iter().map(|node| metric.of(&PackedAabb::from(&node.aabb))).collect::<Sum>().value()
 }
 
 /// Implements [`Search`](crate::Search) by the type's method `search_by`, which is generic over the

@@ -152,11 +152,7 @@ impl<M: Metric> Working<M> {
     /// [`area`](Self::area), recomputed. O(n).
     #[cfg(test)]
     pub fn internal_area(&self) -> f64 {
-        self.nodes
-            .iter()
-            .filter_map(|node| self.part(node))
-            .collect::<Sum>()
-            .value()
+        self.nodes.iter().filter_map(|node| self.part(node)).collect::<Sum>().value()
     }
 
     /// Returns the node's part of the tree's area; `None` if its kind has none.
@@ -277,10 +273,8 @@ impl<M: Metric> Working<M> {
     /// Adds a detached leaf with its parent node, so that it can be attached. The boxes are empty.
     pub fn push_spare(&mut self, object: u32) -> u32 {
         let leaf = self.nodes.len() as u32;
-        self.nodes
-            .push(Node { parent: leaf + 1, children: [NONE, object], ..Node::ANCHOR });
-        self.nodes
-            .push(Node { children: [leaf; 2], ..Node::ANCHOR });
+        self.nodes.push(Node { parent: leaf + 1, children: [NONE, object], ..Node::ANCHOR });
+        self.nodes.push(Node { children: [leaf; 2], ..Node::ANCHOR });
         leaf
     }
 
@@ -296,9 +290,7 @@ impl<M: Metric> Working<M> {
     /// The box around two nodes.
     #[inline(always)]
     pub fn union_of(&self, [left, right]: [u32; 2]) -> PackedAabb {
-        self.nodes[left as usize]
-            .aabb
-            .union(&self.nodes[right as usize].aabb)
+        self.nodes[left as usize].aabb.union(&self.nodes[right as usize].aabb)
     }
 
     /// Gives the inner node `index` these children and makes its box tight. Does not update its
@@ -308,9 +300,7 @@ impl<M: Metric> Working<M> {
     pub fn join(&mut self, index: u32, children: [u32; 2]) {
         let aabb = self.union_of(children);
         let area = self.metric.of(&aabb);
-        children
-            .into_iter()
-            .for_each(|child| self.write(child).parent = index);
+        children.into_iter().for_each(|child| self.write(child).parent = index);
         let node = self.write(index);
         let before = node.area;
         (node.children, node.aabb, node.area) = (children, aabb, area);

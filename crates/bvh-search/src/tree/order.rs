@@ -78,11 +78,7 @@ impl<M: Metric> Working<M> {
                 continue;
             }
             // The anchor has one child.
-            for child in node
-                .children
-                .iter_mut()
-                .filter(|child| **child != NONE)
-            {
+            for child in node.children.iter_mut().filter(|child| **child != NONE) {
                 *child = places[*child as usize];
             }
         }
@@ -90,11 +86,7 @@ impl<M: Metric> Working<M> {
         for start in (0..order.len()).step_by(at_once) {
             let end = order.len().min(start + at_once);
             chunk.clear();
-            chunk.extend(
-                order[start..end]
-                    .iter()
-                    .map(|&index| self.nodes[index as usize]),
-            );
+            chunk.extend(order[start..end].iter().map(|&index| self.nodes[index as usize]));
             let mut in_the_way = start;
             for place in start..end {
                 let free = order[place] as usize;
@@ -121,11 +113,8 @@ impl<M: Metric> Working<M> {
     #[inline(always)]
     pub fn visit_in_preorder(&self, mut visit: impl FnMut(&Node, u32, u32, usize)) {
         // Pending nodes: index, place of the parent, side.
-        let mut stack: Vec<(u32, u32, usize)> = self
-            .root()
-            .map(|root| (root, ANCHOR, 0))
-            .into_iter()
-            .collect();
+        let mut stack: Vec<(u32, u32, usize)> =
+            self.root().map(|root| (root, ANCHOR, 0)).into_iter().collect();
         let mut place = 0;
         while let Some((index, parent, side)) = stack.pop() {
             place += 1;

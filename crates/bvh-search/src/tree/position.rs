@@ -129,8 +129,7 @@ impl PositionSearch {
             }
             let node = &tree.nodes[index as usize];
             let joint = tree.metric().of(&node.aabb.union(item.0));
-            self.path
-                .push(Step { node: index, below, joint, growth: joint - node.area });
+            self.path.push(Step { node: index, below, joint, growth: joint - node.area });
             (below, index) = (index, node.parent);
         }
         let mut best = Position { sibling: NONE, cost: limit };
@@ -161,8 +160,7 @@ impl PositionSearch {
         let rest_area = tree.area(sibling);
         let joint = tree.area(parent);
         let mut index = tree.parent(parent);
-        self.path
-            .push(Step { node: sibling, below: NONE, joint, growth: joint - rest_area });
+        self.path.push(Step { node: sibling, below: NONE, joint, growth: joint - rest_area });
         let mut below = parent;
         while index != T::ABOVE {
             let area = tree.area(index);

@@ -48,12 +48,7 @@ impl<M: Metric> Working<M> {
             let area = self.metric.of(&aabb);
             (self.nodes[index].aabb, self.nodes[index].area) = (aabb, area);
         }
-        let area: Sum = self
-            .nodes
-            .iter()
-            .skip(1)
-            .filter_map(|node| self.part(node))
-            .collect();
+        let area: Sum = self.nodes.iter().skip(1).filter_map(|node| self.part(node)).collect();
         self.restart(area);
     }
 }

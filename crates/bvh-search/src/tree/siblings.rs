@@ -33,11 +33,7 @@ fn first(pair: u32) -> usize {
 impl Siblings {
     /// Wraps a tight binary tree of two objects or more, whose siblings are adjacent. O(n).
     pub fn new(tree: Bvh) -> Self {
-        debug_assert!(
-            tree.nodes
-                .iter()
-                .all(|node| node.is_leaf() || node.children().len() == 2)
-        );
+        debug_assert!(tree.nodes.iter().all(|node| node.is_leaf() || node.children().len() == 2));
         let pairs = tree.nodes.len() / 2;
         // Leaves write to a dummy slot, so the store needs no branch, which the processor could not
         // predict.
@@ -75,10 +71,8 @@ impl Siblings {
     fn tighten(&mut self, mut index: u32) -> u64 {
         let mut visits = 0;
         while index != NONE {
-            let [left, right] = self
-                .children(index)
-                .expect("an inner node")
-                .map(|child| self.node(child).aabb);
+            let [left, right] =
+                self.children(index).expect("an inner node").map(|child| self.node(child).aabb);
             visits += 1;
             let aabb = left.union(&right);
             let node = &mut self.tree.nodes[index as usize];
@@ -96,10 +90,7 @@ impl Siblings {
         let Self { mut tree, parents } = self;
         let PairOrder { sequence, late } = PairOrder::of(&parents);
         let mut places = vec![0; sequence.len()];
-        sequence
-            .iter()
-            .zip(0..)
-            .for_each(|(&from, to)| places[from as usize] = to);
+        sequence.iter().zip(0..).for_each(|(&from, to)| places[from as usize] = to);
         let moved = |mut node: Node| {
             let (NodeKind::Inner { first: before, .. } | NodeKind::Leaf { first: before, .. }) =
                 node.kind();
@@ -111,11 +102,8 @@ impl Siblings {
         // Reorder in place: late pairs wait in a copy, and all other pairs move towards the front
         // or stay, so no unread pair is overwritten.
         let nodes = tree.nodes.as_mut_slice();
-        let aside: Vec<Node> = late
-            .iter()
-            .flat_map(|&pair| &nodes[first(pair)..][..2])
-            .copied()
-            .collect();
+        let aside: Vec<Node> =
+            late.iter().flat_map(|&pair| &nodes[first(pair)..][..2]).copied().collect();
         let mut aside = aside.chunks_exact(2);
         let mut next = 0;
         nodes[0] = moved(nodes[0]);
@@ -240,9 +228,7 @@ mod tests {
     fn starts(boxes: &[Aabb]) -> [Bvh; 2] {
         [
             ploc::Config::default().build(boxes).unwrap(),
-            muller_fellner::Config::default()
-                .build(boxes)
-                .unwrap(),
+            muller_fellner::Config::default().build(boxes).unwrap(),
         ]
     }
 

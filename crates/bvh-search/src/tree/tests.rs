@@ -35,10 +35,7 @@ fn assert_tight(tree: &Working, boxes: &[Aabb]) {
         let node = &tree.nodes[index as usize];
         assert!(
             node.is_leaf()
-                || node
-                    .children
-                    .iter()
-                    .all(|&child| tree.nodes[child as usize].parent == index)
+                || node.children.iter().all(|&child| tree.nodes[child as usize].parent == index)
         );
         assert_eq!(node.area, node.aabb.half_area());
     }
@@ -90,12 +87,7 @@ fn conversion_there_and_back_changes_nothing() {
         let mut sorted = tree.clone();
         for _ in 0..2 {
             sorted.sort_in_preorder();
-            assert!(
-                sorted
-                    .preorder()
-                    .into_iter()
-                    .eq(1..sorted.nodes.len() as u32)
-            );
+            assert!(sorted.preorder().into_iter().eq(1..sorted.nodes.len() as u32));
             assert_eq!(sorted.to_bvh(), tree.to_bvh());
             assert!((sorted.area() - tree.area()).abs() <= 1e-12 * tree.area());
         }
@@ -214,9 +206,7 @@ fn assert_best_places(mut tree: Working<impl Metric>) {
         }
         let below = least * (1.0 - 1e-9);
         assert!(
-            search
-                .position_of_detached(&tree, Scope::ALL, (&aabb, area), sibling, below)
-                .is_none()
+            search.position_of_detached(&tree, Scope::ALL, (&aabb, area), sibling, below).is_none()
         );
         assert!((found.map_or(current, |place| place.cost) - least).abs() <= 1e-12 * least);
         let place = found.map_or(sibling, |place| place.sibling);
@@ -259,19 +249,9 @@ fn the_best_place_in_a_region_is_the_best_there_and_costs_what_it_adds() {
                 || tree.nodes[root as usize].aabb.union(&aabb) == tree.nodes[root as usize].aabb
         );
         let cost = |place| tree.clone().attach(node, place).0;
-        let [least, everywhere] = [
-            tree.preorder()
-                .into_iter()
-                .filter(inside)
-                .collect(),
-            tree.preorder(),
-        ]
-        .map(|places: Vec<u32>| {
-            places
-                .into_iter()
-                .map(cost)
-                .fold(f64::INFINITY, f64::min)
-        });
+        let [least, everywhere] =
+            [tree.preorder().into_iter().filter(inside).collect(), tree.preorder()]
+                .map(|places: Vec<u32>| places.into_iter().map(cost).fold(f64::INFINITY, f64::min));
         for first in [sibling, NONE] {
             let place = search
                 .position_of_detached(&tree, region, (&aabb, area), first, f64::INFINITY)

@@ -15,9 +15,7 @@ fn scene() -> Vec<Aabb> {
 #[test]
 fn a_bake_of_a_moment_beats_the_greedy_tree_and_ends_in_time() {
     let boxes = scene();
-    let greedy = muller_fellner::Config::default()
-        .build(&boxes)
-        .unwrap();
+    let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
     let start = Instant::now();
     let baked = bake(&boxes, Duration::from_millis(400)).unwrap();
     // Other tests share the machine, hence the generous limit.
@@ -35,22 +33,9 @@ fn a_bake_of_a_moment_beats_the_greedy_tree_and_ends_in_time() {
 fn a_time_of_zero_still_gives_a_tree() {
     let boxes = scene();
     validate(&bake(&boxes, Duration::ZERO).unwrap().tree, &boxes).unwrap();
-    let greedy = muller_fellner::Config::default()
-        .build(&boxes)
-        .unwrap();
-    assert!(
-        improve(&greedy, &boxes, Duration::ZERO)
-            .unwrap()
-            .cost
-            <= cost::internal_area(&greedy)
-    );
-    assert!(
-        bake(&[], Duration::ZERO)
-            .unwrap()
-            .tree
-            .nodes
-            .is_empty()
-    );
+    let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
+    assert!(improve(&greedy, &boxes, Duration::ZERO).unwrap().cost <= cost::internal_area(&greedy));
+    assert!(bake(&[], Duration::ZERO).unwrap().tree.nodes.is_empty());
 }
 
 #[test]
@@ -96,9 +81,8 @@ fn a_tree_with_its_objects_is_improved_saved_and_loaded_divided_or_whole() {
 #[test]
 fn a_tree_with_its_objects_follows_a_seed_a_budget_recorded_rays_and_moved_objects() {
     let at = |x: f32, z: f32| [[x, 0.0, z], [x + 1.5, 0.2, z], [x, 1.0, z + 0.1]];
-    let triangles: Vec<Triangle> = (0..400u16)
-        .map(|i| Triangle::from(at(f32::from(i % 20), f32::from(i / 20))))
-        .collect();
+    let triangles: Vec<Triangle> =
+        (0..400u16).map(|i| Triangle::from(at(f32::from(i % 20), f32::from(i / 20)))).collect();
     let shapes =
         |triangles: &[Triangle]| Objects::Shapes(Primitives::Triangles(triangles.to_vec()));
     let rays: Vec<Segment> = (0..300u16)

@@ -65,9 +65,7 @@ fn a_cancelled_search_returns_the_tree_of_its_caller_without_an_evaluation() {
     let boxes = boxes(300);
     let judged = Judged::default();
     let problem = Problem { judge: Some(&judged), ..Problem::new(&boxes) };
-    let tree = median_cut::Config::default()
-        .build(&boxes)
-        .unwrap();
+    let tree = median_cut::Config::default().build(&boxes).unwrap();
     for method in Method::all() {
         let kept = Kept { tree: tree.clone(), cost: 7.0 };
         let polls = Polls { polled: 0.into(), until: 0 };
@@ -124,9 +122,7 @@ fn the_observer_is_polled_between_moves_however_long_they_are() {
 #[test]
 fn numbers_that_no_poll_could_interrupt_are_rejected() {
     fn error(method: Method, boxes: &[Aabb]) -> String {
-        solve(&method, &Problem::new(boxes), 1, Budget::UNLIMITED, &())
-            .unwrap_err()
-            .to_string()
+        solve(&method, &Problem::new(boxes), 1, Budget::UNLIMITED, &()).unwrap_err().to_string()
     }
     let tournament = rebuild::Config { tournament: 1 << 31, ..Default::default() };
     assert_eq!(
@@ -146,21 +142,15 @@ fn numbers_that_no_poll_could_interrupt_are_rejected() {
 
 /// Methods whose first tree is a construction over all objects.
 fn constructing() -> impl Iterator<Item = Method> {
-    Method::all()
-        .into_iter()
-        .filter(|method| method.name() != "exact")
+    Method::all().into_iter().filter(|method| method.name() != "exact")
 }
 
 #[test]
 fn a_search_that_is_cancelled_during_its_first_construction_returns_the_known_tree_or_that_of_the_fastest_builder()
  {
     let boxes = boxes(100_000);
-    let known = median_cut::Config::default()
-        .build(&boxes)
-        .unwrap();
-    let fastest = ploc::Config { radius: 1, near_rounds: 0 }
-        .build(&boxes)
-        .unwrap();
+    let known = median_cut::Config::default().build(&boxes).unwrap();
+    let fastest = ploc::Config { radius: 1, near_rounds: 0 }.build(&boxes).unwrap();
     for method in constructing() {
         for (known, expected) in [(Some(&known), &known), (None, &fastest)] {
             let polls = Polls { polled: 0.into(), until: 0 };

@@ -22,9 +22,7 @@ const METHODS: [&str; 8] = [
 
 /// The methods under test with their default parameters.
 fn methods() -> impl Iterator<Item = Method> {
-    Method::all()
-        .into_iter()
-        .filter(|method| METHODS.contains(&method.name()))
+    Method::all().into_iter().filter(|method| METHODS.contains(&method.name()))
 }
 
 /// Boxes of very different sizes in a unit cube.
@@ -60,17 +58,10 @@ fn run(method: &Method, boxes: &[Aabb], max_work: u64) -> Outcome {
 #[test]
 fn every_method_improves_on_its_start_and_the_best_most() {
     let boxes = scatter(2000, 1);
-    let start = cost::internal_area(
-        &reinsertion::Config::default()
-            .start
-            .build(&boxes)
-            .unwrap(),
-    );
+    let start = cost::internal_area(&reinsertion::Config::default().start.build(&boxes).unwrap());
     let [reinsertion, rotated, treelets, single, iterated, rebuilt, annealed, best] =
         METHODS.map(|name| {
-            let method = methods()
-                .find(|method| method.name() == name)
-                .unwrap();
+            let method = methods().find(|method| method.name() == name).unwrap();
             let outcome = run(&method, &boxes, 8_000_000);
             assert_eq!(outcome.history[0].cost, start);
             outcome.cost
@@ -85,10 +76,7 @@ fn every_method_improves_on_its_start_and_the_best_most() {
 }
 
 fn run_on_threads(threads: usize, config: best::Config, boxes: &[Aabb], work: u64) -> Outcome {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| run(&Method::Best(config), boxes, work))
 }
 
@@ -240,24 +228,14 @@ fn the_deepest_tree_can_be_optimised() {
 #[test]
 fn leaves_of_several_objects_are_kept_and_other_trees_are_rejected_by_name() {
     let boxes = scatter(400, 6);
-    let pairs: Vec<Aabb> = boxes
-        .chunks(2)
-        .map(|pair| pair[0].union(&pair[1]))
-        .collect();
-    let mut tree = reinsertion::Config::default()
-        .start
-        .build(&pairs)
-        .unwrap();
+    let pairs: Vec<Aabb> = boxes.chunks(2).map(|pair| pair[0].union(&pair[1])).collect();
+    let mut tree = reinsertion::Config::default().start.build(&pairs).unwrap();
     for node in &mut tree.nodes {
         if node.is_leaf() {
             *node = Node::leaf(node.aabb, 2 * node.prims().start as u32, 2);
         }
     }
-    tree.prim_ids = tree
-        .prim_ids
-        .iter()
-        .flat_map(|&pair| [2 * pair, 2 * pair + 1])
-        .collect();
+    tree.prim_ids = tree.prim_ids.iter().flat_map(|&pair| [2 * pair, 2 * pair + 1]).collect();
     let config = best::Config::default();
     let outcome = optimize(&tree, &Problem::new(&boxes), &config, 1, work(1_000_000), &()).unwrap();
     validate(&outcome.tree, &boxes).unwrap();
@@ -269,8 +247,7 @@ fn leaves_of_several_objects_are_kept_and_other_trees_are_rejected_by_name() {
         optimize(tree, &Problem::new(boxes), &config, 1, work(0), &()).unwrap_err()
     };
     let mut flat = Bvh { nodes: vec![Node::inner(Aabb::EMPTY, 1, 3)], prim_ids: vec![0, 1, 2] };
-    flat.nodes
-        .extend((0..3).map(|i| Node::leaf(Aabb::EMPTY, i, 1)));
+    flat.nodes.extend((0..3).map(|i| Node::leaf(Aabb::EMPTY, i, 1)));
     flat.refit(&boxes[..3]);
     assert_eq!(error(&flat, &boxes[..3]), SearchError::NotBinary { node: 0, children: 3 });
     assert!(matches!(error(&flat, &boxes[..2]), SearchError::Invalid(_)));
@@ -280,9 +257,7 @@ fn leaves_of_several_objects_are_kept_and_other_trees_are_rejected_by_name() {
 fn parameters_outside_their_range_are_named() {
     let problem = Problem::new(&[]);
     let error = |method: Method| {
-        solve(&method, &problem, 1, Budget::UNLIMITED, &())
-            .unwrap_err()
-            .to_string()
+        solve(&method, &problem, 1, Budget::UNLIMITED, &()).unwrap_err().to_string()
     };
     let cold = ruin_recreate::Config { cold: 1.0, ..Default::default() };
     assert_eq!(error(Method::RuinRecreate(cold)), "cold is 1; accepted: above 0, not above hot");

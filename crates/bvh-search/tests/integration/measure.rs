@@ -37,15 +37,12 @@ fn boxes(n: u32) -> Vec<Aabb> {
 
 /// All methods; `best` without its search by area within milliseconds.
 fn methods() -> impl Iterator<Item = Method> {
-    Method::all()
-        .into_iter()
-        .filter(|method| method.name() != "exact")
-        .map(|method| match method {
-            Method::Best(config) => {
-                Method::Best(best::Config { start: Some(Start::default()), ..config })
-            }
-            other => other,
-        })
+    Method::all().into_iter().filter(|method| method.name() != "exact").map(|method| match method {
+        Method::Best(config) => {
+            Method::Best(best::Config { start: Some(Start::default()), ..config })
+        }
+        other => other,
+    })
 }
 
 fn run(method: &Method, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Outcome {
@@ -104,9 +101,7 @@ fn builders_and_searches_use_the_measure_and_report_every_objective_by_it() {
 #[test]
 fn local_searches_begin_with_a_tree_by_the_measure() {
     let boxes = boxes(700);
-    let begun = Start::default()
-        .build_by(&boxes, Some(&AlongX))
-        .unwrap();
+    let begun = Start::default().build_by(&boxes, Some(&AlongX)).unwrap();
     let by_area = Start::default().build(&boxes).unwrap();
     let [begun, by_area] = [begun, by_area].map(|tree| cost::internal_measure(&tree, &AlongX));
     assert!(begun < 0.99 * by_area, "{begun} {by_area}");

@@ -35,9 +35,7 @@ fn instances(count: usize) -> Vec<Vec<Aabb>> {
             nearest.truncate(n);
             nearest
         } else {
-            (0..n)
-                .map(|k| all[draw(number * 16 + k)])
-                .collect()
+            (0..n).map(|k| all[draw(number * 16 + k)]).collect()
         }
     };
     (0..count).map(instance).collect()
@@ -51,9 +49,8 @@ fn no_method_goes_below_the_optimum_the_bound_neither_above_and_the_best_reaches
     let mut reached = 0;
     for (number, boxes) in instances.iter().enumerate() {
         let problem = Problem::new(boxes);
-        let optimum = solve(&exact::Config::default(), &problem, 1, Budget::UNLIMITED, &())
-            .unwrap()
-            .cost;
+        let optimum =
+            solve(&exact::Config::default(), &problem, 1, Budget::UNLIMITED, &()).unwrap().cost;
         assert!(lower_bound::internal_area(boxes, 8, &()).unwrap() <= optimum, "instance {number}");
         for method in Method::all() {
             let outcome = solve(&method, &problem, 1, budget, &()).unwrap();

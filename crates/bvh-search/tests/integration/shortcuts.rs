@@ -16,9 +16,7 @@ fn number(i: usize, salt: usize) -> f32 {
 }
 
 fn scattered(n: usize) -> Vec<Aabb> {
-    (0..n)
-        .map(|i| cube([number(i, 1), number(i, 2), number(i, 3)], number(i, 4) / 9.0))
-        .collect()
+    (0..n).map(|i| cube([number(i, 1), number(i, 2), number(i, 3)], number(i, 4) / 9.0)).collect()
 }
 
 /// Equal boxes; nested boxes; segments along each axis, in and out of order.
@@ -88,10 +86,8 @@ fn a_tiny_scene_gets_the_optimum_instead_of_a_search() {
 #[test]
 fn no_tree_is_below_the_bound_and_stiff_scenes_meet_it() {
     for n in 2..=9 {
-        for (boxes, met) in stiff(n)
-            .into_iter()
-            .map(|boxes| (boxes, true))
-            .chain([(scattered(n), false)])
+        for (boxes, met) in
+            stiff(n).into_iter().map(|boxes| (boxes, true)).chain([(scattered(n), false)])
         {
             let exact =
                 solve(&exact::Config {}, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap();
@@ -107,20 +103,14 @@ fn no_tree_is_below_the_bound_and_stiff_scenes_meet_it() {
 fn facts_report_the_shortcuts_of_a_scene() {
     fn shortcuts(boxes: &[Aabb]) -> Vec<Shortcut> {
         let found = Facts::of(boxes).unwrap().shortcuts();
-        found
-            .into_iter()
-            .map(|(shortcut, _)| shortcut)
-            .collect()
+        found.into_iter().map(|(shortcut, _)| shortcut).collect()
     }
     assert_eq!(shortcuts(&scattered(1)), []);
     assert_eq!(shortcuts(&scattered(500)), [Shortcut::BoundMet]);
     assert_eq!(shortcuts(&scattered(12)), [Shortcut::Tiny, Shortcut::BoundMet]);
     let line = &stiff(50)[3];
     assert_eq!(shortcuts(line), [Shortcut::Flat, Shortcut::BoundMet]);
-    let repeated: Vec<Aabb> = scattered(5)
-        .into_iter()
-        .flat_map(|b| [b; 10])
-        .collect();
+    let repeated: Vec<Aabb> = scattered(5).into_iter().flat_map(|b| [b; 10]).collect();
     assert_eq!(Facts::of(&repeated).unwrap().repeated, 45);
 }
 
@@ -135,15 +125,10 @@ fn a_flat_axis_that_orders_like_no_other_may_have_the_best_split() {
         internal_area(&Config::default().build(boxes).unwrap())
     }
     let positions = (0..9u8).map(|i| 2.0 * f32::from(i));
-    let (row, column): (Vec<_>, Vec<_>) = positions
-        .map(|position| (tile(position, 8.0), tile(8.0, position)))
-        .unzip();
+    let (row, column): (Vec<_>, Vec<_>) =
+        positions.map(|position| (tile(position, 8.0), tile(8.0, position))).unzip();
     let one_by_one: Vec<Aabb> = row.iter().chain(&column).copied().collect();
-    let interleaved: Vec<Aabb> = row
-        .iter()
-        .zip(&column)
-        .flat_map(|(a, b)| [*a, *b])
-        .collect();
+    let interleaved: Vec<Aabb> = row.iter().zip(&column).flat_map(|(a, b)| [*a, *b]).collect();
     assert!(cost(&one_by_one) < cost(&interleaved));
 }
 
@@ -153,12 +138,9 @@ fn a_flat_axis_that_orders_like_no_other_may_have_the_best_split() {
 fn a_tie_may_part_equal_boxes_so_that_merging_them_would_change_the_cost() {
     let large = cube([0.0; 3], 4.0);
     let small = cube([1.0; 3], 2.0);
-    let apart = Config::default()
-        .build(&[large, small, small, small, small, large])
-        .unwrap();
-    let merged = Config::default()
-        .build_weighted(&[large, small, large], &[1.0, 4.0, 1.0])
-        .unwrap();
+    let apart = Config::default().build(&[large, small, small, small, small, large]).unwrap();
+    let merged =
+        Config::default().build_weighted(&[large, small, large], &[1.0, 4.0, 1.0]).unwrap();
     let expanded = internal_area(&merged) + 3.0 * small.half_area();
     assert_eq!(internal_area(&apart), 3.0 * large.half_area() + 2.0 * small.half_area());
     assert_eq!(expanded, 2.0 * large.half_area() + 3.0 * small.half_area());

@@ -97,9 +97,7 @@ fn check_built(boxes: &[Aabb], seed: u64, budget: Budget) {
     }
     let kd_tree = kd_tree::Config::default().build(boxes).unwrap();
     assert!(kd_tree.references() >= kd_tree.cells().min(1));
-    let greedy = muller_fellner::Config::default()
-        .build(boxes)
-        .unwrap();
+    let greedy = muller_fellner::Config::default().build(boxes).unwrap();
     let before = cost::internal_area(&greedy);
     let merged = collapse_leaves(&greedy, &SahConstants::default());
     for tree in [&greedy, &merged] {

@@ -48,10 +48,8 @@ pub fn rays(bytes: &[u8]) {
     }
     let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
     // Spheres from the same bits test the traversal with another object test.
-    let spheres: Vec<Sphere> = triangles
-        .iter()
-        .map(|t| Sphere::new(t.0[0] / 4.0, t.0[1].x.abs() / 4.0))
-        .collect();
+    let spheres: Vec<Sphere> =
+        triangles.iter().map(|t| Sphere::new(t.0[0] / 4.0, t.0[1].x.abs() / 4.0)).collect();
     let around: Vec<Aabb> = spheres.iter().map(Sphere::aabb).collect();
     for ray in &rays {
         check_trees(&boxes, ray, |id, t_max| {

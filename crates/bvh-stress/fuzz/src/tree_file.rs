@@ -16,11 +16,7 @@ pub fn tree_file(bytes: &[u8]) {
     for (line, part) in held.iter_mut().zip(bytes.chunks(64)) {
         line.0[..part.len()].copy_from_slice(part);
     }
-    let mut flat: Vec<u8> = held
-        .iter()
-        .flat_map(|line| line.0)
-        .take(bytes.len())
-        .collect();
+    let mut flat: Vec<u8> = held.iter().flat_map(|line| line.0).take(bytes.len()).collect();
     if mode & 1 == 1 && flat.len() >= Header::BYTES {
         correct_header(&mut flat, mode & 2 == 2, mode & 4 == 4);
         seal(&mut flat);
@@ -81,9 +77,7 @@ fn opened(bytes: &[u8]) {
     if let Ok(Some(visits)) = file.visits() {
         assert!(
             visits.len() == file.header().nodes
-                && visits
-                    .iter()
-                    .all(|part| (0.0..=1.0).contains(part))
+                && visits.iter().all(|part| (0.0..=1.0).contains(part))
         );
     }
     assert_eq!([file.tree().is_ok(), file.view().is_ok()], [file.tree().is_ok(); 2]);
@@ -133,15 +127,10 @@ fn measured(mut tree: Bvh, objects: usize) {
     assert!(cost::over_root_area(&tree, costs[0]).is_nan() || tree.depth() <= tree.nodes.len());
     let merged = collapse_leaves(&tree, &constants);
     assert_eq!(merged.prim_ids.len(), objects);
-    let boxes: Vec<Aabb> = (0..objects)
-        .map(|at| Aabb::around([Vec3::splat(at as f32)]))
-        .collect();
+    let boxes: Vec<Aabb> = (0..objects).map(|at| Aabb::around([Vec3::splat(at as f32)])).collect();
     let _ = validate(&tree, &boxes);
     tree.refit(&boxes);
     assert_eq!(validate(&tree, &boxes), Ok(()));
-    let triangles: Vec<Triangle> = boxes
-        .iter()
-        .map(|b| Triangle([b.min; 3]))
-        .collect();
+    let triangles: Vec<Triangle> = boxes.iter().map(|b| Triangle([b.min; 3])).collect();
     assert!(bvh_core::WideBvh::new(&tree, &triangles).is_ok());
 }

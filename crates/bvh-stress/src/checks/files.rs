@@ -11,10 +11,7 @@ use std::path::Path;
 /// S17: degenerate triangles are never hit, and the reader counts them.
 pub fn degenerate_are_counted() -> Verdict {
     let triangles = stiff::degenerate(60);
-    let degenerate = triangles
-        .iter()
-        .filter(|triangle| triangle.is_degenerate())
-        .count();
+    let degenerate = triangles.iter().filter(|triangle| triangle.is_degenerate()).count();
     ensure!(degenerate == 30, "{degenerate} of 60 are degenerate");
     for ray in tracing::rays(&triangles, 2000, 17) {
         let prepared = PreparedRay::new(&ray);
@@ -87,9 +84,7 @@ pub fn files_as_people_write_them() -> Verdict {
 /// version, endianness or scene.
 pub fn damaged_tree_files() -> Verdict {
     let boxes = stiff::boxes(&stiff::uniform(12));
-    let tree = muller_fellner::Config::default()
-        .build(&boxes)
-        .map_err(Broken::case)?;
+    let tree = muller_fellner::Config::default().build(&boxes).map_err(Broken::case)?;
     let whole = file::save(&tree, &boxes, &file::Origin::default()).map_err(Broken::case)?;
     let is_rejected = |bytes: &[u8]| file::load(bytes, &boxes).is_err();
     ensure!(
@@ -105,11 +100,7 @@ pub fn damaged_tree_files() -> Verdict {
     for length in 0..whole.len() {
         ensure!(is_rejected(&whole[..length]), "{length} bytes are enough");
     }
-    let reversed: Vec<u8> = whole
-        .chunks(4)
-        .flat_map(|word| word.iter().rev())
-        .copied()
-        .collect();
+    let reversed: Vec<u8> = whole.chunks(4).flat_map(|word| word.iter().rev()).copied().collect();
     ensure!(is_rejected(&reversed), "another endianness is accepted");
     let mut others = boxes.clone();
     others[3].max.x = others[3].max.x.next_up();

@@ -45,10 +45,7 @@ pub fn scaled_scenes(n: usize) -> [Vec<Aabb>; 5] {
 
 /// Flattens boxes along the axes that are 0 in `axes`.
 fn projected(boxes: &[Aabb], axes: Vec3) -> Vec<Aabb> {
-    boxes
-        .iter()
-        .map(|aabb| Aabb { min: aabb.min * axes, max: aabb.max * axes })
-        .collect()
+    boxes.iter().map(|aabb| Aabb { min: aabb.min * axes, max: aabb.max * axes }).collect()
 }
 
 /// S21: P5 holds for every k from -120 to 120 on five scenes.
@@ -129,11 +126,7 @@ pub fn genetic_edges(_: &Method) -> Verdict {
         let outcome = solved(&config, &boxes, 3, Budget::UNLIMITED)?;
         // An order that is no permutation would give an invalid tree.
         check_outcome(&boxes, &outcome)?;
-        let incumbents: Vec<f64> = outcome
-            .history
-            .iter()
-            .map(|event| event.incumbent)
-            .collect();
+        let incumbents: Vec<f64> = outcome.history.iter().map(|event| event.incumbent).collect();
         ensure!(incumbents.is_sorted_by(|a, b| a >= b), "the best was lost");
         ensure!(incumbents.last() == Some(&outcome.cost), "the best was not returned");
     }
@@ -155,9 +148,7 @@ pub fn genetic_edges(_: &Method) -> Verdict {
 /// than the number of candidates does no harm.
 pub fn grasp_edges(_: &Method) -> Verdict {
     let boxes = boxes(150);
-    let greedy = muller_fellner::Config::default()
-        .build(&boxes)
-        .map_err(Broken::case)?;
+    let greedy = muller_fellner::Config::default().build(&boxes).map_err(Broken::case)?;
     for (candidates, noise, equal) in [
         (Candidates::AxisBest, Some(0.0), true),
         (Candidates::KBest(5), Some(0.0), true),
@@ -199,9 +190,7 @@ pub fn insertion_keeps_its_cost() -> Verdict {
         let mut tree = Default::default();
         let order: Vec<u32> = (0..boxes.len() as u32).collect();
         let config = goldsmith_salmon::Config::default();
-        let kept = config
-            .insert_all(&scene, &order, &mut workspace)
-            .map_err(Broken::case)?;
+        let kept = config.insert_all(&scene, &order, &mut workspace).map_err(Broken::case)?;
         workspace.write(&mut tree);
         let recomputed = cost::goldsmith_salmon(&tree);
         largest = largest.max((kept - recomputed).abs() / recomputed);
@@ -226,12 +215,7 @@ pub fn above_the_optimum(method: &Method) -> Verdict {
             let optimum = solved(&exact, &boxes, 1, Budget::UNLIMITED)?.cost;
             let outcome = run(method, &boxes, 2000)?;
             check_outcome(&boxes, &outcome)?;
-            if outcome
-                .tree
-                .nodes
-                .iter()
-                .any(|node| node.children().len() > 2)
-            {
+            if outcome.tree.nodes.iter().any(|node| node.children().len() > 2) {
                 return Ok("wide nodes: another class of trees".into());
             }
             // Only binary trees are in the class over which the optimum is exact.

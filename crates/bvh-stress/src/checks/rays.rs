@@ -75,13 +75,11 @@ pub fn denormal_distances() -> Verdict {
             .iter()
             .filter(|ray| Accelerator::new(objects, Structure::Brute).any_hit(ray))
             .count();
-        tracing::TRAVERSALS
-            .iter()
-            .try_for_each(|(name, traversal)| {
-                tracing::check(*traversal, objects, rays)
-                    .map(drop)
-                    .map_err(|broken| broken.within(name))
-            })
+        tracing::TRAVERSALS.iter().try_for_each(|(name, traversal)| {
+            tracing::check(*traversal, objects, rays)
+                .map(drop)
+                .map_err(|broken| broken.within(name))
+        })
     };
     let facing =
         Triangle([[-1.0, -1.0, 1e-30], [3.0, -1.0, 1e-30], [-1.0, 3.0, 1e-30]].map(Vec3::from));
@@ -94,10 +92,7 @@ pub fn denormal_distances() -> Verdict {
             .map(|triangle| Triangle(triangle.0.map(|p| p * scale)))
             .collect();
         let mut rays = Vec::new();
-        for (ray, attempt) in tracing::rays(&triangles, 400, 22)
-            .iter()
-            .zip(0usize..)
-        {
+        for (ray, attempt) in tracing::rays(&triangles, 400, 22).iter().zip(0usize..) {
             let length = [1.0, 1e20, 1e25, 1e30][attempt % 4] / ray.direction().abs().max_element();
             let t_max = [0.0, f32::from_bits(1), 1e-40, 1e-38, f32::INFINITY][attempt % 5];
             rays.extend(Ray::new(ray.origin(), ray.direction() * length, 0.0, t_max));
@@ -113,9 +108,7 @@ pub fn denormal_distances() -> Verdict {
 pub fn estimates_converge() -> Verdict {
     let primitives = Primitives::Triangles(stiff::uniform(500));
     let boxes = primitives.boxes();
-    let tree = muller_fellner::Config::default()
-        .build(&boxes)
-        .map_err(Broken::case)?;
+    let tree = muller_fellner::Config::default().build(&boxes).map_err(Broken::case)?;
     validate(&tree, &boxes).map_err(Broken::case)?;
     let measure = |count, seed| {
         let rays = RandomRays { family: Family::Inside, query: Query::Any, count };
@@ -138,9 +131,7 @@ pub fn estimates_converge() -> Verdict {
     }
     let ratios = [errors[0] / errors[1], errors[1] / errors[2]];
     ensure!(
-        ratios
-            .iter()
-            .all(|ratio| (ratio - 2.0).abs() < 0.15),
+        ratios.iter().all(|ratio| (ratio - 2.0).abs() < 0.15),
         "standard errors fall by {ratios:?}"
     );
     // Fewer than 51 of 60 would happen once in a thousand times.

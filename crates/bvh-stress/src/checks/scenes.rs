@@ -20,10 +20,7 @@ fn is_greedy(method: &Method) -> bool {
 
 /// Returns ⌈log₂ n⌉.
 fn levels(objects: usize) -> usize {
-    objects
-        .max(1)
-        .next_power_of_two()
-        .trailing_zeros() as usize
+    objects.max(1).next_power_of_two().trailing_zeros() as usize
 }
 
 /// S01: an empty tree has no node and no cost.
@@ -54,12 +51,7 @@ pub fn balanced(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
     }
     ensure!(depth <= levels(boxes.len()) + 1, "depth {depth} over {} equal boxes", boxes.len());
     if let Method::MullerFellner(_) = method {
-        let by_index = outcome
-            .tree
-            .prim_ids
-            .iter()
-            .zip(0..)
-            .all(|(&id, at)| id == at);
+        let by_index = outcome.tree.prim_ids.iter().zip(0..).all(|(&id, at)| id == at);
         ensure!(by_index, "equal boxes are not in the order of their indices");
     }
     Ok(format!("⌈log2 n⌉ = {}", levels(boxes.len())))
@@ -113,20 +105,14 @@ pub fn teapot_is_isolated(method: &Method, boxes: &[Aabb], outcome: &Outcome) ->
     // The teapot's node is on the path to the child that holds most of it.
     while let Some(node) = at {
         let below = objects_below(tree, node);
-        let inside = below
-            .iter()
-            .filter(|&&id| id as usize >= STADIUM)
-            .count();
+        let inside = below.iter().filter(|&&id| id as usize >= STADIUM).count();
         if inside == below.len() {
             ensure!(inside == teapot, "only {inside} of {teapot} together below level {level}");
             ensure!(level <= 8, "isolated at level {level} only");
             return Ok(format!("isolated at level {level}"));
         }
         at = tree.nodes[node].children().max_by_key(|&child| {
-            objects_below(tree, child)
-                .iter()
-                .filter(|&&id| id as usize >= STADIUM)
-                .count()
+            objects_below(tree, child).iter().filter(|&&id| id as usize >= STADIUM).count()
         });
         level += 1;
     }
@@ -147,12 +133,7 @@ fn objects_below(tree: &Bvh, node: usize) -> Vec<u32> {
 /// S28: reports the costs that compare binary trees with wider ones.
 pub fn both_costs(_: &Method, _: &[Aabb], outcome: &Outcome) -> Verdict {
     let tree = &outcome.tree;
-    let widest = tree
-        .nodes
-        .iter()
-        .map(|node| node.children().len())
-        .max()
-        .unwrap_or(0);
+    let widest = tree.nodes.iter().map(|node| node.children().len()).max().unwrap_or(0);
     let area = cost::over_root_area(tree, outcome.cost);
     let gs = cost::goldsmith_salmon(tree);
     Ok(format!("{area:.3} root areas, Goldsmith–Salmon {gs:.3}, up to {widest} children"))
@@ -195,11 +176,7 @@ pub fn order_does_not_matter(method: &Method, boxes: &[Aabb], outcome: &Outcome)
     }
     let (permuted, order) = shuffled(boxes, 33);
     let mut other = run(method, &permuted, 0)?;
-    other
-        .tree
-        .prim_ids
-        .iter_mut()
-        .for_each(|id| *id = order[*id as usize]);
+    other.tree.prim_ids.iter_mut().for_each(|id| *id = order[*id as usize]);
     let same = same_topology(&other.tree, &outcome.tree) && other.cost == outcome.cost;
     ensure!(same, "another order of the objects: cost {} and {}", other.cost, outcome.cost);
     Ok(String::new())

@@ -17,16 +17,10 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// Returns the contents of a folder's files, in the order of their names.
 fn files(folder: &Path) -> Vec<Vec<u8>> {
-    let mut paths: Vec<_> = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .collect();
+    let mut paths: Vec<_> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     paths.sort();
-    paths
-        .into_iter()
-        .filter(|path| path.is_file())
-        .map(|path| fs::read(path).unwrap())
-        .collect()
+    paths.into_iter().filter(|path| path.is_file()).map(|path| fs::read(path).unwrap()).collect()
 }
 
 /// Makes one to eight changes: bits, bytes, special words, numbers, and pieces that are cut,
@@ -94,10 +88,7 @@ fn mutated(inputs: &[Vec<u8>], rng: &mut Stream) -> Vec<u8> {
 
 /// Runs a target on the kept inputs and on `count` mutations, or for `FUZZ_SECONDS`.
 fn run(name: &str, count: usize) {
-    let (_, target) = targets::TARGETS
-        .into_iter()
-        .find(|(known, _)| *known == name)
-        .unwrap();
+    let (_, target) = targets::TARGETS.into_iter().find(|(known, _)| *known == name).unwrap();
     let check = |bytes: &[u8]| {
         if let Err(panic) = catch_unwind(AssertUnwindSafe(|| target(bytes))) {
             let input = bytes.escape_ascii();
@@ -105,21 +96,15 @@ fn run(name: &str, count: usize) {
             resume_unwind(panic);
         }
     };
-    let corpus = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("fuzz/corpus")
-        .join(name);
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(name);
     let inputs = [files(&corpus), vec![Vec::new()]].concat();
     inputs.iter().for_each(|input| check(input));
-    let seconds: Option<u64> = std::env::var("FUZZ_SECONDS")
-        .ok()
-        .and_then(|seconds| seconds.parse().ok());
+    let seconds: Option<u64> =
+        std::env::var("FUZZ_SECONDS").ok().and_then(|seconds| seconds.parse().ok());
     let start = Instant::now();
     // Commits are tested with the same mutations each time, long runs with new ones.
     let seed = match seconds {
-        Some(_) => SystemTime::UNIX_EPOCH
-            .elapsed()
-            .unwrap()
-            .as_nanos() as u64,
+        Some(_) => SystemTime::UNIX_EPOCH.elapsed().unwrap().as_nanos() as u64,
         None => 1,
     };
     let mut rng = Stream::seed_from_u64(seed);
@@ -163,13 +148,9 @@ fn every_target_has_inputs_and_a_fuzzer() {
         let inputs = files(&folder.join("corpus").join(name));
         assert!(!inputs.is_empty(), "{name}");
         bytes += inputs.iter().map(Vec::len).sum::<usize>();
-        let fuzzer = fs::read_to_string(
-            folder
-                .join("fuzz_targets")
-                .join(name)
-                .with_extension("rs"),
-        )
-        .unwrap();
+        let fuzzer =
+            fs::read_to_string(folder.join("fuzz_targets").join(name).with_extension("rs"))
+                .unwrap();
         assert!(fuzzer.contains(&format!("targets::{name}(bytes)")));
     }
     assert!(bytes < 20_000, "the kept inputs are small: {bytes} bytes");

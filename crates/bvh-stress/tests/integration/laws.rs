@@ -55,9 +55,7 @@ fn named(name: &str) -> Method {
 
 /// Returns the methods that use only areas and indices.
 fn insertion_and_exact() -> Vec<Method> {
-    ["goldsmith_salmon", "random_orders", "genetic", "exact"]
-        .map(named)
-        .into()
+    ["goldsmith_salmon", "random_orders", "genetic", "exact"].map(named).into()
 }
 
 /// Turns axis i into axis `to[i]`.
@@ -95,11 +93,8 @@ fn exact_sum(point: Vec3, by: Vec3) -> Option<Vec3> {
 /// indices.
 fn distinct_centres(boxes: &[Aabb]) -> bool {
     (0..3).all(|axis| {
-        let mut keys: Vec<f64> = boxes
-            .iter()
-            .map(Aabb::doubled_centroid)
-            .map(|c: DVec3| c[axis])
-            .collect();
+        let mut keys: Vec<f64> =
+            boxes.iter().map(Aabb::doubled_centroid).map(|c: DVec3| c[axis]).collect();
         keys.sort_by(f64::total_cmp);
         keys.windows(2).all(|pair| pair[0] < pair[1])
     })
@@ -144,10 +139,7 @@ fn close(a: f64, b: f64) -> bool {
 
 /// The number of scenes per law: few in the quick tier, `PROPTEST_CASES` in the slow one.
 fn cases() -> u32 {
-    std::env::var("PROPTEST_CASES")
-        .ok()
-        .and_then(|cases| cases.parse().ok())
-        .unwrap_or(60)
+    std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(60)
 }
 
 proptest! {

@@ -19,9 +19,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 fn soup(n: usize) -> Vec<Aabb> {
     let mut random = bvh_search::Stream::seed_from_u64(1);
     let mut corner = || [random.random::<f32>(), random.random(), random.random()];
-    (0..n)
-        .map(|_| Triangle::from([corner(), corner(), corner()]).aabb())
-        .collect()
+    (0..n).map(|_| Triangle::from([corner(), corner(), corner()]).aabb()).collect()
 }
 
 /// Returns all scenes with several hundred objects, and a few that are stiff only at larger sizes.
@@ -40,12 +38,7 @@ fn scenes() -> Vec<(String, Vec<Aabb>)> {
         let boxes = Scene::load(name).unwrap().boxes;
         (name.to_owned(), boxes)
     });
-    built_in
-        .into_iter()
-        .chain(stiff)
-        .chain(soups)
-        .chain(larger)
-        .collect()
+    built_in.into_iter().chain(stiff).chain(soups).chain(larger).collect()
 }
 
 /// Work per object: near the border between small and large budgets, and beyond.
@@ -71,24 +64,16 @@ fn at_most(cost: f64, limit: f64) -> bool {
 
 #[test]
 fn no_method_ends_above_a_tree_that_it_has_evaluated_or_that_its_caller_has() {
-    for (name, boxes) in scenes()
-        .into_iter()
-        .filter(|(_, boxes)| boxes.len() <= 600)
-    {
+    for (name, boxes) in scenes().into_iter().filter(|(_, boxes)| boxes.len() <= 600) {
         for method in Method::all() {
             let few = &boxes[..boxes.len().min(EXACT_OBJECTS)];
             let boxes = if let Method::Exact(_) = method { few } else { &boxes };
-            let known = muller_fellner::Config::default()
-                .build(boxes)
-                .unwrap();
+            let known = muller_fellner::Config::default().build(boxes).unwrap();
             for work in [0, 20, 60] {
                 let here = format!("{name}, {}, {work} per object", method.name());
                 let found = solved(&method, &Problem::new(boxes), work, &());
-                let least = found
-                    .history
-                    .iter()
-                    .map(|event| event.cost)
-                    .fold(f64::INFINITY, f64::min);
+                let least =
+                    found.history.iter().map(|event| event.cost).fold(f64::INFINITY, f64::min);
                 assert!(at_most(found.cost, least), "{here}: {} after {least}", found.cost);
                 assert!(at_most(cost::internal_area(&found.tree), found.cost), "{here}");
                 let problem = Problem { known: Some(&known), ..Problem::new(boxes) };
@@ -158,11 +143,7 @@ fn more_work_on_objects_as_large_as_the_scene_gives_no_worse_tree() {
 #[test]
 fn local_searches_begin_no_more_than_a_little_above_the_greedy_tree() {
     for (name, boxes) in scenes() {
-        let greedy = cost::internal_area(
-            &muller_fellner::Config::default()
-                .build(&boxes)
-                .unwrap(),
-        );
+        let greedy = cost::internal_area(&muller_fellner::Config::default().build(&boxes).unwrap());
         for method in Method::all()
             .iter()
             .filter(|method| ["reinsertion", "annealing"].contains(&method.name()))
@@ -193,14 +174,9 @@ impl Observer for Questions {
 #[test]
 fn a_clock_ends_no_search_above_the_tree_that_its_caller_has() {
     let boxes = soup(3000);
-    let known = muller_fellner::Config::default()
-        .build(&boxes)
-        .unwrap();
+    let known = muller_fellner::Config::default().build(&boxes).unwrap();
     let limit = cost::internal_area(&known);
-    for method in Method::all()
-        .iter()
-        .filter(|method| method.name() != "exact")
-    {
+    for method in Method::all().iter().filter(|method| method.name() != "exact") {
         for most in [1, 3, 10, 100, 1000] {
             let clock = Questions { asked: AtomicU64::new(0), most };
             let problem = Problem { known: Some(&known), ..Problem::new(&boxes) };
@@ -226,11 +202,7 @@ fn a_clock_ends_the_best_above_no_tree_that_it_has_evaluated_nor_above_its_fast_
             let found =
                 solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &clock).unwrap();
             validate(&found.tree, &boxes).unwrap();
-            let least = found
-                .history
-                .iter()
-                .map(|event| event.cost)
-                .fold(limit, f64::min);
+            let least = found.history.iter().map(|event| event.cost).fold(limit, f64::min);
             assert!(
                 at_most(found.cost, least),
                 "{name}, {most} questions: {} above {least}",

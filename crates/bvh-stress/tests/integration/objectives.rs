@@ -70,13 +70,7 @@ fn every_case_holds_with_the_visits_of_rays_instead_of_area() {
                 from: ray.origin().to_array(),
                 to: ray.at(ray.t_max().min(1e30)).to_array(),
             })
-            .filter(|segment| {
-                segment
-                    .from
-                    .iter()
-                    .chain(&segment.to)
-                    .all(|c| c.is_finite())
-            })
+            .filter(|segment| segment.from.iter().chain(&segment.to).all(|c| c.is_finite()))
             .collect();
         // Scenes without extent have no density; their number is bounded at the end.
         let Ok(density) = RayDensity::of_rays(&bounds, &segments, 0.1) else {
@@ -85,9 +79,7 @@ fn every_case_holds_with_the_visits_of_rays_instead_of_area() {
         };
         searched += 1;
         let problem = Problem { measure: Some(&density), ..Problem::new(&boxes) };
-        let start = muller_fellner::Config::default()
-            .build(&boxes)
-            .unwrap();
+        let start = muller_fellner::Config::default().build(&boxes).unwrap();
         let budget = examine::budget(&method, boxes.len(), WORK);
         let outcome = optimize(&start, &problem, &Default::default(), 1, budget, &()).unwrap();
         validate(&outcome.tree, &boxes).unwrap();
@@ -102,14 +94,7 @@ fn every_case_holds_with_the_visits_of_rays_instead_of_area() {
             &file::Origin { visits: &visits, ..Default::default() },
         );
         let bytes = bytes.unwrap_or_else(|error| panic!("{}: {error}", case.id));
-        assert_eq!(
-            file::TreeFile::open(&bytes)
-                .unwrap()
-                .visits()
-                .unwrap()
-                .unwrap(),
-            visits
-        );
+        assert_eq!(file::TreeFile::open(&bytes).unwrap().visits().unwrap().unwrap(), visits);
         let wide = WideBvh::for_rays(&outcome.tree, &triangles, &visits).unwrap();
         let plain = WideBvh::new(&start, &triangles).unwrap();
         assert_same_answers(case, &wide, &plain, &triangles);
@@ -146,9 +131,7 @@ fn every_case_holds_with_divided_objects_and_with_the_cost_of_the_layout() {
                 assert!(outcome.tree.prim_ids.len() <= most.max(boxes.len()), "{}", case.id);
                 divided += usize::from(outcome.tree.prim_ids.len() > boxes.len());
                 assert_reported(case.id, outcome.cost, problem.cost(&outcome.tree));
-                let greedy = muller_fellner::Config::default()
-                    .build(&boxes)
-                    .unwrap();
+                let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
                 let bytes = file::save_references(
                     &outcome.tree,
                     &boxes,
@@ -193,16 +176,12 @@ fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
         // By spatial splits, and searched by both costs.
         let trees = |k: i32| {
             let scale = |p: Vec3| (p.as_dvec3() * libm::exp2(k.into())).as_vec3();
-            let scaled: Vec<Triangle> = triangles
-                .iter()
-                .map(|t| Triangle(t.0.map(scale)))
-                .collect();
+            let scaled: Vec<Triangle> =
+                triangles.iter().map(|t| Triangle(t.0.map(scale))).collect();
             let boxes = stiff::boxes(&scaled);
             let objects = Primitives::Triangles(scaled);
             let most = boxes.len() * 3 / 2;
-            let built = spatial::Config::default()
-                .build_at_most(most, &boxes, &objects)
-                .unwrap();
+            let built = spatial::Config::default().build_at_most(most, &boxes, &objects).unwrap();
             let searched = [Objective::Layout, Objective::InternalArea].map(|objective| {
                 let splits = Splits::at_most(most, &boxes, &objects);
                 let problem = Problem { objective, splits, ..Problem::new(&boxes) };
@@ -210,16 +189,11 @@ fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
                 let outcome = solve(&method, &problem, 1, budget, &()).unwrap();
                 (outcome.cost, outcome.tree)
             });
-            searched
-                .into_iter()
-                .chain([(total_area(&built), built)])
-                .collect::<Vec<_>>()
+            searched.into_iter().chain([(total_area(&built), built)]).collect::<Vec<_>>()
         };
         let expected = trees(0);
-        divided += expected
-            .iter()
-            .filter(|(_, tree)| tree.prim_ids.len() > triangles.len())
-            .count();
+        divided +=
+            expected.iter().filter(|(_, tree)| tree.prim_ids.len() > triangles.len()).count();
         for threads in [1, 3] {
             let others = examine::on_threads(threads, || Ok(trees(0))).unwrap();
             assert!(others == expected, "{}: another tree on {threads} threads", case.id);
@@ -228,12 +202,8 @@ fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
             for ((expected_cost, expected), (cost, tree)) in expected.iter().zip(trees(k)) {
                 let same = same_topology(&tree, expected);
                 assert!(same, "{}: another tree at scale 2^{k}", case.id);
-                let [parts, others] = [expected, &tree].map(|tree| {
-                    tree.nodes
-                        .iter()
-                        .map(|node| node.aabb)
-                        .collect::<Vec<Aabb>>()
-                });
+                let [parts, others] = [expected, &tree]
+                    .map(|tree| tree.nodes.iter().map(|node| node.aabb).collect::<Vec<Aabb>>());
                 assert_eq!(others, scaled(&parts, k), "{}: other parts at scale 2^{k}", case.id);
                 assert_eq!(cost, scaled_area(*expected_cost, k), "{}: scale 2^{k}", case.id);
             }

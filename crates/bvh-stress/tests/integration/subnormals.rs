@@ -41,18 +41,9 @@ fn flags(wide: &WideBvh, rays: &[Ray]) -> Vec<(&'static str, Option<&'static str
     let mut hits = vec![Hit::MISS; rays.len()];
     let mut shadows = vec![false; rays.len()];
     let mut hit_count = 0;
-    let single_nearest = raised_by(|| {
-        hit_count += rays
-            .iter()
-            .filter_map(|ray| wide.nearest_hit(ray))
-            .count()
-    });
-    let single_any = raised_by(|| {
-        hit_count += rays
-            .iter()
-            .filter(|ray| wide.any_hit(ray))
-            .count()
-    });
+    let single_nearest =
+        raised_by(|| hit_count += rays.iter().filter_map(|ray| wide.nearest_hit(ray)).count());
+    let single_any = raised_by(|| hit_count += rays.iter().filter(|ray| wide.any_hit(ray)).count());
     assert!(hit_count > 0, "rays that meet nothing try no triangle");
     vec![
         ("nearest_hit", single_nearest),
@@ -79,9 +70,7 @@ fn ordinary_rays_make_no_kernel_meet_subnormal_numbers() {
     for scene in STAND_INS {
         let name = scene.name;
         let scene = Scene::load(&format!("{name}:4000")).unwrap();
-        let tree = muller_fellner::Config::default()
-            .build(&scene.boxes)
-            .unwrap();
+        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
         let wide = WideBvh::new(&tree, scene.triangles().unwrap()).unwrap();
         for viewpoint in [Viewpoint::default(), INSIDE] {
             for kind in KINDS {

@@ -70,13 +70,9 @@ fn every_scene_has_the_requested_size() {
 /// Checks every case with each of these methods.
 fn check_methods(methods: &[(String, Method)], effort: Effort) {
     // Methods run in parallel and cases in order, so that a failure names its case first.
-    let found = methods
-        .par_iter()
-        .flat_map_iter(|(label, method)| {
-            CASES
-                .iter()
-                .filter_map(move |case| broken(case, label, case.of_method(method, &effort)))
-        });
+    let found = methods.par_iter().flat_map_iter(|(label, method)| {
+        CASES.iter().filter_map(move |case| broken(case, label, case.of_method(method, &effort)))
+    });
     assert_kept(found.collect());
 }
 
@@ -135,9 +131,8 @@ type Scaled = (&'static Case, i32, Vec<Triangle>);
 fn check_kernels(random: usize, adversarial: usize) {
     let mut jobs = Vec::new();
     for (case, triangles) in scenes(TESTED) {
-        let scaled = SCALES
-            .into_iter()
-            .filter_map(|by| Some((case, by, kernels::scaled(&triangles, by)?)));
+        let scaled =
+            SCALES.into_iter().filter_map(|by| Some((case, by, kernels::scaled(&triangles, by)?)));
         let scaled: Vec<Scaled> = scaled.collect();
         // Every scale gets the same number of pieces, and each piece fits in memory.
         let pieces = random.div_ceil(PIECE * scaled.len()) * scaled.len();
@@ -191,15 +186,9 @@ fn the_rays_of_the_suite_hit_miss_and_cover_every_kind() {
     assert_eq!(rays.len(), 1500);
     let objects = Primitives::Triangles(triangles);
     let brute_force = Accelerator::new(&objects, Structure::Brute);
-    let hits = rays
-        .iter()
-        .filter(|ray| brute_force.any_hit(ray))
-        .count();
+    let hits = rays.iter().filter(|ray| brute_force.any_hit(ray)).count();
     assert!((300..1200).contains(&hits), "{hits}");
-    let zeros = rays
-        .iter()
-        .flat_map(|ray| ray.direction().to_array())
-        .filter(|&d| d == 0.0);
+    let zeros = rays.iter().flat_map(|ray| ray.direction().to_array()).filter(|&d| d == 0.0);
     let signs: BTreeSet<u32> = zeros.map(f32::to_bits).collect();
     assert_eq!(signs.len(), 2, "zeros of both signs");
     assert!(

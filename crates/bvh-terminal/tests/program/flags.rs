@@ -29,10 +29,7 @@ fn flags(folder: &Path, command: &str) -> Vec<(String, Option<String>)> {
         }
         let Some(word) = words.find(|word| word.starts_with("--")) else { continue };
         let name = word.trim_end_matches(',').to_owned();
-        let value = words
-            .next()
-            .filter(|word| word.starts_with('<'))
-            .map(str::to_owned);
+        let value = words.next().filter(|word| word.starts_with('<')).map(str::to_owned);
         if !["--help", "--version"].contains(&name.as_str()) {
             flags.push((name, value));
         }
@@ -49,13 +46,8 @@ pub fn wrong_flags(at: &Path, commands: &[(&str, &[&str])]) -> usize {
     let before = names(at);
     let help = said(at, &["--help"]);
     let (_, list) = help.split_once("Commands:").unwrap();
-    let lines = list
-        .lines()
-        .skip(1)
-        .take_while(|line| !line.trim().is_empty());
-    let listed: BTreeSet<&str> = lines
-        .filter_map(|line| line.split_whitespace().next())
-        .collect();
+    let lines = list.lines().skip(1).take_while(|line| !line.trim().is_empty());
+    let listed: BTreeSet<&str> = lines.filter_map(|line| line.split_whitespace().next()).collect();
     let mut tried: BTreeSet<&str> = commands.iter().map(|(name, _)| *name).collect();
     tried.insert("help");
     tried.remove("");

@@ -38,10 +38,7 @@ pub fn names(folder: &Path) -> Vec<String> {
 /// Prepares the program in a folder, without input.
 pub fn program(folder: &Path, args: &[&str]) -> Command {
     let mut command = Command::new(PROGRAM);
-    command
-        .current_dir(folder)
-        .args(args)
-        .stdin(Stdio::null());
+    command.current_dir(folder).args(args).stdin(Stdio::null());
     command
 }
 
@@ -58,21 +55,14 @@ pub fn run_on_a_small_disk(folder: &Path, args: &str, blocks: u32) -> Option<Out
         return None;
     }
     let script = format!("ulimit -f {blocks}; exec '{PROGRAM}' {args}");
-    let output = Command::new("sh")
-        .args(["-c", &script])
-        .current_dir(folder)
-        .output();
+    let output = Command::new("sh").args(["-c", &script]).current_dir(folder).output();
     Some(output.unwrap())
 }
 
 /// Runs the program where it may have so many kilobytes of memory.
 pub fn run_in_little_memory(folder: &Path, args: &str, kilobytes: u32) -> Output {
     let script = format!("ulimit -v {kilobytes}; exec '{PROGRAM}' {args}");
-    Command::new("sh")
-        .args(["-c", &script])
-        .current_dir(folder)
-        .output()
-        .unwrap()
+    Command::new("sh").args(["-c", &script]).current_dir(folder).output().unwrap()
 }
 
 /// Waits until a file or folder exists.
@@ -103,10 +93,7 @@ pub fn unsaid(folder: &Path, args: &[&str]) {
         eprintln!("not tried: this system has no /dev/full");
         return;
     }
-    let output = program(folder, args)
-        .stdout(full.unwrap())
-        .output()
-        .unwrap();
+    let output = program(folder, args).stdout(full.unwrap()).output().unwrap();
     ended(&output, 1, &["could not be written to standard output"]);
     said(folder, args);
 }
@@ -127,18 +114,12 @@ pub fn ended(output: &Output, code: i32, parts: &[&str]) {
 
 /// Starts the program in the background with a pipe from its standard error.
 pub fn begin(folder: &Path, args: &[&str]) -> Child {
-    program(folder, args)
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap()
+    program(folder, args).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
 /// Sends a signal, such as `-INT`.
 pub fn send(signal: &str, to: &Child) {
-    let status = Command::new("kill")
-        .args([signal, &to.id().to_string()])
-        .status();
+    let status = Command::new("kill").args([signal, &to.id().to_string()]).status();
     assert!(status.unwrap().success());
 }
 

@@ -30,9 +30,7 @@ pub fn pages() -> Vec<PathBuf> {
     }
     pages.push(top().join("results/README.md"));
     pages.retain(|path| {
-        let is_markdown = path
-            .extension()
-            .is_some_and(|extension| extension == "md");
+        let is_markdown = path.extension().is_some_and(|extension| extension == "md");
         is_markdown && path.is_file() && !path.ends_with("CHANGELOG.md")
     });
     pages.sort();
@@ -40,10 +38,7 @@ pub fn pages() -> Vec<PathBuf> {
 }
 
 fn entries(folder: &str) -> Vec<PathBuf> {
-    fs::read_dir(top().join(folder))
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .collect()
+    fs::read_dir(top().join(folder)).unwrap().map(|entry| entry.unwrap().path()).collect()
 }
 
 /// Returns the blocks of all pages.
@@ -103,8 +98,7 @@ pub fn commands(text: &str, place: &str) -> Vec<Vec<String>> {
 /// Returns whether a word sets a variable of the environment.
 fn is_variable(word: &str) -> bool {
     let Some((name, _)) = word.split_once('=') else { return false };
-    name.bytes()
-        .all(|byte| byte == b'_' || byte.is_ascii_uppercase())
+    name.bytes().all(|byte| byte == b'_' || byte.is_ascii_uppercase())
 }
 
 /// The names of a program and of its package.
@@ -121,9 +115,7 @@ impl Called {
         match (&words[..], end) {
             ([name, ..], _) if *name == self.name => Some(words[1..].to_vec()),
             (["cargo", "run", ..], Some(end)) => {
-                let is_called = words[..end]
-                    .windows(2)
-                    .any(|pair| pair == ["-p", self.package]);
+                let is_called = words[..end].windows(2).any(|pair| pair == ["-p", self.package]);
                 is_called.then(|| words[end + 1..].to_vec())
             }
             _ => None,
@@ -180,11 +172,8 @@ pub const UNREADABLE: &str = "try '--help'";
 
 /// Returns the messages of a command on standard error within two seconds.
 fn beginning(folder: &Path, arguments: &[&str]) -> String {
-    let mut child = program(folder, arguments)
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child =
+        program(folder, arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let start = Instant::now();
     while child.try_wait().unwrap().is_none() && start.elapsed() < Duration::from_secs(2) {
         std::thread::sleep(Duration::from_millis(5));

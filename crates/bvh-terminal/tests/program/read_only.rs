@@ -23,11 +23,7 @@ impl<'a> ReadOnly<'a> {
     fn set(&self, mode: &str, attribute: &str) {
         // An immutable folder's mode cannot be changed, so the attribute is removed first.
         for (program, argument) in [("chattr", "-i"), ("chmod", mode), ("chattr", attribute)] {
-            let _ = Command::new(program)
-                .arg(argument)
-                .arg(self.0)
-                .stderr(Stdio::null())
-                .status();
+            let _ = Command::new(program).arg(argument).arg(self.0).stderr(Stdio::null()).status();
         }
     }
 }

@@ -32,19 +32,12 @@ pub fn compare_each_after(
     }
     println!("\n{title}");
     for ((name, _), times) in contenders.iter().zip(&seconds) {
-        let ratios: Vec<f64> = times
-            .iter()
-            .zip(&seconds[0])
-            .map(|(own, first)| own / first)
-            .collect();
+        let ratios: Vec<f64> =
+            times.iter().zip(&seconds[0]).map(|(own, first)| own / first).collect();
         let [low, middle, high] =
             [0.25, 0.5, 0.75].map(|q| quantile(&ratios, q).unwrap_or(f64::NAN));
         let median = quantile(times, 0.5).unwrap_or(f64::NAN) * 1e3;
-        let least = times
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min)
-            * 1e3;
+        let least = times.iter().copied().fold(f64::INFINITY, f64::min) * 1e3;
         println!(
             "  {name:<44} {median:9.3} ms, least {least:9.3} ms   ratio {middle:.4}  ({low:.4} to {high:.4})"
         );

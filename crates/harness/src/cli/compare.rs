@@ -37,10 +37,7 @@ pub struct CompareArgs {
 /// Prints the costs of the tree and of the best known one, a binary tree with one object per leaf.
 pub fn compare(args: &CompareArgs) -> Result<(), Error> {
     let file = &args.file;
-    let results = args
-        .results
-        .as_deref()
-        .unwrap_or(Path::new("results"));
+    let results = args.results.as_deref().unwrap_or(Path::new("results"));
     // The default folder may be missing: a tree can be costed outside a checkout.
     if args.results.is_some() {
         input_folder("--results", results)?;

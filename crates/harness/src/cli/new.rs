@@ -22,10 +22,7 @@ const TEMPLATE: &str = include_str!("new.toml");
 /// Writes the spec unless the file exists.
 pub fn new(args: &NewArgs) -> Result<(), Error> {
     let file = &args.file;
-    if file
-        .extension()
-        .is_none_or(|extension| extension != "toml")
-    {
+    if file.extension().is_none_or(|extension| extension != "toml") {
         return Err(Error::Usage(format!(
             "{}: accepted: a name that ends with .toml",
             file.display()
@@ -36,8 +33,7 @@ pub fn new(args: &NewArgs) -> Result<(), Error> {
         ErrorKind::AlreadyExists => Error::Usage(format!("{} exists already", file.display())),
         _ => Error::io(file, "write the file")(error),
     })?;
-    new.write_all(TEMPLATE.as_bytes())
-        .map_err(Error::io(file, "write the file"))?;
+    new.write_all(TEMPLATE.as_bytes()).map_err(Error::io(file, "write the file"))?;
     print_line(&format!("{0} is written; `harness {0} --quick` runs it small", file.display()));
     Ok(())
 }

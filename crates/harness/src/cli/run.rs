@@ -72,9 +72,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         .collect::<Result<Vec<_>, _>>()?;
     // Two specs with one name would write into one folder.
     let mut folders = HashSet::new();
-    if let Some(twice) = experiments
-        .iter()
-        .find(|experiment| !folders.insert(experiment.folder()))
+    if let Some(twice) = experiments.iter().find(|experiment| !folders.insert(experiment.folder()))
     {
         let message =
             format!("two specs are called {}; run them one by one, each with an --out", twice.name);
@@ -102,10 +100,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         } else {
             execute(experiment, &args.out, &extent, interrupted)?
         };
-        summary
-            .remarks
-            .iter()
-            .for_each(|remark| print_error(remark));
+        summary.remarks.iter().for_each(|remark| print_error(remark));
         if !args.quiet {
             print_summary(experiment, &summary)?;
         }

@@ -27,14 +27,10 @@ pub fn disagreements(
     tree: &Bvh,
     rays: &[Ray],
 ) -> Disagreements {
-    let diagonal = tree
-        .root_aabb()
-        .map_or(0.0, |root| root.extent().length());
+    let diagonal = tree.root_aabb().map_or(0.0, |root| root.extent().length());
     compare(right, found, |index, right, found| {
         // Distances are in units of the direction's length, and the tolerance is in world units.
-        let length = rays
-            .get(index)
-            .map_or(1.0, |ray| ray.direction().as_dvec3().length());
+        let length = rays.get(index).map_or(1.0, |ray| ray.direction().as_dvec3().length());
         // Any-hit queries have no distance.
         right == &SOME_HIT
             || (f64::from(right.t) - f64::from(found.t)).abs() * length <= TOLERANCE * diagonal
@@ -73,9 +69,7 @@ mod tests {
     #[test]
     fn answers_are_compared_by_place_and_not_by_object() {
         let scene = Scene::load("escher:100").unwrap();
-        let tree = muller_fellner::Config::default()
-            .build(&scene.boxes)
-            .unwrap();
+        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
         let rays = rays(Kind::Primary, 4, &scene, &tree, &Viewpoint::default(), 1);
         let hit = |t, object| Some(Hit { t, object });
         let right = [hit(1.0, 1), hit(1.0, 1), None, hit(1.0, 1)];

@@ -57,9 +57,7 @@ pub fn is_repeat(layout: &str) -> bool {
 
 /// Returns true if a layout with this name traces rays one by one.
 pub fn is_single(layout: &str) -> bool {
-    !["batches", "packets", "blocks"]
-        .iter()
-        .any(|word| layout.contains(word))
+    !["batches", "packets", "blocks"].iter().any(|word| layout.contains(word))
 }
 
 /// Returns the name of a kernel's instruction set in tables.
@@ -153,9 +151,7 @@ fn own_contender<'a>(
     tree: &'a Bvh,
     visits: Option<&[f32]>,
 ) -> Result<Contender<'a>, String> {
-    let triangles = scene
-        .triangles()
-        .map_err(|error| error.to_string())?;
+    let triangles = scene.triangles().map_err(|error| error.to_string())?;
     let start = Instant::now();
     let wide = match layout {
         Layout::Binary | Layout::BinaryLeaves => None,

@@ -66,9 +66,7 @@ impl Config {
             structures.push((unpruned(&run.method), own, run.repetition, build_seconds));
         }
         // Seconds per picture compare structures only if all have one thread.
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(1)
-            .build();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
         let pool = pool.map_err(|error| Error::Usage(format!("cannot start a thread: {error}")))?;
         let mut rows = Vec::new();
         let mut times = Vec::new();

@@ -106,17 +106,13 @@ impl Default for Cameras {
 }
 
 fn towards_centre(eyes: [[f64; 3]; 3]) -> Vec<Viewpoint> {
-    eyes.map(|eye| Viewpoint { eye, target: [0.5; 3] })
-        .to_vec()
+    eyes.map(|eye| Viewpoint { eye, target: [0.5; 3] }).to_vec()
 }
 
 impl Config {
     fn check_rays(&self) -> Vec<OutOfRange> {
         // A primary ray, one that it reflects, and one to every light.
-        let rays_per_pixel = self
-            .cameras
-            .values()
-            .map(|cameras| 2 + cameras.lights.len());
+        let rays_per_pixel = self.cameras.values().map(|cameras| 2 + cameras.lights.len());
         let most_rays = rays_per_pixel.fold(OF_ANYTHING, usize::max);
         let mut faults = Vec::new();
         faults.extend(check_count("trained", self.trained, most_rays));
@@ -141,11 +137,7 @@ impl Config {
         count: u32,
         seed: u64,
     ) -> Vec<TracedRay> {
-        let cameras = self
-            .cameras
-            .get(&scene.name)
-            .cloned()
-            .unwrap_or_default();
+        let cameras = self.cameras.get(&scene.name).cloned().unwrap_or_default();
         // Viewpoints are fractions of the root's box, which an empty tree lacks.
         let Some(root) = tree.root_aabb() else { return Vec::new() };
         let poses = path(&cameras).iter().map(|view| Pose {
@@ -155,9 +147,7 @@ impl Config {
         let lights = cameras.lights.iter();
         let rays = RenderedRays {
             cameras: poses.collect(),
-            lights: lights
-                .map(|&light| in_box(&root, light).to_array())
-                .collect(),
+            lights: lights.map(|&light| in_box(&root, light).to_array()).collect(),
             count,
             seed,
             ..Default::default()
@@ -206,10 +196,8 @@ pub fn test_rays(config: &Config, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<T
     for (camera, path) in [("same", Cameras::next_frame as Path), ("other", Cameras::elsewhere)] {
         let traced = config.rendered(scene, tree, path, config.count, seed);
         for kind in [Kind::Primary, Kind::Bounce, Kind::Shadow] {
-            let rays_of_kind = traced
-                .iter()
-                .filter(|traced| traced.kind == kind)
-                .map(|traced| traced.ray);
+            let rays_of_kind =
+                traced.iter().filter(|traced| traced.kind == kind).map(|traced| traced.ray);
             test_rays.push(TestRays { kind, camera, rays: rays_of_kind.collect() });
         }
     }
@@ -244,27 +232,19 @@ mod tests {
     #[test]
     fn a_layout_for_rays_needs_fewer_tests_of_other_rays_of_the_same_camera() {
         let scene = Scene::load("escher:3000").unwrap();
-        let tree = muller_fellner::Config::default()
-            .build(&scene.boxes)
-            .unwrap();
+        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
         let config = Config { count: 5000, trained: 20_000, ..Config::default() };
-        let density = config
-            .density(TrainedOn::Camera, &scene, 1)
-            .unwrap();
+        let density = config.density(TrainedOn::Camera, &scene, 1).unwrap();
         let triangles = scene.triangles().unwrap();
         let plain = WideBvh::new(&tree, triangles).unwrap();
         let trained = WideBvh::for_rays(&tree, triangles, &density.visits(&tree)).unwrap();
         let test_rays = test_rays(&config, &scene, &tree, 2);
-        let kinds: Vec<_> = test_rays
-            .iter()
-            .map(|test_rays| (test_rays.kind, test_rays.camera))
-            .collect();
+        let kinds: Vec<_> =
+            test_rays.iter().map(|test_rays| (test_rays.kind, test_rays.camera)).collect();
         assert_eq!((kinds.len(), kinds[6]), (7, (Kind::Incoherent, "none")));
         let [plain_tests, trained_tests] = [&plain, &trained].map(|wide| {
             let same_camera = test_rays[..3].iter();
-            same_camera
-                .flat_map(|test_rays| test_rays.tests(wide))
-                .sum::<f64>()
+            same_camera.flat_map(|test_rays| test_rays.tests(wide)).sum::<f64>()
         });
         assert!(trained_tests < plain_tests, "{trained_tests} {plain_tests}");
     }
@@ -272,15 +252,11 @@ mod tests {
     #[test]
     fn no_tree_is_trained_on_the_paths_that_judge_it() {
         let scene = Scene::load("escher:300").unwrap();
-        let tree = muller_fellner::Config::default()
-            .build(&scene.boxes)
-            .unwrap();
+        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
         let visits = |cameras: Cameras| {
             let cameras = BTreeMap::from([(scene.name.clone(), cameras)]);
             let config = Config { count: 100, trained: 1000, cameras, ..Config::default() };
-            let density = config
-                .density(TrainedOn::Camera, &scene, 1)
-                .unwrap();
+            let density = config.density(TrainedOn::Camera, &scene, 1).unwrap();
             density.visits(&tree)
         };
         let known = Cameras::default();

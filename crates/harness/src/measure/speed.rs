@@ -78,11 +78,7 @@ pub fn measure(
     cancelled: impl Fn() -> bool,
 ) -> Result<Option<Vec<Traced>>, String> {
     let mut traced = Vec::new();
-    let viewpoint = config
-        .cameras
-        .get(&scene.name)
-        .copied()
-        .unwrap_or_default();
+    let viewpoint = config.cameras.get(&scene.name).copied().unwrap_or_default();
     let reference = Tracer::Own(Accelerator::of_tree(&scene.primitives, tree));
     for &kind in &config.rays {
         let rays = rays(kind, config.count, scene, tree, &viewpoint, seed);
@@ -118,19 +114,10 @@ pub fn measure(
         }
         for (((_, contender), answers), turns) in contenders.iter().zip(answers).zip(&turns) {
             let by_part: Vec<Vec<f64>> = (0..rays.len().div_ceil(PART))
-                .map(|part| {
-                    turns
-                        .iter()
-                        .map(|seconds| seconds[part])
-                        .collect()
-                })
+                .map(|part| turns.iter().map(|seconds| seconds[part]).collect())
                 .collect();
-            let fastest = by_part
-                .iter()
-                .filter_map(|seconds| minimum(seconds.iter().copied()));
-            let middle = by_part
-                .iter()
-                .filter_map(|seconds| median(seconds));
+            let fastest = by_part.iter().filter_map(|seconds| minimum(seconds.iter().copied()));
+            let middle = by_part.iter().filter_map(|seconds| median(seconds));
             let times = TraceTimeRow {
                 scene: answers.scene.clone(),
                 method: answers.method.clone(),
@@ -147,10 +134,7 @@ pub fn measure(
                 times,
                 instructions: contender.instructions.clone(),
                 version: contender.version.clone(),
-                turns: turns
-                    .iter()
-                    .map(|seconds| seconds.iter().sum())
-                    .collect(),
+                turns: turns.iter().map(|seconds| seconds.iter().sum()).collect(),
             });
         }
     }
@@ -215,43 +199,29 @@ mod tests {
     #[test]
     fn all_layouts_of_all_trees_answer_bit_by_bit_the_same() {
         let scene = Scene::load("escher:3000").unwrap();
-        let good = muller_fellner::Config::default()
-            .build(&scene.boxes)
-            .unwrap();
-        let bad = median_cut::Config::default()
-            .build(&scene.boxes)
-            .unwrap();
+        let good = muller_fellner::Config::default().build(&scene.boxes).unwrap();
+        let bad = median_cut::Config::default().build(&scene.boxes).unwrap();
         let mut config: Config = toml::from_str("count = 5000\nrounds = 2").unwrap();
         config.layouts.push(Layout::WideBatches);
         let mut contenders = Vec::new();
         for (method, tree) in [("good", &good), ("bad", &bad)] {
             let own = own_contenders(&config.layouts, &[], &scene, tree, None).unwrap();
-            contenders.extend(
-                own.into_iter()
-                    .map(|contender| (method.to_owned(), contender)),
-            );
+            contenders.extend(own.into_iter().map(|contender| (method.to_owned(), contender)));
         }
-        let traced = measure(&config, &scene, &good, &contenders, 1, || false)
-            .unwrap()
-            .unwrap();
+        let traced = measure(&config, &scene, &good, &contenders, 1, || false).unwrap().unwrap();
         assert_eq!(traced.len(), 40);
         for traced in &traced {
             let TraceTimeRow { seconds, median_seconds, .. } = traced.times;
             assert!(0.0 < seconds && seconds <= median_seconds);
             assert!(traced.turns.len() == 2 && traced.turns.iter().all(|turn| *turn >= seconds));
         }
-        let rows: Vec<TraceRow> = traced
-            .into_iter()
-            .map(|traced| traced.answers)
-            .collect();
+        let rows: Vec<TraceRow> = traced.into_iter().map(|traced| traced.answers).collect();
         for row in &rows {
             assert!(row.hits > 100 && row.hits < row.count, "{row:?}");
             assert_eq!((row.missed_hits, row.false_hits, row.other_hits), (0, 0, 0), "{row:?}");
         }
         let boxes = |method: &str, layout: &str| -> f64 {
-            let own = rows
-                .iter()
-                .filter(|row| row.method == method && row.layout == layout);
+            let own = rows.iter().filter(|row| row.method == method && row.layout == layout);
             own.filter_map(|row| row.boxes_per_ray).sum()
         };
         assert!(boxes("good", "binary") < boxes("bad", "binary"));
@@ -262,40 +232,23 @@ mod tests {
     #[test]
     fn a_tree_for_rays_is_traced_in_the_wide_layout_for_those_rays_and_answers_the_same() {
         let scene = Scene::load("escher:3000").unwrap();
-        let tree = muller_fellner::Config::default()
-            .build(&scene.boxes)
-            .unwrap();
+        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
         let trained = crate::measure::ray_cost::Config { trained: 5000, ..Default::default() };
-        let visits = trained
-            .density(TrainedOn::Camera, &scene, 2)
-            .unwrap()
-            .visits(&tree);
+        let visits = trained.density(TrainedOn::Camera, &scene, 2).unwrap().visits(&tree);
         let config: Config =
             toml::from_str("count = 5000\nrounds = 1\nrays = ['primary']").unwrap();
         let mut contenders = Vec::new();
         for (rays, visits) in [("lines", None), ("camera", Some(&visits[..]))] {
             let own = own_contenders(&config.layouts, &[], &scene, &tree, visits).unwrap();
-            contenders.extend(
-                own.into_iter()
-                    .map(|contender| (rays.to_owned(), contender)),
-            );
+            contenders.extend(own.into_iter().map(|contender| (rays.to_owned(), contender)));
         }
-        let traced = measure(&config, &scene, &tree, &contenders, 1, || false)
-            .unwrap()
-            .unwrap();
-        let rows: Vec<TraceRow> = traced
-            .into_iter()
-            .map(|traced| traced.answers)
-            .collect();
+        let traced = measure(&config, &scene, &tree, &contenders, 1, || false).unwrap().unwrap();
+        let rows: Vec<TraceRow> = traced.into_iter().map(|traced| traced.answers).collect();
         assert!(
-            rows.iter()
-                .all(|row| (row.missed_hits, row.false_hits, row.other_hits) == (0, 0, 0))
+            rows.iter().all(|row| (row.missed_hits, row.false_hits, row.other_hits) == (0, 0, 0))
         );
         let tests = |rays: &str, layout: &str| {
-            let row = rows
-                .iter()
-                .find(|row| row.method == rays && row.layout == layout)
-                .unwrap();
+            let row = rows.iter().find(|row| row.method == rays && row.layout == layout).unwrap();
             row.boxes_per_ray.unwrap() / 8.0 + row.objects_per_ray.unwrap() / 4.0
         };
         assert_eq!(tests("lines", "binary"), tests("camera", "binary"));

@@ -19,31 +19,21 @@ const RULE: &str = "Every verdict is made from the rows. Where the paper has num
 
 /// Text as it stands in HTML, between tags and in attributes.
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// A name as it stands in a URL.
 pub(super) fn reference(name: &str) -> String {
     // These are the unreserved characters of URLs (RFC 3986); all others are encoded.
-    const KEPT: &AsciiSet = &NON_ALPHANUMERIC
-        .remove(b'-')
-        .remove(b'.')
-        .remove(b'_')
-        .remove(b'~');
+    const KEPT: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
     utf8_percent_encode(name, KEPT).to_string()
 }
 
 /// The whole page.
 pub(super) fn page(sections: &[Section]) -> String {
     let list = |title: &str, of_paper: bool| {
-        let own: String = sections
-            .iter()
-            .filter(|section| section.of_paper == of_paper)
-            .map(answer)
-            .collect();
+        let own: String =
+            sections.iter().filter(|section| section.of_paper == of_paper).map(answer).collect();
         // A heading without entries would look like a fault of the page.
         if own.is_empty() {
             own
@@ -116,17 +106,9 @@ fn experiment(section: &Section) -> String {
     } else {
         ""
     };
-    let shown: String = section
-        .outputs
-        .iter()
-        .map(|output| report(section, output))
-        .collect();
-    let is_of_a_report = |figure: &Drawing| {
-        section
-            .outputs
-            .iter()
-            .any(|output| has_drawn(output, figure))
-    };
+    let shown: String = section.outputs.iter().map(|output| report(section, output)).collect();
+    let is_of_a_report =
+        |figure: &Drawing| section.outputs.iter().any(|output| has_drawn(output, figure));
     let others: String = section
         .figures
         .iter()
@@ -157,11 +139,7 @@ fn experiment(section: &Section) -> String {
 fn links(links: &[Link]) -> String {
     let link =
         |link: &Link| format!("<a href=\"{}\">{}</a>", escaped(&link.to), escaped(&link.name));
-    links
-        .iter()
-        .map(link)
-        .collect::<Vec<_>>()
-        .join(", ")
+    links.iter().map(link).collect::<Vec<_>>().join(", ")
 }
 
 /// One report: its reading, figures and tables.
@@ -172,11 +150,8 @@ fn report(section: &Section, output: &Output) -> String {
         .filter(|drawn| has_drawn(output, drawn))
         .map(|drawn| figure(section, drawn))
         .collect();
-    let tables: String = output
-        .tables
-        .iter()
-        .map(|(explanation, rows)| table(explanation, rows))
-        .collect();
+    let tables: String =
+        output.tables.iter().map(|(explanation, rows)| table(explanation, rows)).collect();
     let reading = output.reading.trim();
     // The verdict above has said it already.
     let said = matches!(&section.verdict, Verdict::Reading(verdict) if verdict == reading);
@@ -190,10 +165,7 @@ fn report(section: &Section, output: &Output) -> String {
 
 /// Returns true if the figure is one of the report.
 fn has_drawn(output: &Output, figure: &Drawing) -> bool {
-    output
-        .figures
-        .iter()
-        .any(|(name, _)| *name == figure.name)
+    output.figures.iter().any(|(name, _)| *name == figure.name)
 }
 
 fn figure_id(section: &Section, figure: &Drawing) -> String {
@@ -220,11 +192,7 @@ fn drawing(svg: &str) -> &str {
 /// Returns a table in a box that scrolls if the table is too wide or too long for the page. The
 /// first cell of a row is its header.
 fn table(explanation: &str, table: &Table) -> String {
-    let cells = |row: &Row| {
-        row.cell_iter()
-            .map(|cell| cell.content())
-            .collect::<Vec<String>>()
-    };
+    let cells = |row: &Row| row.cell_iter().map(|cell| cell.content()).collect::<Vec<String>>();
     let header = table.header().map(cells).unwrap_or_default();
     let header = header
         .iter()
@@ -235,14 +203,7 @@ fn table(explanation: &str, table: &Table) -> String {
         (_, false) => format!("<td>{}</td>", escaped(text)),
     };
     let row = |row: &Row| {
-        format!(
-            "\n<tr>{}</tr>",
-            cells(row)
-                .iter()
-                .enumerate()
-                .map(cell)
-                .collect::<String>()
-        )
+        format!("\n<tr>{}</tr>", cells(row).iter().enumerate().map(cell).collect::<String>())
     };
     format!(
         "\n<div class=\"wide\" tabindex=\"0\"><table><caption><span>{}</span></caption>\n<thead><tr>{}</tr></thead>\n<tbody>{}\n</tbody></table></div>",
@@ -253,10 +214,7 @@ fn table(explanation: &str, table: &Table) -> String {
 }
 
 fn is_number(text: &str) -> bool {
-    text.trim_end_matches(" %")
-        .trim_start_matches('+')
-        .parse::<f64>()
-        .is_ok()
+    text.trim_end_matches(" %").trim_start_matches('+').parse::<f64>().is_ok()
 }
 
 #[cfg(test)]

@@ -61,14 +61,11 @@ struct Link {
 pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
     let mut names = files::names(results)?;
     names.retain(|name| results.join(name).join("resolved.toml").is_file());
-    let repeats = |name: &String| {
-        name.strip_suffix(".new")
-            .is_some_and(|kept| names.contains(kept))
-    };
+    let repeats =
+        |name: &String| name.strip_suffix(".new").is_some_and(|kept| names.contains(kept));
     let kept = names.iter().filter(|name| !repeats(name));
-    let mut sections = kept
-        .map(|name| section(results, name, out))
-        .collect::<Result<Vec<_>, _>>()?;
+    let mut sections =
+        kept.map(|name| section(results, name, out)).collect::<Result<Vec<_>, _>>()?;
     if sections.is_empty() {
         return Err(Error::Usage(format!(
             "{} holds no finished experiment; accepted: the --out of one",
@@ -91,14 +88,9 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
     let found = files::names(&folder)?;
     let link = |file: &str| Link { name: file.into(), to: way(out, &folder.join(file)) };
     let ending = |suffix: &'static str| {
-        found
-            .iter()
-            .filter_map(move |file| Some((file, file.strip_suffix(suffix)?.to_owned())))
+        found.iter().filter_map(move |file| Some((file, file.strip_suffix(suffix)?.to_owned())))
     };
-    let drawn: Vec<&(String, Figure)> = outputs
-        .iter()
-        .flat_map(|output| &output.figures)
-        .collect();
+    let drawn: Vec<&(String, Figure)> = outputs.iter().flat_map(|output| &output.figures).collect();
     let mut figures = Vec::new();
     for (file, name) in ending(".svg") {
         let files = ["svg", "csv"].map(|kind| format!("{name}.{kind}"));
@@ -112,15 +104,9 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
     }
     // Readers expect figures in the order of the reports, not of their file names.
     figures.sort_by_key(|figure| {
-        drawn
-            .iter()
-            .position(|(name, _)| *name == figure.name)
-            .unwrap_or(drawn.len())
+        drawn.iter().position(|(name, _)| *name == figure.name).unwrap_or(drawn.len())
     });
-    let miniature = drawn
-        .first()
-        .map(|(_, figure)| ::figures::miniature(figure))
-        .transpose()?;
+    let miniature = drawn.first().map(|(_, figure)| ::figures::miniature(figure)).transpose()?;
     let specs =
         spec_file(name, &provenance).map(|path| Link { name: "spec".into(), to: way(out, &path) });
     let resolved = Link { name: "spec with all defaults".into(), ..link("resolved.toml") };
@@ -128,12 +114,8 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
         name: name.into(),
         question: experiment.question,
         verdict: verdict(&outputs),
-        stand_ins: scenes
-            .iter()
-            .any(|scene| scene.kind == SceneKind::StandIn.to_string()),
-        of_paper: outputs
-            .iter()
-            .any(|output| output.outcome.is_some()),
+        stand_ins: scenes.iter().any(|scene| scene.kind == SceneKind::StandIn.to_string()),
+        of_paper: outputs.iter().any(|output| output.outcome.is_some()),
         miniature,
         outputs,
         figures,
@@ -141,9 +123,7 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
             .into_iter()
             .chain([resolved, Link { name: "provenance".into(), ..link("provenance.toml") }])
             .collect(),
-        tables: ending(".csv")
-            .map(|(file, _)| link(file))
-            .collect(),
+        tables: ending(".csv").map(|(file, _)| link(file)).collect(),
         provenance,
     })
 }
@@ -151,29 +131,21 @@ fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
 /// Returns the verdict and the answers if numbers are compared with the paper's, otherwise the
 /// first report's reading.
 fn verdict(outputs: &[Output]) -> Verdict {
-    let compared = outputs
-        .iter()
-        .find_map(|output| Some((output.outcome?, output.answer.clone()?)));
+    let compared =
+        outputs.iter().find_map(|output| Some((output.outcome?, output.answer.clone()?)));
     if let Some((outcome, answer)) = compared {
         return Verdict::Paper(outcome, answer);
     }
-    let reading = outputs
-        .iter()
-        .map(|output| output.reading.trim())
-        .find(|reading| !reading.is_empty());
+    let reading =
+        outputs.iter().map(|output| output.reading.trim()).find(|reading| !reading.is_empty());
     reading.map_or(Verdict::None, |reading| Verdict::Reading(reading.into()))
 }
 
 /// The spec that was run, if it still is where it was.
 fn spec_file(name: &str, provenance: &Provenance) -> Option<PathBuf> {
-    let command = provenance
-        .parts
-        .first()
-        .map_or(&provenance.command, |part| &part.command);
+    let command = provenance.parts.first().map_or(&provenance.command, |part| &part.command);
     let is_spec = |path: &PathBuf| {
-        path.file_name()
-            .is_some_and(|file| *file == *format!("{name}.toml"))
-            && path.is_file()
+        path.file_name().is_some_and(|file| *file == *format!("{name}.toml")) && path.is_file()
     };
     command
         .split_whitespace()
@@ -185,33 +157,19 @@ fn spec_file(name: &str, provenance: &Provenance) -> Option<PathBuf> {
 /// The way from the page to a file, as a relative reference of a URL.
 fn way(page: &Path, file: &Path) -> String {
     let whole = |path: &Path| {
-        path.canonicalize()
-            .or_else(|_| std::path::absolute(path))
-            .unwrap_or_default()
+        path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or_default()
     };
     let from = whole(
-        page.parent()
-            .filter(|folder| !folder.as_os_str().is_empty())
-            .unwrap_or(Path::new(".")),
+        page.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")),
     );
     let to = whole(file);
     // Only a relative link still works when the results are moved or published.
-    let common = from
-        .components()
-        .zip(to.components())
-        .take_while(|(a, b)| a == b)
-        .count();
-    let up = from
-        .components()
-        .skip(common)
-        .map(|_| "..".into());
-    let down = to
-        .components()
-        .skip(common)
-        .filter_map(|part| match part {
-            Component::Normal(name) => Some(html::reference(&name.to_string_lossy())),
-            _ => None,
-        });
+    let common = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
+    let up = from.components().skip(common).map(|_| "..".into());
+    let down = to.components().skip(common).filter_map(|part| match part {
+        Component::Normal(name) => Some(html::reference(&name.to_string_lossy())),
+        _ => None,
+    });
     up.chain(down).collect::<Vec<String>>().join("/")
 }
 

@@ -97,10 +97,8 @@ fn to_our_tree(theirs: &TheirBvh<f32, 3>, boxes: &[Aabb]) -> Bvh {
 
 /// Builds on one thread; the library's leaves have one object.
 pub(super) fn build(boxes: &[Aabb]) -> Built {
-    let mut shapes: Vec<Shape> = (0..)
-        .zip(boxes)
-        .map(|(object, &aabb)| Shape::new(object, aabb, [aabb.min; 3]))
-        .collect();
+    let mut shapes: Vec<Shape> =
+        (0..).zip(boxes).map(|(object, &aabb)| Shape::new(object, aabb, [aabb.min; 3])).collect();
     let start = Instant::now();
     let theirs = TheirBvh::build(&mut shapes);
     let seconds = start.elapsed().as_secs_f64();
@@ -147,9 +145,7 @@ impl PreparedRay {
     /// Returns whether the ray enters the shape's box behind `limit`, a distance of the library.
     #[inline(always)]
     fn enters_behind(&self, shape: &Shape, limit: f32) -> bool {
-        self.theirs
-            .intersection_slice_for_aabb(&shape.aabb)
-            .is_some_and(|(entry, _)| entry > limit)
+        self.theirs.intersection_slice_for_aabb(&shape.aabb).is_some_and(|(entry, _)| entry > limit)
     }
 
     /// Returns the nearest hit in the ray's range, or for [`Query::Any`] the first one found, by

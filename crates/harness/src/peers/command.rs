@@ -73,10 +73,7 @@ impl Config {
             .args([&boxes_path, &tree_path])
             .env("BVH_SEED", seed.to_string());
         // Standard error goes to a file: a full pipe that nobody reads would stop the program.
-        command
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(errors.try_clone()?);
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(errors.try_clone()?);
         let start = Instant::now();
         let mut program =
             Program::start(&mut command, folder.path()).map_err(CommandFault::NotStarted)?;

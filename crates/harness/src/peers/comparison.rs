@@ -64,11 +64,7 @@ pub fn speeds(
                 build_seconds,
                 disagreements: wrong_answers(traced),
             },
-            turns: traced
-                .turns
-                .iter()
-                .map(|seconds| million / seconds)
-                .collect(),
+            turns: traced.turns.iter().map(|seconds| million / seconds).collect(),
         }
     };
     traced
@@ -86,14 +82,8 @@ fn wrong_answers(traced: &Traced) -> u64 {
 /// Returns the rows of `timing_rays.csv`: all speeds, and for every contender and kind of rays that
 /// all scenes have, the geometric mean of the speeds and the sum of disagreements.
 pub fn rows(speeds: &[Speed]) -> Vec<PeerRayRow> {
-    let rows: Vec<PeerRayRow> = speeds
-        .iter()
-        .map(|speed| speed.row.clone())
-        .collect();
-    let scenes: BTreeSet<&str> = rows
-        .iter()
-        .map(|row| row.scene.as_str())
-        .collect();
+    let rows: Vec<PeerRayRow> = speeds.iter().map(|speed| speed.row.clone()).collect();
+    let scenes: BTreeSet<&str> = rows.iter().map(|row| row.scene.as_str()).collect();
     let mut groups: BTreeMap<[&str; 4], Vec<usize>> = BTreeMap::new();
     for (index, row) in rows.iter().enumerate() {
         groups
@@ -109,10 +99,7 @@ pub fn rows(speeds: &[Speed]) -> Vec<PeerRayRow> {
     complete.sort();
     let mean = |group: &Vec<usize>| {
         let of_group: Vec<&PeerRayRow> = group.iter().map(|&index| &rows[index]).collect();
-        let speeds: Vec<f64> = of_group
-            .iter()
-            .map(|row| row.million_per_s)
-            .collect();
+        let speeds: Vec<f64> = of_group.iter().map(|row| row.million_per_s).collect();
         PeerRayRow {
             scene: MEAN.into(),
             million_per_s: geometric_mean(&speeds),
@@ -202,17 +189,9 @@ fn over_fastest(
         .filter(|rival| rival.row.library != OURS && is_rival(&rival.row))
         .filter(|rival| rival.row.scene == own.row.scene && rival.row.rays == own.row.rays)
         .filter(|rival| accepted_instructions.contains(&rival.row.instructions.as_str()))
-        .max_by(|a, b| {
-            a.row
-                .million_per_s
-                .total_cmp(&b.row.million_per_s)
-        })?;
-    let turns: Vec<f64> = own
-        .turns
-        .iter()
-        .zip(&fastest.turns)
-        .map(|(own, rival)| own / rival)
-        .collect();
+        .max_by(|a, b| a.row.million_per_s.total_cmp(&b.row.million_per_s))?;
+    let turns: Vec<f64> =
+        own.turns.iter().zip(&fastest.turns).map(|(own, rival)| own / rival).collect();
     let ratio = own.row.million_per_s / fastest.row.million_per_s;
     let (least_turn, greatest_turn) = range(turns.iter().copied()).unwrap_or((ratio, ratio));
     let row = RayRatioRow {
@@ -234,9 +213,7 @@ fn over_fastest(
 
 /// Returns the geometric mean over scenes, with and without the scene that raises it most.
 fn mean_ratio(scenes: &[OverFastest]) -> Option<RayRatioRow> {
-    let carrier = scenes
-        .iter()
-        .max_by(|a, b| a.row.ratio.total_cmp(&b.row.ratio))?;
+    let carrier = scenes.iter().max_by(|a, b| a.row.ratio.total_cmp(&b.row.ratio))?;
     let ratios: Vec<f64> = scenes.iter().map(|over| over.row.ratio).collect();
     let ratio = geometric_mean(&ratios);
     let without: Vec<f64> = scenes
@@ -244,16 +221,9 @@ fn mean_ratio(scenes: &[OverFastest]) -> Option<RayRatioRow> {
         .filter(|over| over.row.scene != carrier.row.scene)
         .map(|over| over.row.ratio)
         .collect();
-    let turn_count = scenes
-        .iter()
-        .map(|over| over.turns.len())
-        .min()
-        .unwrap_or(0);
+    let turn_count = scenes.iter().map(|over| over.turns.len()).min().unwrap_or(0);
     let turn_means = (0..turn_count).map(|turn| {
-        let ratios: Vec<f64> = scenes
-            .iter()
-            .map(|over| over.turns[turn])
-            .collect();
+        let ratios: Vec<f64> = scenes.iter().map(|over| over.turns[turn]).collect();
         geometric_mean(&ratios)
     });
     let (least_turn, greatest_turn) = range(turn_means).unwrap_or((ratio, ratio));
@@ -274,20 +244,16 @@ fn mean_ratio(scenes: &[OverFastest]) -> Option<RayRatioRow> {
 /// fastest mode to the fastest third-party mode.
 pub fn text(ratios: &[RayRatioRow]) -> String {
     let mut text = String::from("Our speed over the fastest mode of any other library:\n");
-    let groups: BTreeSet<[&str; 2]> = ratios
-        .iter()
-        .map(|row| [row.processor.as_str(), row.rays.as_str()])
-        .collect();
+    let groups: BTreeSet<[&str; 2]> =
+        ratios.iter().map(|row| [row.processor.as_str(), row.rays.as_str()]).collect();
     for [processor, kind] in groups {
         let group: Vec<&RayRatioRow> = ratios
             .iter()
             .filter(|row| row.processor == processor && row.rays == kind)
             .filter(|row| row.against == AGAINST[0].0 && !is_repeat(&row.mode))
             .collect();
-        let best_mean = group
-            .iter()
-            .filter(|row| row.scene == MEAN)
-            .max_by(|a, b| a.ratio.total_cmp(&b.ratio));
+        let best_mean =
+            group.iter().filter(|row| row.scene == MEAN).max_by(|a, b| a.ratio.total_cmp(&b.ratio));
         let Some(mean) = best_mean else { continue };
         let least = group
             .iter()

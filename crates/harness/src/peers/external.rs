@@ -35,9 +35,7 @@ impl Mode {
 /// Returns the modes that the program lists.
 fn modes(program: &Path) -> Result<Vec<Mode>, String> {
     let shown = program.display();
-    let listed = Command::new(program)
-        .output()
-        .map_err(|error| format!("{shown}: {error}"))?;
+    let listed = Command::new(program).output().map_err(|error| format!("{shown}: {error}"))?;
     let text = String::from_utf8_lossy(&listed.stdout);
     let mut modes = Vec::new();
     for line in text.lines() {
@@ -64,9 +62,7 @@ pub fn contenders(
     program: &Path,
     scene: &Scene,
 ) -> Result<Vec<(String, Contender<'static>)>, String> {
-    let triangles = scene
-        .triangles()
-        .map_err(|error| error.to_string())?;
+    let triangles = scene.triangles().map_err(|error| error.to_string())?;
     let mut contenders = Vec::new();
     for mode in modes(program)? {
         let argument = format!("{} {}", mode.library, mode.name);
@@ -77,10 +73,7 @@ pub fn contenders(
         // Contenders trace one after the other on one thread, so no lock is needed.
         let process = RefCell::new(process);
         let trace = move |batch: &Batch, hits: &mut [Option<Hit>]| {
-            process
-                .borrow_mut()
-                .trace(batch, hits)
-                .map_err(|error| format!("{command}: {error}"))
+            process.borrow_mut().trace(batch, hits).map_err(|error| format!("{command}: {error}"))
         };
         let contender = Contender {
             layout: mode.name,
@@ -105,11 +98,8 @@ struct Process {
 impl Process {
     /// Starts the program and sends it the triangles. Also returns the seconds of its build.
     fn start(program: &Path, mode: &str, triangles: &[Triangle]) -> io::Result<(Self, f64)> {
-        let mut child = Command::new(program)
-            .arg(mode)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()?;
+        let mut child =
+            Command::new(program).arg(mode).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
         let (Some(rays), Some(answers)) = (child.stdin.take(), child.stdout.take()) else {
             return Err(io::Error::other("the program has no pipes"));
         };
@@ -198,23 +188,13 @@ mod tests {
         ask(&mut sent, &batch).unwrap();
         assert_eq!(sent.len(), 4 * 4 + 3 * 8 * 4);
         let words = sent.as_chunks::<4>().0;
-        let counts: Vec<u32> = words[..4]
-            .iter()
-            .map(|word| u32::from_le_bytes(*word))
-            .collect();
+        let counts: Vec<u32> = words[..4].iter().map(|word| u32::from_le_bytes(*word)).collect();
         assert_eq!(counts, [1, 1, 3, PART as u32]);
-        let ray: Vec<f32> = words[4..12]
-            .iter()
-            .map(|word| f32::from_le_bytes(*word))
-            .collect();
+        let ray: Vec<f32> = words[4..12].iter().map(|word| f32::from_le_bytes(*word)).collect();
         assert_eq!(ray, [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, -1.0, 7.0]);
 
         let mut received = 0.25f64.to_le_bytes().to_vec();
-        received.extend(
-            [2.5, f32::INFINITY, 0.0]
-                .map(f32::to_le_bytes)
-                .as_flattened(),
-        );
+        received.extend([2.5, f32::INFINITY, 0.0].map(f32::to_le_bytes).as_flattened());
         let mut hits = [None; 3];
         assert_eq!(answer(&mut &received[..], &mut hits).unwrap(), [0.25]);
         let hit = |t| Some(Hit { t, object: 0 });

@@ -161,9 +161,7 @@ impl Peer {
 
 #[cfg(feature = "peers")]
 fn triangles(scene: &Scene) -> Result<&[bvh_core::Triangle], String> {
-    scene
-        .triangles()
-        .map_err(|error| error.to_string())
+    scene.triangles().map_err(|error| error.to_string())
 }
 
 #[cfg(all(test, feature = "peers"))]
@@ -204,10 +202,7 @@ mod tests {
     #[test]
     fn other_libraries_find_nearly_all_hits_and_nothing_else() {
         let scene = Scene::load("escher:2000").unwrap();
-        let tree = Peer::Bvh(NoSettings {})
-            .build(&scene)
-            .unwrap()
-            .tree;
+        let tree = Peer::Bvh(NoSettings {}).build(&scene).unwrap().tree;
         let rays = rays(Kind::Incoherent, 4000, &scene, &tree, &Default::default(), 1);
         let batch = Batch {
             query: Query::Nearest,

@@ -31,10 +31,8 @@ fn parameters(config: &Obvhs) -> BvhBuildParams {
 
 /// Returns the library's tree over boxes and the time by the library's stopwatch.
 fn build_over(boxes: &[Aabb], parameters: BvhBuildParams) -> (Bvh2, Duration) {
-    let theirs: Vec<aabb::Aabb> = boxes
-        .iter()
-        .map(|b| aabb::Aabb::new(b.min.into(), b.max.into()))
-        .collect();
+    let theirs: Vec<aabb::Aabb> =
+        boxes.iter().map(|b| aabb::Aabb::new(b.min.into(), b.max.into())).collect();
     let mut time = Duration::ZERO;
     (binary::build_bvh2(&theirs, parameters, &mut time), time)
 }
@@ -115,9 +113,7 @@ pub(super) fn contenders(config: &Obvhs, triangles: &[Triangle]) -> Vec<Contende
 
 /// Returns the triangles in the order of `ids`, prepared for the library's test.
 fn in_order(triangles: &[TheirTriangle], ids: &[u32]) -> Vec<RtTriangle> {
-    ids.iter()
-        .map(|&id| (&triangles[id as usize]).into())
-        .collect()
+    ids.iter().map(|&id| (&triangles[id as usize]).into()).collect()
 }
 
 fn contender(layout: &str, time: Duration, trace: Trace<'static>) -> Contender<'static> {

@@ -87,10 +87,7 @@ mod marked {
 
     fn processes(variable: &[u8]) -> Vec<Pid> {
         let Ok(entries) = fs::read_dir("/proc") else { return vec![] };
-        entries
-            .flatten()
-            .filter_map(|entry| marked_process(&entry, variable))
-            .collect()
+        entries.flatten().filter_map(|entry| marked_process(&entry, variable)).collect()
     }
 
     fn marked_process(entry: &fs::DirEntry, variable: &[u8]) -> Option<Pid> {
@@ -98,8 +95,6 @@ mod marked {
         // The environments of other users' processes cannot be read.
         let environment = fs::read(entry.path().join("environ")).ok()?;
         let mut variables = environment.split(|&byte| byte == 0);
-        variables
-            .any(|found| found == variable)
-            .then(|| Pid::from_raw(number))
+        variables.any(|found| found == variable).then(|| Pid::from_raw(number))
     }
 }

@@ -99,16 +99,8 @@ impl Config {
         let Some((low, high)) = range(lowest.iter().map(|(cost, _)| *cost)) else {
             return String::new();
         };
-        let count = |method| {
-            lowest
-                .iter()
-                .filter(|(_, best)| *best == method)
-                .count()
-        };
-        let counts = self
-            .methods
-            .iter()
-            .map(|method| (method.as_str(), count(method)));
+        let count = |method| lowest.iter().filter(|(_, best)| *best == method).count();
+        let counts = self.methods.iter().map(|method| (method.as_str(), count(method)));
         let counts = tally(counts.filter(|(_, count)| *count > 0), lowest.len(), "scenes");
         let low = percent(low);
         let high = percent(high);
@@ -118,14 +110,9 @@ impl Config {
     }
 
     fn add_table(&self, output: &mut Output, rows: &Rows) {
-        let seconds = self
-            .at_seconds
-            .iter()
-            .map(|seconds| format!("{seconds} s"));
-        let header: Vec<String> = ["scene".into(), "method".into()]
-            .into_iter()
-            .chain(seconds)
-            .collect();
+        let seconds = self.at_seconds.iter().map(|seconds| format!("{seconds} s"));
+        let header: Vec<String> =
+            ["scene".into(), "method".into()].into_iter().chain(seconds).collect();
         let mut table = text_table(header.iter().map(String::as_str));
         for scene in rows.scenes() {
             for method in &self.methods {
@@ -135,10 +122,7 @@ impl Config {
                     cost.map_or_else(String::new, |cost| percent(cost / rows.base_cost(scene)))
                 };
                 let name = [rows.shown(scene), method.clone()];
-                table.add_row(
-                    name.into_iter()
-                        .chain(self.at_seconds.iter().map(cell)),
-                );
+                table.add_row(name.into_iter().chain(self.at_seconds.iter().map(cell)));
             }
         }
         output.add_table("Median cost against the greedy tree's, after so many seconds:", table);
@@ -154,34 +138,21 @@ fn percent(ratio: f64) -> String {
 /// has none yet, so that their median never rises.
 fn incumbents(runs: &[Series], at: f64) -> Vec<f64> {
     let incumbent = |run: &Series| {
-        run.iter()
-            .take_while(|(seconds, _)| *seconds <= at)
-            .last()
-            .map(|point| point.1)
+        run.iter().take_while(|(seconds, _)| *seconds <= at).last().map(|point| point.1)
     };
-    runs.iter()
-        .map(|run| incumbent(run).unwrap_or(WORST))
-        .collect()
+    runs.iter().map(|run| incumbent(run).unwrap_or(WORST)).collect()
 }
 
 /// Median and quartiles of the gap from the first moment at which every run has an incumbent to the
 /// last event.
 fn curve<'a>(scene: &'a str, method: &'a str, runs: &[Series], reference: f64) -> Vec<Point<'a>> {
-    let first = runs
-        .iter()
-        .filter_map(|run| Some(run.first()?.0))
-        .fold(0.0, f64::max);
-    let last = runs
-        .iter()
-        .filter_map(|run| Some(run.last()?.0))
-        .fold(0.0, f64::max);
+    let first = runs.iter().filter_map(|run| Some(run.first()?.0)).fold(0.0, f64::max);
+    let last = runs.iter().filter_map(|run| Some(run.last()?.0)).fold(0.0, f64::max);
     // The places of a curve are evenly spaced logarithms, which need a positive start.
     if first <= 0.0 || !last.is_finite() {
         return Vec::new();
     }
-    let steps = ((last / first).log10() * PER_DECADE)
-        .ceil()
-        .max(0.0) as u32;
+    let steps = ((last / first).log10() * PER_DECADE).ceil().max(0.0) as u32;
     let place = |step: u32| {
         // The last place is the end itself, which rounding of the power would miss.
         if step == steps { last } else { first * 10f64.powf(f64::from(step) / PER_DECADE) }
@@ -211,10 +182,8 @@ fn corners<'a>(points: &[Point<'a>]) -> Vec<Point<'a>> {
 
 /// A staircase with its band, or a marker for a single point.
 fn draw(method: &str, points: &[Point]) -> Vec<Layer> {
-    let medians: Vec<(f64, f64)> = points
-        .iter()
-        .map(|point| (point.seconds, point.gap_median))
-        .collect();
+    let medians: Vec<(f64, f64)> =
+        points.iter().map(|point| (point.seconds, point.gap_median)).collect();
     // A builder has one event, and a staircase of one corner would be invisible.
     if points.len() == 1 {
         return vec![Layer::new(method, Marks::Points(medians))];

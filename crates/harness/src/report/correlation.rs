@@ -77,48 +77,29 @@ fn costs(rows: &Rows) -> Vec<Cost<'_>> {
                 && row.rays == rays
         };
         let of = move |run: &RunRow| {
-            Some(
-                rows.visits
-                    .iter()
-                    .find(|row| own(run, row))?
-                    .goldsmith_salmon,
-            )
+            Some(rows.visits.iter().find(|row| own(run, row))?.goldsmith_salmon)
         };
         (format!("goldsmith_salmon_{rays}"), Box::new(of))
     };
     let rays = distinct(rows.visits.iter().map(|row| row.rays.as_str()));
-    of_area
-        .into_iter()
-        .chain(rays.into_iter().map(of_rays))
-        .collect()
+    of_area.into_iter().chain(rays.into_iter().map(of_rays)).collect()
 }
 
 pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     let mut correlations = Vec::new();
     let mut panels = Vec::new();
     let costs = costs(rows);
-    let of_layouts = distinct(
-        rows.run_tests
-            .iter()
-            .map(|row| (row.judged_on.as_str(), row.camera.as_str())),
-    );
+    let of_layouts =
+        distinct(rows.run_tests.iter().map(|row| (row.judged_on.as_str(), row.camera.as_str())));
     let random = rows.ray_kinds().len();
     for scene in rows.scenes() {
-        for (number, kind) in rows
-            .ray_kinds()
-            .into_iter()
-            .chain(of_layouts.clone())
-            .enumerate()
-        {
+        for (number, kind) in rows.ray_kinds().into_iter().chain(of_layouts.clone()).enumerate() {
             let start = correlations.len();
             let mut drawn = Vec::new();
             for method in &config.methods {
                 let trees = trees(rows, scene, method, kind);
-                correlations.extend(
-                    costs
-                        .iter()
-                        .map(|cost| correlate(scene, method, kind, cost, &trees)),
-                );
+                correlations
+                    .extend(costs.iter().map(|cost| correlate(scene, method, kind, cost, &trees)));
                 drawn.push((method.as_str(), trees));
             }
             // Only random rays are drawn; kinds of rays through layouts would make too many panels.
@@ -176,11 +157,7 @@ impl Config {
             let compared = compared.compare(says, format!("{pearson:.2}"), verdict, rule);
             Some(PaperRow { ours_low: Some(low), ours_high: Some(high), ..compared })
         };
-        correlations
-            .iter()
-            .filter(is_of_paper)
-            .filter_map(compare)
-            .collect()
+        correlations.iter().filter(is_of_paper).filter_map(compare).collect()
     }
 }
 
@@ -196,15 +173,8 @@ fn trees<'a>(rows: &'a Rows, scene: &str, method: &str, kind: (&str, &str)) -> V
             && row.method == method
             && (row.judged_on.as_str(), row.camera.as_str()) == kind
     };
-    let of_layouts = rows
-        .run_tests
-        .iter()
-        .filter(own)
-        .map(|row| (row.repetition, row.tests));
-    let run = |repetition| {
-        rows.runs_of(scene, method)
-            .find(|run| run.repetition == repetition)
-    };
+    let of_layouts = rows.run_tests.iter().filter(own).map(|row| (row.repetition, row.tests));
+    let run = |repetition| rows.runs_of(scene, method).find(|run| run.repetition == repetition);
     random
         .chain(of_layouts)
         .filter_map(|(repetition, tests)| Some((run(repetition)?, tests)))
@@ -221,9 +191,8 @@ fn correlate<'a>(
     let pair = |(run, tests): &Tree| Some((of(run)?, *tests));
     let pairs: Vec<(f64, f64)> = trees.iter().filter_map(pair).collect();
     let pearson = pearson(&pairs);
-    let (pearson_low, pearson_high) = pearson
-        .and_then(|pearson| pearson_interval(pearson, pairs.len()))
-        .unzip();
+    let (pearson_low, pearson_high) =
+        pearson.and_then(|pearson| pearson_interval(pearson, pairs.len())).unzip();
     let trees = pairs.len();
     let spearman = spearman(&pairs);
     Correlation {
@@ -247,9 +216,7 @@ fn draw(
     rank: Option<f64>,
 ) -> Panel {
     let points = |(method, trees): &(&str, Vec<Tree>)| {
-        let points = trees
-            .iter()
-            .map(|(run, tests)| (run.goldsmith_salmon, *tests));
+        let points = trees.iter().map(|(run, tests)| (run.goldsmith_salmon, *tests));
         Layer::new(*method, Marks::Points(points.collect()))
     };
     let rank = rank.map_or_else(String::new, |rank| format!(", ρ = {rank:.3}"));
@@ -274,8 +241,7 @@ mod tests {
                 (0..).zip([(1.0, 2.0), (2.0, 1.0), (3.0, 1.0), (4.0, 2.0)])
             {
                 let goldsmith_salmon = level + cost;
-                rows.runs
-                    .push(RunRow { goldsmith_salmon, ..run(method, repetition, 1, 0) });
+                rows.runs.push(RunRow { goldsmith_salmon, ..run(method, repetition, 1, 0) });
                 let scene = "s".to_owned();
                 let method = method.to_owned();
                 let family = OF_PAPER.0.to_owned();
@@ -311,9 +277,8 @@ mod tests {
         let mut reader = csv::Reader::from_reader(&output.csv[0].1[..]);
         let rows: Vec<Row> = reader.deserialize().map(Result::unwrap).collect();
         let own = rows.iter().filter(|row| row["cost"] == OF_AREA);
-        let own: Vec<(&str, f64)> = own
-            .map(|row| (row["method"].as_str(), row["spearman"].parse().unwrap()))
-            .collect();
+        let own: Vec<(&str, f64)> =
+            own.map(|row| (row["method"].as_str(), row["spearman"].parse().unwrap())).collect();
         assert_eq!(own, [("orders", 0.0), ("splits", 0.0)]);
     }
 

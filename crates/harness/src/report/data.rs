@@ -69,10 +69,7 @@ impl Rows {
 
     /// Returns the scene's kind, as in `runs.csv`.
     pub fn kind(&self, scene: &str) -> &str {
-        self.runs
-            .iter()
-            .find(|run| run.scene == scene)
-            .map_or("", |run| run.scene_kind.as_str())
+        self.runs.iter().find(|run| run.scene == scene).map_or("", |run| run.scene_kind.as_str())
     }
 
     /// Returns the scene's name for tables and figures: its kind follows unless it is a file.
@@ -84,47 +81,32 @@ impl Rows {
 
     /// Returns the names of all scenes for tables and figures.
     pub fn all_shown(&self) -> Vec<String> {
-        self.scenes()
-            .into_iter()
-            .map(|scene| self.shown(scene))
-            .collect()
+        self.scenes().into_iter().map(|scene| self.shown(scene)).collect()
     }
 
     /// Returns the cost of the scene's greedy tree.
     pub fn base_cost(&self, scene: &str) -> f64 {
-        self.runs
-            .iter()
-            .find(|run| run.scene == scene)
-            .map_or(f64::NAN, |run| run.base_cost)
+        self.runs.iter().find(|run| run.scene == scene).map_or(f64::NAN, |run| run.base_cost)
     }
 
     /// Returns the reference that gaps on the scene are measured from.
     pub fn reference(&self, scene: &str) -> Option<&ReferenceRow> {
-        self.references
-            .iter()
-            .find(|row| row.scene == scene)
+        self.references.iter().find(|row| row.scene == scene)
     }
 
     /// Returns the runs of one method on one scene.
     pub fn runs_of(&self, scene: &str, method: &str) -> impl Iterator<Item = &RunRow> {
-        self.runs
-            .iter()
-            .filter(move |run| run.scene == scene && run.method == method)
+        self.runs.iter().filter(move |run| run.scene == scene && run.method == method)
     }
 
     /// Returns the final costs over base of the runs of one method on one scene.
     pub fn final_ratios(&self, scene: &str, method: &str) -> Vec<f64> {
-        self.runs_of(scene, method)
-            .map(|run| ratio(run.cost, run.base_cost))
-            .collect()
+        self.runs_of(scene, method).map(|run| ratio(run.cost, run.base_cost)).collect()
     }
 
     /// Returns the seconds of the runs of one method on one scene.
     pub fn seconds_of(&self, scene: &str, method: &str) -> Vec<f64> {
-        let own = self
-            .timing
-            .iter()
-            .filter(|row| row.scene == scene && row.method == method);
+        let own = self.timing.iter().filter(|row| row.scene == scene && row.method == method);
         own.map(|row| row.seconds).collect()
     }
 
@@ -132,43 +114,26 @@ impl Rows {
     pub fn trials_of(&self, scene: &str, method: &str) -> Vec<Vec<&TrialRow>> {
         let own = |row: &&TrialRow| row.scene == scene && row.method == method;
         let rows: Vec<&TrialRow> = self.trials.iter().filter(own).collect();
-        rows.chunk_by(|a, b| a.repetition == b.repetition)
-            .map(<[_]>::to_vec)
-            .collect()
+        rows.chunk_by(|a, b| a.repetition == b.repetition).map(<[_]>::to_vec).collect()
     }
 
     /// Returns the costs of all trials of one method on one scene, over all repetitions.
     pub fn trial_costs(&self, scene: &str, method: &str) -> Vec<f64> {
-        self.trials_of(scene, method)
-            .concat()
-            .iter()
-            .map(|row| row.cost)
-            .collect()
+        self.trials_of(scene, method).concat().iter().map(|row| row.cost).collect()
     }
 
     /// Returns the costs over base of one method's trials on one scene, one list per repetition, in
     /// order.
     pub fn trials_over_base(&self, scene: &str, method: &str) -> Vec<Vec<f64>> {
         let base = self.base_cost(scene);
-        let over_base = |trials: Vec<&TrialRow>| {
-            trials
-                .iter()
-                .map(|row| ratio(row.cost, base))
-                .collect()
-        };
-        self.trials_of(scene, method)
-            .into_iter()
-            .map(over_base)
-            .collect()
+        let over_base =
+            |trials: Vec<&TrialRow>| trials.iter().map(|row| ratio(row.cost, base)).collect();
+        self.trials_of(scene, method).into_iter().map(over_base).collect()
     }
 
     /// Returns the kinds of random rays: family and query.
     pub fn ray_kinds(&self) -> Vec<(&str, &str)> {
-        distinct(
-            self.rays
-                .iter()
-                .map(|row| (row.family.as_str(), row.query.as_str())),
-        )
+        distinct(self.rays.iter().map(|row| (row.family.as_str(), row.query.as_str())))
     }
 
     /// Returns the measurements with random rays of one kind in the trees of one method on one
@@ -189,9 +154,7 @@ pub(super) fn run(method: &str, repetition: u32, evaluations: u64, work: u64) ->
     let row = format!(
         "s,file,{method},0,{repetition},100,{evaluations},{work},completed,1,1,1,1,1,1,1,199,9"
     );
-    csv::StringRecord::from_iter(row.split(','))
-        .deserialize(None)
-        .unwrap()
+    csv::StringRecord::from_iter(row.split(',')).deserialize(None).unwrap()
 }
 
 /// Returns a ratio of costs; 1 when the denominator is 0, as in `runs.csv`.

@@ -59,19 +59,13 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
             let costs = sorted(&rows.trial_costs(scene, method));
             summaries.push(summarise(scene, method, &costs, base_cost));
             let fraction = |rank: u32| f64::from(rank) / costs.len() as f64;
-            let steps = costs
-                .iter()
-                .zip(1..)
-                .map(|(&cost, rank)| (cost, fraction(rank)))
-                .collect();
+            let steps = costs.iter().zip(1..).map(|(&cost, rank)| (cost, fraction(rank))).collect();
             layers.push(Layer::new(method, Marks::Steps(steps)));
         }
         layers.push(Layer::new("Müller–Fellner", Marks::VLine(base_cost)));
         let y = Axis::linear("fraction of trials at most as costly").range(0.0, 1.0);
         let own = summaries.iter().filter(|row| row.scene == scene);
-        let ends = own
-            .flat_map(|row| [row.lowest_cost, row.highest_cost])
-            .chain([base_cost]);
+        let ends = own.flat_map(|row| [row.lowest_cost, row.highest_cost]).chain([base_cost]);
         let (low, high) = range(ends).unwrap_or((0.0, 1.0));
         // The range covers the costs of all methods and the base, with room at both ends.
         let margin = 0.05 * (high - low);
@@ -94,11 +88,7 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     let columns = "scene method lowest_cost median_cost highest_cost relative_deviation base_cost";
     output.show("Costs of all trials:", &summaries, columns)?;
     let reading = each(&config.methods, |method| {
-        let own = || {
-            summaries
-                .iter()
-                .filter(|row| row.method == method)
-        };
+        let own = || summaries.iter().filter(|row| row.method == method);
         let of = |cost: fn(&Summary) -> f64| range(own().map(|row| cost(row) / row.base_cost));
         let (median, most) = of(|row| row.median_cost)?;
         let (lowest, least) = of(|row| row.lowest_cost)?;
@@ -140,11 +130,7 @@ fn fraction_below(costs: &[f64], limit: f64) -> f64 {
 fn summarise<'a>(scene: &'a str, method: &'a str, costs: &[f64], base_cost: f64) -> Summary<'a> {
     let (n, at) = (costs.len() as f64, |q| quantile(costs, q).unwrap_or(f64::NAN));
     let mean_cost = mean(costs.iter().copied());
-    let variance = costs
-        .iter()
-        .map(|cost| (cost - mean_cost).powi(2))
-        .sum::<f64>()
-        / (n - 1.0);
+    let variance = costs.iter().map(|cost| (cost - mean_cost).powi(2)).sum::<f64>() / (n - 1.0);
     Summary {
         scene,
         method,

@@ -89,20 +89,12 @@ impl Config {
     }
 
     fn find<'a>(&self, rows: &'a Rows) -> Found<'a> {
-        let optimal = rows
-            .runs
-            .iter()
-            .filter(|run| run.method == self.optimum);
-        let optima: BTreeMap<&str, f64> = optimal
-            .map(|run| (run.scene.as_str(), run.cost))
-            .collect();
+        let optimal = rows.runs.iter().filter(|run| run.method == self.optimum);
+        let optima: BTreeMap<&str, f64> =
+            optimal.map(|run| (run.scene.as_str(), run.cost)).collect();
         let mut found =
             Found { gaps: BTreeMap::new(), bounds: BTreeMap::new(), optima: optima.len() };
-        for run in rows
-            .runs
-            .iter()
-            .filter(|run| self.methods.contains(&run.method))
-        {
+        for run in rows.runs.iter().filter(|run| self.methods.contains(&run.method)) {
             if let Some(&optimum) = optima.get(run.scene.as_str()) {
                 // An optimum of 0 has no relative gap, so the cost itself is the gap.
                 let gap = if optimum > 0.0 { run.cost / optimum - 1.0 } else { run.cost };
@@ -114,14 +106,9 @@ impl Config {
             }
         }
         for row in &rows.bounds {
-            if let Some(optimum) = optima
-                .get(row.scene.as_str())
-                .filter(|&&optimum| optimum > 0.0)
+            if let Some(optimum) = optima.get(row.scene.as_str()).filter(|&&optimum| optimum > 0.0)
             {
-                let same = found
-                    .bounds
-                    .entry((part(&row.scene), row.objects))
-                    .or_default();
+                let same = found.bounds.entry((part(&row.scene), row.objects)).or_default();
                 same.push(row.lower_bound / optimum);
             }
         }
@@ -140,33 +127,19 @@ impl Config {
                 quantile_90_gap: at(gaps, 0.9),
                 maximum_gap: at(gaps, 1.0),
             };
-        let of = |method| {
-            found
-                .gaps
-                .iter()
-                .filter(move |((of, ..), _)| of == method)
-        };
-        self.methods
-            .iter()
-            .flat_map(of)
-            .map(summary)
-            .collect()
+        let of = |method| found.gaps.iter().filter(move |((of, ..), _)| of == method);
+        self.methods.iter().flat_map(of).map(summary).collect()
     }
 
     /// Draws the fraction solved and the worst gap against size, for every kind of part.
     fn draw(&self, summaries: &[Gaps]) -> Vec<Panel> {
-        let parts: BTreeSet<&str> = summaries
-            .iter()
-            .map(|summary| summary.part)
-            .collect();
+        let parts: BTreeSet<&str> = summaries.iter().map(|summary| summary.part).collect();
         let draw = |part: &str, title: &str, y: Axis, value: fn(&Gaps) -> f64| {
             let line = |method: &String| {
                 let own = summaries
                     .iter()
                     .filter(|summary| summary.part == part && summary.method == method);
-                let points = own
-                    .map(|summary| (summary.objects as f64, value(summary)))
-                    .collect();
+                let points = own.map(|summary| (summary.objects as f64, value(summary))).collect();
                 Layer::new(method, Marks::Line(points))
             };
             let lines = self.methods.iter().map(line).collect();
@@ -187,17 +160,10 @@ impl Config {
     /// bound.
     fn reading(&self, found: &Found) -> String {
         let gaps_of = |method: &str| -> Vec<f64> {
-            let own = found
-                .gaps
-                .iter()
-                .filter(|((of, ..), _)| *of == method);
-            own.flat_map(|(_, gaps)| gaps.iter().copied())
-                .collect()
+            let own = found.gaps.iter().filter(|((of, ..), _)| *of == method);
+            own.flat_map(|(_, gaps)| gaps.iter().copied()).collect()
         };
-        let solved_by = self
-            .methods
-            .iter()
-            .map(|method| (method, solved(&gaps_of(method))));
+        let solved_by = self.methods.iter().map(|method| (method, solved(&gaps_of(method))));
         let (all, some): (Vec<_>, Vec<_>) = solved_by.partition(|(_, part)| *part == 1.0);
         let all = each(all, |(method, _)| Some(format!("‘{method}’")));
         let all = if all.is_empty() { "no method".into() } else { all };
@@ -229,11 +195,7 @@ fn tightness((&(part, objects), bounds): (&(&'static str, usize), &Vec<f64>)) ->
 fn draw_bounds(tightness: &[Tightness]) -> Vec<Panel> {
     let parts: BTreeSet<&str> = tightness.iter().map(|row| row.part).collect();
     let draw = |part| {
-        let own = || {
-            tightness
-                .iter()
-                .filter(move |row| row.part == part)
-        };
+        let own = || tightness.iter().filter(move |row| row.part == part);
         let range = |row: &Tightness| {
             (row.objects as f64, row.minimum_bound_over_optimum, row.maximum_bound_over_optimum)
         };

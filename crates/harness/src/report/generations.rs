@@ -95,19 +95,13 @@ impl Config {
             panels.push(draw(&rows.shown(scene), runs.runs.len(), &own));
             generations.extend(own);
             let Some(end) = runs.end(rows.base_cost(scene)) else { continue };
-            output
-                .paper
-                .extend(self.compare(&rows.shown(scene), &runs, &end));
+            output.paper.extend(self.compare(&rows.shown(scene), &runs, &end));
         }
         let caption = "Goldsmith–Salmon cost of the best tree so far: the run whose final cost is the median and, of several runs, the \
                        range. Random picking: the exact expectation for as many orders, as far as so many were drawn.";
         output.add_figure("generations", caption, 1, panels);
-        let gains: Vec<PaperRow> = output
-            .paper
-            .iter()
-            .filter(|row| row.quantity == GAIN)
-            .cloned()
-            .collect();
+        let gains: Vec<PaperRow> =
+            output.paper.iter().filter(|row| row.quantity == GAIN).cloned().collect();
         answers.extend(ratios(&gains));
         output.answer = Some(answers.join(" "));
         output.add_csv("generations", &generations)?;
@@ -115,10 +109,7 @@ impl Config {
     }
 
     fn check_order(&self) -> impl Iterator<Item = OutOfRange> {
-        let disordered = self
-            .paper_final
-            .iter()
-            .filter(|(_, [low, high])| low > high);
+        let disordered = self.paper_final.iter().filter(|(_, [low, high])| low > high);
         disordered.map(|(scene, found)| {
             OutOfRange::new(
                 format!("paper_final.{scene}"),
@@ -129,16 +120,9 @@ impl Config {
     }
 
     fn runs<'a>(&self, rows: &'a Rows, scene: &'a str) -> Option<Runs<'a>> {
-        let runs: Vec<Vec<Progress>> = rows
-            .trials_of(scene, &self.method)
-            .iter()
-            .map(|run| progress(run))
-            .collect();
-        let last = |run: usize| {
-            runs[run]
-                .last()
-                .map_or(f64::INFINITY, |row| row.incumbent)
-        };
+        let runs: Vec<Vec<Progress>> =
+            rows.trials_of(scene, &self.method).iter().map(|run| progress(run)).collect();
+        let last = |run: usize| runs[run].last().map_or(f64::INFINITY, |row| row.incumbent);
         let mut order: Vec<usize> = (0..runs.len()).collect();
         order.sort_by(|&a, &b| last(a).total_cmp(&last(b)));
         // Of an even number of runs there is no median run, so the lower one stands for it.
@@ -149,25 +133,19 @@ impl Config {
     /// Compares our final costs with the paper's spread and gain, if the spec has them.
     fn compare(&self, shown: &str, runs: &Runs, end: &Final) -> Vec<PaperRow> {
         let row = |quantity: &str| PaperRow::new(&self.source, shown, quantity, &self.reason);
-        let spread = self
-            .paper_final
-            .get(runs.scene)
-            .map(|&[low, high]| {
-                let [theirs, ours] =
-                    [(low, high), (end.low, end.high)].map(|(l, h)| 2.0 * (h - l) / (h + l));
-                let verdict = if (ours / theirs - 1.0).abs() <= 0.5 {
-                    Verdict::Agrees
-                } else {
-                    Verdict::Differs
-                };
-                let rule = "between half and one and a half times the paper's";
-                row("spread of final costs over runs: (highest − lowest) / middle").compare(
-                    format!("{theirs:.3}"),
-                    format!("{ours:.3}"),
-                    verdict,
-                    rule,
-                )
-            });
+        let spread = self.paper_final.get(runs.scene).map(|&[low, high]| {
+            let [theirs, ours] =
+                [(low, high), (end.low, end.high)].map(|(l, h)| 2.0 * (h - l) / (h + l));
+            let verdict =
+                if (ours / theirs - 1.0).abs() <= 0.5 { Verdict::Agrees } else { Verdict::Differs };
+            let rule = "between half and one and a half times the paper's";
+            row("spread of final costs over runs: (highest − lowest) / middle").compare(
+                format!("{theirs:.3}"),
+                format!("{ours:.3}"),
+                verdict,
+                rule,
+            )
+        });
         let says = self.paper_says.as_ref().map(|says| {
             let ours = format!("{:.3}", end.median / end.average);
             row(GAIN).compare(says, ours, Verdict::NoVerdict, "the paper gives no number")
@@ -187,10 +165,7 @@ impl Config {
             ours_over_base: Some(ours),
             ..row("final cost over Müller–Fellner's, both Goldsmith–Salmon")
         };
-        [gain, says, spread, Some(over_base)]
-            .into_iter()
-            .flatten()
-            .collect()
+        [gain, says, spread, Some(over_base)].into_iter().flatten().collect()
     }
 }
 
@@ -210,18 +185,9 @@ fn progress(run: &[&TrialRow]) -> Vec<Progress> {
 /// not drawn.
 fn draw(shown: &str, runs: usize, generations: &[Generation]) -> Panel {
     let at = |generation: &Generation| generation.generation as f64;
-    let median: Vec<_> = generations
-        .iter()
-        .map(|g| (at(g), g.median_run_cost))
-        .collect();
-    let range = generations
-        .iter()
-        .map(|g| (at(g), g.lowest_cost, g.highest_cost))
-        .collect();
-    let random = generations
-        .iter()
-        .filter_map(|g| Some((at(g), g.random_picking_cost?)))
-        .collect();
+    let median: Vec<_> = generations.iter().map(|g| (at(g), g.median_run_cost)).collect();
+    let range = generations.iter().map(|g| (at(g), g.lowest_cost, g.highest_cost)).collect();
+    let random = generations.iter().filter_map(|g| Some((at(g), g.random_picking_cost?))).collect();
     let mut layers = vec![Layer::new("random picking", Marks::Line(random))];
     // One run has no range, so it is drawn as one line.
     if runs > 1 {
@@ -251,19 +217,12 @@ impl<'a> Runs<'a> {
                 random_picking_cost: expected_best_of(&self.random, row.evaluations as usize),
             }
         };
-        self.runs[self.middle]
-            .iter()
-            .enumerate()
-            .map(generation)
-            .collect()
+        self.runs[self.middle].iter().enumerate().map(generation).collect()
     }
 
     /// Returns the final costs of the runs.
     fn costs(&self) -> Vec<f64> {
-        self.runs
-            .iter()
-            .filter_map(|run| Some(run.last()?.incumbent))
-            .collect()
+        self.runs.iter().filter_map(|run| Some(run.last()?.incumbent)).collect()
     }
 
     /// Counts the runs that end below random picking and below the greedy tree, and says how much
@@ -328,10 +287,7 @@ mod tests {
         };
         let runs = vec![run([9.0, 8.0, 6.0]), run([9.0, 8.0, 7.5])];
         let mut runs = Runs { scene: "s", runs, middle: 0, random: vec![7.0; 3] };
-        let answer = |runs: &Runs| {
-            runs.answer("s", &runs.generations(), 8.0)
-                .unwrap()
-        };
+        let answer = |runs: &Runs| runs.answer("s", &runs.generations(), 8.0).unwrap();
         let end = "In the second half of its generations a run gains 15.6 %, the median of 6.2 to \
                    25.0 %.";
         let expected =

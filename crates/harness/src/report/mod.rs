@@ -147,18 +147,14 @@ pub const TEXT_FILE: &str = "timing_report.txt";
 /// nothing.
 pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> {
     let rows = Rows::read(folder)?;
-    let mut outputs = reports
-        .iter()
-        .map(|report| report.write(&rows))
-        .collect::<Result<Vec<_>, _>>()?;
+    let mut outputs =
+        reports.iter().map(|report| report.write(&rows)).collect::<Result<Vec<_>, _>>()?;
     // A spec without reports is a first try, whose author wants to see the costs.
     if reports.is_empty() {
         outputs.push(final_costs(&rows)?);
     }
-    let paper: Vec<PaperRow> = outputs
-        .iter_mut()
-        .flat_map(|output| std::mem::take(&mut output.paper))
-        .collect();
+    let paper: Vec<PaperRow> =
+        outputs.iter_mut().flat_map(|output| std::mem::take(&mut output.paper)).collect();
     if !paper.is_empty() {
         let answers = answers(&outputs);
         outputs.push(beside_paper(&paper, &answers)?);
@@ -169,10 +165,7 @@ pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> 
         .map(|(_, figure)| series(figure))
         .collect();
     let looks = looks(&rows.methods(), &shown);
-    for (_, figure) in outputs
-        .iter_mut()
-        .flat_map(|output| &mut output.figures)
-    {
+    for (_, figure) in outputs.iter_mut().flat_map(|output| &mut output.figures) {
         figure.looks.extend(looks.iter().cloned());
     }
     Ok(outputs)
@@ -232,14 +225,8 @@ fn final_costs(rows: &Rows) -> Result<Output, Error> {
 
 /// Returns the names of the series in a figure.
 fn series(figure: &Figure) -> BTreeSet<String> {
-    let layers = figure
-        .panels
-        .iter()
-        .flat_map(|panel| &panel.layers);
-    layers
-        .filter_map(Layer::series)
-        .map(str::to_owned)
-        .collect()
+    let layers = figure.panels.iter().flat_map(|panel| &panel.layers);
+    layers.filter_map(Layer::series).map(str::to_owned).collect()
 }
 
 /// Chooses the looks of an experiment's methods, the same in all its figures. If there are more
@@ -248,28 +235,17 @@ fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, usize)>
     let mut slots: Vec<usize> = Vec::new();
     for (index, method) in methods.iter().enumerate() {
         let shared = |other: &str| {
-            figures
-                .iter()
-                .any(|shown| shown.contains(*method) && shown.contains(other))
+            figures.iter().any(|shown| shown.contains(*method) && shown.contains(other))
         };
         let taken = |slot: usize| {
-            methods
-                .iter()
-                .zip(&slots)
-                .any(|(other, at)| *at == slot && shared(other))
+            methods.iter().zip(&slots).any(|(other, at)| *at == slot && shared(other))
         };
         // Only more methods than colours share colours; otherwise each method keeps its number, and
         // with it its colour in all figures.
-        let free = (0..COLOURS)
-            .find(|&slot| !taken(slot))
-            .filter(|_| methods.len() > COLOURS);
+        let free = (0..COLOURS).find(|&slot| !taken(slot)).filter(|_| methods.len() > COLOURS);
         slots.push(free.unwrap_or(index));
     }
-    methods
-        .iter()
-        .zip(slots)
-        .map(|(method, slot)| ((*method).to_owned(), slot))
-        .collect()
+    methods.iter().zip(slots).map(|(method, slot)| ((*method).to_owned(), slot)).collect()
 }
 
 /// Returns the answers of all reports in their order.
@@ -283,25 +259,15 @@ fn answers(outputs: &[Output]) -> Vec<Answer> {
 /// Collects the comparisons with the paper of all reports. A number of the paper counts once, even
 /// if several of our numbers are compared with it.
 fn beside_paper(rows: &[PaperRow], answers: &[Answer]) -> Result<Output, Error> {
-    let numbers = rows
-        .iter()
-        .filter(|row| row.paper_over_base.is_some());
-    let numbers: BTreeSet<_> = numbers
-        .map(|row| (&row.source, &row.scene, &row.paper))
-        .collect();
-    let reasons: BTreeSet<&str> = rows
-        .iter()
-        .map(|row| row.reason.as_str())
-        .collect();
+    let numbers = rows.iter().filter(|row| row.paper_over_base.is_some());
+    let numbers: BTreeSet<_> = numbers.map(|row| (&row.source, &row.scene, &row.paper)).collect();
+    let reasons: BTreeSet<&str> = rows.iter().map(|row| row.reason.as_str()).collect();
     let mut output = Output::new("", "Ng & Trifonov 2003 beside our results");
     let outcome = Outcome::of(rows);
     let reasons = reasons.into_iter().collect::<Vec<_>>().join(" ");
     output.reading = format!("Numbers of the paper: {}. {outcome} {reasons}", numbers.len());
     output.outcome = Some(outcome);
-    let sentences: Vec<&str> = answers
-        .iter()
-        .map(|answer| answer.answer.as_str())
-        .collect();
+    let sentences: Vec<&str> = answers.iter().map(|answer| answer.answer.as_str()).collect();
     output.answer = Some(sentences.join(" "));
     output.add_csv("answer", answers)?;
     output.add_csv("paper", rows)?;
@@ -320,26 +286,16 @@ mod tests {
 
     #[test]
     fn methods_of_one_figure_share_no_colour_while_there_are_enough() {
-        let methods: Vec<String> = (0..16)
-            .map(|index| format!("method {index}"))
-            .collect();
+        let methods: Vec<String> = (0..16).map(|index| format!("method {index}")).collect();
         let methods: Vec<&str> = methods.iter().map(String::as_str).collect();
-        let figure = |shown: &[usize]| {
-            shown
-                .iter()
-                .map(|&index| methods[index].to_owned())
-                .collect()
-        };
+        let figure =
+            |shown: &[usize]| shown.iter().map(|&index| methods[index].to_owned()).collect();
         let figures: [BTreeSet<String>; 2] = [
             figure(&[0, 1, 2, 3, 4, 7, 11, 12, 13, 14, 15]),
             figure(&[3, 4, 5, 6, 7, 8, 9, 10, 11, 14, 15]),
         ];
         let few = looks(&methods[..12], &figures);
-        assert!(
-            few.iter()
-                .enumerate()
-                .all(|(index, (_, look))| *look == index)
-        );
+        assert!(few.iter().enumerate().all(|(index, (_, look))| *look == index));
         let looks = looks(&methods, &figures);
         for shown in &figures {
             let colours: BTreeSet<usize> = looks

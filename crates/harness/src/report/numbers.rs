@@ -108,29 +108,20 @@ impl Config {
     /// Draws the lower bound and every method's cost on every scene, over the least known cost.
     fn draw(&self, rows: &Rows, numbers: &[Numbers]) -> Panel {
         let bound = |scene: &str| {
-            rows.reference(scene)
-                .and_then(|row| Some(ratio(row.lower_bound?, row.cost)))
+            rows.reference(scene).and_then(|row| Some(ratio(row.lower_bound?, row.cost)))
         };
-        let bounds = rows
-            .scenes()
-            .into_iter()
-            .map(|scene| bound(scene).unwrap_or(f64::NAN))
-            .collect();
+        let bounds =
+            rows.scenes().into_iter().map(|scene| bound(scene).unwrap_or(f64::NAN)).collect();
         let cost = |method: &String| {
-            let own = |scene: &str| {
-                numbers
-                    .iter()
-                    .find(|row| row.scene == scene && row.method == method)
-            };
+            let own =
+                |scene: &str| numbers.iter().find(|row| row.scene == scene && row.method == method);
             let scenes = rows.scenes().into_iter();
             let values =
                 scenes.map(|scene| own(scene).map_or(f64::NAN, |row| 1.0 + row.gap_median));
             Layer::bars(method, values.collect(), 0.0)
         };
         let bounds = Layer::bars("lower bound", bounds, 0.0);
-        let layers = std::iter::once(bounds)
-            .chain(self.methods.iter().map(cost))
-            .collect();
+        let layers = std::iter::once(bounds).chain(self.methods.iter().map(cost)).collect();
         panel(
             "",
             Axis::categories("", rows.all_shown()),
@@ -147,10 +138,7 @@ fn of_costs<'a>(
     method: &'a str,
     reference: &ReferenceRow,
 ) -> Numbers<'a> {
-    let costs: Vec<f64> = rows
-        .runs_of(scene, method)
-        .map(|run| run.cost)
-        .collect();
+    let costs: Vec<f64> = rows.runs_of(scene, method).map(|run| run.cost).collect();
     let quartiles = quartiles(&costs);
     let gaps = quartiles.map(|cost| ratio(cost, reference.cost) - 1.0);
     Numbers {
@@ -164,8 +152,6 @@ fn of_costs<'a>(
         gap_median: gaps[1],
         gap_quartile_3: gaps[2],
         lower_bound: reference.lower_bound,
-        lower_bound_over_reference: reference
-            .lower_bound
-            .map(|bound| ratio(bound, reference.cost)),
+        lower_bound_over_reference: reference.lower_bound.map(|bound| ratio(bound, reference.cost)),
     }
 }

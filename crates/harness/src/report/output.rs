@@ -103,10 +103,7 @@ impl Output {
     ) -> Result<(), Error> {
         let path = Path::new("table");
         let mut reader = csv::Reader::from_reader(bytes);
-        let header = reader
-            .headers()
-            .map_err(Error::csv(path))?
-            .clone();
+        let header = reader.headers().map_err(Error::csv(path))?.clone();
         // Columns are found by name, so that tables do not depend on their order in the file.
         let shown: Vec<usize> = columns
             .split(' ')
@@ -126,11 +123,8 @@ impl Output {
         let table = |(explanation, table): &(String, Table)| format!("{explanation}\n{table}\n");
         let tables: String = self.tables.iter().map(table).collect();
         let blocks = [&self.heading, self.reading.trim_end(), &tables];
-        let some = blocks
-            .into_iter()
-            .filter(|block| !block.is_empty());
-        some.map(|block| format!("{}\n\n", block.trim_end()))
-            .collect()
+        let some = blocks.into_iter().filter(|block| !block.is_empty());
+        some.map(|block| format!("{}\n\n", block.trim_end())).collect()
     }
 }
 
@@ -138,16 +132,10 @@ impl Output {
 pub fn table_bytes(columns: &[String], rows: &[Row]) -> Result<Vec<u8>, Error> {
     let path = Path::new("table");
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer
-        .write_record(columns)
-        .map_err(Error::csv(path))?;
+    writer.write_record(columns).map_err(Error::csv(path))?;
     for row in rows {
-        let cells = columns
-            .iter()
-            .map(|column| row.get(column).map_or("", String::as_str));
-        writer
-            .write_record(cells)
-            .map_err(Error::csv(path))?;
+        let cells = columns.iter().map(|column| row.get(column).map_or("", String::as_str));
+        writer.write_record(cells).map_err(Error::csv(path))?;
     }
     writer.into_inner().map_err(|error| {
         let source = io::Error::other(error.to_string());
@@ -173,9 +161,7 @@ fn four_digits(text: &str) -> String {
 /// Makes an empty table for the terminal.
 pub fn text_table<'a>(header: impl IntoIterator<Item = &'a str>) -> Table {
     let mut table = Table::new();
-    table
-        .load_preset(presets::UTF8_FULL_CONDENSED)
-        .set_header(header);
+    table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(header);
     table
 }
 
@@ -186,11 +172,7 @@ pub fn panel(title: impl Into<String>, x: Axis, y: Axis, layers: Vec<Layer>) -> 
 
 /// Returns the texts that `say` gives for the items, separated by commas.
 pub fn each<T>(items: impl IntoIterator<Item = T>, say: impl FnMut(T) -> Option<String>) -> String {
-    items
-        .into_iter()
-        .filter_map(say)
-        .collect::<Vec<_>>()
-        .join(", ")
+    items.into_iter().filter_map(say).collect::<Vec<_>>().join(", ")
 }
 
 /// Groups names by their numbers of cases out of `total`: `‘a’, ‘b’ for all 7 scenes; ‘c’ for 3 of
@@ -203,25 +185,15 @@ pub fn tally<'a>(
     let counts: Vec<_> = counts.into_iter().collect();
     let numbers: BTreeSet<usize> = counts.iter().map(|(_, count)| *count).collect();
     let same = |number: usize| {
-        let own = counts
-            .iter()
-            .filter(|(_, count)| *count == number);
-        let names = own
-            .map(|(name, _)| format!("‘{name}’"))
-            .collect::<Vec<_>>()
-            .join(", ");
+        let own = counts.iter().filter(|(_, count)| *count == number);
+        let names = own.map(|(name, _)| format!("‘{name}’")).collect::<Vec<_>>().join(", ");
         match number {
             0 => format!("{names} for none"),
             all if all == total => format!("{names} for all {total} {cases}"),
             some => format!("{names} for {some} of {total} {cases}"),
         }
     };
-    numbers
-        .into_iter()
-        .rev()
-        .map(same)
-        .collect::<Vec<_>>()
-        .join("; ")
+    numbers.into_iter().rev().map(same).collect::<Vec<_>>().join("; ")
 }
 
 #[cfg(test)]
@@ -258,9 +230,7 @@ mod tests {
             .unwrap();
         let text = output.text();
         assert!(
-            ["title\n\nGaps:\n", "gap", "0.5000", "escher"]
-                .iter()
-                .all(|part| text.contains(part)),
+            ["title\n\nGaps:\n", "gap", "0.5000", "escher"].iter().all(|part| text.contains(part)),
             "{text}"
         );
         assert!(!text.contains("77") && !text.contains("hidden"), "{text}");

@@ -95,9 +95,7 @@ impl PaperRow {
         let verdicts = [low, ours, high].map(|ours| Verdict::of_ratios(paper, ours, tolerance));
         // The verdict must not depend on the luck of this repetition, so the whole interval
         // decides.
-        let same = verdicts
-            .iter()
-            .all(|verdict| *verdict == verdicts[0]);
+        let same = verdicts.iter().all(|verdict| *verdict == verdicts[0]);
         let row = self.compare(
             format!("{paper:.4}"),
             format!("{ours:.4}"),
@@ -118,14 +116,10 @@ impl PaperRow {
 /// Returns a sentence for each compared quantity: our value, the paper's and the verdict, scene by
 /// scene. `None` if nothing is compared.
 pub fn ratios(rows: &[PaperRow]) -> Option<String> {
-    let compared: Vec<&PaperRow> = rows
-        .iter()
-        .filter(|row| row.verdict != Verdict::NotInPaper)
-        .collect();
-    let sentences: Vec<String> = compared
-        .chunk_by(|a, b| a.quantity == b.quantity)
-        .map(sentence)
-        .collect();
+    let compared: Vec<&PaperRow> =
+        rows.iter().filter(|row| row.verdict != Verdict::NotInPaper).collect();
+    let sentences: Vec<String> =
+        compared.chunk_by(|a, b| a.quantity == b.quantity).map(sentence).collect();
     (!sentences.is_empty()).then(|| sentences.join(" "))
 }
 
@@ -229,11 +223,8 @@ pub struct Outcome {
 impl Outcome {
     /// Counts the verdicts of all rows, except rows that only add to the others.
     pub fn of(rows: &[PaperRow]) -> Self {
-        let count = |wanted: fn(Verdict) -> bool| {
-            rows.iter()
-                .filter(|row| wanted(row.verdict))
-                .count()
-        };
+        let count =
+            |wanted: fn(Verdict) -> bool| rows.iter().filter(|row| wanted(row.verdict)).count();
         let compared = count(|verdict| verdict != Verdict::NotInPaper);
         let agree = count(|verdict| verdict == Verdict::Agrees);
         let same_side = count(Verdict::is_same_direction);
@@ -267,16 +258,11 @@ impl fmt::Display for Outcome {
             ("no verdict", without_verdict),
         ];
         let some = kinds.iter().filter(|(_, count)| *count > 0);
-        let some: Vec<String> = some
-            .map(|(kind, count)| format!("{kind}: {count}"))
-            .collect();
+        let some: Vec<String> = some.map(|(kind, count)| format!("{kind}: {count}")).collect();
         write!(
             f,
             "Comparisons with the paper: {} ({}).",
-            kinds
-                .iter()
-                .map(|(_, count)| count)
-                .sum::<usize>(),
+            kinds.iter().map(|(_, count)| count).sum::<usize>(),
             some.join("; ")
         )
     }
@@ -287,9 +273,7 @@ mod tests {
     use super::*;
 
     fn verdict(paper: f64, ours: f64, interval: Option<(f64, f64)>) -> Verdict {
-        PaperRow::new("", "", "", "")
-            .compare_ratios(paper, ours, interval, 0.02)
-            .verdict
+        PaperRow::new("", "", "", "").compare_ratios(paper, ours, interval, 0.02).verdict
     }
 
     #[test]

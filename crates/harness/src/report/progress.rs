@@ -14,10 +14,7 @@ pub fn series(rows: &Rows, scene: &str, method: &str) -> Vec<Series> {
     for (index, row) in rows.history.iter().enumerate() {
         if row.scene == scene && row.method == method {
             // `timing_history.csv` has one row for every row of `history.csv`, in the same order.
-            let seconds = rows
-                .clock
-                .get(index)
-                .map_or(f64::NAN, |clock| clock.seconds);
+            let seconds = rows.clock.get(index).map_or(f64::NAN, |clock| clock.seconds);
             points.push((row.repetition, (seconds, row.incumbent)));
         }
     }
@@ -30,9 +27,7 @@ pub fn series(rows: &Rows, scene: &str, method: &str) -> Vec<Series> {
 /// Returns the seconds after which a run first had an incumbent of at most this cost, if it ever
 /// had.
 pub fn reached(run: &Series, cost: f64) -> Option<f64> {
-    run.iter()
-        .find(|(_, incumbent)| *incumbent <= cost)
-        .map(|(seconds, _)| *seconds)
+    run.iter().find(|(_, incumbent)| *incumbent <= cost).map(|(seconds, _)| *seconds)
 }
 
 #[cfg(test)]

@@ -71,13 +71,11 @@ impl Condition {
     fn parse(text: &str) -> Result<Self, QueryError> {
         let wanted = !text.contains("!=");
         let sign = if wanted { "=" } else { "!=" };
-        let (column, texts) = text
-            .split_once(sign)
-            .ok_or_else(|| QueryError::Malformed {
-                part: "condition",
-                found: text.into(),
-                accepted: "COLUMN=TEXT, COLUMN!=TEXT",
-            })?;
+        let (column, texts) = text.split_once(sign).ok_or_else(|| QueryError::Malformed {
+            part: "condition",
+            found: text.into(),
+            accepted: "COLUMN=TEXT, COLUMN!=TEXT",
+        })?;
         let texts = texts.split(" or ").map(str::to_owned).collect();
         Ok(Self { column: column.into(), texts, wanted })
     }
@@ -132,17 +130,12 @@ impl Conditions {
 
     /// Returns the columns of the conditions.
     pub fn columns(&self) -> impl Iterator<Item = &str> {
-        self.0
-            .iter()
-            .map(|condition| condition.column.as_str())
+        self.0.iter().map(|condition| condition.column.as_str())
     }
 
     /// Returns the texts of the conditions.
     pub fn texts(&self) -> Vec<&str> {
-        let texts = self
-            .0
-            .iter()
-            .flat_map(|condition| &condition.texts);
+        let texts = self.0.iter().flat_map(|condition| &condition.texts);
         texts.map(String::as_str).collect()
     }
 
@@ -180,9 +173,8 @@ pub fn join(rows: &[Row], others: &[Row]) -> Vec<Row> {
     let mut joined = Vec::new();
     for row in rows {
         for other in others {
-            let agrees = other
-                .iter()
-                .all(|(column, text)| row.get(column).is_none_or(|own| own == text));
+            let agrees =
+                other.iter().all(|(column, text)| row.get(column).is_none_or(|own| own == text));
             if agrees {
                 let mut both = row.clone();
                 both.extend(other.clone());
@@ -211,10 +203,7 @@ pub fn distinct(rows: &[Row], columns: &[&str]) -> Result<Vec<Vec<String>>, Quer
 /// Returns the rows whose cells in these columns have these values.
 pub fn group<'r>(rows: &'r [Row], columns: &[&str], values: &[String]) -> Vec<&'r Row> {
     let is_own = |row: &&Row| {
-        columns
-            .iter()
-            .zip(values)
-            .all(|(column, value)| row.get(*column) == Some(value))
+        columns.iter().zip(values).all(|(column, value)| row.get(*column) == Some(value))
     };
     rows.iter().filter(is_own).collect()
 }

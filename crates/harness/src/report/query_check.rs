@@ -20,9 +20,7 @@ impl Config {
         let mut are_known = true;
         for (key, name) in joined {
             if let Some((_, columns)) = rows::files().find(|(file, _)| file == name) {
-                let cells = columns
-                    .iter()
-                    .map(|&column| (column.into(), "1".into()));
+                let cells = columns.iter().map(|&column| (column.into(), "1".into()));
                 row.extend(cells);
                 continue;
             }
@@ -48,9 +46,7 @@ impl Config {
     /// Applies every part of the query to a row, and returns the result of each with its key.
     fn attempts(&self, row: &Row) -> Vec<(String, Result<(), QueryError>)> {
         let has = |columns: &[&str]| {
-            columns
-                .iter()
-                .try_for_each(|column| query::cell(row, column).map(|_| ()))
+            columns.iter().try_for_each(|column| query::cell(row, column).map(|_| ()))
         };
         let has_all = |conditions: &str| {
             let conditions = Conditions::parse(conditions)?;
@@ -65,11 +61,7 @@ impl Config {
         }
         for (index, column) in self.columns.iter().enumerate() {
             attempts.push((format!("columns[{index}].value"), column.try_on(row)));
-            let paired_by: Vec<&str> = column
-                .paired_by
-                .iter()
-                .map(String::as_str)
-                .collect();
+            let paired_by: Vec<&str> = column.paired_by.iter().map(String::as_str).collect();
             attempts.push((format!("columns[{index}].paired_by"), has(&paired_by)));
         }
         attempts

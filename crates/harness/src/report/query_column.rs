@@ -93,9 +93,7 @@ impl Column {
     pub(super) fn try_on(&self, row: &Row) -> Result<(), QueryError> {
         match self.value.strip_prefix("text ") {
             Some(column) => query::only_text(&[row], column).map(|_| ()),
-            None => Measure::parse(&self.value)?
-                .of_rows(&[row])
-                .map(|_| ()),
+            None => Measure::parse(&self.value)?.of_rows(&[row]).map(|_| ()),
         }
     }
 
@@ -133,9 +131,7 @@ impl Column {
             row.insert(format!("{}_verdict", self.name), verdict(interval).into());
         }
         for of_paper in &self.paper {
-            let paper = row
-                .entry(format!("paper_{}", self.name))
-                .or_default();
+            let paper = row.entry(format!("paper_{}", self.name)).or_default();
             let is_own = Conditions::parse(&of_paper.row)?.are_met(&group.key)?;
             if is_own {
                 *paper = text_of(Some(of_paper.value / of_paper.over));
@@ -153,15 +149,11 @@ impl Column {
         if self.paired_by.is_empty() {
             let own = measure.of_rows(&group.rows)?;
             let base = measure.of_rows(&group.base)?;
-            let value = own
-                .zip(base)
-                .map(|(own, base)| ratio.of(own, base));
+            let value = own.zip(base).map(|(own, base)| ratio.of(own, base));
             self.check_accepted(group, value)?;
             let of_all = |rows: &[&Row]| {
-                let values: Result<Vec<_>, _> = rows
-                    .iter()
-                    .map(|row| measure.of_row(row))
-                    .collect();
+                let values: Result<Vec<_>, _> =
+                    rows.iter().map(|row| measure.of_row(row)).collect();
                 Ok(range(values?.into_iter().flatten()))
             };
             // Runs are not paired, so any run of the group may meet any run of the base.
@@ -182,9 +174,7 @@ impl Column {
             let Some(partner) = group.base.iter().find(is_partner) else { continue };
             let own = measure.of_row(row)?;
             let base = measure.of_row(partner)?;
-            let quotient = own
-                .zip(base)
-                .map(|(own, base)| ratio.of(own, base));
+            let quotient = own.zip(base).map(|(own, base)| ratio.of(own, base));
             self.check_accepted(group, quotient)?;
             quotients.extend(quotient);
         }

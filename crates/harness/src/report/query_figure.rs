@@ -65,10 +65,7 @@ impl Drawing {
     /// Returns one panel for all rows that agree in the columns `panels`.
     pub(super) fn panels(&self, rows: &Rows, table: &[Row]) -> Vec<Panel> {
         let mut panels = Vec::new();
-        let titles: Vec<String> = table
-            .iter()
-            .map(|row| self.title(rows, row))
-            .collect();
+        let titles: Vec<String> = table.iter().map(|row| self.title(rows, row)).collect();
         for title in distinct(titles.iter()) {
             let rows_of_panel: Vec<&Row> = table
                 .iter()
@@ -94,11 +91,8 @@ impl Drawing {
         let names = distinct(table.iter().map(|row| text_in(row, &self.x)));
         let mut layers = Vec::new();
         for series in distinct(table.iter().map(|row| self.series_of(row))) {
-            let rows_of_series: Vec<&Row> = table
-                .iter()
-                .filter(|row| self.series_of(row) == series)
-                .copied()
-                .collect();
+            let rows_of_series: Vec<&Row> =
+                table.iter().filter(|row| self.series_of(row) == series).copied().collect();
             // Bars of a category have one place each, also where a series has no value.
             if self.marks == Shape::Bars {
                 layers.push(self.bars(series, &names, &rows_of_series));
@@ -112,10 +106,8 @@ impl Drawing {
         }
         let points = self.points(table);
         if let (Some(power), Some(&(first, highest))) = (self.falls_by_power, points.first()) {
-            let line = points
-                .iter()
-                .map(|&(x, _)| (x, highest * (first / x).powf(power)))
-                .collect();
+            let line =
+                points.iter().map(|&(x, _)| (x, highest * (first / x).powf(power))).collect();
             layers.push(Layer::new(format!("slope −{power}"), Marks::Line(line)));
         }
         if self.front {
@@ -142,11 +134,7 @@ impl Drawing {
         if let Some(line) = line {
             return line.name.clone();
         }
-        let values: Vec<String> = self
-            .series
-            .iter()
-            .map(|column| text_in(row, column))
-            .collect();
+        let values: Vec<String> = self.series.iter().map(|column| text_in(row, column)).collect();
         values.join(", ")
     }
 
@@ -154,9 +142,7 @@ impl Drawing {
         let mut values = Vec::new();
         let mut spread = Vec::new();
         for name in names {
-            let row = table
-                .iter()
-                .find(|row| text_in(row, &self.x) == *name);
+            let row = table.iter().find(|row| text_in(row, &self.x) == *name);
             let number = |end: &str| {
                 let value = row.and_then(|row| number_in(row, &format!("{}{end}", self.y)));
                 value.unwrap_or(f64::NAN)

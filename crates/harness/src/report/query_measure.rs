@@ -66,10 +66,8 @@ impl<'t> Measure<'t> {
                        spearman, and two",
         };
         let (name, rest) = text.split_once(' ').ok_or_else(malformed)?;
-        let (_, how) = Aggregate::NAMES
-            .into_iter()
-            .find(|(known, _)| *known == name)
-            .ok_or_else(malformed)?;
+        let (_, how) =
+            Aggregate::NAMES.into_iter().find(|(known, _)| *known == name).ok_or_else(malformed)?;
         let values: Vec<&str> =
             if how.is_of_pairs() { rest.split(", ").collect() } else { vec![rest] };
         if values.len() != 1 + usize::from(how.is_of_pairs()) {
@@ -201,9 +199,7 @@ mod tests {
             ("*", "mean cost", &["\"mean cost\" is no measure", "median"]),
             ("*", "only cost", &["cost has several values, from 2 to 5"]),
         ] {
-            let message = value(conditions, measure)
-                .unwrap_err()
-                .to_string();
+            let message = value(conditions, measure).unwrap_err().to_string();
             assert!(parts.iter().all(|part| message.contains(part)), "{message}");
         }
     }

@@ -159,9 +159,8 @@ impl Config {
                     if !conditions.are_met(row)? {
                         continue;
                     }
-                    let scene = row
-                        .get("scene")
-                        .map_or_else(String::new, |scene| rows.shown(scene));
+                    let scene =
+                        row.get("scene").map_or_else(String::new, |scene| rows.shown(scene));
                     let subject = self.subject(row, &self.by);
                     let quantity = format!("{}, {subject}", column.label());
                     let low = number_in(row, &format!("{}_low", column.name));
@@ -199,32 +198,21 @@ impl Config {
     /// Returns the span over scenes of the first quotient or correlation, for every other value of
     /// the key; of more than [`LISTED`] values, for the two with the extremes.
     fn reading(&self, table: &[Row]) -> String {
-        let Some(column) = self
-            .columns
-            .iter()
-            .find(|column| column.is_read())
-        else {
+        let Some(column) = self.columns.iter().find(|column| column.is_read()) else {
             return String::new();
         };
         // A column with one value for each scene distinguishes no row from another.
         let mut by = self.by.clone();
         by.retain(|column| column == "method" || has_several(table, column));
-        let subjects: Vec<String> = table
-            .iter()
-            .map(|row| self.subject(row, &by))
-            .collect();
+        let subjects: Vec<String> = table.iter().map(|row| self.subject(row, &by)).collect();
         let mut spans: Vec<(&str, f64, f64)> = Vec::new();
         for subject in distinct(subjects.iter().map(String::as_str)) {
-            let rows_of_subject = table
-                .iter()
-                .zip(&subjects)
-                .filter(|(_, of_row)| *of_row == subject);
+            let rows_of_subject =
+                table.iter().zip(&subjects).filter(|(_, of_row)| *of_row == subject);
             let values = rows_of_subject.filter_map(|(row, _)| number_in(row, &column.name));
             let Some((low, high)) = range(values) else { continue };
             // The base compared with itself says nothing.
-            let (own, base) = subject
-                .split_once(" over ")
-                .unwrap_or((subject, ""));
+            let (own, base) = subject.split_once(" over ").unwrap_or((subject, ""));
             if own != base && !own.starts_with(&format!("{base}, ")) {
                 spans.push((subject, low, high));
             }
@@ -274,9 +262,7 @@ fn has_several(table: &[Row], column: &str) -> bool {
 
 fn capitalised(text: &str) -> String {
     let mut characters = text.chars();
-    let first = characters
-        .next()
-        .map(|first| first.to_uppercase().to_string());
+    let first = characters.next().map(|first| first.to_uppercase().to_string());
     first.unwrap_or_default() + characters.as_str()
 }
 
@@ -302,9 +288,7 @@ mod tests {
         let common = "file = 'x'\nrows = 'costs.csv'\nby = ['scene', 'method']\n";
         let config: Config = toml::from_str(&format!("{common}{config}")).unwrap();
         let rows = Rows { folder: folder.path().to_owned(), ..Rows::default() };
-        config
-            .write(&rows)
-            .map_err(|error| error.to_string())
+        config.write(&rows).map_err(|error| error.to_string())
     }
 
     fn csv(output: &Output) -> &str {

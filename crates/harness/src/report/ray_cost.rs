@@ -79,34 +79,23 @@ const ALL: &str = "geometric mean";
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let mut table: Vec<Compared> = rows
-            .tests
-            .iter()
-            .filter_map(|row| compared(rows, row, &self.base))
-            .collect();
+        let mut table: Vec<Compared> =
+            rows.tests.iter().filter_map(|row| compared(rows, row, &self.base)).collect();
         let means = means(&table);
         table.extend(means);
         let mut output = Output::new(&self.source, &self.title);
         output.add_csv("ray_cost", &table)?;
         let caption = "Nodes and blocks of triangles that a ray is tested against in the wide layout, over those in the tree that \
                        is the best by area, below which trees gain. The rays are not those that trees were trained on.";
-        let panels = rows
-            .scenes()
-            .into_iter()
-            .map(|scene| self.draw(rows.shown(scene), scene, &table));
-        let panels = panels
-            .chain([self.draw(ALL.into(), ALL, &table)])
-            .collect();
+        let panels =
+            rows.scenes().into_iter().map(|scene| self.draw(rows.shown(scene), scene, &table));
+        let panels = panels.chain([self.draw(ALL.into(), ALL, &table)]).collect();
         output.add_figure("ray_cost", caption, 2, panels);
         let columns =
             "scene tree trained_on judged_on camera over_base_low tests_over_base over_base_high";
         output.show(&format!("Tests per ray over those of {}:", self.base), &table, columns)?;
         output.reading = reading(&table, &self.base);
-        let paired: Vec<Paired> = self
-            .pairs
-            .iter()
-            .flat_map(|pair| paired(rows, pair))
-            .collect();
+        let paired: Vec<Paired> = self.pairs.iter().flat_map(|pair| paired(rows, pair)).collect();
         if !paired.is_empty() {
             output.add_csv("ray_cost_pairs", &paired)?;
             let columns = "scene method against judged_on camera low tests_over_other high verdict";
@@ -120,16 +109,11 @@ impl Config {
 
     /// One line of markers per tree, over the kinds of rays.
     fn draw(&self, title: String, scene: &str, table: &[Compared]) -> Panel {
-        let own: Vec<&Compared> = table
-            .iter()
-            .filter(|row| row.scene == scene)
-            .collect();
+        let own: Vec<&Compared> = table.iter().filter(|row| row.scene == scene).collect();
         let judged = distinct(own.iter().map(|row| (row.judged_on, row.camera)));
         let trees = distinct(own.iter().map(|row| (row.tree, row.trained_on)));
         let bars = |&(tree, trained_on): &(&str, &str)| {
-            let of_tree = own
-                .iter()
-                .filter(|row| (row.tree, row.trained_on) == (tree, trained_on));
+            let of_tree = own.iter().filter(|row| (row.tree, row.trained_on) == (tree, trained_on));
             let bar = |row: &&Compared| {
                 let ends = row.over_base_low.zip(row.over_base_high);
                 (row.tests_over_base, ends.unwrap_or((row.tests_over_base, row.tests_over_base)))
@@ -137,11 +121,7 @@ impl Config {
             let (values, spread) = of_tree.map(bar).collect();
             Layer::new(tree_name(tree, trained_on), Marks::Bars { values, spread, base: 1.0 })
         };
-        let layers = trees
-            .iter()
-            .filter(|(tree, _)| *tree != self.base)
-            .map(bars)
-            .collect();
+        let layers = trees.iter().filter(|(tree, _)| *tree != self.base).map(bars).collect();
         let categories = judged.iter().map(|(kind, camera)| match *camera {
             "none" => (*kind).to_owned(),
             camera => format!("{kind}, {camera}"),
@@ -170,14 +150,11 @@ fn compared<'a>(rows: &'a Rows, row: &'a TestRow, base: &str) -> Option<Compared
     let [own, other] = [row, base].map(|row| row.node_tests + row.block_tests);
     let ratio = own / other;
     // Of a ratio of means, by the relative errors of both.
-    let relative = row
-        .tests_standard_error
-        .zip(base.tests_standard_error);
+    let relative = row.tests_standard_error.zip(base.tests_standard_error);
     // The degrees of freedom of one mean: with those of both, intervals would be somewhat narrower.
     let factor = student(row.repetitions.min(base.repetitions));
-    let half = relative
-        .zip(factor)
-        .map(|((a, b), factor)| factor * ratio * (a / own).hypot(b / other));
+    let half =
+        relative.zip(factor).map(|((a, b), factor)| factor * ratio * (a / own).hypot(b / other));
     Some(Compared {
         scene: &row.scene,
         tree: &row.tree,
@@ -211,20 +188,12 @@ fn paired<'a>(rows: &'a Rows, [first, second]: &'a [String; 2]) -> Vec<Paired<'a
             },
         })
     };
-    rows.tests
-        .iter()
-        .filter(|row| row.method == *second)
-        .filter_map(pair)
-        .collect()
+    rows.tests.iter().filter(|row| row.method == *second).filter_map(pair).collect()
 }
 
 /// Returns a sentence on the verdicts on a pair.
 fn verdicts(paired: &[Paired], [first, second]: &[String; 2]) -> String {
-    let own = || {
-        paired
-            .iter()
-            .filter(|row| row.against == *first && row.method == *second)
-    };
+    let own = || paired.iter().filter(|row| row.against == *first && row.method == *second);
     let count = |verdict| own().filter(|row| row.verdict == verdict).count();
     let fewer = count(Verdict::Fewer);
     let more = count(Verdict::More);
@@ -238,14 +207,8 @@ fn verdicts(paired: &[Paired], [first, second]: &[String; 2]) -> String {
 fn means<'a>(table: &[Compared<'a>]) -> Vec<Compared<'a>> {
     let key = |row: &Compared<'a>| (row.tree, row.trained_on, row.judged_on, row.camera);
     let mean = |group| {
-        let own: Vec<&Compared> = table
-            .iter()
-            .filter(|row| key(row) == group)
-            .collect();
-        let ratios: Vec<f64> = own
-            .iter()
-            .map(|row| row.tests_over_base)
-            .collect();
+        let own: Vec<&Compared> = table.iter().filter(|row| key(row) == group).collect();
+        let ratios: Vec<f64> = own.iter().map(|row| row.tests_over_base).collect();
         Compared {
             scene: ALL,
             tests: None,
@@ -255,47 +218,24 @@ fn means<'a>(table: &[Compared<'a>]) -> Vec<Compared<'a>> {
             ..*own[0]
         }
     };
-    distinct(table.iter().map(key))
-        .into_iter()
-        .map(mean)
-        .collect()
+    distinct(table.iter().map(key)).into_iter().map(mean).collect()
 }
 
 /// Returns a sentence on the kinds of rays that take fewer tests in each trained tree than in the
 /// base, and on the least ratio.
 fn reading(table: &[Compared], base: &str) -> String {
-    let own = || {
-        table
-            .iter()
-            .filter(|row| row.scene == ALL && row.trained_on != "none")
-    };
+    let own = || table.iter().filter(|row| row.scene == ALL && row.trained_on != "none");
     let Some(least) = own().min_by(|a, b| a.tests_over_base.total_cmp(&b.tests_over_base)) else {
         return String::new();
     };
     let trees = distinct(own().map(|row| tree_name(row.tree, row.trained_on)));
     let of = |tree: &str| {
-        own()
-            .filter(|row| tree_name(row.tree, row.trained_on) == tree)
-            .collect::<Vec<_>>()
+        own().filter(|row| tree_name(row.tree, row.trained_on) == tree).collect::<Vec<_>>()
     };
-    let fewer = |tree: &str| {
-        of(tree)
-            .iter()
-            .filter(|row| row.tests_over_base < 1.0)
-            .count()
-    };
-    let total = trees
-        .iter()
-        .map(|tree| of(tree).len())
-        .max()
-        .unwrap_or(0);
-    let counts = tally(
-        trees
-            .iter()
-            .map(|tree| (tree.as_str(), fewer(tree))),
-        total,
-        "kinds of rays",
-    );
+    let fewer = |tree: &str| of(tree).iter().filter(|row| row.tests_over_base < 1.0).count();
+    let total = trees.iter().map(|tree| of(tree).len()).max().unwrap_or(0);
+    let counts =
+        tally(trees.iter().map(|tree| (tree.as_str(), fewer(tree))), total, "kinds of rays");
     format!(
         "Fewer tests per ray than ‘{base}’, geometric means over scenes: {counts}. The least is {:.3} of its tests, ‘{}’ on \
          {} rays ({} camera).",

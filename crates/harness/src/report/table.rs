@@ -77,9 +77,7 @@ impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let scenes = rows.scenes();
         let row = |&scene: &_| {
-            self.columns
-                .iter()
-                .filter_map(move |column| self.cell(rows, scene, column))
+            self.columns.iter().filter_map(move |column| self.cell(rows, scene, column))
         };
         let cells: Vec<Cell> = scenes.iter().flat_map(row).collect();
         let mut output = Output::new(&self.source, &self.title);
@@ -105,10 +103,9 @@ impl Config {
         let trials = rows.trials_over_base(scene, &column.method);
         let pool = trials.concat();
         let results: Vec<f64> = match column.best_of {
-            Some(m) => trials
-                .iter()
-                .filter_map(|trials| minimum(trials.iter().copied().take(m)))
-                .collect(),
+            Some(m) => {
+                trials.iter().filter_map(|trials| minimum(trials.iter().copied().take(m))).collect()
+            }
             None => rows.final_ratios(scene, &column.method),
         };
         let interval = match column.best_of {
@@ -123,9 +120,7 @@ impl Config {
             method: &column.method,
             best_of: column.best_of,
             cost_over_base: median(&results)?,
-            expected_over_base: column
-                .best_of
-                .and_then(|m| expected_best_of(&pool, m)),
+            expected_over_base: column.best_of.and_then(|m| expected_best_of(&pool, m)),
             low_over_base,
             high_over_base,
             paper_over_base: self.paper_ratio(column, scene),
@@ -139,10 +134,7 @@ impl Config {
         if cells.iter().any(|cell| cell.best_of.is_some()) {
             caption += " Whiskers: at least nine of ten repetitions of as many fresh trials end between them.";
         }
-        if cells
-            .iter()
-            .any(|cell| cell.paper_over_base.is_some())
-        {
+        if cells.iter().any(|cell| cell.paper_over_base.is_some()) {
             caption += " Ours on stand-in scenes, the paper's on the originals: compare ratios within a column, not bar by bar.";
         }
         if is_cut(cells) {
@@ -158,13 +150,9 @@ impl Config {
     fn draw(&self, rows: &Rows, cells: &[Cell]) -> Panel {
         let columns = || self.columns.iter().skip(1);
         let bars = |name: String, column: &Column, value: &dyn Fn(&Cell) -> Option<f64>, spread| {
-            let values = rows
-                .scenes()
-                .into_iter()
-                .map(|scene| find(cells, scene, column).and_then(value));
-            let values = values
-                .map(|value| value.unwrap_or(f64::NAN))
-                .collect();
+            let values =
+                rows.scenes().into_iter().map(|scene| find(cells, scene, column).and_then(value));
+            let values = values.map(|value| value.unwrap_or(f64::NAN)).collect();
             Layer::new(name, Marks::Bars { values, spread, base: 1.0 })
         };
         // Columns that are readings of one column of the paper share its bars.
@@ -194,10 +182,7 @@ impl Config {
     }
 
     fn add_table(&self, output: &mut Output, rows: &Rows, cells: &[Cell]) {
-        let names = self
-            .columns
-            .iter()
-            .map(|column| column.name.as_str());
+        let names = self.columns.iter().map(|column| column.name.as_str());
         let mut table = text_table(std::iter::once("scene").chain(names));
         for scene in rows.scenes() {
             let show = |column: &Column| {
@@ -208,10 +193,7 @@ impl Config {
                         .map_or(ours.clone(), |paper| format!("{ours}  (paper {paper:.4})")),
                 )
             };
-            let shown = self
-                .columns
-                .iter()
-                .map(|column| show(column).unwrap_or_default());
+            let shown = self.columns.iter().map(|column| show(column).unwrap_or_default());
             table.add_row(std::iter::once(rows.shown(scene)).chain(shown));
         }
         output.add_table("Cost over base, ours (and the paper's, on its own scenes):", table);
@@ -221,9 +203,7 @@ impl Config {
     /// ratio.
     fn reading(&self, cells: &[Cell]) -> String {
         let below = |column: &Column| {
-            of_column(cells, column)
-                .filter(|cell| cell.cost_over_base < 1.0)
-                .count()
+            of_column(cells, column).filter(|cell| cell.cost_over_base < 1.0).count()
         };
         let others = || self.columns.iter().skip(1);
         let counts = others().map(|column| (column.name.as_str(), below(column)));
@@ -232,10 +212,7 @@ impl Config {
         else {
             return String::new();
         };
-        let scenes = self
-            .columns
-            .first()
-            .map_or(0, |base| of_column(cells, base).count());
+        let scenes = self.columns.first().map_or(0, |base| of_column(cells, base).count());
         let Cell { column, scene, cost_over_base, .. } = least;
         let counts = tally(counts, scenes, "scenes");
         format!(
@@ -246,19 +223,13 @@ impl Config {
 
 /// The paper's highest ratio, and at least 1.
 fn highest_of_paper(cells: &[Cell]) -> f64 {
-    cells
-        .iter()
-        .filter_map(|cell| cell.paper_over_base)
-        .fold(1.0, f64::max)
+    cells.iter().filter_map(|cell| cell.paper_over_base).fold(1.0, f64::max)
 }
 
 /// Returns true if the figure ends below some bars.
 fn is_cut(cells: &[Cell]) -> bool {
     let theirs = highest_of_paper(cells);
-    theirs > 1.0
-        && cells
-            .iter()
-            .any(|cell| cell.cost_over_base > MOST_OF_PAPER * theirs)
+    theirs > 1.0 && cells.iter().any(|cell| cell.cost_over_base > MOST_OF_PAPER * theirs)
 }
 
 /// Returns the cells of a column.
@@ -266,9 +237,7 @@ pub(super) fn of_column<'c, 'a>(
     cells: &'c [Cell<'a>],
     column: &Column,
 ) -> impl Iterator<Item = &'c Cell<'a>> {
-    cells
-        .iter()
-        .filter(|cell| cell.column == column.name)
+    cells.iter().filter(|cell| cell.column == column.name)
 }
 
 /// Returns the cell of a column on a scene.
@@ -287,8 +256,7 @@ mod tests {
     fn rows(methods: &[(&str, f64)]) -> Rows {
         let mut rows = Rows::default();
         for &(method, cost) in methods {
-            rows.runs
-                .push(RunRow { cost, base_cost: 1.0, ..run(method, 0, 1, 0) });
+            rows.runs.push(RunRow { cost, base_cost: 1.0, ..run(method, 0, 1, 0) });
         }
         rows
     }
@@ -319,18 +287,10 @@ mod tests {
             (row.ours.as_str(), row.verdict),
             ("1.9000, by difference", Verdict::Inconclusive)
         );
-        assert!(
-            near.answer
-                .unwrap()
-                .contains("‘difference’ comes within 10 %")
-        );
+        assert!(near.answer.unwrap().contains("‘difference’ comes within 10 %"));
         let far = written(readings(), &[("base", 1.0), ("sum", 500.0), ("difference", 3.0)]);
         assert_eq!(far.paper[0].verdict, Verdict::Differs);
-        assert!(
-            far.answer
-                .unwrap()
-                .starts_with("None of 2 readings comes within 10 %")
-        );
+        assert!(far.answer.unwrap().starts_with("None of 2 readings comes within 10 %"));
     }
 
     #[test]
@@ -338,11 +298,7 @@ mod tests {
         let columns =
             vec![column("base", 1.0), column("best of 10", 1.1), column("best of 100", 1.2)];
         let output = written(columns, &[("base", 1.0), ("best of 10", 1.15), ("best of 100", 0.9)]);
-        let verdicts: Vec<Verdict> = output
-            .paper
-            .iter()
-            .map(|row| row.verdict)
-            .collect();
+        let verdicts: Vec<Verdict> = output.paper.iter().map(|row| row.verdict).collect();
         assert_eq!(verdicts, [Verdict::Agrees, Verdict::DiffersLower]);
         let answer = output.answer.unwrap();
         assert_eq!(

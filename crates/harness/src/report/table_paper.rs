@@ -21,25 +21,18 @@ impl Config {
     /// ways.
     fn compare_readings(&self, rows: &Rows, scene: &str, cells: &[Cell]) -> Option<PaperRow> {
         let distance = |cell: &&Cell| {
-            cell.paper_over_base
-                .map(|paper| (cell.cost_over_base / paper).ln().abs())
+            cell.paper_over_base.map(|paper| (cell.cost_over_base / paper).ln().abs())
         };
         let base = &self.columns.first()?.name;
         let read = cells.iter().filter(|cell| {
             cell.scene == scene && cell.column != base && cell.paper_over_base.is_some()
         });
-        let closest = read.min_by(|a, b| {
-            distance(a)
-                .partial_cmp(&distance(b))
-                .unwrap_or(Ordering::Equal)
-        })?;
+        let closest =
+            read.min_by(|a, b| distance(a).partial_cmp(&distance(b)).unwrap_or(Ordering::Equal))?;
         let paper = closest.paper_over_base?;
         // The paper prints no formula, so the closest reading is the most favourable to it.
         let close = is_close(closest, self.tolerance);
-        let column = self
-            .columns
-            .iter()
-            .find(|column| column.name == closest.column)?;
+        let column = self.columns.iter().find(|column| column.name == closest.column)?;
         let row = PaperRow::new(
             &self.source,
             rows.shown(scene),
@@ -80,9 +73,7 @@ impl Config {
     pub(super) fn compare_all(&self, rows: &Rows, cells: &[Cell]) -> Vec<PaperRow> {
         if self.are_readings() {
             let scenes = rows.scenes().into_iter();
-            return scenes
-                .filter_map(|scene| self.compare_readings(rows, scene, cells))
-                .collect();
+            return scenes.filter_map(|scene| self.compare_readings(rows, scene, cells)).collect();
         }
         let mut compared = Vec::new();
         for column in self.columns.iter().skip(1) {
@@ -97,23 +88,16 @@ impl Config {
     /// interval is above or below the base, or the numbers of the paper's ratios that a reading
     /// comes close to.
     pub(super) fn answer(&self, cells: &[Cell]) -> Option<String> {
-        cells
-            .iter()
-            .find(|cell| cell.paper_over_base.is_some())?;
+        cells.iter().find(|cell| cell.paper_over_base.is_some())?;
         if self.are_readings() {
             let papers = of_column(cells, self.columns.get(1)?)
                 .filter(|cell| cell.paper_over_base.is_some())
                 .count();
             let close = |column: &Column| {
-                of_column(cells, column)
-                    .filter(|cell| is_close(cell, self.tolerance))
-                    .count()
+                of_column(cells, column).filter(|cell| is_close(cell, self.tolerance)).count()
             };
-            let counts = self
-                .columns
-                .iter()
-                .skip(1)
-                .map(|column| (column.name.as_str(), close(column)));
+            let counts =
+                self.columns.iter().skip(1).map(|column| (column.name.as_str(), close(column)));
             let best = counts.max_by_key(|(_, count)| *count)?;
             let percent = 100.0 * self.tolerance;
             return Some(if best.1 == papers {
@@ -142,6 +126,5 @@ impl Config {
 
 /// Returns true if the ratio is within the tolerance of the paper's.
 fn is_close(cell: &Cell, tolerance: f64) -> bool {
-    cell.paper_over_base
-        .is_some_and(|paper| (cell.cost_over_base / paper - 1.0).abs() <= tolerance)
+    cell.paper_over_base.is_some_and(|paper| (cell.cost_over_base / paper - 1.0).abs() <= tolerance)
 }

@@ -31,10 +31,8 @@ pub(super) fn add(
 ) -> Result<String, Error> {
     let mut table = Vec::new();
     for scene in rows.scenes() {
-        let runs_of_methods: Vec<Vec<Series>> = methods
-            .iter()
-            .map(|method| series(rows, scene, method))
-            .collect();
+        let runs_of_methods: Vec<Vec<Series>> =
+            methods.iter().map(|method| series(rows, scene, method)).collect();
         for target in targets {
             let Some(cost) = target.cost(rows, scene) else { continue };
             for (method, runs) in methods.iter().zip(&runs_of_methods) {
@@ -51,20 +49,14 @@ pub(super) fn add(
 impl<'a> Reached<'a> {
     fn new(scene: &'a str, target: &Target, method: &'a str, runs: &[Series], cost: f64) -> Self {
         // Runs without success must count: dropping them would favour methods that rarely succeed.
-        let times: Vec<f64> = runs
-            .iter()
-            .map(|run| reached(run, cost).unwrap_or(WORST))
-            .collect();
+        let times: Vec<f64> = runs.iter().map(|run| reached(run, cost).unwrap_or(WORST)).collect();
         let quantile = |q| order_quantile(&times, q).filter(|time| time.is_finite());
         Self {
             scene,
             target: target.to_string(),
             method,
             runs: runs.len(),
-            solved: times
-                .iter()
-                .filter(|time| time.is_finite())
-                .count(),
+            solved: times.iter().filter(|time| time.is_finite()).count(),
             median: quantile(0.5),
             quantile_90: quantile(0.9),
         }
@@ -74,14 +66,10 @@ impl<'a> Reached<'a> {
 /// Returns a sentence on the first method to reach each target, by scene.
 fn reading(targets: &[Target], table: &[Reached]) -> String {
     let firsts = targets.iter().filter_map(|target| {
-        let rows: Vec<&Reached> = table
-            .iter()
-            .filter(|row| row.target == target.to_string())
-            .collect();
+        let rows: Vec<&Reached> =
+            table.iter().filter(|row| row.target == target.to_string()).collect();
         let first = |scene: &[&Reached]| {
-            let timed = scene
-                .iter()
-                .filter_map(|row| Some((row.median?, row.method)));
+            let timed = scene.iter().filter_map(|row| Some((row.median?, row.method)));
             let (seconds, method) = timed.min_by(|a, b| a.0.total_cmp(&b.0))?;
             Some(format!("{method} on {} ({seconds:.2} s)", scene[0].scene))
         };

@@ -60,37 +60,24 @@ impl Config {
         let mut panels = Vec::new();
         let mut lists = Vec::new();
         for scene in rows.scenes() {
-            let curves: Vec<Vec<Point>> = self
-                .methods
-                .iter()
-                .map(|method| self.curve(rows, scene, method))
-                .collect();
+            let curves: Vec<Vec<Point>> =
+                self.methods.iter().map(|method| self.curve(rows, scene, method)).collect();
             let mut single = Vec::new();
             let mut expected = Vec::new();
             let mut bands = Vec::new();
             for (name, curve) in self.methods.iter().zip(&curves) {
                 let x = |point: &Point| point.trials as f64;
-                let steps = curve
-                    .iter()
-                    .map(|point| (x(point), point.single_run_over_base))
-                    .collect();
+                let steps =
+                    curve.iter().map(|point| (x(point), point.single_run_over_base)).collect();
                 single.push(Layer::new(name, Marks::Steps(steps)));
-                let line = curve
-                    .iter()
-                    .map(|point| (x(point), point.expected_over_base))
-                    .collect();
+                let line = curve.iter().map(|point| (x(point), point.expected_over_base)).collect();
                 expected.push(Layer::new(name, Marks::Line(line)));
-                let band = curve
-                    .iter()
-                    .map(|point| (x(point), point.interval().0, point.interval().1));
+                let band =
+                    curve.iter().map(|point| (x(point), point.interval().0, point.interval().1));
                 bands.push(Layer::new(name, Marks::Band(band.collect())));
             }
             // One repetition has no interval, and its bands would cover the lines.
-            if curves
-                .iter()
-                .flatten()
-                .any(|point| point.expected_low.is_some())
-            {
+            if curves.iter().flatten().any(|point| point.expected_low.is_some()) {
                 expected.extend(bands);
             }
             for (what, mut layers) in [("one run", single), ("expected", expected)] {
@@ -106,10 +93,8 @@ impl Config {
         let caption = "Lowest cost among so many trials, over that of the greedy tree. Left, one run, as in the paper; \
                        right, what is expected, with the 95 % interval of the mean over repetitions.";
         output.add_figure("trials", caption, 2, panels);
-        let last: Vec<&Point> = points
-            .iter()
-            .filter(|point| point.trials == self.best_of)
-            .collect();
+        let last: Vec<&Point> =
+            points.iter().filter(|point| point.trials == self.best_of).collect();
         let columns = "scene method expected_over_base expected_low expected_high";
         output.show(
             &format!("Expected best of {} trials over base:", self.best_of),
@@ -117,10 +102,7 @@ impl Config {
             columns,
         )?;
         output.reading = self.reading(&last);
-        output.answer = self
-            .paper_best
-            .as_ref()
-            .map(|paper| answer(&lists, &last, paper));
+        output.answer = self.paper_best.as_ref().map(|paper| answer(&lists, &last, paper));
         output.add_csv("trials", &points)?;
         Ok(output)
     }
@@ -130,10 +112,8 @@ impl Config {
         let Some(first) = repetitions.first() else { return Vec::new() };
         let point = |trials: usize| {
             let single_run_over_base = minimum(first.iter().copied().take(trials))?;
-            let every: Vec<f64> = repetitions
-                .iter()
-                .filter_map(|costs| expected_best_of(costs, trials))
-                .collect();
+            let every: Vec<f64> =
+                repetitions.iter().filter_map(|costs| expected_best_of(costs, trials)).collect();
             let (expected_over_base, interval) = mean_interval(&every)?;
             let (expected_low, expected_high) = interval.unzip();
             Some(Point {
@@ -146,9 +126,7 @@ impl Config {
                 expected_high,
             })
         };
-        (1..=self.best_of.min(first.len()))
-            .map_while(point)
-            .collect()
+        (1..=self.best_of.min(first.len())).map_while(point).collect()
     }
 
     /// Returns a sentence on the scenes on which no other method is below each method.
@@ -158,16 +136,8 @@ impl Config {
             let own = scene.iter().find(|point| point.method == method);
             own.is_some_and(|own| !scene.iter().any(|other| other.is_below(own)))
         };
-        let count = |method: &str| {
-            scenes
-                .iter()
-                .filter(|scene| is_best(scene, method))
-                .count()
-        };
-        let counts = self
-            .methods
-            .iter()
-            .map(|method| (method.as_str(), count(method)));
+        let count = |method: &str| scenes.iter().filter(|scene| is_best(scene, method)).count();
+        let counts = self.methods.iter().map(|method| (method.as_str(), count(method)));
         let counts = tally(counts.filter(|(_, count)| *count > 0), scenes.len(), "scenes");
         format!(
             "No other has a lower expected best of {}, as far as can be told: {counts}.",
@@ -177,14 +147,8 @@ impl Config {
 
     /// Returns the methods that no other method is below at `best_of` trials, the lowest first.
     fn best<'p, 'a>(&self, curves: &'p [Vec<Point<'a>>]) -> Vec<&'p Point<'a>> {
-        let mut ranking: Vec<&Point> = curves
-            .iter()
-            .filter_map(|curve| curve.last())
-            .collect();
-        ranking.sort_by(|a, b| {
-            a.expected_over_base
-                .total_cmp(&b.expected_over_base)
-        });
+        let mut ranking: Vec<&Point> = curves.iter().filter_map(|curve| curve.last()).collect();
+        ranking.sort_by(|a, b| a.expected_over_base.total_cmp(&b.expected_over_base));
         let Some(least) = ranking.first().copied() else { return ranking };
         ranking.retain(|point| !least.is_below(point));
         ranking
@@ -222,10 +186,7 @@ impl Config {
 }
 
 fn in_words(best: &[&Point]) -> String {
-    best.iter()
-        .map(|point| point.method)
-        .collect::<Vec<_>>()
-        .join(" or ")
+    best.iter().map(|point| point.method).collect::<Vec<_>>().join(" or ")
 }
 
 /// The sentence that answers for the paper: the best methods by scene, whether the paper's is one
@@ -240,10 +201,7 @@ fn answer(lists: &[(String, &str)], last: &[&Point], paper: &str) -> String {
     }
     let groups = each(groups, |(best, scenes)| Some(format!("{best} on {}", scenes.join(" and "))));
     let is_paper = |best: &str| best.split(" or ").any(|name| name == paper);
-    let with_paper = lists
-        .iter()
-        .filter(|(best, _)| is_paper(best))
-        .count();
+    let with_paper = lists.iter().filter(|(best, _)| is_paper(best)).count();
     let of_paper = match with_paper {
         0 => format!("The paper's {paper} is not among the best on any scene"),
         all if all == lists.len() => format!("The paper's {paper} is among the best on all scenes"),
@@ -251,10 +209,7 @@ fn answer(lists: &[(String, &str)], last: &[&Point], paper: &str) -> String {
             format!("The paper's {paper} is among the best on {some} of {} scenes", lists.len())
         }
     };
-    let below = last
-        .iter()
-        .filter(|point| point.interval().1 < 1.0)
-        .count();
+    let below = last.iter().filter(|point| point.interval().1 < 1.0).count();
     let below = if below == 0 {
         "no interval lies below greedy, the list of k = 1".into()
     } else {
@@ -295,9 +250,7 @@ mod tests {
             paper_best: Some(paper_best.into()),
             ..Config::default()
         };
-        let output = config
-            .write(&rows([("one", one), ("other", other)]))
-            .unwrap();
+        let output = config.write(&rows([("one", one), ("other", other)])).unwrap();
         (output.paper[0].ours.clone(), output.paper[0].verdict)
     }
 

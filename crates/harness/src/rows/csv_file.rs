@@ -14,10 +14,7 @@ pub trait Row: Serialize + DeserializeOwned {
 pub fn read<R: DeserializeOwned>(path: &Path) -> Result<Vec<R>, Error> {
     let bytes = bvh_scenes::read(path)?;
     let mut reader = csv::Reader::from_reader(&bytes[..]);
-    reader
-        .deserialize()
-        .collect::<Result<_, _>>()
-        .map_err(Error::csv(path))
+    reader.deserialize().collect::<Result<_, _>>().map_err(Error::csv(path))
 }
 
 /// Reads all rows of a kind from an experiment's folder; none if no run left any.

@@ -29,8 +29,7 @@ impl FinishedRun {
     /// Adds rows of one kind, once per kind. An empty slice adds no file.
     pub fn add<R: Row>(&mut self, rows: &[R]) -> Result<(), Error> {
         if !rows.is_empty() {
-            self.files
-                .insert(R::FILE.into(), to_bytes(rows, Path::new(R::FILE))?);
+            self.files.insert(R::FILE.into(), to_bytes(rows, Path::new(R::FILE))?);
         }
         Ok(())
     }
@@ -54,10 +53,7 @@ impl FinishedRun {
         let found = run.contents();
         let lines_found: BTreeSet<&str> = found.lines().collect();
         let lines_written: BTreeSet<&str> = contents.lines().collect();
-        if let Some(line) = lines_written
-            .symmetric_difference(&lines_found)
-            .next()
-        {
+        if let Some(line) = lines_written.symmetric_difference(&lines_found).next() {
             return Err(damaged(line.split(' ').next().unwrap_or_default()));
         }
         // Every run has rows, so an empty list of files was cut off.
@@ -90,11 +86,7 @@ impl FinishedRun {
     /// Returns the name of the first file in which two runs differ. Files of seconds, whose names
     /// begin with `timing`, are not compared: they differ always.
     pub fn difference<'a>(&'a self, other: &'a Self) -> Option<&'a str> {
-        let names = self
-            .files
-            .keys()
-            .chain(other.files.keys())
-            .map(String::as_str);
+        let names = self.files.keys().chain(other.files.keys()).map(String::as_str);
         names
             .filter(|name| !name.starts_with("timing"))
             .find(|&name| self.files.get(name) != other.files.get(name))

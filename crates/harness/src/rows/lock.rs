@@ -21,8 +21,7 @@ pub fn lock_folder(folder: &Path) -> Result<File, Error> {
 /// moments only.
 pub fn wait_for_folder(folder: &Path) -> Result<File, Error> {
     let (path, lock) = lock_file(folder)?;
-    lock.lock()
-        .map_err(Error::io(&path, "lock the file"))?;
+    lock.lock().map_err(Error::io(&path, "lock the file"))?;
     Ok(lock)
 }
 
@@ -33,11 +32,7 @@ fn lock_file(folder: &Path) -> Result<(PathBuf, File), Error> {
         let source = io::Error::other("it is not a regular file; remove it");
         return Err(Error::Io { path, action: "create the file", source });
     }
-    let lock = File::options()
-        .write(true)
-        .create(true)
-        .truncate(false)
-        .open(&path);
+    let lock = File::options().write(true).create(true).truncate(false).open(&path);
     let lock = lock.map_err(Error::io(&path, "create the file"))?;
     Ok((path, lock))
 }

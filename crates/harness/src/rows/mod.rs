@@ -347,7 +347,6 @@ pub const ROUNDING: f64 = 1e-12;
 impl ReferenceRow {
     /// Returns true if the lower bound proves the reference to be the optimum.
     pub fn is_optimum(&self) -> bool {
-        self.lower_bound
-            .is_some_and(|bound| bound >= self.cost * (1.0 - ROUNDING))
+        self.lower_bound.is_some_and(|bound| bound >= self.cost * (1.0 - ROUNDING))
     }
 }

@@ -156,10 +156,7 @@ impl Store {
         for index in 0..runs {
             let run_folder = self.run_folder(index);
             for name in files::names(&run_folder)? {
-                folders_by_name
-                    .entry(name)
-                    .or_default()
-                    .push(run_folder.clone());
+                folders_by_name.entry(name).or_default().push(run_folder.clone());
             }
         }
         folders_by_name.remove(CONTENTS);
@@ -312,10 +309,7 @@ mod tests {
     fn finished_runs_are_not_discarded_because_their_spec_cannot_be_read() {
         let out = tempfile::tempdir().unwrap();
         let folder = out.path().join("x");
-        Store::open(&folder, "", Existing::Keep)
-            .unwrap()
-            .keep(0, &run())
-            .unwrap();
+        Store::open(&folder, "", Existing::Keep).unwrap().keep(0, &run()).unwrap();
         let spec = folder.join(".partial").join(SPEC);
         fs::write(&spec, [0xff]).unwrap();
         for existing in [Existing::Keep, Existing::Resume] {

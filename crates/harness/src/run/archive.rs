@@ -23,9 +23,7 @@ pub fn rows(results: &Path) -> Result<Vec<TreeRow>, Error> {
 
 /// Returns the path of a scene's tree in the archive.
 pub fn path(results: &Path, scene: &str) -> PathBuf {
-    results
-        .join(FOLDER)
-        .join(format!("{}.bvh", scene.replace(':', "-")))
+    results.join(FOLDER).join(format!("{}.bvh", scene.replace(':', "-")))
 }
 
 /// Keeps the tree in `file`, which `command` produced, and records its cost in the archive and
@@ -55,10 +53,7 @@ pub fn keep(results: &Path, scene: &Scene, file: &Path, command: &str) -> Result
     }
     let mut rows = rows(results)?;
     let row_checksum = checksum(scene);
-    if let Some(index) = rows
-        .iter()
-        .position(|row| row.scene == scene.name)
-    {
+    if let Some(index) = rows.iter().position(|row| row.scene == scene.name) {
         let archived = rows.remove(index);
         // A tree over other boxes is no competitor: the scene has changed since.
         if archived.checksum == row_checksum

@@ -94,9 +94,7 @@ fn read_spec(folder: &Path, skipped_scenes: &[String]) -> Result<Table, Error> {
     if let Some(Value::Array(scenes)) = spec.get_mut("scenes") {
         scenes.retain(|scene| {
             let name = scene.get("name").and_then(Value::as_str);
-            !skipped_scenes
-                .iter()
-                .any(|skipped| Some(skipped.as_str()) == name)
+            !skipped_scenes.iter().any(|skipped| Some(skipped.as_str()) == name)
         });
     }
     Ok(spec)
@@ -105,10 +103,8 @@ fn read_spec(folder: &Path, skipped_scenes: &[String]) -> Result<Table, Error> {
 fn compare_values(key: &str, fresh: &Value, committed: &Value, differences: &mut Vec<String>) {
     match (fresh, committed) {
         (Value::Table(fresh_table), Value::Table(committed_table)) => {
-            let names: BTreeSet<&String> = fresh_table
-                .keys()
-                .chain(committed_table.keys())
-                .collect();
+            let names: BTreeSet<&String> =
+                fresh_table.keys().chain(committed_table.keys()).collect();
             for name in names {
                 // The full path of a key is what its author searches for.
                 let key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
@@ -146,10 +142,7 @@ fn shortened(file: &str, mut differences: Vec<String>) -> Vec<String> {
     if more > 0 {
         differences.push(format!("and {more} more"));
     }
-    differences
-        .into_iter()
-        .map(|difference| format!("{file}: {difference}"))
-        .collect()
+    differences.into_iter().map(|difference| format!("{file}: {difference}")).collect()
 }
 
 /// Returns the names in a folder that end with `suffix`, without the files that hold seconds.
@@ -172,10 +165,7 @@ fn compare_rows(name: &str, fresh: &Rows, committed: &Rows, all_scenes: bool) ->
     }
     let mut differences = Vec::new();
     for (fresh_row, committed_row) in fresh.records.iter().zip(&committed.records) {
-        for (column, (now, then)) in header
-            .iter()
-            .zip(fresh_row.iter().zip(committed_row))
-        {
+        for (column, (now, then)) in header.iter().zip(fresh_row.iter().zip(committed_row)) {
             if now != then {
                 let row = identity(header, committed_row);
                 differences.push(format!("{row}: {column} is {now}, committed {then}"));
@@ -193,36 +183,21 @@ fn compare_rows(name: &str, fresh: &Rows, committed: &Rows, all_scenes: bool) ->
 /// Returns the columns that identify a row: its scene, method and so on.
 fn identity(header: &StringRecord, row: &StringRecord) -> String {
     let keys = ["scene", "method", "column", "quantity", "repetition", "trials", "evaluations"];
-    let values = header
-        .iter()
-        .zip(row)
-        .filter(|(column, _)| keys.contains(column));
-    values
-        .map(|(column, value)| format!("{column} {value}"))
-        .collect::<Vec<_>>()
-        .join(", ")
+    let values = header.iter().zip(row).filter(|(column, _)| keys.contains(column));
+    values.map(|(column, value)| format!("{column} {value}")).collect::<Vec<_>>().join(", ")
 }
 
 fn read_rows(path: &Path, skipped_scenes: &[String]) -> Result<Rows, Error> {
     // A row of another length is a difference to report, not an error.
     let bytes = bvh_scenes::read(path)?;
-    let mut reader = csv::ReaderBuilder::new()
-        .flexible(true)
-        .from_reader(&bytes[..]);
-    let header = reader
-        .headers()
-        .map_err(Error::csv(path))?
-        .clone();
-    let mut records: Vec<StringRecord> = reader
-        .records()
-        .collect::<Result<_, _>>()
-        .map_err(Error::csv(path))?;
+    let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..]);
+    let header = reader.headers().map_err(Error::csv(path))?.clone();
+    let mut records: Vec<StringRecord> =
+        reader.records().collect::<Result<_, _>>().map_err(Error::csv(path))?;
     if let Some(scene_column) = header.iter().position(|column| column == "scene") {
         records.retain(|record| {
             let scene = record.get(scene_column);
-            !skipped_scenes
-                .iter()
-                .any(|skipped| Some(skipped.as_str()) == scene)
+            !skipped_scenes.iter().any(|skipped| Some(skipped.as_str()) == scene)
         });
     }
     Ok(Rows { header, records })

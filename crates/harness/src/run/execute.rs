@@ -58,9 +58,7 @@ pub fn execute(
 
 /// Returns an error if several processes cannot share the experiment.
 pub fn reject_indivisible(experiment: &Experiment) -> Result<(), Error> {
-    let reason = measurements(experiment)
-        .iter()
-        .find_map(|measurement| measurement.indivisible());
+    let reason = measurements(experiment).iter().find_map(|measurement| measurement.indivisible());
     match reason {
         Some(reason) => Err(Error::Usage(format!("{}: {reason}", experiment.name))),
         None => Ok(()),
@@ -107,10 +105,7 @@ fn run(
         // Before the runs, because a killed part may be resumed on another machine.
         Provenance::add_to_part(&store.part_provenance())?;
     }
-    let mut remarks: Vec<String> = scenes
-        .iter()
-        .filter_map(|scene| scene.remark.clone())
-        .collect();
+    let mut remarks: Vec<String> = scenes.iter().filter_map(|scene| scene.remark.clone()).collect();
     // The subsets of one mesh share its remark.
     remarks.dedup();
     let mut work = Work {

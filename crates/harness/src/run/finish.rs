@@ -105,10 +105,7 @@ pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
             "the rows come from another spec, scene or seed; run it again without --redraw";
         return Err(Error::Usage(format!("{}: {message}", folder.display())));
     };
-    if !recorded
-        .experiment
-        .keeps_rows_for(&experiment.reports)
-    {
+    if !recorded.experiment.keeps_rows_for(&experiment.reports) {
         let message = "a new report reads trials or times of events, which were not kept; \
                        run it again without --redraw";
         return Err(Error::Usage(format!("{}: {message}", folder.display())));

@@ -32,9 +32,8 @@ impl<'a> Job<'a> {
     ) -> Result<Vec<Self>, Error> {
         let selected = selection.of(experiment, scenes)?;
         let runs: Vec<_> = experiment.runs().collect();
-        let runs_of_scenes: Vec<&[usize]> = selected
-            .chunk_by(|a, b| a / runs.len() == b / runs.len())
-            .collect();
+        let runs_of_scenes: Vec<&[usize]> =
+            selected.chunk_by(|a, b| a / runs.len() == b / runs.len()).collect();
         // A process that performs one run of a large sweep needs no bases of the other scenes.
         let jobs_of_scenes = runs_of_scenes
             .into_par_iter()
@@ -53,12 +52,7 @@ impl<'a> Job<'a> {
 
     /// The seed of the run.
     pub fn seed(&self, experiment: &Experiment) -> u64 {
-        let label = self
-            .labelled
-            .options
-            .seed_as
-            .as_ref()
-            .unwrap_or(&self.labelled.label);
+        let label = self.labelled.options.seed_as.as_ref().unwrap_or(&self.labelled.label);
         experiment.seed_of(&self.scene.name, label, self.repetition)
     }
 
@@ -71,9 +65,7 @@ impl<'a> Job<'a> {
         };
         let seed =
             experiment.seed_of(&self.scene.name, "rays that trees are trained on", self.repetition);
-        let density = config
-            .density(trained, self.scene, seed)
-            .map_err(self.tracing_error())?;
+        let density = config.density(trained, self.scene, seed).map_err(self.tracing_error())?;
         Ok(Some(density))
     }
 
@@ -85,9 +77,7 @@ impl<'a> Job<'a> {
     /// Returns how often the run's training rays enter each node of `tree`, which decides its
     /// layout.
     pub fn visits(&self, experiment: &Experiment, tree: &Bvh) -> Result<Option<Vec<f32>>, Error> {
-        Ok(self
-            .density(experiment)?
-            .map(|density| density.visits(tree)))
+        Ok(self.density(experiment)?.map(|density| density.visits(tree)))
     }
 }
 

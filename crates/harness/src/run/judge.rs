@@ -24,8 +24,6 @@ pub(crate) struct RayJudge<'a> {
 
 impl Judge for RayJudge<'_> {
     fn judge(&self, tree: &Bvh) -> f64 {
-        empirical_cost(self.rays, &self.scene.primitives, tree, self.seed)
-            .boxes
-            .mean
+        empirical_cost(self.rays, &self.scene.primitives, tree, self.seed).boxes.mean
     }
 }

@@ -68,26 +68,16 @@ pub fn merge(
             experiments.entry(name).or_default().push(part);
         }
     }
-    experiments
-        .iter()
-        .map(|(name, parts)| join(name, parts, out, existing, unlike))
-        .collect()
+    experiments.iter().map(|(name, parts)| join(name, parts, out, existing, unlike)).collect()
 }
 
 /// Returns the parts in one `--out`, full and quick, by the names of their folders in it.
 fn parts(out: &Path) -> Result<Vec<(PathBuf, Part)>, Error> {
-    let mut names: Vec<PathBuf> = files::names(out)?
-        .into_iter()
-        .map(PathBuf::from)
-        .collect();
+    let mut names: Vec<PathBuf> = files::names(out)?.into_iter().map(PathBuf::from).collect();
     let quick = out.join("quick");
     if quick.is_dir() {
         let quick_names = files::names(&quick)?;
-        names.extend(
-            quick_names
-                .iter()
-                .map(|name| Path::new("quick").join(name)),
-        );
+        names.extend(quick_names.iter().map(|name| Path::new("quick").join(name)));
     }
     let mut parts = Vec::new();
     for name in names {
@@ -116,11 +106,7 @@ fn join(
     let merge_error = |message| Error::Merge { experiment: name.display().to_string(), message };
     // Symbolic links and `..` may hide that two paths are the same folder.
     if let Ok(target) = out.join(name).join(".partial").canonicalize()
-        && parts.iter().any(|part| {
-            part.partial
-                .canonicalize()
-                .is_ok_and(|path| path == target)
-        })
+        && parts.iter().any(|part| part.partial.canonicalize().is_ok_and(|path| path == target))
     {
         let out = out.display();
         return Err(Error::Usage(format!("--out {out} is also one of the parts; choose another")));
@@ -136,10 +122,7 @@ fn join(
         store.keep(index, &FinishedRun::read(owner)?)?;
     }
     let mut provenance = Provenance::gather();
-    provenance.parts = parts
-        .iter()
-        .filter_map(|part| part.provenance.clone())
-        .collect();
+    provenance.parts = parts.iter().filter_map(|part| part.provenance.clone()).collect();
     let best_known = match previous {
         Some(_) => BestKnown::Read(out),
         None => BestKnown::Improve(out),
@@ -168,10 +151,7 @@ fn check_processors(parts: &[Part]) -> Result<(), String> {
 /// merging relies on is checked.
 fn common_spec(name: &Path, parts: &[Part]) -> Result<Resolved, String> {
     let (first, others) = parts.split_first().ok_or("no parts")?;
-    if let Some(other) = others
-        .iter()
-        .find(|part| part.resolved != first.resolved)
-    {
+    if let Some(other) = others.iter().find(|part| part.resolved != first.resolved) {
         let first = first.partial.display();
         let other = other.partial.display();
         return Err(format!("{first} and {other} are parts of different specs, scenes or seeds"));
@@ -185,10 +165,7 @@ fn checked_spec(name: &Path, text: &str) -> Result<Resolved, String> {
     if resolved.experiment.folder() != name {
         return Err(format!("name is {:?}; accepted: the folder's", resolved.experiment.name));
     }
-    resolved
-        .experiment
-        .check_run_count()
-        .map_err(|error| error.to_string())?;
+    resolved.experiment.check_run_count().map_err(|error| error.to_string())?;
     Ok(resolved)
 }
 

@@ -93,27 +93,24 @@ fn solve_or_build(
     stopwatch: &Stopwatch,
 ) -> Result<(Outcome, f64), Error> {
     let Job { scene, labelled, .. } = *job;
-    let (tree, seconds) = match &labelled.method {
-        Contestant::Ours(method) => return search(experiment, job, method, seed, stopwatch),
-        Contestant::Peer(peer) => {
-            let Built { tree, seconds } = peer
-                .build(scene)
-                .map_err(|message| Error::Library {
-                    scene: scene.name.clone(),
-                    library: peer.name(),
-                    message,
+    let (tree, seconds) =
+        match &labelled.method {
+            Contestant::Ours(method) => return search(experiment, job, method, seed, stopwatch),
+            Contestant::Peer(peer) => {
+                let Built { tree, seconds } = peer.build(scene).map_err(|message| {
+                    Error::Library { scene: scene.name.clone(), library: peer.name(), message }
                 })?;
-            (tree, seconds)
-        }
-        Contestant::External(program) => program
-            .build(&scene.boxes, &scene.primitives, seed, &|| stopwatch.watch.cancelled())
-            .map_err(|source| Error::External {
-                scene: scene.name.clone(),
-                method: labelled.label.clone(),
-                command: program.command.join(" "),
-                source,
-            })?,
-    };
+                (tree, seconds)
+            }
+            Contestant::External(program) => program
+                .build(&scene.boxes, &scene.primitives, seed, &|| stopwatch.watch.cancelled())
+                .map_err(|source| Error::External {
+                    scene: scene.name.clone(),
+                    method: labelled.label.clone(),
+                    command: program.command.join(" "),
+                    source,
+                })?,
+        };
     // Third-party methods report no events; their end is the only one.
     stopwatch.note(seconds);
     Ok((single_evaluation(tree, &experiment.objective), seconds))
@@ -131,17 +128,12 @@ fn search(
     let options = &labelled.options;
     // The judge's rays differ from the rays of all measurements.
     let ray_seed = experiment.seed_of(&scene.name, "rays of the judge", job.repetition);
-    let judge = options
-        .judge
-        .as_ref()
-        .map(|rays| RayJudge { rays, scene, seed: ray_seed });
+    let judge = options.judge.as_ref().map(|rays| RayJudge { rays, scene, seed: ray_seed });
     let density = job.density(experiment)?;
     let problem = Problem {
         objective: options.objective.unwrap_or(experiment.objective),
         splits: splits(labelled, scene),
-        measure: density
-            .as_ref()
-            .map(|density| density as &dyn Measure),
+        measure: density.as_ref().map(|density| density as &dyn Measure),
         judge: judge.as_ref().map(|judge| judge as &dyn Judge),
         disabled: &options.keep,
         ..Problem::new(&scene.boxes)
@@ -197,18 +189,12 @@ struct Stopwatch<'a> {
 
 impl Stopwatch<'_> {
     fn note(&self, seconds: f64) {
-        self.events
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner)
-            .push(seconds);
+        self.events.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(seconds);
     }
 
     /// Returns the time of each event so far, in seconds since the start.
     fn seconds(&self) -> Vec<f64> {
-        self.events
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner)
-            .clone()
+        self.events.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone()
     }
 }
 

@@ -71,9 +71,7 @@ impl Provenance {
         if let Some(mut earlier) = Self::of_part(path)? {
             provenance.parts = std::mem::take(&mut earlier.parts);
             provenance.parts.push(earlier);
-            provenance
-                .parts
-                .retain(|part| part.cpu != provenance.cpu);
+            provenance.parts.retain(|part| part.cpu != provenance.cpu);
         }
         files::write(path, to_toml(&provenance)?.as_bytes())?;
         Ok(())
@@ -86,10 +84,7 @@ impl Provenance {
 
     /// Returns the processors of the results, with repetitions.
     pub fn processors(&self) -> impl Iterator<Item = &str> {
-        self.parts
-            .iter()
-            .chain([self])
-            .map(|provenance| provenance.cpu.as_str())
+        self.parts.iter().chain([self]).map(|provenance| provenance.cpu.as_str())
     }
 }
 

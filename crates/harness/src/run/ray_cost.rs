@@ -27,11 +27,8 @@ impl Measurement for Judging<'_> {
 
     fn measure(&self, work: &mut Work) -> Result<String, Error> {
         work.complete_trees(|_| true)?;
-        let runs: Vec<Run> = work
-            .trees
-            .iter()
-            .map(|(&index, tree)| (&work.jobs[index], tree))
-            .collect();
+        let runs: Vec<Run> =
+            work.trees.iter().map(|(&index, tree)| (&work.jobs[index], tree)).collect();
         let mut rows = Rows::default();
         for scene_runs in runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
             rows.judge_scene(self.0, work, scene_runs)?;
@@ -83,18 +80,14 @@ impl Rows {
                 .map(|(runs, layouts)| layout_row(runs, layouts)),
         );
         for &trained_on in &config.costs {
-            self.visits
-                .extend(visit_rows(experiment, config, trained_on, runs)?);
+            self.visits.extend(visit_rows(experiment, config, trained_on, runs)?);
         }
         let seed = experiment.seed_of(&scene.name, "rays that judge trees", 0);
         for rays in test_rays(config, scene, first_tree, seed) {
             if work.watch.cancelled() {
                 return Err(work.interrupted());
             }
-            let tests: Vec<[f64; 2]> = layouts
-                .par_iter()
-                .map(|wide| rays.tests(wide))
-                .collect();
+            let tests: Vec<[f64; 2]> = layouts.par_iter().map(|wide| rays.tests(wide)).collect();
             if !config.costs.is_empty() {
                 self.run_tests.extend(
                     runs.iter()
@@ -154,9 +147,7 @@ fn visit_rows(
 ) -> Result<Vec<VisitRow>, Error> {
     let scene = runs[0].0.scene;
     let seed = experiment.seed_of(&scene.name, "rays that costs are of", 0);
-    let density = config
-        .density(trained_on, scene, seed)
-        .map_err(tracing_error(scene))?;
+    let density = config.density(trained_on, scene, seed).map_err(tracing_error(scene))?;
     let rows = runs.iter().map(|(job, tree)| VisitRow {
         scene: scene.name.clone(),
         method: job.labelled.label.clone(),
@@ -169,10 +160,8 @@ fn visit_rows(
 
 /// Lays out a run's tree for the rays that it was trained on, otherwise for random lines.
 fn layout(experiment: &Experiment, job: &Job, tree: &Bvh) -> Result<WideBvh, Error> {
-    let triangles = job
-        .scene
-        .triangles()
-        .map_err(|error| job.tracing_error()(error.to_string()))?;
+    let triangles =
+        job.scene.triangles().map_err(|error| job.tracing_error()(error.to_string()))?;
     let visits = job.visits(experiment, tree)?;
     widened(tree, triangles, visits.as_deref())
         .map_err(|error| job.tracing_error()(error.to_string()))
@@ -184,12 +173,9 @@ fn layout_row(runs: &[Run], layouts: &[WideBvh]) -> LayoutRow {
     let objects = job.scene.boxes.len() as f64;
     let trees = runs.iter().map(|(_, tree)| *tree);
     let bytes: usize = layouts.iter().map(WideBvh::bytes).sum();
-    let references_per_object = trees
-        .clone()
-        .map(|tree| tree.prim_ids.len() as f64 / objects);
-    let layout_over_root = trees
-        .clone()
-        .map(|tree| cost::over_root_area(tree, cost::layout_area(tree)));
+    let references_per_object = trees.clone().map(|tree| tree.prim_ids.len() as f64 / objects);
+    let layout_over_root =
+        trees.clone().map(|tree| cost::over_root_area(tree, cost::layout_area(tree)));
     LayoutRow {
         scene: job.scene.name.clone(),
         method: job.labelled.label.clone(),

@@ -63,10 +63,8 @@ pub(crate) fn update(
         let has_optimum = experiment.needs_optimum(scene.objects);
         // Experiments solve other small scenes by the hundred, and nothing reads their costs later.
         if scene.objects > exact::MOST_OBJECTS || has_optimum {
-            let bound = bounds
-                .iter()
-                .find(|row| row.scene == scene.name)
-                .map(|row| row.lower_bound);
+            let bound =
+                bounds.iter().find(|row| row.scene == scene.name).map(|row| row.lower_bound);
             let eligible = runs
                 .iter()
                 .filter(|run| run.scene == scene.name && run.nodes + 1 == 2 * run.objects);
@@ -82,11 +80,7 @@ pub(crate) fn update(
     if matches!(best_known, BestKnown::Improve(_)) {
         write_all_known(out, known, &before)?;
     }
-    if experiment
-        .reports
-        .iter()
-        .any(Report::needs_references)
-    {
+    if experiment.reports.iter().any(Report::needs_references) {
         store.write_rows(&references)?;
     }
     Ok(())
@@ -156,9 +150,7 @@ pub fn best_known(results: &Path, scene: &Scene) -> Result<Option<ReferenceRow>,
     let checksum = checksum(scene);
     let objective = objective_name(&Objective::InternalArea);
     let key = (scene.name.as_str(), scene.boxes.len(), checksum.as_str(), objective.as_str());
-    Ok(all_known(results)?
-        .into_iter()
-        .find(|row| key_of(row) == key))
+    Ok(all_known(results)?.into_iter().find(|row| key_of(row) == key))
 }
 
 /// The key of a reference: scene, number of objects, checksum of the boxes, and objective.
@@ -192,19 +184,17 @@ fn references_of(
         (objective_name(&Objective::GoldsmithSalmon), run.goldsmith_salmon, goldsmith_salmon_bound),
         (objective.to_owned(), run.cost, None),
     ];
-    costs
-        .into_iter()
-        .map(|(objective, cost, lower_bound)| ReferenceRow {
-            scene: scene.name.clone(),
-            objects: scene.objects,
-            checksum: scene.checksum.clone(),
-            objective,
-            cost,
-            method: run.method.clone(),
-            seed: run.seed,
-            revision: String::new(),
-            lower_bound: lower_bound.filter(|bound| bound.is_finite()),
-        })
+    costs.into_iter().map(|(objective, cost, lower_bound)| ReferenceRow {
+        scene: scene.name.clone(),
+        objects: scene.objects,
+        checksum: scene.checksum.clone(),
+        objective,
+        cost,
+        method: run.method.clone(),
+        seed: run.seed,
+        revision: String::new(),
+        lower_bound: lower_bound.filter(|bound| bound.is_finite()),
+    })
 }
 
 /// Adds a row, or keeps the better of it and the known row with the same key.
@@ -217,18 +207,11 @@ fn offer(known: &mut Vec<ReferenceRow>, mut found: ReferenceRow, bound_is_optimu
     {
         (found.cost, found.method, found.seed) = (least, "exact".into(), 0);
     }
-    let Some(old) = known
-        .iter_mut()
-        .find(|row| key_of(row) == key_of(&found))
-    else {
+    let Some(old) = known.iter_mut().find(|row| key_of(row) == key_of(&found)) else {
         return known.push(found);
     };
     // A bound holds whoever found the cost, so the greatest one is kept.
-    let lower_bound = old
-        .lower_bound
-        .into_iter()
-        .chain(found.lower_bound)
-        .reduce(f64::max);
+    let lower_bound = old.lower_bound.into_iter().chain(found.lower_bound).reduce(f64::max);
     if found.cost < old.cost * (1.0 - ROUNDING) {
         *old = found;
     }

@@ -79,14 +79,10 @@ pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>),
     if experiment.suite.is_some() {
         return Ok(Default::default());
     }
-    let names = experiment
-        .scenes
-        .iter()
-        .flat_map(|name| subset::expand(name));
+    let names = experiment.scenes.iter().flat_map(|name| subset::expand(name));
     let outside = OutsideFiles::from(experiment.outside_files);
-    let mut scenes = names
-        .map(|name| Scene::load_with(&name, outside))
-        .collect::<Result<Vec<_>, _>>()?;
+    let mut scenes =
+        names.map(|name| Scene::load_with(&name, outside)).collect::<Result<Vec<_>, _>>()?;
     let mut skipped_scenes = Vec::new();
     for name in &experiment.optional_scenes {
         match Scene::load_with(name, outside) {
@@ -96,10 +92,7 @@ pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>),
         }
     }
     let mut names = HashSet::new();
-    match scenes
-        .iter()
-        .find(|scene| !names.insert(&scene.name))
-    {
+    match scenes.iter().find(|scene| !names.insert(&scene.name)) {
         Some(twice) => {
             Err(Error::Usage(format!("two scenes are called {}; name each once", twice.name)))
         }

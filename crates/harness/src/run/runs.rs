@@ -21,13 +21,9 @@ impl Measurement for Runs {
         let missing = missing_runs(work)?;
         let progress = Progress::new(work, work.jobs.len() - missing.len());
         let result = if work.experiment.sequential {
-            missing
-                .iter()
-                .try_for_each(|job| progress.perform(work, job))
+            missing.iter().try_for_each(|job| progress.perform(work, job))
         } else {
-            missing
-                .par_iter()
-                .try_for_each(|job| progress.perform(work, job))
+            missing.par_iter().try_for_each(|job| progress.perform(work, job))
         };
         work.watch.bar.finish_and_clear();
         result?;
@@ -35,10 +31,7 @@ impl Measurement for Runs {
         match progress.finished.into_inner() {
             finished if finished < runs => Err(Error::Interrupted { finished, runs }),
             _ => {
-                work.trees = progress
-                    .trees
-                    .into_inner()
-                    .unwrap_or_else(PoisonError::into_inner);
+                work.trees = progress.trees.into_inner().unwrap_or_else(PoisonError::into_inner);
                 Ok(String::new())
             }
         }
@@ -52,9 +45,7 @@ fn missing_runs<'a>(work: &mut Work<'a>) -> Result<Vec<&'a Job<'a>>, Error> {
         match work.store.has(job.index) {
             Ok(true) => continue,
             Ok(false) => {}
-            Err(damaged) => work
-                .remarks
-                .push(format!("done again: {damaged}")),
+            Err(damaged) => work.remarks.push(format!("done again: {damaged}")),
         }
         missing.push(job);
     }
@@ -79,9 +70,7 @@ struct Progress {
 
 impl Progress {
     fn new(work: &Work, finished: usize) -> Self {
-        work.watch
-            .bar
-            .set_message(work.experiment.name.to_string());
+        work.watch.bar.set_message(work.experiment.name.to_string());
         work.watch.bar.set_position(finished as u64);
         work.watch.bar.reset_eta();
         Self {
@@ -100,10 +89,7 @@ impl Progress {
         let Some((run, tree)) = perform(experiment, job, &work.watch)? else { return Ok(()) };
         work.store.keep(job.index, &run)?;
         if experiment.judges().is_some() || experiment.tracing.is_some() && job.repetition == 0 {
-            self.trees
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .insert(job.index, tree);
+            self.trees.lock().unwrap_or_else(PoisonError::into_inner).insert(job.index, tree);
         }
         let finished = self.finished.fetch_add(1, Relaxed) + 1;
         work.watch.bar.inc(1);
@@ -113,10 +99,7 @@ impl Progress {
 
     /// Prints the line about a finished run, if one is due.
     fn report(&self, work: &Work, job: &Job, finished: usize, duration: Duration) {
-        let mut last_report = self
-            .last_report
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut last_report = self.last_report.lock().unwrap_or_else(PoisonError::into_inner);
         let Work { experiment, verbosity, .. } = *work;
         let bar: &ProgressBar = &work.watch.bar;
         let is_last = finished == self.total;

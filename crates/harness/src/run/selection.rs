@@ -122,13 +122,9 @@ fn estimated_work(labelled: &Labelled, budget: Budget, objects: u64) -> u64 {
     let (trees, work_per_object) = match method {
         Method::Grasp(config) => (config.trials, 0),
         Method::RandomOrders(config) => (config.trials, 0),
-        Method::Genetic(config) => (
-            config
-                .generations
-                .saturating_add(1)
-                .saturating_mul(config.population as u64),
-            0,
-        ),
+        Method::Genetic(config) => {
+            (config.generations.saturating_add(1).saturating_mul(config.population as u64), 0)
+        }
         Method::Annealing(config) => (0, config.work_per_object),
         Method::IteratedLocalSearch(config) => (0, config.work_per_object),
         Method::Rebuild(config) => (0, config.work_per_object),
@@ -138,9 +134,8 @@ fn estimated_work(labelled: &Labelled, budget: Budget, objects: u64) -> u64 {
     };
     // An evaluation is a tree of these methods, and a move of all others.
     let trees = trees.min(budget.max_evaluations.unwrap_or(u64::MAX));
-    let work = trees
-        .saturating_mul(tree_work)
-        .saturating_add(work_per_object.saturating_mul(objects));
+    let work =
+        trees.saturating_mul(tree_work).saturating_add(work_per_object.saturating_mul(objects));
     work.min(budget.max_work.unwrap_or(u64::MAX))
 }
 
@@ -203,10 +198,7 @@ mod tests {
     #[test]
     fn runs_with_much_work_come_first_and_a_shard_takes_its_share_of_them() {
         let (experiment, scenes) = experiment();
-        let works: Vec<u64> = listed(&experiment, &scenes)
-            .iter()
-            .map(|run| run.work)
-            .collect();
+        let works: Vec<u64> = listed(&experiment, &scenes).iter().map(|run| run.work).collect();
         assert!(works.is_sorted_by(|a, b| a >= b), "{works:?}");
         assert_eq!(works[0], 9 * 2 * scenes[0].boxes.len().max(750) as u64);
         assert_eq!(works[11], 2 * scenes[0].boxes.len().min(750) as u64);

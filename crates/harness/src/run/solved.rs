@@ -68,10 +68,7 @@ impl Solved<'_> {
     /// Returns the costs of all trials, if a report reads them.
     pub fn trial_rows(&self) -> Vec<TrialRow> {
         let mut rows = Vec::new();
-        if !self
-            .experiment
-            .keeps_trials_of(&self.job.labelled.label)
-        {
+        if !self.experiment.keeps_trials_of(&self.job.labelled.label) {
             return rows;
         }
         for event in &self.outcome.history {
@@ -103,11 +100,7 @@ impl Solved<'_> {
     }
 
     pub fn ray_rows(&self) -> Vec<RayRow> {
-        self.experiment
-            .rays
-            .iter()
-            .map(|config| self.ray_row(config))
-            .collect()
+        self.experiment.rays.iter().map(|config| self.ray_row(config)).collect()
     }
 
     fn ray_row(&self, config: &RandomRays) -> RayRow {
@@ -148,13 +141,10 @@ impl Solved<'_> {
 /// Returns the events that `history.csv` keeps, each with its index: the first, every improvement,
 /// and the last.
 fn milestones(history: &[Event]) -> impl Iterator<Item = (usize, &Event)> {
-    history
-        .iter()
-        .enumerate()
-        .filter(|&(index, event)| {
-            let is_end = index == 0 || index + 1 == history.len();
-            is_end || event.incumbent < history[index - 1].incumbent
-        })
+    history.iter().enumerate().filter(|&(index, event)| {
+        let is_end = index == 0 || index + 1 == history.len();
+        is_end || event.incumbent < history[index - 1].incumbent
+    })
 }
 
 #[cfg(test)]
@@ -170,9 +160,7 @@ mod tests {
             cost: incumbent,
             incumbent,
         });
-        let kept: Vec<usize> = milestones(&history)
-            .map(|(index, _)| index)
-            .collect();
+        let kept: Vec<usize> = milestones(&history).map(|(index, _)| index).collect();
         assert_eq!(kept, [0, 2, 4, 6]);
         assert_eq!(milestones(&history[..1]).count(), 1);
         assert_eq!(milestones(&[]).count(), 0);

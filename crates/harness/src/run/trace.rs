@@ -83,10 +83,8 @@ fn trace_scene(
             }
         };
         let made = made.map_err(tracing_error(scene))?;
-        contenders.extend(
-            made.into_iter()
-                .map(|contender| (job.labelled.label.clone(), contender)),
-        );
+        contenders
+            .extend(made.into_iter().map(|contender| (job.labelled.label.clone(), contender)));
     }
     for program in programs {
         let made = external::contenders(program, scene).map_err(tracing_error(scene))?;
@@ -115,8 +113,7 @@ fn compare_libraries(work: &Work, first_runs: &[Run], traced: &[Traced]) -> Resu
         |label| library(work.experiment, label),
         |scene, label| search_seconds[&(scene.to_owned(), label.to_owned())],
     );
-    work.store
-        .write_rows(&comparison::rows(&speeds))?;
+    work.store.write_rows(&comparison::rows(&speeds))?;
     let ratios = comparison::ratios(&speeds);
     work.store.write_rows(&ratios)?;
     Ok(comparison::text(&ratios))
@@ -126,12 +123,8 @@ fn compare_libraries(work: &Work, first_runs: &[Run], traced: &[Traced]) -> Resu
 fn write_rows(work: &Work, traced: Vec<Traced>) -> Result<(), Error> {
     // These rows are compared with committed ones. They must depend neither on a program that may
     // be missing nor on the instruction sets of this processor.
-    let labels: Vec<&str> = work
-        .experiment
-        .methods
-        .iter()
-        .map(|method| method.label.as_str())
-        .collect();
+    let labels: Vec<&str> =
+        work.experiment.methods.iter().map(|method| method.label.as_str()).collect();
     let mut seen = BTreeSet::new();
     let mut rows = Vec::new();
     let mut times = Vec::new();
@@ -155,18 +148,12 @@ fn search_seconds(
     let mut seconds: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
     for index in 0..work.jobs.len() {
         for row in work.store.rows::<TimingRow>(index)? {
-            seconds
-                .entry((row.scene, row.method))
-                .or_default()
-                .push(row.seconds);
+            seconds.entry((row.scene, row.method)).or_default().push(row.seconds);
         }
     }
     let medians = first_runs.iter().map(|(job, _)| {
         let key = (job.scene.name.clone(), job.labelled.label.clone());
-        let median = seconds
-            .get(&key)
-            .and_then(|seconds| median(seconds))
-            .unwrap_or(f64::NAN);
+        let median = seconds.get(&key).and_then(|seconds| median(seconds)).unwrap_or(f64::NAN);
         (key, median)
     });
     Ok(medians.collect())
@@ -174,10 +161,7 @@ fn search_seconds(
 
 /// Returns the library behind a label: ours, a method's library, or a library of a ray program.
 fn library(experiment: &Experiment, label: &str) -> String {
-    let labelled = experiment
-        .methods
-        .iter()
-        .find(|method| method.label == label);
+    let labelled = experiment.methods.iter().find(|method| method.label == label);
     match labelled.map(|labelled| &labelled.method) {
         Some(Contestant::Ours(_)) => comparison::OURS.into(),
         Some(Contestant::Peer(peer)) => peer.name().into(),

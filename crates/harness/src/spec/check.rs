@@ -17,11 +17,7 @@ impl Experiment {
     /// Checks the question, the scenes and the number of runs.
     pub(super) fn check_together(&self) -> Vec<Fault> {
         let errors = [self.check_question(), self.check_scenes(), self.check_run_count()];
-        errors
-            .into_iter()
-            .filter_map(Result::err)
-            .map(Fault::from)
-            .collect()
+        errors.into_iter().filter_map(Result::err).map(Fault::from).collect()
     }
 
     fn check_question(&self) -> Result<(), OutOfRange> {
@@ -53,11 +49,8 @@ impl Experiment {
 
     /// Checks that there is at least one run, and at most [`MOST_RUNS`].
     pub(crate) fn check_run_count(&self) -> Result<(), OutOfRange> {
-        let scenes = self
-            .scenes
-            .iter()
-            .map(|name| subset::names(name))
-            .fold(0, u64::saturating_add);
+        let scenes =
+            self.scenes.iter().map(|name| subset::names(name)).fold(0, u64::saturating_add);
         // A range of scenes may have more names than fit in a number of 64 bits.
         let runs = scenes
             .saturating_mul(self.methods.len() as u64)
@@ -188,11 +181,7 @@ fn has_faulty_limit(entry: &str, faults: &[Fault]) -> bool {
     ["budget", "work_per_object"]
         .iter()
         .flat_map(|key| [(*key).to_owned(), format!("{entry}.{key}")])
-        .any(|key| {
-            faults
-                .iter()
-                .any(|fault| is_within(&fault.key, &key))
-        })
+        .any(|key| faults.iter().any(|fault| is_within(&fault.key, &key)))
 }
 
 /// Finds labels that an earlier entry of `methods` has.

@@ -103,20 +103,15 @@ impl Experiment {
 
     /// Returns the runs on one scene in order: method, repetition, and whether it is the first run.
     pub fn runs(&self) -> impl Iterator<Item = (&Labelled, u32, bool)> {
-        self.methods
-            .iter()
-            .enumerate()
-            .flat_map(|(index, labelled)| {
-                (0..self.repetitions)
-                    .map(move |repetition| (labelled, repetition, index == 0 && repetition == 0))
-            })
+        self.methods.iter().enumerate().flat_map(|(index, labelled)| {
+            (0..self.repetitions)
+                .map(move |repetition| (labelled, repetition, index == 0 && repetition == 0))
+        })
     }
 
     /// The rays that judge the experiment's trees, if any do.
     pub fn judges(&self) -> Option<&ray_cost::Config> {
-        self.ray_cost
-            .as_ref()
-            .filter(|config| config.count > 0)
+        self.ray_cost.as_ref().filter(|config| config.count > 0)
     }
 
     /// Returns true if gaps on scenes with this number of objects are measured from the exact
@@ -127,9 +122,7 @@ impl Experiment {
 
     /// Returns true if a report reads the costs of all trials of the method with this label.
     pub fn keeps_trials_of(&self, label: &str) -> bool {
-        self.reports
-            .iter()
-            .any(|report| report.trial_methods().contains(&label))
+        self.reports.iter().any(|report| report.trial_methods().contains(&label))
     }
 
     /// Returns true if runs keep their improvements: if a report reads them, or if there are no
@@ -147,9 +140,7 @@ impl Experiment {
     pub fn keeps_rows_for(&self, reports: &[Report]) -> bool {
         reports.iter().all(|report| {
             let labels = report.trial_methods();
-            let has_trials = labels
-                .iter()
-                .all(|label| self.keeps_trials_of(label));
+            let has_trials = labels.iter().all(|label| self.keeps_trials_of(label));
             let has_clock = !report.needs_clock() || self.keeps_clock();
             has_trials && has_clock
         })
@@ -157,10 +148,7 @@ impl Experiment {
 
     /// The limits of a method's runs.
     pub fn budget_of(&self, labelled: &Labelled) -> Budget {
-        let entry = labelled
-            .options
-            .budget
-            .unwrap_or(Budget::UNLIMITED);
+        let entry = labelled.options.budget.unwrap_or(Budget::UNLIMITED);
         // The lower limit wins, so that a common limit bounds every method.
         let max_evaluations = [self.budget.max_evaluations, entry.max_evaluations];
         let max_work = [self.budget.max_work, entry.max_work];

@@ -66,11 +66,7 @@ mod tests {
         let leading_elsewhere = [".", "..", "a/b", "..\\x", "c:x"];
         let reserved = [".lock", ".partial", "x.new", "quick"];
         let control = ["a\u{1b}[2J", "a\0"];
-        for wrong in leading_elsewhere
-            .iter()
-            .chain(&reserved)
-            .chain(&control)
-        {
+        for wrong in leading_elsewhere.iter().chain(&reserved).chain(&control) {
             assert!(Name::try_from((*wrong).to_owned()).is_err(), "{wrong:?}");
         }
     }

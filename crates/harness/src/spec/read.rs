@@ -38,9 +38,8 @@ impl Experiment {
     /// Reads and checks a spec's text; `path` determines the experiment's name.
     pub fn parse(path: &Path, text: &str, overrides: &Overrides) -> Result<Self, Error> {
         let rejected = |message: String| Error::Spec { file: path.to_owned(), message };
-        let table: Table = text
-            .parse()
-            .map_err(|error: toml::de::Error| rejected(error.to_string()))?;
+        let table: Table =
+            text.parse().map_err(|error: toml::de::Error| rejected(error.to_string()))?;
         let name = name_of(path).map_err(|message| {
             rejected(format!("the file's name without its extension: {message}"))
         })?;
@@ -53,10 +52,7 @@ impl Experiment {
         if overrides.scenes.is_empty()
             && let Some(folder) = path.parent()
         {
-            let scenes = experiment
-                .scenes
-                .iter_mut()
-                .chain(&mut experiment.optional_scenes);
+            let scenes = experiment.scenes.iter_mut().chain(&mut experiment.optional_scenes);
             for scene in scenes.filter(|scene| is_path(scene)) {
                 let path = folder.join(&*scene);
                 *scene = path.to_string_lossy().into_owned();
@@ -104,23 +100,12 @@ impl Experiment {
         }
         // The suite is about all methods; a list in the spec would miss new ones.
         if experiment.suite.is_some() && labels.is_empty() {
-            experiment.methods = Method::all()
-                .into_iter()
-                .map(Labelled::new)
-                .collect();
-            labels = experiment
-                .methods
-                .iter()
-                .map(|method| Some(method.label.clone()))
-                .collect();
+            experiment.methods = Method::all().into_iter().map(Labelled::new).collect();
+            labels = experiment.methods.iter().map(|method| Some(method.label.clone())).collect();
         }
         // A value that was rejected now looks missing, which is not a second fault.
         let mut together = experiment.check_together();
-        together.retain(|late| {
-            !faults
-                .iter()
-                .any(|fault| fault::is_within(&fault.key, &late.key))
-        });
+        together.retain(|late| !faults.iter().any(|fault| fault::is_within(&fault.key, &late.key)));
         together.extend(check::unique(&labels));
         together.extend(experiment.check_methods(&method_indices));
         together.extend(experiment.check_ends(&method_indices, &faults));
@@ -131,10 +116,7 @@ impl Experiment {
 }
 
 fn name_of(path: &Path) -> Result<Name, String> {
-    let stem = path
-        .file_stem()
-        .and_then(OsStr::to_str)
-        .ok_or("no UTF-8")?;
+    let stem = path.file_stem().and_then(OsStr::to_str).ok_or("no UTF-8")?;
     Name::try_from(stem.to_owned())
 }
 

@@ -25,45 +25,31 @@ impl JsonSchema for Labelled {
             keys.extend(options.clone());
             table["properties"] = keys.into();
         }
-        json!({ "oneOf": tables })
-            .try_into()
-            .unwrap_or_default()
+        json!({ "oneOf": tables }).try_into().unwrap_or_default()
     }
 }
 
 /// Returns the alternatives that a schema accepts, if it has any.
 fn choices(schema: &Value) -> Option<&Vec<Value>> {
-    schema
-        .get("oneOf")
-        .or(schema.get("anyOf"))?
-        .as_array()
+    schema.get("oneOf").or(schema.get("anyOf"))?.as_array()
 }
 
 /// Collects the tables that a schema accepts, however nested the alternatives are.
 fn flatten(schema: &Value, tables: &mut Vec<Value>) {
     match choices(schema) {
-        Some(choices) => choices
-            .iter()
-            .for_each(|choice| flatten(choice, tables)),
+        Some(choices) => choices.iter().for_each(|choice| flatten(choice, tables)),
         None => tables.push(schema.clone()),
     }
 }
 
 fn properties(schema: &Value) -> Map<String, Value> {
-    schema
-        .get("properties")
-        .and_then(Value::as_object)
-        .cloned()
-        .unwrap_or_default()
+    schema.get("properties").and_then(Value::as_object).cloned().unwrap_or_default()
 }
 
 /// Returns the JSON schema of specs.
 pub fn schema() -> Value {
     let settings = SchemaSettings::draft07().with(|settings| settings.inline_subschemas = true);
-    let mut schema = settings
-        .into_generator()
-        .into_root_schema_for::<Experiment>()
-        .to_value();
+    let mut schema = settings.into_generator().into_root_schema_for::<Experiment>().to_value();
     tidy(&mut schema);
     let mut keys = properties(&schema);
     // The name comes from the file, and the command line selects the quick variant.
@@ -102,11 +88,7 @@ fn tidy(schema: &mut Value) {
                 }
             }
             if let Some(Value::Array(any)) = map.get_mut("anyOf") {
-                any.retain(|choice| {
-                    choice
-                        .get("type")
-                        .is_none_or(|kind| kind != "null")
-                });
+                any.retain(|choice| choice.get("type").is_none_or(|kind| kind != "null"));
                 if let [Value::Object(one)] = &mut any[..] {
                     let one = std::mem::take(one);
                     map.remove("anyOf");
@@ -146,9 +128,7 @@ fn described(text: &str) -> String {
             continue;
         };
         plain += &format!("{before}{name}");
-        let target = after
-            .strip_prefix('(')
-            .and_then(|after| after.split_once(')'));
+        let target = after.strip_prefix('(').and_then(|after| after.split_once(')'));
         rest = target.map_or(after, |(_, after)| after);
     }
     plain + rest
@@ -173,9 +153,7 @@ pub fn page() -> String {
     page += &section("## Every entry of `methods`", &options, &[]);
     for (tag, tables) in [("method", methods), ("kind", entries(&schema, "reports"))] {
         for table in &tables {
-            let name = table["properties"][tag]["const"]
-                .as_str()
-                .unwrap_or_default();
+            let name = table["properties"][tag]["const"].as_str().unwrap_or_default();
             let hidden = [EntryOptions::KEYS, &[tag]].concat();
             page += &section(&format!("## `{tag} = \"{name}\"`"), table, &hidden);
         }
@@ -208,15 +186,10 @@ fn text<'a>(schema: &'a Value, key: &str) -> &'a str {
 
 /// Adds a row for every key of a table, including the keys of nested tables.
 fn keys_of(table: &Value, above: &str, hidden: &[&str], rows: &mut Vec<String>) {
-    for (key, schema) in properties(table)
-        .iter()
-        .filter(|(key, _)| !hidden.contains(&key.as_str()))
+    for (key, schema) in properties(table).iter().filter(|(key, _)| !hidden.contains(&key.as_str()))
     {
         // A long default would widen the table, and repeats the rows of its keys.
-        let default = schema
-            .get("default")
-            .map(Value::to_string)
-            .filter(|text| text.len() <= 40);
+        let default = schema.get("default").map(Value::to_string).filter(|text| text.len() <= 40);
         let cells = [
             format!("`{above}{key}`"),
             format!("`{}`", value(schema)),
@@ -233,11 +206,7 @@ fn keys_of(table: &Value, above: &str, hidden: &[&str], rows: &mut Vec<String>) 
             &[],
             rows,
         );
-        for (name, inner) in choices(schema)
-            .into_iter()
-            .flatten()
-            .flat_map(properties)
-        {
+        for (name, inner) in choices(schema).into_iter().flatten().flat_map(properties) {
             keys_of(&inner, &format!("{above}{key}.{name}."), &[], rows);
         }
     }
@@ -256,9 +225,7 @@ fn value(schema: &Value) -> String {
         let words: Vec<String> = choices.iter().map(value).collect();
         return words.join(" or ");
     }
-    let values_of_names = schema
-        .get("additionalProperties")
-        .filter(|values| values.is_object());
+    let values_of_names = schema.get("additionalProperties").filter(|values| values.is_object());
     match schema.get("type").and_then(Value::as_str) {
         Some("array") => format!("[{}, …]", value(schema.get("items").unwrap_or(&Value::Null))),
         Some("object") => match (values_of_names, schema.get("required")) {

@@ -108,11 +108,8 @@ fn another_library_is_accepted_exactly_with_its_feature() {
     for name in Peer::NAMES {
         let text =
             format!("question = 'q'\nscenes = ['escher']\nmethods = [{{ method = '{name}' }}]\n");
-        let Contestant::Peer(peer) = toml::from_str::<Experiment>(&text)
-            .unwrap()
-            .methods
-            .remove(0)
-            .method
+        let Contestant::Peer(peer) =
+            toml::from_str::<Experiment>(&text).unwrap().methods.remove(0).method
         else {
             panic!("{name} is no library");
         };
@@ -165,9 +162,8 @@ fn the_lower_of_two_budgets_applies() {
 #[test]
 fn seeds_differ_between_runs_and_depend_only_on_the_spec() {
     let experiment = read(GOOD).unwrap();
-    let mut seeds: Vec<u64> = (0..100)
-        .map(|repetition| experiment.seed_of("escher", "grasp", repetition))
-        .collect();
+    let mut seeds: Vec<u64> =
+        (0..100).map(|repetition| experiment.seed_of("escher", "grasp", repetition)).collect();
     seeds.push(experiment.seed_of("bijou", "grasp", 0));
     let distinct: HashSet<_> = seeds.iter().collect();
     assert_eq!(distinct.len(), seeds.len());
@@ -177,9 +173,8 @@ fn seeds_differ_between_runs_and_depend_only_on_the_spec() {
 #[test]
 fn naming_a_wrong_key_among_thousands_of_methods_is_fast() {
     let methods = "[[methods]]\nmethod = 'grasp'\nlabel = 'NUMBER'\n";
-    let many: String = (0..3000)
-        .map(|number| methods.replace("NUMBER", &number.to_string()))
-        .collect();
+    let many: String =
+        (0..3000).map(|number| methods.replace("NUMBER", &number.to_string())).collect();
     let text = format!(
         "question = 'q'\nscenes = ['escher']\n{}",
         many.replacen("'2900'", "'2900'\nnoise = 'x'", 1)
@@ -223,10 +218,8 @@ at_seconds = [1, -1]
 file = '../x'
 ";
     let message = read(text).unwrap_err();
-    let reported: Vec<String> = message
-        .lines()
-        .map(|line| line_and_key(line).unwrap_or_else(|| line.into()))
-        .collect();
+    let reported: Vec<String> =
+        message.lines().map(|line| line_and_key(line).unwrap_or_else(|| line.into())).collect();
     let expected = [
         "1 question",
         "2 scenes[1]",
@@ -306,9 +299,7 @@ fn a_search_without_a_limit_is_rejected() {
         ("", ", budget = { max_evaluations = 9 }"),
         ("", ", work_per_object = 10_000"),
     ] {
-        let text = endless
-            .replace("REST", rest)
-            .replace("KEYS", keys);
+        let text = endless.replace("REST", rest).replace("KEYS", keys);
         assert_eq!(read(&text).err(), None, "{text}");
     }
 }

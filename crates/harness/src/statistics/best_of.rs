@@ -48,9 +48,7 @@ fn all_above(n: usize, m: usize) -> impl Iterator<Item = f64> {
 /// most [`TAIL`].
 fn exact_low(sorted: &[f64], m: usize) -> f64 {
     let undercut = all_above(sorted.len(), m).map(|above| 1.0 - above);
-    let allowed = undercut
-        .take_while(|&undercut| undercut <= TAIL)
-        .count();
+    let allowed = undercut.take_while(|&undercut| undercut <= TAIL).count();
     sorted[allowed.max(1) - 1]
 }
 
@@ -65,9 +63,7 @@ fn exact_high(sorted: &[f64], m: usize) -> f64 {
 /// so on.
 fn extrapolated_low(sorted: &[f64], m: usize) -> f64 {
     let mut low = sorted[0];
-    let mut fitted = ((FITTED * sorted.len() as f64) as usize)
-        .max(FEWEST)
-        .min(sorted.len() - 1);
+    let mut fitted = ((FITTED * sorted.len() as f64) as usize).max(FEWEST).min(sorted.len() - 1);
     while fitted > 0 {
         low = low.min(end_of_tail(sorted, m, fitted));
         fitted = if fitted >= 2 * FEWEST { fitted / 2 } else { 0 };
@@ -81,11 +77,7 @@ fn extrapolated_low(sorted: &[f64], m: usize) -> f64 {
 fn end_of_tail(sorted: &[f64], m: usize, fitted: usize) -> f64 {
     let n = sorted.len();
     let threshold = sorted[fitted];
-    let scale = sorted[..fitted]
-        .iter()
-        .map(|value| threshold - value)
-        .sum::<f64>()
-        / fitted as f64;
+    let scale = sorted[..fitted].iter().map(|value| threshold - value).sum::<f64>() / fitted as f64;
     let expected_below = m as f64 * (fitted + 1) as f64 / (n + 1) as f64;
     let scales = fitted as f64 * ((expected_below / TAIL).powf(1.0 / fitted as f64) - 1.0);
     threshold - scales.max(0.0) * scale

@@ -122,11 +122,7 @@ pub fn mean_interval(values: &[f64]) -> Option<(f64, Option<(f64, f64)>)> {
     let freedom = values.len().checked_sub(1)?;
     // One value says nothing about the spread.
     let Some(factor) = student(values.len()) else { return Some((mean, None)) };
-    let variance = values
-        .iter()
-        .map(|value| (value - mean).powi(2))
-        .sum::<f64>()
-        / freedom as f64;
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / freedom as f64;
     let half = factor * (variance / n).sqrt();
     Some((mean, Some((mean - half, mean + half))))
 }
@@ -134,13 +130,8 @@ pub fn mean_interval(values: &[f64]) -> Option<(f64, Option<(f64, f64)>)> {
 /// Returns half the width of the 95 % interval of a mean, in standard errors; `None` for fewer than
 /// two values.
 pub fn student(values: usize) -> Option<f64> {
-    let freedom = values
-        .checked_sub(1)
-        .filter(|&freedom| freedom > 0)?;
-    STUDENT
-        .get(freedom - 1)
-        .or(STUDENT.last())
-        .copied()
+    let freedom = values.checked_sub(1).filter(|&freedom| freedom > 0)?;
+    STUDENT.get(freedom - 1).or(STUDENT.last()).copied()
 }
 
 /// The 97.5 % quantiles of Student's t for 1 to 20 degrees of freedom. The last one also serves
@@ -156,9 +147,7 @@ pub fn pearson(pairs: &[(f64, f64)]) -> Option<f64> {
     let n = pairs.len() as f64;
     let mean_x = pairs.iter().map(|pair| pair.0).sum::<f64>() / n;
     let mean_y = pairs.iter().map(|pair| pair.1).sum::<f64>() / n;
-    let centred = pairs
-        .iter()
-        .map(|&(x, y)| (x - mean_x, y - mean_y));
+    let centred = pairs.iter().map(|&(x, y)| (x - mean_x, y - mean_y));
     let xx: f64 = centred.clone().map(|(x, _)| x * x).sum();
     let yy: f64 = centred.clone().map(|(_, y)| y * y).sum();
     let xy: f64 = centred.map(|(x, y)| x * y).sum();
@@ -168,9 +157,7 @@ pub fn pearson(pairs: &[(f64, f64)]) -> Option<f64> {
 /// Returns the 95 % interval of Pearson's correlation by Fisher's transformation; `None` for fewer
 /// than four pairs.
 pub fn pearson_interval(correlation: f64, pairs: usize) -> Option<(f64, f64)> {
-    let freedom = pairs
-        .checked_sub(3)
-        .filter(|&freedom| freedom > 0)?;
+    let freedom = pairs.checked_sub(3).filter(|&freedom| freedom > 0)?;
     let half = NORMAL_95 / (freedom as f64).sqrt();
     // The transformed correlation is nearly normal with a known variance.
     let transformed = correlation.atanh();
@@ -181,10 +168,7 @@ pub fn pearson_interval(correlation: f64, pairs: usize) -> Option<(f64, f64)> {
 /// share their mean rank.
 pub fn spearman(pairs: &[(f64, f64)]) -> Option<f64> {
     let (first, second): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
-    let rank_pairs: Vec<(f64, f64)> = ranks(&first)
-        .into_iter()
-        .zip(ranks(&second))
-        .collect();
+    let rank_pairs: Vec<(f64, f64)> = ranks(&first).into_iter().zip(ranks(&second)).collect();
     pearson(&rank_pairs)
 }
 
@@ -221,12 +205,8 @@ mod tests {
             let minima: Vec<f64> = (0u32..1 << pool.len())
                 .filter(|set| set.count_ones() as usize == m)
                 .map(|set| {
-                    minimum(
-                        (0..pool.len())
-                            .filter(|i| set & (1 << i) != 0)
-                            .map(|i| pool[i]),
-                    )
-                    .unwrap()
+                    minimum((0..pool.len()).filter(|i| set & (1 << i) != 0).map(|i| pool[i]))
+                        .unwrap()
                 })
                 .collect();
             let mean = minima.iter().sum::<f64>() / minima.len() as f64;
@@ -281,13 +261,9 @@ mod tests {
 
     #[test]
     fn correlations_are_one_for_what_rises_together() {
-        let line: Vec<_> = (0..9)
-            .map(|i| (f64::from(i), 3.0 - 2.0 * f64::from(i)))
-            .collect();
+        let line: Vec<_> = (0..9).map(|i| (f64::from(i), 3.0 - 2.0 * f64::from(i))).collect();
         assert!((pearson(&line).unwrap() + 1.0).abs() < 1e-12);
-        let cubes: Vec<_> = (0..9)
-            .map(|i| (f64::from(i), f64::from(i * i * i)))
-            .collect();
+        let cubes: Vec<_> = (0..9).map(|i| (f64::from(i), f64::from(i * i * i))).collect();
         assert!((spearman(&cubes).unwrap() - 1.0).abs() < 1e-12 && pearson(&cubes).unwrap() < 0.95);
         assert_eq!(ranks(&[2.0, 1.0, 2.0, 5.0]), [2.5, 1.0, 2.5, 4.0]);
         assert_eq!(pearson(&[(1.0, 2.0), (1.0, 3.0)]), None);

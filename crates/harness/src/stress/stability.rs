@@ -160,11 +160,9 @@ impl Config {
                 }));
                 rows.push(row);
             }
-            let traversals = tracing::TRAVERSALS
-                .iter()
-                .filter_map(|(name, traversal)| {
-                    Some(Row::new(case, name, case.of_traversal(*traversal, self.rays)?).0)
-                });
+            let traversals = tracing::TRAVERSALS.iter().filter_map(|(name, traversal)| {
+                Some(Row::new(case, name, case.of_traversal(*traversal, self.rays)?).0)
+            });
             rows.extend(traversals);
             rows.extend(
                 Part::ALL
@@ -188,10 +186,7 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
         cells.collect::<Vec<&Row>>()
     };
     let broken = cells_with(Class::Broken);
-    let worst = rows
-        .iter()
-        .filter_map(|row| row.relative_error)
-        .fold(0.0, f64::max);
+    let worst = rows.iter().filter_map(|row| row.relative_error).fold(0.0, f64::max);
     let mut output = Output::new("", HEADING);
     output.reading = format!(
         "{} cells: {} as promised, {} with the error promised, {} broken. Largest error of a cost: \

@@ -17,10 +17,8 @@ pub fn rows(file: &str, conditions: &str) -> Vec<Row> {
 
 /// Returns a column of these rows in ascending order.
 fn sorted(file: &str, conditions: &str, column: &str) -> Vec<f64> {
-    let mut numbers: Vec<f64> = rows(file, conditions)
-        .iter()
-        .map(|row| number_in(row, column).unwrap())
-        .collect();
+    let mut numbers: Vec<f64> =
+        rows(file, conditions).iter().map(|row| number_in(row, column).unwrap()).collect();
     numbers.sort_by(f64::total_cmp);
     numbers
 }

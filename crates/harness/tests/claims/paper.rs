@@ -175,11 +175,7 @@ fn camera_rays_contradict_trees_of_orders_by_random_rays() {
     let mut ratios = tests_over("Goldsmith–Salmon\\, rays", "Goldsmith–Salmon");
     let of_genetic = tests_over("genetic\\, rays", "genetic");
     assert_eq!((ratios.len(), of_genetic.len()), (14, 14));
-    assert!(
-        of_genetic
-            .values()
-            .all(|&ratio| ratio > 1.0 && ratio < 1.135)
-    );
+    assert!(of_genetic.values().all(|&ratio| ratio > 1.0 && ratio < 1.135));
     ratios.retain(|_, &mut ratio| ratio <= 1.0 || ratio >= 1.135);
     let [(exception, ratio)] = &ratios.into_iter().collect::<Vec<_>>()[..] else {
         panic!("one exception")
@@ -332,9 +328,7 @@ fn the_number_of_hierarchies_grows_as_the_page_says() {
 fn every_traversal_draws_the_same_picture_of_a_scene() {
     let mut pictures = BTreeMap::new();
     for row in rows("spheres/renders.csv", "*") {
-        let known = pictures
-            .entry(row["scene"].clone())
-            .or_insert_with(|| row["picture"].clone());
+        let known = pictures.entry(row["scene"].clone()).or_insert_with(|| row["picture"].clone());
         assert_eq!(*known, row["picture"], "{row:?}");
     }
     assert!(pictures.len() > 1);

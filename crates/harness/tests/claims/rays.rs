@@ -19,11 +19,7 @@ fn trees_by_default_rays_lose_where_the_page_says_so() {
     for row in rows("ray_objective/ray_cost.csv", searched) {
         if number_in(&row, "over_base_low").unwrap() > 1.0 {
             let columns = ["scene", "tree", "trained_on", "judged_on", "camera"];
-            lost.push(
-                columns
-                    .map(|column| row[column].as_str())
-                    .join(" "),
-            );
+            lost.push(columns.map(|column| row[column].as_str()).join(" "));
         }
     }
     lost.sort();

@@ -68,18 +68,14 @@ fn the_cheapest_trees_of_obvhs_take_less_than_a_second() {
         if row["method"].starts_with("obvhs") {
             let build =
                 ["cost_over_base", "build_seconds"].map(|column| number_in(&row, column).unwrap());
-            let known = cheapest
-                .entry(row["scene"].clone())
-                .or_insert(build);
+            let known = cheapest.entry(row["scene"].clone()).or_insert(build);
             if build[0] < known[0] {
                 *known = build;
             }
         }
     }
-    let mut seconds: Vec<f64> = cheapest
-        .values()
-        .map(|[_, seconds]| (seconds * 100.0).round() / 100.0)
-        .collect();
+    let mut seconds: Vec<f64> =
+        cheapest.values().map(|[_, seconds]| (seconds * 100.0).round() / 100.0).collect();
     seconds.sort_by(f64::total_cmp);
     assert_eq!((seconds[0], seconds[3]), (0.01, 0.75));
 }
@@ -114,15 +110,10 @@ fn best_for_ten_seconds_comes_near_the_best_known_tree_later_than_shorter_plans(
     );
     let rows = rows("anytime/timing_to_target.csv", "target=best known +1 %");
     let median = |scene: &str, method: &str| {
-        let row = rows
-            .iter()
-            .find(|row| row["scene"] == scene && row["method"] == method);
+        let row = rows.iter().find(|row| row["scene"] == scene && row["method"] == method);
         number_in(row.unwrap(), "median")
     };
-    for row in rows
-        .iter()
-        .filter(|row| row["method"] == "best, 10 s")
-    {
+    for row in rows.iter().filter(|row| row["method"] == "best, 10 s") {
         let scene = row["scene"].as_str();
         let planned = number_in(row, "median").unwrap();
         assert!(median(scene, "best, no end").unwrap() < planned, "{scene}");
@@ -135,17 +126,12 @@ fn lowest_at_the_end() -> BTreeMap<String, String> {
     let mut lowest: BTreeMap<String, (f64, String)> = BTreeMap::new();
     for row in rows("anytime/numbers.csv", "*") {
         let gap = number_in(&row, "gap_median").unwrap();
-        let best = lowest
-            .entry(row["scene"].clone())
-            .or_insert((f64::INFINITY, String::new()));
+        let best = lowest.entry(row["scene"].clone()).or_insert((f64::INFINITY, String::new()));
         if gap < best.0 {
             *best = (gap, row["method"].clone());
         }
     }
-    lowest
-        .into_iter()
-        .map(|(scene, (_, method))| (scene, method))
-        .collect()
+    lowest.into_iter().map(|(scene, (_, method))| (scene, method)).collect()
 }
 
 #[test]
@@ -168,10 +154,7 @@ fn the_methods_page_names_the_searches_that_end_lowest() {
 fn the_minute_and_its_shorter_runs_are_of_the_processor_that_the_pages_name() {
     for experiment in ["anytime", "anytime_long"] {
         let path = top().join(format!("results/{experiment}/provenance.toml"));
-        let provenance: toml::Table = std::fs::read_to_string(path)
-            .unwrap()
-            .parse()
-            .unwrap();
+        let provenance: toml::Table = std::fs::read_to_string(path).unwrap().parse().unwrap();
         let cpu = provenance["cpu"].as_str().unwrap();
         assert!(cpu.starts_with("AMD EPYC (family 25, model 17)"), "{experiment}: {cpu}");
         let build = provenance["build"].as_str().unwrap();
@@ -186,9 +169,7 @@ fn the_pages_name_the_scenes_whose_best_known_tree_is_one_of_the_runs_shown() {
         let references =
             rows(&format!("{experiment}/references.csv"), "objective=goldsmith_salmon");
         for row in rows(&format!("{experiment}/runs.csv"), "*") {
-            let reference = references
-                .iter()
-                .find(|reference| reference["scene"] == row["scene"]);
+            let reference = references.iter().find(|reference| reference["scene"] == row["scene"]);
             if reference.is_some_and(|reference| reference["cost"] == row["cost"]) {
                 scenes.insert(row["scene"].clone());
             }

@@ -15,9 +15,7 @@ fn every_tree_of_the_archive_is_valid_has_the_recorded_cost_and_is_the_best_know
     let results = top().join("results");
     let rows = archive::rows(&results).unwrap();
     assert_eq!(
-        fs::read_dir(results.join("trees"))
-            .unwrap()
-            .count(),
+        fs::read_dir(results.join("trees")).unwrap().count(),
         rows.len() + 1,
         "a row for every file"
     );
@@ -29,9 +27,7 @@ fn every_tree_of_the_archive_is_valid_has_the_recorded_cost_and_is_the_best_know
             (row.objects, row.checksum),
             (scene.boxes.len(), format!("{:016x}", scene.checksum()))
         );
-        let known = reference::best_known(&results, &scene)
-            .unwrap()
-            .unwrap();
+        let known = reference::best_known(&results, &scene).unwrap().unwrap();
         assert!(
             row.internal_area <= known.cost * (1.0 + 1e-12),
             "{}: {} is known",
@@ -44,9 +40,7 @@ fn every_tree_of_the_archive_is_valid_has_the_recorded_cost_and_is_the_best_know
 
 /// Returns a tree of the scene and a better one.
 fn trees(scene: &Scene) -> [Bvh; 2] {
-    let poor = median_cut::Config::default()
-        .build(&scene.boxes)
-        .unwrap();
+    let poor = median_cut::Config::default().build(&scene.boxes).unwrap();
     let budget = Budget { max_work: Some(200_000), ..Budget::UNLIMITED };
     let config = best::Config::default();
     let found = optimize(&poor, &Problem::new(&scene.boxes), &config, 1, budget, &()).unwrap();
@@ -104,12 +98,7 @@ fn only_a_better_tree_is_archived_and_becomes_the_best_known() {
         let (tree, _) = tree_file::load(&dir.join(file), &scene).unwrap();
         let cost = cost::internal_area(&tree).to_string();
         assert!(trees.contains(&format!("made {file}")) && trees.lines().count() == 2, "{trees}");
-        assert!(
-            [known, trees]
-                .iter()
-                .all(|rows| rows.contains(&cost)),
-            "{cost}"
-        );
+        assert!([known, trees].iter().all(|rows| rows.contains(&cost)), "{cost}");
     }
     let before = files();
     for worse in ["poor.bvh", "good.bvh"] {

@@ -15,17 +15,11 @@ type Module = Vec<String>;
 
 /// Collects the code of every module of a crate, without comments and unit tests.
 fn modules(folder: &Path, at: &Module, found: &mut BTreeMap<Module, String>) {
-    let mut entries: Vec<PathBuf> = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .collect();
+    let mut entries: Vec<PathBuf> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     entries.sort();
     for path in entries {
-        let name = path
-            .file_stem()
-            .unwrap()
-            .to_string_lossy()
-            .into_owned();
+        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
         let module = match name.as_str() {
             "lib" | "main" | "mod" => at.clone(),
             _ => [&at[..], &[name]].concat(),
@@ -34,9 +28,7 @@ fn modules(folder: &Path, at: &Module, found: &mut BTreeMap<Module, String>) {
             modules(&path, &module, found);
         } else if is_source(&path) {
             let text = fs::read_to_string(&path).unwrap();
-            let lines = text
-                .lines()
-                .take_while(|line| *line != "#[cfg(test)]");
+            let lines = text.lines().take_while(|line| *line != "#[cfg(test)]");
             let code = lines
                 .map(|line| line.split("//").next().unwrap_or_default())
                 .collect::<Vec<_>>()
@@ -50,9 +42,7 @@ fn modules(folder: &Path, at: &Module, found: &mut BTreeMap<Module, String>) {
 /// library.
 fn is_source(path: &Path) -> bool {
     let is_beside_a_library = path.ends_with("main.rs") && path.with_file_name("lib.rs").exists();
-    let is_rust = path
-        .extension()
-        .is_some_and(|extension| extension == "rs");
+    let is_rust = path.extension().is_some_and(|extension| extension == "rs");
     is_rust && !path.ends_with("tests.rs") && !is_beside_a_library
 }
 
@@ -65,10 +55,8 @@ fn paths(tree: &str) -> Vec<Module> {
         .map(|name| name.split_whitespace().next().unwrap_or(""))
         .map(Into::into)
         .collect();
-    let head: Module = head
-        .into_iter()
-        .filter(|name| !name.is_empty() && name != "self" && name != "*")
-        .collect();
+    let head: Module =
+        head.into_iter().filter(|name| !name.is_empty() && name != "self" && name != "*").collect();
     let mut depth = 0;
     let mut start = 0;
     let mut found = Vec::new();
@@ -83,17 +71,11 @@ fn paths(tree: &str) -> Vec<Module> {
             _ => {}
         }
     }
-    let below: Vec<Module> = found
-        .into_iter()
-        .filter(|tree| !tree.trim().is_empty())
-        .flat_map(paths)
-        .collect();
+    let below: Vec<Module> =
+        found.into_iter().filter(|tree| !tree.trim().is_empty()).flat_map(paths).collect();
     match below.is_empty() {
         true => vec![head],
-        false => below
-            .into_iter()
-            .map(|tail| [&head[..], &tail].concat())
-            .collect(),
+        false => below.into_iter().map(|tail| [&head[..], &tail].concat()).collect(),
     }
 }
 
@@ -102,23 +84,14 @@ fn paths(tree: &str) -> Vec<Module> {
 fn used(module: &Module, code: &str, known: &BTreeMap<Module, String>) -> [Vec<Module>; 2] {
     let mut found = [Vec::new(), Vec::new()];
     for statement in code.split(';') {
-        let (code, tree) = statement
-            .rsplit_once("use ")
-            .unwrap_or((statement, ""));
+        let (code, tree) = statement.rsplit_once("use ").unwrap_or((statement, ""));
         let inline = code
             .split(|c: char| !c.is_alphanumeric() && !"_:".contains(c))
             .filter(|word| word.starts_with("crate::") || word.starts_with("super::"));
         let exported = code.trim_end().ends_with("pub") || code.trim_end().ends_with("pub(crate)");
         let inline = inline.flat_map(paths).map(|path| (false, path));
-        for (exported, path) in paths(tree)
-            .into_iter()
-            .map(|path| (exported, path))
-            .chain(inline)
-        {
-            let ups = path
-                .iter()
-                .take_while(|name| *name == "super")
-                .count();
+        for (exported, path) in paths(tree).into_iter().map(|path| (exported, path)).chain(inline) {
+            let ups = path.iter().take_while(|name| *name == "super").count();
             let whole = match path.first().map(String::as_str) {
                 Some("crate") => path[1..].to_vec(),
                 _ => [&module[..module.len() - ups.min(module.len())], &path[ups..]].concat(),
@@ -137,16 +110,11 @@ fn used(module: &Module, code: &str, known: &BTreeMap<Module, String>) -> [Vec<M
 
 /// Returns the module that defines the item of a path.
 fn resolve(path: &Module, exports: &BTreeMap<Module, Vec<Module>>, depth: usize) -> Module {
-    let length = (0..=path.len())
-        .rev()
-        .find(|&length| exports.contains_key(&path[..length]))
-        .unwrap_or(0);
+    let length =
+        (0..=path.len()).rev().find(|&length| exports.contains_key(&path[..length])).unwrap_or(0);
     let module = path[..length].to_vec();
     let Some(name) = path.get(length).filter(|_| depth < 9) else { return module };
-    match exports[&module]
-        .iter()
-        .find(|exported| exported.last() == Some(name))
-    {
+    match exports[&module].iter().find(|exported| exported.last() == Some(name)) {
         Some(exported) => resolve(exported, exports, depth + 1),
         None => module,
     }
@@ -157,19 +125,13 @@ fn resolve(path: &Module, exports: &BTreeMap<Module, Vec<Module>>, depth: usize)
 fn edges(folder: &Path) -> BTreeSet<(Module, Module)> {
     let mut known = BTreeMap::new();
     modules(folder, &Module::new(), &mut known);
-    let found: BTreeMap<_, _> = known
-        .iter()
-        .map(|(module, code)| (module, used(module, code, &known)))
-        .collect();
-    let exports = found
-        .iter()
-        .map(|(module, [exports, _])| ((*module).clone(), exports.clone()))
-        .collect();
+    let found: BTreeMap<_, _> =
+        known.iter().map(|(module, code)| (module, used(module, code, &known))).collect();
+    let exports =
+        found.iter().map(|(module, [exports, _])| ((*module).clone(), exports.clone())).collect();
     let mut edges = BTreeSet::new();
     for (module, [_, paths]) in &found {
-        let targets = paths
-            .iter()
-            .map(|path| resolve(path, &exports, 0));
+        let targets = paths.iter().map(|path| resolve(path, &exports, 0));
         // The items of a module are open to the files of its folder.
         let others = targets.filter(|target| !module.starts_with(target));
         edges.extend(others.map(|target| ((*module).clone(), target)));
@@ -179,24 +141,13 @@ fn edges(folder: &Path) -> BTreeSet<(Module, Module)> {
 
 /// Returns the crates of ARCHITECTURE.md, each with the top modules of its layers from the top down.
 fn layers(page: &str) -> Vec<(String, Vec<Vec<String>>)> {
-    let block = page
-        .split("```layers\n")
-        .nth(1)
-        .unwrap()
-        .split("```")
-        .next()
-        .unwrap();
+    let block = page.split("```layers\n").nth(1).unwrap().split("```").next().unwrap();
     // An indented line continues the crate above.
     let lines = block.replace("\n ", " ");
     let layer = |names: &str| {
-        names
-            .split_whitespace()
-            .map(|name| name.trim_end_matches(',').to_owned())
-            .collect()
+        names.split_whitespace().map(|name| name.trim_end_matches(',').to_owned()).collect()
     };
-    let crates = lines
-        .lines()
-        .map(|line| line.split_once(' ').unwrap());
+    let crates = lines.lines().map(|line| line.split_once(' ').unwrap());
     crates
         .map(|(name, layers)| (name.to_owned(), layers.split(" → ").map(layer).collect()))
         .collect()
@@ -206,19 +157,12 @@ fn layers(page: &str) -> Vec<(String, Vec<Vec<String>>)> {
 fn top_modules(folder: &Path) -> BTreeSet<String> {
     let mut found = BTreeMap::new();
     modules(folder, &Module::new(), &mut found);
-    found
-        .into_keys()
-        .filter_map(|module| module.first().cloned())
-        .collect()
+    found.into_keys().filter_map(|module| module.first().cloned()).collect()
 }
 
 /// Returns all imports from a top module to one that is not in a lower layer.
 fn rising(edges: &BTreeSet<(Module, Module)>, layers: &[Vec<String>]) -> Vec<String> {
-    let layer = |module: &String| {
-        layers
-            .iter()
-            .position(|modules| modules.contains(module))
-    };
+    let layer = |module: &String| layers.iter().position(|modules| modules.contains(module));
     let mut rising = Vec::new();
     for (from, to) in edges {
         // The root of a crate is in no layer.
@@ -248,20 +192,11 @@ fn top_modules_import_only_from_lower_layers() {
     // Every crate of the workspace is listed.
     let manifest = fs::read_to_string(top().join("Cargo.toml")).unwrap();
     let manifest: toml::Table = manifest.parse().unwrap();
-    let members = manifest["workspace"]["members"]
-        .as_array()
-        .unwrap();
-    let members = members.iter().map(|member| {
-        member
-            .as_str()
-            .unwrap()
-            .trim_start_matches("crates/")
-    });
+    let members = manifest["workspace"]["members"].as_array().unwrap();
+    let members =
+        members.iter().map(|member| member.as_str().unwrap().trim_start_matches("crates/"));
     assert_eq!(
-        listed
-            .iter()
-            .map(|(name, _)| name.as_str())
-            .collect::<BTreeSet<_>>(),
+        listed.iter().map(|(name, _)| name.as_str()).collect::<BTreeSet<_>>(),
         members.collect()
     );
 }
@@ -283,11 +218,7 @@ fn an_import_from_a_layer_above_is_found() {
 fn no_file_uses_a_file_that_uses_it() {
     for crate_folder in fs::read_dir(top().join("crates")).unwrap() {
         let folder = crate_folder.unwrap().path();
-        let name = folder
-            .file_name()
-            .unwrap()
-            .to_string_lossy()
-            .into_owned();
+        let name = folder.file_name().unwrap().to_string_lossy().into_owned();
         let mut edges = edges(&folder.join("src"));
         // A file that nothing uses, or that uses nothing, is in no circle.
         loop {
@@ -299,10 +230,8 @@ fn no_file_uses_a_file_that_uses_it() {
                 break;
             }
         }
-        let circle: Vec<String> = edges
-            .iter()
-            .map(|(a, b)| format!("{} uses {}", a.join("/"), b.join("/")))
-            .collect();
+        let circle: Vec<String> =
+            edges.iter().map(|(a, b)| format!("{} uses {}", a.join("/"), b.join("/"))).collect();
         assert!(circle.is_empty(), "{name}:\n{}", circle.join("\n"));
     }
 }

@@ -35,15 +35,9 @@ fn a_run_writes_rows_figures_and_provenance_and_prints_the_table() {
     assert!(!results.join(".partial").exists());
     let runs = fs::read_to_string(results.join("runs.csv")).unwrap();
     assert_eq!(runs.lines().count(), 1 + 2 * 3 * 3);
-    assert!(
-        !reproducible(&results)
-            .iter()
-            .any(|(_, bytes)| text(bytes).contains("seconds"))
-    );
-    let provenance: toml::Table = fs::read_to_string(results.join("provenance.toml"))
-        .unwrap()
-        .parse()
-        .unwrap();
+    assert!(!reproducible(&results).iter().any(|(_, bytes)| text(bytes).contains("seconds")));
+    let provenance: toml::Table =
+        fs::read_to_string(results.join("provenance.toml")).unwrap().parse().unwrap();
     let build = provenance["build"].as_str().unwrap();
     let assertions = cfg!(debug_assertions);
     let (profile, on) =
@@ -94,9 +88,8 @@ fn any_number_of_threads_writes_the_same_bytes() {
 #[cfg(unix)]
 #[test]
 fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
-    let spec = TABLE
-        .replace("repetitions = 3", "repetitions = 40")
-        .replace("trials = 12", "trials = 100");
+    let spec =
+        TABLE.replace("repetitions = 3", "repetitions = 40").replace("trials = 12", "trials = 100");
     let folder = folder_with("spec.toml", &spec);
     let child = begin(folder.path(), &["spec.toml"]);
     wait_for(&folder.path().join("results/spec/.partial/000000"));
@@ -106,12 +99,7 @@ fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
         130,
         &["of 240 runs are kept, `--resume` does the rest"],
     );
-    assert!(
-        folder
-            .path()
-            .join("results/spec/.partial/000000")
-            .is_dir()
-    );
+    assert!(folder.path().join("results/spec/.partial/000000").is_dir());
 }
 
 #[cfg(unix)]
@@ -135,10 +123,7 @@ fn check_passes_on_equal_results_and_names_an_altered_number() {
     said(folder.path(), &["spec.toml", "--check"]);
     let path = folder.path().join("results/spec/runs.csv");
     let runs = fs::read_to_string(&path).unwrap();
-    let line = runs
-        .lines()
-        .find(|line| line.contains("pinecon2,stand-in,noise"))
-        .unwrap();
+    let line = runs.lines().find(|line| line.contains("pinecon2,stand-in,noise")).unwrap();
     // Column 9 is the cost, which the check must compare to the last digit.
     let cost = line.split(',').nth(9).unwrap();
     fs::write(&path, runs.replace(cost, "12345.5")).unwrap();
@@ -148,12 +133,7 @@ fn check_passes_on_equal_results_and_names_an_altered_number() {
     for part in ["scene pinecon2", "method noise", &format!("cost is {cost}, committed 12345.5")] {
         assert!(said.contains(part), "{part} in {said}");
     }
-    assert!(
-        fs::read_to_string(&path)
-            .unwrap()
-            .contains("12345.5"),
-        "a check writes nothing"
-    );
+    assert!(fs::read_to_string(&path).unwrap().contains("12345.5"), "a check writes nothing");
 }
 
 #[test]
@@ -220,10 +200,7 @@ methods = ['greedy', 'search']
 /// Returns the column of the first row of the scene and method.
 fn cell(path: &Path, scene: &str, method: &str, column: &str) -> f64 {
     let rows = rows(path);
-    let row = rows
-        .iter()
-        .find(|row| row["scene"] == scene && row["method"] == method)
-        .unwrap();
+    let row = rows.iter().find(|row| row["scene"] == scene && row["method"] == method).unwrap();
     row[column].parse().unwrap()
 }
 
@@ -269,9 +246,7 @@ fn without_reports_there_is_a_table_and_without_a_terminal_a_line_for_the_last_r
     let out = text(&output.stdout);
     let err = text(&output.stderr);
     assert!(
-        ["spheres75", "median_cut", "least_over_base"]
-            .iter()
-            .all(|part| out.contains(part)),
+        ["spheres75", "median_cut", "least_over_base"].iter().all(|part| out.contains(part)),
         "{out}"
     );
     assert!(err.contains("plain: 3 of 3 runs") && err.contains("median_cut on spheres75"), "{err}");

@@ -34,10 +34,8 @@ fn every_block_of_rust_is_a_doctest() {
     for entry in fs::read_dir(top().join("crates")).unwrap() {
         let library = entry.unwrap().path().join("src/lib.rs");
         let Ok(text) = fs::read_to_string(&library) else { continue };
-        for (page, _) in text
-            .split("include_str!(\"")
-            .skip(1)
-            .filter_map(|rest| rest.split_once('"'))
+        for (page, _) in
+            text.split("include_str!(\"").skip(1).filter_map(|rest| rest.split_once('"'))
         {
             tested.insert(fs::canonicalize(library.with_file_name(page)).unwrap());
         }
@@ -80,10 +78,8 @@ const SMALL: &str = "escher:60";
 fn every_spec_runs_as_it_is_printed() {
     let mut specs = 0;
     for block in blocks_in("toml") {
-        let table: toml::Table = block
-            .text
-            .parse()
-            .unwrap_or_else(|error| panic!("{}: {error}", block.place()));
+        let table: toml::Table =
+            block.text.parse().unwrap_or_else(|error| panic!("{}: {error}", block.place()));
         let folder = tempfile::tempdir().unwrap();
         let dir = folder.path();
         if table.contains_key("cameras") {
@@ -96,12 +92,7 @@ fn every_spec_runs_as_it_is_printed() {
             "question = 'q'\nscenes = ['escher']\n"
         };
         fs::write(dir.join("spec.toml"), format!("{around}{}", block.text)).unwrap();
-        for name in table
-            .get("scenes")
-            .and_then(toml::Value::as_array)
-            .into_iter()
-            .flatten()
-        {
+        for name in table.get("scenes").and_then(toml::Value::as_array).into_iter().flatten() {
             // The run below uses a small scene, so the printed names are checked here.
             let loaded = Scene::load(name.as_str().unwrap());
             assert!(loaded.is_ok(), "{}: {}", block.place(), loaded.unwrap_err());
@@ -120,9 +111,7 @@ fn every_spec_runs_as_it_is_printed() {
 }
 
 fn run_python() -> bool {
-    let version = std::process::Command::new("python3")
-        .arg("--version")
-        .output();
+    let version = std::process::Command::new("python3").arg("--version").output();
     version.is_ok_and(|output| output.status.success())
 }
 
@@ -146,9 +135,8 @@ fn check_files(command: &[String], place: &str) {
         "{place}: `{program}`"
     );
     for word in command {
-        let of_project = ["scripts/", "experiments/", "crates/"]
-            .iter()
-            .any(|folder| word.starts_with(folder));
+        let of_project =
+            ["scripts/", "experiments/", "crates/"].iter().any(|folder| word.starts_with(folder));
         assert!(
             !of_project || word.contains("/target/") || top().join(word).exists(),
             "{place}: no {word}"

@@ -18,9 +18,7 @@ fn folder(script: &str, more: &str) -> tempfile::TempDir {
     let folder = folder_with("spec.toml", &spec);
     fs::write(folder.path().join("peer.sh"), script).unwrap();
     let scene = Scene::load("spheres75").unwrap();
-    let tree = muller_fellner::Config::default()
-        .build(&scene.boxes)
-        .unwrap();
+    let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
     save(&tree, &scene, &folder.path().join("good.bvh"));
     folder
 }
@@ -28,9 +26,7 @@ fn folder(script: &str, more: &str) -> tempfile::TempDir {
 /// Returns these columns of a finished run's rows.
 fn columns(dir: &Path, columns: [&str; 4]) -> Vec<[String; 4]> {
     let rows = rows(&dir.join("results/spec/runs.csv"));
-    rows.iter()
-        .map(|row| columns.map(|column| row[column].clone()))
-        .collect()
+    rows.iter().map(|row| columns.map(|column| row[column].clone())).collect()
 }
 
 #[test]
@@ -42,12 +38,7 @@ fn the_tree_of_a_program_is_costed_by_us_and_every_run_has_its_seed_and_the_boxe
     said(dir, &["spec.toml", "--jobs=1"]);
     let rows = columns(dir, ["method", "cost", "work", "seed"]);
     let (ours, theirs) = rows.split_at(2);
-    assert!(
-        theirs
-            .iter()
-            .all(|row| row[0] == "theirs" && row[1..3] == ours[0][1..3]),
-        "{rows:?}"
-    );
+    assert!(theirs.iter().all(|row| row[0] == "theirs" && row[1..3] == ours[0][1..3]), "{rows:?}");
     // Equal seeds would make repetitions meaningless.
     assert!(theirs[0][3] != theirs[1][3]);
     let seeds = fs::read_to_string(dir.join("seeds")).unwrap();
@@ -106,10 +97,7 @@ fn missing_and_empty_commands_are_rejected() {
 fn a_signal_ends_a_program_and_what_it_has_started_within_a_second() {
     let folder = folder("sleep 60 & echo $! > pid.new; mv pid.new pid; wait", "");
     let dir = folder.path();
-    let mut child = program(dir, &["spec.toml", "--jobs=1"])
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
+    let mut child = program(dir, &["spec.toml", "--jobs=1"]).stderr(Stdio::null()).spawn().unwrap();
     wait_for(&dir.join("pid"));
     let start = Instant::now();
     send("-TERM", &child);

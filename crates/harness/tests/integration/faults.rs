@@ -30,9 +30,7 @@ fn folder() -> tempfile::TempDir {
 /// Prepares a harness that is killed or runs in the background, without output.
 fn command(folder: &Path, args: &[&str]) -> Command {
     let mut command = program(folder, args);
-    command
-        .stdout(Stdio::null())
-        .stderr(Stdio::null());
+    command.stdout(Stdio::null()).stderr(Stdio::null());
     command
 }
 
@@ -54,10 +52,7 @@ fn whole(folder: &Path) -> Vec<(String, Vec<u8>)> {
 fn killed_at_random_moments_and_resumed_the_bytes_are_the_same() {
     let folder = folder();
     let whole = whole(folder.path());
-    let kills: u32 = std::env::var("KILLS")
-        .ok()
-        .and_then(|kills| kills.parse().ok())
-        .unwrap_or(20);
+    let kills: u32 = std::env::var("KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(20);
     let mut killed = 0;
     let mut finished = 0;
     let mut state = 1u32;
@@ -68,9 +63,7 @@ fn killed_at_random_moments_and_resumed_the_bytes_are_the_same() {
                 .spawn()
                 .unwrap();
         // A fixed sequence of moments makes a failure repeatable.
-        state = state
-            .wrapping_mul(747_796_405)
-            .wrapping_add(2_891_336_453);
+        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
         std::thread::sleep(Duration::from_micros(u64::from(state >> 8) % 60_000));
         if child.try_wait().unwrap().is_none() {
             child.kill().unwrap();
@@ -86,11 +79,8 @@ fn killed_at_random_moments_and_resumed_the_bytes_are_the_same() {
     }
     said(folder.path(), &["spec.toml", "--resume", "--out", &out]);
     let found = results(&folder.path().join(&out));
-    let differing: Vec<&String> = found
-        .iter()
-        .filter(|file| !whole.contains(file))
-        .map(|(name, _)| name)
-        .collect();
+    let differing: Vec<&String> =
+        found.iter().filter(|file| !whole.contains(file)).map(|(name, _)| name).collect();
     assert!(found == whole, "{differing:?}");
     eprintln!("{killed} kills, {} experiments finished", finished + 1);
 }
@@ -107,11 +97,7 @@ fn a_second_harness_on_the_same_folder_is_rejected_and_disturbs_nothing() {
     let folder = folder();
     let long = SPEC.replace("trials = 60", "trials = 1000000");
     fs::write(folder.path().join("long.toml"), long).unwrap();
-    let first = Killed(
-        command(folder.path(), &["long.toml"])
-            .spawn()
-            .unwrap(),
-    );
+    let first = Killed(command(folder.path(), &["long.toml"]).spawn().unwrap());
     wait_for(&folder.path().join("results/long/.partial/000000"));
     for more in [&[][..], &["--resume"], &["--seed=3"], &["--shard=1/2"]] {
         let args = [&["long.toml"], more].concat();
@@ -119,12 +105,7 @@ fn a_second_harness_on_the_same_folder_is_rejected_and_disturbs_nothing() {
     }
     // Other folders are free, and the kept run still exists.
     said(folder.path(), &["spec.toml"]);
-    assert!(
-        folder
-            .path()
-            .join("results/long/.partial/000000/runs.csv")
-            .is_file()
-    );
+    assert!(folder.path().join("results/long/.partial/000000/runs.csv").is_file());
     // The first harness must be alive until here, otherwise its lock proves nothing.
     drop(first);
     // The lock died with its owner.
@@ -145,13 +126,7 @@ fn a_full_disk_is_reported_and_finished_runs_are_kept() {
         let args = format!("spec.toml --jobs 2 --out {out}");
         let Some(output) = run_on_a_small_disk(folder.path(), &args, blocks) else { return };
         ended(&output, 1, &[&format!("{out}/spec"), "cannot write the file"]);
-        assert!(
-            !folder
-                .path()
-                .join(&out)
-                .join("spec/runs.csv")
-                .exists()
-        );
+        assert!(!folder.path().join(&out).join("spec/runs.csv").exists());
         said(folder.path(), &["spec.toml", "--resume", "--out", &out]);
         assert!(results(&folder.path().join(&out)) == whole);
     }

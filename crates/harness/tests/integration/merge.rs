@@ -36,25 +36,15 @@ fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_di
     assert_eq!(provenance.matches("[[parts]]").count(), 4);
     fs::remove_dir_all(folder.path().join("merged")).unwrap();
 
-    let kept = folder
-        .path()
-        .join("again/spec/.partial/000001/runs.csv");
-    fs::write(
-        &kept,
-        fs::read_to_string(&kept)
-            .unwrap()
-            .replace("escher", "esther"),
-    )
-    .unwrap();
+    let kept = folder.path().join("again/spec/.partial/000001/runs.csv");
+    fs::write(&kept, fs::read_to_string(&kept).unwrap().replace("escher", "esther")).unwrap();
     let differs = ["again/spec/.partial/000001", "runs.csv is damaged"];
     refused(&[&folders[..], &["merged"]].concat(), 1, &differs);
     said(folder.path(), &["spec.toml", "--seed", "9", "--shard", "2/3", "--out", "two", "--force"]);
     refused(&["merge", "one", "two", "three", "--out", "merged"], 1, &["different specs"]);
     refused(&["merge", "one", "--out", "one"], 2, &["--out one"]);
 
-    let resolved = folder
-        .path()
-        .join("one/spec/.partial/resolved.toml");
+    let resolved = folder.path().join("one/spec/.partial/resolved.toml");
     let edited = fs::read_to_string(&resolved)
         .unwrap()
         .replace("repetitions = 3", "repetitions = 4294967295");
@@ -72,15 +62,9 @@ fn listed_runs_performed_one_by_one_are_merged_to_the_bytes_of_one_process() {
     let dir = folder.path();
     said(dir, &["spec.toml", "--out", "whole"]);
     let list = said(dir, &["jobs", "spec.toml"]);
-    let ids: Vec<&str> = list
-        .lines()
-        .map(|line| line.split(' ').next().unwrap())
-        .collect();
+    let ids: Vec<&str> = list.lines().map(|line| line.split(' ').next().unwrap()).collect();
     assert_eq!(ids.len(), 18);
-    let parts: Vec<String> = ids
-        .iter()
-        .map(|id| format!("parts/{id}"))
-        .collect();
+    let parts: Vec<String> = ids.iter().map(|id| format!("parts/{id}")).collect();
     for (id, part) in ids.iter().zip(&parts) {
         said(dir, &["spec.toml", "--run", id, "--resume", "--out", part]);
     }
@@ -92,9 +76,7 @@ fn listed_runs_performed_one_by_one_are_merged_to_the_bytes_of_one_process() {
     refused(dir, &[&merge[..5], &["--out", "merged"]].concat(), 1, &["14 of 18 runs are missing"]);
 
     // A part that two processors have worked on.
-    let provenance = dir
-        .join(&parts[0])
-        .join("spec/.partial/provenance.toml");
+    let provenance = dir.join(&parts[0]).join("spec/.partial/provenance.toml");
     let recorded = fs::read_to_string(&provenance).unwrap();
     fs::write(&provenance, recorded.replace("cpu = \"", "cpu = \"another ")).unwrap();
     let resumed = ["spec.toml", "--run", ids[0], "--resume", "--out", parts[0].as_str()];

@@ -41,10 +41,7 @@ fn from_theirs(bvh: &Bvh2) -> Vec<FirstCountNode> {
 /// Converts a tree to compressed nodes of `obvhs`, which have the planes in another order.
 fn to_their_compressed(tree: &Bvh, boxes: &[Aabb]) -> CwBvh {
     let CompressedBvh { nodes, prim_ids } = CompressedBvh::new(tree, boxes).unwrap();
-    let nodes = nodes
-        .iter()
-        .map(to_their_compressed_node)
-        .collect();
+    let nodes = nodes.iter().map(to_their_compressed_node).collect();
     CwBvh { nodes, primitive_indices: prim_ids, ..Default::default() }
 }
 

@@ -7,10 +7,7 @@ use std::path::Path;
 
 /// The texts between `before` and `after` in the page.
 fn between<'a>(page: &'a str, before: &str, after: &str) -> Vec<&'a str> {
-    page.split(before)
-        .skip(1)
-        .map(|rest| rest.split(after).next().unwrap())
-        .collect()
+    page.split(before).skip(1).map(|rest| rest.split(after).next().unwrap()).collect()
 }
 
 #[test]
@@ -84,9 +81,7 @@ fn every_committed_experiment_answers_in_words() {
                 && word.bytes().all(|byte| byte.is_ascii_hexdigit())
                 && word.bytes().any(|byte| byte.is_ascii_lowercase())
         };
-        let checksum = text
-            .split(|c: char| !c.is_ascii_alphanumeric())
-            .find(is_checksum);
+        let checksum = text.split(|c: char| !c.is_ascii_alphanumeric()).find(is_checksum);
         assert_eq!(checksum, None, "{answer}");
     }
 }

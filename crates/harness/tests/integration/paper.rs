@@ -12,9 +12,7 @@ use std::path::PathBuf;
 /// The folders of committed results that compare something with the paper. A repetition beside
 /// finished results, `NAME.new`, is not committed.
 fn compared_folders() -> Vec<PathBuf> {
-    let folders = fs::read_dir(top().join("results"))
-        .unwrap()
-        .map(|folder| folder.unwrap().path());
+    let folders = fs::read_dir(top().join("results")).unwrap().map(|folder| folder.unwrap().path());
     folders
         .filter(|folder| folder.extension().is_none() && folder.join("paper.csv").is_file())
         .collect()
@@ -26,11 +24,7 @@ fn every_difference_from_the_paper_has_a_reason() {
     for folder in compared_folders() {
         let path = folder.join("paper.csv");
         // Rows without a value of the paper only add to the others.
-        for row in read::<PaperRow>(&path)
-            .unwrap()
-            .iter()
-            .filter(|row| !row.paper.is_empty())
-        {
+        for row in read::<PaperRow>(&path).unwrap().iter().filter(|row| !row.paper.is_empty()) {
             let needs_none = matches!(row.verdict, Verdict::Agrees | Verdict::Inconclusive);
             let explained = !row.rule.is_empty() && (needs_none || !row.reason.is_empty());
             assert!(explained, "{}: {row:?}", path.display());
@@ -66,13 +60,10 @@ fn the_committed_answers_are_those_that_the_rules_give_on_the_committed_rows() {
     for folder in compared_folders() {
         let made = remade(&folder).unwrap();
         for name in ["answer", "paper"] {
-            let mut written = made
-                .iter()
-                .flat_map(|output| &output.csv)
-                .filter(|(csv, _)| csv == name);
-            let (_, bytes) = written
-                .next()
-                .unwrap_or_else(|| panic!("{}: no {name}", folder.display()));
+            let mut written =
+                made.iter().flat_map(|output| &output.csv).filter(|(csv, _)| csv == name);
+            let (_, bytes) =
+                written.next().unwrap_or_else(|| panic!("{}: no {name}", folder.display()));
             let committed = fs::read(folder.join(format!("{name}.csv"))).unwrap();
             assert!(
                 *bytes == committed,

@@ -35,16 +35,10 @@ columns = [
     assert_eq!(rows.len(), 2 * (2 + 2 * 2));
     for scene in rows.chunks(6) {
         assert!(
-            scene
-                .iter()
-                .all(|row| row.picture == scene[0].picture && row.rays == scene[0].rays)
+            scene.iter().all(|row| row.picture == scene[0].picture && row.rays == scene[0].rays)
         );
         assert_eq!((scene[0].method.as_str(), scene[0].boxes_per_ray), ("brute force", 0.0));
-        assert!(
-            scene[1..]
-                .iter()
-                .all(|row| row.objects_per_ray < scene[0].objects_per_ray)
-        );
+        assert!(scene[1..].iter().all(|row| row.objects_per_ray < scene[0].objects_per_ray));
     }
     assert!(
         fs::read_to_string(results.join("timing_pictures.csv"))

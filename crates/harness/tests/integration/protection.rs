@@ -210,12 +210,7 @@ fn results_come_from_the_programs_repository_and_not_from_the_current_folders() 
 /// Runs git with an author and a branch, which a machine's configuration may lack.
 fn git(folder: &Path, args: &[&str]) -> Option<std::process::Output> {
     let settings = ["-c", "user.name=x", "-c", "user.email=x", "-c", "init.defaultBranch=x"];
-    std::process::Command::new("git")
-        .args(settings)
-        .args(args)
-        .current_dir(folder)
-        .output()
-        .ok()
+    std::process::Command::new("git").args(settings).args(args).current_dir(folder).output().ok()
 }
 
 #[cfg(unix)]
@@ -224,10 +219,8 @@ fn pipes_and_devices_are_rejected_as_inputs_and_links_are_not_written_through() 
     use std::os::unix::fs::symlink;
     let folder = folder("spec.toml");
     let dir = folder.path();
-    let made = std::process::Command::new("mkfifo")
-        .args(["p.toml", "p.obj"])
-        .current_dir(dir)
-        .status();
+    let made =
+        std::process::Command::new("mkfifo").args(["p.toml", "p.obj"]).current_dir(dir).status();
     // Opening a pipe that nobody writes to would block forever.
     assert!(made.unwrap().success());
     refused(dir, &["p.toml"], &["p.toml", "not a regular file"]);
@@ -255,18 +248,10 @@ fn arguments_need_not_be_utf_8() {
     use std::os::unix::ffi::OsStrExt;
     let folder = folder("spec.toml");
     let out = OsStr::from_bytes(b"out\xff");
-    let output = program(folder.path(), &["spec.toml", "--out"])
-        .arg(out)
-        .output()
-        .unwrap();
+    let output = program(folder.path(), &["spec.toml", "--out"]).arg(out).output().unwrap();
     assert!(output.status.success(), "{}", text(&output.stderr));
-    let provenance = fs::read_to_string(
-        folder
-            .path()
-            .join(out)
-            .join("spec/provenance.toml"),
-    )
-    .unwrap();
+    let provenance =
+        fs::read_to_string(folder.path().join(out).join("spec/provenance.toml")).unwrap();
     assert!(provenance.contains("harness spec.toml --out out"), "{provenance}");
 }
 
@@ -278,10 +263,8 @@ fn the_first_signal_ends_even_a_program_that_waits_for_another() {
     fs::create_dir(dir.join("results")).unwrap();
     let lock = fs::File::create(dir.join("results/.lock")).unwrap();
     lock.lock().unwrap();
-    let mut child = program(dir, &["spec.toml"])
-        .stderr(std::process::Stdio::null())
-        .spawn()
-        .unwrap();
+    let mut child =
+        program(dir, &["spec.toml"]).stderr(std::process::Stdio::null()).spawn().unwrap();
     // All runs are finished, and the program waits for the best known costs, which this test locks.
     wait_for(&dir.join("results/spec/runs.csv"));
     let start = Instant::now();

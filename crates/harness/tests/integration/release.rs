@@ -6,9 +6,7 @@ use std::fs;
 /// Returns the value of the first line of `file` that begins with `key`, without quotes.
 fn value(file: &str, key: &str) -> String {
     let text = fs::read_to_string(top().join(file)).unwrap();
-    let line = text
-        .lines()
-        .find_map(|line| line.strip_prefix(key));
+    let line = text.lines().find_map(|line| line.strip_prefix(key));
     let line = line.unwrap_or_else(|| panic!("{file} has no line that begins with `{key}`"));
     line.trim().trim_matches('"').to_owned()
 }
@@ -25,10 +23,7 @@ fn whatever_is_published_has_the_version_of_the_workspace() {
     }
     assert_eq!(value("CITATION.cff", "version: "), version);
     let workspace = fs::read_to_string(top().join("Cargo.toml")).unwrap();
-    for line in workspace
-        .lines()
-        .filter(|line| line.contains("path = \"crates/bvh-"))
-    {
+    for line in workspace.lines().filter(|line| line.contains("path = \"crates/bvh-")) {
         assert!(line.contains(&format!("version = \"{version}\"")), "{line}");
     }
 }

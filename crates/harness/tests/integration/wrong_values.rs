@@ -51,11 +51,7 @@ fn tables(value: &Value, path: &[Step], found: &mut Vec<Vec<Step>>) {
 /// Returns a spec with the value under a key of the table at `path`.
 fn with(spec: &Value, path: &[Step], key: &str, value: Value) -> Value {
     let mut spec = spec.clone();
-    path.iter()
-        .fold(&mut spec, follow)
-        .as_table_mut()
-        .unwrap()
-        .insert(key.into(), value);
+    path.iter().fold(&mut spec, follow).as_table_mut().unwrap().insert(key.into(), value);
     spec
 }
 
@@ -92,12 +88,7 @@ fn around(spec: &Value, path: &[Step]) -> (Value, Vec<Step>) {
 /// Returns the names that a message lists as accepted.
 fn accepted(message: &str) -> Vec<String> {
     let Some((_, names)) = message.split_once("expected ") else { return Vec::new() };
-    names
-        .split('`')
-        .skip(1)
-        .step_by(2)
-        .map(str::to_owned)
-        .collect()
+    names.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }
 
 /// Returns the place of a table. It names elements of arrays by their method or kind instead of
@@ -107,10 +98,8 @@ fn place(spec: &Value, path: &[Step]) -> String {
     let mut place = String::new();
     for step in path {
         value = follow(&mut value, step).clone();
-        let tag = ["kind", "method"]
-            .iter()
-            .find_map(|tag| value.get(tag)?.as_str())
-            .unwrap_or_default();
+        let tag =
+            ["kind", "method"].iter().find_map(|tag| value.get(tag)?.as_str()).unwrap_or_default();
         match step {
             Step::Key(key) => place += &format!(".{key}"),
             Step::Index(_) => place += &format!("[{tag}]"),
@@ -126,17 +115,9 @@ fn specs() -> Vec<Value> {
         let mut spec: Table = text.parse().unwrap();
         spec.remove("quick");
         // Other libraries may not be compiled in, so a method of ours replaces them.
-        for method in spec
-            .get_mut("methods")
-            .and_then(Value::as_array_mut)
-            .into_iter()
-            .flatten()
-        {
+        for method in spec.get_mut("methods").and_then(Value::as_array_mut).into_iter().flatten() {
             if Peer::NAMES.contains(&method["method"].as_str().unwrap()) {
-                let label = method
-                    .get("label")
-                    .unwrap_or(&method["method"])
-                    .clone();
+                let label = method.get("label").unwrap_or(&method["method"]).clone();
                 *method = Value::Table(Table::from_iter([
                     ("label".into(), label),
                     ("method".into(), "median_cut".into()),
@@ -146,17 +127,12 @@ fn specs() -> Vec<Value> {
         let experiment: Experiment = Value::Table(spec).try_into().unwrap();
         specs.push(Value::try_from(&experiment).unwrap());
     }
-    let methods: Vec<Table> = Method::all()
-        .iter()
-        .map(|method| Table::try_from(method).unwrap())
-        .collect();
+    let methods: Vec<Table> =
+        Method::all().iter().map(|method| Table::try_from(method).unwrap()).collect();
     let question = Value::from("Which keys does every method have?");
     let all =
         [("question", question), ("scenes", vec!["escher"].into()), ("methods", methods.into())];
-    let mut all: Table = all
-        .map(|(key, value)| (key.to_owned(), value))
-        .into_iter()
-        .collect();
+    let mut all: Table = all.map(|(key, value)| (key.to_owned(), value)).into_iter().collect();
     let text = "
 budget = { max_work = 5 }
 objective = { sah = { traversal = 1.0, intersection = 2.0 } }
@@ -200,21 +176,12 @@ fn a_wrong_value_under_any_key_of_a_spec_is_rejected_by_name() {
             let place = place(&spec, &path);
             let (spec, path) = around(&spec, &path);
             let mut table = spec.clone();
-            let table = path
-                .iter()
-                .fold(&mut table, follow)
-                .as_table()
-                .unwrap()
-                .clone();
+            let table = path.iter().fold(&mut table, follow).as_table().unwrap().clone();
             // An unknown key makes the parser list the keys that it accepts.
             let unknown = read(&with(&spec, &path, "unheard_of", 1.into()));
             let listed = unknown.map_or_else(|(_, message)| accepted(&message), |_| Vec::new());
             for key in table.keys().cloned().chain(listed) {
-                if key == "unheard_of"
-                    || seen
-                        .insert(format!("{place}.{key}"), ())
-                        .is_some()
-                {
+                if key == "unheard_of" || seen.insert(format!("{place}.{key}"), ()).is_some() {
                     continue;
                 }
                 let try_value = |value: &Value| match read(&with(&spec, &path, &key, value.clone()))
@@ -224,11 +191,8 @@ fn a_wrong_value_under_any_key_of_a_spec_is_rejected_by_name() {
                         // The message names the key or one within it. A label is only wrong because
                         // a report names another one. For a table, the key above may be named.
                         let other = key == "label" && message.contains("names method");
-                        let above = path
-                            .iter()
-                            .rev()
-                            .filter(|_| value.is_table())
-                            .any(|step| match step {
+                        let above =
+                            path.iter().rev().filter(|_| value.is_table()).any(|step| match step {
                                 Step::Key(above) => message.contains(above),
                                 Step::Index(_) => false,
                             });
@@ -293,10 +257,7 @@ fn check_text(text: &str, quick: bool) {
 
 /// Returns the last place up to `byte` where a character begins.
 fn boundary(text: &str, byte: usize) -> usize {
-    (0..=byte)
-        .rev()
-        .find(|&at| text.is_char_boundary(at))
-        .unwrap_or(0)
+    (0..=byte).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0)
 }
 
 proptest! {

@@ -25,9 +25,8 @@ fn paths(file: &str) -> Vec<PathBuf> {
     let Some((before, after)) = file.split_once("/*/") else { return vec![results.join(file)] };
     let folders =
         fs::read_dir(results.join(before)).unwrap_or_else(|error| panic!("{file}: {error}"));
-    let mut paths: Vec<PathBuf> = folders
-        .map(|folder| folder.unwrap().path().join(after))
-        .collect();
+    let mut paths: Vec<PathBuf> =
+        folders.map(|folder| folder.unwrap().path().join(after)).collect();
     paths.retain(|path| path.is_file());
     paths.sort();
     paths
@@ -75,18 +74,14 @@ fn divide(rows: &mut [Row], measure: &str, file: &str, others: &str) {
         .rsplit_once(" by ")
         .unwrap_or_else(|| panic!("over {others}: expected over CONDITIONS by COLUMNS"));
     let columns: Vec<&str> = columns.split(" + ").collect();
-    let (_, column) = measure
-        .split_once(' ')
-        .unwrap_or_else(|| panic!("{measure}: expected AGGREGATE COLUMN"));
+    let (_, column) =
+        measure.split_once(' ').unwrap_or_else(|| panic!("{measure}: expected AGGREGATE COLUMN"));
     divide_by_least(rows, column, &self::rows(file, conditions), &columns);
 }
 
 fn divide_by_least(rows: &mut [Row], column: &str, others: &[Row], columns: &[&str]) {
     for row in rows {
-        let names: Vec<String> = columns
-            .iter()
-            .map(|name| row[*name].clone())
-            .collect();
+        let names: Vec<String> = columns.iter().map(|name| row[*name].clone()).collect();
         let least = group(others, columns, &names)
             .into_iter()
             .filter_map(|other| number_in(other, column))
@@ -120,10 +115,8 @@ fn write(value: f64, format: &str) -> Result<String, QueryError> {
 
 /// Returns the further column of a measure: a number in the format, a text as it is.
 fn further(rows: &[&Row], column: &str, format: &str) -> Result<Option<String>, QueryError> {
-    let is_number = rows
-        .iter()
-        .filter_map(|row| row.get(column))
-        .any(|text| text.parse::<f64>().is_ok());
+    let is_number =
+        rows.iter().filter_map(|row| row.get(column)).any(|text| text.parse::<f64>().is_ok());
     if is_number && format != "text" {
         one(rows, &format!("only {column}"), format)
     } else {
@@ -136,10 +129,7 @@ fn one(rows: &[&Row], measure: &str, format: &str) -> Result<Option<String>, Que
     if format == "text" {
         return only_text(rows, measure.strip_prefix("only ").unwrap_or(measure));
     }
-    Measure::parse(measure)?
-        .of_rows(rows)?
-        .map(|value| write(value, format))
-        .transpose()
+    Measure::parse(measure)?.of_rows(rows)?.map(|value| write(value, format)).transpose()
 }
 
 /// Returns the text of a whole measure over some rows; empty if they have no value.
@@ -164,32 +154,22 @@ fn show(rows: &[&Row], measure: &str, format: &str) -> Result<String, QueryError
 
 /// Returns a Markdown table of `ROWS × COLUMNS`; ROWS may be several columns, with ` + ` between.
 fn pivot(rows: &[Row], axes: &str, measure: &str, format: &str) -> Result<String, QueryError> {
-    let (down, across) = axes
-        .split_once(" × ")
-        .ok_or_else(|| QueryError::Malformed {
-            part: "pair of axes",
-            found: axes.into(),
-            accepted: "ROWS × COLUMNS",
-        })?;
+    let (down, across) = axes.split_once(" × ").ok_or_else(|| QueryError::Malformed {
+        part: "pair of axes",
+        found: axes.into(),
+        accepted: "ROWS × COLUMNS",
+    })?;
     let down: Vec<&str> = down.split(" + ").collect();
     let columns = distinct(rows, &[across])?.concat();
-    let mut header: Vec<String> = down
-        .iter()
-        .map(|column| escape(&column.replace('_', " ")))
-        .collect();
+    let mut header: Vec<String> =
+        down.iter().map(|column| escape(&column.replace('_', " "))).collect();
     header.extend(columns.iter().map(|column| escape(column)));
     let mut lines = vec![format!("| {} |", header.join(" | "))];
     lines.push(format!("|{}", "---|".repeat(header.len())));
     for names in together(distinct(rows, &down)?) {
-        let of_line: Vec<Row> = group(rows, &down, &names)
-            .into_iter()
-            .cloned()
-            .collect();
-        let mut cells: Vec<String> = down
-            .iter()
-            .zip(&names)
-            .map(|(column, name)| escape(&heading(column, name)))
-            .collect();
+        let of_line: Vec<Row> = group(rows, &down, &names).into_iter().cloned().collect();
+        let mut cells: Vec<String> =
+            down.iter().zip(&names).map(|(column, name)| escape(&heading(column, name))).collect();
         // Readers must see which scenes are stand-ins wherever a table names them.
         if down == ["scene"] {
             cells[0] += &kind_note(&of_line);
@@ -207,9 +187,7 @@ fn pivot(rows: &[Row], axes: &str, measure: &str, format: &str) -> Result<String
 fn together(names: Vec<Vec<String>>) -> Vec<Vec<String>> {
     let mut groups: Vec<Vec<Vec<String>>> = Vec::new();
     for name in names {
-        let found = groups
-            .iter_mut()
-            .find(|group| group[0][0] == name[0]);
+        let found = groups.iter_mut().find(|group| group[0][0] == name[0]);
         match found {
             Some(group) => group.push(name),
             None => groups.push(vec![name]),
@@ -225,8 +203,7 @@ fn escape(text: &str) -> String {
 /// Returns the scene's kind in parentheses, unless it is a file.
 fn kind_note(rows: &[Row]) -> String {
     let kind = rows.iter().find_map(|row| row.get("scene_kind"));
-    kind.filter(|kind| *kind != "file")
-        .map_or_else(String::new, |kind| format!(" ({kind})"))
+    kind.filter(|kind| *kind != "file").map_or_else(String::new, |kind| format!(" ({kind})"))
 }
 
 /// Returns the name of a line: seconds with two digits, everything else as it is.
@@ -248,9 +225,7 @@ fn values_are_written_in_their_format_and_a_table_has_empty_cells_where_no_row_i
     assert_eq!(shown("median cost", "1").unwrap(), "3.0");
     assert_eq!(shown("max cost [cost, cost]", "0").unwrap(), "5 [2, 5]");
     assert_eq!(shown("min cost / rays (rays)", "0 percent").unwrap(), "50 (400)");
-    let message = shown("only scene", "text")
-        .unwrap_err()
-        .to_string();
+    let message = shown("only scene", "text").unwrap_err().to_string();
     assert!(message.contains("scene has several values, a, b"), "{message}");
     let message = shown("max cost", "two").unwrap_err().to_string();
     assert!(message.contains("\"two\" is no format"), "{message}");
@@ -266,9 +241,6 @@ fn a_number_is_divided_by_the_least_one_of_the_rows_that_agree() {
     let mut divided = query::select(rows.clone(), "method=z").unwrap();
     let others = query::select(rows, "method=x or y").unwrap();
     divide_by_least(&mut divided, "cost", &others, &["scene"]);
-    let costs: Vec<&str> = divided
-        .iter()
-        .map(|row| row["cost"].as_str())
-        .collect();
+    let costs: Vec<&str> = divided.iter().map(|row| row["cost"].as_str()).collect();
     assert_eq!(costs, ["4", "4.5"]);
 }

@@ -60,10 +60,7 @@ pub fn assert_current(path: &Path, made: &str, by: &str) {
         fs::write(path, made).unwrap();
     }
     let text = fs::read_to_string(path).unwrap_or_default();
-    let differs = text
-        .lines()
-        .zip(made.lines())
-        .find(|(now, then)| now != then);
+    let differs = text.lines().zip(made.lines()).find(|(now, then)| now != then);
     let stale = path.display();
     assert!(
         text == made,

@@ -55,9 +55,7 @@ struct Open {
 
 impl Ord for Open {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.area
-            .total_cmp(&other.area)
-            .then(other.node.cmp(&self.node))
+        self.area.total_cmp(&other.area).then(other.node.cmp(&self.node))
     }
 }
 
@@ -161,14 +159,9 @@ impl Build<'_> {
             return Ok(tree);
         }
         let mut pace = Pace::new(self.watch);
-        self.powers = (0..=boxes.len())
-            .map(|n| libm::pow(n as f64, self.config.power))
-            .collect();
-        let references: Vec<Reference> = boxes
-            .iter()
-            .zip(0..)
-            .map(|(&aabb, object)| Reference { aabb, object })
-            .collect();
+        self.powers = (0..=boxes.len()).map(|n| libm::pow(n as f64, self.config.power)).collect();
+        let references: Vec<Reference> =
+            boxes.iter().zip(0..).map(|(&aabb, object)| Reference { aabb, object }).collect();
         let root = union(&references);
         self.least_overlap = self.config.overlap * root.half_area();
         tree.nodes.push(Node::leaf(root, 0, 1));
@@ -252,9 +245,7 @@ impl Build<'_> {
 
 /// Returns the box around the references.
 fn union(references: &[Reference]) -> Aabb {
-    references
-        .iter()
-        .fold(Aabb::EMPTY, |aabb, reference| aabb.union(&reference.aabb))
+    references.iter().fold(Aabb::EMPTY, |aabb, reference| aabb.union(&reference.aabb))
 }
 
 #[cfg(test)]
@@ -284,9 +275,7 @@ mod tests {
         let objects = &triangles.as_slice();
         let mut before = f64::INFINITY;
         for references in [1.0, 1.1, 1.5, 3.0] {
-            let tree = Config { references, ..Config::default() }
-                .build(&boxes, objects)
-                .unwrap();
+            let tree = Config { references, ..Config::default() }.build(&boxes, objects).unwrap();
             validate_references(&tree, &boxes, objects).unwrap();
             let count = tree.prim_ids.len();
             assert!(
@@ -297,9 +286,7 @@ mod tests {
             assert!(cost <= before, "{cost} {before}");
             before = cost;
         }
-        let whole = muller_fellner::Config::default()
-            .build(&boxes)
-            .unwrap();
+        let whole = muller_fellner::Config::default().build(&boxes).unwrap();
         let whole_cost = cost::total_area(&whole);
         assert!(before < 0.97 * whole_cost, "{before} of {whole_cost}");
     }
@@ -316,9 +303,7 @@ mod tests {
             extra: usize::MAX,
             watch: &watch,
             least_overlap: 0.0,
-            powers: (0..=8)
-                .map(|n| libm::pow(f64::from(n), config.power))
-                .collect(),
+            powers: (0..=8).map(|n| libm::pow(f64::from(n), config.power)).collect(),
             axes: Default::default(),
         };
         let mut kept = 0;
@@ -346,19 +331,13 @@ mod tests {
             [vec![], needles(1), vec![Triangle([Vec3::ONE; 3]); 30], vec![needles(1)[0]; 3000]]
         {
             let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
-            let tree = Config::default()
-                .build(&boxes, &triangles.as_slice())
-                .unwrap();
+            let tree = Config::default().build(&boxes, &triangles.as_slice()).unwrap();
             validate_references(&tree, &boxes, &triangles.as_slice()).unwrap();
             assert_eq!(tree.prim_ids.len(), triangles.len(), "there is nothing to split");
             assert!(tree.depth() <= 12, "objects in one place are not halved: {}", tree.depth());
         }
         let wrong = [Aabb::from([[f32::NAN; 3], [1.0; 3]])];
-        assert!(
-            Config::default()
-                .build(&wrong, &needles(1).as_slice())
-                .is_err()
-        );
+        assert!(Config::default().build(&wrong, &needles(1).as_slice()).is_err());
         assert!(
             Config { references: 0.5, ..Config::default() }
                 .build(&[], &needles(1).as_slice())

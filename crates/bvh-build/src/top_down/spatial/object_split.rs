@@ -30,16 +30,12 @@ impl Axis {
     fn sort(&mut self, references: &[Reference], number: usize) {
         self.keys.clear();
         self.keys.extend(
-            references
-                .iter()
-                .zip(0..)
-                .map(|(r, index)| (r.aabb.doubled_centroid()[number], index)),
+            references.iter().zip(0..).map(|(r, index)| (r.aabb.doubled_centroid()[number], index)),
         );
         if references.len() >= RADIX_SORTED {
             radsort::sort_by_key(&mut self.keys, |&(centre, _)| centre);
         } else {
-            self.keys
-                .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            self.keys.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         }
     }
 
@@ -110,10 +106,8 @@ impl Build<'_> {
             }
         }
         let keys = &self.axes[axis].keys;
-        let mut ordered: Vec<Reference> = keys
-            .iter()
-            .map(|&(_, index)| references[index as usize])
-            .collect();
+        let mut ordered: Vec<Reference> =
+            keys.iter().map(|&(_, index)| references[index as usize]).collect();
         if union(&ordered[..left]) == union(&ordered[left..]) {
             // Such a split gains nothing, and the power would separate one reference after the
             // other.

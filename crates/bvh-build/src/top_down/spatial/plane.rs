@@ -98,12 +98,7 @@ impl Build<'_> {
                 parts[first].0 = parts[first].0.union(&reference.aabb);
                 continue;
             }
-            for (bin, part) in parts
-                .iter_mut()
-                .enumerate()
-                .take(last + 1)
-                .skip(first)
-            {
+            for (bin, part) in parts.iter_mut().enumerate().take(last + 1).skip(first) {
                 let mut region = reference.aabb;
                 if bin > first {
                     region.min[axis] = border(bin);
@@ -111,9 +106,7 @@ impl Build<'_> {
                 if bin < last {
                     region.max[axis] = border(bin + 1);
                 }
-                part.0 = part
-                    .0
-                    .union(&self.objects.clip(reference.object, &region));
+                part.0 = part.0.union(&self.objects.clip(reference.object, &region));
             }
         }
         let mut after = vec![(Aabb::EMPTY, 0usize); bins + 1];
@@ -169,9 +162,7 @@ impl Build<'_> {
             }
         }
         let mut boxes = sides.each_ref().map(|side| union(side));
-        let mut counts = sides
-            .each_ref()
-            .map(|side| side.len() + cut.len());
+        let mut counts = sides.each_ref().map(|side| side.len() + cut.len());
         for (_, parts) in &cut {
             boxes = [boxes[0].union(&parts[0]), boxes[1].union(&parts[1])];
         }

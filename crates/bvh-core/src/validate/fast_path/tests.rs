@@ -29,12 +29,7 @@ fn chain(objects: u32) -> Bvh {
             parent = first;
         }
     }
-    Bvh {
-        nodes,
-        prim_ids: (0..objects)
-            .map(|object| (object + 2) % objects)
-            .collect(),
-    }
+    Bvh { nodes, prim_ids: (0..objects).map(|object| (object + 2) % objects).collect() }
 }
 
 /// Returns whether the check passes the tree: in one piece, in many pieces, and without vector

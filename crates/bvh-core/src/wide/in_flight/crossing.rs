@@ -33,17 +33,12 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
                 if traversal.child == Child::END {
                     let (t, instance, object) = traversal.nearest_of_all::<ANY>();
                     let number = first + traversal.ray.number as usize;
-                    self.batch
-                        .answers
-                        .write(number, t, instance, object);
+                    self.batch.answers.write(number, t, instance, object);
                     self.idle.append(traversal, true);
                     continue;
                 }
                 if traversal.child.is_instance_or_mark() {
-                    let ray = self
-                        .batch
-                        .rays
-                        .ray(first + traversal.ray.number as usize);
+                    let ray = self.batch.rays.ray(first + traversal.ray.number as usize);
                     let instance = traversal.child.instance_index();
                     if let Some(scene) = self.batch.scene
                         && let Some((local_ray, entry)) = scene.enter(instance, &ray, traversal.t)

@@ -36,8 +36,7 @@ impl Instances {
     pub fn nearest_hits(&self, rays: &[Ray], mut hits: &mut [InstanceHit], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "a hit for every ray");
         let batch = Batch::through_instances(self, rays, &mut hits);
-        self.wide_top
-            .trace::<NEAREST_HIT>(batch, coherence);
+        self.wide_top.trace::<NEAREST_HIT>(batch, coherence);
     }
 
     /// Writes to `hits` whether each ray hits a triangle of [any instance](Self::any_hit).

@@ -121,10 +121,7 @@ impl<const R: usize> Lanes for Singles<R> {
         let four = four.into_iter().fold(four[0], Lanes::max);
         let two = four.max(four.swap_twos());
         let mut greatest = [0.0; 4];
-        unsafe {
-            two.max(two.swap_ones())
-                .store(greatest.as_mut_ptr())
-        };
+        unsafe { two.max(two.swap_ones()).store(greatest.as_mut_ptr()) };
         greatest[0]
     }
 
@@ -135,19 +132,12 @@ impl<const R: usize> Lanes for Singles<R> {
 
     #[inline(always)]
     fn double(self) -> Doubles<R> {
-        Doubles(
-            self.0
-                .map(|a| unsafe { [double_low(a), double_high(a)] }),
-        )
+        Doubles(self.0.map(|a| unsafe { [double_low(a), double_high(a)] }))
     }
 
     #[inline(always)]
     fn single(double: Doubles<R>) -> Self {
-        Self(
-            double
-                .0
-                .map(|[low, high]| unsafe { single(low, high) }),
-        )
+        Self(double.0.map(|[low, high]| unsafe { single(low, high) }))
     }
 
     /// Masks of f64 are narrow from the beginning.
@@ -211,10 +201,7 @@ impl<const R: usize> Doubles<R> {
     /// A half of every lane.
     #[inline(always)]
     fn narrowed(self) -> Singles<R> {
-        Singles(
-            self.0
-                .map(|[low, high]| unsafe { narrow(low, high) }),
-        )
+        Singles(self.0.map(|[low, high]| unsafe { narrow(low, high) }))
     }
 }
 
@@ -269,19 +256,16 @@ impl<const R: usize> DoubleLanes for Doubles<R> {
 
     #[inline(always)]
     fn lt(self, other: Self) -> Singles<R> {
-        self.zip(other, |a, b| unsafe { lt_double(a, b) })
-            .narrowed()
+        self.zip(other, |a, b| unsafe { lt_double(a, b) }).narrowed()
     }
 
     #[inline(always)]
     fn le(self, other: Self) -> Singles<R> {
-        self.zip(other, |a, b| unsafe { le_double(a, b) })
-            .narrowed()
+        self.zip(other, |a, b| unsafe { le_double(a, b) }).narrowed()
     }
 
     #[inline(always)]
     fn eq(self, other: Self) -> Singles<R> {
-        self.zip(other, |a, b| unsafe { eq_double(a, b) })
-            .narrowed()
+        self.zip(other, |a, b| unsafe { eq_double(a, b) }).narrowed()
     }
 }

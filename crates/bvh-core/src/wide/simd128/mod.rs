@@ -121,11 +121,7 @@ impl Instructions for Simd128 {
         // SAFETY: the caller's promises; there is room for a key per bit.
         unsafe {
             Self::sort_keys(entry, mask, keys.as_mut_ptr());
-            for (i, &key) in keys
-                .iter()
-                .enumerate()
-                .take(mask.count_ones() as usize)
-            {
+            for (i, &key) in keys.iter().enumerate().take(mask.count_ones() as usize) {
                 nearest = node.children[(!key & 7) as usize];
                 *to.add(i) = u64::from(key) << 32 | u64::from(nearest.bits());
             }

@@ -86,8 +86,6 @@ pub(super) unsafe fn nearest(node: &WideNode, keys: __m256i) -> Child {
             _mm_min_epu32(_mm256_castsi256_si128(keys), _mm256_extracti128_si256::<1>(keys));
         let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0x4e>(least));
         let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0xb1>(least));
-        *node
-            .children
-            .get_unchecked((!_mm_cvtsi128_si32(least) & 7) as usize)
+        *node.children.get_unchecked((!_mm_cvtsi128_si32(least) & 7) as usize)
     }
 }

@@ -8,17 +8,10 @@ use glam::Vec3;
 /// has.
 pub fn layouts(triangles: &[Triangle], random: &mut Random) -> Vec<(Kernel, WideBvh)> {
     let boxes = boxes(triangles);
-    let mut trees: Vec<_> = SHAPES
-        .iter()
-        .map(|&shape| tree(&boxes, shape, random))
-        .collect();
+    let mut trees: Vec<_> = SHAPES.iter().map(|&shape| tree(&boxes, shape, random)).collect();
     trees.push(collapse_leaves(&trees[0], &SahConstants::default()));
-    let layouts = trees
-        .iter()
-        .map(|tree| WideBvh::new(tree, triangles).unwrap());
-    let kernels = Kernel::ALL
-        .into_iter()
-        .filter(|kernel| kernel.is_available());
+    let layouts = trees.iter().map(|tree| WideBvh::new(tree, triangles).unwrap());
+    let kernels = Kernel::ALL.into_iter().filter(|kernel| kernel.is_available());
     let of_kernel = |wide: WideBvh| {
         kernels
             .clone()

@@ -74,13 +74,9 @@ pub fn tree(boxes: &[Aabb], shape: Shape, random: &mut Random) -> Bvh {
         }
         let arity = (2 + random.below(shape.arity - 1)).min(range.len());
         let mut cuts: Vec<usize> = if shape.sorted {
-            (1..arity)
-                .map(|i| range.start + i * range.len() / arity)
-                .collect()
+            (1..arity).map(|i| range.start + i * range.len() / arity).collect()
         } else {
-            (1..arity)
-                .map(|_| range.start + 1 + random.below(range.len() - 1))
-                .collect()
+            (1..arity).map(|_| range.start + 1 + random.below(range.len() - 1)).collect()
         };
         cuts.extend([range.start, range.end]);
         cuts.sort_unstable();
@@ -186,10 +182,7 @@ pub fn ball(levels: usize) -> Vec<Triangle> {
 }
 
 pub fn scaled(triangles: &[Triangle], factor: f32) -> Vec<Triangle> {
-    triangles
-        .iter()
-        .map(|t| Triangle(t.0.map(|p| p * factor)))
-        .collect()
+    triangles.iter().map(|t| Triangle(t.0.map(|p| p * factor))).collect()
 }
 
 /// Returns difficult rays: axis-parallel with both zeros, in face planes, along edges, through

@@ -87,9 +87,7 @@ fn ring() -> MeshBuilder {
             (0.5, 1.71),
             (0.43, 1.73),
         ];
-        let path: Vec<_> = bent
-            .map(|(r, z)| on_circle(r, fraction(k, 6) + 0.02, z))
-            .into();
+        let path: Vec<_> = bent.map(|(r, z)| on_circle(r, fraction(k, 6) + 0.02, z)).into();
         let side = on_circle(1.0, fraction(k, 6) + 0.27, 0.0);
         ring.sweep(&path, side, &circle(0.045, 9), &|i| 1.0 - 0.06 * i as f64);
     }

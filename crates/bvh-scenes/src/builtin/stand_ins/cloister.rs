@@ -358,10 +358,8 @@ fn well() -> MeshBuilder {
         .collect();
     well.sweep(&yoke, DVec3::Y, &circle(0.035, 7), &|_| 1.0);
     let mut link = MeshBuilder::default();
-    let ring: Vec<_> = (0..=6)
-        .map(|i| on_circle(0.012, fraction(i, 6), 0.0))
-        .map(|p| (0.03 + p.x, p.y))
-        .collect();
+    let ring: Vec<_> =
+        (0..=6).map(|i| on_circle(0.012, fraction(i, 6), 0.0)).map(|p| (0.03 + p.x, p.y)).collect();
     link.revolve(&ring, 9);
     for k in 0..18 {
         let turned = about_z(if k % 2 == 0 { 0.02 } else { 0.27 }) * about_y(0.25);

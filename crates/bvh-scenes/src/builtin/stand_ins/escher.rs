@@ -177,9 +177,7 @@ fn flight(steps: usize, width: f64, climbs_beneath: bool) -> MeshBuilder {
         );
     }
     for y in [0.15, width - 0.15] {
-        let feet: Vec<_> = (0..steps)
-            .map(|k| at(k as f64 + 0.5, y, k as f64 + 1.0))
-            .collect();
+        let feet: Vec<_> = (0..steps).map(|k| at(k as f64 + 0.5, y, k as f64 + 1.0)).collect();
         balustrade(&mut flight, &feet);
     }
     flight

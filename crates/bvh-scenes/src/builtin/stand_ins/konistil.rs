@@ -117,9 +117,7 @@ fn railway(mesh: &mut MeshBuilder) {
     mesh.grid(steps, bed.len() - 1, &|k, row| beside(at(k), bed[row].0, bed[row].1));
     let rail = [(0.035, 0.0), (0.035, 0.16), (-0.035, 0.16), (-0.035, 0.0)];
     for aside in [-2.8, -1.3, 1.3, 2.8] {
-        let path: Vec<_> = (0..=steps)
-            .map(|k| beside(at(k), aside, TRACK))
-            .collect();
+        let path: Vec<_> = (0..=steps).map(|k| beside(at(k), aside, TRACK)).collect();
         mesh.sweep(&path, DVec3::Z, &rail, &|_| 1.0);
     }
     let mut sleeper = MeshBuilder::default();
@@ -191,9 +189,7 @@ fn station(mesh: &mut MeshBuilder) {
     });
     for j in 0..ribs {
         let x = length * (fraction(j, ribs - 1) - 0.5);
-        let path: Vec<_> = (0..=18)
-            .map(|i| vault(fraction(i, 18), x, half - 0.3))
-            .collect();
+        let path: Vec<_> = (0..=18).map(|i| vault(fraction(i, 18), x, half - 0.3)).collect();
         station.sweep(
             &path,
             DVec3::X,

@@ -180,10 +180,7 @@ pub fn on_circle(radius: f64, turns: f64, z: f64) -> DVec3 {
 
 /// A regular polygon of `sides` corners as a profile for [`MeshBuilder::sweep`].
 pub fn circle(radius: f64, sides: usize) -> Vec<(f64, f64)> {
-    (0..sides)
-        .map(|i| cos_sin(fraction(i, sides)))
-        .map(|(c, s)| (radius * c, radius * s))
-        .collect()
+    (0..sides).map(|i| cos_sin(fraction(i, sides))).map(|(c, s)| (radius * c, radius * s)).collect()
 }
 
 /// `i / n`, the parameter of the i-th of n steps.
@@ -247,11 +244,7 @@ mod tests {
     }
 
     fn volume(mesh: &MeshBuilder) -> f64 {
-        let six: f64 = mesh
-            .triangles
-            .iter()
-            .map(|[a, b, c]| a.cross(*b).dot(*c))
-            .sum();
+        let six: f64 = mesh.triangles.iter().map(|[a, b, c]| a.cross(*b).dot(*c)).sum();
         (six / 6.0).abs()
     }
 

@@ -22,11 +22,7 @@ const SUB_SCALES: usize = 6;
 pub fn triangles() -> Vec<Triangle> {
     let mut cone = MeshBuilder::default();
     let core = [0.0, 0.0, 0.25, 0.5, 0.75, 1.0].map(|t| (0.6 * belly(t), 0.97 * t));
-    let closed: Vec<_> = [(0.0, -0.04)]
-        .into_iter()
-        .chain(core)
-        .chain([(0.0, 1.0)])
-        .collect();
+    let closed: Vec<_> = [(0.0, -0.04)].into_iter().chain(core).chain([(0.0, 1.0)]).collect();
     cone.revolve(&closed, 14);
     let stem: Vec<DVec3> = (0..=6)
         .map(|k| fraction(k, 6))

@@ -49,9 +49,8 @@ impl<'a> Buffers<'a> {
             .buffers
             .get(number)
             .ok_or_else(|| format!("no buffers[{number}]; expected one that exists"))?;
-        let bytes = self
-            .read(number, buffer)
-            .map_err(|message| format!("buffers[{number}]: {message}"))?;
+        let bytes =
+            self.read(number, buffer).map_err(|message| format!("buffers[{number}]: {message}"))?;
         self.needed.insert(number, bytes);
         Ok(())
     }
@@ -88,10 +87,7 @@ impl<'a> Buffers<'a> {
     /// Returns the bytes of a `data:` URI, or of a file in the folder of the glTF file.
     fn of_uri(&mut self, uri: &str) -> Result<Rc<Vec<u8>>, String> {
         if let Some(data) = uri.strip_prefix("data:") {
-            let encoded = data
-                .split_once(";base64,")
-                .ok_or("a data URI that is not base64")?
-                .1;
+            let encoded = data.split_once(";base64,").ok_or("a data URI that is not base64")?.1;
             let decoded = base64::engine::general_purpose::STANDARD.decode(encoded);
             let bytes = decoded.map_err(|error| error.to_string())?;
             self.count(bytes.len() as u64)?;

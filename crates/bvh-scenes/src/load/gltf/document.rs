@@ -54,10 +54,7 @@ pub(super) fn document<'a>(
         .and_then(|_| Root::from_slice(json))
         .map_err(|error| Fault::new(path, Place::File, error))?;
     let asset = &root.asset;
-    let version = asset
-        .min_version
-        .as_ref()
-        .unwrap_or(&asset.version);
+    let version = asset.min_version.as_ref().unwrap_or(&asset.version);
     // A file of a later minor version is read unless it says that it needs this version.
     let is_known = match asset.min_version {
         Some(_) => version == "2.0",
@@ -67,10 +64,8 @@ pub(super) fn document<'a>(
         let message = format!("version `{version}`; expected 2.0");
         return Err(Fault::new(path, Place::Element("asset".into()), message));
     }
-    if let Some(unknown) = root
-        .extensions_required
-        .iter()
-        .find(|name| !HARMLESS.contains(&name.as_str()))
+    if let Some(unknown) =
+        root.extensions_required.iter().find(|name| !HARMLESS.contains(&name.as_str()))
     {
         let place = Place::Element("extensionsRequired".into());
         let message = format!(

@@ -28,9 +28,7 @@ pub struct References;
 
 impl<'de> Deserialize<'de> for References {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Value { key: "" }
-            .deserialize(deserializer)
-            .map(|()| Self)
+        Value { key: "" }.deserialize(deserializer).map(|()| Self)
     }
 }
 

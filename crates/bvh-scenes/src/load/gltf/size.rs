@@ -31,14 +31,8 @@ pub fn check(root: &Root, places: &[Placed], path: &Path) -> Result<(), Fault> {
 /// a scene may have. A fault of the primitive is found when it is read.
 fn promised(root: &Root, primitive: &Primitive) -> usize {
     let Valid(mode) = primitive.mode else { return 0 };
-    let positions = primitive
-        .attributes
-        .get(&Valid(Semantic::Positions))
-        .copied();
-    let Some(accessor) = primitive
-        .indices
-        .or(positions)
-        .and_then(|accessor| root.get(accessor))
+    let positions = primitive.attributes.get(&Valid(Semantic::Positions)).copied();
+    let Some(accessor) = primitive.indices.or(positions).and_then(|accessor| root.get(accessor))
     else {
         return 0;
     };

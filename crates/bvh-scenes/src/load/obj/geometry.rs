@@ -46,9 +46,7 @@ impl<'a> Geometry<'a> {
     /// Returns the number of lines so far that begin with no keyword, with the first such line's
     /// number and first word.
     pub fn unknown(&self) -> Option<(usize, usize, String)> {
-        self.statements
-            .unknown
-            .map(|(count, line, word)| (count, line, shown(word)))
+        self.statements.unknown.map(|(count, line, word)| (count, line, shown(word)))
     }
 
     /// Checks the rest of the file.
@@ -80,10 +78,7 @@ impl<'a> Geometry<'a> {
         if self.fault.is_some() {
             return false;
         }
-        let Some((keyword, line)) = self
-            .statements
-            .next(&mut self.words, MOST_CORNERS + 1)
-        else {
+        let Some((keyword, line)) = self.statements.next(&mut self.words, MOST_CORNERS + 1) else {
             return false;
         };
         self.fault = self.add_checked(keyword, line).err();
@@ -105,10 +100,7 @@ impl<'a> Geometry<'a> {
                 if self.words.len() < 3 {
                     self.short_faces += 1;
                 } else {
-                    let corners = self
-                        .words
-                        .iter()
-                        .map(|corner| vertex_index(corner));
+                    let corners = self.words.iter().map(|corner| vertex_index(corner));
                     add(b'f', corners, &mut self.block);
                 }
             }

@@ -80,20 +80,11 @@ impl<'a> Statements<'a> {
         if self.rest.is_empty() {
             return None;
         }
-        let end = self
-            .rest
-            .iter()
-            .position(|&b| b == b'\n' || b == b'\r');
+        let end = self.rest.iter().position(|&b| b == b'\n' || b == b'\r');
         let (line, tail) = self.rest.split_at(end.unwrap_or(self.rest.len()));
-        self.rest = tail
-            .strip_prefix(b"\r\n")
-            .unwrap_or(tail.get(1..).unwrap_or_default());
+        self.rest = tail.strip_prefix(b"\r\n").unwrap_or(tail.get(1..).unwrap_or_default());
         self.lines += 1;
-        let code = line
-            .split(|&b| b == b'#')
-            .next()
-            .unwrap_or_default()
-            .trim_ascii_end();
+        let code = line.split(|&b| b == b'#').next().unwrap_or_default().trim_ascii_end();
         Some(match code.strip_suffix(b"\\") {
             Some(code) => (code, true),
             None => (code, false),
@@ -102,22 +93,16 @@ impl<'a> Statements<'a> {
 }
 
 fn is_ignored(word: &[u8]) -> bool {
-    IGNORED
-        .split(' ')
-        .any(|known| known.as_bytes() == word)
+    IGNORED.split(' ').any(|known| known.as_bytes() == word)
 }
 
 fn split(code: &[u8]) -> impl Iterator<Item = &[u8]> {
-    code.split(u8::is_ascii_whitespace)
-        .filter(|word| !word.is_empty())
+    code.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
 /// Returns the `7` of `7`, `7/1`, `7//3` and `7/1/3`.
 pub fn vertex_index(corner: &[u8]) -> &[u8] {
-    corner
-        .split(|&b| b == b'/')
-        .next()
-        .unwrap_or_default()
+    corner.split(|&b| b == b'/').next().unwrap_or_default()
 }
 
 /// Makes a word printable for an error message, and short even if the file is one endless word.

@@ -136,9 +136,7 @@ impl Config {
         let mut sides = vec![Side::Both; n];
         let placeholder = Cell::Leaf { first: 0, count: 0 };
         tree.cells.push(placeholder);
-        let budget = n
-            .saturating_mul(Self::MAX_REFERENCES)
-            .min(u32::MAX as usize);
+        let budget = n.saturating_mul(Self::MAX_REFERENCES).min(u32::MAX as usize);
         let events = [0, 1, 2].map(|axis| events(boxes, axis));
         let mut stack = vec![Frame { cell: 0, bounds, events, count: n, depth: 0, budget }];
         while let Some(frame) = stack.pop() {
@@ -147,11 +145,8 @@ impl Config {
             let Some(split) = split else {
                 let first = tree.objects.len();
                 // Every object has exactly one event that is not an end.
-                let starts = frame.events[0]
-                    .iter()
-                    .filter(|event| event.kind != Kind::End);
-                tree.objects
-                    .extend(starts.map(|event| event.object));
+                let starts = frame.events[0].iter().filter(|event| event.kind != Kind::End);
+                tree.objects.extend(starts.map(|event| event.object));
                 tree.objects[first..].sort_unstable();
                 tree.cells[frame.cell] =
                     Cell::Leaf { first: first as u32, count: frame.count as u32 };
@@ -286,10 +281,6 @@ fn events(boxes: &[Aabb], axis: usize) -> Vec<Event> {
             events.push(Event { position: max, kind: Kind::End, object });
         }
     }
-    events.sort_by(|a, b| {
-        a.position
-            .total_cmp(&b.position)
-            .then(a.kind.cmp(&b.kind))
-    });
+    events.sort_by(|a, b| a.position.total_cmp(&b.position).then(a.kind.cmp(&b.kind)));
     events
 }

@@ -80,10 +80,7 @@ impl KdTree {
             return;
         }
         let slabs = Slabs::new(ray, &self.bounds);
-        let backwards = ray
-            .inverse_direction()
-            .to_array()
-            .map(|inverse| inverse < 0.0);
+        let backwards = ray.inverse_direction().to_array().map(|inverse| inverse < 0.0);
         let mut t_max = ray.t_max();
         counter.boxes(1);
         let (mut entry, mut exit) = slabs.interval(&self.bounds);
@@ -199,11 +196,7 @@ mod tests {
         let mut counts = TestCounts::default();
         let ray = Ray::half_line(Vec3::new(60.5, 0.5, -5.0), Vec3::Z).unwrap();
         let solid = |id: u32, t_max| clip_to_box(&ray, &boxes[id as usize], 0.0, t_max);
-        assert_eq!(
-            tree.nearest_hit(&ray, solid, &mut counts)
-                .map(|hit| hit.object),
-            Some(30)
-        );
+        assert_eq!(tree.nearest_hit(&ray, solid, &mut counts).map(|hit| hit.object), Some(30));
         assert_eq!(counts.objects, 1);
         assert!(counts.boxes <= 1 + tree.depth() as u64, "{counts:?}");
     }

@@ -26,9 +26,7 @@ fn passes_divide_and_reunite_within_the_limit_and_every_reference_saves_its_pric
     for by_layout in [false, true] {
         let cost =
             |tree: &bvh_core::Bvh| if by_layout { layout_area(tree) } else { total_area(tree) };
-        let start = muller_fellner::Config::default()
-            .build(&boxes)
-            .unwrap();
+        let start = muller_fellner::Config::default().build(&boxes).unwrap();
         let mut before = cost(&start);
         let mut tree = Working::from_bvh(&start, total_area(&start), AreaWithLeaves).unwrap();
         let mut most_seen = 0;

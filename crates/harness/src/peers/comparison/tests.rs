@@ -52,8 +52,7 @@ fn ratios_are_to_the_fastest_rival_of_each_scene_and_kind() {
     let ratios = ratios(&measured);
     let of = |against: &str| -> Vec<(&str, f64)> {
         let of = ratios.iter().filter(|row| row.against == against);
-        of.map(|row| (row.scene.as_str(), row.ratio))
-            .collect()
+        of.map(|row| (row.scene.as_str(), row.ratio)).collect()
     };
     assert_eq!(of("any mode"), [("a", 0.5), ("b", 2.0), (MEAN, 1.0)]);
     assert_eq!(of("single calls")[..2], [("a", 2.0), ("b", 2.0)]);
