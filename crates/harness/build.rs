@@ -26,17 +26,15 @@ fn main() {
 }
 
 /// The sources of the program, relative to this folder.
-const SOURCES: [&str; 11] = [
+const SOURCES: [&str; 9] = [
     "build.rs",
     "src",
     "../bvh-config/src",
     "../bvh-core/src",
     "../bvh-build/src",
     "../bvh-search/src",
-    "../bvh-files/src",
     "../bvh-scenes/src",
     "../bvh-stress/src",
-    "../bvh-terminal/src",
     "../figures/src",
 ];
 

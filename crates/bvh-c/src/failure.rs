@@ -1,8 +1,8 @@
 //! Failures: a function returns a status or null, and keeps a message for the calling thread.
 //! Panics become failures as well.
 
-use bvh_files::WriteError;
-use bvh_files::tree_file::TreeFileError;
+use bvh_scenes::files::WriteError;
+use bvh_scenes::tree_file::TreeFileError;
 use std::cell::RefCell;
 use std::ffi::{CString, c_char};
 use std::fmt::Display;

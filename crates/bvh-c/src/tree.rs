@@ -287,7 +287,7 @@ pub unsafe extern "C" fn bvh_tree_save(tree: *const BvhTree, path: *const c_char
         // SAFETY: `path` is null or ends with a zero.
         let path = unsafe { text(path) }?;
         let bytes = tree.owned.save().map_err(Failure::invalid)?;
-        Ok(bvh_files::write(path.as_ref(), &bytes)?)
+        Ok(bvh_scenes::files::write(path.as_ref(), &bytes)?)
     })
 }
 
@@ -326,7 +326,7 @@ fn found(objects: Objects, references: f64, seconds: f64) -> Result<BvhTree, Fai
 }
 
 fn loaded(path: &str, objects: Objects) -> Result<BvhTree, Failure> {
-    let bytes = bvh_files::tree_file::read(path.as_ref())?;
+    let bytes = bvh_scenes::tree_file::read(path.as_ref())?;
     let loaded = OwnedTree::load(objects, &bytes);
     loaded.map(whole).map_err(|error| Failure::invalid(format!("{path}: {error}")))
 }

@@ -1,9 +1,10 @@
 //! The failures of the commands, and the exit code of each.
 
 use bvh_core::DensityError;
+use bvh_scenes::SceneError;
+use bvh_scenes::files::{ReadError, WriteError};
 use bvh_scenes::render::StructureError;
 use bvh_scenes::tree_file::TreeFileError;
-use bvh_scenes::{ReadError, SceneError};
 use bvh_search::SearchError;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -27,12 +28,9 @@ pub enum Error {
     /// A file or folder cannot be read or written.
     #[error("{}: cannot {action}: {source}", .path.display())]
     Io { path: PathBuf, action: &'static str, source: io::Error },
-    /// An argument, a file or a folder is rejected.
-    #[error(transparent)]
-    Interface(#[from] bvh_terminal::Error),
     /// A file cannot be written.
     #[error(transparent)]
-    Write(#[from] bvh_terminal::files::WriteError),
+    Write(#[from] WriteError),
     /// The scene is too large for the memory that the process can have.
     #[error(
         "scene {scene}: a bake of {objects} objects needs {bytes} bytes of memory, more than this \
@@ -86,7 +84,6 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Scene(_) | Self::Usage(_) | Self::Rays { .. } => 2,
-            Self::Interface(bvh_terminal::Error::Usage(_)) => 2,
             Self::Read(error) | Self::TreeFile(TreeFileError::Read(error)) => read_code(error),
             Self::TreeFile(_) => 2,
             Self::Structure(error) => match error {
@@ -103,7 +100,6 @@ impl Error {
             | Self::Unmeasured
             | Self::NoTree => 130,
             Self::Io { .. }
-            | Self::Interface(bvh_terminal::Error::Io { .. })
             | Self::Write(_)
             | Self::Memory { .. }
             | Self::Search { .. }

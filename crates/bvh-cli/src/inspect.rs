@@ -1,6 +1,8 @@
 //! `bvh inspect` and `bvh verify`: report the origin of a tree file, and the costs and the shape of
 //! its tree.
 
+use crate::arguments::{FileKind, output_file};
+use crate::output::print_line;
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use crate::{Error, csv_table};
@@ -9,10 +11,8 @@ use bvh_core::cost::{self, EndPointOverlap, Objective, Overlap, SahConstants};
 use bvh_core::file::{FileError, Header, TreeFile};
 use bvh_core::{Aabb, Bvh, NodeKind, Triangle, validate_references};
 use bvh_scenes::Scene;
+use bvh_scenes::files;
 use bvh_scenes::tree_file::{self, TreeFileError};
-use bvh_terminal::arguments::{FileKind, output_file};
-use bvh_terminal::files;
-use bvh_terminal::output::print_line;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;

@@ -1,11 +1,14 @@
 //! The program `bvh`: parses the arguments, runs the command, and sets the exit code.
 
+mod arguments;
 mod bake;
 mod commands;
 mod csv_table;
 mod error;
 mod inspect;
+mod interrupt;
 mod memory;
+mod output;
 mod rays;
 mod recorded;
 mod render;
@@ -13,11 +16,11 @@ mod report;
 mod scene_files;
 mod scenes;
 
-use bvh_terminal::interrupt::{self, INTERRUPTED};
-use bvh_terminal::output::{answered, print_bytes, print_error, succeeded};
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use error::Error;
+use interrupt::INTERRUPTED;
+use output::{answered, print_bytes, print_error, succeeded};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -56,7 +59,7 @@ fn main() -> ExitCode {
         Err(answer) => return answered(&answer),
     };
     // Signals are heard before any work begins.
-    interrupt::listen("error: interrupted");
+    interrupt::listen();
     match run(cli.command) {
         Ok(()) => succeeded(),
         Err(error) => {

@@ -1,13 +1,14 @@
 //! The rays of `--rays`, from a file, from a renderer or any through the scene, and their density.
 
+use crate::arguments::input_file;
 use crate::{Error, recorded};
 use bvh_config::fault;
 use bvh_core::cost::Objective;
 use bvh_core::{Aabb, Bvh, RayDensity, Segment};
+use bvh_scenes::Scene;
+use bvh_scenes::files::read_text;
 use bvh_scenes::rays::{RenderedRays, TRAINED, density, of_anything, of_renderer};
-use bvh_scenes::{Scene, read_text};
 use bvh_search::ray_density_through;
-use bvh_terminal::arguments::input_file;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};

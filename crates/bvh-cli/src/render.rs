@@ -1,15 +1,15 @@
 //! `bvh render`: draws a scene into a PNG file, and prints times and counts.
 
 use crate::Error;
+use crate::arguments::{FileKind, Jobs, input_file, output_file};
+use crate::output::print_line;
 use crate::scene_files::SceneFiles;
 use bvh_core::Aabb;
 use bvh_scenes::Scene;
+use bvh_scenes::files;
 use bvh_scenes::rays::View;
 use bvh_scenes::render::{Film, Options, framing, heat, image, render as draw, structure, tiles};
 use bvh_scenes::trace::Accelerator;
-use bvh_terminal::arguments::{FileKind, Jobs, input_file, output_file};
-use bvh_terminal::files;
-use bvh_terminal::output::print_line;
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io;

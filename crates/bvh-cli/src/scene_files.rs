@@ -1,8 +1,8 @@
 //! The arguments about files that a scene's file refers to.
 
+use crate::output::print_error;
 use bvh_scenes::load::OutsideFiles;
 use bvh_scenes::{Scene, SceneError};
-use bvh_terminal::output::print_error;
 
 /// The permission to read files outside a scene's folder.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]

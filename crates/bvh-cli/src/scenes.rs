@@ -1,9 +1,9 @@
 //! `bvh scenes`: lists the scenes that need no path.
 
 use crate::Error;
+use crate::output::print_line;
 use bvh_scenes::builtin::stand_ins::STAND_INS;
 use bvh_scenes::{FETCHED, SPHERES, Scene, fetched_path};
-use bvh_terminal::output::print_line;
 
 /// Prints a table of the built-in scenes: their sizes, and the originals that they replace.
 pub fn scenes() -> Result<(), Error> {

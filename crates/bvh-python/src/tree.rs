@@ -6,8 +6,8 @@ use crate::improver::Improver;
 use crate::pickle::{self, State};
 use crate::scalars::{self, REFERENCES};
 use crate::search::{self, Limits};
-use bvh_files::WriteError;
-use bvh_files::tree_file::{self, TreeFileError};
+use bvh_scenes::files::{self, WriteError};
+use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_search::bvh_core::Segment;
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
 use bvh_search::{FindError, Objects, Options, OwnedTree};
@@ -173,7 +173,7 @@ impl Tree {
     /// >>> square.save(folder.name + "/square.bvh")
     fn save(&self, path: PathBuf) -> PyResult<()> {
         let bytes = self.owned().save().map_err(invalid)?;
-        bvh_files::write(&path, &bytes).map_err(write_error)
+        files::write(&path, &bytes).map_err(write_error)
     }
 
     /// Improves the tree for about `seconds`. Ctrl-C ends the search early, and the tree keeps its

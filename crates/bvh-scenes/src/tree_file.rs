@@ -1,10 +1,58 @@
-//! Tree files of scenes, read completely and checked against the scene's objects.
+//! Tree files, read completely and checked against a scene's objects.
 
 use crate::Scene;
-use bvh_core::file::{FileError, Header};
+use crate::files::{ReadError, regular};
+use bvh_core::file::{FileError, Header, TreeFile};
 use bvh_core::{Bvh, validate_references};
-pub use bvh_files::tree_file::{TreeFileError, open, read};
-use std::path::Path;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+/// The reason why a file gave no tree.
+#[derive(Debug, thiserror::Error)]
+pub enum TreeFileError {
+    /// The file does not exist or cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The file is damaged or belongs to a different scene.
+    #[error("{}: {source}", .path.display())]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// The fault of its contents.
+        source: FileError,
+    },
+}
+
+impl TreeFileError {
+    /// Returns a function for `map_err` that names the file.
+    pub fn of(path: &Path) -> impl FnOnce(FileError) -> Self {
+        move |source| Self::Invalid { path: path.to_owned(), source }
+    }
+}
+
+/// Returns the bytes of the tree file at `path`. If the header is invalid or does not match the
+/// file's length, rejects the file before it reads the rest.
+pub fn read(path: &Path) -> Result<Vec<u8>, TreeFileError> {
+    let length = regular(path)?;
+    let failed = |source| ReadError::Failed { path: path.to_owned(), source };
+    let mut file = File::open(path).map_err(failed)?;
+    let mut bytes = Vec::new();
+    file.by_ref().take(Header::BYTES as u64).read_to_end(&mut bytes).map_err(failed)?;
+    Header::of_file(&bytes, length).map_err(TreeFileError::of(path))?;
+    let after_header = length.saturating_sub(bytes.len() as u64);
+    // An intact file may still be larger than the memory, which is an error and no abort.
+    bytes
+        .try_reserve_exact(after_header as usize)
+        .map_err(|_| failed(io::ErrorKind::OutOfMemory.into()))?;
+    file.take(after_header).read_to_end(&mut bytes).map_err(failed)?;
+    Ok(bytes)
+}
+
+/// Opens the bytes of a tree file; `path` names it in errors.
+pub fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<TreeFile<'a>, TreeFileError> {
+    TreeFile::open(bytes).map_err(TreeFileError::of(path))
+}
 
 /// Reads the tree over a scene's objects from the file at `path`, and the file's header.
 ///
@@ -22,4 +70,51 @@ pub fn load(path: &Path, scene: &Scene) -> Result<(Bvh, Header), TreeFileError> 
         .map_err(FileError::Tree)
         .map_err(TreeFileError::of(path))?;
     Ok((tree, header))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_core::file::{self, Origin};
+    use bvh_core::{Aabb, Node};
+    use std::fs;
+
+    /// A tree file over one box.
+    fn tree() -> Vec<u8> {
+        let aabb = Aabb::from([[0.0; 3], [1.0; 3]]);
+        let tree = Bvh { nodes: vec![Node::leaf(aabb, 0, 1)], prim_ids: vec![0] };
+        file::save(&tree, &[aabb], &Origin::default()).unwrap()
+    }
+
+    #[test]
+    fn a_tree_file_is_read_completely_and_nothing_else_is_opened() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.bvh");
+        for wrong in [folder.path(), &path, Path::new("/dev/zero")] {
+            assert!(matches!(read(wrong), Err(TreeFileError::Read(_))), "{}", wrong.display());
+        }
+        fs::write(&path, tree()).unwrap();
+        assert_eq!(read(&path).unwrap(), tree());
+    }
+
+    // Linux stores holes of files, so that this file needs no space on the disk.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_file_of_64_gigabytes_is_rejected_by_its_header() {
+        let length = 64 << 30;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("huge.bvh");
+        for (beginning, expected) in [
+            (vec![], FileError::Magic),
+            (tree(), FileError::Length { found: length, expected: tree().len() as u64 }),
+        ] {
+            fs::write(&path, beginning).unwrap();
+            let file = File::options().write(true).open(&path).unwrap();
+            file.set_len(length).unwrap();
+            let Err(TreeFileError::Invalid { source, .. }) = read(&path) else {
+                panic!("no fault of the contents")
+            };
+            assert_eq!(source, expected);
+        }
+    }
 }

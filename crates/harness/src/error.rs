@@ -1,9 +1,10 @@
 //! The failures of the harness and their exit codes.
 
 use bvh_core::file::FileError;
+use bvh_scenes::SceneError;
+use bvh_scenes::files::{ReadError, WriteError};
 use bvh_scenes::render::StructureError;
 use bvh_scenes::tree_file::TreeFileError;
-use bvh_scenes::{ReadError, SceneError};
 use bvh_search::SearchError;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -28,12 +29,9 @@ pub enum Error {
     /// A file or folder that could not be read or written.
     #[error("{}: cannot {action}: {source}", .path.display())]
     Io { path: PathBuf, action: &'static str, source: io::Error },
-    /// An argument, a file or a folder that the program's interface rejects.
-    #[error(transparent)]
-    Interface(#[from] bvh_terminal::Error),
     /// A file that could not be written.
     #[error(transparent)]
-    Write(#[from] bvh_terminal::files::WriteError),
+    Write(#[from] WriteError),
     /// A CSV file that the harness cannot have written.
     #[error("{}: {source}", .path.display())]
     Csv { path: PathBuf, source: csv::Error },
@@ -130,8 +128,11 @@ impl Error {
             {
                 1
             }
-            Self::Read(_) | Self::Interface(bvh_terminal::Error::Usage(_)) => 2,
-            Self::Spec { .. } | Self::Scene(_) | Self::Usage(_) | Self::TreeFile(_) => 2,
+            Self::Read(_)
+            | Self::Spec { .. }
+            | Self::Scene(_)
+            | Self::Usage(_)
+            | Self::TreeFile(_) => 2,
             Self::Interrupted { .. } => 130,
             _ => 1,
         }

@@ -7,6 +7,7 @@
 pub mod cli;
 pub mod contestant;
 pub mod error;
+mod files;
 pub mod measure;
 pub mod page;
 pub mod peers;

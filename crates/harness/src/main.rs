@@ -1,8 +1,7 @@
 //! The command line: parses the arguments, dispatches to a command, and sets the exit code.
 
-use bvh_terminal::interrupt::{self, INTERRUPTED};
-use bvh_terminal::output::{answered, print_error, print_line, succeeded};
 use clap::{Parser, Subcommand};
+use harness::cli::terminal::{self, INTERRUPTED, print_error, print_line};
 use harness::cli::{compare, jobs, merge, new, report, run};
 use harness::{Error, stress::child};
 use std::process::ExitCode;
@@ -41,11 +40,8 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(answer) => return answered(&answer),
-    };
-    interrupt::listen("error: interrupted; finished runs are kept, and `--resume` does the rest");
+    let cli = Cli::parse();
+    terminal::listen();
     let result = match cli.command {
         None => run::run(&cli.run, &INTERRUPTED),
         Some(Command::Report(args)) => report::report(&args),
@@ -62,7 +58,7 @@ fn main() -> ExitCode {
             .map_err(Error::Usage),
     };
     match result {
-        Ok(()) => succeeded(),
+        Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             print_error(&format!("error: {error}"));
             ExitCode::from(error.exit_code())

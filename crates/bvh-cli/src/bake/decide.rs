@@ -9,13 +9,13 @@ use super::plan::Prepared;
 use super::starts::{Division, greedy};
 use super::watch::Interrupted;
 use crate::Error;
+use crate::interrupt;
+use crate::output::print_error;
 use crate::rays::Rays;
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::{Bvh, RayDensity};
 use bvh_scenes::Scene;
 use bvh_search::{Budget, Method, Problem, solve};
-use bvh_terminal::interrupt;
-use bvh_terminal::output::print_error;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 

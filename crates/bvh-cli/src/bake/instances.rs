@@ -5,15 +5,15 @@ use super::BakeArgs;
 use super::plan::{Figures, Plan, Prepared};
 use super::watch::gain;
 use crate::Error;
+use crate::arguments::output_folder;
 use crate::csv_table;
+use crate::output::print_line;
 use bvh_build::{Builder, median_cut};
 use bvh_core::cost::Objective;
 use bvh_core::{Instance, InvalidInstances, Primitives, Triangle, WideBvh};
+use bvh_scenes::files;
 use bvh_scenes::load::{Format, OutsideFiles, gltf};
-use bvh_scenes::{Scene, SceneError, SceneKind, read};
-use bvh_terminal::arguments::output_folder;
-use bvh_terminal::files;
-use bvh_terminal::output::print_line;
+use bvh_scenes::{Scene, SceneError, SceneKind};
 use glam::Affine3A;
 use std::fs;
 use std::path::Path;
@@ -116,7 +116,7 @@ fn new_folder(path: &Path) -> Result<(), Error> {
 }
 
 fn parts(path: &Path, outside: OutsideFiles) -> Result<gltf::Parts, Error> {
-    let bytes = read(path)?;
+    let bytes = files::read(path)?;
     let parts = match Format::of(&bytes, path) {
         Format::Gltf => gltf::parts(&bytes, path, outside).map_err(|fault| fault.to_string()),
         format => Err(format!(

@@ -10,17 +10,17 @@ mod starts;
 mod watch;
 
 use crate::Error;
+use crate::arguments::{FileKind, Jobs, input_file, output_file, output_or_free, reserve};
+use crate::output::print_line;
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use bvh_core::Bvh;
 use bvh_core::cost::Objective;
 use bvh_core::file::Header;
+use bvh_scenes::files::Reserved;
 use bvh_scenes::{Scene, explain};
 use bvh_search::best::{self, Horizon};
 use bvh_search::{Method, StopReason};
-use bvh_terminal::arguments::{FileKind, Jobs, input_file, output_file, output_or_free};
-use bvh_terminal::files::{Reserved, reserve};
-use bvh_terminal::output::print_line;
 use clap::Args;
 use decide::{Choices, Decided, Open, decide};
 use effort::Effort;
@@ -113,7 +113,7 @@ const BEST: &str = "best";
 impl BakeArgs {
     /// Returns the file or folder to write.
     fn out(&self) -> Result<PathBuf, Error> {
-        Ok(output_or_free("--out", self.out.as_ref(), || self.name_after_scene())?)
+        output_or_free("--out", self.out.as_ref(), || self.name_after_scene())
     }
 
     /// Reserves the file to write.

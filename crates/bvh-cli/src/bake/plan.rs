@@ -4,23 +4,21 @@ use super::effort::Effort;
 use super::starts::{Division, greedy};
 use super::watch::{Interrupted, Watch};
 use crate::Error;
+use crate::interrupt;
 use crate::rays::Rays;
 use bvh_core::cost::{CallBoth, Measure, Objective};
 use bvh_core::file::{self, FileError, Header, Origin};
 use bvh_core::{Aabb, Bvh, Node, RayDensity, Triangle, validate_references};
+use bvh_scenes::files::Reserved;
 use bvh_scenes::tree_file::TreeFileError;
 use bvh_scenes::{Scene, is_allocatable};
 use bvh_search::{
     Budget, Deadline, Kept, Method, Outcome, Problem, SearchError, StopReason, best, optimize,
     solve_or_keep,
 };
-use bvh_terminal::files::Reserved;
-use bvh_terminal::interrupt;
 use rayon::prelude::*;
-use std::panic::resume_unwind;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::thread::{self, ScopedJoinHandle};
 
 /// A search for the best tree of any scene.
 #[derive(Clone)]
@@ -226,35 +224,15 @@ impl Bake<'_> {
         &self,
         baked: &Baked,
         path: &Path,
-        mut reserved: Reserved,
+        reserved: Reserved,
     ) -> Result<(usize, f64), Error> {
         let Baked { tree, work, figures } = baked;
         let Scene { boxes, primitives, .. } = self.scene;
-        // Somebody may wait for the file of a large tree after Ctrl-C, so most of it is written
-        // while the rest is computed, all at once. The thread that writes waits for the disk, which
-        // no thread of the pool should do.
-        let (written, cost, validated, visits) = thread::scope(|scope| {
-            let reserved = &mut reserved;
-            let writer = (tree.nodes.len() >= WRITTEN_AHEAD).then(|| {
-                scope.spawn(|| {
-                    let body = file::body(tree);
-                    let body = body.each_ref().map(|section| &**section);
-                    reserved.write_ahead(Header::BYTES as u64, &body)
-                })
-            });
-            let (cost, (validated, visits)) = rayon::join(
-                || self.cost_for_lines(tree, figures.as_ref()),
-                || {
-                    rayon::join(
-                        || validate_references(tree, boxes, primitives),
-                        || self.visits(tree),
-                    )
-                },
-            );
-            let written = writer.map_or(Ok(()), joined);
-            (written, cost, validated, visits)
-        });
-        written?;
+        // Somebody may wait for the file of a large tree after Ctrl-C.
+        let (cost, (validated, visits)) = rayon::join(
+            || self.cost_for_lines(tree, figures.as_ref()),
+            || rayon::join(|| validate_references(tree, boxes, primitives), || self.visits(tree)),
+        );
         validated.map_err(FileError::from).map_err(TreeFileError::of(path))?;
         // The work of all bakes that led to this tree, one after the other.
         let spent = self.start.map_or(0, |start| start.work);
@@ -269,7 +247,7 @@ impl Bake<'_> {
         let sections =
             file::sections(tree, boxes, cost, &origin, both).map_err(TreeFileError::of(path))?;
         let sections = sections.each_ref().map(|section| &**section);
-        reserved.write_sections(&sections)?;
+        reserved.write(&sections)?;
         let bytes = sections.iter().map(|section| section.len()).sum();
         Ok((bytes, cost))
     }
@@ -313,15 +291,6 @@ impl Bake<'_> {
             (_, None) => "internal area",
         }
     }
-}
-
-/// The number of nodes from which a tree is written while its header is computed. A smaller file is
-/// on the disk at once.
-const WRITTEN_AHEAD: usize = 1 << 18;
-
-/// Waits for a thread, and continues its panic.
-fn joined<T>(thread: ScopedJoinHandle<T>) -> T {
-    thread.join().unwrap_or_else(|panic| resume_unwind(panic))
 }
 
 /// The result of a search.

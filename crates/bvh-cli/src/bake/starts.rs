@@ -1,11 +1,11 @@
 //! The trees that `bvh bake` builds before it searches.
 
 use crate::Error;
+use crate::interrupt;
 use bvh_build::{BuildError, Builder, Watch, muller_fellner, ploc};
 use bvh_core::Bvh;
 use bvh_scenes::Scene;
 use bvh_search::Splits;
-use bvh_terminal::interrupt;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// The number of objects up to which even an interrupted bake builds the greedy tree, because that

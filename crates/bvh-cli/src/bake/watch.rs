@@ -1,8 +1,8 @@
 //! Observes a bake, ends it in time, and shows its progress.
 
 use super::effort::Effort;
+use crate::output::print_error;
 use bvh_search::{Deadline, Event, Observer};
-use bvh_terminal::output::print_error;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};

@@ -4,6 +4,8 @@ mod levels;
 mod page;
 
 use crate::Error;
+use crate::arguments::{FileKind, Jobs, output_file, output_or_free, reserve};
+use crate::output::print_line;
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
@@ -13,9 +15,6 @@ use bvh_scenes::Scene;
 use bvh_scenes::render::{Film, Options, heat, image, render};
 use bvh_scenes::trace::{Accelerator, Structure};
 use bvh_scenes::tree_file::{self, TreeFileError};
-use bvh_terminal::arguments::{FileKind, Jobs, output_file, output_or_free};
-use bvh_terminal::files::reserve;
-use bvh_terminal::output::print_line;
 use clap::Args;
 use levels::Level;
 use page::{Heat, Page, Row};
@@ -86,7 +85,7 @@ pub fn report(args: &ReportArgs, interrupted: &AtomicBool) -> Result<(), Error> 
         heat: heat_maps(&out, &baked.film, &greedy.film)?,
         levels: [&baked.levels, &greedy.levels],
     };
-    reserve(&out, args.out.is_some(), 0)?.write(page.html().as_bytes())?;
+    reserve(&out, args.out.is_some(), 0)?.write(&[page.html().as_bytes()])?;
     print_line(&format!("{}: {title}", out.display()));
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! The examples in the documentation that call `bvh` or describe rays for it.
 
-#[path = "../../../bvh-terminal/tests/program/pages.rs"]
+#[path = "../program/pages.rs"]
 mod pages;
 use crate::support::{run, said, text};
 use pages::{Called, UNREADABLE, blocks_in};

@@ -3,7 +3,7 @@
 
 #[path = "../../../bvh-scenes/tests/integration/glb.rs"]
 mod glb;
-#[path = "../../../bvh-terminal/tests/program/mod.rs"]
+#[path = "../program/mod.rs"]
 mod program;
 
 pub use glb::glb;

@@ -6,7 +6,7 @@ pub mod obj;
 mod ply;
 mod stl;
 
-use crate::{ReadError, read};
+use crate::files::{ReadError, read};
 pub use gltf::OutsideFiles;
 use mesh::{Fault, Mesh};
 use obj::ObjError;

@@ -4,9 +4,10 @@ use crate::samples::{
     CORNERS, INDEXED, buffer, error, gltf, gltf_json, samples, square, stl_text, with,
 };
 use bvh_core::Triangle;
+use bvh_scenes::Scene;
+use bvh_scenes::files::ReadError;
 use bvh_scenes::load::mesh::Mesh;
 use bvh_scenes::load::{Format, MeshError, load, parse};
-use bvh_scenes::{ReadError, Scene};
 use glam::Vec3;
 use std::path::Path;
 

@@ -1,12 +1,11 @@
 //! `harness compare`: compares a tree with the best known one of its scene and, on request,
 //! archives a better one.
 
+use super::terminal::{input_folder, print_line};
 use crate::Error;
 use crate::run::{archive, reference};
 use bvh_core::cost;
 use bvh_scenes::{Scene, tree_file};
-use bvh_terminal::arguments::input_folder;
-use bvh_terminal::output::print_line;
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 use std::path::{Path, PathBuf};

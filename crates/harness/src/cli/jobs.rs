@@ -1,11 +1,11 @@
 //! `harness jobs`: lists the runs of an experiment, for programs that share them among machines.
 
+use super::terminal::print_line;
 use crate::Error;
 use crate::run::execute::reject_indivisible;
 use crate::run::resolved::load_scenes;
 use crate::run::selection::listed;
 use crate::spec::{Experiment, Overrides};
-use bvh_terminal::output::print_line;
 use std::path::PathBuf;
 
 /// List the runs of an experiment, one a line: identifier, estimated work, and description. The

@@ -1,10 +1,9 @@
 //! `harness merge`: joins the parts of experiments that ran with `--run` or `--shard`.
 
+use super::terminal::{output_folder, print_line};
 use crate::Error;
 use crate::rows::store::Existing;
 use crate::run::merge::{self, UnlikeProcessors};
-use bvh_terminal::arguments::output_folder;
-use bvh_terminal::output::print_line;
 use std::path::PathBuf;
 
 /// Join the parts of experiments that ran with --run or --shard into the files that one run writes.

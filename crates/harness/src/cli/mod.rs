@@ -6,3 +6,4 @@ pub mod merge;
 pub mod new;
 pub mod report;
 pub mod run;
+pub mod terminal;

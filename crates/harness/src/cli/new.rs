@@ -1,8 +1,8 @@
 //! `harness new` and `harness schema`: a spec to begin with, and the schema that editors complete
 //! it by.
 
+use super::terminal::print_line;
 use crate::{Error, spec};
-use bvh_terminal::output::{print_bytes, print_line};
 use clap::Args;
 use std::fs::File;
 use std::io::{ErrorKind, Write};
@@ -40,5 +40,5 @@ pub fn new(args: &NewArgs) -> Result<(), Error> {
 
 /// Prints the JSON schema of specs.
 pub fn schema() {
-    print_bytes(format!("{:#}\n", spec::schema()).as_bytes());
+    print_line(&format!("{:#}", spec::schema()));
 }

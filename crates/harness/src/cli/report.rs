@@ -1,14 +1,9 @@
 //! `harness report`: all results on one page.
 
+use super::terminal::{input_folder, print_line};
 use crate::Error;
 use crate::page;
-use bvh_terminal::arguments::{FileKind, input_folder, output_file};
-use bvh_terminal::output::print_line;
 use std::path::PathBuf;
-
-/// The kind of file that holds the page.
-const PAGE: FileKind =
-    FileKind { name: "an HTML page", beginning: b"<!DOCTYPE html>", extension: "html" };
 
 /// Write all results on one HTML page.
 #[derive(clap::Args, Clone, Debug)]
@@ -24,7 +19,11 @@ pub struct ReportArgs {
 /// Writes the page and prints the number of experiments on it.
 pub fn report(args: &ReportArgs) -> Result<(), Error> {
     input_folder("--results", &args.results)?;
-    output_file("--out", &args.out, &PAGE)?;
+    if args.out.extension().is_none_or(|extension| extension != "html") || args.out.is_dir() {
+        let found = args.out.display();
+        let message = format!("--out: {found}; accepted: a file whose name ends with .html");
+        return Err(Error::Usage(message));
+    }
     let experiments = page::write(&args.results, &args.out)?;
     print_line(&format!("{experiments} experiments: {}", args.out.display()));
     Ok(())

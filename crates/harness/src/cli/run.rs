@@ -1,6 +1,7 @@
 //! `harness SPEC.toml...`: runs experiments, compares them with committed results, or makes their
 //! reports again.
 
+use super::terminal::{Jobs, output_folder, print_error, print_line};
 use crate::Error;
 use crate::rows::store::Existing;
 use crate::run::execute::{Extent, Verbosity, execute};
@@ -8,8 +9,6 @@ use crate::run::finish::Summary;
 use crate::run::selection::{Selection, Shard};
 use crate::run::{check, finish, reference};
 use crate::spec::{Experiment, Overrides};
-use bvh_terminal::arguments::{Jobs, output_folder};
-use bvh_terminal::output::{print_error, print_line};
 use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;

@@ -3,14 +3,15 @@
 mod html;
 
 use crate::Error;
+use crate::files;
 use crate::report::output::Output;
 use crate::report::paper::Outcome;
 use crate::run::finish::outputs;
 use crate::run::provenance::Provenance;
 use crate::run::resolved::{Resolved, read_toml};
 use ::figures::Figure;
-use bvh_scenes::{SceneKind, read_text};
-use bvh_terminal::files;
+use bvh_scenes::SceneKind;
+use bvh_scenes::files::read_text;
 use std::path::{Component, Path, PathBuf};
 
 /// One experiment's folder, as read.

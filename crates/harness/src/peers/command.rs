@@ -6,7 +6,7 @@ use crate::error::CommandFault;
 use bvh_config::{OutOfRange, above};
 use bvh_core::file::{self, FileError};
 use bvh_core::{Aabb, Bvh, Clip, validate_references};
-use bvh_scenes::ReadError;
+use bvh_scenes::files::ReadError;
 use bvh_scenes::tree_file::{self, TreeFileError};
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};

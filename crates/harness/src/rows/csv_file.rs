@@ -12,7 +12,7 @@ pub trait Row: Serialize + DeserializeOwned {
 
 /// Reads all rows of a CSV file.
 pub fn read<R: DeserializeOwned>(path: &Path) -> Result<Vec<R>, Error> {
-    let bytes = bvh_scenes::read(path)?;
+    let bytes = bvh_scenes::files::read(path)?;
     let mut reader = csv::Reader::from_reader(&bytes[..]);
     reader.deserialize().collect::<Result<_, _>>().map_err(Error::csv(path))
 }

@@ -2,8 +2,9 @@
 
 use super::{Row, to_bytes};
 use crate::Error;
-use bvh_scenes::{fnv1a, read_text};
-use bvh_terminal::files;
+use crate::files;
+use bvh_scenes::files::read_text;
+use bvh_scenes::fnv1a;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
@@ -46,7 +47,7 @@ impl FinishedRun {
         names.remove(CONTENTS);
         let mut files = BTreeMap::new();
         for name in names {
-            let bytes = bvh_scenes::read(&folder.join(&name)).map_err(|_| damaged(&name))?;
+            let bytes = bvh_scenes::files::read(&folder.join(&name)).map_err(|_| damaged(&name))?;
             files.insert(name, bytes);
         }
         let run = Self { files };

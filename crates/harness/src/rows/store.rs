@@ -10,8 +10,8 @@ use super::finished_run::{CONTENTS, FinishedRun};
 use super::lock::lock_folder;
 use super::{Row, read_if_any, to_bytes};
 use crate::Error;
-use bvh_scenes::{ReadError, read_text};
-use bvh_terminal::files;
+use crate::files;
+use bvh_scenes::files::{ReadError, read_text};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -164,7 +164,7 @@ impl Store {
             let mut joined = Vec::new();
             for run_folder in run_folders {
                 let path = run_folder.join(&name);
-                let bytes = bvh_scenes::read(&path)?;
+                let bytes = bvh_scenes::files::read(&path)?;
                 // All runs have the same header, which would be a row in the middle of the file.
                 let added = if joined.is_empty() { &bytes } else { without_header(&bytes) };
                 joined.extend_from_slice(added);

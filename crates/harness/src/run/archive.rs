@@ -1,6 +1,7 @@
 //! The archive of the best known trees: a folder with one tree file per scene and a table of them.
 
 use crate::Error;
+use crate::files;
 use crate::rows::lock::wait_for_folder;
 use crate::rows::{ROUNDING, Row, TreeRow, read, to_bytes};
 use crate::run::reference::{best_known, improve};
@@ -8,7 +9,6 @@ use crate::run::resolved::checksum;
 use bvh_core::cost;
 use bvh_scenes::Scene;
 use bvh_scenes::tree_file;
-use bvh_terminal::files;
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -3,7 +3,7 @@
 
 use super::resolved::read_toml;
 use crate::Error;
-use bvh_terminal::files;
+use crate::files;
 use csv::StringRecord;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -60,8 +60,8 @@ fn compare_figures(fresh: &Path, committed: &Path) -> Result<Vec<String>, Error>
     names.extend(untimed_files(committed, ".svg")?);
     let mut differences = Vec::new();
     for name in names {
-        let fresh_bytes = bvh_scenes::read(&fresh.join(&name)).ok();
-        let committed_bytes = bvh_scenes::read(&committed.join(&name)).ok();
+        let fresh_bytes = bvh_scenes::files::read(&fresh.join(&name)).ok();
+        let committed_bytes = bvh_scenes::files::read(&committed.join(&name)).ok();
         if fresh_bytes == committed_bytes {
             continue;
         }
@@ -189,7 +189,7 @@ fn identity(header: &StringRecord, row: &StringRecord) -> String {
 
 fn read_rows(path: &Path, skipped_scenes: &[String]) -> Result<Rows, Error> {
     // A row of another length is a difference to report, not an error.
-    let bytes = bvh_scenes::read(path)?;
+    let bytes = bvh_scenes::files::read(path)?;
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..]);
     let header = reader.headers().map_err(Error::csv(path))?.clone();
     let mut records: Vec<StringRecord> =

@@ -9,7 +9,7 @@ use crate::run::provenance::Provenance;
 use crate::run::reference::{self, BestKnown};
 use crate::run::resolved::{Resolved, read_toml, to_toml};
 use crate::spec::Experiment;
-use bvh_scenes::read_text;
+use bvh_scenes::files::read_text;
 use std::path::{Path, PathBuf};
 
 /// The outcome of a finished experiment, for the terminal.

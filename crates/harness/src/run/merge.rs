@@ -2,6 +2,7 @@
 //! writes.
 
 use crate::Error;
+use crate::files;
 use crate::rows::finished_run::FinishedRun;
 use crate::rows::lock::lock_folder;
 use crate::rows::store::{self, Existing, Store};
@@ -10,8 +11,7 @@ use crate::run::provenance::Provenance;
 use crate::run::reference::BestKnown;
 use crate::run::resolved::Resolved;
 use crate::run::target::Target;
-use bvh_scenes::read_text;
-use bvh_terminal::files;
+use bvh_scenes::files::read_text;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::path::{Path, PathBuf};

@@ -3,8 +3,8 @@
 
 use super::resolved::{read_toml, to_toml};
 use crate::Error;
+use crate::files;
 use crate::processor::PROCESSOR;
-use bvh_terminal::files;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::SystemTime;

@@ -11,6 +11,7 @@
 //! beatable.
 
 use crate::Error;
+use crate::files;
 use crate::report::Report;
 use crate::rows::lock::wait_for_folder;
 use crate::rows::store::Store;
@@ -22,7 +23,6 @@ use bvh_core::cost::Objective;
 use bvh_core::file::Header;
 use bvh_scenes::Scene;
 use bvh_search::exact;
-use bvh_terminal::files;
 use std::fs;
 use std::path::Path;
 

@@ -2,8 +2,9 @@
 
 use crate::Error;
 use crate::spec::Experiment;
+use bvh_scenes::files::read_text;
 use bvh_scenes::load::OutsideFiles;
-use bvh_scenes::{Scene, read_text, subset};
+use bvh_scenes::{Scene, subset};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;

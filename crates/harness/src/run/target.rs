@@ -36,7 +36,7 @@ impl Target {
         if existing == Existing::Replace || is_unfinished(&folder) || !recorded.is_file() {
             return Ok(Self { folder, previous: None, is_finished: false });
         }
-        let text = bvh_scenes::read_text(&recorded)?;
+        let text = bvh_scenes::files::read_text(&recorded)?;
         let found = if is_part {
             Some("has finished results")
         } else if !toml::from_str(&text).is_ok_and(|found| resolved.repeats(&found)) {

@@ -4,7 +4,7 @@ use super::{Experiment, Labelled, Name, check};
 use crate::Error;
 use crate::report::Report;
 use bvh_config::fault::{self, Fault, Read};
-use bvh_scenes::read_text;
+use bvh_scenes::files::read_text;
 use bvh_search::Method;
 use std::ffi::OsStr;
 use std::path::Path;

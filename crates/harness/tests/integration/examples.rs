@@ -2,7 +2,7 @@
 //! of a crate run Rust; the tests of the bindings run C and Python; and the programs parse the
 //! arguments of commands. The commands of `bvh` are in the tests of that crate.
 
-#[path = "../../../bvh-terminal/tests/program/pages.rs"]
+#[path = "../../../bvh-cli/tests/program/pages.rs"]
 mod pages;
 use crate::support::{ended, run, top};
 use bvh_scenes::Scene;

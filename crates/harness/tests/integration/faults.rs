@@ -4,7 +4,7 @@
 
 use crate::support::{
     ReadOnly, ended, folder_with, program, refused, reproducible, run_on_a_small_disk, said,
-    unsaid, wait_for,
+    wait_for,
 };
 use std::fs;
 use std::path::Path;
@@ -129,14 +129,6 @@ fn a_full_disk_is_reported_and_finished_runs_are_kept() {
         assert!(!folder.path().join(&out).join("spec/runs.csv").exists());
         said(folder.path(), &["spec.toml", "--resume", "--out", &out]);
         assert!(results(&folder.path().join(&out)) == whole);
-    }
-}
-
-#[test]
-fn help_and_version_that_cannot_be_printed_are_errors() {
-    let folder = folder();
-    for args in [&["--help"][..], &["--version"], &["-h"], &["merge", "--help"], &["help", "new"]] {
-        unsaid(folder.path(), args);
     }
 }
 

@@ -6,11 +6,10 @@
 
 use crate::support::{
     ended, folder_with, names, outside_buffer, outside_scene, program, reproducible, run, said,
-    send, text, wait_for,
+    text,
 };
 use std::fs;
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 const SPEC: &str = "
 question = 'What stays?'
@@ -126,11 +125,6 @@ fn resuming_what_is_finished_does_nothing() {
 #[test]
 fn a_missing_folder_is_named_before_the_work() {
     let folder = folder("spec.toml");
-    refused(
-        folder.path(),
-        &["report", "--results=.", "--out=no/x.html"],
-        &["no is no folder", "accepted: a path in a folder that is there"],
-    );
     refused(folder.path(), &["report"], &["--results", "results is no folder"]);
     assert_eq!(names(folder.path()), ["spec.toml"]);
 }
@@ -180,9 +174,8 @@ fn the_page_replaces_no_file_of_another_kind() {
     let folder = folder("spec.toml");
     let dir = folder.path();
     said(dir, &["spec.toml"]);
-    refused(dir, &["report", "--out=spec.toml"], &["--out", "spec.toml", "HTML"]);
-    refused(dir, &["report", "--out=results/spec/runs.csv"], &["--out", "runs.csv", "HTML"]);
-    refused(dir, &["report", "--out=x.csv"], &["a name that ends with", ".html", "accepted"]);
+    refused(dir, &["report", "--out=spec.toml"], &["--out", "spec.toml", ".html"]);
+    refused(dir, &["report", "--out=results/spec/runs.csv"], &["--out", "runs.csv", ".html"]);
     assert_eq!(fs::read_to_string(dir.join("spec.toml")).unwrap(), SPEC);
     for _ in 0..2 {
         said(dir, &["report", "--out=page.html"]);
@@ -253,44 +246,6 @@ fn arguments_need_not_be_utf_8() {
     let provenance =
         fs::read_to_string(folder.path().join(out).join("spec/provenance.toml")).unwrap();
     assert!(provenance.contains("harness spec.toml --out out"), "{provenance}");
-}
-
-#[cfg(unix)]
-#[test]
-fn the_first_signal_ends_even_a_program_that_waits_for_another() {
-    let folder = folder("spec.toml");
-    let dir = folder.path();
-    fs::create_dir(dir.join("results")).unwrap();
-    let lock = fs::File::create(dir.join("results/.lock")).unwrap();
-    lock.lock().unwrap();
-    let mut child =
-        program(dir, &["spec.toml"]).stderr(std::process::Stdio::null()).spawn().unwrap();
-    // All runs are finished, and the program waits for the best known costs, which this test locks.
-    wait_for(&dir.join("results/spec/runs.csv"));
-    let start = Instant::now();
-    send("-TERM", &child);
-    while child.try_wait().unwrap().is_none() && start.elapsed() < Duration::from_secs(5) {
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    // This has no effect on a program that has ended.
-    child.kill().unwrap();
-    assert_eq!(child.wait().unwrap().code(), Some(130), "{:?}", start.elapsed());
-    // Nothing is lost.
-    drop(lock);
-    said(dir, &["spec.toml", "--resume"]);
-}
-
-#[test]
-fn control_characters_of_a_spec_do_not_reach_the_terminal() {
-    let folder = folder("spec.toml");
-    fs::write(folder.path().join("wrong.toml"), format!("{SPEC}\"\\u001b[31mred\" = 1\n")).unwrap();
-    let output = run(folder.path(), &["wrong.toml"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(
-        !output.stderr.contains(&0x1b) && text(&output.stderr).contains("red"),
-        "{}",
-        text(&output.stderr)
-    );
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The harness as a child process, its specs, and what it leaves in a folder.
 #![allow(dead_code, unused_imports)] // each test file uses some of it
 
-#[path = "../../../bvh-terminal/tests/program/mod.rs"]
+#[path = "../../../bvh-cli/tests/program/mod.rs"]
 mod program;
 
 use bvh_core::Bvh;

@@ -1,9 +1,8 @@
 //! The buffers of a glTF file. A buffer is read when a mesh first needs it, and a file once.
 
 use super::{MOST_BYTES, OutsideFiles};
-use crate::read;
+use crate::files::{read, regular};
 use base64::Engine as _;
-use bvh_files::regular;
 use gltf_json::{Buffer, Root};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;

@@ -1,9 +1,6 @@
 //! Ctrl-C and SIGTERM. The first signal lets a command end in order; the second ends it at once.
-//! The signal for files that become too large ends nothing: the write fails instead.
 
 use crate::output::print_error;
-#[cfg(unix)]
-use nix::sys::signal::{SigSet, Signal};
 use std::process::exit;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Duration;
@@ -21,16 +18,8 @@ const CODE: u8 = 130;
 /// and loses no finished run.
 const GRACE: Duration = Duration::from_millis(800);
 
-/// Begins to listen to signals. Prints `message` if the program is ended by force. Must be called
-/// before the program starts threads.
-pub fn listen(message: &'static str) {
-    // Threads and external programs inherit the blocked signals of the thread that starts them.
-    #[cfg(unix)]
-    if let Err(error) = SigSet::from(Signal::SIGXFSZ).thread_block() {
-        print_error(&format!(
-            "warning: a file that becomes too large will end the program: {error}"
-        ));
-    }
+/// Begins to listen to signals.
+pub fn listen() {
     let handler = ctrlc::set_handler(move || {
         if INTERRUPTED.swap(true, Relaxed) {
             exit(CODE.into());
@@ -39,7 +28,7 @@ pub fn listen(message: &'static str) {
         std::thread::spawn(move || {
             std::thread::sleep(GRACE);
             if !HELD.load(Relaxed) {
-                print_error(message);
+                print_error("error: interrupted");
                 exit(CODE.into());
             }
         });

@@ -1,6 +1,7 @@
 //! Arguments of several commands, and the check of paths before any work.
 
 use crate::Error;
+use bvh_scenes::files::{Reserved, WriteError};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -82,7 +83,6 @@ pub fn output_file(flag: &str, path: &Path, kind: &FileKind) -> Result<(), Error
     }
 }
 
-/// Returns the folder of a file.
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
@@ -107,6 +107,13 @@ pub fn output_or_free(
     Ok(path)
 }
 
+/// Reserves bytes of the file to write. At a path that is not `given` by the user, a file that
+/// somebody creates meanwhile stays.
+pub fn reserve(path: &Path, given: bool, bytes: usize) -> Result<Reserved, WriteError> {
+    let reserve = if given { Reserved::new } else { Reserved::new_file };
+    reserve(path, bytes)
+}
+
 /// Checks the path of a folder to write into: an existing folder, or one that can be created
 /// because no part of its path is a file.
 pub fn output_folder(flag: &str, path: &Path) -> Result<(), Error> {
@@ -118,11 +125,6 @@ pub fn output_folder(flag: &str, path: &Path) -> Result<(), Error> {
         Some(above) if !above.is_dir() => reject(flag, above, "a file", "the path of a folder"),
         _ => Ok(()),
     }
-}
-
-/// Checks the path of a folder to read.
-pub fn input_folder(flag: &str, path: &Path) -> Result<(), Error> {
-    if path.is_dir() { Ok(()) } else { reject(flag, path, "no folder", "a folder that is there") }
 }
 
 /// Checks the path of a file to read.

@@ -1,18 +1,11 @@
-//! Files that `bvh_files` replaces as a whole, and folders.
+//! Folders of results, and files in them that must be on the disk.
 
 use crate::Error;
-pub use bvh_files::{Reserved, WriteError, write};
+pub use bvh_scenes::files::write;
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::Path;
-
-/// Reserves bytes of the file to write. At a path that is not `given` by the user, a file that
-/// somebody creates meanwhile stays.
-pub fn reserve(path: &Path, given: bool, bytes: usize) -> Result<Reserved, WriteError> {
-    let reserve = if given { Reserved::new } else { Reserved::new_file };
-    reserve(path, bytes)
-}
 
 /// Writes a new file and waits until it is on the disk.
 pub fn write_synced(path: &Path, bytes: &[u8]) -> Result<(), Error> {

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// True after a failed write to standard output.
-pub static STDOUT_FAILED: AtomicBool = AtomicBool::new(false);
+static STDOUT_FAILED: AtomicBool = AtomicBool::new(false);
 
 /// Prints text to standard output, and ends the line. A reader that closes the pipe early, like
 /// `head`, causes no error, because the results are in files.

@@ -1,0 +1,320 @@
+//! Files that are read only where they are regular, and replaced whole or not at all.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Read, Seek, Write};
+use std::path::{Path, PathBuf};
+use std::str::Utf8Error;
+use tempfile::NamedTempFile;
+
+/// The reason why a file cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each message describes its fields")]
+pub enum ReadError {
+    /// The path does not exist.
+    #[error("{}: no such file", .path.display())]
+    NotFound { path: PathBuf },
+    /// The path is a folder.
+    #[error("{}: a folder; accepted: a file", .path.display())]
+    Folder { path: PathBuf },
+    /// The path is a device, pipe or socket, which might never end.
+    #[error("{}: not a regular file; accepted: a file", .path.display())]
+    NotRegular { path: PathBuf },
+    /// The text is not UTF-8.
+    #[error("{}: {source}; accepted: UTF-8", .path.display())]
+    NotUtf8 { path: PathBuf, source: Utf8Error },
+    /// The file exists, but the system cannot read it.
+    #[error("{} could not be read: {source}", .path.display())]
+    Failed { path: PathBuf, source: io::Error },
+}
+
+impl ReadError {
+    /// Returns the kind of error that the operating system would report. Bindings choose their
+    /// exception by it.
+    pub fn kind(&self) -> io::ErrorKind {
+        match self {
+            Self::NotFound { .. } => io::ErrorKind::NotFound,
+            Self::Folder { .. } => io::ErrorKind::IsADirectory,
+            Self::NotRegular { .. } => io::ErrorKind::InvalidInput,
+            Self::NotUtf8 { .. } => io::ErrorKind::InvalidData,
+            Self::Failed { source, .. } => source.kind(),
+        }
+    }
+
+    /// Returns whether the path is at fault and not the system.
+    pub fn is_of_the_path(&self) -> bool {
+        !matches!(self, Self::Failed { .. })
+    }
+}
+
+/// Returns the text of the regular file at `path`.
+pub fn read_text(path: &Path) -> Result<String, ReadError> {
+    String::from_utf8(read(path)?).map_err(|error| ReadError::NotUtf8 {
+        path: path.to_path_buf(),
+        source: error.utf8_error(),
+    })
+}
+
+/// Returns the bytes of the regular file at `path`. Rejects anything else unread, because a pipe
+/// could block the program and a device might never end.
+pub fn read(path: &Path) -> Result<Vec<u8>, ReadError> {
+    regular(path)?;
+    fs::read(path).map_err(|source| failed(path, source))
+}
+
+/// Returns the number of bytes of the regular file at `path`.
+pub fn regular(path: &Path) -> Result<u64, ReadError> {
+    let file = fs::metadata(path).map_err(|source| failed(path, source))?;
+    match file.is_file() {
+        true => Ok(file.len()),
+        false if file.is_dir() => Err(ReadError::Folder { path: path.to_path_buf() }),
+        false => Err(ReadError::NotRegular { path: path.to_path_buf() }),
+    }
+}
+
+fn failed(path: &Path, source: io::Error) -> ReadError {
+    let path = path.to_path_buf();
+    match source.kind() {
+        io::ErrorKind::NotFound => ReadError::NotFound { path },
+        _ => ReadError::Failed { path, source },
+    }
+}
+
+/// A failure to write a file.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: cannot {action}: {source}", .path.display())]
+pub struct WriteError {
+    /// The file to write.
+    pub path: PathBuf,
+    /// The operation, after 'cannot'.
+    pub action: &'static str,
+    /// The system's error.
+    pub source: io::Error,
+}
+
+impl WriteError {
+    fn of(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self { path: path.to_owned(), action, source }
+    }
+}
+
+/// Replaces the contents of the file at `path` by `bytes`. At any moment the file is the old one or
+/// the complete new one.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    Reserved::new(path, 0)?.write(&[bytes])
+}
+
+/// A file whose space on the disk is reserved before its contents exist. A search of hours thus
+/// learns at its beginning and not at its end that its result cannot be saved. Dropping it leaves
+/// no file behind.
+#[derive(Debug)]
+pub struct Reserved {
+    path: PathBuf,
+    new: NamedTempFile,
+    /// True if a file that somebody else creates meanwhile is not replaced.
+    only_new: bool,
+}
+
+impl Reserved {
+    /// Reserves `bytes` bytes in a file with a temporary name next to `path`.
+    pub fn new(path: &Path, bytes: usize) -> Result<Self, WriteError> {
+        // Renaming onto a symbolic link would replace the link instead of the file.
+        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let mut new = create_beside(&path)?;
+        reserve(new.as_file_mut(), bytes)
+            .map_err(WriteError::of(&path, "reserve the file's space"))?;
+        Ok(Self { path, new, only_new: false })
+    }
+
+    /// Reserves like [`new`](Self::new) for a name that nobody gave, at which there is no file. If
+    /// somebody creates one meanwhile, it stays: writing then fails, and the error names the file
+    /// with the bytes.
+    pub fn new_file(path: &Path, bytes: usize) -> Result<Self, WriteError> {
+        let reserved = Self::new(path, bytes)?;
+        Ok(Self { only_new: true, ..reserved })
+    }
+
+    /// Writes the sections one after the other, syncs the file, and renames it. At any moment the
+    /// file at the path is the old one or the complete new one.
+    pub fn write(self, sections: &[&[u8]]) -> Result<(), WriteError> {
+        let Self { path, mut new, only_new } = self;
+        // The user may have removed it during hours of search.
+        if !new.path().exists() {
+            new = create_beside(&path)?;
+        }
+        overwrite(new.as_file_mut(), sections).map_err(WriteError::of(&path, "write the file"))?;
+        let persisted = if only_new { new.persist_noclobber(&path) } else { new.persist(&path) };
+        persisted.map_err(|unnamed| WriteError::of(&path, "replace the file")(kept(unnamed)))?;
+        // The new name must outlast a loss of power. Where folders cannot be synced, the old file
+        // may come back, complete.
+        if let Ok(folder) = File::open(folder_of(&path)) {
+            let _ = folder.sync_all();
+        }
+        Ok(())
+    }
+}
+
+/// Creates a file with a temporary name beside the file at `path`, and with the permissions of the
+/// file there, because whoever may not read the old file may not read the new one.
+fn create_beside(path: &Path) -> Result<NamedTempFile, WriteError> {
+    let old = fs::metadata(path).ok();
+    if path.file_name().is_none() || old.as_ref().is_some_and(|old| !old.is_file()) {
+        let error = io::Error::other("not a regular file");
+        return Err(WriteError::of(path, "replace the file")(error));
+    }
+    let mut builder = tempfile::Builder::new();
+    builder.prefix("bvh-").suffix(".new");
+    // Temporary files are private by default; this one becomes an ordinary file.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let new = builder
+        .tempfile_in(folder_of(path))
+        .map_err(WriteError::of(path, "write the file: cannot create a file there"))?;
+    #[cfg(unix)]
+    if let Some(old) = old {
+        new.as_file()
+            .set_permissions(old.permissions())
+            .map_err(WriteError::of(path, "give the new file the old one's permissions"))?;
+    }
+    Ok(new)
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Fills the beginning of a new file. Written zeros reserve space on every file system; a mere
+/// length may be a hole.
+fn reserve(file: &mut File, bytes: usize) -> io::Result<()> {
+    // The kernel caches large writes in large pages, which it maps faster than many small ones.
+    const PIECE: usize = 1 << 21;
+    if bytes == 0 {
+        return Ok(());
+    }
+    let mut pieces = BufWriter::with_capacity(PIECE, file);
+    io::copy(&mut io::repeat(0).take(bytes as u64), &mut pieces)?;
+    pieces.flush()?;
+    pieces.get_ref().sync_all()
+}
+
+/// Replaces the contents of an open file by the sections.
+fn overwrite(file: &mut File, sections: &[&[u8]]) -> io::Result<()> {
+    file.rewind()?;
+    sections.iter().try_for_each(|section| file.write_all(section))?;
+    // The reserved space may be larger than the contents.
+    let end = file.stream_position()?;
+    file.set_len(end)?;
+    file.sync_all()
+}
+
+/// Keeps a complete file that could not get its name, because the old file is in use on Windows or
+/// is a folder by now. Returns the failure, which names the kept file.
+fn kept(unnamed: tempfile::PersistError) -> io::Error {
+    let tempfile::PersistError { error, file } = unnamed;
+    match file.keep() {
+        Ok((_, path)) => {
+            let message = format!("{error}; the new file is complete, as {}", path.display());
+            io::Error::new(error.kind(), message)
+        }
+        Err(_) => error,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<PathBuf> {
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect()
+    }
+
+    #[test]
+    fn folders_devices_and_missing_files_are_rejected_unread() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(matches!(read(folder.path()), Err(ReadError::Folder { .. })));
+        assert!(matches!(read(&folder.path().join("x")), Err(ReadError::NotFound { .. })));
+        #[cfg(unix)]
+        assert!(matches!(read(Path::new("/dev/zero")), Err(ReadError::NotRegular { .. })));
+    }
+
+    #[test]
+    fn a_reserved_file_replaces_the_old_one_only_when_it_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.bvh");
+        fs::write(&path, "old").unwrap();
+        for is_removed in [false, true] {
+            let reserved = Reserved::new(&path, 1000).unwrap();
+            assert_eq!(fs::metadata(reserved.new.path()).unwrap().len(), 1000);
+            drop(reserved);
+            assert_eq!((fs::read(&path).unwrap(), names(folder.path()).len()), (b"old".into(), 1));
+            let reserved = Reserved::new(&path, 1000).unwrap();
+            if is_removed {
+                fs::remove_file(reserved.new.path()).unwrap();
+            }
+            reserved.write(&[b"the ", b"new"]).unwrap();
+            assert_eq!(fs::read(&path).unwrap(), b"the new");
+            assert_eq!(names(folder.path()).len(), 1);
+            write(&path, b"old").unwrap();
+        }
+    }
+
+    #[test]
+    fn bytes_that_cannot_get_the_name_of_the_file_are_kept_under_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.bvh");
+        let kept = |reserved: Reserved| {
+            let error = reserved.write(&[b"the work of hours"]).unwrap_err().to_string();
+            let kept = names(folder.path()).into_iter().find(|name| *name != path).unwrap();
+            assert!(error.contains(&kept.display().to_string()), "{error}");
+            assert_eq!(fs::read(&kept).unwrap(), b"the work of hours");
+            fs::remove_file(kept).unwrap();
+        };
+        let reserved = Reserved::new(&path, 1000).unwrap();
+        fs::create_dir(&path).unwrap();
+        kept(reserved);
+        fs::remove_dir(&path).unwrap();
+        let reserved = Reserved::new_file(&path, 10).unwrap();
+        fs::write(&path, "notes").unwrap();
+        kept(reserved);
+        assert_eq!(fs::read(&path).unwrap(), b"notes");
+    }
+
+    #[test]
+    fn writers_of_one_file_at_the_same_time_all_succeed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = &folder.path().join("x.bvh");
+        std::thread::scope(|scope| {
+            for writer in 0..4 {
+                scope.spawn(move || (0..50).for_each(|_| write(path, &[writer; 100]).unwrap()));
+            }
+        });
+        let bytes = fs::read(path).unwrap();
+        assert!(bytes.len() == 100 && bytes.iter().all(|byte| *byte == bytes[0]), "{bytes:?}");
+        assert_eq!(names(folder.path()).len(), 1);
+    }
+
+    #[test]
+    fn only_regular_files_are_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        for wrong in [folder.path(), &folder.path().join("no/x.bvh"), Path::new("/dev/null")] {
+            assert!(Reserved::new(wrong, 1).is_err(), "{}", wrong.display());
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_stay_and_a_new_file_has_the_permissions_of_the_old_one() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.bvh");
+        let link = folder.path().join("link");
+        symlink("x.bvh", &link).unwrap();
+        fs::write(&path, "old").unwrap();
+        for mode in [0o600, 0o666, 0o444] {
+            fs::set_permissions(&path, PermissionsExt::from_mode(mode)).unwrap();
+            write(&link, b"new").unwrap();
+            assert!(link.is_symlink());
+            assert_eq!(fs::read(&path).unwrap(), b"new");
+            assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, mode);
+        }
+    }
+}
