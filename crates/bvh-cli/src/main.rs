@@ -5,6 +5,7 @@ mod bake;
 mod commands;
 mod csv_table;
 mod error;
+mod explain;
 mod inspect;
 mod interrupt;
 mod memory;

@@ -13,7 +13,6 @@
 //! files as a whole; [`tree_file`] reads the trees of scenes.
 
 pub mod builtin;
-pub mod explain;
 pub mod files;
 mod fnv;
 pub mod load;

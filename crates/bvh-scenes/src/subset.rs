@@ -1,7 +1,7 @@
 //! Subsets of scenes by name: evenly spaced, at random, or around one object.
 
 use bvh_core::Aabb;
-use bvh_search::Stream;
+use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 
@@ -55,10 +55,10 @@ impl Subset {
             Self::Spaced(count) => (0..count).map(|index| index * all / count).collect(),
             Self::Random(count, seed) => {
                 let mut objects: Vec<usize> = (0..all).collect();
-                objects.partial_shuffle(&mut Stream::seed_from_u64(seed), count).0.to_vec()
+                objects.partial_shuffle(&mut ChaCha8Rng::seed_from_u64(seed), count).0.to_vec()
             }
             Self::Cluster(count, seed) => {
-                let middle = Stream::seed_from_u64(seed).random_range(0..all);
+                let middle = ChaCha8Rng::seed_from_u64(seed).random_range(0..all);
                 let center = boxes[middle].doubled_centroid();
                 let distances: Vec<_> = boxes
                     .iter()

@@ -11,14 +11,15 @@ mod watch;
 
 use crate::Error;
 use crate::arguments::{FileKind, Jobs, input_file, output_file, output_or_free, reserve};
+use crate::explain;
 use crate::output::print_line;
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use bvh_core::Bvh;
 use bvh_core::cost::Objective;
 use bvh_core::file::Header;
+use bvh_scenes::Scene;
 use bvh_scenes::files::Reserved;
-use bvh_scenes::{Scene, explain};
 use bvh_search::best::{self, Horizon};
 use bvh_search::{Method, StopReason};
 use clap::Args;

@@ -5,8 +5,8 @@
 //! the triangle over its diagonal. The same number gives the same scene on every machine.
 
 use bvh_core::{Aabb, Triangle};
-use bvh_search::Stream;
 use glam::Vec3;
+use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 
@@ -69,24 +69,24 @@ fn cube(min: Vec3, size: f32) -> Triangle {
     diagonal(Aabb { min, max: min + size })
 }
 
-fn random(salt: u64) -> Stream {
-    Stream::seed_from_u64(salt)
+fn random(salt: u64) -> ChaCha8Rng {
+    ChaCha8Rng::seed_from_u64(salt)
 }
 
 /// Draws a uniform point in the cube from 0 to `size`.
-fn point(rng: &mut Stream, size: f32) -> Vec3 {
+fn point(rng: &mut ChaCha8Rng, size: f32) -> Vec3 {
     Vec3::from([(); 3].map(|()| rng.random::<f32>())) * size
 }
 
 /// Draws a triangle with this corner and edges of at most `size` along every axis.
-fn around(rng: &mut Stream, corner: Vec3, size: f32) -> Triangle {
+fn around(rng: &mut ChaCha8Rng, corner: Vec3, size: f32) -> Triangle {
     Triangle([corner, corner + point(rng, size), corner + point(rng, size)])
 }
 
 fn many(
     n: usize,
     salt: u64,
-    mut make: impl FnMut(&mut Stream, usize) -> Triangle,
+    mut make: impl FnMut(&mut ChaCha8Rng, usize) -> Triangle,
 ) -> Vec<Triangle> {
     let mut rng = random(salt);
     (0..n).map(|i| make(&mut rng, i)).collect()

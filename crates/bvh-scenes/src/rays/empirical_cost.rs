@@ -8,8 +8,8 @@ use super::random::{Family, Kind, random_ray};
 use crate::trace::{Accelerator, Query};
 use bvh_config::config;
 use bvh_core::{Aabb, Bvh, Primitives, Ray, TestCounts, WideBvh};
-use bvh_search::Stream;
 use rand::SeedableRng;
+use rand::rngs::ChaCha8Rng;
 use rayon::prelude::*;
 
 config! {
@@ -140,7 +140,7 @@ fn measure_chunk(
     seed: u64,
     chunk: u64,
 ) -> Sums {
-    let mut rng = Stream::seed_from_u64(seed);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // Streams by chunk make the rays independent of the number of threads.
     rng.set_stream(chunk);
     let mut sums = Sums::default();

@@ -4,8 +4,8 @@ use super::camera::{Camera, View};
 use crate::Scene;
 use crate::trace::{Accelerator, Query};
 use bvh_core::{Aabb, Bvh, Coherence, Ray};
-use bvh_search::Stream;
 use glam::{DVec3, Vec3};
+use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
 bvh_config::config! {
@@ -20,7 +20,7 @@ bvh_config::config! {
 }
 
 /// Returns a random ray of a family; `None` if the box is too small or too large for a ray.
-pub fn random_ray(family: Family, root: &Aabb, rng: &mut Stream) -> Option<Ray> {
+pub fn random_ray(family: Family, root: &Aabb, rng: &mut ChaCha8Rng) -> Option<Ray> {
     let low = root.min.as_dvec3();
     let size = root.extent();
     let inside = DVec3::from_array(rng.random());
@@ -49,7 +49,7 @@ pub fn random_ray(family: Family, root: &Aabb, rng: &mut Stream) -> Option<Ray> 
 
 /// Returns a uniform point on the unit sphere: the direction of a uniform point in the unit ball,
 /// which needs no function that differs between machines.
-pub fn on_sphere(rng: &mut Stream) -> DVec3 {
+pub fn on_sphere(rng: &mut ChaCha8Rng) -> DVec3 {
     loop {
         let unit = DVec3::from_array(rng.random());
         let point = unit * 2.0 - 1.0;
@@ -147,12 +147,12 @@ pub fn rays(
     let Some(root) = tree.root_aabb() else { return Vec::new() };
     match kind {
         Kind::Incoherent => {
-            let mut rng = Stream::seed_from_u64(seed);
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
             (0..count).filter_map(|_| random_ray(Family::Inside, &root, &mut rng)).collect()
         }
         Kind::Primary => primary_rays(count, &root, viewpoint),
         Kind::Bounce => {
-            let mut rng = Stream::seed_from_u64(seed);
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let primary = primary_rays(count, &root, viewpoint);
             // Many primary rays miss. Repeating the hits keeps the number of rays, which times are
             // compared over.

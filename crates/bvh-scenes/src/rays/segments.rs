@@ -7,8 +7,8 @@ use crate::Scene;
 use crate::trace::Accelerator;
 use bvh_config::{OutOfRange, above, config};
 use bvh_core::{Aabb, Bvh, Ray, RayDensity, Segment};
-use bvh_search::Stream;
 use glam::{DVec3, Vec3};
+use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use std::ops::Bound::Excluded;
 
@@ -184,7 +184,7 @@ pub fn of_inside(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<Traced
 struct Tracing<'a> {
     accelerator: Accelerator<'a>,
     bounds: Aabb,
-    rng: Stream,
+    rng: ChaCha8Rng,
     rays: Vec<TracedRay>,
 }
 
@@ -192,7 +192,7 @@ impl<'a> Tracing<'a> {
     fn new(scene: &'a Scene, tree: &'a Bvh, seed: u64) -> Self {
         let accelerator = Accelerator::of_tree(&scene.primitives, tree);
         let bounds = tree.root_aabb().unwrap_or(Aabb::EMPTY);
-        Self { accelerator, bounds, rng: Stream::seed_from_u64(seed), rays: Vec::new() }
+        Self { accelerator, bounds, rng: ChaCha8Rng::seed_from_u64(seed), rays: Vec::new() }
     }
 
     /// Keeps a ray that needs its nearest hit. Returns a point just before the hit, where further

@@ -1,7 +1,7 @@
 //! A path tracer that records the segments of a frame, bakes a tree for them, and traces the next
 //! frame with it: cut-out triangles, instances, a refitted flag, a light, diffuse reflections.
 //!
-//! `cargo run -p bvh-scenes --example path_tracer [SCENE [SECONDS]]`, by default `cloister` and 2
+//! `cargo run -p bvh-search --example path_tracer [SCENE [SECONDS]]`, by default `cloister` and 2
 
 use bvh_scenes::Scene;
 use bvh_scenes::rays::{Camera, Kind, TracedRay, View, in_box, on_sphere, tests_per_ray};

@@ -1,8 +1,8 @@
 //! Lists, before the work begins, the steps that a scene does not need and that are skipped.
 
-use crate::Scene;
 use bvh_build::BuildError;
 use bvh_core::Primitives;
+use bvh_scenes::Scene;
 use bvh_search::shortcuts::Facts;
 
 /// Lists the skipped steps of a scene, one line each.
