@@ -2,8 +2,6 @@
 
 use crate::Error;
 use bvh_scenes::files::{Reserved, WriteError};
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The limit on the program's threads.
@@ -31,55 +29,22 @@ fn reject(flag: &str, path: &Path, found: &str, accepted: &str) -> Result<(), Er
     Err(Error::Usage(format!("{flag}: {} is {found}; accepted: {accepted}", path.display())))
 }
 
-/// A kind of files that a command writes.
-#[derive(Clone, Copy, Debug)]
-pub struct FileKind {
-    /// The name in messages, with an article.
-    pub name: &'static str,
-    /// The first bytes of every file of this kind.
-    pub beginning: &'static [u8],
-    /// The extension of their names.
-    pub extension: &'static str,
-}
-
-/// Checks the path of a file to write: a new file, or a file of the same kind, which is replaced.
-/// Rejects folders, devices and files of other kinds, such as the command's own input.
-pub fn output_file(flag: &str, path: &Path, kind: &FileKind) -> Result<(), Error> {
-    let accepted = "the path of a file to write";
-    if path.as_os_str().is_empty() {
-        return reject(flag, path, "empty", accepted);
-    }
+/// Checks the path of a file to write: its name must have this ending, so that no file of another
+/// kind is replaced, such as the command's own input.
+pub fn output_file(flag: &str, path: &Path, ending: &str) -> Result<(), Error> {
+    let has_ending = path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending));
     match std::fs::metadata(path) {
+        _ if !has_ending => {
+            let accepted = format!("a name that ends with .{ending}");
+            Err(Error::Usage(format!("{flag}: {}; accepted: {accepted}", path.display())))
+        }
+        Ok(found) if !found.is_file() => {
+            reject(flag, path, "not a regular file", "the path of a file to write")
+        }
         Err(_) if !folder_of(path).is_dir() => {
             reject(flag, folder_of(path), "no folder", "a path in a folder that is there")
         }
-        Err(_) => match path.extension() {
-            // Users would mistake the new file for a file of the other kind.
-            Some(extension) if !extension.eq_ignore_ascii_case(kind.extension) => {
-                let found = format!("a name that ends with `.{}`", extension.display());
-                let accepted = format!(
-                    "{}, by a name that ends with `.{}` or has no ending",
-                    kind.name, kind.extension
-                );
-                reject(flag, path, &found, &accepted)
-            }
-            _ => Ok(()),
-        },
-        Ok(found) if found.is_dir() => reject(flag, path, "a folder", accepted),
-        Ok(found) if !found.is_file() => reject(flag, path, "not a regular file", accepted),
-        Ok(_) => {
-            let mut beginning = Vec::new();
-            File::open(path)
-                .map(|file| file.take(kind.beginning.len() as u64))
-                .and_then(|mut file| file.read_to_end(&mut beginning))
-                .map_err(Error::io(path, "read the file"))?;
-            // An empty file has nothing to lose; `mktemp` makes one.
-            if beginning.is_empty() || beginning == kind.beginning {
-                return Ok(());
-            }
-            let found = format!("a file, but not {}", kind.name);
-            reject(flag, path, &found, "a new file, or one of that kind")
-        }
+        _ => Ok(()),
     }
 }
 

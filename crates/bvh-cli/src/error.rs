@@ -49,9 +49,6 @@ pub enum Error {
     /// A picture cannot be traced with the structure.
     #[error(transparent)]
     Structure(#[from] StructureError),
-    /// Ctrl-C ended a picture.
-    #[error("interrupted; no picture was written")]
-    Abandoned,
     /// Ctrl-C ended a measurement.
     #[error("interrupted; nothing was written")]
     Unmeasured,
@@ -96,7 +93,6 @@ impl Error {
             Self::Stopped { .. }
             | Self::StoppedInstances { .. }
             | Self::StoppedParts { .. }
-            | Self::Abandoned
             | Self::Unmeasured
             | Self::NoTree => 130,
             Self::Io { .. }

@@ -1,7 +1,7 @@
 //! `bvh inspect` and `bvh verify`: report the origin of a tree file, and the costs and the shape of
 //! its tree.
 
-use crate::arguments::{FileKind, output_file};
+use crate::arguments::output_file;
 use crate::output::print_line;
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
@@ -21,7 +21,6 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
 /// Report the origin of a tree file, and the costs, depth, arity and validity of its tree.
 #[derive(Args, Clone, Debug)]
@@ -48,9 +47,6 @@ pub struct InspectArgs {
     pub json: bool,
 }
 
-/// The kind of the table of nodes.
-const NODES: FileKind =
-    FileKind { name: "a CSV file of nodes", beginning: b"node,parent,", extension: "csv" };
 /// The columns of the nodes, which docs/TREE_FILES.md describes.
 const COLUMNS: &str = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
 
@@ -78,10 +74,10 @@ impl Serialize for Facts {
 
 /// Inspects a file, and prints each fact as a line `name: value`, or all as JSON. Rejects a damaged
 /// file, and a file for a different scene.
-pub fn inspect(args: &InspectArgs, interrupted: &AtomicBool) -> Result<(), Error> {
+pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     // A wrong path is reported before the scene is loaded, which may take long.
     if let Some(nodes) = &args.nodes {
-        output_file("--nodes", nodes, &NODES)?;
+        output_file("--nodes", nodes, "csv")?;
     }
     let rays = args.rays.as_deref().map(Rays::read).transpose()?;
     let scene = args.scene.as_deref().map(|name| args.files.load(name)).transpose()?;
@@ -90,7 +86,7 @@ pub fn inspect(args: &InspectArgs, interrupted: &AtomicBool) -> Result<(), Error
     }
     let (tree, mut facts) = examine(&args.file, scene.as_ref())?;
     if let (Some(rays), Some(scene)) = (rays, &scene) {
-        let tests = rays.expected_tests(&tree, scene, interrupted)?;
+        let tests = rays.expected_tests(&tree, scene)?;
         facts.add("expected tests of a ray", tests);
     }
     if let Some(path) = &args.nodes {

@@ -77,10 +77,10 @@ fn run(command: Command) -> Result<(), Error> {
             Some(count) => bake::parts::bake(&args, count, &INTERRUPTED),
             None => bake::bake(&args, &INTERRUPTED),
         },
-        Command::Inspect(args) => inspect::inspect(&args, &INTERRUPTED),
+        Command::Inspect(args) => inspect::inspect(&args),
         Command::Verify(args) => inspect::verify(&args),
-        Command::Render(args) => render::render(&args, &INTERRUPTED),
-        Command::Report(args) => report::report(&args, &INTERRUPTED),
+        Command::Render(args) => render::render(&args),
+        Command::Report(args) => report::report(&args),
         Command::Scenes => scenes::scenes(),
         Command::Completions { shell } => {
             print_bytes(&commands::completions(shell, &mut Cli::command()));

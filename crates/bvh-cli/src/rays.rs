@@ -1,6 +1,7 @@
 //! The rays of `--rays`, from a file, from a renderer or any through the scene, and their density.
 
 use crate::arguments::input_file;
+use crate::interrupt::INTERRUPTED;
 use crate::{Error, recorded};
 use bvh_config::fault;
 use bvh_core::cost::Objective;
@@ -103,13 +104,8 @@ impl Rays {
 
     /// Returns the expected number of tests of a ray that enters the scene, in the wide layout of a
     /// tree. No bake trains on the same default rays.
-    pub fn expected_tests(
-        &self,
-        tree: &Bvh,
-        scene: &Scene,
-        interrupted: &AtomicBool,
-    ) -> Result<f64, Error> {
-        let density = self.density(scene, tree, Self::JUDGING, interrupted)?;
+    pub fn expected_tests(&self, tree: &Bvh, scene: &Scene) -> Result<f64, Error> {
+        let density = self.density(scene, tree, Self::JUDGING, &INTERRUPTED)?;
         let density = density.ok_or(Error::Unmeasured)?;
         let tests = Objective::Layout.cost_by(tree, &density);
         let root = tree.root_aabb().map_or(0.0, |root| density.measure(&root));

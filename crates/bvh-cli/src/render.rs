@@ -1,7 +1,7 @@
 //! `bvh render`: draws a scene into a PNG file, and prints times and counts.
 
 use crate::Error;
-use crate::arguments::{FileKind, Jobs, input_file, output_file};
+use crate::arguments::{Jobs, input_file, output_file};
 use crate::output::print_line;
 use crate::scene_files::SceneFiles;
 use bvh_core::Aabb;
@@ -14,7 +14,6 @@ use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Instant;
 
 /// Draw a scene with a small Whitted ray tracer. The picture is the same with any structure.
@@ -78,8 +77,6 @@ pub struct RenderArgs {
     pub jobs: Jobs,
 }
 
-/// The kind of pictures.
-const PICTURE: FileKind = FileKind { name: "a PNG file", beginning: b"\x89PNG", extension: "png" };
 /// The largest number of pixels of a picture. With their counts they need a gigabyte.
 const LARGEST: u64 = 100_000_000;
 
@@ -137,11 +134,11 @@ impl RenderArgs {
 }
 
 /// Draws the picture, writes it, and prints its times.
-pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> {
+pub fn render(args: &RenderArgs) -> Result<(), Error> {
     if args.accel.ends_with(".bvh") {
         input_file("--accel", Path::new(&args.accel))?;
     }
-    output_file("--out", &args.out, &PICTURE)?;
+    output_file("--out", &args.out, "png")?;
     args.jobs.apply()?;
     let scene = args.files.load(&args.scene)?;
     if args.heatmap && args.accel == "wide" {
@@ -161,12 +158,8 @@ pub fn render(args: &RenderArgs, interrupted: &AtomicBool) -> Result<(), Error> 
         ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
     bar.set_message(scene.name.clone());
-    let film = draw(&scene, &accelerator, &options, &|| {
-        bar.inc(1);
-        !interrupted.load(Relaxed)
-    });
+    let film = draw(&scene, &accelerator, &options, &|| bar.inc(1));
     bar.finish_and_clear();
-    let film = film.ok_or(Error::Abandoned)?;
     let rendered = start.elapsed().as_secs_f64() - built;
     let rays_per_pixel = options.samples * options.samples;
     write(args, &film, rays_per_pixel)?;

@@ -10,14 +10,13 @@ mod starts;
 mod watch;
 
 use crate::Error;
-use crate::arguments::{FileKind, Jobs, input_file, output_file, output_or_free, reserve};
+use crate::arguments::{Jobs, input_file, output_file, output_or_free, reserve};
 use crate::explain;
 use crate::output::print_line;
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use bvh_core::Bvh;
 use bvh_core::cost::Objective;
-use bvh_core::file::Header;
 use bvh_scenes::Scene;
 use bvh_scenes::files::Reserved;
 use bvh_search::best::{self, Horizon};
@@ -105,9 +104,6 @@ pub enum BakeCost {
     Layout,
 }
 
-/// The kind of baked trees.
-const TREE: FileKind =
-    FileKind { name: "a tree file", beginning: &Header::MAGIC, extension: "bvh" };
 /// The method that can continue from a given tree.
 const BEST: &str = "best";
 
@@ -262,7 +258,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         input_file("--from", from)?;
     }
     let out = args.out()?;
-    output_file("--out", &out, &TREE)?;
+    output_file("--out", &out, "bvh")?;
     let plan = args.plan()?;
     args.jobs.apply()?;
     // A decision may add references later.

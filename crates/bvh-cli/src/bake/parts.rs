@@ -3,7 +3,7 @@
 
 use super::instances::{Interruption, bake_part};
 use super::plan::{Plan, Prepared, Start};
-use super::{BakeArgs, TREE, search_and_save};
+use super::{BakeArgs, search_and_save};
 use crate::Error;
 use crate::arguments::output_file;
 use crate::output::print_line;
@@ -44,7 +44,7 @@ impl Part {
 /// Lists the parts, bakes one part, or bakes the missing parts and joins all.
 pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(), Error> {
     let out = args.out()?;
-    output_file("--out", &out, &TREE)?;
+    output_file("--out", &out, "bvh")?;
     let plan = args.plan()?;
     args.jobs.apply()?;
     let scene = args.files.load(&args.scene)?;

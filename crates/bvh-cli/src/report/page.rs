@@ -1,6 +1,5 @@
 //! The page as HTML: one file without scripts, with its pictures inside.
 
-use super::levels::Level;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::fmt::Write;
@@ -35,7 +34,8 @@ pub struct Page<'a> {
     pub scene: Vec<u8>,
     /// The heat of both trees under one scale.
     pub heat: [Heat; 2],
-    pub levels: [&'a [Level]; 2],
+    /// The area of the inner nodes at each depth, over the root's.
+    pub levels: [Vec<f64>; 2],
 }
 
 impl Page<'_> {
@@ -52,8 +52,7 @@ impl Page<'_> {
             );
             heat += &picture(png, &caption);
         }
-        let area = chart(self.levels, |level| level.area);
-        let overlap = chart(self.levels, |level| level.overlap);
+        let area = chart(&self.levels);
         let version = env!("CARGO_PKG_VERSION");
         format!(
             "<!DOCTYPE html>
@@ -74,9 +73,6 @@ tree.</p>
 <p>The area of the inner nodes at each depth over the root's area: how many of them a random line
 visits.</p>
 {area}
-<h2>Overlap by level</h2>
-<p>The area that siblings share at each depth, over the root's area. A ray in it visits both.</p>
-{overlap}
 <footer><p>Written by bvh {version}.</p></footer>
 </body></html>
 "
@@ -125,21 +121,20 @@ fn picture(png: &[u8], caption: &str) -> String {
 }
 
 /// Draws one pair of bars per level.
-fn chart(levels: [&[Level]; 2], value: fn(&Level) -> f64) -> String {
+fn chart(levels: &[Vec<f64>; 2]) -> String {
     let (width, height, base) = CHART;
     let count = levels[0].len().max(levels[1].len()).max(1);
-    let most =
-        levels.iter().flat_map(|tree| tree.iter()).map(value).fold(f64::MIN_POSITIVE, f64::max);
+    let most = levels.iter().flatten().copied().fold(f64::MIN_POSITIVE, f64::max);
     let step = width / count as f64;
     let mut text =
         format!("<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"By level\">\n");
     for (tree, class) in [(0, "baked"), (1, "greedy")] {
-        for (depth, level) in levels[tree].iter().enumerate() {
-            let bar = base * value(level) / most;
+        for (depth, &area) in levels[tree].iter().enumerate() {
+            let bar = base * area / most;
             let x = step * (depth as f64 + 0.1 + 0.4 * tree as f64);
             let y = base - bar;
             let breadth = 0.38 * step;
-            let shown = number(value(level));
+            let shown = number(area);
             // Writing to a string cannot fail.
             let _ = writeln!(
                 text,
@@ -172,14 +167,13 @@ mod tests {
 
     #[test]
     fn a_page_escapes_names_and_refers_to_no_other_file() {
-        let levels = [Level { inner: 1, leaves: 0, area: 1.0, overlap: 0.25 }];
         let page = Page {
             title: "<b> & co",
             origin: "2 objects".into(),
             rows: vec![Row { name: "Depth", baked: 1.0, greedy: 2.0 }],
             scene: vec![1, 2, 3],
             heat: [4, 5].map(|byte| Heat { png: vec![byte], median: 1.0, most: 2.0 }),
-            levels: [&levels, &[]],
+            levels: [vec![1.0], vec![]],
         };
         let html = page.html();
         assert!(html.contains("<h1>&lt;b&gt; &amp; co</h1>"), "{html}");

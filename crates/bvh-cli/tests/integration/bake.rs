@@ -173,7 +173,7 @@ fn invalid_bakes_and_inspections_are_rejected_and_change_no_file() {
     let into = |out: &'static str| vec!["bake", "spheres75", "--budget=0s", "--out", out];
     let kept = |more: &[&'static str]| [&into("good.bvh")[..], more].concat();
     for (args, parts) in [
-        (into("folder"), &["folder is a folder"][..]),
+        (into("folder"), &["folder; accepted"][..]),
         (into("file/x.bvh"), &["file is no folder"]),
         (kept(&["--method", "greedy"]), &["greedy", "accepted: muller_fellner"]),
         (kept(&["--method", "grasp", "--from", "good.bvh"]), &["grasp", "--from", "best"]),

@@ -12,7 +12,7 @@ fn a_report_compares_a_tree_with_the_greedy_tree_on_one_page_and_replaces_no_fil
         let written = said(at, &["report", "a.bvh", scene, "--out=a.html"]);
         assert!(written.contains("a.html"), "{written}");
         let page = fs::read_to_string(at.join("a.html")).unwrap();
-        for part in ["Internal area over root area", "greedy tree: median", "Overlap by level"] {
+        for part in ["Internal area over root area", "greedy tree: median", "Cost by level"] {
             assert!(page.contains(part), "{scene}: {part}");
         }
         assert_eq!(page.matches("data:image/png;base64,").count(), 3, "{scene}");

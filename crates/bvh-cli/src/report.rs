@@ -1,30 +1,26 @@
 //! `bvh report`: one page about a tree file, compared with the plain tree that a library builds.
 
-mod levels;
 mod page;
 
 use crate::Error;
-use crate::arguments::{FileKind, Jobs, output_file, output_or_free, reserve};
+use crate::arguments::{Jobs, output_file, output_or_free, reserve};
 use crate::output::print_line;
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
+use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective};
-use bvh_core::{Bvh, validate_references};
-use bvh_scenes::Scene;
 use bvh_scenes::render::{Film, Options, heat, image, render};
 use bvh_scenes::trace::{Accelerator, Structure};
-use bvh_scenes::tree_file::{self, TreeFileError};
+use bvh_scenes::{Scene, tree_file};
 use clap::Args;
-use levels::Level;
 use page::{Heat, Page, Row};
 use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// Write a page about a tree file: costs by level, overlap, tests of rays as heat, each compared
-/// with the greedy tree of the same scene.
+/// Write a page about a tree file: costs by level and tests of rays as heat, each compared with the
+/// greedy tree of the same scene.
 #[derive(Args, Clone, Debug)]
 pub struct ReportArgs {
     /// The tree file.
@@ -44,35 +40,26 @@ pub struct ReportArgs {
     pub jobs: Jobs,
 }
 
-/// The kind of pages.
-const PAGE: FileKind =
-    FileKind { name: "an HTML page", beginning: b"<!DOCTYPE html>", extension: "html" };
-/// The width and the height of the pictures, in pixels.
-const PICTURE: (u32, u32) = (640, 400);
-
 /// One of the two trees on the page.
 struct Measured {
     tree: Bvh,
-    levels: Vec<Level>,
     /// The expected tests of a ray in the wide layout, for triangles.
     tests: Option<f64>,
     film: Film,
 }
 
 /// Measures the tree in a file and the greedy tree, draws both, and writes the page.
-pub fn report(args: &ReportArgs, interrupted: &AtomicBool) -> Result<(), Error> {
+pub fn report(args: &ReportArgs) -> Result<(), Error> {
     let out = output_or_free("--out", args.out.as_ref(), || args.file.with_extension("html"))?;
-    output_file("--out", &out, &PAGE)?;
+    output_file("--out", &out, "html")?;
     args.jobs.apply()?;
     let scene = args.files.load(&args.scene)?;
     let (tree, header) = tree_file::load(&args.file, &scene)?;
-    validate_references(&tree, &scene.boxes, &scene.primitives)
-        .map_err(|fault| TreeFileError::of(&args.file)(fault.into()))?;
     let greedy = muller_fellner::Config::default()
         .build(&scene.boxes)
         .map_err(Error::search(&scene.name, "muller_fellner"))?;
-    let baked = measure(tree, &scene, interrupted)?;
-    let greedy = measure(greedy, &scene, interrupted)?;
+    let baked = measure(tree, &scene)?;
+    let greedy = measure(greedy, &scene)?;
     let title = format!("{} by {}", scene.name, header.method);
     let page = Page {
         title: &title,
@@ -83,7 +70,7 @@ pub fn report(args: &ReportArgs, interrupted: &AtomicBool) -> Result<(), Error> 
         rows: rows(&baked, &greedy),
         scene: png(&out, &baked.film, &baked.film.pixels)?,
         heat: heat_maps(&out, &baked.film, &greedy.film)?,
-        levels: [&baked.levels, &greedy.levels],
+        levels: [area_by_level(&baked.tree), area_by_level(&greedy.tree)],
     };
     reserve(&out, args.out.is_some(), 0)?.write(&[page.html().as_bytes()])?;
     print_line(&format!("{}: {title}", out.display()));
@@ -91,49 +78,63 @@ pub fn report(args: &ReportArgs, interrupted: &AtomicBool) -> Result<(), Error> 
 }
 
 /// Measures a tree, and draws the scene with it.
-fn measure(tree: Bvh, scene: &Scene, interrupted: &AtomicBool) -> Result<Measured, Error> {
+fn measure(tree: Bvh, scene: &Scene) -> Result<Measured, Error> {
     let tests = match scene.triangles() {
-        Ok(_) => Some(Rays::Default.expected_tests(&tree, scene, interrupted)?),
+        Ok(_) => Some(Rays::Default.expected_tests(&tree, scene)?),
         Err(_) => None,
     };
-    let (width, height) = PICTURE;
-    let options =
-        Options { width, height, samples: 1, depth: 0, view: None, lights: None, ground: false };
+    let options = Options {
+        width: 640,
+        height: 400,
+        samples: 1,
+        depth: 0,
+        ground: false,
+        ..Options::default()
+    };
     let accelerator = Accelerator::new(&scene.primitives, Structure::Tree(Cow::Borrowed(&tree)));
-    let film = render(scene, &accelerator, &options, &|| !interrupted.load(Relaxed))
-        .ok_or(Error::Abandoned)?;
-    let levels = levels::of(&tree);
-    Ok(Measured { tree, levels, tests, film })
+    let film = render(scene, &accelerator, &options, &|| ());
+    Ok(Measured { tree, tests, film })
 }
-
-/// Computes a number from a tree, if it has this number.
-type Fact = fn(&Measured) -> Option<f64>;
 
 /// Compares the two trees, one fact each.
 fn rows(baked: &Measured, greedy: &Measured) -> Vec<Row> {
-    let facts: [(&'static str, Fact); 7] = [
-        ("Internal area over root area", |of| {
-            Some(cost::over_root_area(&of.tree, cost::internal_area(&of.tree)))
-        }),
-        ("Cost of the wide layout by area", |of| {
-            let cost = Objective::Layout.cost(&of.tree);
-            Some(cost::over_root_area(&of.tree, cost))
-        }),
-        ("Expected tests of a ray from anywhere", |of| of.tests),
-        ("Tests per ray of the picture, in the binary tree", |of| {
-            let counts = of.film.counts;
-            Some((counts.boxes + counts.objects) as f64 / of.film.rays.max(1) as f64)
-        }),
-        ("Shared area of siblings over root area", |of| {
-            Some(of.levels.iter().map(|level| level.overlap).sum())
-        }),
-        ("Depth", |of| Some(of.tree.depth() as f64)),
-        ("Nodes", |of| Some(of.tree.nodes.len() as f64)),
-    ];
-    facts
+    let over_root = |of: &Measured, cost| Some(cost::over_root_area(&of.tree, cost));
+    let facts = |of: &Measured| {
+        let counts = of.film.counts;
+        [
+            ("Internal area over root area", over_root(of, cost::internal_area(&of.tree))),
+            ("Cost of the wide layout by area", over_root(of, Objective::Layout.cost(&of.tree))),
+            ("Expected tests of a ray from anywhere", of.tests),
+            (
+                "Tests per ray of the picture, in the binary tree",
+                Some((counts.boxes + counts.objects) as f64 / of.film.rays.max(1) as f64),
+            ),
+            ("Depth", Some(of.tree.depth() as f64)),
+            ("Nodes", Some(of.tree.nodes.len() as f64)),
+        ]
+    };
+    facts(baked)
         .into_iter()
-        .filter_map(|(name, fact)| Some(Row { name, baked: fact(baked)?, greedy: fact(greedy)? }))
+        .zip(facts(greedy))
+        .filter_map(|((name, baked), (_, greedy))| {
+            Some(Row { name, baked: baked?, greedy: greedy? })
+        })
         .collect()
+}
+
+/// Returns the sum of the inner nodes' areas at each depth over the root's area: the expected
+/// number of them that a random line visits.
+fn area_by_level(tree: &Bvh) -> Vec<f64> {
+    // The areas of a scene without area are all 0.
+    let unit = tree.root_aabb().map_or(0.0, |root| root.half_area()).max(f64::MIN_POSITIVE);
+    let mut levels = Vec::new();
+    let mut row: Vec<usize> = (0..tree.nodes.len().min(1)).collect();
+    while !row.is_empty() {
+        let inner = row.iter().map(|&index| &tree.nodes[index]).filter(|node| !node.is_leaf());
+        levels.push(inner.clone().map(|node| node.aabb.half_area() / unit).sum());
+        row = inner.flat_map(|node| node.children()).collect();
+    }
+    levels
 }
 
 /// Returns the heat maps of both trees under one scale.
@@ -159,4 +160,20 @@ fn png(out: &Path, film: &Film, pixels: &[[u8; 3]]) -> Result<Vec<u8>, Error> {
     image::png(film.width, pixels)
         .map_err(io::Error::other)
         .map_err(Error::io(out, "encode the picture"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_areas_of_all_levels_add_up_to_the_cost() {
+        let scene = Scene::load("escher:300").unwrap();
+        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
+        let levels = area_by_level(&tree);
+        let sum: f64 = levels.iter().sum();
+        let expected = cost::over_root_area(&tree, cost::internal_area(&tree));
+        assert!((sum - expected).abs() < 1e-12 * expected, "{sum} {expected}");
+        assert_eq!((levels[0], levels.len()), (1.0, tree.depth() + 1));
+    }
 }
