@@ -6,8 +6,6 @@
 
 mod buffers;
 mod document;
-mod references;
-mod size;
 
 use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Place};
 use buffers::Buffers;
@@ -54,7 +52,7 @@ pub fn parse(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Mesh, F
     let (root, chunk) = document(bytes, path)?;
     let mut loader = Loader::new(path, &root, Buffers::new(path, outside, chunk));
     let places = loader.places()?;
-    size::check(&root, &places, path)?;
+    check_size(&root, &places, path)?;
     for place in places {
         loader.place(&place, &place.transform)?;
     }
@@ -94,7 +92,7 @@ pub fn parts(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Parts, 
     let mut placed = BTreeSet::new();
     let mut first_places = places.clone();
     first_places.retain(|place| placed.insert(place.mesh));
-    size::check(&root, &first_places, path)?;
+    check_size(&root, &first_places, path)?;
     let mut meshes = BTreeMap::new();
     for place in &first_places {
         loader.place(place, &DMat4::IDENTITY)?;
@@ -252,7 +250,7 @@ impl<'a> Loader<'a> {
         if let Some(index) = indices.iter().find(|&&index| index as usize >= points.len()) {
             return Err(format!("index {index}; expected 0 to below {}", points.len()));
         }
-        let count = size::triangles(mode, indices.len());
+        let count = triangle_count(mode, indices.len());
         self.triangles.extend((0..count).map(|i| {
             let corners = match mode {
                 Mode::Triangles => [3 * i, 3 * i + 1, 3 * i + 2],
@@ -334,4 +332,46 @@ fn window<'a>(
 
 fn little_endian(bytes: &[u8]) -> u32 {
     bytes.iter().rev().fold(0, |number, &byte| number << 8 | u32::from(byte))
+}
+
+/// Rejects places that have more triangles together than a scene may have, before any of them takes
+/// memory: a file of a few kilobytes can place one mesh any number of times. The meshes of all
+/// places must exist.
+fn check_size(root: &Root, places: &[Placed], path: &Path) -> Result<(), Fault> {
+    let mut total = 0;
+    for place in places {
+        for primitive in &root.meshes[place.mesh].primitives {
+            total += promised(root, primitive);
+        }
+        if total > MOST_TRIANGLES {
+            return Err(Fault::new(
+                path,
+                Place::Element(format!("nodes[{}]", place.node)),
+                format!("more than {MOST_TRIANGLES} triangles in all; expected no more"),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Returns the number of triangles that the accessors of a primitive promise, at most one more than
+/// a scene may have. A fault of the primitive is found when it is read.
+fn promised(root: &Root, primitive: &Primitive) -> usize {
+    let Valid(mode) = primitive.mode else { return 0 };
+    let positions = primitive.attributes.get(&Valid(Semantic::Positions)).copied();
+    let Some(accessor) = primitive.indices.or(positions).and_then(|accessor| root.get(accessor))
+    else {
+        return 0;
+    };
+    let items = usize::try_from(accessor.count.0).unwrap_or(usize::MAX);
+    triangle_count(mode, items).min(MOST_TRIANGLES + 1)
+}
+
+/// Returns the number of triangles of a primitive with this many indices.
+fn triangle_count(mode: Mode, indices: usize) -> usize {
+    match mode {
+        Mode::Triangles => indices / 3,
+        Mode::TriangleStrip | Mode::TriangleFan => indices.saturating_sub(2),
+        Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => 0,
+    }
 }

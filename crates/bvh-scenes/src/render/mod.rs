@@ -12,15 +12,12 @@
 //! therefore gives the same bytes on every machine.
 
 mod draw;
-mod film;
 pub mod framing;
 pub mod heat;
 pub mod image;
-mod key;
 mod light;
 pub mod structure;
 mod surface;
 
-pub use draw::{Options, render, tiles};
-pub use film::Film;
+pub use draw::{Film, Options, render, tiles};
 pub use structure::StructureError;
