@@ -141,7 +141,6 @@ fn examine(path: &Path, scene: Option<&Scene>) -> Result<(Bvh, Facts), Error> {
     Ok((tree, facts))
 }
 
-/// Adds the facts in the header.
 fn describe(header: &Header, bytes: &[u8], facts: &mut Facts) {
     let objective = match header.objective {
         Objective::InternalArea => "internal area".to_owned(),
@@ -200,7 +199,6 @@ fn histogram(counts: &BTreeMap<u32, usize>) -> String {
     if bins.is_empty() { "none".into() } else { bins.join(", ") }
 }
 
-/// Adds the facts that need the scene.
 fn against(tree: &Bvh, file: TreeFile, scene: &Scene, facts: &mut Facts) -> Result<(), FileError> {
     file.for_boxes(&scene.boxes)?;
     validate_references(tree, &scene.boxes, &scene.primitives)?;

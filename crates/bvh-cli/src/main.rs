@@ -2,7 +2,6 @@
 
 mod arguments;
 mod bake;
-mod commands;
 mod csv_table;
 mod error;
 mod explain;
@@ -22,7 +21,6 @@ use clap_complete::Shell;
 use error::Error;
 use interrupt::INTERRUPTED;
 use output::{answered, print_bytes, print_error, succeeded};
-use std::path::Path;
 use std::process::ExitCode;
 
 #[global_allocator]
@@ -50,8 +48,6 @@ enum Command {
     Completions {
         shell: Shell,
     },
-    /// Print the manual page, for `man -l -`.
-    Man,
 }
 
 fn main() -> ExitCode {
@@ -83,13 +79,9 @@ fn run(command: Command) -> Result<(), Error> {
         Command::Report(args) => report::report(&args),
         Command::Scenes => scenes::scenes(),
         Command::Completions { shell } => {
-            print_bytes(&commands::completions(shell, &mut Cli::command()));
-            Ok(())
-        }
-        Command::Man => {
-            let page = commands::manual(Cli::command());
-            let page = page.map_err(Error::io(Path::new("the manual page"), "write"))?;
-            print_bytes(&page);
+            let mut file = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "bvh", &mut file);
+            print_bytes(&file);
             Ok(())
         }
     }

@@ -82,7 +82,7 @@ impl Rays {
         interrupted: &AtomicBool,
     ) -> Result<Option<RayDensity>, Error> {
         let is_over = || interrupted.load(Relaxed);
-        let found = match self {
+        let density = match self {
             Self::Default => {
                 let rays = of_anything(TRAINED, scene, tree, seed, &is_over);
                 density(&rays, tree).map(Some)
@@ -99,7 +99,7 @@ impl Rays {
         if is_over() {
             return Ok(None);
         }
-        found.map_err(|source| Error::Tracing { scene: scene.name.clone(), source })
+        density.map_err(|source| Error::Tracing { scene: scene.name.clone(), source })
     }
 
     /// Returns the expected number of tests of a ray that enters the scene, in the wide layout of a

@@ -36,7 +36,6 @@ fn segment(&[x, y, z, to_x, to_y, to_z]: &[f32; 6]) -> Segment {
     Segment { from: [x, y, z], to: [to_x, to_y, to_z] }
 }
 
-/// Reads little-endian `f32`.
 fn read_floats(bytes: &[u8]) -> Result<Vec<f32>, String> {
     let (floats, rest) = bytes.as_chunks();
     if !rest.is_empty() {
@@ -117,7 +116,6 @@ fn split_npy(bytes: &[u8]) -> Option<(String, &[u8])> {
     Some((header.split_whitespace().collect(), data))
 }
 
-/// Returns the shape in the header of an array of numpy, from which spaces are removed.
 fn npy_shape(header: &str) -> Option<Vec<usize>> {
     let (_, rest) = header.split_once("'shape':(")?;
     let (shape, _) = rest.split_once(')')?;
@@ -130,7 +128,6 @@ mod tests {
 
     const SEGMENT: Segment = Segment { from: [1.0, 2.0, 3.0], to: [4.0, 5.0, -6.5] };
 
-    /// Returns an array of numpy.
     fn array(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
         let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
         let length = (header.len() as u16).to_le_bytes();

@@ -167,7 +167,6 @@ pub fn render(args: &RenderArgs) -> Result<(), Error> {
     Ok(())
 }
 
-/// Writes the picture or its heat map.
 fn write(args: &RenderArgs, film: &Film, rays_per_pixel: u32) -> Result<(), Error> {
     let action = "encode the picture";
     let bytes = if args.heatmap {

@@ -77,7 +77,6 @@ pub fn report(args: &ReportArgs) -> Result<(), Error> {
     Ok(())
 }
 
-/// Measures a tree, and draws the scene with it.
 fn measure(tree: Bvh, scene: &Scene) -> Result<Measured, Error> {
     let tests = match scene.triangles() {
         Ok(_) => Some(Rays::Default.expected_tests(&tree, scene)?),
@@ -96,7 +95,6 @@ fn measure(tree: Bvh, scene: &Scene) -> Result<Measured, Error> {
     Ok(Measured { tree, tests, film })
 }
 
-/// Compares the two trees, one fact each.
 fn rows(baked: &Measured, greedy: &Measured) -> Vec<Row> {
     let over_root = |of: &Measured, cost| Some(cost::over_root_area(&of.tree, cost));
     let facts = |of: &Measured| {
@@ -137,7 +135,6 @@ fn area_by_level(tree: &Bvh) -> Vec<f64> {
     levels
 }
 
-/// Returns the heat maps of both trees under one scale.
 fn heat_maps(out: &Path, baked: &Film, greedy: &Film) -> Result<[Heat; 2], Error> {
     let [ours, theirs] = [baked, greedy].map(|film| heat::range(film, 1));
     // The same colour must mean the same number of tests in both.
@@ -155,7 +152,6 @@ fn heat_map(out: &Path, film: &Film, range: heat::Range) -> Result<Heat, Error> 
     Ok(Heat { png: png(out, film, &pixels)?, median: range.median, most: range.max })
 }
 
-/// Returns a PNG file as wide as the film.
 fn png(out: &Path, film: &Film, pixels: &[[u8; 3]]) -> Result<Vec<u8>, Error> {
     image::png(film.width, pixels)
         .map_err(io::Error::other)

@@ -143,7 +143,7 @@ impl Reserved {
         }
         overwrite(new.as_file_mut(), sections).map_err(WriteError::of(&path, "write the file"))?;
         let persisted = if only_new { new.persist_noclobber(&path) } else { new.persist(&path) };
-        persisted.map_err(|unnamed| WriteError::of(&path, "replace the file")(kept(unnamed)))?;
+        persisted.map_err(|unnamed| WriteError::of(&path, "replace the file")(keep(unnamed)))?;
         // The new name must outlast a loss of power. Where folders cannot be synced, the old file
         // may come back, complete.
         if let Ok(folder) = File::open(folder_of(&path)) {
@@ -196,7 +196,6 @@ fn reserve(file: &mut File, bytes: usize) -> io::Result<()> {
     pieces.get_ref().sync_all()
 }
 
-/// Replaces the contents of an open file by the sections.
 fn overwrite(file: &mut File, sections: &[&[u8]]) -> io::Result<()> {
     file.rewind()?;
     sections.iter().try_for_each(|section| file.write_all(section))?;
@@ -208,7 +207,7 @@ fn overwrite(file: &mut File, sections: &[&[u8]]) -> io::Result<()> {
 
 /// Keeps a complete file that could not get its name, because the old file is in use on Windows or
 /// is a folder by now. Returns the failure, which names the kept file.
-fn kept(unnamed: tempfile::PersistError) -> io::Error {
+fn keep(unnamed: tempfile::PersistError) -> io::Error {
     let tempfile::PersistError { error, file } = unnamed;
     match file.keep() {
         Ok((_, path)) => {

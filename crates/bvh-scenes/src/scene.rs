@@ -196,7 +196,6 @@ impl Scene {
         Self { name: name.into(), kind, boxes: primitives.boxes(), primitives, remark: None }
     }
 
-    /// Returns a subset of the scene's objects, named by the scene's name and `suffix`.
     fn subset(self, subset: Subset, suffix: &str) -> Result<Self, SceneError> {
         let name = self.name + suffix;
         let all = self.boxes.len();
@@ -244,12 +243,10 @@ pub fn fetched_path(name: &str) -> Option<PathBuf> {
         .find(|path| path.is_file())
 }
 
-/// Returns the generator of a scene of any number of objects, which is therefore no subset.
 fn generator(id: &str) -> Option<stiff::Generator> {
     stiff::by_id(id).or_else(|| landscape::by_name(id))
 }
 
-/// Lists the accepted names, as a part of an error message.
 fn known_scenes() -> String {
     let names = stand_ins::STAND_INS.iter().map(|scene| scene.name);
     let names = names.chain(SPHERES.map(|(name, _)| name)).chain(FETCHED.map(|(name, _)| name));

@@ -85,7 +85,6 @@ pub fn names(name: &str) -> u64 {
         .fold(1, u64::saturating_mul)
 }
 
-/// Returns the ends of `A..B`.
 fn range(word: &str) -> Option<(u32, u32)> {
     let (low, high) = word.split_once("..")?;
     Some((low.parse().ok()?, high.parse().ok()?))

@@ -79,7 +79,6 @@ visits.</p>
         )
     }
 
-    /// Returns the table of facts.
     fn table(&self) -> String {
         let mut text = String::from(
             "<table>\n<tr><th></th><th>baked</th><th>greedy</th><th>difference</th></tr>\n",
@@ -101,17 +100,14 @@ visits.</p>
     }
 }
 
-/// Returns a number with two decimals, or without if it is a count.
 fn number(value: f64) -> String {
     if value.fract() == 0.0 { format!("{value}") } else { format!("{value:.2}") }
 }
 
-/// Returns text between tags.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// Returns a figure with a PNG file inside.
 fn picture(png: &[u8], caption: &str) -> String {
     let data = STANDARD.encode(png);
     format!(

@@ -79,7 +79,6 @@ pub fn forest(count: usize) -> Vec<Triangle> {
     triangles
 }
 
-/// Adds the tree of this number.
 fn plant(triangles: &mut Vec<Triangle>, tree: usize, foot: DVec3) {
     let tall = 9.0 + 4.0 * jitter(33, tree);
     let top = foot + DVec3::new(jitter(34, tree), tall, jitter(35, tree));

@@ -60,7 +60,6 @@ pub fn boxes(triangles: &[Triangle]) -> Vec<Aabb> {
     triangles.iter().map(Triangle::aabb).collect()
 }
 
-/// Returns a triangle with this box.
 fn diagonal(Aabb { min, max }: Aabb) -> Triangle {
     Triangle([min, max, Vec3::new(max.x, min.y, max.z)])
 }

@@ -40,7 +40,6 @@ pub enum OutsideFiles {
 }
 
 impl From<bool> for OutsideFiles {
-    /// Returns `Allowed` for true.
     fn from(allowed: bool) -> Self {
         if allowed { Self::Allowed } else { Self::Rejected }
     }
@@ -122,7 +121,6 @@ struct Loader<'a> {
     items: u64,
 }
 
-/// Returns the transform of a node into its parent's coordinates.
 fn transform(node: &Node) -> DMat4 {
     // The format allows a matrix or its three parts, never both.
     if let Some(matrix) = node.matrix {
@@ -139,8 +137,8 @@ fn transform(node: &Node) -> DMat4 {
     )
 }
 
-fn vector(found: Option<[f32; 3]>, default: DVec3) -> DVec3 {
-    found.map_or(default, |vector| DVec3::from(vector.map(f64::from)))
+fn vector(given: Option<[f32; 3]>, default: DVec3) -> DVec3 {
+    given.map_or(default, |vector| DVec3::from(vector.map(f64::from)))
 }
 
 impl<'a> Loader<'a> {
@@ -148,7 +146,6 @@ impl<'a> Loader<'a> {
         Self { path, root, buffers, triangles: Vec::new(), items: 0 }
     }
 
-    /// Returns the element with this index.
     fn get<T>(&self, index: Index<T>, name: &str) -> Result<&'a T, String>
     where
         Root: Get<T>,
@@ -198,7 +195,6 @@ impl<'a> Loader<'a> {
         Ok(places)
     }
 
-    /// Adds the transformed triangles of a node's mesh.
     fn place(&mut self, place: &Placed, transform: &DMat4) -> Result<(), Fault> {
         let Placed { node, mesh, .. } = *place;
         for (number, primitive) in self.root.meshes[mesh].primitives.iter().enumerate() {
@@ -210,7 +206,6 @@ impl<'a> Loader<'a> {
         Ok(())
     }
 
-    /// Adds the transformed triangles of a primitive. Points and lines have none.
     fn add(&mut self, primitive: &Primitive, transform: &DMat4) -> Result<(), String> {
         let Valid(mode) = primitive.mode else {
             return Err("an unknown mode; expected 0 to 6".into());
@@ -263,7 +258,6 @@ impl<'a> Loader<'a> {
         Ok(())
     }
 
-    /// Returns the bytes of every item of an accessor.
     fn items(
         &mut self,
         accessor: Index<Accessor>,
@@ -272,9 +266,9 @@ impl<'a> Loader<'a> {
     ) -> Result<impl Iterator<Item = &[u8]>, String> {
         let place = format!("accessors[{}]", accessor.value());
         let accessor = self.get(accessor, "accessors")?;
-        let component = components
-            .iter()
-            .find(|&&wanted| matches!(accessor.component_type, Valid(found) if found.0 == wanted));
+        let component = components.iter().find(
+            |&&wanted| matches!(accessor.component_type, Valid(component) if component.0 == wanted),
+        );
         let (Some(component), true, None) =
             (component, accessor.type_ == Valid(type_), &accessor.sparse)
         else {
@@ -308,7 +302,6 @@ impl<'a> Loader<'a> {
     }
 }
 
-/// Returns the bytes of a buffer from an accessor's first item to its last one.
 fn window<'a>(
     buffer: &'a [u8],
     view: &View,
@@ -367,7 +360,6 @@ fn promised(root: &Root, primitive: &Primitive) -> usize {
     triangle_count(mode, items).min(MOST_TRIANGLES + 1)
 }
 
-/// Returns the number of triangles of a primitive with this many indices.
 fn triangle_count(mode: Mode, indices: usize) -> usize {
     match mode {
         Mode::Triangles => indices / 3,

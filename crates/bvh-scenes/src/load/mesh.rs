@@ -72,7 +72,6 @@ impl Mesh {
     }
 }
 
-/// Returns `count` with the noun and verb for one or for many; nothing for none.
 fn counted(count: usize, one: &str, many: &str) -> Option<String> {
     match count {
         0 => None,
@@ -117,7 +116,6 @@ impl Fault {
     }
 }
 
-/// Returns a text on one line, cut to at most `most` characters.
 fn shortened(text: &str, most: usize) -> String {
     // Messages of third-party parsers may span lines and quote the file at any length.
     let words: Vec<&str> = text.split_whitespace().collect();

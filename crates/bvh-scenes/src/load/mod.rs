@@ -71,7 +71,6 @@ impl Format {
     }
 }
 
-/// Returns the bytes of a text file without a byte order mark.
 fn without_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
 }

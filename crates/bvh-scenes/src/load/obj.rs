@@ -192,7 +192,7 @@ const IGNORED: &str = "vt vn vp p l curv curv2 surf parm trim hole scrv sp end c
 
 /// The statements of a file, in order.
 struct Statements<'a> {
-    rest: &'a [u8],
+    unread: &'a [u8],
     /// The number of lines taken so far.
     lines: usize,
     /// True if the previous line was ignored and continues on the next one.
@@ -204,12 +204,12 @@ struct Statements<'a> {
 
 impl<'a> Statements<'a> {
     fn new(bytes: &'a [u8]) -> Self {
-        let mut rest = bytes;
+        let mut unread = bytes;
         // A file can have several byte order marks if several programs have each added one.
-        while let Some(further) = rest.strip_prefix(b"\xef\xbb\xbf") {
-            rest = further;
+        while let Some(further) = unread.strip_prefix(b"\xef\xbb\xbf") {
+            unread = further;
         }
-        Self { rest, lines: 0, ignoring: false, unknown: None }
+        Self { unread, lines: 0, ignoring: false, unknown: None }
     }
 
     /// Returns the next `v` or `f` statement and the number of its first line. Replaces the
@@ -248,12 +248,12 @@ impl<'a> Statements<'a> {
     /// Returns the next line without its end (LF, CRLF or CR) and comment, and whether a backslash
     /// continues it.
     fn line(&mut self) -> Option<(&'a [u8], bool)> {
-        if self.rest.is_empty() {
+        if self.unread.is_empty() {
             return None;
         }
-        let end = self.rest.iter().position(|&b| b == b'\n' || b == b'\r');
-        let (line, tail) = self.rest.split_at(end.unwrap_or(self.rest.len()));
-        self.rest = tail.strip_prefix(b"\r\n").unwrap_or(tail.get(1..).unwrap_or_default());
+        let end = self.unread.iter().position(|&b| b == b'\n' || b == b'\r');
+        let (line, tail) = self.unread.split_at(end.unwrap_or(self.unread.len()));
+        self.unread = tail.strip_prefix(b"\r\n").unwrap_or(tail.get(1..).unwrap_or_default());
         self.lines += 1;
         let code = line.split(|&b| b == b'#').next().unwrap_or_default().trim_ascii_end();
         Some(match code.strip_suffix(b"\\") {

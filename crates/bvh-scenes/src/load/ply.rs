@@ -147,7 +147,6 @@ fn element_of_header(path: &Path, element: &str, message: String) -> Fault {
     Fault::new(path, Place::Element(format!("element {element}")), message)
 }
 
-/// Reads all elements of one kind.
 fn elements<E: PropertyAccess>(
     reader: &mut Reader<&[u8]>,
     element: &ElementDef,
@@ -184,7 +183,6 @@ fn fault(path: &Path, within: Option<(&ElementDef, &Header)>, error: &ParseError
     }
 }
 
-/// Returns the beginning of a line, which may be binary, with escapes.
 fn beginning(line: &str) -> String {
     // Some of the parser's errors quote the line with its end.
     line.trim_matches('\'').trim_end().chars().take(60).flat_map(char::escape_debug).collect()
@@ -194,7 +192,6 @@ fn element_fault(path: &Path, element: &str, number: usize, message: String) -> 
     Fault::new(path, Place::Element(format!("{element} {number}, counted from 0")), message)
 }
 
-/// Makes the fans of all faces.
 fn mesh(vertices: &[Vertex], faces: &[Face], path: &Path) -> Result<Mesh, Fault> {
     if let Some((number, Vertex(found))) = vertices
         .iter()
@@ -219,11 +216,11 @@ fn mesh(vertices: &[Vertex], faces: &[Face], path: &Path) -> Result<Mesh, Fault>
             };
             corners.push(Vec3::from(*position));
         }
-        let [first, rest @ ..] = &corners[..] else {
+        let [first, others @ ..] = &corners[..] else {
             short_faces += 1;
             continue;
         };
-        if rest.len() < 2 {
+        if others.len() < 2 {
             short_faces += 1;
             continue;
         }
@@ -231,7 +228,7 @@ fn mesh(vertices: &[Vertex], faces: &[Face], path: &Path) -> Result<Mesh, Fault>
         for &index in indices {
             used[index as usize] = true;
         }
-        for pair in rest.windows(2) {
+        for pair in others.windows(2) {
             triangles.push(Triangle([*first, pair[0], pair[1]]));
         }
     }

@@ -15,7 +15,6 @@ const HEADER: usize = 84;
 /// The number of bytes of a triangle: a normal, three corners, and two bytes without a meaning.
 const FACET: usize = 50;
 
-/// Returns the number of triangles in a binary file's header.
 fn promised(bytes: &[u8]) -> Option<usize> {
     Some(u32::from_le_bytes(*bytes.get(80..)?.first_chunk()?) as usize)
 }
@@ -146,7 +145,6 @@ fn parse_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
     Ok(triangles)
 }
 
-/// Returns the corner with these coordinates, if they are three finite numbers.
 fn corner(words: &[&str]) -> Option<Vec3> {
     let [x, y, z] = words else { return None };
     let corner = Vec3::new(x.parse().ok()?, y.parse().ok()?, z.parse().ok()?);

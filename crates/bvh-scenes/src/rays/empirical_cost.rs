@@ -77,7 +77,6 @@ pub struct Mean {
 }
 
 impl Mean {
-    /// Returns mean and standard error of `count` numbers from their sum and sum of squares.
     fn of_sums(count: u64, sum: u64, squares: u128) -> Self {
         let n = count as f64;
         let sum = sum as f64;
@@ -132,7 +131,6 @@ pub fn empirical_cost(
     }
 }
 
-/// Traces the rays of one random stream.
 fn measure_chunk(
     config: &RandomRays,
     accelerator: &Accelerator,

@@ -2,15 +2,14 @@
 //! and the density of these segments.
 
 mod camera;
-mod density;
 mod empirical_cost;
 mod random;
 mod segments;
 
 pub use camera::{Camera, View, frame};
-pub use density::{TRAINED, density};
 pub use empirical_cost::{EmpiricalCost, Mean, RandomRays, empirical_cost, tests_per_ray};
 pub use random::{Family, Kind, Viewpoint, in_box, on_sphere, random_ray, rays};
 pub use segments::{
-    OF_ANYTHING, Pose, RenderedRays, TracedRay, check_count, of_anything, of_inside, of_renderer,
+    OF_ANYTHING, Pose, RenderedRays, TRAINED, TracedRay, check_count, density, of_anything,
+    of_inside, of_renderer,
 };

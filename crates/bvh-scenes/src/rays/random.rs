@@ -185,7 +185,6 @@ pub fn in_box(root: &Aabb, fractions: [f64; 3]) -> DVec3 {
     root.min.as_dvec3() + DVec3::from(fractions) * root.extent()
 }
 
-/// Returns the points at this fraction of the distance to the nearest hits of rays.
 fn hit_points(rays: &[Ray], scene: &Scene, tree: &Bvh, fraction: f32) -> Vec<Vec3> {
     let accelerator = Accelerator::of_tree(&scene.primitives, tree);
     let mut points = Vec::new();
@@ -239,12 +238,10 @@ fn pixels(side: u32, count: u32) -> impl Iterator<Item = [u32; 2]> {
     })
 }
 
-/// Returns the number that the bits at even positions of a Morton code form.
 fn even_bits(code: u64) -> u32 {
     (0..32).map(|bit| ((code >> (2 * bit) & 1) as u32) << bit).sum()
 }
 
-/// Returns the ray from a point to the light.
 fn shadow_ray(point: Vec3, light: DVec3) -> Option<Ray> {
     let way = light - point.as_dvec3();
     // A library without a minimum distance would hit the surface that the ray starts from.

@@ -1,12 +1,12 @@
-//! The rays that train a tree, with their segments up to the hit: from a renderer, or any through a
-//! scene.
+//! The rays that train a tree, with their segments up to the hit and the density of these: from a
+//! renderer, or any through a scene.
 
 use super::camera::{Camera, View};
 use super::random::{Family, JUST_BEFORE, Kind, in_box, on_sphere, random_ray};
 use crate::Scene;
 use crate::trace::Accelerator;
 use bvh_config::{OutOfRange, above, config};
-use bvh_core::{Aabb, Bvh, Ray, RayDensity, Segment};
+use bvh_core::{Aabb, Bvh, DensityError, Ray, RayDensity, Segment};
 use glam::{DVec3, Vec3};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -180,6 +180,26 @@ pub fn of_inside(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<Traced
     tracing.rays
 }
 
+/// The default number of primary rays that train a tree; without a camera, the number of rays of
+/// each family.
+pub const TRAINED: u32 = 100_000;
+
+/// The share of area in a box's measure. Without it a box that no sampled ray enters would be free.
+/// For a camera, shares from 0.02 to 0.3 change trees by less than seeds do; without a camera, 0.3
+/// loses half of the gain in interiors.
+const AREA_WEIGHT: f64 = 0.1;
+
+/// Returns the density of rays through the scene of a tree.
+///
+/// # Errors
+///
+/// [`DensityError`] if there are no rays, too many, or the tree has no nodes.
+pub fn density(rays: &[TracedRay], tree: &Bvh) -> Result<RayDensity, DensityError> {
+    let segments: Vec<Segment> = rays.iter().map(|traced| traced.segment).collect();
+    let bounds = tree.root_aabb().ok_or(DensityError::Bounds)?;
+    RayDensity::of_rays(&bounds, &segments, AREA_WEIGHT)
+}
+
 /// Traces rays and keeps them.
 struct Tracing<'a> {
     accelerator: Accelerator<'a>,
@@ -206,7 +226,6 @@ impl<'a> Tracing<'a> {
         hit.map(|hit| ray.at(hit.t * JUST_BEFORE))
     }
 
-    /// Keeps the ray from a point to a light.
     fn shadow(&mut self, point: Vec3, light: DVec3) {
         let way = light - point.as_dvec3();
         let Ok(ray) = Ray::new(point, way.as_vec3(), 0.0, JUST_BEFORE) else { return };
@@ -220,7 +239,6 @@ impl<'a> Tracing<'a> {
         }
     }
 
-    /// Returns a distance at which the ray is outside the scene.
     fn beyond(&self, ray: &Ray) -> f32 {
         let reach =
             (self.bounds.min - ray.origin()).abs().max((self.bounds.max - ray.origin()).abs());

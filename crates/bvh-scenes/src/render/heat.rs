@@ -78,7 +78,6 @@ fn colour(value: f64) -> [u8; 3] {
     })
 }
 
-/// Returns the labels below the left end of the key, its middle and its right end.
 fn labels(range: &Range) -> [String; 3] {
     [
         "0".into(),
@@ -131,13 +130,11 @@ fn key(width: u32, colours: &[[u8; 3]], labels: &[String; 3]) -> Result<Vec<[u8;
     Ok(pixels)
 }
 
-/// Returns the advance of a character in pixels.
 fn advance(font: &FontRef, character: char) -> f64 {
     let units = font.units_per_em().unwrap_or(1.0);
     SIZE * f64::from(font.h_advance_unscaled(font.glyph_id(character)) / units)
 }
 
-/// Returns the length of a text in pixels.
 fn length(font: &FontRef, text: &str) -> f64 {
     text.chars().map(|character| advance(font, character)).sum()
 }
@@ -166,7 +163,6 @@ fn write(font: &FontRef, text: &str, start: f64, columns: usize, pixels: &mut [[
     }
 }
 
-/// Covers a fraction of a pixel with ink.
 fn blend(pixel: &mut [u8; 3], coverage: f32) {
     for (channel, ink) in pixel.iter_mut().zip(INK) {
         let old = f32::from(*channel);

@@ -32,7 +32,6 @@ impl Light {
         positions.iter().map(|&position| Self { position, colour, reach: f64::INFINITY }).collect()
     }
 
-    /// Returns the light that arrives at a distance.
     fn at(&self, distance: f64) -> DVec3 {
         // A distance of ∞ over a reach of ∞ would be NaN.
         if self.reach.is_finite() {
@@ -178,7 +177,6 @@ impl<'a> World<'a> {
         light + weight * self.sky(direction)
     }
 
-    /// Returns the first surface that the ray meets, the ground included.
     fn meet(&self, origin: DVec3, direction: DVec3, tally: &mut Tally) -> Option<Surface> {
         tally.rays += 1;
         let hit = Ray::half_line(origin.as_vec3(), direction.as_vec3())
@@ -202,7 +200,6 @@ impl<'a> World<'a> {
         surface.point + surface.normal * (size * (64.0 * f64::from(f32::EPSILON)))
     }
 
-    /// Returns the light that the surface sends to the eye without its mirror reflection.
     fn direct(
         &self,
         surface: &Surface,
@@ -248,7 +245,6 @@ impl<'a> World<'a> {
         ray.is_ok_and(|ray| self.accelerator.any_hit_counted(&ray, &mut tally.counts))
     }
 
-    /// Returns the light from a direction without any surface.
     fn sky(&self, direction: DVec3) -> DVec3 {
         HORIZON + (ZENITH - HORIZON) * direction.dot(self.up).clamp(0.0, 1.0)
     }

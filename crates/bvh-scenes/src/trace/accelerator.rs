@@ -194,27 +194,27 @@ impl<'a> Accelerator<'a> {
     /// a hit.
     #[inline(always)]
     fn visit(&self, ray: &Ray, ends_at_hit: bool, counter: &mut impl Counter) -> bool {
-        let mut found = false;
+        let mut is_hit = false;
         // To visit all objects, the tests report no hit, so that the traversal continues.
         match self.objects {
             Primitives::Triangles(triangles) => {
                 let prepared = PreparedRay::new(ray);
                 let test = |id: u32| {
                     let hit = triangles[id as usize].intersect(&prepared, ray.t_max());
-                    found |= hit.is_some();
-                    found && ends_at_hit
+                    is_hit |= hit.is_some();
+                    is_hit && ends_at_hit
                 };
                 self.structure.any_hit(triangles.len(), ray, test, counter);
             }
             Primitives::Spheres(spheres) => {
                 let test = |id: u32| {
                     let hit = spheres[id as usize].intersect(ray, ray.t_max());
-                    found |= hit.is_some();
-                    found && ends_at_hit
+                    is_hit |= hit.is_some();
+                    is_hit && ends_at_hit
                 };
                 self.structure.any_hit(spheres.len(), ray, test, counter);
             }
         }
-        found
+        is_hit
     }
 }

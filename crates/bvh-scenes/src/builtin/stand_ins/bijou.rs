@@ -118,12 +118,10 @@ fn ring() -> MeshBuilder {
     ring
 }
 
-/// Returns the placement on the circle of the halo, `turns` around the stone.
 fn on_halo(turns: f64, z: f64) -> DAffine3 {
     upright(turns, 0.0, 0.0, 0.0) * upright(0.0, 0.65, 0.0, z)
 }
 
-/// Returns the placement on the outer surface of the shank.
 fn seat(away: f64, across: f64) -> DAffine3 {
     placed(about_y(away), DVec3::ZERO)
         * placed(DMat3::IDENTITY, DVec3::new(0.0, across, surface(away, across)))
@@ -163,7 +161,6 @@ fn shank(mesh: &mut MeshBuilder) {
     });
 }
 
-/// Returns the placement that shrinks a part to `size`.
 fn small(size: f64) -> DAffine3 {
     DAffine3::from_scale(DVec3::splat(size))
 }
@@ -204,7 +201,6 @@ fn chain(links: usize) -> MeshBuilder {
     chain
 }
 
-/// Returns a point of the chain, `t` from its start to its end in 0..=1.
 fn on_wave(t: f64) -> DVec3 {
     let point = on_circle(1.75 + 0.22 * cos_sin(2.5 * t).0, 0.55 + 0.8 * t, 0.0);
     point.with_z(padding(point.x, point.y) + 0.05)

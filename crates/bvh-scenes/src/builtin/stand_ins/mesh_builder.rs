@@ -160,9 +160,9 @@ pub fn cos_sin(turns: f64) -> (f64, f64) {
     // Reduction to the first quarter leaves 0 there, of which both functions are exact.
     let within = turns - turns.floor();
     let quarters = (within * 4.0).floor();
-    let rest = (within - quarters * 0.25) * std::f64::consts::TAU;
-    let c = libm::cos(rest);
-    let s = libm::sin(rest);
+    let angle = (within - quarters * 0.25) * std::f64::consts::TAU;
+    let c = libm::cos(angle);
+    let s = libm::sin(angle);
     match quarters as u32 {
         1 => (-s, c),
         2 => (-c, -s),

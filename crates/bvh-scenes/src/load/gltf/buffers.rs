@@ -83,7 +83,6 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    /// Returns the bytes of a `data:` URI, or of a file in the folder of the glTF file.
     fn of_uri(&mut self, uri: &str) -> Result<Rc<Vec<u8>>, String> {
         if let Some(data) = uri.strip_prefix("data:") {
             let encoded = data.split_once(";base64,").ok_or("a data URI that is not base64")?.1;

@@ -79,7 +79,6 @@ pub(super) fn document<'a>(
     Ok((root, chunk))
 }
 
-/// Returns the JSON chunk and the binary chunk of a GLB file of version 2.
 fn chunks(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
     if bytes.get(4..8)? != [2, 0, 0, 0] {
         return None;
@@ -95,12 +94,12 @@ fn chunks(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
 
 /// Returns the contents of the chunk whose header begins at `offset`, if it has this kind.
 fn chunk<'a>(bytes: &'a [u8], offset: usize, kind: &[u8; 4]) -> Option<&'a [u8]> {
-    let (header, rest) = bytes.get(offset..)?.split_first_chunk::<8>()?;
+    let (header, contents) = bytes.get(offset..)?.split_first_chunk::<8>()?;
     let length = u32::from_le_bytes(*header.first_chunk()?) as usize;
     if header[4..] != *kind {
         return None;
     }
-    rest.get(..length)
+    contents.get(..length)
 }
 
 /// The keys of the numbers that the loader follows or compares.

@@ -267,7 +267,6 @@ fn events_on(side: Side, events: &[Vec<Event>; 3], sides: &[Side]) -> [Vec<Event
     })
 }
 
-/// Returns the sorted events of all objects along one axis.
 fn events(boxes: &[Aabb], axis: usize) -> Vec<Event> {
     let mut events = Vec::with_capacity(2 * boxes.len());
     for (b, object) in boxes.iter().zip(0..) {

@@ -53,18 +53,18 @@ impl KdTree {
         mut test: impl FnMut(u32) -> bool,
         counter: &mut impl Counter,
     ) -> bool {
-        let mut found = false;
+        let mut is_hit = false;
         self.walk(ray, counter, |objects, _, counter| {
             for &object in objects {
                 counter.object();
                 if test(object) {
-                    found = true;
+                    is_hit = true;
                     return ControlFlow::Break(());
                 }
             }
             ControlFlow::Continue(())
         });
-        found
+        is_hit
     }
 
     /// Calls `leaf` with the objects of every leaf that the ray may hit, from near to far, until
