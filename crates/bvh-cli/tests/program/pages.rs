@@ -1,10 +1,8 @@
 //! The examples in the documentation, and its commands that call a program.
 
-use crate::support::{program, run, text, top};
+use crate::support::{run, top};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
-use std::time::{Duration, Instant};
 
 /// A block of code on a page.
 pub struct Block {
@@ -101,83 +99,46 @@ fn is_variable(word: &str) -> bool {
     name.bytes().all(|byte| byte == b'_' || byte.is_ascii_uppercase())
 }
 
-/// The names of a program and of its package.
-pub struct Called {
-    pub name: &'static str,
-    pub package: &'static str,
+/// Asserts that a program accepts the flags and values of all its commands on the pages, in blocks
+/// and in sentences. Returns the number of commands.
+pub fn accepts_printed_commands(name: &str, package: &str) -> usize {
+    let mut texts: Vec<(String, String)> =
+        blocks_in("sh").into_iter().map(|block| (block.place(), block.text)).collect();
+    for page in pages() {
+        let text = fs::read_to_string(&page).unwrap();
+        // Every second part is a block.
+        let outside: String = text.split("```").step_by(2).collect();
+        let inline_code = outside.split('`').skip(1).step_by(2);
+        for code in inline_code.filter(|code| code.starts_with(&format!("{name} "))) {
+            // A command may be wrapped like the sentence around it.
+            texts.push((page.display().to_string(), code.replace('\n', " ")));
+        }
+    }
+    let mut accepted = 0;
+    for (place, text) in texts {
+        for command in commands(&text, &place) {
+            let Some(mut arguments) = arguments(&command, name, package) else { continue };
+            // The program then reads the other arguments and does nothing.
+            arguments.push("--help");
+            let answer = run(Path::new("."), &arguments);
+            let message = crate::support::text(&answer.stderr);
+            assert_eq!(answer.status.code(), Some(0), "{place}: {command:?}: {message}");
+            accepted += 1;
+        }
+    }
+    accepted
 }
 
-impl Called {
-    /// Returns the program's arguments in a command, if the command calls the program.
-    fn arguments<'a>(&self, command: &'a [String]) -> Option<Vec<&'a str>> {
-        let words: Vec<&str> = command.iter().map(String::as_str).collect();
-        let end = words.iter().position(|&word| word == "--");
-        match (&words[..], end) {
-            ([name, ..], _) if *name == self.name => Some(words[1..].to_vec()),
-            (["cargo", "run", ..], Some(end)) => {
-                let is_called = words[..end].windows(2).any(|pair| pair == ["-p", self.package]);
-                is_called.then(|| words[end + 1..].to_vec())
-            }
-            _ => None,
+/// Returns a program's arguments in a command, if the command calls the program.
+fn arguments<'a>(command: &'a [String], name: &str, package: &str) -> Option<Vec<&'a str>> {
+    let words: Vec<&str> = command.iter().map(String::as_str).collect();
+    let end = words.iter().position(|&word| word == "--");
+    match (&words[..], end) {
+        ([program, ..], _) if *program == name => Some(words[1..].to_vec()),
+        (["cargo", "run", ..], Some(end)) => {
+            let is_called = words[..end].windows(2).any(|pair| pair == ["-p", package]);
+            is_called.then(|| words[end + 1..].to_vec())
         }
+        _ => None,
     }
-
-    /// Asserts that the program accepts the arguments of all commands in blocks. Returns the number
-    /// of commands.
-    pub fn reads_blocks(&self) -> usize {
-        // In an empty folder valid commands end soon, because the files that they name do not
-        // exist.
-        let empty = tempfile::tempdir().unwrap();
-        let mut read = 0;
-        for block in blocks_in("sh") {
-            for command in commands(&block.text, &block.place()) {
-                let Some(arguments) = self.arguments(&command) else { continue };
-                let answer = beginning(empty.path(), &arguments);
-                assert!(!answer.contains(UNREADABLE), "{}: {command:?}: {answer}", block.place());
-                read += 1;
-            }
-        }
-        read
-    }
-
-    /// Asserts that the program has the commands and flags that sentences name. Returns the number
-    /// of commands.
-    pub fn knows_sentences(&self) -> usize {
-        let mut read = 0;
-        for page in pages() {
-            let text = fs::read_to_string(&page).unwrap();
-            // Every second part is a block.
-            let outside: String = text.split("```").step_by(2).collect();
-            let place = page.display().to_string();
-            let begins = format!("{} ", self.name);
-            let inline_code = outside.split('`').skip(1).step_by(2);
-            for code in inline_code.filter(|code| code.starts_with(&begins)) {
-                // A command may be wrapped like the sentence around it.
-                for command in commands(&code.replace('\n', " "), &place) {
-                    let Some(mut arguments) = self.arguments(&command) else { continue };
-                    arguments.push("--help");
-                    let answer = run(Path::new("."), &arguments);
-                    let message = crate::support::text(&answer.stderr);
-                    assert_eq!(answer.status.code(), Some(0), "{place}: `{code}`: {message}");
-                    read += 1;
-                }
-            }
-        }
-        read
-    }
-}
-
-/// The part of a program's message about invalid arguments.
-pub const UNREADABLE: &str = "try '--help'";
-
-/// Returns the messages of a command on standard error within two seconds.
-fn beginning(folder: &Path, arguments: &[&str]) -> String {
-    let mut child =
-        program(folder, arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-    let start = Instant::now();
-    while child.try_wait().unwrap().is_none() && start.elapsed() < Duration::from_secs(2) {
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let _ = child.kill();
-    text(&child.wait_with_output().unwrap().stderr)
 }
