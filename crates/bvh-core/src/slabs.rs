@@ -1,72 +1,132 @@
 //! The conservative ray–box test: it never misses a box that contains a hit.
 
+use crate::ray::pow2;
 use crate::{Aabb, Ray};
 use glam::{Vec3, Vec4, Vec4Swizzles};
 
 /// A ray prepared for tests against the boxes of one scene.
 ///
-/// Three properties make the answer of a traversal independent of its tree:
+/// Three properties make the answer of a traversal independent of its tree, and its time
+/// independent of the place and the size of the scene:
 ///
 /// 1. *Conservative.* If the ray is in the box at a distance t ≥ 0 in real arithmetic, the interval
-///    of the box contains t rounded to f32. The box grows by R · [`Slabs::MARGIN`] = 8uR, where u =
-///    2⁻²⁴ and R is the largest coordinate of the scene relative to the origin; at least 7.9uR
-///    remain after the sum with the origin is rounded. The difference from a plane and the
-///    reciprocal of the direction are off by at most u of themselves, and no difference exceeds R.
-///    So the product before its own rounding is at most t for an entry and at least t for an exit,
-///    and rounding is monotone. A reciprocal that would overflow is `f32::MAX`, which moves an
-///    entry nearer. An exit is then at least 7.9uR · `f32::MAX`, and t ≤ R / D, where D ≥ 2⁻¹⁰⁰ is
-///    the direction's largest component.
+///    of the box contains t rounded to f32.
 /// 2. *Monotone.* The interval of a box inside another box is inside the other's interval, bit by
 ///    bit: each operation rounds monotonically.
-/// 3. *Defined.* Reciprocals are finite and the margin is never zero, so no 0 · ∞ occurs, and a ray
-///    in a face plane is strictly inside the enlarged box.
+/// 3. *Tight.* Boxes grow in proportion to their distance from the ray's origin alone: by less than
+///    2⁻²⁰ of it, and by less than 2⁻⁴⁷ of it if the ray begins far from the scene.
+///
+/// # Proof of the first
+///
+/// Take one axis, and a direction d > 0 along it; the other sign mirrors every step. The ray is in
+/// the box at t:
+///
+/// ```text
+///       origin          lower      origin + t d       upper
+///   ──────┼───────────────┼─────────────┼───────────────┼─────>
+///         └─ d · entry ───┘             │               │
+///         ├─ d · t ─────────────────────┘               │
+///         └─ d · exit ──────────────────────────────────┘
+/// ```
+///
+/// With u = 2⁻²⁴, the difference lower − origin is rounded by at most u of itself, subnormal or not,
+/// and so are the reciprocal of d and its product n with 1 − 4u. Before it is rounded, the product of
+/// the difference and n is at most (1 + u)³ (1 − 4u) < 1 times (lower − origin) / d ≤ t if the
+/// difference is positive, and below t if it is not. Rounding is monotone, so that the entry is at
+/// most t rounded. In the same way the exit, with 1 + 4u, is at least t rounded.
+///
+/// *Parallel.* Where the reciprocal of d would overflow, n is made of the largest number, which is
+/// below 1 / d, and the factor of exits is infinite. The origin is moved by one step up for lower
+/// faces and by one step down for upper faces. So a box that the ray meets has a negative difference
+/// below, and a positive one above, whose product is infinite: no 0 · ∞ occurs.
+///
+/// *Far.* In the unit of a scene, the growth of its boxes increases with the distance from it. So
+/// rays from far away, and rays whose differences could overflow, are tested in f64. The quotient of
+/// a difference and d is rounded twice, by 2⁻⁵³ of itself; the factors are 1 ∓ 2⁻⁴⁹.
 #[derive(Clone, Copy, Debug)]
 pub struct Slabs {
-    /// origin + margin, subtracted from lower corners.
+    /// The origin, as it is subtracted from lower and from upper corners.
     lower: Vec4,
-    /// origin − margin, subtracted from upper corners.
     upper: Vec4,
-    inverse: Vec4,
-    t_min: f32,
+    /// The reciprocals of the direction for entries and for exits.
+    near: Vec4,
+    far: Vec4,
+    ray: Ray,
+    is_far: bool,
 }
 
+/// The factor of entries, 1 − 4u.
+pub(crate) const NEAR: f32 = 1.0 - 4.0 * (f32::EPSILON / 2.0);
+/// The factor of exits, 1 + 4u.
+pub(crate) const FAR: f32 = 1.0 + 4.0 * (f32::EPSILON / 2.0);
+/// The factors in f64.
+pub(crate) const NEAR_DOUBLE: f64 = 1.0 - 8.0 * f64::EPSILON;
+pub(crate) const FAR_DOUBLE: f64 = 1.0 + 8.0 * f64::EPSILON;
+
 impl Slabs {
-    /// The factor of an exit. With u = 2^-24, an entry is too far by at most (1 + u)^3, and an exit
-    /// too near by at most (1 − u)^4.
-    pub const FAR: f32 = 1.0 + 8.0 * (f32::EPSILON / 2.0);
-
-    /// The growth of boxes, in multiples of the largest coordinate of the scene relative to the
-    /// ray's origin.
-    pub const MARGIN: f32 = 8.0 * (f32::EPSILON / 2.0);
-
     /// Prepares `ray` for boxes inside `bounds`, which may be a scene's root box or an object's
     /// box.
     #[inline]
     pub fn new(ray: &Ray, bounds: &Aabb) -> Self {
         let origin = ray.origin();
-        let margin = margin(ray, bounds);
-        Self {
-            lower: (origin + margin).extend(0.0),
-            upper: (origin - margin).extend(0.0),
-            inverse: ray.inverse_direction().extend(0.0),
-            t_min: ray.t_min(),
+        let inverse = ray.inverse_direction();
+        let far = inverse * FAR;
+        let mut lower = origin;
+        let mut upper = origin;
+        let is_parallel = far.abs().cmpeq(Vec3::INFINITY);
+        if is_parallel.any() {
+            lower = Vec3::select(is_parallel, origin.map(f32::next_up), origin);
+            upper = Vec3::select(is_parallel, origin.map(f32::next_down), origin);
         }
+        Self {
+            lower: lower.extend(0.0),
+            upper: upper.extend(0.0),
+            near: (inverse * NEAR).extend(0.0),
+            far: far.extend(0.0),
+            ray: *ray,
+            is_far: ray.is_far_from(bounds),
+        }
+    }
+
+    /// The origin as it is subtracted from lower and from upper faces, by axis.
+    pub(crate) fn origins(&self) -> [[f32; 3]; 2] {
+        [self.lower, self.upper].map(|origin| origin.truncate().to_array())
+    }
+
+    /// The factors of the differences of near and of far faces, by axis.
+    pub(crate) fn factors(&self) -> [[f32; 3]; 2] {
+        [self.near, self.far].map(|factor| factor.truncate().to_array())
     }
 
     /// Returns the distances between which the ray may be inside the box, from `t_min` on. The
     /// interval is empty if the first exceeds the second.
     #[inline(always)]
     pub fn interval(&self, aabb: &Aabb) -> (f32, f32) {
+        if self.is_far {
+            return self.far_interval(aabb);
+        }
         let Aabb { min, max } = *aabb;
         // Two overlapping loads of four lanes and a rotation. The fourth lane is not used.
         let min = Vec4::new(min.x, min.y, min.z, max.x);
         let max = Vec4::new(aabb.min.z, max.x, max.y, max.z).yzwx();
-        let low = (min - self.lower) * self.inverse;
-        let high = (max - self.upper) * self.inverse;
-        let near = low.min(high);
-        let far = low.max(high);
-        let entry = larger(larger(near.x, near.y), larger(near.z, self.t_min));
-        (entry, smaller(smaller(far.x, far.y), far.z) * Self::FAR)
+        let low = min - self.lower;
+        let high = max - self.upper;
+        let near = (low * self.near).min(high * self.near);
+        let far = (low * self.far).max(high * self.far);
+        let entry = larger(larger(near.x, near.y), larger(near.z, self.ray.t_min()));
+        (entry, smaller(smaller(far.x, far.y), far.z))
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn far_interval(&self, aabb: &Aabb) -> (f32, f32) {
+        let (entry, exit) = interval_in_f64(&self.ray, aabb);
+        let entry = entry * NEAR_DOUBLE;
+        let exit = exit * FAR_DOUBLE;
+        if entry > exit {
+            return (f32::INFINITY, f32::NEG_INFINITY);
+        }
+        (larger(entry as f32, self.ray.t_min()), exit as f32)
     }
 
     /// Returns the distances between which the ray may cross the plane across `axis` at `position`,
@@ -76,9 +136,30 @@ impl Slabs {
     /// bit by bit.
     #[inline(always)]
     pub fn crossing(&self, axis: usize, position: f32) -> (f32, f32) {
-        let a = (position - self.lower[axis]) * self.inverse[axis];
-        let b = (position - self.upper[axis]) * self.inverse[axis];
-        (smaller(a, b), larger(a, b) * Self::FAR)
+        if self.is_far {
+            return self.far_crossing(axis, position);
+        }
+        let is_backwards = self.near[axis] < 0.0;
+        // Of a box behind the plane, the plane is the first face; of a box in front, the last.
+        let (first, last) =
+            if is_backwards { (self.upper, self.lower) } else { (self.lower, self.upper) };
+        let last = (position - last[axis]) * self.far[axis];
+        // 0 · ∞ where the ray runs along the plane.
+        let last = if last.is_nan() { f32::INFINITY } else { last };
+        ((position - first[axis]) * self.near[axis], last)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn far_crossing(&self, axis: usize, position: f32) -> (f32, f32) {
+        let difference = f64::from(position) - f64::from(self.ray.origin()[axis]);
+        let distance = difference / f64::from(self.ray.direction()[axis]);
+        // 0 / 0 where the ray runs in the plane.
+        if distance.is_nan() {
+            return (f32::NEG_INFINITY, f32::INFINITY);
+        }
+        let (first, last) = (distance * NEAR_DOUBLE, distance * FAR_DOUBLE);
+        (first.min(last) as f32, first.max(last) as f32)
     }
 
     /// Returns the distance at which the ray enters the box; infinity for a miss, which is beyond
@@ -90,15 +171,65 @@ impl Slabs {
     }
 }
 
-/// Returns the growth of boxes along each axis for a ray that meets boxes inside `bounds`. It is
-/// always large enough to change the origin when added to it.
-#[inline(always)]
-pub(crate) fn margin(ray: &Ray, bounds: &Aabb) -> Vec3 {
-    let origin = ray.origin();
-    let reach = (bounds.min - origin).abs().max((bounds.max - origin).abs());
-    // The second term covers the rounding of the sum with the origin. The third keeps the margin
-    // above zero if the origin and the reach are zero.
-    reach.max_element() * Slabs::MARGIN + origin.abs() * f32::EPSILON + f32::MIN_POSITIVE
+impl Ray {
+    /// Returns whether f32 is too coarse to tell boxes inside `bounds` apart from the ray's origin.
+    #[inline]
+    pub(crate) fn is_far_from(&self, bounds: &Aabb) -> bool {
+        !self.begins_in(&near_region(bounds))
+    }
+
+    #[inline(always)]
+    pub(crate) fn begins_in(&self, region: &Aabb) -> bool {
+        let origin = self.origin();
+        (region.min.cmple(origin) & origin.cmple(region.max)).all()
+    }
+
+    /// Returns the largest coordinate of a point of `bounds` relative to the origin, rounded.
+    #[inline(always)]
+    pub(crate) fn reach(&self, bounds: &Aabb) -> f32 {
+        let origin = self.origin();
+        (bounds.max - origin).max(origin - bounds.min).max_element()
+    }
+}
+
+/// Returns the region from which f32 tells boxes inside `bounds` apart: up to 256 times as far from
+/// them as they extend, and where no coordinate relative to another overflows.
+#[inline]
+pub(crate) fn near_region(bounds: &Aabb) -> Aabb {
+    const HUGE: f32 = pow2(126);
+    let size = bounds.min.abs().max(bounds.max.abs()).max_element();
+    if size >= HUGE {
+        return Aabb::EMPTY;
+    }
+    let distance = 256.0 * (bounds.max - bounds.min).max_element();
+    Aabb {
+        min: (bounds.min - distance).max(Vec3::splat(-HUGE)),
+        max: (bounds.max + distance).min(Vec3::splat(HUGE)),
+    }
+}
+
+/// Returns the distances at which the line of a ray enters and leaves a box, each rounded by at most
+/// 2⁻⁵¹ of itself. The first exceeds the second, up to that rounding, if the line misses the box.
+#[inline]
+fn interval_in_f64(ray: &Ray, aabb: &Aabb) -> (f64, f64) {
+    let mut entry = f64::NEG_INFINITY;
+    let mut exit = f64::INFINITY;
+    for axis in 0..3 {
+        let origin = f64::from(ray.origin()[axis]);
+        let direction = f64::from(ray.direction()[axis]);
+        let low = f64::from(aabb.min[axis]) - origin;
+        let high = f64::from(aabb.max[axis]) - origin;
+        if direction == 0.0 {
+            if low > 0.0 || high < 0.0 {
+                return (f64::INFINITY, f64::NEG_INFINITY);
+            }
+            continue;
+        }
+        let (near, far) = if direction < 0.0 { (high, low) } else { (low, high) };
+        entry = entry.max(near / direction);
+        exit = exit.min(far / direction);
+    }
+    (entry, exit)
 }
 
 /// Returns the larger of two numbers that are not NaN. Unlike `f32::max`, it is one instruction.
@@ -118,7 +249,9 @@ fn smaller(a: f32, b: f32) -> f32 {
 /// the ray misses the box in its range, or if the moved distance exceeds `t_max`.
 ///
 /// A traversal skips a box whose entry is behind the nearest hit so far. Without the move, the tree
-/// would decide which of two objects at nearly the same distance is found.
+/// would decide which of two objects at nearly the same distance is found. The moved distance is at
+/// least the distance, in real arithmetic and then rounded, at which the ray enters the box, and no
+/// traversal enters a box around it later.
 ///
 /// `bounds` must be the object's box, or a box inside it.
 #[inline]
@@ -126,15 +259,18 @@ pub fn clip_to_box(ray: &Ray, bounds: &Aabb, t: f32, t_max: f32) -> Option<f32> 
     if t.is_nan() || t < ray.t_min() {
         return None;
     }
-    let (entry, exit) = Slabs::new(ray, bounds).interval(bounds);
+    let (entry, exit) = interval_in_f64(ray, bounds);
+    let first = larger((entry * FAR_DOUBLE) as f32, ray.t_min());
+    let last = (exit * NEAR_DOUBLE) as f32;
     // Adding 0 turns −0 into +0.
-    let moved = larger(smaller(t, exit), entry) + 0.0;
-    (entry <= exit && moved <= t_max).then_some(moved)
+    let moved = larger(smaller(t, last), first) + 0.0;
+    (entry <= exit && ray.t_min() <= exit as f32 && moved <= t_max).then_some(moved)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn meets(ray: &Ray, b: &Aabb) -> bool {
         let (entry, exit) = Slabs::new(ray, b).interval(b);
@@ -166,13 +302,67 @@ mod tests {
     fn boxes_without_extent_are_met_at_every_scale() {
         for k in [-120, -60, 0, 60, 120] {
             let scale = libm::exp2f(k as f32);
-            let point = Vec3::new(0.3, -0.7, 1.9) * scale;
-            for origin in [Vec3::new(-1.0, 0.4, 0.1) * scale, Vec3::ZERO, point] {
-                let towards = (point - origin) / scale;
-                let ray =
-                    Ray::half_line(origin, if towards == Vec3::ZERO { Vec3::X } else { towards })
-                        .unwrap();
-                assert!(meets(&ray, &Aabb { min: point, max: point }), "2^{k}: {ray:?}");
+            let point = Vec3::new(0.5, -0.75, 1.875) * scale;
+            for towards in [Vec3::X, Vec3::new(0.25, -1.0, 0.5), Vec3::new(-0.0, 0.125, 0.0)] {
+                // The ray meets the point in real arithmetic, too.
+                for steps in [0.0, 1.0, 8.0] {
+                    let ray = Ray::half_line(point - steps * scale * towards, towards).unwrap();
+                    assert!(meets(&ray, &Aabb { min: point, max: point }), "2^{k}: {ray:?}");
+                }
+            }
+        }
+    }
+
+    /// Returns an upper bound of the entry and a lower bound of the exit in real arithmetic, which
+    /// differ by 2⁻⁴⁸ of themselves from these distances.
+    fn real_interval(ray: &Ray, aabb: &Aabb) -> (f64, f64) {
+        let (entry, exit) = interval_in_f64(ray, aabb);
+        (entry + entry.abs() * 1e-15, exit - exit.abs() * 1e-15)
+    }
+
+    proptest! {
+        #[test]
+        fn intervals_contain_the_real_ones_and_grow_with_the_distance_alone(
+            words in prop::collection::vec(prop::array::uniform12(any::<u32>()), 200),
+            exponents in prop::array::uniform4(-149i32..127),
+            largest in 0i32..60,
+        ) {
+            // Coordinates of three sizes, and scenes of another, more or less far away.
+            let number = |word: u32, exponent: i32| {
+                let size = libm::ldexp(f64::from(word >> 8) / 16_777_216.0 + 0.5, exponent);
+                (if word & 1 == 0 { size } else { -size }) as f32
+            };
+            for word in words {
+                let vector = |first: usize, exponent: i32| {
+                    Vec3::from([0, 1, 2].map(|i| {
+                        let word = word[first + i];
+                        if word & 0b1110 == 0 { 0.0 } else { number(word, exponent) }
+                    }))
+                };
+                let corner = vector(0, exponents[0].min(120));
+                let bounds = Aabb::around([corner, corner + vector(3, exponents[1].min(120))]);
+                let origin = vector(6, exponents[2].min(120));
+                let direction = vector(9, exponents[3].clamp(-98, 98));
+                let Ok(ray) = Ray::half_line(origin, direction) else { continue };
+                let scene = Aabb {
+                    min: bounds.min,
+                    max: bounds.max + libm::ldexpf(1.0, exponents[1].min(60) + largest),
+                };
+                if scene.check().is_err() {
+                    continue;
+                }
+                let (entry, exit) = Slabs::new(&ray, &scene).interval(&bounds);
+                let (real_entry, real_exit) = real_interval(&ray, &bounds);
+                if real_entry <= real_exit && real_exit >= 0.0 {
+                    prop_assert!(entry <= (real_entry.max(0.0) as f32), "{ray:?} {bounds:?}");
+                    prop_assert!(exit >= real_exit as f32, "{ray:?} {bounds:?}");
+                }
+                // A box that is farther off than the growth is missed.
+                let size = real_entry.abs().max(real_exit.abs());
+                let gap = real_entry.max(0.0) - real_exit;
+                if gap > size * 1e-6 + 1e-44 && size < 1e38 {
+                    prop_assert!(entry > exit, "{ray:?} {bounds:?}: {entry} {exit}");
+                }
             }
         }
     }

@@ -218,7 +218,7 @@ impl Structure {
                 let planes = node.planes.map(|plane| plane[lane]);
                 if planes.iter().all(|plane| plane.is_finite()) {
                     structure.name(node.children[lane], index + 1, depth + 1)?;
-                } else if !planes.iter().all(|plane| plane.is_nan()) {
+                } else if planes != [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]].concat()[..] {
                     // A box that is unused in part could be entered.
                     return Err(FileError::Layout { node: index });
                 }

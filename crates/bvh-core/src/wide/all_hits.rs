@@ -153,16 +153,9 @@ impl WideBvh {
             return;
         }
         let first = hits.len();
-        // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw; callers
+        // SAFETY: `kernel` is available, as `choose` saw; callers
         // pass parts of no more rays.
-        let others = unsafe { vector::all_hits_of(self, rays, found) };
-        for (number, ray) in (0..).zip(rays) {
-            if others[number / 64] >> (number % 64) & 1 == 1 {
-                self.append_hits(ray, hits);
-                let number = number as u32;
-                found.extend(hits.drain(first..).map(|hit| Found { number, hit }));
-            }
-        }
+        unsafe { vector::all_hits_of(self, rays, found) };
         counts.fill(0);
         for found in found.iter() {
             counts[found.number as usize] += 1;
@@ -199,12 +192,12 @@ impl WideBvh {
     /// leaves.
     fn append_hits(&self, ray: &Ray, hits: &mut Vec<Hit>) {
         let line = Line::new(ray);
-        let sloped = SlopedLine::new(ray, self.largest);
+        let sloped = SlopedLine::new(ray, &self.bounds);
         let mut leaves = AllHits { ray, line, sloped, hits };
-        // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
-        let is_traced =
-            self.kernel != Kernel::Portable && unsafe { vector::all_hits(self, ray, &mut leaves) };
-        if !is_traced {
+        if self.kernel != Kernel::Portable {
+            // SAFETY: `kernel` is available, as `choose` saw.
+            unsafe { vector::all_hits(self, ray, &mut leaves) };
+        } else {
             portable::traverse::<ANY_HIT>(self, ray, &mut (), |block, _| {
                 leaves.test(block, (1 << block.len()) - 1);
                 false

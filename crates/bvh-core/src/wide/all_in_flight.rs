@@ -15,7 +15,7 @@
 
 use super::crossed_leaves::{Decision, LineLanes, SlopedLine};
 use super::instructions::{Instructions, Pending};
-use super::kernel::STACK;
+use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::Lanes;
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
@@ -54,20 +54,15 @@ pub(crate) struct Found {
 type Pair = u64;
 
 /// Appends the hits of the rays to `found`, in no order; the hits of a divided triangle once for
-/// each of its leaves. Returns the rays that the portable kernel must trace, a bit per ray.
+/// each of its leaves.
 ///
 /// # Safety
 /// The processor has the instructions of `K`, and the caller is compiled with them; the references
-/// of `wide` are sound and its `stack_need` is at most [`STACK`]; there are at most [`MOST`] rays.
+/// of `wide` are sound; there are at most [`MOST`] rays.
 #[inline(always)]
-pub(crate) unsafe fn trace<K: Instructions>(
-    wide: &WideBvh,
-    rays: &[Ray],
-    found: &mut Vec<Found>,
-) -> [u64; MOST / 64] {
+pub(crate) unsafe fn trace<K: Instructions>(wide: &WideBvh, rays: &[Ray], found: &mut Vec<Found>) {
     const { assert!(K::FLIGHT <= FLIGHT && K::Rays::N <= RAYS) };
-    let mut others = [0; MOST / 64];
-    let Some(root) = wide.root else { return others };
+    let Some(root) = wide.root else { return };
     let mut prepared = [const { MaybeUninit::<Prepared>::uninit() }; MOST + RAYS];
     let mut lines = [const { MaybeUninit::<SlopedLine>::uninit() }; MOST];
     let mut waiting = [0; MOST];
@@ -77,15 +72,13 @@ pub(crate) unsafe fn trace<K: Instructions>(
         for first in (0..rays.len()).step_by(K::Rays::N) {
             let source = Source::Rays(rays);
             let lanes = source.lanes_up_to::<K::Rays>(first, rays.len());
-            let ready = Ready::new(lanes, wide.largest);
+            let ready = Ready::new(lanes, wide);
             ready.write(first as u32, prepared[first].as_mut_ptr());
             let entered = ready.enter(&wide.bounds);
             let last = rays.len().min(first + K::Rays::N);
             for (lane, number) in (first..last).enumerate() {
-                let is_in_range = ready.in_range >> lane & 1;
-                others[number / 64] |= u64::from(1 - is_in_range) << (number % 64);
-                if is_in_range & entered >> lane & 1 == 1 {
-                    lines[number].write(SlopedLine::new(&rays[number], wide.largest));
+                if entered >> lane & 1 == 1 {
+                    lines[number].write(SlopedLine::new(&rays[number], &wide.bounds));
                     waiting[count] = number as u32;
                     count += 1;
                 }
@@ -102,7 +95,6 @@ pub(crate) unsafe fn trace<K: Instructions>(
         }
         pairs.test::<K>();
     }
-    others
 }
 
 /// The way of one ray through the layout.
@@ -113,8 +105,9 @@ struct Traversal {
     /// The node to visit next.
     child: Child,
     number: u32,
-    /// [`END`], what waits, and room for stores of whole registers.
-    stack: [MaybeUninit<Pending>; STACK + 24],
+    /// [`END`], what waits, and room for stores of whole registers: `frame`, or on the heap.
+    stack: *mut Pending,
+    frame: [MaybeUninit<Pending>; STACK + SPARE],
 }
 
 impl Traversal {
@@ -125,9 +118,11 @@ impl Traversal {
         self.ray = unsafe { prepared.add(number as usize) };
         self.number = number;
         self.child = root;
-        self.stack[0].write(u64::from(END.bits()));
         // SAFETY: the stack has more than one place.
-        self.top = unsafe { self.stack.as_mut_ptr().cast::<Pending>().add(1) };
+        unsafe {
+            self.stack.write(u64::from(END.bits()));
+            self.top = self.stack.add(1);
+        }
     }
 }
 
@@ -143,6 +138,15 @@ unsafe fn visit_nodes<K: Instructions>(
     root: Child,
 ) {
     let mut traversals = [const { MaybeUninit::<Traversal>::uninit() }; FLIGHT];
+    let mut deep = DeepStacks::new(FLIGHT, pairs.wide.stack_need);
+    for (i, traversal) in traversals.iter_mut().enumerate() {
+        let traversal: *mut Traversal = traversal.as_mut_ptr();
+        // SAFETY: the traversal exists; its fields need not be initialised to be named.
+        unsafe {
+            let frame = (&raw mut (*traversal).frame).cast();
+            (*traversal).stack = deep.as_mut().map_or(frame, |deep| deep.stack(i));
+        }
+    }
     let mut active = [core::ptr::null_mut(); FLIGHT];
     let mut count = K::FLIGHT.min(waiting.len());
     let (first, mut waiting) = waiting.split_at(count);

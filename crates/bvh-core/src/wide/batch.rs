@@ -16,8 +16,7 @@ const MANY: usize = 128;
 ///
 /// # Safety
 /// The processor has the instructions of `K`, and the caller is compiled with them; there is an
-/// answer for every ray; the references of `wide` are sound and its `stack_need` is at most
-/// [`STACK`](super::kernel::STACK).
+/// answer for every ray; the references of `wide` are sound.
 #[inline(always)]
 pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
     wide: &WideBvh,
@@ -37,11 +36,11 @@ pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
         while next + K::Rays::N <= rays.len() {
             rays.prefetch::<K>(next + K::PACKET);
             let lanes = rays.lanes::<K::Rays>(next);
-            if let Some(scale) = lanes.cohere(wide.largest) {
+            if lanes.cohere(&wide.near) {
                 if !packet.takes(lanes.octant()) {
                     packet.trace::<ANY>(wide, batch);
                 }
-                packet.add(lanes, scale, next);
+                packet.add(lanes, next);
                 rest::<K, ANY>(wide, batch, first_of_rest..next);
                 first_of_rest = next + K::Rays::N;
             }

@@ -132,7 +132,7 @@ pub(super) fn lay_out_nodes(
             nodes.push(WideNode::EMPTY);
             let (mut children, lanes) = children(tree, decisions, subtree);
             children[..lanes].sort_by(|&a, &b| promise[a].total_cmp(&promise[b]));
-            let waiting = waiting + 7;
+            let waiting = waiting + lanes - 1;
             open.extend((0..lanes).map(|lane| (children[lane], Some((index, lane)), waiting)));
             Child::node(index as u32)
         };

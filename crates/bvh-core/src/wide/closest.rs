@@ -49,7 +49,7 @@ impl WideBvh {
     pub fn closest_points(&self, points: &[Vec3], closest: &mut [Option<Closest>]) {
         assert_eq!(points.len(), closest.len(), "an answer for every point");
         if self.kernel != Kernel::Portable {
-            // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
+            // SAFETY: `kernel` is available, as `choose` saw.
             return unsafe { vector::closest_points(self, points, closest) };
         }
         let mut stack = Vec::new();
@@ -86,8 +86,8 @@ impl WideBvh {
                 let node = &self.nodes[child.index()];
                 let first = stack.len();
                 for (lane, bound) in bounds(node, point).into_iter().enumerate() {
-                    // False for unused lanes, which are NaN.
-                    if bound <= nearest.near.distance_squared {
+                    // Unused lanes are infinitely far away.
+                    if bound <= nearest.near.distance_squared.min(f64::MAX) {
                         stack.push(Pending { bound, child: node.children[lane] });
                     }
                 }
@@ -112,7 +112,7 @@ impl WideBvh {
     }
 }
 
-/// Returns lower bounds of the squared distances of a point from the boxes of a node; NaN for
+/// Returns lower bounds of the squared distances of a point from the boxes of a node; ∞ for
 /// unused lanes.
 #[inline(always)]
 fn bounds(node: &WideNode, point: Vec3) -> [f64; WideNode::LANES] {
@@ -126,9 +126,7 @@ fn bounds(node: &WideNode, point: Vec3) -> [f64; WideNode::LANES] {
             // In f32 differences of the largest coordinates would overflow.
             let below = f64::from(lower[lane]) - f64::from(point[axis]);
             let above = f64::from(point[axis]) - f64::from(upper[lane]);
-            // Comparisons that keep NaN.
-            let outside = if below > above { below } else { above };
-            let outside = if outside < 0.0 { 0.0 } else { outside };
+            let outside = below.max(above).max(0.0);
             bounds[lane] += outside * outside;
         }
     }

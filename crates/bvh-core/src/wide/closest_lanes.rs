@@ -1,12 +1,13 @@
 //! The triangles closest to points, four triangles and eight boxes at once.
 
 use super::instructions::{Instructions, Pending};
-use super::kernel::STACK;
+use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use super::layout::WideBvh;
 use super::nearest::{Closest, Nearest};
 use super::node::{Child, WideNode};
 use super::triangles::TriangleBlock;
+use crate::Aabb;
 use crate::ray::pow2;
 use core::mem::MaybeUninit;
 use glam::{DVec3, Vec3};
@@ -15,17 +16,20 @@ use glam::{DVec3, Vec3};
 ///
 /// # Safety
 /// The processor has the instructions of `K`, and the caller is compiled with them; the references
-/// of `wide` are sound and its `stack_need` is at most [`STACK`].
+/// of `wide` are sound.
 #[inline(always)]
 pub(crate) unsafe fn trace<K: Instructions>(
     wide: &WideBvh,
     points: &[Vec3],
     closest: &mut [Option<Closest>],
 ) {
+    let mut stack = [const { MaybeUninit::<Pending>::uninit() }; STACK + SPARE];
+    let mut deep = DeepStacks::new(1, wide.stack_need);
+    let stack = deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.stack(0));
     for (&point, closest) in points.iter().zip(closest) {
         *closest = match wide.root {
-            // SAFETY: the caller's promises.
-            Some(root) if point.is_finite() => unsafe { one::<K>(wide, root, point) },
+            // SAFETY: the stack has room for `stack_need` children and one register more.
+            Some(root) if point.is_finite() => unsafe { one::<K>(wide, root, point, stack) },
             _ => None,
         };
     }
@@ -33,20 +37,24 @@ pub(crate) unsafe fn trace<K: Instructions>(
 
 /// Returns the closest point of one point.
 #[inline(always)]
-unsafe fn one<K: Instructions>(wide: &WideBvh, root: Child, point: Vec3) -> Option<Closest> {
+unsafe fn one<K: Instructions>(
+    wide: &WideBvh,
+    root: Child,
+    point: Vec3,
+    base: *mut Pending,
+) -> Option<Closest> {
     let mut nearest = Nearest::new(point);
     let nodes = wide.nodes.as_ptr();
     let blocks = wide.blocks.as_ptr();
-    let mut stack = [const { MaybeUninit::<Pending>::uninit() }; STACK + 8];
-    let base = stack.as_mut_ptr().cast::<Pending>();
     let mut top = base;
     let mut child = root;
     // SAFETY: references are sound, and the stack has room for `stack_need` children and one
     // register more.
     unsafe {
-        let boxes = PointLanes::<K::Boxes>::new(point, wide.largest);
+        let boxes = PointLanes::<K::Boxes>::new(point, &wide.bounds);
         let triangles = TargetLanes::<K::Block>::new(nearest.target);
-        let mut limit = f32::INFINITY;
+        // Unused lanes are infinitely far away.
+        let mut limit = f32::MAX;
         loop {
             while child.is_node() {
                 let node = &*nodes.add(child.index());
@@ -101,8 +109,8 @@ struct PointLanes<L> {
 
 impl<L: Lanes> PointLanes<L> {
     #[inline(always)]
-    unsafe fn new(point: Vec3, largest: f32) -> Self {
-        let size = point.abs().max_element().max(largest);
+    unsafe fn new(point: Vec3, bounds: &Aabb) -> Self {
+        let size = point.abs().max(bounds.min.abs()).max(bounds.max.abs()).max_element();
         let exponent = (size.to_bits() >> 23) as i32 - 127;
         let scale = pow2((-exponent).clamp(-126, 126));
         let [x, y, z] = (point * scale).to_array();
@@ -116,7 +124,7 @@ impl<L: Lanes> PointLanes<L> {
         }
     }
 
-    /// Returns bounds of the scaled squared distances from the boxes of a node; NaN for unused
+    /// Returns bounds of the scaled squared distances from the boxes of a node; ∞ for unused
     /// lanes.
     #[inline(always)]
     unsafe fn bounds(&self, node: &WideNode) -> L {
@@ -129,7 +137,6 @@ impl<L: Lanes> PointLanes<L> {
                 let upper = L::load(node.planes[axis + 3].as_ptr()) * self.scale;
                 let below = lower - self.scaled[axis];
                 let above = self.scaled[axis] - upper;
-                // Of a number and a NaN the second: unused lanes stay NaN.
                 let outside = zero.max(below.max(above));
                 sum = outside.mul_add(outside, sum);
             }

@@ -5,7 +5,7 @@ use super::one_ray::Leaves;
 use super::triangles::TriangleBlock;
 use crate::exact::{ERROR, Line};
 use crate::ray::AXES;
-use crate::{Hit, Ray};
+use crate::{Aabb, Hit, Ray};
 use alloc::vec::Vec;
 
 /// Collects all hits of a ray.
@@ -59,11 +59,13 @@ pub(super) struct SlopedLine {
 }
 
 impl SlopedLine {
-    /// Prepares a ray for triangles whose coordinates are at most `largest`.
+    /// Prepares a ray for triangles within `bounds`.
     #[inline(always)]
-    pub(super) fn new(ray: &Ray, largest: f32) -> Self {
+    pub(super) fn new(ray: &Ray, bounds: &Aabb) -> Self {
         let Line { origin, direction: [dx, dy, dz], axes } = Line::new(ray);
-        let reach = f64::from(ray.origin().abs().max_element()) + f64::from(largest);
+        let origin64 = ray.origin().as_dvec3();
+        let reach = (bounds.max.as_dvec3() - origin64).max(origin64 - bounds.min.as_dvec3());
+        let reach = reach.max_element();
         Self { origin, slope: [dx / dz, dy / dz], depth: dz, reach, largest_axis: axes[2] }
     }
 }

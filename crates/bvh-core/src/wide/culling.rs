@@ -4,6 +4,7 @@ use super::instructions::Instructions;
 use super::lanes::Lanes;
 use super::node::WideNode;
 use super::ray_lanes::RayBounds;
+use crate::slabs::{FAR, NEAR};
 
 /// The bounds of a packet as boxes are tested with them: along each axis the origins for which the
 /// distances to near planes are least and to far planes greatest, and the extreme scales.
@@ -13,11 +14,11 @@ pub(super) struct Culling<L> {
     far: [usize; 3],
     near_origin: [L; 3],
     far_origin: [L; 3],
-    least: [L; 3],
-    most: [L; 3],
+    /// The extreme factors of near and of far planes, the one of the lesser size first.
+    near_factors: [[L; 2]; 3],
+    far_factors: [[L; 2]; 3],
     begin: L,
-    /// The distance by which near and far planes are moved apart.
-    margin: [f32; 3],
+    side: [f32; 3],
 }
 
 impl<L: Lanes> Culling<L> {
@@ -26,39 +27,40 @@ impl<L: Lanes> Culling<L> {
     /// # Safety
     /// The processor has the instructions.
     #[inline(always)]
-    pub(super) unsafe fn new<R: Lanes>(bounds: &RayBounds<R>, octant: u32, largest: f32) -> Self {
+    pub(super) unsafe fn new<R: Lanes>(bounds: &RayBounds<R>, octant: u32) -> Self {
         // SAFETY: the caller's promise.
         unsafe {
-            let margin = bounds.margin(largest);
             let zero = L::splat(0.0);
             let mut culling = Self {
                 near: [0; 3],
                 far: [0; 3],
                 near_origin: [zero; 3],
                 far_origin: [zero; 3],
-                least: [zero; 3],
-                most: [zero; 3],
+                near_factors: [[zero; 2]; 3],
+                far_factors: [[zero; 2]; 3],
                 begin: L::splat(bounds.begin()),
-                margin: [margin; 3],
+                side: [1.0; 3],
             };
             for axis in 0..3 {
                 let [lowest, highest] = bounds.origins(axis);
-                let [least, most] = bounds.scales(axis);
+                let [least, most] = bounds.inverses(axis);
                 let is_backwards = octant >> axis & 1 != 0;
                 culling.near[axis] = axis + 3 * usize::from(is_backwards);
                 culling.far[axis] = axis + 3 * usize::from(!is_backwards);
                 // Distances grow with the plane minus the origin if the scale is positive, else the
                 // other way.
                 let (near, far) = if is_backwards {
-                    culling.margin[axis] = -margin;
-                    (lowest - margin, highest + margin)
+                    culling.side[axis] = -1.0;
+                    (lowest, highest)
                 } else {
-                    (highest + margin, lowest - margin)
+                    (highest, lowest)
                 };
                 culling.near_origin[axis] = L::splat(near);
                 culling.far_origin[axis] = L::splat(far);
-                culling.least[axis] = L::splat(least);
-                culling.most[axis] = L::splat(most);
+                // An infinite factor must be the second: `cull` has NaN from it, not a number.
+                let (small, large) = if is_backwards { (most, least) } else { (least, most) };
+                culling.near_factors[axis] = [L::splat(small * NEAR), L::splat(large * NEAR)];
+                culling.far_factors[axis] = [L::splat(small * FAR), L::splat(large * FAR)];
             }
             culling
         }
@@ -83,14 +85,16 @@ impl<L: Lanes> Culling<L> {
             for axis in 0..3 {
                 let near = L::load(node.planes.as_ptr().add(self.near[axis]).cast());
                 let near = near - self.near_origin[axis];
-                let near = (near * self.least[axis]).min(near * self.most[axis]);
+                let [small, large] = self.near_factors[axis];
+                let near = (near * small).min(near * large);
                 // `max` returns the second of two zeros: entries are never −0.
                 entry = near.max(entry);
                 let far = L::load(node.planes.as_ptr().add(self.far[axis]).cast());
                 let far = far - self.far_origin[axis];
-                let far = (far * self.least[axis]).max(far * self.most[axis]);
-                // `min` returns the second of a NaN and a number: unused lanes stay NaN.
-                exit = exit.min(far);
+                let [small, large] = self.far_factors[axis];
+                let far = (far * small).max(far * large);
+                // `min` returns the second of a NaN and a number.
+                exit = far.min(exit);
             }
             (entry, K::entered(entry, exit))
         }
@@ -99,7 +103,7 @@ impl<L: Lanes> Culling<L> {
     /// Returns the planes of a box that contains everything, by axis.
     #[inline(always)]
     pub(super) fn all_space(&self) -> [[f32; 2]; 3] {
-        let far = self.margin.map(|margin| f32::INFINITY.copysign(margin));
+        let far = self.side.map(|margin| f32::INFINITY.copysign(margin));
         [[-far[0], far[0]], [-far[1], far[1]], [-far[2], far[2]]]
     }
 
@@ -114,10 +118,9 @@ impl<L: Lanes> Culling<L> {
             let lanes = node.planes.as_ptr().cast::<f32>().add(lane);
             let mut planes = [[0.0; 2]; 3];
             for (axis, planes) in planes.iter_mut().enumerate() {
-                let margin = self.margin[axis];
                 *planes = [
-                    *lanes.add(WideNode::LANES * self.near[axis]) - margin,
-                    *lanes.add(WideNode::LANES * self.far[axis]) + margin,
+                    *lanes.add(WideNode::LANES * self.near[axis]),
+                    *lanes.add(WideNode::LANES * self.far[axis]),
                 ];
             }
             planes

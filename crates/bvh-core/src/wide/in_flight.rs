@@ -18,6 +18,7 @@ mod crossing;
 
 use super::answer::Batch;
 use super::instructions::{Instructions, Part};
+use super::kernel::DeepStacks;
 use super::lanes::Lanes;
 use super::layout::WideBvh;
 use super::prepared::{Prepared, Ready};
@@ -100,12 +101,20 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool> Part
     unsafe fn run(self) {
         let Self { mut flight, last } = self;
         let mut traversals = MaybeUninit::<[Traversal; FLIGHT]>::uninit();
+        let traversals = traversals.as_mut_ptr().cast::<Traversal>();
+        let mut deep = DeepStacks::new(FLIGHT, flight.wide.stack_need);
+        for i in 0..FLIGHT {
+            // SAFETY: there is room for so many.
+            unsafe {
+                Traversal::set_stack(traversals.add(i), deep.as_mut().map(|deep| deep.stack(i)));
+            }
+        }
         // Rays are numbered by 32 bits.
         while flight.end < last {
             flight.from = flight.end;
             flight.end = last.min(flight.from + MOST);
             // SAFETY: the caller's promises.
-            unsafe { flight.trace(traversals.as_mut_ptr().cast()) };
+            unsafe { flight.trace(traversals) };
         }
     }
 }
@@ -215,8 +224,7 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
         }
     }
 
-    /// Prepares the next rays, traces those that cannot be, and answers those that miss the box
-    /// around everything.
+    /// Prepares the next rays, and answers those that miss the box around everything.
     #[inline(always)]
     unsafe fn prepare(&mut self, first: usize) {
         let from = self.from;
@@ -225,25 +233,20 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
         let there = u32::MAX >> (32 - count);
         let rays = self.batch.rays;
         // SAFETY: the caller's promises; `ready` has room for sixteen.
-        let in_range = unsafe {
+        unsafe {
             rays.prefetch::<K>(self.from + K::Rays::N);
-            let ready = Ready::new(rays.lanes_up_to::<K::Rays>(from, self.end), self.wide.largest);
-            self.waiting = there & ready.in_range & ready.enter(&self.wide.bounds);
+            let ready = Ready::new(rays.lanes_up_to::<K::Rays>(from, self.end), self.wide);
+            self.waiting = there & ready.enter(&self.wide.bounds);
             if self.waiting != 0 {
                 ready.write((from - first) as u32, self.ready.as_mut_ptr().cast());
             }
-            ready.in_range
-        };
+        }
         let mut others = there & !self.waiting;
         while others != 0 {
             let lane = others.trailing_zeros();
             let number = from + lane as usize;
             others &= others - 1;
-            if in_range >> lane & 1 == 0 {
-                self.batch.alone::<ANY>(number, self.wide, &rays.ray(number));
-            } else {
-                self.batch.answers.write(number, f32::INFINITY, u32::MAX, u32::MAX);
-            }
+            self.batch.answers.write(number, f32::INFINITY, u32::MAX, u32::MAX);
         }
     }
 

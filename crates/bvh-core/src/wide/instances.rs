@@ -139,9 +139,12 @@ fn transformed(transform: &DAffine3, aabb: &Aabb) -> Aabb {
     }
     // Rounding moves a hit by less than this: the rounding of the ray's origin near the part,
     // and of the corners of this box.
-    let margin = size * f64::from(Slabs::MARGIN);
+    let margin = size * ROUNDING;
     Aabb { min: (min - margin).as_vec3(), max: (max + margin).as_vec3() }
 }
+
+/// The growth of a transformed box: 8u, as a part of the largest coordinate on the way.
+const ROUNDING: f64 = 8.0 * (f32::EPSILON / 2.0) as f64;
 
 /// Prepares all instances for rays.
 fn place_all(instances: &[Instance], parts: &[WideBvh]) -> Result<Vec<Placed>, InvalidInstances> {
@@ -206,8 +209,6 @@ pub struct Instances {
     top: Bvh,
     /// The same tree for batches.
     wide_top: WideBvh,
-    /// The largest absolute value of a coordinate of any part, in the part's coordinates.
-    largest_of_parts: f32,
 }
 
 impl Instances {
@@ -225,8 +226,7 @@ impl Instances {
         let boxes: Vec<Aabb> = placed.iter().map(|placed| placed.aabb).collect();
         let used = placed.iter().map(|placed| &parts[placed.part as usize]);
         let wide_top = lay_out_instances(&top, &boxes, used);
-        let largest_of_parts = parts.iter().fold(0.0f32, |largest, part| largest.max(part.largest));
-        Ok(Self { parts, placed, top, wide_top, largest_of_parts })
+        Ok(Self { parts, placed, top, wide_top })
     }
 
     /// Returns the parts, for other instances of the same parts.

@@ -1,5 +1,9 @@
 //! The implementations of the wide layout's traversal, and which of them this processor can run.
 
+use alloc::vec::Vec;
+use core::marker::PhantomData;
+use core::mem::MaybeUninit;
+
 /// An implementation of the traversal of a [`WideBvh`](crate::WideBvh). All answer rays by the same
 /// bits, and find the same [closest points](crate::WideBvh::closest_point); only in a layout with
 /// divided triangles may these differ by rounding.
@@ -20,6 +24,42 @@ impl Kernel {
     pub const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Simd128, Self::Portable];
 }
 
-/// Entries of the stack of a vector kernel's traversal; layouts that could need more are left to
-/// the portable kernel.
+/// The number of children that can wait in the frame of a vector kernel's traversal. The stacks of
+/// deeper layouts are [on the heap](DeepStacks).
 pub(crate) const STACK: usize = 256;
+
+/// The places of a stack beyond the children that wait: the end of every ray, the next block of the
+/// same leaf, and room for stores of whole registers.
+pub(crate) const SPARE: usize = 24;
+
+/// Stacks for a layout in which more than [`STACK`] children can wait.
+pub(crate) struct DeepStacks<T> {
+    /// Cache lines, so that every stack is aligned to them.
+    lines: Vec<MaybeUninit<[u64; 8]>>,
+    lines_of_one: usize,
+    entries: PhantomData<T>,
+}
+
+impl<T> DeepStacks<T> {
+    /// Returns stacks of `need` entries and [`SPARE`] more; `None` if [`STACK`] entries suffice.
+    pub(crate) fn new(stacks: usize, need: usize) -> Option<Self> {
+        if need <= STACK {
+            return None;
+        }
+        let lines_of_one = (size_of::<T>() * (need + SPARE)).div_ceil(size_of::<[u64; 8]>());
+        let mut lines = Vec::with_capacity(stacks * lines_of_one + 1);
+        // SAFETY: there is such a capacity, and nothing is claimed of the entries.
+        unsafe { lines.set_len(stacks * lines_of_one + 1) };
+        Some(Self { lines, lines_of_one, entries: PhantomData })
+    }
+
+    /// The beginning of a stack, aligned to a cache line.
+    pub(crate) fn stack(&mut self, index: usize) -> *mut T {
+        assert!(index < self.lines.len() / self.lines_of_one);
+        let first = self.lines.as_mut_ptr().cast::<u8>();
+        let line = size_of::<[u64; 8]>();
+        // One more line is there than stacks need.
+        let aligned = first.wrapping_add(first.align_offset(line));
+        aligned.wrapping_add(line * self.lines_of_one * index).cast()
+    }
+}

@@ -4,6 +4,7 @@ use super::kernel::Kernel;
 use super::node::{Child, WideNode};
 use super::triangles::TriangleBlock;
 use crate::Aabb;
+use crate::slabs::near_region;
 use alloc::borrow::Cow;
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
@@ -39,18 +40,12 @@ pub struct WideBvh {
     /// Borrowed in a [`WideView`](crate::file::WideView) alone.
     pub(crate) nodes: Cow<'static, [WideNode]>,
     pub(crate) blocks: Cow<'static, [TriangleBlock]>,
-    /// The largest absolute value of a coordinate; for the vector kernels.
-    #[cfg_attr(not(all(feature = "std", target_arch = "x86_64")), allow(dead_code))]
-    pub(crate) largest: f32,
+    /// The [region](near_region) from which f32 tells the boxes apart.
+    pub(crate) near: Aabb,
     /// The kernel that traces it. The processor has its instructions.
     pub(crate) kernel: Kernel,
     /// The most children that can be waiting on the way through it.
     pub(crate) stack_need: usize,
-}
-
-/// Returns the largest absolute value of a coordinate of a box.
-pub(super) fn largest(bounds: &Aabb) -> f32 {
-    bounds.min.abs().max(bounds.max.abs()).max_element()
 }
 
 /// The maximum number of boxes in an outline. Boxes of instances are computed from all of them.
@@ -85,7 +80,7 @@ impl WideBvh {
             root: None,
             nodes: Cow::default(),
             blocks: Cow::default(),
-            largest: largest(&bounds),
+            near: near_region(&bounds),
             kernel: Kernel::Portable,
             stack_need: 0,
         }

@@ -56,17 +56,16 @@ pub(crate) use decide::{BLOCK_COST, NODE_COST, areas, children, decide};
 pub use instances::{Instance, InstanceHit, Instances, InvalidInstances};
 pub use kernel::Kernel;
 pub use layout::WideBvh;
-use layout::largest;
 pub use nearest::Closest;
 pub(crate) use node::{Child, WideNode};
 pub use refit::RefitError;
 pub(crate) use triangles::TriangleBlock;
 
+use crate::slabs::near_region;
 use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate_references};
 use alloc::borrow::Cow;
 use alloc::vec::Vec;
 use answer::{ANY_HIT, NEAREST_HIT};
-use kernel::STACK;
 use portable::walk;
 
 impl WideBvh {
@@ -158,13 +157,12 @@ impl WideBvh {
         if self.kernel == Kernel::Portable {
             return walk::<ANY>(self, ray, &mut (), accept);
         }
-        // SAFETY: `kernel` is available and `stack_need` small enough, as `choose` saw.
+        // SAFETY: `kernel` is available, as `choose` saw.
         let hit = unsafe { vector::one_ray::<ANY>(self, ray, accept) };
         (!hit.is_miss()).then_some(hit)
     }
 
     /// Returns the same layout for another kernel; `None` if this processor cannot run that kernel.
-    /// [`Kernel::Portable`] always traces layouts that need an unusually deep stack.
     pub fn with_kernel(mut self, kernel: Kernel) -> Option<Self> {
         if !kernel.is_available() {
             return None;
@@ -182,18 +180,18 @@ impl WideBvh {
         blocks: Cow<'static, [TriangleBlock]>,
         depth: usize,
     ) -> Self {
-        let largest = largest(&bounds);
+        let near = near_region(&bounds);
         // Seven of a node's eight children wait while the eighth is visited.
         let stack_need = depth * (WideNode::LANES - 1);
         let kernel = Kernel::Portable;
-        let mut wide = Self { bounds, root, nodes, blocks, largest, kernel, stack_need };
+        let mut wide = Self { bounds, root, nodes, blocks, near, kernel, stack_need };
         wide.choose(Kernel::best());
         wide
     }
 
     fn choose(&mut self, available: Kernel) {
         // A child with a greater index than blocks have is an instance.
-        let is_vector = self.stack_need <= STACK && self.blocks.len() <= Child::INSTANCE as usize;
+        let is_vector = self.blocks.len() <= Child::INSTANCE as usize;
         self.kernel = if is_vector { available } else { Kernel::Portable };
     }
 

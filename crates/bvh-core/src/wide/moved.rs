@@ -10,35 +10,15 @@ impl<L: Lanes> RayLanes<L> {
     /// rays prepared for a scene with these bounds, and the rays that enter it.
     #[inline(always)]
     pub(super) fn entry(&self, bounds: &Aabb, aabb: &Aabb) -> (L, L::Mask) {
-        // SAFETY: values exist.
-        unsafe {
-            let reach = self
-                .far_plane(bounds, 0)
-                .max(self.far_plane(bounds, 1).max(self.far_plane(bounds, 2)));
-            let reach = reach * L::splat(Slabs::MARGIN);
-            let mut entry = self.t_min;
-            let mut exit = L::splat(f32::INFINITY);
-            for axis in 0..3 {
-                let origin = self.origin[axis];
-                let margin = reach + origin.abs() * L::splat(f32::EPSILON);
-                let margin = margin + L::splat(f32::MIN_POSITIVE);
-                let inverse = self.inverse[axis];
-                let low = (L::splat(aabb.min[axis]) - (origin + margin)) * inverse;
-                let high = (L::splat(aabb.max[axis]) - (origin - margin)) * inverse;
-                entry = low.min(high).max(entry);
-                exit = low.max(high).min(exit);
-            }
-            (entry, entry.le(exit * L::splat(Slabs::FAR)))
+        let mut entries = [f32::INFINITY; 16];
+        for (lane, entry) in entries.iter_mut().enumerate().take(L::N) {
+            *entry = Slabs::new(&self.ray(lane), bounds).entry(aabb);
         }
-    }
-
-    /// Returns the farthest distance of an origin from the bounds' planes across an axis.
-    #[inline(always)]
-    fn far_plane(&self, bounds: &Aabb, axis: usize) -> L {
-        let origin = self.origin[axis];
-        // SAFETY: values exist.
-        let (min, max) = unsafe { (L::splat(bounds.min[axis]), L::splat(bounds.max[axis])) };
-        (min - origin).abs().max((max - origin).abs())
+        // SAFETY: values exist; there are sixteen numbers.
+        unsafe {
+            let entry = L::load_unaligned(entries.as_ptr());
+            (entry, entry.lt(L::splat(f32::INFINITY)))
+        }
     }
 
     /// Returns the rays in other coordinates over the same ranges, and those that have a valid

@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(crate) struct WideNode {
-    /// Lower x, y, z, then upper x, y, z, of all children; NaN in unused lanes, so that no ray
+    /// Lower x, y, z, then upper x, y, z, of all children; ∞ and −∞ in unused lanes, so that no ray
     /// enters them.
     pub(crate) planes: [[f32; 8]; 6],
     pub(crate) children: [Child; 8],
@@ -16,8 +16,11 @@ pub(crate) struct WideNode {
 
 impl WideNode {
     pub(crate) const LANES: usize = 8;
-    pub(crate) const EMPTY: Self =
-        Self { planes: [[f32::NAN; 8]; 6], children: [Child::node(0); 8], padding: [0; 8] };
+    pub(crate) const EMPTY: Self = {
+        let (lower, upper) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
+        let planes = [lower, lower, lower, upper, upper, upper];
+        Self { planes, children: [Child::node(0); 8], padding: [0; 8] }
+    };
 
     /// Gives a lane a child with this box.
     pub(crate) fn set_box(&mut self, lane: usize, aabb: &Aabb) {
@@ -30,7 +33,7 @@ impl WideNode {
     /// The box of a lane's child; `None` for an unused lane.
     pub(crate) fn lane_box(&self, lane: usize) -> Option<Aabb> {
         let corner = |from: usize| [from, from + 1, from + 2].map(|plane| self.planes[plane][lane]);
-        (!self.planes[0][lane].is_nan()).then(|| Aabb::from([corner(0), corner(3)]))
+        (self.planes[0][lane] < f32::INFINITY).then(|| Aabb::from([corner(0), corner(3)]))
     }
 }
 

@@ -1,17 +1,17 @@
 //! The traversal of one ray in vector registers.
 
-use super::box_ray::BoxRay;
-use super::instructions::{Instructions, Pending};
-use super::kernel::STACK;
+use super::box_ray::{BoxRay, BoxTest, FarBoxRay};
+use super::instructions::{Instructions, Part, Pending};
+use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
 use super::node::Child;
 use super::pairs::{Pairs, Plane, SINGLE_ERROR};
-use super::portable::walk;
 use super::triangles::TriangleBlock;
 use crate::ray::{AXES, largest_axis};
-use crate::{Hit, Ray};
+use crate::{Aabb, Hit, Ray};
 use core::hint::black_box;
+use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 
 /// Aligns the frame of the function that holds it. Otherwise the compiler keeps vectors of 32 bytes
@@ -25,7 +25,7 @@ struct Aligned<T>(T);
 ///
 /// # Safety
 /// The processor has the instructions of `K`, and the caller is compiled with them; the references
-/// of `wide` are sound and its `stack_need` is at most [`STACK`].
+/// of `wide` are sound.
 #[inline(always)]
 pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
     wide: &WideBvh,
@@ -34,16 +34,13 @@ pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
 ) -> Hit {
     let mut leaves = FirstHits {
         ray,
-        largest: wide.largest,
+        bounds: &wide.bounds,
         leaf_ray: MaybeUninit::uninit(),
         is_prepared: false,
         accept,
     };
     // SAFETY: the caller's promises.
-    match unsafe { traverse::<K, ANY>(wide, ray, &mut leaves) } {
-        Some(hit) => hit,
-        None => portable::<ANY>(wide, ray, &mut leaves.accept),
-    }
+    unsafe { traverse::<K, ANY>(wide, ray, &mut leaves) }
 }
 
 /// Tests of the triangles in the leaves that a ray enters.
@@ -56,7 +53,7 @@ pub(crate) trait Leaves<L> {
 }
 
 /// Visits the leaves that the ray enters up to the nearest hit, or with `ANY` up to the first hit
-/// that is found, in no order. Returns `None` for a ray that the portable kernel must trace.
+/// that is found, in no order.
 ///
 /// # Safety
 /// As for [`trace`].
@@ -65,24 +62,68 @@ pub(crate) unsafe fn traverse<K: Instructions, const ANY: bool>(
     wide: &WideBvh,
     ray: &Ray,
     leaves: &mut impl Leaves<K::Block>,
-) -> Option<Hit> {
+) -> Hit {
+    // SAFETY: the caller's promises.
+    unsafe {
+        if !ray.begins_in(&wide.near) || wide.stack_need > STACK {
+            return K::call(Rare::<K, _, ANY> { wide, ray, leaves, kernel: PhantomData });
+        }
+        let mut stack = MaybeUninit::<Aligned<[Pending; STACK + SPARE]>>::uninit();
+        let base = stack.as_mut_ptr().cast::<Pending>();
+        visit::<K, ANY>(wide, ray, &BoxRay::new(ray), leaves, base)
+    }
+}
+
+/// The traversal of a ray that begins far from the scene, or of a deep layout.
+struct Rare<'a, K, L, const ANY: bool> {
+    wide: &'a WideBvh,
+    ray: &'a Ray,
+    leaves: &'a mut L,
+    kernel: PhantomData<K>,
+}
+
+impl<K: Instructions, L: Leaves<K::Block>, const ANY: bool> Part for Rare<'_, K, L, ANY> {
+    type Output = Hit;
+
+    #[inline(always)]
+    unsafe fn run(self) -> Hit {
+        let Self { wide, ray, leaves, .. } = self;
+        let mut stack = MaybeUninit::<Aligned<[Pending; STACK + SPARE]>>::uninit();
+        let mut deep = DeepStacks::new(1, wide.stack_need);
+        let base = deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.stack(0));
+        // SAFETY: the stack has room for `stack_need` children; the rest is as in `traverse`.
+        unsafe {
+            if ray.begins_in(&wide.near) {
+                visit::<K, ANY>(wide, ray, &BoxRay::new(ray), leaves, base)
+            } else {
+                visit::<K, ANY>(wide, ray, &FarBoxRay::new(ray), leaves, base)
+            }
+        }
+    }
+}
+
+/// [`traverse`] with one of the tests of boxes, and a stack from `base` on.
+#[inline(always)]
+unsafe fn visit<K: Instructions, const ANY: bool>(
+    wide: &WideBvh,
+    ray: &Ray,
+    box_ray: &impl BoxTest<K>,
+    leaves: &mut impl Leaves<K::Block>,
+    base: *mut Pending,
+) -> Hit {
     let mut nearest = Hit { t: ray.t_max(), object: u32::MAX };
+    let Some(root) = wide.root else { return nearest };
     // SAFETY: the processor has the instructions; references are sound, and the stack has room for
     // `stack_need` children and one register more.
     unsafe {
-        let root = wide.root?;
-        let box_ray = BoxRay::new(ray, wide.largest)?;
         let nodes = wide.nodes.as_ptr();
         let blocks = wide.blocks.as_ptr();
-        let mut stack = MaybeUninit::<Aligned<[Pending; STACK + 8]>>::uninit();
-        let base = stack.as_mut_ptr().cast::<Pending>();
         let mut top = base;
         let mut child = root;
         loop {
             while child.is_node() {
                 let node = &*nodes.add(child.index());
-                let (entry, exit) = box_ray.intervals(node, nearest.t);
-                let mask = K::entered(entry, exit);
+                let (entry, mask) = box_ray.boxes(node, nearest.t);
                 let others = mask & mask.wrapping_sub(1);
                 if others == 0 {
                     if mask == 0 {
@@ -110,7 +151,7 @@ pub(crate) unsafe fn traverse<K: Instructions, const ANY: bool>(
                 let mut block = blocks.add(child.index());
                 loop {
                     if leaves.visit(&*block, &mut nearest) && ANY {
-                        return Some(nearest);
+                        return nearest;
                     }
                     if (*block).is_last() {
                         break;
@@ -120,7 +161,7 @@ pub(crate) unsafe fn traverse<K: Instructions, const ANY: bool>(
             }
             child = loop {
                 if top == base {
-                    return Some(nearest);
+                    return nearest;
                 }
                 top = top.sub(1);
                 let pending = *top;
@@ -132,20 +173,10 @@ pub(crate) unsafe fn traverse<K: Instructions, const ANY: bool>(
     }
 }
 
-#[cold]
-#[inline(never)]
-fn portable<const ANY: bool>(
-    wide: &WideBvh,
-    ray: &Ray,
-    accept: &mut impl FnMut(Hit) -> bool,
-) -> Hit {
-    walk::<ANY>(wide, ray, &mut (), accept).unwrap_or(Hit::MISS)
-}
-
 /// Keeps the nearest hit among those that `accept` accepts.
 struct FirstHits<'r, L, A> {
     ray: &'r Ray,
-    largest: f32,
+    bounds: &'r Aabb,
     leaf_ray: MaybeUninit<LeafRay<L>>,
     is_prepared: bool,
     accept: A,
@@ -157,7 +188,7 @@ impl<L: Lanes, A: FnMut(Hit) -> bool> Leaves<L> for FirstHits<'_, L, A> {
         // SAFETY: the caller's promise; the ray is prepared before its use.
         unsafe {
             if !self.is_prepared {
-                self.leaf_ray.write(LeafRay::new(self.ray, self.largest));
+                self.leaf_ray.write(LeafRay::new(self.ray, self.bounds));
                 self.is_prepared = true;
             }
             self.leaf_ray.assume_init_ref().visit(block, nearest, &mut self.accept)
@@ -173,13 +204,13 @@ struct LeafRay<L> {
 
 impl<L: Lanes> LeafRay<L> {
     #[inline(always)]
-    unsafe fn new(ray: &Ray, largest: f32) -> Self {
+    unsafe fn new(ray: &Ray, bounds: &Aabb) -> Self {
         // Most rays in the open meet no leaf: without this the compiler does a part of this work
         // for all.
         let ray = black_box(ray);
         let origin = ray.origin().to_array();
         let direction = ray.direction().to_array();
-        let reach = ray.origin().abs().max_element() + largest;
+        let reach = ray.reach(bounds);
         let axes = AXES[largest_axis(ray)];
         // SAFETY: the caller's promise: the processor has the instructions.
         unsafe {

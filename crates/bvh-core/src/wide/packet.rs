@@ -9,12 +9,13 @@
 use super::answer::Batch;
 use super::culling::Culling;
 use super::instructions::{Instructions, Part};
-use super::kernel::STACK;
+use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::{Lanes, Mask as _};
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
 use super::pairs::Pairs;
 use super::ray_lanes::{RayBounds, RayLanes};
+use crate::slabs::{FAR, NEAR};
 use core::mem::MaybeUninit;
 
 /// The maximum number of vectors in a packet.
@@ -31,9 +32,8 @@ pub(crate) struct Packet<K: Instructions> {
 
 /// Rays of a packet side by side.
 pub(super) struct Vector<L> {
-    /// The distance to a plane is `plane · scale + shift`.
-    scale: [L; 3],
-    shift: [L; 3],
+    near_factor: [L; 3],
+    far_factor: [L; 3],
     t_min: L,
     /// The nearest hits so far, or the ends of the rays and `u32::MAX`.
     pub(super) t: L,
@@ -87,16 +87,16 @@ impl<K: Instructions> Packet<K> {
 
     /// Adds rays that cohere, of which the first is number `first` of its batch.
     #[inline(always)]
-    pub(crate) fn add(&mut self, rays: RayLanes<K::Rays>, scale: [K::Rays; 3], first: usize) {
+    pub(crate) fn add(&mut self, rays: RayLanes<K::Rays>, first: usize) {
         // SAFETY: a value exists.
-        let (zero, none) = unsafe { (K::Rays::splat(0.0), K::Rays::splat_bits(u32::MAX)) };
-        let [x, y, z] = rays.origin;
-        let shift = [zero - x * scale[0], zero - y * scale[1], zero - z * scale[2]];
-        self.bounds.add(&rays, &scale);
+        let [near, far, none] =
+            unsafe { [NEAR, FAR, f32::from_bits(u32::MAX)].map(|x| K::Rays::splat(x)) };
+        self.bounds.add(&rays);
+        let [x, y, z] = rays.inverse;
         self.octant = rays.octant();
         self.vectors[self.count].write(Vector {
-            scale,
-            shift,
+            near_factor: [x * near, y * near, z * near],
+            far_factor: [x * far, y * far, z * far],
             t_min: rays.t_min,
             t: rays.t_max,
             object: none,
@@ -156,10 +156,14 @@ impl<K: Instructions> Packet<K> {
             let blocks = wide.blocks.as_ptr();
             let mut farthest = self.bounds.end();
             let mut end = key_of(farthest);
-            let mut keys = MaybeUninit::<[u32; STACK + 8]>::uninit();
-            let mut parents = MaybeUninit::<[Parent; STACK + 8]>::uninit();
-            let keys = keys.as_mut_ptr().cast::<u32>();
-            let parents = parents.as_mut_ptr().cast::<Parent>();
+            let mut keys = MaybeUninit::<[u32; STACK + SPARE]>::uninit();
+            let mut parents = MaybeUninit::<[Parent; STACK + SPARE]>::uninit();
+            let mut deep_keys = DeepStacks::new(1, wide.stack_need);
+            let mut deep_parents = DeepStacks::new(1, wide.stack_need);
+            let keys: *mut u32 =
+                deep_keys.as_mut().map_or(keys.as_mut_ptr().cast(), |deep| deep.stack(0));
+            let parents: *mut Parent =
+                deep_parents.as_mut().map_or(parents.as_mut_ptr().cast(), |deep| deep.stack(0));
             let mut top = 0;
             let mut child = root;
             // The first vector that enters the child, its rays that do, and the planes of the
@@ -191,7 +195,7 @@ impl<K: Instructions> Packet<K> {
                     } else {
                         let block = blocks.add(child.index());
                         let accept = &mut batch.accept;
-                        self.visit_leaf::<ANY>(first, entered, &planes, block, wide.largest, accept)
+                        self.visit_leaf::<ANY>(first, entered, &planes, block, &wide.bounds, accept)
                     };
                     if is_hit {
                         farthest = self.farthest();
@@ -253,10 +257,11 @@ impl<K: Instructions> Packet<K> {
             let mut entry = vector.t_min;
             let mut exit = vector.t;
             for (axis, &[near, far]) in planes.iter().enumerate() {
-                let near = K::Rays::splat(near).mul_add(vector.scale[axis], vector.shift[axis]);
-                let far = K::Rays::splat(far).mul_add(vector.scale[axis], vector.shift[axis]);
+                let origin = vector.rays.origin[axis];
+                let near = (K::Rays::splat(near) - origin) * vector.near_factor[axis];
+                let far = (K::Rays::splat(far) - origin) * vector.far_factor[axis];
                 entry = entry.max(near);
-                exit = exit.min(far);
+                exit = far.min(exit);
             }
             entry.le(exit).bits()
         }
@@ -302,7 +307,7 @@ impl<K: Instructions, const ANY: bool> Part for Trace<'_, '_, K, ANY> {
         let Self { packet, wide, batch } = self;
         // SAFETY: the caller's promises.
         unsafe {
-            let culling = Culling::<K::Boxes>::new(&packet.bounds, packet.octant, wide.largest);
+            let culling = Culling::<K::Boxes>::new(&packet.bounds, packet.octant);
             if let Some(root) = wide.root {
                 packet.traverse::<ANY>(wide, root, &culling, batch);
             }

@@ -82,11 +82,11 @@ impl<K: Instructions, const ANY: bool> Part for Visit<'_, K, ANY> {
                 entry_of_vector.write(entry);
                 visited |= 1 << i;
                 let number = i * K::Rays::N;
-                if let Some(scale) = moved.cohere(part.largest) {
+                if moved.cohere(&part.near) {
                     if !moved_packet.takes(moved.octant()) {
                         moved_packet.trace::<ANY>(part, &mut in_part);
                     }
-                    moved_packet.add(moved, scale, number);
+                    moved_packet.add(moved, number);
                     continue;
                 }
                 let mut left = enters.bits();

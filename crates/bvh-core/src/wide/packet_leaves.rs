@@ -6,7 +6,7 @@ use super::lanes::{Lanes, Mask};
 use super::packet::Packet;
 use super::pairs::Plane;
 use super::triangles::TriangleBlock;
-use crate::Hit;
+use crate::{Aabb, Hit};
 
 impl<K: Instructions> Packet<K> {
     /// Tests the triangles of a leaf with the rays that enter it. `entered` has a bit per ray of
@@ -19,7 +19,7 @@ impl<K: Instructions> Packet<K> {
         mut entered: u32,
         planes: &[[f32; 2]; 3],
         block: *const TriangleBlock,
-        largest: f32,
+        bounds: &Aabb,
         accept: &mut Option<&mut Accept>,
     ) -> bool {
         let mut is_hit = false;
@@ -30,7 +30,7 @@ impl<K: Instructions> Packet<K> {
                     entered = self.enter(i, planes);
                 }
                 if entered != 0 {
-                    is_hit |= self.test::<ANY>(i, entered, block, largest, accept);
+                    is_hit |= self.test::<ANY>(i, entered, block, bounds, accept);
                 }
             }
         }
@@ -45,7 +45,7 @@ impl<K: Instructions> Packet<K> {
         vector: usize,
         entered: u32,
         block: *const TriangleBlock,
-        largest: f32,
+        bounds: &Aabb,
         accept: &mut Option<&mut Accept>,
     ) -> bool {
         // SAFETY: the caller's promises; a block that is not its leaf's last is followed by
@@ -53,7 +53,7 @@ impl<K: Instructions> Packet<K> {
         unsafe {
             let vector = self.vectors.get_unchecked_mut(vector).assume_init_mut();
             if !vector.is_sheared {
-                vector.pairs.write(vector.rays.sheared(vector.axes, largest));
+                vector.pairs.write(vector.rays.sheared(vector.axes, bounds));
                 vector.is_sheared = true;
             }
             let pairs = vector.pairs.assume_init_ref();

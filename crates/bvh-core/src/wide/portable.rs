@@ -4,7 +4,6 @@
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
 use super::triangles::TriangleBlock;
-use crate::slabs::margin;
 use crate::stack::Stack;
 use crate::{Aabb, Counter, Hit, PreparedRay, Ray, Slabs};
 
@@ -15,33 +14,61 @@ struct Pending {
     child: Child,
 }
 
-/// A ray prepared for wide nodes: the numbers of [`Slabs`].
+/// A ray prepared for wide nodes, with the numbers of [`Slabs`].
 struct WideRay {
     /// Which planes of a node the ray meets first, by axis, and which last.
     near: [usize; 3],
     far: [usize; 3],
-    /// The margins of [`Slabs`] for those planes.
     near_origin: [f32; 3],
     far_origin: [f32; 3],
-    inverse: [f32; 3],
+    near_factor: [f32; 3],
+    far_factor: [f32; 3],
     t_min: f32,
+    /// The ray itself, where f32 is too coarse.
+    far_away: Option<Slabs>,
 }
-
 impl WideRay {
     #[inline(always)]
     fn new(ray: &Ray, bounds: &Aabb) -> Self {
-        let origin = ray.origin();
-        let inverse = ray.inverse_direction();
-        let margin = margin(ray, bounds).copysign(inverse);
-        let backwards = inverse.to_array().map(|x| (x.to_bits() >> 31) as usize);
-        Self {
-            near: [3 * backwards[0], 1 + 3 * backwards[1], 2 + 3 * backwards[2]],
-            far: [3 - 3 * backwards[0], 4 - 3 * backwards[1], 5 - 3 * backwards[2]],
-            near_origin: (origin + margin).to_array(),
-            far_origin: (origin - margin).to_array(),
-            inverse: inverse.to_array(),
-            t_min: ray.t_min(),
+        let slabs = Slabs::new(ray, bounds);
+        let [lower, upper] = slabs.origins();
+        let [near_factor, far_factor] = slabs.factors();
+        let (mut near, mut far) = ([0, 1, 2], [3, 4, 5]);
+        let (mut near_origin, mut far_origin) = (lower, upper);
+        for axis in (0..3).filter(|&axis| near_factor[axis] < 0.0) {
+            (near[axis], far[axis]) = (far[axis], near[axis]);
+            (near_origin[axis], far_origin[axis]) = (far_origin[axis], near_origin[axis]);
         }
+        let far_away = ray.is_far_from(bounds).then_some(slabs);
+        let t_min = ray.t_min();
+        Self { near, far, near_origin, far_origin, near_factor, far_factor, t_min, far_away }
+    }
+
+    /// Returns the distances at which the ray enters and leaves the boxes of a node. The first
+    /// exceeds the second for a box that it misses.
+    #[inline(always)]
+    fn intervals(&self, node: &WideNode) -> ([f32; 8], [f32; 8]) {
+        let mut entry = [self.t_min; 8];
+        let mut exit = [f32::INFINITY; 8];
+        if let Some(slabs) = &self.far_away {
+            for lane in 0..8 {
+                let miss = (f32::INFINITY, f32::NEG_INFINITY);
+                (entry[lane], exit[lane]) =
+                    node.lane_box(lane).map_or(miss, |aabb| slabs.interval(&aabb));
+            }
+            return (entry, exit);
+        }
+        for axis in 0..3 {
+            let near = &node.planes[self.near[axis]];
+            let far = &node.planes[self.far[axis]];
+            for lane in 0..8 {
+                let t = (near[lane] - self.near_origin[axis]) * self.near_factor[axis];
+                entry[lane] = if t > entry[lane] { t } else { entry[lane] };
+                let t = (far[lane] - self.far_origin[axis]) * self.far_factor[axis];
+                exit[lane] = if t < exit[lane] { t } else { exit[lane] };
+            }
+        }
+        (entry, exit)
     }
 
     /// The nearest of the children that the ray enters before `t_max`, and the number of the
@@ -54,22 +81,10 @@ impl WideRay {
         t_max: f32,
         others: &mut [Pending; 8],
     ) -> Option<(Child, usize)> {
-        let mut entry = [self.t_min; 8];
-        let mut exit = [f32::INFINITY; 8];
-        for axis in 0..3 {
-            let near = &node.planes[self.near[axis]];
-            let far = &node.planes[self.far[axis]];
-            for lane in 0..8 {
-                let t = (near[lane] - self.near_origin[axis]) * self.inverse[axis];
-                entry[lane] = if t > entry[lane] { t } else { entry[lane] };
-                // In unused lanes NaN, and it stays so.
-                let t = (far[lane] - self.far_origin[axis]) * self.inverse[axis];
-                exit[lane] = if exit[lane] < t { exit[lane] } else { t };
-            }
-        }
+        let (entry, exit) = self.intervals(node);
         let mut count = 0;
         for lane in 0..8 {
-            if entry[lane] <= exit[lane] * Slabs::FAR && entry[lane] <= t_max {
+            if entry[lane] <= exit[lane] && entry[lane] <= t_max {
                 // Insertion; the higher lane is nearer on ties, for example where the ray begins in
                 // both boxes.
                 let mut at = count;

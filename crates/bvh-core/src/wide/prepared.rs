@@ -1,22 +1,25 @@
 //! Rays made ready for rays in flight: what the tests of boxes and triangles need of one, together
 //! in memory.
 
-use super::box_ray::MARGIN;
-use super::instructions::Instructions;
+use super::box_ray::{BoxTest, FarBoxRay};
+use super::instructions::{Instructions, Part};
 use super::lanes::{Lanes, Mask};
+use super::layout::WideBvh;
 use super::node::WideNode;
 use super::pairs::{Pairs, SINGLE_ERROR};
 use super::ray_lanes::RayLanes;
-use crate::Aabb;
+use crate::ray::AXES;
+use crate::slabs::{FAR, NEAR};
+use crate::{Aabb, Ray};
+use core::marker::PhantomData;
 
 /// Rays side by side that are about to be written one after the other.
 pub(crate) struct Ready<L> {
     rays: RayLanes<L>,
-    scale: [L; 3],
-    near_shift: [L; 3],
-    far_shift: [L; 3],
-    /// One bit per ray: unset for a ray that the portable kernel must trace.
-    pub(crate) in_range: u32,
+    near_factor: [L; 3],
+    far_factor: [L; 3],
+    /// A bit per ray that begins [far](Ray::is_far_from) from the scene.
+    far: u32,
     reach: L,
 }
 
@@ -24,12 +27,12 @@ pub(crate) struct Ready<L> {
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(crate) struct Prepared {
-    /// The distance to a plane is `plane · scale + shift`.
-    pub(crate) scale: [f32; 3],
+    near_factor: [f32; 3],
     pub(crate) t_min: f32,
-    pub(crate) near_shift: [f32; 3],
+    /// The origin by axis.
+    box_origin: [f32; 3],
     pub(crate) t_max: f32,
-    pub(crate) far_shift: [f32; 3],
+    far_factor: [f32; 3],
     /// As in [`Pairs`], and in the shear's order of axes, up to `x_slope`.
     depth: f32,
     origin: [f32; 3],
@@ -45,31 +48,30 @@ pub(crate) struct Prepared {
     pub(crate) far: [u32; 3],
     /// Among the rays of the batch.
     pub(crate) number: u32,
-    padding: [u32; 4],
+    is_far: u32,
+    padding: [u32; 3],
 }
 
 impl<L: Lanes> Ready<L> {
-    /// Rays for boxes whose coordinates are at most `largest`.
+    /// Rays for a layout.
     #[inline(always)]
-    pub(crate) fn new(rays: RayLanes<L>, largest: f32) -> Self {
-        let (in_range, size, scale) = rays.bounded(largest);
+    pub(crate) fn new(rays: RayLanes<L>, wide: &WideBvh) -> Self {
+        Self::with_far(rays, rays.reach(&wide.bounds), rays.beyond(&wide.near))
+    }
+
+    /// Rays for layouts of these reaches; `far` has a bit per ray that begins far from its layout.
+    #[inline(always)]
+    pub(crate) fn with_far(rays: RayLanes<L>, reach: L, far: u32) -> Self {
+        let [x, y, z] = rays.inverse;
         // SAFETY: values exist.
         unsafe {
-            let zero = L::splat(0.0);
-            let sign = L::splat(-0.0);
-            let margin = size * L::splat(MARGIN);
-            let mut near_shift = [zero; 3];
-            let mut far_shift = [zero; 3];
-            for axis in 0..3 {
-                let margin = margin | rays.inverse[axis] & sign;
-                near_shift[axis] = zero - (rays.origin[axis] + margin) * scale[axis];
-                far_shift[axis] = zero - (rays.origin[axis] - margin) * scale[axis];
-            }
-            Self { rays, scale, near_shift, far_shift, in_range: in_range.bits(), reach: size }
+            let (near, exit) = (L::splat(NEAR), L::splat(FAR));
+            let near_factor = [x * near, y * near, z * near];
+            Self { rays, near_factor, far_factor: [x * exit, y * exit, z * exit], far, reach }
         }
     }
 
-    /// Returns a bit per ray that may meet something within `bounds`.
+    /// Returns a bit per ray that may meet something within `bounds`. Those from far away all may.
     #[inline(always)]
     pub(crate) fn enter(&self, bounds: &Aabb) -> u32 {
         let mut entry = self.rays.t_min;
@@ -80,10 +82,10 @@ impl<L: Lanes> Ready<L> {
             let is_backwards = self.backwards(axis);
             let near = L::select(is_backwards, high, low);
             let far = L::select(is_backwards, low, high);
-            entry = entry.max(near.mul_add(self.scale[axis], self.near_shift[axis]));
-            exit = exit.min(far.mul_add(self.scale[axis], self.far_shift[axis]));
+            entry = entry.max((near - self.rays.origin[axis]) * self.near_factor[axis]);
+            exit = ((far - self.rays.origin[axis]) * self.far_factor[axis]).min(exit);
         }
-        entry.le(exit).bits()
+        entry.le(exit).bits() | self.far
     }
 
     /// Returns the rays that run backwards along an axis.
@@ -114,15 +116,16 @@ impl<L: Lanes> Ready<L> {
                 near[i] = L::select(self.backwards(i), upper, lower);
                 far[i] = L::select(self.backwards(i), lower, upper);
             }
-            write_row(to, 0, self.scale, self.rays.t_min);
-            write_row(to, 1, self.near_shift, self.rays.t_max);
-            write_row(to, 2, self.far_shift, depth);
+            write_row(to, 0, self.near_factor, self.rays.t_min);
+            write_row(to, 1, self.rays.origin, self.rays.t_max);
+            write_row(to, 2, self.far_factor, depth);
             write_row(to, 3, origin, dy / depth);
             write_row(to, 4, [dx, dy, self.reach], dx / depth);
             write_row(to, 5, near, axis);
             write_row(to, 6, far, bits(0));
             for (lane, number) in (first..).enumerate().take(L::N) {
                 (*to.add(lane)).number = number;
+                (*to.add(lane)).is_far = self.far >> lane & 1;
             }
         }
     }
@@ -148,21 +151,31 @@ impl Prepared {
     ) -> (K::Boxes, u32) {
         // SAFETY: the ray names whole, aligned planes.
         unsafe {
-            let distance = |plane: u32, scale: f32, shift: f32| {
+            if self.is_far != 0 {
+                return K::call(FarBoxes::<K> { ray: self, node, t_max, kernel: PhantomData });
+            }
+            let distance = |axis: usize, plane: u32, factor: f32| {
                 let planes = node.planes.as_ptr().cast::<u8>();
                 let plane = K::Boxes::load(planes.add(plane as usize).cast());
-                plane.mul_add(K::Boxes::splat(scale), K::Boxes::splat(shift))
+                (plane - K::Boxes::splat(self.box_origin[axis])) * K::Boxes::splat(factor)
             };
-            let near =
-                |axis: usize| distance(self.near[axis], self.scale[axis], self.near_shift[axis]);
-            let far =
-                |axis: usize| distance(self.far[axis], self.scale[axis], self.far_shift[axis]);
+            let near = |axis: usize| distance(axis, self.near[axis], self.near_factor[axis]);
+            let far = |axis: usize| distance(axis, self.far[axis], self.far_factor[axis]);
             let begin = K::Boxes::splat(self.t_min);
             let entry = near(0).max(near(1)).max(near(2).max(begin));
-            // `min` returns the second of a NaN and a number: unused lanes stay NaN.
-            let exit = K::Boxes::splat(t_max).min(far(0).min(far(1)).min(far(2)));
+            let exit = far(0).min(far(1)).min(far(2).min(K::Boxes::splat(t_max)));
             (entry, K::entered(entry, exit))
         }
+    }
+
+    /// Returns the ray as [`boxes`](Self::boxes) tests it if it begins far from the scene.
+    fn far_away(&self) -> FarBoxRay {
+        let [x, y, z] = AXES[self.largest_axis as usize % 3];
+        let mut direction = [0.0; 3];
+        direction[x] = self.direction[0];
+        direction[y] = self.direction[1];
+        direction[z] = self.depth;
+        FarBoxRay::new(&Ray::assume_valid(self.box_origin, direction, self.t_min, self.t_max))
     }
 
     /// Returns a ray for each quarter of the lanes, as triangles are tested with it.
@@ -194,6 +207,24 @@ impl Prepared {
                 t_min: begin.spread::<3>(),
             }
         }
+    }
+}
+
+/// A box test of a ray that begins far from the scene.
+struct FarBoxes<'a, K> {
+    ray: &'a Prepared,
+    node: &'a WideNode,
+    t_max: f32,
+    kernel: PhantomData<K>,
+}
+
+impl<K: Instructions> Part for FarBoxes<'_, K> {
+    type Output = (K::Boxes, u32);
+
+    #[inline(always)]
+    unsafe fn run(self) -> (K::Boxes, u32) {
+        // SAFETY: this is compiled with the instructions, which the processor has.
+        unsafe { BoxTest::<K>::boxes(&self.ray.far_away(), self.node, self.t_max) }
     }
 }
 

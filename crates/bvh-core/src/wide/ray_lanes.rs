@@ -1,8 +1,8 @@
 //! Rays side by side, a ray per lane, from any order in memory.
 
-use super::box_ray::{CLAMP, MARGIN, SHIFTS, SIZES};
 use super::lanes::{Lanes, Mask};
 use super::pairs::{Pairs, SINGLE_ERROR};
+use crate::Aabb;
 use crate::ray::AXES;
 
 /// One ray per lane. Vectors of three are by axis.
@@ -41,58 +41,51 @@ impl<L: Lanes> RayLanes<L> {
         (x.lt(y).and_not(third), third)
     }
 
-    /// The rays within the bounds of [`box_ray`](super::box_ray), the largest absolute value of a
-    /// coordinate for each, and the reciprocals of the directions made so small that nothing
-    /// overflows.
+    /// Returns a bit per ray that begins outside of a region.
     #[inline(always)]
-    pub(crate) fn bounded(&self, largest: f32) -> (L::Mask, L, [L; 3]) {
-        // SAFETY: values exist.
-        unsafe {
-            let [x, y, z] = self.inverse;
-            let limit = x.abs().min(y.abs()).min(z.abs()) * L::splat(CLAMP);
-            let size = self.reach_up_to(largest);
-            let shift = size * limit;
-            let in_range = size.lt(L::splat(SIZES.end))
-                & L::splat(SIZES.start).le(size)
-                & shift.lt(L::splat(SHIFTS.end))
-                & L::splat(SHIFTS.start).le(shift);
-            let least = L::splat(0.0) - limit;
-            let scale = [x.max(least).min(limit), y.max(least).min(limit), z.max(least).min(limit)];
-            (in_range, size, scale)
+    pub(crate) fn beyond(&self, region: &Aabb) -> u32 {
+        let all = u32::MAX >> (32 - L::N);
+        let mut inside = all;
+        for axis in 0..3 {
+            // SAFETY: values exist.
+            let (min, max) = unsafe { (L::splat(region.min[axis]), L::splat(region.max[axis])) };
+            inside &= (min.le(self.origin[axis]) & self.origin[axis].le(max)).bits();
         }
+        all & !inside
     }
 
-    /// The bounded reciprocals, if all rays are in range, run to the same sides, and mostly along
-    /// the same axis.
+    /// Returns whether all rays begin in a region, and run to the same sides, and mostly along the
+    /// same axis.
     #[inline(always)]
-    pub(crate) fn cohere(&self, largest: f32) -> Option<[L; 3]> {
+    pub(crate) fn cohere(&self, region: &Aabb) -> bool {
         let all = u32::MAX >> (32 - L::N);
         let same = |mask: u32| mask == 0 || mask == all;
         let [x, y, z] = self.inverse;
         let (second, third) = self.largest();
-        let (in_range, _, scale) = self.bounded(largest);
-        let cohere = same(x.signs())
+        same(x.signs())
             & same(y.signs())
             & same(z.signs())
             & same(second.bits())
             & same(third.bits())
-            & (in_range.bits() == all);
-        cohere.then_some(scale)
+            & (self.beyond(region) == 0)
     }
 
-    /// The largest absolute value of a coordinate of the origin, plus `largest`.
+    /// Returns the largest coordinate of a point of `bounds` relative to each origin, rounded.
     #[inline(always)]
-    fn reach_up_to(&self, largest: f32) -> L {
-        let [x, y, z] = self.origin;
-        // SAFETY: a value exists.
-        x.abs().max(y.abs()).max(z.abs()) + unsafe { L::splat(largest) }
+    pub(crate) fn reach(&self, bounds: &Aabb) -> L {
+        let along = |axis: usize| {
+            // SAFETY: values exist.
+            let (min, max) = unsafe { (L::splat(bounds.min[axis]), L::splat(bounds.max[axis])) };
+            (max - self.origin[axis]).max(self.origin[axis] - min)
+        };
+        along(0).max(along(1)).max(along(2))
     }
 
-    /// Returns the rays as triangles are tested with them whose coordinates are at most `largest`.
+    /// Returns the rays as triangles within `bounds` are tested with them.
     #[inline(always)]
-    pub(crate) fn sheared(&self, [x, y, z]: [usize; 3], largest: f32) -> Pairs<L> {
+    pub(crate) fn sheared(&self, [x, y, z]: [usize; 3], bounds: &Aabb) -> Pairs<L> {
         let Self { origin, direction, t_min, .. } = self;
-        let reach = self.reach_up_to(largest);
+        let reach = self.reach(bounds);
         // SAFETY: a value exists.
         let part = unsafe { L::splat(SINGLE_ERROR) };
         Pairs {
@@ -136,12 +129,12 @@ impl<L: Lanes> RayBounds<L> {
     }
 
     #[inline(always)]
-    pub(crate) fn add(&mut self, rays: &RayLanes<L>, scale: &[L; 3]) {
-        for (axis, (&origin, &scale)) in rays.origin.iter().zip(scale).enumerate() {
+    pub(crate) fn add(&mut self, rays: &RayLanes<L>) {
+        for (axis, (&origin, &inverse)) in rays.origin.iter().zip(&rays.inverse).enumerate() {
             self.lowest[axis] = self.lowest[axis].min(origin);
             self.highest[axis] = self.highest[axis].max(origin);
-            self.least[axis] = self.least[axis].min(scale);
-            self.most[axis] = self.most[axis].max(scale);
+            self.least[axis] = self.least[axis].min(inverse);
+            self.most[axis] = self.most[axis].max(inverse);
         }
         self.begin = self.begin.min(rays.t_min);
         self.end = self.end.max(rays.t_max);
@@ -153,7 +146,7 @@ impl<L: Lanes> RayBounds<L> {
     }
 
     #[inline(always)]
-    pub(crate) fn scales(&self, axis: usize) -> [f32; 2] {
+    pub(crate) fn inverses(&self, axis: usize) -> [f32; 2] {
         [least(self.least[axis]), self.most[axis].greatest()]
     }
 
@@ -165,16 +158,6 @@ impl<L: Lanes> RayBounds<L> {
     #[inline(always)]
     pub(crate) fn end(&self) -> f32 {
         self.end.greatest()
-    }
-
-    /// The margin of boxes for all rays, in a scene whose coordinates are at most `largest`.
-    #[inline(always)]
-    pub(crate) fn margin(&self, largest: f32) -> f32 {
-        let mut size = self.highest[0].max(self.lowest[0].abs());
-        for axis in 0..3 {
-            size = size.max(self.lowest[axis].abs()).max(self.highest[axis].abs());
-        }
-        (size.greatest() + largest) * MARGIN
     }
 }
 

@@ -1,8 +1,9 @@
 //! The wide layout over triangles that have moved, and what it then costs.
 
-use super::layout::{WideBvh, largest};
+use super::layout::WideBvh;
 use super::node::{Child, WideNode};
 use super::triangles::TriangleBlock;
+use crate::slabs::near_region;
 use crate::{Aabb, Triangle};
 use alloc::vec;
 
@@ -60,7 +61,7 @@ impl WideBvh {
             }
         }
         self.bounds = self.root.map_or(Aabb::EMPTY, |root| self.box_of(root, &around));
-        self.largest = largest(&self.bounds);
+        self.near = near_region(&self.bounds);
         Ok(())
     }
 

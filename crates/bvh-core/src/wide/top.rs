@@ -2,7 +2,7 @@
 
 use super::build::lay_out_nodes;
 use super::decide::{BLOCK_COST, areas, decide};
-use super::kernel::{Kernel, STACK};
+use super::kernel::Kernel;
 use super::layout::WideBvh;
 use super::node::Child;
 use crate::collapse::binary;
@@ -10,7 +10,7 @@ use crate::{Aabb, Bvh, Node};
 
 /// Lays out a valid tree over the boxes of instances, or over boxes around them, with a leaf for
 /// each instance. Rays go on in `parts`: the parts of the instances. The layout has the kernel of
-/// the parts if all have the same and its stack suffices, otherwise the portable one. O(instances +
+/// the parts if all have the same, otherwise the portable one. O(instances +
 /// parts).
 pub(crate) fn lay_out_instances<'p>(
     tree: &Bvh,
@@ -45,7 +45,7 @@ pub(crate) fn lay_out_instances<'p>(
     // A mark waits between the children of this layout and those of a part. An index below the
     // greatest two is never a mark's.
     wide.stack_need += need + 1;
-    if wide.stack_need <= STACK && boxes.len() < Child::INSTANCE as usize - 2 {
+    if boxes.len() < Child::INSTANCE as usize - 2 {
         wide.kernel = kernel.unwrap_or(Kernel::Portable);
     }
     wide

@@ -3,7 +3,7 @@
 use super::answer::Accept;
 use super::instances::Placed;
 use super::instructions::{Instructions, Pending};
-use super::kernel::STACK;
+use super::kernel::{SPARE, STACK};
 use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
@@ -29,7 +29,10 @@ pub(super) struct Traversal {
     pub(super) blocks: *const TriangleBlock,
     /// Written while the scene has instances.
     outside: MaybeUninit<Outside>,
-    stack: Stack,
+    /// [`END`](Child::END), the children that wait, the next block of the same leaf, and room for
+    /// stores of whole registers: `frame`, or on the heap.
+    stack: *mut Pending,
+    frame: Frame,
 }
 
 /// The state of a ray outside of the instance in which it is.
@@ -44,16 +47,21 @@ struct Outside {
     entry: f32,
 }
 
-/// [`END`](Child::END), the children that wait, the next block of the same leaf, and room for
-/// stores of whole registers.
 #[repr(C, align(64))]
-struct Stack([MaybeUninit<Pending>; STACK + 24]);
+struct Frame([MaybeUninit<Pending>; STACK + SPARE]);
 
 /// # Safety
 ///
 /// All functions: the processor has the instructions of `K`, the traversal was started, and the
 /// references of the layout are sound, so that the stack has room for what a visit pushes.
 impl Traversal {
+    /// Chooses the stack of all rays that are started here: on the heap, or in the frame.
+    #[inline(always)]
+    pub(super) unsafe fn set_stack(this: *mut Self, deep: Option<*mut Pending>) {
+        // SAFETY: the traversal exists; its fields need not be initialised to be named.
+        unsafe { (*this).stack = deep.unwrap_or((&raw mut (*this).frame).cast()) };
+    }
+
     /// Starts a ray at the root.
     #[inline(always)]
     pub(super) unsafe fn start(&mut self, ray: Prepared, wide: &WideBvh) {
@@ -61,9 +69,11 @@ impl Traversal {
         self.object = u32::MAX;
         self.ray = ray;
         self.is_in(wide);
-        self.stack.0[0].write(u64::from(Child::END.bits()));
         // SAFETY: the stack has more than one place.
-        self.top = unsafe { self.bottom().add(1) };
+        unsafe {
+            self.stack.write(u64::from(Child::END.bits()));
+            self.top = self.stack.add(1);
+        }
     }
 
     /// Goes on at the root of a layout.
@@ -149,12 +159,6 @@ impl Traversal {
         }
     }
 
-    /// The address of [`END`](Child::END) on the stack.
-    #[inline(always)]
-    fn bottom(&mut self) -> *mut Pending {
-        self.stack.0.as_mut_ptr().cast()
-    }
-
     /// Pushes the entered children, and goes on to the nearest of them, or else to what waits.
     #[inline(always)]
     pub(super) unsafe fn enter<K: Instructions, const ANY: bool>(
@@ -184,7 +188,7 @@ impl Traversal {
     #[inline(always)]
     pub(super) unsafe fn drop_farther<K: Instructions>(&mut self) {
         // SAFETY: the stack is between its bottom and its top.
-        self.top = unsafe { K::drop_farther(self.bottom(), self.top, self.t) };
+        self.top = unsafe { K::drop_farther(self.stack, self.top, self.t) };
     }
 
     /// Goes on from a block of triangles: to the next one of the leaf, to what waits, or to the end
@@ -199,7 +203,7 @@ impl Traversal {
             *self.top = u64::from(Child::leaf(block as u32 + 1).bits());
             self.top = self.top.add(usize::from(!is_last));
             if ANY && self.object != u32::MAX {
-                self.top = self.bottom().add(1);
+                self.top = self.stack.add(1);
             }
             self.pop();
         }

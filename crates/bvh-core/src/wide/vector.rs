@@ -1,6 +1,6 @@
 //! A target without vector kernels.
 
-use super::all_in_flight::{Found, MOST};
+use super::all_in_flight::Found;
 use super::answer::Batch;
 use super::crossed_leaves::AllHits;
 use super::layout::WideBvh;
@@ -24,14 +24,10 @@ pub(super) unsafe fn one_ray<const ANY: bool>(
 }
 
 /// Is never called.
-pub(super) unsafe fn all_hits(_: &WideBvh, _: &Ray, _: &mut AllHits) -> bool {
-    false
-}
+pub(super) unsafe fn all_hits(_: &WideBvh, _: &Ray, _: &mut AllHits) {}
 
 /// Is never called.
-pub(super) unsafe fn all_hits_of(_: &WideBvh, _: &[Ray], _: &mut Vec<Found>) -> [u64; MOST / 64] {
-    [0; MOST / 64]
-}
+pub(super) unsafe fn all_hits_of(_: &WideBvh, _: &[Ray], _: &mut Vec<Found>) {}
 
 /// Is never called.
 pub(super) unsafe fn closest_points(_: &WideBvh, _: &[Vec3], _: &mut [Option<Closest>]) {}

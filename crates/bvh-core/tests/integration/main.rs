@@ -12,5 +12,6 @@ mod query;
 mod ray_density;
 mod references;
 mod support;
+mod tightness;
 mod traversal;
 mod wide;

@@ -346,18 +346,51 @@ fn triangles_without_area_are_left_out_and_never_hit() {
 }
 
 #[test]
-fn trees_too_deep_for_the_stack_of_a_vector_kernel_are_traced_all_the_same() {
-    let triangles: Vec<Triangle> = (0..20_000)
+fn every_kernel_traces_trees_of_any_depth() {
+    let mut random = Random(21);
+    // Boxes inside boxes, so that a ray enters all of them and the stack is as full as can be; and
+    // boxes one behind the other.
+    let nested = |i: usize| (i + 1) as f32;
+    let nested: Vec<Triangle> = (0..3000)
         .map(|i| {
-            Triangle(
-                [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p * (i + 1) as f32 + Vec3::Z * (i as f32)),
-            )
+            Triangle([Vec3::NEG_ONE, Vec3::X, Vec3::new(0.0, 1.0, 0.25)].map(|p| p * nested(i)))
         })
         .collect();
-    let wide = WideBvh::new(&chain(&boxes(&triangles)), &triangles).unwrap();
-    for (z, direction, object) in [(-1.0, 1.0, 0), (30_000.0, -1.0, 19_999)] {
-        let ray = Ray::half_line(Vec3::new(0.1, 0.1, z), Vec3::Z * direction).unwrap();
-        assert_eq!(wide.nearest_hit(&ray).map(|hit| hit.object), Some(object));
+    let shifted = |i: usize, p: Vec3| p * (i + 1) as f32 + Vec3::Z * (i as f32);
+    let row: Vec<Triangle> = (0..3000)
+        .map(|i| Triangle([Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| shifted(i, p))))
+        .collect();
+    for (name, triangles) in [("nested", nested), ("in a row", row)] {
+        let wide = WideBvh::new(&chain(&boxes(&triangles)), &triangles).unwrap();
+        let kernels = Kernel::ALL.into_iter().filter(|kernel| kernel.is_available());
+        let layouts: Vec<_> =
+            kernels.map(|kernel| (kernel, wide.clone().with_kernel(kernel).unwrap())).collect();
+        let mut rays: Vec<Ray> = (0..150)
+            .map(|_| {
+                let origin = random.point() * random.of(&[0.1, 10.0, 5000.0]);
+                Ray::half_line(origin, random.point() - origin.normalize_or_zero()).unwrap()
+            })
+            .collect();
+        rays.extend(bundles(&triangles, 8, &mut random));
+        assert!(check(name, &triangles, &layouts, &rays) > 30);
+        let expected = layouts[0].1.clone().with_kernel(Kernel::Portable).unwrap();
+        for (kernel, wide) in &layouts {
+            for ray in &rays {
+                assert_eq!(
+                    wide.all_hits(ray),
+                    expected.all_hits(ray),
+                    "{name}, {kernel:?}, {ray:?}"
+                );
+                let point = ray.origin();
+                let distance =
+                    |wide: &WideBvh| wide.closest_point(point).map(|c| c.distance.to_bits());
+                assert_eq!(distance(wide), distance(&expected), "{name}, {kernel:?}, {point}");
+            }
+            let (mut hits, mut counts) = (Vec::new(), vec![0; rays.len()]);
+            wide.all_hits_of(&rays, &mut hits, &mut counts);
+            let singly: Vec<Hit> = rays.iter().flat_map(|ray| wide.all_hits(ray)).collect();
+            assert_eq!(hits, singly, "{name}, {kernel:?}");
+        }
     }
 }
 

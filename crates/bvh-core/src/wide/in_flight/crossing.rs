@@ -45,7 +45,7 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
                     {
                         entering.add(traversal, local_ray, entry);
                         if entering.count == K::Rays::N {
-                            self.enter(first, &mut entering);
+                            self.enter(&mut entering);
                         }
                         continue;
                     }
@@ -55,14 +55,14 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
                 self.enlist(traversal);
             }
             if entering.count > 0 {
-                self.enter(first, &mut entering);
+                self.enter(&mut entering);
             }
         }
     }
 
     /// Has rays enter the instances at which they are.
     #[inline(always)]
-    unsafe fn enter(&mut self, first: usize, entering: &mut Entering) {
+    unsafe fn enter(&mut self, entering: &mut Entering) {
         let count = core::mem::replace(&mut entering.count, 0);
         let Some(scene) = self.batch.scene else { return };
         let mut prepared = [const { MaybeUninit::<Prepared>::uninit() }; RAYS];
@@ -74,14 +74,19 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
             }
             let rays = entering.rays.as_ptr().cast::<Ray>();
             let rays = core::slice::from_raw_parts(rays, K::Rays::N);
-            let ready = Ready::new(lanes_of_rays::<K::Rays>(rays, 0), scene.largest_of_parts());
+            let mut far = 0;
+            let mut reaches = [0.0; RAYS];
+            for (i, ray) in rays.iter().enumerate().take(count) {
+                let traversal = &*entering.traversals[i].assume_init();
+                let part = scene.part_of(traversal.child.instance_index());
+                far |= u32::from(!ray.begins_in(&part.near)) << i;
+                reaches[i] = ray.reach(&part.bounds);
+            }
+            let rays = lanes_of_rays::<K::Rays>(rays, 0);
+            let ready = Ready::with_far(rays, K::Rays::load_unaligned(reaches.as_ptr()), far);
             ready.write(0, prepared.as_mut_ptr().cast());
             for (i, prepared) in prepared.iter().enumerate().take(count) {
                 let traversal = &mut *entering.traversals[i].assume_init();
-                if ready.in_range >> i & 1 == 0 {
-                    self.finish_alone(first, traversal);
-                    continue;
-                }
                 let entry = entering.entries[i].assume_init();
                 let part = scene.part_of(traversal.child.instance_index());
                 traversal.enter_instance(prepared.assume_init(), entry, part);

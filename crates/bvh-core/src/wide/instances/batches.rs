@@ -79,10 +79,4 @@ impl Instances {
     pub(crate) fn bounds(&self) -> Aabb {
         self.wide_top.bounds
     }
-
-    /// Returns the largest absolute value of a coordinate of any part, in the part's coordinates.
-    #[inline(always)]
-    pub(crate) fn largest_of_parts(&self) -> f32 {
-        self.largest_of_parts
-    }
 }

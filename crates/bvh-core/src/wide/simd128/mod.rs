@@ -6,7 +6,7 @@ mod lanes;
 #[cfg_attr(target_arch = "wasm32", path = "wasm.rs")]
 mod registers;
 
-use super::all_in_flight::{Found, MOST};
+use super::all_in_flight::Found;
 use super::answer::{ANY_HIT, Batch};
 use super::crossed_leaves::AllHits;
 use super::instructions::{Instructions, Part, Pending};
@@ -38,18 +38,14 @@ pub(super) unsafe fn one_ray<const ANY: bool>(
     unsafe { one_ray::trace::<Simd128, ANY>(wide, ray, accept) }
 }
 
-/// [`one_ray::traverse`] for all hits. Returns whether it could trace the ray.
-pub(super) unsafe fn all_hits(wide: &WideBvh, ray: &Ray, leaves: &mut AllHits) -> bool {
+/// [`one_ray::traverse`] for all hits.
+pub(super) unsafe fn all_hits(wide: &WideBvh, ray: &Ray, leaves: &mut AllHits) {
     // SAFETY: the target has the instructions; the rest is the caller's promise.
-    unsafe { one_ray::traverse::<Simd128, ANY_HIT>(wide, ray, leaves) }.is_some()
+    unsafe { one_ray::traverse::<Simd128, ANY_HIT>(wide, ray, leaves) };
 }
 
 /// [`all_in_flight::trace`].
-pub(super) unsafe fn all_hits_of(
-    wide: &WideBvh,
-    rays: &[Ray],
-    found: &mut Vec<Found>,
-) -> [u64; MOST / 64] {
+pub(super) unsafe fn all_hits_of(wide: &WideBvh, rays: &[Ray], found: &mut Vec<Found>) {
     // SAFETY: the target has the instructions; the rest is the caller's promise.
     unsafe { all_in_flight::trace::<Simd128>(wide, rays, found) }
 }

@@ -6,7 +6,7 @@ mod lanes;
 mod masks;
 mod sort;
 
-use super::all_in_flight::{Found, MOST};
+use super::all_in_flight::Found;
 use super::answer::Batch;
 use super::crossed_leaves::AllHits;
 use super::layout::WideBvh;
@@ -46,8 +46,7 @@ fn has_avx512() -> bool {
 /// Runs [`one_ray::trace`](super::one_ray::trace) by the layout's kernel.
 ///
 /// # Safety
-/// The layout has a vector kernel, which the processor can run; its references are sound and its
-/// `stack_need` is at most [`STACK`](super::kernel::STACK).
+/// The layout has a vector kernel, which the processor can run; its references are sound.
 #[inline(always)]
 pub(super) unsafe fn one_ray<const ANY: bool>(
     wide: &WideBvh,
@@ -67,7 +66,7 @@ pub(super) unsafe fn one_ray<const ANY: bool>(
 ///
 /// # Safety
 /// As for [`one_ray`].
-pub(super) unsafe fn all_hits(wide: &WideBvh, ray: &Ray, leaves: &mut AllHits) -> bool {
+pub(super) unsafe fn all_hits(wide: &WideBvh, ray: &Ray, leaves: &mut AllHits) {
     // SAFETY: the caller's promises.
     unsafe {
         match wide.kernel {
@@ -81,11 +80,7 @@ pub(super) unsafe fn all_hits(wide: &WideBvh, ray: &Ray, leaves: &mut AllHits) -
 ///
 /// # Safety
 /// As for [`one_ray`], and there are at most [`MOST`](super::all_in_flight::MOST) rays.
-pub(super) unsafe fn all_hits_of(
-    wide: &WideBvh,
-    rays: &[Ray],
-    found: &mut Vec<Found>,
-) -> [u64; MOST / 64] {
+pub(super) unsafe fn all_hits_of(wide: &WideBvh, rays: &[Ray], found: &mut Vec<Found>) {
     // SAFETY: the caller's promises.
     unsafe {
         match wide.kernel {
@@ -154,15 +149,14 @@ macro_rules! entry_points {
             wide: &WideBvh,
             ray: &crate::Ray,
             leaves: &mut crate::wide::crossed_leaves::AllHits,
-        ) -> bool {
+        ) {
             // SAFETY: this function is compiled with the instructions; the rest is the caller's
             // promise.
             unsafe {
                 crate::wide::one_ray::traverse::<$instructions, { crate::wide::answer::ANY_HIT }>(
                     wide, ray, leaves,
-                )
+                );
             }
-            .is_some()
         }
 
         /// [`all_in_flight::trace`](crate::wide::all_in_flight::trace).
@@ -171,7 +165,7 @@ macro_rules! entry_points {
             wide: &WideBvh,
             rays: &[crate::Ray],
             found: &mut alloc::vec::Vec<crate::wide::all_in_flight::Found>,
-        ) -> [u64; crate::wide::all_in_flight::MOST / 64] {
+        ) {
             // SAFETY: this function is compiled with the instructions; the rest is the caller's
             // promise.
             unsafe { crate::wide::all_in_flight::trace::<$instructions>(wide, rays, found) }
