@@ -1,4 +1,4 @@
-//! `bvh inspect`: reports the origin of a tree file, and the costs and the shape of
+//! `bvh inspect` and `bvh verify`: report the origin of a tree file, and the costs and the shape of
 //! its tree.
 
 use crate::arguments::output_file;
@@ -22,8 +22,7 @@ use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 use std::path::{Path, PathBuf};
 
-/// Report the origin of a tree file, and the costs, depth, arity and validity of its tree, which are
-/// computed again: any program may have written the file.
+/// Report the origin of a tree file, and the costs, depth, arity and validity of its tree.
 #[derive(Args, Clone, Debug)]
 pub struct InspectArgs {
     /// The tree file.
@@ -93,8 +92,37 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     if let Some(path) = &args.nodes {
         write_nodes(&tree, path)?;
     }
-    print_line(&if args.json { format!("{:#}", json!(facts)) } else { facts.to_string() });
+    print(&facts, args.json);
     Ok(())
+}
+
+/// Prove that a tree file from any source contains a tree for a scene. Computes validity and costs
+/// again.
+#[derive(Args, Clone, Debug)]
+pub struct VerifyArgs {
+    /// The tree file.
+    #[arg(value_name = "FILE.bvh")]
+    pub file: PathBuf,
+    /// The tree's scene, by name or path of a mesh file.
+    pub scene: String,
+    /// Permits files outside the scene's folder.
+    #[command(flatten)]
+    pub files: SceneFiles,
+    /// Print the facts as JSON with the same names.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Does the same as [`inspect`], and requires a scene.
+pub fn verify(args: &VerifyArgs) -> Result<(), Error> {
+    let scene = args.files.load(&args.scene)?;
+    let (_, facts) = examine(&args.file, Some(&scene))?;
+    print(&facts, args.json);
+    Ok(())
+}
+
+fn print(facts: &Facts, as_json: bool) {
+    print_line(&if as_json { format!("{:#}", json!(facts)) } else { facts.to_string() });
 }
 
 /// Reads the tree in a file, and lists the facts about it.

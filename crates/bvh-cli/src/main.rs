@@ -39,6 +39,7 @@ struct Cli {
 enum Command {
     Bake(bake::BakeArgs),
     Inspect(inspect::InspectArgs),
+    Verify(inspect::VerifyArgs),
     Render(render::RenderArgs),
     Report(report::ReportArgs),
     /// List the built-in scenes, their sizes, and the originals that they replace.
@@ -73,6 +74,7 @@ fn run(command: Command) -> Result<(), Error> {
             None => bake::bake(&args, &INTERRUPTED),
         },
         Command::Inspect(args) => inspect::inspect(&args),
+        Command::Verify(args) => inspect::verify(&args),
         Command::Render(args) => render::render(&args),
         Command::Report(args) => report::report(&args),
         Command::Scenes => scenes::scenes(),

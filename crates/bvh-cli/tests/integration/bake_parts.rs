@@ -25,7 +25,7 @@ fn joined_parts_cost_at_most_a_percent_more_than_a_whole_bake_of_the_same_work()
     let at = folder.path();
     bake(at, "parts.bvh", &[]);
     said(at, &[&BAKE[..4], &["--out", "whole.bvh"]].concat());
-    said(at, &["inspect", "parts.bvh", "escher"]);
+    said(at, &["verify", "parts.bvh", "escher"]);
     let [parts, whole] = ["parts.bvh", "whole.bvh"].map(|file| cost(at, file));
     assert!(parts <= 1.01 * whole, "{parts} is more than 1 % above {whole}");
 }
@@ -35,7 +35,7 @@ fn joined_parts_may_have_divided_objects() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     bake(at, "parts.bvh", &["--references", "1.2"]);
-    let facts = facts(&said(at, &["inspect", "parts.bvh", "escher"]));
+    let facts = facts(&said(at, &["verify", "parts.bvh", "escher"]));
     let [references, objects] =
         ["references", "objects"].map(|name| facts[name].parse::<f64>().unwrap());
     assert!(references > objects && references <= 1.2 * objects, "{references} of {objects}");

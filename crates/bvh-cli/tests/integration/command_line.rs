@@ -4,8 +4,8 @@
 #![cfg_attr(windows, allow(unused_imports))]
 
 use crate::support::{
-    ended, names, outside_buffer, outside_scene, program, refused, run_in_little_memory, said,
-    unsaid, wrong_flags,
+    ReadOnly, ended, names, outside_buffer, outside_scene, program, refused, run_in_little_memory,
+    said, unsaid, wrong_flags,
 };
 use std::fs;
 use std::path::Path;
@@ -150,6 +150,30 @@ fn a_missing_folder_is_named_before_the_work() {
 }
 
 #[test]
+fn a_folder_that_cannot_be_written_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let locked = at.join("locked");
+    fs::create_dir(&locked).unwrap();
+    said(at, &["bake", "spheres75", "--budget=0s", "--out=good.bvh"]);
+    let Some(_guard) = ReadOnly::new(&locked) else {
+        eprintln!("not tried: this user can write into any folder here");
+        return;
+    };
+    for (args, parts) in [
+        (
+            &["bake", "spheres75", "--budget=1h", "--out=locked/x.bvh"][..],
+            ["locked", "cannot create"],
+        ),
+        (&["inspect", "good.bvh", "--nodes=locked/x.csv"], ["locked/x.csv", "cannot write"]),
+        (&["render", "spheres75", "--size=8x8", "--out=locked/x.png"], ["locked/x.png", "cannot"]),
+    ] {
+        refused(at, args, 1, &parts);
+    }
+    assert_eq!(fs::read_dir(&locked).unwrap().count(), 0);
+}
+
+#[test]
 fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
@@ -160,6 +184,7 @@ fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
         &[
             ("bake", &["spheres75", "--budget=0s", "--out=x.bvh"]),
             ("inspect", &["good.bvh", "spheres75"]),
+            ("verify", &["good.bvh", "spheres75"]),
             ("render", &["spheres75", "--out=x.png", "--size=8x8"]),
             ("report", &["good.bvh", "spheres75"]),
             ("scenes", &[]),
@@ -181,6 +206,7 @@ fn every_command_reads_buffers_outside_the_folder_of_a_scene_only_with_permissio
         &bake[..],
         &["bake", "scene.gltf", "--instances", "--budget=0s", "--out=x"],
         &["inspect", "x.bvh", "scene.gltf"],
+        &["verify", "x.bvh", "scene.gltf"],
         &["render", "scene.gltf", "--size=8x8", "--out=x.png"],
         &["report", "x.bvh", "scene.gltf"],
     ] {
