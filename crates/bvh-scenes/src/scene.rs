@@ -1,6 +1,6 @@
 //! A loaded scene, and the names that select one.
 
-use crate::builtin::{landscape, spheres, stand_ins, stiff};
+use crate::builtin::{spheres, stand_ins, stiff};
 use crate::load::OutsideFiles;
 use crate::subset::Subset;
 use crate::{fnv1a, load};
@@ -95,8 +95,8 @@ impl Scene {
     /// Loads a scene by name.
     ///
     /// `name` is a stand-in, one of [`SPHERES`], one of [`FETCHED`] or the path of a mesh file,
-    /// each optionally followed by a [`Subset`]; or it is a landscape or a stiff scene with its
-    /// number of objects, such as `terrain:1000000` or `S34:20000`.
+    /// each optionally followed by a [`Subset`]; or it is a stiff scene with its number of objects,
+    /// such as `S34:20000`.
     ///
     /// # Errors
     ///
@@ -110,7 +110,7 @@ impl Scene {
     pub fn load_with(name: &str, outside: OutsideFiles) -> Result<Self, SceneError> {
         match Subset::parse(name) {
             // A generated scene has any number of objects, so its count is not a subset.
-            Some((id, Subset::Spaced(objects))) if generator(id).is_some() => {
+            Some((id, Subset::Spaced(objects))) if stiff::by_id(id).is_some() => {
                 Self::generated(id, name, objects)
             }
             Some((whole, subset)) => {
@@ -167,7 +167,7 @@ impl Scene {
     pub fn generated_objects(name: &str) -> Option<usize> {
         match Subset::parse(name)? {
             (id, Subset::Spaced(objects)) => {
-                generator(id)?;
+                stiff::by_id(id)?;
                 Some(objects).filter(|objects| (1..=MOST_GENERATED).contains(objects))
             }
             _ => None,
@@ -177,7 +177,7 @@ impl Scene {
     /// Generates a scene of `objects` objects, or of nearly as many where the generator cannot make
     /// exactly that number.
     fn generated(id: &str, name: &str, objects: usize) -> Result<Self, SceneError> {
-        let generator = generator(id).filter(|_| (1..=MOST_GENERATED).contains(&objects));
+        let generator = stiff::by_id(id).filter(|_| (1..=MOST_GENERATED).contains(&objects));
         let bytes = objects.saturating_mul(size_of::<Triangle>() + size_of::<Aabb>());
         if generator.is_some() && !is_allocatable(bytes) {
             let message = format!("its triangles and their boxes need {bytes} bytes of memory");
@@ -243,17 +243,13 @@ pub fn fetched_path(name: &str) -> Option<PathBuf> {
         .find(|path| path.is_file())
 }
 
-fn generator(id: &str) -> Option<stiff::Generator> {
-    stiff::by_id(id).or_else(|| landscape::by_name(id))
-}
-
 fn known_scenes() -> String {
     let names = stand_ins::STAND_INS.iter().map(|scene| scene.name);
     let names = names.chain(SPHERES.map(|(name, _)| name)).chain(FETCHED.map(|(name, _)| name));
     format!(
         "accepted: {}, the path of an OBJ, PLY, STL or glTF file, either of them with `:COUNT`, \
-         `:random:COUNT:SEED` or `:cluster:COUNT:SEED` for a subset, or city, forest, terrain or a \
-         case of the suite with a number of objects such as terrain:1000000 or S34:20000",
+         `:random:COUNT:SEED` or `:cluster:COUNT:SEED` for a subset, or a case of the suite with a \
+         number of objects such as S34:20000",
         names.collect::<Vec<_>>().join(", ")
     )
 }
@@ -292,10 +288,9 @@ mod tests {
 
     #[test]
     fn the_number_of_objects_of_a_generated_scene_is_known_before_it_is_generated() {
-        assert_eq!(Scene::generated_objects("city:100000000"), Some(100_000_000));
+        assert_eq!(Scene::generated_objects("S21:100000000"), Some(100_000_000));
         assert_eq!(Scene::generated_objects("S34:20000"), Some(20_000));
-        for other in
-            ["city", "city:100000001", "escher:100", "spheres75", "a.ply", "city:random:9:1"]
+        for other in ["S21", "S21:100000001", "escher:100", "spheres75", "a.ply", "S21:random:9:1"]
         {
             assert_eq!(Scene::generated_objects(other), None, "{other}");
         }

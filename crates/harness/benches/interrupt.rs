@@ -4,6 +4,7 @@
 //! for a million recorded rays, interrupts each bake at several times, and writes
 //! `results/interrupt/timing_interrupt.csv`. About ten minutes.
 
+mod landscape;
 mod measured;
 
 use bvh_scenes::Scene;
@@ -27,11 +28,13 @@ fn main() {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     std::env::set_current_dir(&top).expect("the project's folder");
     let program = program();
-    let scene = Scene::load(SCENE).expect("a scene");
+    let scene = landscape::load(SCENE).expect("a scene");
     let objects = scene.boxes.len();
     let folder = tempfile::tempdir().expect("a folder");
     let recorded = folder.path().join("rays.bin");
     fs::write(&recorded, segments(&scene)).expect("a file");
+    let mesh = folder.path().join("city.stl");
+    fs::write(&mesh, stl(&scene)).expect("a file");
     // Another scene of this size beside the bake would change what is measured.
     drop(scene);
     let processor = PROCESSOR.name();
@@ -39,7 +42,7 @@ fn main() {
     for segments in [0, SEGMENTS] {
         let recorded = (segments > 0).then_some(recorded.as_path());
         for after_seconds in AFTER {
-            let seconds = interrupted(&program, folder.path(), recorded, after_seconds);
+            let seconds = interrupted(&program, &mesh, recorded, after_seconds);
             println!("{SCENE}, {segments} segments, after {after_seconds} s: {seconds:.2} s");
             let scene = SCENE.to_owned();
             let processor = processor.clone();
@@ -73,11 +76,28 @@ fn segments(scene: &Scene) -> Vec<u8> {
     bytes
 }
 
+/// Returns the triangles of a scene as a binary STL file.
+fn stl(scene: &Scene) -> Vec<u8> {
+    let triangles = scene.triangles().expect("triangles");
+    let mut bytes = vec![0; 80];
+    bytes.extend((triangles.len() as u32).to_le_bytes());
+    for triangle in triangles {
+        bytes.extend([0; 12]);
+        for coordinate in triangle.0.iter().flat_map(|corner| corner.to_array()) {
+            bytes.extend(coordinate.to_le_bytes());
+        }
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
 /// Begins a bake and interrupts it. Returns the seconds from the signal to the end of the program.
-fn interrupted(program: &Path, folder: &Path, recorded: Option<&Path>, after: f64) -> f64 {
-    let tree = folder.join("tree.bvh");
+fn interrupted(program: &Path, mesh: &Path, recorded: Option<&Path>, after: f64) -> f64 {
+    let tree = mesh.with_extension("bvh");
     let mut bake = Command::new(program);
-    bake.args(["bake", SCENE, "--budget", "10m", "--out"])
+    bake.arg("bake")
+        .arg(mesh)
+        .args(["--budget", "10m", "--out"])
         .arg(&tree)
         .stdout(Stdio::null())
         .stderr(Stdio::null());

@@ -8,6 +8,7 @@
 //! The program counts the bytes that it requests from its allocator; counting adds about 1 % to the
 //! times. Mapped files are not counted.
 
+mod landscape;
 mod measured;
 
 use bvh_build::{Builder, Watch, muller_fellner, ploc, spatial};
@@ -104,7 +105,7 @@ impl Phases {
         let ply = folder.path().join("scene.ply");
         let obj = folder.path().join("scene.obj");
         {
-            let scene = Scene::load(&self.scene).expect("a scene");
+            let scene = landscape::load(&self.scene).expect("a scene");
             self.objects = scene.boxes.len();
             write_ply(&scene, &ply);
             write_obj(&scene, &obj);

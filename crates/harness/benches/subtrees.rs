@@ -9,6 +9,7 @@
 //! One thread and two alternate, and their trees are the same. The seconds of more threads are
 //! expected by Amdahl's law from these two, so far as there are that many subtrees or copies.
 
+mod landscape;
 mod measured;
 
 use bvh_build::{Builder, muller_fellner};
@@ -53,7 +54,7 @@ fn main() {
     std::env::set_current_dir(&top).expect("the project's folder");
     let args = Args::parse();
     for name in &args.scenes {
-        match Scene::load(name) {
+        match landscape::load(name) {
             Ok(scene) => measured::replace(FOLDER, measure(&scene, &args), key),
             Err(error) => println!("{error}"),
         }

@@ -1,6 +1,5 @@
 //! Scenes that are generated in code, the same on every machine.
 
-pub mod landscape;
 pub mod spheres;
 pub mod stand_ins;
 pub mod stiff;

@@ -2,14 +2,10 @@
 //!
 //! `y` is up, and one unit is about a metre. Every call gives the same bytes on every machine.
 
-use super::stand_ins::{cos_sin, jitter};
-use super::stiff::Generator;
-use bvh_core::Triangle;
+use bvh_core::{Primitives, Triangle};
+use bvh_scenes::builtin::stand_ins::{cos_sin, jitter};
+use bvh_scenes::{Scene, SceneError, SceneKind};
 use glam::{DVec3, Vec3};
-
-/// Every landscape by its name.
-pub const LANDSCAPES: [(&str, Generator); 3] =
-    [("city", city), ("forest", forest), ("terrain", terrain)];
 
 /// The number of triangles of a tree: the trunk and the leaves.
 const TREE: usize = 2 * TRUNK_SIDES + 380;
@@ -20,14 +16,23 @@ const GLADE: f64 = 6.0;
 /// The edge of the square of ground that one building has.
 const PLOT: f64 = 40.0;
 
-/// Returns the generator of the landscape called `name`.
-pub fn by_name(name: &str) -> Option<Generator> {
-    LANDSCAPES.iter().find(|(known, _)| *known == name).map(|(_, generator)| *generator)
+/// Generates a landscape of `N` triangles by its name, `city:N`, `forest:N` or `terrain:N`, or
+/// loads any other scene.
+pub fn load(name: &str) -> Result<Scene, SceneError> {
+    let (kind, count) = name.split_once(':').unwrap_or((name, ""));
+    let generator = match kind {
+        "city" => city,
+        "forest" => forest,
+        "terrain" => terrain,
+        _ => return Scene::load(name),
+    };
+    let Ok(count) = count.parse() else { return Scene::load(name) };
+    Ok(Scene::new(name, SceneKind::Procedural, Primitives::Triangles(generator(count))))
 }
 
 /// Hills and valleys with ridges down to a metre: a square grid of `count` triangles, whose last
 /// row may be incomplete.
-pub fn terrain(count: usize) -> Vec<Triangle> {
+fn terrain(count: usize) -> Vec<Triangle> {
     let columns = (count as f64 / 2.0).sqrt().ceil() as usize;
     let row = |z: usize| -> Vec<Vec3> {
         (0..=columns)
@@ -54,7 +59,7 @@ pub fn terrain(count: usize) -> Vec<Triangle> {
 }
 
 /// Trees with slender leaves on a square of hills. One triangle in nine is ground.
-pub fn forest(count: usize) -> Vec<Triangle> {
+fn forest(count: usize) -> Vec<Triangle> {
     let trees = (count - count / 9).div_ceil(TREE);
     let columns = (trees as f64).sqrt().ceil().max(1.0) as usize;
     let ground = count / 9;
@@ -108,7 +113,7 @@ fn plant(triangles: &mut Vec<Triangle>, tree: usize, foot: DVec3) {
 }
 
 /// Streets between buildings of 3 to 40 floors, each wall a grid of panes.
-pub fn city(count: usize) -> Vec<Triangle> {
+fn city(count: usize) -> Vec<Triangle> {
     let mut triangles = Vec::with_capacity(count + (1 << 14));
     // Buildings follow a spiral of squares, so that every size is a compact city.
     let mut place = [0i64; 2];
@@ -184,42 +189,4 @@ fn height(x: f64, z: f64) -> f64 {
         sum += (low + (high - low) * t) * 0.12 * length;
     }
     sum
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_size_has_its_number_of_finite_triangles_and_a_larger_one_covers_more_ground() {
-        for (name, generator) in LANDSCAPES {
-            let mut before = 0.0;
-            for count in [1, 2, 1000, 20_000, 100_000] {
-                let triangles = generator(count);
-                assert_eq!(triangles.len(), count, "{name}");
-                let bounds =
-                    triangles.iter().map(Triangle::aabb).reduce(|a, b| a.union(&b)).unwrap();
-                assert!(bounds.min.is_finite() && bounds.max.is_finite(), "{name}");
-                let ground = bounds.extent().x * bounds.extent().z;
-                assert!(ground >= before, "{name} of {count} triangles");
-                before = ground;
-            }
-            assert_eq!(by_name(name).unwrap()(3), generator(3));
-        }
-        assert!(by_name("sea").is_none());
-    }
-
-    #[test]
-    fn no_machine_changes_a_bit_of_any_landscape() {
-        let fingerprints = LANDSCAPES.map(|(_, generator)| {
-            let triangles = generator(30_000);
-            let numbers = triangles
-                .iter()
-                .flat_map(|Triangle(corners)| corners.map(|corner| corner.to_array()))
-                .flatten();
-            crate::fnv1a(numbers.flat_map(f32::to_le_bytes))
-        });
-        let pinned = [0x5e9e_0167_c46c_0f58, 0xe219_6c2e_c6fb_1a1e, 0x7b14_55e5_d485_a86a];
-        assert_eq!(fingerprints, pinned, "{fingerprints:#x?}");
-    }
 }
