@@ -1,6 +1,6 @@
 //! The heat map: the number of tests of each pixel as a colour, with a key below.
 
-use super::Film;
+use super::image::Film;
 use ab_glyph::{Font, FontRef, PxScale, point};
 
 /// Every sixteenth colour of matplotlib's 'inferno' (van der Walt & Smith 2015; CC0), whose

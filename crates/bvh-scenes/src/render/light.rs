@@ -1,8 +1,7 @@
 //! Computes the light that reaches a pixel with rays through the pixel, to the lights, and along
 //! mirror reflections.
 
-use super::Film;
-use super::image;
+use super::image::{self, Film};
 use super::surface::{Ground, Surface};
 use crate::rays::{Camera, View};
 use crate::trace::Accelerator;

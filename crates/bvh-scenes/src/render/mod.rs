@@ -19,5 +19,6 @@ mod light;
 pub mod structure;
 mod surface;
 
-pub use draw::{Film, Options, render, tiles};
+pub use draw::{Options, render, tiles};
+pub use image::Film;
 pub use structure::StructureError;
