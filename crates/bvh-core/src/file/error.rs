@@ -32,19 +32,6 @@ pub enum FileError {
         /// The version found.
         found: u32,
     },
-    /// The file has another version of the format of wide layouts.
-    #[error("the file has version {found} of wide layouts; accepted: 1; save the layout again")]
-    LayoutVersion {
-        /// The version found.
-        found: u32,
-    },
-    /// A node of a wide layout has a box that is not finite, or names a child that does not exist
-    /// or has another parent, or the node has no parent.
-    #[error("node {node} of the layout has no parent, or names a wrong child")]
-    Layout {
-        /// The node.
-        node: usize,
-    },
     /// The file was written with the most significant byte first.
     #[error("the file is big-endian; the format is little-endian")]
     Endianness,

@@ -67,18 +67,13 @@
 //!
 //! On little-endian machines [`TreeFile::view`] borrows the bytes. Their address must be a multiple
 //! of 4, which mapped files ensure. [`load`] copies and works everywhere.
-//!
-//! [`save_layout`] and [`view_layout`] do the same for wide layouts, which have a format of their
-//! own.
 
 mod error;
 mod header;
-mod layout;
 mod words;
 
 pub use error::FileError;
 pub use header::Header;
-pub use layout::{WideView, load_layout, save_layout, view_layout};
 
 use crate::cost::{CallBoth, Objective, call_in_turn};
 use crate::validate::{FastPath, Leaves, check_structure, find_fault, for_each};

@@ -153,7 +153,7 @@ impl WideBvh {
             return;
         }
         let first = hits.len();
-        // SAFETY: `kernel` is available, as `choose` saw; callers
+        // SAFETY: `kernel` is available, as those who set it saw; callers
         // pass parts of no more rays.
         unsafe { vector::all_hits_of(self, rays, found) };
         counts.fill(0);
@@ -195,7 +195,7 @@ impl WideBvh {
         let sloped = SlopedLine::new(ray, &self.bounds);
         let mut leaves = AllHits { ray, line, sloped, hits };
         if self.kernel != Kernel::Portable {
-            // SAFETY: `kernel` is available, as `choose` saw.
+            // SAFETY: `kernel` is available, as those who set it saw.
             unsafe { vector::all_hits(self, ray, &mut leaves) };
         } else {
             portable::traverse::<ANY_HIT>(self, ray, &mut (), |block, _| {

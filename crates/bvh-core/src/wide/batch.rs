@@ -61,8 +61,7 @@ unsafe fn rest<K: Instructions, const ANY: bool>(
     batch: &mut Batch,
     numbers: Range<usize>,
 ) {
-    // One by one, rays come to instances much more slowly.
-    let is_many = numbers.len() >= MANY || batch.scene.is_some() && !numbers.is_empty();
+    let is_many = numbers.len() >= MANY;
     if is_many {
         // SAFETY: the caller's promises.
         unsafe { in_flight::trace::<K, ANY>(wide, batch, numbers) };

@@ -122,7 +122,7 @@ impl WideBvh {
     /// Answers a batch by the layout's kernel.
     pub(super) fn trace<const ANY: bool>(&self, mut batch: Batch, coherence: Coherence) {
         if self.kernel != Kernel::Portable {
-            // SAFETY: `kernel` is available, as `choose` and `lay_out_instances` saw.
+            // SAFETY: `kernel` is available, as those who set it saw.
             return unsafe { vector::trace::<ANY>(self, &mut batch, coherence) };
         }
         for number in 0..batch.rays.len() {

@@ -140,7 +140,7 @@ impl<K: Instructions> BoxTest<K> for FarBoxRay {
         // SAFETY: the processor has the instructions.
         unsafe {
             let double = |x: f64| <K::Boxes as Lanes>::Double::splat(x);
-            let mut entry = double(f64::from(self.t_min));
+            let mut entry = double(f64::NEG_INFINITY);
             let mut exit = double(f64::INFINITY);
             for axis in 0..3 {
                 let [near, far] = self.planes.load::<K::Boxes>(node, axis);
@@ -149,11 +149,14 @@ impl<K: Instructions> BoxTest<K> for FarBoxRay {
                 entry = ((near.double() - origin) * inverse).max(entry);
                 exit = ((far.double() - origin) * inverse).min(exit);
             }
-            let crosses = (entry * double(NEAR_DOUBLE)).le(exit * double(FAR_DOUBLE));
-            // A distance is rounded before it is compared with those of hits, which are.
-            let entry = K::Boxes::single(entry * double(NEAR_DOUBLE));
-            let begins = entry.le(K::Boxes::splat(t_max));
-            (entry, (K::Boxes::narrow(crosses) & begins).bits())
+            let entry = entry * double(NEAR_DOUBLE);
+            let exit = exit * double(FAR_DOUBLE);
+            let crosses = K::Boxes::narrow(entry.le(exit));
+            // The range of the ray is compared with rounded distances, as those of hits are.
+            let t_min = K::Boxes::splat(self.t_min);
+            let entry = K::Boxes::single(entry).max(t_min);
+            let is_in_range = t_min.le(K::Boxes::single(exit)) & entry.le(K::Boxes::splat(t_max));
+            (entry, (crosses & is_in_range).bits())
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The wide layout of least expected cost of a given tree.
 
-use super::decide::{Costs, Decision, areas, children, decide};
+use super::decide::{BLOCK_COST, Costs, Decision, areas, children, decide};
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
 use super::triangles::TriangleBlock;
@@ -53,14 +53,8 @@ fn sizes(tree: &Bvh, decisions: &[Decision]) -> (usize, usize) {
 }
 
 /// The wide layout of least expected cost for rays that enter the nodes of `tree` as often as
-/// `visits` says, by default for random lines, where testing a block takes `block_cost`. `tree`
-/// must be valid over the triangles' boxes.
-pub(crate) fn widen(
-    tree: &Bvh,
-    triangles: &[Triangle],
-    visits: Option<&[f32]>,
-    block_cost: f32,
-) -> WideBvh {
+/// `visits` says, by default for random lines. `tree` must be valid over the triangles' boxes.
+pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) -> WideBvh {
     let bounds = tree.root_aabb().unwrap_or(Aabb::EMPTY);
     let mut wide = WideBvh::without_nodes(bounds);
     if tree.nodes.is_empty() {
@@ -80,7 +74,7 @@ pub(crate) fn widen(
     let tree = &*tree;
     let split = tree.prim_ids.len() > triangles.len();
     let blocks =
-        |objects: u32| Some(block_cost * objects.div_ceil(TriangleBlock::LANES as u32) as f32);
+        |objects: u32| Some(BLOCK_COST * objects.div_ceil(TriangleBlock::LANES as u32) as f32);
     let (decisions, costs) = decide(tree, &visits, blocks);
     let promise = promise(tree, triangles, &visits, &costs);
     drop(visits);
@@ -106,13 +100,14 @@ pub(crate) fn widen(
         Some(child)
     };
     lay_out_nodes(&mut wide, tree, &decisions, &promise, node_count, leaf);
-    wide.blocks = all_blocks.into();
+    assert!(all_blocks.len() < Child::END.index(), "blocks have indices of 31 bits");
+    wide.blocks = all_blocks;
     wide
 }
 
 /// Lays out the nodes, the root and the `stack_need` as decided; children of more promise are in
 /// later lanes. `leaf` lays out a leaf, and returns `None` if there is nothing in it.
-pub(super) fn lay_out_nodes(
+fn lay_out_nodes(
     wide: &mut WideBvh,
     tree: &Bvh,
     decisions: &[Decision],
@@ -146,7 +141,7 @@ pub(super) fn lay_out_nodes(
             }
         }
     }
-    wide.nodes = nodes.into();
+    wide.nodes = nodes;
 }
 
 #[cfg(test)]

@@ -49,7 +49,7 @@ impl WideBvh {
     pub fn closest_points(&self, points: &[Vec3], closest: &mut [Option<Closest>]) {
         assert_eq!(points.len(), closest.len(), "an answer for every point");
         if self.kernel != Kernel::Portable {
-            // SAFETY: `kernel` is available, as `choose` saw.
+            // SAFETY: `kernel` is available, as those who set it saw.
             return unsafe { vector::closest_points(self, points, closest) };
         }
         let mut stack = Vec::new();

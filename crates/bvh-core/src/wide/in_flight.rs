@@ -14,13 +14,12 @@
 //! No branch depends on one ray: its next step decides the list that it is appended to, and the
 //! order of hits and the children behind them are found without branches, too.
 
-mod crossing;
-
 use super::answer::Batch;
 use super::instructions::{Instructions, Part};
 use super::kernel::DeepStacks;
 use super::lanes::Lanes;
 use super::layout::WideBvh;
+use super::node::Child;
 use super::prepared::{Prepared, Ready};
 use super::traversal::{self, Traversal};
 use core::marker::PhantomData;
@@ -50,29 +49,21 @@ pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
     // No triangle has an area. The flight below expects that every ray visits something.
     if wide.root.is_none() {
         for number in numbers {
-            batch.answers.write(number, f32::INFINITY, u32::MAX, u32::MAX);
+            batch.answers.write(number, f32::INFINITY, u32::MAX);
         }
         return;
     }
-    // Instances are a second body, not a branch: the branch costs rays without instances a tenth.
     // SAFETY: the caller's promises.
-    unsafe {
-        if batch.scene.is_some() {
-            K::call(Trace::<K, ANY, true>::new(wide, batch, numbers));
-        } else {
-            K::call(Trace::<K, ANY, false>::new(wide, batch, numbers));
-        }
-    }
+    unsafe { K::call(Trace::<K, ANY>::new(wide, batch, numbers)) };
 }
 
-/// A flight of all rays up to the last number. With `IN_INSTANCES` leaves of the layout are
-/// instances.
-struct Trace<'a, 'b, K, const ANY: bool, const IN_INSTANCES: bool> {
-    flight: Flight<'a, 'b, K, ANY, IN_INSTANCES>,
+/// A flight of all rays up to the last number.
+struct Trace<'a, 'b, K, const ANY: bool> {
+    flight: Flight<'a, 'b, K, ANY>,
     last: usize,
 }
 
-impl<'a, 'b, K, const ANY: bool, const IN_INSTANCES: bool> Trace<'a, 'b, K, ANY, IN_INSTANCES> {
+impl<'a, 'b, K, const ANY: bool> Trace<'a, 'b, K, ANY> {
     #[inline(always)]
     fn new(wide: &'a WideBvh, batch: &'a mut Batch<'b>, numbers: Range<usize>) -> Self {
         let flight = Flight {
@@ -92,9 +83,7 @@ impl<'a, 'b, K, const ANY: bool, const IN_INSTANCES: bool> Trace<'a, 'b, K, ANY,
     }
 }
 
-impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool> Part
-    for Trace<'_, '_, K, ANY, IN_INSTANCES>
-{
+impl<K: Instructions, const ANY: bool> Part for Trace<'_, '_, K, ANY> {
     type Output = ();
 
     #[inline(always)]
@@ -145,7 +134,7 @@ impl List {
 }
 
 /// The rays of a batch that are in flight, that are prepared, and that are neither.
-struct Flight<'a, 'b, K, const ANY: bool, const IN_INSTANCES: bool> {
+struct Flight<'a, 'b, K, const ANY: bool> {
     /// The layout at whose root rays start.
     wide: &'a WideBvh,
     batch: &'a mut Batch<'b>,
@@ -163,9 +152,7 @@ struct Flight<'a, 'b, K, const ANY: bool, const IN_INSTANCES: bool> {
     instructions: PhantomData<K>,
 }
 
-impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
-    Flight<'_, '_, K, ANY, IN_INSTANCES>
-{
+impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
     /// Traces all rays.
     #[inline(always)]
     unsafe fn trace(&mut self, traversals: *mut Traversal) {
@@ -184,13 +171,7 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
                 let leaves_wait = self.at_leaves.count >= K::FLIGHT / 2 || self.at_nodes.count == 0;
                 if leaves_wait {
                     self.visit_leaves(first);
-                }
-                if !IN_INSTANCES {
-                    if leaves_wait {
-                        self.finish(first);
-                    }
-                } else if self.at_end.count >= K::Rays::N || self.at_nodes.count == 0 {
-                    self.cross(first);
+                    self.finish(first);
                 }
             }
         }
@@ -216,9 +197,6 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
                 let traversal = &mut *self.idle.get(i);
                 let ray = self.ready.get_unchecked(next).assume_init();
                 traversal.start(ray, self.wide);
-                if IN_INSTANCES {
-                    traversal.start_outside();
-                }
                 self.enlist(traversal);
             }
         }
@@ -246,7 +224,7 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
             let lane = others.trailing_zeros();
             let number = from + lane as usize;
             others &= others - 1;
-            self.batch.answers.write(number, f32::INFINITY, u32::MAX, u32::MAX);
+            self.batch.answers.write(number, f32::INFINITY, u32::MAX);
         }
     }
 
@@ -257,7 +235,7 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
         // SAFETY: every list has a place for every traversal.
         unsafe {
             self.at_nodes.append(traversal, child.is_node());
-            let is_at_end = child.is_instance_or_mark();
+            let is_at_end = child == Child::END;
             self.at_leaves.append(traversal, !child.is_node() & !is_at_end);
             self.at_end.append(traversal, is_at_end);
         }
@@ -288,10 +266,9 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
                 traversal.enter::<K, ANY>(node, entry, *masks.get_unchecked(i));
             }
             self.at_nodes.count = 0;
-            let placed = self.placed();
             for i in 0..count {
                 let traversal = &mut *self.at_nodes.get(i);
-                traversal.fetch::<K>(placed);
+                traversal.fetch::<K>();
                 self.enlist(traversal);
             }
         }
@@ -329,11 +306,10 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
                     }
                 }
             }
-            let placed = self.placed();
             for i in 0..count {
                 let traversal = &mut *self.at_leaves.get(i);
                 traversal.leave_block::<ANY>();
-                traversal.fetch::<K>(placed);
+                traversal.fetch::<K>();
                 self.enlist(traversal);
             }
         }
@@ -348,7 +324,7 @@ impl<K: Instructions, const ANY: bool, const IN_INSTANCES: bool>
             unsafe {
                 let traversal = self.at_end.get(i);
                 let Traversal { ray, t, object, .. } = &*traversal;
-                self.batch.answers.write(first + ray.number as usize, *t, u32::MAX, *object);
+                self.batch.answers.write(first + ray.number as usize, *t, *object);
                 self.idle.append(traversal, true);
             }
         }

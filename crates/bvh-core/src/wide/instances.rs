@@ -28,10 +28,7 @@
 //! # Ok::<(), bvh_core::InvalidInstances>(())
 //! ```
 
-mod batches;
-
 use super::layout::WideBvh;
-use super::top::lay_out_instances;
 use crate::{Aabb, Bvh, Hit, InvalidBvh, Ray, Slabs, any_hit_by, nearest_hit_by, validate};
 use alloc::vec::Vec;
 use glam::{Affine3A, DAffine3};
@@ -155,12 +152,12 @@ fn place_all(instances: &[Instance], parts: &[WideBvh]) -> Result<Vec<Placed>, I
 
 /// An instance that is prepared for rays.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Placed {
+struct Placed {
     part: u32,
     /// The transform from the scene's coordinates to the part's.
-    pub(crate) to_local: DAffine3,
+    to_local: DAffine3,
     /// A box in which all hits of the instance are, and the box that trees over instances have.
-    pub(crate) aabb: Aabb,
+    aabb: Aabb,
     bounds: Aabb,
 }
 
@@ -207,8 +204,6 @@ pub struct Instances {
     parts: Vec<WideBvh>,
     placed: Vec<Placed>,
     top: Bvh,
-    /// The same tree for batches.
-    wide_top: WideBvh,
 }
 
 impl Instances {
@@ -223,15 +218,16 @@ impl Instances {
         let placed = place_all(&instances, &parts)?;
         let bounds: Vec<Aabb> = placed.iter().map(|placed| placed.bounds).collect();
         validate(&top, &bounds)?;
-        let boxes: Vec<Aabb> = placed.iter().map(|placed| placed.aabb).collect();
-        let used = placed.iter().map(|placed| &parts[placed.part as usize]);
-        let wide_top = lay_out_instances(&top, &boxes, used);
-        Ok(Self { parts, placed, top, wide_top })
+        Ok(Self { parts, placed, top })
     }
 
     /// Returns the parts, for other instances of the same parts.
     pub fn into_parts(self) -> Vec<WideBvh> {
         self.parts
+    }
+
+    fn part_of(&self, instance: u32) -> &WideBvh {
+        &self.parts[self.placed[instance as usize].part as usize]
     }
 
     /// Returns the ray in the coordinates of an instance's part. Returns `None` if the instance's

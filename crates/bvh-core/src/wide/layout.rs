@@ -5,7 +5,6 @@ use super::node::{Child, WideNode};
 use super::triangles::TriangleBlock;
 use crate::Aabb;
 use crate::slabs::near_region;
-use alloc::borrow::Cow;
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
@@ -32,14 +31,13 @@ use alloc::vec::Vec;
 /// assert!(wide.any_hit(&ray));
 /// # Ok::<(), bvh_core::InvalidBvh>(())
 /// ```
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct WideBvh {
     pub(crate) bounds: Aabb,
     /// `None` for the tree over no triangles.
     pub(crate) root: Option<Child>,
-    /// Borrowed in a [`WideView`](crate::file::WideView) alone.
-    pub(crate) nodes: Cow<'static, [WideNode]>,
-    pub(crate) blocks: Cow<'static, [TriangleBlock]>,
+    pub(crate) nodes: Vec<WideNode>,
+    pub(crate) blocks: Vec<TriangleBlock>,
     /// The [region](near_region) from which f32 tells the boxes apart.
     pub(crate) near: Aabb,
     /// The kernel that traces it. The processor has its instructions.
@@ -78,22 +76,11 @@ impl WideBvh {
         Self {
             bounds,
             root: None,
-            nodes: Cow::default(),
-            blocks: Cow::default(),
+            nodes: Vec::new(),
+            blocks: Vec::new(),
             near: near_region(&bounds),
             kernel: Kernel::Portable,
             stack_need: 0,
-        }
-    }
-}
-
-/// Copies all arrays: a clone may outlive the bytes that a view borrows.
-impl Clone for WideBvh {
-    fn clone(&self) -> Self {
-        Self {
-            nodes: Cow::Owned(self.nodes.to_vec()),
-            blocks: Cow::Owned(self.blocks.to_vec()),
-            ..*self
         }
     }
 }

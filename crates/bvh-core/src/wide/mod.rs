@@ -24,12 +24,10 @@ mod instructions;
 mod kernel;
 mod lanes;
 mod layout;
-mod moved;
 mod nearest;
 mod node;
 mod one_ray;
 mod packet;
-mod packet_instances;
 mod packet_leaves;
 mod pairs;
 mod portable;
@@ -37,7 +35,6 @@ mod prepared;
 mod ray_lanes;
 mod refit;
 mod source;
-mod top;
 mod traversal;
 mod triangles;
 // The kernels of the target, or none.
@@ -57,13 +54,11 @@ pub use instances::{Instance, InstanceHit, Instances, InvalidInstances};
 pub use kernel::Kernel;
 pub use layout::WideBvh;
 pub use nearest::Closest;
-pub(crate) use node::{Child, WideNode};
+pub(crate) use node::WideNode;
 pub use refit::RefitError;
 pub(crate) use triangles::TriangleBlock;
 
-use crate::slabs::near_region;
 use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate_references};
-use alloc::borrow::Cow;
 use alloc::vec::Vec;
 use answer::{ANY_HIT, NEAREST_HIT};
 use portable::walk;
@@ -85,7 +80,7 @@ impl WideBvh {
     /// compressed wide BVHs', section 4.1. Differs from the paper: boxes in full precision; leaves
     /// of any size, paid per block of four.
     pub fn new(tree: &Bvh, triangles: &[Triangle]) -> Result<Self, InvalidBvh> {
-        Self::made(tree, triangles, None, BLOCK_COST)
+        Self::made(tree, triangles, None)
     }
 
     /// Lays out `tree` as [`new`](Self::new) does, but for rays that enter each node as often as
@@ -103,39 +98,20 @@ impl WideBvh {
         visits: &[f32],
     ) -> Result<Self, InvalidBvh> {
         assert_eq!(tree.nodes.len(), visits.len(), "a number of visits for every node");
-        Self::made(tree, triangles, Some(visits), BLOCK_COST)
-    }
-
-    /// Lays out `tree` as [`new`](Self::new) does, for a machine on which the test of a block of
-    /// four triangles lasts as long as visits to `block_cost` nodes. `new` assumes one node; half
-    /// and twice as much made no difference where we measured it.
-    ///
-    /// # Panics
-    /// If `block_cost` is not positive and finite.
-    pub fn with_block_cost(
-        tree: &Bvh,
-        triangles: &[Triangle],
-        block_cost: f32,
-    ) -> Result<Self, InvalidBvh> {
-        assert!(
-            block_cost > 0.0 && block_cost.is_finite(),
-            "a positive, finite cost, not {block_cost}"
-        );
-        Self::made(tree, triangles, None, block_cost)
+        Self::made(tree, triangles, Some(visits))
     }
 
     fn made(
         tree: &Bvh,
         triangles: &[Triangle],
         visits: Option<&[f32]>,
-        block_cost: f32,
     ) -> Result<Self, InvalidBvh> {
         let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
         validate_references(tree, &boxes, &triangles)?;
         // Boxes take a quarter of the layout's memory, and nobody reads them again.
         drop(boxes);
-        let mut wide = build::widen(tree, triangles, visits, block_cost);
-        wide.choose(Kernel::best());
+        let mut wide = build::widen(tree, triangles, visits);
+        wide.kernel = Kernel::best();
         Ok(wide)
     }
 
@@ -157,7 +133,7 @@ impl WideBvh {
         if self.kernel == Kernel::Portable {
             return walk::<ANY>(self, ray, &mut (), accept);
         }
-        // SAFETY: `kernel` is available, as `choose` saw.
+        // SAFETY: `kernel` is available, as those who set it saw.
         let hit = unsafe { vector::one_ray::<ANY>(self, ray, accept) };
         (!hit.is_miss()).then_some(hit)
     }
@@ -167,32 +143,8 @@ impl WideBvh {
         if !kernel.is_available() {
             return None;
         }
-        self.choose(kernel);
+        self.kernel = kernel;
         Some(self)
-    }
-
-    /// Returns the layout of these arrays, whose references are sound, with `depth` nodes on the
-    /// longest way.
-    pub(crate) fn from_arrays(
-        bounds: Aabb,
-        root: Option<Child>,
-        nodes: Cow<'static, [WideNode]>,
-        blocks: Cow<'static, [TriangleBlock]>,
-        depth: usize,
-    ) -> Self {
-        let near = near_region(&bounds);
-        // Seven of a node's eight children wait while the eighth is visited.
-        let stack_need = depth * (WideNode::LANES - 1);
-        let kernel = Kernel::Portable;
-        let mut wide = Self { bounds, root, nodes, blocks, near, kernel, stack_need };
-        wide.choose(Kernel::best());
-        wide
-    }
-
-    fn choose(&mut self, available: Kernel) {
-        // A child with a greater index than blocks have is an instance.
-        let is_vector = self.blocks.len() <= Child::INSTANCE as usize;
-        self.kernel = if is_vector { available } else { Kernel::Portable };
     }
 
     /// Returns the [nearest hit](Self::nearest_hit) by [`Kernel::Portable`], and counts the tests:

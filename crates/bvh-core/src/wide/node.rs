@@ -44,13 +44,8 @@ pub(crate) struct Child(u32);
 
 impl Child {
     const LEAF: u32 = 1 << 31;
-    /// The number of instances that have a child, and of blocks of a layout that may be an
-    /// instance's.
-    pub(crate) const INSTANCE: u32 = 1 << 30;
     /// The end of every ray.
     pub(crate) const END: Self = Self::leaf(u32::MAX);
-    /// The end of a ray's way through an instance.
-    pub(crate) const LEAVE: Self = Self::leaf(u32::MAX - 1);
 
     pub(crate) const fn node(index: u32) -> Self {
         Self(index)
@@ -59,17 +54,6 @@ impl Child {
     /// The leaf that begins with this block.
     pub(crate) const fn leaf(first_block: u32) -> Self {
         Self(first_block | Self::LEAF)
-    }
-
-    /// The instance in the tree over all instances.
-    pub(crate) const fn instance(index: u32) -> Self {
-        Self(Self::leaf(Self::INSTANCE).0 | index)
-    }
-
-    /// Returns whether this is an instance, or one of the marks that no block and no instance has.
-    #[inline(always)]
-    pub(crate) fn is_instance_or_mark(self) -> bool {
-        self.0 >= Self::instance(0).0
     }
 
     #[inline(always)]
@@ -81,12 +65,6 @@ impl Child {
     #[inline(always)]
     pub(crate) fn index(self) -> usize {
         (self.0 & !Self::LEAF) as usize
-    }
-
-    /// The index of the instance.
-    #[inline(always)]
-    pub(crate) fn instance_index(self) -> u32 {
-        self.0 & (Self::INSTANCE - 1)
     }
 
     #[inline(always)]

@@ -38,8 +38,6 @@ pub(super) struct Vector<L> {
     /// The nearest hits so far, or the ends of the rays and `u32::MAX`.
     pub(super) t: L,
     pub(super) object: L,
-    /// The instances of the objects, if leaves are instances.
-    pub(super) instance: L,
     /// The rays, and whether `pairs` has been made from them. Many packets meet no triangle.
     pub(super) rays: RayLanes<L>,
     pub(super) axes: [usize; 3],
@@ -100,7 +98,6 @@ impl<K: Instructions> Packet<K> {
             t_min: rays.t_min,
             t: rays.t_max,
             object: none,
-            instance: none,
             axes: rays.axes(),
             rays,
             is_sheared: false,
@@ -126,19 +123,17 @@ impl<K: Instructions> Packet<K> {
     unsafe fn write(&self, batch: &mut Batch) {
         const { assert!(K::Rays::N <= 16) };
         let mut distances = [0.0; 16];
-        let mut instances = [0; 16];
         let mut objects = [0; 16];
         for vector in &self.vectors[..self.count] {
             // SAFETY: as many vectors are written as are counted; there is room for sixteen lanes.
             let first = unsafe {
                 let vector = vector.assume_init_ref();
                 vector.t.store(distances.as_mut_ptr());
-                vector.instance.store(instances.as_mut_ptr().cast());
                 vector.object.store(objects.as_mut_ptr().cast());
                 vector.first
             };
             let lanes = ..K::Rays::N;
-            batch.answers.write_lanes(first, &distances[lanes], &instances[lanes], &objects[lanes]);
+            batch.answers.write_lanes(first, &distances[lanes], &objects[lanes]);
         }
     }
 
@@ -189,14 +184,16 @@ impl<K: Instructions> Packet<K> {
                         fetch::<K>(wide, node, mask);
                     }
                 } else {
-                    let is_hit = if let Some(scene) = batch.scene {
-                        let instance = child.instance_index();
-                        self.visit_instance::<ANY>(scene, instance, first, entered, &planes)
-                    } else {
-                        let block = blocks.add(child.index());
-                        let accept = &mut batch.accept;
-                        self.visit_leaf::<ANY>(first, entered, &planes, block, &wide.bounds, accept)
-                    };
+                    let block = blocks.add(child.index());
+                    let accept = &mut batch.accept;
+                    let is_hit = self.visit_leaf::<ANY>(
+                        first,
+                        entered,
+                        &planes,
+                        block,
+                        &wide.bounds,
+                        accept,
+                    );
                     if is_hit {
                         farthest = self.farthest();
                         end = key_of(farthest);

@@ -56,12 +56,8 @@ impl<L: Lanes> Ready<L> {
     /// Rays for a layout.
     #[inline(always)]
     pub(crate) fn new(rays: RayLanes<L>, wide: &WideBvh) -> Self {
-        Self::with_far(rays, rays.reach(&wide.bounds), rays.beyond(&wide.near))
-    }
-
-    /// Rays for layouts of these reaches; `far` has a bit per ray that begins far from its layout.
-    #[inline(always)]
-    pub(crate) fn with_far(rays: RayLanes<L>, reach: L, far: u32) -> Self {
+        let reach = rays.reach(&wide.bounds);
+        let far = rays.beyond(&wide.near);
         let [x, y, z] = rays.inverse;
         // SAFETY: values exist.
         unsafe {

@@ -45,7 +45,7 @@ impl WideBvh {
                 return Err(RefitError::Gained(id));
             }
         }
-        for block in self.blocks.to_mut() {
+        for block in &mut self.blocks {
             block.move_to(triangles);
         }
         // Children come after their parents.
@@ -55,7 +55,7 @@ impl WideBvh {
                 let child = self.nodes[index].children[lane];
                 if self.nodes[index].lane_box(lane).is_some() {
                     let aabb = self.box_of(child, &around);
-                    self.nodes.to_mut()[index].set_box(lane, &aabb);
+                    self.nodes[index].set_box(lane, &aabb);
                     around[index] = around[index].union(&aabb);
                 }
             }

@@ -1,7 +1,6 @@
 //! The state of one ray in flight, and its steps: into a node, onto the stack, through triangles.
 
 use super::answer::Accept;
-use super::instances::Placed;
 use super::instructions::{Instructions, Pending};
 use super::kernel::{SPARE, STACK};
 use super::lanes::{Lanes, Mask};
@@ -27,24 +26,10 @@ pub(super) struct Traversal {
     /// The arrays of the layout in which the ray is.
     pub(super) nodes: *const WideNode,
     pub(super) blocks: *const TriangleBlock,
-    /// Written while the scene has instances.
-    outside: MaybeUninit<Outside>,
     /// [`END`](Child::END), the children that wait, the next block of the same leaf, and room for
     /// stores of whole registers: `frame`, or on the heap.
     stack: *mut Pending,
     frame: Frame,
-}
-
-/// The state of a ray outside of the instance in which it is.
-struct Outside {
-    ray: Prepared,
-    /// The nearest hit so far, or the end of the ray and `u32::MAX`.
-    t: f32,
-    instance: u32,
-    object: u32,
-    /// The instance in which the ray is, and the distance at which it enters the instance's box.
-    entered: u32,
-    entry: f32,
 }
 
 #[repr(C, align(64))]
@@ -68,85 +53,14 @@ impl Traversal {
         self.t = ray.t_max;
         self.object = u32::MAX;
         self.ray = ray;
-        self.is_in(wide);
+        self.child = wide.root.unwrap_or(Child::END);
+        self.nodes = wide.nodes.as_ptr();
+        self.blocks = wide.blocks.as_ptr();
         // SAFETY: the stack has more than one place.
         unsafe {
             self.stack.write(u64::from(Child::END.bits()));
             self.top = self.stack.add(1);
         }
-    }
-
-    /// Goes on at the root of a layout.
-    #[inline(always)]
-    fn is_in(&mut self, wide: &WideBvh) {
-        self.child = wide.root.unwrap_or(Child::END);
-        self.nodes = wide.nodes.as_ptr();
-        self.blocks = wide.blocks.as_ptr();
-    }
-
-    /// Keeps the state of a ray that has been started, so that it can enter instances.
-    #[inline(always)]
-    pub(super) fn start_outside(&mut self) {
-        let Self { ray, t, .. } = *self;
-        let none = u32::MAX;
-        let outside = Outside { ray, t, instance: none, object: none, entered: none, entry: 0.0 };
-        self.outside.write(outside);
-    }
-
-    /// Goes on in an instance of a part, where this is the ray.
-    #[inline(always)]
-    pub(super) unsafe fn enter_instance(&mut self, ray: Prepared, entry: f32, part: &WideBvh) {
-        let number = self.ray.number;
-        // SAFETY: the caller's promise: the state outside is kept; the stack has room for the mark.
-        unsafe {
-            let outside = self.outside.assume_init_mut();
-            outside.entered = self.child.instance_index();
-            outside.entry = entry;
-            *self.top = u64::from(Child::LEAVE.bits());
-            self.top = self.top.add(1);
-        }
-        self.ray = ray;
-        self.ray.number = number;
-        self.is_in(part);
-    }
-
-    /// Keeps the nearest hit in the instance if it precedes those before, and goes on in the layout
-    /// of all instances. Returns false if the hit is in front of the instance's box, where a tree
-    /// that visits the box later would skip it.
-    #[inline(always)]
-    pub(super) unsafe fn leave_instance(&mut self, all: &WideBvh) -> bool {
-        // SAFETY: the caller's promise: the state outside is kept.
-        let outside = unsafe { self.outside.assume_init_mut() };
-        if self.object != u32::MAX {
-            if self.t < outside.entry {
-                return false;
-            }
-            let before = Hit { t: outside.t, object: outside.instance };
-            if (Hit { t: self.t, object: outside.entered }).precedes(&before) {
-                outside.t = self.t;
-                outside.instance = outside.entered;
-                outside.object = self.object;
-            }
-        }
-        self.t = outside.t;
-        self.ray = outside.ray;
-        self.object = u32::MAX;
-        self.nodes = all.nodes.as_ptr();
-        // SAFETY: the caller's promises.
-        unsafe { self.pop() };
-        true
-    }
-
-    /// Returns the nearest hit of a ray among all instances at its end: the distance, the instance
-    /// and the triangle.
-    #[inline(always)]
-    pub(super) unsafe fn nearest_of_all<const ANY: bool>(&self) -> (f32, u32, u32) {
-        if ANY {
-            return (self.t, self.object, self.object);
-        }
-        // SAFETY: the caller's promise: the state outside is kept.
-        let outside = unsafe { self.outside.assume_init_ref() };
-        (outside.t, outside.instance, outside.object)
     }
 
     /// Goes on to what waits.
@@ -209,20 +123,16 @@ impl Traversal {
         }
     }
 
-    /// Has the next node, block of triangles, or instance of those at `placed` fetched.
+    /// Fetches the next node or block of triangles from memory.
     #[inline(always)]
-    pub(super) unsafe fn fetch<K: Instructions>(&self, placed: &[Placed]) {
+    pub(super) unsafe fn fetch<K: Instructions>(&self) {
         let child = self.child;
-        let mut index = child.index();
         let (array, size) = if child.is_node() {
             (self.nodes.cast::<u8>(), size_of::<WideNode>())
-        } else if !placed.is_empty() && child.is_instance_or_mark() {
-            index = child.instance_index() as usize;
-            (placed.as_ptr().cast::<u8>(), size_of::<Placed>())
         } else {
             (self.blocks.cast::<u8>(), size_of::<TriangleBlock>())
         };
-        let lines = array.wrapping_add(index.wrapping_mul(size));
+        let lines = array.wrapping_add(child.index().wrapping_mul(size));
         for line in 0..4 {
             // SAFETY: a prefetch may name any address.
             unsafe { K::prefetch(lines.wrapping_add(64 * line)) };

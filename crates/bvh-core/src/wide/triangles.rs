@@ -141,23 +141,6 @@ impl TriangleBlock {
         }
     }
 
-    /// Returns whether corners are finite, used lanes are the first ones with ids of objects, and
-    /// unused lanes repeat the last used one, which kernels that test all lanes rely on.
-    pub(crate) fn is_sound(&self) -> bool {
-        let used = self.len();
-        let are_repeated = self
-            .corners
-            .as_flattened()
-            .iter()
-            .all(|lanes| lanes[used..].iter().all(|x| *x == lanes[used - 1]));
-        let are_ids = (0..Self::LANES).all(|lane| match lane < used {
-            true => self.id(lane) < Self::LAST,
-            false => self.ids[lane] == Self::UNUSED,
-        });
-        let coordinates = self.corners.as_flattened().as_flattened();
-        are_ids && are_repeated && coordinates.iter().all(|x| x.is_finite())
-    }
-
     /// The triangle in a lane, and its id; `None` in an unused lane.
     #[inline(always)]
     pub(crate) fn triangle(&self, lane: usize) -> Option<(u32, Triangle)> {

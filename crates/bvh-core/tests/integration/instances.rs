@@ -4,8 +4,8 @@
 use crate::support::layouts::bundles;
 use crate::support::{self, Random, SHAPES, ball, boxes, chain, grid_box, soup, tree};
 use bvh_core::{
-    Aabb, Bvh, Coherence, Instance, InstanceHit, Instances, InvalidInstances, Kernel, Ray,
-    Triangle, WideBvh, nearest_hit,
+    Aabb, Bvh, Instance, InstanceHit, Instances, InvalidInstances, Kernel, Ray, Triangle, WideBvh,
+    nearest_hit,
 };
 use glam::{Affine3A, Mat3A, Quat, Vec3, Vec3A};
 
@@ -219,31 +219,8 @@ fn rays_of_every_kind(flat: &[Triangle], random: &mut Random) -> Vec<Ray> {
     all
 }
 
-/// Checks that batches of many lengths have the answers of the single calls.
-fn check_batches(scene: &Instances, rays: &[Ray]) -> usize {
-    let nearest: Vec<_> = rays.iter().map(|ray| bits(scene.nearest_hit(ray))).collect();
-    let any: Vec<bool> = rays.iter().map(|ray| scene.any_hit(ray)).collect();
-    for coherence in [Coherence::Coherent, Coherence::Incoherent] {
-        for (first, end) in [(0, rays.len()), (0, 0), (3, 4), (5, 68), (1, 200)] {
-            let batch = &rays[first..end];
-            let mut hits = vec![InstanceHit { t: 7.0, instance: 7, triangle: 7 }; batch.len()];
-            scene.nearest_hits(batch, &mut hits, coherence);
-            for (number, hit) in (first..).zip(hits) {
-                let found = bits((!hit.is_miss()).then_some(hit));
-                assert_eq!(found, nearest[number], "{coherence:?}, {:?}", rays[number]);
-            }
-            for stale in [false, true] {
-                let mut hits = vec![stale; batch.len()];
-                scene.any_hits(batch, &mut hits, coherence);
-                assert_eq!(hits, any[first..end], "{coherence:?}");
-            }
-        }
-    }
-    any.iter().filter(|&&is_hit| is_hit).count()
-}
-
 #[test]
-fn batches_have_the_answers_of_single_calls_bit_by_bit() {
+fn every_tree_and_every_kernel_answers_alike() {
     let mut random = Random(5);
     let mut hits = 0;
     for count in [1, 2, 7, 40, 90] {
@@ -252,35 +229,27 @@ fn batches_have_the_answers_of_single_calls_bit_by_bit() {
         let mut scene = scene(parts, transforms, &mut random);
         let (flat, _) = scene.flat();
         let rays = rays_of_every_kind(&flat, &mut random);
-        let available = Kernel::ALL.into_iter().filter(|kernel| kernel.is_available());
-        for kernel in available {
+        let mut expected = None;
+        for kernel in Kernel::ALL.into_iter().filter(|kernel| kernel.is_available()) {
             for part in &mut scene.parts {
                 *part = part.clone().with_kernel(kernel).unwrap();
             }
-            for scene in scene.all(&mut random) {
-                hits += check_batches(&scene, &rays);
+            let boxes = Instance::boxes(&scene.instances, &scene.parts).unwrap();
+            let deep = Instances::new(scene.parts.clone(), scene.instances.clone(), chain(&boxes));
+            for scene in scene.all(&mut random).into_iter().chain(deep) {
+                let answer = |ray: &Ray| (bits(scene.nearest_hit(ray)), scene.any_hit(ray));
+                let answers: Vec<_> = rays.iter().map(answer).collect();
+                hits += answers.iter().filter(|(_, any)| *any).count();
+                let expected = expected.get_or_insert_with(|| answers.clone());
+                for ((ray, expected), answer) in rays.iter().zip(expected).zip(&answers) {
+                    assert_eq!(expected, answer, "{kernel:?}, {ray:?}");
+                }
             }
         }
     }
     assert!(hits > 4000, "{hits}");
-}
-
-#[test]
-fn batches_of_deep_trees_and_of_parts_with_several_kernels_have_the_answers_of_single_calls() {
-    let mut random = Random(6);
-    let transforms = (0..80).map(|_| nested_transform(&mut random)).collect();
-    let mut scene = scene(vec![ball(1), grid_box(2)], transforms, &mut random);
-    let (flat, _) = scene.flat();
-    let rays = rays_of_every_kind(&flat, &mut random);
-    let boxes = Instance::boxes(&scene.instances, &scene.parts).unwrap();
-    let deep = Instances::new(scene.parts.clone(), scene.instances.clone(), chain(&boxes)).unwrap();
-    assert!(check_batches(&deep, &rays) > 100);
-    scene.parts[1] = scene.parts[1].clone().with_kernel(Kernel::Portable).unwrap();
-    for scene in scene.all(&mut random) {
-        assert!(check_batches(&scene, &rays) > 100);
-    }
-    let empty = Instances::new(scene.parts, vec![], Bvh::default()).unwrap();
-    assert_eq!(check_batches(&empty, &rays), 0);
+    let empty = Instances::new(vec![], vec![], Bvh::default()).unwrap();
+    assert!(!empty.any_hit(&Ray::half_line(Vec3::ZERO, Vec3::X).unwrap()));
 }
 
 /// Returns a point whose coordinates are integers from 0 to `end` − 1.

@@ -6,7 +6,6 @@ mod exact;
 mod export;
 mod filters;
 mod instances;
-mod layout_files;
 mod leave;
 mod query;
 mod ray_density;

@@ -346,6 +346,27 @@ fn triangles_without_area_are_left_out_and_never_hit() {
 }
 
 #[test]
+fn a_range_of_one_distance_has_the_hit_at_that_distance_from_near_and_from_afar() {
+    let mut random = Random(22);
+    let triangles = [soup(100, &mut random), grid_box(3)].concat();
+    let layouts = layouts(&triangles, &mut random);
+    let mut rays = Vec::new();
+    for distance in [0.5, 10.0, 1e3, 1e5, 1e7] {
+        for _ in 0..200 {
+            let origin = random.point() * distance;
+            let towards = random.of(&triangles).0[0].as_dvec3() - origin.as_dvec3();
+            let towards = towards.as_vec3() * random.of(&[1.0, 0.01, 37.0]);
+            let Ok(ray) = Ray::half_line(origin, towards) else { continue };
+            if let Some(hit) = brute_force(&triangles, &ray) {
+                rays.push(Ray::new(origin, towards, hit.t, hit.t).unwrap());
+            }
+        }
+    }
+    assert_eq!(check("one distance", &triangles, &layouts, &rays), rays.len());
+    assert!(rays.len() > 300, "{}", rays.len());
+}
+
+#[test]
 fn every_kernel_traces_trees_of_any_depth() {
     let mut random = Random(21);
     // Boxes inside boxes, so that a ray enters all of them and the stack is as full as can be; and
