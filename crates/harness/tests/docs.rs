@@ -1,6 +1,5 @@
 //! Every number in the README and in `docs/` that can come from a committed CSV does. Tables have
-//! their query in a comment, numbers in running prose in `docs/numbers.toml`, which the test
-//! `numbers` reads. `UPDATE_DOCS=1 cargo test -p harness --test docs` writes the tables.
+//! their query in a comment; the test `numbers` is for running prose. `UPDATE_DOCS=1 cargo test -p harness --test docs` writes the tables.
 //!
 //! ```text
 //! <!-- pivot QUERY -->
@@ -12,40 +11,28 @@
 mod queries;
 mod support;
 
-use queries::answer;
+use queries::table;
 use regex_lite::{Captures, Regex};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
-use support::{assert_current, experiments, top};
+use support::{assert_current, experiments, pages, top};
 
 /// The beginning of a table's comment.
 const OPENING: &str = "<!-- pivot ";
 
 /// Returns the text with every table as the committed results have it.
 fn renewed(text: &str) -> String {
-    let table = Regex::new(r"(?s)(<!-- pivot (.*?) -->).*?<!-- end -->").unwrap();
-    let ends = table.find_iter(text).count();
+    let tables = Regex::new(r"(?s)(<!-- pivot (.*?) -->).*?<!-- end -->").unwrap();
+    let ends = tables.find_iter(text).count();
     assert_eq!(ends, text.matches(OPENING).count(), "every table has an end");
     let renew = |found: &Captures| {
         // A long query goes on in the next line.
         let query: Vec<&str> = found[2].split_whitespace().collect();
-        format!("{}{}<!-- end -->", &found[1], answer(&query.join(" ")))
+        format!("{}{}<!-- end -->", &found[1], table(&query.join(" ")))
     };
-    table.replace_all(text, renew).into_owned()
-}
-
-/// The pages at the top, of `docs/`, and of `results/`.
-fn pages() -> Vec<PathBuf> {
-    let mut pages = vec![top().join("results/README.md")];
-    for folder in [top(), top().join("docs")] {
-        let entries = fs::read_dir(folder).unwrap();
-        pages.extend(entries.map(|entry| entry.unwrap().path()));
-    }
-    pages.retain(|page| page.extension().is_some_and(|extension| extension == "md"));
-    pages.sort();
-    pages
+    tables.replace_all(text, renew).into_owned()
 }
 
 #[test]

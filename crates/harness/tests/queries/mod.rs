@@ -2,16 +2,18 @@
 //! [`harness::report::query`].
 //!
 //! ```text
-//! FILE | CONDITIONS | SHOWN | FORMAT                     one value
-//! FILE | CONDITIONS | ROWS × COLUMNS | SHOWN | FORMAT    a table
+//! FILE | CONDITIONS | MEASURE [| below, above or percent]   one value
+//! FILE | CONDITIONS | ROWS × COLUMNS | SHOWN | FORMAT       a table
 //!
-//! SHOWN    MEASURE [LOW, HIGH] (COLUMN)         an interval and a further column, both optional
-//!          MEASURE over CONDITIONS by COLUMNS   of one value: each row's number over the least
+//! MEASURE  over CONDITIONS by COLUMNS           of one value: each row's number over the least
 //!                                               number of other rows that agree in the columns
+//! SHOWN    MEASURE [LOW, HIGH] (COLUMN)         an interval and a further column, both optional
 //! FORMAT   DECIMALS [below | above | percent]   percent below one, above one, or of a fraction
 //!          text                                 cells as they are; all rows have the same one
 //! ```
 //! A file with `/*/` in its path stands for all such files: results by processor.
+
+#![allow(dead_code)] // numbers and tables use a part each
 
 use super::support::top;
 use harness::report::query::{self, QueryError, Row, distinct, group, number_in, only_text};
@@ -41,30 +43,37 @@ fn rows(file: &str, conditions: &str) -> Vec<Row> {
     query::select(rows, conditions).unwrap_or_else(|error| panic!("{file}: {error}"))
 }
 
-/// The answer of a query of four or five parts.
-pub fn answer(query: &str) -> String {
+/// The value of a query of three parts, or of four with a unit.
+pub fn value(query: &str) -> f64 {
     let parts: Vec<&str> = query.split(" | ").collect();
-    let answer = match parts[..] {
-        [file, conditions, measure, format] => {
-            let mut rows = rows(file, conditions);
-            let measure = match measure.split_once(" over ") {
-                Some((measure, others)) => {
-                    divide(&mut rows, measure, file, others);
-                    measure
-                }
-                None => measure,
-            };
-            show(&rows.iter().collect::<Vec<_>>(), measure, format)
-        }
-        [file, conditions, axes, measure, format] => {
-            pivot(&rows(file, conditions), axes, measure, format)
-                .map(|table| format!("\n{table}\n"))
-        }
-        _ => panic!("{query}: expected FILE | CONDITIONS | [ROWS × COLUMNS |] MEASURE | FORMAT"),
+    let (file, conditions, measure, unit) = match parts[..] {
+        [file, conditions, measure] => (file, conditions, measure, ""),
+        [file, conditions, measure, unit] => (file, conditions, measure, unit),
+        _ => panic!("{query}: expected FILE | CONDITIONS | MEASURE [| below, above or percent]"),
     };
-    let text = answer.unwrap_or_else(|error| panic!("{query}: {error}"));
-    assert!(!text.is_empty(), "{query}: no value");
-    text
+    let mut rows = rows(file, conditions);
+    let measure = match measure.split_once(" over ") {
+        Some((measure, others)) => {
+            divide(&mut rows, measure, file, others);
+            measure
+        }
+        None => measure,
+    };
+    let rows: Vec<&Row> = rows.iter().collect();
+    let value = Measure::parse(measure).and_then(|measure| measure.of_rows(&rows));
+    let value = value.unwrap_or_else(|error| panic!("{query}: {error}"));
+    in_unit(value.unwrap_or_else(|| panic!("{query}: no value")), unit)
+        .unwrap_or_else(|| panic!("{query}: {unit:?} is no unit; accepted: below, above, percent"))
+}
+
+/// The table of a query of five parts.
+pub fn table(query: &str) -> String {
+    let parts: Vec<&str> = query.split(" | ").collect();
+    let [file, conditions, axes, measure, format] = parts[..] else {
+        panic!("{query}: expected FILE | CONDITIONS | ROWS × COLUMNS | SHOWN | FORMAT")
+    };
+    let table = pivot(&rows(file, conditions), axes, measure, format);
+    format!("\n{}\n", table.unwrap_or_else(|error| panic!("{query}: {error}")))
 }
 
 /// Divides the number of each row by the least one among other rows of the file, `CONDITIONS by
@@ -102,15 +111,19 @@ fn write(value: f64, format: &str) -> Result<String, QueryError> {
     };
     let (digits, unit) = format.split_once(' ').unwrap_or((format, ""));
     let digits: usize = digits.parse().map_err(|_| malformed())?;
-    // Percentages in prose are differences from 1, which no column holds.
-    let value = match unit {
-        "" => value,
-        "below" => 100.0 * (1.0 - value),
-        "above" => 100.0 * (value - 1.0),
-        "percent" => 100.0 * value,
-        _ => return Err(malformed()),
-    };
+    let value = in_unit(value, unit).ok_or_else(malformed)?;
     Ok(format!("{value:.digits$}"))
+}
+
+/// Percentages are differences from 1, which no column holds.
+fn in_unit(value: f64, unit: &str) -> Option<f64> {
+    match unit {
+        "" => Some(value),
+        "below" => Some(100.0 * (1.0 - value)),
+        "above" => Some(100.0 * (value - 1.0)),
+        "percent" => Some(100.0 * value),
+        _ => None,
+    }
 }
 
 /// Returns the further column of a measure: a number in the format, a text as it is.
