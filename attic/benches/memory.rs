@@ -1,6 +1,6 @@
 //! The peak memory of each method of `experiments/anytime.toml`, beyond the scene, on one thread.
 //!
-//! `cargo bench -p harness --bench memory` writes `results/memory/memory.csv`; scenes that have not
+//! `cargo bench --manifest-path attic/Cargo.toml --bench memory` writes `results/memory/memory.csv`; scenes that have not
 //! been fetched are skipped.
 //!
 //! The program counts the bytes that it requests from its allocator, without pages, padding and the
@@ -20,7 +20,7 @@ use std::path::Path;
 static ALLOCATED: PeakAlloc = PeakAlloc;
 
 fn main() {
-    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     std::env::set_current_dir(&top).expect("the project's folder");
     let experiment = Experiment::read(Path::new("experiments/anytime.toml"), &Overrides::default())
         .expect("a spec");

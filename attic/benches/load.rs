@@ -5,7 +5,7 @@
 //! of the file's pages come from memory. A second load finds them in caches. The time to map a file
 //! depends on the pieces in which the kernel holds it, from one page to hundreds of pages.
 //!
-//! `cargo bench -p harness --bench load`
+//! `cargo bench --manifest-path attic/Cargo.toml --bench load`
 
 mod paired;
 

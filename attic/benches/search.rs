@@ -1,7 +1,7 @@
 //! `best` against the clock on one thread and on two: cost over the cost of greedy Müller–Fellner, one
 //! triangle per leaf, after each limit in seconds.
 //!
-//! `cargo bench -p harness --bench search -- [--seconds 0.1,1,10,60] [--seeds 5] SCENE...` writes
+//! `cargo bench --manifest-path attic/Cargo.toml --bench search -- [--seconds 0.1,1,10,60] [--seeds 5] SCENE...` writes
 //! `results/threads/timing_threads.csv`, and keeps its rows of other scenes and processors.
 //!
 //! The time includes the build and the final conversion. The runs of one limit alternate: one
@@ -45,7 +45,7 @@ struct Args {
 }
 
 fn main() {
-    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     std::env::set_current_dir(&top).expect("the project's folder");
     let Args { scenes, seconds, seeds, .. } = Args::parse();
     for name in scenes {

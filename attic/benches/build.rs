@@ -1,6 +1,6 @@
 //! Times of builders, compared with each other, with more threads, and with other libraries.
 //!
-//! `cargo bench -p harness --bench build --features peers`
+//! `cargo bench --manifest-path attic/Cargo.toml --bench build`
 
 mod paired;
 
@@ -98,13 +98,6 @@ fn shuffled(n: u32) -> Vec<u32> {
 }
 
 /// Returns no contenders: other libraries need the feature.
-#[cfg(not(feature = "peers"))]
-fn peers(_boxes: &[Aabb]) -> Vec<Contender<'_>> {
-    Vec::new()
-}
-
-/// Returns the builds of other libraries, with their leaves.
-#[cfg(feature = "peers")]
 fn peers(boxes: &[Aabb]) -> Vec<Contender<'_>> {
     use obvhs::{BvhBuildParams, aabb, bvh2::builder::build_bvh2};
     let theirs: Vec<aabb::Aabb> = boxes

@@ -1,6 +1,6 @@
 //! The time and cost of every other library, and the cost of `best` in the same time.
 //!
-//! `cargo bench -p harness --bench peers --features peers -- [--rounds N] SCENE...`
+//! `cargo bench --manifest-path attic/Cargo.toml --bench peers -- [--rounds N] SCENE...`
 //!
 //! Use `RUSTFLAGS="-C target-cpu=native"`, which `obvhs` gains from. All run on one thread, with
 //! one object per leaf, in interleaved rounds. Costs are ratios to greedy Müller–Fellner. A

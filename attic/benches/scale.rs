@@ -1,7 +1,7 @@
 //! Time and peak memory of every phase on scenes of millions of triangles, on one thread, and of
 //! bakes on two.
 //!
-//! `cargo bench -p harness --bench scale --features peers -- terrain:1000000 forest:8000000` writes
+//! `cargo bench --manifest-path attic/Cargo.toml --bench scale -- terrain:1000000 forest:8000000` writes
 //! `results/scale/timing_scale.csv`, and keeps its rows of other scenes. Without scenes it measures
 //! forests of 1, 8 and 20 million triangles.
 //!
@@ -35,7 +35,7 @@ const FOLDER: &str = "results/scale";
 const DEFAULT: [&str; 3] = ["forest:1000000", "forest:8000000", "forest:20000000"];
 
 fn main() {
-    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     std::env::set_current_dir(&top).expect("the project's folder");
     let mut names: Vec<String> =
         std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
@@ -186,7 +186,6 @@ impl Phases {
         baked
     }
 
-    #[cfg(feature = "peers")]
     fn peers(&mut self, scene: &Scene, base: f64) {
         use harness::peers::{Obvhs, Peer, Preset};
         for preset in [Preset::Medium, Preset::VerySlow] {
@@ -198,9 +197,6 @@ impl Phases {
             self.cost(&built.tree, base);
         }
     }
-
-    #[cfg(not(feature = "peers"))]
-    fn peers(&mut self, _scene: &Scene, _base: f64) {}
 }
 
 /// Writes a binary PLY file in which every triangle has three vertices of its own.

@@ -2,7 +2,7 @@
 //! annealed at once: cost over the cost of greedy Müller–Fellner, and seconds on one thread and on
 //! two.
 //!
-//! `cargo bench -p harness --bench subtrees -- [--subtrees 1,8,64,512] [--copies 2,8] [--million-work
+//! `cargo bench --manifest-path attic/Cargo.toml --bench subtrees -- [--subtrees 1,8,64,512] [--copies 2,8] [--million-work
 //! 400] [--seeds 3] SCENE...` writes `results/threads/timing_subtrees.csv`, and keeps its rows of
 //! other scenes and processors.
 //!
@@ -50,7 +50,7 @@ struct Args {
 }
 
 fn main() {
-    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     std::env::set_current_dir(&top).expect("the project's folder");
     let args = Args::parse();
     for name in &args.scenes {

@@ -1,6 +1,6 @@
 //! The seconds from Ctrl-C to the end of `bvh bake`, the file of the best tree so far included.
 //!
-//! `cargo bench -p harness --bench interrupt` bakes a city of five million triangles, by area and
+//! `cargo bench --manifest-path attic/Cargo.toml --bench interrupt` bakes a city of five million triangles, by area and
 //! for a million recorded rays, interrupts each bake at several times, and writes
 //! `results/interrupt/timing_interrupt.csv`. About ten minutes.
 
@@ -25,7 +25,7 @@ const SEGMENTS: usize = 1_000_000;
 const AFTER: [f64; 6] = [4.3, 9.1, 17.7, 24.2, 33.9, 46.4];
 
 fn main() {
-    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     std::env::set_current_dir(&top).expect("the project's folder");
     let program = program();
     let scene = landscape::load(SCENE).expect("a scene");

@@ -1,0 +1,1 @@
+//! Empty: the instruments are the benchmarks.
