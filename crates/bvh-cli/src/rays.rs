@@ -47,7 +47,7 @@ impl Rays {
             return Ok(Self::Recorded(segments));
         }
         let text = read_text(path)?;
-        fault::parse(&text, &path.to_string_lossy())
+        fault::parse(&text)
             .map(Self::Rendered)
             .map_err(|message| Error::Rays { file: path.to_owned(), message })
     }

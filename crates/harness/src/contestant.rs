@@ -2,7 +2,7 @@
 
 use crate::measure::ray_cost::TrainedOn;
 use crate::peers::{Peer, command};
-use bvh_config::fault::{self, Fault, Read};
+use bvh_config::fault::{self, Fault};
 use bvh_config::{Check, Keys, Nested, OutOfRange};
 use bvh_core::cost::Objective;
 use bvh_scenes::rays::RandomRays;
@@ -112,24 +112,20 @@ impl Labelled {
         }
     }
 
-    /// Reads an entry and finds all its faults that do not depend on the rest of the spec.
-    pub(crate) fn read(mut entry: Table) -> Read<Self> {
+    /// Reads an entry, without what depends on the rest of the spec.
+    pub(crate) fn read(mut entry: Table) -> Result<Self, Fault> {
         // A method rejects unknown keys, so the keys that are not its parameters are removed first.
-        let option_table =
+        let options =
             EntryOptions::KEYS.iter().filter_map(|key| entry.remove_entry(*key)).collect();
-        let (options, mut faults) = fault::deserialize::<EntryOptions>(option_table);
-        let (method, method_faults) = fault::tagged(
+        let mut options: EntryOptions = fault::deserialize(options)?;
+        let method = fault::tagged(
             entry,
             "method",
             |name, parameters| Contestant::read(name, parameters),
             accepted_methods,
-        );
-        faults.extend(method_faults);
-        let labelled = options.zip(method).map(|(mut options, method)| {
-            let label = options.label.take().unwrap_or_else(|| method.name().into());
-            Self { label, method, options }
-        });
-        (labelled, faults)
+        )?;
+        let label = options.label.take().unwrap_or_else(|| method.name().into());
+        Ok(Self { label, method, options })
     }
 }
 
@@ -141,14 +137,7 @@ fn accepted_methods() -> String {
 
 impl<'de> Deserialize<'de> for Labelled {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let (labelled, faults) = Self::read(Table::deserialize(deserializer)?);
-        match labelled {
-            Some(labelled) if faults.is_empty() => Ok(labelled),
-            _ => {
-                let messages: String = faults.iter().map(Fault::to_string).collect();
-                Err(serde::de::Error::custom(messages))
-            }
-        }
+        Self::read(Table::deserialize(deserializer)?).map_err(serde::de::Error::custom)
     }
 }
 

@@ -1,4 +1,4 @@
-//! `harness merge`: joins the parts of experiments that ran with `--run` or `--shard`.
+//! `harness merge`: joins the parts of experiments that ran with `--run`.
 
 use super::terminal::{output_folder, print_line};
 use crate::Error;
@@ -6,10 +6,10 @@ use crate::rows::store::Existing;
 use crate::run::merge::{self, UnlikeProcessors};
 use std::path::PathBuf;
 
-/// Join the parts of experiments that ran with --run or --shard into the files that one run writes.
+/// Join the parts of experiments that ran with --run into the files that one run writes.
 #[derive(clap::Args, Clone, Debug)]
 pub struct MergeArgs {
-    /// Folders that were given as --out to runs with --run or --shard.
+    /// Folders that were given as --out to runs with --run.
     #[arg(value_name = "DIR", required = true)]
     pub folders: Vec<PathBuf>,
     /// Folder for the results.

@@ -6,7 +6,7 @@ use crate::Error;
 use crate::rows::store::Existing;
 use crate::run::execute::{Extent, Verbosity, execute};
 use crate::run::finish::Summary;
-use crate::run::selection::{Selection, Shard};
+use crate::run::selection::Selection;
 use crate::run::{check, finish, reference};
 use crate::spec::{Experiment, Overrides};
 use std::collections::HashSet;
@@ -33,7 +33,7 @@ pub struct RunArgs {
     pub check: bool,
     /// Make the tables and figures again from existing rows, with the current best known costs; run
     /// nothing.
-    #[arg(long, conflicts_with_all = ["check", "resume", "shard", "runs"])]
+    #[arg(long, conflicts_with_all = ["check", "resume", "runs"])]
     pub redraw: bool,
     /// Keep the finished runs of an interrupted experiment and perform the missing ones.
     #[arg(long)]
@@ -42,13 +42,9 @@ pub struct RunArgs {
     /// to a folder next to them whose name ends with `.new`.
     #[arg(long, conflicts_with_all = ["check", "redraw", "resume"])]
     pub force: bool,
-    /// Perform only the I-th of N parts of the runs, from 1, and keep them for `harness merge`:
-    /// every N-th run that `harness jobs` lists. Every part needs a different --out.
-    #[arg(long, value_name = "I/N", conflicts_with = "check")]
-    pub shard: Option<Shard>,
     /// Perform only the run that `harness jobs` lists with this identifier, and keep it for
     /// `harness merge`; may be repeated. Every process needs a different --out.
-    #[arg(long = "run", value_name = "ID", conflicts_with_all = ["check", "shard"])]
+    #[arg(long = "run", value_name = "ID", conflicts_with = "check")]
     pub runs: Vec<String>,
     /// Print only errors and, under --check, differences.
     #[arg(long)]
@@ -82,10 +78,9 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         (_, true) => Existing::Replace,
         _ => Existing::Keep,
     };
-    let selection = match args.shard {
-        Some(shard) => Selection::Shard(shard),
-        None if args.runs.is_empty() => Selection::All,
-        None => Selection::Runs(args.runs.clone()),
+    let selection = match args.runs.is_empty() {
+        true => Selection::All,
+        false => Selection::Runs(args.runs.clone()),
     };
     let extent = Extent { existing, selection, verbosity: verbosity(args) };
     let mut differences = 0;

@@ -1,60 +1,56 @@
-//! All results on one page: what each experiment answers first, then its tables, figures and files.
-
-mod html;
+//! All results on one page: the paper's numbers beside ours first, then each experiment with its
+//! figures, tables and files.
 
 use crate::Error;
 use crate::files;
 use crate::report::output::Output;
-use crate::report::paper::Outcome;
+use crate::report::paper::{PaperRow, Verdict};
 use crate::run::finish::outputs;
 use crate::run::provenance::Provenance;
 use crate::run::resolved::{Resolved, read_toml};
-use ::figures::Figure;
-use bvh_scenes::SceneKind;
-use bvh_scenes::files::read_text;
-use std::path::{Component, Path, PathBuf};
+use comfy_table::{Row, Table};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
+use std::path::{Component, Path};
+
+const STYLE: &str = include_str!("style.css");
 
 /// One experiment's folder, as read.
 struct Section {
     name: String,
     question: String,
-    /// The verdict on its rows.
-    verdict: Verdict,
-    stand_ins: bool,
-    /// True if it reproduces a result of the paper.
-    of_paper: bool,
-    /// The outputs of its reports.
     outputs: Vec<Output>,
-    /// The figures in the folder, those of the first report first.
-    figures: Vec<Drawing>,
-    /// The first figure's first panel, small; of a figure without panels nothing.
-    miniature: Option<String>,
-    /// Spec, resolved spec and provenance: what it is called, and where it is as seen from the
-    /// page.
-    specs: Vec<Link>,
-    /// The rows.
-    tables: Vec<Link>,
+    /// The figures and the CSV files in the folder: name, and path relative to the page.
+    figures: Vec<(String, String)>,
+    tables: Vec<(String, String)>,
     provenance: Provenance,
 }
 
-/// The conclusion of an experiment, by a rule that the page states.
-enum Verdict {
-    Paper(Outcome, String),
-    Reading(String),
-    None,
-}
+impl Section {
+    /// Reads what an experiment has written, and makes its reports again, which read CSV files only.
+    fn read(results: &Path, name: &str, page: &Path) -> Result<Self, Error> {
+        let folder = results.join(name);
+        let Resolved { experiment, .. } = read_toml(&folder.join("resolved.toml"))?;
+        let names = files::names(&folder)?;
+        let ending = |suffix: &str| {
+            let ours = names.iter().filter(|file| file.ends_with(suffix));
+            ours.map(|file| (file.clone(), relative(page, &folder.join(file)))).collect()
+        };
+        Ok(Self {
+            name: name.into(),
+            outputs: outputs(&experiment, &folder)?,
+            question: experiment.question,
+            figures: ending(".svg"),
+            tables: ending(".csv"),
+            provenance: read_toml(&folder.join("provenance.toml"))?,
+        })
+    }
 
-/// A figure of the folder.
-struct Drawing {
-    name: String,
-    svg: String,
-    files: Vec<Link>,
-}
-
-/// The name of a file, and its path relative to the page.
-struct Link {
-    name: String,
-    to: String,
+    /// Returns the comparisons with the paper's numbers and words.
+    fn paper(&self) -> Vec<&PaperRow> {
+        let rows = self.outputs.iter().flat_map(|output| &output.paper);
+        rows.filter(|row| row.verdict != Verdict::NotInPaper).collect()
+    }
 }
 
 /// Writes a page of all finished experiments in `results` to `out`, without quick variants and
@@ -63,117 +59,152 @@ pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
     let mut names = files::names(results)?;
     names.retain(|name| results.join(name).join("resolved.toml").is_file());
     let repeats =
-        |name: &String| name.strip_suffix(".new").is_some_and(|kept| names.contains(kept));
-    let kept = names.iter().filter(|name| !repeats(name));
-    let mut sections =
-        kept.map(|name| section(results, name, out)).collect::<Result<Vec<_>, _>>()?;
+        |name: &String| name.strip_suffix(".new").is_some_and(|first| names.contains(first));
+    let mut sections = Vec::new();
+    for name in names.iter().filter(|name| !repeats(name)) {
+        sections.push(Section::read(results, name, out)?);
+    }
     if sections.is_empty() {
         return Err(Error::Usage(format!(
             "{} holds no finished experiment; accepted: the --out of one",
             results.display()
         )));
     }
-    // The paper's experiments come first.
-    sections.sort_by(|a, b| (!a.of_paper, &a.name).cmp(&(!b.of_paper, &b.name)));
-    files::write(out, html::page(&sections).as_bytes())?;
+    // In the order of the paper's tables and figures.
+    let source = |section: &Section| section.paper().first().map(|row| row.source.clone());
+    sections.sort_by_key(|section| {
+        let source = source(section);
+        (source.is_none(), source, section.name.clone())
+    });
+    files::write(out, page(&sections).into_string().as_bytes())?;
     Ok(sections.len())
 }
 
-/// Reads what an experiment has written, and makes its reports again, which read CSV files only.
-/// Runs nothing.
-fn section(results: &Path, name: &str, out: &Path) -> Result<Section, Error> {
-    let folder = results.join(name);
-    let Resolved { experiment, scenes } = read_toml(&folder.join("resolved.toml"))?;
-    let provenance: Provenance = read_toml(&folder.join("provenance.toml"))?;
-    let outputs = outputs(&experiment, &folder)?;
-    let found = files::names(&folder)?;
-    let link = |file: &str| Link { name: file.into(), to: way(out, &folder.join(file)) };
-    let ending = |suffix: &'static str| {
-        found.iter().filter_map(move |file| Some((file, file.strip_suffix(suffix)?.to_owned())))
-    };
-    let drawn: Vec<&(String, Figure)> = outputs.iter().flat_map(|output| &output.figures).collect();
-    let mut figures = Vec::new();
-    for (file, name) in ending(".svg") {
-        let files = ["svg", "csv"].map(|kind| format!("{name}.{kind}"));
-        let files = files
-            .iter()
-            // A figure of several tables has no CSV file of its name.
-            .filter(|file| found.contains(*file))
-            .map(|file| link(file))
-            .collect();
-        figures.push(Drawing { svg: read(&folder.join(file))?, name, files });
+fn page(sections: &[Section]) -> Markup {
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { "BVH by stochastic search: results" }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                h1 { "BVH by stochastic search: results" }
+                main {
+                    (scoreboard(sections))
+                    h2 { "All questions" }
+                    ul {
+                        @for section in sections {
+                            li { a href={ "#" (in_url(&section.name)) } { (section.question) } }
+                        }
+                    }
+                    @for section in sections { (experiment(section)) }
+                }
+                footer { p { "Made by harness " (env!("CARGO_PKG_VERSION")) " from the CSV files that it leads to." } }
+            }
+        }
     }
-    // Readers expect figures in the order of the reports, not of their file names.
-    figures.sort_by_key(|figure| {
-        drawn.iter().position(|(name, _)| *name == figure.name).unwrap_or(drawn.len())
-    });
-    let miniature = drawn.first().map(|(_, figure)| ::figures::miniature(figure)).transpose()?;
-    let specs =
-        spec_file(name, &provenance).map(|path| Link { name: "spec".into(), to: way(out, &path) });
-    let resolved = Link { name: "spec with all defaults".into(), ..link("resolved.toml") };
-    Ok(Section {
-        name: name.into(),
-        question: experiment.question,
-        verdict: verdict(&outputs),
-        stand_ins: scenes.iter().any(|scene| scene.kind == SceneKind::StandIn.to_string()),
-        of_paper: outputs.iter().any(|output| output.outcome.is_some()),
-        miniature,
-        outputs,
-        figures,
-        specs: specs
-            .into_iter()
-            .chain([resolved, Link { name: "provenance".into(), ..link("provenance.toml") }])
-            .collect(),
-        tables: ending(".csv").map(|(file, _)| link(file)).collect(),
-        provenance,
-    })
 }
 
-/// Returns the verdict and the answers if numbers are compared with the paper's, otherwise the
-/// first report's reading.
-fn verdict(outputs: &[Output]) -> Verdict {
-    let compared =
-        outputs.iter().find_map(|output| Some((output.outcome?, output.answer.clone()?)));
-    if let Some((outcome, answer)) = compared {
-        return Verdict::Paper(outcome, answer);
+/// The numbers and words of the paper beside ours, in the paper's order.
+fn scoreboard(sections: &[Section]) -> Markup {
+    html! {
+        @if sections.iter().any(|section| !section.paper().is_empty()) {
+            div.wide tabindex="0" { table {
+                caption { span {
+                    "Ng & Trifonov (2003) beside ours. Their scenes are gone; ours are stand-ins. \
+                     Costs are ratios to the greedy Müller–Fellner tree."
+                } }
+                thead { tr { @for name in ["source", "scene", "quantity", "paper", "ours", "verdict"] {
+                    th scope="col" { (name) }
+                } } }
+                tbody { @for section in sections { @for row in section.paper() { tr {
+                    th scope="row" { a href={ "#" (in_url(&section.name)) } { (row.source) } }
+                    td { (row.scene) }
+                    td { (row.quantity) }
+                    td.number { (row.paper) }
+                    td.number { (row.ours) }
+                    td { (row.verdict.name()) }
+                } } } }
+            } }
+        }
     }
-    let reading =
-        outputs.iter().map(|output| output.reading.trim()).find(|reading| !reading.is_empty());
-    reading.map_or(Verdict::None, |reading| Verdict::Reading(reading.into()))
 }
 
-/// The spec that was run, if it still is where it was.
-fn spec_file(name: &str, provenance: &Provenance) -> Option<PathBuf> {
-    let command = provenance.parts.first().map_or(&provenance.command, |part| &part.command);
-    let is_spec = |path: &PathBuf| {
-        path.file_name().is_some_and(|file| *file == *format!("{name}.toml")) && path.is_file()
-    };
-    command
-        .split_whitespace()
-        .map(PathBuf::from)
-        // Only the command line of the run records where the spec was.
-        .find(is_spec)
+/// An experiment with all that belongs to it.
+fn experiment(section: &Section) -> Markup {
+    let Provenance { command, revision, rustc, cpu, threads, date, parts, .. } =
+        &section.provenance;
+    html! {
+        section id=(in_url(&section.name)) {
+            h2 { (section.question) }
+            @for (name, path) in &section.figures {
+                figure { img.sheet src=(path) alt=(name) loading="lazy"; }
+            }
+            @for output in &section.outputs { @for (explanation, rows) in &output.tables {
+                details {
+                    summary { (output.heading) ": " (explanation.trim_end_matches(':')) }
+                    (table(rows))
+                }
+            } }
+            p.files {
+                "Rows of " (section.name) ": "
+                @for (name, path) in &section.tables { a href=(path) { (name) } " " }
+            }
+            p.files {
+                code { (command) } ", revision " (revision) ", " (rustc) ", " (cpu) ", "
+                (threads) " thread(s), " (date)
+                @if !parts.is_empty() { ", merged from " (parts.len()) " parts" }
+            }
+        }
+    }
 }
 
-/// The way from the page to a file, as a relative reference of a URL.
-fn way(page: &Path, file: &Path) -> String {
+/// A table in a box that scrolls if it is too wide for the page. The first cell of a row is its
+/// header.
+fn table(table: &Table) -> Markup {
+    let cells = |row: &Row| row.cell_iter().map(|cell| cell.content()).collect::<Vec<String>>();
+    let is_number =
+        |text: &str| text.trim_end_matches(" %").trim_start_matches('+').parse::<f64>().is_ok();
+    html! {
+        div.wide tabindex="0" { table {
+            thead { tr { @for name in table.header().map(cells).unwrap_or_default() {
+                th scope="col" { (name.replace('_', " ")) }
+            } } }
+            tbody { @for row in table.row_iter() { tr {
+                @for (at, text) in cells(row).iter().enumerate() {
+                    @if at == 0 { th scope="row" { (text) } }
+                    @else if is_number(text) { td.number { (text) } }
+                    @else { td { (text) } }
+                }
+            } } }
+        } }
+    }
+}
+
+/// A name as it stands in a URL.
+fn in_url(name: &str) -> String {
+    // These are the unreserved characters of URLs (RFC 3986); all others are encoded.
+    const PLAIN: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
+    utf8_percent_encode(name, PLAIN).to_string()
+}
+
+/// The path from the page to a file, as a relative reference of a URL. Only a relative one still
+/// works when the results are moved or published.
+fn relative(page: &Path, file: &Path) -> String {
     let whole = |path: &Path| {
         path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or_default()
     };
-    let from = whole(
-        page.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")),
-    );
-    let to = whole(file);
-    // Only a relative link still works when the results are moved or published.
+    let folder = page.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let (from, to) = (whole(folder.unwrap_or(Path::new("."))), whole(file));
     let common = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
     let up = from.components().skip(common).map(|_| "..".into());
     let down = to.components().skip(common).filter_map(|part| match part {
-        Component::Normal(name) => Some(html::reference(&name.to_string_lossy())),
+        Component::Normal(name) => Some(in_url(&name.to_string_lossy())),
         _ => None,
     });
     up.chain(down).collect::<Vec<String>>().join("/")
-}
-
-fn read(path: &Path) -> Result<String, Error> {
-    Ok(read_text(path)?)
 }

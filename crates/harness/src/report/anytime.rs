@@ -5,7 +5,7 @@ use super::data::ratio;
 use super::output::text_table;
 use super::prelude::*;
 use super::progress::{Series, WORST, series};
-use crate::statistics::{median, quartiles, range};
+use crate::statistics::{median, quartiles};
 use bvh_config::{OutOfRange, above};
 
 bvh_config::config! { serde;
@@ -73,7 +73,6 @@ impl Config {
         output.add_figure(&file, caption, self.panels_per_row, panels);
         output.add_csv(file, &corners(&points))?;
         self.add_table(&mut output, rows);
-        output.reading = self.reading(rows);
         Ok(output)
     }
 
@@ -83,30 +82,6 @@ impl Config {
             OutOfRange::new("at_seconds", format!("{:?}", self.at_seconds), "ascending numbers")
         });
         falls.into_iter().chain(check_file(&self.file))
-    }
-
-    /// Returns a sentence on the methods that end lowest, their numbers of scenes, and their costs.
-    fn reading(&self, rows: &Rows) -> String {
-        let lowest = |scene: &&str| {
-            let ends = self
-                .methods
-                .iter()
-                .map(|method| (median(&rows.final_ratios(scene, method)), method));
-            ends.filter_map(|(cost, method)| Some((cost?, method)))
-                .min_by(|a, b| a.0.total_cmp(&b.0))
-        };
-        let lowest: Vec<(f64, &String)> = rows.scenes().iter().filter_map(lowest).collect();
-        let Some((low, high)) = range(lowest.iter().map(|(cost, _)| *cost)) else {
-            return String::new();
-        };
-        let count = |method| lowest.iter().filter(|(_, best)| *best == method).count();
-        let counts = self.methods.iter().map(|method| (method.as_str(), count(method)));
-        let counts = tally(counts.filter(|(_, count)| *count > 0), lowest.len(), "scenes");
-        let low = percent(low);
-        let high = percent(high);
-        format!(
-            "Lowest median cost at the end of the runs: {counts}; against the greedy tree's {low} to {high}."
-        )
     }
 
     fn add_table(&self, output: &mut Output, rows: &Rows) {

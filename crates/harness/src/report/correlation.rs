@@ -6,7 +6,7 @@
 
 use super::config::first;
 use super::data::distinct;
-use super::paper::{PaperRow, Verdict, ratios};
+use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
 use crate::rows::{RunRow, RunTestRow, VisitRow};
 use crate::statistics::{pearson, pearson_interval, spearman};
@@ -116,7 +116,6 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     );
     output.add_figure("correlation", caption, random.clamp(1, 3), panels);
     output.paper = config.compare(rows, &correlations);
-    output.answer = ratios(&output.paper);
     let columns = "scene method trees cost family query pearson spearman";
     output.show(
         "Correlation of costs and tests per ray over the trees of each method:",

@@ -75,27 +75,10 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     for method in &config.methods {
         output.paper.extend(config.majority(rows, method));
     }
-    output.answer = output.paper.first().map(|row| {
-        let kept = if row.verdict == Verdict::Agrees {
-            "as the paper says"
-        } else {
-            "unlike in the paper"
-        };
-        format!("Of single trials {} lie where the paper finds the majority, {kept}.", row.ours)
-    });
     output.add_csv("distribution", &summaries)?;
     output.add_figure("distribution", "Every trial of every repetition.", 2, panels);
     let columns = "scene method lowest_cost median_cost highest_cost relative_deviation base_cost";
     output.show("Costs of all trials:", &summaries, columns)?;
-    let reading = each(&config.methods, |method| {
-        let own = || summaries.iter().filter(|row| row.method == method);
-        let of = |cost: fn(&Summary) -> f64| range(own().map(|row| cost(row) / row.base_cost));
-        let (median, most) = of(|row| row.median_cost)?;
-        let (lowest, least) = of(|row| row.lowest_cost)?;
-        Some(format!("‘{method}’ {median:.3} to {most:.3}, lowest {lowest:.3} to {least:.3}"))
-    });
-    output.reading =
-        format!("Costs of trials over Müller–Fellner's, over scenes: median of {reading}.");
     Ok(output)
 }
 

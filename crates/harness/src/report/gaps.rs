@@ -1,7 +1,7 @@
 //! Gaps to the exact optimum of small scenes, by method, and the tightness of the lower bound.
 
 use super::prelude::*;
-use crate::statistics::{median, quantile};
+use crate::statistics::quantile;
 use bvh_scenes::subset::Subset;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -84,7 +84,6 @@ impl Config {
         output.add_figure("gaps", caption, 2, panels);
         let columns = "method part objects runs solved_fraction median_gap maximum_gap";
         output.show("Gaps to the exact optimum:", &summaries, columns)?;
-        output.reading = self.reading(&found);
         Ok(output)
     }
 
@@ -154,29 +153,6 @@ impl Config {
             ]
         };
         parts.into_iter().flat_map(both).collect()
-    }
-
-    /// Returns a sentence on the runs that end at the optimum, and on the tightness of the lower
-    /// bound.
-    fn reading(&self, found: &Found) -> String {
-        let gaps_of = |method: &str| -> Vec<f64> {
-            let own = found.gaps.iter().filter(|((of, ..), _)| *of == method);
-            own.flat_map(|(_, gaps)| gaps.iter().copied()).collect()
-        };
-        let solved_by = self.methods.iter().map(|method| (method, solved(&gaps_of(method))));
-        let (all, some): (Vec<_>, Vec<_>) = solved_by.partition(|(_, part)| *part == 1.0);
-        let all = each(all, |(method, _)| Some(format!("‘{method}’")));
-        let all = if all.is_empty() { "no method".into() } else { all };
-        let some = each(some, |(method, part)| Some(format!("‘{method}’ {:.1} %", 100.0 * part)));
-        let some = if some.is_empty() { some } else { format!("; of some runs: {some}") };
-        let bounds: Vec<f64> = found.bounds.values().flatten().copied().collect();
-        let bound = median(&bounds).map_or_else(String::new, |median| {
-            format!(
-                " The lower bound is {median:.3} of the optimum (median), at least {:.3}.",
-                at(&bounds, 0.0)
-            )
-        });
-        format!("All runs end at the exact optimum: {all}{some}.{bound}")
     }
 }
 

@@ -1,7 +1,7 @@
 //! Figures 2 to 4 of the paper: cost against generation, with the median run, the range of all
 //! runs, and random picking.
 
-use super::paper::{PaperRow, Verdict, ratios};
+use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
 use crate::rows::TrialRow;
 use crate::statistics::{expected_best_of, mean, median, range};
@@ -87,11 +87,9 @@ impl Config {
         let mut output = Output::new(&self.source, &self.title);
         let mut generations = Vec::new();
         let mut panels = Vec::new();
-        let mut answers = Vec::new();
         for scene in rows.scenes() {
             let Some(runs) = self.runs(rows, scene) else { continue };
             let own = runs.generations();
-            answers.extend(runs.answer(&rows.shown(scene), &own, rows.base_cost(scene)));
             panels.push(draw(&rows.shown(scene), runs.runs.len(), &own));
             generations.extend(own);
             let Some(end) = runs.end(rows.base_cost(scene)) else { continue };
@@ -100,10 +98,6 @@ impl Config {
         let caption = "Goldsmith–Salmon cost of the best tree so far: the run whose final cost is the median and, of several runs, the \
                        range. Random picking: the exact expectation for as many orders, as far as so many were drawn.";
         output.add_figure("generations", caption, 1, panels);
-        let gains: Vec<PaperRow> =
-            output.paper.iter().filter(|row| row.quantity == GAIN).cloned().collect();
-        answers.extend(ratios(&gains));
-        output.answer = Some(answers.join(" "));
         output.add_csv("generations", &generations)?;
         Ok(output)
     }
@@ -225,80 +219,10 @@ impl<'a> Runs<'a> {
         self.runs.iter().filter_map(|run| Some(run.last()?.incumbent)).collect()
     }
 
-    /// Counts the runs that end below random picking and below the greedy tree, and says how much
-    /// the second half of their generations gains.
-    fn answer(&self, shown: &str, generations: &[Generation], base: f64) -> Option<String> {
-        let costs = self.costs();
-        let count = |limit: f64| costs.iter().filter(|&&cost| cost < limit).count();
-        let end = generations.last()?;
-        let beside_picking = end.random_picking_cost.map_or_else(
-            || "too few random orders were drawn to compare".to_owned(),
-            |cost| format!("{} below the best of as many random orders", count(cost)),
-        );
-        let number = costs.len();
-        let runs = if number == 1 { "run" } else { "runs" };
-        let below_greedy = count(base);
-        let gains = self.gains_of_second_half();
-        let gain = median(&gains)?;
-        let mut spread = String::new();
-        if number > 1 {
-            let (least, most) = range(gains.iter().copied())?;
-            spread = format!(", the median of {least:.1} to {most:.1} %");
-        }
-        Some(format!(
-            "Of {number} {runs} on {shown}, {below_greedy} end below the greedy tree, and \
-             {beside_picking}. In the second half of its generations a run gains {gain:.1} \
-             %{spread}.",
-        ))
-    }
-
-    /// Returns the part of its cost that every run gains in the second half of its generations, in
-    /// percent.
-    fn gains_of_second_half(&self) -> Vec<f64> {
-        let mut gains = Vec::new();
-        for run in &self.runs {
-            let Some(end) = run.last() else { continue };
-            let half = run[run.len() / 2].incumbent;
-            gains.push(100.0 * (1.0 - end.incumbent / half));
-        }
-        gains
-    }
-
     fn end(&self, base: f64) -> Option<Final> {
         let costs = self.costs();
         let (low, high) = range(costs.iter().copied())?;
         let average = mean(self.random.iter().copied());
         Some(Final { low, median: median(&costs)?, high, average, base })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_answer_counts_runs_and_names_the_gain_of_the_second_half() {
-        let run = |costs: [f64; 3]| {
-            let mut run = Vec::new();
-            for (incumbent, evaluations) in costs.into_iter().zip(1..) {
-                run.push(Progress { evaluations, incumbent });
-            }
-            run
-        };
-        let runs = vec![run([9.0, 8.0, 6.0]), run([9.0, 8.0, 7.5])];
-        let mut runs = Runs { scene: "s", runs, middle: 0, random: vec![7.0; 3] };
-        let answer = |runs: &Runs| runs.answer("s", &runs.generations(), 8.0).unwrap();
-        let end = "In the second half of its generations a run gains 15.6 %, the median of 6.2 to \
-                   25.0 %.";
-        let expected =
-            "Of 2 runs on s, 2 end below the greedy tree, and 1 below the best of as many";
-        assert_eq!(answer(&runs), format!("{expected} random orders. {end}"));
-        runs.random.pop();
-        let expected =
-            "Of 2 runs on s, 2 end below the greedy tree, and too few random orders were";
-        assert_eq!(answer(&runs), format!("{expected} drawn to compare. {end}"));
-        runs.runs.pop();
-        assert!(answer(&runs).starts_with("Of 1 run on s, "));
-        assert!(answer(&runs).ends_with("generations a run gains 25.0 %."));
     }
 }

@@ -21,7 +21,6 @@ mod query_figure;
 pub mod query_measure;
 pub mod query_report;
 mod ray_cost;
-mod sides;
 pub mod table;
 mod table_paper;
 pub mod target;
@@ -36,7 +35,7 @@ use config::Labels as _;
 use data::Rows;
 use figures::{COLOURS, Figure, Layer};
 use output::Output;
-use paper::{Answer, Outcome, PaperRow};
+use paper::PaperRow;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -156,8 +155,7 @@ pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> 
     let paper: Vec<PaperRow> =
         outputs.iter_mut().flat_map(|output| std::mem::take(&mut output.paper)).collect();
     if !paper.is_empty() {
-        let answers = answers(&outputs);
-        outputs.push(beside_paper(&paper, &answers)?);
+        outputs.push(beside_paper(&paper)?);
     }
     let shown: Vec<_> = outputs
         .iter()
@@ -248,28 +246,9 @@ fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, usize)>
     methods.iter().zip(slots).map(|(method, slot)| ((*method).to_owned(), slot)).collect()
 }
 
-/// Returns the answers of all reports in their order.
-fn answers(outputs: &[Output]) -> Vec<Answer> {
-    let answer = |output: &Output| {
-        Some(Answer { source: output.heading.clone(), answer: output.answer.clone()? })
-    };
-    outputs.iter().filter_map(answer).collect()
-}
-
-/// Collects the comparisons with the paper of all reports. A number of the paper counts once, even
-/// if several of our numbers are compared with it.
-fn beside_paper(rows: &[PaperRow], answers: &[Answer]) -> Result<Output, Error> {
-    let numbers = rows.iter().filter(|row| row.paper_over_base.is_some());
-    let numbers: BTreeSet<_> = numbers.map(|row| (&row.source, &row.scene, &row.paper)).collect();
-    let reasons: BTreeSet<&str> = rows.iter().map(|row| row.reason.as_str()).collect();
+/// Collects the comparisons with the paper of all reports.
+fn beside_paper(rows: &[PaperRow]) -> Result<Output, Error> {
     let mut output = Output::new("", "Ng & Trifonov 2003 beside our results");
-    let outcome = Outcome::of(rows);
-    let reasons = reasons.into_iter().collect::<Vec<_>>().join(" ");
-    output.reading = format!("Numbers of the paper: {}. {outcome} {reasons}", numbers.len());
-    output.outcome = Some(outcome);
-    let sentences: Vec<&str> = answers.iter().map(|answer| answer.answer.as_str()).collect();
-    output.answer = Some(sentences.join(" "));
-    output.add_csv("answer", answers)?;
     output.add_csv("paper", rows)?;
     let columns = "scene quantity paper ours ours_low ours_high verdict";
     output.show(
@@ -277,6 +256,7 @@ fn beside_paper(rows: &[PaperRow], answers: &[Answer]) -> Result<Output, Error> 
         rows,
         columns,
     )?;
+    output.paper = rows.to_vec();
     Ok(output)
 }
 

@@ -6,7 +6,7 @@ use super::prelude::*;
 use super::target::Target;
 use super::to_target;
 use crate::rows::ReferenceRow;
-use crate::statistics::{quartiles, range};
+use crate::statistics::quartiles;
 use bvh_config::Nested;
 
 bvh_config::config! { serde;
@@ -89,18 +89,8 @@ impl Config {
                            cost of every method's runs.";
             output.add_figure("numbers", caption, 1, vec![self.draw(rows, &numbers)]);
         }
-        let proven = rows.scenes().into_iter().filter_map(|scene| {
-            let reference = rows.reference(scene)?;
-            Some(100.0 * (ratio(reference.cost, reference.lower_bound?) - 1.0))
-        });
-        output.reading = range(proven).map_or_else(String::new, |(low, high)| {
-            format!(
-                "The best known trees cost at most {low:.0} to {high:.0} % more than the optimum, by scene."
-            )
-        });
         if !self.targets.is_empty() {
-            let firsts = to_target::add(&mut output, &self.methods, &self.targets, rows)?;
-            output.reading = format!("{} {firsts}", output.reading);
+            to_target::add(&mut output, &self.methods, &self.targets, rows)?;
         }
         Ok(output)
     }

@@ -1,7 +1,7 @@
 //! The output of a report: CSV files, figures, comparisons with the paper, and text for the
 //! terminal.
 
-use super::paper::{Outcome, PaperRow};
+use super::paper::PaperRow;
 use super::query::Row;
 use crate::Error;
 use crate::rows::store::Store;
@@ -9,7 +9,6 @@ use crate::rows::to_bytes;
 use comfy_table::{Table, presets};
 use figures::{Axis, Figure, Layer, Panel};
 use serde::Serialize;
-use std::collections::BTreeSet;
 use std::io;
 use std::path::Path;
 
@@ -24,13 +23,6 @@ pub struct Output {
     pub figures: Vec<(String, Figure)>,
     /// Comparisons with the paper.
     pub paper: Vec<PaperRow>,
-    /// The sentence that states the result, made from its numbers; empty if the tables suffice.
-    pub reading: String,
-    /// The sentence that compares with the paper, chosen by a rule from the numbers; only where the
-    /// paper has a number or words to compare with.
-    pub answer: Option<String>,
-    /// The verdict on all of the paper's numbers, if any are compared.
-    pub outcome: Option<Outcome>,
     /// The tables, each under a line that explains it.
     pub tables: Vec<(String, Table)>,
 }
@@ -118,13 +110,11 @@ impl Output {
         Ok(())
     }
 
-    /// Returns heading, reading and tables for the terminal, separated by empty lines.
+    /// Returns heading and tables for the terminal, separated by empty lines.
     pub fn text(&self) -> String {
         let table = |(explanation, table): &(String, Table)| format!("{explanation}\n{table}\n");
         let tables: String = self.tables.iter().map(table).collect();
-        let blocks = [&self.heading, self.reading.trim_end(), &tables];
-        let some = blocks.into_iter().filter(|block| !block.is_empty());
-        some.map(|block| format!("{}\n\n", block.trim_end())).collect()
+        format!("{}\n\n{}\n\n", self.heading, tables.trim_end())
     }
 }
 
@@ -170,32 +160,6 @@ pub fn panel(title: impl Into<String>, x: Axis, y: Axis, layers: Vec<Layer>) -> 
     Panel { title: title.into(), x, y, layers }
 }
 
-/// Returns the texts that `say` gives for the items, separated by commas.
-pub fn each<T>(items: impl IntoIterator<Item = T>, say: impl FnMut(T) -> Option<String>) -> String {
-    items.into_iter().filter_map(say).collect::<Vec<_>>().join(", ")
-}
-
-/// Groups names by their numbers of cases out of `total`: `‘a’, ‘b’ for all 7 scenes; ‘c’ for 3 of
-/// 7 scenes; ‘d’ for none`.
-pub fn tally<'a>(
-    counts: impl IntoIterator<Item = (&'a str, usize)>,
-    total: usize,
-    cases: &str,
-) -> String {
-    let counts: Vec<_> = counts.into_iter().collect();
-    let numbers: BTreeSet<usize> = counts.iter().map(|(_, count)| *count).collect();
-    let same = |number: usize| {
-        let own = counts.iter().filter(|(_, count)| *count == number);
-        let names = own.map(|(name, _)| format!("‘{name}’")).collect::<Vec<_>>().join(", ");
-        match number {
-            0 => format!("{names} for none"),
-            all if all == total => format!("{names} for all {total} {cases}"),
-            some => format!("{names} for {some} of {total} {cases}"),
-        }
-    };
-    numbers.into_iter().rev().map(same).collect::<Vec<_>>().join("; ")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -208,12 +172,6 @@ mod tests {
             shown,
             ["1.235", "0.01235", "12346", "1.500e-9", "0", "123456", "best", "-1.000"]
         );
-    }
-
-    #[test]
-    fn names_are_grouped_by_the_cases_for_which_they_hold() {
-        let said = tally([("a", 0), ("b", 7), ("c", 3), ("d", 7)], 7, "scenes");
-        assert_eq!(said, "‘b’, ‘d’ for all 7 scenes; ‘c’ for 3 of 7 scenes; ‘a’ for none");
     }
 
     #[test]

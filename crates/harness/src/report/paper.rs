@@ -1,7 +1,6 @@
 //! Compares the paper's numbers with ours and gives a verdict on each.
 
 use serde::{Deserialize, Serialize};
-use std::fmt;
 
 /// One row of `paper.csv`: a statement of the paper and our result. Absolute costs are not
 /// compared, because the scenes are not the paper's.
@@ -32,16 +31,6 @@ pub struct PaperRow {
     pub rule: String,
     /// The reason for a difference, where known.
     pub reason: String,
-}
-
-/// One row of `answer.csv`: the sentence that a report answers with, chosen by a rule from its
-/// numbers.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Answer {
-    /// The place in the paper.
-    pub source: String,
-    /// The sentence.
-    pub answer: String,
 }
 
 impl PaperRow {
@@ -113,32 +102,6 @@ impl PaperRow {
     }
 }
 
-/// Returns a sentence for each compared quantity: our value, the paper's and the verdict, scene by
-/// scene. `None` if nothing is compared.
-pub fn ratios(rows: &[PaperRow]) -> Option<String> {
-    let compared: Vec<&PaperRow> =
-        rows.iter().filter(|row| row.verdict != Verdict::NotInPaper).collect();
-    let sentences: Vec<String> =
-        compared.chunk_by(|a, b| a.quantity == b.quantity).map(sentence).collect();
-    (!sentences.is_empty()).then(|| sentences.join(" "))
-}
-
-/// Returns the sentence for one quantity.
-fn sentence(rows: &[&PaperRow]) -> String {
-    let digits = |number: Option<f64>, text: &str| {
-        number.map_or_else(|| text.to_owned(), |number| format!("{number:.2}"))
-    };
-    let scene = |row: &&PaperRow| {
-        let ours = digits(row.ours_over_base, &row.ours);
-        let paper = digits(row.paper_over_base, &row.paper);
-        format!("{ours} on {}, where the paper has {paper} ({})", row.scene, row.verdict.name())
-    };
-    let scenes: Vec<String> = rows.iter().map(scene).collect();
-    let quantity = &rows[0].quantity;
-    let (first, rest) = quantity.split_at(quantity.chars().next().map_or(0, char::len_utf8));
-    format!("{}{rest}: {}.", first.to_uppercase(), scenes.join("; "))
-}
-
 /// The relation of our number to the paper's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Verdict {
@@ -202,70 +165,6 @@ impl Verdict {
             (_, true, false) => Self::DiffersLower,
         }
     }
-
-    /// Returns true if our number differs from the paper's but is on the same side of the base.
-    pub fn is_same_direction(self) -> bool {
-        matches!(self, Self::SameDirectionHigher | Self::SameDirectionLower)
-    }
-}
-
-/// The number of comparisons with the paper of each kind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Outcome {
-    agree: usize,
-    /// Numbers that differ from the paper's on the same side of the base.
-    same_side: usize,
-    differ: usize,
-    inconclusive: usize,
-    without_verdict: usize,
-}
-
-impl Outcome {
-    /// Counts the verdicts of all rows, except rows that only add to the others.
-    pub fn of(rows: &[PaperRow]) -> Self {
-        let count =
-            |wanted: fn(Verdict) -> bool| rows.iter().filter(|row| wanted(row.verdict)).count();
-        let compared = count(|verdict| verdict != Verdict::NotInPaper);
-        let agree = count(|verdict| verdict == Verdict::Agrees);
-        let same_side = count(Verdict::is_same_direction);
-        let inconclusive = count(|verdict| verdict == Verdict::Inconclusive);
-        let without_verdict = count(|verdict| verdict == Verdict::NoVerdict);
-        let differ = compared - agree - same_side - inconclusive - without_verdict;
-        Self { agree, same_side, differ, inconclusive, without_verdict }
-    }
-
-    /// Returns the verdict on all comparisons together, ignoring the inconclusive ones.
-    pub fn name(&self) -> &'static str {
-        match (self.agree, self.same_side, self.differ) {
-            (0, 0, 0) if self.inconclusive == 0 && self.without_verdict > 0 => "no verdict",
-            (0, 0, 0) => "inconclusive",
-            (_, 0, 0) => "agrees",
-            (_, _, 0) => "same direction",
-            (0, 0, _) => "differs",
-            _ => "in part",
-        }
-    }
-}
-
-impl fmt::Display for Outcome {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { agree, same_side, differ, inconclusive, without_verdict } = *self;
-        let kinds = [
-            ("agree", agree),
-            ("same side of the base only", same_side),
-            ("differ", differ),
-            ("inconclusive", inconclusive),
-            ("no verdict", without_verdict),
-        ];
-        let some = kinds.iter().filter(|(_, count)| *count > 0);
-        let some: Vec<String> = some.map(|(kind, count)| format!("{kind}: {count}")).collect();
-        write!(
-            f,
-            "Comparisons with the paper: {} ({}).",
-            kinds.iter().map(|(_, count)| count).sum::<usize>(),
-            some.join("; ")
-        )
-    }
 }
 
 #[cfg(test)]
@@ -284,25 +183,6 @@ mod tests {
         assert_eq!(verdict(0.95, 1.2, None), Verdict::DiffersHigher);
         // Close by, but the paper finds an improvement where ours finds none.
         assert_eq!(verdict(0.996, 1.01, None), Verdict::DiffersHigher);
-    }
-
-    #[test]
-    fn the_verdict_on_all_is_what_those_that_can_be_told_have_in_common() {
-        use Verdict::{
-            Agrees, Differs, DiffersLower, Inconclusive, NoVerdict, NotInPaper, SameDirectionLower,
-        };
-        let of = |verdicts: &[Verdict]| {
-            let row = |&verdict: &Verdict| PaperRow { verdict, ..PaperRow::new("", "", "", "") };
-            Outcome::of(&verdicts.iter().map(row).collect::<Vec<_>>()).name()
-        };
-        assert_eq!(of(&[Agrees, Inconclusive, NotInPaper]), "agrees");
-        assert_eq!(of(&[Agrees, SameDirectionLower]), "same direction");
-        assert_eq!(of(&[Differs, DiffersLower, Inconclusive]), "differs");
-        assert_eq!(of(&[Differs, SameDirectionLower]), "in part");
-        assert_eq!(of(&[Inconclusive, NotInPaper]), "inconclusive");
-        assert_eq!(of(&[NoVerdict, Inconclusive]), "inconclusive");
-        assert_eq!(of(&[NoVerdict, Agrees]), "agrees");
-        assert_eq!(of(&[NoVerdict, NotInPaper]), "no verdict");
     }
 
     #[test]

@@ -1,18 +1,13 @@
 //! A table of some rows of a CSV file, by the language of [`query`]: selected,
 //! grouped, aggregated, compared with a base, and drawn.
 
-use super::data::distinct;
 use super::output::table_bytes;
-use super::paper::{PaperRow, ratios};
+use super::paper::PaperRow;
 use super::prelude::*;
 use super::query::{self, Conditions, QueryError, Row, number_in};
 use super::query_column::{Column, Group};
 use super::query_figure::Drawing;
-use crate::statistics::range;
 use bvh_config::Nested;
-
-/// The most values of a key that a reading lists.
-const LISTED: usize = 6;
 
 bvh_config::config! { serde;
     /// A table of some rows of a CSV file, and a figure of it.
@@ -70,8 +65,6 @@ impl Config {
         output.show_csv(&format!("{}:", self.title), &bytes, &columns.join(" "))?;
         output.csv.push((self.file.clone(), bytes));
         output.paper = self.compare(rows, &table).map_err(named)?;
-        output.answer = ratios(&output.paper);
-        output.reading = self.reading(&table);
         if let Some(figure) = &self.figure {
             let panels = figure.panels(rows, &table);
             output.add_figure(&self.file, &figure.caption, figure.per_row, panels);
@@ -194,40 +187,6 @@ impl Config {
             _ => own,
         }
     }
-
-    /// Returns the span over scenes of the first quotient or correlation, for every other value of
-    /// the key; of more than [`LISTED`] values, for the two with the extremes.
-    fn reading(&self, table: &[Row]) -> String {
-        let Some(column) = self.columns.iter().find(|column| column.is_read()) else {
-            return String::new();
-        };
-        // A column with one value for each scene distinguishes no row from another.
-        let mut by = self.by.clone();
-        by.retain(|column| column == "method" || has_several(table, column));
-        let subjects: Vec<String> = table.iter().map(|row| self.subject(row, &by)).collect();
-        let mut spans: Vec<(&str, f64, f64)> = Vec::new();
-        for subject in distinct(subjects.iter().map(String::as_str)) {
-            let rows_of_subject =
-                table.iter().zip(&subjects).filter(|(_, of_row)| *of_row == subject);
-            let values = rows_of_subject.filter_map(|(row, _)| number_in(row, &column.name));
-            let Some((low, high)) = range(values) else { continue };
-            // The base compared with itself says nothing.
-            let (own, base) = subject.split_once(" over ").unwrap_or((subject, ""));
-            if own != base && !own.starts_with(&format!("{base}, ")) {
-                spans.push((subject, low, high));
-            }
-        }
-        let said =
-            |&(subject, low, high): &(&str, f64, f64)| format!("{subject} {low:.3} to {high:.3}");
-        let label = capitalised(&column.label());
-        if spans.len() <= LISTED {
-            return format!("{label}: {}.", each(&spans, |span| Some(said(span))));
-        }
-        let least = spans.iter().min_by(|a, b| a.1.total_cmp(&b.1));
-        let most = spans.iter().max_by(|a, b| a.2.total_cmp(&b.2));
-        let extremes = each(least.into_iter().chain(most), |span| Some(said(span)));
-        format!("{label}, the least and the most of {}: {extremes}.", spans.len())
-    }
 }
 
 /// Returns the rows that agree with the key in all columns but the `free` ones, and that meet the
@@ -249,21 +208,6 @@ fn find<'r>(
         }
     }
     Ok(found)
-}
-
-/// Returns whether two rows of the same scene have different values in this column.
-fn has_several(table: &[Row], column: &str) -> bool {
-    table.iter().any(|row| {
-        table
-            .iter()
-            .any(|other| row.get("scene") == other.get("scene") && row[column] != other[column])
-    })
-}
-
-fn capitalised(text: &str) -> String {
-    let mut characters = text.chars();
-    let first = characters.next().map(|first| first.to_uppercase().to_string());
-    first.unwrap_or_default() + characters.as_str()
 }
 
 #[cfg(test)]
@@ -304,20 +248,6 @@ mod tests {
         let expected = "scene,method,r,r_low,r_high,r_verdict\n\
                         s,a,1,1,1,inconclusive\ns,b,0.625,0.5,0.75,lower\n";
         assert_eq!(csv(&output), expected);
-        assert_eq!(output.reading, "R: b over a 0.625 to 0.625.");
-    }
-
-    #[test]
-    fn a_column_with_one_value_for_each_scene_names_no_row_of_a_reading() {
-        let row = |scene: &str, picture: &str| -> Row {
-            [("scene", scene), ("picture", picture)]
-                .map(|(column, value)| (column.to_owned(), value.to_owned()))
-                .into_iter()
-                .collect()
-        };
-        let same = [row("s", "5ccc"), row("s", "5ccc"), row("t", "a0")];
-        assert!(!has_several(&same, "picture"));
-        assert!(has_several(&[row("s", "5ccc"), row("s", "a0")], "picture"));
     }
 
     #[test]

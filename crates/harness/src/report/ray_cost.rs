@@ -94,15 +94,11 @@ impl Config {
         let columns =
             "scene tree trained_on judged_on camera over_base_low tests_over_base over_base_high";
         output.show(&format!("Tests per ray over those of {}:", self.base), &table, columns)?;
-        output.reading = reading(&table, &self.base);
         let paired: Vec<Paired> = self.pairs.iter().flat_map(|pair| paired(rows, pair)).collect();
         if !paired.is_empty() {
             output.add_csv("ray_cost_pairs", &paired)?;
             let columns = "scene method against judged_on camera low tests_over_other high verdict";
             output.show("Tests per ray over those of another method:", &paired, columns)?;
-            for pair in &self.pairs {
-                output.reading += &verdicts(&paired, pair);
-            }
         }
         Ok(output)
     }
@@ -191,18 +187,6 @@ fn paired<'a>(rows: &'a Rows, [first, second]: &'a [String; 2]) -> Vec<Paired<'a
     rows.tests.iter().filter(|row| row.method == *second).filter_map(pair).collect()
 }
 
-/// Returns a sentence on the verdicts on a pair.
-fn verdicts(paired: &[Paired], [first, second]: &[String; 2]) -> String {
-    let own = || paired.iter().filter(|row| row.against == *first && row.method == *second);
-    let count = |verdict| own().filter(|row| row.verdict == verdict).count();
-    let fewer = count(Verdict::Fewer);
-    let more = count(Verdict::More);
-    format!(
-        " ‘{second}’ beside ‘{first}’: fewer in {fewer} of {} cells, more in {more}.",
-        own().count()
-    )
-}
-
 /// Returns the geometric means over scenes of rows that agree in all other columns.
 fn means<'a>(table: &[Compared<'a>]) -> Vec<Compared<'a>> {
     let key = |row: &Compared<'a>| (row.tree, row.trained_on, row.judged_on, row.camera);
@@ -219,29 +203,4 @@ fn means<'a>(table: &[Compared<'a>]) -> Vec<Compared<'a>> {
         }
     };
     distinct(table.iter().map(key)).into_iter().map(mean).collect()
-}
-
-/// Returns a sentence on the kinds of rays that take fewer tests in each trained tree than in the
-/// base, and on the least ratio.
-fn reading(table: &[Compared], base: &str) -> String {
-    let own = || table.iter().filter(|row| row.scene == ALL && row.trained_on != "none");
-    let Some(least) = own().min_by(|a, b| a.tests_over_base.total_cmp(&b.tests_over_base)) else {
-        return String::new();
-    };
-    let trees = distinct(own().map(|row| tree_name(row.tree, row.trained_on)));
-    let of = |tree: &str| {
-        own().filter(|row| tree_name(row.tree, row.trained_on) == tree).collect::<Vec<_>>()
-    };
-    let fewer = |tree: &str| of(tree).iter().filter(|row| row.tests_over_base < 1.0).count();
-    let total = trees.iter().map(|tree| of(tree).len()).max().unwrap_or(0);
-    let counts =
-        tally(trees.iter().map(|tree| (tree.as_str(), fewer(tree))), total, "kinds of rays");
-    format!(
-        "Fewer tests per ray than ‘{base}’, geometric means over scenes: {counts}. The least is {:.3} of its tests, ‘{}’ on \
-         {} rays ({} camera).",
-        least.tests_over_base,
-        tree_name(least.tree, least.trained_on),
-        least.judged_on,
-        least.camera
-    )
 }

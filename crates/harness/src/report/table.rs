@@ -84,9 +84,7 @@ impl Config {
         output.add_csv("table", &cells)?;
         output.add_figure("table", self.caption(&cells), 1, vec![self.draw(rows, &cells)]);
         output.paper = self.compare_all(rows, &cells);
-        output.answer = self.answer(&cells);
         self.add_table(&mut output, rows, &cells);
-        output.reading = self.reading(&cells);
         Ok(output)
     }
 
@@ -198,27 +196,6 @@ impl Config {
         }
         output.add_table("Cost over base, ours (and the paper's, on its own scenes):", table);
     }
-
-    /// Returns a sentence on the scenes on which each column is below the base, and on the least
-    /// ratio.
-    fn reading(&self, cells: &[Cell]) -> String {
-        let below = |column: &Column| {
-            of_column(cells, column).filter(|cell| cell.cost_over_base < 1.0).count()
-        };
-        let others = || self.columns.iter().skip(1);
-        let counts = others().map(|column| (column.name.as_str(), below(column)));
-        let compared = others().flat_map(|column| of_column(cells, column));
-        let Some(least) = compared.min_by(|a, b| a.cost_over_base.total_cmp(&b.cost_over_base))
-        else {
-            return String::new();
-        };
-        let scenes = self.columns.first().map_or(0, |base| of_column(cells, base).count());
-        let Cell { column, scene, cost_over_base, .. } = least;
-        let counts = tally(counts, scenes, "scenes");
-        format!(
-            "Below base: {counts}. The least is {cost_over_base:.3} of base, ‘{column}’ on {scene}."
-        )
-    }
 }
 
 /// The paper's highest ratio, and at least 1.
@@ -287,23 +264,16 @@ mod tests {
             (row.ours.as_str(), row.verdict),
             ("1.9000, by difference", Verdict::Inconclusive)
         );
-        assert!(near.answer.unwrap().contains("‘difference’ comes within 10 %"));
         let far = written(readings(), &[("base", 1.0), ("sum", 500.0), ("difference", 3.0)]);
         assert_eq!(far.paper[0].verdict, Verdict::Differs);
-        assert!(far.answer.unwrap().starts_with("None of 2 readings comes within 10 %"));
     }
 
     #[test]
-    fn columns_of_their_own_have_a_row_each_and_a_sentence_by_side() {
+    fn columns_of_their_own_have_a_row_each() {
         let columns =
             vec![column("base", 1.0), column("best of 10", 1.1), column("best of 100", 1.2)];
         let output = written(columns, &[("base", 1.0), ("best of 10", 1.15), ("best of 100", 0.9)]);
         let verdicts: Vec<Verdict> = output.paper.iter().map(|row| row.verdict).collect();
         assert_eq!(verdicts, [Verdict::Agrees, Verdict::DiffersLower]);
-        let answer = output.answer.unwrap();
-        assert_eq!(
-            answer,
-            "The best of 10 costs more than greedy on all 1 scenes. The best of 100 costs less than greedy on all 1 scenes."
-        );
     }
 }

@@ -2,7 +2,6 @@
 
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
-use super::sides::Sides;
 use super::table::{Cell, Column, Config, of_column};
 use std::cmp::Ordering;
 
@@ -82,45 +81,6 @@ impl Config {
             );
         }
         compared
-    }
-
-    /// Returns the sentence that compares with the paper: the numbers of scenes whose whole
-    /// interval is above or below the base, or the numbers of the paper's ratios that a reading
-    /// comes close to.
-    pub(super) fn answer(&self, cells: &[Cell]) -> Option<String> {
-        cells.iter().find(|cell| cell.paper_over_base.is_some())?;
-        if self.are_readings() {
-            let papers = of_column(cells, self.columns.get(1)?)
-                .filter(|cell| cell.paper_over_base.is_some())
-                .count();
-            let close = |column: &Column| {
-                of_column(cells, column).filter(|cell| is_close(cell, self.tolerance)).count()
-            };
-            let counts =
-                self.columns.iter().skip(1).map(|column| (column.name.as_str(), close(column)));
-            let best = counts.max_by_key(|(_, count)| *count)?;
-            let percent = 100.0 * self.tolerance;
-            return Some(if best.1 == papers {
-                format!(
-                    "‘{}’ comes within {percent} % of the paper's ratio on all {papers} of its scenes.",
-                    best.0
-                )
-            } else {
-                let readings = self.columns.len() - 1;
-                format!(
-                    "None of {readings} readings comes within {percent} % of the paper's ratio on all {papers} of its scenes; the best does on {}.",
-                    best.1
-                )
-            });
-        }
-        let interval = |cell: &Cell| {
-            let ends = cell.low_over_base.zip(cell.high_over_base);
-            ends.unwrap_or((cell.cost_over_base, cell.cost_over_base))
-        };
-        let say =
-            |column: &Column| Sides::of(of_column(cells, column).map(interval)).say(&column.name);
-        let each = self.columns.iter().skip(1).map(say);
-        Some(each.collect::<Vec<_>>().join(" "))
     }
 }
 

@@ -21,14 +21,13 @@ pub(super) struct Reached<'a> {
     quantile_90: Option<f64>,
 }
 
-/// Adds the seconds until `methods` reach `targets`, and returns a sentence on the
-/// first method to reach each target.
+/// Adds the seconds until `methods` reach `targets`.
 pub(super) fn add(
     output: &mut Output,
     methods: &[String],
     targets: &[Target],
     rows: &Rows,
-) -> Result<String, Error> {
+) -> Result<(), Error> {
     let mut table = Vec::new();
     for scene in rows.scenes() {
         let runs_of_methods: Vec<Vec<Series>> =
@@ -42,8 +41,7 @@ pub(super) fn add(
     }
     output.add_csv("timing_to_target", &table)?;
     let columns = "scene target method runs solved median quantile_90";
-    output.show("Seconds until the target is reached, over all runs:", &table, columns)?;
-    Ok(reading(targets, &table))
+    output.show("Seconds until the target is reached, over all runs:", &table, columns)
 }
 
 impl<'a> Reached<'a> {
@@ -61,21 +59,4 @@ impl<'a> Reached<'a> {
             quantile_90: quantile(0.9),
         }
     }
-}
-
-/// Returns a sentence on the first method to reach each target, by scene.
-fn reading(targets: &[Target], table: &[Reached]) -> String {
-    let firsts = targets.iter().filter_map(|target| {
-        let rows: Vec<&Reached> =
-            table.iter().filter(|row| row.target == target.to_string()).collect();
-        let first = |scene: &[&Reached]| {
-            let timed = scene.iter().filter_map(|row| Some((row.median?, row.method)));
-            let (seconds, method) = timed.min_by(|a, b| a.0.total_cmp(&b.0))?;
-            Some(format!("{method} on {} ({seconds:.2} s)", scene[0].scene))
-        };
-        let firsts = each(rows.chunk_by(|a, b| a.scene == b.scene), first);
-        (!firsts.is_empty()).then(|| format!("{target}: {firsts}"))
-    });
-    let firsts: Vec<String> = firsts.collect();
-    format!("The first method in the median to reach {}.", firsts.join("; "))
 }

@@ -58,7 +58,6 @@ impl Config {
         let mut output = Output::new(&self.source, &self.title);
         let mut points = Vec::new();
         let mut panels = Vec::new();
-        let mut lists = Vec::new();
         for scene in rows.scenes() {
             let curves: Vec<Vec<Point>> =
                 self.methods.iter().map(|method| self.curve(rows, scene, method)).collect();
@@ -87,7 +86,6 @@ impl Config {
                 panels.push(panel(format!("{}, {what}", rows.shown(scene)), x, y, layers));
             }
             self.compare(&rows.shown(scene), &curves, &mut output);
-            lists.extend(self.best_lists(scene, &curves));
             points.extend(curves.into_iter().flatten());
         }
         let caption = "Lowest cost among so many trials, over that of the greedy tree. Left, one run, as in the paper; \
@@ -101,8 +99,6 @@ impl Config {
             &last,
             columns,
         )?;
-        output.reading = self.reading(&last);
-        output.answer = self.paper_best.as_ref().map(|paper| answer(&lists, &last, paper));
         output.add_csv("trials", &points)?;
         Ok(output)
     }
@@ -129,22 +125,6 @@ impl Config {
         (1..=self.best_of.min(first.len())).map_while(point).collect()
     }
 
-    /// Returns a sentence on the scenes on which no other method is below each method.
-    fn reading(&self, last: &[&Point]) -> String {
-        let scenes: Vec<&[&Point]> = last.chunk_by(|a, b| a.scene == b.scene).collect();
-        let is_best = |scene: &[&Point], method: &str| {
-            let own = scene.iter().find(|point| point.method == method);
-            own.is_some_and(|own| !scene.iter().any(|other| other.is_below(own)))
-        };
-        let count = |method: &str| scenes.iter().filter(|scene| is_best(scene, method)).count();
-        let counts = self.methods.iter().map(|method| (method.as_str(), count(method)));
-        let counts = tally(counts.filter(|(_, count)| *count > 0), scenes.len(), "scenes");
-        format!(
-            "No other has a lower expected best of {}, as far as can be told: {counts}.",
-            self.best_of
-        )
-    }
-
     /// Returns the methods that no other method is below at `best_of` trials, the lowest first.
     fn best<'p, 'a>(&self, curves: &'p [Vec<Point<'a>>]) -> Vec<&'p Point<'a>> {
         let mut ranking: Vec<&Point> = curves.iter().filter_map(|curve| curve.last()).collect();
@@ -152,12 +132,6 @@ impl Config {
         let Some(least) = ranking.first().copied() else { return ranking };
         ranking.retain(|point| !least.is_below(point));
         ranking
-    }
-
-    /// Returns the best methods on a scene in words, with the scene.
-    fn best_lists<'a>(&self, scene: &'a str, curves: &[Vec<Point>]) -> Option<(String, &'a str)> {
-        let best = self.best(curves);
-        (!best.is_empty()).then(|| (in_words(&best), scene))
     }
 
     /// Compares the best methods with the paper's. Where there are several, it is inconclusive
@@ -187,35 +161,6 @@ impl Config {
 
 fn in_words(best: &[&Point]) -> String {
     best.iter().map(|point| point.method).collect::<Vec<_>>().join(" or ")
-}
-
-/// The sentence that answers for the paper: the best methods by scene, whether the paper's is one
-/// of them, and whether any is below the base.
-fn answer(lists: &[(String, &str)], last: &[&Point], paper: &str) -> String {
-    let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
-    for (best, scene) in lists {
-        match groups.iter_mut().find(|(found, _)| found == best) {
-            Some((_, scenes)) => scenes.push(scene),
-            None => groups.push((best, vec![scene])),
-        }
-    }
-    let groups = each(groups, |(best, scenes)| Some(format!("{best} on {}", scenes.join(" and "))));
-    let is_paper = |best: &str| best.split(" or ").any(|name| name == paper);
-    let with_paper = lists.iter().filter(|(best, _)| is_paper(best)).count();
-    let of_paper = match with_paper {
-        0 => format!("The paper's {paper} is not among the best on any scene"),
-        all if all == lists.len() => format!("The paper's {paper} is among the best on all scenes"),
-        some => {
-            format!("The paper's {paper} is among the best on {some} of {} scenes", lists.len())
-        }
-    };
-    let below = last.iter().filter(|point| point.interval().1 < 1.0).count();
-    let below = if below == 0 {
-        "no interval lies below greedy, the list of k = 1".into()
-    } else {
-        format!("{below} lie below greedy")
-    };
-    format!("{of_paper}: best are {groups}; {below}.")
 }
 
 #[cfg(test)]
@@ -263,23 +208,5 @@ mod tests {
         let lucky = [[0.8, 1.1, 1.2], [1.02, 1.1, 1.2], [1.01, 1.1, 1.2], [1.02, 1.1, 1.2]];
         assert_eq!(verdict("one", lucky), ("other or one".into(), Verdict::Inconclusive));
         assert_eq!(verdict("other", lucky), ("other or one".into(), Verdict::Inconclusive));
-    }
-
-    #[test]
-    fn the_answer_names_the_best_by_scene_and_never_a_list_that_another_is_below() {
-        let lists = [
-            ("k = 2 or k = 30".to_owned(), "a"),
-            ("k = 2".to_owned(), "b"),
-            ("k = 2".to_owned(), "c"),
-        ];
-        let said = answer(&lists, &[], "k = 5");
-        assert_eq!(
-            said,
-            "The paper's k = 5 is not among the best on any scene: best are k = 2 or k = 30 on a, k = 2 on b and c; no interval lies below greedy, the list of k = 1."
-        );
-        assert!(
-            answer(&lists, &[], "k = 30")
-                .starts_with("The paper's k = 30 is among the best on 1 of 3 scenes")
-        );
     }
 }

@@ -241,7 +241,7 @@ pub fn run_folder_name(index: usize) -> String {
     format!("{index:06}")
 }
 
-/// Returns true if an interrupted experiment, or a shard, has left finished runs in its folder.
+/// Returns true if an interrupted experiment, or a part of one, has left finished runs in its folder.
 pub fn is_unfinished(folder: &Path) -> bool {
     folder.join(".partial").exists()
 }

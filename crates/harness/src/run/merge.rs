@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// One part of an experiment, made with `--run` or `--shard`. Its folder stays locked as long as
+/// One part of an experiment, made with `--run`. Its folder stays locked as long as
 /// this lives.
 struct Part {
     partial: PathBuf,
@@ -38,7 +38,7 @@ pub enum UnlikeProcessors {
 }
 
 /// Joins every experiment that has a part in one of `folders`, each the `--out` of a harness with
-/// `--run` or `--shard`, into its folder in `out`.
+/// `--run`, into its folder in `out`.
 ///
 /// Except for seconds and provenance, the bytes are the same as from one machine. The parts stay.
 /// Returns the tables of every experiment and the folder of its results.
@@ -60,7 +60,7 @@ pub fn merge(
         if found.is_empty() {
             return Err(Error::Usage(format!(
                 "{} holds no part of an experiment; accepted: folders given as --out to runs with \
-                 --run or --shard",
+                 --run",
                 folder.display()
             )));
         }
@@ -210,7 +210,7 @@ fn owners(
     }
     let names: Vec<String> = missing
         .iter()
-        // A shard that never ran misses thousands of runs.
+        // A part that never ran misses thousands of runs.
         .take(NAMED)
         .map(|&index| resolved.run_name(index))
         .collect();

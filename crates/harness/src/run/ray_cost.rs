@@ -22,7 +22,7 @@ pub(crate) struct Judging<'a>(pub &'a Config);
 
 impl Measurement for Judging<'_> {
     fn indivisible(&self) -> Option<&'static str> {
-        Some("rays judge all trees of a scene together; run it without --shard and --run")
+        Some("rays judge all trees of a scene together; run it without --run")
     }
 
     fn measure(&self, work: &mut Work) -> Result<String, Error> {

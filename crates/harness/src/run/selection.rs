@@ -8,7 +8,6 @@ use bvh_search::{Budget, Method};
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
 use std::fmt;
-use std::str::FromStr;
 
 /// All runs of an experiment, or a part of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -16,8 +15,6 @@ pub enum Selection {
     /// All runs.
     #[default]
     All,
-    /// Every N-th run of the [list](listed).
-    Shard(Shard),
     /// The runs with these identifiers.
     Runs(Vec<String>),
 }
@@ -41,12 +38,6 @@ impl Selection {
         let listed = listed(experiment, scenes);
         let selected: BTreeSet<usize> = match self {
             Self::All => listed.iter().map(|run| run.index).collect(),
-            Self::Shard(shard) => listed
-                .iter()
-                .skip(shard.number - 1)
-                .step_by(shard.count)
-                .map(|run| run.index)
-                .collect(),
             Self::Runs(ids) => ids
                 .iter()
                 .map(|id| {
@@ -69,7 +60,6 @@ impl fmt::Display for Selection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::All => f.write_str("the whole experiment"),
-            Self::Shard(Shard { number, count }) => write!(f, "part {number}/{count}"),
             Self::Runs(ids) => f.write_str(&ids.join(", ")),
         }
     }
@@ -139,26 +129,6 @@ fn estimated_work(labelled: &Labelled, budget: Budget, objects: u64) -> u64 {
     work.min(budget.max_work.unwrap_or(u64::MAX))
 }
 
-/// Part `number` of `count`, both from 1; written `number/count`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
-    number: usize,
-    count: usize,
-}
-
-impl FromStr for Shard {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let parsed = text.split_once('/').and_then(|(number, count)| {
-            Some(Self { number: number.parse().ok()?, count: count.parse().ok()? })
-        });
-        parsed
-            .filter(|shard| (1..=shard.count).contains(&shard.number))
-            .ok_or_else(|| "accepted: I/N with I from 1 to N, for example 2/8".into())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -176,32 +146,19 @@ mod tests {
     }
 
     #[test]
-    fn every_run_belongs_to_one_part_and_has_one_identifier() {
+    fn every_run_has_one_identifier_and_those_with_most_work_come_first() {
         let (experiment, scenes) = experiment();
         let all = Selection::All.of(&experiment, &scenes).unwrap();
         assert_eq!(all, (0..12).collect::<Vec<_>>());
-        for count in 1..=14 {
-            let mut owned = Vec::new();
-            for number in 1..=count {
-                let shard = Selection::Shard(Shard { number, count });
-                owned.extend(shard.of(&experiment, &scenes).unwrap());
-            }
-            owned.sort_unstable();
-            assert_eq!(owned, all);
-        }
-        for run in listed(&experiment, &scenes) {
-            let selection = Selection::Runs(vec![run.id]);
-            assert_eq!(selection.of(&experiment, &scenes).unwrap(), [run.index]);
-        }
-    }
-
-    #[test]
-    fn runs_with_much_work_come_first_and_a_shard_takes_its_share_of_them() {
-        let (experiment, scenes) = experiment();
-        let works: Vec<u64> = listed(&experiment, &scenes).iter().map(|run| run.work).collect();
+        let runs = listed(&experiment, &scenes);
+        let works: Vec<u64> = runs.iter().map(|run| run.work).collect();
         assert!(works.is_sorted_by(|a, b| a >= b), "{works:?}");
         assert_eq!(works[0], 9 * 2 * scenes[0].boxes.len().max(750) as u64);
         assert_eq!(works[11], 2 * scenes[0].boxes.len().min(750) as u64);
+        for run in runs {
+            let selection = Selection::Runs(vec![run.id]);
+            assert_eq!(selection.of(&experiment, &scenes).unwrap(), [run.index]);
+        }
     }
 
     #[test]
@@ -217,15 +174,5 @@ mod tests {
         let ids: BTreeSet<String> = after.into_iter().map(|run| run.id).collect();
         assert_eq!(ids.len(), 18);
         assert!(before.iter().all(|run| ids.contains(&run.id)));
-    }
-
-    #[test]
-    fn parts_are_written_as_they_are_read_and_wrong_ones_are_rejected() {
-        let shard = Selection::Shard("2/8".parse().unwrap());
-        assert_eq!(shard.to_string(), "part 2/8");
-        for wrong in ["0/3", "4/3", "1/0", "1", "a/b", "-1/2", ""] {
-            let error = wrong.parse::<Shard>().unwrap_err();
-            assert!(error.contains("I/N"), "{wrong}");
-        }
     }
 }

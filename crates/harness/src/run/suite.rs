@@ -10,7 +10,7 @@ pub(crate) struct Suite<'a>(pub &'a Measure);
 
 impl Measurement for Suite<'_> {
     fn indivisible(&self) -> Option<&'static str> {
-        Some("the suite of cases cannot be split; run it without --shard and --run")
+        Some("the suite of cases cannot be split; run it without --run")
     }
 
     fn measure(&self, work: &mut Work) -> Result<String, Error> {

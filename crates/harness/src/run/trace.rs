@@ -20,7 +20,7 @@ pub(crate) struct Tracing<'a>(pub &'a speed::Config);
 
 impl Measurement for Tracing<'_> {
     fn indivisible(&self) -> Option<&'static str> {
-        Some("ray times are compared within one process; run it without --shard and --run")
+        Some("ray times are compared within one process; run it without --run")
     }
 
     fn measure(&self, work: &mut Work) -> Result<String, Error> {

@@ -5,19 +5,27 @@
 use super::Experiment;
 use crate::contestant::{Contestant, EntryOptions, Labelled};
 use bvh_config::OutOfRange;
-use bvh_config::fault::{Fault, is_within};
+use bvh_config::fault::Fault;
 use bvh_scenes::subset;
 use bvh_search::{Budget, Method, best};
-use std::collections::HashSet;
 
 /// The maximum number of runs of an experiment.
 const MOST_RUNS: u64 = 10_000_000;
 
 impl Experiment {
-    /// Checks the question, the scenes and the number of runs.
-    pub(super) fn check_together(&self) -> Vec<Fault> {
-        let errors = [self.check_question(), self.check_scenes(), self.check_run_count()];
-        errors.into_iter().filter_map(Result::err).map(Fault::from).collect()
+    /// Checks relations between keys.
+    pub(super) fn check_together(&self) -> Result<(), Fault> {
+        self.check_question()?;
+        self.check_scenes()?;
+        self.check_run_count()?;
+        self.check_labels()?;
+        for (index, labelled) in self.methods.iter().enumerate() {
+            let fault = self.check_method(labelled).err();
+            if let Some(fault) = fault.or_else(|| self.check_end(labelled).err()) {
+                return Err(fault.below(&format!("methods[{index}]")));
+            }
+        }
+        Ok(())
     }
 
     fn check_question(&self) -> Result<(), OutOfRange> {
@@ -66,18 +74,7 @@ impl Experiment {
         Ok(())
     }
 
-    /// Checks methods against the rest of the experiment. `indices` are their places in the spec.
-    pub(super) fn check_methods(&self, indices: &[usize]) -> Vec<Fault> {
-        let mut faults = Vec::new();
-        for (index, labelled) in indices.iter().zip(&self.methods) {
-            let entry = format!("methods[{index}]");
-            let found = self.check_method(labelled).into_iter();
-            faults.extend(found.map(|fault| fault.below(&entry)));
-        }
-        faults
-    }
-
-    fn check_method(&self, labelled: &Labelled) -> Vec<Fault> {
+    fn check_method(&self, labelled: &Labelled) -> Result<(), Fault> {
         let Labelled { method, options, .. } = labelled;
         let EntryOptions { budget, keep, judge, for_rays, objective, references, .. } = options;
         let is_ours = matches!(method, Contestant::Ours(_));
@@ -94,42 +91,40 @@ impl Experiment {
             ("references", references.is_some(), is_best, "with best"),
             ("judge", judge.is_some(), judged.contains(&method.name()), &with_judged),
         ];
-        let mut faults: Vec<Fault> = restricted_keys
-            .iter()
-            .filter(|(_, is_set, is_accepted, _)| *is_set && !is_accepted)
-            .map(|(key, .., accepted)| {
-                Fault::new(key, format!("set for {}", method.name()), accepted)
-            })
-            .collect();
-        if for_rays.is_some() && is_ours && self.ray_cost.is_none() {
-            let accepted = "with the experiment's `ray_cost`";
-            faults.push(Fault::new("for_rays", "set without `ray_cost`", accepted));
+        for (key, is_set, is_accepted, accepted) in restricted_keys {
+            if is_set && !is_accepted {
+                return Err(Fault::new(key, format!("set for {}", method.name()), accepted));
+            }
         }
-        faults.extend(self.check_library(method));
-        faults
+        if for_rays.is_some() && self.ray_cost.is_none() {
+            let accepted = "with the experiment's `ray_cost`";
+            return Err(Fault::new("for_rays", "set without `ray_cost`", accepted));
+        }
+        self.check_library(method)
     }
 
     /// Checks that the experiment can run a third-party method.
-    fn check_library(&self, method: &Contestant) -> Option<Fault> {
+    fn check_library(&self, method: &Contestant) -> Result<(), Fault> {
         let name = method.name();
         if self.suite.is_some() && !matches!(method, Contestant::Ours(_)) {
             // One that crashes must not end the suite; it runs each library in a separate process.
             let accepted =
                 "methods of ours; the suite itself runs the libraries that are compiled in";
-            return Some(Fault::new("method", format!("{name:?}, none of ours"), accepted));
+            return Err(Fault::new("method", format!("{name:?}, none of ours"), accepted));
         }
-        let Contestant::Peer(peer) = method else { return None };
-        let feature = peer.missing_feature()?;
+        let Contestant::Peer(peer) = method else { return Ok(()) };
+        let Some(feature) = peer.missing_feature() else { return Ok(()) };
         let command = format!("cargo run --release -p harness --features {feature}");
         let found = format!("{name:?}, another library, which needs `{command}`");
         let accepted = format!("without it {}", Method::NAMES.join(", "));
-        Some(Fault::new("method", found, accepted))
+        Err(Fault::new("method", found, accepted))
     }
 
-    /// Finds methods that would run for hours because the spec sets no limit.
-    ///
-    /// A method is skipped if its limits have `faults` already.
-    pub(super) fn check_ends(&self, indices: &[usize], faults: &[Fault]) -> Vec<Fault> {
+    /// Rejects a method that would run for hours because the spec sets no limit.
+    fn check_end(&self, labelled: &Labelled) -> Result<(), Fault> {
+        if !self.is_endless(labelled) {
+            return Ok(());
+        }
         let work = best::Config::default().work_per_object;
         let found = format!(
             "missing for best, which would spend {work} nodes of work per object: hours on a large \
@@ -137,14 +132,7 @@ impl Experiment {
         );
         let accepted = "`budget = { max_work = 300_000_000 }`, some seconds on one thread, here or \
                         for all methods, or another `work_per_object`";
-        indices
-            .iter()
-            .zip(&self.methods)
-            .filter(|(_, labelled)| self.is_endless(labelled))
-            .map(|(index, _)| format!("methods[{index}]"))
-            .filter(|entry| !has_faulty_limit(entry, faults))
-            .map(|entry| Fault::new(format!("{entry}.budget"), &found, accepted))
-            .collect()
+        Err(Fault::new("budget", found, accepted))
     }
 
     /// Returns true if nothing but the generous default limits a method's runs.
@@ -155,47 +143,30 @@ impl Experiment {
             && self.suite.is_none()
     }
 
-    /// Finds labels in reports that no method has. `indices` are the reports' places in the spec.
-    pub(super) fn check_reports(&self, labels: &[Option<String>], indices: &[usize]) -> Vec<Fault> {
-        // Any name may be the label of an entry that could not be read.
-        let known: Option<Vec<&str>> = labels.iter().map(Option::as_deref).collect();
-        // One fault is enough: a report may name the entry that could not be read.
-        let Some(known) = known else { return vec![] };
-        let accepted = known.join(", ");
-        let mut faults = Vec::new();
-        for (index, report) in indices.iter().zip(&self.reports) {
+    /// Rejects a label of two methods, and a label in a report that no method has.
+    fn check_labels(&self) -> Result<(), Fault> {
+        let mut known = Vec::new();
+        for (index, labelled) in self.methods.iter().enumerate() {
+            let label = labelled.label.as_str();
+            if known.contains(&label) {
+                let key = format!("methods[{index}].label");
+                return Err(Fault::new(
+                    key,
+                    format!("{label:?} for the second time"),
+                    "unique labels",
+                ));
+            }
+            known.push(label);
+        }
+        for (index, report) in self.reports.iter().enumerate() {
             for (key, label) in report.labels() {
                 if !known.contains(&label) {
                     let key = format!("reports[{index}].{key}");
                     let found = format!("{label:?}, no label of a method");
-                    faults.push(Fault::new(key, found, &accepted));
+                    return Err(Fault::new(key, found, known.join(", ")));
                 }
             }
         }
-        faults
+        Ok(())
     }
-}
-
-/// Returns true if a key that limits the runs of `entry` has a fault.
-fn has_faulty_limit(entry: &str, faults: &[Fault]) -> bool {
-    ["budget", "work_per_object"]
-        .iter()
-        .flat_map(|key| [(*key).to_owned(), format!("{entry}.{key}")])
-        .any(|key| faults.iter().any(|fault| is_within(&fault.key, &key)))
-}
-
-/// Finds labels that an earlier entry of `methods` has.
-pub(super) fn unique(labels: &[Option<String>]) -> Vec<Fault> {
-    let mut known = HashSet::new();
-    let mut faults = Vec::new();
-    for (index, label) in labels.iter().enumerate() {
-        if let Some(label) = label
-            && !known.insert(label)
-        {
-            let key = format!("methods[{index}].label");
-            let found = format!("{label:?} for the second time");
-            faults.push(Fault::new(key, found, "unique labels"));
-        }
-    }
-    faults
 }

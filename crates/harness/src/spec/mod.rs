@@ -22,7 +22,7 @@ use bvh_scenes::rays::RandomRays;
 use bvh_search::{Budget, exact};
 pub use name::Name;
 pub use read::Overrides;
-pub use schema::{page, schema};
+pub use schema::schema;
 use std::path::{Path, PathBuf};
 
 config! {

@@ -1,9 +1,9 @@
 //! Reads a spec's text, with the overrides of the command line, into a checked [`Experiment`].
 
-use super::{Experiment, Labelled, Name, check};
+use super::{Experiment, Labelled, Name};
 use crate::Error;
 use crate::report::Report;
-use bvh_config::fault::{self, Fault, Read};
+use bvh_config::fault::{self, Fault};
 use bvh_scenes::files::read_text;
 use bvh_search::Method;
 use std::ffi::OsStr;
@@ -45,9 +45,8 @@ impl Experiment {
         })?;
         // A key that `quick` replaces is written there, not where it is read.
         let above = overrides.quick.then_some("quick");
-        let mut experiment = Self::from_table(table, name, overrides).map_err(|faults| {
-            rejected(fault::say(&faults, text, &path.to_string_lossy(), above))
-        })?;
+        let mut experiment = Self::from_table(table, name, overrides)
+            .map_err(|fault| rejected(fault.in_text(text, above)))?;
         // Paths in a spec are relative to its folder, those on the command line to the shell's.
         if overrides.scenes.is_empty()
             && let Some(folder) = path.parent()
@@ -61,29 +60,27 @@ impl Experiment {
         Ok(experiment)
     }
 
-    /// Returns the experiment, or all faults of the spec.
-    fn from_table(mut table: Table, name: Name, overrides: &Overrides) -> Result<Self, Vec<Fault>> {
-        let mut faults = Vec::new();
-        remove_unacceptable(&mut table, "", &mut faults);
+    fn from_table(mut table: Table, name: Name, overrides: &Overrides) -> Result<Self, Fault> {
+        check_numbers(&table, "")?;
         match table.remove("quick") {
             Some(Value::Table(quick)) if overrides.quick => replace(&mut table, quick),
             None if overrides.quick => {
                 let accepted = "with --quick, a table of keys to replace";
-                faults.push(Fault::new("quick", "missing", accepted));
+                return Err(Fault::new("quick", "missing", accepted));
             }
             None | Some(Value::Table(_)) => {}
-            Some(found) => faults.push(Fault::new("quick", found, "a table of keys to replace")),
+            Some(found) => return Err(Fault::new("quick", found, "a table of keys to replace")),
         }
-        let mut labels = labels(table.get("methods"));
         // Serde loses the path to an error within an internally tagged enum, so entries are read
         // singly.
-        let (methods, method_indices) = list(&mut table, "methods", Labelled::read, &mut faults);
-        let (reports, report_indices) = list(&mut table, "reports", read_report, &mut faults);
-        let (experiment, key_faults) = fault::deserialize::<Self>(table);
-        faults.extend(key_faults);
-        let Some(mut experiment) = experiment else { return Err(faults) };
+        let methods = list(&mut table, "methods", Labelled::read)?;
+        let reports = list(&mut table, "reports", |table| {
+            let accepted = || Report::NAMES.join(", ");
+            fault::tagged(table, "kind", |kind, config| Report::read(kind, config), accepted)
+        })?;
+        let mut experiment: Self = fault::deserialize(table)?;
         if experiment.name != Name::default() {
-            faults.push(Fault::new("name", experiment.name, "none, the file's name is used"));
+            return Err(Fault::new("name", experiment.name, "none, the file's name is used"));
         }
         experiment.name = name;
         experiment.quick = overrides.quick;
@@ -99,19 +96,11 @@ impl Experiment {
             experiment.optional_scenes.clear();
         }
         // The suite is about all methods; a list in the spec would miss new ones.
-        if experiment.suite.is_some() && labels.is_empty() {
+        if experiment.suite.is_some() && experiment.methods.is_empty() {
             experiment.methods = Method::all().into_iter().map(Labelled::new).collect();
-            labels = experiment.methods.iter().map(|method| Some(method.label.clone())).collect();
         }
-        // A value that was rejected now looks missing, which is not a second fault.
-        let mut together = experiment.check_together();
-        together.retain(|late| !faults.iter().any(|fault| fault::is_within(&fault.key, &late.key)));
-        together.extend(check::unique(&labels));
-        together.extend(experiment.check_methods(&method_indices));
-        together.extend(experiment.check_ends(&method_indices, &faults));
-        together.extend(experiment.check_reports(&labels, &report_indices));
-        faults.extend(together);
-        if faults.is_empty() { Ok(experiment) } else { Err(faults) }
+        experiment.check_together()?;
+        Ok(experiment)
     }
 }
 
@@ -126,82 +115,44 @@ fn is_path(scene: &str) -> bool {
     file.contains(['.', '/', '\\'])
 }
 
-fn read_report(table: Table) -> Read<Report> {
-    let accepted = || Report::NAMES.join(", ");
-    fault::tagged(table, "kind", |kind, config| Report::read(kind, config), accepted)
-}
-
-/// Returns the labels of the entries of `methods`, `None` for those without a readable one.
-fn labels(methods: Option<&Value>) -> Vec<Option<String>> {
-    let entries = methods.and_then(Value::as_array);
-    let entries = entries.into_iter().flatten();
-    entries
-        .map(|entry| {
-            // Labels are read before the entries, so that a faulty entry does not hide its label
-            // from reports.
-            let label = entry.get("label").or(entry.get("method"))?;
-            Some(label.as_str()?.to_owned())
-        })
-        .collect()
-}
-
 /// Removes the list of tables under `key` from a spec and reads each table by `read`.
-///
-/// Returns the values that could be read, with their indices in the list; adds faults to `faults`.
 fn list<T>(
     table: &mut Table,
     key: &str,
-    read: impl Fn(Table) -> Read<T>,
-    faults: &mut Vec<Fault>,
-) -> (Vec<T>, Vec<usize>) {
+    read: impl Fn(Table) -> Result<T, Fault>,
+) -> Result<Vec<T>, Fault> {
     let entries = match table.remove(key) {
         None => vec![],
         Some(Value::Array(entries)) => entries,
-        Some(found) => {
-            faults.push(Fault::new(key, found, "a list of tables"));
-            vec![]
-        }
+        Some(found) => return Err(Fault::new(key, found, "a list of tables")),
     };
-    let mut values = Vec::new();
-    let mut indices = Vec::new();
-    for (index, entry) in entries.into_iter().enumerate() {
-        let (value, entry_faults) = match entry {
+    let read_entry = |(index, entry)| {
+        let value = match entry {
             Value::Table(entry) => read(entry),
-            found => (None, vec![Fault::new("", found, "a table")]),
+            found => Err(Fault::new("", found, "a table")),
         };
-        let entry_faults = entry_faults.into_iter();
-        faults.extend(entry_faults.map(|fault| fault.below(&format!("{key}[{index}]"))));
-        if let Some(value) = value {
-            values.push(value);
-            indices.push(index);
-        }
-    }
-    (values, indices)
+        value.map_err(|fault| fault.below(&format!("{key}[{index}]")))
+    };
+    entries.into_iter().enumerate().map(read_entry).collect()
 }
 
-/// Removes values that no key accepts: infinite numbers, NaN, and dates.
-fn remove_unacceptable(table: &mut Table, above: &str, faults: &mut Vec<Fault>) {
-    fn is_acceptable(key: &str, value: &mut Value, faults: &mut Vec<Fault>) -> bool {
+/// Rejects values that no key accepts: infinite numbers, NaN, and dates.
+fn check_numbers(table: &Table, above: &str) -> Result<(), Fault> {
+    fn check(key: &str, value: &Value) -> Result<(), Fault> {
         match value {
-            Value::Table(table) => remove_unacceptable(table, &format!("{key}."), faults),
-            Value::Array(list) => {
-                // Every element is visited, so that each one is named.
-                let mut is_list_acceptable = true;
-                for (index, value) in list.iter_mut().enumerate() {
-                    is_list_acceptable &= is_acceptable(&format!("{key}[{index}]"), value, faults);
-                }
-                return is_list_acceptable;
-            }
-            Value::Float(number) if number.is_finite() => {}
+            Value::Table(table) => check_numbers(table, &format!("{key}.")),
+            Value::Array(list) => list
+                .iter()
+                .enumerate()
+                .try_for_each(|(index, value)| check(&format!("{key}[{index}]"), value)),
+            Value::Float(number) if number.is_finite() => Ok(()),
             Value::Float(_) | Value::Datetime(_) => {
-                faults.push(Fault::new(key, value, "under any key finite numbers, and no dates"));
-                return false;
+                Err(Fault::new(key, value, "under any key finite numbers, and no dates"))
             }
-            _ => {}
+            _ => Ok(()),
         }
-        true
     }
-    table.retain(|key, value| is_acceptable(&format!("{above}{key}"), value, faults));
+    table.iter().try_for_each(|(key, value)| check(&format!("{above}{key}"), value))
 }
 
 /// Replaces keys of `table` by the keys of `replacements`, nested tables key by key.

@@ -1,10 +1,8 @@
-//! The JSON schema of specs, which editors complete and check them by, and the page of all keys.
-//!
-//! Both come from the declarations that also read and check the keys.
+//! The JSON schema of specs, which editors complete and check them by. It comes from the
+//! declarations that also read and check the keys.
 
 use super::{Contestant, Experiment, Labelled};
 use crate::contestant::EntryOptions;
-use bvh_config::Keys;
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde_json::{Map, Value, json};
@@ -132,114 +130,4 @@ fn described(text: &str) -> String {
         rest = target.map_or(after, |(_, after)| after);
     }
     plain + rest
-}
-
-/// Returns the page of all keys, in Markdown.
-pub fn page() -> String {
-    let schema = schema();
-    let mut page = "# Keys of specs\n\n\
-        Every key that a spec may have, as `harness schema` describes it to editors; generated from\n\
-        the declarations that read the keys by `UPDATE_DOCS=1 cargo test -p harness --test schema`.\n\
-        [How specs are written and run](EXPERIMENTS.md).\n"
-        .to_owned();
-    page += &section("## An experiment", &schema, &["methods", "reports", "quick"]);
-    let methods = entries(&schema, "methods");
-    let options: Map<String, Value> = properties(&methods[0])
-        .into_iter()
-        .filter(|(key, _)| EntryOptions::KEYS.contains(&key.as_str()))
-        .collect();
-    let description = "Further keys of an entry, next to `method`, its name.";
-    let options = json!({ "properties": options, "description": description });
-    page += &section("## Every entry of `methods`", &options, &[]);
-    for (tag, tables) in [("method", methods), ("kind", entries(&schema, "reports"))] {
-        for table in &tables {
-            let name = table["properties"][tag]["const"].as_str().unwrap_or_default();
-            let hidden = [EntryOptions::KEYS, &[tag]].concat();
-            page += &section(&format!("## `{tag} = \"{name}\"`"), table, &hidden);
-        }
-    }
-    page
-}
-
-/// Returns the tables that the list under `key` of an experiment may hold.
-fn entries(schema: &Value, key: &str) -> Vec<Value> {
-    let tables = schema["properties"][key]["items"]["oneOf"].as_array();
-    tables.cloned().unwrap_or_default()
-}
-
-fn section(heading: &str, table: &Value, hidden: &[&str]) -> String {
-    let description = text(table, "description");
-    let mut section = format!("\n{heading}\n\n{description}\n\n");
-    let mut rows = Vec::new();
-    keys_of(table, "", hidden, &mut rows);
-    if !rows.is_empty() {
-        section += "| key | value | default | meaning |\n|---|---|---|---|\n";
-        section += &rows.concat();
-    }
-    section
-}
-
-fn text<'a>(schema: &'a Value, key: &str) -> &'a str {
-    let text = schema.get(key).and_then(Value::as_str);
-    text.unwrap_or_default()
-}
-
-/// Adds a row for every key of a table, including the keys of nested tables.
-fn keys_of(table: &Value, above: &str, hidden: &[&str], rows: &mut Vec<String>) {
-    for (key, schema) in properties(table).iter().filter(|(key, _)| !hidden.contains(&key.as_str()))
-    {
-        // A long default would widen the table, and repeats the rows of its keys.
-        let default = schema.get("default").map(Value::to_string).filter(|text| text.len() <= 40);
-        let cells = [
-            format!("`{above}{key}`"),
-            format!("`{}`", value(schema)),
-            default.map_or_else(String::new, |text| format!("`{text}`")),
-            text(schema, "description").to_owned(),
-        ];
-        let cells = cells.map(|cell| cell.replace('|', "\\|"));
-        rows.push(format!("| {} |\n", cells.join(" | ")));
-        // Keys of nested tables, of elements of lists, and of alternatives have separate rows.
-        keys_of(schema, &format!("{above}{key}."), &[], rows);
-        keys_of(
-            schema.get("items").unwrap_or(&Value::Null),
-            &format!("{above}{key}[]."),
-            &[],
-            rows,
-        );
-        for (name, inner) in choices(schema).into_iter().flatten().flat_map(properties) {
-            keys_of(&inner, &format!("{above}{key}.{name}."), &[], rows);
-        }
-    }
-}
-
-/// Describes the values that a schema accepts, in the notation of TOML.
-fn value(schema: &Value) -> String {
-    if let Some(constant) = schema.get("const") {
-        return constant.to_string();
-    }
-    if let Some(constants) = schema.get("enum").and_then(Value::as_array) {
-        let words: Vec<String> = constants.iter().map(Value::to_string).collect();
-        return words.join(" or ");
-    }
-    if let Some(choices) = choices(schema) {
-        let words: Vec<String> = choices.iter().map(value).collect();
-        return words.join(" or ");
-    }
-    let values_of_names = schema.get("additionalProperties").filter(|values| values.is_object());
-    match schema.get("type").and_then(Value::as_str) {
-        Some("array") => format!("[{}, …]", value(schema.get("items").unwrap_or(&Value::Null))),
-        Some("object") => match (values_of_names, schema.get("required")) {
-            (Some(values), _) => format!("{{ NAME = {}, … }}", value(values)),
-            (None, None) => "{ … }".into(),
-            (None, Some(_)) => {
-                let fields: Vec<String> = properties(schema)
-                    .iter()
-                    .map(|(key, field)| format!("{key} = {}", value(field)))
-                    .collect();
-                format!("{{ {} }}", fields.join(", "))
-            }
-        },
-        Some(kind) => kind.into(),
-        None => "any".into(),
-    }
 }

@@ -186,103 +186,16 @@ fn naming_a_wrong_key_among_thousands_of_methods_is_fast() {
 }
 
 #[test]
-fn all_errors_of_a_file_are_reported_at_once_in_its_order_and_once_each() {
-    let text = "\
-question = ' '
-scenes = ['escher', 3]
-repetitions = 0
-sedd = 1
-seed = 1979-05-27
-budget = { max_work = 'x', max_wrok = 1 }
-rays = [{ count = 0, query = 'any' }, { family = 'curves', count = nan }]
-methods = [
-    { method = 'grasp', noise = 2.0, trials = 0, trails = 1, label = 3 },
-    { method = 'grep', noise = 2.0, label = 'a' },
-    7,
-    { method = 'annealing', label = 'a', hot = -1, cold = 0.2, move = { climb = 0 }, \
-judge = { count = 0 }, for_rays = 'camera' },
-    { method = 'best', work_per_object = 'x', label = 'c' },
-    { method = 'best', label = 'd', references = 99.0, keep = ['nothing'] },
-]
-[[reports]]
-kind = 'numbers'
-titel = 't'
-methods = ['a', 'b', 'e']
-targets = [{ of = 'bse', percent = 'x' }, { of = 'base', percent = -100 }]
-[[reports]]
-kind = 'pie'
-[[reports]]
-kind = 'anytime'
-methods = []
-at_seconds = [1, -1]
-file = '../x'
-";
-    let message = read(text).unwrap_err();
-    let reported: Vec<String> =
-        message.lines().map(|line| line_and_key(line).unwrap_or_else(|| line.into())).collect();
-    let expected = [
-        "1 question",
-        "2 scenes[1]",
-        "3 repetitions",
-        "4 sedd",
-        "5 seed",
-        "6 budget.max_work",
-        "6 budget.max_wrok",
-        "7 rays[0].count",
-        "7 rays[1].family",
-        "7 rays[1].count",
-        "9 methods[0].noise",
-        "9 methods[0].trials",
-        "9 methods[0].trails",
-        "9 methods[0].label",
-        "10 methods[1].method",
-        "11 methods[2]",
-        "12 methods[3].label",
-        "12 methods[3].hot",
-        "12 methods[3].move.climb",
-        "12 methods[3].judge",
-        "12 methods[3].judge.count",
-        "12 methods[3].for_rays",
-        "13 methods[4].work_per_object",
-        "14 methods[5].references",
-        "14 methods[5].keep[0]",
-        "18 reports[0].titel",
-        "20 reports[0].targets[0].of",
-        "20 reports[0].targets[0].percent",
-        "20 reports[0].targets[1].percent",
-        "22 reports[1].kind",
-        "25 reports[2].methods",
-        "26 reports[2].at_seconds",
-        "26 reports[2].at_seconds[1]",
-        "27 reports[2].file",
-    ];
-    assert_eq!(reported, expected, "{message}");
-}
-
-#[test]
-fn labels_are_checked_even_if_a_method_is_unknown() {
-    let text = "question = 'q'\nscenes = ['escher']\n\
-                [[methods]]\nmethod = 'grep'\n\
-                [[methods]]\nmethod = 'grasp'\n\
-                [[methods]]\nmethod = 'grasp'\n\
-                [[reports]]\nkind = 'numbers'\nmethods = ['grep', 'grasp', 'a', 'b']\n";
-    let message = read(text).unwrap_err();
-    let reported: Vec<String> = message.lines().filter_map(line_and_key).collect();
-    let expected = [
-        "4 methods[0].method",
-        "7 methods[2].label",
-        "11 reports[0].methods[2]",
-        "11 reports[0].methods[3]",
-    ];
-    assert_eq!(reported, expected);
-}
-
-/// Returns the line number and the key of one error in a message.
-fn line_and_key(error: &str) -> Option<String> {
-    let (_, error) = error.split_once("spec.toml: line ")?;
-    let (line, rest) = error.split_once(": ")?;
-    let key = rest.split([' ', ':']).next()?;
-    Some(format!("{line} {key}"))
+fn labels_are_unique_and_reports_name_labels_of_methods() {
+    let text = "question = 'q'\nscenes = ['escher']\n[[methods]]\nmethod = 'grasp'\n";
+    assert_rejected(
+        &format!("{text}[[methods]]\nmethod = 'grasp'\n"),
+        &["line 5: methods[1].label is \"grasp\" for the second time"],
+    );
+    assert_rejected(
+        &format!("{text}[[reports]]\nkind = 'numbers'\nmethods = ['grasp', 'a']\n"),
+        &["line 7: reports[0].methods[1] is \"a\"", "accepted: grasp"],
+    );
 }
 
 #[test]

@@ -187,8 +187,7 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     };
     let broken = cells_with(Class::Broken);
     let worst = rows.iter().filter_map(|row| row.relative_error).fold(0.0, f64::max);
-    let mut output = Output::new("", HEADING);
-    output.reading = format!(
+    let title = format!(
         "{} cells: {} as promised, {} with the error promised, {} broken. Largest error of a cost: \
          {worst:.1e}.",
         rows.len(),
@@ -196,6 +195,7 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
         cells_with(Class::Refused).len(),
         broken.len(),
     );
+    let mut output = Output::new(HEADING, &title);
     if !broken.is_empty() {
         output.show("Broken promises:", &broken, "scene method outcome note")?;
     }

@@ -99,7 +99,7 @@ fn a_second_harness_on_the_same_folder_is_rejected_and_disturbs_nothing() {
     fs::write(folder.path().join("long.toml"), long).unwrap();
     let first = Killed(command(folder.path(), &["long.toml"]).spawn().unwrap());
     wait_for(&folder.path().join("results/long/.partial/000000"));
-    for more in [&[][..], &["--resume"], &["--seed=3"], &["--shard=1/2"]] {
+    for more in [&[][..], &["--resume"], &["--seed=3"]] {
         let args = [&["long.toml"], more].concat();
         refused(folder.path(), &args, 1, &["results/long is in use by another harness", "--out"]);
     }

@@ -1,30 +1,29 @@
 //! Runs that several processes share, and the merge of their results.
 
-use crate::support::{TABLE, folder_with, refused, reproducible, said};
+use crate::support::{TABLE, folder_with, part, refused, reproducible, said};
 use std::fs;
 
 #[test]
 fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_differs_is_named() {
     let folder = folder_with("spec.toml", TABLE);
-    let part = |number: &str, out: &str| {
-        said(folder.path(), &["spec.toml", "--shard", number, "--out", out]);
-    };
+    let part =
+        |number: usize, out: &str| part(folder.path(), "spec.toml", number, 3, &["--out", out]);
     let refused = |args: &[&str], code: i32, parts: &[&str]| {
         refused(folder.path(), args, code, parts);
         assert!(!folder.path().join("merged").exists());
     };
     said(folder.path(), &["spec.toml", "--out", "whole"]);
-    part("1/3", "one");
-    part("3/3", "three");
+    part(0, "one");
+    part(2, "three");
     let missing = ["spec: 6 of 18 runs are missing", "scene escher, method greedy, repetition 1"];
     refused(&["merge", "one", "three", "--out", "merged"], 1, &missing);
-    refused(&["merge", "one", "whole", "--out", "merged"], 2, &["whole", "--shard"]);
+    refused(&["merge", "one", "whole", "--out", "merged"], 2, &["whole", "--run"]);
     refused(&["merge", "one", "nowhere", "--out", "merged"], 1, &["nowhere"]);
 
     // Two parts may hold the same run, as long as its results agree.
-    part("2/3", "two");
+    part(1, "two");
     // The second copy of the same part stands for a machine that was started twice.
-    part("2/3", "again");
+    part(1, "again");
     let folders = ["merge", "one", "two", "three", "again", "--out"];
     said(folder.path(), &[&folders[..], &["merged"]].concat());
     let whole = reproducible(&folder.path().join("whole/spec"));
@@ -40,7 +39,9 @@ fn parts_made_apart_are_merged_to_the_bytes_of_one_run_and_what_is_missing_or_di
     fs::write(&kept, fs::read_to_string(&kept).unwrap().replace("escher", "esther")).unwrap();
     let differs = ["again/spec/.partial/000001", "runs.csv is damaged"];
     refused(&[&folders[..], &["merged"]].concat(), 1, &differs);
-    said(folder.path(), &["spec.toml", "--seed", "9", "--shard", "2/3", "--out", "two", "--force"]);
+    let other = said(folder.path(), &["jobs", "spec.toml", "--seed", "9"]);
+    let run = other.split(' ').next().unwrap();
+    said(folder.path(), &["spec.toml", "--seed=9", "--run", run, "--out", "two", "--force"]);
     refused(&["merge", "one", "two", "three", "--out", "merged"], 1, &["different specs"]);
     refused(&["merge", "one", "--out", "one"], 2, &["--out one"]);
 

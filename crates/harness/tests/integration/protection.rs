@@ -5,8 +5,8 @@
 #![cfg_attr(windows, allow(unused_imports))]
 
 use crate::support::{
-    ended, folder_with, names, outside_buffer, outside_scene, program, reproducible, run, said,
-    text,
+    ended, folder_with, names, of_part, outside_buffer, outside_scene, part, program, reproducible,
+    run, said, text,
 };
 use std::fs;
 use std::path::Path;
@@ -71,8 +71,9 @@ fn finished_results_are_replaced_by_force_only() {
     assert!(repeated.contains("results/spec is kept and has the same rows"), "{repeated}");
     assert!(reproducible(&dir.join("results/spec.new")) == first);
     // Other runs are rejected.
-    for other in [&["--scene=spheres750"][..], &["--seed=2"], &["--shard=1/2"]] {
-        refused(dir, &[&["spec.toml"], other].concat(), &["results/spec", "--force", "--out"]);
+    let part = of_part(dir, "spec.toml", 0, 1000);
+    for other in ["--scene=spheres750", "--seed=2", part[0].as_str()] {
+        refused(dir, &["spec.toml", other], &["results/spec", "--force", "--out"]);
     }
     assert!(reproducible(&results) == first);
     assert!(fs::read(results.join("timing.csv")).unwrap() == first_timing);
@@ -140,7 +141,7 @@ fn kept_runs(results: &Path) -> Vec<String> {
 fn the_finished_runs_of_an_interrupted_experiment_are_discarded_by_force_only() {
     let folder = folder("spec.toml");
     let dir = folder.path();
-    said(dir, &["spec.toml", "--shard=1/2"]);
+    part(dir, "spec.toml", 0, 2, &[]);
     refused(dir, &["spec.toml"], &["finished runs", "--resume", "--force"]);
     assert!(!kept_runs(&dir.join("results/spec")).is_empty());
     said(dir, &["spec.toml", "--resume"]);
@@ -154,8 +155,8 @@ fn a_damaged_finished_run_is_named_and_repeated_or_rejected() {
     let dir = folder.path();
     said(dir, &["spec.toml", "--out=whole"]);
     let whole = reproducible(&dir.join("whole/spec"));
-    said(dir, &["spec.toml", "--shard=1/2", "--out=one"]);
-    said(dir, &["spec.toml", "--shard=2/2", "--out=two"]);
+    part(dir, "spec.toml", 0, 2, &["--out=one"]);
+    part(dir, "spec.toml", 1, 2, &["--out=two"]);
     let kept = kept_runs(&dir.join("one/spec"));
     let damaged = kept.last().unwrap();
     // The unit tests of the store try all kinds of damage.

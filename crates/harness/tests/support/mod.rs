@@ -44,6 +44,21 @@ scenes = ['escher']
 repetitions = 1
 ";
 
+/// Performs every `of`-th run that the harness lists for a spec, from the `number`-th on, as one
+/// of several processes would.
+pub fn part(dir: &Path, spec: &str, number: usize, of: usize, more: &[&str]) {
+    let part = of_part(dir, spec, number, of);
+    let part = part.iter().map(String::as_str);
+    said(dir, &[spec].into_iter().chain(part).chain(more.iter().copied()).collect::<Vec<_>>());
+}
+
+/// The arguments that select this part.
+pub fn of_part(dir: &Path, spec: &str, number: usize, of: usize) -> Vec<String> {
+    let list = said(dir, &["jobs", spec]);
+    let ids = list.lines().filter_map(|line| line.split(' ').next());
+    ids.skip(number).step_by(of).map(|id| format!("--run={id}")).collect()
+}
+
 /// The committed specs, each with its name and text, in the order of their names.
 pub fn experiments() -> Vec<(String, String)> {
     let folder = top().join("experiments");
