@@ -24,7 +24,7 @@ fn the_page_of_all_results_begins_with_the_paper_and_leads_to_files_that_are_the
         for part in ["best of 5, cost over base", "Do results survive?", "Is 1 &lt; 2?"] {
             assert!(first.contains(part), "{part}: {first}");
         }
-        assert_eq!(between(sections, "<details>", "</details>").len(), 2);
+        assert_eq!(between(sections, "<details>", "</details>").len(), 3);
         let at = folder.path().join(out);
         let links = between(&page, " href=\"", "\"");
         for link in links.iter().chain(&between(&page, " src=\"", "\"")) {
