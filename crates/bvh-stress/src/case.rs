@@ -1,9 +1,21 @@
-//! Cases of the suite: stiff scenes, checks of methods, and checks of other parts of the program.
+//! Cases of the suite, and their checks of one method, traversal or other part: a row of the
+//! suite's table.
 
-use crate::promise::Verdict;
-use bvh_core::{Aabb, Triangle};
+use crate::methods::{EXACT_OBJECTS, is_builder};
+use crate::transform::scale_range;
+use crate::{Verdict, examine, tracing};
+use anyhow::{Result, anyhow, ensure};
+use bvh_core::{Aabb, Primitives, Triangle};
 use bvh_scenes::builtin::stiff;
 use bvh_search::{Method, Outcome};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Instant;
+
+/// The maximum number of objects of a scene that is built again for other numbers of threads and at
+/// other scales.
+const REPEATED: usize = 20_000;
 
 /// One case.
 #[derive(Debug)]
@@ -12,72 +24,28 @@ pub struct Case {
     pub id: &'static str,
     /// A short description.
     pub name: &'static str,
-    /// How the promises are checked; at least one way.
+    /// Numbers of objects by [`Size`], if every method builds the scene of the case, and every
+    /// traversal traces it.
+    pub sizes: Option<[usize; 3]>,
+    /// What else the case promises.
     pub checks: &'static [Check],
 }
 
-/// One way to check.
+/// One check of a case.
 #[derive(Debug)]
 pub enum Check {
-    /// Every method builds the scene of the case, every traversal traces it.
-    Scene(SceneCase),
-    /// Every method rejects these boxes and names the object.
-    Refused {
-        /// Makes this many boxes.
-        boxes: fn(usize) -> Vec<Aabb>,
-        /// Index of the object that the error names.
-        object: usize,
-    },
-    /// A check of the method with this name, or of all methods.
-    Method(Option<&'static str>, fn(&Method) -> Verdict),
-    /// A check of another part of the program.
-    Part(Part, fn() -> Verdict),
+    /// A further promise about the outcome of every method on the scene.
+    Outcome(fn(&Method, &[Aabb], &Outcome) -> Verdict),
+    /// Every method rejects that many boxes of this kind, and names [`Case::BAD`].
+    Refused(fn(usize) -> Vec<Aabb>),
+    /// A check of the method with this name, or of all methods if it is empty.
+    Method(&'static str, fn(&Method) -> Verdict),
+    /// A check of another part of the program, of this name.
+    Part(&'static str, fn() -> Verdict),
 }
-
-/// A part of the program that is neither a method nor a traversal.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// Rays and their ranges.
-    Rays,
-    /// The reader of OBJ files.
-    ObjFiles,
-    /// The reader of tree files.
-    TreeFiles,
-    /// Costs that are updated while a tree changes.
-    Costs,
-}
-
-impl Part {
-    /// All parts, in the order of the tables.
-    pub const ALL: [Self; 4] = [Self::Rays, Self::ObjFiles, Self::TreeFiles, Self::Costs];
-
-    /// The part's name in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Rays => "rays",
-            Self::ObjFiles => "OBJ files",
-            Self::TreeFiles => "tree files",
-            Self::Costs => "costs",
-        }
-    }
-}
-
-/// The scene of a case.
-#[derive(Debug)]
-pub struct SceneCase {
-    /// Numbers of objects by [`Size`].
-    pub sizes: [usize; 3],
-    /// A further promise about this scene.
-    pub also: Option<Also>,
-}
-
-/// A promise about one method's outcome on one scene.
-pub type Also = fn(&Method, &[Aabb], &Outcome) -> Verdict;
 
 /// The size of a scene.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Size {
     /// For every method and every ray.
@@ -87,30 +55,6 @@ pub enum Size {
     /// For builders, at the full size of the case.
     All,
 }
-
-impl Case {
-    /// The case's scene, if it has one.
-    pub fn scene(&self) -> Option<&SceneCase> {
-        self.checks.iter().find_map(|check| match check {
-            Check::Scene(scene) => Some(scene),
-            _ => None,
-        })
-    }
-
-    /// Returns the case's scene with this number of triangles; none if the case has no scene.
-    pub fn triangles(&self, objects: usize) -> Vec<Triangle> {
-        stiff::by_id(self.id).map_or_else(Vec::new, |triangles| triangles(objects))
-    }
-}
-
-/// Returns true if the method is a builder: one evaluation, no search.
-pub fn is_builder(method: &Method) -> bool {
-    use Method::{Agglomerative, GoldsmithSalmon, MedianCut, MullerFellner};
-    matches!(method, MullerFellner(_) | MedianCut(_) | GoldsmithSalmon(_) | Agglomerative(_))
-}
-
-/// The number of objects for which the exact optimum is computed.
-pub const EXACT_OBJECTS: usize = 12;
 
 /// The amount of work for the methods on every scene.
 #[derive(Clone, Copy, Debug)]
@@ -124,9 +68,7 @@ pub struct Effort {
 }
 
 /// Scenes for searches beyond those of few objects.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LargerScenes {
     /// Objects per scene; less where [`Size::Many`] is less.
@@ -135,54 +77,185 @@ pub struct LargerScenes {
     pub work_per_object: u64,
 }
 
-impl SceneCase {
-    /// Returns the numbers of objects for a method, each with its work per object, in ascending
-    /// order. The exact optimum gets at most [`EXACT_OBJECTS`].
-    pub fn extents(&self, method: &Method, effort: &Effort) -> Vec<(usize, u64)> {
-        let few = (self.sizes[Size::Few as usize], effort.work_per_object);
-        // Builders are fast enough for many objects; searches get them only on request.
-        let further = match method {
-            // The exact optimum takes exponential time.
-            Method::Exact(_) => return vec![(few.0.min(EXACT_OBJECTS), few.1)],
-            builder if is_builder(builder) => Some((self.sizes[effort.builders as usize], few.1)),
-            _ => effort.larger.map(|larger| {
-                (larger.objects.min(self.sizes[Size::Many as usize]), larger.work_per_object)
+/// How a case ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Class {
+    /// All promises are kept.
+    #[default]
+    #[serde(rename = "as promised")]
+    Kept,
+    /// The input is rejected with a typed error that names the object, as promised.
+    #[serde(rename = "error, as promised")]
+    Refused,
+    /// A promise is broken.
+    #[serde(rename = "promise broken")]
+    Broken,
+}
+
+/// The outcome of one case for one method, traversal or part.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Cell {
+    /// The case.
+    pub scene: String,
+    /// The method, traversal or part.
+    pub method: String,
+    /// The outcome.
+    pub outcome: Class,
+    /// Number of objects; 0 if nothing is built.
+    pub objects: usize,
+    /// Edges from the root to the deepest leaf.
+    pub depth: Option<usize>,
+    /// Internal area, world units squared.
+    pub cost: Option<f64>,
+    /// The cost's relative error against exact arithmetic.
+    pub relative_error: Option<f64>,
+    /// Further findings, the error, or the broken promise.
+    pub note: String,
+    /// The method's wall time.
+    #[serde(skip)]
+    pub seconds: f64,
+}
+
+impl Case {
+    /// The object that is damaged where every method rejects the scene.
+    pub const BAD: usize = 7;
+
+    /// Returns the case's scene with this number of triangles; none if the case has no scene.
+    pub fn triangles(&self, objects: usize) -> Vec<Triangle> {
+        stiff::by_id(self.id).map_or_else(Vec::new, |triangles| triangles(objects))
+    }
+
+    /// Performs all checks of a method; `None` if there are none. The numbers are those of the
+    /// largest scene.
+    pub fn of_method(&self, label: &str, method: &Method, effort: &Effort) -> Option<Cell> {
+        self.cell(label, |cell| {
+            let extents = self.sizes.map(|sizes| extents(sizes, method, effort));
+            for &(objects, work) in extents.iter().flatten() {
+                examine(self, method, objects, work, cell)?;
+            }
+            let mut is_checked = extents.is_some();
+            for check in self.checks {
+                match check {
+                    Check::Refused(boxes) => {
+                        cell.outcome = Class::Refused;
+                        // The exact method rejects larger scenes for their size first.
+                        let objects =
+                            if let Method::Exact(_) = method { EXACT_OBJECTS } else { 100 };
+                        cell.note = examine::refuses(method, &boxes(objects), Self::BAD)?;
+                    }
+                    Check::Method(name, check) if ["", method.name()].contains(name) => {
+                        cell.note = format!("{} {}", cell.note, check(method)?).trim().to_owned();
+                    }
+                    _ => continue,
+                }
+                is_checked = true;
+            }
+            Ok(is_checked)
+        })
+    }
+
+    /// Checks a traversal's answers to the scene's rays; `None` if there is no scene.
+    pub fn of_traversal(
+        &self,
+        name: &str,
+        traversal: tracing::Traversal,
+        rays: usize,
+    ) -> Option<Cell> {
+        let triangles = self.triangles(self.sizes?[Size::Few as usize]);
+        self.cell(name, |cell| {
+            let rays = tracing::rays(&triangles, rays, 1);
+            cell.note = tracing::check(traversal, &Primitives::Triangles(triangles), &rays)?;
+            Ok(true)
+        })
+    }
+
+    /// Performs the checks of another part of the program, one of them for each part.
+    pub fn of_parts(&self) -> impl Iterator<Item = Cell> {
+        self.checks.iter().filter_map(|check| match check {
+            Check::Part(name, check) => self.cell(name, |cell| {
+                cell.note = check()?;
+                Ok(true)
             }),
-        };
-        [few].into_iter().chain(further.filter(|further| further.0 > few.0)).collect()
+            _ => None,
+        })
+    }
+
+    /// Fills a cell by checks, or with the promise that they find broken. A panic breaks one.
+    /// `None` if the checks say that there was nothing to check.
+    fn cell(&self, method: &str, checks: impl FnOnce(&mut Cell) -> Result<bool>) -> Option<Cell> {
+        let scene = format!("{} {}", self.id, self.name);
+        let bare = Cell { scene, method: method.to_owned(), ..Default::default() };
+        let mut cell = bare.clone();
+        // Nothing that the checks borrow is used after a panic.
+        let checked =
+            catch_unwind(AssertUnwindSafe(|| checks(&mut cell))).unwrap_or_else(|panic| {
+                let text = panic.downcast_ref::<String>().map(String::as_str);
+                let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+                Err(anyhow!("P1: panicked: {}", text.unwrap_or_default()))
+            });
+        match checked {
+            Ok(is_checked) => is_checked.then_some(cell),
+            Err(broken) => {
+                Some(Cell { outcome: Class::Broken, note: format!("{broken:#}"), ..bare })
+            }
+        }
     }
 }
 
-/// Returns every method of the registry and every variant of the builders, with labels.
-pub fn methods() -> Vec<(String, Method)> {
-    use bvh_build::{goldsmith_salmon, median_cut, muller_fellner, ploc, top_down::AreaOnly};
-    use goldsmith_salmon::Descent;
-    use muller_fellner::Heuristic;
-    let mut methods: Vec<(String, Method)> =
-        Method::all().into_iter().map(|method| (method.name().to_owned(), method)).collect();
-    let readings = [
-        AreaOnly::Sum,
-        AreaOnly::InnerSum,
-        AreaOnly::Max,
-        AreaOnly::SumOfSquares,
-        AreaOnly::Difference,
-        AreaOnly::Product,
-    ];
-    for heuristic in
-        readings.map(Heuristic::AreaOnly).into_iter().chain([Heuristic::AreaTimesPower(0.9)])
-    {
-        let config = muller_fellner::Config { heuristic, ..Default::default() };
-        methods.push((format!("muller_fellner, {heuristic:?}"), Method::MullerFellner(config)));
+/// Returns the numbers of objects for a method, each with its work per object, in ascending order.
+/// The exact optimum gets at most [`EXACT_OBJECTS`].
+fn extents(sizes: [usize; 3], method: &Method, effort: &Effort) -> Vec<(usize, u64)> {
+    let few = (sizes[Size::Few as usize], effort.work_per_object);
+    // Builders are fast enough for many objects; searches get them only on request.
+    let further = match method {
+        // The exact optimum takes exponential time.
+        Method::Exact(_) => return vec![(few.0.min(EXACT_OBJECTS), few.1)],
+        builder if is_builder(builder) => Some((sizes[effort.builders as usize], few.1)),
+        _ => effort
+            .larger
+            .map(|larger| (larger.objects.min(sizes[Size::Many as usize]), larger.work_per_object)),
+    };
+    [few].into_iter().chain(further.filter(|further| further.0 > few.0)).collect()
+}
+
+/// Checks P1, P2 and P4 to P7 for a method on the scene of a case with this number of objects, and
+/// what the case promises beyond them. Writes the findings to `cell`.
+fn examine(
+    case: &Case,
+    method: &Method,
+    objects: usize,
+    work_per_object: u64,
+    cell: &mut Cell,
+) -> Result<()> {
+    let boxes = stiff::boxes(&case.triangles(objects));
+    let start = Instant::now();
+    let outcome = examine::run(method, &boxes, work_per_object)?;
+    cell.seconds = start.elapsed().as_secs_f64();
+    cell.objects = boxes.len();
+    cell.depth = Some(outcome.tree.depth());
+    cell.cost = Some(outcome.cost);
+    cell.relative_error = Some(examine::check_outcome(&boxes, &outcome)?);
+    // Repetitions take several times as long, so large scenes are built once.
+    if boxes.len() <= REPEATED {
+        for threads in [1, 3] {
+            let other =
+                examine::on_threads(threads, || examine::run(method, &boxes, work_per_object))??;
+            let same = (&other.tree, &other.history) == (&outcome.tree, &outcome.history);
+            ensure!(same, "P4: another outcome on {threads} threads");
+        }
+        let range = scale_range(&boxes);
+        let low = *range.start().max(&-120);
+        let high = *range.end().min(&120);
+        // The ends of the range are where exponents overflow; two scales in between cover the rest.
+        for k in [low, low / 7, high / 7, high] {
+            examine::check_scale(method, &boxes, work_per_object, &outcome, k)?;
+        }
     }
-    let longest = median_cut::Config { axis: median_cut::CutAxis::Longest, ..Default::default() };
-    methods.push(("median_cut, longest".into(), Method::MedianCut(longest)));
-    for (descent, pair_inner) in
-        [(Descent::Cost, true), (Descent::Area, false), (Descent::Area, true)]
-    {
-        let config = goldsmith_salmon::Config { descent, pair_inner };
-        methods.push((format!("goldsmith_salmon, {config:?}"), Method::GoldsmithSalmon(config)));
+    cell.note.clear();
+    for check in case.checks {
+        if let Check::Outcome(check) = check {
+            cell.note = check(method, &boxes, &outcome)?;
+        }
     }
-    let narrow = ploc::Config { radius: 1, ..Default::default() };
-    methods.push(("agglomerative, radius 1".into(), Method::Agglomerative(narrow)));
-    methods
+    Ok(())
 }

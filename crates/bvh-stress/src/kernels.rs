@@ -1,9 +1,9 @@
 //! Compares every kernel of the wide layout, ray by ray and in batches with both hints, with
 //! testing every triangle; and makes rays where rounding decides.
 
-use crate::exact_distance::is_rounded_distance;
-use crate::promise::{Broken, ensure};
+use crate::exact::is_rounded_distance;
 use crate::tracing::{self, bits, wide_layouts};
+use anyhow::{Context, Result, ensure};
 use bvh_core::{Coherence, Distances, Hit, Primitives, Ray, RayComponents, Triangle, WideBvh};
 use bvh_scenes::trace::{Accelerator, Structure};
 use bvh_search::Stream;
@@ -18,7 +18,7 @@ const LENGTHS: [usize; 12] = [1, 3, 16, 15, 17, 33, 7, 23, 25, 65, 257, 1023];
 /// Checks that the distances of testing every triangle are the real ones, rounded once, and P3, bit
 /// by bit, for the layouts of two trees and every kernel of this processor. Returns the number of
 /// rays that hit.
-pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
+pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize> {
     let objects = Primitives::Triangles(triangles.to_vec());
     let brute_force = Accelerator::new(&objects, Structure::Brute);
     let expected: Vec<_> = rays.iter().map(|ray| brute_force.nearest_hit(ray)).collect();
@@ -26,14 +26,16 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
         if let Some(hit) = hit {
             let triangle = &triangles[hit.object as usize];
             let is_exact = is_rounded_distance(ray, triangle, hit.t);
-            ensure!(is_exact, P3: "{ray:?} gives {hit:?}, whose distance is another one");
+            ensure!(is_exact, "P3: {ray:?} gives {hit:?}, whose distance is another one");
         }
     }
-    for (kernel, wide) in wide_layouts(triangles).map_err(Broken::case)? {
+    for (kernel, wide) in wide_layouts(triangles)? {
         let nearest: Vec<_> = rays.iter().map(|ray| wide.nearest_hit(ray)).collect();
         let any: Vec<_> = rays.iter().map(|ray| wide.any_hit(ray)).collect();
-        compare(rays, &expected, &nearest, &any)
-            .map_err(|broken| broken.within(format!("{kernel:?}")))?;
+        let compared = |way: &str, nearest: &[Option<Hit>], any: &[bool]| {
+            compare(rays, &expected, nearest, any).with_context(|| format!("{kernel:?}, {way}"))
+        };
+        compared("ray by ray", &nearest, &any)?;
         for coherence in [Coherence::Coherent, Coherence::Incoherent] {
             let mut nearest = vec![Hit::MISS; rays.len()];
             let mut any = vec![false; rays.len()];
@@ -50,12 +52,9 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize, Broken> {
             }
             let nearest: Vec<_> =
                 nearest.iter().map(|hit| (!hit.is_miss()).then_some(*hit)).collect();
-            compare(rays, &expected, &nearest, &any)
-                .map_err(|broken| broken.within(format!("{kernel:?}, {coherence:?}")))?;
+            compared(&format!("{coherence:?}"), &nearest, &any)?;
             let (nearest, any) = by_component(&wide, rays, coherence);
-            compare(rays, &expected, &nearest, &any).map_err(|broken| {
-                broken.within(format!("{kernel:?}, {coherence:?}, by component"))
-            })?;
+            compared(&format!("{coherence:?}, by component"), &nearest, &any)?;
         }
     }
     Ok(expected.iter().flatten().count())
@@ -67,7 +66,7 @@ fn compare(
     expected: &[Option<Hit>],
     nearest: &[Option<Hit>],
     any: &[bool],
-) -> Result<(), Broken> {
+) -> Result<()> {
     for (index, ray) in rays.iter().enumerate() {
         let expected = expected[index];
         let nearest = nearest[index];
@@ -75,7 +74,7 @@ fn compare(
         let is_right = bits(nearest) == bits(expected) && any == expected.is_some();
         ensure!(
             is_right,
-            P3: "{ray:?} gives {nearest:?} and {any}, testing every triangle {expected:?}"
+            "P3: {ray:?} gives {nearest:?} and {any}, testing every triangle {expected:?}"
         );
     }
     Ok(())

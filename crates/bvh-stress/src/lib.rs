@@ -1,10 +1,19 @@
 //! Stiff and extreme cases S01 to S45 for builders, searches, traversals and readers of files, and
-//! checks of the promises that all of them keep.
+//! checks of the promises that all of them keep for every input:
 //!
-//! [`Promise`] lists the general promises, and [`CASES`] the cases, some of which promise more
-//! about their own scene. A [`Case`] is checked by [`Case::of_method`], [`Case::of_traversal`] and
-//! [`Case::of_part`]. The checks themselves work on any tree: [`examine::check_outcome`] on the
-//! outcome of a search, [`transform`] on scenes, [`kernels`] and [`tracing`] on rays.
+//! - **P1**: no panic, hang or abort, but a tree, or a typed error that names the object.
+//! - **P2**: containment is exact, bit by bit.
+//! - **P3**: no false miss: every traversal gives the answers of brute force.
+//! - **P4**: the same bytes for any number of threads.
+//! - **P5**: scaling by 2^k leaves the topology and multiplies areas by 4^k.
+//! - **P6**: depth is reported, and no stack overflows.
+//! - **P7**: every cost is finite and equals the tree's cost.
+//! - **P8**: every traversal tests at most twice as many boxes and objects as in real arithmetic.
+//!
+//! [`CASES`] lists the cases, some of which promise more about their own scene. A [`Case`] is
+//! checked by [`Case::of_method`], [`Case::of_traversal`] and [`Case::of_part`]. The checks
+//! themselves work on any tree: [`examine::check_outcome`] on the outcome of a search,
+//! [`transform`] on scenes, [`kernels`] and [`tracing`] on rays.
 //!
 //! ```
 //! use bvh_search::{Budget, Method, Problem, solve};
@@ -19,21 +28,19 @@
 //! ```
 
 mod case;
-mod cell;
 mod checks;
-pub mod exact_area;
-pub mod exact_distance;
+pub mod exact;
 pub mod examine;
 pub mod kernels;
-mod promise;
+mod methods;
 mod table;
 pub mod tracing;
 pub mod transform;
 
-pub use case::{
-    Also, Case, Check, EXACT_OBJECTS, Effort, LargerScenes, Part, SceneCase, Size, is_builder,
-    methods,
-};
-pub use cell::Cell;
-pub use promise::{Broken, Promise, Verdict};
+pub use case::{Case, Cell, Check, Class, Effort, LargerScenes, Size};
+pub use methods::{EXACT_OBJECTS, is_builder, methods};
 pub use table::{CASES, by_id, scenes};
+
+/// A note, or the broken promise: an error whose text begins with `P1: ` to `P8: ` if the promise
+/// is a general one.
+pub type Verdict = anyhow::Result<String>;

@@ -1,6 +1,7 @@
 //! Compares every traversal with testing every triangle, and makes difficult rays.
 
-use crate::promise::{Broken, Verdict, ensure};
+use crate::Verdict;
+use anyhow::{Result, bail, ensure};
 use bvh_build::{Builder, goldsmith_salmon, median_cut, muller_fellner};
 use bvh_core::{
     Aabb, Bvh, Hit, Kernel, Primitives, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants,
@@ -13,7 +14,7 @@ use rand::{RngExt, SeedableRng};
 use std::borrow::Cow;
 
 /// Prepares objects for rays in one or several ways, or returns the reason why it cannot.
-pub type Traversal = fn(&Primitives) -> Result<Vec<Accelerator<'_>>, String>;
+pub type Traversal = fn(&Primitives) -> Result<Vec<Accelerator<'_>>>;
 
 /// Every traversal by name. Adding a traversal takes one line.
 pub const TRAVERSALS: &[(&str, Traversal)] = &[
@@ -25,20 +26,18 @@ pub const TRAVERSALS: &[(&str, Traversal)] = &[
     ("wide, SIMD", |objects| over_wide_layouts(objects, Structure::Wide)),
     ("wide, portable", |objects| over_wide_layouts(objects, Structure::WidePortable)),
     ("KD-tree", |objects| {
-        let cells = kd_tree::Config::default()
-            .build(&objects.boxes())
-            .map_err(|error| error.to_string())?;
+        let cells = kd_tree::Config::default().build(&objects.boxes())?;
         Ok(vec![Accelerator::new(objects, Structure::KdTree(cells))])
     }),
 ];
 
-fn build(objects: &Primitives, builder: &dyn Builder) -> Result<Bvh, String> {
-    builder.build(&objects.boxes()).map_err(|error| error.to_string())
+fn build(objects: &Primitives, builder: &dyn Builder) -> Result<Bvh> {
+    Ok(builder.build(&objects.boxes())?)
 }
 
 /// Prepares trees with one object per leaf, with leaves merged by the surface area heuristic, and
 /// with a tenth of all objects in every leaf.
-fn over_binary_trees(objects: &Primitives) -> Result<Vec<Accelerator<'_>>, String> {
+fn over_binary_trees(objects: &Primitives) -> Result<Vec<Accelerator<'_>>> {
     let greedy = build(objects, &muller_fellner::Config::default())?;
     let merged = collapse_leaves(&greedy, &SahConstants::default());
     let tenths = median_cut::Config { leaf_fraction: 0.1, ..Default::default() };
@@ -49,9 +48,9 @@ fn over_binary_trees(objects: &Primitives) -> Result<Vec<Accelerator<'_>>, Strin
 fn over_wide_layouts(
     objects: &Primitives,
     structure: fn(WideBvh) -> Structure<'static>,
-) -> Result<Vec<Accelerator<'_>>, String> {
+) -> Result<Vec<Accelerator<'_>>> {
     let Primitives::Triangles(triangles) = objects else {
-        return Err("only triangles have a wide layout".into());
+        bail!("only triangles have a wide layout");
     };
     let layouts = wide_layouts(triangles)?.into_iter();
     Ok(layouts.map(|(_, wide)| Accelerator::new(objects, structure(wide))).collect())
@@ -59,14 +58,14 @@ fn over_wide_layouts(
 
 /// Lays out a binary tree and a tree with many children per node for every kernel of this
 /// processor.
-pub fn wide_layouts(triangles: &[Triangle]) -> Result<Vec<(Kernel, WideBvh)>, String> {
+pub fn wide_layouts(triangles: &[Triangle]) -> Result<Vec<(Kernel, WideBvh)>> {
     let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
     let builders: [&dyn Builder; 2] =
         [&muller_fellner::Config::default(), &goldsmith_salmon::Config::default()];
     let mut layouts = Vec::new();
     for builder in builders {
-        let tree = builder.build(&boxes).map_err(|error| error.to_string())?;
-        let wide = WideBvh::new(&tree, triangles).map_err(|error| error.to_string())?;
+        let tree = builder.build(&boxes)?;
+        let wide = WideBvh::new(&tree, triangles)?;
         for kernel in Kernel::ALL {
             // The processor may lack the kernel's instructions.
             if let Some(wide) = wide.clone().with_kernel(kernel) {
@@ -85,7 +84,7 @@ pub fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {
 /// Checks P3: for all rays the traversal gives the answers of testing every object, bit by bit. The
 /// note reports the number of hits.
 pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Verdict {
-    let accelerators = traversal(objects).map_err(Broken::case)?;
+    let accelerators = traversal(objects)?;
     let brute_force = Accelerator::new(objects, Structure::Brute);
     let mut hits = 0;
     for ray in rays {
@@ -95,7 +94,10 @@ pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Verdic
             let nearest = accelerator.nearest_hit(ray);
             let any = accelerator.any_hit(ray);
             let same = bits(nearest) == bits(expected) && any == expected.is_some();
-            ensure!(same, P3: "{ray:?} gives {nearest:?} and {any}, testing every object {expected:?}");
+            ensure!(
+                same,
+                "P3: {ray:?} gives {nearest:?} and {any}, testing every object {expected:?}"
+            );
         }
     }
     Ok(format!("{hits} of {} rays hit", rays.len()))

@@ -11,31 +11,21 @@ use glam::Vec3;
 /// corrected.
 pub fn tree_file(bytes: &[u8]) {
     let Some((&mode, bytes)) = bytes.split_first() else { return };
-    // Views need the alignment of a mapped file.
-    let mut held = vec![Line([0; 64]); bytes.len().div_ceil(64)];
-    for (line, part) in held.iter_mut().zip(bytes.chunks(64)) {
-        line.0[..part.len()].copy_from_slice(part);
+    // Views need the alignment of a mapped file, and a byte further on they have none.
+    let len = bytes.len();
+    let mut held = vec![0; len + 65];
+    let start = held.as_ptr().align_offset(64);
+    let file = &mut held[start..start + len];
+    file.copy_from_slice(bytes);
+    if mode & 1 == 1 && len >= Header::BYTES {
+        correct_header(file, mode & 2 == 2, mode & 4 == 4);
+        seal(file);
     }
-    let mut flat: Vec<u8> = held.iter().flat_map(|line| line.0).take(bytes.len()).collect();
-    if mode & 1 == 1 && flat.len() >= Header::BYTES {
-        correct_header(&mut flat, mode & 2 == 2, mode & 4 == 4);
-        seal(&mut flat);
-        for (line, part) in held.iter_mut().zip(flat.chunks(64)) {
-            line.0[..part.len()].copy_from_slice(part);
-        }
-    }
-    let lines = held.len();
-    let len = flat.len();
-    // SAFETY: `Line` is an array of 64 bytes without padding, so `lines` of them are `64 * lines`
-    // initialised bytes.
-    let aligned = unsafe { std::slice::from_raw_parts(held.as_ptr().cast::<u8>(), lines * 64) };
-    opened(&aligned[..len]);
-    let _ = TreeFile::open(&flat).map(|file| (file.view().is_ok(), file.tree().is_ok()));
+    opened(file);
+    held.copy_within(start..start + len, start + 1);
+    let moved = &held[start + 1..][..len];
+    let _ = TreeFile::open(moved).map(|file| (file.view().is_ok(), file.tree().is_ok()));
 }
-
-#[derive(Clone, Copy)]
-#[repr(align(64))]
-struct Line([u8; 64]);
 
 /// Gives a file the right magic bytes and, on request, visits, and as many objects as fit its
 /// length.

@@ -1,7 +1,7 @@
 //! Checks of the readers of OBJ files and tree files.
 
-use crate::promise::{Broken, Verdict, ensure};
-use crate::tracing;
+use crate::{Verdict, tracing};
+use anyhow::{bail, ensure};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, PreparedRay, Primitives, Triangle, file};
 use bvh_scenes::load::mesh::Mesh;
@@ -20,7 +20,7 @@ pub fn degenerate_are_counted() -> Verdict {
             .find(|t| t.is_degenerate() && t.intersect(&prepared, f32::MAX).is_some());
         ensure!(hit.is_none(), "{ray:?} hits {hit:?}");
     }
-    let mesh = read(&to_obj(&triangles)).map_err(Broken::case)?;
+    let mesh = read(&to_obj(&triangles))?;
     let counted = (mesh.triangles.len(), mesh.degenerate_triangles);
     ensure!(counted == (60, 30), "the reader counts {} of {}", counted.1, counted.0);
     Ok(format!("{degenerate} kept, none hit"))
@@ -43,7 +43,7 @@ fn read(text: &str) -> Result<Mesh, obj::ObjError> {
 
 /// Returns the message that rejects the text, which must name this line.
 fn refused_in_line(text: &str, line: usize) -> Verdict {
-    let Err(error) = read(text) else { return Err(Broken::case("the file is accepted")) };
+    let Err(error) = read(text) else { bail!("the file is accepted") };
     let message = error.to_string();
     ensure!(
         message.contains(&format!("scene.obj:{line}: ")),
@@ -66,8 +66,7 @@ pub fn infinity_in_a_file() -> Verdict {
 /// S35: unused vertices do not count, relative indices and polygons are resolved, files without
 /// faces are rejected.
 pub fn files_as_people_write_them() -> Verdict {
-    let mesh = read("v 9e9 0 0\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf -4 -3 -2 -1\n")
-        .map_err(Broken::case)?;
+    let mesh = read("v 9e9 0 0\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf -4 -3 -2 -1\n")?;
     ensure!((mesh.triangles.len(), mesh.unused_vertices) == (2, 1), "{mesh:?}");
     let boxes = Primitives::Triangles(mesh.triangles).boxes();
     let bounds = Aabb::union_of(&boxes);
@@ -84,8 +83,8 @@ pub fn files_as_people_write_them() -> Verdict {
 /// version, endianness or scene.
 pub fn damaged_tree_files() -> Verdict {
     let boxes = stiff::boxes(&stiff::uniform(12));
-    let tree = muller_fellner::Config::default().build(&boxes).map_err(Broken::case)?;
-    let whole = file::save(&tree, &boxes, &file::Origin::default()).map_err(Broken::case)?;
+    let tree = muller_fellner::Config::default().build(&boxes)?;
+    let whole = file::save(&tree, &boxes, &file::Origin::default())?;
     let is_rejected = |bytes: &[u8]| file::load(bytes, &boxes).is_err();
     ensure!(
         file::load(&whole, &boxes).ok() == Some(tree),

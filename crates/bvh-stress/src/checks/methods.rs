@@ -1,8 +1,9 @@
 //! Checks of methods without stiff scenes: scales, threads, budgets, extreme parameters.
 
-use crate::case::is_builder;
+use crate::Verdict;
 use crate::examine::{ROUNDING, check_outcome, check_scale, on_threads, run};
-use crate::promise::{Broken, Verdict, ensure};
+use crate::methods::is_builder;
+use anyhow::{Context, Result, ensure};
 use bvh_build::{Builder, goldsmith_salmon, muller_fellner};
 use bvh_core::{Aabb, cost};
 use bvh_scenes::builtin::stiff;
@@ -17,13 +18,8 @@ fn boxes(n: usize) -> Vec<Aabb> {
     stiff::boxes(&stiff::uniform(n))
 }
 
-fn solved(
-    search: &dyn Search,
-    boxes: &[Aabb],
-    seed: u64,
-    budget: Budget,
-) -> Result<Outcome, Broken> {
-    solve(search, &Problem::new(boxes), seed, budget, &()).map_err(Broken::case)
+fn solved(search: &dyn Search, boxes: &[Aabb], seed: u64, budget: Budget) -> Result<Outcome> {
+    Ok(solve(search, &Problem::new(boxes), seed, budget, &())?)
 }
 
 /// Returns five scenes for P5: uniform, flat, a line, many ties, and very different sizes.
@@ -57,7 +53,7 @@ pub fn scales(method: &Method) -> Verdict {
         // All scales are tried, because a fault of one exponent shows at that scale alone.
         for k in -120..=120 {
             check_scale(method, boxes, WORK, &outcome, k)
-                .map_err(|broken| broken.within(format!("scene {scene}")))?;
+                .with_context(|| format!("scene {scene}"))?;
         }
     }
     Ok("241 scales of 5 scenes".into())
@@ -70,11 +66,11 @@ pub fn threads_and_seeds(method: &Method) -> Verdict {
     for seed in [1, 2, 1 << 40] {
         let budget = Budget { max_evaluations: None, max_work: Some(20_000) };
         let on = |threads| on_threads(threads, || solved(method, &boxes, seed, budget));
-        let one = on(1)?;
+        let one = on(1)??;
         for threads in [1, 2, 3, 8] {
-            let other = on(threads)?;
+            let other = on(threads)??;
             let same = (&one.tree, &one.history) == (&other.tree, &other.history);
-            ensure!(same, P4: "seed {seed}: another outcome on {threads} threads");
+            ensure!(same, "P4: seed {seed}: another outcome on {threads} threads");
         }
     }
     Ok("4 numbers of threads, 3 seeds".into())
@@ -102,8 +98,7 @@ pub fn budgets_end(method: &Method) -> Verdict {
     let watchers: [(Budget, &dyn Observer); 4] =
         [(nothing, &()), (one, &()), (free, &Deadline(None)), (free, &soon)];
     for (budget, observer) in watchers {
-        let outcome =
-            solve(method, &Problem::new(&boxes), 1, budget, observer).map_err(Broken::case)?;
+        let outcome = solve(method, &Problem::new(&boxes), 1, budget, observer)?;
         check_outcome(&boxes, &outcome)?;
     }
     Ok(String::new())
@@ -148,7 +143,7 @@ pub fn genetic_edges(_: &Method) -> Verdict {
 /// than the number of candidates does no harm.
 pub fn grasp_edges(_: &Method) -> Verdict {
     let boxes = boxes(150);
-    let greedy = muller_fellner::Config::default().build(&boxes).map_err(Broken::case)?;
+    let greedy = muller_fellner::Config::default().build(&boxes)?;
     for (candidates, noise, equal) in [
         (Candidates::AxisBest, Some(0.0), true),
         (Candidates::KBest(5), Some(0.0), true),
@@ -185,12 +180,12 @@ pub fn insertion_keeps_its_cost() -> Verdict {
         [stiff::uniform, stiff::slivers, stiff::two_densities, stiff::enormous, stiff::denormal]
     {
         let boxes = stiff::boxes(&make(2000));
-        let scene = goldsmith_salmon::Scene::new(&boxes).map_err(Broken::case)?;
+        let scene = goldsmith_salmon::Scene::new(&boxes)?;
         let mut workspace = goldsmith_salmon::Workspace::default();
         let mut tree = Default::default();
         let order: Vec<u32> = (0..boxes.len() as u32).collect();
         let config = goldsmith_salmon::Config::default();
-        let kept = config.insert_all(&scene, &order, &mut workspace).map_err(Broken::case)?;
+        let kept = config.insert_all(&scene, &order, &mut workspace)?;
         workspace.write(&mut tree);
         let recomputed = cost::goldsmith_salmon(&tree);
         largest = largest.max((kept - recomputed).abs() / recomputed);

@@ -1,7 +1,7 @@
 //! Checks of rays, their ranges, and the estimator that traces random rays.
 
-use crate::promise::{Broken, Verdict, ensure};
-use crate::tracing;
+use crate::{Verdict, tracing};
+use anyhow::{Context, ensure};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Primitives, Ray, Triangle, validate};
 use bvh_scenes::builtin::stiff;
@@ -45,9 +45,9 @@ pub fn ranges_are_defined() -> Verdict {
         (2f32.next_up(), f32::INFINITY, false),
         (f32::INFINITY, f32::INFINITY, false),
     ] {
-        let ray = Ray::new(origin, Vec3::Z, t_min, t_max).map_err(Broken::case)?;
+        let ray = Ray::new(origin, Vec3::Z, t_min, t_max)?;
         for (name, traversal) in tracing::TRAVERSALS {
-            for accelerator in traversal(&triangle).map_err(Broken::case)? {
+            for accelerator in traversal(&triangle)? {
                 let nearest = accelerator.nearest_hit(&ray);
                 let any = accelerator.any_hit(&ray);
                 let agree = nearest.is_some() == expected && any == expected;
@@ -76,14 +76,12 @@ pub fn denormal_distances() -> Verdict {
             .filter(|ray| Accelerator::new(objects, Structure::Brute).any_hit(ray))
             .count();
         tracing::TRAVERSALS.iter().try_for_each(|(name, traversal)| {
-            tracing::check(*traversal, objects, rays)
-                .map(drop)
-                .map_err(|broken| broken.within(name))
+            tracing::check(*traversal, objects, rays).map(drop).context(*name)
         })
     };
     let facing =
         Triangle([[-1.0, -1.0, 1e-30], [3.0, -1.0, 1e-30], [-1.0, 3.0, 1e-30]].map(Vec3::from));
-    let ray = Ray::new(Vec3::ZERO, Vec3::Z * 1e20, 0.0, 0.0).map_err(Broken::case)?;
+    let ray = Ray::new(Vec3::ZERO, Vec3::Z * 1e20, 0.0, 0.0)?;
     check(&Primitives::Triangles(vec![facing]), &[ray])?;
     for k in [-100, -60, -40, -20] {
         let scale = 2f32.powi(k);
@@ -108,8 +106,8 @@ pub fn denormal_distances() -> Verdict {
 pub fn estimates_converge() -> Verdict {
     let primitives = Primitives::Triangles(stiff::uniform(500));
     let boxes = primitives.boxes();
-    let tree = muller_fellner::Config::default().build(&boxes).map_err(Broken::case)?;
-    validate(&tree, &boxes).map_err(Broken::case)?;
+    let tree = muller_fellner::Config::default().build(&boxes)?;
+    validate(&tree, &boxes)?;
     let measure = |count, seed| {
         let rays = RandomRays { family: Family::Inside, query: Query::Any, count };
         empirical_cost(&rays, &primitives, &tree, seed).boxes

@@ -1,8 +1,9 @@
 //! Checks of one method's outcome on the scene of a single case, beyond P1 to P7.
 
+use crate::Verdict;
 use crate::examine::{ROUNDING, run};
-use crate::promise::{Broken, Verdict, ensure};
 use crate::transform::{mirrored, same_topology, shuffled};
+use anyhow::{Result, ensure};
 use bvh_build::muller_fellner;
 use bvh_core::{Aabb, Bvh, cost};
 use bvh_scenes::builtin::stiff::STADIUM;
@@ -59,13 +60,13 @@ pub fn balanced(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
 
 /// S05: the tree is balanced as in S04, and its cost is 0.
 pub fn balanced_at_no_cost(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
-    ensure!(outcome.cost == 0.0, P7: "points cost {}", outcome.cost);
+    ensure!(outcome.cost == 0.0, "P7: points cost {}", outcome.cost);
     balanced(method, boxes, outcome)
 }
 
 /// S10: the cost is 0, and the top-down builders' trees have the least possible depth.
 pub fn shallow_at_no_cost(method: &Method, boxes: &[Aabb], outcome: &Outcome) -> Verdict {
-    ensure!(outcome.cost == 0.0, P7: "segments on a line cost {}", outcome.cost);
+    ensure!(outcome.cost == 0.0, "P7: segments on a line cost {}", outcome.cost);
     let depth = outcome.tree.depth();
     let least = levels(boxes.len());
     ensure!(!is_top_down(method) || depth == least, "depth {depth}, {least} would do");
@@ -165,7 +166,7 @@ pub fn order_does_not_matter(method: &Method, boxes: &[Aabb], outcome: &Outcome)
     if let Method::GoldsmithSalmon(_) = method {
         let costs = (0..ORDERS)
             .map(|seed| Ok(run(method, &shuffled(boxes, seed).0, 0)?.cost / outcome.cost));
-        let mut costs = costs.collect::<Result<Vec<f64>, Broken>>()?;
+        let mut costs = costs.collect::<Result<Vec<f64>>>()?;
         costs.sort_by(f64::total_cmp);
         let [low, high] =
             [costs.first(), costs.last()].map(|cost| cost.copied().unwrap_or(f64::NAN));

@@ -195,7 +195,7 @@ fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
         divided +=
             expected.iter().filter(|(_, tree)| tree.prim_ids.len() > triangles.len()).count();
         for threads in [1, 3] {
-            let others = examine::on_threads(threads, || Ok(trees(0))).unwrap();
+            let others = examine::on_threads(threads, || trees(0)).unwrap();
             assert!(others == expected, "{}: another tree on {threads} threads", case.id);
         }
         for k in [*range.start(), range.start() / 7, range.end() / 7, *range.end()] {

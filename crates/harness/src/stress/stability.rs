@@ -7,8 +7,7 @@ use crate::report::output::Output;
 use crate::rows::store::Store;
 use crate::rows::{read, to_bytes};
 use bvh_config::config;
-use bvh_stress::examine::Examined;
-use bvh_stress::{CASES, Case, Cell, Effort, LargerScenes, Part, Size, is_builder, tracing};
+use bvh_stress::{CASES, Case, Cell, Class, Effort, LargerScenes, Size, is_builder, tracing};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -25,37 +24,6 @@ config! {
         /// Rays per scene and traversal.
         rays: usize = 5000, in 1..=100_000_000;
     }
-}
-
-/// The outcome of a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-enum Class {
-    #[serde(rename = "as promised")]
-    Kept,
-    #[serde(rename = "error, as promised")]
-    Refused,
-    #[serde(rename = "promise broken")]
-    Broken,
-}
-
-/// One cell, as written to `cells.csv`.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-struct Row {
-    /// The case.
-    scene: String,
-    /// The method, traversal or part.
-    method: String,
-    /// The outcome.
-    outcome: Class,
-    /// Number of objects; 0 if nothing is built.
-    objects: usize,
-    depth: Option<usize>,
-    /// Internal area, world units squared.
-    cost: Option<f64>,
-    /// The cost's relative error against exact arithmetic.
-    relative_error: Option<f64>,
-    /// The error, or the broken promises.
-    note: String,
 }
 
 /// The time of a method on a case's scene, as written to `timing_cells.csv`.
@@ -75,45 +43,6 @@ struct Timing {
 /// The case whose memory is measured.
 const MEMORY: &str = "S36";
 
-impl Row {
-    /// Makes a row without numbers.
-    fn bare(case: &Case, method: &str, outcome: Class, note: String) -> Self {
-        Self {
-            scene: format!("{} {}", case.id, case.name),
-            method: method.into(),
-            outcome,
-            objects: 0,
-            depth: None,
-            cost: None,
-            relative_error: None,
-            note,
-        }
-    }
-
-    fn new(case: &Case, method: &str, cell: Cell) -> (Self, Option<Examined>) {
-        let examined = match cell {
-            Cell::Refused(error) => return (Self::bare(case, method, Class::Refused, error), None),
-            Cell::Broken(broken) => {
-                return (Self::bare(case, method, Class::Broken, broken.to_string()), None);
-            }
-            Cell::Kept(examined) => examined,
-        };
-        let row = Self::bare(case, method, Class::Kept, examined.note.clone());
-        // Checks that build nothing have no numbers.
-        if case.scene().is_none() || examined.seconds <= 0.0 {
-            return (row, None);
-        }
-        let row = Self {
-            objects: examined.objects,
-            depth: Some(examined.depth),
-            cost: Some(examined.cost),
-            relative_error: Some(examined.relative_error),
-            ..row
-        };
-        (row, Some(examined))
-    }
-}
-
 impl Config {
     /// Runs the cases (all if none are named) and writes rows and times.
     pub fn execute(
@@ -132,7 +61,7 @@ impl Config {
             work_per_object: self.work_per_object,
             larger: self.larger_searches,
         };
-        let mut rows = Vec::new();
+        let mut cells = Vec::new();
         let mut times = Vec::new();
         for (done, case) in cases.iter().enumerate() {
             if interrupted() {
@@ -141,36 +70,28 @@ impl Config {
             for Labelled { label, method, .. } in methods {
                 // Specs accept only methods of ours here.
                 let Contestant::Ours(method) = method else { continue };
-                let cell = case.of_method(method, &effort);
-                let Some((row, examined)) = cell.map(|cell| Row::new(case, label, cell)) else {
-                    continue;
-                };
-                times.extend(examined.map(|Examined { objects, seconds, .. }| {
-                    Timing {
-                        scene: row.scene.clone(),
+                let Some(cell) = case.of_method(label, method, &effort) else { continue };
+                if cell.seconds > 0.0 {
+                    let per_object = |total: f64| total / cell.objects.max(1) as f64;
+                    times.push(Timing {
+                        scene: cell.scene.clone(),
                         method: label.clone(),
-                        objects,
-                        seconds,
-                        nanoseconds_per_object: seconds * 1e9 / objects.max(1) as f64,
+                        objects: cell.objects,
+                        seconds: cell.seconds,
+                        nanoseconds_per_object: per_object(cell.seconds * 1e9),
                         peak_bytes_per_object: (case.id == MEMORY && is_builder(method))
-                            .then(|| child::peak_bytes(method, case.id, objects))
+                            .then(|| child::peak_bytes(method, case.id, cell.objects))
                             .flatten()
-                            .map(|bytes| bytes as f64 / objects.max(1) as f64),
-                    }
-                }));
-                rows.push(row);
+                            .map(|bytes| per_object(bytes as f64)),
+                    });
+                }
+                cells.push(cell);
             }
-            let traversals = tracing::TRAVERSALS.iter().filter_map(|(name, traversal)| {
-                Some(Row::new(case, name, case.of_traversal(*traversal, self.rays)?).0)
-            });
-            rows.extend(traversals);
-            rows.extend(
-                Part::ALL
-                    .iter()
-                    .filter_map(|&part| Some(Row::new(case, part.name(), case.of_part(part)?).0)),
-            );
+            let ways = tracing::TRAVERSALS.iter();
+            cells.extend(ways.filter_map(|(name, way)| case.of_traversal(name, *way, self.rays)));
+            cells.extend(case.of_parts());
         }
-        store.write("cells.csv", &to_bytes(&rows, Path::new("cells.csv"))?)?;
+        store.write("cells.csv", &to_bytes(&cells, Path::new("cells.csv"))?)?;
         store.write("timing_cells.csv", &to_bytes(&times, Path::new("timing_cells.csv"))?)?;
         Ok(output(store.folder())?.text())
     }
@@ -180,17 +101,15 @@ const HEADING: &str = "Stiff and extreme cases";
 
 /// Makes the summary and the table of broken promises from the CSV files in the folder.
 pub fn output(folder: &Path) -> Result<Output, Error> {
-    let rows: Vec<Row> = read(&folder.join("cells.csv"))?;
-    let cells_with = |outcome| {
-        let cells = rows.iter().filter(|row| row.outcome == outcome);
-        cells.collect::<Vec<&Row>>()
-    };
+    let cells: Vec<Cell> = read(&folder.join("cells.csv"))?;
+    let cells_with =
+        |outcome| cells.iter().filter(|cell| cell.outcome == outcome).collect::<Vec<&Cell>>();
     let broken = cells_with(Class::Broken);
-    let worst = rows.iter().filter_map(|row| row.relative_error).fold(0.0, f64::max);
+    let worst = cells.iter().filter_map(|cell| cell.relative_error).fold(0.0, f64::max);
     let title = format!(
         "{} cells: {} as promised, {} with the error promised, {} broken. Largest error of a cost: \
          {worst:.1e}.",
-        rows.len(),
+        cells.len(),
         cells_with(Class::Kept).len(),
         cells_with(Class::Refused).len(),
         broken.len(),
