@@ -52,6 +52,8 @@ pub use traverse::{
 };
 pub use triangle::{PreparedRay, Triangle};
 pub use validate::{InvalidBvh, validate, validate_references};
+#[doc(hidden)]
+pub use wide::NodeTest;
 pub use wide::{
     Closest, Coherence, Instance, InstanceHit, Instances, InvalidInstances, Kernel, RefitError,
     WideBvh,

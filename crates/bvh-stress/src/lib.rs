@@ -8,7 +8,8 @@
 //! - **P5**: scaling by 2^k leaves the topology and multiplies areas by 4^k.
 //! - **P6**: depth is reported, and no stack overflows.
 //! - **P7**: every cost is finite and equals the tree's cost.
-//! - **P8**: every traversal tests at most twice as many boxes and objects as in real arithmetic.
+//! - **P8**: every traversal tests at most twice as many boxes and objects as in real arithmetic,
+//!   except where boxes are smaller than 2⁻²⁰ of their distance from the ray's origin, as in S24.
 //!
 //! [`CASES`] lists the cases, some of which promise more about their own scene. A [`Case`] is
 //! checked by [`Case::of_method`], [`Case::of_traversal`] and [`Case::of_part`]. The checks

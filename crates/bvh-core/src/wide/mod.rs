@@ -35,6 +35,7 @@ mod prepared;
 mod ray_lanes;
 mod refit;
 mod source;
+mod tightness;
 mod traversal;
 mod triangles;
 // The kernels of the target, or none.
@@ -56,6 +57,8 @@ pub use layout::WideBvh;
 pub use nearest::Closest;
 pub(crate) use node::WideNode;
 pub use refit::RefitError;
+#[doc(hidden)]
+pub use tightness::NodeTest;
 pub(crate) use triangles::TriangleBlock;
 
 use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate_references};

@@ -5,6 +5,8 @@ use super::answer::Batch;
 use super::crossed_leaves::AllHits;
 use super::layout::WideBvh;
 use super::nearest::Closest;
+use super::node::WideNode;
+use super::tightness::NodeTest;
 use crate::{Coherence, Hit, Kernel, Ray};
 use alloc::vec::Vec;
 use glam::Vec3;
@@ -21,6 +23,11 @@ pub(super) unsafe fn one_ray<const ANY: bool>(
     _: impl FnMut(Hit) -> bool,
 ) -> Hit {
     Hit::MISS
+}
+
+/// Is never called.
+pub(super) unsafe fn entered(_: &WideBvh, _: &Ray, _: &WideNode, _: NodeTest) -> u32 {
+    0
 }
 
 /// Is never called.

@@ -11,6 +11,5 @@ mod query;
 mod ray_density;
 mod references;
 mod support;
-mod tightness;
 mod traversal;
 mod wide;

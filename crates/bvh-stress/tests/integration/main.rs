@@ -7,3 +7,4 @@ mod objectives;
 #[cfg(target_arch = "x86_64")]
 mod subnormals;
 mod suite;
+mod tightness;

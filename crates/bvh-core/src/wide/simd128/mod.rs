@@ -14,10 +14,12 @@ use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
 use super::nearest::Closest;
 use super::node::{Child, WideNode};
+use super::tightness::{Entered, NodeTest};
 use super::{all_in_flight, batch, closest_lanes, one_ray};
 use crate::{Coherence, Hit, Kernel, Ray};
 use alloc::vec::Vec;
 use core::cmp::Reverse;
+use core::marker::PhantomData;
 use glam::Vec3;
 use lanes::Singles;
 
@@ -58,6 +60,12 @@ pub(super) unsafe fn closest_points(
 ) {
     // SAFETY: the target has the instructions; the rest is the caller's promise.
     unsafe { closest_lanes::trace::<Simd128>(wide, points, closest) }
+}
+
+/// Returns a bit for each box of a node that the ray enters.
+pub(super) unsafe fn entered(wide: &WideBvh, ray: &Ray, node: &WideNode, test: NodeTest) -> u32 {
+    // SAFETY: the target has the instructions.
+    unsafe { Simd128::call(Entered { wide, ray, node, test, kernel: PhantomData::<Simd128> }) }
 }
 
 /// [`batch::trace`].

@@ -9,10 +9,14 @@ mod sort;
 use super::all_in_flight::Found;
 use super::answer::Batch;
 use super::crossed_leaves::AllHits;
+use super::instructions::Instructions;
 use super::layout::WideBvh;
 use super::nearest::Closest;
+use super::node::WideNode;
+use super::tightness::{Entered, NodeTest};
 use crate::{Coherence, Hit, Kernel, Ray};
 use alloc::vec::Vec;
+use core::marker::PhantomData;
 use glam::Vec3;
 
 /// Returns whether this processor can run a kernel.
@@ -58,6 +62,32 @@ pub(super) unsafe fn one_ray<const ANY: bool>(
         match wide.kernel {
             Kernel::Avx512 => avx512::one_ray::<ANY>(wide, ray, accept),
             _ => avx2::one_ray::<ANY>(wide, ray, accept),
+        }
+    }
+}
+
+/// Returns a bit for each box of a node that the ray enters, by a test of the layout's kernel.
+///
+/// # Safety
+/// The layout has a vector kernel, which the processor can run.
+pub(super) unsafe fn entered(wide: &WideBvh, ray: &Ray, node: &WideNode, test: NodeTest) -> u32 {
+    // SAFETY: the processor has the instructions.
+    unsafe {
+        match wide.kernel {
+            Kernel::Avx512 => avx512::Avx512::call(Entered {
+                wide,
+                ray,
+                node,
+                test,
+                kernel: PhantomData::<avx512::Avx512>,
+            }),
+            _ => avx2::Avx2::call(Entered {
+                wide,
+                ray,
+                node,
+                test,
+                kernel: PhantomData::<avx2::Avx2>,
+            }),
         }
     }
 }

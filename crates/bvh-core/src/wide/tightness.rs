@@ -1,0 +1,110 @@
+//! The number of tests by each test of boxes, for the promise that it is at most twice the number
+//! in real arithmetic.
+
+use super::box_ray::{BoxRay, BoxTest, FarBoxRay};
+use super::culling::Culling;
+use super::instructions::{Instructions, Part};
+use super::lanes::Lanes;
+use super::node::WideNode;
+use super::prepared::{Prepared, Ready};
+use super::ray_lanes::RayBounds;
+use super::source::lanes_of_rays;
+use super::{WideBvh, vector};
+use crate::{Aabb, Kernel, Ray, TestCounts};
+use alloc::vec;
+use core::marker::PhantomData;
+use core::mem::MaybeUninit;
+
+/// A test of the boxes of a node.
+#[doc(hidden)]
+#[derive(Clone, Copy)]
+pub enum NodeTest<'a> {
+    /// That of a vector kernel for a ray by itself.
+    Alone,
+    /// That of a vector kernel for rays in flight.
+    InFlight,
+    /// That of a vector kernel for a packet, here of equal rays.
+    Packet,
+    /// Any other.
+    Given(&'a dyn Fn(&Aabb) -> bool),
+}
+
+impl WideBvh {
+    /// Counts the tests of a traversal that finds no hit: all nodes whose boxes the ray enters
+    /// before its end, in any order.
+    ///
+    /// # Panics
+    /// If the kernel is the portable one, which counts its own tests, and the test is of another.
+    #[doc(hidden)]
+    pub fn tests_without_hits(&self, ray: &Ray, test: NodeTest) -> TestCounts {
+        let mut counts = TestCounts::default();
+        let mut open = vec![];
+        open.extend(self.root);
+        while let Some(child) = open.pop() {
+            if !child.is_node() {
+                let blocks = &self.blocks[child.index()..];
+                let others = blocks.iter().take_while(|block| !block.is_last()).count();
+                counts.objects += Self::OBJECTS_OF_BLOCK * (others as u64 + 1);
+                continue;
+            }
+            counts.boxes += Self::BOXES_OF_NODE;
+            let node = &self.nodes[child.index()];
+            let mask = self.entered(ray, node, test);
+            let lanes = (0..WideNode::LANES).filter(|lane| mask >> lane & 1 == 1);
+            open.extend(lanes.map(|lane| node.children[lane]));
+        }
+        counts
+    }
+
+    /// Returns a bit for each box of a node that the ray enters.
+    fn entered(&self, ray: &Ray, node: &WideNode, test: NodeTest) -> u32 {
+        if let NodeTest::Given(is_entered) = test {
+            let is_entered = |lane: &usize| node.lane_box(*lane).as_ref().is_some_and(is_entered);
+            return (0..WideNode::LANES).filter(is_entered).map(|lane| 1 << lane).sum();
+        }
+        assert!(self.kernel != Kernel::Portable, "the portable kernel counts its tests itself");
+        // SAFETY: `kernel` is available.
+        unsafe { vector::entered(self, ray, node, test) }
+    }
+}
+
+/// One of the tests of an instruction set.
+pub(super) struct Entered<'a, K> {
+    pub(super) wide: &'a WideBvh,
+    pub(super) ray: &'a Ray,
+    pub(super) node: &'a WideNode,
+    pub(super) test: NodeTest<'a>,
+    pub(super) kernel: PhantomData<K>,
+}
+
+impl<K: Instructions> Part for Entered<'_, K> {
+    type Output = u32;
+
+    #[inline(always)]
+    unsafe fn run(self) -> u32 {
+        let Self { wide, ray, node, test, .. } = self;
+        let t_max = ray.t_max();
+        let is_near = ray.begins_in(&wide.near);
+        let equal = [*ray; 16];
+        const { assert!(K::Rays::N <= 16) };
+        // SAFETY: the processor has the instructions, and there are as many rays as lanes.
+        unsafe {
+            let lanes = lanes_of_rays::<K::Rays>(&equal, 0);
+            match test {
+                // Packets are of rays that begin near the scene.
+                NodeTest::Packet if is_near => {
+                    let mut bounds = RayBounds::none();
+                    bounds.add(&lanes);
+                    Culling::new(&bounds, lanes.octant()).cull::<K>(node, t_max).1
+                }
+                NodeTest::InFlight => {
+                    let mut rays = [const { MaybeUninit::<Prepared>::zeroed() }; 16];
+                    Ready::new(lanes, wide).write(0, rays.as_mut_ptr().cast());
+                    rays[0].assume_init_ref().boxes::<K>(node, t_max).1
+                }
+                _ if is_near => BoxTest::<K>::boxes(&BoxRay::<K::Boxes>::new(ray), node, t_max).1,
+                _ => BoxTest::<K>::boxes(&FarBoxRay::new(ray), node, t_max).1,
+            }
+        }
+    }
+}
