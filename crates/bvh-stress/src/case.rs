@@ -11,7 +11,6 @@ use bvh_search::{Method, Outcome};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::Instant;
 
 /// The maximum number of objects of a scene that is built again for other numbers of threads and at
 /// other scales.
@@ -111,9 +110,6 @@ pub struct Cell {
     pub relative_error: Option<f64>,
     /// Further findings, the error, or the broken promise.
     pub note: String,
-    /// The method's wall time.
-    #[serde(skip)]
-    pub seconds: f64,
 }
 
 impl Case {
@@ -228,9 +224,7 @@ fn examine(
     cell: &mut Cell,
 ) -> Result<()> {
     let boxes = stiff::boxes(&case.triangles(objects));
-    let start = Instant::now();
     let outcome = examine::run(method, &boxes, work_per_object)?;
-    cell.seconds = start.elapsed().as_secs_f64();
     cell.objects = boxes.len();
     cell.depth = Some(outcome.tree.depth());
     cell.cost = Some(outcome.cost);

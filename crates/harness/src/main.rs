@@ -1,9 +1,8 @@
 //! The command line: parses the arguments, dispatches to a command, and sets the exit code.
 
 use clap::{Parser, Subcommand};
-use harness::cli::terminal::{self, INTERRUPTED, print_error, print_line};
+use harness::cli::terminal::{self, INTERRUPTED, print_error};
 use harness::cli::{compare, jobs, merge, new, report, run};
-use harness::{Error, stress::child};
 use std::process::ExitCode;
 
 /// Experiments on bounding volume hierarchies: TOML specs in, CSV files and figures out.
@@ -30,13 +29,6 @@ enum Command {
     New(new::NewArgs),
     /// Print the JSON schema of specs, which lets editors complete and check them.
     Schema,
-    /// Print the peak memory of one build of the suite, made in this process.
-    #[command(name = child::COMMAND, hide = true)]
-    SuiteChild {
-        method: String,
-        case: String,
-        objects: usize,
-    },
 }
 
 fn main() -> ExitCode {
@@ -53,9 +45,6 @@ fn main() -> ExitCode {
             new::schema();
             Ok(())
         }
-        Some(Command::SuiteChild { method, case, objects }) => child::main(&method, &case, objects)
-            .map(|answer| print_line(&answer))
-            .map_err(Error::Usage),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

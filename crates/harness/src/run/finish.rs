@@ -9,6 +9,7 @@ use crate::run::provenance::Provenance;
 use crate::run::reference::{self, BestKnown};
 use crate::run::resolved::{Resolved, read_toml, to_toml};
 use crate::spec::Experiment;
+use crate::stress;
 use bvh_scenes::files::read_text;
 use std::path::{Path, PathBuf};
 
@@ -76,7 +77,7 @@ fn report(
 /// Makes tables and figures from the CSV files in an experiment's folder. Writes nothing.
 pub fn outputs(experiment: &Experiment, folder: &Path) -> Result<Vec<Output>, Error> {
     match &experiment.suite {
-        Some(measure) => Ok(vec![measure.output(folder)?]),
+        Some(_) => Ok(vec![stress::output(folder)?]),
         None => report::outputs(&experiment.reports, folder),
     }
 }

@@ -15,11 +15,7 @@ impl Measurement for Suite<'_> {
 
     fn measure(&self, work: &mut Work) -> Result<String, Error> {
         let Work { experiment, store, watch, .. } = work;
-        match self.0 {
-            Measure::Stability(config) => {
-                config
-                    .execute(&experiment.scenes, &experiment.methods, store, &|| watch.cancelled())
-            }
-        }
+        let Measure { stability } = self.0;
+        stability.execute(&experiment.scenes, &experiment.methods, store, &|| watch.cancelled())
     }
 }

@@ -1,20 +1,29 @@
-//! The experiment `stability`: every case with every method, traversal and part, as rows.
+//! The measurement of the suite of stiff and extreme cases, which `bvh_stress` declares and checks.
+//!
+//! Only the commands and specs that run the suite know it.
 
-use super::child;
 use crate::Error;
 use crate::contestant::{Contestant, Labelled};
 use crate::report::output::Output;
 use crate::rows::store::Store;
 use crate::rows::{read, to_bytes};
-use bvh_config::config;
-use bvh_stress::{CASES, Case, Cell, Class, Effort, LargerScenes, Size, is_builder, tracing};
-use serde::{Deserialize, Serialize};
+use bvh_config::{Nested, config};
+use bvh_stress::{CASES, Case, Cell, Class, Effort, LargerScenes, Size, tracing};
 use std::path::Path;
 
 config! {
     serde;
+    /// A measurement over the suite, selected by a spec.
+    pub struct Measure {
+        /// Every case with every method, traversal and part.
+        stability: Stability, in Nested;
+    }
+}
+
+config! {
+    serde;
     /// Parameters of the measurement.
-    pub struct Config {
+    pub struct Stability {
         /// Size of the scenes for builders.
         builders: Size = Size::Many;
         /// Budget of a search: nodes per object that it may make or visit.
@@ -26,25 +35,8 @@ config! {
     }
 }
 
-/// The time of a method on a case's scene, as written to `timing_cells.csv`.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-struct Timing {
-    scene: String,
-    method: String,
-    objects: usize,
-    /// Wall time.
-    seconds: f64,
-    /// Wall time per object, in nanoseconds.
-    nanoseconds_per_object: f64,
-    /// Peak memory of builders on S36, beyond the boxes, if the system reports it.
-    peak_bytes_per_object: Option<f64>,
-}
-
-/// The case whose memory is measured.
-const MEMORY: &str = "S36";
-
-impl Config {
-    /// Runs the cases (all if none are named) and writes rows and times.
+impl Stability {
+    /// Runs the cases (all if none are named) and writes rows.
     pub fn execute(
         &self,
         cases: &[String],
@@ -62,7 +54,6 @@ impl Config {
             larger: self.larger_searches,
         };
         let mut cells = Vec::new();
-        let mut times = Vec::new();
         for (done, case) in cases.iter().enumerate() {
             if interrupted() {
                 return Err(Error::Interrupted { finished: done, runs: cases.len() });
@@ -70,36 +61,20 @@ impl Config {
             for Labelled { label, method, .. } in methods {
                 // Specs accept only methods of ours here.
                 let Contestant::Ours(method) = method else { continue };
-                let Some(cell) = case.of_method(label, method, &effort) else { continue };
-                if cell.seconds > 0.0 {
-                    let per_object = |total: f64| total / cell.objects.max(1) as f64;
-                    times.push(Timing {
-                        scene: cell.scene.clone(),
-                        method: label.clone(),
-                        objects: cell.objects,
-                        seconds: cell.seconds,
-                        nanoseconds_per_object: per_object(cell.seconds * 1e9),
-                        peak_bytes_per_object: (case.id == MEMORY && is_builder(method))
-                            .then(|| child::peak_bytes(method, case.id, cell.objects))
-                            .flatten()
-                            .map(|bytes| per_object(bytes as f64)),
-                    });
-                }
-                cells.push(cell);
+                cells.extend(case.of_method(label, method, &effort));
             }
             let ways = tracing::TRAVERSALS.iter();
             cells.extend(ways.filter_map(|(name, way)| case.of_traversal(name, *way, self.rays)));
             cells.extend(case.of_parts());
         }
         store.write("cells.csv", &to_bytes(&cells, Path::new("cells.csv"))?)?;
-        store.write("timing_cells.csv", &to_bytes(&times, Path::new("timing_cells.csv"))?)?;
         Ok(output(store.folder())?.text())
     }
 }
 
 const HEADING: &str = "Stiff and extreme cases";
 
-/// Makes the summary and the table of broken promises from the CSV files in the folder.
+/// Makes the summary and the table of broken promises from the rows in the folder.
 pub fn output(folder: &Path) -> Result<Output, Error> {
     let cells: Vec<Cell> = read(&folder.join("cells.csv"))?;
     let cells_with =
