@@ -14,7 +14,9 @@ static int bake(const float *corners, size_t count, const char *path) {
         float ray[6] = {x, 0.2f, 9, x + 0.1f, 0.2f, 0};
         for (int j = 0; j < 6; j++) rays[i][j] = ray[j];
     }
-    BvhTree *tree = bvh_tree_for_rays(corners, count, 0.05, 1.0, &rays[0][0], STEPS);
+    BvhBake search = {.corners = corners, .count = count, .rays = &rays[0][0], .ray_count = STEPS};
+    search.seconds = 0.05;
+    BvhTree *tree = bvh_tree_bake(&search);
     int is_saved = tree && bvh_tree_save(tree, path) == 0;
     bvh_tree_free(tree);
     return is_saved;

@@ -3,7 +3,8 @@
 
 use crate::failure::{BvhStatus, bvh_last_error, status};
 use crate::{tracer::*, tree::*};
-use bvh_search::prelude::*;
+use bvh_search::bvh_core::Primitives;
+use bvh_search::{Objects, Options, OwnedTree, prelude::*};
 use std::ffi::{CStr, CString, c_void};
 use std::ptr::{null, null_mut};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -12,6 +13,19 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 fn corners(count: usize) -> Vec<f32> {
     (0..count).map(|i| i as f32).flat_map(|x| [x, 0.0, x, x + 1.5, 0.0, x, x, 1.5, x]).collect()
 }
+
+/// A search without objects, and every choice at its default.
+const NO_BAKE: BvhBake = BvhBake {
+    boxes: null(),
+    corners: null(),
+    count: 0,
+    rays: null(),
+    ray_count: 0,
+    references: 0.0,
+    seconds: 0.0,
+    work: 0,
+    seed: 0,
+};
 
 fn last_error() -> String {
     // SAFETY: the message ends with a zero, and no call of this thread fails before the copy is
@@ -106,7 +120,15 @@ fn surfaces_all_hits_closest_points_and_insides_equal_the_results_of_the_rust_cr
     let mut inside = vec![9u8; rays.len()];
     // SAFETY: every pointer comes with its array's length.
     unsafe {
-        let tree = bvh_tree_for_rays(corners.as_ptr(), 40, 0.02, 1.0, segments.as_ptr(), 60);
+        let (corners, rays_of_last_frame) = (corners.as_ptr(), segments.as_ptr());
+        let tree = bvh_tree_bake(&BvhBake {
+            corners,
+            count: 40,
+            rays: rays_of_last_frame,
+            ray_count: 60,
+            seconds: 0.02,
+            ..NO_BAKE
+        });
         let tracer = bvh_tracer_new(tree);
         let count = rays.len();
         let status =
@@ -287,8 +309,14 @@ fn invalid_arguments_are_rejected_by_name() {
         let misaligned = (&raw mut cost).byte_add(1);
         assert_eq!(bvh_tree_cost(tree, 0, misaligned), BvhStatus::Invalid);
         rejected("cost is not aligned to a multiple of 8");
-        assert!(bvh_tree_for_rays(wrong.as_ptr(), 3, 0.0, 1.0, null(), 0).is_null());
-        rejected("ray_count is 0; accepted: 1 or more");
+        let both = BvhBake { boxes: wrong.as_ptr(), corners: wrong.as_ptr(), count: 3, ..NO_BAKE };
+        assert!(bvh_tree_bake(&both).is_null());
+        rejected("boxes and corners; accepted: one of the two");
+        let many = BvhBake { boxes: null(), references: 17.0, count: 0, ..both };
+        assert!(bvh_tree_bake(&many).is_null());
+        rejected("references is 17; accepted: 1 to 16");
+        assert!(bvh_tree_bake(null()).is_null());
+        rejected("bake is null");
         assert!(
             bvh_tree_nodes(tree, null_mut()).is_null() && bvh_tree_nodes(null(), &mut 0).is_null()
         );
@@ -305,6 +333,44 @@ fn invalid_arguments_are_rejected_by_name() {
         }
         bvh_tracer_free(tracer);
         bvh_tracer_free(null_mut());
+    }
+}
+
+#[test]
+fn a_budget_of_work_gives_the_file_of_the_rust_crates() {
+    let corners = corners(40);
+    let triangles = bytes_as_triangles(&corners);
+    let segments: Vec<Segment> = (0..60u8)
+        .map(|i| Segment { from: [f32::from(i), 9.0, 0.5], to: [f32::from(i) + 0.5, 0.5, f32::from(i)] })
+        .collect();
+    let floats: Vec<f32> =
+        segments.iter().flat_map(|segment| [segment.from, segment.to]).flatten().collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("c.bvh");
+    let name = CString::new(path.to_str().unwrap()).unwrap();
+    for (references, rays) in [(1.0, &[][..]), (1.5, &[]), (1.0, &segments), (1.5, &segments)] {
+        let work = 50_000;
+        let bake = BvhBake {
+            corners: corners.as_ptr(),
+            count: triangles.len(),
+            rays: floats.as_ptr(),
+            ray_count: rays.len(),
+            references,
+            work,
+            seed: 3,
+            ..NO_BAKE
+        };
+        // SAFETY: every pointer comes with its array's length, and the tree is freed once.
+        unsafe {
+            let tree = bvh_tree_bake(&bake);
+            assert_eq!(bvh_tree_save(tree, name.as_ptr()), BvhStatus::Ok);
+            bvh_tree_free(tree);
+        }
+        let objects = Objects::Shapes(Primitives::Triangles(triangles.clone()));
+        let budget = Budget { max_work: Some(work), ..Budget::UNLIMITED };
+        let options = Options { references, seed: 3, budget, rays };
+        let expected = OwnedTree::find(objects, &options, &()).unwrap().save().unwrap();
+        assert!(std::fs::read(&path).unwrap() == expected, "{references}, {} rays", rays.len());
     }
 }
 

@@ -56,7 +56,7 @@ pub unsafe extern "C" fn bvh_tree_from_boxes(
     made(|| {
         // SAFETY: `boxes` points to 6 floats for each of `count` boxes.
         let boxes = unsafe { boxes_of(boxes, count) }?;
-        found(boxes, 1.0, seconds)
+        found(boxes, &Options::default(), Some(seconds))
     })
 }
 
@@ -73,41 +73,68 @@ pub unsafe extern "C" fn bvh_tree_from_triangles(
     references: f64,
 ) -> *mut BvhTree {
     made(|| {
-        check_references(references)?;
         // SAFETY: `corners` points to 9 floats for each of `count` triangles.
         let triangles = unsafe { triangles_of(corners, count) }?;
-        found(triangles, references, seconds)
+        found(triangles, &Options { references, ..Options::default() }, Some(seconds))
     })
 }
 
-/// Searches like `bvh_tree_from_triangles` for the best tree for recorded rays. Each of `ray_count`
-/// rays is 6 floats: its origin, then its hit or a point outside the scene.
+/// A search with every choice. Fields that are 0 or null have their defaults; either `boxes` or
+/// `corners` is given.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct BvhBake {
+    /// 6 floats for each of `count` boxes: the lower corner, then the upper corner.
+    pub boxes: *const f32,
+    /// 9 floats for each of `count` triangles: three corners.
+    pub corners: *const f32,
+    /// The number of boxes or triangles.
+    pub count: usize,
+    /// 6 floats for each of `ray_count` recorded rays that the tree is for: its origin, then its
+    /// hit or a point outside the scene.
+    pub rays: *const f32,
+    /// The number of rays; 0 for a tree for random lines.
+    pub ray_count: usize,
+    /// The average number of parts into which triangles may be divided among leaves, up to 16; 0 is
+    /// 1, for whole triangles.
+    pub references: f64,
+    /// The time of the search in seconds, if there is no `work` or if it is not 0.
+    pub seconds: f64,
+    /// The largest number of nodes created or visited; 0 is no limit. With `work` and without
+    /// `seconds`, the tree is the same on every machine, and the same as from Python and from the
+    /// program `bvh`.
+    pub work: u64,
+    /// The seed of the random numbers, which is 1 by default in Python and in the program `bvh`.
+    pub seed: u64,
+}
+
+/// Searches for the best tree with these choices.
 ///
-/// `corners` points to 9 * `count` floats, and `rays` to 6 * `ray_count` floats.
+/// `bake` is a search whose arrays have the promised lengths.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_for_rays(
-    corners: *const f32,
-    count: usize,
-    seconds: f64,
-    references: f64,
-    rays: *const f32,
-    ray_count: usize,
-) -> *mut BvhTree {
+pub unsafe extern "C" fn bvh_tree_bake(bake: *const BvhBake) -> *mut BvhTree {
     made(|| {
-        // SAFETY: `corners` points to 9 floats for each of `count` triangles.
-        let triangles = unsafe { triangles_of(corners, count) }?;
+        // SAFETY: `bake` is null or points to a search.
+        let bake = *unsafe { given("bake", bake) }?;
+        let BvhBake { boxes, corners, count, rays, ray_count, seconds, work, seed, .. } = bake;
+        let objects = match (boxes.is_null(), corners.is_null()) {
+            // SAFETY: `corners` points to 9 floats for each of `count` triangles.
+            (true, _) => unsafe { triangles_of(corners, count) }?,
+            // SAFETY: `boxes` points to 6 floats for each of `count` boxes.
+            (false, true) => unsafe { boxes_of(boxes, count) }?,
+            (false, false) => {
+                return Err(Failure::invalid("boxes and corners; accepted: one of the two"));
+            }
+        };
         // SAFETY: `rays` points to 6 floats for each of `ray_count` rays.
         let rays = unsafe { slice("rays", rays.cast::<[[f32; 3]; 2]>(), ray_count) }?;
         let rays: Vec<Segment> = rays.iter().map(|&[from, to]| Segment { from, to }).collect();
-        // Without rays the search would be by area, which nobody asks for by this name.
-        if rays.is_empty() {
-            return Err(Failure::invalid("ray_count is 0; accepted: 1 or more"));
-        }
-        check_references(references)?;
-        let options = Options { references, rays: &rays, ..Options::default() };
-        OwnedTree::find_with(triangles, &options, &deadline(seconds)?)
-            .map(whole)
-            .map_err(Failure::invalid)
+        let references = if bake.references == 0.0 { 1.0 } else { bake.references };
+        let max_work = (work > 0).then_some(work);
+        let budget = Budget { max_work, ..Budget::UNLIMITED };
+        let options = Options { references, seed, budget, rays: &rays };
+        let is_timed = max_work.is_none() || seconds != 0.0;
+        found(objects, &options, is_timed.then_some(seconds))
     })
 }
 
@@ -139,7 +166,9 @@ pub unsafe extern "C" fn bvh_tree_improve_until(
         // SAFETY: no other thread uses the tree during the call.
         let tree = unsafe { given_mut("tree", tree) }?;
         let until = Until { deadline: deadline(seconds)?, cancelled, context };
-        tree.owned.improve(&until).map_err(Failure::invalid)?;
+        let improvement =
+            tree.owned.improvement(Budget::UNLIMITED, &until).map_err(Failure::invalid)?;
+        tree.owned.apply(improvement);
         tree.nodes = nodes(&tree.owned);
         Ok(())
     })
@@ -314,15 +343,14 @@ fn nodes(owned: &OwnedTree) -> Vec<BvhNode> {
         .collect()
 }
 
-fn check_references(references: f64) -> Result<(), Failure> {
-    if (1.0..=16.0).contains(&references) {
-        return Ok(());
+fn found(objects: Objects, options: &Options, seconds: Option<f64>) -> Result<BvhTree, Failure> {
+    let references = options.references;
+    if !(1.0..=16.0).contains(&references) {
+        return Err(Failure::invalid(format!("references is {references}; accepted: 1 to 16")));
     }
-    Err(Failure::invalid(format!("references is {references}; accepted: 1 to 16")))
-}
-
-fn found(objects: Objects, references: f64, seconds: f64) -> Result<BvhTree, Failure> {
-    OwnedTree::find(objects, references, &deadline(seconds)?).map(whole).map_err(Failure::invalid)
+    let deadline = seconds.map(deadline).transpose()?;
+    let observer = deadline.as_ref().map_or(&() as &dyn Observer, |deadline| deadline);
+    OwnedTree::find(objects, options, observer).map(whole).map_err(Failure::invalid)
 }
 
 fn loaded(path: &str, objects: Objects) -> Result<BvhTree, Failure> {

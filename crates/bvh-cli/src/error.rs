@@ -52,16 +52,12 @@ pub enum Error {
     /// Ctrl-C ended a measurement.
     #[error("interrupted; nothing was written")]
     Unmeasured,
-    /// Ctrl-C ended a bake that had no tree.
-    #[error("interrupted; there was no tree yet, and no file was written")]
-    NoTree,
     /// Ctrl-C ended a bake.
     #[error(
-        "interrupted; the best tree so far{1} is in {0}; `--from {0}` continues",
-        .path.display(),
-        .cost.map_or_else(String::new, |cost| format!(", of cost {cost},"))
+        "interrupted; the best tree so far, of cost {cost}, is in {0}; `--from {0}` continues",
+        .path.display()
     )]
-    Stopped { path: PathBuf, cost: Option<f64> },
+    Stopped { path: PathBuf, cost: f64 },
     /// Ctrl-C ended a bake of instances.
     #[error(
         "interrupted; the best trees so far, of all meshes and over the instances, are in {}",
@@ -93,8 +89,7 @@ impl Error {
             Self::Stopped { .. }
             | Self::StoppedInstances { .. }
             | Self::StoppedParts { .. }
-            | Self::Unmeasured
-            | Self::NoTree => 130,
+            | Self::Unmeasured => 130,
             Self::Io { .. }
             | Self::Write(_)
             | Self::Memory { .. }

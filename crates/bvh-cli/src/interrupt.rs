@@ -38,11 +38,6 @@ pub fn listen() {
     }
 }
 
-/// Returns whether the first signal leaves the command running until it ends in order.
-pub fn holds() -> bool {
-    HELD.load(Relaxed)
-}
-
 /// Forbids the end by force after the first signal, because the command saves its result at the
 /// end.
 pub fn hold() {

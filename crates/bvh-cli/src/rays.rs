@@ -9,7 +9,7 @@ use bvh_core::{Aabb, Bvh, RayDensity, Segment};
 use bvh_scenes::Scene;
 use bvh_scenes::files::read_text;
 use bvh_scenes::rays::{RenderedRays, TRAINED, density, of_anything, of_renderer};
-use bvh_search::ray_density_through;
+use bvh_search::ray_density;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -92,7 +92,7 @@ impl Rays {
                 density(&rays, tree).map(Some)
             }
             Self::Recorded(segments) => {
-                ray_density_through(tree, &scene.primitives, segments, &is_over)
+                ray_density(tree, Some(&scene.primitives), segments, &is_over)
             }
         };
         // After an interruption some rays are missing, or all of them, which is an error otherwise.

@@ -10,7 +10,7 @@ use bvh_scenes::files::{self, WriteError};
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_search::bvh_core::Segment;
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
-use bvh_search::{FindError, Objects, Options, OwnedTree};
+use bvh_search::{BakeError, Objects, Options, OwnedTree};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use std::fmt::Display;
@@ -193,7 +193,7 @@ impl Tree {
         let owned = self.owned();
         let limits = Limits { seconds, work, progress };
         let (improvement, raised) =
-            search::run(py, limits, |budget, observer| owned.improvement_within(budget, observer))?;
+            search::run(py, limits, |budget, observer| owned.improvement(budget, observer))?;
         drop(owned);
         let improvement = improvement.map_err(invalid)?;
         // The gains are applied before a KeyboardInterrupt is raised.
@@ -314,12 +314,12 @@ fn found(
     }
     let (found, raised) = search::run(py, limits, |budget, observer| {
         let options = Options { references, seed, budget, rays };
-        OwnedTree::find_with(objects, &options, observer)
+        OwnedTree::find(objects, &options, observer)
     })?;
     raised?;
     found.map(Tree::new).map_err(|error| match error {
-        FindError::Rays(_) => invalid(error),
-        FindError::Search(_) | FindError::Instances(_) => invalid_argument(name, error),
+        BakeError::Rays(_) => invalid(error),
+        BakeError::Search(_) | BakeError::Instances(_) => invalid_argument(name, error),
     })
 }
 

@@ -3,6 +3,7 @@
 import os
 import signal
 import struct
+import subprocess
 import threading
 import time
 from pathlib import Path
@@ -91,6 +92,25 @@ def test_trees_come_back_from_files(tmp_path, references):
         Tree.load(tmp_path / "nothing.bvh", triangles=TRIANGLES)
     with pytest.raises(OSError, match="nowhere"):
         tree.save(tmp_path / "nowhere" / "tree.bvh")
+
+
+@pytest.mark.parametrize("references", [1.0, 1.3])
+@pytest.mark.parametrize("has_rays", [False, True])
+def test_a_budget_of_work_gives_the_file_of_the_program(tmp_path, references, has_rays):
+    program = os.environ.get("BVH_PROGRAM")
+    if not program:
+        pytest.skip("BVH_PROGRAM is not the path of the program bvh")
+    corners = "".join("v {!r} {!r} {!r}\n".format(*point) for point in TRIANGLES.reshape(-1, 3).tolist())
+    faces = "".join(f"f {3 * i + 1} {3 * i + 2} {3 * i + 3}\n" for i in range(len(TRIANGLES)))
+    (tmp_path / "mesh.obj").write_text(corners + faces)
+    rays = RANDOM.uniform(0, 10, (90, 2, 3)).astype(np.float32)
+    np.save(tmp_path / "rays.npy", rays.reshape(-1, 6))
+    flags = ["--budget=300kwork", f"--references={references}", "--out=program.bvh"]
+    flags += ["--rays=rays.npy"] if has_rays else []
+    subprocess.run([program, "bake", "mesh.obj", *flags], cwd=tmp_path, check=True)
+    tree = Tree.from_triangles(TRIANGLES, work=300_000, references=references, rays=rays if has_rays else None)
+    tree.save(tmp_path / "python.bvh")
+    assert (tmp_path / "python.bvh").read_bytes() == (tmp_path / "program.bvh").read_bytes()
 
 
 def test_a_save_that_fails_leaves_the_old_file_whole(tmp_path):

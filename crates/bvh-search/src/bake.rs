@@ -1,59 +1,311 @@
-//! The everyday calls: the best tree for a given time, with every parameter at its default.
+//! [`Bake`]: the one way from objects to the best tree and its file, for the command line, C and
+//! Python alike.
 
-use crate::{Budget, Deadline, FindError, Outcome, Problem, SearchError, best, optimize, solve};
-use bvh_core::{Aabb, Bvh, Instance, Instances, WideBvh};
-use std::time::Duration;
+use crate::parallel;
+use crate::run::watched;
+use crate::{Budget, Kept, Observer, Outcome, Problem, Search, SearchError, Splits};
+use crate::{best, optimize, ray_density, solve_or_keep};
+use best::Horizon;
+use bvh_build::{BuildError, Builder, muller_fellner};
+use bvh_core::cost::{Measure, Objective};
+use bvh_core::file::{self, FileError, Origin};
+use bvh_core::{
+    Aabb, Bvh, DensityError, InvalidInstances, Primitives, RayDensity, Segment, validate,
+    validate_references,
+};
 
-/// Returns the best tree over `boxes` that [`best`](crate::best) finds in about `time`, from the
-/// milliseconds of a build to the minutes of a bake. The search plans with the time, so one call
-/// for a second finds a better tree than ten calls for a tenth. The search ends earlier if it
-/// proves its tree optimal, and later if the time is not enough for the fastest build.
+/// A search for the best tree of a scene.
 ///
-/// [`solve`] has everything else: progress, cancellation, seeds, other searches, and limits in work
-/// instead of time, which give the same result on every machine.
+/// The same objects, rays, references, seed and budget of work give the same tree and the same
+/// [file](Self::write) on every machine, for any number of threads, from the command line, C and
+/// Python alike. Within the same work, no tree costs more than the greedy one, nor than the result
+/// of [reinsertion](crate::reinsertion) where the budget is long; the search of an observer with a
+/// clock keeps such a tree itself.
 ///
 /// ```
-/// use bvh_search::prelude::*;
+/// use bvh_search::{Bake, Budget, prelude::*};
 /// let boxes: Vec<Aabb> = (0..100u8).map(f32::from).map(|x| Aabb::from([[x; 3], [x + 1.5; 3]])).collect();
-/// let tree = bake(&boxes, Duration::from_millis(10))?.tree;
-/// validate(&tree, &boxes)?;
+/// let budget = Budget { max_work: Some(100_000), ..Budget::UNLIMITED };
+/// let baked = Bake { seed: 7, budget, ..Bake::new(&boxes) }.search(None, &())?;
+/// validate(&baked.outcome.tree, &boxes)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn bake(boxes: &[Aabb], time: Duration) -> Result<Outcome, SearchError> {
-    let deadline = Deadline::after(time);
-    solve(&best::Config::default(), &Problem::new(boxes), 1, Budget::UNLIMITED, &deadline)
+#[derive(Clone, Copy)]
+pub struct Bake<'a> {
+    /// One box per object.
+    pub boxes: &'a [Aabb],
+    /// The objects, if their shape is known. Other objects are not divided.
+    pub shapes: Option<&'a Primitives>,
+    /// The density of the rays that the tree is for; random lines if `None`.
+    pub rays: Option<&'a RayDensity>,
+    /// The cost to minimise. `None` is the cost of the [layout](Objective::Layout) for rays,
+    /// because it saves more of their tests than the sum of visits does, and otherwise the internal
+    /// area.
+    pub objective: Option<Objective>,
+    /// The largest average number of references to an object, from 1 for whole objects.
+    pub references: f64,
+    /// The division of the objects with spatial splits, if the caller has it.
+    pub division: Option<&'a Bvh>,
+    /// The tree that the search continues from; the outcome never costs more. `None` builds one.
+    pub start: Option<&'a Bvh>,
+    /// The name of another method than [`best`], and the method. It divides no objects and
+    /// continues from no tree.
+    pub method: Option<(&'a str, &'a (dyn Search + Sync))>,
+    /// The seed of the random numbers.
+    pub seed: u64,
+    /// The limits of the search besides its observer.
+    pub budget: Budget,
 }
 
-/// Returns a scene of instances with the best tree over them that [`best`](crate::best) finds in
-/// about `time`. The trees of the parts are as they are.
-///
-/// ```
-/// use bvh_search::prelude::*;
-/// let triangles = [Triangle::from([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])];
-/// let tree = bake(&boxes(&triangles), Duration::ZERO)?.tree;
-/// let part = WideBvh::new(&tree, &triangles)?;
-/// let row = (0..9u8).map(|i| Affine3A::from_translation(Vec3::X * f32::from(i)));
-/// let instances: Vec<Instance> = row.map(|transform| Instance { part: 0, transform }).collect();
-/// let scene = bake_instances(vec![part], instances, Duration::from_millis(10))?;
-/// let hit = scene.nearest_hit(&Ray::half_line([4.2, 0.2, 3.0], [0.0, 0.0, -1.0])?);
-/// assert_eq!(hit, Some(InstanceHit { t: 3.0, instance: 4, triangle: 0 }));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn bake_instances(
-    parts: Vec<WideBvh>,
-    instances: Vec<Instance>,
-    time: Duration,
-) -> Result<Instances, FindError> {
-    let top = bake(&Instance::boxes(&instances, &parts)?, time)?.tree;
-    Ok(Instances::new(parts, instances, top)?)
+/// The result of a [`Bake`].
+#[derive(Clone, Debug)]
+pub struct Baked {
+    /// The result of the search.
+    pub outcome: Outcome,
+    /// The cost of the greedy tree by the same objective, if there was one.
+    pub greedy: Option<f64>,
+    /// The cost of the [start](Bake::start) by the same objective.
+    pub start: Option<f64>,
+    /// Whether the search divided objects among leaves.
+    pub division: Division,
 }
 
-/// Improves a tree over `boxes` for about `time`: a tree from another library, or one that has been
-/// [refitted](Bvh::refit) to objects that moved. The growth of the tree's
-/// [internal area](bvh_core::cost::internal_area) over the root's area, or of
-/// [`WideBvh::expected_visits`](bvh_core::WideBvh::expected_visits), measures how far refitting has
-/// degraded the tree. Accepts the same trees as [`optimize()`].
-pub fn improve(tree: &Bvh, boxes: &[Aabb], time: Duration) -> Result<Outcome, SearchError> {
-    let deadline = Deadline::after(time);
-    optimize(tree, &Problem::new(boxes), &best::Config::default(), 1, Budget::UNLIMITED, &deadline)
+/// Whether a search divides objects among leaves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Division {
+    /// The objects are whole, or the search ended before it knew.
+    No,
+    /// No spatial split saves anything, so that the search for whole objects finds the same tree.
+    Useless,
+    /// Leaves may hold parts of objects, and the cost includes leaves.
+    Allowed,
+}
+
+/// The reason why there is no tree.
+#[derive(Debug, thiserror::Error)]
+pub enum BakeError {
+    /// The search failed.
+    #[error(transparent)]
+    Search(#[from] SearchError),
+    /// The rays are invalid.
+    #[error("rays: {0}")]
+    Rays(#[from] DensityError),
+    /// An instance is invalid.
+    #[error(transparent)]
+    Instances(#[from] InvalidInstances),
+}
+
+/// Asks the observer to cancel and tells it nothing, because what it hears of belongs to another
+/// search.
+struct Unheard<'a>(&'a dyn Observer);
+
+impl Observer for Unheard<'_> {
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+}
+
+impl<'a> Bake<'a> {
+    /// Returns a search with the defaults: whole objects, random lines, seed 1, no limit.
+    pub fn new(boxes: &'a [Aabb]) -> Self {
+        Self {
+            boxes,
+            shapes: None,
+            rays: None,
+            objective: None,
+            references: 1.0,
+            division: None,
+            start: None,
+            method: None,
+            seed: 1,
+            budget: Budget::UNLIMITED,
+        }
+    }
+
+    /// Returns the cost that the search minimises.
+    pub fn objective(&self) -> Objective {
+        let default = if self.rays.is_some() { Objective::Layout } else { Objective::default() };
+        self.objective.unwrap_or(default)
+    }
+
+    /// Builds the greedy tree, with which gains are compared. `None` if the observer cancels first.
+    pub fn greedy(&self, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
+        let config = muller_fellner::Config::default();
+        unless_cancelled(watched(observer, |watch| config.build_watched(self.boxes, None, watch)))
+    }
+
+    /// Searches until the budget is spent or the observer cancels.
+    ///
+    /// Takes the `greedy` tree if the caller has it, and frees its memory as soon as there is a
+    /// better tree. Otherwise builds it for a budget of work, in which its time does not count.
+    pub fn search(
+        &self,
+        greedy: Option<Bvh>,
+        observer: &dyn Observer,
+    ) -> Result<Baked, SearchError> {
+        let is_timed = observer.progress().is_some();
+        let builds = !is_timed && self.budget != Budget::UNLIMITED && self.start.is_none();
+        let greedy = match greedy {
+            None if builds => self.greedy(observer)?,
+            greedy => greedy,
+        };
+        let mut splits = self.splits();
+        // A division may take all the time of a search that has no tree yet. Such a search divides
+        // later itself.
+        let is_later = self.starts_divided() || is_timed && greedy.is_none();
+        let divided = match &splits {
+            Some(splits) if splits.division.is_none() && !is_later => {
+                self.divided_by(splits, observer)?
+            }
+            _ => None,
+        };
+        let mut division = Division::No;
+        if let Some(allowed) = &mut splits {
+            allowed.division = allowed.division.or(divided.as_ref());
+            division = match allowed.division {
+                _ if is_later => Division::Allowed,
+                Some(tree) if tree.prim_ids.len() > self.boxes.len() => Division::Allowed,
+                Some(_) => Division::Useless,
+                None => Division::No,
+            };
+        }
+        let splits = splits.filter(|_| division == Division::Allowed);
+        let problem = Problem {
+            objective: self.objective(),
+            splits,
+            measure: self.rays.map(|density| density as &dyn Measure),
+            ..Problem::new(self.boxes)
+        };
+        let greedy = greedy.map(|tree| Kept::new(tree, &problem));
+        let greedy_cost = greedy.as_ref().map(|greedy| greedy.cost);
+        let outcome = self.outcome(&problem, greedy, observer)?;
+        let start = self.start.map(|tree| problem.cost(tree));
+        Ok(Baked { outcome, greedy: greedy_cost, start, division })
+    }
+
+    fn outcome(
+        &self,
+        problem: &Problem,
+        greedy: Option<Kept>,
+        observer: &dyn Observer,
+    ) -> Result<Outcome, SearchError> {
+        let Self { seed, budget, .. } = *self;
+        if let Some((_, method)) = self.method {
+            return solve_or_keep(method, problem, greedy, seed, budget, observer);
+        }
+        // An early end of a long search leaves a tree that is behind reinsertion's.
+        let reinserted = match budget.max_work {
+            Some(work) if observer.progress().is_none() && !observer.cancelled() => {
+                let known = greedy.as_ref().map(|greedy| &greedy.tree);
+                let problem = Problem { known, ..*problem };
+                best::fallback(&problem, work, &Unheard(observer))?
+            }
+            _ => None,
+        };
+        // The budget ends the search, so the method's own limit is lifted.
+        let config = best::Config { horizon: Some(Horizon::Known), ..Default::default() };
+        let outcome = match self.start {
+            Some(start) => optimize(start, problem, &config, seed, budget, observer)?,
+            None => solve_or_keep(&config, problem, greedy, seed, budget, observer)?,
+        };
+        Ok(best::unless_behind(outcome, reinserted))
+    }
+
+    /// Returns the permission to divide objects, if there is any.
+    fn splits(&self) -> Option<Splits<'a>> {
+        let most = (self.references * self.boxes.len() as f64) as usize;
+        let splits = Splits::at_most(most, self.boxes, self.shapes?)?;
+        let is_best = self.method.is_none();
+        is_best.then_some(Splits { division: self.division, ..splits })
+    }
+
+    /// Divides the objects with spatial splits, unless they stay whole anyway. `None` if the
+    /// observer cancels first.
+    pub fn divided(&self, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
+        self.splits().map_or(Ok(None), |splits| self.divided_by(&splits, observer))
+    }
+
+    fn divided_by(
+        &self,
+        splits: &Splits,
+        observer: &dyn Observer,
+    ) -> Result<Option<Bvh>, SearchError> {
+        // The division of a large scene takes tenths of a second before it looks at its watch.
+        if observer.cancelled() {
+            return Ok(None);
+        }
+        unless_cancelled(watched(observer, |watch| splits.divide(self.boxes, watch)))
+    }
+
+    /// Returns whether the start divides objects, after which no search returns to whole ones.
+    fn starts_divided(&self) -> bool {
+        self.start.is_some_and(|tree| tree.prim_ids.len() > self.boxes.len())
+    }
+
+    /// Passes the sections of the [file](bvh_core::file) of a tree over these objects to `write`,
+    /// with the tree's cost for random lines, which the file records. `work` is the work of all
+    /// searches that led to the tree.
+    ///
+    /// Rejects a tree that is not valid over the objects. O(nodes + objects).
+    pub fn write<T>(
+        &self,
+        tree: &Bvh,
+        work: u64,
+        write: impl FnOnce(&[&[u8]], f64) -> T,
+    ) -> Result<T, FileError> {
+        let objective = self.objective();
+        let mut cost = 0.0;
+        let mut validated = Ok(());
+        let mut visits = Vec::new();
+        // Somebody may wait for the file of a large tree.
+        parallel::call_both(
+            &mut || cost = Problem { objective, ..Problem::new(self.boxes) }.cost(tree),
+            &mut || {
+                parallel::call_both(
+                    &mut || {
+                        validated = match self.shapes {
+                            Some(shapes) => validate_references(tree, self.boxes, shapes),
+                            None => validate(tree, self.boxes),
+                        }
+                    },
+                    &mut || visits = self.visits(tree),
+                );
+            },
+        );
+        validated?;
+        let name = self.method.map_or("best", |(name, _)| name);
+        let name = if self.rays.is_some() { format!("{name} for rays") } else { name.into() };
+        let origin = Origin { method: &name, seed: self.seed, work, visits: &visits, objective };
+        let sections = file::sections(tree, self.boxes, cost, &origin, &parallel::call_both)?;
+        Ok(write(&sections.each_ref().map(|section| &**section), cost))
+    }
+
+    /// Returns the visits of all nodes by the rays; none if there are no rays.
+    fn visits(&self, tree: &Bvh) -> Vec<f32> {
+        const NODES_PER_TASK: usize = 1 << 16;
+        let Some(density) = self.rays else { return Vec::new() };
+        let root = tree.root_aabb().unwrap_or(Aabb::EMPTY);
+        let chunks = tree.nodes.chunks(NODES_PER_TASK).collect();
+        // One copy of whole chunks; an iterator over all of them would move number by number.
+        parallel::map(chunks, |nodes| density.visits_of(&root, nodes)).concat()
+    }
+}
+
+/// Returns the greedy tree and the [density](ray_density) of recorded segments.
+pub(crate) fn density_of(
+    boxes: &[Aabb],
+    shapes: Option<&Primitives>,
+    segments: &[Segment],
+) -> Result<(Bvh, RayDensity), BakeError> {
+    let greedy = muller_fellner::Config::default().build(boxes).map_err(SearchError::from)?;
+    let density = ray_density(&greedy, shapes, segments, &|| false)?;
+    Ok((greedy, density.expect("the density of rays that nobody cancels")))
+}
+
+/// Returns a tree, or `None` if its construction was cancelled.
+fn unless_cancelled(built: Result<Bvh, BuildError>) -> Result<Option<Bvh>, SearchError> {
+    match built {
+        Err(BuildError::Cancelled) => Ok(None),
+        built => Ok(Some(built?)),
+    }
 }

@@ -2,7 +2,6 @@
 #![doc = include_str!("../README.md")]
 
 pub mod annealing;
-#[cfg(feature = "std")]
 mod bake;
 mod baselines;
 pub mod best;
@@ -23,12 +22,13 @@ mod run;
 #[cfg(test)]
 mod scatter;
 pub mod shortcuts;
+#[cfg(feature = "std")]
+mod timed;
 mod tree;
 mod tuning;
 
 pub use annealing::ruin_recreate;
-#[cfg(feature = "std")]
-pub use bake::{bake, bake_instances, improve};
+pub use bake::{Bake, BakeError, Baked, Division};
 pub use baselines::{LocalSearch, iterated, rebuild, rotation, treelet};
 pub use bvh_build;
 pub use bvh_core;
@@ -37,9 +37,7 @@ pub use local::reinsertion;
 pub use optimize::optimize;
 pub use orders::{genetic, random_orders};
 pub use owned::{Improvement, Objects, Options, OwnedTree};
-#[cfg(feature = "std")]
-pub use rays::bake_for_rays;
-pub use rays::{FindError, ray_density, ray_density_through};
+pub use rays::ray_density;
 #[cfg(feature = "serde")]
 pub use registry::Method;
 pub use run::{
@@ -48,3 +46,5 @@ pub use run::{
 };
 #[cfg(feature = "std")]
 pub use run::{Deadline, Watched};
+#[cfg(feature = "std")]
+pub use timed::{bake, bake_for_rays, bake_instances, improve};

@@ -1,11 +1,14 @@
 //! A tree that owns its objects, for callers that cannot lend them: the bindings to other
 //! languages.
 
-use crate::rays::{FindError, ray_density};
-use crate::{Budget, Observer, Outcome, Problem, SearchError, Splits, best, optimize, solve};
-use bvh_core::cost::{Measure, Objective};
-use bvh_core::file::{self, FileError, Origin};
-use bvh_core::{Aabb, Bvh, InvalidBvh, Primitives, RayDensity, Segment, Triangle, WideBvh};
+use crate::bake::density_of;
+use crate::{Bake, BakeError, Baked, Budget, Division, Observer, SearchError};
+use bvh_core::cost::Objective;
+use bvh_core::file::{self, FileError};
+use bvh_core::{
+    Aabb, Bvh, InvalidBox, InvalidBvh, Primitives, RayDensity, Segment, Triangle, WideBvh,
+    check_boxes,
+};
 
 /// The objects of a tree.
 #[derive(Clone, Debug)]
@@ -38,16 +41,16 @@ impl Default for Options<'_> {
 
 /// A better tree over the objects of an [`OwnedTree`], from [`OwnedTree::improvement`].
 #[derive(Clone, Debug)]
-pub struct Improvement(Outcome);
+pub struct Improvement(Baked);
 
-/// A tree found by [`best`](crate::best), with its objects.
+/// The tree of a [`Bake`], with its objects.
 #[derive(Clone, Debug)]
 pub struct OwnedTree {
     tree: Bvh,
     boxes: Vec<Aabb>,
     shapes: Option<Primitives>,
-    /// Maximum number of references to objects.
-    most: usize,
+    /// The largest average number of references to an object.
+    references: f64,
     /// The work of all searches so far.
     work: u64,
     seed: u64,
@@ -56,38 +59,24 @@ pub struct OwnedTree {
 }
 
 impl OwnedTree {
-    /// Searches until `observer` cancels, as a [`Deadline`](crate::Deadline) does. Shapes may be
-    /// divided among leaves, into up to `references` parts each on average; boxes may not.
+    /// Searches until the options' budget is spent or `observer` cancels, as a
+    /// [`Deadline`](crate::Deadline) does.
     pub fn find(
-        objects: Objects,
-        references: f64,
-        observer: &dyn Observer,
-    ) -> Result<Self, SearchError> {
-        let mut owned = Self::bare(objects, references);
-        owned.search(Budget::UNLIMITED, observer)?;
-        Ok(owned)
-    }
-
-    /// Searches as [`find`](Self::find) does, with these options.
-    pub fn find_with(
         objects: Objects,
         options: &Options,
         observer: &dyn Observer,
-    ) -> Result<Self, FindError> {
-        let mut owned = Self::bare(objects, options.references);
-        owned.seed = options.seed;
-        if !options.rays.is_empty() {
-            owned.density = Some(ray_density(&owned.boxes, owned.shapes.as_ref(), options.rays)?);
+    ) -> Result<Self, BakeError> {
+        let Options { references, seed, budget, rays } = *options;
+        let mut owned = Self { references, seed, ..Self::bare(objects) };
+        let mut greedy = None;
+        if !rays.is_empty() {
+            let (tree, density) = density_of(&owned.boxes, owned.shapes.as_ref(), rays)?;
+            greedy = Some(tree);
+            owned.density = Some(density);
         }
-        owned.search(options.budget, observer)?;
+        let baked = Bake { budget, start: None, ..owned.bake() }.search(greedy, observer)?;
+        owned.apply(Improvement(baked));
         Ok(owned)
-    }
-
-    fn search(&mut self, budget: Budget, observer: &dyn Observer) -> Result<(), SearchError> {
-        let config = best::Config::default();
-        let outcome = solve(&config, &self.problem(), self.seed, budget, observer)?;
-        self.take(outcome);
-        Ok(())
     }
 
     /// Moves the tree to the same objects at other places: every box becomes tight again, and the
@@ -99,7 +88,7 @@ impl OwnedTree {
     ///
     /// # Panics
     /// Panics if the number of objects differs.
-    pub fn refit(&mut self, objects: Objects) -> Result<(), bvh_core::InvalidBox> {
+    pub fn refit(&mut self, objects: Objects) -> Result<(), InvalidBox> {
         let (boxes, shapes) = self.moved(objects)?;
         self.tree.refit(&boxes);
         self.boxes = boxes;
@@ -115,23 +104,20 @@ impl OwnedTree {
     ///
     /// # Panics
     /// Panics if the number of objects differs.
-    pub fn refitted(&self, objects: Objects) -> Result<Self, bvh_core::InvalidBox> {
+    pub fn refitted(&self, objects: Objects) -> Result<Self, InvalidBox> {
         let (boxes, shapes) = self.moved(objects)?;
         let mut tree = self.tree.clone();
         tree.refit(&boxes);
         let density = self.density.clone();
-        let Self { most, work, seed, .. } = *self;
-        Ok(Self { tree, boxes, shapes, most, work, seed, density })
+        let Self { references, work, seed, .. } = *self;
+        Ok(Self { tree, boxes, shapes, references, work, seed, density })
     }
 
     /// Returns the boxes and shapes of the objects at other places.
-    fn moved(
-        &self,
-        objects: Objects,
-    ) -> Result<(Vec<Aabb>, Option<Primitives>), bvh_core::InvalidBox> {
+    fn moved(&self, objects: Objects) -> Result<(Vec<Aabb>, Option<Primitives>), InvalidBox> {
         let (boxes, shapes) = boxes_of(objects);
         assert_eq!(boxes.len(), self.boxes.len(), "the same number of objects");
-        bvh_core::check_boxes(&boxes)?;
+        check_boxes(&boxes)?;
         Ok((boxes, shapes))
     }
 
@@ -148,51 +134,41 @@ impl OwnedTree {
     /// Reads a tree over these objects from `bytes`. Later searches may use as many references as
     /// the tree has.
     pub fn load(objects: Objects, bytes: &[u8]) -> Result<Self, FileError> {
-        let mut owned = Self::bare(objects, 1.0);
+        let mut owned = Self::bare(objects);
         let file = file::TreeFile::open(bytes)?.for_boxes(&owned.boxes)?;
         owned.tree = file.tree()?;
-        owned.most = owned.tree.prim_ids.len();
+        // Half a reference more keeps the product with the number of objects from being rounded
+        // down.
+        owned.references = (owned.tree.prim_ids.len() as f64 + 0.5) / owned.boxes.len() as f64;
         owned.work = file.header().work;
         Ok(owned)
     }
 
-    /// Improves the tree until `observer` cancels the search; the cost never rises.
-    pub fn improve(&mut self, observer: &dyn Observer) -> Result<(), SearchError> {
-        let improvement = self.improvement(observer)?;
-        self.apply(improvement);
-        Ok(())
-    }
-
-    /// Searches as [`improve`](Self::improve) does without changing the tree, so that other threads
-    /// can read it meanwhile. Pass the result to [`apply`](Self::apply).
-    pub fn improvement(&self, observer: &dyn Observer) -> Result<Improvement, SearchError> {
-        self.improvement_within(Budget::UNLIMITED, observer)
-    }
-
-    /// Searches as [`improvement`](Self::improvement) does, within a budget.
-    pub fn improvement_within(
+    /// Searches for a better tree until the budget is spent or `observer` cancels, without changing
+    /// this one, so that other threads can read it meanwhile. The cost never rises. Pass the result
+    /// to [`apply`](Self::apply).
+    pub fn improvement(
         &self,
         budget: Budget,
         observer: &dyn Observer,
     ) -> Result<Improvement, SearchError> {
-        let config = best::Config::default();
-        optimize(&self.tree, &self.problem(), &config, self.seed, budget, observer).map(Improvement)
+        Bake { budget, ..self.bake() }.search(None, observer).map(Improvement)
     }
 
     /// Replaces the tree by an improvement of this very tree.
     pub fn apply(&mut self, improvement: Improvement) {
-        self.take(improvement.0);
+        let Baked { outcome, division, .. } = improvement.0;
+        self.tree = outcome.tree;
+        self.work = self.work.saturating_add(outcome.work);
+        // Later searches need not look again.
+        if division == Division::Useless {
+            self.references = 1.0;
+        }
     }
 
     /// Returns the tree as a file, which [`load`](Self::load) and the program `bvh` read.
     pub fn save(&self) -> Result<Vec<u8>, FileError> {
-        let origin =
-            Origin { method: "best", seed: self.seed, work: self.work, ..Origin::default() };
-        match &self.shapes {
-            // The validation of divided objects needs their shapes.
-            Some(shapes) => file::save_references(&self.tree, &self.boxes, shapes, &origin),
-            None => file::save(&self.tree, &self.boxes, &origin),
-        }
+        self.bake().write(&self.tree, self.work, |sections, _| sections.concat())
     }
 
     /// The cost of the tree by `objective`. O(nodes).
@@ -224,28 +200,22 @@ impl OwnedTree {
     }
 
     /// Builds the value without a tree.
-    fn bare(objects: Objects, references: f64) -> Self {
+    fn bare(objects: Objects) -> Self {
         let (boxes, shapes) = boxes_of(objects);
-        let most = (references * boxes.len() as f64) as usize;
-        Self { tree: Bvh::default(), boxes, shapes, most, work: 0, seed: 1, density: None }
+        let tree = Bvh::default();
+        Self { tree, boxes, shapes, references: 1.0, work: 0, seed: 1, density: None }
     }
 
-    /// The problem that every search solves.
-    fn problem(&self) -> Problem<'_> {
-        let shapes = self.shapes.as_ref();
-        let splits = shapes.and_then(|shapes| Splits::at_most(self.most, &self.boxes, shapes));
-        let mut problem = Problem { splits, ..Problem::new(&self.boxes) };
-        if let Some(density) = &self.density {
-            // The cost of the layout saves more tests of rays than the sum of visits does.
-            problem.objective = Objective::Layout;
-            problem.measure = Some(density as &dyn Measure);
+    /// The search that continues from the tree.
+    fn bake(&self) -> Bake<'_> {
+        Bake {
+            shapes: self.shapes.as_ref(),
+            rays: self.density.as_ref(),
+            references: self.references,
+            start: Some(&self.tree),
+            seed: self.seed,
+            ..Bake::new(&self.boxes)
         }
-        problem
-    }
-
-    fn take(&mut self, outcome: Outcome) {
-        self.tree = outcome.tree;
-        self.work = self.work.saturating_add(outcome.work);
     }
 }
 

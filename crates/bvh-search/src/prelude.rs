@@ -1,6 +1,6 @@
 //! Everything for programs that build, bake, trace and save trees: `use bvh_search::prelude::*`.
 
-pub use crate::{Budget, Outcome, Problem, StopReason, best, optimize, solve};
+pub use crate::{Bake, Budget, Outcome, Problem, StopReason, best, optimize, solve};
 #[cfg(feature = "std")]
 pub use crate::{Deadline, bake, bake_for_rays, bake_instances, improve};
 pub use bvh_build::{Builder, median_cut, muller_fellner, ploc};

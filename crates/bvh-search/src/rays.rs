@@ -1,115 +1,39 @@
 //! Trees for the rays of one program: record segments, search, trace the next ones.
 
-#[cfg(feature = "std")]
-use crate::{Budget, Deadline, Outcome, Problem, best, solve};
-use crate::{SearchError, Stream};
-use bvh_build::{Builder, muller_fellner};
-#[cfg(feature = "std")]
-use bvh_core::Triangle;
-#[cfg(feature = "std")]
-use bvh_core::cost::{Measure, Objective};
+use crate::Stream;
 use bvh_core::glam::Vec3;
 use bvh_core::{
-    Aabb, Bvh, DensityError, InvalidInstances, Primitive, Primitives, Ray, RayDensity, Segment,
-    nearest_hit,
+    Aabb, Bvh, DensityError, Primitive, Primitives, Ray, RayDensity, Segment, nearest_hit,
 };
 use rand::{RngExt, SeedableRng};
-#[cfg(feature = "std")]
-use std::time::Duration;
 
 /// The share of area in the measure of a box. Without it, a box that no ray enters would be free.
 const AREA_WEIGHT: f64 = 0.1;
 
-/// One in this many rays of a density comes from anywhere in the scene, as a guard of rays that were
-/// not recorded. Half of the rays instead cost recorded rays two per cent more tests.
+/// One in this many rays of a density comes from anywhere in the scene, as a guard of rays that
+/// were not recorded. Half of the rays instead cost recorded rays two per cent more tests.
 const GUARD: usize = 4;
 
 /// The part of the way to a hit after which the next ray begins: before the surface.
 const JUST_BEFORE: f32 = 0.9999;
 
-/// The reason why no tree was found.
-#[derive(Debug, thiserror::Error)]
-pub enum FindError {
-    /// The search failed.
-    #[error(transparent)]
-    Search(#[from] SearchError),
-    /// The rays are invalid.
-    #[error("rays: {0}")]
-    Rays(#[from] DensityError),
-    /// An instance is invalid.
-    #[error(transparent)]
-    Instances(#[from] InvalidInstances),
-}
-
-/// Returns the best tree over `triangles` that [`best`](crate::best) finds in about `time` for rays
-/// like the recorded `segments`, and the density of these rays as by [`ray_density`]. The segments begin
-/// where rays began and end at their hits or outside the scene.
-///
-/// The tree is best for its rays; other rays may take longer than with a tree from
-/// [`bake`](crate::bake). The layout for the same rays is
-/// `WideBvh::for_rays(&tree, &triangles, &density.visits(&tree))`.
-///
-/// ```
-/// use bvh_search::prelude::*;
-/// let triangles: Vec<Triangle> = (0..50u8)
-///     .map(|i| Triangle::from([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]].map(|c| c.map(|x| x * f32::from(i + 1)))))
-///     .collect();
-/// // Yesterday's frame: rays from a camera to their hits.
-/// let segments: Vec<Segment> = (0..100u8)
-///     .map(|i| Segment { from: [0.5, 0.5, -9.0], to: [f32::from(i) / 9.0, 0.5, 1.0] })
-///     .collect();
-/// let (outcome, density) = bake_for_rays(&triangles, &segments, Duration::from_millis(10))?;
-/// let wide = WideBvh::for_rays(&outcome.tree, &triangles, &density.visits(&outcome.tree))?;
-/// assert!(wide.any_hit(&Ray::half_line([0.2, 0.2, 0.0], [0.0, 0.0, 1.0])?));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[cfg(feature = "std")]
-pub fn bake_for_rays(
-    triangles: &[Triangle],
-    segments: &[Segment],
-    time: Duration,
-) -> Result<(Outcome, RayDensity), FindError> {
-    let deadline = Deadline::after(time);
-    let boxes = bvh_core::boxes(triangles);
-    let density = guarded(&boxes, segments, |count| from_anywhere(triangles, &boxes, count))?;
-    let problem = Problem {
-        objective: Objective::Layout,
-        measure: Some(&density as &dyn Measure),
-        ..Problem::new(&boxes)
-    };
-    let config = best::Config::default();
-    let outcome = solve(&config, &problem, 1, Budget::UNLIMITED, &deadline)?;
-    Ok((outcome, density))
-}
-
-/// Returns the density of recorded segments between the surfaces of a scene, with a tenth of area. If
-/// the `shapes` of the boxes are known, a quarter of its rays comes from anywhere in the scene, so that
-/// rays from elsewhere lose little. Of more segments than fit into [`RayDensity::MOST_SEGMENTS`], every
-/// n-th counts.
+/// Returns the density of recorded segments between the surfaces of a scene, with a tenth of area.
+/// The segments begin where rays began and end at their hits or outside the scene. If the `shapes`
+/// are known, a quarter of the density's rays comes from anywhere in the scene, so that rays from
+/// elsewhere lose little; they are traced through `tree`, any valid tree over the shapes. Of more
+/// segments than fit into [`RayDensity::MOST_SEGMENTS`], every n-th counts. Returns `None` soon
+/// after `is_over` returns true.
 pub fn ray_density(
-    boxes: &[Aabb],
-    shapes: Option<&Primitives>,
-    segments: &[Segment],
-) -> Result<RayDensity, DensityError> {
-    guarded(boxes, segments, |count| match shapes {
-        Some(Primitives::Triangles(triangles)) => from_anywhere(triangles, boxes, count),
-        Some(Primitives::Spheres(spheres)) => from_anywhere(spheres, boxes, count),
-        None => vec![],
-    })
-}
-
-/// Returns the density as [`ray_density`] does, or `None` soon after `is_over` returns true. The rays
-/// from anywhere are traced through `tree`, any valid tree over the shapes.
-pub fn ray_density_through(
     tree: &Bvh,
-    shapes: &Primitives,
+    shapes: Option<&Primitives>,
     segments: &[Segment],
     is_over: &dyn Fn() -> bool,
 ) -> Result<Option<RayDensity>, DensityError> {
-    let root = tree.root_aabb().ok_or(DensityError::Bounds)?;
+    let root = tree.root_aabb().unwrap_or(Aabb::EMPTY);
     let sampled = with_others(segments, |count| match shapes {
-        Primitives::Triangles(triangles) => traced(tree, triangles, &root, count, is_over),
-        Primitives::Spheres(spheres) => traced(tree, spheres, &root, count, is_over),
+        Some(Primitives::Triangles(triangles)) => traced(tree, triangles, &root, count, is_over),
+        Some(Primitives::Spheres(spheres)) => traced(tree, spheres, &root, count, is_over),
+        None => vec![],
     });
     if is_over() {
         return Ok(None);
@@ -117,16 +41,8 @@ pub fn ray_density_through(
     RayDensity::of_rays(&root, &sampled, AREA_WEIGHT).map(Some)
 }
 
-/// Returns the density of segments and of those that `others` returns for their number.
-fn guarded(
-    boxes: &[Aabb],
-    segments: &[Segment],
-    others: impl FnOnce(usize) -> Vec<Segment>,
-) -> Result<RayDensity, DensityError> {
-    RayDensity::of_rays(&Aabb::union_of(boxes), &with_others(segments, others), AREA_WEIGHT)
-}
-
-/// Returns as many segments as leave room for those that `others` returns for their number, and these.
+/// Returns as many segments as leave room for those that `others` returns for their number, and
+/// these.
 fn with_others(segments: &[Segment], others: impl FnOnce(usize) -> Vec<Segment>) -> Vec<Segment> {
     let most = RayDensity::MOST_SEGMENTS / GUARD * (GUARD - 1);
     let step = segments.len().div_ceil(most).max(1);
@@ -135,16 +51,9 @@ fn with_others(segments: &[Segment], others: impl FnOnce(usize) -> Vec<Segment>)
     sampled
 }
 
-/// Returns the segments of `count` rays as [`traced`] does, through the greedy tree.
-fn from_anywhere<P: Primitive>(objects: &[P], boxes: &[Aabb], count: usize) -> Vec<Segment> {
-    // A search rejects the same boxes with a better message.
-    let Ok(tree) = muller_fellner::Config::default().build(boxes) else { return vec![] };
-    traced(&tree, objects, &Aabb::union_of(boxes), count, &|| false)
-}
-
-/// Returns the segments of `count` rays, up to their nearest hits: from random points of the scene's box
-/// in random directions, and from each hit one more. They are the same on every machine. Ends early, with
-/// fewer rays, when `is_over` returns true.
+/// Returns the segments of `count` rays, up to their nearest hits: from random points of the
+/// scene's box in random directions, and from each hit one more. They are the same on every
+/// machine. Ends early, with fewer rays, when `is_over` returns true.
 fn traced<P: Primitive>(
     tree: &Bvh,
     objects: &[P],
@@ -175,7 +84,8 @@ fn traced<P: Primitive>(
     segments
 }
 
-/// Returns a direction that is uniform on the sphere, by arithmetic that is the same on every machine.
+/// Returns a direction that is uniform on the sphere, by arithmetic that is the same on every
+/// machine.
 fn random_direction(rng: &mut Stream) -> Vec3 {
     loop {
         let point = 2.0 * Vec3::from_array(rng.random()) - 1.0;
@@ -189,7 +99,7 @@ fn random_direction(rng: &mut Stream) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bvh_build::median_cut;
+    use bvh_build::{Builder, median_cut, muller_fellner};
     use bvh_core::Triangle;
     use std::cell::Cell;
 
@@ -207,14 +117,15 @@ mod tests {
         let boxes = bvh_core::boxes(&triangles);
         let recorded = [Segment { from: [-1.0, 1.0, 1.0], to: [0.0, 1.0, 1.0] }; 300];
         let last = boxes[3];
-        let alone = ray_density(&boxes, None, &recorded).unwrap();
+        let tree = median_cut::Config::default().build(&boxes).unwrap();
+        let shapes = Primitives::Triangles(triangles.clone());
+        let density = |shapes| ray_density(&tree, shapes, &recorded, &|| false).unwrap().unwrap();
+        let alone = density(None);
         assert_eq!((alone.segments(), alone.entries(&last)), (300, 0.0));
-        let guarded =
-            ray_density(&boxes, Some(&Primitives::Triangles(triangles.clone())), &recorded)
-                .unwrap();
+        let guarded = density(Some(&shapes));
         assert_eq!(guarded.segments(), 400);
         assert!(guarded.entries(&last) > 1.0, "{}", guarded.entries(&last));
-        let segments = from_anywhere(&triangles, &boxes, 1000);
+        let segments = traced(&tree, &triangles, &Aabb::union_of(&boxes), 1000, &|| false);
         let ends = segments.iter().map(|segment| Vec3::from(segment.to));
         let is_on_a_wall = |end: &Vec3| {
             (end.x - end.x.round()).abs() < 1e-4
@@ -244,30 +155,31 @@ mod tests {
         let most = RayDensity::MOST_SEGMENTS;
         let recorded = vec![Segment { from: [-1.0, 1.0, 1.0], to: [0.0, 1.0, 1.0] }; most];
         let shapes = Primitives::Triangles(triangles);
-        let segments = ray_density(&boxes, Some(&shapes), &recorded).unwrap().segments() as usize;
+        let tree = median_cut::Config::default().build(&boxes).unwrap();
+        let density = ray_density(&tree, Some(&shapes), &recorded, &|| false).unwrap().unwrap();
         // Every second one is recorded.
-        assert_eq!(segments, most / 2 + most / 6);
+        assert_eq!(density.segments() as usize, most / 2 + most / 6);
     }
 
     #[test]
-    fn a_density_through_a_given_tree_is_the_same_and_ends_when_the_caller_says_so() {
+    fn a_density_is_the_same_through_any_tree_and_ends_when_the_caller_says_so() {
         let triangles = walls();
         let boxes = bvh_core::boxes(&triangles);
         let recorded = [Segment { from: [-1.0, 1.0, 1.0], to: [0.0, 1.0, 1.0] }; 300];
         let shapes = Primitives::Triangles(triangles);
-        let expected = ray_density(&boxes, Some(&shapes), &recorded).unwrap();
-        // The order of its objects makes this tree another one than the greedy tree.
-        let tree = median_cut::Config::default().build(&boxes).unwrap();
+        // The order of their objects makes these trees different.
+        let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
+        let halved = median_cut::Config::default().build(&boxes).unwrap();
         let polls = Cell::new(0);
-        let over_after = |most: usize| {
+        let over_after = |tree: &Bvh, most: usize| {
             polls.set(0);
             let is_over = || polls.replace(polls.get() + 1) >= most;
-            ray_density_through(&tree, &shapes, &recorded, &is_over).unwrap()
+            ray_density(tree, Some(&shapes), &recorded, &is_over).unwrap()
         };
-        let found = over_after(usize::MAX).unwrap();
-        assert_eq!(found.visits(&tree), expected.visits(&tree));
-        assert_eq!(found.segments(), 400);
-        assert!(over_after(10).is_none());
+        let [expected, found] =
+            [&greedy, &halved].map(|tree| over_after(tree, usize::MAX).unwrap());
+        assert_eq!(found.visits(&halved), expected.visits(&halved));
+        assert!(over_after(&halved, 10).is_none());
         assert_eq!(polls.get(), 12);
     }
 }

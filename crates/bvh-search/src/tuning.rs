@@ -114,6 +114,9 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 SCENE..
     /// Minimum length of a time-limited search that first keeps a local optimum of reinsertion, in
     /// case it is stopped early. The local optimum takes 300 to 900 work per object.
     SECURED_FROM: f64 = 20_000.0, "work per object";
+    /// Work below which plain reinsertion within the same work may end lower, so that a bake makes
+    /// its tree, too.
+    REINSERTED_BELOW: f64 = 300.0, "work per object";
     /// Minimum length for which several threads anneal disjoint subtrees. Shorter runs have too few
     /// rounds to cut them.
     WORTH_SUBTREES: f64 = 256.0, "work per object";
@@ -126,11 +129,11 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 SCENE..
     LEAST_LARGE_SUBTREES: u32 = 8, "subtrees";
     /// Maximum number of subtrees.
     MOST_SUBTREES: u32 = 4096, "subtrees";
-    /// Minimum size of a tree that is copied for several threads. In smaller trees, accepted moves of
-    /// one turn exclude each other more often.
+    /// Minimum size of a tree that is copied for several threads. In smaller trees, accepted moves
+    /// of one turn exclude each other more often.
     COPIED_FROM: u64 = 1 << 14, "objects";
-    /// Maximum number of threads for which a tree is copied. Every copy repeats the accepted moves of
-    /// all.
+    /// Maximum number of threads for which a tree is copied. Every copy repeats the accepted moves
+    /// of all.
     MOST_COPIES: usize = 8, "threads";
     /// Work of every copy but the first. It waits for the others, and repeats their moves.
     WORK_OF_A_COPY: f64 = 0.8, "fraction of the work of one thread";

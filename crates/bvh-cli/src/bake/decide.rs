@@ -5,17 +5,16 @@
 //! judge the trees. Chosen is the simplest combination that is within [`TOLERANCE`] of the best
 //! one.
 
-use super::plan::Prepared;
-use super::starts::{Division, greedy};
+use super::plan::{Plan, Prepared};
 use super::watch::Interrupted;
 use crate::Error;
 use crate::interrupt;
 use crate::output::print_error;
 use crate::rays::Rays;
-use bvh_core::cost::{Measure, Objective};
+use bvh_core::cost::Objective;
 use bvh_core::{Bvh, RayDensity};
 use bvh_scenes::Scene;
-use bvh_search::{Budget, Method, Problem, solve};
+use bvh_search::{Bake, Budget};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -70,49 +69,40 @@ pub struct Open {
     pub references: bool,
 }
 
-/// The choices of a bake.
-#[derive(Clone)]
-pub struct Choices {
-    /// The cost to minimise.
-    pub objective: Objective,
-    /// The rays whose visits replace areas.
-    pub rays: Option<Rays>,
-    /// The largest number of references per object; 1 for whole objects.
-    pub references: f64,
-}
-
 /// The outcome of a decision.
-pub struct Decided<'a> {
-    /// The choices that pay.
-    pub choices: Choices,
+pub struct Decided {
+    /// The plan with the choices that pay.
+    pub plan: Plan,
     /// The explanation of each choice, in one line.
     pub reasons: Vec<String>,
     /// The parts of the decision that the bake needs too.
-    pub prepared: Prepared<'a>,
+    pub prepared: Prepared,
 }
 
-/// Tries the combinations of the open choices, and chooses one of them. Ends with the `given`
-/// choices if `interrupted` becomes true.
-pub fn decide<'a>(
+/// Tries the combinations of the open choices, and chooses one of them. Keeps the plan as it is if
+/// `interrupted` becomes true.
+pub fn decide(
     open: Open,
-    given: Choices,
-    method: &Method,
-    scene: &'a Scene,
-    seed: u64,
+    plan: Plan,
+    scene: &Scene,
     interrupted: &AtomicBool,
-) -> Result<Decided<'a>, Error> {
-    let costs = open.costs(&given);
-    let references = open.references(&given);
+) -> Result<Decided, Error> {
+    let costs = open.costs(&plan);
+    let references = open.references(&plan);
     if costs.len() * references.len() == 1 {
-        let prepared = Prepared::default();
-        return Ok(Decided { choices: given, reasons: Vec::new(), prepared });
+        return Ok(Decided { plan, reasons: Vec::new(), prepared: Prepared::default() });
     }
-    let mut trials = Trials::begin(&open, &given, method, scene, seed, interrupted)?;
+    // From here on there is a tree soon, which Ctrl-C must save instead of ending the program.
+    interrupt::hold();
+    let Some(mut trials) = Trials::begin(&open, &plan, scene, interrupted)? else {
+        return Ok(Decided { plan, reasons: Vec::new(), prepared: Prepared::default() });
+    };
     let mut table = Table { columns: costs.len(), tests: Vec::new() };
     let bar = bar(costs.len() * references.len());
     for &references in &references {
         for (objective, rays) in &costs {
-            let choices = Choices { objective: *objective, rays: rays.clone(), references };
+            let choices =
+                Plan { objective: *objective, rays: rays.clone(), references, ..plan.clone() };
             table.tests.push(trials.expected_tests(&choices)?);
             bar.inc(1);
         }
@@ -121,22 +111,22 @@ pub fn decide<'a>(
     // An interrupted search says nothing about the choices.
     if interrupted.load(Relaxed) {
         let prepared = Prepared { greedy: Some(trials.greedy), ..Prepared::default() };
-        return Ok(Decided { choices: given, reasons: Vec::new(), prepared });
+        return Ok(Decided { plan, reasons: Vec::new(), prepared });
     }
     let (row, column) = table.simplest();
     let (objective, rays) = costs[column].clone();
-    let choices = Choices { objective, rays, references: references[row] };
+    let plan = Plan { objective, rays, references: references[row], ..plan };
     let prepared = Prepared {
         greedy: Some(trials.greedy),
-        density: trials.trained.take_if(|_| choices.rays.is_some()),
-        division: trials.division.take_if(|_| choices.references > 1.0),
+        density: trials.trained.take_if(|_| plan.rays.is_some()),
+        division: trials.division.take_if(|_| plan.references > 1.0),
     };
-    Ok(Decided { choices, reasons: table.reasons(&open, row, column), prepared })
+    Ok(Decided { plan, reasons: table.reasons(&open, row, column), prepared })
 }
 
 impl Open {
     /// Returns the costs to try, with their rays: the simpler ones first.
-    fn costs(&self, given: &Choices) -> Vec<(Objective, Option<Rays>)> {
+    fn costs(&self, given: &Plan) -> Vec<(Objective, Option<Rays>)> {
         let mut costs = vec![(given.objective, given.rays.clone())];
         let objective = if self.cost { Objective::Layout } else { given.objective };
         if self.cost {
@@ -149,7 +139,7 @@ impl Open {
     }
 
     /// Returns the numbers of references per object to try: the smaller one first.
-    fn references(&self, given: &Choices) -> Vec<f64> {
+    fn references(&self, given: &Plan) -> Vec<f64> {
         if self.references { vec![1.0, REFERENCES] } else { vec![given.references] }
     }
 }
@@ -215,84 +205,64 @@ fn bar(trials: usize) -> ProgressBar {
 }
 
 /// Short searches, and the data that they share.
-struct Trials<'a, 'b> {
-    method: &'b Method,
+struct Trials<'a> {
     scene: &'a Scene,
-    seed: u64,
-    interrupted: &'b AtomicBool,
+    interrupted: &'a AtomicBool,
     greedy: Bvh,
-    /// The rays that judge; `None` after an interruption.
-    judging: Option<RayDensity>,
+    /// The rays that judge.
+    judging: RayDensity,
     /// The rays that train trees.
     trained: Option<RayDensity>,
-    /// The permission to divide objects.
-    division: Option<Division<'a>>,
+    /// The division of the objects.
+    division: Option<Bvh>,
 }
 
-impl<'a, 'b> Trials<'a, 'b> {
+impl<'a> Trials<'a> {
+    /// Returns `None` after an interruption.
     fn begin(
         open: &Open,
-        given: &Choices,
-        method: &'b Method,
+        given: &Plan,
         scene: &'a Scene,
-        seed: u64,
-        interrupted: &'b AtomicBool,
-    ) -> Result<Self, Error> {
-        let greedy = greedy(method.name(), scene, interrupted)?;
-        // There is a tree now, which Ctrl-C must save instead of ending the program.
-        interrupt::hold();
+        interrupted: &'a AtomicBool,
+    ) -> Result<Option<Self>, Error> {
+        let failed = |error| Error::search(&scene.name, given.method.name())(error);
+        let references = if open.references { REFERENCES } else { given.references };
+        let bake = Bake { references, ..given.bake(scene, None) };
+        let observer = Interrupted(interrupted);
+        let Some(greedy) = bake.greedy(&observer).map_err(failed)? else { return Ok(None) };
         let judging = Rays::Default.density(scene, &greedy, Rays::JUDGING, interrupted)?;
+        let Some(judging) = judging else { return Ok(None) };
         let default = open.rays.then_some(Rays::Default);
         let trained = match given.rays.as_ref().or(default.as_ref()) {
-            Some(rays) => rays.density(scene, &greedy, seed, interrupted)?,
+            Some(rays) => rays.density(scene, &greedy, given.seed, interrupted)?,
             None => None,
         };
-        let references = if open.references { REFERENCES } else { given.references };
-        let most_references = (references * scene.boxes.len() as f64) as usize;
-        let is_over = || interrupted.load(Relaxed);
-        let division = Division::decide(most_references, scene, None, &is_over)?;
-        Ok(Self {
-            method,
-            scene,
-            seed,
-            interrupted,
-            greedy,
-            judging,
-            trained,
-            division: Some(division),
-        })
+        let division = bake.divided(&observer).map_err(failed)?;
+        Ok(Some(Self { scene, interrupted, greedy, judging, trained, division }))
     }
 
     /// Returns the expected tests of the judging rays in the tree of a short search; infinitely
     /// many after an interruption.
-    fn expected_tests(&self, choices: &Choices) -> Result<f64, Error> {
-        let Self { method, scene, seed, interrupted, greedy, .. } = self;
+    fn expected_tests(&self, choices: &Plan) -> Result<f64, Error> {
+        let Self { scene, interrupted, greedy, .. } = self;
         // A trial of no work takes seconds in large scenes.
         if interrupted.load(Relaxed) {
             return Ok(f64::INFINITY);
         }
-        let is_divided = choices.references > 1.0;
-        let problem = Problem {
-            objective: choices.objective,
-            splits: self.division.as_ref().filter(|_| is_divided).and_then(Division::splits),
-            measure: self
-                .trained
-                .as_ref()
-                .filter(|_| choices.rays.is_some())
-                .map(|density| density as &dyn Measure),
-            known: Some(greedy),
-            ..Problem::new(&scene.boxes)
-        };
         let work = work(scene.boxes.len()) as f64;
         let tried = (TRIED * work).max(LEAST_TRIED.min(MOST_TRIED * work));
-        let budget = Budget { max_work: Some(tried as u64), ..Budget::UNLIMITED };
-        let found = solve(*method, &problem, *seed, budget, &Interrupted(interrupted))
-            .map_err(Error::search(&scene.name, method.name()))?;
-        match &self.judging {
-            Some(judging) if !interrupted.load(Relaxed) => {
-                Ok(Objective::Layout.cost_by(&found.tree, judging))
-            }
-            _ => Ok(f64::INFINITY),
+        let rays = self.trained.as_ref().filter(|_| choices.rays.is_some());
+        let bake = Bake {
+            division: self.division.as_ref(),
+            budget: Budget { max_work: Some(tried as u64), ..Budget::UNLIMITED },
+            ..choices.bake(scene, rays)
+        };
+        let baked = bake
+            .search(Some(greedy.clone()), &Interrupted(interrupted))
+            .map_err(Error::search(&scene.name, choices.method.name()))?;
+        if interrupted.load(Relaxed) {
+            return Ok(f64::INFINITY);
         }
+        Ok(Objective::Layout.cost_by(&baked.outcome.tree, &self.judging))
     }
 }

@@ -2,7 +2,7 @@
 //! instances that its nodes place, into a folder.
 
 use super::BakeArgs;
-use super::plan::{Figures, Plan, Prepared};
+use super::plan::{Plan, Prepared};
 use super::watch::gain;
 use crate::Error;
 use crate::arguments::output_folder;
@@ -86,13 +86,13 @@ pub(super) fn bake_part(
     interruption: Interruption,
     interrupted: &AtomicBool,
 ) -> Result<(), Error> {
-    let (bake, greedy) = plan.begin(scene, None, Prepared::default(), interrupted)?;
-    let baked = bake.search(greedy, interrupted)?;
+    let found = plan.search(scene, None, Prepared::default(), interrupted)?;
     if interruption == Interruption::Discards && interrupted.load(Relaxed) {
         return Ok(());
     }
-    bake.save(&baked, path, files::Reserved::new(path, 0)?)?;
-    let Some(Figures { cost, base, .. }) = baked.figures else { return Ok(()) };
+    found.save(path, files::Reserved::new(path, 0)?)?;
+    let cost = found.baked.outcome.cost;
+    let Some(base) = found.baked.greedy else { return Ok(()) };
     let count = scene.boxes.len();
     let gain = gain(cost, base);
     print_line(&format!(

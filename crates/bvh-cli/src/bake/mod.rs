@@ -6,7 +6,6 @@ mod from;
 pub mod instances;
 pub mod parts;
 mod plan;
-mod starts;
 mod watch;
 
 use crate::Error;
@@ -15,16 +14,14 @@ use crate::explain;
 use crate::output::print_line;
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
-use bvh_core::Bvh;
 use bvh_core::cost::Objective;
 use bvh_scenes::Scene;
 use bvh_scenes::files::Reserved;
-use bvh_search::best::{self, Horizon};
-use bvh_search::{Method, StopReason};
+use bvh_search::{Method, Outcome, StopReason};
 use clap::Args;
-use decide::{Choices, Decided, Open, decide};
+use decide::{Decided, Open, decide};
 use effort::Effort;
-use plan::{Bake, Baked, Figures, Plan, Prepared};
+use plan::{Found, Plan, Prepared};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use watch::gain;
@@ -147,7 +144,6 @@ impl BakeArgs {
             objective,
             references: self.references.unwrap_or(1.0),
             rays,
-            name: self.recorded(self.rays.as_deref()),
         })
     }
 
@@ -162,12 +158,12 @@ impl BakeArgs {
 
     /// Makes the choices that the arguments leave open if there is no budget, and prints the
     /// reasons. Also returns the results of the decision that the bake needs.
-    fn decided<'a>(
+    fn decided(
         &self,
         plan: Plan,
-        scene: &'a Scene,
+        scene: &Scene,
         interrupted: &AtomicBool,
-    ) -> Result<(Plan, Prepared<'a>), Error> {
+    ) -> Result<(Plan, Prepared), Error> {
         // Only `best` offers the choices, and only triangles have a wide layout. A search from an
         // earlier tree minimises the cost that is given.
         let has_choices = matches!(plan.method, Method::Best(_)) && scene.triangles().is_ok();
@@ -179,22 +175,9 @@ impl BakeArgs {
             rays: self.rays.is_none(),
             references: self.references.is_none(),
         };
-        let given = Choices {
-            objective: plan.objective,
-            rays: plan.rays.clone(),
-            references: plan.references,
-        };
-        let Decided { choices, reasons, prepared } =
-            decide(open, given, &plan.method, scene, plan.seed, interrupted)?;
-        for reason in reasons {
-            print_line(&reason);
-        }
-        let Choices { objective, rays, references } = choices;
-        let name = match (&rays, &self.rays) {
-            (Some(_), None) => self.recorded(Some(Rays::DEFAULT)),
-            _ => plan.name,
-        };
-        Ok((Plan { objective, rays, references, name, ..plan }, prepared))
+        let Decided { plan, reasons, prepared } = decide(open, plan, scene, interrupted)?;
+        reasons.iter().for_each(|reason| print_line(reason));
+        Ok((plan, prepared))
     }
 
     /// Returns the named method. If a tree is given, rejects methods that cannot continue from it.
@@ -206,12 +189,9 @@ impl BakeArgs {
                 let accepted = Method::NAMES.join(", ");
                 Err(Error::Usage(format!("--method {name}: no such method; accepted: {accepted}")))
             }
-            Some(Method::Best(config)) => {
-                // The budget ends the search, so the method's own limit is lifted.
-                Ok(Method::Best(best::Config { horizon: Some(Horizon::Known), ..config }))
-            }
-            Some(_) if self.from.is_some() => Err(Error::Usage(format!(
-                "--method {name} cannot continue --from a tree; accepted: {BEST}"
+            Some(method) if self.from.is_some() && name != BEST => Err(Error::Usage(format!(
+                "--method {} cannot continue --from a tree; accepted: {BEST}",
+                method.name()
             ))),
             Some(method) => Ok(method),
         }
@@ -230,23 +210,6 @@ impl BakeArgs {
             return Err(Error::Usage(message));
         }
         Ok(())
-    }
-
-    /// Returns the name that the file records: the method, and the `rays` if there are any.
-    fn recorded(&self, rays: Option<&str>) -> String {
-        const MOST_BYTES: usize = 64;
-        let Some(rays) = rays else { return self.method.clone() };
-        let rays = match Path::new(rays).file_name() {
-            _ if rays == Rays::DEFAULT => "default rays".to_owned(),
-            Some(file) => format!("rays of {}", file.to_string_lossy()),
-            None => format!("rays of {rays}"),
-        };
-        let mut name = format!("{} for {rays}", self.method).replace('\0', "");
-        // Removing characters and not bytes keeps the name valid UTF-8.
-        while name.len() > MOST_BYTES {
-            name.pop();
-        }
-        name
     }
 }
 
@@ -287,57 +250,51 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     // Reserving the file first reports a full disk before the search and not after it.
     let reserved = args.reserved(&out, plan::most_bytes(&scene, most_references))?;
     let (plan, prepared) = args.decided(plan, &scene, interrupted)?;
-    let (bake, greedy) = plan.begin(&scene, start.as_ref(), prepared, interrupted)?;
-    if args.explain && bake.is_whole() {
-        print_line(
-            "  skipped: divided objects: no spatial split of a top-down division saves anything",
-        );
-    }
-    search_and_save(&bake, greedy, &out, reserved, interrupted)
+    let found = plan.search(&scene, start.as_ref(), prepared, interrupted)?;
+    save(&found, &out, reserved, interrupted)
 }
 
-/// Searches, writes the best tree, and prints its cost.
-fn search_and_save(
-    bake: &Bake,
-    greedy: Bvh,
+/// Writes the best tree, and prints its cost.
+fn save(
+    found: &Found,
     out: &Path,
     reserved: Reserved,
     interrupted: &AtomicBool,
 ) -> Result<(), Error> {
-    let baked = bake.search(greedy, interrupted)?;
-    let (bytes, cost_for_lines) = bake.save(&baked, out, reserved)?;
-    match &baked.figures {
-        Some(figures) if !interrupted.load(Relaxed) => {
-            print_line(&summary(bake, &baked, figures, cost_for_lines));
-            print_line(&format!("{}: {bytes} bytes", out.display()));
-            Ok(())
-        }
-        figures => {
-            let cost = figures.as_ref().map(|figures| figures.cost);
-            Err(Error::Stopped { path: out.to_owned(), cost })
-        }
+    let (bytes, cost_for_lines) = found.save(out, reserved)?;
+    if interrupted.load(Relaxed) {
+        return Err(Error::Stopped { path: out.to_owned(), cost: found.baked.outcome.cost });
     }
+    print_line(&summary(found, cost_for_lines));
+    print_line(&format!("{}: {bytes} bytes", out.display()));
+    Ok(())
 }
 
-/// Describes the result of a bake, with its figures and the cost of its tree for random lines.
-fn summary(bake: &Bake, baked: &Baked, figures: &Figures, cost_for_lines: f64) -> String {
-    let Bake { plan, scene, .. } = *bake;
-    let Baked { tree, work, .. } = baked;
-    let Figures { cost, base, before, moves, stop, seconds, .. } = figures;
+/// Describes the result of a search, whose tree has this cost for random lines.
+fn summary(found: &Found, cost_for_lines: f64) -> String {
+    let Found { plan, scene, baked, greedy_for_lines, seconds, .. } = found;
+    let Outcome { tree, cost, evaluations: moves, work, stop, .. } = &baked.outcome;
     let objects = scene.boxes.len();
     let method = plan.method.name();
-    let mut lines = vec![
-        format!("{} ({}), {objects} objects, {method}, seed {}", scene.name, scene.kind, plan.seed),
-        format!("{} {cost}, {} Müller–Fellner's {base}", bake.unit(), gain(*cost, *base)),
-    ];
-    if let Some(greedy) = figures.base_elsewhere {
+    let mut lines = vec![format!(
+        "{} ({}), {objects} objects, {method}, seed {}",
+        scene.name, scene.kind, plan.seed
+    )];
+    if let Some(greedy) = baked.greedy {
+        lines.push(format!(
+            "{} {cost}, {} Müller–Fellner's {greedy}",
+            found.unit(),
+            gain(*cost, greedy)
+        ));
+    }
+    if let Some(greedy) = *greedy_for_lines {
         lines.push(format!(
             "risk: a tree for rays may be worse for others; for random lines it is {} Müller–Fellner's",
             gain(cost_for_lines, greedy)
         ));
     }
-    if let Some(before) = before {
-        lines.push(format!("{} the tree it started from, {before}", gain(*cost, *before)));
+    if let Some(before) = baked.start {
+        lines.push(format!("{} the tree it started from, {before}", gain(*cost, before)));
     }
     if plan.references > 1.0 {
         let references = tree.prim_ids.len();

@@ -3,7 +3,7 @@
 
 use super::instances::{Interruption, bake_part};
 use super::plan::{Plan, Prepared, Start};
-use super::{BakeArgs, search_and_save};
+use super::{BakeArgs, save};
 use crate::Error;
 use crate::arguments::output_file;
 use crate::output::print_line;
@@ -82,8 +82,8 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
     let reserved = args.reserved(&out, super::plan::most_bytes(&scene, plan.references))?;
     let start = join(&scene, &parts, &folder)?;
     let plan = Plan { effort: plan.effort.share(1.0 - SHARE_OF_PARTS), ..plan };
-    let (bake, greedy) = plan.begin(&scene, Some(&start), Prepared::default(), interrupted)?;
-    search_and_save(&bake, greedy, &out, reserved, interrupted)
+    let found = plan.search(&scene, Some(&start), Prepared::default(), interrupted)?;
+    save(&found, &out, reserved, interrupted)
 }
 
 /// Cuts a scene, and gives every part a share of the budget in proportion to its objects.
@@ -99,9 +99,10 @@ fn parts(plan: &Plan, scene: &Scene, count: u32) -> Result<Vec<Part>, Error> {
     for (number, objects) in cut(&scene.boxes, count as usize).into_iter().enumerate() {
         let share = SHARE_OF_PARTS * objects.len() as f64 / all as f64;
         let plan = Plan { effort: plan.effort.share(share), ..plan.clone() };
-        let Plan { effort, seed, objective, references, name, .. } = &plan;
+        let Plan { method, effort, seed, objective, references, .. } = &plan;
+        let method = method.name();
         let identity = format!(
-            "{} {count} {number} {name} {effort:?} {seed} {objective:?} {references}",
+            "{} {count} {number} {method} {effort:?} {seed} {objective:?} {references}",
             scene.checksum()
         );
         let id = format!("{:016x}", fnv1a(identity.into_bytes()));

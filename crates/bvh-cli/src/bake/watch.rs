@@ -22,8 +22,6 @@ pub struct Watch<'a> {
     pub bar: ProgressBar,
     deadline: Deadline,
     effort: Effort,
-    /// The cost that gains are relative to.
-    base: f64,
     last: Mutex<Option<Event>>,
     /// The work so far. Events are rare while the search is hot, so that their work would be out of
     /// date.
@@ -34,7 +32,7 @@ pub struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    pub fn new(effort: Effort, deadline: Deadline, base: f64, interrupted: &'a AtomicBool) -> Self {
+    pub fn new(effort: Effort, deadline: Deadline, interrupted: &'a AtomicBool) -> Self {
         // The bar counts thousandths of the budget.
         let bar = ProgressBar::new(1000);
         let style = ProgressStyle::with_template("{bar:10} {wide_msg}");
@@ -43,7 +41,6 @@ impl<'a> Watch<'a> {
             bar,
             deadline,
             effort,
-            base,
             last: Mutex::default(),
             work: AtomicU64::default(),
             shown: AtomicU64::default(),
@@ -51,7 +48,7 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Shows the incumbent, its gain and the time left: in the bar ten times a second, or
+    /// Shows the lowest cost and the time left: in the bar ten times a second, or
     /// without a terminal as a line every ten seconds.
     fn show(&self) {
         const BAR_MILLISECONDS: u64 = 100;
@@ -76,8 +73,7 @@ impl<'a> Watch<'a> {
             Effort::Time(_) => self.deadline.fraction(),
             Effort::Work(work) => self.work.load(Relaxed) as f64 / work.max(1) as f64,
         };
-        let gain = gain(event.incumbent, self.base);
-        let mut message = format!("cost {:.6e}, {gain} the greedy tree's", event.incumbent);
+        let mut message = format!("cost {:.6e}", event.incumbent);
         // The rate of the first moments predicts nothing.
         if done >= 0.01 {
             message += &format!(", {:.0} s left", (seconds / done - seconds).max(0.0));

@@ -3,9 +3,10 @@
 use crate::support::{
     begin, cost, ended, facts, names, number, refused, run_on_a_small_disk, said,
 };
-use bvh_core::{Aabb, Bvh, Node};
+use bvh_core::{Aabb, Bvh, Node, Segment};
 use bvh_scenes::Scene;
 use bvh_scenes::tree_file;
+use bvh_search::{Budget, Objects, Options, OwnedTree};
 use std::fs;
 use std::time::{Duration, Instant};
 
@@ -36,9 +37,8 @@ fn a_bake_for_rays_saves_the_number_of_visits_of_each_node() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("walk.toml"), WALK).unwrap();
-    for (rays, name) in
-        [("default", "best for default rays"), ("walk.toml", "best for rays of walk.toml")]
-    {
+    let name = "best for rays";
+    for rays in ["default", "walk.toml"] {
         let bake = ["bake", "escher", "--budget=2Mwork", "--out=x.bvh", "--rays", rays];
         let bytes = ["1", "2"].map(|jobs| {
             let said = said(at, &[&bake[..], &["--jobs", jobs]].concat());
@@ -77,6 +77,33 @@ fn a_bake_for_rays_saves_the_number_of_visits_of_each_node() {
         let bake = ["bake", "escher", "--budget=1s", "--out=y.bvh", "--rays", file];
         refused(at, &bake, 2, parts);
         assert!(!at.join("y.bvh").exists());
+    }
+}
+
+#[test]
+fn a_bake_of_work_writes_the_bytes_that_the_library_gives_other_languages() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let scene = Scene::load("escher:400").unwrap();
+    let segments: Vec<Segment> = (0..90u8)
+        .map(|i| Segment { from: [0.0, 9.0, f32::from(i)], to: [1.0, 0.5, f32::from(i) / 9.0] })
+        .collect();
+    let coordinates = segments.iter().flat_map(|segment| [segment.from, segment.to]).flatten();
+    let bytes: Vec<u8> = coordinates.flat_map(f32::to_le_bytes).collect();
+    fs::write(at.join("rays.bin"), bytes).unwrap();
+    // The last budget is long enough for a tree of reinsertion aside.
+    for (flags, references, rays, work) in [
+        (&["--budget=300kwork"][..], 1.0, &[][..], 300_000),
+        (&["--budget=300kwork", "--references=1.3"], 1.3, &[], 300_000),
+        (&["--budget=300kwork", "--rays=rays.bin"], 1.0, &segments, 300_000),
+        (&["--budget=9Mwork", "--rays=rays.bin", "--references=1.3"], 1.3, &segments, 9_000_000),
+    ] {
+        said(at, &[&["bake", "escher:400", "--out=x.bvh", "--seed=5"], flags].concat());
+        let objects = Objects::Shapes(scene.primitives.clone());
+        let budget = Budget { max_work: Some(work), ..Budget::UNLIMITED };
+        let options = Options { references, seed: 5, budget, rays };
+        let owned = OwnedTree::find(objects, &options, &()).unwrap();
+        assert!(fs::read(at.join("x.bvh")).unwrap() == owned.save().unwrap(), "{flags:?}");
     }
 }
 

@@ -30,7 +30,7 @@ use crate::run::{
 use crate::tree::{Metric, Working, search_by_metric};
 use crate::tuning::{
     CLUSTERING, CLUSTERING_MUCH_CHEAPER, COPIED_FROM, EVALUATED_AT_ONCE, LARGE_SUBTREE,
-    LEAST_LARGE_SUBTREES, MOST_COPIES, RECOMBINED_AT_ONCE, SECURED_FROM,
+    LEAST_LARGE_SUBTREES, MOST_COPIES, RECOMBINED_AT_ONCE, REINSERTED_BELOW, SECURED_FROM,
 };
 use bvh_build::ploc::{self, MortonOrder};
 use bvh_build::{BuildError, Builder, Watch};
@@ -42,19 +42,22 @@ use small_budget::SmallBudget;
 
 search_by_metric!(Config);
 
-/// Returns the outcome of plain reinsertion, for callers who may stop a search of this much work
-/// early and want no worse tree. Reinsertion takes at most a twentieth of the work; `None` if the
-/// work is too little. A time-limited search keeps such a tree itself. A search limited by work
-/// does not, because its bytes must follow from its plan alone.
-pub fn fallback(
+/// Returns the outcome of plain reinsertion within the same work, which `best` may end behind:
+/// within little work, because it does not yet pay to anneal, and after an early stop of a long
+/// search. A time-limited search keeps such a tree itself. A search limited by work does not,
+/// because its bytes must follow from its plan alone. In a long search, reinsertion takes at most a
+/// twentieth of the work. `None` if the work is neither little nor much.
+pub(crate) fn fallback(
     problem: &Problem,
     work: u64,
     observer: &dyn Observer,
 ) -> Result<Option<Outcome>, SearchError> {
-    if (work as f64) < SECURED_FROM * problem.boxes.len() as f64 {
-        return Ok(None);
-    }
-    solve(&reinsertion::Config::default(), problem, 0, Budget::UNLIMITED, observer).map(Some)
+    let per_object = work as f64 / problem.boxes.len() as f64;
+    let is_used = !(REINSERTED_BELOW..SECURED_FROM).contains(&per_object);
+    let budget = Budget { max_work: Some(work), ..Budget::UNLIMITED };
+    is_used
+        .then(|| solve(&reinsertion::Config::default(), problem, 0, budget, observer))
+        .transpose()
 }
 
 /// Returns the number of copies of a tree of so many objects that a search within a time limit
@@ -66,7 +69,7 @@ pub fn copies(objects: u64, threads: usize) -> u32 {
 
 /// Returns the outcome of a search, with the [`fallback`]'s tree if it costs less, which happens
 /// after an early stop.
-pub fn unless_behind(found: Outcome, fallback: Option<Outcome>) -> Outcome {
+pub(crate) fn unless_behind(found: Outcome, fallback: Option<Outcome>) -> Outcome {
     let better = fallback.filter(|other| other.cost < found.cost);
     match better {
         Some(Outcome { tree, cost, .. }) => Outcome { tree, cost, ..found },
@@ -145,8 +148,8 @@ impl Config {
     }
 
     /// Builds the initial tree. Unless the configuration names a builder, also builds a clustering,
-    /// which takes a fraction of the time. If the clustering or the caller's tree is cheaper, a more
-    /// thorough clustering is built and kept aside, so no budget ends above it. If the first
+    /// which takes a fraction of the time. If the clustering or the caller's tree is cheaper, a
+    /// more thorough clustering is built and kept aside, so no budget ends above it. If the first
     /// clustering is much cheaper, the cheapest of them becomes the initial tree. The work of a
     /// clustering counts only if it is used, like the work of the [`fallback`].
     fn initial(

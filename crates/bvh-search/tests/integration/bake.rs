@@ -38,6 +38,11 @@ fn a_time_of_zero_still_gives_a_tree() {
     assert!(bake(&[], Duration::ZERO).unwrap().tree.nodes.is_empty());
 }
 
+fn improve_owned(owned: &mut OwnedTree, time: Duration) {
+    let improvement = owned.improvement(Budget::UNLIMITED, &Deadline::after(time)).unwrap();
+    owned.apply(improvement);
+}
+
 #[test]
 fn a_tree_with_its_objects_is_improved_saved_and_loaded_divided_or_whole() {
     // Long and thin, so that dividing them pays.
@@ -56,12 +61,13 @@ fn a_tree_with_its_objects_is_improved_saved_and_loaded_divided_or_whole() {
         [(shapes(), 1.0), (shapes(), 2.0), (Objects::Boxes(boxes.clone()), 2.0)]
     {
         let deadline = || Deadline::after(Duration::from_millis(50));
-        let mut owned = OwnedTree::find(objects.clone(), references, &deadline()).unwrap();
+        let options = Options { references, ..Options::default() };
+        let mut owned = OwnedTree::find(objects.clone(), &options, &deadline()).unwrap();
         let first = cost::total_area(owned.tree());
         let may_divide = references > 1.0 && owned.triangles().is_some();
         let mut time = Duration::from_millis(50);
         let divides = loop {
-            owned.improve(&Deadline::after(time)).unwrap();
+            improve_owned(&mut owned, time);
             assert!(cost::total_area(owned.tree()) <= first * (1.0 + 1e-12));
             let divides = owned.tree().prim_ids.len() > boxes.len();
             // A busy or an emulated processor may need more than a moment before it divides any.
@@ -73,7 +79,7 @@ fn a_tree_with_its_objects_is_improved_saved_and_loaded_divided_or_whole() {
         assert_eq!(divides, may_divide);
         let mut loaded = OwnedTree::load(objects, &owned.save().unwrap()).unwrap();
         assert_eq!((loaded.tree(), loaded.objects()), (owned.tree(), boxes.len()));
-        loaded.improve(&deadline()).unwrap();
+        improve_owned(&mut loaded, Duration::from_millis(50));
         assert!(cost::total_area(loaded.tree()) <= first * (1.0 + 1e-12));
     }
 }
@@ -91,14 +97,14 @@ fn a_tree_with_its_objects_follows_a_seed_a_budget_recorded_rays_and_moved_objec
     let find = |seed: u64, rays: &[Segment]| {
         let budget = Budget { max_evaluations: Some(2000), ..Budget::UNLIMITED };
         let options = Options { seed, budget, rays, ..Options::default() };
-        OwnedTree::find_with(shapes(&triangles), &options, &()).unwrap()
+        OwnedTree::find(shapes(&triangles), &options, &()).unwrap()
     };
     assert_eq!(find(1, &[]).tree(), find(1, &[]).tree());
     assert_eq!(find(2, &rays).tree(), find(2, &rays).tree());
     assert_ne!(find(2, &rays).tree(), find(2, &[]).tree());
     let bad = [Segment { from: [f32::NAN; 3], to: [0.0; 3] }];
     let options = Options { rays: &bad, ..Options::default() };
-    let error = OwnedTree::find_with(shapes(&triangles), &options, &()).unwrap_err();
+    let error = OwnedTree::find(shapes(&triangles), &options, &()).unwrap_err();
     assert_eq!(error.to_string(), "rays: segment 0 has a coordinate that is not finite");
 
     let mut owned = find(1, &rays);
@@ -112,4 +118,19 @@ fn a_tree_with_its_objects_follows_a_seed_a_budget_recorded_rays_and_moved_objec
     let hit = owned.layout().unwrap().unwrap().nearest_hit(&ray);
     assert_eq!(hit, nearest_hit(owned.tree(), &moved, &ray));
     assert!(hit.is_some());
+}
+
+#[test]
+fn no_bake_of_work_is_behind_reinsertion_within_the_same_work() {
+    for (name, objects) in [("escher", 60), ("bijou", 500), ("konistil", 300), ("S04", 200)] {
+        let boxes = bvh_scenes::Scene::load(&format!("{name}:{objects}")).unwrap().boxes;
+        for per_object in [1, 5, 20, 30, 50, 100, 200, 400, 1000, 3000, 20_000, 60_000] {
+            let work = per_object * boxes.len() as u64;
+            let budget = Budget { max_work: Some(work), ..Budget::UNLIMITED };
+            let method = bvh_search::reinsertion::Config::default();
+            let plain = solve(&method, &Problem::new(&boxes), 1, budget, &()).unwrap();
+            let baked = Bake { budget, ..Bake::new(&boxes) }.search(None, &()).unwrap().outcome;
+            assert!(baked.cost <= plain.cost, "{name}, {per_object}");
+        }
+    }
 }

@@ -174,8 +174,9 @@ impl Config {
         };
         if trained == TrainedOn::Recorded {
             let segments: Vec<Segment> = rays.iter().map(|traced| traced.segment).collect();
-            return ray_density(&scene.boxes, Some(&scene.primitives), &segments)
-                .map_err(|error| error.to_string());
+            let density = ray_density(&tree, Some(&scene.primitives), &segments, &|| false)
+                .map_err(|error| error.to_string())?;
+            return density.ok_or_else(|| "nobody cancels a density".into());
         }
         density(&rays, &tree).map_err(|error| error.to_string())
     }

@@ -1,0 +1,96 @@
+//! The everyday calls: the best tree for a given time, with every parameter at its default.
+
+use crate::bake::density_of;
+use crate::{Bake, BakeError, Deadline, Outcome, SearchError};
+use bvh_core::{
+    Aabb, Bvh, Instance, Instances, Primitives, RayDensity, Segment, Triangle, WideBvh,
+};
+use std::time::Duration;
+
+/// Returns the best tree over `boxes` that [`best`](crate::best) finds in about `time`, from the
+/// milliseconds of a build to the minutes of a bake. The search plans with the time, so one call
+/// for a second finds a better tree than ten calls for a tenth. The search ends earlier if it
+/// proves its tree optimal, and later if the time is not enough for the fastest build.
+///
+/// [`Bake`] has everything else: progress, cancellation, seeds, divided objects, other searches,
+/// and limits in work instead of time, which give the same result on every machine.
+///
+/// ```
+/// use bvh_search::prelude::*;
+/// let boxes: Vec<Aabb> = (0..100u8).map(f32::from).map(|x| Aabb::from([[x; 3], [x + 1.5; 3]])).collect();
+/// let tree = bake(&boxes, Duration::from_millis(10))?.tree;
+/// validate(&tree, &boxes)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn bake(boxes: &[Aabb], time: Duration) -> Result<Outcome, SearchError> {
+    Ok(Bake::new(boxes).search(None, &Deadline::after(time))?.outcome)
+}
+
+/// Returns a scene of instances with the best tree over them that [`best`](crate::best) finds in
+/// about `time`. The trees of the parts are as they are.
+///
+/// ```
+/// use bvh_search::prelude::*;
+/// let triangles = [Triangle::from([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])];
+/// let tree = bake(&boxes(&triangles), Duration::ZERO)?.tree;
+/// let part = WideBvh::new(&tree, &triangles)?;
+/// let row = (0..9u8).map(|i| Affine3A::from_translation(Vec3::X * f32::from(i)));
+/// let instances: Vec<Instance> = row.map(|transform| Instance { part: 0, transform }).collect();
+/// let scene = bake_instances(vec![part], instances, Duration::from_millis(10))?;
+/// let hit = scene.nearest_hit(&Ray::half_line([4.2, 0.2, 3.0], [0.0, 0.0, -1.0])?);
+/// assert_eq!(hit, Some(InstanceHit { t: 3.0, instance: 4, triangle: 0 }));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn bake_instances(
+    parts: Vec<WideBvh>,
+    instances: Vec<Instance>,
+    time: Duration,
+) -> Result<Instances, BakeError> {
+    let top = bake(&Instance::boxes(&instances, &parts)?, time)?.tree;
+    Ok(Instances::new(parts, instances, top)?)
+}
+
+/// Improves a tree over `boxes` for about `time`: a tree from another library, or one that has been
+/// [refitted](Bvh::refit) to objects that moved. The growth of the tree's
+/// [internal area](bvh_core::cost::internal_area) over the root's area, or of
+/// [`WideBvh::expected_visits`](bvh_core::WideBvh::expected_visits), measures how far refitting has
+/// degraded the tree. Accepts the same trees as [`optimize`](crate::optimize()).
+pub fn improve(tree: &Bvh, boxes: &[Aabb], time: Duration) -> Result<Outcome, SearchError> {
+    let bake = Bake { start: Some(tree), ..Bake::new(boxes) };
+    Ok(bake.search(None, &Deadline::after(time))?.outcome)
+}
+
+/// Returns the best tree over `triangles` that [`best`](crate::best) finds in about `time` for rays
+/// like the recorded `segments`, and the density of these rays as by
+/// [`ray_density`](crate::ray_density).
+///
+/// The tree is best for its rays; other rays may take longer than with a tree from [`bake`]. The
+/// layout for the same rays is `WideBvh::for_rays(&tree, &triangles, &density.visits(&tree))`.
+///
+/// ```
+/// use bvh_search::prelude::*;
+/// let triangles: Vec<Triangle> = (0..50u8)
+///     .map(|i| Triangle::from([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]].map(|c| c.map(|x| x * f32::from(i + 1)))))
+///     .collect();
+/// // Yesterday's frame: rays from a camera to their hits.
+/// let segments: Vec<Segment> = (0..100u8)
+///     .map(|i| Segment { from: [0.5, 0.5, -9.0], to: [f32::from(i) / 9.0, 0.5, 1.0] })
+///     .collect();
+/// let (outcome, density) = bake_for_rays(&triangles, &segments, Duration::from_millis(10))?;
+/// let wide = WideBvh::for_rays(&outcome.tree, &triangles, &density.visits(&outcome.tree))?;
+/// assert!(wide.any_hit(&Ray::half_line([0.2, 0.2, 0.0], [0.0, 0.0, 1.0])?));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn bake_for_rays(
+    triangles: &[Triangle],
+    segments: &[Segment],
+    time: Duration,
+) -> Result<(Outcome, RayDensity), BakeError> {
+    let deadline = Deadline::after(time);
+    let boxes = bvh_core::boxes(triangles);
+    let shapes = Primitives::Triangles(triangles.to_vec());
+    let (greedy, density) = density_of(&boxes, Some(&shapes), segments)?;
+    let bake = Bake { rays: Some(&density), ..Bake::new(&boxes) };
+    let outcome = bake.search(Some(greedy), &deadline)?.outcome;
+    Ok((outcome, density))
+}
