@@ -29,7 +29,7 @@ mod tuning;
 
 pub use annealing::ruin_recreate;
 pub use bake::{Bake, BakeError, Baked, Division};
-pub use baselines::{LocalSearch, iterated, rebuild, rotation, treelet};
+pub use baselines::{LocalSearch, rebuild, rotation, treelet};
 pub use bvh_build;
 pub use bvh_core;
 pub use local::initial::Start;

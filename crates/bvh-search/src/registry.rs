@@ -80,8 +80,6 @@ methods! {
     "treelet" => Treelet(crate::treelet::Config),
     /// Annealing on single reinsertions.
     "annealing" => Annealing(crate::annealing::Config),
-    /// Perturbations and local searches.
-    "iterated_local_search" => IteratedLocalSearch(crate::iterated::Config),
     /// Rebuilding of subtrees that look badly split.
     "rebuild" => Rebuild(crate::rebuild::Config),
     /// Annealed ruin and recreate.

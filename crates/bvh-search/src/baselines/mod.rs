@@ -1,10 +1,8 @@
 //! Published methods that [`best`](crate::best) is compared with and never calls.
 //!
-//! Two local searches, [`rotation`] and [`treelet`], and two ways to continue from a local optimum,
-//! [`iterated`] and [`rebuild`]. GRASP and the ways to continue share [`LocalSearch`], which names
-//! a local search.
+//! Two local searches, [`rotation`] and [`treelet`], and a way to continue from a local optimum,
+//! [`rebuild`]. GRASP and the latter share [`LocalSearch`], which names a local search.
 
-pub mod iterated;
 pub mod rebuild;
 pub mod rotation;
 pub mod treelet;

@@ -9,16 +9,8 @@ use bvh_search::{
 use proptest::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
-const METHODS: [&str; 8] = [
-    "reinsertion",
-    "rotation",
-    "treelet",
-    "annealing",
-    "iterated_local_search",
-    "rebuild",
-    "ruin_recreate",
-    "best",
-];
+const METHODS: [&str; 7] =
+    ["reinsertion", "rotation", "treelet", "annealing", "rebuild", "ruin_recreate", "best"];
 
 /// The methods under test with their default parameters.
 fn methods() -> impl Iterator<Item = Method> {
@@ -59,20 +51,18 @@ fn run(method: &Method, boxes: &[Aabb], max_work: u64) -> Outcome {
 fn every_method_improves_on_its_start_and_the_best_most() {
     let boxes = scatter(2000, 1);
     let start = cost::internal_area(&reinsertion::Config::default().start.build(&boxes).unwrap());
-    let [reinsertion, rotated, treelets, single, iterated, rebuilt, annealed, best] =
-        METHODS.map(|name| {
-            let method = methods().find(|method| method.name() == name).unwrap();
-            let outcome = run(&method, &boxes, 8_000_000);
-            assert_eq!(outcome.history[0].cost, start);
-            outcome.cost
-        });
+    let [reinsertion, rotated, treelets, single, rebuilt, annealed, best] = METHODS.map(|name| {
+        let method = methods().find(|method| method.name() == name).unwrap();
+        let outcome = run(&method, &boxes, 8_000_000);
+        assert_eq!(outcome.history[0].cost, start);
+        outcome.cost
+    });
     assert!(rotated < start && treelets < start && reinsertion < start);
     for (name, cost) in
         [("annealing", single), ("rebuild", rebuilt), ("ruin_recreate", annealed), ("best", best)]
     {
         assert!(cost < reinsertion, "{name}: {cost}, reinsertion {reinsertion}");
     }
-    assert!(iterated <= reinsertion);
 }
 
 fn run_on_threads(threads: usize, config: best::Config, boxes: &[Aabb], work: u64) -> Outcome {

@@ -116,7 +116,6 @@ fn estimated_work(labelled: &Labelled, budget: Budget, objects: u64) -> u64 {
             (config.generations.saturating_add(1).saturating_mul(config.population as u64), 0)
         }
         Method::Annealing(config) => (0, config.work_per_object),
-        Method::IteratedLocalSearch(config) => (0, config.work_per_object),
         Method::Rebuild(config) => (0, config.work_per_object),
         Method::RuinRecreate(config) => (0, config.work_per_object),
         Method::Best(config) => (0, config.work_per_object),
