@@ -91,9 +91,7 @@ impl<M: Mover, A: Metric> Copies<M, A> {
                 has_led: false,
             })
             .collect();
-        let begun = on_each(&mut copies, |copy| {
-            copy.mover.begin(copy.tree, Vec::new(), &|| observer.cancelled())
-        });
+        on_each(&mut copies, |copy| copy.mover.begin(copy.tree, Vec::new()));
         let mut done = Tally::default();
         // The moves of the last turn, the leader's first.
         let mut accepted = Vec::new();
@@ -103,7 +101,7 @@ impl<M: Mover, A: Metric> Copies<M, A> {
             let fraction = work as f64 / quota.work as f64;
             hot * libm::pow(factor, fraction.min(1.0))
         };
-        while !begun.contains(&false) && !quota.is_reached(&done) && !observer.cancelled() {
+        while !quota.is_reached(&done) && !observer.cancelled() {
             let left = quota.less(&done);
             let share = Quota {
                 work: WORK_PER_TURN.min(left.work.div_ceil(u64::from(count))),
@@ -127,7 +125,7 @@ impl<M: Mover, A: Metric> Copies<M, A> {
             copy.catch_up(&accepted);
             // A cancelled search must return soon, and every later round would sort first.
             if !observer.cancelled() {
-                copy.tree.sort_in_preorder_unless(&|| observer.cancelled());
+                copy.tree.sort_in_preorder();
             }
         });
         done

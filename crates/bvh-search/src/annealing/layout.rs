@@ -9,9 +9,6 @@ use crate::tree::{ANCHOR, Metric, NONE, Working};
 use bvh_core::cost::LayoutCost;
 use bvh_core::with_vector_instructions;
 
-/// The number of rows after which a computation may end early. They take about 10 ms.
-const ROWS_PER_LOOK: usize = 1 << 16;
-
 /// A row of costs for every node of a tree, and the rows that undo a change.
 #[derive(Debug, Default)]
 pub(crate) struct Layout {
@@ -29,33 +26,16 @@ pub(crate) struct Layout {
 
 impl Layout {
     /// Computes all rows. O(nodes).
-    pub fn fill(&mut self, tree: &Working<impl Metric>) {
-        self.fill_unless(tree, &|| false);
-    }
-
-    /// Computes all rows and returns true. Returns false if `is_over` returns true before the rows
-    /// of a large tree are computed; then there are no rows. Fresh memory for ten million rows
-    /// takes more than a second. O(nodes).
     #[inline(never)]
-    pub fn fill_unless(&mut self, tree: &Working<impl Metric>, is_over: &dyn Fn() -> bool) -> bool {
+    pub fn fill(&mut self, tree: &Working<impl Metric>) {
         let count = tree.nodes.len();
         self.rows.clear();
-        self.rows.reserve(count);
-        while self.rows.len() < count {
-            if is_over() {
-                return false;
-            }
-            let next = count.min(self.rows.len() + ROWS_PER_LOOK);
-            self.rows.resize(next, LayoutCost::leaf(0.0, 0));
-        }
+        self.rows.resize(count, LayoutCost::leaf(0.0, 0));
         self.marks.clear();
         self.marks.resize(count, 0);
         self.change = 0;
-        if !fill_rows(self, tree, is_over) {
-            return false;
-        }
+        fill_rows(self, tree);
         self.cost = self.root(tree);
-        true
     }
 
     #[inline(always)]
@@ -132,66 +112,34 @@ impl Layout {
 }
 
 with_vector_instructions! {
-    /// Computes the row of every node and returns true, unless `is_over` returns true before.
-    fill_rows = fill_rows_plain<M: Metric>(
-        layout: &mut Layout, tree: &Working<M>, is_over: &dyn Fn() -> bool) -> bool
+    /// Computes the row of every node.
+    fill_rows = fill_rows_plain<M: Metric>(layout: &mut Layout, tree: &Working<M>)
 }
 
 #[inline(always)]
-fn fill_rows_plain<M: Metric>(
-    layout: &mut Layout,
-    tree: &Working<M>,
-    is_over: &dyn Fn() -> bool,
-) -> bool {
+fn fill_rows_plain<M: Metric>(layout: &mut Layout, tree: &Working<M>) {
     // Children before parents, because a row depends on the rows of both children. In a sorted tree
     // this is the order in memory; to find any other order takes longer than the rows.
     for (index, node) in tree.nodes.iter().enumerate().skip(1).rev() {
-        if index % ROWS_PER_LOOK == 0 && is_over() {
-            return false;
-        }
         let index = index as u32;
         if !node.is_leaf() && node.children.iter().any(|&child| child <= index) {
             for &index in tree.preorder().iter().rev() {
                 layout.rows[index as usize] = layout.row(tree, index);
             }
-            return true;
+            return;
         }
         layout.rows[index as usize] = layout.row(tree, index);
     }
-    true
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::annealing::Mover;
-    use crate::annealing::ruin_recreate::{Ruin, RuinMover};
     use crate::run::stream;
     use crate::scatter::{built, scatter};
     use bvh_build::muller_fellner;
     use bvh_core::cost::layout_area;
     use rand::RngExt;
-    use std::cell::Cell;
-
-    #[test]
-    fn a_mover_that_is_cancelled_prepares_at_most_a_part_of_a_large_tree_and_can_begin_again() {
-        let tree = built(&muller_fellner::Config::default(), &scatter(100_000));
-        let ruin = Ruin::default();
-        let mut mover = RuinMover::new(&ruin, 1000.0, true);
-        // Three parts of nodes are weighed, then four of rows are allocated, and three computed.
-        for most in 0..10 {
-            let looks = Cell::new(0);
-            let is_over = || {
-                looks.set(looks.get() + 1);
-                looks.get() > most
-            };
-            assert!(!mover.begin(&tree, vec![], &is_over), "{most}");
-            assert_eq!(looks.get(), most + 1);
-        }
-        assert!(mover.begin(&tree, vec![], &|| false));
-        let layout = mover.layout.unwrap();
-        assert_eq!(layout.current(), tree.layout_cost());
-    }
 
     #[test]
     fn rows_that_follow_moves_equal_recomputed_rows() {

@@ -8,14 +8,8 @@ use bvh_core::with_vector_instructions;
 /// Makes moves of one kind.
 pub(crate) trait Mover: Send {
     /// Begins a series of moves on a tree in preorder, near these nodes, or anywhere if there are
-    /// none, and returns true. Returns false if `is_over` returns true while a large tree is
-    /// prepared; then no move can be made. O(n), in the memory of an earlier series.
-    fn begin(
-        &mut self,
-        tree: &Working<impl Metric>,
-        near: Vec<u32>,
-        is_over: &dyn Fn() -> bool,
-    ) -> bool;
+    /// none. O(n), in the memory of an earlier series.
+    fn begin(&mut self, tree: &Working<impl Metric>, near: Vec<u32>);
     /// Changes the tree, and undoes the change unless Metropolis accepts it. Returns whether it was
     /// accepted.
     fn step(&mut self, tree: &mut Working<impl Metric>, temperature: f64, rng: &mut Stream)
@@ -61,9 +55,11 @@ fn cool_plain<M: Mover>(
     rng: &mut Stream,
     observer: &dyn Observer,
 ) -> Tally {
-    if !mover.begin(tree, near, &|| observer.cancelled()) {
+    // The beginning takes tenths of a second in a large tree.
+    if observer.cancelled() {
         return Tally::default();
     }
+    mover.begin(tree, near);
     moves(mover, tree, [hot, cold], quota, rng, observer, |_, _| ())
 }
 

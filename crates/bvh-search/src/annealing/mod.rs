@@ -16,6 +16,5 @@ mod side;
 mod single;
 mod subtrees;
 
-pub(crate) use metropolis::{Mover, cool};
-pub(crate) use single::SingleMover;
+pub(crate) use metropolis::cool;
 pub use single::{Config, SingleMove, Target};

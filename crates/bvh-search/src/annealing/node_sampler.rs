@@ -29,8 +29,6 @@ pub(crate) struct NodeSampler {
     draws: u32,
 }
 
-/// The number of nodes after which weighing may end early. They take about a millisecond.
-const NODES_PER_LOOK: usize = 1 << 16;
 /// The golden section.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
@@ -40,15 +38,9 @@ impl NodeSampler {
         Self { short_run: per_object < SHORT_RUN, ..Self::default() }
     }
 
-    /// Weighs the nodes of a tree, and returns true; then only these nodes will be drawn, or all
-    /// nodes if `only` is empty. Returns false if `is_over` returns true before the nodes of a large
-    /// tree are weighed. O(n).
-    pub fn begin(
-        &mut self,
-        tree: &Working<impl Metric>,
-        only: Vec<u32>,
-        is_over: &dyn Fn() -> bool,
-    ) -> bool {
+    /// Weighs the nodes of a tree. Only these nodes will be drawn, or all nodes if `only` is empty.
+    /// O(n).
+    pub fn begin(&mut self, tree: &Working<impl Metric>, only: Vec<u32>) {
         self.only = only;
         self.middle = None;
         self.draws = 0;
@@ -60,13 +52,9 @@ impl NodeSampler {
         let mut sum = 0.0;
         self.sums.push(sum);
         for position in 0..all {
-            if position % NODES_PER_LOOK == NODES_PER_LOOK - 1 && is_over() {
-                return false;
-            }
             sum += weight(tree, self.node(position));
             self.sums.push(sum);
         }
-        true
     }
 
     /// Draws a node of the tree, which must have the same nodes as at the
@@ -142,7 +130,7 @@ mod tests {
         let mut sampler = NodeSampler::default();
         let mut counts = vec![0; tree.nodes.len()];
         let mut rng = stream(6, 0);
-        assert!(sampler.begin(tree, only, &|| false));
+        sampler.begin(tree, only);
         (0..times).for_each(|_| counts[sampler.draw(&mut rng) as usize] += 1);
         counts
     }

@@ -220,14 +220,11 @@ impl Mover for RuinMover<'_> {
         Some(Reinsertions { removed: order, inserted, limit: *limit })
     }
 
-    fn begin(
-        &mut self,
-        tree: &Working<impl Metric>,
-        near: Vec<u32>,
-        is_over: &dyn Fn() -> bool,
-    ) -> bool {
-        self.sampler.begin(tree, near, is_over)
-            && self.layout.as_mut().is_none_or(|layout| layout.fill_unless(tree, is_over))
+    fn begin(&mut self, tree: &Working<impl Metric>, near: Vec<u32>) {
+        self.sampler.begin(tree, near);
+        if let Some(layout) = &mut self.layout {
+            layout.fill(tree);
+        }
     }
 
     #[inline(always)]

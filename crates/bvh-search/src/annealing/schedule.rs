@@ -123,15 +123,11 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
     // The completed fraction of the work or time, and the fraction per unit of work.
     let mut fraction = 0.0;
     let mut rate = 1.0 / work as f64;
-    // The order of a large tree takes tenths of a second before the sort looks.
     if observer.cancelled() {
         return;
     }
     // Moves find their nodes near each other in memory only after a sort.
-    tree.sort_in_preorder_unless(&|| observer.cancelled());
-    if observer.cancelled() {
-        return;
-    }
+    tree.sort_in_preorder();
     // Every round uses the memory of the one before: fresh memory for the rows of costs of ten
     // million nodes takes more than a second.
     let mut whole = mover();
@@ -219,13 +215,8 @@ mod tests {
         fn work(&self) -> u64 {
             self.inner.work()
         }
-        fn begin(
-            &mut self,
-            tree: &Working<impl Metric>,
-            near: Vec<u32>,
-            is_over: &dyn Fn() -> bool,
-        ) -> bool {
-            self.inner.begin(tree, near, is_over)
+        fn begin(&mut self, tree: &Working<impl Metric>, near: Vec<u32>) {
+            self.inner.begin(tree, near);
         }
     }
 

@@ -147,13 +147,8 @@ impl Mover for SingleMover<'_> {
         self.work
     }
 
-    fn begin(
-        &mut self,
-        tree: &Working<impl Metric>,
-        near: Vec<u32>,
-        is_over: &dyn Fn() -> bool,
-    ) -> bool {
-        self.sampler.begin(tree, near, is_over)
+    fn begin(&mut self, tree: &Working<impl Metric>, near: Vec<u32>) {
+        self.sampler.begin(tree, near);
     }
 
     #[inline(always)]

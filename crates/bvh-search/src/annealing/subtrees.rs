@@ -65,7 +65,7 @@ pub(crate) fn cool<M: Mover>(
     done += metropolis::cool(whole, tree, near, heat, quota.less(&done), &mut rng, observer);
     // A cancelled search must return soon, and every later round would sort first.
     if !observer.cancelled() {
-        tree.sort_in_preorder_unless(&|| observer.cancelled());
+        tree.sort_in_preorder();
     }
     done
 }

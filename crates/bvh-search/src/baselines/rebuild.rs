@@ -13,9 +13,9 @@
 
 use super::LocalSearch;
 use crate::candidates::{Candidates, Randomised};
+use crate::local::TOLERANCE;
 use crate::local::incumbent::Incumbent;
 use crate::local::initial::{Start, construction};
-use crate::local::pass::TOLERANCE;
 use crate::local::reinsertion;
 use crate::parallel;
 use crate::run::{

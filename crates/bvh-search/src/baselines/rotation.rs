@@ -7,9 +7,10 @@
 //! Differs from the paper: hill climbing only. Simulated annealing is in
 //! [annealing](crate::annealing), on reinsertion moves; every rotation is one or two reinsertions.
 
+use crate::local::TOLERANCE;
 use crate::local::incumbent::Incumbent;
 use crate::local::initial::Start;
-use crate::local::pass::{TOLERANCE, repeat, sort_by_area};
+use crate::local::reinsertion::{repeat, sort_by_area};
 use crate::run::{Found, Observer, Problem, Quota, Run, Tally};
 use crate::tree::{Metric, Working, search_by_metric};
 use bvh_config::Nested;

@@ -9,9 +9,10 @@
 //! Differs from them: any size from 3 to 12 at every node, bottom-up, until a full pass changes
 //! nothing. A treelet whose nodes have not changed since it was last optimal is not solved again.
 
+use crate::local::TOLERANCE;
 use crate::local::incumbent::Incumbent;
 use crate::local::initial::Start;
-use crate::local::pass::{TOLERANCE, repeat};
+use crate::local::reinsertion::repeat;
 use crate::run::{Found, Observer, Problem, Quota, Run, Tally};
 use crate::tree::{Metric, NONE, Subsets, Working, search_by_metric};
 use bvh_config::Nested;

@@ -11,7 +11,7 @@ use crate::annealing::schedule::Schedule;
 use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion;
 use crate::parallel::threads;
-use crate::run::{Problem, Quota, Run, Stream, Tally, stream};
+use crate::run::{Problem, Quota, Run, StopReason, Stream, Tally, stream};
 use crate::tree::{Metric, Working};
 use crate::tuning::{
     FINISH_AT_MOST, FINISH_WORK, LARGE_SUBTREE, LEAST_LARGE_SUBTREES, MOST_GENERATIONS,
@@ -34,7 +34,7 @@ pub(crate) fn improve<A: Metric>(
 ) {
     let n = tree.objects() as u64;
     // Two objects have only one tree.
-    if n < 3 {
+    if n < 3 || run.stopped() == Some(StopReason::Cancelled) {
         return;
     }
     let (horizon, work) = config.horizon(n, run);
@@ -142,16 +142,14 @@ impl Improvement<'_, '_, '_, '_> {
         if self.divider.is_none() {
             // A working form is a large part of all memory, so the tree itself is searched.
             let before = tree.shape();
-            if matches!(self.best.refill_unless_cancelled(tree, observer), Ok(true)) {
+            if self.best.refill(tree).is_ok() {
                 self.reinsert(tree);
             }
             // After a cancellation nobody continues from the tree.
             if self.run.stopped().is_none() {
                 tree.reshape(&before, self.boxes);
             }
-        } else if let Ok(Some(mut aside)) =
-            self.best.working_unless_cancelled(tree.metric(), observer)
-        {
+        } else if let Ok(mut aside) = self.best.working(tree.metric()) {
             self.reinsert(&mut aside);
         }
     }

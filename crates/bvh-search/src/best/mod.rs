@@ -140,9 +140,7 @@ impl Config {
                 best
             }
         };
-        let Some(mut tree) = best.working_unless_cancelled(metric, run.observer())? else {
-            return Ok(best.tree);
-        };
+        let mut tree = best.working(metric)?;
         improve(self, &mut tree, None, seed, problem, &mut best, run);
         Ok(best.tree)
     }
@@ -214,9 +212,7 @@ impl Config {
         }
         if problem.splits.is_some() {
             let metric = metric.with_leaves();
-            let Some(mut tree) = best.working_unless_cancelled(metric, run.observer())? else {
-                return Ok(best.tree);
-            };
+            let mut tree = best.working(metric)?;
             let working = |tree: &Bvh| Working::from_bvh(tree, metric.internal(tree), metric);
             let other_working = other.as_ref().map(working).transpose()?;
             if let Some(other) = other {
@@ -224,9 +220,7 @@ impl Config {
             }
             improve(self, &mut tree, other_working, seed, problem, &mut best, run);
         } else {
-            let Some(mut tree) = best.working_unless_cancelled(metric, run.observer())? else {
-                return Ok(best.tree);
-            };
+            let mut tree = best.working(metric)?;
             improve(self, &mut tree, None, seed, problem, &mut best, run);
         }
         Ok(best.tree)

@@ -1,6 +1,6 @@
 //! The best tree of a local search. The working form is converted only when it is better.
 
-use super::pass::TOLERANCE;
+use super::TOLERANCE;
 use crate::lower_bound;
 use crate::run::{Kept, Observer, Problem, Quota, Run, SearchError, Shortcut, Tally, watched};
 use crate::tree::{Metric, Working};
@@ -40,27 +40,6 @@ impl<'p> Incumbent<'p> {
     /// Converts the best tree to its working form. Builders and moves leave boxes tight.
     pub fn working<A: Metric>(&self, metric: A) -> Result<Working<A>, SearchError> {
         Working::from_bvh(&self.tree, self.area, metric)
-    }
-
-    /// Converts the best tree to its working form. Returns `None` if the search is cancelled before
-    /// a large tree is converted.
-    pub fn working_unless_cancelled<A: Metric>(
-        &self,
-        metric: A,
-        observer: &dyn Observer,
-    ) -> Result<Option<Working<A>>, SearchError> {
-        Working::from_bvh_unless(&self.tree, self.area, metric, &|| observer.cancelled())
-    }
-
-    /// Makes `tree` the working form of the best tree, in the memory that it has, and returns true.
-    /// Returns false if the search is cancelled before a large tree is converted; then `tree` is no
-    /// tree.
-    pub fn refill_unless_cancelled(
-        &self,
-        tree: &mut Working<impl Metric>,
-        observer: &dyn Observer,
-    ) -> Result<bool, SearchError> {
-        tree.refill_unless(&self.tree, self.area, &|| observer.cancelled())
     }
 
     /// Makes `tree` the working form of the best tree, in the memory that it has.

@@ -3,5 +3,8 @@
 
 pub(crate) mod incumbent;
 pub(crate) mod initial;
-pub(crate) mod pass;
 pub mod reinsertion;
+
+/// The fraction of its cost that a move must save. It exceeds rounding errors, so no two moves undo
+/// each other forever.
+pub(crate) const TOLERANCE: f64 = 1e-12;

@@ -3,12 +3,30 @@
 //!
 //! Bittner, Hapala & Havran 2013; the position search of Meister & Bittner 2018.
 //!
-//! Differs from them: the search is exact and sequential, every node is tried, and the method ends
-//! only when a full pass over the tree finds no improvement.
+//! The removal of X takes its parent P out of the tree, too, and its sibling S moves up. Every box
+//! above shrinks to what is left. An insertion next to Y puts a new node J around both, and every
+//! box above J grows. With A(·) for the half area, and for the boxes that X alone makes larger:
+//!
+//! ```text
+//!          R                            R
+//!        /   \                        /   \           saved:  A(P) + A(R) − A(R without X)
+//!       P     Q        ─────→        S     Q          added:  A(J) + A(Q with X) − A(Q)
+//!      / \   / \                          / \                   + A(R) − A(R without X)
+//!     X   S Y   Z                        J   Z
+//!                                       / \           The move pays if it saves more than it adds.
+//!                                      X   Y
+//! ```
+//!
+//! Both sums are the same kind: the cost of a position, which `PositionSearch` finds by branch
+//! and bound over the whole tree while X stays where it is (`position_of_attached`). The move is
+//! made by `Linked::reinsert`.
+//!
+//! Differs from the papers: the search is exact and sequential, every node is tried, and the method
+//! ends only when a full pass over the tree finds no improvement.
 
+use super::TOLERANCE;
 use super::incumbent::Incumbent;
 use super::initial::Start;
-use super::pass::{TOLERANCE, repeat, sort_by_area};
 use crate::run::{Found, Observer, Problem, Quota, Run, Tally, WORK_PER_POLL, stream};
 use crate::tree::{Linked, Metric, PositionSearch, Working, search_by_metric};
 use bvh_config::Nested;
@@ -89,6 +107,30 @@ pub(crate) fn to_local_optimum(
     observer: &dyn Observer,
 ) -> Tally {
     repeat(quota, observer, |quota| pass_by_area(tree, quota, observer))
+}
+
+/// Sorts nodes by area, the largest first. The sort is stable: nodes of equal area keep their
+/// order.
+pub(crate) fn sort_by_area(tree: &Working<impl Metric>, order: &mut [u32]) {
+    // Areas are never negative, so their inverted bits are in reverse order. A key is read from
+    // memory once and not at every comparison, which in large trees takes most of the time.
+    order.sort_by_cached_key(|&index| !tree.nodes[index as usize].area.to_bits());
+}
+
+/// Repeats a pass until it keeps no move, the quota is used up, or the observer cancels.
+pub(crate) fn repeat(
+    quota: Quota,
+    observer: &dyn Observer,
+    mut pass: impl FnMut(Quota) -> Tally,
+) -> Tally {
+    let mut total = Tally::default();
+    loop {
+        let done = pass(quota.less(&total));
+        total += done;
+        if done.kept == 0 || quota.is_reached(&total) || observer.cancelled() {
+            return total;
+        }
+    }
 }
 
 with_vector_instructions! {

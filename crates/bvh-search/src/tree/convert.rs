@@ -5,9 +5,6 @@ use crate::run::SearchError;
 use bvh_core::cost::Sum;
 use bvh_core::{Aabb, Bvh, Node as BvhNode, NodeKind, PackedAabb};
 
-/// The number of nodes after which a conversion may end early. They take about 5 ms.
-const NODES_PER_LOOK: usize = 1 << 16;
-
 impl<M: Metric> Working<M> {
     /// Builds the working form of a valid tree with one object per leaf and tight boxes, whose
     /// internal area by the metric is `area`. Rejects inner nodes with more than two children.
@@ -18,33 +15,8 @@ impl<M: Metric> Working<M> {
         Ok(working)
     }
 
-    /// Builds the working form like [`from_bvh`](Self::from_bvh). Returns `None` if `is_over`
-    /// returns true before a large tree is complete. Ten million nodes take most of a second.
-    pub fn from_bvh_unless(
-        tree: &Bvh,
-        area: f64,
-        metric: M,
-        is_over: &dyn Fn() -> bool,
-    ) -> Result<Option<Self>, SearchError> {
-        let mut working = Self::new(Vec::with_capacity(tree.nodes.len() + 1), metric);
-        let is_complete = working.refill_unless(tree, area, is_over)?;
-        Ok(is_complete.then_some(working))
-    }
-
     /// Becomes the working form of another tree, in the memory that it has. O(n).
     pub fn refill(&mut self, tree: &Bvh, area: f64) -> Result<(), SearchError> {
-        self.refill_unless(tree, area, &|| false)?;
-        Ok(())
-    }
-
-    /// Becomes the working form of another tree and returns true. Returns false if `is_over`
-    /// returns true before a large tree is complete; then this is no tree. O(n).
-    pub fn refill_unless(
-        &mut self,
-        tree: &Bvh,
-        area: f64,
-        is_over: &dyn Fn() -> bool,
-    ) -> Result<bool, SearchError> {
         let metric = self.metric;
         let nodes = &mut self.nodes;
         nodes.clear();
@@ -53,9 +25,6 @@ impl<M: Metric> Working<M> {
         // not predict.
         let mut parents = vec![ANCHOR; tree.nodes.len() + 2];
         for (index, (node, place)) in tree.nodes.iter().zip(1..).enumerate() {
-            if index % NODES_PER_LOOK == NODES_PER_LOOK - 1 && is_over() {
-                return Ok(false);
-            }
             let (first, count, leaf) = match node.kind() {
                 NodeKind::Inner { first, count } => (first, count, false),
                 NodeKind::Leaf { first, .. } => (first, 2, true),
@@ -78,7 +47,7 @@ impl<M: Metric> Working<M> {
         let mut sum = Sum::default();
         sum.add(area);
         self.restart(sum);
-        Ok(true)
+        Ok(())
     }
 
     /// Returns the flat tree, with adjacent children, left before right, and objects in leaf order.

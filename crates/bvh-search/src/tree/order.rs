@@ -26,14 +26,8 @@ impl<M: Metric> Working<M> {
 
     /// Sorts the nodes in preorder, so that neighbours in the tree are neighbours in memory. O(n).
     pub fn sort_in_preorder(&mut self) {
-        self.sort_in_preorder_unless(&|| false);
-    }
-
-    /// Sorts the nodes in preorder, unless `is_over` returns true before a large tree has been
-    /// changed. The sort of ten million nodes takes about half a second.
-    pub fn sort_in_preorder_unless(&mut self, is_over: &dyn Fn() -> bool) {
         if self.nodes.len() >= SORTED_IN_PLACE {
-            self.sort_in_place(SORTED_AT_ONCE, is_over);
+            self.sort_in_place(SORTED_AT_ONCE);
         } else {
             self.sort_into_spare();
         }
@@ -42,12 +36,9 @@ impl<M: Metric> Working<M> {
     /// Sorts chunks of so many nodes, with an eighth of the memory of `sort_into_spare`. The nodes
     /// of a chunk are collected, the nodes in their way take the places that become free, and the
     /// chunk is written.
-    pub(super) fn sort_in_place(&mut self, at_once: usize, is_over: &dyn Fn() -> bool) {
+    pub(super) fn sort_in_place(&mut self, at_once: usize) {
         // The old index of the node at each place, and the place of the node at each index.
         let mut order = self.preorder();
-        if is_over() {
-            return;
-        }
         order.insert(0, ANCHOR);
         let mut places = vec![NONE; self.nodes.len()];
         let mut area = Sum::default();
@@ -64,10 +55,6 @@ impl<M: Metric> Working<M> {
                 *place = order.len() as u32;
                 order.push(index);
             }
-        }
-        // Beyond this point the tree is no tree until the sort is complete.
-        if is_over() {
-            return;
         }
         for node in &mut self.nodes {
             node.stamp = 0;

@@ -2,13 +2,10 @@
 
 use super::*;
 use crate::run::stream;
-use crate::scatter::{built, density, scatter};
+use crate::scatter::{built, density};
 use bvh_build::muller_fellner;
-use bvh_core::cost::Measure;
 use bvh_core::{Aabb, validate};
 use rand::RngExt;
-use std::cell::Cell;
-use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 fn scene(n: usize) -> (Vec<Aabb>, Working) {
     let mut rng = stream(1, 0);
@@ -48,32 +45,6 @@ fn any(tree: &Working<impl Metric>, rng: &mut impl RngExt) -> u32 {
         if tree.nodes[node as usize].parent != ANCHOR {
             return node;
         }
-    }
-}
-
-#[test]
-fn a_conversion_that_is_cancelled_ends_before_it_measures_most_boxes() {
-    let boxes = scatter(200_000);
-    let flat = built(&muller_fellner::Config::default(), &boxes).to_bvh();
-    let measured = AtomicU32::new(0);
-    let measure = Counted(&measured);
-    let metric = Measured::new(&measure);
-    let is_over = || measured.load(Relaxed) > 0;
-    let working = Working::from_bvh_unless(&flat, 0.0, metric, &is_over).unwrap();
-    assert!(working.is_none());
-    assert!(measured.load(Relaxed) < 100_000);
-    let working = Working::from_bvh_unless(&flat, 0.0, metric, &|| false).unwrap();
-    assert_eq!(working.unwrap().to_bvh(), flat);
-}
-
-/// The half area, with the number of boxes that were measured.
-#[derive(Debug)]
-struct Counted<'a>(&'a AtomicU32);
-
-impl Measure for Counted<'_> {
-    fn of(&self, aabb: &PackedAabb) -> f64 {
-        self.0.fetch_add(1, Relaxed);
-        aabb.half_area()
     }
 }
 
@@ -121,7 +92,7 @@ fn sorting_in_place_gives_the_same_nodes() {
             tree.sort_into_spare();
             for at_once in [1, 7, 4096] {
                 let mut in_place = unsorted.clone();
-                in_place.sort_in_place(at_once, &|| false);
+                in_place.sort_in_place(at_once);
                 let [nodes, nodes_in_place] =
                     [&tree, &in_place].map(|tree| format!("{:?}", tree.nodes));
                 assert_eq!(nodes, nodes_in_place);
@@ -129,27 +100,6 @@ fn sorting_in_place_gives_the_same_nodes() {
             }
         }
     }
-}
-
-#[test]
-fn a_sort_in_place_that_ends_early_changes_nothing() {
-    let (_, tree) = scene(50);
-    let mut ended = 0;
-    for most in 0.. {
-        let polls = Cell::new(0);
-        let mut sorted = tree.clone();
-        sorted.sort_in_place(4096, &|| {
-            polls.set(polls.get() + 1);
-            polls.get() > most
-        });
-        if polls.get() <= most {
-            assert_ne!(format!("{:?}", sorted.nodes), format!("{:?}", tree.nodes));
-            break;
-        }
-        assert_eq!(format!("{:?}", sorted.nodes), format!("{:?}", tree.nodes));
-        ended += 1;
-    }
-    assert_eq!(ended, 2);
 }
 
 #[test]
