@@ -51,7 +51,7 @@ fn one_thread(scene: &Scene) {
     contenders.push((
         "Goldsmith–Salmon, a random order",
         Box::new(move || {
-            insertion.insert_all(&objects, &order, &mut workspace).expect("a permutation");
+            insertion.insert_all(&objects, &order, &mut workspace, &Watch::default()).expect("a permutation");
             workspace.write(&mut tree);
         }),
     ));

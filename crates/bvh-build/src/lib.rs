@@ -27,13 +27,8 @@ pub trait Builder: Check {
         watch: &Watch,
     ) -> Result<Bvh, BuildError>;
 
-    /// Builds a tree like [`build_watched`](Self::build_watched), without a watch.
-    fn build_by(&self, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Result<Bvh, BuildError> {
-        self.build_watched(boxes, measure, &Watch::default())
-    }
-
     /// Builds a tree by half area, without a watch.
     fn build(&self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
-        self.build_by(boxes, None)
+        self.build_watched(boxes, None, &Watch::default())
     }
 }

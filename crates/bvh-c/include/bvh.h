@@ -37,6 +37,33 @@ typedef struct BvhTracer BvhTracer;
 // improves or frees it must be the only user.
 typedef struct BvhTree BvhTree;
 
+// A search with every choice. Fields that are 0 or null have their defaults; either `boxes` or
+// `corners` is given.
+typedef struct {
+    // 6 floats for each of `count` boxes: the lower corner, then the upper corner.
+    const float *boxes;
+    // 9 floats for each of `count` triangles: three corners.
+    const float *corners;
+    // The number of boxes or triangles.
+    size_t count;
+    // 6 floats for each of `ray_count` recorded rays that the tree is for: its origin, then its
+    // hit or a point outside the scene.
+    const float *rays;
+    // The number of rays; 0 for a tree for random lines.
+    size_t ray_count;
+    // The average number of parts into which triangles may be divided among leaves, up to 16; 0 is
+    // 1, for whole triangles.
+    double references;
+    // The time of the search in seconds, if there is no `work` or if it is not 0.
+    double seconds;
+    // The largest number of nodes created or visited; 0 is no limit. With `work` and without
+    // `seconds`, the tree is the same on every machine, and the same as from Python and from the
+    // program `bvh`.
+    uint64_t work;
+    // The seed of the random numbers, which is 1 by default in Python and in the program `bvh`.
+    uint64_t seed;
+} BvhBake;
+
 // A binary node of 32 bytes with the layout of tinybvh's `BVH::BVHNode`. Node 0 is the root. If
 // there are more nodes, node 1 is unused, so that both children of a node share a cache line.
 typedef struct {
@@ -121,11 +148,10 @@ BvhTree *bvh_tree_from_boxes(const float *boxes, size_t count, double seconds);
 // `corners` points to 9 * `count` floats.
 BvhTree *bvh_tree_from_triangles(const float *corners, size_t count, double seconds, double references);
 
-// Searches like `bvh_tree_from_triangles` for the best tree for recorded rays. Each of `ray_count`
-// rays is 6 floats: its origin, then its hit or a point outside the scene.
+// Searches for the best tree with these choices.
 //
-// `corners` points to 9 * `count` floats, and `rays` to 6 * `ray_count` floats.
-BvhTree *bvh_tree_for_rays(const float *corners, size_t count, double seconds, double references, const float *rays, size_t ray_count);
+// `bake` is a search whose arrays have the promised lengths.
+BvhTree *bvh_tree_bake(const BvhBake *bake);
 
 // Improves a tree for about `seconds`, 0 or more. Arrays from `bvh_tree_nodes` and
 // `bvh_tree_object_ids` become invalid.

@@ -163,19 +163,9 @@ impl Config {
     /// Inserts the scene's objects in the given order. Returns the tree's cost by
     /// [`goldsmith_salmon`](bvh_core::cost::goldsmith_salmon) and the scene's measure, which is
     /// updated incrementally. Equal orders give equal bits. [`Workspace::write`] then writes the
-    /// tree. A rejected order leaves the workspace's tree unchanged.
+    /// tree. A rejected order leaves the workspace's tree unchanged. After the `watch` has cancelled,
+    /// the workspace holds no complete tree.
     pub fn insert_all(
-        &self,
-        scene: &Scene,
-        order: &[u32],
-        workspace: &mut Workspace,
-    ) -> Result<f64, InvalidOrder> {
-        self.insert_watched(scene, order, workspace, &Watch::default())
-    }
-
-    /// Inserts the objects like [`insert_all`](Self::insert_all), unless the `watch` cancels. The
-    /// workspace then holds no complete tree.
-    pub fn insert_watched(
         &self,
         scene: &Scene,
         order: &[u32],

@@ -48,7 +48,7 @@ impl Builder for Config {
         if boxes.len() >= OBJECTS_PER_POLL && watch.is_cancelled() {
             return Err(BuildError::Cancelled);
         }
-        sorted.build_watched(self, measure, watch)
+        sorted.build(self, measure, watch)
     }
 }
 
@@ -79,14 +79,9 @@ impl MortonOrder {
         &self.order
     }
 
-    /// Clusters the sorted objects by half area.
-    pub fn build(self, config: &Config) -> Result<Bvh, BuildError> {
-        self.build_watched(config, None, &Watch::default())
-    }
-
     /// Clusters the sorted objects by the measure, or by half area without one, unless the `watch`
     /// cancels.
-    pub fn build_watched(
+    pub fn build(
         self,
         config: &Config,
         measure: Option<&dyn Measure>,

@@ -2,8 +2,8 @@
 //! method.
 
 use crate::plain_tree::brute_force;
-use bvh_build::Builder;
 use bvh_build::goldsmith_salmon::{Config, Descent, InvalidOrder, Scene, Workspace};
+use bvh_build::{Builder, Watch};
 use bvh_core::{Aabb, Bvh, NodeKind, cost, validate};
 use proptest::prelude::*;
 
@@ -32,7 +32,7 @@ fn topology(tree: &Bvh) -> Vec<Result<usize, u32>> {
 /// Builds a tree, checks the tree and its cost, and returns both.
 fn insert(config: &Config, boxes: &[Aabb], order: &[u32], workspace: &mut Workspace) -> (Bvh, f64) {
     let scene = Scene::new(boxes).unwrap();
-    let cost = config.insert_all(&scene, order, workspace).unwrap();
+    let cost = config.insert_all(&scene, order, workspace, &Watch::default()).unwrap();
     let mut tree = Bvh::default();
     workspace.write(&mut tree);
     validate(&tree, boxes).unwrap();
@@ -261,7 +261,7 @@ fn an_invalid_order_is_rejected_and_the_tree_is_kept() {
     let mut workspace = Workspace::default();
     let mut before = Bvh::default();
     let mut after = Bvh::default();
-    Config::default().insert_all(&scene, &[2, 0, 1], &mut workspace).unwrap();
+    Config::default().insert_all(&scene, &[2, 0, 1], &mut workspace, &Watch::default()).unwrap();
     workspace.write(&mut before);
     for (order, expected) in [
         (vec![0, 1], InvalidOrder::Length { named: 2, objects: 3 }),
@@ -273,7 +273,10 @@ fn an_invalid_order_is_rejected_and_the_tree_is_kept() {
         ),
         (vec![1, 0, 1], InvalidOrder::Repeated { position: 2, object: 1 }),
     ] {
-        assert_eq!(Config::default().insert_all(&scene, &order, &mut workspace), Err(expected));
+        assert_eq!(
+            Config::default().insert_all(&scene, &order, &mut workspace, &Watch::default()),
+            Err(expected)
+        );
     }
     workspace.write(&mut after);
     assert_eq!(before, after);

@@ -2,7 +2,6 @@
 
 mod decide;
 mod effort;
-mod from;
 pub mod instances;
 pub mod parts;
 mod plan;
@@ -21,7 +20,7 @@ use bvh_search::{Method, Outcome, StopReason};
 use clap::Args;
 use decide::{Decided, Open, decide};
 use effort::Effort;
-use plan::{Found, Plan, Prepared};
+use plan::{Found, Plan, Prepared, Start};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use watch::gain;
@@ -103,6 +102,112 @@ pub enum BakeCost {
 
 /// The method that can continue from a given tree.
 const BEST: &str = "best";
+
+/// Searches until the budget is spent or `interrupted` becomes true, writes the best tree, and
+/// prints its cost. An interrupted bake writes the file as well, and returns [`Error::Stopped`].
+pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
+    // Wrong paths are reported before the scene is loaded, which may take long.
+    if let Some(from) = &args.from {
+        input_file("--from", from)?;
+    }
+    let out = args.out()?;
+    output_file("--out", &out, "bvh")?;
+    let plan = args.plan()?;
+    args.jobs.apply()?;
+    // A decision may add references later.
+    let most_references = if args.budget.is_none() {
+        decide::REFERENCES.max(plan.references)
+    } else {
+        plan.references
+    };
+    // The number of objects of a mesh file is known when it is loaded.
+    if let Some(objects) = Scene::generated_objects(&args.scene) {
+        plan::check_memory(&args.scene, objects, most_references, 0)?;
+    }
+    let scene = args.files.load(&args.scene)?;
+    let objects = scene.boxes.len();
+    plan::check_memory(&scene.name, objects, most_references, plan::BYTES_PER_LOADED)?;
+    if let (Some(named), Some(rays)) = (&args.rays, &plan.rays) {
+        rays.check(named, &scene)?;
+    }
+    if args.explain {
+        let text = explain::scene(&scene).map_err(Error::search(&scene.name, "--explain"))?;
+        print_line(&text);
+    }
+    let start =
+        args.from.as_ref().map(|path| Start::load(path, &scene, most_references)).transpose()?;
+    let plan = args.with_budget(plan, objects);
+    // Reserving the file first reports a full disk before the search and not after it.
+    let reserved = args.reserved(&out, plan::most_bytes(&scene, most_references))?;
+    let (plan, prepared) = args.decided(plan, &scene, interrupted)?;
+    let found = plan.search(&scene, start.as_ref(), prepared, interrupted)?;
+    save(&found, &out, reserved, interrupted)
+}
+
+/// Writes the best tree, and prints its cost.
+fn save(
+    found: &Found,
+    out: &Path,
+    reserved: Reserved,
+    interrupted: &AtomicBool,
+) -> Result<(), Error> {
+    let (bytes, cost_for_lines) = found.save(out, reserved)?;
+    if interrupted.load(Relaxed) {
+        return Err(Error::Stopped { path: out.to_owned(), cost: found.baked.outcome.cost });
+    }
+    print_line(&summary(found, cost_for_lines));
+    print_line(&format!("{}: {bytes} bytes", out.display()));
+    Ok(())
+}
+
+/// Describes the result of a search, whose tree has this cost for random lines.
+fn summary(found: &Found, cost_for_lines: f64) -> String {
+    let Found { plan, scene, baked, greedy_for_lines, seconds, .. } = found;
+    let Outcome { tree, cost, evaluations: moves, work, stop, .. } = &baked.outcome;
+    let objects = scene.boxes.len();
+    let method = plan.method.name();
+    let mut lines = vec![format!(
+        "{} ({}), {objects} objects, {method}, seed {}",
+        scene.name, scene.kind, plan.seed
+    )];
+    if let Some(greedy) = baked.greedy {
+        lines.push(format!(
+            "{} {cost}, {} Müller–Fellner's {greedy}",
+            found.unit(),
+            gain(*cost, greedy)
+        ));
+    }
+    if let Some(greedy) = *greedy_for_lines {
+        lines.push(format!(
+            "risk: a tree for rays may be worse for others; for random lines it is {} Müller–Fellner's",
+            gain(cost_for_lines, greedy)
+        ));
+    }
+    if let Some(before) = baked.start {
+        lines.push(format!("{} the tree it started from, {before}", gain(*cost, before)));
+    }
+    if plan.references > 1.0 {
+        let references = tree.prim_ids.len();
+        let allowed = plan.references;
+        lines.push(if references > objects {
+            format!("{references} references to {objects} objects, at most {allowed} per object")
+        } else {
+            "no object is divided, because that does not pay here".into()
+        });
+    }
+    // A method that plans its time completes its plan just before the time is over, and then could
+    // have used more.
+    let in_time =
+        matches!(plan.effort, Effort::Time(limit) if *seconds >= 0.5 * limit.as_secs_f64());
+    let why = match stop {
+        StopReason::Completed if in_time => "",
+        StopReason::Completed => ", and the method has completed",
+        StopReason::Optimal => ", and no tree is better",
+        _ => "",
+    };
+    lines.push(format!("{moves} moves, {work} nodes visited, {seconds:.1} s{why}"));
+    lines.join("\n")
+}
 
 impl BakeArgs {
     /// Returns the file or folder to write.
@@ -211,110 +316,4 @@ impl BakeArgs {
         }
         Ok(())
     }
-}
-
-/// Searches until the budget is spent or `interrupted` becomes true, writes the best tree, and
-/// prints its cost. An interrupted bake writes the file as well, and returns [`Error::Stopped`].
-pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
-    // Wrong paths are reported before the scene is loaded, which may take long.
-    if let Some(from) = &args.from {
-        input_file("--from", from)?;
-    }
-    let out = args.out()?;
-    output_file("--out", &out, "bvh")?;
-    let plan = args.plan()?;
-    args.jobs.apply()?;
-    // A decision may add references later.
-    let most_references = if args.budget.is_none() {
-        decide::REFERENCES.max(plan.references)
-    } else {
-        plan.references
-    };
-    // The number of objects of a mesh file is known when it is loaded.
-    if let Some(objects) = Scene::generated_objects(&args.scene) {
-        plan::check_memory(&args.scene, objects, most_references, 0)?;
-    }
-    let scene = args.files.load(&args.scene)?;
-    let objects = scene.boxes.len();
-    plan::check_memory(&scene.name, objects, most_references, plan::BYTES_PER_LOADED)?;
-    if let (Some(named), Some(rays)) = (&args.rays, &plan.rays) {
-        rays.check(named, &scene)?;
-    }
-    if args.explain {
-        let text = explain::scene(&scene).map_err(Error::search(&scene.name, "--explain"))?;
-        print_line(&text);
-    }
-    let start =
-        args.from.as_ref().map(|path| from::start(path, &scene, most_references)).transpose()?;
-    let plan = args.with_budget(plan, objects);
-    // Reserving the file first reports a full disk before the search and not after it.
-    let reserved = args.reserved(&out, plan::most_bytes(&scene, most_references))?;
-    let (plan, prepared) = args.decided(plan, &scene, interrupted)?;
-    let found = plan.search(&scene, start.as_ref(), prepared, interrupted)?;
-    save(&found, &out, reserved, interrupted)
-}
-
-/// Writes the best tree, and prints its cost.
-fn save(
-    found: &Found,
-    out: &Path,
-    reserved: Reserved,
-    interrupted: &AtomicBool,
-) -> Result<(), Error> {
-    let (bytes, cost_for_lines) = found.save(out, reserved)?;
-    if interrupted.load(Relaxed) {
-        return Err(Error::Stopped { path: out.to_owned(), cost: found.baked.outcome.cost });
-    }
-    print_line(&summary(found, cost_for_lines));
-    print_line(&format!("{}: {bytes} bytes", out.display()));
-    Ok(())
-}
-
-/// Describes the result of a search, whose tree has this cost for random lines.
-fn summary(found: &Found, cost_for_lines: f64) -> String {
-    let Found { plan, scene, baked, greedy_for_lines, seconds, .. } = found;
-    let Outcome { tree, cost, evaluations: moves, work, stop, .. } = &baked.outcome;
-    let objects = scene.boxes.len();
-    let method = plan.method.name();
-    let mut lines = vec![format!(
-        "{} ({}), {objects} objects, {method}, seed {}",
-        scene.name, scene.kind, plan.seed
-    )];
-    if let Some(greedy) = baked.greedy {
-        lines.push(format!(
-            "{} {cost}, {} Müller–Fellner's {greedy}",
-            found.unit(),
-            gain(*cost, greedy)
-        ));
-    }
-    if let Some(greedy) = *greedy_for_lines {
-        lines.push(format!(
-            "risk: a tree for rays may be worse for others; for random lines it is {} Müller–Fellner's",
-            gain(cost_for_lines, greedy)
-        ));
-    }
-    if let Some(before) = baked.start {
-        lines.push(format!("{} the tree it started from, {before}", gain(*cost, before)));
-    }
-    if plan.references > 1.0 {
-        let references = tree.prim_ids.len();
-        let allowed = plan.references;
-        lines.push(if references > objects {
-            format!("{references} references to {objects} objects, at most {allowed} per object")
-        } else {
-            "no object is divided, because that does not pay here".into()
-        });
-    }
-    // A method that plans its time completes its plan just before the time is over, and then could
-    // have used more.
-    let in_time =
-        matches!(plan.effort, Effort::Time(limit) if *seconds >= 0.5 * limit.as_secs_f64());
-    let why = match stop {
-        StopReason::Completed if in_time => "",
-        StopReason::Completed => ", and the method has completed",
-        StopReason::Optimal => ", and no tree is better",
-        _ => "",
-    };
-    lines.push(format!("{moves} moves, {work} nodes visited, {seconds:.1} s{why}"));
-    lines.join("\n")
 }

@@ -9,7 +9,7 @@ use bvh_core::cost::Objective;
 use bvh_core::file::Header;
 use bvh_core::{Aabb, Bvh, Node, RayDensity, Triangle};
 use bvh_scenes::files::Reserved;
-use bvh_scenes::tree_file::TreeFileError;
+use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_scenes::{Scene, is_allocatable};
 use bvh_search::{Bake, Baked, Budget, Division, Method, best};
 use std::path::Path;
@@ -80,6 +80,42 @@ pub struct Start {
     pub tree: Bvh,
     /// The work of the earlier bake, in nodes built or visited.
     pub work: u64,
+}
+
+impl Start {
+    /// Reads the tree of `--from` over the scene. Rejects a tree that the bake could not improve.
+    pub fn load(from: &Path, scene: &Scene, most_references: f64) -> Result<Self, Error> {
+        let (tree, header) = tree_file::load(from, scene)?;
+        check_references(from, tree.prim_ids.len(), scene.boxes.len(), most_references)?;
+        check_binary(from, &tree)?;
+        Ok(Self { tree, work: header.work })
+    }
+}
+
+/// Rejects a start with more references than the bake may keep.
+fn check_references(from: &Path, found: usize, objects: usize, most: f64) -> Result<(), Error> {
+    if found <= objects || found <= (most * objects as f64) as usize {
+        return Ok(());
+    }
+    let percent = (100 * found).div_ceil(objects);
+    Err(Error::Usage(format!(
+        "--from {}: the tree has {found} references to {objects} objects; accepted: --references \
+         {}.{:02} or more",
+        from.display(),
+        percent / 100,
+        percent % 100
+    )))
+}
+
+/// Rejects a start that no search can improve.
+fn check_binary(from: &Path, tree: &Bvh) -> Result<(), Error> {
+    let wide = tree.nodes.iter().position(|node| !node.is_leaf() && node.children().len() != 2);
+    let Some(node) = wide else { return Ok(()) };
+    Err(Error::Usage(format!(
+        "--from {}: inner node {node} has {} children; accepted: a tree of nodes with two",
+        from.display(),
+        tree.nodes[node].children().len()
+    )))
 }
 
 /// The results of a decision that the search needs too, and would otherwise make again.

@@ -163,8 +163,7 @@ impl Config {
             return Ok(Kept::new(watched(run.observer(), build)?, problem));
         }
         let morton = morton.map_or_else(|| MortonOrder::new(boxes), Ok)?;
-        let clustered =
-            watched(run.observer(), |watch| morton.build_watched(&CLUSTERING, None, watch))?;
+        let clustered = watched(run.observer(), |watch| morton.build(&CLUSTERING, None, watch))?;
         // Only the cheapest tree is kept, because the division of a large scene needs most of the
         // memory of the search.
         run.keep_aside(Kept::new(clustered, problem));

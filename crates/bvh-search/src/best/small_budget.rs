@@ -18,7 +18,7 @@ use crate::tuning::{
     SAMPLES, TOP_DOWN_BELOW,
 };
 use bvh_build::ploc::MortonOrder;
-use bvh_build::{BuildError, Builder};
+use bvh_build::{BuildError, Builder, Watch};
 use bvh_core::{Aabb, Bvh, cost};
 
 /// The result of a small budget.
@@ -55,7 +55,7 @@ pub(super) fn search<'p>(
             return Ok(SmallBudget::Large(Some(morton)));
         }
         if let Some(clustering) = limit.only_build() {
-            let tree = Kept::new(morton.build(&clustering)?, problem);
+            let tree = Kept::new(morton.build(&clustering, None, &Watch::default())?, problem);
             return Ok(SmallBudget::Tree(Incumbent::begin_unbounded(tree, problem, run).tree));
         }
     }
@@ -80,7 +80,7 @@ fn initial(
     run: &mut Run,
 ) -> Result<Start, SearchError> {
     let tries_division = has_two_starts && top_down_may_be_better(&morton, problem, run)?;
-    let clustered = morton.build(&CLUSTERING)?;
+    let clustered = morton.build(&CLUSTERING, None, &Watch::default())?;
     if tries_division && let Some(divided) = build_top_down(problem.boxes, run)? {
         run.count(Tally { moves: 1, kept: 0, work: divided.nodes.len() as u64 });
         if cost::internal_area(&divided) < cost::internal_area(&clustered) {

@@ -47,7 +47,7 @@ impl<'p> Insertion<'p> {
         workspace: &mut Workspace,
         observer: &dyn Observer,
     ) -> Result<f64, InvalidOrder> {
-        watched(observer, |watch| self.config.insert_watched(&self.scene, order, workspace, watch))
+        watched(observer, |watch| self.config.insert_all(&self.scene, order, workspace, watch))
     }
 
     /// Returns the cost of the tree of one order, which must be a permutation of the objects;

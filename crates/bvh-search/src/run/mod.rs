@@ -11,7 +11,7 @@ mod stream;
 
 pub use budget::{Budget, Quota, StopReason, Tally};
 use bvh_build::ploc::Config as Clustering;
-use bvh_build::{BuildError, Builder};
+use bvh_build::{BuildError, Builder, Watch};
 use bvh_config::Check;
 use bvh_core::Bvh;
 #[cfg(feature = "std")]
@@ -161,7 +161,7 @@ impl<'a> Run<'a> {
         if let Some(tree) = tree {
             return Ok(tree);
         }
-        let tree = FASTEST.build_by(problem.boxes, problem.measure)?;
+        let tree = FASTEST.build_watched(problem.boxes, problem.measure, &Watch::default())?;
         self.record(problem.cost(&tree), tree.nodes.len() as u64);
         Ok(tree)
     }

@@ -1,7 +1,7 @@
 //! Measures of boxes instead of the area: every builder and search uses them, and the area as a
 //! measure equals the area.
 
-use bvh_build::Builder;
+use bvh_build::{Builder, Watch};
 use bvh_core::cost::{self, Measure, Objective};
 use bvh_core::{Aabb, PackedAabb, RayDensity, Segment, glam, validate};
 use bvh_search::{
@@ -101,7 +101,7 @@ fn builders_and_searches_use_the_measure_and_report_every_objective_by_it() {
 #[test]
 fn local_searches_begin_with_a_tree_by_the_measure() {
     let boxes = boxes(700);
-    let begun = Start::default().build_by(&boxes, Some(&AlongX)).unwrap();
+    let begun = Start::default().build_watched(&boxes, Some(&AlongX), &Watch::default()).unwrap();
     let by_area = Start::default().build(&boxes).unwrap();
     let [begun, by_area] = [begun, by_area].map(|tree| cost::internal_measure(&tree, &AlongX));
     assert!(begun < 0.99 * by_area, "{begun} {by_area}");

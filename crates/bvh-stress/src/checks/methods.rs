@@ -4,7 +4,7 @@ use crate::Verdict;
 use crate::examine::{ROUNDING, check_outcome, check_scale, on_threads, run};
 use crate::methods::is_builder;
 use anyhow::{Context, Result, ensure};
-use bvh_build::{Builder, goldsmith_salmon, muller_fellner};
+use bvh_build::{Builder, Watch, goldsmith_salmon, muller_fellner};
 use bvh_core::{Aabb, cost};
 use bvh_scenes::builtin::stiff;
 use bvh_search::grasp::{self, Candidates};
@@ -185,7 +185,7 @@ pub fn insertion_keeps_its_cost() -> Verdict {
         let mut tree = Default::default();
         let order: Vec<u32> = (0..boxes.len() as u32).collect();
         let config = goldsmith_salmon::Config::default();
-        let kept = config.insert_all(&scene, &order, &mut workspace)?;
+        let kept = config.insert_all(&scene, &order, &mut workspace, &Watch::default())?;
         workspace.write(&mut tree);
         let recomputed = cost::goldsmith_salmon(&tree);
         largest = largest.max((kept - recomputed).abs() / recomputed);

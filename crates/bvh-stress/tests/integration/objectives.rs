@@ -1,7 +1,7 @@
 //! Every scene of the suite holds with other objectives: costs other than the area, the visits of
 //! rays, and objects that are divided among leaves.
 
-use bvh_build::{Builder, muller_fellner, spatial};
+use bvh_build::{Builder, Watch, muller_fellner, spatial};
 use bvh_core::cost::{Objective, total_area};
 use bvh_core::{
     Aabb, Primitives, RayDensity, Segment, Triangle, WideBvh, file, validate, validate_references,
@@ -181,7 +181,9 @@ fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
             let boxes = stiff::boxes(&scaled);
             let objects = Primitives::Triangles(scaled);
             let most = boxes.len() * 3 / 2;
-            let built = spatial::Config::default().build_at_most(most, &boxes, &objects).unwrap();
+            let built = spatial::Config::default()
+                .build_watched(most, &boxes, &objects, &Watch::default())
+                .unwrap();
             let searched = [Objective::Layout, Objective::InternalArea].map(|objective| {
                 let splits = Splits::at_most(most, &boxes, &objects);
                 let problem = Problem { objective, splits, ..Problem::new(&boxes) };

@@ -98,21 +98,11 @@ impl Config {
     pub fn build(&self, boxes: &[Aabb], objects: &dyn Clip) -> Result<Bvh, BuildError> {
         self.check()?;
         let most = (self.references * boxes.len() as f64) as usize;
-        self.build_at_most(most, boxes, objects)
-    }
-
-    /// Builds a tree like [`build`](Self::build), with at most `most` references, but at least one
-    /// per object.
-    pub fn build_at_most(
-        &self,
-        most: usize,
-        boxes: &[Aabb],
-        objects: &dyn Clip,
-    ) -> Result<Bvh, BuildError> {
         self.build_watched(most, boxes, objects, &Watch::default())
     }
 
-    /// Builds a tree like [`build_at_most`](Self::build_at_most), unless the `watch` cancels.
+    /// Builds a tree like [`build`](Self::build), with at most `most` references, but at least one
+    /// per object, unless the `watch` cancels.
     pub fn build_watched(
         &self,
         most: usize,
