@@ -12,7 +12,7 @@ mod landscape;
 mod measured;
 
 use bvh_build::{Builder, Watch, muller_fellner, ploc, spatial};
-use bvh_core::cost::{self, SahConstants};
+use bvh_core::cost;
 use bvh_core::file::{self, Origin, TreeFile};
 use bvh_core::{Aabb, Bvh, WideBvh, validate};
 use bvh_scenes::{Scene, load};
@@ -159,9 +159,6 @@ impl Phases {
         self.phase("inspect", || {
             validate(&baked, boxes).expect("a valid tree");
             [cost::internal_area(&baked), cost::goldsmith_salmon(&baked)]
-        });
-        self.phase("inspect, overlap", || {
-            cost::end_point_overlap(&baked, triangles, &SahConstants::default())
         });
         self.phase("wide layout", || WideBvh::new(&baked, triangles).expect("a layout").bytes());
     }

@@ -7,15 +7,13 @@ use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use crate::{Error, csv_table};
 use bvh_build::{Builder, muller_fellner};
-use bvh_core::cost::{self, EndPointOverlap, Objective, Overlap, SahConstants};
+use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_core::file::{FileError, Header, TreeFile};
-use bvh_core::{Aabb, Bvh, NodeKind, Triangle, validate_references};
+use bvh_core::{Aabb, Bvh, NodeKind, validate_references};
 use bvh_scenes::Scene;
 use bvh_scenes::files;
 use bvh_scenes::tree_file::{self, TreeFileError};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
-use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -29,7 +27,7 @@ pub struct InspectArgs {
     #[arg(value_name = "FILE.bvh")]
     pub file: PathBuf,
     /// The tree's scene, by name or path of a mesh file. Checks the tree against the scene's
-    /// objects, compares it with the Müller–Fellner tree, and measures the end-point overlap.
+    /// objects, and compares it with the Müller–Fellner tree.
     pub scene: Option<String>,
     /// Measure the expected tests of rays in the wide layout of the tree: `default` for rays that
     /// need no camera, or a file that describes the rays of a renderer. No bake trains on the same
@@ -211,34 +209,7 @@ fn against(tree: &Bvh, file: TreeFile, scene: &Scene, facts: &mut Facts) -> Resu
             facts.add("internal area over Müller–Fellner's", cost::internal_area(tree) / base);
         }
     }
-    match scene.triangles() {
-        Ok(triangles) => {
-            facts.add("end-point overlap", end_point_overlap(tree, triangles));
-        }
-        Err(_) => facts.add("end-point overlap", "defined for triangles only"),
-    }
     Ok(())
-}
-
-/// Computes the end-point overlap on all threads, under a progress bar.
-fn end_point_overlap(tree: &Bvh, triangles: &[Triangle]) -> f64 {
-    let parts = EndPointOverlap::new(tree, triangles, &SahConstants::default());
-    let bar = ProgressBar::new(parts.count() as u64).with_message("end-point overlap");
-    let style = ProgressStyle::with_template("{bar:10} {msg}, {eta} left");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let found: Vec<Overlap> = (0..parts.count())
-        .into_par_iter()
-        .map(|number| parts.part(number))
-        // Two million triangles take many seconds, so every part moves the bar.
-        .inspect(|_| bar.inc(1))
-        .collect();
-    bar.finish_and_clear();
-    // Adding in a fixed order gives the same sum for any number of threads.
-    let mut sum = Overlap::default();
-    for part in &found {
-        sum.add(part);
-    }
-    sum.value()
 }
 
 fn write_nodes(tree: &Bvh, path: &Path) -> Result<(), Error> {

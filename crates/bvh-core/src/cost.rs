@@ -11,7 +11,6 @@ pub(crate) use crate::layout_cost::call_in_turn;
 pub use crate::layout_cost::{
     CallBoth, LayoutCost, LayoutTree, layout_area, layout_cost, layout_measure, layout_row,
 };
-pub use crate::overlap::{EndPointOverlap, Overlap, end_point_overlap};
 
 /// The cost that a search minimises and that results report in the column `cost`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -278,12 +277,6 @@ impl Sum {
             (term - total) + self.total
         };
         self.total = total;
-    }
-
-    /// Adds all terms of another sum.
-    pub fn add_sum(&mut self, other: &Self) {
-        self.add(other.total);
-        self.lost += other.lost;
     }
 
     /// Returns the sum so far.

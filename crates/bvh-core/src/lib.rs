@@ -18,7 +18,6 @@ pub mod file;
 mod layout_cost;
 mod leave;
 mod mesh;
-mod overlap;
 mod packed;
 mod polygon;
 mod primitives;
