@@ -75,12 +75,6 @@ impl Node {
         self.first = first;
     }
 
-    /// Returns `first`, and the count with its highest bit set for a leaf.
-    #[inline(always)]
-    pub(crate) fn words(&self) -> [u32; 2] {
-        [self.first, self.tagged_count]
-    }
-
     /// Returns whether the node is a leaf.
     #[inline]
     pub fn is_leaf(&self) -> bool {

@@ -76,11 +76,10 @@ pub use error::FileError;
 pub use header::Header;
 
 use crate::cost::{CallBoth, Objective, call_in_turn};
-use crate::validate::{FastPath, Leaves, check_structure, find_fault, for_each};
+use crate::validate::{Leaves, check_structure, for_each};
 use crate::{Aabb, Bvh, BvhView, Clip, InvalidBvh, Node, validate, validate_references};
 use alloc::borrow::Cow;
 use alloc::vec::Vec;
-use core::ops::Range;
 use crc32fast::Hasher;
 use words::{cast, copied, le_bytes};
 
@@ -226,22 +225,11 @@ pub fn boxes_checksum(boxes: &[Aabb]) -> u32 {
     crc32fast::hash(&le_bytes(boxes))
 }
 
-/// The number of bytes after which the checksum and the check of the structure alternate. It is
-/// large enough that changing between them costs nothing, and small enough that the second one
-/// finds the bytes in the cache.
-const PIECE: usize = 8192;
-
-/// Returns the checksum of a file that has at least the length of a header. Calls `visit` with the
-/// range of every piece after the header.
-fn checksum(file: &[u8], mut visit: impl FnMut(Range<usize>)) -> u32 {
+/// Returns the checksum of a file that has at least the length of a header.
+fn checksum(file: &[u8]) -> u32 {
     let (header, body) = file.split_at(Header::BYTES);
     let mut hasher = Hasher::new();
-    let mut start = 0;
-    for piece in body.chunks(PIECE) {
-        hasher.update(piece);
-        visit(start..start + piece.len());
-        start += piece.len();
-    }
+    hasher.update(body);
     hasher.update(&header[..Header::CHECKSUM.start]);
     hasher.finalize()
 }
@@ -249,7 +237,7 @@ fn checksum(file: &[u8], mut visit: impl FnMut(Range<usize>)) -> u32 {
 /// Writes the checksum into a file.
 #[cfg(test)]
 fn seal(file: &mut [u8]) {
-    let sum = checksum(file, |_| ());
+    let sum = checksum(file);
     file[Header::CHECKSUM].copy_from_slice(&sum.to_le_bytes());
 }
 
@@ -264,9 +252,6 @@ pub struct TreeFile<'a> {
     nodes: &'a [u8],
     prim_ids: &'a [u8],
     visits: &'a [u8],
-    /// True if the tree has passed the check of its structure, in place, while the checksum was
-    /// computed.
-    is_sound: bool,
 }
 
 impl<'a> TreeFile<'a> {
@@ -276,21 +261,10 @@ impl<'a> TreeFile<'a> {
         let [node_bytes, id_bytes, _] = header.sections();
         let (nodes, rest) = bytes[Header::BYTES..].split_at(node_bytes as usize);
         let (prim_ids, visits) = rest.split_at(id_bytes as usize);
-        let mut file = Self { header, nodes, prim_ids, visits, is_sound: false };
-        // Bytes that cannot be cast are checked later, in the copy.
-        let mut fast_path = match file.cast() {
-            Ok(tree) => FastPath::new(tree, file.header.objects),
-            Err(_) => None,
-        };
-        let sum = checksum(bytes, |piece| {
-            if let Some(check) = &mut fast_path {
-                check.add(piece);
-            }
-        });
-        if sum.to_le_bytes() != bytes[Header::CHECKSUM] {
+        if checksum(bytes).to_le_bytes() != bytes[Header::CHECKSUM] {
             return Err(FileError::Checksum);
         }
-        file.is_sound = fast_path.is_some_and(FastPath::finish);
+        let file = Self { header, nodes, prim_ids, visits };
         // The header repeats the first 24 bytes of the first node.
         let agrees = match file.nodes.get(..size_of::<Aabb>()) {
             Some(root) => *root == bytes[Header::BOUNDS],
@@ -352,16 +326,10 @@ impl<'a> TreeFile<'a> {
         Ok(BvhView { nodes: cast(self.nodes)?, prim_ids: cast(self.prim_ids)? })
     }
 
-    /// Checks the structure of the file's tree unless `open` has done so.
     fn check(&self, tree: BvhView) -> Result<(), InvalidBvh> {
         let Header { objects, references, .. } = self.header;
-        if self.is_sound {
-            Ok(())
-        } else if references > objects {
-            find_fault(tree, objects, Leaves::OneOrMore)
-        } else {
-            check_structure(tree, objects)
-        }
+        let leaves = if references > objects { Leaves::OneOrMore } else { Leaves::One };
+        check_structure(tree, objects, leaves)
     }
 }
 

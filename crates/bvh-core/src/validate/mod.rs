@@ -2,9 +2,6 @@
 //! objects.
 
 mod covering;
-mod fast_path;
-
-pub(crate) use fast_path::FastPath;
 
 use crate::{Aabb, Bvh, BvhView, Clip, InvalidBoxReason, MAX_OBJECTS, Node, NodeKind};
 use alloc::vec::Vec;
@@ -56,7 +53,7 @@ pub enum InvalidBvh {
 /// parent's box. Boxes are compared without tolerance. O(nodes + objects), without recursion; safe
 /// on any bits.
 pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
-    check_structure(tree.into(), boxes.len())?;
+    check_structure(tree.into(), boxes.len(), Leaves::One)?;
     check_nesting(tree)?;
     for_each(&tree.nodes, Node::is_leaf, |index, leaf| {
         for &object in &tree.prim_ids[leaf.prims()] {
@@ -79,7 +76,7 @@ pub fn validate_references(
     if tree.prim_ids.len() == boxes.len() {
         return validate(tree, boxes);
     }
-    find_fault(tree.into(), boxes.len(), Leaves::OneOrMore)?;
+    check_structure(tree.into(), boxes.len(), Leaves::OneOrMore)?;
     check_nesting(tree)?;
     let mut leaf_counts = alloc::vec![0u32; boxes.len()];
     for &object in &tree.prim_ids {
@@ -146,15 +143,6 @@ pub(crate) fn for_each<E>(
     Ok(())
 }
 
-/// Checks a tree as [`validate`] does, except for the nesting of the boxes. A tree that passes has
-/// the properties that make traversals end and stay in bounds, and its boxes and costs are finite.
-///
-/// Loading a tree spends most of its time here. The most common kind of tree therefore passes a
-/// check without unpredictable branches. Any other tree, and any fault, goes to [`find_fault`].
-pub(crate) fn check_structure(tree: BvhView, objects: usize) -> Result<(), InvalidBvh> {
-    if FastPath::passes(tree, objects) { Ok(()) } else { find_fault(tree, objects, Leaves::One) }
-}
-
 /// The number of leaves that an object may be in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Leaves {
@@ -162,8 +150,13 @@ pub(crate) enum Leaves {
     OneOrMore,
 }
 
-/// Returns the first fault in a tree's structure as an error.
-pub(crate) fn find_fault(tree: BvhView, objects: usize, leaves: Leaves) -> Result<(), InvalidBvh> {
+/// Checks a tree as [`validate`] does, except for the nesting of the boxes. A tree that passes has
+/// the properties that make traversals end and stay in bounds, and its boxes and costs are finite.
+pub(crate) fn check_structure(
+    tree: BvhView,
+    objects: usize,
+    leaves: Leaves,
+) -> Result<(), InvalidBvh> {
     let nodes = tree.nodes.len();
     let references = tree.prim_ids.len();
     if objects.max(references) > MAX_OBJECTS {
@@ -342,6 +335,79 @@ mod tests {
             let (mut tree, boxes) = valid();
             damage(&mut tree);
             assert_eq!(validate(&tree, &boxes), Err(expected));
+        }
+    }
+
+    const UNIT: Aabb = Aabb { min: glam::Vec3::ZERO, max: glam::Vec3::ONE };
+
+    /// A chain: each pair is a leaf and the parent of the next pair, on alternating sides.
+    fn chain(objects: u32) -> Bvh {
+        let last_leaf = Node::leaf(UNIT, objects - 1, 1);
+        let mut nodes = vec![last_leaf];
+        let mut parent = 0;
+        for object in 0..objects - 1 {
+            let first = nodes.len();
+            nodes.extend([Node::leaf(UNIT, object, 1), last_leaf]);
+            nodes[parent] = Node::inner(UNIT, first as u32, 2);
+            parent = first + 1;
+            if object % 2 == 0 {
+                nodes.swap(first, parent);
+                parent = first;
+            }
+        }
+        Bvh { nodes, prim_ids: (0..objects).map(|object| (object + 2) % objects).collect() }
+    }
+
+    fn passes(tree: &Bvh) -> bool {
+        validate(tree, &vec![UNIT; tree.prim_ids.len()]).is_ok()
+    }
+
+    #[test]
+    fn no_change_of_a_node_or_of_an_object_id_passes() {
+        // Fewer under Miri, which takes thousands of times as long as a processor.
+        for objects in [3, if cfg!(miri) { 6 } else { 20 }] {
+            let tree = chain(objects);
+            assert!(passes(&tree));
+            // Every `first` around the indices of the tree, with and without the highest bit.
+            let low_words = 0..2 * objects + 2;
+            let high_words = low_words.clone().map(|word| word | 1 << 31);
+            let firsts = low_words.chain(high_words).chain([u32::MAX]);
+            for first in firsts {
+                for count in 0..4 {
+                    for node in [Node::inner(UNIT, first, count), Node::leaf(UNIT, first, count)] {
+                        for index in 0..tree.nodes.len() {
+                            let mut changed = tree.clone();
+                            changed.nodes[index] = node;
+                            assert_eq!(passes(&changed), changed == tree, "{:?}", changed.nodes);
+                        }
+                    }
+                }
+            }
+            for position in 0..tree.prim_ids.len() {
+                for id in 0..objects + 3 {
+                    let mut changed = tree.clone();
+                    changed.prim_ids[position] = id;
+                    assert_eq!(passes(&changed), changed == tree);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_box_that_is_not_finite_or_is_inverted_passes() {
+        let tree = chain(5);
+        for index in 0..tree.nodes.len() {
+            for axis in 0..3 {
+                for wrong in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                    for (min, max) in [(wrong, 1.0), (0.0, wrong), (1.5, 1.0), (0.0, -0.5)] {
+                        let mut damaged = tree.clone();
+                        damaged.nodes[index].aabb.min[axis] = min;
+                        damaged.nodes[index].aabb.max[axis] = max;
+                        let fault = validate(&damaged, &[UNIT; 5]);
+                        assert!(matches!(fault, Err(InvalidBvh::Box { .. })), "{fault:?}");
+                    }
+                }
+            }
         }
     }
 }
