@@ -4,7 +4,7 @@
 use crate::exact::is_rounded_distance;
 use crate::tracing::{self, bits, wide_layouts};
 use anyhow::{Context, Result, ensure};
-use bvh_core::{Coherence, Distances, Hit, Primitives, Ray, RayComponents, Triangle, WideBvh};
+use bvh_core::{Coherence, Hit, Primitives, Ray, Triangle};
 use bvh_scenes::trace::{Accelerator, Structure};
 use bvh_search::Stream;
 use glam::Vec3;
@@ -53,8 +53,6 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize> {
             let nearest: Vec<_> =
                 nearest.iter().map(|hit| (!hit.is_miss()).then_some(*hit)).collect();
             compared(&format!("{coherence:?}"), &nearest, &any)?;
-            let (nearest, any) = by_component(&wide, rays, coherence);
-            compared(&format!("{coherence:?}, by component"), &nearest, &any)?;
         }
     }
     Ok(expected.iter().flatten().count())
@@ -78,37 +76,6 @@ fn compare(
         );
     }
     Ok(())
-}
-
-/// Returns the answers to one batch of rays that is passed component by component.
-fn by_component(
-    wide: &WideBvh,
-    rays: &[Ray],
-    coherence: Coherence,
-) -> (Vec<Option<Hit>>, Vec<bool>) {
-    let origins = components(rays, Ray::origin);
-    let directions = components(rays, Ray::direction);
-    let t_min: Vec<_> = rays.iter().map(Ray::t_min).collect();
-    let t_max: Vec<_> = rays.iter().map(Ray::t_max).collect();
-    let components = RayComponents::new(
-        origins.each_ref().map(Vec::as_slice),
-        directions.each_ref().map(Vec::as_slice),
-        Distances::Each(&t_min),
-        Distances::Each(&t_max),
-    );
-    let components = components.expect("rays");
-    let mut distances = vec![0.0; rays.len()];
-    let mut objects = vec![0; rays.len()];
-    let mut any = vec![false; rays.len()];
-    wide.nearest_hits_by_component(&components, &mut distances, &mut objects, coherence);
-    wide.any_hits_by_component(&components, &mut any, coherence);
-    let hits = distances.into_iter().zip(objects).map(|(t, object)| Hit { t, object });
-    let nearest = hits.map(|hit| if hit.is_miss() { None } else { Some(hit) });
-    (nearest.collect(), any)
-}
-
-fn components(rays: &[Ray], vector: fn(&Ray) -> Vec3) -> [Vec<f32>; 3] {
-    [0, 1, 2].map(|axis| rays.iter().map(|ray| vector(ray)[axis]).collect())
 }
 
 /// Returns rays of [`tracing::rays`], half of them single, half in bundles.

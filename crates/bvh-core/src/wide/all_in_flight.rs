@@ -20,7 +20,7 @@ use super::lanes::Lanes;
 use super::layout::WideBvh;
 use super::node::{Child, WideNode};
 use super::prepared::{Prepared, Ready};
-use super::source::Source;
+use super::ray_lanes::RayLanes;
 use super::triangles::TriangleBlock;
 use crate::exact::Line;
 use crate::{Hit, Ray};
@@ -70,8 +70,7 @@ pub(crate) unsafe fn trace<K: Instructions>(wide: &WideBvh, rays: &[Ray], found:
     // SAFETY: the caller's promises; there is room for the last lanes.
     unsafe {
         for first in (0..rays.len()).step_by(K::Rays::N) {
-            let source = Source::Rays(rays);
-            let lanes = source.lanes_up_to::<K::Rays>(first, rays.len());
+            let lanes = RayLanes::<K::Rays>::load_up_to(rays, first, rays.len());
             let ready = Ready::new(lanes, wide);
             ready.write(first as u32, prepared[first].as_mut_ptr());
             let entered = ready.enter(&wide.bounds);

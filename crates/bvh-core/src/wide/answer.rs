@@ -1,7 +1,6 @@
 //! A batch of rays: where the rays are, which hits count, and where the answers go.
 
 use super::layout::WideBvh;
-use super::source::Source;
 use crate::{Hit, Ray};
 
 /// The value of the parameter `ANY` of a traversal that ends a ray at the first hit that is found.
@@ -32,7 +31,7 @@ pub(crate) trait Answers {
 // Not generic over any of these: each kernel would be compiled once more for every kind of rays and
 // of answers. A call through a pointer per ray, or per vector of rays, takes no measurable time.
 pub(crate) struct Batch<'a> {
-    pub(crate) rays: Source<'a>,
+    pub(crate) rays: &'a [Ray],
     pub(crate) answers: &'a mut dyn Answers,
     /// Decides which hits count. Without it all hits count.
     pub(crate) accept: Option<&'a mut Accept<'a>>,
@@ -41,7 +40,7 @@ pub(crate) struct Batch<'a> {
 impl<'a> Batch<'a> {
     /// Returns a batch whose hits all count.
     #[inline]
-    pub(crate) fn new(rays: Source<'a>, answers: &'a mut dyn Answers) -> Self {
+    pub(crate) fn new(rays: &'a [Ray], answers: &'a mut dyn Answers) -> Self {
         Self { rays, answers, accept: None }
     }
 
@@ -78,13 +77,5 @@ impl Answers for &mut [Hit] {
 impl Answers for &mut [bool] {
     fn write(&mut self, number: usize, _: f32, object: u32) {
         self[number] = object != u32::MAX;
-    }
-}
-
-/// Distances and objects in separate slices.
-impl Answers for (&mut [f32], &mut [u32]) {
-    fn write(&mut self, number: usize, t: f32, object: u32) {
-        self.0[number] = distance(t, object);
-        self.1[number] = object;
     }
 }

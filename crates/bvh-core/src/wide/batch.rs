@@ -7,6 +7,7 @@ use super::instructions::Instructions;
 use super::lanes::Lanes;
 use super::layout::WideBvh;
 use super::packet::Packet;
+use super::ray_lanes::{RayLanes, prefetch};
 use core::ops::Range;
 
 /// The minimum run of rays between packets that is traced in flight rather than ray by ray.
@@ -34,8 +35,8 @@ pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
         let mut first_of_rest = 0;
         let mut next = 0;
         while next + K::Rays::N <= rays.len() {
-            rays.prefetch::<K>(next + K::PACKET);
-            let lanes = rays.lanes::<K::Rays>(next);
+            prefetch::<K>(rays, next + K::PACKET);
+            let lanes = RayLanes::load(rays, next);
             if lanes.cohere(&wide.near) {
                 if !packet.takes(lanes.octant()) {
                     packet.trace::<ANY>(wide, batch);
@@ -67,7 +68,7 @@ unsafe fn rest<K: Instructions, const ANY: bool>(
         unsafe { in_flight::trace::<K, ANY>(wide, batch, numbers) };
     } else {
         for number in numbers {
-            let ray = batch.rays.ray(number);
+            let ray = batch.rays[number];
             batch.alone::<ANY>(number, wide, &ray);
         }
     }

@@ -1,11 +1,10 @@
-//! The public calls for batches of rays, one after the other in memory or by component.
+//! The public calls for batches of rays.
 
 use super::answer::{ANY_HIT, Accept, Batch, NEAREST_HIT};
 use super::coherence::Coherence;
 use super::layout::WideBvh;
-use super::source::Source;
 use super::vector;
-use crate::{Hit, Kernel, Ray, RayComponents};
+use crate::{Hit, Kernel, Ray};
 
 impl WideBvh {
     /// Writes the [nearest hit](Self::nearest_hit) of every ray to `hits`; [`Hit::MISS`] for a ray
@@ -15,7 +14,7 @@ impl WideBvh {
     /// If `rays` and `hits` are not equally many.
     pub fn nearest_hits(&self, rays: &[Ray], mut hits: &mut [Hit], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "a hit for every ray");
-        self.trace::<NEAREST_HIT>(Batch::new(Source::Rays(rays), &mut hits), coherence);
+        self.trace::<NEAREST_HIT>(Batch::new(rays, &mut hits), coherence);
     }
 
     /// Writes to `hits` whether each ray meets [any triangle](Self::any_hit).
@@ -24,7 +23,7 @@ impl WideBvh {
     /// If `rays` and `hits` are not equally many.
     pub fn any_hits(&self, rays: &[Ray], mut hits: &mut [bool], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "an answer for every ray");
-        self.trace::<ANY_HIT>(Batch::new(Source::Rays(rays), &mut hits), coherence);
+        self.trace::<ANY_HIT>(Batch::new(rays, &mut hits), coherence);
     }
 
     /// Writes the [nearest accepted hit](Self::nearest_hit_where) of every ray to `hits`. `accept`
@@ -54,7 +53,7 @@ impl WideBvh {
         mut accept: impl FnMut(usize, Hit) -> bool,
     ) {
         assert_eq!(rays.len(), hits.len(), "a hit for every ray");
-        let batch = Batch::new(Source::Rays(rays), &mut hits);
+        let batch = Batch::new(rays, &mut hits);
         self.trace_where::<NEAREST_HIT>(batch, &mut accept, coherence);
     }
 
@@ -71,7 +70,7 @@ impl WideBvh {
         mut accept: impl FnMut(usize, Hit) -> bool,
     ) {
         assert_eq!(rays.len(), hits.len(), "an answer for every ray");
-        let batch = Batch::new(Source::Rays(rays), &mut hits);
+        let batch = Batch::new(rays, &mut hits);
         self.trace_where::<ANY_HIT>(batch, &mut accept, coherence);
     }
 
@@ -86,39 +85,6 @@ impl WideBvh {
         self.trace::<ANY>(Batch { accept: Some(accept), ..batch }, coherence);
     }
 
-    /// Writes the [nearest hits](Self::nearest_hits) of rays by component, by component, too:
-    /// distances in multiples of the lengths of the rays' directions, and objects. A ray that meets
-    /// nothing gets infinity and `u32::MAX`.
-    ///
-    /// # Panics
-    /// If `rays`, `distances` and `objects` are not equally many.
-    pub fn nearest_hits_by_component(
-        &self,
-        rays: &RayComponents,
-        distances: &mut [f32],
-        objects: &mut [u32],
-        coherence: Coherence,
-    ) {
-        assert_eq!(rays.len(), distances.len(), "a distance for every ray");
-        assert_eq!(rays.len(), objects.len(), "an object for every ray");
-        let mut answers = (distances, objects);
-        self.trace::<NEAREST_HIT>(Batch::new(Source::Components(rays), &mut answers), coherence);
-    }
-
-    /// Writes [whether rays by component meet any triangle](Self::any_hits) to `hits`.
-    ///
-    /// # Panics
-    /// If `rays` and `hits` are not equally many.
-    pub fn any_hits_by_component(
-        &self,
-        rays: &RayComponents,
-        mut hits: &mut [bool],
-        coherence: Coherence,
-    ) {
-        assert_eq!(rays.len(), hits.len(), "an answer for every ray");
-        self.trace::<ANY_HIT>(Batch::new(Source::Components(rays), &mut hits), coherence);
-    }
-
     /// Answers a batch by the layout's kernel.
     pub(super) fn trace<const ANY: bool>(&self, mut batch: Batch, coherence: Coherence) {
         if self.kernel != Kernel::Portable {
@@ -126,7 +92,7 @@ impl WideBvh {
             return unsafe { vector::trace::<ANY>(self, &mut batch, coherence) };
         }
         for number in 0..batch.rays.len() {
-            let ray = batch.rays.ray(number);
+            let ray = batch.rays[number];
             batch.alone::<ANY>(number, self, &ray);
         }
     }

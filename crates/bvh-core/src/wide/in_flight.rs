@@ -21,6 +21,7 @@ use super::lanes::Lanes;
 use super::layout::WideBvh;
 use super::node::Child;
 use super::prepared::{Prepared, Ready};
+use super::ray_lanes::{RayLanes, prefetch};
 use super::traversal::{self, Traversal};
 use core::marker::PhantomData;
 use core::mem::MaybeUninit;
@@ -212,8 +213,9 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
         let rays = self.batch.rays;
         // SAFETY: the caller's promises; `ready` has room for sixteen.
         unsafe {
-            rays.prefetch::<K>(self.from + K::Rays::N);
-            let ready = Ready::new(rays.lanes_up_to::<K::Rays>(from, self.end), self.wide);
+            prefetch::<K>(rays, self.from + K::Rays::N);
+            let ready =
+                Ready::new(RayLanes::<K::Rays>::load_up_to(rays, from, self.end), self.wide);
             self.waiting = there & ready.enter(&self.wide.bounds);
             if self.waiting != 0 {
                 ready.write((from - first) as u32, self.ready.as_mut_ptr().cast());

@@ -34,7 +34,6 @@ mod portable;
 mod prepared;
 mod ray_lanes;
 mod refit;
-mod source;
 mod tightness;
 mod traversal;
 mod triangles;

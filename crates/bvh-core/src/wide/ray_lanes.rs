@@ -1,9 +1,10 @@
-//! Rays side by side, a ray per lane, from any order in memory.
+//! Rays side by side, a ray per lane.
 
+use super::instructions::Instructions;
 use super::lanes::{Lanes, Mask};
 use super::pairs::{Pairs, SINGLE_ERROR};
-use crate::Aabb;
 use crate::ray::AXES;
+use crate::{Aabb, Ray};
 
 /// One ray per lane. Vectors of three are by axis.
 #[derive(Clone, Copy)]
@@ -16,6 +17,45 @@ pub(crate) struct RayLanes<L> {
 }
 
 impl<L: Lanes> RayLanes<L> {
+    /// Returns the rays from number `first` on.
+    ///
+    /// # Safety
+    /// The processor has the instructions, and there are so many rays.
+    #[inline(always)]
+    pub(crate) unsafe fn load(rays: &[Ray], first: usize) -> Self {
+        // SAFETY: there are a ray per lane; a ray is three vectors of four lanes.
+        unsafe {
+            let rays = rays.as_ptr().add(first);
+            let [ox, oy, oz, t_min] = transpose(rays, 0);
+            let [dx, dy, dz, t_max] = transpose(rays, 1);
+            let [ix, iy, iz, _] = transpose(rays, 2);
+            Self {
+                origin: [ox, oy, oz],
+                direction: [dx, dy, dz],
+                inverse: [ix, iy, iz],
+                t_min,
+                t_max,
+            }
+        }
+    }
+
+    /// Returns the rays from number `first` on. The last one before `end` fills the lanes that have
+    /// none.
+    ///
+    /// # Safety
+    /// The processor has the instructions, and there is a ray.
+    #[inline(always)]
+    pub(crate) unsafe fn load_up_to(rays: &[Ray], first: usize, end: usize) -> Self {
+        // SAFETY: the rays exist, or the padding does.
+        unsafe {
+            if first + L::N <= end {
+                return Self::load(rays, first);
+            }
+            let padded: [Ray; 16] = core::array::from_fn(|i| rays[(first + i).min(end - 1)]);
+            Self::load(&padded, 0)
+        }
+    }
+
     /// Returns a bit per axis along which the first ray runs backwards.
     #[inline(always)]
     pub(crate) fn octant(&self) -> u32 {
@@ -96,6 +136,43 @@ impl<L: Lanes> RayLanes<L> {
             error: reach * part,
             t_min: *t_min,
         }
+    }
+}
+
+/// Fetches the rays that follow number `first`, as many as a vector's. They need not exist. While a
+/// packet is traced, the processor does not see that the rays of the next one follow.
+///
+/// # Safety
+/// The processor has the instructions.
+#[inline(always)]
+pub(crate) unsafe fn prefetch<K: Instructions>(rays: &[Ray], first: usize) {
+    const LINE: usize = 64;
+    let next = rays.as_ptr().wrapping_add(first).cast::<u8>();
+    for line in 0..(K::Rays::N * size_of::<Ray>()).div_ceil(LINE) {
+        // SAFETY: a prefetch may name any address.
+        unsafe { K::prefetch(next.wrapping_add(line * LINE)) };
+    }
+}
+
+/// Returns one of the three vectors of rays, by component.
+///
+/// # Safety
+/// The processor has the instructions, and there is a ray per lane.
+#[inline(always)]
+unsafe fn transpose<L: Lanes>(rays: *const Ray, vector: usize) -> [L; 4] {
+    const STEP: usize = size_of::<Ray>() / 4;
+    // SAFETY: vectors are aligned to four lanes; quarters beyond the lanes are not loaded.
+    unsafe {
+        let row = |i: usize| {
+            let ray = rays.cast::<f32>().wrapping_add(4 * vector + i * STEP);
+            L::load_quarters([
+                ray,
+                ray.wrapping_add(4 * STEP),
+                ray.wrapping_add(8 * STEP),
+                ray.wrapping_add(12 * STEP),
+            ])
+        };
+        L::transpose_quarters([row(0), row(1), row(2), row(3)])
     }
 }
 

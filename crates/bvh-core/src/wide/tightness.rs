@@ -7,8 +7,7 @@ use super::instructions::{Instructions, Part};
 use super::lanes::Lanes;
 use super::node::WideNode;
 use super::prepared::{Prepared, Ready};
-use super::ray_lanes::RayBounds;
-use super::source::lanes_of_rays;
+use super::ray_lanes::{RayBounds, RayLanes};
 use super::{WideBvh, vector};
 use crate::{Aabb, Kernel, Ray, TestCounts};
 use alloc::vec;
@@ -89,7 +88,7 @@ impl<K: Instructions> Part for Entered<'_, K> {
         const { assert!(K::Rays::N <= 16) };
         // SAFETY: the processor has the instructions, and there are as many rays as lanes.
         unsafe {
-            let lanes = lanes_of_rays::<K::Rays>(&equal, 0);
+            let lanes = RayLanes::<K::Rays>::load(&equal, 0);
             match test {
                 // Packets are of rays that begin near the scene.
                 NodeTest::Packet if is_near => {

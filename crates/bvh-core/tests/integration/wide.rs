@@ -5,9 +5,7 @@ use crate::support::layouts::{bundles, layouts};
 use crate::support::{
     Random, SHAPES, ball, bits, boxes, brute_force, chain, grid_box, rays, scaled, soup, tree,
 };
-use bvh_core::{
-    Coherence, Distances, Hit, Kernel, Ray, RayComponents, RefitError, Triangle, WideBvh,
-};
+use bvh_core::{Coherence, Hit, Kernel, Ray, RefitError, Triangle, WideBvh};
 use glam::Vec3;
 
 /// Checks all rays by all layouts, one by one and in a batch. Returns the number of rays that hit.
@@ -140,31 +138,6 @@ fn a_range_that_ends_at_either_zero_has_the_same_bits_from_every_kernel() {
     assert!(hits > 40, "{hits} of 64");
 }
 
-/// The answers to rays by component, all of whose ranges begin and end at the given distances.
-fn by_component(
-    wide: &WideBvh,
-    rays: &[Ray],
-    range: [f32; 2],
-    coherence: Coherence,
-) -> Vec<(u32, u32)> {
-    let components = |vector: fn(&Ray) -> Vec3| {
-        [0, 1, 2].map(|axis| -> Vec<f32> { rays.iter().map(|ray| vector(ray)[axis]).collect() })
-    };
-    let origins = components(Ray::origin);
-    let directions = components(Ray::direction);
-    let components = RayComponents::assume_valid(
-        origins.each_ref().map(Vec::as_slice),
-        directions.each_ref().map(Vec::as_slice),
-        Distances::All(range[0]),
-        Distances::All(range[1]),
-    );
-    let mut distances = vec![0.0; rays.len()];
-    let mut objects = vec![0; rays.len()];
-    wide.nearest_hits_by_component(&components, &mut distances, &mut objects, coherence);
-    let distance_bits = distances.into_iter().map(f32::to_bits);
-    distance_bits.zip(objects).collect()
-}
-
 /// The answers to a batch of rays.
 fn of_batch(wide: &WideBvh, rays: &[Ray], coherence: Coherence) -> Vec<(u32, u32)> {
     let mut hits = vec![Hit::MISS; rays.len()];
@@ -189,26 +162,6 @@ fn batches_miss_a_scene_in_which_no_triangle_has_an_area() {
 }
 
 #[test]
-fn ranges_by_component_end_at_either_zero_with_the_same_bits() {
-    let sheet = |x: f32| {
-        Triangle([Vec3::new(x, -1.0, 0.0), Vec3::new(x + 1.0, -1.0, 0.0), Vec3::new(x, 3.0, 0.0)])
-    };
-    let triangles: Vec<Triangle> = (0..20).map(|x| sheet(x as f32)).collect();
-    let rays: Vec<Ray> = (0..64)
-        .map(|i| {
-            let side = [1.0, -1.0][i % 2];
-            Ray::new([0.3 * i as f32, 0.0, 0.0], [0.0, 0.0, side], 0.0, 0.0).unwrap()
-        })
-        .collect();
-    for (kernel, wide) in layouts(&triangles, &mut Random(5)) {
-        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
-            let answers = by_component(&wide, &rays, [-0.0, -0.0], coherence);
-            assert_eq!(answers, of_batch(&wide, &rays, coherence), "{kernel:?}, {coherence:?}");
-        }
-    }
-}
-
-#[test]
 fn ranges_that_begin_below_zero_are_answered_as_from_zero() {
     let mut random = Random(6);
     let triangles = soup(200, &mut random);
@@ -222,9 +175,6 @@ fn ranges_that_begin_below_zero_are_answered_as_from_zero() {
     for (kernel, wide) in layouts(&triangles, &mut random) {
         for coherence in [Coherence::Coherent, Coherence::Incoherent] {
             let expected = of_batch(&wide, &valid, coherence);
-            let range = [-1e30, f32::INFINITY];
-            let separate = by_component(&wide, &valid, range, coherence);
-            assert_eq!(separate, expected, "{kernel:?}, {coherence:?}, by component");
             let together = of_batch(&wide, &invalid, coherence);
             assert_eq!(together, expected, "{kernel:?}, {coherence:?}");
         }
