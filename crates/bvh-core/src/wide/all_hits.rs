@@ -36,15 +36,22 @@
 //! origin is perturbed, so three terms suffice. [`exact`](crate::exact) has the filter in f64 and
 //! its bounds; no rounding decides an answer.
 
-use super::all_in_flight::{self, Found};
 use super::answer::ANY_HIT;
-use super::crossed_leaves::{AllHits, SlopedLine};
-use super::layout::WideBvh;
-use super::portable;
-use super::vector;
+use super::crossed_leaves::{AllHits, Decision, LineLanes, SlopedLine};
+use super::flight::{FLIGHT, RAYS, Traversal};
+use super::instructions::{Instructions, Task};
+use super::kernel::DeepStacks;
+use super::lanes::Lanes;
+use super::layout::{Child, WideBvh, WideNode};
+use super::one_ray::traverse;
+use super::prepared::{Prepared, Ready};
+use super::ray_lanes::RayLanes;
+use super::triangles::TriangleBlock;
+use super::{portable, vector};
 use crate::exact::Line;
 use crate::{Hit, Kernel, Ray};
 use alloc::vec::Vec;
+use core::mem::MaybeUninit;
 use glam::Vec3;
 
 impl WideBvh {
@@ -85,8 +92,8 @@ impl WideBvh {
     pub fn all_hits_of(&self, rays: &[Ray], hits: &mut Vec<Hit>, counts: &mut [u32]) {
         assert_eq!(rays.len(), counts.len(), "a count for every ray");
         let mut found = Vec::new();
-        let parts = rays.chunks(all_in_flight::MOST);
-        for (rays, counts) in parts.zip(counts.chunks_mut(all_in_flight::MOST)) {
+        let parts = rays.chunks(MOST);
+        for (rays, counts) in parts.zip(counts.chunks_mut(MOST)) {
             self.append_hits_of(rays, hits, counts, &mut found);
         }
     }
@@ -99,8 +106,8 @@ impl WideBvh {
         assert_eq!(rays.len(), counts.len(), "a count for every ray");
         let mut hits = Vec::new();
         let mut found = Vec::new();
-        let parts = rays.chunks(all_in_flight::MOST);
-        for (rays, counts) in parts.zip(counts.chunks_mut(all_in_flight::MOST)) {
+        let parts = rays.chunks(MOST);
+        for (rays, counts) in parts.zip(counts.chunks_mut(MOST)) {
             hits.clear();
             self.append_hits_of(rays, &mut hits, counts, &mut found);
         }
@@ -153,15 +160,14 @@ impl WideBvh {
             return;
         }
         let first = hits.len();
-        // SAFETY: `kernel` is available, as those who set it saw; callers
-        // pass parts of no more rays.
-        unsafe { vector::all_hits_of(self, rays, found) };
+        // SAFETY: a layout's kernel is available.
+        unsafe { vector::dispatch::<_, ()>(self.kernel, ManyRays { wide: self, rays, found }) };
         counts.fill(0);
         for found in found.iter() {
             counts[found.number as usize] += 1;
         }
         // Sorted by counting: the hits of ray after ray, in any order.
-        let mut next = [0; all_in_flight::MOST];
+        let mut next = [0; MOST];
         let mut end = first;
         for (next, &count) in next.iter_mut().zip(counts.iter()) {
             *next = end;
@@ -195,8 +201,9 @@ impl WideBvh {
         let sloped = SlopedLine::new(ray, &self.bounds);
         let mut leaves = AllHits { ray, line, sloped, hits };
         if self.kernel != Kernel::Portable {
-            // SAFETY: `kernel` is available, as those who set it saw.
-            unsafe { vector::all_hits(self, ray, &mut leaves) };
+            let task = OneRay { wide: self, ray, leaves: &mut leaves };
+            // SAFETY: a layout's kernel is available.
+            unsafe { vector::dispatch::<_, ()>(self.kernel, task) };
         } else {
             portable::traverse::<ANY_HIT>(self, ray, &mut (), |block, _| {
                 leaves.test(block, (1 << block.len()) - 1);
@@ -223,4 +230,280 @@ fn sort_hits(hits: &mut [Hit]) -> usize {
         }
     }
     kept
+}
+
+/// The largest number of rays that are traced together. What is kept of each fits in the cache.
+const MOST: usize = 256;
+
+/// The number of pairs that are tested together, at most.
+const PAIRS: usize = 1024;
+
+/// A hit of the ray of this number.
+#[derive(Clone, Copy)]
+pub(crate) struct Found {
+    pub(super) number: u32,
+    pub(super) hit: Hit,
+}
+
+/// A block of triangles, as the bits of a [`Child`], and above them the number of a ray that
+/// entered it.
+type Pair = u64;
+
+/// The search for all hits of one ray.
+struct OneRay<'a, 'b> {
+    wide: &'a WideBvh,
+    ray: &'a Ray,
+    leaves: &'a mut AllHits<'b>,
+}
+
+impl<K: Instructions> Task<K> for OneRay<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run(self) {
+        let Self { wide, ray, leaves } = self;
+        // SAFETY: the processor has the instructions of `K`.
+        unsafe { traverse::<K, ANY_HIT>(wide, ray, leaves) };
+    }
+}
+
+/// The search for all hits of at most [`MOST`] rays, with many rays in flight. Appends the hits to
+/// `found`, in no order; the hits of a divided triangle once for each of its leaves.
+///
+/// A search for all hits cuts nothing off, so the order of visits does not matter. A visit of a
+/// node puts the inner children that the ray enters on the ray's stack, and the leaves on a list of
+/// pairs that all rays share:
+///
+/// ```text
+///   at a node: boxes ─┬─> inner children: the ray's stack ─> the ray's next node
+///                     └─> leaves: pairs of a ray and a block ─> candidates ─> decisions ─> hits
+/// ```
+///
+/// Steps of different rays and of different pairs do not depend on each other, and no step has a
+/// branch that is hard to predict.
+struct ManyRays<'a> {
+    wide: &'a WideBvh,
+    rays: &'a [Ray],
+    found: &'a mut Vec<Found>,
+}
+
+impl<K: Instructions> Task<K> for ManyRays<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run(self) {
+        let Self { wide, rays, found } = self;
+        assert!(rays.len() <= MOST);
+        let Some(root) = wide.root else { return };
+        let mut prepared = [const { MaybeUninit::<Prepared>::uninit() }; MOST + RAYS];
+        let mut lines = [const { MaybeUninit::<SlopedLine>::uninit() }; MOST];
+        let mut waiting = [0; MOST];
+        let mut count = 0;
+        // SAFETY: the processor has the instructions of `K`; there is room for the last lanes.
+        unsafe {
+            for first in (0..rays.len()).step_by(K::Rays::N) {
+                let lanes = RayLanes::<K::Rays>::load_up_to(rays, first, rays.len());
+                let ready = Ready::new(lanes, wide);
+                ready.write(first as u32, prepared[first].as_mut_ptr());
+                let entered = ready.enter(&wide.bounds);
+                let last = rays.len().min(first + K::Rays::N);
+                for (lane, number) in (first..last).enumerate() {
+                    if entered >> lane & 1 == 1 {
+                        lines[number].write(SlopedLine::new(&rays[number], &wide.bounds));
+                        waiting[count] = number as u32;
+                        count += 1;
+                    }
+                }
+            }
+            let mut pairs = Pairs { wide, rays, lines: &lines, pairs: [0; PAIRS], count: 0, found };
+            let waiting = &waiting[..count];
+            if root.is_node() {
+                visit_nodes::<K>(&mut pairs, waiting, prepared.as_ptr().cast());
+            } else {
+                for &number in waiting {
+                    pairs.append_leaf::<K>(root, number);
+                }
+            }
+            pairs.test::<K>();
+        }
+    }
+}
+
+/// Visits all nodes that the rays of these numbers enter, and puts their leaves on the list.
+///
+/// # Safety
+/// The processor has the instructions of `K`, and the caller is compiled with them; the rays are
+/// prepared, and the root is a node.
+#[inline(always)]
+unsafe fn visit_nodes<K: Instructions>(
+    pairs: &mut Pairs,
+    waiting: &[u32],
+    prepared: *const Prepared,
+) {
+    let wide = pairs.wide;
+    let mut traversals = MaybeUninit::<[Traversal; FLIGHT]>::uninit();
+    let traversals = traversals.as_mut_ptr().cast::<Traversal>();
+    let mut deep = DeepStacks::new(FLIGHT, wide.stack_need);
+    let mut active = [core::ptr::null_mut(); FLIGHT];
+    let mut count = K::FLIGHT.min(waiting.len());
+    let (first, mut waiting) = waiting.split_at(count);
+    let nodes = wide.nodes.as_ptr();
+    // SAFETY: the references of the layout are sound, and its stacks large enough; nothing is
+    // popped after `END`; a prefetch may name any address.
+    unsafe {
+        for (i, &number) in first.iter().enumerate() {
+            active[i] = traversals.add(i);
+            Traversal::set_stack(active[i], deep.as_mut().map(|deep| deep.stack(i)));
+            (*active[i]).start(*prepared.add(number as usize), wide);
+        }
+        while count > 0 {
+            let visits = count;
+            let mut ended = [core::ptr::null_mut(); FLIGHT];
+            let mut ends = 0;
+            count = 0;
+            for i in 0..visits {
+                let traversal = &mut *active[i];
+                let node = &*nodes.add(traversal.child.index());
+                let (_, entered) = traversal.ray.boxes::<K>(node, traversal.t);
+                let leaves = K::Boxes::load(node.children.as_ptr().cast()).signs();
+                K::compress(node, entered & !leaves, traversal.top);
+                let inner = (entered & !leaves).count_ones() as usize;
+                pairs.append_leaves::<K>(node, entered & leaves, traversal.ray.number);
+                traversal.top = traversal.top.add(inner).sub(1);
+                traversal.child = Child::from_bits(*traversal.top as u32);
+                let is_at_end = traversal.child == Child::END;
+                traversal.fetch::<K>();
+                active[count] = traversal;
+                count += usize::from(!is_at_end);
+                ended[ends] = traversal;
+                ends += usize::from(is_at_end);
+            }
+            for &traversal in &ended[..ends] {
+                let Some((&number, rest)) = waiting.split_first() else { break };
+                waiting = rest;
+                (*traversal).start(*prepared.add(number as usize), wide);
+                active[count] = traversal;
+                count += 1;
+            }
+            if pairs.count > PAIRS - WideNode::LANES * (FLIGHT + 1) {
+                pairs.test::<K>();
+            }
+        }
+    }
+}
+
+/// The pairs of a ray and a block of triangles that wait for their test.
+struct Pairs<'a> {
+    wide: &'a WideBvh,
+    rays: &'a [Ray],
+    /// Written for all rays in flight.
+    lines: &'a [MaybeUninit<SlopedLine>; MOST],
+    pairs: [Pair; PAIRS],
+    count: usize,
+    found: &'a mut Vec<Found>,
+}
+
+impl Pairs<'_> {
+    /// Appends a leaf.
+    #[inline(always)]
+    unsafe fn append_leaf<K: Instructions>(&mut self, leaf: Child, number: u32) {
+        self.pairs[self.count] = u64::from(leaf.bits()) | u64::from(number) << 32;
+        self.count += 1;
+        if self.count == PAIRS {
+            // SAFETY: the processor has the instructions of `K`.
+            unsafe { self.test::<K>() };
+        }
+    }
+
+    /// Appends the leaves among the children of a node, without a branch.
+    ///
+    /// # Safety
+    /// As for [`trace`]; there is room for eight more than are appended.
+    #[inline(always)]
+    unsafe fn append_leaves<K: Instructions>(&mut self, node: &WideNode, leaves: u32, number: u32) {
+        // SAFETY: there is room for eight more pairs.
+        unsafe {
+            let to = self.pairs.as_mut_ptr().add(self.count);
+            K::compress(node, leaves, to);
+            // All eight, whose number the compiler knows.
+            for i in 0..WideNode::LANES {
+                *to.add(i) |= u64::from(number) << 32;
+            }
+        }
+        self.count += leaves.count_ones() as usize;
+    }
+
+    /// Tests all pairs and empties the list.
+    ///
+    /// # Safety
+    /// As for [`trace`].
+    #[inline(always)]
+    unsafe fn test<K: Instructions>(&mut self) {
+        /// The number of pairs between the one that is tested and the one that is fetched from
+        /// memory.
+        const AHEAD: usize = 8;
+        let blocks = self.wide.blocks.as_ptr();
+        let block_of = |pair: Pair| blocks.wrapping_add(Child::from_bits(pair as u32).index());
+        // SAFETY: pairs name rays in flight and blocks of the layout; after a block that is not the
+        // last of its leaf comes another; a prefetch may name any address.
+        unsafe {
+            while self.count > 0 {
+                let mut hopeful = [0; PAIRS];
+                let mut hopes = 0;
+                let mut rest = 0;
+                for i in 0..self.count {
+                    let ahead = block_of(self.pairs[(i + AHEAD).min(self.count - 1)]);
+                    for offset in 0..size_of::<TriangleBlock>().div_ceil(64) {
+                        K::prefetch(ahead.cast::<u8>().wrapping_add(64 * offset));
+                    }
+                    let pair = self.pairs[i];
+                    let block = &*block_of(pair);
+                    let line = self.lines[(pair >> 32) as usize].assume_init_ref();
+                    let line = LineLanes::<K::Block>::new(line);
+                    hopeful[hopes] = pair;
+                    hopes += usize::from(line.candidates(block) != 0);
+                    // The next block of the leaf takes the place of a pair that has been tested.
+                    self.pairs[rest] = pair + 1;
+                    rest += usize::from(!block.is_last());
+                }
+                self.count = rest;
+                for &pair in &hopeful[..hopes] {
+                    self.decide::<K>((pair >> 32) as u32, &*block_of(pair));
+                }
+            }
+        }
+    }
+
+    /// Appends the hits of a ray in a block.
+    #[inline(always)]
+    unsafe fn decide<K: Instructions>(&mut self, number: u32, block: &TriangleBlock) {
+        let ray = &self.rays[number as usize];
+        // SAFETY: the ray is one of those in flight.
+        let Decision { mut hits, mut unsure, distances } = unsafe {
+            let line = self.lines[number as usize].assume_init_ref();
+            LineLanes::<K::Block>::new(line).decide(block)
+        };
+        while hits != 0 {
+            let lane = hits.trailing_zeros() as usize & 3;
+            hits &= hits - 1;
+            self.append(number, ray, Hit { t: distances[lane], object: block.id(lane) });
+        }
+        while unsure != 0 {
+            let lane = unsure.trailing_zeros() as usize & 3;
+            unsure &= unsure - 1;
+            if let Some((object, triangle)) = block.triangle(lane)
+                && let Some(t) = Line::new(ray).crossing(ray, &triangle.0)
+            {
+                self.append(number, ray, Hit { t, object });
+            }
+        }
+    }
+
+    /// Appends a hit if it is in the range of its ray, and not of an unused lane.
+    #[inline(always)]
+    fn append(&mut self, number: u32, ray: &Ray, hit: Hit) {
+        if ray.t_min() <= hit.t && hit.t <= ray.t_max() && !hit.is_miss() {
+            self.found.push(Found { number, hit });
+        }
+    }
 }

@@ -13,7 +13,7 @@
 
 use super::instructions::Instructions;
 use super::lanes::{DoubleLanes, Lanes, Mask};
-use super::node::WideNode;
+use super::layout::WideNode;
 use crate::Ray;
 use crate::slabs::{FAR, FAR_DOUBLE, NEAR, NEAR_DOUBLE};
 

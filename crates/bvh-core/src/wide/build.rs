@@ -1,8 +1,7 @@
 //! The wide layout of least expected cost of a given tree.
 
 use super::decide::{BLOCK_COST, Costs, Decision, areas, children, decide};
-use super::layout::WideBvh;
-use super::node::{Child, WideNode};
+use super::layout::{Child, WideBvh, WideNode};
 use super::triangles::TriangleBlock;
 use crate::collapse::{binary, binary_visited, collect};
 use crate::{Aabb, Bvh, Triangle};

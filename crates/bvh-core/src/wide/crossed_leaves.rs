@@ -37,8 +37,8 @@ impl AllHits<'_> {
 impl<L: Lanes> Leaves<L> for AllHits<'_> {
     #[inline(always)]
     unsafe fn visit(&mut self, block: &TriangleBlock, _: &mut Hit) -> bool {
-        // SAFETY: the caller's promise. The lanes are the same for all blocks; the compiler keeps
-        // them in registers.
+        // SAFETY: the processor has the instructions. The lanes are the same for all blocks; the
+        // compiler keeps them in registers.
         let candidates = unsafe { LineLanes::<L>::new(&self.sloped).candidates(block) };
         self.test(block, candidates);
         false
@@ -123,7 +123,7 @@ impl<L: Lanes> LineLanes<L> {
     pub(super) unsafe fn new(line: &SlopedLine) -> Self {
         let [ox, oy, oz] = line.origin;
         let [x_slope, y_slope] = line.slope;
-        // SAFETY: the caller's promise.
+        // SAFETY: the processor has the instructions.
         unsafe {
             Self {
                 origin: [L::Double::splat(ox), L::Double::splat(oy), L::Double::splat(oz)],
@@ -143,7 +143,7 @@ impl<L: Lanes> LineLanes<L> {
     /// As for [`new`](Self::new).
     #[inline(always)]
     pub(super) unsafe fn candidates(&self, block: &TriangleBlock) -> u32 {
-        // SAFETY: the caller's promise; axes are below 3.
+        // SAFETY: the processor has the instructions; axes are below 3.
         let [a, b, c] = unsafe { block.corners_along::<L>(self.axes) };
         let edges = Edges::new([self.sheared(a), self.sheared(b), self.sheared(c)]);
         !L::narrow(self.misses(&edges)).bits() & 15
@@ -155,7 +155,8 @@ impl<L: Lanes> LineLanes<L> {
     /// As for [`new`](Self::new).
     #[inline(always)]
     pub(super) unsafe fn decide(&self, block: &TriangleBlock) -> Decision {
-        // SAFETY: the caller's promise; axes are below 3, and there is room for four distances.
+        // SAFETY: the processor has the instructions; axes are below 3, and there is room for four
+        // distances.
         unsafe {
             let [a, b, c] = block.corners_along::<L>(self.axes);
             let a = self.sheared(a);

@@ -1,21 +1,23 @@
 //! The operations of an instruction set that the kernels need besides its lanes.
 
 use super::lanes::Lanes;
-use super::node::{Child, WideNode};
+use super::layout::{Child, WideNode};
 
 /// A child to visit later: the bits of its entry, of which the last three are any, above those of
 /// the child. Entries are not negative, so that their bits are ordered as they are.
 pub(crate) type Pending = u64;
 
-/// A part of a kernel that is compiled once and called, so that its callers stay small.
-pub(crate) trait Part {
+/// A part of a kernel that is compiled once for an instruction set and called, so that its callers
+/// stay small, or are compiled without the instructions.
+pub(crate) trait Task<K: Instructions> {
     /// The result.
     type Output;
 
-    /// Runs the part.
+    /// Runs the task.
     ///
     /// # Safety
-    /// The processor has the instructions of the part; it is always inlined.
+    /// The processor has the instructions of `K`. This is inlined into a function that is compiled
+    /// with them.
     unsafe fn run(self) -> Self::Output;
 }
 
@@ -54,11 +56,11 @@ pub(crate) trait Instructions: Sized {
     /// Writes the entered children in the order of their lanes, with entries of 0.
     unsafe fn compress(node: &WideNode, mask: u32, to: *mut Pending);
 
-    /// Has a line of memory fetched, which may be anywhere.
+    /// Fetches a line of memory, which may be anywhere.
     unsafe fn prefetch(line: *const u8);
 
-    /// Runs a part of a kernel in a function of its own that is compiled with the instructions.
-    unsafe fn call<P: Part>(part: P) -> P::Output;
+    /// Runs a task in a function of its own that is compiled with the instructions.
+    unsafe fn call<T: Task<Self>>(task: T) -> T::Output;
 
     /// Removes the children behind `nearest` from a stack that is aligned to 64 bytes. Returns its
     /// new end.

@@ -125,7 +125,7 @@ pub(crate) trait Lanes:
     /// Fills all lanes with one number.
     #[inline(always)]
     unsafe fn splat_bits(bits: u32) -> Self {
-        // SAFETY: the caller's promise.
+        // SAFETY: the processor has the instructions.
         unsafe { Self::splat(f32::from_bits(bits)) }
     }
 

@@ -5,37 +5,27 @@
 #![cfg_attr(not(all(feature = "std", target_arch = "x86_64")), allow(dead_code))]
 
 mod all_hits;
-mod all_in_flight;
 mod answer;
-mod available;
 mod batch;
-mod batches;
 mod box_ray;
 mod build;
 mod closest;
-mod closest_lanes;
-mod coherence;
 mod crossed_leaves;
-mod culling;
 mod decide;
-mod in_flight;
+mod flight;
 mod instances;
 mod instructions;
 mod kernel;
 mod lanes;
 mod layout;
-mod nearest;
-mod node;
 mod one_ray;
 mod packet;
-mod packet_leaves;
 mod pairs;
 mod portable;
 mod prepared;
 mod ray_lanes;
 mod refit;
 mod tightness;
-mod traversal;
 mod triangles;
 // The kernels of the target, or none.
 #[cfg_attr(all(feature = "std", target_arch = "x86_64"), path = "x86/mod.rs")]
@@ -48,13 +38,13 @@ mod triangles;
 )]
 mod vector;
 
-pub use coherence::Coherence;
+pub use batch::Coherence;
+pub use closest::Closest;
 pub(crate) use decide::{BLOCK_COST, NODE_COST, areas, children, decide};
 pub use instances::{Instance, InstanceHit, Instances, InvalidInstances};
 pub use kernel::Kernel;
 pub use layout::WideBvh;
-pub use nearest::Closest;
-pub(crate) use node::WideNode;
+pub(crate) use layout::WideNode;
 pub use refit::RefitError;
 #[doc(hidden)]
 pub use tightness::NodeTest;
@@ -63,7 +53,20 @@ pub(crate) use triangles::TriangleBlock;
 use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate_references};
 use alloc::vec::Vec;
 use answer::{ANY_HIT, NEAREST_HIT};
+use one_ray::OneRay;
 use portable::walk;
+
+impl Kernel {
+    /// Returns whether this processor can run the kernel.
+    pub fn is_available(self) -> bool {
+        self == Self::Portable || vector::has(self)
+    }
+
+    /// The fastest kernel that this processor can run.
+    pub fn best() -> Self {
+        Self::ALL.into_iter().find(|kernel| kernel.is_available()).unwrap_or(Self::Portable)
+    }
+}
 
 impl WideBvh {
     /// Boxes that are tested, and counted, at every node.
@@ -135,8 +138,9 @@ impl WideBvh {
         if self.kernel == Kernel::Portable {
             return walk::<ANY>(self, ray, &mut (), accept);
         }
-        // SAFETY: `kernel` is available, as those who set it saw.
-        let hit = unsafe { vector::one_ray::<ANY>(self, ray, accept) };
+        let task = OneRay::<_, ANY> { wide: self, ray, accept };
+        // SAFETY: a layout's kernel is available.
+        let hit: Hit = unsafe { vector::dispatch(self.kernel, task) };
         (!hit.is_miss()).then_some(hit)
     }
 

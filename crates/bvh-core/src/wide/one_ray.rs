@@ -1,17 +1,15 @@
 //! The traversal of one ray in vector registers.
 
 use super::box_ray::{BoxRay, BoxTest, FarBoxRay};
-use super::instructions::{Instructions, Part, Pending};
+use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::{Lanes, Mask};
-use super::layout::WideBvh;
-use super::node::Child;
+use super::layout::{Child, WideBvh};
 use super::pairs::{Pairs, Plane, SINGLE_ERROR};
 use super::triangles::TriangleBlock;
 use crate::ray::{AXES, largest_axis};
 use crate::{Aabb, Hit, Ray};
 use core::hint::black_box;
-use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 
 /// Aligns the frame of the function that holds it. Otherwise the compiler keeps vectors of 32 bytes
@@ -20,27 +18,30 @@ use core::mem::MaybeUninit;
 #[repr(align(64))]
 struct Aligned<T>(T);
 
-/// Returns the nearest hit, or with `ANY` the first one found, among those that `accept` accepts;
-/// without any the object is `u32::MAX`.
-///
-/// # Safety
-/// The processor has the instructions of `K`, and the caller is compiled with them; the references
-/// of `wide` are sound.
-#[inline(always)]
-pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
-    wide: &WideBvh,
-    ray: &Ray,
-    accept: impl FnMut(Hit) -> bool,
-) -> Hit {
-    let mut leaves = FirstHits {
-        ray,
-        bounds: &wide.bounds,
-        leaf_ray: MaybeUninit::uninit(),
-        is_prepared: false,
-        accept,
-    };
-    // SAFETY: the caller's promises.
-    unsafe { traverse::<K, ANY>(wide, ray, &mut leaves) }
+/// The search for a ray's nearest hit, or with `ANY` the first one found, among those that `accept`
+/// accepts; without any the object is `u32::MAX`.
+pub(crate) struct OneRay<'a, A, const ANY: bool> {
+    pub(crate) wide: &'a WideBvh,
+    pub(crate) ray: &'a Ray,
+    pub(crate) accept: A,
+}
+
+impl<K: Instructions, A: FnMut(Hit) -> bool, const ANY: bool> Task<K> for OneRay<'_, A, ANY> {
+    type Output = Hit;
+
+    #[inline(always)]
+    unsafe fn run(self) -> Hit {
+        let Self { wide, ray, accept } = self;
+        let mut leaves = FirstHits {
+            ray,
+            bounds: &wide.bounds,
+            leaf_ray: MaybeUninit::uninit(),
+            is_prepared: false,
+            accept,
+        };
+        // SAFETY: the processor has the instructions of `K`.
+        unsafe { traverse::<K, ANY>(wide, ray, &mut leaves) }
+    }
 }
 
 /// Tests of the triangles in the leaves that a ray enters.
@@ -56,17 +57,18 @@ pub(crate) trait Leaves<L> {
 /// that is found, in no order.
 ///
 /// # Safety
-/// As for [`trace`].
+/// The processor has the instructions of `K`, and the caller is compiled with them.
 #[inline(always)]
 pub(crate) unsafe fn traverse<K: Instructions, const ANY: bool>(
     wide: &WideBvh,
     ray: &Ray,
     leaves: &mut impl Leaves<K::Block>,
 ) -> Hit {
-    // SAFETY: the caller's promises.
+    // SAFETY: the processor has the instructions; the stack has room for `stack_need` children and
+    // one register more.
     unsafe {
         if !ray.begins_in(&wide.near) || wide.stack_need > STACK {
-            return K::call(Rare::<K, _, ANY> { wide, ray, leaves, kernel: PhantomData });
+            return K::call(Rare::<_, ANY> { wide, ray, leaves });
         }
         let mut stack = MaybeUninit::<Aligned<[Pending; STACK + SPARE]>>::uninit();
         let base = stack.as_mut_ptr().cast::<Pending>();
@@ -75,19 +77,18 @@ pub(crate) unsafe fn traverse<K: Instructions, const ANY: bool>(
 }
 
 /// The traversal of a ray that begins far from the scene, or of a deep layout.
-struct Rare<'a, K, L, const ANY: bool> {
+struct Rare<'a, L, const ANY: bool> {
     wide: &'a WideBvh,
     ray: &'a Ray,
     leaves: &'a mut L,
-    kernel: PhantomData<K>,
 }
 
-impl<K: Instructions, L: Leaves<K::Block>, const ANY: bool> Part for Rare<'_, K, L, ANY> {
+impl<K: Instructions, L: Leaves<K::Block>, const ANY: bool> Task<K> for Rare<'_, L, ANY> {
     type Output = Hit;
 
     #[inline(always)]
     unsafe fn run(self) -> Hit {
-        let Self { wide, ray, leaves, .. } = self;
+        let Self { wide, ray, leaves } = self;
         let mut stack = MaybeUninit::<Aligned<[Pending; STACK + SPARE]>>::uninit();
         let mut deep = DeepStacks::new(1, wide.stack_need);
         let base = deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.stack(0));
@@ -185,7 +186,7 @@ struct FirstHits<'r, L, A> {
 impl<L: Lanes, A: FnMut(Hit) -> bool> Leaves<L> for FirstHits<'_, L, A> {
     #[inline(always)]
     unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool {
-        // SAFETY: the caller's promise; the ray is prepared before its use.
+        // SAFETY: the processor has the instructions; the ray is prepared before its use.
         unsafe {
             if !self.is_prepared {
                 self.leaf_ray.write(LeafRay::new(self.ray, self.bounds));
@@ -212,7 +213,7 @@ impl<L: Lanes> LeafRay<L> {
         let direction = ray.direction().to_array();
         let reach = ray.reach(bounds);
         let axes = AXES[largest_axis(ray)];
-        // SAFETY: the caller's promise: the processor has the instructions.
+        // SAFETY: the processor has the instructions.
         unsafe {
             let [x, y, z] = axes;
             let dx = direction[x];
@@ -238,7 +239,7 @@ impl<L: Lanes> LeafRay<L> {
         nearest: &mut Hit,
         accept: &mut impl FnMut(Hit) -> bool,
     ) -> bool {
-        // SAFETY: the caller's promise: the processor has the instructions; axes are below 3.
+        // SAFETY: the processor has the instructions; axes are below 3.
         unsafe {
             let corners = block.corners_along::<L>(self.axes);
             let candidates = self.pairs.candidates(&corners);

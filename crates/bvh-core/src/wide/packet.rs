@@ -6,16 +6,16 @@
 //! volume hierarchies'; Overbeck, Ramamoorthi & Mark 2008, 'Large ray packets for real-time Whitted
 //! ray tracing' (ranged traversal).
 
-use super::answer::Batch;
-use super::culling::Culling;
-use super::instructions::{Instructions, Part};
+use super::answer::{Accept, Batch};
+use super::instructions::{Instructions, Task};
 use super::kernel::{DeepStacks, SPARE, STACK};
-use super::lanes::{Lanes, Mask as _};
-use super::layout::WideBvh;
-use super::node::{Child, WideNode};
-use super::pairs::Pairs;
+use super::lanes::{Lanes, Mask};
+use super::layout::{Child, WideBvh, WideNode};
+use super::pairs::{Pairs, Plane};
 use super::ray_lanes::{RayBounds, RayLanes};
+use super::triangles::TriangleBlock;
 use crate::slabs::{FAR, NEAR};
+use crate::{Aabb, Hit};
 use core::mem::MaybeUninit;
 
 /// The maximum number of vectors in a packet.
@@ -66,7 +66,7 @@ impl<K: Instructions> Packet<K> {
             vectors: [const { MaybeUninit::uninit() }; VECTORS],
             count: 0,
             octant: 0,
-            // SAFETY: the caller's promise.
+            // SAFETY: the processor has the instructions.
             bounds: unsafe { RayBounds::none() },
         }
     }
@@ -114,7 +114,7 @@ impl<K: Instructions> Packet<K> {
     /// As for [`trace`](super::batch::trace).
     #[inline(always)]
     pub(crate) unsafe fn trace<const ANY: bool>(&mut self, wide: &WideBvh, batch: &mut Batch) {
-        // SAFETY: the caller's promises.
+        // SAFETY: the processor has the instructions.
         unsafe { K::call(Trace::<K, ANY> { packet: self, wide, batch }) };
     }
 
@@ -248,7 +248,7 @@ impl<K: Instructions> Packet<K> {
     /// hit.
     #[inline(always)]
     pub(super) unsafe fn enter(&self, vector: usize, planes: &[[f32; 2]; 3]) -> u32 {
-        // SAFETY: the caller's promise: the vector is counted.
+        // SAFETY: the vector is counted.
         unsafe {
             let vector = self.vectors.get_unchecked(vector).assume_init_ref();
             let mut entry = vector.t_min;
@@ -296,13 +296,13 @@ struct Trace<'p, 'a, K: Instructions, const ANY: bool> {
     batch: &'p mut Batch<'a>,
 }
 
-impl<K: Instructions, const ANY: bool> Part for Trace<'_, '_, K, ANY> {
+impl<K: Instructions, const ANY: bool> Task<K> for Trace<'_, '_, K, ANY> {
     type Output = ();
 
     #[inline(always)]
     unsafe fn run(self) {
         let Self { packet, wide, batch } = self;
-        // SAFETY: the caller's promises.
+        // SAFETY: the processor has the instructions.
         unsafe {
             let culling = Culling::<K::Boxes>::new(&packet.bounds, packet.octant);
             if let Some(root) = wide.root {
@@ -319,4 +319,245 @@ impl<K: Instructions, const ANY: bool> Part for Trace<'_, '_, K, ANY> {
 #[inline(always)]
 fn key_of(farthest: f32) -> u32 {
     farthest.to_bits() | 7
+}
+
+impl<K: Instructions> Packet<K> {
+    /// Tests the triangles of a leaf with the rays that enter it. `entered` has a bit per ray of
+    /// the vector `first` that enters the box of these planes, and earlier vectors do not enter it.
+    /// Returns whether any ray has a new nearest hit.
+    #[inline(always)]
+    pub(super) unsafe fn visit_leaf<const ANY: bool>(
+        &mut self,
+        first: usize,
+        mut entered: u32,
+        planes: &[[f32; 2]; 3],
+        block: *const TriangleBlock,
+        bounds: &Aabb,
+        accept: &mut Option<&mut Accept>,
+    ) -> bool {
+        let mut is_hit = false;
+        for i in first..self.count {
+            // SAFETY: the processor has the instructions; so many vectors are counted.
+            unsafe {
+                if i > first {
+                    entered = self.enter(i, planes);
+                }
+                if entered != 0 {
+                    is_hit |= self.test::<ANY>(i, entered, block, bounds, accept);
+                }
+            }
+        }
+        is_hit
+    }
+
+    /// Tests the triangles of a leaf with the rays of a vector that entered it. Returns whether any
+    /// ray has a new nearest hit.
+    #[inline(always)]
+    unsafe fn test<const ANY: bool>(
+        &mut self,
+        vector: usize,
+        entered: u32,
+        block: *const TriangleBlock,
+        bounds: &Aabb,
+        accept: &mut Option<&mut Accept>,
+    ) -> bool {
+        // SAFETY: the processor has the instructions; a block that is not its leaf's last is followed by
+        // another.
+        unsafe {
+            let vector = self.vectors.get_unchecked_mut(vector).assume_init_mut();
+            if !vector.is_sheared {
+                vector.pairs.write(vector.rays.sheared(vector.axes, bounds));
+                vector.is_sheared = true;
+            }
+            let pairs = vector.pairs.assume_init_ref();
+            let mut block = block;
+            let mut is_hit = false;
+            loop {
+                for lane in 0..(*block).len() {
+                    let corners = (*block).splat_corners::<K::Rays>(lane, vector.axes);
+                    let mut candidates = pairs.candidates(&corners);
+                    candidates.possible &= entered;
+                    if candidates.possible == 0 {
+                        continue;
+                    }
+                    let plane = Plane::of_triangle(&(*block).doubles(lane, vector.axes));
+                    let (inside, t) = pairs.decide(&corners, &plane, &candidates, vector.t);
+                    let inside = inside & Mask::from_bits(entered);
+                    let object = K::Rays::splat_bits((*block).id(lane));
+                    let mut hits = if ANY {
+                        inside
+                    } else {
+                        t.lt(vector.t) & inside
+                            | t.eq(vector.t) & inside & object.below(vector.object)
+                    };
+                    if hits.bits() == 0 {
+                        continue;
+                    }
+                    if let Some(accept) = accept {
+                        hits = accepted(accept, vector.first, hits, t, (*block).id(lane));
+                    }
+                    is_hit |= hits.bits() != 0;
+                    // A ray that has its answer ends before it begins.
+                    let t = if ANY { K::Rays::splat(-1.0) } else { t };
+                    vector.t = Lanes::select(hits, t, vector.t);
+                    vector.object = Lanes::select(hits, object, vector.object);
+                }
+                if (*block).is_last() {
+                    return is_hit;
+                }
+                block = block.add(1);
+            }
+        }
+    }
+}
+
+/// Returns the hits with one object that `accept` accepts. The ray of the first lane is number
+/// `first` of its batch.
+#[inline(always)]
+unsafe fn accepted<L: Lanes>(
+    accept: &mut Accept,
+    first: usize,
+    hits: L::Mask,
+    t: L,
+    object: u32,
+) -> L::Mask {
+    let found = hits.bits();
+    let mut distances = [0.0; 16];
+    let mut left = found;
+    let mut accepted = found;
+    // SAFETY: there is room for sixteen lanes; the processor has the instructions.
+    unsafe {
+        t.store(distances.as_mut_ptr());
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let hit = Hit { t: distances[lane], object };
+            if !accept(first + lane, hit) {
+                accepted ^= 1 << lane;
+            }
+        }
+        if accepted == found { hits } else { Mask::from_bits(accepted) }
+    }
+}
+
+/// The bounds of a packet as boxes are tested with them: along each axis the origins for which the
+/// distances to near planes are least and to far planes greatest, and the extreme scales.
+pub(super) struct Culling<L> {
+    /// The indices of the planes that the rays meet first, by axis, and of the planes opposite.
+    near: [usize; 3],
+    far: [usize; 3],
+    near_origin: [L; 3],
+    far_origin: [L; 3],
+    /// The extreme factors of near and of far planes, the one of the lesser size first.
+    near_factors: [[L; 2]; 3],
+    far_factors: [[L; 2]; 3],
+    begin: L,
+    side: [f32; 3],
+}
+
+impl<L: Lanes> Culling<L> {
+    /// Returns the bounds of rays of one octant, for boxes whose coordinates are at most `largest`.
+    ///
+    /// # Safety
+    /// The processor has the instructions.
+    #[inline(always)]
+    pub(super) unsafe fn new<R: Lanes>(bounds: &RayBounds<R>, octant: u32) -> Self {
+        // SAFETY: the processor has the instructions.
+        unsafe {
+            let zero = L::splat(0.0);
+            let mut culling = Self {
+                near: [0; 3],
+                far: [0; 3],
+                near_origin: [zero; 3],
+                far_origin: [zero; 3],
+                near_factors: [[zero; 2]; 3],
+                far_factors: [[zero; 2]; 3],
+                begin: L::splat(bounds.begin()),
+                side: [1.0; 3],
+            };
+            for axis in 0..3 {
+                let [lowest, highest] = bounds.origins(axis);
+                let [least, most] = bounds.inverses(axis);
+                let is_backwards = octant >> axis & 1 != 0;
+                culling.near[axis] = axis + 3 * usize::from(is_backwards);
+                culling.far[axis] = axis + 3 * usize::from(!is_backwards);
+                // Distances grow with the plane minus the origin if the scale is positive, else the
+                // other way.
+                let (near, far) = if is_backwards {
+                    culling.side[axis] = -1.0;
+                    (lowest, highest)
+                } else {
+                    (highest, lowest)
+                };
+                culling.near_origin[axis] = L::splat(near);
+                culling.far_origin[axis] = L::splat(far);
+                // An infinite factor must be the second: `cull` has NaN from it, not a number.
+                let (small, large) = if is_backwards { (most, least) } else { (least, most) };
+                culling.near_factors[axis] = [L::splat(small * NEAR), L::splat(large * NEAR)];
+                culling.far_factors[axis] = [L::splat(small * FAR), L::splat(large * FAR)];
+            }
+            culling
+        }
+    }
+
+    /// Returns the least distance at which any ray may enter each child, and a bit per child that
+    /// some ray may enter before `farthest`: the bounds of `(plane − origin) · scale` over all
+    /// rays.
+    ///
+    /// # Safety
+    /// The processor has the instructions.
+    #[inline(always)]
+    pub(super) unsafe fn cull<K: Instructions<Boxes = L>>(
+        &self,
+        node: &WideNode,
+        farthest: f32,
+    ) -> (L, u32) {
+        // SAFETY: planes are whole and aligned.
+        unsafe {
+            let mut entry = self.begin;
+            let mut exit = L::splat(farthest);
+            for axis in 0..3 {
+                let near = L::load(node.planes.as_ptr().add(self.near[axis]).cast());
+                let near = near - self.near_origin[axis];
+                let [small, large] = self.near_factors[axis];
+                let near = (near * small).min(near * large);
+                // `max` returns the second of two zeros: entries are never −0.
+                entry = near.max(entry);
+                let far = L::load(node.planes.as_ptr().add(self.far[axis]).cast());
+                let far = far - self.far_origin[axis];
+                let [small, large] = self.far_factors[axis];
+                let far = (far * small).max(far * large);
+                // `min` returns the second of a NaN and a number.
+                exit = far.min(exit);
+            }
+            (entry, K::entered(entry, exit))
+        }
+    }
+
+    /// Returns the planes of a box that contains everything, by axis.
+    #[inline(always)]
+    pub(super) fn all_space(&self) -> [[f32; 2]; 3] {
+        let far = self.side.map(|margin| f32::INFINITY.copysign(margin));
+        [[-far[0], far[0]], [-far[1], far[1]], [-far[2], far[2]]]
+    }
+
+    /// Returns the near and the far plane of the child in a lane, by axis, moved by the margin.
+    ///
+    /// # Safety
+    /// There is such a lane.
+    #[inline(always)]
+    pub(super) unsafe fn planes(&self, node: &WideNode, lane: usize) -> [[f32; 2]; 3] {
+        // SAFETY: there are six planes of eight lanes.
+        unsafe {
+            let lanes = node.planes.as_ptr().cast::<f32>().add(lane);
+            let mut planes = [[0.0; 2]; 3];
+            for (axis, planes) in planes.iter_mut().enumerate() {
+                *planes = [
+                    *lanes.add(WideNode::LANES * self.near[axis]),
+                    *lanes.add(WideNode::LANES * self.far[axis]),
+                ];
+            }
+            planes
+        }
+    }
 }

@@ -284,7 +284,7 @@ impl<L: Lanes> Pairs<L> {
 /// The processor has the instructions.
 #[inline(always)]
 unsafe fn constants<D: DoubleLanes, const N: usize>(numbers: [f64; N]) -> [D; N] {
-    // SAFETY: the caller's promise.
+    // SAFETY: the processor has the instructions.
     numbers.map(|number| unsafe { D::splat(number) })
 }
 
@@ -333,7 +333,7 @@ impl<L: Lanes> Plane<L> {
         };
         let first = side(b);
         let second = side(c);
-        // SAFETY: the caller's promise.
+        // SAFETY: the processor has the instructions.
         unsafe {
             Self {
                 corner: constants(*a),

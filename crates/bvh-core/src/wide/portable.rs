@@ -1,8 +1,7 @@
 //! The portable kernel: traversal of the wide layout by safe code for any machine, which can count
 //! its tests.
 
-use super::layout::WideBvh;
-use super::node::{Child, WideNode};
+use super::layout::{Child, WideBvh, WideNode};
 use super::triangles::TriangleBlock;
 use crate::stack::Stack;
 use crate::{Aabb, Counter, Hit, PreparedRay, Ray, Slabs};

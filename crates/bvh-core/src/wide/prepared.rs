@@ -2,16 +2,15 @@
 //! in memory.
 
 use super::box_ray::{BoxTest, FarBoxRay};
-use super::instructions::{Instructions, Part};
+use super::instructions::{Instructions, Task};
 use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
-use super::node::WideNode;
+use super::layout::WideNode;
 use super::pairs::{Pairs, SINGLE_ERROR};
 use super::ray_lanes::RayLanes;
 use crate::ray::AXES;
 use crate::slabs::{FAR, NEAR};
 use crate::{Aabb, Ray};
-use core::marker::PhantomData;
 
 /// Rays side by side that are about to be written one after the other.
 pub(crate) struct Ready<L> {
@@ -100,7 +99,7 @@ impl<L: Lanes> Ready<L> {
         let (second, third) = self.rays.largest();
         let origin = in_order(self.rays.origin, second, third);
         let [dx, dy, depth] = in_order(self.rays.direction, second, third);
-        // SAFETY: values exist; the rest is the caller's promise.
+        // SAFETY: values exist; there is room for a ray per lane.
         unsafe {
             let bits = |bits: u32| L::splat_bits(bits);
             let axis = L::select(third, bits(2), L::select(second, bits(1), bits(0)));
@@ -148,7 +147,7 @@ impl Prepared {
         // SAFETY: the ray names whole, aligned planes.
         unsafe {
             if self.is_far != 0 {
-                return K::call(FarBoxes::<K> { ray: self, node, t_max, kernel: PhantomData });
+                return K::call(FarBoxes { ray: self, node, t_max });
             }
             let distance = |axis: usize, plane: u32, factor: f32| {
                 let planes = node.planes.as_ptr().cast::<u8>();
@@ -180,7 +179,7 @@ impl Prepared {
     /// The processor has the instructions.
     #[inline(always)]
     pub(crate) unsafe fn pairs<L: Lanes>(rays: [&Self; 4]) -> Pairs<L> {
-        // SAFETY: the caller's promise.
+        // SAFETY: there are so many rows of four aligned lanes.
         unsafe {
             let row = |row: usize| {
                 L::load_quarters([
@@ -207,14 +206,13 @@ impl Prepared {
 }
 
 /// A box test of a ray that begins far from the scene.
-struct FarBoxes<'a, K> {
+struct FarBoxes<'a> {
     ray: &'a Prepared,
     node: &'a WideNode,
     t_max: f32,
-    kernel: PhantomData<K>,
 }
 
-impl<K: Instructions> Part for FarBoxes<'_, K> {
+impl<K: Instructions> Task<K> for FarBoxes<'_> {
     type Output = (K::Boxes, u32);
 
     #[inline(always)]
@@ -239,7 +237,7 @@ fn in_order<L: Lanes>([x, y, z]: [L; 3], second: L::Mask, third: L::Mask) -> [L;
 #[inline(always)]
 unsafe fn write_row<L: Lanes>(to: *mut Prepared, row: usize, [a, b, c]: [L; 3], d: L) {
     const NEXT: usize = size_of::<Prepared>() / 4;
-    // SAFETY: the caller's promises.
+    // SAFETY: there are so many rows of four aligned lanes.
     unsafe {
         let to = to.cast::<f32>().wrapping_add(4 * row);
         for (i, row) in L::transpose_quarters([a, b, c, d]).into_iter().enumerate() {

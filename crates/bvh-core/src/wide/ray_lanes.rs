@@ -193,7 +193,7 @@ impl<L: Lanes> RayBounds<L> {
     /// The processor has the instructions.
     #[inline(always)]
     pub(crate) unsafe fn none() -> Self {
-        // SAFETY: the caller's promise.
+        // SAFETY: the processor has the instructions.
         let (low, high) = unsafe { (L::splat(f32::NEG_INFINITY), L::splat(f32::INFINITY)) };
         Self {
             lowest: [high; 3],

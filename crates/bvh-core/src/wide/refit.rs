@@ -1,7 +1,6 @@
 //! The wide layout over triangles that have moved, and what it then costs.
 
-use super::layout::WideBvh;
-use super::node::{Child, WideNode};
+use super::layout::{Child, WideBvh, WideNode};
 use super::triangles::TriangleBlock;
 use crate::slabs::near_region;
 use crate::{Aabb, Triangle};

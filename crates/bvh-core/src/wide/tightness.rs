@@ -2,16 +2,15 @@
 //! in real arithmetic.
 
 use super::box_ray::{BoxRay, BoxTest, FarBoxRay};
-use super::culling::Culling;
-use super::instructions::{Instructions, Part};
+use super::instructions::{Instructions, Task};
 use super::lanes::Lanes;
-use super::node::WideNode;
+use super::layout::WideNode;
+use super::packet::Culling;
 use super::prepared::{Prepared, Ready};
 use super::ray_lanes::{RayBounds, RayLanes};
 use super::{WideBvh, vector};
 use crate::{Aabb, Kernel, Ray, TestCounts};
 use alloc::vec;
-use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 
 /// A test of the boxes of a node.
@@ -62,26 +61,25 @@ impl WideBvh {
             return (0..WideNode::LANES).filter(is_entered).map(|lane| 1 << lane).sum();
         }
         assert!(self.kernel != Kernel::Portable, "the portable kernel counts its tests itself");
-        // SAFETY: `kernel` is available.
-        unsafe { vector::entered(self, ray, node, test) }
+        // SAFETY: a layout's kernel is available.
+        unsafe { vector::dispatch(self.kernel, Entered { wide: self, ray, node, test }) }
     }
 }
 
 /// One of the tests of an instruction set.
-pub(super) struct Entered<'a, K> {
-    pub(super) wide: &'a WideBvh,
-    pub(super) ray: &'a Ray,
-    pub(super) node: &'a WideNode,
-    pub(super) test: NodeTest<'a>,
-    pub(super) kernel: PhantomData<K>,
+struct Entered<'a> {
+    wide: &'a WideBvh,
+    ray: &'a Ray,
+    node: &'a WideNode,
+    test: NodeTest<'a>,
 }
 
-impl<K: Instructions> Part for Entered<'_, K> {
+impl<K: Instructions> Task<K> for Entered<'_> {
     type Output = u32;
 
     #[inline(always)]
     unsafe fn run(self) -> u32 {
-        let Self { wide, ray, node, test, .. } = self;
+        let Self { wide, ray, node, test } = self;
         let t_max = ray.t_max();
         let is_near = ray.begins_in(&wide.near);
         let equal = [*ray; 16];

@@ -107,17 +107,13 @@ impl TriangleBlock {
         lane: usize,
         axes: [usize; 3],
     ) -> [[L; 3]; 3] {
-        // SAFETY: the caller's promises.
+        // SAFETY: there are three axes of four lanes for every corner.
         unsafe {
             let lanes = self.corners.as_ptr().cast::<f32>().add(lane);
             let of = |corner: usize, axis: usize| {
                 L::splat(*lanes.add((3 * corner + axes[axis]) * Self::LANES))
             };
-            [
-                [of(0, 0), of(0, 1), of(0, 2)],
-                [of(1, 0), of(1, 1), of(1, 2)],
-                [of(2, 0), of(2, 1), of(2, 2)],
-            ]
+            three_by_three(of)
         }
     }
 
@@ -127,17 +123,13 @@ impl TriangleBlock {
     /// Axes are below 3, and `lane` is one.
     #[inline(always)]
     pub(crate) unsafe fn doubles(&self, lane: usize, axes: [usize; 3]) -> [[f64; 3]; 3] {
-        // SAFETY: the caller's promises.
+        // SAFETY: there are three axes of four lanes for every corner.
         unsafe {
             let lanes = self.corners.as_ptr().cast::<f32>().add(lane);
             let of = |corner: usize, axis: usize| {
                 f64::from(*lanes.add((3 * corner + axes[axis]) * Self::LANES))
             };
-            [
-                [of(0, 0), of(0, 1), of(0, 2)],
-                [of(1, 0), of(1, 1), of(1, 2)],
-                [of(2, 0), of(2, 1), of(2, 2)],
-            ]
+            three_by_three(of)
         }
     }
 
@@ -149,4 +141,10 @@ impl TriangleBlock {
             |corner: &[[f32; Self::LANES]; 3]| Vec3::from(corner.each_ref().map(|axis| axis[lane]));
         (id != Self::UNUSED).then(|| (id, Triangle(self.corners.each_ref().map(corner))))
     }
+}
+
+/// Returns the value of every corner and axis.
+#[inline(always)]
+pub(crate) fn three_by_three<T>(of: impl Fn(usize, usize) -> T) -> [[T; 3]; 3] {
+    [[of(0, 0), of(0, 1), of(0, 2)], [of(1, 0), of(1, 1), of(1, 2)], [of(2, 0), of(2, 1), of(2, 2)]]
 }

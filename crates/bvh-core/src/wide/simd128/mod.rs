@@ -6,21 +6,11 @@ mod lanes;
 #[cfg_attr(target_arch = "wasm32", path = "wasm.rs")]
 mod registers;
 
-use super::all_in_flight::Found;
-use super::answer::{ANY_HIT, Batch};
-use super::crossed_leaves::AllHits;
-use super::instructions::{Instructions, Part, Pending};
+use super::instructions::{Instructions, Pending, Task};
 use super::lanes::{Lanes, Mask};
-use super::layout::WideBvh;
-use super::nearest::Closest;
-use super::node::{Child, WideNode};
-use super::tightness::{Entered, NodeTest};
-use super::{all_in_flight, batch, closest_lanes, one_ray};
-use crate::{Coherence, Hit, Kernel, Ray};
-use alloc::vec::Vec;
+use super::layout::{Child, WideNode};
+use crate::Kernel;
 use core::cmp::Reverse;
-use core::marker::PhantomData;
-use glam::Vec3;
 use lanes::Singles;
 
 pub(crate) struct Simd128;
@@ -30,52 +20,13 @@ pub(super) fn has(kernel: Kernel) -> bool {
     kernel == Kernel::Simd128
 }
 
-/// [`one_ray::trace`].
-pub(super) unsafe fn one_ray<const ANY: bool>(
-    wide: &WideBvh,
-    ray: &Ray,
-    accept: impl FnMut(Hit) -> bool,
-) -> Hit {
-    // SAFETY: the target has the instructions; the rest is the caller's promise.
-    unsafe { one_ray::trace::<Simd128, ANY>(wide, ray, accept) }
-}
-
-/// [`one_ray::traverse`] for all hits.
-pub(super) unsafe fn all_hits(wide: &WideBvh, ray: &Ray, leaves: &mut AllHits) {
-    // SAFETY: the target has the instructions; the rest is the caller's promise.
-    unsafe { one_ray::traverse::<Simd128, ANY_HIT>(wide, ray, leaves) };
-}
-
-/// [`all_in_flight::trace`].
-pub(super) unsafe fn all_hits_of(wide: &WideBvh, rays: &[Ray], found: &mut Vec<Found>) {
-    // SAFETY: the target has the instructions; the rest is the caller's promise.
-    unsafe { all_in_flight::trace::<Simd128>(wide, rays, found) }
-}
-
-/// [`closest_lanes::trace`].
-pub(super) unsafe fn closest_points(
-    wide: &WideBvh,
-    points: &[Vec3],
-    closest: &mut [Option<Closest>],
-) {
-    // SAFETY: the target has the instructions; the rest is the caller's promise.
-    unsafe { closest_lanes::trace::<Simd128>(wide, points, closest) }
-}
-
-/// Returns a bit for each box of a node that the ray enters.
-pub(super) unsafe fn entered(wide: &WideBvh, ray: &Ray, node: &WideNode, test: NodeTest) -> u32 {
+/// Runs a task with the target's instructions.
+///
+/// # Safety
+/// None: the target has the instructions.
+pub(super) unsafe fn dispatch<T: Task<Simd128, Output = O>, O>(_: Kernel, task: T) -> O {
     // SAFETY: the target has the instructions.
-    unsafe { Simd128::call(Entered { wide, ray, node, test, kernel: PhantomData::<Simd128> }) }
-}
-
-/// [`batch::trace`].
-pub(crate) unsafe fn trace<const ANY: bool>(
-    wide: &WideBvh,
-    batch: &mut Batch,
-    coherence: Coherence,
-) {
-    // SAFETY: the caller's promises.
-    unsafe { batch::trace::<Simd128, ANY>(wide, batch, coherence) }
+    unsafe { Simd128::call(task) }
 }
 
 /// The entered lanes, the lowest first.
@@ -98,7 +49,7 @@ impl Instructions for Simd128 {
 
     #[inline(always)]
     unsafe fn sort_keys(entry: Singles<2>, mask: u32, to: *mut u32) {
-        // SAFETY: the caller's promises; as many keys are written as there are bits.
+        // SAFETY: the target has the instructions; as many keys are written as there are bits.
         unsafe {
             Self::compress_keys(entry, mask, to);
             let keys = core::slice::from_raw_parts_mut(to, mask.count_ones() as usize);
@@ -122,7 +73,7 @@ impl Instructions for Simd128 {
     unsafe fn sort(node: &WideNode, entry: Singles<2>, mask: u32, to: *mut Pending) -> Child {
         let mut keys = [0; 8];
         let mut nearest = Child::node(0);
-        // SAFETY: the caller's promises; there is room for a key per bit.
+        // SAFETY: the target has the instructions; there is room for a key per bit.
         unsafe {
             Self::sort_keys(entry, mask, keys.as_mut_ptr());
             for (i, &key) in keys.iter().enumerate().take(mask.count_ones() as usize) {
@@ -136,7 +87,7 @@ impl Instructions for Simd128 {
     #[inline(always)]
     unsafe fn compress(node: &WideNode, mask: u32, to: *mut Pending) {
         for (i, lane) in lanes_of(mask).enumerate() {
-            // SAFETY: the caller's promise: there is room for a child per bit.
+            // SAFETY: there is room for a child per bit.
             unsafe { *to.add(i) = u64::from(node.children[lane].bits()) };
         }
     }
@@ -146,8 +97,8 @@ impl Instructions for Simd128 {
     unsafe fn prefetch(_: *const u8) {}
 
     #[inline(never)]
-    unsafe fn call<P: Part>(part: P) -> P::Output {
-        // SAFETY: the caller's promise.
-        unsafe { part.run() }
+    unsafe fn call<T: Task<Self>>(task: T) -> T::Output {
+        // SAFETY: the target has the instructions.
+        unsafe { task.run() }
     }
 }

@@ -15,19 +15,19 @@ pub(super) use core::arch::wasm32::{
 
 #[inline(always)]
 pub(super) unsafe fn load(from: *const f32) -> v128 {
-    // SAFETY: the caller's promise; the instruction accepts any alignment.
+    // SAFETY: the place has four lanes; the instruction accepts any alignment.
     unsafe { v128_load(from.cast()) }
 }
 
 #[inline(always)]
 pub(super) unsafe fn store(to: *mut f32, a: v128) {
-    // SAFETY: the caller's promise; the instruction accepts any alignment.
+    // SAFETY: the place has four lanes; the instruction accepts any alignment.
     unsafe { v128_store(to.cast(), a) }
 }
 
 #[inline(always)]
 pub(super) unsafe fn store_double(to: *mut f64, a: v128) {
-    // SAFETY: the caller's promise; the instruction accepts any alignment.
+    // SAFETY: the place has four lanes; the instruction accepts any alignment.
     unsafe { v128_store(to.cast(), a) }
 }
 

@@ -1,18 +1,14 @@
 //! The AVX2 kernel: eight boxes at once with fused multiply-add, entered children sorted without a
 //! branch.
 
-use super::lanes::{F32x4, F32x8};
-use super::masks::Mask8;
+use super::lanes::{F32x4, F32x8, Mask8};
 use super::sort;
-use crate::wide::instructions::{Instructions, Part, Pending};
+use crate::wide::instructions::{Instructions, Pending, Task};
 use crate::wide::lanes::{Lanes as _, Mask as _};
-use crate::wide::layout::WideBvh;
-use crate::wide::node::{Child, WideNode};
+use crate::wide::layout::{Child, WideNode};
 use core::arch::x86_64::*;
 
 pub(crate) struct Avx2;
-
-super::entry_points!(Avx2, "avx2,fma,bmi1,bmi2,popcnt,lzcnt");
 
 /// The lanes of each mask, the lowest first: what compresses eight lanes by one permutation.
 static LANES_OF: [[u8; 8]; 256] = {
@@ -39,7 +35,19 @@ impl Instructions for Avx2 {
     type Rays = F32x8;
     const PACKET: usize = 64;
     const FLIGHT: usize = 32;
-    super::common_instructions!();
+
+    #[inline(always)]
+    unsafe fn prefetch(line: *const u8) {
+        // SAFETY: a prefetch may name any address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(line.cast()) }
+    }
+
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
+    #[inline(never)]
+    unsafe fn call<T: Task<Self>>(task: T) -> T::Output {
+        // SAFETY: the processor has the instructions, with which this function is compiled.
+        unsafe { task.run() }
+    }
 
     #[inline(always)]
     unsafe fn entered(entry: F32x8, exit: F32x8) -> u32 {
@@ -48,7 +56,7 @@ impl Instructions for Avx2 {
 
     #[inline(always)]
     unsafe fn sort_keys(entry: F32x8, mask: u32, to: *mut u32) {
-        // SAFETY: the caller's promises.
+        // SAFETY: the processor has the instructions, and there is room for eight.
         unsafe {
             let sorted = sort::descending(compress(sort::keys(entry.0), mask), mask.count_ones());
             _mm256_storeu_si256(to.cast(), sorted);
@@ -57,13 +65,13 @@ impl Instructions for Avx2 {
 
     #[inline(always)]
     unsafe fn compress_keys(entry: F32x8, mask: u32, to: *mut u32) {
-        // SAFETY: the caller's promises.
+        // SAFETY: the processor has the instructions, and there is room for eight.
         unsafe { _mm256_storeu_si256(to.cast(), compress(sort::keys(entry.0), mask)) }
     }
 
     #[inline(always)]
     unsafe fn compress(node: &WideNode, mask: u32, to: *mut Pending) {
-        // SAFETY: the caller's promises.
+        // SAFETY: the processor has the instructions, and there is room for eight.
         unsafe {
             let children = compress(_mm256_load_si256(node.children.as_ptr().cast()), mask);
             let to = to.cast::<__m256i>();

@@ -2,14 +2,11 @@
 
 use super::lanes::{F32x4, F32x8, F32x16};
 use super::sort;
-use crate::wide::instructions::{Instructions, Part, Pending, last_pending};
-use crate::wide::layout::WideBvh;
-use crate::wide::node::{Child, WideNode};
+use crate::wide::instructions::{Instructions, Pending, Task, last_pending};
+use crate::wide::layout::{Child, WideNode};
 use core::arch::x86_64::*;
 
 pub(crate) struct Avx512;
-
-super::entry_points!(Avx512, "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt");
 
 impl Instructions for Avx512 {
     type Boxes = F32x8;
@@ -17,7 +14,19 @@ impl Instructions for Avx512 {
     type Rays = F32x16;
     const PACKET: usize = 64;
     const FLIGHT: usize = 24;
-    super::common_instructions!();
+
+    #[inline(always)]
+    unsafe fn prefetch(line: *const u8) {
+        // SAFETY: a prefetch may name any address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(line.cast()) }
+    }
+
+    #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
+    #[inline(never)]
+    unsafe fn call<T: Task<Self>>(task: T) -> T::Output {
+        // SAFETY: the processor has the instructions, with which this function is compiled.
+        unsafe { task.run() }
+    }
 
     #[inline(always)]
     unsafe fn entered(F32x8(entry): F32x8, F32x8(exit): F32x8) -> u32 {
@@ -27,7 +36,7 @@ impl Instructions for Avx512 {
 
     #[inline(always)]
     unsafe fn sort_keys(entry: F32x8, mask: u32, to: *mut u32) {
-        // SAFETY: the caller's promises.
+        // SAFETY: the processor has the instructions, and there is room for eight.
         unsafe {
             let keys = _mm256_maskz_compress_epi32(mask as u8, sort::keys(entry.0));
             _mm256_storeu_si256(to.cast(), sort::descending(keys, mask.count_ones()));
@@ -36,7 +45,7 @@ impl Instructions for Avx512 {
 
     #[inline(always)]
     unsafe fn compress_keys(entry: F32x8, mask: u32, to: *mut u32) {
-        // SAFETY: the caller's promises.
+        // SAFETY: the processor has the instructions, and there is room for eight.
         unsafe {
             _mm256_storeu_si256(
                 to.cast(),
@@ -47,7 +56,7 @@ impl Instructions for Avx512 {
 
     #[inline(always)]
     unsafe fn compress(node: &WideNode, mask: u32, to: *mut Pending) {
-        // SAFETY: the caller's promises.
+        // SAFETY: the processor has the instructions, and there is room for eight.
         unsafe {
             let children = _mm256_load_si256(node.children.as_ptr().cast());
             let entered = _mm256_maskz_compress_epi32(mask as u8, children);

@@ -1,7 +1,7 @@
 //! Keys of a node's children, and their order.
 
 use crate::wide::instructions::Pending;
-use crate::wide::node::{Child, WideNode};
+use crate::wide::layout::{Child, WideNode};
 use core::arch::x86_64::*;
 
 /// Returns the bits of the entries with the inverted lane in the last three: of equal entries the

@@ -1,0 +1,607 @@
+//! Batches of incoherent rays, with many rays in flight: a step of each in turn.
+//!
+//! One ray alone waits: for the next node to come from memory, for one box test to end before the
+//! next can begin, for the processor to recover from branches that nobody can predict. Steps of
+//! different rays do not depend on each other. While one ray waits, the processor does the step of
+//! the next:
+//!
+//! ```text
+//!            ┌─> at a node: boxes ────────────────────────────┐
+//!  in flight ┼─> at a leaf: candidates ─> exact decisions ────┼─> pop, fetch what comes next ─> in flight
+//!            └─> at the end: write the answer, start another ─┘
+//! ```
+//!
+//! No branch depends on one ray: its next step decides the list that it is appended to, and the
+//! order of hits and the children behind them are found without branches, too.
+
+use super::answer::{Accept, Batch};
+use super::instructions::{Instructions, Pending, Task};
+use super::kernel::{DeepStacks, SPARE, STACK};
+use super::lanes::{Lanes, Mask};
+use super::layout::{Child, WideBvh, WideNode};
+use super::pairs::Pairs;
+use super::prepared::{Prepared, Ready};
+use super::ray_lanes::{RayLanes, prefetch};
+use super::triangles::{TriangleBlock, three_by_three};
+use crate::Hit;
+use crate::ray::AXES;
+use core::marker::PhantomData;
+use core::mem::MaybeUninit;
+use core::ops::Range;
+
+/// The maximum number of rays in flight.
+pub(super) const FLIGHT: usize = 32;
+
+/// The maximum number of rays that are prepared at once.
+pub(super) const RAYS: usize = 16;
+
+/// The maximum number of rays of a batch that are numbered together.
+const MOST: usize = 1 << 31;
+
+/// Answers the rays of these numbers.
+///
+/// # Safety
+/// The processor has the instructions of `K`, and the caller is compiled with them.
+#[inline(always)]
+pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
+    wide: &WideBvh,
+    batch: &mut Batch,
+    numbers: Range<usize>,
+) {
+    const { assert!(K::FLIGHT <= FLIGHT && K::Rays::N <= RAYS) };
+    // No triangle has an area. The flight below expects that every ray visits something.
+    if wide.root.is_none() {
+        for number in numbers {
+            batch.answers.write(number, f32::INFINITY, u32::MAX);
+        }
+        return;
+    }
+    // SAFETY: the processor has the instructions.
+    unsafe { K::call(Trace::<K, ANY>::new(wide, batch, numbers)) };
+}
+
+/// A flight of all rays up to the last number.
+struct Trace<'a, 'b, K, const ANY: bool> {
+    flight: Flight<'a, 'b, K, ANY>,
+    last: usize,
+}
+
+impl<'a, 'b, K, const ANY: bool> Trace<'a, 'b, K, ANY> {
+    #[inline(always)]
+    fn new(wide: &'a WideBvh, batch: &'a mut Batch<'b>, numbers: Range<usize>) -> Self {
+        let flight = Flight {
+            wide,
+            batch,
+            from: numbers.start,
+            end: numbers.start,
+            ready: [MaybeUninit::uninit(); RAYS],
+            waiting: 0,
+            at_nodes: List::EMPTY,
+            at_leaves: List::EMPTY,
+            at_end: List::EMPTY,
+            idle: List::EMPTY,
+            instructions: PhantomData,
+        };
+        Self { flight, last: numbers.end }
+    }
+}
+
+impl<K: Instructions, const ANY: bool> Task<K> for Trace<'_, '_, K, ANY> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run(self) {
+        let Self { mut flight, last } = self;
+        let mut traversals = MaybeUninit::<[Traversal; FLIGHT]>::uninit();
+        let traversals = traversals.as_mut_ptr().cast::<Traversal>();
+        let mut deep = DeepStacks::new(FLIGHT, flight.wide.stack_need);
+        for i in 0..FLIGHT {
+            // SAFETY: there is room for so many.
+            unsafe {
+                Traversal::set_stack(traversals.add(i), deep.as_mut().map(|deep| deep.stack(i)));
+            }
+        }
+        // Rays are numbered by 32 bits.
+        while flight.end < last {
+            flight.from = flight.end;
+            flight.end = last.min(flight.from + MOST);
+            // SAFETY: the processor has the instructions.
+            unsafe { flight.trace(traversals) };
+        }
+    }
+}
+
+/// Rays that wait for the same step.
+struct List {
+    rays: [*mut Traversal; FLIGHT],
+    count: usize,
+}
+
+impl List {
+    const EMPTY: Self = Self { rays: [core::ptr::null_mut(); FLIGHT], count: 0 };
+
+    /// Appends a ray if it `belongs` here, without a branch. While a list is gone through it may be
+    /// filled again from its beginning.
+    #[inline(always)]
+    unsafe fn append(&mut self, traversal: *mut Traversal, belongs: bool) {
+        // SAFETY: a list is never full when a ray is not in it.
+        unsafe { *self.rays.get_unchecked_mut(self.count) = traversal };
+        self.count += usize::from(belongs);
+    }
+
+    #[inline(always)]
+    unsafe fn get(&self, i: usize) -> *mut Traversal {
+        // SAFETY: `i` is less than the count.
+        unsafe { *self.rays.get_unchecked(i) }
+    }
+}
+
+/// The rays of a batch that are in flight, that are prepared, and that are neither.
+struct Flight<'a, 'b, K, const ANY: bool> {
+    /// The layout at whose root rays start.
+    wide: &'a WideBvh,
+    batch: &'a mut Batch<'b>,
+    /// The numbers of the rays that have not been prepared.
+    from: usize,
+    end: usize,
+    /// The last that have been, and a bit for each that has not been started.
+    ready: [MaybeUninit<Prepared>; RAYS],
+    waiting: u32,
+    at_nodes: List,
+    at_leaves: List,
+    at_end: List,
+    /// The places of rays whose answers are written.
+    idle: List,
+    instructions: PhantomData<K>,
+}
+
+impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
+    /// Traces all rays.
+    #[inline(always)]
+    unsafe fn trace(&mut self, traversals: *mut Traversal) {
+        // SAFETY: the processor has the instructions; there is room for so many.
+        unsafe {
+            let first = self.from;
+            for i in 0..K::FLIGHT {
+                self.idle.append(traversals.add(i), true);
+            }
+            loop {
+                self.start_idle(first);
+                if self.at_nodes.count + self.at_leaves.count + self.at_end.count == 0 {
+                    return;
+                }
+                self.visit_nodes();
+                let leaves_wait = self.at_leaves.count >= K::FLIGHT / 2 || self.at_nodes.count == 0;
+                if leaves_wait {
+                    self.visit_leaves(first);
+                    self.finish(first);
+                }
+            }
+        }
+    }
+
+    /// Starts the next rays in the idle places, as far as there are rays; number 0 is ray number
+    /// `first` of its batch.
+    #[inline(always)]
+    unsafe fn start_idle(&mut self, first: usize) {
+        let count = core::mem::replace(&mut self.idle.count, 0);
+        for i in 0..count {
+            while self.waiting == 0 {
+                if self.from == self.end {
+                    return;
+                }
+                // SAFETY: the processor has the instructions.
+                unsafe { self.prepare(first) };
+            }
+            let next = self.waiting.trailing_zeros() as usize;
+            self.waiting &= self.waiting - 1;
+            // SAFETY: so many places are idle; `ready` is written where `waiting` had a bit.
+            unsafe {
+                let traversal = &mut *self.idle.get(i);
+                let ray = self.ready.get_unchecked(next).assume_init();
+                traversal.start(ray, self.wide);
+                self.enlist(traversal);
+            }
+        }
+    }
+
+    /// Prepares the next rays, and answers those that miss the box around everything.
+    #[inline(always)]
+    unsafe fn prepare(&mut self, first: usize) {
+        let from = self.from;
+        let count = (self.end - from).min(K::Rays::N);
+        self.from += count;
+        let there = u32::MAX >> (32 - count);
+        let rays = self.batch.rays;
+        // SAFETY: the processor has the instructions; `ready` has room for sixteen.
+        unsafe {
+            prefetch::<K>(rays, self.from + K::Rays::N);
+            let ready =
+                Ready::new(RayLanes::<K::Rays>::load_up_to(rays, from, self.end), self.wide);
+            self.waiting = there & ready.enter(&self.wide.bounds);
+            if self.waiting != 0 {
+                ready.write((from - first) as u32, self.ready.as_mut_ptr().cast());
+            }
+        }
+        let mut others = there & !self.waiting;
+        while others != 0 {
+            let lane = others.trailing_zeros();
+            let number = from + lane as usize;
+            others &= others - 1;
+            self.batch.answers.write(number, f32::INFINITY, u32::MAX);
+        }
+    }
+
+    /// Puts a ray where its next visit is.
+    #[inline(always)]
+    unsafe fn enlist(&mut self, traversal: &mut Traversal) {
+        let child = traversal.child;
+        // SAFETY: every list has a place for every traversal.
+        unsafe {
+            self.at_nodes.append(traversal, child.is_node());
+            let is_at_end = child == Child::END;
+            self.at_leaves.append(traversal, !child.is_node() & !is_at_end);
+            self.at_end.append(traversal, is_at_end);
+        }
+    }
+
+    /// Visits the nodes at which rays are, in three passes. A pass over many rays has short chains
+    /// of dependent operations, so that the processor works on several rays at once; the whole
+    /// visit of one ray fills half of its window of instructions.
+    #[inline(always)]
+    unsafe fn visit_nodes(&mut self) {
+        let count = self.at_nodes.count;
+        let mut entries = [const { MaybeUninit::<K::Boxes>::uninit() }; FLIGHT];
+        let mut masks = [0; FLIGHT];
+        // SAFETY: there are at most `FLIGHT` rays; the references of the layout are sound, and its
+        // stacks large enough.
+        unsafe {
+            for i in 0..count {
+                let traversal = &*self.at_nodes.get(i);
+                let node = &*traversal.nodes.add(traversal.child.index());
+                let (entry, mask) = traversal.ray.boxes::<K>(node, traversal.t);
+                entries.get_unchecked_mut(i).write(entry);
+                *masks.get_unchecked_mut(i) = mask;
+            }
+            for i in 0..count {
+                let traversal = &mut *self.at_nodes.get(i);
+                let node = &*traversal.nodes.add(traversal.child.index());
+                let entry = entries.get_unchecked(i).assume_init();
+                traversal.enter::<K, ANY>(node, entry, *masks.get_unchecked(i));
+            }
+            self.at_nodes.count = 0;
+            for i in 0..count {
+                let traversal = &mut *self.at_nodes.get(i);
+                traversal.fetch::<K>();
+                self.enlist(traversal);
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn visit_leaves(&mut self, first: usize) {
+        // SAFETY: as for nodes; a block that is not its leaf's last is followed by another.
+        unsafe {
+            let count = self.at_leaves.count;
+            self.at_leaves.count = 0;
+            let quarters = K::Rays::N / 4;
+            let mut hopeful = List::EMPTY;
+            for i in (0..count).step_by(quarters) {
+                let at = |k: usize| self.at_leaves.get((i + k).min(count - 1));
+                let four = [at(0), at(1), at(2), at(3)];
+                let found = candidates::<K::Rays>(four);
+                for (k, &traversal) in four.iter().enumerate().take(quarters) {
+                    hopeful.append(traversal, (found >> (4 * k) & 0b1111 != 0) & (i + k < count));
+                }
+            }
+            for i in (0..hopeful.count).step_by(quarters) {
+                let at = |k: usize| hopeful.get((i + k).min(hopeful.count - 1));
+                let four = [at(0), at(1), at(2), at(3)];
+                if let Some(accept) = &mut self.batch.accept {
+                    // A traversal that only fills the lanes must not show its hits twice.
+                    let rays = &four[..quarters.min(hopeful.count - i)];
+                    decide_accepted::<K::Rays>(rays, first, accept);
+                } else {
+                    decide::<K::Rays>(four);
+                }
+                if !ANY {
+                    for &traversal in four.iter().take(quarters) {
+                        (*traversal).drop_farther::<K>();
+                    }
+                }
+            }
+            for i in 0..count {
+                let traversal = &mut *self.at_leaves.get(i);
+                traversal.leave_block::<ANY>();
+                traversal.fetch::<K>();
+                self.enlist(traversal);
+            }
+        }
+    }
+
+    /// Writes the answers of rays at their end.
+    #[inline(always)]
+    unsafe fn finish(&mut self, first: usize) {
+        let count = core::mem::replace(&mut self.at_end.count, 0);
+        for i in 0..count {
+            // SAFETY: so many rays are at their end, and their places become idle.
+            unsafe {
+                let traversal = self.at_end.get(i);
+                let Traversal { ray, t, object, .. } = &*traversal;
+                self.batch.answers.write(first + ray.number as usize, *t, *object);
+                self.idle.append(traversal, true);
+            }
+        }
+    }
+}
+
+/// The traversal of the layout by one ray.
+#[repr(C, align(64))]
+pub(super) struct Traversal {
+    pub(super) ray: Prepared,
+    /// The nearest hit so far, or the end of the ray and `u32::MAX`.
+    pub(super) t: f32,
+    pub(super) object: u32,
+    pub(super) top: *mut Pending,
+    /// The node or the block of triangles to visit next, or [`END`](Child::END).
+    pub(super) child: Child,
+    /// The arrays of the layout in which the ray is.
+    pub(super) nodes: *const WideNode,
+    pub(super) blocks: *const TriangleBlock,
+    /// [`END`](Child::END), the children that wait, the next block of the same leaf, and room for
+    /// stores of whole registers: `frame`, or on the heap.
+    stack: *mut Pending,
+    frame: Frame,
+}
+
+#[repr(C, align(64))]
+struct Frame([MaybeUninit<Pending>; STACK + SPARE]);
+
+/// # Safety
+///
+/// All functions: the processor has the instructions of `K`, the traversal was started, and the
+/// references of the layout are sound, so that the stack has room for what a visit pushes.
+impl Traversal {
+    /// Chooses the stack of all rays that are started here: on the heap, or in the frame.
+    #[inline(always)]
+    pub(super) unsafe fn set_stack(this: *mut Self, deep: Option<*mut Pending>) {
+        // SAFETY: the traversal exists; its fields need not be initialised to be named.
+        unsafe { (*this).stack = deep.unwrap_or((&raw mut (*this).frame).cast()) };
+    }
+
+    /// Starts a ray at the root.
+    #[inline(always)]
+    pub(super) unsafe fn start(&mut self, ray: Prepared, wide: &WideBvh) {
+        self.t = ray.t_max;
+        self.object = u32::MAX;
+        self.ray = ray;
+        self.child = wide.root.unwrap_or(Child::END);
+        self.nodes = wide.nodes.as_ptr();
+        self.blocks = wide.blocks.as_ptr();
+        // SAFETY: the stack has more than one place.
+        unsafe {
+            self.stack.write(u64::from(Child::END.bits()));
+            self.top = self.stack.add(1);
+        }
+    }
+
+    /// Goes on to what waits.
+    #[inline(always)]
+    pub(super) unsafe fn pop(&mut self) {
+        // SAFETY: the stack holds at least an end.
+        unsafe {
+            self.top = self.top.sub(1);
+            self.child = Child::from_bits(*self.top as u32);
+        }
+    }
+
+    /// Pushes the entered children, and goes on to the nearest of them, or else to what waits.
+    #[inline(always)]
+    pub(super) unsafe fn enter<K: Instructions, const ANY: bool>(
+        &mut self,
+        node: &WideNode,
+        entry: K::Boxes,
+        mask: u32,
+    ) {
+        // SAFETY: the stack holds at least an end, and has room for eight children.
+        unsafe {
+            let top = self.top;
+            self.top = top.add(mask.count_ones() as usize).sub(1);
+            if ANY {
+                K::compress(node, mask, top);
+                self.child = Child::from_bits(*self.top as u32);
+            } else {
+                // The nearest child is on top of the stack, too. But a load from there would wait
+                // until the stores, which are wider, have reached the cache.
+                let waiting = Child::from_bits(*top.sub(1) as u32);
+                let nearest = K::sort(node, entry, mask, top);
+                self.child = if mask == 0 { waiting } else { nearest };
+            }
+        }
+    }
+
+    /// Takes the children behind the nearest hit from the stack.
+    #[inline(always)]
+    pub(super) unsafe fn drop_farther<K: Instructions>(&mut self) {
+        // SAFETY: the stack is between its bottom and its top.
+        self.top = unsafe { K::drop_farther(self.stack, self.top, self.t) };
+    }
+
+    /// Goes on from a block of triangles: to the next one of the leaf, to what waits, or to the end
+    /// if any hit will do and there is one.
+    #[inline(always)]
+    pub(super) unsafe fn leave_block<const ANY: bool>(&mut self) {
+        // SAFETY: a block that is not its leaf's last is followed by another; the stack holds at
+        // least an end, and has room for one more.
+        unsafe {
+            let block = self.child.index();
+            let is_last = (*self.blocks.add(block)).is_last();
+            *self.top = u64::from(Child::leaf(block as u32 + 1).bits());
+            self.top = self.top.add(usize::from(!is_last));
+            if ANY && self.object != u32::MAX {
+                self.top = self.stack.add(1);
+            }
+            self.pop();
+        }
+    }
+
+    /// Fetches the next node or block of triangles from memory.
+    #[inline(always)]
+    pub(super) unsafe fn fetch<K: Instructions>(&self) {
+        let child = self.child;
+        let (array, size) = if child.is_node() {
+            (self.nodes.cast::<u8>(), size_of::<WideNode>())
+        } else {
+            (self.blocks.cast::<u8>(), size_of::<TriangleBlock>())
+        };
+        let lines = array.wrapping_add(child.index().wrapping_mul(size));
+        for line in 0..4 {
+            // SAFETY: a prefetch may name any address.
+            unsafe { K::prefetch(lines.wrapping_add(64 * line)) };
+        }
+    }
+}
+
+/// Returns the rays as triangles are tested with them.
+#[inline(always)]
+unsafe fn pairs<L: Lanes>(four: [*mut Traversal; 4]) -> Pairs<L> {
+    // SAFETY: the traversals exist, and the processor has the instructions.
+    unsafe { Prepared::pairs([&(*four[0]).ray, &(*four[1]).ray, &(*four[2]).ray, &(*four[3]).ray]) }
+}
+
+/// Returns a bit for each triangle that the line of its ray may meet, of the block at which each
+/// ray is: four bits per ray.
+#[inline(always)]
+unsafe fn candidates<L: Lanes>(four: [*mut Traversal; 4]) -> u32 {
+    // SAFETY: the processor has the instructions.
+    unsafe { pairs::<L>(four).candidates(&corners(four)).possible }
+}
+
+/// Returns the corners of the block at which each ray is, along the axes of its shear.
+#[inline(always)]
+unsafe fn corners<L: Lanes>(four: [*mut Traversal; 4]) -> [[L; 3]; 3] {
+    // SAFETY: the processor has the instructions; axes are below 3.
+    unsafe {
+        let lanes = |i: usize, corner: usize, axis: usize| {
+            let traversal = &*four[i];
+            let axis = AXES[traversal.ray.largest_axis as usize % 3][axis];
+            let block = traversal.blocks.wrapping_add(traversal.child.index());
+            block.cast::<f32>().wrapping_add((3 * corner + axis) * TriangleBlock::LANES)
+        };
+        let of = |corner: usize, axis: usize| {
+            L::load_quarters([
+                lanes(0, corner, axis),
+                lanes(1, corner, axis),
+                lanes(2, corner, axis),
+                lanes(3, corner, axis),
+            ])
+        };
+        three_by_three(of)
+    }
+}
+
+/// Gives every ray the nearest hit among the hit it has and those in the block at which it is, by
+/// [`Hit::precedes`](crate::Hit::precedes) and without a branch.
+#[inline(always)]
+unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4]) {
+    // SAFETY: the processor has the instructions; ids are four aligned lanes, and so are the fields of a
+    // traversal from its distance on.
+    unsafe {
+        let row = |i: usize| (&raw const (*four[i]).t);
+        let before = L::load_quarters([row(0), row(1), row(2), row(3)]);
+        let t_max = before.spread::<0>();
+        let corners = corners::<L>(four);
+        let (inside, t) = pairs::<L>(four).decide_alone(&corners, t_max);
+        let ids =
+            |i: usize| (*(*four[i]).blocks.wrapping_add((*four[i]).child.index())).ids().cast();
+        let ids = L::load_quarters([ids(0), ids(1), ids(2), ids(3)])
+            & L::splat_bits(!TriangleBlock::LAST);
+        let none = L::splat_bits(u32::MAX);
+        let t = L::select(inside, t, t_max);
+        let least = t.min(t.swap_twos());
+        let least = least.min(least.swap_ones());
+        let ids = L::select(inside & t.eq(least), ids, none);
+        let own = L::select(t_max.eq(least), before.spread::<1>(), none);
+        let ids = lower(ids, own);
+        let ids = lower(ids, ids.swap_twos());
+        let ids = lower(ids, ids.swap_ones());
+        let mut distances = [0.0; 16];
+        let mut objects = [0.0; 16];
+        least.store(distances.as_mut_ptr());
+        ids.store(objects.as_mut_ptr());
+        for (i, &traversal) in four.iter().enumerate().take(L::N / 4) {
+            (*traversal).t = distances[4 * i];
+            (*traversal).object = f32::to_bits(objects[4 * i]);
+        }
+    }
+}
+
+/// Gives every ray the nearest hit that `accept` accepts, among the hit it has and those in the
+/// block at which it is. The rays are numbered from `first` on.
+#[inline(always)]
+unsafe fn decide_accepted<L: Lanes>(four: &[*mut Traversal], first: usize, accept: &mut Accept) {
+    let last = four.len() - 1;
+    let rays = [four[0], four[1.min(last)], four[2.min(last)], four[3.min(last)]];
+    // SAFETY: the processor has the instructions; `four` has a traversal at least.
+    unsafe {
+        let before = [nearest(rays[0]), nearest(rays[1]), nearest(rays[2]), nearest(rays[3])];
+        decide::<L>(rays);
+        // Filters accept most hits, so that the nearest one in the block is asked for first.
+        for (i, &traversal) in four.iter().enumerate() {
+            let hit = nearest(traversal);
+            let number = first + (*traversal).ray.number as usize;
+            if hit != before[i] && !accept(number, hit) {
+                (*traversal).t = before[i].t;
+                (*traversal).object = before[i].object;
+                decide_others::<L>(traversal, hit.object, number, accept);
+            }
+        }
+    }
+}
+
+/// Gives a ray the nearest hit that `accept` accepts, as [`decide_accepted`] does, where `accept`
+/// has rejected one object.
+#[inline(always)]
+unsafe fn decide_others<L: Lanes>(
+    traversal: *mut Traversal,
+    rejected: u32,
+    number: usize,
+    accept: &mut Accept,
+) {
+    // SAFETY: the processor has the instructions.
+    unsafe {
+        let ray = [traversal; 4];
+        let end = &raw const (*traversal).t;
+        let t_max = L::load_quarters([end; 4]).spread::<0>();
+        let corners = corners::<L>(ray);
+        let (inside, t) = pairs::<L>(ray).decide_alone(&corners, t_max);
+        let mut distances = [0.0; 16];
+        t.store(distances.as_mut_ptr());
+        let block = &*(*traversal).blocks.add((*traversal).child.index());
+        let mut left = inside.bits() & 0b1111;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let hit = Hit { t: distances[lane], object: block.id(lane) };
+            // An unused lane repeats a triangle, which may have been rejected.
+            let is_new = hit.object != rejected && !hit.is_miss();
+            if is_new && hit.precedes(&nearest(traversal)) && accept(number, hit) {
+                (*traversal).t = hit.t;
+                (*traversal).object = hit.object;
+            }
+        }
+    }
+}
+
+/// Returns the nearest hit of a ray so far.
+#[inline(always)]
+unsafe fn nearest(traversal: *const Traversal) -> Hit {
+    // SAFETY: the traversal exists.
+    unsafe { Hit { t: (*traversal).t, object: (*traversal).object } }
+}
+
+/// Returns the lower of two ids.
+#[inline(always)]
+fn lower<L: Lanes>(a: L, b: L) -> L {
+    L::select(a.below(b), a, b)
+}
