@@ -2,12 +2,22 @@
 
 use crate::failure::{BvhStatus, Failure, given, made, slice, slice_mut, status};
 use crate::tree::BvhTree;
+use bvh_search::OwnedTree;
 use bvh_search::prelude::*;
+use std::sync::{Arc, OnceLock};
 
 /// Triangles in the wide layout. Any number of threads may use a tracer at the same time.
 pub struct BvhTracer {
     wide: WideBvh,
-    triangles: Vec<Triangle>,
+    source: Arc<OwnedTree>,
+    /// Made when it is first needed.
+    solid: OnceLock<Solid>,
+}
+
+impl BvhTracer {
+    fn triangles(&self) -> &[Triangle] {
+        self.source.triangles().unwrap_or(&[])
+    }
 }
 
 /// The points `origin` + t * `direction` with `t_min` <= t <= `t_max`. The direction may have any
@@ -76,11 +86,11 @@ pub unsafe extern "C" fn bvh_tracer_new(tree: *const BvhTree) -> *mut BvhTracer 
     made(|| {
         // SAFETY: the caller keeps the tree alive and unchanged during the call.
         let owned = &unsafe { given("tree", tree) }?.owned;
-        let (Some(triangles), Some(wide)) = (owned.triangles(), owned.layout()) else {
+        let Some(wide) = owned.layout() else {
             return Err(Failure::invalid("tree is over boxes; accepted: a tree over triangles"));
         };
         let wide = wide.map_err(Failure::invalid)?;
-        Ok(BvhTracer { wide, triangles: triangles.to_vec() })
+        Ok(BvhTracer { wide, source: owned.clone(), solid: OnceLock::new() })
     })
 }
 
@@ -169,7 +179,7 @@ pub unsafe extern "C" fn bvh_tracer_surface_hits(
             let found = &mut found[..rays.len()];
             tracer.wide.nearest_hits(rays, found, coherence(coherent));
             for ((to, ray), &Hit { t, object }) in hits[start..].iter_mut().zip(rays).zip(&*found) {
-                let triangle = tracer.triangles.get(object as usize);
+                let triangle = tracer.triangles().get(object as usize);
                 let weights = triangle.and_then(|triangle| triangle.barycentrics(ray));
                 let normal = triangle.and_then(Triangle::normal);
                 let [_, u, v] = weights.unwrap_or_default().map(|weight| weight as f32);
@@ -264,8 +274,9 @@ pub unsafe extern "C" fn bvh_tracer_closest_points(
     })
 }
 
-/// Writes to `inside` whether each of `count` points, 3 floats each, is inside the mesh: 1 or 0.
-/// The answer is exact for closed meshes; a point on the surface may count as either.
+/// Writes to `inside` whether each of `count` points, 3 floats each, is inside of the mesh: 1 or 0.
+/// A mesh with holes has an inside, too: there the generalised winding number decides. A point on
+/// the surface may count as either. The first call for a tracer examines all edges.
 ///
 /// `tracer` is a tracer; `points` points to 3 * `count` floats, and `inside` to `count` bytes.
 #[unsafe(no_mangle)]
@@ -282,10 +293,12 @@ pub unsafe extern "C" fn bvh_tracer_contains(
         let points = unsafe { slice("points", points.cast::<Vec3>(), count) }?;
         // SAFETY: `inside` points to `count` bytes that nobody else uses during the call.
         let inside = unsafe { slice_mut("inside", inside, count) }?;
+        let solid =
+            tracer.solid.get_or_init(|| Solid::new(tracer.source.tree(), tracer.triangles()));
         let mut found = [false; BATCH];
         for (points, inside) in points.chunks(BATCH).zip(inside.chunks_mut(BATCH)) {
             let found = &mut found[..points.len()];
-            tracer.wide.contains(points, found);
+            solid.contains(&tracer.wide, points, InsideRule::Auto, found);
             for (to, &is_inside) in inside.iter_mut().zip(&*found) {
                 *to = u8::from(is_inside);
             }

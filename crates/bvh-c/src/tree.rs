@@ -5,11 +5,13 @@ use bvh_search::bvh_core::{FirstCountNode, Primitives, cost::Objective, cost::Sa
 use bvh_search::prelude::*;
 use bvh_search::{Objects, Observer, Options, OwnedTree};
 use std::ffi::{CStr, c_char, c_void};
+use std::sync::Arc;
 
 /// A tree with its objects. Any number of threads may read a tree at the same time. A thread that
 /// improves or frees it must be the only user.
 pub struct BvhTree {
-    pub(crate) owned: OwnedTree,
+    /// Tracers share the tree until it is improved.
+    pub(crate) owned: Arc<OwnedTree>,
     nodes: Vec<BvhNode>,
 }
 
@@ -168,7 +170,7 @@ pub unsafe extern "C" fn bvh_tree_improve_until(
         let until = Until { deadline: deadline(seconds)?, cancelled, context };
         let improvement =
             tree.owned.improvement(Budget::UNLIMITED, &until).map_err(Failure::invalid)?;
-        tree.owned.apply(improvement);
+        Arc::make_mut(&mut tree.owned).apply(improvement);
         tree.nodes = nodes(&tree.owned);
         Ok(())
     })
@@ -332,7 +334,7 @@ pub unsafe extern "C" fn bvh_tree_free(tree: *mut BvhTree) {
 }
 
 fn whole(owned: OwnedTree) -> BvhTree {
-    BvhTree { nodes: nodes(&owned), owned }
+    BvhTree { nodes: nodes(&owned), owned: Arc::new(owned) }
 }
 
 fn nodes(owned: &OwnedTree) -> Vec<BvhNode> {

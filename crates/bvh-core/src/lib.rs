@@ -24,12 +24,14 @@ pub mod query;
 mod ray;
 pub mod ray_density;
 mod slabs;
+mod solid;
 mod sphere;
 mod stack;
 mod traverse;
 mod triangle;
 mod validate;
 mod wide;
+mod winding;
 
 pub use aabb::{Aabb, InvalidBox, InvalidBoxReason, check_boxes};
 pub use bvh::{Bvh, BvhView, MAX_OBJECTS, Node, NodeKind};
@@ -42,6 +44,7 @@ pub use primitives::{Primitive, Primitives, boxes};
 pub use ray::{Hit, InvalidRay, Ray};
 pub use ray_density::{DensityError, RayDensity, Segment};
 pub use slabs::{Slabs, clip_to_box};
+pub use solid::{InsideRule, Solid};
 pub use sphere::Sphere;
 pub use traverse::{
     Counter, TestCounts, any_hit, any_hit_by, any_hit_of_all, nearest_hit, nearest_hit_by,

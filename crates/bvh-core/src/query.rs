@@ -16,7 +16,7 @@
 //! All queries use the tree. The [wide layout](crate::WideBvh) is faster, but omits triangles
 //! without area. Its [`all_hits`](crate::WideBvh::all_hits) counts each crossing of a surface once,
 //! although triangles share edges; [`closest_points`](crate::WideBvh::closest_points) and
-//! [`contains`](crate::WideBvh::contains) answer batches of points.
+//! [`Solid::contains`](crate::Solid::contains) answer batches of points.
 //!
 //! ```
 //! use bvh_core::{Aabb, Bvh, Node, Triangle, query};

@@ -7,8 +7,8 @@ pub use bvh_build::{Builder, median_cut, muller_fellner, ploc};
 pub use bvh_core::cost::Objective;
 pub use bvh_core::glam::{Affine3A, Vec3};
 pub use bvh_core::{
-    Aabb, Bvh, Coherence, Hit, Instance, InstanceHit, Instances, Primitive, Ray, RayDensity,
-    RefitError, Segment, Sphere, Triangle, WideBvh, any_hit, boxes, cost, file, nearest_hit, query,
-    validate,
+    Aabb, Bvh, Coherence, Hit, InsideRule, Instance, InstanceHit, Instances, Primitive, Ray,
+    RayDensity, RefitError, Segment, Solid, Sphere, Triangle, WideBvh, any_hit, boxes, cost, file,
+    nearest_hit, query, validate,
 };
 pub use std::time::Duration;

@@ -255,16 +255,25 @@ impl Line {
     }
 }
 
-/// Returns whether a triangle has no area; false if a corner is not finite. Each rounding of the
-/// normal in f64, of two differences, a product and their difference, is off by ε of the sum of the
-/// absolute products, which the bound 64ε covers.
+/// Returns whether a triangle has no area; false if a corner is not finite.
 pub(crate) fn is_degenerate(triangle: &[Vec3; 3]) -> bool {
+    triangle.iter().all(|corner| corner.is_finite())
+        && (0..3).all(|axis| normal_sign(triangle, axis) == 0)
+}
+
+/// Returns the sign of a component of a finite triangle's normal: −1, 0 or 1. Each rounding in f64,
+/// of two differences, a product and their difference, is off by ε of the sum of the absolute
+/// products, which the bound 64ε covers.
+pub(crate) fn normal_sign(triangle: &[Vec3; 3], axis: usize) -> i32 {
     let [a, b, c] = triangle.map(|corner| corner.to_array().map(f64::from));
     let edge = |from: [f64; 3], to: [f64; 3]| [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
     let (normal, products) = normal(&edge(a, b), &edge(a, c));
-    let has_area =
-        normal.iter().zip(products).any(|(component, sum)| component.abs() > ERROR * sum);
-    !has_area && volumes::is_degenerate(triangle)
+    let error = ERROR * products[axis];
+    if normal[axis].abs() > error {
+        return if normal[axis] > 0.0 { 1 } else { -1 };
+    }
+    // Products of zero are exact.
+    if error == 0.0 { 0 } else { volumes::normal_sign(triangle, axis) }
 }
 
 /// Returns the cross product, and the same with sums of absolute products instead of differences.

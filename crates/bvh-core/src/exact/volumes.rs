@@ -116,20 +116,13 @@ impl<'a> Volumes<'a> {
     }
 }
 
-/// Returns whether a triangle has no area, by exact arithmetic; false if a corner is not finite.
+/// Returns the sign of a component of a finite triangle's normal, by exact arithmetic.
 #[cold]
 #[inline(never)]
-pub(super) fn is_degenerate(triangle: &[Vec3; 3]) -> bool {
-    let [a, b, c] = *triangle;
-    let to_second = difference(b, a);
-    let to_third = difference(c, a);
-    let is_finite = triangle.iter().all(|corner| corner.is_finite());
-    is_finite
-        && (0..3).all(|axis| {
-            let mut normal = Expansion::zero();
-            add_cross(&mut normal, &to_second, &to_third, axis);
-            normal.sign() == 0
-        })
+pub(super) fn normal_sign(&[a, b, c]: &[Vec3; 3], axis: usize) -> i32 {
+    let mut normal = Expansion::zero();
+    add_cross(&mut normal, &difference(b, a), &difference(c, a), axis);
+    normal.sign()
 }
 
 /// Returns the quotient, rounded to the nearest f32, ties to even; `None` if it is negative, if the

@@ -1,4 +1,4 @@
-//! All hits of a ray, each crossing of a surface once, and whether points are inside a closed mesh.
+//! All hits of a ray, each crossing of a surface once.
 //!
 //! # Rule
 //!
@@ -52,7 +52,6 @@ use crate::exact::Line;
 use crate::{Hit, Kernel, Ray};
 use alloc::vec::Vec;
 use core::mem::MaybeUninit;
-use glam::Vec3;
 
 impl WideBvh {
     /// Returns the hits of the ray in its range, each crossing of a surface once, the nearest
@@ -110,32 +109,6 @@ impl WideBvh {
         for (rays, counts) in parts.zip(counts.chunks_mut(MOST)) {
             hits.clear();
             self.append_hits_of(rays, &mut hits, counts, &mut found);
-        }
-    }
-
-    /// Writes whether every point is inside the mesh: whether the half line from the point along +x
-    /// has an odd number of [hits](Self::all_hits). The answer is exact for closed meshes. A point
-    /// on the surface counts as inside or outside, and of two solids with a common face and
-    /// opposite sides of it one contains the point. A point that is not finite is outside.
-    ///
-    /// # Panics
-    /// Panics if `points` and `inside` are not equally many.
-    pub fn contains(&self, points: &[Vec3], inside: &mut [bool]) {
-        assert_eq!(points.len(), inside.len(), "an answer for every point");
-        let is_within = |point: Vec3| {
-            // A point outside the box is outside the mesh. NaN fails every comparison.
-            (self.bounds.min.cmple(point) & point.cmple(self.bounds.max)).all()
-        };
-        let rays: Vec<Ray> = points
-            .iter()
-            .filter(|&&point| is_within(point))
-            .map(|&point| Ray::assume_valid(point, Vec3::X, 0.0, f32::MAX))
-            .collect();
-        let mut counts = alloc::vec![0; rays.len()];
-        self.count_hits(&rays, &mut counts);
-        let mut counts = counts.into_iter();
-        for (&point, inside) in points.iter().zip(inside) {
-            *inside = is_within(point) && counts.next().is_some_and(|count| count % 2 == 1);
         }
     }
 

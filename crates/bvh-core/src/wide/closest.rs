@@ -1,4 +1,4 @@
-//! The points of the triangles closest to given points, and signed distances.
+//! The points of the triangles closest to given points.
 
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{DeepStacks, SPARE, STACK};
@@ -108,24 +108,6 @@ impl WideBvh {
         let mut stack = Vec::new();
         for (&point, closest) in points.iter().zip(closest) {
             *closest = self.closest_portable(point, &mut stack);
-        }
-    }
-
-    /// Writes the distance of every point from the [closest point](Self::closest_point), negative
-    /// if the mesh [contains](Self::contains) the point: the sign follows from parity, and is right
-    /// for closed meshes. Infinite where there is no closest point.
-    ///
-    /// # Panics
-    /// Panics if `points` and `distances` are not equally many.
-    pub fn signed_distances(&self, points: &[Vec3], distances: &mut [f64]) {
-        assert_eq!(points.len(), distances.len(), "a distance for every point");
-        let mut inside = alloc::vec![false; points.len()];
-        self.contains(points, &mut inside);
-        let mut closest = alloc::vec![None; points.len()];
-        self.closest_points(points, &mut closest);
-        for ((closest, inside), distance) in closest.iter().zip(inside).zip(distances) {
-            let size = closest.map_or(f64::INFINITY, |closest| closest.distance);
-            *distance = if inside { -size } else { size };
         }
     }
 

@@ -1,4 +1,4 @@
-//! Closest points and signed distances by the wide layout agree with a test of every triangle.
+//! Closest points by the wide layout agree with a test of every triangle.
 
 use crate::support::{Random, SHAPES, ball, boxes, grid_box, scaled, soup, tree};
 use bvh_core::{Kernel, Triangle, WideBvh};
@@ -124,20 +124,6 @@ fn triangles_with_the_same_closest_point_tie_to_the_lowest_id() {
     }
 }
 
-#[test]
-fn distances_are_negative_inside_and_infinite_without_a_closest_point() {
-    let wide = layout(&grid_box(4), 0);
-    let points =
-        [[0.0, 0.0, 0.0], [0.5, 0.25, 0.0], [3.0, 0.0, 0.0], [4.0, 5.0, 1.0]].map(Vec3::from);
-    let mut distances = [0.0; 4];
-    wide.signed_distances(&points, &mut distances);
-    assert_eq!(distances, [-1.0, -0.5, 2.0, 5.0]);
-    wide.signed_distances(&[Vec3::NAN, Vec3::INFINITY], &mut distances[..2]);
-    assert_eq!(distances[..2], [f64::INFINITY; 2]);
-    let empty = layout(&[Triangle([Vec3::ONE; 3])], 0);
-    assert_eq!(empty.closest_point(Vec3::ZERO), None);
-}
-
 /// Returns the layouts of a scene for all kernels of this machine.
 fn layouts(triangles: &[Triangle]) -> Vec<WideBvh> {
     let of_kernel = |kernel| layout(triangles, 0).with_kernel(kernel);
@@ -152,9 +138,6 @@ fn many_triangles_without_area_have_no_closest_point() {
         for point in [Vec3::ZERO, Vec3::splat(3.5), Vec3::MAX] {
             assert_eq!(wide.closest_point(point), None);
         }
-        let mut distances = [0.0];
-        wide.signed_distances(&[Vec3::ZERO], &mut distances);
-        assert_eq!(distances, [f64::INFINITY]);
     }
 }
 

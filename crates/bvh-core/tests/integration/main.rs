@@ -10,6 +10,7 @@ mod leave;
 mod query;
 mod ray_density;
 mod references;
+mod solid;
 mod support;
 mod traversal;
 mod wide;

@@ -1,0 +1,193 @@
+//! Which points are inside of a mesh, and signed distances.
+//!
+//! A mesh is *closed* if each of its edges runs as often in one direction as in the other, counting
+//! edges between equal positions. Its winding number at a point is an integer, and the sum of the
+//! signs of the crossings along any half line: +1 where the half line leaves through the side from
+//! which the corners run counterclockwise. The crossings are exact, see
+//! [`WideBvh::all_hits`], and so is their sum.
+//!
+//! [`winding`](crate::winding) finds the winding numbers of meshes that are not closed.
+
+use crate::exact::normal_sign;
+use crate::winding::{Open, Winding};
+use crate::{BvhView, Hit, Ray, Triangle, WideBvh};
+use alloc::vec::Vec;
+use core::cmp::Ordering;
+use glam::Vec3;
+
+/// The rule by which a point is inside of a mesh.
+#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
+pub enum InsideRule {
+    /// By parity where every edge belongs to two triangles, but in the same direction for some of
+    /// them; otherwise by the winding number.
+    #[default]
+    Auto,
+    /// A half line from the point crosses the mesh an odd number of times. The direction of the
+    /// corners does not matter. Right for meshes without holes that do not overlap themselves.
+    Parity,
+    /// The size of the generalised winding number exceeds one half. Right for meshes that overlap
+    /// themselves or have holes, if the corners of all triangles run in the same direction.
+    Winding,
+}
+
+/// What is needed to tell the inside of a mesh from its outside.
+///
+/// A point on the surface may count as inside or outside. A point that is not finite is outside.
+///
+/// ```
+/// use bvh_core::{Aabb, Bvh, InsideRule, Node, Solid, Triangle, WideBvh};
+/// let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+/// let triangles = Triangle::from_mesh(&corners, &faces)?;
+/// let leaf = Node::leaf(Aabb::from([[0.0; 3], [1.0; 3]]), 0, 4);
+/// let tree = Bvh { nodes: vec![leaf], prim_ids: vec![0, 1, 2, 3] };
+/// let wide = WideBvh::new(&tree, &triangles)?;
+/// let solid = Solid::new(&tree, &triangles);
+/// let points = [[0.2, 0.2, 0.2], [0.5, 0.5, 0.5]].map(Into::into);
+/// let mut inside = [false; 2];
+/// solid.contains(&wide, &points, InsideRule::Auto, &mut inside);
+/// assert_eq!((solid.is_watertight(), inside), (true, [true, false]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Solid {
+    /// Whether every edge belongs to two triangles.
+    is_paired: bool,
+    turns: Turns,
+}
+
+/// How winding numbers are found.
+#[derive(Clone, Debug)]
+enum Turns {
+    /// By the signs of crossings; a sign for every triangle.
+    Signs(Vec<i8>),
+    /// By the sum of solid angles.
+    Angles(Winding),
+}
+
+impl Solid {
+    /// Examines the edges of all triangles. `tree` is a valid tree over the triangles. O(n log n)
+    /// time, O(n) memory.
+    pub fn new<'t>(tree: impl Into<BvhView<'t>>, triangles: &[Triangle]) -> Self {
+        let edges = sorted_edges(triangles);
+        let groups = || edges.chunk_by(|a, b| a.0 == b.0);
+        let is_closed = groups().all(|group| group.iter().map(|edge| edge.1).sum::<i64>() == 0);
+        let is_paired = groups().all(|group| group.len() == 2);
+        let turns = if is_closed {
+            let sign = |triangle: &Triangle| normal_sign(&triangle.0, 0) as i8;
+            Turns::Signs(triangles.iter().map(sign).collect())
+        } else {
+            Turns::Angles(Winding::new(tree.into(), triangles))
+        };
+        Self { is_paired, turns }
+    }
+
+    /// Returns whether the mesh has no holes: every edge runs as often in one direction as in the
+    /// other, or belongs to two triangles.
+    pub fn is_watertight(&self) -> bool {
+        self.is_paired || matches!(self.turns, Turns::Signs(_))
+    }
+
+    /// Writes whether every point is inside of the mesh. `wide` is a layout of the same triangles.
+    ///
+    /// The answer of [`Winding`](InsideRule::Winding) is exact for meshes that are closed, and
+    /// otherwise that of a sum over all triangles in f64; the answer of
+    /// [`Parity`](InsideRule::Parity) is exact.
+    ///
+    /// # Panics
+    /// Panics if `points` and `inside` are not equally many.
+    pub fn contains(&self, wide: &WideBvh, points: &[Vec3], rule: InsideRule, inside: &mut [bool]) {
+        assert_eq!(points.len(), inside.len(), "an answer for every point");
+        match (&self.turns, rule) {
+            (Turns::Angles(_), InsideRule::Auto) if self.is_paired => {
+                by_crossings(wide, points, inside, |hits| hits.len() % 2 == 1);
+            }
+            (_, InsideRule::Parity) => {
+                by_crossings(wide, points, inside, |hits| hits.len() % 2 == 1);
+            }
+            (Turns::Signs(signs), _) => by_crossings(wide, points, inside, |hits| {
+                hits.iter().map(|hit| i64::from(signs[hit.object as usize])).sum::<i64>() != 0
+            }),
+            (Turns::Angles(winding), _) => {
+                let mut open = Open::default();
+                for (point, inside) in points.iter().zip(inside) {
+                    *inside = point.is_finite() && winding.is_inside(*point, &mut open);
+                }
+            }
+        }
+    }
+
+    /// Writes the distance of every point from the [closest point](WideBvh::closest_point) of the
+    /// triangles, negative if the mesh [contains](Self::contains) the point. Infinite where there
+    /// is no closest point.
+    ///
+    /// # Panics
+    /// Panics if `points` and `distances` are not equally many.
+    pub fn signed_distances(
+        &self,
+        wide: &WideBvh,
+        points: &[Vec3],
+        rule: InsideRule,
+        distances: &mut [f64],
+    ) {
+        assert_eq!(points.len(), distances.len(), "a distance for every point");
+        let mut inside = alloc::vec![false; points.len()];
+        self.contains(wide, points, rule, &mut inside);
+        let mut closest = alloc::vec![None; points.len()];
+        wide.closest_points(points, &mut closest);
+        for ((closest, inside), distance) in closest.iter().zip(inside).zip(distances) {
+            let size = closest.map_or(f64::INFINITY, |closest| closest.distance);
+            *distance = if inside { -size } else { size };
+        }
+    }
+}
+
+/// An edge between positions, the lower one first, and its direction: 1 upwards, −1 downwards.
+type Edge = ([[u32; 3]; 2], i64);
+
+/// Returns the edges of all triangles; equal edges are adjacent. Edges without length are omitted.
+fn sorted_edges(triangles: &[Triangle]) -> Vec<Edge> {
+    // The sum turns −0 into 0.
+    let bits = |corner: Vec3| (corner + 0.0).to_array().map(f32::to_bits);
+    let mut edges: Vec<Edge> = Vec::with_capacity(3 * triangles.len());
+    for triangle in triangles {
+        let [a, b, c] = triangle.0.map(bits);
+        for [from, to] in [[a, b], [b, c], [c, a]] {
+            match from.cmp(&to) {
+                Ordering::Less => edges.push(([from, to], 1)),
+                Ordering::Equal => {}
+                Ordering::Greater => edges.push(([to, from], -1)),
+            }
+        }
+    }
+    edges.sort_unstable();
+    edges
+}
+
+/// Writes whether `is_inside` holds for the hits of the half line from every point along +x.
+fn by_crossings(
+    wide: &WideBvh,
+    points: &[Vec3],
+    inside: &mut [bool],
+    is_inside: impl Fn(&[Hit]) -> bool,
+) {
+    let is_within = |point: Vec3| {
+        // A point outside the box is outside the mesh. NaN fails every comparison.
+        (wide.bounds.min.cmple(point) & point.cmple(wide.bounds.max)).all()
+    };
+    let rays: Vec<Ray> = (points.iter())
+        .filter(|&&point| is_within(point))
+        .map(|&point| Ray::assume_valid(point, Vec3::X, 0.0, f32::MAX))
+        .collect();
+    let mut hits = Vec::new();
+    let mut counts = alloc::vec![0; rays.len()];
+    wide.all_hits_of(&rays, &mut hits, &mut counts);
+    let mut hits = &hits[..];
+    let mut counts = counts.into_iter();
+    for (&point, inside) in points.iter().zip(inside) {
+        let count = if is_within(point) { counts.next().unwrap_or(0) } else { 0 };
+        let own;
+        (own, hits) = hits.split_at(count as usize);
+        *inside = is_inside(own);
+    }
+}
