@@ -247,8 +247,9 @@ BvhStatus bvh_tracer_all_hits(const BvhTracer *tracer, const BvhRay *rays, size_
 // `tracer` is a tracer; `points` points to 3 * `count` floats, and `closest` to `count` elements.
 BvhStatus bvh_tracer_closest_points(const BvhTracer *tracer, const float *points, size_t count, BvhClosest *closest);
 
-// Writes to `inside` whether each of `count` points, 3 floats each, is inside the mesh: 1 or 0.
-// The answer is exact for closed meshes; a point on the surface may count as either.
+// Writes to `inside` whether each of `count` points, 3 floats each, is inside of the mesh: 1 or 0.
+// A mesh with holes has an inside, too: there the generalised winding number decides. A point on
+// the surface may count as either. The first call for a tracer examines all edges.
 //
 // `tracer` is a tracer; `points` points to 3 * `count` floats, and `inside` to `count` bytes.
 BvhStatus bvh_tracer_contains(const BvhTracer *tracer, const float *points, size_t count, uint8_t *inside);

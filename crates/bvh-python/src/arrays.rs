@@ -2,6 +2,7 @@
 //! type, order, strides and alignment. Errors name the argument, the value found and the values
 //! accepted.
 
+use bvh_search::bvh_core::glam::DVec3;
 use bvh_search::bvh_core::{InvalidRay, MeshError, Primitives};
 use bvh_search::{Objects, prelude::*};
 use numpy::{
@@ -224,11 +225,26 @@ pub fn segments(argument: Option<&Bound<PyAny>>) -> PyResult<Vec<Segment>> {
     Ok(segments.iter().map(segment).collect())
 }
 
-/// Reads points, `(m, 3)`.
-pub fn points(argument: &Bound<PyAny>) -> PyResult<Vec<Vec3>> {
-    let array = floats("points", argument, "(m, 3)", |shape| matches!(shape, [_, 3]))?;
-    let points: &[Vec3] = bytemuck::cast_slice(array.elements()?);
-    Ok(points.to_vec())
+/// Reads points, `(m, 3)`, relative to the place of the tree.
+pub fn points(argument: &Bound<PyAny>, place: Option<&Place>) -> PyResult<Vec<Vec3>> {
+    let points = Vectors::read("points", argument, "(m, 3)", |shape| matches!(shape, [_, 3]))?;
+    let slice = points.slice()?;
+    Ok((0..points.len())
+        .map(|index| match place {
+            Some(place) => (slice.exact(index) - place.center).as_vec3(),
+            None => slice.at(index),
+        })
+        .collect())
+}
+
+/// Reads a point.
+pub fn point(name: &str, argument: &Bound<PyAny>) -> PyResult<DVec3> {
+    let array = doubles(name, argument, "(3,)", |shape| shape == [3])?;
+    let point = DVec3::from_slice(array.elements()?);
+    if !point.is_finite() {
+        return Err(invalid(format!("{name} is {point}; accepted: finite coordinates")));
+    }
+    Ok(point)
 }
 
 /// Reads boxes with a lower and an upper corner each.
@@ -240,27 +256,36 @@ pub fn boxes(argument: &Bound<PyAny>) -> PyResult<Objects> {
     Ok(Objects::Boxes(boxes.to_vec()))
 }
 
-/// The origins or directions of rays, in either precision: `float64` is rounded ray by ray, without
-/// a copy of the array.
-enum Vectors<'py> {
+/// Points or directions in either precision: `float64` is rounded vector by vector, without a copy
+/// of the array.
+pub enum Vectors<'py> {
     Single(Array<'py, f32>),
     Double(Array<'py, f64>),
 }
 
 impl<'py> Vectors<'py> {
-    fn read(
+    pub fn read(
         name: &str,
         argument: &Bound<'py, PyAny>,
         accepted: &str,
         accepts: impl Fn(&[usize]) -> bool,
     ) -> PyResult<Self> {
-        let is_double = argument
-            .cast::<PyUntypedArray>()
-            .is_ok_and(|array| array.dtype().num() == f64::get_dtype(argument.py()).num());
-        if is_double {
-            doubles(name, argument, accepted, accepts).map(Self::Double)
-        } else {
+        // In either byte order.
+        let is_single = argument.cast::<PyUntypedArray>().is_ok_and(|array| {
+            let dtype = array.dtype();
+            dtype.kind() == b'f' && dtype.itemsize() <= size_of::<f32>()
+        });
+        if is_single {
             floats(name, argument, accepted, accepts).map(Self::Single)
+        } else {
+            doubles(name, argument, accepted, accepts).map(Self::Double)
+        }
+    }
+
+    pub fn into_numpy(self) -> Bound<'py, PyAny> {
+        match self {
+            Self::Single(array) => array.into_numpy().into_any(),
+            Self::Double(array) => array.into_numpy().into_any(),
         }
     }
 
@@ -294,13 +319,53 @@ impl VectorSlice<'_> {
             Self::Double(vectors) => Vec3::from(vectors[index].map(|x| x as f32)),
         }
     }
+
+    fn exact(self, index: usize) -> DVec3 {
+        match self {
+            Self::Single(vectors) => Vec3::from(vectors[index]).as_dvec3(),
+            Self::Double(vectors) => DVec3::from(vectors[index]),
+        }
+    }
+}
+
+/// The place of a tree in a world whose coordinates `float32` is too coarse for.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// The point of the world that is the tree's zero.
+    pub center: DVec3,
+    /// The middle of the tree's box, relative to the centre, and its distance from the corners.
+    sphere: (DVec3, f64),
+}
+
+impl Place {
+    pub fn new(center: DVec3, bounds: Option<Aabb>) -> Self {
+        let bounds = bounds.unwrap_or(Aabb { min: Vec3::ZERO, max: Vec3::ZERO });
+        let [min, max] = [bounds.min.as_dvec3(), bounds.max.as_dvec3()];
+        Self { center, sphere: ((min + max) / 2.0, (max - min).length() / 2.0) }
+    }
+
+    /// Advances a ray that begins far away to the sphere around the tree's box. Returns the origin
+    /// relative to the centre, and its distance in multiples of the direction's length. It is exact
+    /// enough for a ray that misses the sphere: that ray advances to its point next to the sphere.
+    fn advanced(&self, origin: DVec3, direction: DVec3) -> (Vec3, f64) {
+        let (middle, radius) = self.sphere;
+        let origin = origin - self.center;
+        let square = direction.length_squared();
+        let nearest = (middle - origin).dot(direction) / square;
+        let distance = nearest - radius / square.sqrt();
+        if distance > 0.0 && distance.is_finite() {
+            ((origin + distance * direction).as_vec3(), distance)
+        } else {
+            (origin.as_vec3(), 0.0)
+        }
+    }
 }
 
 /// The arrays of rays. `t_min` and `t_max` are one number for all rays or one number per ray.
 pub struct RayArrays<'py> {
     origins: Vectors<'py>,
     directions: Vectors<'py>,
-    limits: [Vec<f32>; 2],
+    limits: [Vec<f64>; 2],
     /// Whether an invalid ray hits nothing, instead of being an error.
     misses: bool,
 }
@@ -328,23 +393,24 @@ impl<'py> RayArrays<'py> {
         let directions =
             Vectors::read("directions", directions, &accepted, |shape| shape == [rays, 3])?;
         let accepted = format!("a number or ({rays},), as origins");
-        let mut limits = [vec![0.0], vec![f32::INFINITY]];
+        let mut limits = [vec![0.0], vec![f64::INFINITY]];
         for ((name, argument), limit) in
             [("t_min", t_min), ("t_max", t_max)].into_iter().zip(&mut limits)
         {
             if let Some(argument) = argument {
                 // An array without axes is one number for all rays.
-                *limit =
-                    floats(name, argument, &accepted, |shape| shape.is_empty() || shape == [rays])?
-                        .elements()?
-                        .to_vec();
+                *limit = doubles(name, argument, &accepted, |shape| {
+                    shape.is_empty() || shape == [rays]
+                })?
+                .elements()?
+                .to_vec();
             }
         }
         Ok(Self { origins, directions, limits, misses })
     }
 
     /// Returns the rays for threads without Python.
-    pub fn source(&self) -> PyResult<RaySource<'_>> {
+    pub fn source(&self, place: Option<Place>) -> PyResult<RaySource<'_>> {
         let [t_min, t_max] = self.limits.each_ref().map(Vec::as_slice);
         Ok(RaySource {
             origins: self.origins.slice()?,
@@ -353,6 +419,7 @@ impl<'py> RayArrays<'py> {
             t_max,
             rays: self.origins.len(),
             misses: self.misses,
+            place,
         })
     }
 }
@@ -362,32 +429,63 @@ impl<'py> RayArrays<'py> {
 pub struct RaySource<'a> {
     origins: VectorSlice<'a>,
     directions: VectorSlice<'a>,
-    t_min: &'a [f32],
-    t_max: &'a [f32],
+    t_min: &'a [f64],
+    t_max: &'a [f64],
     pub rays: usize,
     misses: bool,
+    place: Option<Place>,
+}
+
+/// Consecutive rays.
+#[derive(Default)]
+pub struct Batch {
+    pub rays: Vec<Ray>,
+    /// The distances by which the rays have been advanced; none if no ray has.
+    advances: Vec<f64>,
+}
+
+impl Batch {
+    /// Returns the distance of a hit from the origin that the caller gave.
+    pub fn distance(&self, ray: usize, t: f32) -> f32 {
+        match self.advances.get(ray) {
+            Some(advance) => (advance + f64::from(t)) as f32,
+            None => t,
+        }
+    }
 }
 
 impl RaySource<'_> {
     /// Returns some of the rays, or the number of an invalid one and its fault.
-    pub fn rays(&self, range: Range<usize>) -> Result<Vec<Ray>, (usize, InvalidRay)> {
+    pub fn batch(&self, range: Range<usize>) -> Result<Batch, (usize, InvalidRay)> {
         let limit =
-            |limits: &[f32], index: usize| limits[if limits.len() == 1 { 0 } else { index }];
-        range
-            .map(|index| {
-                let ray = Ray::new(
-                    self.origins.at(index),
-                    self.directions.at(index),
-                    limit(self.t_min, index),
-                    limit(self.t_max, index),
-                );
-                match ray {
-                    // An empty range hits nothing.
-                    Err(_) if self.misses => Ok(Ray::assume_valid(Vec3::ZERO, Vec3::X, 1.0, 0.0)),
-                    _ => ray.map_err(|error| (index, error)),
+            |limits: &[f64], index: usize| limits[if limits.len() == 1 { 0 } else { index }];
+        let mut batch = Batch::default();
+        for index in range {
+            let direction = self.directions.at(index);
+            let (origin, advance) = match self.place {
+                Some(place) => {
+                    place.advanced(self.origins.exact(index), self.directions.exact(index))
                 }
-            })
-            .collect()
+                None => (self.origins.at(index), 0.0),
+            };
+            let limits = [limit(self.t_min, index), limit(self.t_max, index)];
+            let [t_min, t_max] = limits.map(|t| t as f32);
+            let ray = match Ray::new(origin, direction, t_min, t_max) {
+                // An empty range hits nothing.
+                Err(_) if self.misses => Ray::assume_valid(Vec3::ZERO, Vec3::X, 1.0, 0.0),
+                Err(error) => return Err((index, error)),
+                Ok(_) if advance > 0.0 => {
+                    let [t_min, t_max] = limits.map(|t| (t - advance) as f32);
+                    Ray::assume_valid(origin, direction, t_min, t_max)
+                }
+                Ok(ray) => ray,
+            };
+            batch.rays.push(ray);
+            if self.place.is_some() {
+                batch.advances.push(advance);
+            }
+        }
+        Ok(batch)
     }
 }
 

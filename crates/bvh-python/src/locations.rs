@@ -1,18 +1,18 @@
 //! The function `locations`: hit points in double precision.
 
-use crate::arrays::{doubles, floats, integers, invalid};
+use crate::arrays::{doubles, integers, invalid};
 use bvh_search::bvh_core::glam::DVec3;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
-/// Returns the points, in `float64`, where rays cross the planes of triangles: `t`, the indices of
-/// triangles and the indices of rays are from `Tracer.all`. `triangles` has the shape `(n, 3, 3)`.
+/// Returns the points, in `float64`, where rays cross triangles: the indices of triangles and rays
+/// are from `Tracer.all`. `triangles` has the shape `(n, 3, 3)`. Each point is in the box of its
+/// triangle.
 #[pyfunction]
 pub fn locations<'py>(
     triangles: &Bound<'py, PyAny>,
     origins: &Bound<'py, PyAny>,
     directions: &Bound<'py, PyAny>,
-    t: &Bound<'py, PyAny>,
     triangle: &Bound<'py, PyAny>,
     ray: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
@@ -23,28 +23,34 @@ pub fn locations<'py>(
     };
     let origins = vectors("origins", origins)?;
     let directions = vectors("directions", directions)?;
-    let t = floats("t", t, "(h,)", |shape| shape.len() == 1)?;
-    let triangle = integers("triangle", triangle, "(h,)", |shape| shape == t.shape())?;
-    let ray = integers("ray", ray, "(h,)", |shape| shape == t.shape())?;
+    let triangle = integers("triangle", triangle, "(h,)", |shape| shape.len() == 1)?;
+    let ray = integers("ray", ray, "(h,)", |shape| shape == triangle.shape())?;
     let (corners, _) = corners.elements()?.as_chunks::<9>();
     let (origins, _) = origins.elements()?.as_chunks::<3>();
     let (directions, _) = directions.elements()?.as_chunks::<3>();
-    let (t, triangle, ray) = (t.elements()?, triangle.elements()?, ray.elements()?);
-    let mut points = Vec::with_capacity(3 * t.len());
-    for ((&t, &triangle), &ray) in t.iter().zip(triangle).zip(ray) {
+    let mut points = Vec::with_capacity(3 * ray.shape()[0]);
+    for (&triangle, &ray) in triangle.elements()?.iter().zip(ray.elements()?) {
         let missing = || invalid("locations: accepted: hits of these rays and triangles");
         let &[ax, ay, az, bx, by, bz, cx, cy, cz] =
             corners.get(triangle as usize).ok_or_else(missing)?;
-        let a = DVec3::new(ax, ay, az);
-        let normal = (DVec3::new(bx, by, bz) - a).cross(DVec3::new(cx, cy, cz) - a);
+        let corners = [DVec3::new(ax, ay, az), DVec3::new(bx, by, bz), DVec3::new(cx, cy, cz)];
         let origin = DVec3::from(*origins.get(ray as usize).ok_or_else(missing)?);
         let direction = DVec3::from(*directions.get(ray as usize).ok_or_else(missing)?);
-        let exact = normal.dot(a - origin) / normal.dot(direction);
-        // Next to a plane that is nearly parallel, the distance in f32 is as good.
-        let rounded = f64::from(t);
-        let is_close = (exact - rounded).abs() <= 1e-4 * rounded.abs().max(1e-3);
-        let distance = if is_close { exact } else { rounded };
-        points.extend((origin + direction * distance).to_array());
+        points.extend(location(corners, origin, direction).to_array());
     }
-    points.into_pyarray(py).reshape([t.len(), 3])
+    points.into_pyarray(py).reshape([triangle.shape()[0], 3])
+}
+
+/// Returns the point where a ray crosses the triangle that it is known to hit.
+fn location([a, b, c]: [DVec3; 3], origin: DVec3, direction: DVec3) -> DVec3 {
+    let normal = (b - a).cross(c - a);
+    let mut distance = normal.dot(a - origin) / normal.dot(direction);
+    // Next to a plane that is nearly parallel, rounding moves the quotient out of the triangle.
+    let lower = a.min(b).min(c);
+    let upper = a.max(b).max(c);
+    for axis in (0..3).filter(|&axis| direction[axis] != 0.0) {
+        let [p, q] = [lower, upper].map(|corner| (corner[axis] - origin[axis]) / direction[axis]);
+        distance = distance.max(p.min(q)).min(p.max(q));
+    }
+    (origin + direction * distance).clamp(lower, upper)
 }

@@ -1,16 +1,19 @@
 //! The class `Tracer`: triangles in the wide layout, which answer batches of rays and points on all
 //! threads.
 
-use crate::arrays::{RayArrays, RaySource, integers, invalid, invalid_ray, points};
+use crate::arrays::{
+    Batch, Place, RayArrays, RaySource, integers, invalid, invalid_ray, point, points,
+};
 use crate::threads::detached;
 use crate::tree::Tree;
 use bvh_search::OwnedTree;
 use bvh_search::bvh_core::InvalidRay;
+use bvh_search::bvh_core::glam::DVec3;
 use bvh_search::prelude::*;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// The distances of hits, and the indices of their triangles.
 type Hits<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<i32>>);
@@ -20,10 +23,15 @@ type Hits<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<i32>>);
 ///
 /// Rays have `origins` and `directions` of the shape `(m, 3)`. `t_min` and `t_max`, by default 0
 /// and infinity, are one number or have the shape `(m,)`. Distances are in multiples of the
-/// directions' lengths. Set `coherent` if consecutive rays begin close to each other and have
-/// similar directions: it changes the speed and no answer. An invalid ray, with a direction that is
-/// zero or a number that is not finite, raises a `ValueError`; with `invalid="miss"` it hits
-/// nothing.
+/// directions' lengths. `coherent` tells whether consecutive rays begin close to each other and have
+/// similar directions; by default a look at the rays decides. It changes the speed and no answer. An
+/// invalid ray, with a direction that is zero or a number that is not finite, raises a `ValueError`;
+/// with `invalid="miss"` it hits nothing.
+///
+/// Trees have `float32` coordinates. For coordinates that need `float64`, move the triangles by
+/// `-center` before they are rounded, and pass `center`: rays, points and answers are then in the
+/// coordinates of the world, and only what is left after their move is rounded. A ray that begins
+/// outside the tree's box is first advanced to it in `float64`.
 ///
 /// >>> import numpy as np
 /// >>> from bvh_search import Tracer, Tree
@@ -34,6 +42,9 @@ type Hits<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<i32>>);
 pub struct Tracer {
     wide: WideBvh,
     source: Arc<OwnedTree>,
+    place: Option<Place>,
+    /// Made when it is first needed.
+    solid: OnceLock<Solid>,
 }
 
 /// The number of rays or points that a thread answers at once.
@@ -42,12 +53,15 @@ const BATCH: usize = 1024;
 #[pymethods]
 impl Tracer {
     #[new]
-    fn new(tree: &Tree) -> PyResult<Self> {
+    #[pyo3(signature = (tree, *, center = None))]
+    fn new(tree: &Tree, center: Option<&Bound<PyAny>>) -> PyResult<Self> {
         let source = tree.owned();
+        let center = center.map(|center| point("center", center)).transpose()?;
         let Some(wide) = source.layout() else {
             return Err(invalid("tree is over boxes; accepted: a tree over triangles"));
         };
-        Ok(Self { wide: wide.map_err(invalid)?, source })
+        let place = center.map(|center| Place::new(center, source.tree().root_aabb()));
+        Ok(Self { wide: wide.map_err(invalid)?, source, place, solid: OnceLock::new() })
     }
 
     /// Returns the distances of the nearest hits and the triangles' indices. A ray without a hit
@@ -55,7 +69,7 @@ impl Tracer {
     ///
     /// >>> tracer.nearest([[0.25, 0.5, 3], [2, 2, 3]], [[0, 0, -1], [0, 0, -1]])
     /// (array([ 3., inf], dtype=float32), array([ 1, -1], dtype=int32))
-    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, coherent = false, invalid = "error"))]
+    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, coherent = None, invalid = "error"))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
     fn nearest<'py>(
         &self,
@@ -63,23 +77,24 @@ impl Tracer {
         directions: &Bound<'py, PyAny>,
         t_min: Option<&Bound<'py, PyAny>>,
         t_max: Option<&Bound<'py, PyAny>>,
-        coherent: bool,
+        coherent: Option<bool>,
         invalid: &str,
     ) -> PyResult<Hits<'py>> {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
-        let source = arrays.source()?;
+        let source = arrays.source(self.place)?;
         let (t, objects) = detached(py, || {
             let mut t = vec![0.0; source.rays];
             let mut objects = vec![0; source.rays];
             let parts = t.par_chunks_mut(BATCH).zip(objects.par_chunks_mut(BATCH));
             parts.enumerate().try_for_each(|(batch, (t, objects))| {
-                let rays = batch_of(source, batch)?;
+                let batch = batch_of(source, batch)?;
                 let mut hits = [Hit::MISS; BATCH];
-                let hits = &mut hits[..rays.len()];
-                self.wide.nearest_hits(&rays, hits, coherence(coherent));
-                for ((hit, t), object) in hits.iter().zip(t).zip(objects) {
-                    *t = hit.t;
+                let hits = &mut hits[..batch.rays.len()];
+                let coherence = self.coherence(coherent, &batch.rays);
+                self.wide.nearest_hits(&batch.rays, hits, coherence);
+                for (ray, ((hit, t), object)) in hits.iter().zip(t).zip(objects).enumerate() {
+                    *t = batch.distance(ray, hit.t);
                     // The cast turns the id of a miss, `u32::MAX`, into −1.
                     *object = hit.object as i32;
                 }
@@ -95,7 +110,7 @@ impl Tracer {
     ///
     /// >>> tracer.any([[0.25, 0.5, 3], [2, 2, 3]], [[0, 0, -1], [0, 0, -1]])
     /// array([ True, False])
-    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, coherent = false, invalid = "error"))]
+    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, coherent = None, invalid = "error"))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
     fn any<'py>(
         &self,
@@ -103,16 +118,16 @@ impl Tracer {
         directions: &Bound<'py, PyAny>,
         t_min: Option<&Bound<'py, PyAny>>,
         t_max: Option<&Bound<'py, PyAny>>,
-        coherent: bool,
+        coherent: Option<bool>,
         invalid: &str,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
-        let source = arrays.source()?;
+        let source = arrays.source(self.place)?;
         let hits = detached(py, || {
             answers(source.rays, false, |batch, hits| {
-                let rays = batch_of(source, batch)?;
-                self.wide.any_hits(&rays, hits, coherence(coherent));
+                let rays = batch_of(source, batch)?.rays;
+                self.wide.any_hits(&rays, hits, self.coherence(coherent, &rays));
                 Ok(())
             })
         })?
@@ -139,15 +154,21 @@ impl Tracer {
     {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
-        let source = arrays.source()?;
+        let source = arrays.source(self.place)?;
         let (t, objects, numbers) = detached(py, || {
             let batches = (0..source.rays.div_ceil(BATCH)).into_par_iter();
             let found: Vec<(Vec<Hit>, Vec<u32>)> = batches
                 .map(|batch| {
-                    let rays = batch_of(source, batch)?;
-                    let mut hits = Vec::with_capacity(2 * rays.len());
-                    let mut counts = vec![0; rays.len()];
-                    self.wide.all_hits_of(&rays, &mut hits, &mut counts);
+                    let batch = batch_of(source, batch)?;
+                    let mut hits = Vec::with_capacity(2 * batch.rays.len());
+                    let mut counts = vec![0; batch.rays.len()];
+                    self.wide.all_hits_of(&batch.rays, &mut hits, &mut counts);
+                    let mut own = hits.iter_mut();
+                    for (ray, &count) in counts.iter().enumerate() {
+                        for hit in own.by_ref().take(count as usize) {
+                            hit.t = batch.distance(ray, hit.t);
+                        }
+                    }
                     Ok((hits, counts))
                 })
                 .collect::<Result<_, _>>()?;
@@ -185,10 +206,10 @@ impl Tracer {
     ) -> PyResult<Bound<'py, PyArray1<u32>>> {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
-        let source = arrays.source()?;
+        let source = arrays.source(self.place)?;
         let counts = detached(py, || {
             answers(source.rays, 0, |batch, counts| {
-                self.wide.count_hits(&batch_of(source, batch)?, counts);
+                self.wide.count_hits(&batch_of(source, batch)?.rays, counts);
                 Ok(())
             })
         })?
@@ -196,16 +217,43 @@ impl Tracer {
         Ok(counts.into_pyarray(py))
     }
 
-    /// Returns whether each point, `(m, 3)`, is inside the mesh. The answer is exact for closed
-    /// meshes; a point on the surface may count as either.
+    /// Whether the mesh has no holes: every edge runs as often in one direction as in the other, or
+    /// belongs to two triangles. Positions count, not indices. Computed once.
+    ///
+    /// >>> tracer.watertight
+    /// False
+    #[getter]
+    fn watertight(&self, py: Python) -> PyResult<bool> {
+        Ok(self.solid(py)?.is_watertight())
+    }
+
+    /// Returns whether each point, `(m, 3)`, is inside the mesh. A point on the surface may count as
+    /// either.
+    ///
+    /// `by="winding"` counts how often the triangles wind round the point: right for meshes that
+    /// have holes or overlap themselves, if the corners of all triangles run in the same direction.
+    /// It is exact for watertight meshes, and otherwise the generalised winding number of all
+    /// triangles, at a hundred times the cost. `by="parity"` counts the crossings along one
+    /// direction: right for watertight meshes that do not overlap themselves, in whatever direction
+    /// their corners run. `by="auto"` is parity for watertight meshes with corners in both
+    /// directions, and otherwise winding.
     ///
     /// >>> tracer.contains([[0.5, 0.5, 1]])
     /// array([False])
-    fn contains<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+    #[pyo3(signature = (points, *, by = "auto"))]
+    fn contains<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        by: &str,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let py = points.py();
-        let points = self::points(points)?;
+        let rule = rule(by)?;
+        let points = self::points(points, self.place.as_ref())?;
+        let solid = self.solid(py)?;
         let inside = detached(py, || {
-            of_points(&points, false, |points, inside| self.wide.contains(points, inside))
+            of_points(&points, false, |points, inside| {
+                solid.contains(&self.wide, points, rule, inside);
+            })
         })?;
         Ok(inside.into_pyarray(py))
     }
@@ -224,7 +272,8 @@ impl Tracer {
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<f64>>)>
     {
         let py = points.py();
-        let points = self::points(points)?;
+        let points = self::points(points, self.place.as_ref())?;
+        let center = self.place.map_or(DVec3::ZERO, |place| place.center);
         let (closest, objects, distances) = detached(py, || {
             let closest = of_points(&points, None, |points, closest| {
                 self.wide.closest_points(points, closest)
@@ -233,7 +282,8 @@ impl Tracer {
             let mut objects = Vec::with_capacity(points.len());
             let mut distances = Vec::with_capacity(points.len());
             for closest in closest {
-                positions.extend(closest.map_or([f64::NAN; 3], |closest| closest.point.to_array()));
+                let position = closest.map_or(DVec3::NAN, |closest| closest.point + center);
+                positions.extend(position.to_array());
                 objects.push(closest.map_or(-1, |closest| closest.object as i32));
                 distances.push(closest.map_or(f64::INFINITY, |closest| closest.distance));
             }
@@ -244,19 +294,23 @@ impl Tracer {
     }
 
     /// Returns the distance of each point, `(m, 3)`, from the triangles, negative for points that
-    /// the mesh contains.
+    /// the mesh contains. `by` is as for `contains`.
     ///
     /// >>> tracer.signed_distance([[0.5, 0.25, 2]])
     /// array([2.])
+    #[pyo3(signature = (points, *, by = "auto"))]
     fn signed_distance<'py>(
         &self,
         points: &Bound<'py, PyAny>,
+        by: &str,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let py = points.py();
-        let points = self::points(points)?;
+        let rule = rule(by)?;
+        let points = self::points(points, self.place.as_ref())?;
+        let solid = self.solid(py)?;
         let distances = detached(py, || {
             of_points(&points, 0.0, |points, distances| {
-                self.wide.signed_distances(points, distances);
+                solid.signed_distances(&self.wide, points, rule, distances);
             })
         })?;
         Ok(distances.into_pyarray(py))
@@ -278,7 +332,7 @@ impl Tracer {
     {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, None, None, "miss")?;
-        let source = arrays.source()?;
+        let source = arrays.source(self.place)?;
         let accepted = format!("({},), as origins", source.rays);
         let indices = integers("triangle", triangle, &accepted, |shape| shape == [source.rays])?;
         let indices = indices.elements()?;
@@ -291,7 +345,7 @@ impl Tracer {
         }
         let surfaces = detached(py, || {
             answers(source.rays, ([0.0; 2], [0.0; 3]), |batch, surfaces| {
-                let rays = batch_of(source, batch)?;
+                let rays = batch_of(source, batch)?.rays;
                 for ((ray, &index), surface) in
                     rays.iter().zip(&indices[batch * BATCH..]).zip(surfaces)
                 {
@@ -315,16 +369,69 @@ impl Tracer {
         self.source.objects()
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Tree,))> {
-        let class = py.get_type::<Self>().into_any();
-        Ok((class, (Tree::shared(self.source.clone()),)))
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, State)> {
+        let restore = py.get_type::<Self>().getattr("_restore")?;
+        let center = self.place.map(|place| place.center.to_array());
+        Ok((restore, (Tree::shared(self.source.clone()), center)))
+    }
+
+    /// Restores a pickle.
+    #[staticmethod]
+    #[pyo3(signature = (tree, center))]
+    fn _restore(tree: &Tree, center: Option<&Bound<PyAny>>) -> PyResult<Self> {
+        Self::new(tree, center)
+    }
+}
+
+/// The arguments that restore a tracer.
+type State = (Tree, Option<[f64; 3]>);
+
+impl Tracer {
+    fn solid(&self, py: Python) -> PyResult<&Solid> {
+        if let Some(solid) = self.solid.get() {
+            return Ok(solid);
+        }
+        let triangles = self.source.triangles().unwrap_or(&[]);
+        let solid = detached(py, || Solid::new(self.source.tree(), triangles))?;
+        // Only a thread that holds the interpreter's lock comes here, and so does a thread that
+        // forks: no fork copies a locked lock. Another thread may have been faster.
+        Ok(self.solid.get_or_init(|| solid))
+    }
+
+    /// Returns the hint for a batch that the caller gave, or else the one that suits the rays.
+    fn coherence(&self, coherent: Option<bool>, rays: &[Ray]) -> Coherence {
+        /// The least cosine of the angle between similar directions.
+        const SIMILAR: f32 = 0.97;
+        /// The largest distance of close origins, in diagonals of the scene.
+        const CLOSE: f64 = 0.05;
+        let is_coherent = coherent.unwrap_or_else(|| {
+            let size = self.source.tree().root_aabb().map_or(0.0, |aabb| aabb.extent().length());
+            let pairs = rays.windows(2).step_by(16);
+            let similar = pairs.clone().filter(|pair| {
+                let [a, b] = [pair[0].direction(), pair[1].direction()];
+                a.dot(b) >= SIMILAR * a.length() * b.length()
+                    && f64::from(pair[0].origin().distance(pair[1].origin())) <= CLOSE * size
+            });
+            4 * similar.count() >= 3 * pairs.len().max(1)
+        });
+        if is_coherent { Coherence::Coherent } else { Coherence::Incoherent }
+    }
+}
+
+/// Reads the argument `by`.
+fn rule(by: &str) -> PyResult<InsideRule> {
+    match by {
+        "auto" => Ok(InsideRule::Auto),
+        "parity" => Ok(InsideRule::Parity),
+        "winding" => Ok(InsideRule::Winding),
+        _ => Err(invalid(format!("by is {by:?}; accepted: auto, parity, winding"))),
     }
 }
 
 /// Returns the rays of a batch.
-fn batch_of(source: RaySource, batch: usize) -> Result<Vec<Ray>, (usize, InvalidRay)> {
+fn batch_of(source: RaySource, batch: usize) -> Result<Batch, (usize, InvalidRay)> {
     let first = batch * BATCH;
-    source.rays(first..(first + BATCH).min(source.rays))
+    source.batch(first..(first + BATCH).min(source.rays))
 }
 
 /// Returns one answer per ray; `answer` writes the answers of a batch.
@@ -351,8 +458,4 @@ fn of_points<T: Clone + Send + Sync>(
     let parts = points.par_chunks(BATCH).zip(answers.par_chunks_mut(BATCH));
     parts.for_each(|(points, answers)| answer(points, answers));
     answers
-}
-
-fn coherence(coherent: bool) -> Coherence {
-    if coherent { Coherence::Coherent } else { Coherence::Incoherent }
 }

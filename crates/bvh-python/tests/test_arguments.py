@@ -5,11 +5,12 @@ import pickle
 import numpy as np
 import pytest
 
-from bvh_search import RaycastingScene, Tree
+from bvh_search import RaycastingScene, Tracer, Tree
 
 CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 FACE = [[0, 1, 2]]
 BOXES = [[0, 0, 0, 1, 1, 1]]
+PINHOLE = RaycastingScene.create_rays_pinhole
 NAN = [[0, 0, np.nan], [1, 0, 0], [0, 1, 0]]
 ALL_BITS = "0 to 18446744073709551615"
 
@@ -170,3 +171,22 @@ def test_scenes_accept_rays_of_any_leading_shape():
         rays = np.broadcast_to([0.2, 0.2, 5, 0, 0, -1], shape)
         assert scene.cast_rays(rays)["t_hit"].shape == shape[:-1]
         assert scene.count_intersections(rays.astype(np.float32)).shape == shape[:-1]
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: Tracer(mesh()).contains(CORNERS, by="rays"), '^by is "rays"; accepted: auto, parity, winding$'),
+        (lambda: Tracer(mesh()).signed_distance(CORNERS, by=""), '^by is ""; accepted: auto, parity, winding$'),
+        (lambda: Tracer(mesh(), center=[0, 0]), r"^center has shape \(2\); accepted: \(3,\)$"),
+        (lambda: Tracer(mesh(), center=[0, 0, np.inf]), r"^center is \[0, 0, inf\]; accepted: finite coordinates$"),
+        (lambda: RaycastingScene().compute_occupancy(CORNERS, nsamples=2), "^nsamples is 2; accepted: odd numbers from 1$"),
+        (lambda: RaycastingScene().compute_signed_distance(CORNERS, nsamples=0), "^nsamples is 0; accepted: odd"),
+        (lambda: PINHOLE(np.eye(4), np.eye(4), 2, 2), r"^intrinsic_matrix has shape \(4, 4\); accepted: \(..., 3\)$"),
+        (lambda: PINHOLE(np.eye(3), np.eye(4)[:3], 2, 2), r"^extrinsic_matrix has shape \(3, 4\); accepted: \(4, 4\)$"),
+        (lambda: PINHOLE(60, [0, 0, 0], [0, 0, 5], [0, 0, 1], 2, 2), "^up is parallel to the view"),
+    ],
+)
+def test_errors_of_insides_centers_and_cameras_name_the_argument(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()

@@ -100,12 +100,16 @@ CALLS = {
         f"RayMeshIntersector.{name}": (of_trimesh(name), TRIMESH_RAYS)
         for name in ("intersects_id", "intersects_location", "intersects_first", "intersects_any")
     },
+    "Tracer of a center": (
+        lambda center: Tracer(TREE, center=center).nearest(ORIGINS, DIRECTIONS),
+        {"center": np.array([0.5, 0.25, -0.25])},
+    ),
     "RayMeshIntersector.contains_points": (of_trimesh("contains_points"), {"points": ORIGINS}),
 }
 
 # Parameters that are no arrays of numbers.
 OTHERS = {"self", "seconds", "references", "seed", "work", "progress", "path", "kind", "coherent", "invalid"}
-OTHERS |= {"tnear", "tfar", "multiple_hits", "max_hits", "return_locations", "kwargs", "memo"}
+OTHERS |= {"by", "nthreads", "nsamples", "args", "tnear", "tfar", "multiple_hits", "max_hits", "return_locations", "kwargs", "memo"}
 
 
 def unaligned(array):

@@ -56,6 +56,94 @@ def test_points_have_closest_points_and_signed_distances():
     assert (np.isnan(closest).all(), triangle[0], distance[0]) == (True, -1, np.inf)
 
 
+def winding_numbers(triangles, points):
+    """The sums of all solid angles over 4 pi."""
+    a, b, c = np.moveaxis(triangles[None] - points[:, None, None], 2, 0)
+    la, lb, lc = (np.linalg.norm(corner, axis=-1) for corner in (a, b, c))
+    volume = (a * np.cross(b, c)).sum(axis=-1)
+    cosines = la * lb * lc + (a * b).sum(-1) * lc + (b * c).sum(-1) * la + (c * a).sum(-1) * lb
+    return np.arctan2(volume, cosines).sum(axis=1) / (2 * np.pi)
+
+
+def test_points_are_inside_meshes_with_holes_and_overlaps_as_the_winding_number_says():
+    vertices, faces = box()
+    triangles = vertices[faces].astype(np.float32).astype(np.float64)
+    shifted = triangles + [0.75, 0.25, 0.5]
+    meshes = {
+        "open box": (triangles[2:], False),
+        "doubled faces": (np.concatenate([triangles, triangles]), True),
+        "overlapping boxes": (np.concatenate([triangles, shifted]), True),
+        "overlapping boxes with a hole": (np.concatenate([triangles, shifted[1:]]), False),
+        "nested shells": (np.concatenate([triangles, triangles / 2]), True),
+        "cavity": (np.concatenate([triangles, triangles[:, ::-1] / 2]), True),
+    }
+    points = RANDOM.uniform(-2, 2, (5000, 3)).astype(np.float32).astype(np.float64)
+    for name, (mesh, is_closed) in meshes.items():
+        tracer = Tracer(Tree.from_triangles(mesh, work=1000))
+        assert tracer.watertight == is_closed, name
+        expected = np.abs(winding_numbers(mesh, points)) > 0.5
+        for rule in ("auto", "winding"):
+            np.testing.assert_array_equal(tracer.contains(points, by=rule), expected, name)
+            np.testing.assert_array_equal(tracer.signed_distance(points, by=rule) < 0, expected, name)
+    # Parity does not care for the direction of corners, and auto chooses it for such a mesh.
+    mixed = np.where(np.arange(12)[:, None, None] % 2 == 0, triangles, triangles[:, ::-1])
+    tracer = Tracer(Tree.from_triangles(mixed, work=1000))
+    inside = (np.abs(points) < 1).all(axis=1)
+    assert tracer.watertight
+    np.testing.assert_array_equal(tracer.contains(points), inside)
+    np.testing.assert_array_equal(tracer.contains(points, by="parity"), inside)
+    assert (tracer.contains(points, by="winding") != inside).any()
+
+
+@pytest.mark.parametrize("center", [[0, 0, 0], [4.5e5, 5.4e6, 100], [1e9, -2e9, 3e9]])
+def test_a_tracer_with_a_center_answers_in_the_coordinates_of_the_world(center):
+    center = np.array(center, np.float64)
+    vertices, faces = box()
+    tree = Tree.from_mesh(vertices, faces, work=1000)
+    plain, tracer = Tracer(tree), Tracer(tree, center=center)
+    tracer = pickle.loads(pickle.dumps(tracer))
+    # Multiples of a power of two, which are exact everywhere.
+    origins = RANDOM.integers(-(2**22), 2**22, (300, 3)) / 2**20
+    directions = RANDOM.normal(size=(300, 3))
+    expected = plain.all(origins, directions)
+    for found, known in zip(tracer.all(origins + center, directions), expected):
+        np.testing.assert_allclose(found, known, rtol=1e-6, atol=1e-6)
+    np.testing.assert_array_equal(tracer.counts(origins + center, directions), plain.counts(origins, directions))
+    limits = np.full(300, 0.501), np.full(300, 3.001)
+    t, triangle = tracer.nearest(origins + center, directions, *limits)
+    known_t, known_triangle = plain.nearest(origins, directions, *limits)
+    np.testing.assert_allclose(t, known_t, rtol=1e-6, atol=1e-6)
+    np.testing.assert_array_equal(triangle, known_triangle)
+    np.testing.assert_array_equal(tracer.any(origins + center, directions, *limits), triangle >= 0)
+    np.testing.assert_array_equal(tracer.contains(origins + center), plain.contains(origins))
+    np.testing.assert_array_equal(tracer.signed_distance(origins + center), plain.signed_distance(origins))
+    closest, _, _ = tracer.closest(origins + center)
+    np.testing.assert_allclose(closest - center, plain.closest(origins)[0], atol=1e-15 * np.abs(center).max())
+    lists = tracer.nearest((origins + center).tolist(), directions.tolist(), *limits)
+    np.testing.assert_array_equal(lists[1], triangle)
+
+
+def test_rays_from_far_away_hit_as_if_they_began_nearby():
+    vertices, faces = box()
+    tracer = Tracer(Tree.from_mesh(vertices, faces, work=1000), center=[0, 0, 0])
+    targets = RANDOM.uniform(-1.2, 1.2, (500, 3))
+    directions = RANDOM.normal(size=(500, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    near = tracer.nearest(targets - 8 * directions, directions)
+    assert 0.2 < (near[1] >= 0).mean() < 0.9
+    for away in (1e5, 1e7, 1e9):
+        origins = targets - away * directions
+        t, triangle = tracer.nearest(origins, directions)
+        np.testing.assert_array_equal(triangle, near[1])
+        np.testing.assert_allclose(t, near[0] + (away - 8), rtol=1e-6)
+        # Limits count from the origin of the caller.
+        assert tracer.any(origins, directions, t_max=away - 8).sum() == 0
+        assert tracer.any(origins, directions, t_min=away + 8).sum() == 0
+        assert (tracer.any(origins, directions, away - 8, away + 8) == (triangle >= 0)).all()
+        # Nothing is behind a ray.
+        assert tracer.any(origins, -directions).sum() == 0
+
+
 def test_surfaces_have_weights_and_normals():
     vertices, faces = box()
     tracer = Tracer(Tree.from_mesh(vertices, faces, work=1000))
@@ -189,6 +277,39 @@ def test_a_scene_has_open3ds_answers():
         a, b, c = corners[closest["geometry_ids"][i]][closest["primitive_ids"][i]]
         u, v = closest["primitive_uvs"][i]
         np.testing.assert_allclose(a + u * (b - a) + v * (c - a), point, atol=1e-6)
+
+
+def test_a_scene_far_from_zero_keeps_the_precision_of_its_coordinates():
+    vertices, faces = box()
+    offset = np.array([4.5e5, 5.4e6, 100])
+    scene = RaycastingScene(seconds=0.05, nthreads=2)
+    scene.add_triangles(vertices + offset, faces)
+    rays = np.concatenate([offset + [3, 0.125, 0.25], [-1, 0, 0]])
+    assert scene.cast_rays(rays, nthreads=1)["t_hit"] == 2
+    assert scene.cast_rays(rays + [1e7, 0, 0, 0, 0, 0])["t_hit"] == np.float32(1e7 + 2)
+    assert scene.compute_closest_points(offset + [0, 0, 0.75])["points"].tolist() == (offset + [0, 0, 1]).tolist()
+    assert scene.compute_signed_distance([offset + [0, 0, 0.75]], nsamples=3).tolist() == [-0.25]
+    assert scene.compute_occupancy([offset, offset + 2], 0, 1).tolist() == [1, 0]
+
+
+def test_a_pinhole_camera_has_open3ds_rays():
+    intrinsic = np.array([[500, 3, 310], [0, 400, 250], [0, 0, 1]], dtype=float)
+    angle = 0.3
+    extrinsic = np.eye(4)
+    extrinsic[:3, :3] = [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
+    extrinsic[:3, 3] = [1, 2, 3]
+    rays = RaycastingScene.create_rays_pinhole(intrinsic, np.asfortranarray(extrinsic), width_px=5, height_px=4)
+    assert rays.shape == (4, 5, 6)
+    # The camera sees a point of a ray in its pixel, at the depth of its distance.
+    for distance in (0, 2.5):
+        points = rays[..., :3] + distance * rays[..., 3:]
+        seen = (points @ extrinsic[:3, :3].T + extrinsic[:3, 3]) @ intrinsic.T
+        x, y = np.meshgrid(np.arange(5) + 0.5, np.arange(4) + 0.5)
+        np.testing.assert_allclose(seen, distance * np.stack([x, y, np.ones_like(x)], axis=-1), atol=1e-9)
+    view = {"fov_deg": 90, "center": [0, 0, 9], "eye": [0, 0, 5], "up": [0, 1, 0], "width_px": 3, "height_px": 1}
+    rays = RaycastingScene.create_rays_pinhole(**view)
+    np.testing.assert_allclose(rays[0], [[0, 0, 5, -2 / 3, 0, 1], [0, 0, 5, 0, 0, 1], [0, 0, 5, 2 / 3, 0, 1]], atol=1e-15)
+    np.testing.assert_array_equal(RaycastingScene.create_rays_pinhole(*view.values()), rays)
 
 
 def test_every_public_function_has_an_example_and_all_examples_run():

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -48,6 +49,63 @@ def test_answers_are_those_of_the_python_engine(mesh):
     np.testing.assert_array_equal(index_tri, first[index_ray])
     index_tri, index_ray = ours.intersects_id(origins, directions, max_hits=1)
     np.testing.assert_array_equal(index_ray, np.nonzero(first >= 0)[0])
+
+
+@pytest.mark.parametrize("away", [1e3, 1e5, 1e7, 1e9])
+def test_rays_from_far_away_hit_the_faces_of_exact_arithmetic(away):
+    mesh = trimesh.creation.icosphere(subdivisions=1)
+    corners = [[list(map(Fraction, corner)) for corner in face] for face in mesh.triangles.tolist()]
+    directions = RANDOM.normal(size=(60, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    origins = RANDOM.normal(size=(60, 3)) * 0.4 - directions * away
+    rays = [[list(map(Fraction, part)) for part in ray] for ray in zip(origins.tolist(), directions.tolist())]
+    expected = [first_face(corners, *ray) for ray in rays]
+    assert RayMeshIntersector(mesh).intersects_first(origins, directions).tolist() == expected
+    locations, index_ray, index_tri = RayMeshIntersector(mesh).intersects_location(origins, directions)
+    assert len(locations) == 2 * sum(face >= 0 for face in expected)
+    heights = ((locations - mesh.triangles[index_tri, 0]) * mesh.face_normals[index_tri]).sum(axis=1)
+    offsets = np.linalg.norm(np.cross(locations - origins[index_ray], directions[index_ray]), axis=1)
+    np.testing.assert_allclose(heights, 0, atol=1e-14 * max(away, 10))
+    np.testing.assert_allclose(offsets, 0, atol=1e-14 * max(away, 10))
+
+
+def first_face(faces, origin, direction):
+    """Returns the first face that a ray of rationals hits, or -1."""
+    nearest = (None, -1)
+    for number, (a, b, c) in enumerate(faces):
+        normal = cross(minus(b, a), minus(c, a))
+        along = dot(normal, direction)
+        if along == 0:
+            continue
+        t = dot(normal, minus(a, origin)) / along
+        point = [x + t * y for x, y in zip(origin, direction)]
+        sides = (dot(cross(minus(q, p), minus(point, p)), normal) for p, q in ((a, b), (b, c), (c, a)))
+        if t >= 0 and min(sides) >= 0 and (nearest[0] is None or t < nearest[0]):
+            nearest = (t, number)
+    return nearest[1]
+
+
+def minus(p, q):
+    return [a - b for a, b in zip(p, q)]
+
+
+def dot(p, q):
+    return sum(a * b for a, b in zip(p, q))
+
+
+def cross(p, q):
+    return [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
+
+
+def test_a_mesh_with_a_hole_has_an_inside():
+    mesh = trimesh.creation.icosphere(subdivisions=2)
+    points = RANDOM.uniform(-1.2, 1.2, (1000, 3))
+    radius = np.linalg.norm(points, axis=1)
+    points = points[(radius < 0.9) | (radius > 1.05)]
+    mesh.update_faces(np.arange(len(mesh.faces)) != 7)
+    assert not mesh.is_watertight
+    inside = RayMeshIntersector(mesh).contains_points(points)
+    np.testing.assert_array_equal(inside, np.linalg.norm(points, axis=1) < 1)
 
 
 def test_an_engine_follows_its_mesh_and_is_copied():

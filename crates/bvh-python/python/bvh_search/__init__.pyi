@@ -15,6 +15,7 @@ __all__ = ["RaycastingScene", "Tracer", "Tree", "__version__"]
 __version__: str
 
 _Invalid = Literal["error", "miss"]
+_Rule = Literal["auto", "parity", "winding"]
 _Progress = Callable[[float, float], object]
 
 @final
@@ -73,7 +74,9 @@ class Tree:
 
 @final
 class Tracer:
-    def __new__(cls, tree: Tree) -> Tracer: ...
+    def __new__(cls, tree: Tree, *, center: ArrayLike | None = None) -> Tracer: ...
+    @property
+    def watertight(self) -> bool: ...
     def nearest(
         self,
         origins: ArrayLike,
@@ -81,7 +84,7 @@ class Tracer:
         t_min: ArrayLike | None = None,
         t_max: ArrayLike | None = None,
         *,
-        coherent: bool = False,
+        coherent: bool | None = None,
         invalid: _Invalid = "error",
     ) -> tuple[NDArray[np.float32], NDArray[np.int32]]: ...
     def any(
@@ -91,7 +94,7 @@ class Tracer:
         t_min: ArrayLike | None = None,
         t_max: ArrayLike | None = None,
         *,
-        coherent: bool = False,
+        coherent: bool | None = None,
         invalid: _Invalid = "error",
     ) -> NDArray[np.bool_]: ...
     def all(
@@ -112,11 +115,11 @@ class Tracer:
         *,
         invalid: _Invalid = "error",
     ) -> NDArray[np.uint32]: ...
-    def contains(self, points: ArrayLike) -> NDArray[np.bool_]: ...
+    def contains(self, points: ArrayLike, *, by: _Rule = "auto") -> NDArray[np.bool_]: ...
     def closest(
         self, points: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]: ...
-    def signed_distance(self, points: ArrayLike) -> NDArray[np.float64]: ...
+    def signed_distance(self, points: ArrayLike, *, by: _Rule = "auto") -> NDArray[np.float64]: ...
     def surface(
         self, origins: ArrayLike, directions: ArrayLike, triangle: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float32]]: ...

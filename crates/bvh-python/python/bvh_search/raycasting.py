@@ -3,6 +3,7 @@
 import numpy as np
 
 from ._bvh_search import Tracer, Tree, corners, rows
+from ._center import center_of
 
 __all__ = ["RaycastingScene"]
 
@@ -14,7 +15,10 @@ class RaycastingScene:
     Rays have the shape `(..., 6)`: origin, then direction. Points have the shape `(..., 3)`. Answers
     are numpy arrays of the same leading shape. Geometries are numbered in the order of `add_triangles`.
     The tree is found at the first query, in about `seconds`. Arrays of other shapes, and meshes that
-    `Tree.from_mesh` would refuse, raise a `ValueError`.
+    `Tree.from_mesh` would refuse, raise a `ValueError`. Coordinates may be `float64`: scenes far from
+    zero are moved to it before they are rounded, and rays that begin far away are advanced to them.
+
+    `nthreads` is accepted for compatibility: all threads answer.
 
     >>> from bvh_search import RaycastingScene
     >>> scene = RaycastingScene(seconds=0.1)
@@ -26,7 +30,7 @@ class RaycastingScene:
 
     INVALID_ID = 0xFFFFFFFF
 
-    def __init__(self, seconds=1.0):
+    def __init__(self, seconds=1.0, *, nthreads=0):
         self._seconds = seconds
         self._triangles = []
         self._made = None
@@ -47,8 +51,9 @@ class RaycastingScene:
 
     def _scene(self):
         if self._made is None:
-            triangles = np.concatenate([np.empty((0, 3, 3), np.float32), *self._triangles])
-            tracer = Tracer(Tree.from_triangles(triangles, self._seconds))
+            triangles = np.concatenate([np.empty((0, 3, 3)), *self._triangles])
+            center = center_of(triangles)
+            tracer = Tracer(Tree.from_triangles(triangles - center, self._seconds), center=center)
             first = np.cumsum([0] + [len(part) for part in self._triangles])
             self._made = tracer, first
         return self._made
@@ -67,7 +72,7 @@ class RaycastingScene:
         geometry = np.where(hit, geometry, self.INVALID_ID)
         return geometry.astype(np.uint32), primitive.astype(np.uint32)
 
-    def cast_rays(self, rays):
+    def cast_rays(self, rays, nthreads=0):
         """Returns the nearest hits: `t_hit`, `geometry_ids`, `primitive_ids`, `primitive_uvs` and
         `primitive_normals`.
 
@@ -76,7 +81,7 @@ class RaycastingScene:
         """
         shape, origins, directions = self._split(rays)
         tracer, first = self._scene()
-        t, triangle = tracer.nearest(origins, directions, coherent=True, invalid="miss")
+        t, triangle = tracer.nearest(origins, directions, invalid="miss")
         u, v, normals = tracer.surface(origins, directions, triangle)
         geometry, primitive = self._ids(triangle, first)
         return {
@@ -87,7 +92,7 @@ class RaycastingScene:
             "primitive_normals": normals.reshape((*shape, 3)),
         }
 
-    def test_occlusions(self, rays, tnear=0.0, tfar=np.inf):
+    def test_occlusions(self, rays, tnear=0.0, tfar=np.inf, nthreads=0):
         """Returns whether each ray hits anything between `tnear` and `tfar`.
 
         >>> scene.test_occlusions([[0.25, 0.25, 2, 0, 0, 1]], tfar=1)
@@ -95,10 +100,10 @@ class RaycastingScene:
         """
         shape, origins, directions = self._split(rays)
         tracer, _ = self._scene()
-        hits = tracer.any(origins, directions, tnear, tfar, coherent=True, invalid="miss")
+        hits = tracer.any(origins, directions, tnear, tfar, invalid="miss")
         return hits.reshape(shape)
 
-    def count_intersections(self, rays):
+    def count_intersections(self, rays, nthreads=0):
         """Returns the number of crossings of the surface by each ray.
 
         >>> scene.count_intersections([[0.25, 0.25, -1, 0, 0, 1]])
@@ -108,7 +113,7 @@ class RaycastingScene:
         counts = self._scene()[0].counts(origins, directions, invalid="miss")
         return counts.astype(np.int32).reshape(shape)
 
-    def list_intersections(self, rays):
+    def list_intersections(self, rays, nthreads=0):
         """Returns all crossings of the surface, ray after ray: `ray_splits`, `ray_ids`, `t_hit`,
         `geometry_ids`, `primitive_ids` and `primitive_uvs`.
 
@@ -134,12 +139,12 @@ class RaycastingScene:
         points = rows("query_points", query_points, 3)
         return points.shape[:-1], points.reshape((-1, 3))
 
-    def compute_closest_points(self, query_points):
-        """Returns the closest points of the surface: `points`, `geometry_ids`, `primitive_ids`,
-        `primitive_uvs` and `primitive_normals`.
+    def compute_closest_points(self, query_points, nthreads=0):
+        """Returns the closest points of the surface: `points`, as precise as `query_points`,
+        `geometry_ids`, `primitive_ids`, `primitive_uvs` and `primitive_normals`.
 
         >>> scene.compute_closest_points([[0.25, 0.25, 4]])["points"]
-        array([[0.25, 0.25, 5.  ]], dtype=float32)
+        array([[0.25, 0.25, 5.  ]])
         """
         shape, points = self._points(query_points)
         tracer, first = self._scene()
@@ -149,14 +154,14 @@ class RaycastingScene:
         normals = tracer.surface(closest, np.ones_like(closest), triangle)[2]
         u, v, _ = tracer.surface(closest, normals, triangle)
         return {
-            "points": closest.astype(np.float32).reshape((*shape, 3)),
+            "points": closest.astype(points.dtype).reshape((*shape, 3)),
             "geometry_ids": geometry.reshape(shape),
             "primitive_ids": primitive.reshape(shape),
             "primitive_uvs": np.stack([u, v], axis=-1).astype(np.float32).reshape((*shape, 2)),
             "primitive_normals": normals.reshape((*shape, 3)),
         }
 
-    def compute_distance(self, query_points):
+    def compute_distance(self, query_points, nthreads=0):
         """Returns the distances of points from the surface.
 
         >>> scene.compute_distance([[0.25, 0.25, 4]])
@@ -165,21 +170,83 @@ class RaycastingScene:
         shape, points = self._points(query_points)
         return self._scene()[0].closest(points)[2].astype(np.float32).reshape(shape)
 
-    def compute_signed_distance(self, query_points):
-        """Returns the distances of points from the surface, negative inside; the sign follows from the
-        parity of crossings.
+    def compute_signed_distance(self, query_points, nthreads=0, nsamples=1):
+        """Returns the distances of points from the surface, negative inside as `Tracer.contains` has
+        it. Every answer is certain with one sample; `nsamples` is an odd number, as in Open3D.
 
         >>> scene.compute_signed_distance([[0.25, 0.25, 6]])
         array([1.], dtype=float32)
         """
+        _check_samples(nsamples)
         shape, points = self._points(query_points)
         return self._scene()[0].signed_distance(points).astype(np.float32).reshape(shape)
 
-    def compute_occupancy(self, query_points):
-        """Returns 1 for points inside the surface and 0 for others.
+    def compute_occupancy(self, query_points, nthreads=0, nsamples=1):
+        """Returns 1 for points inside the surface, as `Tracer.contains` has it, and 0 for others.
 
         >>> scene.compute_occupancy([[0.25, 0.25, 6]])
         array([0.], dtype=float32)
         """
+        _check_samples(nsamples)
         shape, points = self._points(query_points)
         return self._scene()[0].contains(points).astype(np.float32).reshape(shape)
+
+    @staticmethod
+    def create_rays_pinhole(*args, **kwargs):
+        """Returns the rays of a pinhole camera through the middles of all pixels, `(height, width, 6)`
+        in `float64`, row by row from the top left. A direction advances by 1 along the view. Takes the
+        arguments of either of Open3D's functions:
+
+        - `intrinsic_matrix`, `(3, 3)`, `extrinsic_matrix`, `(4, 4)` from the world to the camera,
+          `width_px`, `height_px`;
+        - `fov_deg`, the horizontal angle of view, `center`, the point that the camera at `eye` looks
+          at, `up`, `width_px`, `height_px`. As in Open3D, `up` points down in the image.
+
+        >>> RaycastingScene.create_rays_pinhole(90, [0, 0, 0], [0, 0, -3], [0, 1, 0], 2, 2)[0, 0]
+        array([ 0. ,  0. , -3. , -0.5, -0.5,  1. ])
+        """
+        if len(args) + len(kwargs) == 4:
+            return _rays_by_matrices(*args, **kwargs)
+        return _rays_by_view(*args, **kwargs)
+
+
+def _check_samples(nsamples):
+    if nsamples < 1 or nsamples % 2 != 1:
+        raise ValueError(f"nsamples is {nsamples}; accepted: odd numbers from 1")
+
+
+def _array(name, argument, shape):
+    array = np.asarray(rows(name, argument, shape[-1]), dtype=np.float64)
+    if array.shape != shape:
+        raise ValueError(f"{name} has shape {array.shape}; accepted: {shape}")
+    return array
+
+
+def _rays_by_matrices(intrinsic_matrix, extrinsic_matrix, width_px, height_px):
+    intrinsic = _array("intrinsic_matrix", intrinsic_matrix, (3, 3))
+    extrinsic = _array("extrinsic_matrix", extrinsic_matrix, (4, 4))
+    to_world = extrinsic[:3, :3].T
+    x, y = np.meshgrid(np.arange(width_px) + 0.5, np.arange(height_px) + 0.5)
+    pixels = np.stack([x, y, np.ones_like(x)], axis=-1)
+    rays = np.empty((height_px, width_px, 6))
+    rays[..., :3] = -to_world @ extrinsic[:3, 3]
+    rays[..., 3:] = pixels @ (to_world @ np.linalg.inv(intrinsic)).T
+    return rays
+
+
+def _rays_by_view(fov_deg, center, eye, up, width_px, height_px):
+    center, eye, up = _array("center", center, (3,)), _array("eye", eye, (3,)), _array("up", up, (3,))
+    forward = center - eye
+    right = np.cross(up, forward)
+    if not (right != 0).any():
+        raise ValueError("up is parallel to the view from eye to center; accepted: other directions")
+    axes = np.stack([right, np.cross(forward, right), forward])
+    extrinsic = np.eye(4)
+    extrinsic[:3, :3] = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+    extrinsic[:3, 3] = -extrinsic[:3, :3] @ eye
+    focal = width_px / (2 * np.tan(np.radians(fov_deg) / 2))
+    intrinsic = [[focal, 0, width_px / 2], [0, focal, height_px / 2], [0, 0, 1]]
+    rays = _rays_by_matrices(intrinsic, extrinsic, width_px, height_px)
+    # Without the rounding of a translation to a far eye and back.
+    rays[..., :3] = eye
+    return rays

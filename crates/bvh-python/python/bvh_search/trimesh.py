@@ -11,18 +11,17 @@ array([ True])
 import numpy as np
 
 from ._bvh_search import Tracer, Tree, locations
+from ._center import center_of
 
 __all__ = ["RayMeshIntersector"]
-
-# A mesh far from zero is moved to it, because tracers round to float32.
-_FAR = 16.0
 
 
 class RayMeshIntersector:
     """Answers the ray queries of trimesh, with the names and results of its own engines.
 
     All hits of a ray count each crossing of the surface once, also through edges and corners. Rays
-    whose direction is zero or not finite hit nothing. The tree is found at the first query, in about
+    whose direction is zero or not finite hit nothing. Rays may begin far away: they are advanced to
+    the mesh in `float64`, and locations are in `float64`. The tree is found at the first query, in about
     `seconds`, and again after the mesh has changed.
     """
 
@@ -35,33 +34,28 @@ class RayMeshIntersector:
         self._made = None
 
     def _tracer(self):
-        """Returns the tracer of the mesh as it is, and the point that has moved to zero."""
+        """Returns the tracer of the mesh as it is."""
         state = hash(self.mesh)
         if self._made is None or self._made[0] != state:
             vertices = np.asarray(self.mesh.vertices, dtype=np.float64)
             faces = np.asarray(self.mesh.faces, dtype=np.int64).reshape((-1, 3))
-            center = None
-            if len(vertices) > 0:
-                low, high = vertices.min(axis=0), vertices.max(axis=0)
-                if np.abs([low, high]).max() > _FAR * (high - low).max():
-                    center = (low + high) / 2
-                    vertices = vertices - center
             seconds = self._seconds
             if seconds is None:
                 seconds = min(1.0, 1e-6 * len(faces))
-            tree = Tree.from_mesh(vertices, faces, seconds=seconds)
-            self._made = state, Tracer(tree), center
-        return self._made[1:]
+            center = center_of(vertices)
+            tree = Tree.from_mesh(vertices - center, faces, seconds=seconds)
+            self._made = state, Tracer(tree, center=center)
+        return self._made[1]
 
-    def _rays(self, ray_origins, ray_directions):
+    @staticmethod
+    def _rays(ray_origins, ray_directions):
         origins = np.ascontiguousarray(ray_origins, dtype=np.float64).view(np.ndarray)
         directions = np.ascontiguousarray(ray_directions, dtype=np.float64).view(np.ndarray)
         if origins.shape != directions.shape:
             raise ValueError("Ray origin and direction don't match!")
         if origins.size == 0:
-            origins = directions = np.empty((0, 3))
-        tracer, center = self._tracer()
-        return tracer, origins if center is None else origins - center, directions, origins
+            return np.empty((0, 3)), np.empty((0, 3))
+        return origins, directions
 
     def intersects_location(self, ray_origins, ray_directions, multiple_hits=True, **kwargs):
         """Returns the locations of hits, `(h, 3)`, and the indices of their rays and faces.
@@ -84,22 +78,22 @@ class RayMeshIntersector:
         >>> mesh.ray.intersects_id([[0.1, 0.2, 5]], [[0, 0, -1]])[1]
         array([0, 0])
         """
-        tracer, moved, directions, origins = self._rays(ray_origins, ray_directions)
+        rays = self._rays(ray_origins, ray_directions)
         if multiple_hits:
-            t, index_tri, index_ray = tracer.all(moved, directions, invalid="miss")
+            _, index_tri, index_ray = self._tracer().all(*rays, invalid="miss")
             # A ray has more hits if the hit so many places later is its own, too.
-            if (index_ray[max_hits:] == index_ray[: max(len(t) - max_hits, 0)]).any():
+            if (index_ray[max_hits:] == index_ray[: max(len(index_ray) - max_hits, 0)]).any():
                 first = np.searchsorted(index_ray, index_ray)
-                kept = np.arange(len(t)) - first < max_hits
-                t, index_tri, index_ray = t[kept], index_tri[kept], index_ray[kept]
+                kept = np.arange(len(index_ray)) - first < max_hits
+                index_tri, index_ray = index_tri[kept], index_ray[kept]
         else:
-            t, index_tri = tracer.nearest(moved, directions, coherent=True, invalid="miss")
+            _, index_tri = self._tracer().nearest(*rays, invalid="miss")
             index_ray = np.nonzero(index_tri >= 0)[0]
-            t, index_tri = t[index_ray], index_tri[index_ray]
+            index_tri = index_tri[index_ray]
         if not return_locations:
             return index_tri.astype(np.int64), index_ray
         corners = np.ascontiguousarray(self.mesh.triangles, dtype=np.float64).view(np.ndarray)
-        found = locations(corners, origins, directions, t, index_tri, index_ray)
+        found = locations(corners, *rays, index_tri, index_ray)
         return index_tri.astype(np.int64), index_ray, found
 
     def intersects_first(self, ray_origins, ray_directions):
@@ -108,8 +102,7 @@ class RayMeshIntersector:
         >>> mesh.ray.intersects_first([[5, 5, 5]], [[0, 0, -1]])
         array([-1], dtype=int32)
         """
-        tracer, moved, directions, _ = self._rays(ray_origins, ray_directions)
-        return tracer.nearest(moved, directions, coherent=True, invalid="miss")[1]
+        return self._tracer().nearest(*self._rays(ray_origins, ray_directions), invalid="miss")[1]
 
     def intersects_any(self, ray_origins, ray_directions):
         """Returns whether each ray hits the mesh.
@@ -117,11 +110,12 @@ class RayMeshIntersector:
         >>> mesh.ray.intersects_any([[5, 5, 5]], [[0, 0, -1]])
         array([False])
         """
-        tracer, moved, directions, _ = self._rays(ray_origins, ray_directions)
-        return tracer.any(moved, directions, coherent=True, invalid="miss")
+        return self._tracer().any(*self._rays(ray_origins, ray_directions), invalid="miss")
 
     def contains_points(self, points):
-        """Returns whether each point is inside the mesh. The answer is exact for watertight meshes.
+        """Returns whether each point is inside the mesh, by `Tracer.contains`: also for meshes that
+        overlap themselves, and by the generalised winding number for meshes with holes. Vertices and
+        points are rounded to `float32`, next to the middle of a mesh that is far from zero.
 
         >>> mesh.ray.contains_points([[0, 0, 0.25], [0, 0, 1]])
         array([ True, False])
@@ -129,8 +123,7 @@ class RayMeshIntersector:
         points = np.ascontiguousarray(points, dtype=np.float64).view(np.ndarray)
         if points.ndim != 2 or points.shape[1] != 3:
             raise ValueError("points must be (n, 3)!")
-        tracer, center = self._tracer()
-        return tracer.contains(points if center is None else points - center)
+        return self._tracer().contains(points)
 
     def __getstate__(self):
         return {**self.__dict__, "_made": None}
