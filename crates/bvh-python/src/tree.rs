@@ -27,11 +27,11 @@ use std::sync::{Arc, PoisonError, RwLock, RwLockWriteGuard};
 ///
 /// Searches have these arguments. They end after `seconds`, by default 1, or after `work` nodes
 /// created or visited. With `work` and without `seconds`, the same `seed` gives the same tree on
-/// every machine. `progress(seconds, cost)` is called about twenty times per second with the
-/// elapsed time and the lowest cost so far; if it raises an exception, the search ends. `rays` are
-/// recorded rays of the shape `(m, 2, 3)`, from their origins to their hits: the tree is then for
-/// rays like these. `references` above 1, up to 16, divides triangles among leaves, on average into
-/// that many parts each.
+/// every machine, and the same file as `bvh bake`. `progress(seconds, cost)` is called about twenty
+/// times per second with the elapsed time and the lowest cost so far; if it raises an exception,
+/// the search ends. `rays` are recorded rays of the shape `(m, 2, 3)`, from their origins to their
+/// hits: the tree is then for rays like these. `references` above 1, up to 16, divides triangles
+/// among leaves, on average into that many parts each.
 ///
 /// >>> from bvh_search import Tree
 /// >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
