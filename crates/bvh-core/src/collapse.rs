@@ -23,6 +23,11 @@ struct Subtree {
 /// # Panics
 /// May panic on a tree that [`validate`](crate::validate()) rejects.
 pub fn collapse_leaves(tree: &Bvh, constants: &SahConstants) -> Bvh {
+    collapse_at_most(tree, constants, u32::MAX)
+}
+
+/// Does the same, but makes no leaves of more than `most` objects.
+pub(crate) fn collapse_at_most(tree: &Bvh, constants: &SahConstants, most: u32) -> Bvh {
     let mut best = vec![Subtree::default(); tree.nodes.len()];
     // Backwards, because the cost of a node depends on its children, which come after it.
     for (index, node) in tree.nodes.iter().enumerate().rev() {
@@ -36,7 +41,7 @@ pub fn collapse_leaves(tree: &Bvh, constants: &SahConstants) -> Bvh {
         let as_leaf = area * constants.intersection * f64::from(objects);
         let as_inner = area * constants.traversal + cost_below;
         // `<=`, because a leaf is one node and an inner node is several.
-        let is_leaf = node.is_leaf() || as_leaf <= as_inner;
+        let is_leaf = node.is_leaf() || objects <= most && as_leaf <= as_inner;
         best[index] = Subtree { cost: if is_leaf { as_leaf } else { as_inner }, objects, is_leaf };
     }
     let mut collapsed = Bvh::default();

@@ -5,7 +5,11 @@
 //! |---|---|---|---|---|
 //! | [binary](FirstCountNode) | 32 per node | [`to_first_count`](crate::Bvh::to_first_count) | [`from_first_count`](crate::Bvh::from_first_count) | `obvhs`, `tinybvh`, most GPU tracers |
 //! | [children's boxes](AilaLaineNode) | 64 per node | [`to_aila_laine`](crate::Bvh::to_aila_laine) | [`from_aila_laine`](crate::Bvh::from_aila_laine) | `tinybvh` (`BVH_GPU`), after Aila & Laine 2009 |
+//! | [three-mesh-bvh's](ThreeMeshNode) | 32 per node | [`to_three_mesh`](crate::Bvh::to_three_mesh) | [`from_three_mesh`](crate::Bvh::from_three_mesh) | `three-mesh-bvh`, `three-gpu-pathtracer` |
 //! | [compressed, eight-wide](CompressedNode) | 80 per node | [`CompressedBvh::new`] | [`CompressedBvh::decode`] | `obvhs`, `tinybvh`, after Ylitie et al. 2017 |
+//!
+//! A cheap tree by area is not yet a fast one there: [`Target::fit`] gives it the leaves, the depth
+//! and the order that a library is fastest with.
 //!
 //! Numbers are little-endian, and nodes are plain data: `bytemuck::cast_slice` gives their bytes on
 //! little-endian machines. The conversion back rejects invalid indices. A tree that was converted
@@ -18,6 +22,8 @@
 mod aila_laine;
 mod compressed;
 mod first_count;
+mod target;
+mod three_mesh;
 mod unpack;
 
 /// Complete compute shaders. Each one reads buffers of nodes, object ids, corners and rays, and
@@ -40,3 +46,5 @@ pub mod shaders {
 pub use aila_laine::AilaLaineNode;
 pub use compressed::{CompressedBvh, CompressedNode};
 pub use first_count::FirstCountNode;
+pub use target::Target;
+pub use three_mesh::ThreeMeshNode;

@@ -2,16 +2,19 @@
 //! has the documented bytes.
 
 use crate::support::{Random, SHAPES, ball, boxes, chain, grid_box, rays, scaled, soup, tree};
-use bvh_core::export::{AilaLaineNode, CompressedBvh, CompressedNode, FirstCountNode};
+use bvh_core::export::{
+    AilaLaineNode, CompressedBvh, CompressedNode, FirstCountNode, Target, ThreeMeshNode,
+};
 use bvh_core::{Aabb, Bvh, InvalidBvh, Node, Triangle, any_hit, nearest_hit, validate};
 use glam::Vec3;
 use proptest::prelude::*;
 
 /// Converts the tree to every layout and back.
-fn returned(tree: &Bvh, boxes: &[Aabb]) -> [(&'static str, Bvh); 3] {
+fn returned(tree: &Bvh, boxes: &[Aabb]) -> [(&'static str, Bvh); 4] {
     [
         ("binary", Bvh::from_first_count(&tree.to_first_count(), &tree.prim_ids).unwrap()),
         ("Aila-Laine", Bvh::from_aila_laine(&tree.to_aila_laine(), &tree.prim_ids).unwrap()),
+        ("three-mesh-bvh", Bvh::from_three_mesh(&tree.to_three_mesh(), &tree.prim_ids).unwrap()),
         ("compressed", CompressedBvh::new(tree, boxes).unwrap().decode().unwrap()),
     ]
 }
@@ -105,6 +108,7 @@ fn the_bytes_are_the_documented_ones() {
         [size_of::<FirstCountNode>(), size_of::<AilaLaineNode>(), size_of::<CompressedNode>()],
         [32, 64, 80]
     );
+    assert_eq!(size_of::<ThreeMeshNode>(), 32);
     // Two cubes of side 1 at x = 0 and x = 509: the grid's step is 2 along x, and 1/128 along y and
     // z.
     let cube = |x: f32| Aabb::from([[x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]]);
@@ -124,6 +128,14 @@ fn the_bytes_are_the_documented_ones() {
     assert_eq!([12, 28, 44].map(|offset| word(bytes, offset)), [1, 2, 0]);
     let leaves = [64 + 44, 64 + 60, 128 + 44, 128 + 60].map(|offset| word(bytes, offset));
     assert_eq!(leaves, [1, 0, 1, 1]);
+
+    let nodes = refitted.to_three_mesh();
+    let bytes: &[u8] = bytemuck::cast_slice(&nodes);
+    // The root's children lie side by side along x; leaves have the mark 0xffff behind the count.
+    assert_eq!([24, 28].map(|offset| word(bytes, offset)), [2, 0]);
+    assert_eq!([32 + 24, 64 + 24].map(|offset| word(bytes, offset)), [1, 0]);
+    assert_eq!(bytes[32 + 28..64], [1, 0, 0xff, 0xff]);
+    assert!(float(bytes, 64) < 509.0 && float(bytes, 64 + 12) > 510.0);
 
     let compressed = CompressedBvh::new(&refitted, &boxes).unwrap();
     let bytes: &[u8] = bytemuck::cast_slice(&compressed.nodes);
@@ -148,6 +160,40 @@ fn float(bytes: &[u8], offset: usize) -> f32 {
 fn word(bytes: &[u8], offset: usize) -> u32 {
     let (word, _) = bytes[offset..].split_first_chunk().unwrap();
     u32::from_le_bytes(*word)
+}
+
+#[test]
+fn a_fitted_tree_has_what_the_tracer_accepts_and_traces_the_same_hits() {
+    let mut random = Random(4);
+    let triangles = soup(700, &mut random);
+    let boxes = boxes(&triangles);
+    let rays = rays(&triangles, 300, &mut random);
+    let mut one_leaf =
+        Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, 700)], prim_ids: (0..700).collect() };
+    one_leaf.refit(&boxes);
+    let trees = [tree(&boxes, SHAPES[0], &mut random), chain(&boxes), one_leaf];
+    let strict = Target { most_objects: 3, most_depth: 11, ..Target::OBVHS };
+    for target in Target::ALL.into_iter().chain([strict]) {
+        for tree in &trees {
+            let fitted = target.fit(tree);
+            validate(&fitted, &boxes).unwrap();
+            assert!(fitted.depth() <= target.most_depth + 1, "{target:?}: {}", fitted.depth());
+            for node in &fitted.nodes {
+                assert!(node.prims().len() <= target.most_objects as usize);
+                assert!(node.is_leaf() || node.children().len() == 2);
+            }
+            // A tree that is accepted as it is never becomes dearer.
+            let binary = Bvh::from_first_count(&tree.to_first_count(), &tree.prim_ids).unwrap();
+            let most = binary.nodes.iter().map(|node| node.prims().len()).max().unwrap();
+            if binary.depth() < target.most_depth && most <= target.most_objects as usize {
+                assert!(target.cost(&fitted) <= target.cost(&binary), "{target:?}");
+            }
+            for ray in &rays {
+                let expected = nearest_hit(tree, &triangles, ray);
+                assert_eq!(nearest_hit(&fitted, &triangles, ray), expected);
+            }
+        }
+    }
 }
 
 #[test]
@@ -179,9 +225,10 @@ proptest! {
             bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect()
         }
         let compressed = CompressedBvh { nodes: nodes(&bytes), prim_ids: ids.clone() };
-        let trees: [Result<Bvh, InvalidBvh>; 3] = [
+        let trees: [Result<Bvh, InvalidBvh>; 4] = [
             Bvh::from_first_count(&nodes(&bytes), &ids),
             Bvh::from_aila_laine(&nodes(&bytes), &ids),
+            Bvh::from_three_mesh(&nodes(&bytes), &ids),
             compressed.decode(),
         ];
         for tree in trees.into_iter().flatten() {

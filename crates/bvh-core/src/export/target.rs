@@ -1,0 +1,157 @@
+//! Tracers of others that take a ready tree: what a node and a triangle cost there, and which trees
+//! they accept.
+
+use crate::collapse::{binary, collapse_at_most};
+use crate::cost::{self, SahConstants};
+use crate::{Bvh, Node};
+use alloc::{vec, vec::Vec};
+
+/// A tracer that traces rays through a ready tree.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Target {
+    /// The name of the library.
+    pub name: &'static str,
+    /// What a visit of an inner node, with the tests of its two children, and a test of a triangle
+    /// cost there.
+    pub constants: SahConstants,
+    /// The most objects in a leaf.
+    pub most_objects: u32,
+    /// The most nodes from the root to a leaf, the root not counted.
+    pub most_depth: usize,
+}
+
+impl Target {
+    /// All targets.
+    pub const ALL: [Self; 3] = [Self::THREE_MESH_BVH, Self::TINYBVH, Self::OBVHS];
+
+    /// `three-mesh-bvh` for three.js, and `three-gpu-pathtracer`. The costs are about those that the
+    /// library builds with; its shaders have a stack of 60.
+    pub const THREE_MESH_BVH: Self = Self {
+        name: "three-mesh-bvh",
+        constants: constants(1.8, 1.25),
+        most_objects: 65_535,
+        most_depth: 59,
+    };
+
+    /// The binary layout `BVH` of `tinybvh`, by the costs that the library builds with.
+    pub const TINYBVH: Self = Self {
+        name: "tinybvh",
+        constants: constants(1.0, 1.0),
+        most_objects: 1 << 20,
+        most_depth: 63,
+    };
+
+    /// The layout `Bvh2` of `obvhs`, by the costs that the library builds with.
+    pub const OBVHS: Self =
+        Self { name: "obvhs", constants: constants(1.0, 1.0), most_objects: 255, most_depth: 95 };
+
+    /// Returns the target of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|target| target.name == name)
+    }
+
+    /// Returns the tree for this tracer: binary, with the leaves that cost least there, no leaf too
+    /// large and none too deep. O(n), and O(n depth) where subtrees are too deep.
+    ///
+    /// # Panics
+    /// May panic on a tree that [`validate`](crate::validate()) rejects.
+    pub fn fit(&self, tree: &Bvh) -> Bvh {
+        let collapsed = collapse_at_most(tree, &self.constants, self.most_objects);
+        let divided = divide_leaves(&binary(&collapsed), self.most_objects);
+        limit_depth(divided, self.most_depth)
+    }
+
+    /// Returns the cost of a ray in a tree, fitted or not: the surface area heuristic by the
+    /// tracer's costs. O(nodes).
+    pub fn cost(&self, tree: &Bvh) -> f64 {
+        cost::sah(tree, &self.constants)
+    }
+}
+
+const fn constants(traversal: f64, intersection: f64) -> SahConstants {
+    SahConstants { traversal, intersection }
+}
+
+/// Halves leaves with more than `most` objects.
+fn divide_leaves(tree: &Bvh, most: u32) -> Bvh {
+    let mut divided = tree.clone();
+    let mut index = 0;
+    while index < divided.nodes.len() {
+        let node = divided.nodes[index];
+        let range = node.prims();
+        if range.len() > most as usize {
+            let (first, start) = (divided.nodes.len() as u32, range.start as u32);
+            let half = range.len() as u32 / 2;
+            divided.nodes[index] = Node::inner(node.aabb, first, 2);
+            divided.nodes.push(Node::leaf(node.aabb, start, half));
+            divided.nodes.push(Node::leaf(node.aabb, start + half, range.len() as u32 - half));
+        }
+        index += 1;
+    }
+    divided
+}
+
+/// Replaces subtrees that reach below `most` levels by balanced ones over the same leaves, as far
+/// down as possible, where few rays come.
+fn limit_depth(mut tree: Bvh, most: usize) -> Bvh {
+    let mut heights = vec![0usize; tree.nodes.len()];
+    let mut leaves = vec![1usize; tree.nodes.len()];
+    for index in (0..tree.nodes.len()).rev() {
+        let children = tree.nodes[index].children();
+        if !children.is_empty() {
+            heights[index] = 1 + heights[children.clone()].iter().max().unwrap_or(&0);
+            leaves[index] = leaves[children].iter().sum();
+        }
+    }
+    if heights.first().is_none_or(|&height| height <= most) {
+        return tree;
+    }
+    let balanced = |leaves: usize| leaves.next_power_of_two().trailing_zeros() as usize;
+    let mut open = vec![(0, 0)];
+    while let Some((index, depth)) = open.pop() {
+        if depth + heights[index] <= most {
+            continue;
+        }
+        let children = tree.nodes[index].children();
+        if children.clone().all(|child| depth + 1 + balanced(leaves[child]) <= most) {
+            open.extend(children.map(|child| (child, depth + 1)));
+        } else {
+            balance(&mut tree, index);
+        }
+    }
+    compact(&tree)
+}
+
+/// Makes the subtree a balanced one over its leaves in their order. Its former nodes stay, unused.
+fn balance(tree: &mut Bvh, root: usize) {
+    let mut leaves: Vec<Node> = Vec::new();
+    let mut open = vec![root];
+    while let Some(index) = open.pop() {
+        let node = tree.nodes[index];
+        if node.is_leaf() {
+            leaves.push(node);
+        }
+        open.extend(node.children().rev());
+    }
+    let mut open = vec![(root, 0..leaves.len())];
+    while let Some((index, range)) = open.pop() {
+        if range.len() == 1 {
+            tree.nodes[index] = leaves[range.start];
+            continue;
+        }
+        let aabb = leaves[range.clone()]
+            .iter()
+            .fold(crate::Aabb::EMPTY, |around, leaf| around.union(&leaf.aabb));
+        let first = tree.nodes.len();
+        tree.nodes[index] = Node::inner(aabb, first as u32, 2);
+        tree.nodes.extend([leaves[range.start]; 2]);
+        let middle = range.start + range.len() / 2;
+        open.extend([(first + 1, middle..range.end), (first, range.start..middle)]);
+    }
+}
+
+/// Returns the nodes that the root reaches, in depth-first order.
+fn compact(tree: &Bvh) -> Bvh {
+    // A traversal cost of zero keeps every inner node that has two leaves or more.
+    collapse_at_most(tree, &constants(0.0, 1.0), 0)
+}
