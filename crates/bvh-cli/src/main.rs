@@ -5,6 +5,7 @@ mod bake;
 mod csv_table;
 mod error;
 mod explain;
+mod export;
 mod inspect;
 mod interrupt;
 mod memory;
@@ -26,8 +27,8 @@ use std::process::ExitCode;
 #[global_allocator]
 static ALLOCATOR: memory::HugePages = memory::HugePages;
 
-/// Bounding volume hierarchies by stochastic search: bake the best tree within a budget, and
-/// inspect it.
+/// Bounding volume hierarchies by stochastic search: bake the best tree within a budget, inspect
+/// it, and export it.
 #[derive(Parser)]
 #[command(name = "bvh", version, arg_required_else_help = true)]
 struct Cli {
@@ -40,6 +41,7 @@ enum Command {
     Bake(bake::BakeArgs),
     Inspect(inspect::InspectArgs),
     Verify(inspect::VerifyArgs),
+    Export(export::ExportArgs),
     Render(render::RenderArgs),
     Report(report::ReportArgs),
     /// List the built-in scenes, their sizes, and the originals that they replace.
@@ -75,6 +77,7 @@ fn run(command: Command) -> Result<(), Error> {
         },
         Command::Inspect(args) => inspect::inspect(&args),
         Command::Verify(args) => inspect::verify(&args),
+        Command::Export(args) => export::export(&args),
         Command::Render(args) => render::render(&args),
         Command::Report(args) => report::report(&args),
         Command::Scenes => scenes::scenes(),

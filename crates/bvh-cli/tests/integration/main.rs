@@ -8,6 +8,7 @@ mod bake_parts;
 mod bake_references;
 mod command_line;
 mod examples;
+mod export;
 mod inspect;
 mod render;
 mod report;

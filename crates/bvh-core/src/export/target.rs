@@ -3,7 +3,7 @@
 
 use crate::collapse::{binary, collapse_at_most};
 use crate::cost::{self, SahConstants};
-use crate::{Bvh, Node};
+use crate::{Aabb, Bvh, Node, file};
 use alloc::{vec, vec::Vec};
 
 /// A tracer that traces rays through a ready tree.
@@ -45,11 +45,6 @@ impl Target {
     pub const OBVHS: Self =
         Self { name: "obvhs", constants: constants(1.0, 1.0), most_objects: 255, most_depth: 95 };
 
-    /// Returns the target of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|target| target.name == name)
-    }
-
     /// Returns the tree for this tracer: binary, with the leaves that cost least there, no leaf too
     /// large and none too deep. O(n), and O(n depth) where subtrees are too deep.
     ///
@@ -59,6 +54,50 @@ impl Target {
         let collapsed = collapse_at_most(tree, &self.constants, self.most_objects);
         let divided = divide_leaves(&binary(&collapsed), self.most_objects);
         limit_depth(divided, self.most_depth)
+    }
+
+    /// Returns a [fitted](Self::fit) tree over `boxes` as a file for this tracer:
+    ///
+    /// | bytes | type | contents |
+    /// |---|---|---|
+    /// | 0..4 | `u8[4]` | `BVHX` |
+    /// | 4..8 | `u32` | version: 1 |
+    /// | 8..12 | `u32` | number of nodes |
+    /// | 12..16 | `u32` | number of object ids |
+    /// | 16..20 | `u32` | [checksum](file::boxes_checksum) of the scene's boxes |
+    /// | 20..32 | | zeros |
+    /// | 32.. | | the nodes, 32 bytes each, in the layout of the tracer, then a `u32` per object id |
+    ///
+    /// The layout is [`ThreeMeshNode`](super::ThreeMeshNode) for `three-mesh-bvh`, otherwise
+    /// [`FirstCountNode`](super::FirstCountNode), for `tinybvh` with the unused node at index 1.
+    ///
+    /// # Panics
+    /// May panic on a tree that [`validate`](crate::validate()) rejects, or that is not fitted.
+    pub fn bytes(&self, tree: &Bvh, boxes: &[Aabb]) -> Vec<u8> {
+        let three = |tree: &Bvh| bytemuck::cast_slice(&tree.to_three_mesh()).to_vec();
+        let aligned = |tree: &Bvh| bytemuck::cast_slice(&tree.to_first_count_aligned()).to_vec();
+        let plain = |tree: &Bvh| bytemuck::cast_slice(&tree.to_first_count()).to_vec();
+        let nodes: Vec<u8> = match *self {
+            Self::THREE_MESH_BVH => three(tree),
+            Self::TINYBVH => aligned(tree),
+            _ => plain(tree),
+        };
+        let header = [
+            1,
+            (nodes.len() / 32) as u32,
+            tree.prim_ids.len() as u32,
+            file::boxes_checksum(boxes),
+            0,
+            0,
+            0,
+        ];
+        let words = header.iter().map(|word| word.to_le_bytes());
+        let ids = tree.prim_ids.iter().map(|id| id.to_le_bytes());
+        let mut bytes = b"BVHX".to_vec();
+        bytes.extend(words.flatten());
+        bytes.extend(nodes);
+        bytes.extend(ids.flatten());
+        bytes
     }
 
     /// Returns the cost of a ray in a tree, fitted or not: the surface area heuristic by the
@@ -139,9 +178,8 @@ fn balance(tree: &mut Bvh, root: usize) {
             tree.nodes[index] = leaves[range.start];
             continue;
         }
-        let aabb = leaves[range.clone()]
-            .iter()
-            .fold(crate::Aabb::EMPTY, |around, leaf| around.union(&leaf.aabb));
+        let aabb =
+            leaves[range.clone()].iter().fold(Aabb::EMPTY, |around, leaf| around.union(&leaf.aabb));
         let first = tree.nodes.len();
         tree.nodes[index] = Node::inner(aabb, first as u32, 2);
         tree.nodes.extend([leaves[range.start]; 2]);

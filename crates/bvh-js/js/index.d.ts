@@ -1,0 +1,43 @@
+import type { BufferGeometry } from 'three';
+import type { MeshBVH } from 'three-mesh-bvh';
+
+export interface BakeOptions {
+    /** How long to search, in seconds. 1 if neither `seconds` nor `work` is given. */
+    seconds?: number;
+    /** How much to search, in nodes visited: the same tree on every machine, as of `bvh bake --budget 50Mwork`. */
+    work?: number;
+    /** Seed of the random numbers. */
+    seed?: number;
+    /** Up to so many leaves per triangle on average, 1 to 16; 1 keeps triangles whole. */
+    references?: number;
+    /**
+     * Called about twenty times a second with the part of the budget that is spent, and after each improvement with the
+     * cost. An exception ends the search and is thrown by `bake`.
+     */
+    onProgress?: (progress: { fraction: number; cost?: number }) => void;
+}
+
+/** A searched tree over the triangles of a geometry. */
+export class Tree {
+    /** Reads a tree that was saved for this very geometry; rejects damaged bytes and other geometries. */
+    static load(bytes: Uint8Array, geometry: BufferGeometry): Promise<Tree>;
+    /** The tree as a file, which the program `bvh` and the interfaces of other languages read. */
+    save(): Uint8Array;
+    /**
+     * The tree as a `MeshBVH`, for `geometry.boundsTree`, `raycastFirst` and whatever takes one. Puts the triangles of the
+     * geometry's index into the order of the tree, as `new MeshBVH` does. With `indirect`, the default for geometries with
+     * groups or a draw range, the index stays as it is and rays are a little slower.
+     */
+    toMeshBVH(geometry: BufferGeometry, options?: { indirect?: boolean }): MeshBVH;
+    /** The expected cost of a ray, in tests of a triangle weighed as three-mesh-bvh does; see `costOf`. */
+    readonly cost: number;
+}
+
+/** Searches the best tree of a geometry in this thread. Rejects a geometry without triangles or with infinite corners. */
+export function bake(geometry: BufferGeometry, options?: BakeOptions): Promise<Tree>;
+
+/** Searches as `bake` does in a worker, so that the page stays alive. `signal` ends it. */
+export function bakeInWorker(geometry: BufferGeometry, options?: BakeOptions & { signal?: AbortSignal }): Promise<Tree>;
+
+/** The cost of a ray in any `MeshBVH` with one root, to compare with `Tree.cost`. */
+export function costOf(meshBVH: MeshBVH): Promise<number>;

@@ -1,0 +1,161 @@
+// What the package promises: the library's own hits, the program's bytes, and errors that name what is wrong.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { test } from 'node:test';
+import {
+    BufferAttribute, BufferGeometry, DoubleSide, InterleavedBuffer, InterleavedBufferAttribute, Ray, TorusKnotGeometry, Vector3,
+} from 'three';
+import { MeshBVH, SAH } from 'three-mesh-bvh';
+import { bake, bakeInWorker, costOf, Tree } from 'bvh-search';
+import { loadExport } from '../examples/load-export.mjs';
+
+/** Numbers from 0 to 1, the same in every run. */
+function random(seed) {
+    return () => {
+        seed = (Math.imul(seed, 1664525) + 1013904223) >>> 0;
+        return seed / 2 ** 32;
+    };
+}
+
+/** A knot among stretched triangles, as scenes of buildings have. */
+function scene({ isIndexed = true } = {}) {
+    const next = random(1);
+    const knot = new TorusKnotGeometry(1, 0.3, 120, 16);
+    const corners = Array.from(knot.attributes.position.array);
+    const index = Array.from(knot.index.array);
+    for (let i = 0; i < 600; i++) {
+        const centre = [next(), next(), next()].map((x) => 6 * x - 3);
+        const axis = Math.floor(3 * next());
+        for (let corner = 0; corner < 3; corner++) {
+            index.push(corners.length / 3);
+            for (let x = 0; x < 3; x++) corners.push(centre[x] + (x === axis ? 4 : 0.1) * (next() - 0.5));
+        }
+    }
+    const geometry = new BufferGeometry();
+    geometry.setAttribute('position', new BufferAttribute(new Float32Array(corners), 3));
+    geometry.setIndex(new BufferAttribute(new Uint32Array(index), 1));
+    return isIndexed ? geometry : geometry.toNonIndexed();
+}
+
+function rays(count) {
+    const next = random(2);
+    const point = () => new Vector3(next(), next(), next()).multiplyScalar(6).subScalar(3);
+    return Array.from({ length: count }, () => {
+        const origin = point();
+        return new Ray(origin, point().sub(origin).normalize());
+    });
+}
+
+/** The corners of a hit triangle, whatever its place in the index. */
+function corners(geometry, hit) {
+    const position = geometry.attributes.position;
+    const vertex = (corner) => new Vector3().fromBufferAttribute(position, corner).toArray().join();
+    return [hit.face.a, hit.face.b, hit.face.c].map(vertex).join(';');
+}
+
+function assertSameHits(ours, theirs, count, least = count / 10) {
+    let hits = 0;
+    for (const ray of rays(count)) {
+        const [a, b] = [ours, theirs].map((bvh) => bvh.raycastFirst(ray, DoubleSide));
+        assert.equal(a?.distance, b?.distance);
+        if (a) {
+            hits++;
+            assert.equal(corners(ours.geometry, a), corners(theirs.geometry, b));
+        }
+    }
+    assert.ok(hits > least, `${hits} hits`);
+}
+
+test('a searched tree has the hits of the library’s own and costs less', async () => {
+    const [geometry, other] = [scene(), scene()];
+    const tree = await bake(geometry, { work: 3_000_000 });
+    const theirs = new MeshBVH(other, { strategy: SAH, targetLeafSize: 1 });
+    const ours = tree.toMeshBVH(geometry);
+    assertSameHits(ours, theirs, 100_000);
+    const [cost, own] = [tree.cost, await costOf(theirs)];
+    assert.ok(cost < 0.9 * own, `${cost} beside ${own}`);
+    assert.ok(Math.abs((await costOf(ours)) / cost - 1) < 1e-3);
+});
+
+test('geometries without an index, with groups, with a draw range and with interleaved corners are traced', async () => {
+    const grouped = scene();
+    const half = 3 * Math.floor(grouped.index.count / 6);
+    grouped.addGroup(0, half, 0);
+    grouped.addGroup(half, grouped.index.count - half, 1);
+    const partial = scene();
+    partial.setDrawRange(half, 900);
+    const interleaved = scene();
+    const position = interleaved.attributes.position;
+    const buffer = new InterleavedBuffer(new Float32Array(5 * position.count), 5);
+    for (let vertex = 0; vertex < position.count; vertex++) {
+        buffer.array.set(position.array.subarray(3 * vertex, 3 * vertex + 3), 5 * vertex + 1);
+    }
+    interleaved.setAttribute('position', new InterleavedBufferAttribute(buffer, 3, 1));
+    for (const geometry of [scene({ isIndexed: false }), grouped, partial, interleaved]) {
+        const theirs = new MeshBVH(geometry.clone(), {});
+        const index = geometry.index?.array.slice();
+        const ours = (await bake(geometry, { work: 200_000 })).toMeshBVH(geometry);
+        assertSameHits(ours, theirs, 5000, geometry === partial ? 100 : 500);
+        if (geometry === grouped || geometry === partial) assert.deepEqual(geometry.index.array, index);
+    }
+});
+
+test('a worker finds the same tree, tells of its progress, and ends on a signal', async () => {
+    const geometry = scene();
+    const work = 2_000_000;
+    const here = await bake(geometry, { work });
+    const fractions = [];
+    const there = await bakeInWorker(geometry, { work, onProgress: ({ fraction }) => fractions.push(fraction) });
+    assert.deepEqual(there.save(), here.save());
+    assert.ok(fractions.length > 2 && fractions.every((part) => part >= 0 && part <= 1));
+    const ended = bakeInWorker(geometry, { seconds: 60, signal: AbortSignal.timeout(200) });
+    await assert.rejects(ended, { name: 'TimeoutError' });
+});
+
+test('a time is kept, and an exception of onProgress ends the search', async () => {
+    const start = performance.now();
+    await bake(scene(), { seconds: 0.2 });
+    assert.ok(performance.now() - start < 5000);
+    const stop = new Error('enough');
+    await assert.rejects(bake(scene(), { seconds: 60, onProgress: () => { throw stop; } }), stop);
+});
+
+test('a saved tree is the file of the program, and loads for its own geometry only', async () => {
+    const geometry = scene();
+    const bytes = (await bake(geometry, { work: 1_000_000, seed: 7 })).save();
+    const tree = await Tree.load(bytes, scene());
+    assert.equal(tree.cost, (await bake(geometry, { work: 1_000_000, seed: 7 })).cost);
+    await assert.rejects(Tree.load(bytes, new TorusKnotGeometry()), /scene|objects/);
+    await assert.rejects(Tree.load(bytes.subarray(1), geometry));
+    if (!process.env.BVH) return;
+    const folder = mkdtempSync(join(tmpdir(), 'bvh-'));
+    const position = geometry.attributes.position.array;
+    const lines = [];
+    for (let at = 0; at < position.length; at += 3) lines.push(`v ${position.slice(at, at + 3).join(' ')}`);
+    const index = geometry.index.array;
+    for (let at = 0; at < index.length; at += 3) lines.push(`f ${[0, 1, 2].map((corner) => index[at + corner] + 1).join(' ')}`);
+    const [mesh, out] = ['mesh.obj', 'tree.bvh'].map((name) => join(folder, name));
+    writeFileSync(mesh, lines.join('\n'));
+    execFileSync(process.env.BVH, ['bake', mesh, '--budget', '1Mwork', '--seed', '7', '--out', out], { stdio: 'pipe' });
+    assert.ok(readFileSync(out).equals(bytes));
+    const exported = join(folder, 'tree.bin');
+    execFileSync(process.env.BVH, ['export', out, mesh, '--for', 'three-mesh-bvh', '--out', exported], { stdio: 'pipe' });
+    const file = readFileSync(exported);
+    const ours = loadExport(file.buffer.slice(file.byteOffset, file.byteOffset + file.length), scene());
+    assertSameHits(ours, new MeshBVH(scene()), 20_000);
+});
+
+test('wrong arguments and geometries are named', async () => {
+    for (const [options, name] of [[{ seconds: -1 }, 'seconds'], [{ work: 0.5 }, 'work'], [{ seed: '1' }, 'seed'], [{ references: 0 }, 'references']]) {
+        await assert.rejects(bake(scene(), options), (error) => error instanceof RangeError && error.message.startsWith(`${name} is`));
+    }
+    await assert.rejects(bake(new BufferGeometry()), /no position/);
+    const broken = scene();
+    broken.attributes.position.array[10] = NaN;
+    await assert.rejects(bake(broken), /object|box/);
+    const tree = await bake(scene(), { work: 100_000 });
+    assert.throws(() => tree.toMeshBVH(new TorusKnotGeometry()), /triangles; accepted/);
+});
