@@ -38,7 +38,7 @@
 
 use super::answer::ANY_HIT;
 use super::crossed_leaves::{AllHits, Decision, LineLanes, SlopedLine};
-use super::flight::{FLIGHT, RAYS, Traversal};
+use super::flight::{RAYS, Traversal};
 use super::instructions::{Instructions, Task};
 use super::kernel::DeepStacks;
 use super::lanes::Lanes;
@@ -208,6 +208,9 @@ fn sort_hits(hits: &mut [Hit]) -> usize {
 /// The largest number of rays that are traced together. What is kept of each fits in the cache.
 const MOST: usize = 256;
 
+/// The number of rays in flight.
+const FLIGHT: usize = 32;
+
 /// The number of pairs that are tested together, at most.
 const PAIRS: usize = 1024;
 
@@ -318,7 +321,7 @@ unsafe fn visit_nodes<K: Instructions>(
     let traversals = traversals.as_mut_ptr().cast::<Traversal>();
     let mut deep = DeepStacks::new(FLIGHT, wide.stack_need);
     let mut active = [core::ptr::null_mut(); FLIGHT];
-    let mut count = K::FLIGHT.min(waiting.len());
+    let mut count = FLIGHT.min(waiting.len());
     let (first, mut waiting) = waiting.split_at(count);
     let nodes = wide.nodes.as_ptr();
     // SAFETY: the references of the layout are sound, and its stacks large enough; nothing is
@@ -327,7 +330,7 @@ unsafe fn visit_nodes<K: Instructions>(
         for (i, &number) in first.iter().enumerate() {
             active[i] = traversals.add(i);
             Traversal::set_stack(active[i], deep.as_mut().map(|deep| deep.stack(i)));
-            (*active[i]).start(*prepared.add(number as usize), wide);
+            (*active[i]).start::<K>(&*prepared.add(number as usize), wide);
         }
         while count > 0 {
             let visits = count;
@@ -354,7 +357,7 @@ unsafe fn visit_nodes<K: Instructions>(
             for &traversal in &ended[..ends] {
                 let Some((&number, rest)) = waiting.split_first() else { break };
                 waiting = rest;
-                (*traversal).start(*prepared.add(number as usize), wide);
+                (*traversal).start::<K>(&*prepared.add(number as usize), wide);
                 active[count] = traversal;
                 count += 1;
             }

@@ -4,7 +4,7 @@ use super::answer::{ANY_HIT, Accept, Batch, NEAREST_HIT};
 use super::instructions::{Instructions, Task};
 use super::lanes::Lanes;
 use super::layout::WideBvh;
-use super::packet::Packet;
+use super::packet::{Packet, RAYS};
 use super::ray_lanes::{RayLanes, prefetch};
 use super::{flight, vector};
 use crate::{Hit, Kernel, Ray};
@@ -15,10 +15,10 @@ use core::ops::Range;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coherence {
     /// Consecutive rays begin close to each other and run in similar directions, as rays through
-    /// neighbouring pixels do, or rays from neighbouring points to a light. Packets of 64 trace
+    /// neighbouring pixels do, or rays from neighbouring points to a light. Packets of 128 trace
     /// them where they cohere; all other rays are traced as incoherent ones.
     Coherent,
-    /// Consecutive rays have little in common. Two dozen rays are in flight, and each advances by a
+    /// Consecutive rays have little in common. Four dozen rays are in flight, and each advances by a
     /// step in turn, which hides the latency of memory. This pays from a hundred rays on.
     Incoherent,
 }
@@ -144,7 +144,7 @@ impl<K: Instructions, const ANY: bool> Task<K> for Trace<'_, '_, ANY> {
             let mut first_of_rest = 0;
             let mut next = 0;
             while next + K::Rays::N <= rays.len() {
-                prefetch::<K>(rays, next + K::PACKET);
+                prefetch::<K>(rays, next + RAYS);
                 let lanes = RayLanes::load(rays, next);
                 if lanes.cohere(&wide.near) {
                     if !packet.takes(lanes.octant()) {

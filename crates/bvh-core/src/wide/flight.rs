@@ -29,8 +29,8 @@ use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 use core::ops::Range;
 
-/// The maximum number of rays in flight.
-pub(super) const FLIGHT: usize = 32;
+/// The number of rays in flight.
+const FLIGHT: usize = 48;
 
 /// The maximum number of rays that are prepared at once.
 pub(super) const RAYS: usize = 16;
@@ -48,7 +48,7 @@ pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
     batch: &mut Batch,
     numbers: Range<usize>,
 ) {
-    const { assert!(K::FLIGHT <= FLIGHT && K::Rays::N <= RAYS) };
+    const { assert!(K::Rays::N <= RAYS) };
     // No triangle has an area. The flight below expects that every ray visits something.
     if wide.root.is_none() {
         for number in numbers {
@@ -162,7 +162,7 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
         // SAFETY: the processor has the instructions; there is room for so many.
         unsafe {
             let first = self.from;
-            for i in 0..K::FLIGHT {
+            for i in 0..FLIGHT {
                 self.idle.append(traversals.add(i), true);
             }
             loop {
@@ -171,7 +171,7 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
                     return;
                 }
                 self.visit_nodes();
-                let leaves_wait = self.at_leaves.count >= K::FLIGHT / 2 || self.at_nodes.count == 0;
+                let leaves_wait = self.at_leaves.count >= FLIGHT / 2 || self.at_nodes.count == 0;
                 if leaves_wait {
                     self.visit_leaves(first);
                     self.finish(first);
@@ -198,8 +198,8 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
             // SAFETY: so many places are idle; `ready` is written where `waiting` had a bit.
             unsafe {
                 let traversal = &mut *self.idle.get(i);
-                let ray = self.ready.get_unchecked(next).assume_init();
-                traversal.start(ray, self.wide);
+                let ray = self.ready.get_unchecked(next).assume_init_ref();
+                traversal.start::<K>(ray, self.wide);
                 self.enlist(traversal);
             }
         }
@@ -286,12 +286,19 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
             self.at_leaves.count = 0;
             let quarters = K::Rays::N / 4;
             let mut hopeful = List::EMPTY;
+            let accepts_all = self.batch.accept.is_none();
             for i in (0..count).step_by(quarters) {
                 let at = |k: usize| self.at_leaves.get((i + k).min(count - 1));
                 let four = [at(0), at(1), at(2), at(3)];
-                let found = candidates::<K::Rays>(four);
+                let (possible, sure) = candidates::<K::Rays>(four);
                 for (k, &traversal) in four.iter().enumerate().take(quarters) {
-                    hopeful.append(traversal, (found >> (4 * k) & 0b1111 != 0) & (i + k < count));
+                    let has = |pairs: u32| pairs >> (4 * k) & 0b1111 != 0;
+                    let is_hit = ANY && accepts_all && has(sure);
+                    if ANY {
+                        let object = (*traversal).object;
+                        (*traversal).object = if is_hit { 0 } else { object };
+                    }
+                    hopeful.append(traversal, has(possible) & !is_hit & (i + k < count));
                 }
             }
             for i in (0..hopeful.count).step_by(quarters) {
@@ -371,10 +378,11 @@ impl Traversal {
 
     /// Starts a ray at the root.
     #[inline(always)]
-    pub(super) unsafe fn start(&mut self, ray: Prepared, wide: &WideBvh) {
+    pub(super) unsafe fn start<K: Instructions>(&mut self, ray: &Prepared, wide: &WideBvh) {
         self.t = ray.t_max;
         self.object = u32::MAX;
-        self.ray = ray;
+        // SAFETY: the processor has the instructions of `K`.
+        unsafe { self.ray.copy::<K::Block>(ray) };
         self.child = wide.root.unwrap_or(Child::END);
         self.nodes = wide.nodes.as_ptr();
         self.blocks = wide.blocks.as_ptr();
@@ -469,12 +477,18 @@ unsafe fn pairs<L: Lanes>(four: [*mut Traversal; 4]) -> Pairs<L> {
     unsafe { Prepared::pairs([&(*four[0]).ray, &(*four[1]).ray, &(*four[2]).ray, &(*four[3]).ray]) }
 }
 
-/// Returns a bit for each triangle that the line of its ray may meet, of the block at which each
-/// ray is: four bits per ray.
+/// Returns a bit for each triangle that its ray may hit, of the block at which each ray is, and a
+/// bit for each that it certainly hits: four bits per ray.
 #[inline(always)]
-unsafe fn candidates<L: Lanes>(four: [*mut Traversal; 4]) -> u32 {
-    // SAFETY: the processor has the instructions.
-    unsafe { pairs::<L>(four).candidates(&corners(four)).possible }
+unsafe fn candidates<L: Lanes>(four: [*mut Traversal; 4]) -> (u32, u32) {
+    // SAFETY: the processor has the instructions; the fields of a traversal from its distance on
+    // are four aligned lanes.
+    unsafe {
+        let row = |i: usize| (&raw const (*four[i]).t);
+        let t_max = L::load_quarters([row(0), row(1), row(2), row(3)]).spread::<0>();
+        let pairs = pairs::<L>(four);
+        pairs.within(&pairs.candidates(&corners(four)), t_max)
+    }
 }
 
 /// Returns the corners of the block at which each ray is, along the axes of its shear.

@@ -33,10 +33,6 @@ pub(crate) trait Instructions: Sized {
     type Block: Lanes;
     /// The widest register: one ray per lane.
     type Rays: Lanes;
-    /// The number of rays in a packet.
-    const PACKET: usize;
-    /// The number of rays in flight.
-    const FLIGHT: usize;
 
     /// Returns a bit per child whose entry is at most its exit.
     unsafe fn entered(entry: Self::Boxes, exit: Self::Boxes) -> u32;

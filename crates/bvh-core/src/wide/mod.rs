@@ -53,7 +53,7 @@ pub(crate) use triangles::TriangleBlock;
 use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate_references};
 use alloc::vec::Vec;
 use answer::{ANY_HIT, NEAREST_HIT};
-use one_ray::OneRay;
+use one_ray::{All, Filter, OneRay};
 use portable::walk;
 
 impl Kernel {
@@ -123,22 +123,22 @@ impl WideBvh {
     /// Returns the nearest triangle that `ray` meets in its range. Of several at the same distance,
     /// the one with the lowest id is nearest.
     pub fn nearest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.one_ray::<NEAREST_HIT>(ray, |_| true)
+        self.one_ray::<NEAREST_HIT>(ray, All)
     }
 
     /// Returns whether `ray` meets any triangle in its range.
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        self.one_ray::<ANY_HIT>(ray, |_| true).is_some()
+        self.one_ray::<ANY_HIT>(ray, All).is_some()
     }
 
-    /// Returns the nearest hit, or with `ANY` the first one found, among those that `accept`
-    /// accepts.
+    /// Returns the nearest hit, or with `ANY` the first one found, among those that `filter`
+    /// accepts. The distance of any hit is that of no hit in particular.
     #[inline]
-    fn one_ray<const ANY: bool>(&self, ray: &Ray, accept: impl FnMut(Hit) -> bool) -> Option<Hit> {
+    fn one_ray<const ANY: bool>(&self, ray: &Ray, mut filter: impl Filter) -> Option<Hit> {
         if self.kernel == Kernel::Portable {
-            return walk::<ANY>(self, ray, &mut (), accept);
+            return walk::<ANY>(self, ray, &mut (), |hit| filter.accepts(hit));
         }
-        let task = OneRay::<_, ANY> { wide: self, ray, accept };
+        let task = OneRay::<_, ANY> { wide: self, ray, filter };
         // SAFETY: a layout's kernel is available.
         let hit: Hit = unsafe { vector::dispatch(self.kernel, task) };
         (!hit.is_miss()).then_some(hit)

@@ -5,7 +5,7 @@ use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::{Lanes, Mask};
 use super::layout::{Child, WideBvh};
-use super::pairs::{Pairs, Plane, SINGLE_ERROR};
+use super::pairs::{Pairs, Plane};
 use super::triangles::TriangleBlock;
 use crate::ray::{AXES, largest_axis};
 use crate::{Aabb, Hit, Ray};
@@ -18,29 +18,59 @@ use core::mem::MaybeUninit;
 #[repr(align(64))]
 struct Aligned<T>(T);
 
-/// The search for a ray's nearest hit, or with `ANY` the first one found, among those that `accept`
+/// The search for a ray's nearest hit, or with `ANY` the first one found, among those that `filter`
 /// accepts; without any the object is `u32::MAX`.
-pub(crate) struct OneRay<'a, A, const ANY: bool> {
+pub(crate) struct OneRay<'a, F, const ANY: bool> {
     pub(crate) wide: &'a WideBvh,
     pub(crate) ray: &'a Ray,
-    pub(crate) accept: A,
+    pub(crate) filter: F,
 }
 
-impl<K: Instructions, A: FnMut(Hit) -> bool, const ANY: bool> Task<K> for OneRay<'_, A, ANY> {
+impl<K: Instructions, F: Filter, const ANY: bool> Task<K> for OneRay<'_, F, ANY> {
     type Output = Hit;
 
     #[inline(always)]
     unsafe fn run(self) -> Hit {
-        let Self { wide, ray, accept } = self;
-        let mut leaves = FirstHits {
+        let Self { wide, ray, filter } = self;
+        let mut leaves = FirstHits::<_, _, ANY> {
             ray,
             bounds: &wide.bounds,
             leaf_ray: MaybeUninit::uninit(),
             is_prepared: false,
-            accept,
+            filter,
         };
         // SAFETY: the processor has the instructions of `K`.
         unsafe { traverse::<K, ANY>(wide, ray, &mut leaves) }
+    }
+}
+
+/// Decides which hits of a ray count.
+pub(crate) trait Filter {
+    /// Whether all hits do, so that any hit needs no distance.
+    const ACCEPTS_ALL: bool;
+
+    /// Returns whether a hit counts.
+    fn accepts(&mut self, hit: Hit) -> bool;
+}
+
+/// The filter that accepts all hits.
+pub(crate) struct All;
+
+impl Filter for All {
+    const ACCEPTS_ALL: bool = true;
+
+    #[inline(always)]
+    fn accepts(&mut self, _: Hit) -> bool {
+        true
+    }
+}
+
+impl Filter for &mut dyn FnMut(Hit) -> bool {
+    const ACCEPTS_ALL: bool = false;
+
+    #[inline(always)]
+    fn accepts(&mut self, hit: Hit) -> bool {
+        self(hit)
     }
 }
 
@@ -174,16 +204,16 @@ unsafe fn visit<K: Instructions, const ANY: bool>(
     }
 }
 
-/// Keeps the nearest hit among those that `accept` accepts.
-struct FirstHits<'r, L, A> {
+/// Keeps the nearest hit among those that `filter` accepts.
+struct FirstHits<'r, L, F, const ANY: bool> {
     ray: &'r Ray,
     bounds: &'r Aabb,
     leaf_ray: MaybeUninit<LeafRay<L>>,
     is_prepared: bool,
-    accept: A,
+    filter: F,
 }
 
-impl<L: Lanes, A: FnMut(Hit) -> bool> Leaves<L> for FirstHits<'_, L, A> {
+impl<L: Lanes, F: Filter, const ANY: bool> Leaves<L> for FirstHits<'_, L, F, ANY> {
     #[inline(always)]
     unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool {
         // SAFETY: the processor has the instructions; the ray is prepared before its use.
@@ -192,7 +222,7 @@ impl<L: Lanes, A: FnMut(Hit) -> bool> Leaves<L> for FirstHits<'_, L, A> {
                 self.leaf_ray.write(LeafRay::new(self.ray, self.bounds));
                 self.is_prepared = true;
             }
-            self.leaf_ray.assume_init_ref().visit(block, nearest, &mut self.accept)
+            self.leaf_ray.assume_init_ref().visit::<F, ANY>(block, nearest, &mut self.filter)
         }
     }
 }
@@ -219,35 +249,42 @@ impl<L: Lanes> LeafRay<L> {
             let dx = direction[x];
             let dy = direction[y];
             let dz = direction[z];
-            let pairs = Pairs {
-                origin: [L::splat(origin[x]), L::splat(origin[y]), L::splat(origin[z])],
-                direction: [L::splat(dx), L::splat(dy), L::splat(dz)],
-                slope: [L::splat(dx / dz), L::splat(dy / dz)],
-                reach: L::splat(reach),
-                error: L::splat(reach * SINGLE_ERROR),
-                t_min: L::splat(ray.t_min()),
-            };
+            let pairs = Pairs::new(
+                [L::splat(origin[x]), L::splat(origin[y]), L::splat(origin[z])],
+                [L::splat(dx), L::splat(dy), L::splat(dz)],
+                [L::splat(dx / dz), L::splat(dy / dz)],
+                L::splat(reach),
+                L::splat(ray.t_min()),
+            );
             Self { pairs, axes }
         }
     }
 
     /// Tests the triangles of a block. Returns whether one of them is the new nearest hit.
     #[inline(always)]
-    unsafe fn visit(
+    unsafe fn visit<F: Filter, const ANY: bool>(
         &self,
         block: &TriangleBlock,
         nearest: &mut Hit,
-        accept: &mut impl FnMut(Hit) -> bool,
+        filter: &mut F,
     ) -> bool {
         // SAFETY: the processor has the instructions; axes are below 3.
         unsafe {
             let corners = block.corners_along::<L>(self.axes);
-            let candidates = self.pairs.candidates(&corners);
+            let t_max = L::splat(nearest.t);
+            let mut candidates = self.pairs.candidates(&corners);
+            if ANY {
+                let (possible, sure) = self.pairs.within(&candidates, t_max);
+                if F::ACCEPTS_ALL && sure != 0 {
+                    nearest.object = block.id(sure.trailing_zeros() as usize & 3);
+                    return true;
+                }
+                candidates.possible = possible;
+            }
             if candidates.possible == 0 {
                 return false;
             }
             let plane = Plane::of_lanes(&corners);
-            let t_max = L::splat(nearest.t);
             let (inside, t) = self.pairs.decide(&corners, &plane, &candidates, t_max);
             let mut hits = inside.bits();
             if hits == 0 {
@@ -261,7 +298,7 @@ impl<L: Lanes> LeafRay<L> {
                 hits &= hits - 1;
                 let hit = Hit { t: distances[lane], object: block.id(lane) };
                 // An unused lane repeats a triangle, which a filter may have rejected.
-                if !hit.is_miss() && hit.precedes(nearest) && accept(hit) {
+                if !hit.is_miss() && hit.precedes(nearest) && filter.accepts(hit) {
                     *nearest = hit;
                     is_nearer = true;
                 }

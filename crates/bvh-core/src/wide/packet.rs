@@ -18,8 +18,11 @@ use crate::slabs::{FAR, NEAR};
 use crate::{Aabb, Hit};
 use core::mem::MaybeUninit;
 
+/// The maximum number of rays in a packet.
+pub(crate) const RAYS: usize = 128;
+
 /// The maximum number of vectors in a packet.
-pub(crate) const VECTORS: usize = 64 / 8;
+const VECTORS: usize = RAYS / 8;
 
 /// A packet of vectors of rays that [cohere](RayLanes::cohere), all of the same octant.
 pub(crate) struct Packet<K: Instructions> {
@@ -79,8 +82,7 @@ impl<K: Instructions> Packet<K> {
     /// Returns whether rays of this octant can be added.
     #[inline(always)]
     pub(crate) fn takes(&self, octant: u32) -> bool {
-        self.count == 0
-            || (self.count < VECTORS.min(K::PACKET / K::Rays::N) && self.octant == octant)
+        self.count == 0 || (self.count < RAYS / K::Rays::N && self.octant == octant)
     }
 
     /// Adds rays that cohere, of which the first is number `first` of its batch.
@@ -377,6 +379,18 @@ impl<K: Instructions> Packet<K> {
                     let corners = (*block).splat_corners::<K::Rays>(lane, vector.axes);
                     let mut candidates = pairs.candidates(&corners);
                     candidates.possible &= entered;
+                    if ANY && accept.is_none() {
+                        let (possible, sure) = pairs.within(&candidates, vector.t);
+                        if sure != 0 {
+                            is_hit = true;
+                            // A ray that has its answer ends before it begins.
+                            let sure: <K::Rays as Lanes>::Mask = Mask::from_bits(sure);
+                            vector.t = Lanes::select(sure, K::Rays::splat(-1.0), vector.t);
+                            let object = K::Rays::splat_bits((*block).id(lane));
+                            vector.object = Lanes::select(sure, object, vector.object);
+                        }
+                        candidates.possible = possible & !sure;
+                    }
                     if candidates.possible == 0 {
                         continue;
                     }

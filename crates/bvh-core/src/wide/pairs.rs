@@ -8,8 +8,10 @@
 //! ```text
 //!   does the line cross the triangle?        at which distance?
 //!
-//!   f32          nearly all triangles        f64          nearly all that are crossed
-//!    │ perhaps                                │ perhaps
+//!   f32          nearly all triangles        f32          is it in the range?
+//!    │ perhaps                                │ perhaps, or which one is it?
+//!    │                                       f64          nearly all that are crossed
+//!    │                                        │ perhaps
 //!   f64          nearly all others            │
 //!    │ perhaps                                │
 //!    └───────────> expansions, exact <────────┘
@@ -27,6 +29,24 @@
 //! less than E = e (m + e) with e = 64uR. Underflow adds less than 2⁻¹²⁶, the last term of the
 //! bound in the code. The sum m + e is the *spread*: no real |x|, |y| exceeds it. If all edge
 //! values are above E, or all below −E, the line crosses the triangle.
+//!
+//! *Range in f32*. Where all edge values u, v, w are certain, they and their sum a have the signs of
+//! the real ones. With depths z of the corners relative to the origin and T a bound of the range,
+//!
+//! ```text
+//!   (T − t) d_z = T d_z − z_A − X,      X = (v (z_B − z_A) + w (z_C − z_A)) / a
+//! ```
+//!
+//! and its product with the computed a is what `within` computes. Let Δ be the larger of the two
+//! differences of depths, which |X| does not exceed. An edge value is off by E, a by 3E + 3u|a|, a
+//! difference by 4uR: the computed X is off by at most 5EΔ / |a| + 22uR. The computed Δ may lack
+//! 4uR, and so 20EuR of 5EΔ, which is below 7uR|a|, because |a| is at least 3E. Where |T d_z| is at
+//! most 4R, roundings of the other terms are below 23uR together; where it is more, they are less
+//! than T d_z. A hit counts by its rounded distance, which is off by at most u|t|, and uR / |d_z|
+//! covers that, or by 2⁻¹⁵⁰, where it is subnormal. Hence a product beyond 8EΔ + (e + 2⁻¹⁴⁹|d_z|) |a|
+//! has the sign of the difference of T and the rounded distance, or that difference is 0 within the
+//! range. Below R = 2⁴⁰ nothing overflows but T d_z, which then has the right sign, and its
+//! products; other rays get an infinite bound.
 //!
 //! *f64*, ε = 2⁻⁵³. Corners are sheared by multiplication with d_z, so S = spread · |d_z| is at
 //! least the largest |x|, |y|, and the edge values are within E = e (S + e) with e = 64εR|d_z|, as
@@ -48,17 +68,18 @@
 //!   h′ / s′ − t = (h′ − h − t (s′ − s)) / s′
 //! ```
 //!
-//! is at most (24 + 21) εMP / |s′|, and the division adds 2ε|h′ / s′|, which is at most 6εMP /
+//! is at most (24 + 21) εMP / |s′|, and the division adds 2.2ε|h′ / s′|, which is at most 7εMP /
 //! |s′|, because |h| is at most 3MP. The bound 64εMP / |s′| covers the sum. If both ends of this
 //! interval round to one f32, that f32 is the rounded distance, because rounding is monotone.
 
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use crate::exact::ERROR;
+use crate::ray::pow2;
 use crate::{PreparedRay, Ray, Triangle};
 use core::ops::{Mul, Sub};
 
 /// e of f32, in multiples of R.
-pub(crate) const SINGLE_ERROR: f32 = 64.0 * (f32::EPSILON / 2.0);
+const SINGLE_ERROR: f32 = 64.0 * (f32::EPSILON / 2.0);
 
 /// The rays of the pairs. Vectors, of corners too, are in the shear's order of axes: the
 /// direction's largest component is the last.
@@ -71,7 +92,9 @@ pub(crate) struct Pairs<L> {
     /// At least the coordinates of corners relative to the origin.
     pub(crate) reach: L,
     /// e, the bound of the error of a coordinate sheared in f32.
-    pub(crate) error: L,
+    error: L,
+    /// The bound of the error of a distance times the depth in f32, without the tilt's.
+    range_error: L,
     pub(crate) t_min: L,
 }
 
@@ -81,6 +104,11 @@ pub(crate) struct Candidates<L> {
     pub(crate) possible: u32,
     /// A bit per pair whose triangle the ray's line certainly crosses.
     certain: u32,
+    /// The edge values, and their error bound.
+    edges: [L; 3],
+    error: L,
+    /// The negated depths of the corners.
+    depths: [L; 3],
     /// The spread of each pair.
     spread: L,
 }
@@ -98,15 +126,40 @@ pub(crate) struct Plane<L: Lanes> {
 }
 
 impl<L: Lanes> Pairs<L> {
+    /// Returns rays of these origins and directions in the shear's order of axes, for corners whose
+    /// coordinates relative to the origin are at most `reach`.
+    #[inline(always)]
+    pub(crate) fn new(
+        origin: [L; 3],
+        direction: [L; 3],
+        slope: [L; 2],
+        reach: L,
+        t_min: L,
+    ) -> Self {
+        // SAFETY: values exist.
+        let [part, subnormal, most, infinite] = unsafe {
+            [
+                L::splat(SINGLE_ERROR),
+                L::splat(f32::from_bits(1)),
+                L::splat(pow2(40)),
+                L::splat(f32::INFINITY),
+            ]
+        };
+        let error = reach * part;
+        let range_error = direction[2].abs().mul_add(subnormal, error);
+        let range_error = L::select(reach.lt(most), range_error, infinite);
+        Self { origin, direction, slope, reach, error, range_error, t_min }
+    }
+
     /// Finds the pairs whose triangle the ray's line may cross, in f32.
     #[inline(always)]
     pub(crate) fn candidates(&self, corners: &[[L; 3]; 3]) -> Candidates<L> {
         // SAFETY: values exist.
         let (zero, underflow) = unsafe { (L::splat(0.0), L::splat(f32::MIN_POSITIVE)) };
         let [a, b, c] = self.roughly_sheared(corners);
-        let [ax, ay] = a;
-        let [bx, by] = b;
-        let [cx, cy] = c;
+        let [ax, ay, az] = a;
+        let [bx, by, bz] = b;
+        let [cx, cy, cz] = c;
         let u = cx.mul_sub(by, cy * bx);
         let v = ax.mul_sub(cy, ay * cx);
         let w = bx.mul_sub(ay, by * ax);
@@ -118,11 +171,38 @@ impl<L: Lanes> Pairs<L> {
         let all = u32::MAX >> (32 - L::N);
         let possible = all & !(least.lt(below) & error.lt(most)).bits();
         let certain = (error.lt(least) | most.lt(below)).bits();
-        Candidates { possible, certain, spread }
+        Candidates { possible, certain, edges: [u, v, w], error, depths: [az, bz, cz], spread }
+    }
+
+    /// Returns the candidates that may be hits in the range up to `t_max`, and those that certainly
+    /// are, in f32.
+    #[inline(always)]
+    pub(crate) fn within(&self, candidates: &Candidates<L>, t_max: L) -> (u32, u32) {
+        // SAFETY: values exist.
+        let [zero, minus, eight] = unsafe { [L::splat(0.0), L::splat(-0.0), L::splat(8.0)] };
+        // SAFETY: a value exists.
+        let underflow = unsafe { L::splat(f32::MIN_POSITIVE) };
+        let [u, v, w] = candidates.edges;
+        let [az, bz, cz] = candidates.depths;
+        let depth = self.direction[2];
+        let area = u + v + w;
+        let side = bz - az;
+        let other = cz - az;
+        let tilt = v.mul_add(side, w * other);
+        let flip = minus & (area ^ depth);
+        let slack = (candidates.error * eight)
+            .mul_add(side.abs().max(other.abs()), self.range_error.mul_add(area.abs(), underflow));
+        let begin = area.mul_add(self.t_min.mul_add(depth, az), tilt) ^ flip;
+        let end = area.mul_add(t_max.mul_add(depth, az), tilt) ^ flip;
+        let no_slack = zero - slack;
+        let beyond = slack.lt(begin) | end.lt(no_slack);
+        let within = begin.lt(no_slack) & slack.lt(end);
+        let certain = candidates.certain & candidates.possible;
+        (candidates.possible & !(certain & beyond.bits()), certain & within.bits())
     }
 
     #[inline(always)]
-    fn spread(&self, [a, b, c]: &[[L; 2]; 3]) -> L {
+    fn spread(&self, [a, b, c]: &[[L; 3]; 3]) -> L {
         let a = a[0].abs().max(a[1].abs());
         let b = b[0].abs().max(b[1].abs());
         let c = c[0].abs().max(c[1].abs());
@@ -150,7 +230,7 @@ impl<L: Lanes> Pairs<L> {
             crossed = is_inside & unsafe { L::Mask::from_bits(possible) };
             unsure = possible & !(is_outside | is_inside & (is_hit | is_behind)).bits();
             if unsure != 0 {
-                return self.decide_exactly(corners, t_max, unsure, is_hit & crossed, t);
+                return Self::decide_exactly(*self, *corners, t_max, unsure, is_hit & crossed, t);
             }
         }
         (is_hit & crossed & self.t_min.le(t) & t.le(t_max), t)
@@ -161,7 +241,7 @@ impl<L: Lanes> Pairs<L> {
     #[inline(always)]
     fn meet(&self, first: &[L; 3], plane: &Plane<L>) -> (L::Mask, L::Mask, L) {
         // SAFETY: values exist.
-        let [zero, one, part]: [L::Double; 3] = unsafe { constants([0.0, 1.0, ERROR]) };
+        let [zero, part]: [L::Double; 2] = unsafe { constants([0.0, ERROR]) };
         let [nx, ny, nz] = plane.normal;
         let x = plane.corner[0] - self.origin[0].double();
         let y = plane.corner[1] - self.origin[1].double();
@@ -170,7 +250,7 @@ impl<L: Lanes> Pairs<L> {
         let [dx, dy, dz] = self.direction.map(L::double);
         let height = nz.mul_add(z, ny.mul_add(y, nx * x));
         let speed = nz.mul_add(dz, ny.mul_add(dy, nx * dx));
-        let inverse = one / speed;
+        let inverse = speed.inverse();
         let t = height * inverse;
         let slack = part * plane.size * reach.double() * size(inverse);
         let low = t - slack;
@@ -210,18 +290,20 @@ impl<L: Lanes> Pairs<L> {
         self.decide(corners, &Plane::of_lanes(corners), &self.candidates(corners), t_max)
     }
 
-    /// Returns the corners of each triangle relative to the ray, sheared in f32.
+    /// Returns the corners of each triangle relative to the ray, sheared in f32; the last
+    /// coordinate is negated.
     #[inline(always)]
-    fn roughly_sheared(&self, [a, b, c]: &[[L; 3]; 3]) -> [[L; 2]; 3] {
+    fn roughly_sheared(&self, [a, b, c]: &[[L; 3]; 3]) -> [[L; 3]; 3] {
         [self.corner(a), self.corner(b), self.corner(c)]
     }
 
     #[inline(always)]
-    fn corner(&self, corner: &[L; 3]) -> [L; 2] {
+    fn corner(&self, corner: &[L; 3]) -> [L; 3] {
         let z = self.origin[2] - corner[2];
         [
             z.mul_add(self.slope[0], corner[0] - self.origin[0]),
             z.mul_add(self.slope[1], corner[1] - self.origin[1]),
+            z,
         ]
     }
 
@@ -238,12 +320,13 @@ impl<L: Lanes> Pairs<L> {
         ]
     }
 
-    /// Decides the pairs that are unsure one by one.
+    /// Decides the pairs that are unsure one by one. Takes copies, so that what its callers have
+    /// stays in registers.
     #[cold]
     #[inline(never)]
     fn decide_exactly(
-        &self,
-        corners: &[[L; 3]; 3],
+        self,
+        corners: [[L; 3]; 3],
         t_max: L,
         unsure: u32,
         is_hit: L::Mask,

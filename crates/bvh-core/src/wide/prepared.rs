@@ -6,7 +6,7 @@ use super::instructions::{Instructions, Task};
 use super::lanes::{Lanes, Mask};
 use super::layout::WideBvh;
 use super::layout::WideNode;
-use super::pairs::{Pairs, SINGLE_ERROR};
+use super::pairs::Pairs;
 use super::ray_lanes::RayLanes;
 use crate::ray::AXES;
 use crate::slabs::{FAR, NEAR};
@@ -27,18 +27,20 @@ pub(crate) struct Ready<L> {
 #[repr(C, align(64))]
 pub(crate) struct Prepared {
     near_factor: [f32; 3],
-    pub(crate) t_min: f32,
+    /// The first two components of the direction in the shear's order of axes, as in [`Pairs`].
+    x_direction: f32,
     /// The origin by axis.
     box_origin: [f32; 3],
     pub(crate) t_max: f32,
     far_factor: [f32; 3],
-    /// As in [`Pairs`], and in the shear's order of axes, up to `x_slope`.
-    depth: f32,
+    y_direction: f32,
+    /// As in [`Pairs`].
     origin: [f32; 3],
-    y_slope: f32,
-    direction: [f32; 2],
-    reach: f32,
     x_slope: f32,
+    y_slope: f32,
+    reach: f32,
+    depth: f32,
+    t_min: f32,
     /// The bytes of a node before the planes that the ray meets first, by axis.
     pub(crate) near: [u32; 3],
     /// The axis of the largest component of the direction.
@@ -111,11 +113,11 @@ impl<L: Lanes> Ready<L> {
                 near[i] = L::select(self.backwards(i), upper, lower);
                 far[i] = L::select(self.backwards(i), lower, upper);
             }
-            write_row(to, 0, self.near_factor, self.rays.t_min);
+            write_row(to, 0, self.near_factor, dx);
             write_row(to, 1, self.rays.origin, self.rays.t_max);
-            write_row(to, 2, self.far_factor, depth);
-            write_row(to, 3, origin, dy / depth);
-            write_row(to, 4, [dx, dy, self.reach], dx / depth);
+            write_row(to, 2, self.far_factor, dy);
+            write_row(to, 3, origin, dx / depth);
+            write_row(to, 4, [dy / depth, self.reach, depth], self.rays.t_min);
             write_row(to, 5, near, axis);
             write_row(to, 6, far, bits(0));
             for (lane, number) in (first..).enumerate().take(L::N) {
@@ -127,6 +129,20 @@ impl<L: Lanes> Ready<L> {
 }
 
 impl Prepared {
+    /// Copies a ray as it was written, row by row: wider loads would wait until all rows have
+    /// reached the cache.
+    ///
+    /// # Safety
+    /// The processor has the instructions.
+    #[inline(always)]
+    pub(crate) unsafe fn copy<L: Lanes>(&mut self, from: &Self) {
+        const { assert!(L::N == 4) };
+        for row in 0..size_of::<Self>() / size_of::<[f32; 4]>() {
+            // SAFETY: rows are four aligned lanes.
+            unsafe { L::load(from.row(row)).store(self.row(row).cast_mut()) };
+        }
+    }
+
     /// Four lanes of it.
     #[inline(always)]
     fn row(&self, row: usize) -> *const f32 {
@@ -167,8 +183,8 @@ impl Prepared {
     fn far_away(&self) -> FarBoxRay {
         let [x, y, z] = AXES[self.largest_axis as usize % 3];
         let mut direction = [0.0; 3];
-        direction[x] = self.direction[0];
-        direction[y] = self.direction[1];
+        direction[x] = self.x_direction;
+        direction[y] = self.y_direction;
         direction[z] = self.depth;
         FarBoxRay::new(&Ray::assume_valid(self.box_origin, direction, self.t_min, self.t_max))
     }
@@ -189,18 +205,15 @@ impl Prepared {
                     rays[3].row(row),
                 ])
             };
-            let begin = row(0);
-            let far = row(2);
             let origin = row(3);
-            let direction = row(4);
-            Pairs {
-                origin: [origin.spread::<0>(), origin.spread::<1>(), origin.spread::<2>()],
-                direction: [direction.spread::<0>(), direction.spread::<1>(), far.spread::<3>()],
-                slope: [direction.spread::<3>(), origin.spread::<3>()],
-                reach: direction.spread::<2>(),
-                error: direction.spread::<2>() * L::splat(SINGLE_ERROR),
-                t_min: begin.spread::<3>(),
-            }
+            let last = row(4);
+            Pairs::new(
+                [origin.spread::<0>(), origin.spread::<1>(), origin.spread::<2>()],
+                [row(0).spread::<3>(), row(2).spread::<3>(), last.spread::<2>()],
+                [origin.spread::<3>(), last.spread::<0>()],
+                last.spread::<1>(),
+                last.spread::<3>(),
+            )
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::instructions::Instructions;
 use super::lanes::{Lanes, Mask};
-use super::pairs::{Pairs, SINGLE_ERROR};
+use super::pairs::Pairs;
 use crate::ray::AXES;
 use crate::{Aabb, Ray};
 
@@ -125,17 +125,13 @@ impl<L: Lanes> RayLanes<L> {
     #[inline(always)]
     pub(crate) fn sheared(&self, [x, y, z]: [usize; 3], bounds: &Aabb) -> Pairs<L> {
         let Self { origin, direction, t_min, .. } = self;
-        let reach = self.reach(bounds);
-        // SAFETY: a value exists.
-        let part = unsafe { L::splat(SINGLE_ERROR) };
-        Pairs {
-            origin: [origin[x], origin[y], origin[z]],
-            direction: [direction[x], direction[y], direction[z]],
-            slope: [direction[x] / direction[z], direction[y] / direction[z]],
-            reach,
-            error: reach * part,
-            t_min: *t_min,
-        }
+        Pairs::new(
+            [origin[x], origin[y], origin[z]],
+            [direction[x], direction[y], direction[z]],
+            [direction[x] / direction[z], direction[y] / direction[z]],
+            self.reach(bounds),
+            *t_min,
+        )
     }
 }
 

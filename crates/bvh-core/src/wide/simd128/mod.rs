@@ -39,8 +39,6 @@ impl Instructions for Simd128 {
     type Boxes = Singles<2>;
     type Block = Singles<1>;
     type Rays = Singles<2>;
-    const PACKET: usize = 64;
-    const FLIGHT: usize = 24;
 
     #[inline(always)]
     unsafe fn entered(entry: Singles<2>, exit: Singles<2>) -> u32 {

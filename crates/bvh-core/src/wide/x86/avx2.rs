@@ -33,8 +33,6 @@ impl Instructions for Avx2 {
     type Boxes = F32x8;
     type Block = F32x4;
     type Rays = F32x8;
-    const PACKET: usize = 64;
-    const FLIGHT: usize = 32;
 
     #[inline(always)]
     unsafe fn prefetch(line: *const u8) {

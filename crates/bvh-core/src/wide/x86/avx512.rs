@@ -12,8 +12,6 @@ impl Instructions for Avx512 {
     type Boxes = F32x8;
     type Block = F32x4;
     type Rays = F32x16;
-    const PACKET: usize = 64;
-    const FLIGHT: usize = 24;
 
     #[inline(always)]
     unsafe fn prefetch(line: *const u8) {

@@ -327,6 +327,17 @@ impl DoubleLanes for F64x8 {
     unsafe fn splat(x: f64) -> Self {
         unsafe { Self(_mm512_set1_pd(x)) }
     }
+    /// Two steps of Newton's method, which take half the time of a division. Of 0 and ∞ they make
+    /// NaN, which no comparison accepts.
+    #[inline(always)]
+    fn inverse(self) -> Self {
+        unsafe {
+            let one = _mm512_set1_pd(1.0);
+            let x = _mm512_rcp14_pd(self.0);
+            let x = _mm512_fmadd_pd(_mm512_fnmadd_pd(self.0, x, one), x, x);
+            Self(_mm512_fmadd_pd(_mm512_fnmadd_pd(self.0, x, one), x, x))
+        }
+    }
     #[inline(always)]
     unsafe fn store(self, to: *mut f64) {
         unsafe { _mm512_storeu_pd(to, self.0) }
@@ -366,6 +377,10 @@ impl<T: DoubleLanes> DoubleLanes for Two<T> {
     #[inline(always)]
     unsafe fn splat(x: f64) -> Self {
         unsafe { Self(T::splat(x), T::splat(x)) }
+    }
+    #[inline(always)]
+    fn inverse(self) -> Self {
+        Self(self.0.inverse(), self.1.inverse())
     }
     #[inline(always)]
     unsafe fn store(self, to: *mut f64) {
