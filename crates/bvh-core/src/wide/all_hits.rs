@@ -38,9 +38,9 @@
 
 use super::answer::ANY_HIT;
 use super::crossed_leaves::{AllHits, Decision, LineLanes, SlopedLine};
-use super::flight::{RAYS, Traversal};
-use super::instructions::{Instructions, Task};
-use super::kernel::DeepStacks;
+use super::flight::RAYS;
+use super::instructions::{Instructions, Pending, Task};
+use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::Lanes;
 use super::layout::{Child, WideBvh, WideNode};
 use super::one_ray::traverse;
@@ -294,13 +294,42 @@ impl<K: Instructions> Task<K> for ManyRays<'_> {
             let mut pairs = Pairs { wide, rays, lines: &lines, pairs: [0; PAIRS], count: 0, found };
             let waiting = &waiting[..count];
             if root.is_node() {
-                visit_nodes::<K>(&mut pairs, waiting, prepared.as_ptr().cast());
+                visit_nodes::<K>(&mut pairs, waiting, prepared.as_ptr().cast(), root);
             } else {
                 for &number in waiting {
                     pairs.append_leaf::<K>(root, number);
                 }
             }
             pairs.test::<K>();
+        }
+    }
+}
+
+/// The way of one ray through the layout. Without its nearest hit it needs no copy of the ray.
+#[repr(C, align(64))]
+struct Traversal {
+    ray: *const Prepared,
+    top: *mut Pending,
+    /// The node to visit next.
+    child: Child,
+    /// [`Child::END`], what waits, and room for stores of whole registers: `frame`, or on the heap.
+    stack: *mut Pending,
+    frame: [MaybeUninit<Pending>; STACK + SPARE],
+}
+
+impl Traversal {
+    /// Starts a ray at the root.
+    ///
+    /// # Safety
+    /// The stack has more than one place.
+    #[inline(always)]
+    unsafe fn start(&mut self, ray: *const Prepared, root: Child) {
+        self.ray = ray;
+        self.child = root;
+        // SAFETY: the stack has more than one place.
+        unsafe {
+            self.stack.write(u64::from(Child::END.bits()));
+            self.top = self.stack.add(1);
         }
     }
 }
@@ -315,6 +344,7 @@ unsafe fn visit_nodes<K: Instructions>(
     pairs: &mut Pairs,
     waiting: &[u32],
     prepared: *const Prepared,
+    root: Child,
 ) {
     let wide = pairs.wide;
     let mut traversals = MaybeUninit::<[Traversal; FLIGHT]>::uninit();
@@ -329,8 +359,9 @@ unsafe fn visit_nodes<K: Instructions>(
     unsafe {
         for (i, &number) in first.iter().enumerate() {
             active[i] = traversals.add(i);
-            Traversal::set_stack(active[i], deep.as_mut().map(|deep| deep.stack(i)));
-            (*active[i]).start::<K>(&*prepared.add(number as usize), wide);
+            let frame = (&raw mut (*active[i]).frame).cast();
+            (*active[i]).stack = deep.as_mut().map_or(frame, |deep| deep.stack(i));
+            (*active[i]).start(prepared.add(number as usize), root);
         }
         while count > 0 {
             let visits = count;
@@ -340,15 +371,19 @@ unsafe fn visit_nodes<K: Instructions>(
             for i in 0..visits {
                 let traversal = &mut *active[i];
                 let node = &*nodes.add(traversal.child.index());
-                let (_, entered) = traversal.ray.boxes::<K>(node, traversal.t);
+                let ray = &*traversal.ray;
+                let (_, entered) = ray.boxes::<K>(node, ray.t_max);
                 let leaves = K::Boxes::load(node.children.as_ptr().cast()).signs();
                 K::compress(node, entered & !leaves, traversal.top);
                 let inner = (entered & !leaves).count_ones() as usize;
-                pairs.append_leaves::<K>(node, entered & leaves, traversal.ray.number);
+                pairs.append_leaves::<K>(node, entered & leaves, ray.number);
                 traversal.top = traversal.top.add(inner).sub(1);
                 traversal.child = Child::from_bits(*traversal.top as u32);
                 let is_at_end = traversal.child == Child::END;
-                traversal.fetch::<K>();
+                let line = nodes.wrapping_add(traversal.child.index()).cast::<u8>();
+                for offset in 0..size_of::<WideNode>() / 64 {
+                    K::prefetch(line.wrapping_add(64 * offset));
+                }
                 active[count] = traversal;
                 count += usize::from(!is_at_end);
                 ended[ends] = traversal;
@@ -357,7 +392,7 @@ unsafe fn visit_nodes<K: Instructions>(
             for &traversal in &ended[..ends] {
                 let Some((&number, rest)) = waiting.split_first() else { break };
                 waiting = rest;
-                (*traversal).start::<K>(&*prepared.add(number as usize), wide);
+                (*traversal).start(prepared.add(number as usize), root);
                 active[count] = traversal;
                 count += 1;
             }

@@ -349,7 +349,7 @@ pub(super) struct Traversal {
     /// The nearest hit so far, or the end of the ray and `u32::MAX`.
     pub(super) t: f32,
     pub(super) object: u32,
-    pub(super) top: *mut Pending,
+    top: *mut Pending,
     /// The node or the block of triangles to visit next, or [`END`](Child::END).
     pub(super) child: Child,
     /// The arrays of the layout in which the ray is.
@@ -371,7 +371,7 @@ struct Frame([MaybeUninit<Pending>; STACK + SPARE]);
 impl Traversal {
     /// Chooses the stack of all rays that are started here: on the heap, or in the frame.
     #[inline(always)]
-    pub(super) unsafe fn set_stack(this: *mut Self, deep: Option<*mut Pending>) {
+    unsafe fn set_stack(this: *mut Self, deep: Option<*mut Pending>) {
         // SAFETY: the traversal exists; its fields need not be initialised to be named.
         unsafe { (*this).stack = deep.unwrap_or((&raw mut (*this).frame).cast()) };
     }

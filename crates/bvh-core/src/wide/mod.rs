@@ -21,6 +21,7 @@ mod layout;
 mod one_ray;
 mod packet;
 mod pairs;
+mod pinhole;
 mod portable;
 mod prepared;
 mod ray_lanes;

@@ -12,11 +12,13 @@ use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::{Lanes, Mask};
 use super::layout::{Child, WideBvh, WideNode};
 use super::pairs::{Pairs, Plane};
+use super::pinhole::one_origin;
 use super::ray_lanes::{RayBounds, RayLanes};
 use super::triangles::TriangleBlock;
 use crate::slabs::{FAR, NEAR};
 use crate::{Aabb, Hit};
 use core::mem::MaybeUninit;
+use glam::Vec3;
 
 /// The maximum number of rays in a packet.
 pub(crate) const RAYS: usize = 128;
@@ -31,13 +33,15 @@ pub(crate) struct Packet<K: Instructions> {
     /// One bit per axis: set where the rays run backwards.
     octant: u32,
     bounds: RayBounds<K::Rays>,
+    /// The origin of all rays, if they have one, while the packet is traced.
+    origin: Option<Vec3>,
 }
 
 /// Rays of a packet side by side.
 pub(super) struct Vector<L> {
     near_factor: [L; 3],
     far_factor: [L; 3],
-    t_min: L,
+    pub(super) t_min: L,
     /// The nearest hits so far, or the ends of the rays and `u32::MAX`.
     pub(super) t: L,
     pub(super) object: L,
@@ -48,6 +52,17 @@ pub(super) struct Vector<L> {
     pub(super) pairs: MaybeUninit<Pairs<L>>,
     /// The number of the first ray in its batch.
     pub(super) first: usize,
+}
+
+impl<L: Lanes> Vector<L> {
+    /// Makes `pairs` for triangles within `bounds`, unless they have been made.
+    #[inline(always)]
+    pub(super) fn shear(&mut self, bounds: &Aabb) {
+        if !self.is_sheared {
+            self.pairs.write(self.rays.sheared(self.axes, bounds));
+            self.is_sheared = true;
+        }
+    }
 }
 
 /// The parent of a child that waits.
@@ -71,6 +86,7 @@ impl<K: Instructions> Packet<K> {
             octant: 0,
             // SAFETY: the processor has the instructions.
             bounds: unsafe { RayBounds::none() },
+            origin: None,
         }
     }
 
@@ -307,6 +323,7 @@ impl<K: Instructions, const ANY: bool> Task<K> for Trace<'_, '_, K, ANY> {
         // SAFETY: the processor has the instructions.
         unsafe {
             let culling = Culling::<K::Boxes>::new(&packet.bounds, packet.octant);
+            packet.origin = one_origin(&packet.bounds, &wide.bounds);
             if let Some(root) = wide.root {
                 packet.traverse::<ANY>(wide, root, &culling, batch);
             }
@@ -337,6 +354,10 @@ impl<K: Instructions> Packet<K> {
         bounds: &Aabb,
         accept: &mut Option<&mut Accept>,
     ) -> bool {
+        if let (false, Some(origin), None) = (ANY, self.origin, &accept) {
+            // SAFETY: as for this function.
+            return unsafe { self.visit_leaf_from(origin, first, entered, planes, block, bounds) };
+        }
         let mut is_hit = false;
         for i in first..self.count {
             // SAFETY: the processor has the instructions; so many vectors are counted.
@@ -367,10 +388,7 @@ impl<K: Instructions> Packet<K> {
         // another.
         unsafe {
             let vector = self.vectors.get_unchecked_mut(vector).assume_init_mut();
-            if !vector.is_sheared {
-                vector.pairs.write(vector.rays.sheared(vector.axes, bounds));
-                vector.is_sheared = true;
-            }
+            vector.shear(bounds);
             let pairs = vector.pairs.assume_init_ref();
             let mut block = block;
             let mut is_hit = false;

@@ -118,7 +118,7 @@ pub(crate) struct Plane<L: Lanes> {
     /// The first corners.
     corner: [L::Double; 3],
     /// The normals, of any length.
-    normal: [L::Double; 3],
+    pub(super) normal: [L::Double; 3],
     /// M, the bound of the normals' components.
     size: L::Double,
     /// The sum of the largest |B − A| and the largest |C − A| along an axis.
@@ -241,18 +241,14 @@ impl<L: Lanes> Pairs<L> {
     #[inline(always)]
     fn meet(&self, first: &[L; 3], plane: &Plane<L>) -> (L::Mask, L::Mask, L) {
         // SAFETY: values exist.
-        let [zero, part]: [L::Double; 2] = unsafe { constants([0.0, ERROR]) };
+        let zero = unsafe { L::Double::splat(0.0) };
         let [nx, ny, nz] = plane.normal;
-        let x = plane.corner[0] - self.origin[0].double();
-        let y = plane.corner[1] - self.origin[1].double();
-        let z = plane.corner[2] - self.origin[2].double();
-        let reach = longest(&self.origin, first) + plane.sides;
+        let (height, slack) = plane.height(first, &self.origin);
         let [dx, dy, dz] = self.direction.map(L::double);
-        let height = nz.mul_add(z, ny.mul_add(y, nx * x));
         let speed = nz.mul_add(dz, ny.mul_add(dy, nx * dx));
         let inverse = speed.inverse();
         let t = height * inverse;
-        let slack = part * plane.size * reach.double() * size(inverse);
+        let slack = slack * size(inverse);
         let low = t - slack;
         let high = t + slack;
         let rounded = L::single(high);
@@ -390,6 +386,20 @@ fn doubled<L: Lanes>([a, b, c]: &[[L; 3]; 3]) -> [[L::Double; 3]; 3] {
 }
 
 impl<L: Lanes> Plane<L> {
+    /// Returns N · (A − O), and the bound of a distance's error for a speed of 1. `first` are the
+    /// first corners again.
+    #[inline(always)]
+    pub(super) fn height(&self, first: &[L; 3], origin: &[L; 3]) -> (L::Double, L::Double) {
+        let [nx, ny, nz] = self.normal;
+        let x = self.corner[0] - origin[0].double();
+        let y = self.corner[1] - origin[1].double();
+        let z = self.corner[2] - origin[2].double();
+        let reach = longest(origin, first) + self.sides;
+        // SAFETY: a value exists.
+        let part = unsafe { L::Double::splat(ERROR) };
+        (nz.mul_add(z, ny.mul_add(y, nx * x)), part * self.size * reach.double())
+    }
+
     /// Returns the planes of triangles in lanes.
     #[inline(always)]
     pub(crate) fn of_lanes(corners: &[[L; 3]; 3]) -> Self {

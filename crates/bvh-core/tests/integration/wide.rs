@@ -54,6 +54,89 @@ fn every_kernel_answers_as_brute_force_at_every_scale() {
     assert!(hits > 10_000, "the rays should hit something: {hits}");
 }
 
+/// Rays from one origin through the neighbourhoods of corners, edges and centres, exactly and
+/// nearly: as many as a packet takes for each target, mostly in the same octant.
+fn pinhole(triangles: &[Triangle], origin: Vec3, length: f32, random: &mut Random) -> Vec<Ray> {
+    let mut rays = Vec::new();
+    for _ in 0..4 {
+        let Triangle([a, b, c]) = random.of(triangles);
+        let spread = random.of(&[0.0, 1e-7, 1e-3, 0.1]) * a.distance(b).max(a.distance(c));
+        for i in 0..128 {
+            let target = [a, b, c, (a + b) * 0.5, (a + b + c) / 3.0][i % 5];
+            let to = target + random.point() * spread - origin;
+            let to = to / to.abs().max_element() * length;
+            let t_max = random.of(&[f32::MAX, f32::MAX, 1.0]);
+            rays.extend(Ray::new(origin, to, 0.0, t_max));
+        }
+    }
+    rays
+}
+
+#[test]
+fn packets_from_one_origin_answer_as_brute_force() {
+    let mut random = Random(11);
+    // The last ones are too small, as seen from afar, to have sides in f64, and too far away for
+    // products in f32.
+    let cases = [
+        ("soup", soup(80, &mut random), 1.0, 3.0),
+        ("grid", grid_box(3), 1.0, 3.0),
+        ("ball", ball(2), 1.0, 0.5),
+        ("small", soup(40, &mut random), 1e-16, 1.0),
+        ("tiny", soup(40, &mut random), 1e-30, 1.0),
+        ("large", soup(40, &mut random), 1e12, 1e13),
+        ("huge", soup(40, &mut random), 1e30, 1e31),
+    ];
+    let mut hits = 0;
+    for (name, scene, scale, distance) in cases {
+        let triangles = scaled(&scene, scale);
+        let layouts = layouts(&triangles, &mut random);
+        for exponent in [0.0, -25.0, 25.0, -19.9, 19.9] {
+            let origin = random.point() * distance;
+            let rays = pinhole(&triangles, origin, libm::exp2f(exponent), &mut random);
+            hits += check(name, &triangles, &layouts, &rays);
+        }
+    }
+    assert!(hits > 2_000, "the rays should hit something: {hits}");
+}
+
+#[test]
+fn ranges_that_end_at_a_hit_or_next_to_it_are_answered_alike() {
+    let mut random = Random(12);
+    let mut hits = 0;
+    for scale in [1.0, 1e-20, 1e11, 1e14, 1e-38] {
+        let triangles = scaled(&soup(80, &mut random), scale);
+        let layouts = layouts(&triangles, &mut random);
+        let mut ends = Vec::new();
+        for ray in rays(&triangles, 300, &mut random) {
+            let Some(Hit { t, .. }) = brute_force(&triangles, &ray) else { continue };
+            let ranges = [
+                (0.0, t),
+                (0.0, t.next_down()),
+                (0.0, t.next_up()),
+                (t, t),
+                (t.next_up(), f32::MAX),
+                (t.next_down(), f32::MAX),
+                (t, f32::MAX),
+            ];
+            let ranged = |(t_min, t_max)| Ray::new(ray.origin(), ray.direction(), t_min, t_max);
+            ends.extend(ranges.into_iter().flat_map(ranged));
+        }
+        hits += check(&format!("soup * {scale}"), &triangles, &layouts, &ends);
+    }
+    assert!(hits > 500, "the rays should hit something: {hits}");
+}
+
+#[test]
+fn a_distance_that_rounds_to_zero_is_in_the_range_that_ends_there() {
+    let sheet = Triangle(
+        [[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]].map(|[x, y]| Vec3::new(x, y, 0.5) * 1e-15),
+    );
+    let direction = Vec3::new(1e27, 0.0, 1.2e30);
+    let ray = Ray::new(Vec3::ZERO, direction, 0.0, 0.0).unwrap();
+    let layouts = layouts(&[sheet], &mut Random(13));
+    assert_eq!(check("a sheet", &[sheet], &layouts, &[ray; 40]), 40);
+}
+
 #[test]
 fn batches_of_any_length_answer_as_their_rays_do() {
     let mut random = Random(9);

@@ -1,0 +1,237 @@
+//! Packets of rays from one origin at leaves, as through the pixels of a pinhole camera. What the
+//! tests of a triangle compute from its corners and the origin is computed once for all rays.
+//!
+//! With corners relative to the origin, the line crosses the triangle where d · (B × C), d · (C × A)
+//! and d · (A × B) have the same sign, because it passes each edge on the same side. Names are those
+//! of [`pairs`](super::pairs): u = 2⁻²⁴, ε = 2⁻⁵³; R is the largest relative coordinate, X the
+//! largest component of the three products, D the largest component of d.
+//!
+//! *Edges.* A relative coordinate is off by εR, so that a component of a product is off by 4εR² from
+//! them and by another 4εR² from its own roundings in f64; rounding it to f32 adds uX. Three
+//! components move an edge value by less than 3 (uX + 9εR²) D, and its own roundings by less than
+//! 10uXD: in total by less than E = (32uX + 64εR²) D. Underflow, of components and of products, adds
+//! less than 2⁻¹²⁶. Nothing overflows with R < 2⁴⁰ and D < 2²¹; other packets have no common origin
+//! here. If all edge values are above E, or all below −E, the line crosses the triangle; if one is
+//! above and one below, it does not.
+//!
+//! *Distance.* As in [`pairs`](super::pairs), from the same numbers: only the product N · (A − O)
+//! and the factors of its bound are computed once. The normal is that of the corners themselves.
+//! Corners relative to a distant origin would have lost the sides of a small triangle.
+//!
+//! What either leaves open is tested as in any packet.
+
+use super::instructions::Instructions;
+use super::lanes::{DoubleLanes, Lanes, Mask};
+use super::packet::Packet;
+use super::pairs::Plane;
+use super::ray_lanes::RayBounds;
+use super::triangles::TriangleBlock;
+use crate::Aabb;
+use crate::ray::pow2;
+use core::mem::MaybeUninit;
+use glam::Vec3;
+
+/// The origin of all rays, if they have one from which the bounds above hold for triangles within
+/// `bounds`.
+#[inline(always)]
+pub(super) fn one_origin<L: Lanes>(rays: &RayBounds<L>, bounds: &Aabb) -> Option<Vec3> {
+    let mut origin = Vec3::ZERO;
+    // Bounds of the reciprocals of largest components.
+    let mut least = f32::INFINITY;
+    let mut most = f32::INFINITY;
+    for axis in 0..3 {
+        let [low, high] = rays.origins(axis);
+        if low != high {
+            return None;
+        }
+        origin[axis] = low;
+        let [first, last] = rays.inverses(axis).map(f32::abs);
+        least = least.min(first.min(last));
+        most = most.min(first.max(last));
+    }
+    let reach = (bounds.max - origin).max(origin - bounds.min).max_element();
+    let is_in_range = pow2(-20) < least && most < pow2(20) && reach < pow2(40);
+    is_in_range.then_some(origin)
+}
+
+/// Four triangles as rays of one origin see them, lane by lane.
+#[repr(C)]
+struct Seen {
+    /// The components of B × C, C × A and A × B, and E / D.
+    edges: [[f32; 4]; 10],
+    /// The components of the normal, its product with A − O, and the bound of the distance's error
+    /// for a speed of 1.
+    plane: [[f64; 4]; 5],
+}
+
+impl Seen {
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    #[inline(always)]
+    unsafe fn new<L: Lanes>(block: &TriangleBlock, origin: Vec3) -> Self {
+        let mut seen = MaybeUninit::<Self>::uninit();
+        // SAFETY: the processor has the instructions; all rows are written.
+        unsafe {
+            let corners = block.corners_along::<L>([0, 1, 2]);
+            let plane = Plane::of_lanes(&corners);
+            let origin = [L::splat(origin.x), L::splat(origin.y), L::splat(origin.z)];
+            let (height, slack) = plane.height(&corners[0], &origin);
+            let [a, b, c] = corners;
+            let a = minus(&a, &origin);
+            let b = minus(&b, &origin);
+            let c = minus(&c, &origin);
+            let edges = (&raw mut (*seen.as_mut_ptr()).edges).cast::<f32>();
+            let mut most = L::splat(0.0);
+            let products = [cross(&b, &c), cross(&c, &a), cross(&a, &b)];
+            for (row, &component) in products.as_flattened().iter().enumerate() {
+                let component = L::single(component);
+                most = most.max(component.abs());
+                component.store(edges.add(4 * row));
+            }
+            let reach = L::single(largest(&a).max(largest(&b)).max(largest(&c)));
+            let error = most * L::splat(pow2(-19)) + reach * reach * L::splat(pow2(-47));
+            error.store(edges.add(4 * 9));
+            let [x, y, z] = plane.normal;
+            let planes = (&raw mut (*seen.as_mut_ptr()).plane).cast::<f64>();
+            for (row, number) in [x, y, z, height, slack].into_iter().enumerate() {
+                number.store(planes.add(4 * row));
+            }
+            seen.assume_init()
+        }
+    }
+}
+
+impl<K: Instructions> Packet<K> {
+    /// Tests the triangles of a leaf with the rays that enter it, all from one origin, as
+    /// [`visit_leaf`](Self::visit_leaf) does.
+    ///
+    /// # Safety
+    /// As for [`visit_leaf`](Self::visit_leaf).
+    #[inline(always)]
+    pub(super) unsafe fn visit_leaf_from(
+        &mut self,
+        origin: Vec3,
+        first: usize,
+        entered: u32,
+        planes: &[[f32; 2]; 3],
+        mut block: *const TriangleBlock,
+        bounds: &Aabb,
+    ) -> bool {
+        let mut is_hit = false;
+        // SAFETY: the vectors are counted; a block that is not its leaf's last is followed by
+        // another.
+        unsafe {
+            loop {
+                let seen = Seen::new::<K::Block>(&*block, origin);
+                for i in first..self.count {
+                    let entered = if i > first { self.enter(i, planes) } else { entered };
+                    if entered != 0 {
+                        is_hit |= self.test_from(i, entered, &*block, &seen, bounds);
+                    }
+                }
+                if (*block).is_last() {
+                    return is_hit;
+                }
+                block = block.add(1);
+            }
+        }
+    }
+
+    /// Tests the triangles of a block with the rays of a vector that entered it. Returns whether
+    /// any ray has a new nearest hit.
+    #[inline(always)]
+    unsafe fn test_from(
+        &mut self,
+        vector: usize,
+        entered: u32,
+        block: &TriangleBlock,
+        seen: &Seen,
+        bounds: &Aabb,
+    ) -> bool {
+        // SAFETY: the vector is counted; lanes are below four.
+        unsafe {
+            let vector = self.vectors.get_unchecked_mut(vector).assume_init_mut();
+            let direction = vector.rays.direction;
+            let longest = direction[vector.axes[2]].abs();
+            let underflow = K::Rays::splat(f32::MIN_POSITIVE);
+            let zero = <K::Rays as Lanes>::Double::splat(0.0);
+            let mut is_hit = false;
+            for lane in 0..block.len() {
+                let edge = |row: usize| K::Rays::splat(*seen.edges[row].get_unchecked(lane));
+                let value = |row: usize| {
+                    let x = edge(row) * direction[0];
+                    edge(row + 2).mul_add(direction[2], edge(row + 1).mul_add(direction[1], x))
+                };
+                let u = value(0);
+                let v = value(3);
+                let w = value(6);
+                let least = u.min(v).min(w);
+                let most = u.max(v).max(w);
+                let error = edge(9).mul_add(longest, underflow);
+                let below = K::Rays::splat(0.0) - error;
+                let possible = entered & !(least.lt(below) & error.lt(most)).bits();
+                if possible == 0 {
+                    continue;
+                }
+                let certain = possible & (error.lt(least) | most.lt(below)).bits();
+                let plane = |row: usize| {
+                    <K::Rays as Lanes>::Double::splat(*seen.plane[row].get_unchecked(lane))
+                };
+                let [dx, dy, dz] = direction;
+                let speed = plane(1).mul_add(dy.double(), plane(0) * dx.double());
+                let inverse = plane(2).mul_add(dz.double(), speed).inverse();
+                let distance = plane(3) * inverse;
+                let slack = plane(4) * inverse.max(zero - inverse);
+                let low = distance - slack;
+                let high = distance + slack;
+                let mut t = K::Rays::single(high);
+                let meets = K::Rays::narrow(zero.le(low)) & K::Rays::single(low).eq(t);
+                let is_behind = K::Rays::narrow(high.lt(zero));
+                let mut inside = meets & Mask::from_bits(certain);
+                if possible & !(certain & (meets | is_behind).bits()) != 0 {
+                    vector.shear(bounds);
+                    let pairs = vector.pairs.assume_init_ref();
+                    let corners = block.splat_corners::<K::Rays>(lane, vector.axes);
+                    let plane = Plane::of_triangle(&block.doubles(lane, vector.axes));
+                    let candidates = pairs.candidates(&corners);
+                    (inside, t) = pairs.decide(&corners, &plane, &candidates, vector.t);
+                    inside = inside & Mask::from_bits(entered);
+                }
+                let inside = inside & vector.t_min.le(t);
+                let object = K::Rays::splat_bits(block.id(lane));
+                let hits = inside & (t.lt(vector.t) | t.eq(vector.t) & object.below(vector.object));
+                if hits.bits() != 0 {
+                    is_hit = true;
+                    vector.t = Lanes::select(hits, t, vector.t);
+                    vector.object = Lanes::select(hits, object, vector.object);
+                }
+            }
+            is_hit
+        }
+    }
+}
+
+/// Returns the difference of vectors in f64.
+#[inline(always)]
+fn minus<L: Lanes>(a: &[L; 3], b: &[L; 3]) -> [L::Double; 3] {
+    [a[0].double() - b[0].double(), a[1].double() - b[1].double(), a[2].double() - b[2].double()]
+}
+
+#[inline(always)]
+fn cross<D: DoubleLanes>(a: &[D; 3], b: &[D; 3]) -> [D; 3] {
+    [
+        a[1].mul_sub(b[2], a[2] * b[1]),
+        a[2].mul_sub(b[0], a[0] * b[2]),
+        a[0].mul_sub(b[1], a[1] * b[0]),
+    ]
+}
+
+/// Returns the largest absolute value of a component.
+#[inline(always)]
+fn largest<D: DoubleLanes>([x, y, z]: &[D; 3]) -> D {
+    // SAFETY: a value exists.
+    let zero = unsafe { D::splat(0.0) };
+    let x = x.max(zero - *x);
+    let y = y.max(zero - *y);
+    x.max(y).max(z.max(zero - *z))
+}
