@@ -106,7 +106,7 @@ impl Tree {
         THROWN.set(None);
         let limit = seconds.map(|seconds| 1000.0 * seconds);
         let watch = Watch { start: now(), limit, most_work, counted: 0.into() };
-        let found = OwnedTree::find_with(triangles(corners)?, &options, &watch);
+        let found = OwnedTree::find(triangles(corners)?, &options, &watch);
         FOLLOWER.set(None);
         match THROWN.take() {
             Some(thrown) => Err(thrown),
