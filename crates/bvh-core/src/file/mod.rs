@@ -25,7 +25,7 @@
 //! | 8..12 | `u32` | version: 4 |
 //! | 12..16 | `u32` | endianness mark, 0x01020304: the bytes `04 03 02 01` |
 //! | 16..20 | `u32` | objective: 0 internal area, 1 Goldsmith–Salmon, 2 surface area heuristic, 3 wide layout |
-//! | 20..24 | `u32` | checksum of the scene's boxes, each min x, y, z, max x, y, z as `f32` |
+//! | 20..24 | `u32` | checksum of the scene's boxes, each min x, y, z, max x, y, z as `f32`, 0 for −0 |
 //! | 24..32 | `u64` | number of nodes |
 //! | 32..40 | `u64` | number of objects |
 //! | 40..48 | `u64` | seed of the search |
@@ -81,6 +81,7 @@ use crate::{Aabb, Bvh, BvhView, Clip, InvalidBvh, Node, validate, validate_refer
 use alloc::borrow::Cow;
 use alloc::vec::Vec;
 use crc32fast::Hasher;
+use glam::Vec3;
 use words::{cast, copied, le_bytes};
 
 /// The origin of a tree, as the header of its file records it.
@@ -220,9 +221,19 @@ pub fn load(bytes: &[u8], boxes: &[Aabb]) -> Result<Bvh, FileError> {
 }
 
 /// Returns the checksum that identifies a scene in a tree file: the CRC-32 of min x, y, z, max x,
-/// y, z of each box, as little-endian `f32`. O(n).
+/// y, z of each box, as little-endian `f32`, with 0 for −0. O(n).
 pub fn boxes_checksum(boxes: &[Aabb]) -> u32 {
-    crc32fast::hash(&le_bytes(boxes))
+    let mut hasher = Hasher::new();
+    let mut piece = [Aabb::EMPTY; PIECE / size_of::<Aabb>()];
+    for boxes in boxes.chunks(piece.len()) {
+        for (without_sign, given) in piece.iter_mut().zip(boxes) {
+            // Mirrored objects have −0 where others have 0; −0 + 0 is 0.
+            let zero = Vec3::ZERO;
+            *without_sign = Aabb { min: given.min + zero, max: given.max + zero };
+        }
+        hasher.update(&le_bytes(&piece[..boxes.len()]));
+    }
+    hasher.finalize()
 }
 
 /// Returns the checksum of a file that has at least the length of a header.

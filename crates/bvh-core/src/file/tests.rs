@@ -217,6 +217,21 @@ fn checksums_are_the_crc_32_that_other_programs_compute() {
 }
 
 #[test]
+fn a_tree_is_for_all_boxes_that_equal_those_it_was_built_over() {
+    let (boxes, tree) = scene(500 / ONE_OF as u32);
+    let signed =
+        |corner: Vec3| Vec3::from(corner.to_array().map(|x| if x == 0.0 { -0.0 } else { x }));
+    let mut mirrored = boxes.clone();
+    for one in &mut mirrored {
+        *one = Aabb { min: signed(one.min), max: signed(one.max) };
+    }
+    assert_eq!(mirrored, boxes);
+    let bytes = save(&tree, &mirrored, &ORIGIN).unwrap();
+    assert_eq!(load(&bytes, &boxes), Ok(tree));
+    assert_eq!(boxes_checksum(&mirrored), boxes_checksum(&boxes));
+}
+
+#[test]
 fn every_changed_byte_and_every_cut_is_rejected() {
     let (boxes, tree) = scene(5);
     let mut bytes = save(&tree, &boxes, &ORIGIN).unwrap();

@@ -64,7 +64,8 @@ impl Config {
             .iter()
             .flat_map(|aabb| [aabb.min.to_array(), aabb.max.to_array()])
             .flatten()
-            .flat_map(f32::to_le_bytes)
+            // The checksum of a scene knows no −0.
+            .flat_map(|x| (x + 0.0).to_le_bytes())
             .collect();
         fs::write(&boxes_path, box_bytes)?;
         let mut command = Command::new(&self.command[0]);
