@@ -7,7 +7,7 @@ use super::watch::gain;
 use crate::Error;
 use crate::arguments::output_folder;
 use crate::csv_table;
-use crate::output::print_line;
+use crate::output::{print_error, print_line};
 use bvh_build::{Builder, median_cut};
 use bvh_core::cost::Objective;
 use bvh_core::{Instance, InvalidInstances, Primitives, Triangle, WideBvh};
@@ -37,6 +37,9 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let path = Path::new(&args.scene);
     let parts = parts(path, args.files.outside())?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    if let Some(remark) = &parts.remark {
+        print_error(&format!("scene {stem}: {remark}"));
+    }
     let mut scenes = Vec::new();
     for (mesh, triangles) in &parts.meshes {
         let name = format!("{stem}, mesh {mesh}");

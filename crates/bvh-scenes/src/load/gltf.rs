@@ -1,24 +1,22 @@
-//! Triangles from glTF 2.0 files, JSON or GLB, with the transforms of their nodes applied.
+//! Triangles from glTF 2.0 files, JSON or GLB, where the nodes place them.
 //!
-//! `gltf-json` declares the names and types of the format. This module checks references and ranges
-//! itself, because the check in `gltf-json` and the readers in `gltf` panic on forged files.
-//! Materials, cameras, animations and skins are ignored: nodes alone place the meshes.
+//! Reads what the standard says about the places of vertices: transforms, morph targets with their
+//! default weights, skins, and the instances, visibility and quantised positions of three
+//! extensions. Animations are ignored, so that a scene is as at rest; materials and cameras change
+//! no triangle. Each of these modules checks every reference and range of the file itself.
 
+mod accessors;
 mod buffers;
 mod document;
+mod nodes;
 
-use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Place};
+use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Place, counted};
+use accessors::{Accessors, F32, I8, I16, U8, U16, U32};
 use buffers::Buffers;
 use bvh_core::Triangle;
-use document::document;
-use glam::{DMat4, DQuat, DVec3, Vec3};
-use gltf_json::accessor::{ComponentType, Type};
-use gltf_json::buffer::View;
-use gltf_json::mesh::{Mode, Primitive, Semantic};
-use gltf_json::root::Get;
-use gltf_json::scene::Node;
-use gltf_json::validation::Checked::Valid;
-use gltf_json::{Accessor, Index, Root};
+use document::{Document, Primitive, document, is_covered};
+use glam::{DMat4, DVec3, Vec3};
+use nodes::Nodes;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -48,21 +46,22 @@ impl From<bool> for OutsideFiles {
 /// Reads the bytes of a glTF or GLB file, and the buffers that its meshes refer to from the folder
 /// of `path`.
 pub fn parse(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Mesh, Fault> {
-    let (root, chunk) = document(bytes, path)?;
-    let mut loader = Loader::new(path, &root, Buffers::new(path, outside, chunk));
+    let (document, chunk) = document(bytes, path)?;
+    let buffers = Buffers::new(path, outside, chunk);
+    let mut loader = Loader::new(path, &document, buffers, bytes.len());
     let places = loader.places()?;
-    check_size(&root, &places, path)?;
-    for place in places {
-        loader.place(&place, &place.transform)?;
+    check_size(&document, &places, path)?;
+    for place in &places {
+        loader.add_mesh(place, &place.transform)?;
     }
     match loader.triangles.is_empty() {
         true => Err(no_triangle(path)),
-        false => Ok(Mesh::new(loader.triangles)),
+        false => Ok(Mesh::new(std::mem::take(&mut loader.triangles), loader.remarks())),
     }
 }
 
 /// The meshes of a file, each once, and their places. The meshes in the order of the places, with
-/// all transforms applied, are the triangles that [`parse`] returns.
+/// all transforms applied, are the triangles that [`parse`] returns, but for those without area.
 #[derive(Clone, Debug)]
 pub struct Parts {
     /// Triangles in the mesh's own coordinates, by the mesh's number in the file. Contains only
@@ -70,6 +69,8 @@ pub struct Parts {
     pub meshes: BTreeMap<usize, Vec<Triangle>>,
     /// The places of the meshes, in the order of the file's nodes.
     pub places: Vec<Placed>,
+    /// The file's contents besides plain triangles, in one sentence.
+    pub remark: Option<String>,
 }
 
 /// A mesh that a node places in the scene.
@@ -83,122 +84,146 @@ pub struct Placed {
     pub transform: DMat4,
 }
 
-/// Reads a file as [`parse`] does, but returns every mesh once.
+/// Reads a file as [`parse`] does, but returns every mesh once. Rejects a node that gives its mesh
+/// a shape of its own. Leaves out places in which no triangle has an area.
 pub fn parts(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Parts, Fault> {
-    let (root, chunk) = document(bytes, path)?;
-    let mut loader = Loader::new(path, &root, Buffers::new(path, outside, chunk));
+    let (document, chunk) = document(bytes, path)?;
+    let buffers = Buffers::new(path, outside, chunk);
+    let mut loader = Loader::new(path, &document, buffers, bytes.len());
     let mut places = loader.places()?;
+    for Placed { node, mesh, .. } in &places {
+        let own = &document.nodes[*node];
+        let bends = own.weights.as_ref().is_some_and(|own| *own != document.meshes[*mesh].weights);
+        if own.skin.is_some() || bends {
+            let cause = if bends { "weights" } else { "a skin" };
+            let message = format!("{cause}; expected none, so that every instance has one shape");
+            return Err(loader.fault(format!("nodes[{node}]"), message));
+        }
+    }
+    let all = places.len();
+    places.retain(|place| has_area(&place.transform));
+    let flat = counted(
+        all - places.len(),
+        "instance without area was left out",
+        "instances without area were left out",
+    );
     let mut placed = BTreeSet::new();
     let mut first_places = places.clone();
     first_places.retain(|place| placed.insert(place.mesh));
-    check_size(&root, &first_places, path)?;
+    check_size(&document, &first_places, path)?;
     let mut meshes = BTreeMap::new();
     for place in &first_places {
-        loader.place(place, &DMat4::IDENTITY)?;
+        loader.add_mesh(place, &DMat4::IDENTITY)?;
         meshes.insert(place.mesh, std::mem::take(&mut loader.triangles));
     }
     // A mesh of points or lines gives no triangles, and a tree needs at least one object.
     meshes.retain(|_, triangles| !triangles.is_empty());
     places.retain(|place| meshes.contains_key(&place.mesh));
-    if places.is_empty() { Err(no_triangle(path)) } else { Ok(Parts { meshes, places }) }
+    if places.is_empty() {
+        return Err(no_triangle(path));
+    }
+    let remarks: Vec<String> = loader.remarks().into_iter().chain(flat).collect();
+    let remark = (!remarks.is_empty()).then(|| remarks.join("; "));
+    Ok(Parts { meshes, places, remark })
+}
+
+/// Returns whether a triangle can have an area after this transform.
+fn has_area(transform: &DMat4) -> bool {
+    let [x, y, z] = [transform.x_axis, transform.y_axis, transform.z_axis].map(|a| a.truncate());
+    [x.cross(y), y.cross(z), z.cross(x)].iter().any(|normal| *normal != DVec3::ZERO)
 }
 
 fn no_triangle(path: &Path) -> Fault {
-    Fault::new(
-        path,
-        Place::File,
-        "no triangle in its scene; expected a glTF file with at least one",
-    )
+    let message = "no triangle in its scene; expected a glTF file with at least one";
+    Fault::new(path, Place::File, message)
 }
 
-/// A file while its nodes are followed.
+/// Returns the element of a list that a reference names.
+fn get<'a, T>(list: &'a [T], index: usize, name: &str) -> Result<&'a T, String> {
+    list.get(index).ok_or_else(|| format!("no {name}[{index}]; expected one that exists"))
+}
+
+/// A file while its triangles are read.
 struct Loader<'a> {
     path: &'a Path,
-    root: &'a Root,
-    buffers: Buffers<'a>,
+    document: &'a Document,
+    accessors: Accessors<'a>,
+    nodes: Nodes,
     triangles: Vec<Triangle>,
-    /// Positions and indices read so far.
-    items: u64,
+    /// The numbers of nodes, and of primitives, that are not read for a reason.
+    hidden: usize,
+    lines: usize,
+    without_positions: usize,
+    incomplete: usize,
 }
 
-fn transform(node: &Node) -> DMat4 {
-    // The format allows a matrix or its three parts, never both.
-    if let Some(matrix) = node.matrix {
-        return DMat4::from_cols_array(&matrix.map(f64::from));
-    }
-    // Exporters round quaternions to f32, which would scale the mesh by a little.
-    let rotation = node
-        .rotation
-        .map_or(DQuat::IDENTITY, |turn| DQuat::from_array(turn.0.map(f64::from)).normalize());
-    DMat4::from_scale_rotation_translation(
-        vector(node.scale, DVec3::ONE),
-        rotation,
-        vector(node.translation, DVec3::ZERO),
-    )
-}
-
-fn vector(given: Option<[f32; 3]>, default: DVec3) -> DVec3 {
-    given.map_or(default, |vector| DVec3::from(vector.map(f64::from)))
-}
+/// Positions are floats, or integers by `KHR_mesh_quantization`.
+const POSITIONS: [u32; 5] = [F32, I8, U8, I16, U16];
 
 impl<'a> Loader<'a> {
-    fn new(path: &'a Path, root: &'a Root, buffers: Buffers<'a>) -> Self {
-        Self { path, root, buffers, triangles: Vec::new(), items: 0 }
-    }
-
-    fn get<T>(&self, index: Index<T>, name: &str) -> Result<&'a T, String>
-    where
-        Root: Get<T>,
-    {
-        self.root
-            .get(index)
-            .ok_or_else(|| format!("no {name}[{}]; expected one that exists", index.value()))
+    fn new(path: &'a Path, document: &'a Document, buffers: Buffers<'a>, length: usize) -> Self {
+        Self {
+            path,
+            document,
+            accessors: Accessors::new(document, buffers, length),
+            nodes: Nodes::default(),
+            triangles: Vec::new(),
+            hidden: 0,
+            lines: 0,
+            without_positions: 0,
+            incomplete: 0,
+        }
     }
 
     fn fault(&self, place: String, message: impl std::fmt::Display) -> Fault {
         Fault::new(self.path, Place::Element(place), message)
     }
 
-    /// Follows the default scene, or the first one, from its roots. Rejects a node with two
-    /// parents.
-    fn places(&self) -> Result<Vec<Placed>, Fault> {
-        let scene = match self.root.scene {
-            Some(index) => Some(
-                self.get(index, "scenes").map_err(|message| self.fault("scene".into(), message))?,
+    /// Returns the clauses about everything in the file that moves or adds a triangle and was not
+    /// read, or that the reader had to choose.
+    fn remarks(&self) -> Vec<String> {
+        let document = self.document;
+        let extensions = document.extensions_used.iter().filter(|name| !is_covered(name));
+        let extensions = extensions.map(|name| format!("the extension {name} was ignored"));
+        let scenes = document.scenes.len();
+        let scene = document.scene.unwrap_or(0);
+        let other_scenes = (scenes > 1).then(|| format!("scenes[{scene}] of {scenes} was read"));
+        let counts = [
+            counted(document.animations.len(), "animation was ignored", "animations were ignored"),
+            counted(
+                self.hidden,
+                "invisible node was left out with its children",
+                "invisible nodes were left out with their children",
             ),
-            None => self.root.scenes.first(),
-        };
-        let mut places = Vec::new();
-        let mut reached = vec![false; self.root.nodes.len()];
-        // Nodes are pushed in reverse, so that the stack returns them in the order of the file.
-        let mut open: Vec<(Index<Node>, DMat4)> = Vec::new();
-        open.extend(
-            scene.iter().flat_map(|scene| &scene.nodes).rev().map(|&node| (node, DMat4::IDENTITY)),
-        );
-        while let Some((index, parent)) = open.pop() {
-            let number = index.value();
-            let node =
-                self.get(index, "nodes").map_err(|message| self.fault("scene".into(), message))?;
-            // A forged file could have a circle of nodes, which would never end.
-            if std::mem::replace(&mut reached[number], true) {
-                let message = "reached twice; expected a tree of nodes, each with one parent";
-                return Err(self.fault(format!("nodes[{number}]"), message));
-            }
-            let transform = parent * transform(node);
-            if let Some(mesh) = node.mesh {
-                self.get(mesh, "meshes")
-                    .map_err(|message| self.fault(format!("nodes[{number}]"), message))?;
-                places.push(Placed { node: number, mesh: mesh.value(), transform });
-            }
-            open.extend(node.children.iter().flatten().rev().map(|&child| (child, transform)));
-        }
-        Ok(places)
+            counted(
+                self.lines,
+                "primitive of points or lines was left out",
+                "primitives of points or lines were left out",
+            ),
+            counted(
+                self.without_positions,
+                "primitive without positions was left out",
+                "primitives without positions were left out",
+            ),
+            counted(
+                self.incomplete,
+                "primitive ends in an incomplete triangle",
+                "primitives end in incomplete triangles",
+            ),
+        ];
+        extensions.chain(other_scenes).chain(counts.into_iter().flatten()).collect()
     }
 
-    fn place(&mut self, place: &Placed, transform: &DMat4) -> Result<(), Fault> {
+    fn add_mesh(&mut self, place: &Placed, transform: &DMat4) -> Result<(), Fault> {
         let Placed { node, mesh, .. } = *place;
-        for (number, primitive) in self.root.meshes[mesh].primitives.iter().enumerate() {
-            self.add(primitive, transform).map_err(|message| {
+        let joints = match self.document.nodes[node].skin {
+            Some(skin) => Some(self.joints(skin).map_err(|message| {
+                self.fault(format!("skins[{skin}] at nodes[{node}]"), message)
+            })?),
+            None => None,
+        };
+        for (number, primitive) in self.document.meshes[mesh].primitives.iter().enumerate() {
+            self.add(place, primitive, transform, joints.as_deref()).map_err(|message| {
                 let place = format!("meshes[{mesh}].primitives[{number}] at nodes[{node}]");
                 self.fault(place, message)
             })?;
@@ -206,135 +231,173 @@ impl<'a> Loader<'a> {
         Ok(())
     }
 
-    fn add(&mut self, primitive: &Primitive, transform: &DMat4) -> Result<(), String> {
-        let Valid(mode) = primitive.mode else {
-            return Err("an unknown mode; expected 0 to 6".into());
+    /// Returns the transforms of a skin's joints, from the mesh's coordinates to the scene's.
+    fn joints(&mut self, skin: usize) -> Result<Vec<DMat4>, String> {
+        let skin = get(&self.document.skins, skin, "skins")?;
+        let binds = match skin.inverse_bind_matrices {
+            Some(accessor) => self.accessors.read::<16>(accessor, &[F32])?,
+            None => vec![DMat4::IDENTITY.to_cols_array(); skin.joints.len()],
         };
-        if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+        if binds.len() < skin.joints.len() {
+            let (binds, joints) = (binds.len(), skin.joints.len());
+            return Err(format!("{binds} inverse bind matrices; expected {joints}, one per joint"));
+        }
+        let joints = skin.joints.iter().zip(binds).map(|(&joint, bind)| {
+            Ok(*get(&self.nodes.transforms, joint, "nodes")? * DMat4::from_cols_array(&bind))
+        });
+        joints.collect()
+    }
+
+    fn add(
+        &mut self,
+        place: &Placed,
+        primitive: &Primitive,
+        transform: &DMat4,
+        joints: Option<&[DMat4]>,
+    ) -> Result<(), String> {
+        match primitive.mode {
+            0..4 => {
+                self.lines += 1;
+                return Ok(());
+            }
+            4..7 => {}
+            mode => return Err(format!("mode {mode}; expected 0 to 6")),
+        }
+        let points = match primitive.attributes.get("POSITION") {
+            Some(&accessor) => self.positions(place, primitive, accessor)?,
+            None => Vec::new(),
+        };
+        if points.is_empty() {
+            self.without_positions += 1;
             return Ok(());
         }
-        let positions = *primitive
-            .attributes
-            .get(&Valid(Semantic::Positions))
-            .ok_or("no POSITION; expected one")?;
-        let mut points = Vec::new();
-        for bytes in self.items(positions, Type::Vec3, &[ComponentType::F32])? {
-            let point = bytes
-                .as_chunks()
-                .0
-                .first_chunk()
-                .map_or([f32::NAN; 3], |x| x.map(f32::from_le_bytes));
-            let point = Vec3::from(point);
-            let moved = transform.transform_point3(point.as_dvec3()).as_vec3();
-            if !moved.is_finite() {
-                return Err(format!(
-                    "position {} is {point}, moved {moved}; expected finite numbers",
-                    points.len()
-                ));
+        let moved: Vec<Vec3> = match joints {
+            None => {
+                points.iter().map(|point| transform.transform_point3(*point).as_vec3()).collect()
             }
-            points.push(moved);
-        }
-        let types = [ComponentType::U8, ComponentType::U16, ComponentType::U32];
-        let indices: Vec<u32> = match primitive.indices {
-            None => (0..points.len() as u32).collect(),
+            Some(joints) => self.skinned(primitive, &points, joints)?,
+        };
+        let indices: Vec<usize> = match primitive.indices {
+            None => (0..points.len()).collect(),
             Some(accessor) => {
-                self.items(accessor, Type::Scalar, &types)?.map(little_endian).collect()
+                let indices = self.accessors.read::<1>(accessor, &[U8, U16, U32])?;
+                indices.into_iter().map(|[index]| index as usize).collect()
             }
         };
-        // Checked before any use, because the indices come from the file.
-        if let Some(index) = indices.iter().find(|&&index| index as usize >= points.len()) {
-            return Err(format!("index {index}; expected 0 to below {}", points.len()));
+        for &index in &indices {
+            let point = points
+                .get(index)
+                .ok_or_else(|| format!("index {index}; expected 0 to below {}", points.len()))?;
+            if !moved[index].is_finite() {
+                let found = format!("position {index} is {point}, moved {}", moved[index]);
+                return Err(format!("{found}; expected finite numbers"));
+            }
         }
-        let count = triangle_count(mode, indices.len());
+        let count = triangle_count(primitive.mode, indices.len());
+        let is_incomplete = match primitive.mode {
+            4 => !indices.len().is_multiple_of(3),
+            _ => matches!(indices.len(), 1 | 2),
+        };
+        self.incomplete += usize::from(is_incomplete);
         self.triangles.extend((0..count).map(|i| {
-            let corners = match mode {
-                Mode::Triangles => [3 * i, 3 * i + 1, 3 * i + 2],
-                Mode::TriangleFan => [0, i + 1, i + 2],
+            let corners = match primitive.mode {
+                4 => [3 * i, 3 * i + 1, 3 * i + 2],
                 // Every second triangle of a strip is turned, so that all have one orientation.
-                _ => [i, i + 1 + i % 2, i + 2 - i % 2],
+                5 => [i, i + 1 + i % 2, i + 2 - i % 2],
+                _ => [0, i + 1, i + 2],
             };
-            Triangle(corners.map(|corner| points[indices[corner] as usize]))
+            Triangle(corners.map(|corner| moved[indices[corner]]))
         }));
         Ok(())
     }
 
-    fn items(
+    /// Returns the positions of a primitive with its morph targets added, before any transform.
+    fn positions(
         &mut self,
-        accessor: Index<Accessor>,
-        type_: Type,
-        components: &[ComponentType],
-    ) -> Result<impl Iterator<Item = &[u8]>, String> {
-        let place = format!("accessors[{}]", accessor.value());
-        let accessor = self.get(accessor, "accessors")?;
-        let component = components.iter().find(
-            |&&wanted| matches!(accessor.component_type, Valid(component) if component.0 == wanted),
-        );
-        let (Some(component), true, None) =
-            (component, accessor.type_ == Valid(type_), &accessor.sparse)
-        else {
-            let found = format!("{:?} of {:?}", accessor.type_, accessor.component_type);
-            return Err(format!(
-                "{place} is {found}, or sparse; expected {type_:?} of {components:?}"
-            ));
-        };
-        let view = accessor.buffer_view.ok_or_else(|| {
-            format!("{place} has no buffer view; expected one (compressed meshes cannot be read)")
-        })?;
-        let view = self.get(view, "bufferViews")?;
-        self.buffers.need(self.root, view.buffer.value())?;
-        let size = component.size() * type_.multiplicity();
-        let stride = view.byte_stride.map_or(size, |stride| stride.0);
-        let buffer = self.buffers.bytes(view.buffer.value());
-        let count = accessor.count.0;
-        let bytes =
-            buffer.and_then(|buffer| window(buffer, view, accessor, stride, size)).ok_or_else(
-                || format!("{place} reaches beyond its buffer; expected {count} items in it"),
-            )?;
-        // A few accessors over the same bytes can stand for any number of items.
-        self.items += count;
-        if self.items > MOST_ITEMS {
-            return Err(format!(
-                "{place} makes it {} positions and indices; expected at most {MOST_ITEMS}",
-                self.items
-            ));
+        place: &Placed,
+        primitive: &Primitive,
+        accessor: usize,
+    ) -> Result<Vec<DVec3>, String> {
+        let draco = "KHR_draco_mesh_compression";
+        let in_view =
+            self.document.accessors.get(accessor).is_some_and(|a| a.buffer_view.is_some());
+        if primitive.extensions.contains_key(draco) && !in_view {
+            return Err(format!("positions in {draco} alone; expected them without compression"));
         }
-        Ok((0..count as usize).map(move |item| &bytes[item * stride..][..size]))
+        let points = self.accessors.read::<3>(accessor, &POSITIONS)?;
+        let mut points: Vec<DVec3> = points.into_iter().map(DVec3::from).collect();
+        let own = self.document.nodes[place.node].weights.as_ref();
+        let weights = own.unwrap_or(&self.document.meshes[place.mesh].weights);
+        if !weights.is_empty() && weights.len() != primitive.targets.len() {
+            let (weights, targets) = (weights.len(), primitive.targets.len());
+            return Err(format!("{weights} weights; expected {targets}, one per morph target"));
+        }
+        for (&weight, target) in weights.iter().zip(&primitive.targets) {
+            let Some(&accessor) = target.get("POSITION").filter(|_| weight != 0.0) else {
+                continue;
+            };
+            let moves = self.accessors.read::<3>(accessor, &POSITIONS)?;
+            same_length(moves.len(), points.len(), "positions of a morph target")?;
+            for (point, by) in points.iter_mut().zip(moves) {
+                *point += weight * DVec3::from(by);
+            }
+        }
+        Ok(points)
+    }
+
+    /// Returns the positions moved by the joints of a skin, each by its weights.
+    fn skinned(
+        &mut self,
+        primitive: &Primitive,
+        points: &[DVec3],
+        joints: &[DMat4],
+    ) -> Result<Vec<Vec3>, String> {
+        let mut sums = vec![(DVec3::ZERO, 0.0); points.len()];
+        for set in 0.. {
+            let named = |name| primitive.attributes.get(&format!("{name}_{set}"));
+            let (numbers, weights) = match (named("JOINTS"), named("WEIGHTS")) {
+                (Some(&numbers), Some(&weights)) => (numbers, weights),
+                (None, None) if set > 0 => break,
+                _ => return Err(format!("a skin; expected JOINTS_{set} and WEIGHTS_{set}")),
+            };
+            let numbers = self.accessors.read::<4>(numbers, &[U8, U16])?;
+            let weights = self.accessors.read::<4>(weights, &[F32, U8, U16])?;
+            same_length(numbers.len(), points.len(), &format!("items of JOINTS_{set}"))?;
+            same_length(weights.len(), points.len(), &format!("items of WEIGHTS_{set}"))?;
+            for (i, (numbers, weights)) in numbers.into_iter().zip(weights).enumerate() {
+                for (number, weight) in numbers.into_iter().zip(weights) {
+                    if weight != 0.0 {
+                        let joint = get(joints, number as usize, "joints")?;
+                        sums[i].0 += weight * joint.transform_point3(points[i]);
+                        sums[i].1 += weight;
+                    }
+                }
+            }
+        }
+        // Exporters round the weights, whose sum the standard wants to be one.
+        let means = sums.into_iter().enumerate().map(|(i, (sum, weight))| match weight > 0.0 {
+            true => Ok((sum / weight).as_vec3()),
+            false => Err(format!("weights of position {i} with sum {weight}; expected 1")),
+        });
+        means.collect()
     }
 }
 
-fn window<'a>(
-    buffer: &'a [u8],
-    view: &View,
-    accessor: &Accessor,
-    stride: usize,
-    size: usize,
-) -> Option<&'a [u8]> {
-    if stride < size {
-        return None;
+fn same_length(found: usize, expected: usize, name: &str) -> Result<(), String> {
+    match found == expected {
+        true => Ok(()),
+        false => Err(format!("{found} {name}; expected {expected}, one per position")),
     }
-    // Every number comes from the file, so each step checks for overflow and for the buffer's end.
-    let view_start = usize::try_from(view.byte_offset.map_or(0, |offset| offset.0)).ok()?;
-    let view_length = usize::try_from(view.byte_length.0).ok()?;
-    let start = usize::try_from(accessor.byte_offset.map_or(0, |offset| offset.0)).ok()?;
-    let gaps = usize::try_from(accessor.count.0).ok()?.checked_sub(1)?;
-    // The last item needs no padding after it.
-    let length = stride.checked_mul(gaps)?.checked_add(size)?;
-    let view_bytes = buffer.get(view_start..)?.get(..view_length)?;
-    view_bytes.get(start..)?.get(..length)
-}
-
-fn little_endian(bytes: &[u8]) -> u32 {
-    bytes.iter().rev().fold(0, |number, &byte| number << 8 | u32::from(byte))
 }
 
 /// Rejects places that have more triangles together than a scene may have, before any of them takes
 /// memory: a file of a few kilobytes can place one mesh any number of times. The meshes of all
 /// places must exist.
-fn check_size(root: &Root, places: &[Placed], path: &Path) -> Result<(), Fault> {
+fn check_size(document: &Document, places: &[Placed], path: &Path) -> Result<(), Fault> {
     let mut total = 0;
     for place in places {
-        for primitive in &root.meshes[place.mesh].primitives {
-            total += promised(root, primitive);
+        for primitive in &document.meshes[place.mesh].primitives {
+            total += promised(document, primitive);
         }
         if total > MOST_TRIANGLES {
             return Err(Fault::new(
@@ -349,21 +412,17 @@ fn check_size(root: &Root, places: &[Placed], path: &Path) -> Result<(), Fault> 
 
 /// Returns the number of triangles that the accessors of a primitive promise, at most one more than
 /// a scene may have. A fault of the primitive is found when it is read.
-fn promised(root: &Root, primitive: &Primitive) -> usize {
-    let Valid(mode) = primitive.mode else { return 0 };
-    let positions = primitive.attributes.get(&Valid(Semantic::Positions)).copied();
-    let Some(accessor) = primitive.indices.or(positions).and_then(|accessor| root.get(accessor))
-    else {
-        return 0;
-    };
-    let items = usize::try_from(accessor.count.0).unwrap_or(usize::MAX);
-    triangle_count(mode, items).min(MOST_TRIANGLES + 1)
+fn promised(document: &Document, primitive: &Primitive) -> usize {
+    let positions = primitive.attributes.get("POSITION").copied();
+    let items = primitive.indices.or(positions).and_then(|index| document.accessors.get(index));
+    let items = items.map_or(0, |accessor| accessor.count);
+    triangle_count(primitive.mode, items).min(MOST_TRIANGLES + 1)
 }
 
-fn triangle_count(mode: Mode, indices: usize) -> usize {
+fn triangle_count(mode: u32, indices: usize) -> usize {
     match mode {
-        Mode::Triangles => indices / 3,
-        Mode::TriangleStrip | Mode::TriangleFan => indices.saturating_sub(2),
-        Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => 0,
+        4 => indices / 3,
+        5 | 6 => indices.saturating_sub(2),
+        _ => 0,
     }
 }

@@ -12,67 +12,30 @@ pub const MOST_TRIANGLES: usize = 100_000_000;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
     /// The triangles in world units with finite corners, in the order of the file across its
-    /// objects and groups. A face of n ≥ 3 vertices becomes the n − 2 triangles of the fan around
-    /// its first vertex. The fan is exact for convex faces; for a concave face it can reach
-    /// outside.
+    /// objects and groups. A face of n ≥ 3 vertices becomes n − 2 triangles: the fan around its
+    /// first vertex where that covers the face, otherwise triangles between its vertices that do.
     pub triangles: Vec<Triangle>,
-    /// The number of vertices that are a corner of no triangle. They must be finite.
-    pub unused_vertices: usize,
-    /// The number of faces that were skipped because they have fewer than three vertices.
-    pub short_faces: usize,
-    /// The number of triangles without area (collinear or repeated corners). `triangles` contains
-    /// them.
-    pub degenerate_triangles: usize,
-    /// The number of lines that begin with no keyword of the format, with the first such line's
-    /// number, counted from 1, and its first word.
-    pub unknown: Option<(usize, usize, String)>,
+    /// The file's contents besides plain triangles, one clause for each kind.
+    pub remarks: Vec<String>,
 }
 
 impl Mesh {
-    /// Creates a mesh of these triangles and nothing else.
-    pub fn new(triangles: Vec<Triangle>) -> Self {
-        Self {
-            degenerate_triangles: triangles
-                .iter()
-                .filter(|triangle| triangle.is_degenerate())
-                .count(),
-            triangles,
-            unused_vertices: 0,
-            short_faces: 0,
-            unknown: None,
-        }
+    /// Creates a mesh of these triangles. Adds a remark on those without area (collinear or
+    /// repeated corners), which stay in the mesh, to the given remarks.
+    pub fn new(triangles: Vec<Triangle>, mut remarks: Vec<String>) -> Self {
+        let degenerate = triangles.iter().filter(|triangle| triangle.is_degenerate()).count();
+        remarks.extend(counted(degenerate, "triangle has no area", "triangles have no area"));
+        Self { triangles, remarks }
     }
 
-    /// Describes the file's contents besides plain triangles in one sentence, if there are any.
+    /// Joins the remarks to one sentence, if there are any.
     pub fn remark(&self) -> Option<String> {
-        let unknown = self.unknown.as_ref().and_then(|(count, line, word)| {
-            let lines = counted(
-                *count,
-                "line with an unknown keyword was",
-                "lines with unknown keywords were",
-            )?;
-            Some(format!("{lines} ignored (`{word}` in line {line})"))
-        });
-        let parts = [
-            counted(
-                self.unused_vertices,
-                "vertex is used by no face",
-                "vertices are used by no face",
-            ),
-            counted(
-                self.short_faces,
-                "face has fewer than three vertices and was skipped",
-                "faces have fewer than three vertices and were skipped",
-            ),
-            counted(self.degenerate_triangles, "triangle has no area", "triangles have no area"),
-            unknown,
-        ];
-        let parts: Vec<String> = parts.into_iter().flatten().collect();
-        (!parts.is_empty()).then(|| parts.join("; "))
+        (!self.remarks.is_empty()).then(|| self.remarks.join("; "))
     }
 }
 
-fn counted(count: usize, one: &str, many: &str) -> Option<String> {
+/// Returns a clause about `count` things, and nothing if there are none.
+pub(super) fn counted(count: usize, one: &str, many: &str) -> Option<String> {
     match count {
         0 => None,
         1 => Some(format!("1 {one}")),
@@ -80,12 +43,17 @@ fn counted(count: usize, one: &str, many: &str) -> Option<String> {
     }
 }
 
+/// Returns the clause about vertices that no face uses. Often they show that an export went wrong.
+pub(super) fn unused(vertices: usize) -> Option<String> {
+    counted(vertices, "vertex is used by no face", "vertices are used by no face")
+}
+
 /// The place of a fault in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// The whole file.
     File,
-    /// A line, counted from 1.
+    /// A line, counted from 1. A continued statement has the number of its first line.
     Line(usize),
     /// A part of the file, with the name or number that its format gives it.
     Element(String),
@@ -116,10 +84,11 @@ impl Fault {
     }
 }
 
-fn shortened(text: &str, most: usize) -> String {
-    // Messages of third-party parsers may span lines and quote the file at any length.
+/// Makes a text of a file, or of a parser that quotes the file, one line of at most `most`
+/// printable characters.
+pub(super) fn shortened(text: &str, most: usize) -> String {
     let words: Vec<&str> = text.split_whitespace().collect();
-    let line = words.join(" ");
+    let line: String = words.join(" ").chars().filter(|c| !c.is_control()).collect();
     if line.chars().nth(most).is_none() {
         return line;
     }

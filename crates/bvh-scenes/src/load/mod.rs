@@ -4,12 +4,13 @@ pub mod gltf;
 pub mod mesh;
 pub mod obj;
 mod ply;
+mod polygon;
 mod stl;
+mod text;
 
 use crate::files::{ReadError, read};
 pub use gltf::OutsideFiles;
-use mesh::{Fault, Mesh};
-use obj::ObjError;
+use mesh::{Fault, Mesh, Place};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -22,10 +23,7 @@ pub enum MeshError {
     /// The file has no bytes, or only blanks.
     #[error("{} is empty; expected an OBJ, PLY, STL or glTF file", .0.display())]
     Empty(PathBuf),
-    /// The OBJ file is invalid.
-    #[error(transparent)]
-    Obj(#[from] ObjError),
-    /// The PLY, STL or glTF file is invalid.
+    /// The file is invalid.
     #[error(transparent)]
     Fault(#[from] Fault),
 }
@@ -57,7 +55,7 @@ impl Format {
         {
             return Self::Ply;
         }
-        if stl::is_binary(bytes) || stl::is_text(text) {
+        if stl::is_binary(bytes) || stl::is_text(unmarked) {
             return Self::Stl;
         }
         let extension =
@@ -96,6 +94,11 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
 fn parse_with(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Mesh, MeshError> {
     if bytes.trim_ascii().is_empty() {
         return Err(MeshError::Empty(path.to_path_buf()));
+    }
+    let is_utf_16 = bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff");
+    if is_utf_16 && !stl::is_binary(bytes) {
+        let message = "the text is UTF-16; expected UTF-8 or ASCII";
+        return Err(Fault::new(path, Place::File, message).into());
     }
     Ok(match Format::of(bytes, path) {
         Format::Obj => obj::parse(bytes, path)?,

@@ -1,245 +1,422 @@
-//! Triangles from PLY files, text or binary, which `ply-rs-bw` parses.
+//! Triangles from PLY files, text or binary: the faces and triangle strips over the vertices.
+//!
+//! This module does not use `ply-rs-bw` 4.0.1, because that crate rejects blank lines, comments in
+//! Latin-1, lines that end in CR, elements without properties, and `-nan(ind)`; it reads an element
+//! that is declared twice at wrong places; and its errors speak of its grammar.
 
-use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Place};
-use super::without_mark;
+use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Place, counted, unused};
+use super::polygon::{Polygons, open};
+use super::{text, without_mark};
 use bvh_core::Triangle;
 use glam::Vec3;
-use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{
-    ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
-    ScalarType,
-};
-use std::collections::HashSet;
 use std::path::Path;
 
-/// A position, with NaN where the file has no coordinate. Elements that are neither vertices nor
-/// faces are read as positions, too, and dropped: a type for them would compile the parser again.
-struct Vertex([f32; 3]);
+/// The types of numbers, each with its two names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
 
-impl PropertyAccess for Vertex {
-    fn new() -> Self {
-        Self([f32::NAN; 3])
+impl Scalar {
+    fn named(word: &str) -> Result<Self, String> {
+        Ok(match word {
+            "char" | "int8" => Self::I8,
+            "uchar" | "uint8" => Self::U8,
+            "short" | "int16" => Self::I16,
+            "ushort" | "uint16" => Self::U16,
+            "int" | "int32" => Self::I32,
+            "uint" | "uint32" => Self::U32,
+            "float" | "float32" => Self::F32,
+            "double" | "float64" => Self::F64,
+            _ => return Err(format!("type `{word}`; expected a type such as uchar, int or float")),
+        })
     }
 
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == name) else {
-            return PropertyAccessResult::Ignored;
-        };
-        // A list stays without a coordinate, which only a vertex needs.
-        match property.to_f32_lossy() {
-            Some(coordinate) => self.0[axis] = coordinate,
-            None => return PropertyAccessResult::Ignored,
+    fn integer(word: &str, what: &str) -> Result<Self, String> {
+        match Self::named(word)? {
+            Self::F32 | Self::F64 => {
+                Err(format!("{what} of type {word}; expected an integer type"))
+            }
+            integer => Ok(integer),
         }
-        PropertyAccessResult::Set
     }
 }
 
-/// The indices of one polygon's positions.
-struct Face(Vec<i64>);
+/// What becomes of a property.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Purpose {
+    Ignored,
+    Axis(usize),
+    Indices,
+}
 
-impl PropertyAccess for Face {
-    fn new() -> Self {
-        Self(Vec::new())
-    }
+#[derive(Debug)]
+struct Property {
+    name: String,
+    /// The type of the length, if the property is a list.
+    length: Option<Scalar>,
+    scalar: Scalar,
+    purpose: Purpose,
+}
 
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        if !matches!(name, "vertex_indices" | "vertex_index") {
-            return PropertyAccessResult::Ignored;
-        }
-        self.0 = match property {
-            Property::ListChar(list) => list.into_iter().map(Into::into).collect(),
-            Property::ListUChar(list) => list.into_iter().map(Into::into).collect(),
-            Property::ListShort(list) => list.into_iter().map(Into::into).collect(),
-            Property::ListUShort(list) => list.into_iter().map(Into::into).collect(),
-            Property::ListInt(list) => list.into_iter().map(Into::into).collect(),
-            Property::ListUInt(list) => list.into_iter().map(Into::into).collect(),
-            _ => return PropertyAccessResult::UnsupportedType,
-        };
-        PropertyAccessResult::Set
+#[derive(Debug)]
+struct Element {
+    name: String,
+    count: u64,
+    properties: Vec<Property>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Encoding {
+    Text,
+    LittleEndian,
+    BigEndian,
+}
+
+/// Lists of indices of vertices, one after the other.
+#[derive(Default)]
+struct Lists {
+    indices: Vec<i64>,
+    ends: Vec<usize>,
+}
+
+impl Lists {
+    fn iter(&self) -> impl Iterator<Item = &[i64]> {
+        let starts = [0].iter().chain(&self.ends);
+        starts.zip(&self.ends).map(|(&start, &end)| &self.indices[start..end])
     }
 }
 
-/// Reads the bytes of a PLY file; `path` only names it in errors.
+/// Reads the bytes of a PLY file; `path` only names it in errors. O(bytes), and more for polygons
+/// that are not convex.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
-    let bytes = without_mark(bytes);
-    let mut reader = Reader::new(bytes);
-    let header = Parser::<Vertex>::new()
-        .read_header(&mut reader)
-        .map_err(|error| fault(path, None, &error))?;
-    check(&header, path)?;
-    check_names(bytes, path)?;
+    let mut file =
+        File { rest: without_mark(bytes), line: 0, words: &[], encoding: Encoding::Text };
+    let elements =
+        file.header().map_err(|message| Fault::new(path, Place::Line(file.line), message))?;
     let mut vertices = Vec::new();
-    let mut faces = Vec::new();
-    for element in header.elements.values() {
-        // Every element has at least a byte or a line. Without this check a header of one line
-        // could ask for any amount of memory.
-        if element.properties.is_empty() || element.count > bytes.len() {
-            let found = format!(
-                "{} of {} properties in a file of {} bytes",
-                element.count,
-                element.properties.len(),
-                bytes.len()
-            );
-            let message = format!("{found}; expected no more than the file has room for");
-            return Err(element_of_header(path, &element.name, message));
-        }
-        match element.name.as_str() {
-            "vertex" => vertices = elements::<Vertex>(&mut reader, element, &header, path)?,
-            "face" => faces = elements::<Face>(&mut reader, element, &header, path)?,
-            // Other elements must be read as well, because their length is not known in advance.
-            _ => drop(elements::<Vertex>(&mut reader, element, &header, path)?),
-        }
-    }
-    mesh(&vertices, &faces, path)
-}
-
-/// Rejects a version other than 1.0 and a list whose length has a fraction.
-fn check(header: &Header, path: &Path) -> Result<(), Fault> {
-    let version = header.version;
-    if (version.major, version.minor) != (1, 0) {
-        let message = format!("version {version}; expected 1.0");
-        return Err(Fault::new(path, Place::Element("format".into()), message));
-    }
-    for element in header.elements.values() {
-        for property in element.properties.values() {
-            let PropertyType::List(length, _) = &property.data_type else { continue };
-            if matches!(length, ScalarType::Float | ScalarType::Double) {
-                let message = format!(
-                    "the length of list {} is a {length:?}; expected an integer type",
-                    property.name
-                );
-                return Err(element_of_header(path, &element.name, message));
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Rejects an element, or a property of an element, that the header declares twice. The parser
-/// keeps the last declaration and would read all bytes after it at wrong places.
-fn check_names(bytes: &[u8], path: &Path) -> Result<(), Fault> {
-    let mut elements = HashSet::new();
-    let mut properties = HashSet::new();
-    let mut element = String::new();
-    for line in bytes.split(|byte| matches!(byte, b'\n' | b'\r')) {
-        let line = String::from_utf8_lossy(line);
-        let words: Vec<&str> = line.split_ascii_whitespace().collect();
-        let is_new = match words[..] {
-            ["end_header"] => break,
-            ["element", name, ..] => {
-                name.clone_into(&mut element);
-                properties.clear();
-                elements.insert(element.clone())
-            }
-            ["property", .., name] => properties.insert(name.to_owned()),
-            _ => true,
+    let (mut faces, mut strips, mut others) = Default::default();
+    for Element { name, count, properties } in &elements {
+        let lists: &mut Lists = match name.as_str() {
+            "face" => &mut faces,
+            "tristrips" => &mut strips,
+            _ => &mut others,
         };
-        if !is_new {
-            let found = format!("`{}` repeats a name", beginning(&line));
-            let message = format!("{found}; expected each name once");
-            return Err(element_of_header(path, &element, message));
+        // An element without properties has no bytes, whatever its count.
+        for number in 0..if properties.is_empty() { 0 } else { *count } {
+            let mut point = [f32::NAN; 3];
+            file.element(properties, &mut point, &mut lists.indices).map_err(|message| {
+                let name = format!("{name} {number}, counted from 0");
+                match file.encoding {
+                    Encoding::Text => {
+                        Fault::new(path, Place::Line(file.line), format!("{name}: {message}"))
+                    }
+                    _ => Fault::new(path, Place::Element(name), message),
+                }
+            })?;
+            lists.ends.push(lists.indices.len());
+            if name == "vertex" {
+                vertices.push(Vec3::from(point));
+            }
         }
     }
-    Ok(())
+    let after = counted(
+        file.rest.trim_ascii().len(),
+        "byte after the last element was ignored",
+        "bytes after the last element were ignored",
+    );
+    mesh(&vertices, &faces, &strips, after, path)
 }
 
-fn element_of_header(path: &Path, element: &str, message: String) -> Fault {
-    Fault::new(path, Place::Element(format!("element {element}")), message)
+/// The part of a file that is not read yet.
+struct File<'a> {
+    rest: &'a [u8],
+    /// The number of lines taken so far.
+    line: usize,
+    /// The rest of the current line.
+    words: &'a [u8],
+    encoding: Encoding,
 }
 
-fn elements<E: PropertyAccess>(
-    reader: &mut Reader<&[u8]>,
-    element: &ElementDef,
-    header: &Header,
+impl<'a> File<'a> {
+    /// Reads the header, and everything up to the first byte of the first element.
+    fn header(&mut self) -> Result<Vec<Element>, String> {
+        // Only in a file whose lines end in CR alone may the body begin with LF.
+        let end = self.rest.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+        let end = &self.rest[end.unwrap_or(self.rest.len())..];
+        let ends_in_cr = end.starts_with(b"\r") && !end.starts_with(b"\r\n");
+        let mut elements: Vec<Element> = Vec::new();
+        let mut encoding = None;
+        let unexpected = |line: &[u8]| {
+            let expected = "format, comment, obj_info, element, property or end_header";
+            format!("`{}`; expected {expected}", text::shown(line))
+        };
+        loop {
+            let before = self.rest;
+            let line = text::line(&mut self.rest).ok_or("the file ends in its header")?;
+            self.line += 1;
+            let lossy = String::from_utf8_lossy(line);
+            let words: Vec<&str> = lossy.split_ascii_whitespace().collect();
+            match words[..] {
+                ["ply"] if self.line == 1 => {}
+                _ if self.line == 1 => {
+                    return Err(format!("`{}`; expected ply", text::shown(line)));
+                }
+                [] | ["comment" | "obj_info", ..] => {}
+                ["format", name, "1.0"] => {
+                    encoding = Some(match name {
+                        "ascii" => Encoding::Text,
+                        "binary_little_endian" => Encoding::LittleEndian,
+                        "binary_big_endian" => Encoding::BigEndian,
+                        _ => {
+                            let known = "ascii, binary_little_endian or binary_big_endian";
+                            return Err(format!("format `{name}`; expected {known}"));
+                        }
+                    });
+                }
+                ["format", _, version] => {
+                    return Err(format!("version {version}; expected 1.0"));
+                }
+                ["element", name, count] => {
+                    if elements.iter().any(|element| element.name == name) {
+                        return Err(format!("element `{name}` repeats a name; expected each once"));
+                    }
+                    let count = count
+                        .parse()
+                        .map_err(|_| format!("`{count}` elements; expected a whole number"))?;
+                    elements.push(Element { name: name.into(), count, properties: Vec::new() });
+                }
+                ["property", ref type_ @ .., name] => {
+                    let Some(element) = elements.last_mut() else { return Err(unexpected(line)) };
+                    element.add(type_, name)?;
+                }
+                ["end_header"] => {
+                    if ends_in_cr {
+                        self.rest = &before[before.len().min(line.len() + 1)..];
+                    }
+                    break;
+                }
+                _ => return Err(unexpected(line)),
+            }
+        }
+        self.encoding = encoding.ok_or("no format; expected a line such as format ascii 1.0")?;
+        elements.iter().try_for_each(Element::check)?;
+        Ok(elements)
+    }
+
+    /// Reads one element. Adds its list of vertices to `indices`.
+    fn element(
+        &mut self,
+        properties: &[Property],
+        point: &mut [f32; 3],
+        indices: &mut Vec<i64>,
+    ) -> Result<(), String> {
+        while self.encoding == Encoding::Text && self.words.is_empty() {
+            self.words = text::line(&mut self.rest).ok_or(ENDS)?.trim_ascii();
+            self.line += 1;
+        }
+        for property in properties {
+            let named = |message| format!("{}: {message}", property.name);
+            let count = match property.length {
+                None => 1,
+                Some(length) => self.integer(length).map_err(named)?,
+            };
+            if count < 0 {
+                return Err(named(format!("a list of length {count}; expected 0 or more")));
+            }
+            for _ in 0..count {
+                match property.purpose {
+                    Purpose::Ignored => self.skip(property.scalar),
+                    Purpose::Axis(axis) => {
+                        self.float(property.scalar).map(|number| point[axis] = number)
+                    }
+                    Purpose::Indices => {
+                        self.integer(property.scalar).map(|index| indices.push(index))
+                    }
+                }
+                .map_err(named)?;
+            }
+        }
+        match std::mem::take(&mut self.words) {
+            [] => Ok(()),
+            extra => Err(format!(
+                "`{}` after its last property; expected the end of the line",
+                text::shown(extra)
+            )),
+        }
+    }
+
+    fn skip(&mut self, scalar: Scalar) -> Result<(), String> {
+        match (self.encoding, scalar) {
+            (Encoding::Text, _) => self.word().map(drop),
+            (_, Scalar::I8 | Scalar::U8) => self.bytes::<1>().map(drop),
+            (_, Scalar::I16 | Scalar::U16) => self.bytes::<2>().map(drop),
+            (_, Scalar::I32 | Scalar::U32 | Scalar::F32) => self.bytes::<4>().map(drop),
+            (_, Scalar::F64) => self.bytes::<8>().map(drop),
+        }
+    }
+
+    fn float(&mut self, scalar: Scalar) -> Result<f32, String> {
+        match (self.encoding, scalar) {
+            (Encoding::Text, Scalar::F32 | Scalar::F64) => {
+                let word = self.word()?;
+                text::number(word)
+                    .ok_or_else(|| format!("`{}`; expected a number", text::shown(word)))
+            }
+            (_, Scalar::F32) => Ok(f32::from_le_bytes(self.bytes()?)),
+            (_, Scalar::F64) => Ok(f64::from_le_bytes(self.bytes()?) as f32),
+            _ => Ok(self.integer(scalar)? as f32),
+        }
+    }
+
+    fn integer(&mut self, scalar: Scalar) -> Result<i64, String> {
+        if self.encoding == Encoding::Text {
+            let word = self.word()?;
+            let number = std::str::from_utf8(word).ok().and_then(|word| word.parse().ok());
+            return number
+                .ok_or_else(|| format!("`{}`; expected a whole number", text::shown(word)));
+        }
+        Ok(match scalar {
+            Scalar::I8 => i8::from_le_bytes(self.bytes()?).into(),
+            Scalar::U8 => u8::from_le_bytes(self.bytes()?).into(),
+            Scalar::I16 => i16::from_le_bytes(self.bytes()?).into(),
+            Scalar::U16 => u16::from_le_bytes(self.bytes()?).into(),
+            Scalar::I32 => i32::from_le_bytes(self.bytes()?).into(),
+            Scalar::U32 => u32::from_le_bytes(self.bytes()?).into(),
+            Scalar::F32 | Scalar::F64 => unreachable!("the header was checked for integer types"),
+        })
+    }
+
+    fn word(&mut self) -> Result<&'a [u8], String> {
+        if self.words.is_empty() {
+            return Err("its line ends before it; expected one line for each element".into());
+        }
+        let end = self.words.iter().position(u8::is_ascii_whitespace);
+        let (word, rest) = self.words.split_at(end.unwrap_or(self.words.len()));
+        self.words = rest.trim_ascii_start();
+        Ok(word)
+    }
+
+    /// Returns the next bytes in little-endian order.
+    fn bytes<const N: usize>(&mut self) -> Result<[u8; N], String> {
+        let (bytes, rest) = self.rest.split_first_chunk::<N>().ok_or(ENDS)?;
+        self.rest = rest;
+        let mut bytes = *bytes;
+        if self.encoding == Encoding::BigEndian {
+            bytes.reverse();
+        }
+        Ok(bytes)
+    }
+}
+
+const ENDS: &str = "the file ends here; expected the elements of the header";
+
+impl Element {
+    /// Adds the property of these types, or rejects it.
+    fn add(&mut self, types: &[&str], name: &str) -> Result<(), String> {
+        if self.properties.iter().any(|property| property.name == name) {
+            return Err(format!("property `{name}` repeats a name; expected each once"));
+        }
+        let axis = ["x", "y", "z"].iter().position(|axis| *axis == name);
+        let purpose = match (self.name.as_str(), axis) {
+            ("vertex", Some(axis)) => Purpose::Axis(axis),
+            ("face" | "tristrips", _) if matches!(name, "vertex_indices" | "vertex_index") => {
+                Purpose::Indices
+            }
+            _ => Purpose::Ignored,
+        };
+        let (length, scalar) = match (types, purpose) {
+            (&[scalar], Purpose::Ignored | Purpose::Axis(_)) => (None, Scalar::named(scalar)?),
+            (&["list", length, scalar], Purpose::Ignored | Purpose::Indices) => {
+                let scalar = match purpose {
+                    Purpose::Indices => Scalar::integer(scalar, "indices")?,
+                    _ => Scalar::named(scalar)?,
+                };
+                (Some(Scalar::integer(length, "a length")?), scalar)
+            }
+            (_, Purpose::Axis(_)) => return Err(format!("`{name}`; expected one number")),
+            (_, Purpose::Indices) => return Err(format!("`{name}`; expected a list")),
+            _ => return Err(format!("the type of `{name}`; expected one type, or list and two")),
+        };
+        self.properties.push(Property { name: name.into(), length, scalar, purpose });
+        Ok(())
+    }
+
+    /// Rejects an element without the properties that make it a vertex or a face.
+    fn check(&self) -> Result<(), String> {
+        let (needed, names) = match self.name.as_str() {
+            "vertex" => (3, "x, y and z"),
+            "face" | "tristrips" => (1, "vertex_indices"),
+            _ => (0, ""),
+        };
+        let has = self.properties.iter().filter(|property| property.purpose != Purpose::Ignored);
+        match self.count > 0 && has.count() != needed {
+            true => Err(format!("element {} has other properties; expected {names}", self.name)),
+            false => Ok(()),
+        }
+    }
+}
+
+fn mesh(
+    vertices: &[Vec3],
+    faces: &Lists,
+    strips: &Lists,
+    after: Option<String>,
     path: &Path,
-) -> Result<Vec<E>, Fault> {
-    Parser::<E>::new()
-        .read_payload_for_element(reader, element, header)
-        .map_err(|error| fault(path, Some((element, header)), &error))
-}
-
-/// Converts the parser's error: with its line if the file has lines, otherwise with its element.
-fn fault(path: &Path, within: Option<(&ElementDef, &Header)>, error: &ParseError) -> Fault {
-    let place = match (within, error.line()) {
-        (Some((element, header)), _) if header.encoding != Encoding::Ascii => {
-            Place::Element(format!("element {}", element.name))
-        }
-        (_, Some(line)) => Place::Line(line),
-        _ => Place::File,
-    };
-    let full = error.to_string();
-    // The place already names the line.
-    let message =
-        error.line().and_then(|line| full.strip_prefix(&format!("Line {line}: "))).unwrap_or(&full);
-    // The parser's words for a line that it does not know are those of its grammar.
-    let unknown =
-        message.split_once("String: ").and_then(|(_, rest)| rest.split_once("\n\tError: "));
-    match unknown {
-        Some((line, _)) => {
-            let message = format!("`{}`; expected a line of a PLY header", beginning(line));
-            Fault::new(path, place, message)
-        }
-        None => Fault::new(path, place, message),
-    }
-}
-
-fn beginning(line: &str) -> String {
-    // Some of the parser's errors quote the line with its end.
-    line.trim_matches('\'').trim_end().chars().take(60).flat_map(char::escape_debug).collect()
-}
-
-fn element_fault(path: &Path, element: &str, number: usize, message: String) -> Fault {
-    Fault::new(path, Place::Element(format!("{element} {number}, counted from 0")), message)
-}
-
-fn mesh(vertices: &[Vertex], faces: &[Face], path: &Path) -> Result<Mesh, Fault> {
-    if let Some((number, Vertex(found))) = vertices
-        .iter()
-        .enumerate()
-        .find(|(_, Vertex(position))| position.iter().any(|x| !x.is_finite()))
-    {
-        let message = format!("position {found:?}; expected finite x, y and z");
-        return Err(element_fault(path, "vertex", number, message));
-    }
+) -> Result<Mesh, Fault> {
     // Unused vertices are reported, because they often show that an export went wrong.
     let mut used = vec![false; vertices.len()];
-    let mut triangles = Vec::new();
-    let mut short_faces = 0;
-    for (number, Face(indices)) in faces.iter().enumerate() {
-        let mut corners = Vec::with_capacity(indices.len());
-        for &index in indices {
-            let Some(Vertex(position)) =
-                usize::try_from(index).ok().and_then(|index| vertices.get(index))
-            else {
-                let message = format!("vertex {index}; expected 0 to below {}", vertices.len());
-                return Err(element_fault(path, "face", number, message));
-            };
-            corners.push(Vec3::from(*position));
+    let mut point = |index: i64| -> Result<Vec3, String> {
+        let index = usize::try_from(index)
+            .ok()
+            .filter(|index| *index < vertices.len())
+            .ok_or_else(|| format!("vertex {index}; expected 0 to below {}", vertices.len()))?;
+        used[index] = true;
+        match vertices[index] {
+            point if point.is_finite() => Ok(point),
+            point => Err(format!("vertex {index} at {point}; expected finite x, y and z")),
         }
-        let [first, others @ ..] = &corners[..] else {
-            short_faces += 1;
-            continue;
-        };
-        if others.len() < 2 {
-            short_faces += 1;
-            continue;
+    };
+    let fault = |element: &str, number: usize, message: String| {
+        Fault::new(path, Place::Element(format!("{element} {number}, counted from 0")), message)
+    };
+    let mut polygons = Polygons::default();
+    let mut corners = Vec::new();
+    for (number, face) in faces.iter().enumerate() {
+        corners.clear();
+        for &index in open(face) {
+            corners.push(point(index).map_err(|message| fault("face", number, message))?);
         }
-        // The loop above has checked every index.
-        for &index in indices {
-            used[index as usize] = true;
-        }
-        for pair in others.windows(2) {
-            triangles.push(Triangle([*first, pair[0], pair[1]]));
+        polygons.add(&corners).map_err(|message| fault("face", number, message))?;
+    }
+    for (number, strip) in strips.iter().enumerate() {
+        // The index -1 ends a strip and begins another one.
+        for run in strip.split(|&index| index == -1) {
+            corners.clear();
+            for &index in run {
+                corners.push(point(index).map_err(|message| fault("tristrips", number, message))?);
+            }
+            let triangles = corners.windows(3).enumerate().map(|(i, corners)| {
+                // Every second triangle is turned, so that all have one orientation.
+                Triangle([corners[0], corners[1 + i % 2], corners[2 - i % 2]])
+            });
+            polygons.triangles.extend(triangles);
         }
     }
+    let remarks = unused(used.iter().filter(|used| !**used).count());
+    let remarks = remarks.into_iter().chain(polygons.remarks()).chain(after).collect();
+    let triangles = polygons.triangles;
     if triangles.is_empty() || triangles.len() > MOST_TRIANGLES {
         let found = format!("{} vertices and {} triangles", vertices.len(), triangles.len());
-        return Err(Fault::new(
-            path,
-            Place::File,
-            format!("{found}; expected 1 to {MOST_TRIANGLES} triangles"),
-        ));
+        let message = format!("{found}; expected 1 to {MOST_TRIANGLES} triangles");
+        return Err(Fault::new(path, Place::File, message));
     }
-    let unused_vertices = used.iter().filter(|used| !**used).count();
-    Ok(Mesh { unused_vertices, short_faces, ..Mesh::new(triangles) })
+    Ok(Mesh::new(triangles, remarks))
 }

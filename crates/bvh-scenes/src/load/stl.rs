@@ -1,10 +1,11 @@
 //! Triangles from STL files, text or binary.
 //!
 //! This module does not use `stl_io` 0.11, because `stl_io` stops after the first of several
-//! solids, mistakes `solid` without a name for a binary file, and names no line.
+//! solids, mistakes `solid` without a name for a binary file, names no line, and knows neither of
+//! the ways in which programs write comments, colours, `end loop`, counts and attributes.
 
-use super::mesh::{Fault, Mesh, Place};
-use super::without_mark;
+use super::mesh::{Fault, Mesh, Place, counted};
+use super::{text, without_mark};
 use bvh_core::Triangle;
 use glam::Vec3;
 use std::path::Path;
@@ -12,7 +13,8 @@ use std::path::Path;
 /// The number of bytes before the triangles of a binary file: a comment of 80 bytes, and the number
 /// of triangles.
 const HEADER: usize = 84;
-/// The number of bytes of a triangle: a normal, three corners, and two bytes without a meaning.
+/// The number of bytes of a triangle: a normal, three corners, and the length of the attribute
+/// after it, which most programs use for a colour instead.
 const FACET: usize = 50;
 
 fn promised(bytes: &[u8]) -> Option<usize> {
@@ -25,46 +27,61 @@ pub fn is_binary(bytes: &[u8]) -> bool {
     promised(bytes).is_some_and(|facets| facets > 0 && bytes.len() == HEADER + FACET * facets)
 }
 
-/// Returns whether text begins like an STL file: with `solid`, and a facet within 4096 bytes.
+/// Returns whether text is that of an STL file: whether it begins with `solid`, after comments, and
+/// names a facet. The beginning of a binary file contains zeros.
 pub fn is_text(text: &[u8]) -> bool {
-    let mut words =
-        text[..text.len().min(4096)].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    let mut rest = text;
+    let first = std::iter::from_fn(|| text::line(&mut rest)).find(|line| !is_comment(line));
+    let mut words = first.into_iter().flat_map(text::words).chain(text::words(rest));
     words.next().is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+        && !text[..text.len().min(HEADER + FACET)].contains(&0)
         && words.any(|word| {
-            word.eq_ignore_ascii_case(b"facet") || word.eq_ignore_ascii_case(b"endsolid")
+            [&b"facet"[..], b"endsolid", b"end"].iter().any(|k| word.eq_ignore_ascii_case(k))
         })
 }
 
-/// Reads the bytes of an STL file; `path` only names it in errors.
+fn is_comment(line: &[u8]) -> bool {
+    matches!(line.trim_ascii_start(), [] | [b';' | b'#', ..])
+}
+
+/// Reads the bytes of an STL file; `path` only names it in errors. O(bytes).
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     let text = without_mark(bytes);
-    let is_text = !is_binary(bytes) && is_text(text.trim_ascii_start());
-    let triangles = if is_text { parse_text(text, path)? } else { parse_binary(bytes, path)? };
+    let is_text = !is_binary(bytes) && is_text(text);
+    let (triangles, remarks) = match is_text {
+        true => (parse_text(text, path)?, None),
+        false => parse_binary(bytes, path)?,
+    };
     if triangles.is_empty() {
         let message = "no facet; expected an STL file with at least one";
         return Err(Fault::new(path, Place::File, message));
     }
-    Ok(Mesh::new(triangles))
+    Ok(Mesh::new(triangles, remarks.into_iter().collect()))
 }
 
-/// Reads the triangles that the header promises. Bytes after them are ignored, because some programs
-/// append their own data.
-fn parse_binary(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
-    let facets = promised(bytes).ok_or_else(|| {
+/// Reads the triangles of a binary file, and returns a remark if the header does not give their
+/// number or bytes follow them.
+fn parse_binary(bytes: &[u8], path: &Path) -> Result<(Vec<Triangle>, Option<String>), Fault> {
+    let promised = promised(bytes).ok_or_else(|| {
         let message =
             format!("{} bytes; expected the {HEADER} of a binary STL file's header", bytes.len());
         Fault::new(path, Place::File, message)
     })?;
-    let body = bytes[HEADER..].chunks_exact(FACET);
-    if body.len() < facets {
-        let message = format!(
-            "{} whole facets; expected the {facets} of the header: the file was cut",
-            body.len()
-        );
+    let body = &bytes[HEADER..];
+    let (room, after) = (body.len() / FACET, body.len() % FACET);
+    let has_attributes = body.len() != promised * FACET && are_attributes(body, promised);
+    // Programs that write while they compute do not always return to the header.
+    let is_unwritten = matches!(promised, 0 | 0xffff_ffff) && after == 0;
+    if !has_attributes && !is_unwritten && (room < promised || room > promised && after == 0) {
+        let message = format!("room for {room} facets; expected the {promised} of the header");
         return Err(Fault::new(path, Place::File, message));
     }
-    let mut triangles = Vec::new();
-    for (number, facet) in body.take(facets).enumerate() {
+    let facets = if is_unwritten { room } else { promised };
+    let mut triangles = Vec::with_capacity(facets);
+    let mut rest = body;
+    for number in 0..facets {
+        let (facet, after) = rest.split_at(FACET);
+        rest = if has_attributes { &after[attribute(facet)..] } else { after };
         // The normal in the first 12 bytes is ignored: many programs write zeros there.
         let (words, _) = facet[12..48].as_chunks();
         let corners: [f32; 9] = std::array::from_fn(|i| f32::from_le_bytes(words[i]));
@@ -75,72 +92,100 @@ fn parse_binary(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
         }
         triangles.push(Triangle::from(corners));
     }
-    Ok(triangles)
+    let ignored = counted(
+        rest.len(),
+        "byte after the last facet was ignored",
+        "bytes after the last facet were ignored",
+    );
+    let unwritten = (is_unwritten && facets > 0)
+        .then(|| format!("the header counts {promised} facets and the file has {facets}"));
+    Ok((triangles, unwritten.or(ignored)))
 }
 
-/// Reads the corners of every loop, three at a time. Normals and names are ignored.
+/// Returns the number of bytes that a facet says follow it.
+fn attribute(facet: &[u8]) -> usize {
+    usize::from(u16::from_le_bytes([facet[48], facet[49]]))
+}
+
+/// Returns whether the facets, each with as many bytes after it as it says, end where the file does.
+fn are_attributes(body: &[u8], facets: usize) -> bool {
+    let mut rest = Some(body);
+    for _ in 0..facets {
+        rest = rest
+            .and_then(|rest| rest.split_at_checked(FACET))
+            .and_then(|(facet, after)| after.get(attribute(facet)..));
+    }
+    rest.is_some_and(<[u8]>::is_empty)
+}
+
+/// Words that begin a part of a text file. Any other words after `facet`, `normal` and `color` are
+/// numbers that nobody needs, whatever they look like.
+const KEYWORDS: [&str; 9] =
+    ["color", "end", "endfacet", "endloop", "endsolid", "facet", "outer", "solid", "vertex"];
+
+/// Reads the corners of every loop, three at a time. Normals, colours and names are ignored.
 fn parse_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
     let mut triangles = Vec::new();
     let mut corners: Vec<Vec3> = Vec::new();
+    let mut rest = bytes;
     let mut line = 0;
     let mut inside = false;
-    for text in bytes.split(|&byte| byte == b'\n') {
+    while let Some(text) = text::line(&mut rest) {
         line += 1;
-        let place = Place::Line(line);
-        let text = String::from_utf8_lossy(text);
+        if is_comment(text) {
+            continue;
+        }
+        let fault = |message| Fault::new(path, Place::Line(line), message);
+        let text = String::from_utf8_lossy(text).to_ascii_lowercase();
         // A line may have several keywords, because STL knows only words.
         let mut words = text.split_whitespace().peekable();
         while let Some(word) = words.next() {
-            match word.to_ascii_lowercase().as_str() {
-                "vertex" => {
+            let part = if word == "end" { words.next().unwrap_or_default() } else { word };
+            match (word, part) {
+                ("vertex", _) => {
                     let found: Vec<&str> = words.by_ref().take(3).collect();
                     corners.push(corner(&found).ok_or_else(|| {
                         let found = found.join(" ");
-                        let message = format!("vertex `{found}`; expected three finite numbers");
-                        Fault::new(path, place.clone(), message)
+                        fault(format!("vertex `{found}`; expected three finite numbers"))
                     })?);
                     if corners.len() > 3 {
-                        let message = "a fourth vertex in a loop; expected three";
-                        return Err(Fault::new(path, place, message));
+                        return Err(fault("a fourth vertex in a loop; expected three".into()));
                     }
                 }
-                keyword @ ("endloop" | "endfacet") => {
-                    // `endfacet` closes a loop as well, because some programs omit `endloop`.
+                // The end of a facet closes a loop as well, because some programs omit `endloop`.
+                ("endloop" | "endfacet", _) | ("end", "loop" | "facet") => {
                     match *corners {
                         [] => {}
                         [a, b, c] => triangles.push(Triangle([a, b, c])),
                         _ => {
                             let count = corners.len();
-                            let message = format!("a loop of {count} vertices; expected three");
-                            return Err(Fault::new(path, place, message));
+                            return Err(fault(format!(
+                                "a loop of {count} vertices; expected three"
+                            )));
                         }
                     }
                     corners.clear();
-                    inside &= keyword != "endfacet";
+                    inside &= part.ends_with("loop");
                 }
-                "facet" => {
-                    inside = true;
-                    words.next_if(|word| word.eq_ignore_ascii_case("normal"));
-                    while words.next_if(|word| word.parse::<f32>().is_ok()).is_some() {}
+                ("facet" | "color", _) => {
+                    inside |= word == "facet";
+                    while words.next_if(|word| !KEYWORDS.contains(word)).is_some() {}
                 }
-                "outer" => {
-                    words.next_if(|word| word.eq_ignore_ascii_case("loop"));
+                ("outer", _) => {
+                    words.next_if(|word| *word == "loop");
                 }
                 // A name follows.
-                "solid" | "endsolid" => break,
+                ("solid" | "endsolid", _) | ("end", "solid") => break,
                 _ => {
                     let expected = "expected a keyword of an STL file, such as facet or vertex";
-                    return Err(Fault::new(path, place, format!("`{word}`; {expected}")));
+                    return Err(fault(format!("`{word}`; {expected}")));
                 }
             }
         }
     }
     if inside || !corners.is_empty() {
-        return Err(Fault::new(
-            path,
-            Place::Line(line),
-            "the file ends in a facet; expected `endfacet`",
-        ));
+        let message = "the file ends in a facet; expected `endfacet`";
+        return Err(Fault::new(path, Place::Line(line), message));
     }
     Ok(triangles)
 }

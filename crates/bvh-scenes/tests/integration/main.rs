@@ -2,8 +2,11 @@
 
 mod base_cost;
 mod damaged_meshes;
+mod dialects;
 mod glb;
 mod gltf;
+mod gltf_places;
 mod meshes;
 mod obj;
+mod polygons;
 mod samples;

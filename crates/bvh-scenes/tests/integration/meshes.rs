@@ -19,7 +19,11 @@ fn every_format_gives_the_same_triangles_under_any_file_name() {
                 continue; // OBJ has no signature.
             }
             assert_eq!(Format::of(&bytes, Path::new(name)), format);
-            assert_eq!(parse(&bytes, Path::new(name)).unwrap(), Mesh::new(square()), "{name}");
+            assert_eq!(
+                parse(&bytes, Path::new(name)).unwrap(),
+                Mesh::new(square(), vec![]),
+                "{name}"
+            );
         }
     }
 }
@@ -30,7 +34,7 @@ fn text_formats_may_begin_with_a_byte_order_mark() {
         if ["square.obj", "text.ply", "text.stl", "square.gltf"].contains(&name) {
             let marked = [b"\xef\xbb\xbf", &bytes[..]].concat();
             for path in [Path::new(name), Path::new("scene")] {
-                assert_eq!(parse(&marked, path).unwrap(), Mesh::new(square()), "{name}");
+                assert_eq!(parse(&marked, path).unwrap(), Mesh::new(square(), vec![]), "{name}");
             }
         }
     }
@@ -122,6 +126,9 @@ fn text_stl_is_a_sequence_of_words_of_any_case_on_any_lines() {
     let in_capitals = facets.to_uppercase();
     for facets in [facets.as_str(), &in_capitals, &one_line, &one_line.replace("loop ", "loop\n")] {
         let file = format!("{first}\n{facets}\nendsolid a square");
-        assert_eq!(parse(file.as_bytes(), Path::new("a.stl")).unwrap(), Mesh::new(square()));
+        assert_eq!(
+            parse(file.as_bytes(), Path::new("a.stl")).unwrap(),
+            Mesh::new(square(), vec![])
+        );
     }
 }

@@ -5,12 +5,12 @@
 
 pub mod boxes;
 pub mod bytes;
-pub mod obj;
+pub mod mesh;
 pub mod rays;
 pub mod tree_file;
 
 pub use boxes::boxes;
-pub use obj::obj;
+pub use mesh::mesh;
 pub use rays::rays;
 pub use tree_file::tree_file;
 
@@ -19,4 +19,4 @@ pub type Target = fn(&[u8]);
 
 /// Every target by name.
 pub const TARGETS: [(&str, Target); 4] =
-    [("boxes", boxes), ("obj", obj), ("tree_file", tree_file), ("rays", rays)];
+    [("boxes", boxes), ("mesh", mesh), ("tree_file", tree_file), ("rays", rays)];

@@ -126,8 +126,8 @@ fn every_method_survives_boxes_of_any_bits() {
 }
 
 #[test]
-fn any_bytes_are_an_obj_file_or_rejected() {
-    run("obj", 20_000);
+fn any_bytes_are_a_mesh_file_or_rejected() {
+    run("mesh", 20_000);
 }
 
 #[test]

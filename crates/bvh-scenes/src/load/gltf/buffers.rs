@@ -1,9 +1,9 @@
 //! The buffers of a glTF file. A buffer is read when a mesh first needs it, and a file once.
 
+use super::document::{Buffer, Document};
 use super::{MOST_BYTES, OutsideFiles};
 use crate::files::{read, regular};
-use base64::Engine as _;
-use gltf_json::{Buffer, Root};
+use data_url::DataUrl;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::fs;
@@ -30,7 +30,7 @@ pub struct Buffers<'a> {
     /// The files that buffers have named, by their canonical path.
     files: BTreeMap<PathBuf, Rc<Vec<u8>>>,
     /// Bytes read so far.
-    total: u64,
+    pub total: u64,
 }
 
 impl<'a> Buffers<'a> {
@@ -40,11 +40,11 @@ impl<'a> Buffers<'a> {
     }
 
     /// Reads a buffer if no mesh has needed it before. The error describes its fault.
-    pub fn need(&mut self, root: &Root, number: usize) -> Result<(), String> {
+    pub fn need(&mut self, document: &Document, number: usize) -> Result<(), String> {
         if self.needed.contains_key(&number) {
             return Ok(());
         }
-        let buffer = root
+        let buffer = document
             .buffers
             .get(number)
             .ok_or_else(|| format!("no buffers[{number}]; expected one that exists"))?;
@@ -77,22 +77,20 @@ impl<'a> Buffers<'a> {
                 return Err("no URI; expected one, or a GLB file with a binary chunk".into());
             }
         };
-        match buffer.byte_length.0 > length as u64 {
-            true => Err(format!("{length} bytes; expected {}", buffer.byte_length.0)),
+        match buffer.byte_length > length {
+            true => Err(format!("{length} bytes; expected {}", buffer.byte_length)),
             false => Ok(bytes),
         }
     }
 
     fn of_uri(&mut self, uri: &str) -> Result<Rc<Vec<u8>>, String> {
-        if let Some(data) = uri.strip_prefix("data:") {
-            let encoded = data.split_once(";base64,").ok_or("a data URI that is not base64")?.1;
-            let decoded = base64::engine::general_purpose::STANDARD.decode(encoded);
-            let bytes = decoded.map_err(|error| error.to_string())?;
+        if let Ok(data) = DataUrl::process(uri) {
+            let (bytes, _) = data.decode_to_vec().map_err(|_| "a data URI of invalid base64")?;
             self.count(bytes.len() as u64)?;
             return Ok(Rc::new(bytes));
         }
         if uri.contains("://") {
-            return Err(format!("`{uri}`; expected a file in this folder, or data in base64"));
+            return Err(format!("`{uri}`; expected a file in this folder, or a data URI"));
         }
         let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
         let path = self.allowed(Path::new(&*name))?;

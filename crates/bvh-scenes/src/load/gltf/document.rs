@@ -1,51 +1,194 @@
 //! The JSON of a glTF or GLB file, and the binary chunk next to it.
+//!
+//! The types contain what places triangles and nothing else. This module does not use `gltf-json`
+//! 1.4, because that crate takes references modulo 2³², knows neither instances nor visibility, and
+//! speaks of its own types where a file is wrong. The readers in `gltf` panic on forged files.
 
 use super::super::mesh::{Fault, Place};
 use super::super::without_mark;
-use gltf_json::Root;
-use gltf_json::deserialize::from_slice;
-use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error, IgnoredAny};
-use serde::de::{MapAccess, SeqAccess, Visitor};
-use std::borrow::Cow;
-use std::fmt;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::Path;
 
+/// Extensions that a file may require, because the loader reads them.
+const READ: [&str; 3] = ["EXT_mesh_gpu_instancing", "KHR_mesh_quantization", "KHR_node_visibility"];
+
 /// Extensions that a file may require, because none of them changes its triangles: lights,
-/// materials, textures, metadata, and other types of positions, which the loader rejects
-/// where a mesh uses them.
-const HARMLESS: [&str; 25] = [
-    "EXT_texture_avif",
-    "EXT_texture_webp",
-    "KHR_animation_pointer",
-    "KHR_lights_punctual",
-    "KHR_materials_anisotropy",
-    "KHR_materials_clearcoat",
-    "KHR_materials_diffuse_transmission",
-    "KHR_materials_dispersion",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_iridescence",
-    "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_sheen",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_unlit",
-    "KHR_materials_variants",
-    "KHR_materials_volume",
-    "KHR_mesh_quantization",
-    "KHR_techniques_webgl",
-    "KHR_texture_basisu",
-    "KHR_texture_transform",
-    "KHR_xmp",
-    "KHR_xmp_json_ld",
-    "MSFT_texture_dds",
-];
+/// materials, textures, metadata, and what else a program may do with a node.
+const HARMLESS: &str = "EXT_lights_ies EXT_lights_image_based EXT_mesh_features EXT_mesh_manifold \
+    EXT_structural_metadata EXT_texture_astc EXT_texture_avif EXT_texture_webp FB_ngon_encoding \
+    KHR_animation_pointer KHR_lights_punctual KHR_materials_anisotropy KHR_materials_clearcoat \
+    KHR_materials_diffuse_transmission KHR_materials_dispersion KHR_materials_emissive_strength \
+    KHR_materials_ior KHR_materials_iridescence KHR_materials_pbrSpecularGlossiness \
+    KHR_materials_sheen KHR_materials_specular KHR_materials_transmission KHR_materials_unlit \
+    KHR_materials_variants KHR_materials_volume KHR_node_hoverability KHR_node_selectability \
+    KHR_techniques_webgl KHR_texture_basisu KHR_texture_transform KHR_xmp KHR_xmp_json_ld \
+    MSFT_packing_normalRoughnessMetallic MSFT_packing_occlusionRoughnessMetallic MSFT_texture_dds";
+
+/// The JSON of a file. References to elements are their ranks in these lists.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+pub struct Document {
+    asset: Asset,
+    pub scene: Option<usize>,
+    pub scenes: Vec<Scene>,
+    pub nodes: Vec<Node>,
+    pub meshes: Vec<Mesh>,
+    pub skins: Vec<Skin>,
+    pub accessors: Vec<Accessor>,
+    pub buffer_views: Vec<View>,
+    pub buffers: Vec<Buffer>,
+    pub animations: Vec<IgnoredAny>,
+    pub extensions_used: Vec<String>,
+    extensions_required: Vec<String>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct Asset {
+    version: Value,
+    min_version: Option<Value>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct Scene {
+    pub nodes: Vec<usize>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct Node {
+    pub children: Vec<usize>,
+    pub mesh: Option<usize>,
+    pub skin: Option<usize>,
+    pub weights: Option<Vec<f64>>,
+    pub matrix: Option<[f64; 16]>,
+    pub translation: Option<[f64; 3]>,
+    pub rotation: Option<[f64; 4]>,
+    pub scale: Option<[f64; 3]>,
+    pub extensions: NodeExtensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct NodeExtensions {
+    #[serde(rename = "EXT_mesh_gpu_instancing")]
+    pub instances: Option<Instances>,
+    #[serde(rename = "KHR_node_visibility")]
+    pub visibility: Visibility,
+}
+
+#[derive(Debug, Deserialize)]
+pub struct Instances {
+    pub attributes: BTreeMap<String, usize>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(default)]
+pub struct Visibility {
+    pub visible: bool,
+}
+
+impl Default for Visibility {
+    fn default() -> Self {
+        Self { visible: true }
+    }
+}
+
+#[derive(Debug, Deserialize)]
+pub struct Mesh {
+    pub primitives: Vec<Primitive>,
+    #[serde(default)]
+    pub weights: Vec<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+pub struct Primitive {
+    pub attributes: BTreeMap<String, usize>,
+    pub indices: Option<usize>,
+    /// Points, three kinds of lines, triangles, strips and fans of triangles.
+    #[serde(default = "triangles")]
+    pub mode: u32,
+    /// The attributes of each morph target.
+    #[serde(default)]
+    pub targets: Vec<BTreeMap<String, usize>>,
+    #[serde(default)]
+    pub extensions: BTreeMap<String, IgnoredAny>,
+}
+
+fn triangles() -> u32 {
+    4
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Skin {
+    pub joints: Vec<usize>,
+    pub inverse_bind_matrices: Option<usize>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Accessor {
+    pub buffer_view: Option<usize>,
+    #[serde(default)]
+    pub byte_offset: usize,
+    pub component_type: u32,
+    #[serde(default)]
+    pub normalized: bool,
+    pub count: usize,
+    #[serde(rename = "type")]
+    pub type_: String,
+    pub sparse: Option<Sparse>,
+}
+
+/// The items of an accessor that differ from its view.
+#[derive(Debug, Deserialize)]
+pub struct Sparse {
+    pub count: usize,
+    pub indices: SparseIndices,
+    pub values: SparseValues,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct SparseIndices {
+    pub buffer_view: usize,
+    #[serde(default)]
+    pub byte_offset: usize,
+    pub component_type: u32,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct SparseValues {
+    pub buffer_view: usize,
+    #[serde(default)]
+    pub byte_offset: usize,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct View {
+    pub buffer: usize,
+    #[serde(default)]
+    pub byte_offset: usize,
+    pub byte_length: usize,
+    pub byte_stride: Option<usize>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Buffer {
+    pub byte_length: usize,
+    pub uri: Option<String>,
+}
 
 /// Reads a file's JSON, and returns the bytes of the binary chunk of a GLB file with it.
-pub(super) fn document<'a>(
-    bytes: &'a [u8],
-    path: &Path,
-) -> Result<(Root, Option<&'a [u8]>), Fault> {
+pub fn document<'a>(bytes: &'a [u8], path: &Path) -> Result<(Document, Option<&'a [u8]>), Fault> {
     let (json, chunk) = match bytes.starts_with(b"glTF") {
         true => chunks(bytes).ok_or_else(|| {
             let message = "no chunk of JSON in version 2; expected a GLB file, and whole";
@@ -53,30 +196,34 @@ pub(super) fn document<'a>(
         })?,
         false => (without_mark(bytes), None),
     };
-    let root = from_slice::<References>(json)
-        .and_then(|_| Root::from_slice(json))
-        .map_err(|error| Fault::new(path, Place::File, error))?;
-    let asset = &root.asset;
-    let version = asset.min_version.as_ref().unwrap_or(&asset.version);
+    // Some programs pad the chunk with zeros instead of blanks.
+    let zeros = json.iter().rev().take_while(|&&byte| byte == 0).count();
+    let document: Document = serde_json::from_slice(&json[..json.len() - zeros])
+        .map_err(|error| Fault::new(path, Place::File, format!("{error} of the JSON")))?;
     // A file of a later minor version is read unless it says that it needs this version.
-    let is_known = match asset.min_version {
-        Some(_) => version == "2.0",
-        None => version.starts_with("2."),
+    let version = |value: &Value| value.as_str().map_or_else(|| value.to_string(), Into::into);
+    let asset = &document.asset;
+    let (found, is_known) = match &asset.min_version {
+        Some(least) => (version(least), version(least) == "2.0"),
+        None => (version(&asset.version), version(&asset.version).starts_with("2.")),
     };
     if !is_known {
-        let message = format!("version `{version}`; expected 2.0");
+        let message = format!("version `{found}`; expected 2.0");
         return Err(Fault::new(path, Place::Element("asset".into()), message));
     }
-    if let Some(unknown) =
-        root.extensions_required.iter().find(|name| !HARMLESS.contains(&name.as_str()))
-    {
+    if let Some(unknown) = document.extensions_required.iter().find(|name| !is_covered(name)) {
         let place = Place::Element("extensionsRequired".into());
         let message = format!(
             "`{unknown}`; expected none that changes triangles (compressed meshes cannot be read)"
         );
         return Err(Fault::new(path, place, message));
     }
-    Ok((root, chunk))
+    Ok((document, chunk))
+}
+
+/// Returns whether no triangle is lost or moved for want of reading an extension.
+pub fn is_covered(extension: &str) -> bool {
+    READ.contains(&extension) || HARMLESS.split(' ').any(|harmless| harmless == extension)
 }
 
 fn chunks(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
@@ -100,103 +247,4 @@ fn chunk<'a>(bytes: &'a [u8], offset: usize, kind: &[u8; 4]) -> Option<&'a [u8]>
         return None;
     }
     contents.get(..length)
-}
-
-/// The keys of the numbers that the loader follows or compares.
-const REFERENCES: [&str; 10] = [
-    "attributes",
-    "buffer",
-    "bufferView",
-    "children",
-    "componentType",
-    "indices",
-    "mesh",
-    "mode",
-    "nodes",
-    "scene",
-];
-
-/// The keys of values that belong to the author of the file or of an extension.
-const FREE: [&str; 2] = ["extensions", "extras"];
-
-/// A JSON document whose references are all below 2³²; `gltf-json` takes others modulo 2³².
-struct References;
-
-impl<'de> Deserialize<'de> for References {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Value { key: "" }.deserialize(deserializer).map(|()| Self)
-    }
-}
-
-/// A value of the document, and the key of the nearest object around it.
-#[derive(Clone, Copy)]
-struct Value<'k> {
-    key: &'k str,
-}
-
-impl<'de> DeserializeSeed<'de> for Value<'_> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
-        deserializer.deserialize_any(self)
-    }
-}
-
-impl<'de> Visitor<'de> for Value<'_> {
-    type Value = ();
-
-    fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
-        formatter.write_str("JSON")
-    }
-
-    fn visit_u64<E: Error>(self, number: u64) -> Result<(), E> {
-        if number > u64::from(u32::MAX) && REFERENCES.contains(&self.key) {
-            return Err(E::custom(format!(
-                "{number}; expected at most {} as `{}`",
-                u32::MAX,
-                self.key
-            )));
-        }
-        Ok(())
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut elements: A) -> Result<(), A::Error> {
-        while elements.next_element_seed(self)?.is_some() {}
-        Ok(())
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<(), A::Error> {
-        while let Some(key) = entries.next_key::<Cow<str>>()? {
-            if FREE.contains(&key.as_ref()) {
-                entries.next_value::<IgnoredAny>()?;
-                continue;
-            }
-            // The keys of attributes are names, such as POSITION.
-            let is_name = self.key == "attributes";
-            let key = if is_name { self.key } else { key.as_ref() };
-            entries.next_value_seed(Value { key })?;
-        }
-        Ok(())
-    }
-
-    // Other values contain no reference.
-    fn visit_bool<E: Error>(self, _: bool) -> Result<(), E> {
-        Ok(())
-    }
-
-    fn visit_i64<E: Error>(self, _: i64) -> Result<(), E> {
-        Ok(())
-    }
-
-    fn visit_f64<E: Error>(self, _: f64) -> Result<(), E> {
-        Ok(())
-    }
-
-    fn visit_str<E: Error>(self, _: &str) -> Result<(), E> {
-        Ok(())
-    }
-
-    fn visit_unit<E: Error>(self) -> Result<(), E> {
-        Ok(())
-    }
 }

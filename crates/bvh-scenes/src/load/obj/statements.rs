@@ -1,17 +1,15 @@
 //! Splits the bytes of an OBJ file into statements and words, without parsing any number.
 
+use super::super::text;
+
 /// A statement that defines geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keyword {
-    /// `v`
+    /// `v`, or a capital one.
     Vertex,
-    /// `f`
+    /// `f`, a capital one, or the obsolete `fo`.
     Face,
 }
-
-/// The largest number of vertices of one face. The fan of a larger face would need a hundred bytes
-/// of memory for every two bytes of the file.
-pub const MOST_CORNERS: usize = 1 << 16;
 
 /// Keywords of the format that are ignored (Wavefront, "Object Files", version 3.0).
 const IGNORED: &str = "vt vn vp p l curv curv2 surf parm trim hole scrv sp end con cstype deg bmat \
@@ -47,10 +45,10 @@ impl<'a> Statements<'a> {
         loop {
             let (code, mut continued) = self.line()?;
             let number = self.lines;
-            let mut on_line = split(code);
+            let mut on_line = text::words(code);
             let keyword = match on_line.next() {
-                Some(b"v") => Keyword::Vertex,
-                Some(b"f") => Keyword::Face,
+                Some(b"v" | b"V") => Keyword::Vertex,
+                Some(b"f" | b"F" | b"fo") => Keyword::Face,
                 word => {
                     // A line that ends in a backslash by accident, such as a path, must not swallow
                     // a vertex. The line after it is therefore ignored only if it is no `v` or `f`
@@ -67,7 +65,7 @@ impl<'a> Statements<'a> {
             words.clear();
             words.extend(on_line.take(most));
             while continued && let Some((code, more)) = self.line() {
-                words.extend(split(code).take(most - words.len()));
+                words.extend(text::words(code).take(most - words.len()));
                 continued = more;
             }
             return Some((keyword, number));
@@ -77,14 +75,11 @@ impl<'a> Statements<'a> {
     /// Returns the next line without its end (LF, CRLF or CR) and comment, and whether a backslash
     /// continues it.
     fn line(&mut self) -> Option<(&'a [u8], bool)> {
-        if self.rest.is_empty() {
-            return None;
-        }
-        let end = self.rest.iter().position(|&b| b == b'\n' || b == b'\r');
-        let (line, tail) = self.rest.split_at(end.unwrap_or(self.rest.len()));
-        self.rest = tail.strip_prefix(b"\r\n").unwrap_or(tail.get(1..).unwrap_or_default());
+        let line = text::line(&mut self.rest)?;
         self.lines += 1;
-        let code = line.split(|&b| b == b'#').next().unwrap_or_default().trim_ascii_end();
+        // `1.#QNAN` is a number of Microsoft's C library and no comment.
+        let comment = (0..line.len()).find(|&i| line[i] == b'#' && !line[..i].ends_with(b"."));
+        let code = line[..comment.unwrap_or(line.len())].trim_ascii_end();
         Some(match code.strip_suffix(b"\\") {
             Some(code) => (code, true),
             None => (code, false),
@@ -93,23 +88,7 @@ impl<'a> Statements<'a> {
 }
 
 fn is_ignored(word: &[u8]) -> bool {
-    IGNORED.split(' ').any(|known| known.as_bytes() == word)
-}
-
-fn split(code: &[u8]) -> impl Iterator<Item = &[u8]> {
-    code.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
-}
-
-/// Returns the `7` of `7`, `7/1`, `7//3` and `7/1/3`.
-pub fn vertex_index(corner: &[u8]) -> &[u8] {
-    corner.split(|&b| b == b'/').next().unwrap_or_default()
-}
-
-/// Makes a word printable for an error message, and short even if the file is one endless word.
-pub fn shown(word: &[u8]) -> String {
-    const LONGEST: usize = 40;
-    let cut = if word.len() > LONGEST { "…" } else { "" };
-    format!("{}{cut}", word[..word.len().min(LONGEST)].escape_ascii())
+    IGNORED.split(' ').any(|known| known.as_bytes().eq_ignore_ascii_case(word))
 }
 
 #[cfg(test)]

@@ -1,0 +1,178 @@
+//! The numbers of a glTF file: accessors, their views and the items that differ from them.
+
+use super::buffers::Buffers;
+use super::document::{Accessor, Document};
+use super::{MOST_ITEMS, get};
+
+/// The types of numbers.
+pub const I8: u32 = 5120;
+pub const U8: u32 = 5121;
+pub const I16: u32 = 5122;
+pub const U16: u32 = 5123;
+pub const U32: u32 = 5125;
+pub const F32: u32 = 5126;
+
+fn name(component: u32) -> String {
+    match component {
+        I8 => "byte",
+        U8 => "unsigned byte",
+        I16 => "short",
+        U16 => "unsigned short",
+        U32 => "unsigned int",
+        F32 => "float",
+        _ => return format!("component type {component}"),
+    }
+    .into()
+}
+
+fn size(component: u32) -> usize {
+    match component {
+        I8 | U8 => 1,
+        I16 | U16 => 2,
+        _ => 4,
+    }
+}
+
+/// Returns the number in the first bytes. A normalised integer is a fraction of the largest one.
+fn decode(bytes: &[u8], component: u32, normalized: bool) -> f64 {
+    let little = bytes.iter().rev().fold(0, |number, &byte| number << 8 | u32::from(byte));
+    let (number, largest) = match component {
+        I8 => (f64::from(little as i8), 127.0),
+        U8 => (f64::from(little), 255.0),
+        I16 => (f64::from(little as i16), 32767.0),
+        U16 => (f64::from(little), 65535.0),
+        U32 => (f64::from(little), f64::from(u32::MAX)),
+        _ => return f64::from(f32::from_bits(little)),
+    };
+    if normalized { (number / largest).max(-1.0) } else { number }
+}
+
+/// The accessors of one file.
+pub struct Accessors<'a> {
+    document: &'a Document,
+    buffers: Buffers<'a>,
+    /// The number of bytes of the file itself.
+    length: usize,
+    /// Items read so far.
+    items: u64,
+}
+
+/// Items one after the other in a view.
+struct Window {
+    view: usize,
+    offset: usize,
+    count: usize,
+    component: u32,
+    normalized: bool,
+}
+
+impl<'a> Accessors<'a> {
+    /// Prepares the accessors of a file of this many bytes.
+    pub fn new(document: &'a Document, buffers: Buffers<'a>, length: usize) -> Self {
+        Self { document, buffers, length, items: 0 }
+    }
+
+    /// Reads an accessor whose items have `N` numbers of one of the types `wanted`.
+    pub fn read<const N: usize>(
+        &mut self,
+        index: usize,
+        wanted: &[u32],
+    ) -> Result<Vec<[f64; N]>, String> {
+        let accessor = get(&self.document.accessors, index, "accessors")?;
+        self.read_checked(accessor, wanted)
+            .map_err(|message| format!("accessors[{index}]: {message}"))
+    }
+
+    fn read_checked<const N: usize>(
+        &mut self,
+        accessor: &Accessor,
+        wanted: &[u32],
+    ) -> Result<Vec<[f64; N]>, String> {
+        let Accessor { count, component_type: component, normalized, .. } = *accessor;
+        let type_ = match N {
+            1 => "SCALAR",
+            3 => "VEC3",
+            4 => "VEC4",
+            _ => "MAT4",
+        };
+        if accessor.type_ != type_ || !wanted.contains(&component) {
+            let wanted: Vec<String> = wanted.iter().map(|&component| name(component)).collect();
+            return Err(format!(
+                "{} of {}; expected {type_} of {}",
+                accessor.type_,
+                name(component),
+                wanted.join(" or ")
+            ));
+        }
+        // A few accessors over the same bytes can stand for any number of items.
+        self.items = self.items.saturating_add(count as u64);
+        if self.items > MOST_ITEMS {
+            return Err(format!(
+                "{count} items, {} with those before; expected at most {MOST_ITEMS}",
+                self.items
+            ));
+        }
+        let mut items = match accessor.buffer_view {
+            _ if count == 0 => Vec::new(),
+            Some(view) => {
+                let offset = accessor.byte_offset;
+                self.window(&Window { view, offset, count, component, normalized })?
+            }
+            // Zeros need no bytes, so that a forged file could ask for any number of them. The
+            // displacements of a mesh are no more than its positions, which were read before.
+            None if count as u64 > self.length as u64 + self.buffers.total => {
+                return Err(format!("{count} zeros without a buffer view; expected fewer"));
+            }
+            None => vec![[0.0; N]; count],
+        };
+        let Some(sparse) = &accessor.sparse else { return Ok(items) };
+        let indices: Vec<[f64; 1]> = self.window(&Window {
+            view: sparse.indices.buffer_view,
+            offset: sparse.indices.byte_offset,
+            count: sparse.count,
+            component: sparse.indices.component_type,
+            normalized: false,
+        })?;
+        let values = self.window(&Window {
+            view: sparse.values.buffer_view,
+            offset: sparse.values.byte_offset,
+            count: sparse.count,
+            component,
+            normalized,
+        })?;
+        if !indices.is_sorted_by(|a, b| a < b) {
+            return Err("sparse indices out of order; expected each larger than the last".into());
+        }
+        for ([index], value) in indices.into_iter().zip(values) {
+            *items
+                .get_mut(index as usize)
+                .ok_or_else(|| format!("sparse index {index}; expected below {count}"))? = value;
+        }
+        Ok(items)
+    }
+
+    fn window<const N: usize>(&mut self, window: &Window) -> Result<Vec<[f64; N]>, String> {
+        let &Window { view, offset, count, component, normalized } = window;
+        let number = view;
+        let view = get(&self.document.buffer_views, number, "bufferViews")?;
+        self.buffers.need(self.document, view.buffer)?;
+        let size = size(component);
+        let stride = view.byte_stride.unwrap_or(size * N);
+        // Every number comes from the file, so each step checks for overflow and for the end.
+        let bytes = || {
+            let buffer = self.buffers.bytes(view.buffer)?;
+            let bytes = buffer.get(view.byte_offset..)?.get(..view.byte_length)?;
+            // The last item needs no padding after it.
+            let length = stride.checked_mul(count.checked_sub(1)?)?.checked_add(size * N)?;
+            bytes.get(offset..)?.get(..length).filter(|_| stride >= size * N)
+        };
+        let bytes = bytes().ok_or_else(|| {
+            format!("bufferViews[{number}] has no room for {count} items; expected it")
+        })?;
+        let item = |item: usize| {
+            let bytes = &bytes[item * stride..];
+            std::array::from_fn(|i| decode(&bytes[i * size..][..size], component, normalized))
+        };
+        Ok((0..count).map(item).collect())
+    }
+}

@@ -1,0 +1,139 @@
+//! Polygons are covered once by their triangles, whatever their shape and their first corner.
+
+use bvh_core::Triangle;
+use bvh_scenes::load::mesh::Mesh;
+use bvh_scenes::load::parse;
+use proptest::prelude::*;
+use std::fmt::Write;
+use std::path::Path;
+
+/// Reads one polygon as an OBJ file and as a PLY file, which must agree.
+fn mesh(corners: &[[f32; 3]]) -> Mesh {
+    let mut obj = String::new();
+    let mut ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
+         property float z\nelement face 1\nproperty list int int vertex_indices\nend_header\n",
+        corners.len()
+    );
+    for [x, y, z] in corners {
+        writeln!(obj, "v {x} {y} {z}").unwrap();
+        writeln!(ply, "{x} {y} {z}").unwrap();
+    }
+    let indices =
+        |first: usize| (first..first + corners.len()).map(|i| format!(" {i}")).collect::<String>();
+    writeln!(obj, "f{}", indices(1)).unwrap();
+    writeln!(ply, "{}{}", corners.len(), indices(0)).unwrap();
+    let obj = parse(obj.as_bytes(), Path::new("a.obj")).unwrap();
+    assert_eq!(parse(ply.as_bytes(), Path::new("a.ply")).unwrap(), obj);
+    obj
+}
+
+fn triangles(corners: &[[f32; 3]], indices: &[[u32; 3]]) -> Vec<Triangle> {
+    Triangle::from_mesh(corners, indices).unwrap()
+}
+
+#[test]
+fn a_polygon_is_the_fan_around_its_first_corner_only_if_that_covers_it() {
+    let mut arrow = vec![[2.0, 1.0, 0.0], [0.0, 2.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 0.0]];
+    for first in 0..4 {
+        // Both corners of the only diagonal inside, at 0 and 2, begin a fan.
+        let expected = match first % 2 {
+            0 => [[0, 1, 2], [0, 2, 3]],
+            _ => [[0, 1, 3], [1, 2, 3]],
+        };
+        assert_eq!(mesh(&arrow).triangles, triangles(&arrow, &expected), "{first}");
+        arrow.rotate_left(1);
+    }
+}
+
+#[test]
+fn a_polygon_that_crosses_itself_is_a_fan_with_a_remark() {
+    let bow = [[0.0, 0.0, 0.0], [3.0, 2.0, 0.0], [3.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let mesh = mesh(&bow);
+    assert_eq!(mesh.triangles, triangles(&bow, &[[0, 1, 2], [0, 2, 3]]));
+    assert_eq!(mesh.remarks, ["1 face crosses itself and became the fan around its first vertex"]);
+}
+
+#[test]
+fn polygons_of_many_corners_are_covered_or_rejected_before_they_take_long() {
+    // The teeth of a comb, and a zigzag that crosses itself everywhere.
+    let comb = |i: u32| [(i - i % 2) as f32, -1e4 * (i % 2) as f32, 0.0];
+    let zigzag = |i: u32| [(i * 7919 % 65536) as f32, (i * 10_473 % 65537) as f32, 0.0];
+    let corners: Vec<[f32; 3]> = (0..1 << 13).map(comb).collect();
+    assert_eq!(mesh(&corners).triangles.len(), corners.len() - 2);
+    let corners: Vec<[f32; 3]> = (0..1 << 12).map(zigzag).collect();
+    assert!(mesh(&corners).remark().unwrap().contains("crosses itself"));
+    let mut text = String::from("# a zigzag\n");
+    for [x, y, z] in &corners {
+        writeln!(text, "v {x} {y} {z}").unwrap();
+    }
+    let face = (1..=corners.len()).map(|i| format!(" {i}")).collect::<String>();
+    let text = text + "f 1 2 3\nf 1 2\n" + &format!("f{face}\n").repeat(1000);
+    let message = parse(text.as_bytes(), Path::new("a.obj")).unwrap_err().to_string();
+    assert!(message.starts_with("a.obj:4105: face of 4096 vertices that are not"), "{message}");
+}
+
+type Point = [i64; 2];
+
+/// Twice the signed area.
+fn area([a, b, c]: [Point; 3]) -> i64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+proptest! {
+    #[test]
+    fn a_point_in_a_star_is_in_one_of_its_triangles_and_a_point_outside_in_none(
+        radii in prop::collection::vec(1.0_f64..1000.0, 4..40),
+        first in any::<prop::sample::Index>(),
+        is_reversed in any::<bool>(),
+        axes in prop::sample::select(vec![[0, 1, 2], [2, 0, 1], [1, 2, 0], [1, 0, 2]]),
+        points in prop::collection::vec([-1000i64..1000, -1000i64..1000], 100),
+    ) {
+        let count = radii.len();
+        let mut star: Vec<Point> = radii
+            .iter()
+            .enumerate()
+            .map(|(i, radius)| {
+                let (sin, cos) = (std::f64::consts::TAU * i as f64 / count as f64).sin_cos();
+                [radius * cos, radius * sin].map(|x| x.round() as i64)
+            })
+            .collect();
+        star.rotate_left(first.index(count));
+        if is_reversed {
+            star.reverse();
+        }
+        // An oblique plane, in which the coordinates stay whole numbers.
+        let corners: Vec<[f32; 3]> = star
+            .iter()
+            .map(|&[x, y]| {
+                let point = [x, y, 2 * x - y].map(|x| x as f32);
+                axes.map(|axis: usize| point[axis])
+            })
+            .collect();
+        let flat = |corner: glam::Vec3| -> Point {
+            let place = |axis| axes.iter().position(|a| *a == axis).unwrap();
+            [corner[place(0)] as i64, corner[place(1)] as i64]
+        };
+        let mesh = mesh(&corners);
+        prop_assume!(!mesh.remarks.iter().any(|remark| remark.contains("crosses")));
+        prop_assert_eq!(mesh.triangles.len() <= count - 2, true);
+        for point in points {
+            let signs = |triangle: &Triangle| {
+                let corners = triangle.0.map(flat);
+                [0, 1, 2].map(|i| area([corners[i], corners[(i + 1) % 3], point]).signum())
+            };
+            let all: Vec<[i64; 3]> = mesh.triangles.iter().map(signs).collect();
+            let is_on_edge = all.iter().flatten().any(|sign| *sign == 0);
+            let holding = all.iter().filter(|[a, b, c]| a == b && b == c).count();
+            let is_inside = (0..count).fold(false, |inside, i| {
+                let (a, b) = (star[i], star[(i + 1) % count]);
+                let crosses = (a[1] > point[1]) != (b[1] > point[1])
+                    && (area([a, b, point]) > 0) == (b[1] > a[1]);
+                inside != crosses
+            });
+            if !is_on_edge {
+                prop_assert_eq!(holding, usize::from(is_inside), "{:?}", point);
+            }
+        }
+    }
+}

@@ -1,3 +1,0 @@
-//! `cargo fuzz run obj`: see the function of that name.
-#![no_main]
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| targets::obj(bytes));
