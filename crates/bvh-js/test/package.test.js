@@ -1,7 +1,7 @@
 // What the package promises: the library's own hits, the program's bytes, and errors that name what is wrong.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { mkdtempSync, readFileSync, writeFileSync } from 'node:fs';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
@@ -146,6 +146,19 @@ test('a saved tree is the file of the program, and loads for its own geometry on
     const file = readFileSync(exported);
     const ours = loadExport(file.buffer.slice(file.byteOffset, file.byteOffset + file.length), scene());
     assertSameHits(ours, new MeshBVH(scene()), 20_000);
+});
+
+test('the example of the README runs', async () => {
+    const readme = readFileSync(new URL('../README.md', import.meta.url), 'utf8');
+    const example = new URL('./readme-example.mjs', import.meta.url);
+    writeFileSync(example, readme.split('```js\n')[1].split('```')[0].replace('seconds: 5', 'seconds: 0.1'));
+    globalThis.mesh = { geometry: scene() };
+    try {
+        await import(example.href);
+    } finally {
+        rmSync(example);
+    }
+    assert.ok(globalThis.mesh.geometry.boundsTree instanceof MeshBVH);
 });
 
 test('wrong arguments and geometries are named', async () => {

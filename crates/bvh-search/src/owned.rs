@@ -29,7 +29,7 @@ pub struct Options<'a> {
     pub seed: u64,
     /// The limits of the search besides its observer.
     pub budget: Budget,
-    /// The rays that the tree is for, as in [`ray_density`]; random lines if empty.
+    /// The rays that the tree is for, as in [`RayDensity`]; random lines if empty.
     pub rays: &'a [Segment],
 }
 

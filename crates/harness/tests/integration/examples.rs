@@ -14,15 +14,16 @@ use std::fs;
 fn every_block_has_a_language_whose_examples_are_run() {
     for block in blocks() {
         // The layers are read by the test `circles`.
-        let languages = ["c", "layers", "python", "rust", "rust,no_run", "sh", "text", "toml"];
+        let languages = ["c", "js", "layers", "python", "rust", "rust,no_run", "sh", "text", "toml"];
         assert!(
             languages.contains(&block.language.as_str()),
             "{}: `{}`",
             block.place(),
             block.language
         );
-        // `scripts/languages` compiles and runs the C example, pytest runs the Python example.
-        for (language, page) in [("c", "bvh-c/README.md"), ("python", "bvh-python/README.md")] {
+        // `scripts/languages` compiles and runs the C example, pytest and node run the others.
+        for language in ["c", "python", "js"] {
+            let page = format!("bvh-{language}/README.md");
             assert!(block.language != language || block.page.ends_with(page), "{}", block.place());
         }
     }
