@@ -185,6 +185,7 @@ fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
             ("bake", &["spheres75", "--budget=0s", "--out=x.bvh"]),
             ("inspect", &["good.bvh", "spheres75"]),
             ("verify", &["good.bvh", "spheres75"]),
+            ("export", &["good.bvh", "spheres75", "--for=obvhs", "--out=x.bin"]),
             ("render", &["spheres75", "--out=x.png", "--size=8x8"]),
             ("report", &["good.bvh", "spheres75"]),
             ("scenes", &[]),

@@ -43,7 +43,7 @@
 //! 4uR, and so 20EuR of 5EΔ, which is below 7uR|a|, because |a| is at least 3E. Where |T d_z| is at
 //! most 4R, roundings of the other terms are below 23uR together; where it is more, they are less
 //! than T d_z. A hit counts by its rounded distance, which is off by at most u|t|, and uR / |d_z|
-//! covers that, or by 2⁻¹⁵⁰, where it is subnormal. Hence a product beyond 8EΔ + (e + 2⁻¹⁴⁹|d_z|) |a|
+//! covers that, or by 2⁻¹⁵⁰, where it is subnormal. Hence a product beyond 8EΔ + (e + 2⁻¹²⁶|d_z|) |a|
 //! has the sign of the difference of T and the rounded distance, or that difference is 0 within the
 //! range. Below R = 2⁴⁰ nothing overflows but T d_z, which then has the right sign, and its
 //! products; other rays get an infinite bound.
@@ -137,16 +137,17 @@ impl<L: Lanes> Pairs<L> {
         t_min: L,
     ) -> Self {
         // SAFETY: values exist.
-        let [part, subnormal, most, infinite] = unsafe {
+        // The least normal number, because arithmetic with subnormal ones is slow.
+        let [part, least, most, infinite] = unsafe {
             [
                 L::splat(SINGLE_ERROR),
-                L::splat(f32::from_bits(1)),
+                L::splat(f32::MIN_POSITIVE),
                 L::splat(pow2(40)),
                 L::splat(f32::INFINITY),
             ]
         };
         let error = reach * part;
-        let range_error = direction[2].abs().mul_add(subnormal, error);
+        let range_error = direction[2].abs().mul_add(least, error);
         let range_error = L::select(reach.lt(most), range_error, infinite);
         Self { origin, direction, slope, reach, error, range_error, t_min }
     }
