@@ -14,7 +14,8 @@ use std::fs;
 fn every_block_has_a_language_whose_examples_are_run() {
     for block in blocks() {
         // The layers are read by the test `circles`.
-        let languages = ["c", "js", "layers", "python", "rust", "rust,no_run", "sh", "text", "toml"];
+        let languages =
+            ["c", "js", "layers", "python", "rust", "rust,no_run", "sh", "text", "toml"];
         assert!(
             languages.contains(&block.language.as_str()),
             "{}: `{}`",
