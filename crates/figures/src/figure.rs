@@ -2,15 +2,13 @@
 
 use super::canvas::{self, Align, Fault, Frame, Sheet};
 use super::legend::Legend;
-use super::model::{Axis, Figure, FigureError, Panel, Scale};
+use super::model::{Figure, FigureError, Panel};
 use super::panel::Plot;
 use super::style::{GREY, INK, Strokes};
 use super::text::{BODY, Fonts, TITLE};
 
 /// Width of every figure in pixels.
 const WIDTH: f64 = 800.0;
-/// Width of a miniature, and the height of its plot.
-const MINIATURE: (f64, f64) = (240.0, 110.0);
 /// Width of the blank border.
 const BORDER: f64 = 14.0;
 /// Heights of plots in figures of 1, 2, 3 and 4 columns.
@@ -63,33 +61,6 @@ pub(super) fn svg(figure: &Figure) -> Result<String, FigureError> {
     let columns = figure.columns.clamp(1, HEIGHTS.len()).min(figure.panels.len().max(1));
     let size = (WIDTH, HEIGHTS[columns - 1]);
     Plan::new(head, strokes, legend, &figure.panels, columns, size, &fonts).svg(&figure.title)
-}
-
-/// Draws the first panel of a figure without words, small enough for a list of figures.
-pub(super) fn miniature(figure: &Figure) -> Result<String, FigureError> {
-    let fonts = Fonts::new()?;
-    let nothing = Figure::default();
-    let legend = Legend::new(&nothing, &Strokes::new(&nothing), MINIATURE.0, &fonts);
-    let panels: Vec<Panel> = figure.panels.iter().take(1).map(wordless_panel).collect();
-    let strokes = Strokes::new(figure);
-    Plan::new(Head::default(), strokes, legend, &panels, 1, MINIATURE, &fonts).svg(&figure.title)
-}
-
-fn wordless_panel(panel: &Panel) -> Panel {
-    Panel {
-        title: String::new(),
-        x: wordless_axis(&panel.x),
-        y: wordless_axis(&panel.y),
-        layers: panel.layers.clone(),
-    }
-}
-
-fn wordless_axis(axis: &Axis) -> Axis {
-    let scale = match &axis.scale {
-        Scale::Category(names) => Scale::Category(vec![String::new(); names.len()]),
-        other => other.clone(),
-    };
-    Axis { label: String::new(), scale, ..axis.clone() }
 }
 
 impl<'a> Plan<'a> {

@@ -31,15 +31,6 @@ pub fn svg(figure: &Figure) -> Result<String, FigureError> {
     figure::svg(figure)
 }
 
-/// Draws the first panel of a figure without words, 240 pixels wide, for a list of figures.
-///
-/// # Errors
-///
-/// Like [`svg`].
-pub fn miniature(figure: &Figure) -> Result<String, FigureError> {
-    figure::miniature(figure)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -108,11 +99,6 @@ mod tests {
                 let picture = svg(&figure).unwrap();
                 assert!(
                     !picture.contains("NaN") && !picture.contains("inf"),
-                    "{points:?} on {x:?}"
-                );
-                let miniature = miniature(&figure).unwrap();
-                assert!(
-                    !miniature.contains("category") && !miniature.contains("<&>"),
                     "{points:?} on {x:?}"
                 );
             }

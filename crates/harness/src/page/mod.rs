@@ -71,9 +71,8 @@ pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
         )));
     }
     // In the order of the paper's tables and figures.
-    let source = |section: &Section| section.paper().first().map(|row| row.source.clone());
-    sections.sort_by_key(|section| {
-        let source = source(section);
+    sections.sort_by_cached_key(|section| {
+        let source = section.paper().first().map(|row| row.source.clone());
         (source.is_none(), source, section.name.clone())
     });
     files::write(out, page(&sections).into_string().as_bytes())?;

@@ -84,11 +84,6 @@ struct Compared {
 }
 
 impl Column {
-    /// Returns whether a report sums the column up in words: a quotient or a correlation.
-    pub fn is_read(&self) -> bool {
-        self.ratio.is_some() || ["pearson", "spearman"].contains(&self.name.as_str())
-    }
-
     /// Computes the value of a group of one row, for its errors alone.
     pub(super) fn try_on(&self, row: &Row) -> Result<(), QueryError> {
         match self.value.strip_prefix("text ") {
