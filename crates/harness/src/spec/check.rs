@@ -8,6 +8,7 @@ use bvh_config::OutOfRange;
 use bvh_config::fault::Fault;
 use bvh_scenes::subset;
 use bvh_search::{Budget, Method, best};
+use std::collections::HashSet;
 
 /// The maximum number of runs of an experiment.
 const MOST_RUNS: u64 = 10_000_000;
@@ -145,10 +146,10 @@ impl Experiment {
 
     /// Rejects a label of two methods, and a label in a report that no method has.
     fn check_labels(&self) -> Result<(), Fault> {
-        let mut known = Vec::new();
+        let mut known = HashSet::new();
         for (index, labelled) in self.methods.iter().enumerate() {
             let label = labelled.label.as_str();
-            if known.contains(&label) {
+            if !known.insert(label) {
                 let key = format!("methods[{index}].label");
                 return Err(Fault::new(
                     key,
@@ -156,14 +157,15 @@ impl Experiment {
                     "unique labels",
                 ));
             }
-            known.push(label);
         }
         for (index, report) in self.reports.iter().enumerate() {
             for (key, label) in report.labels() {
-                if !known.contains(&label) {
+                if !known.contains(label) {
                     let key = format!("reports[{index}].{key}");
                     let found = format!("{label:?}, no label of a method");
-                    return Err(Fault::new(key, found, known.join(", ")));
+                    let labels = self.methods.iter().map(|labelled| labelled.label.as_str());
+                    let accepted = labels.collect::<Vec<_>>().join(", ");
+                    return Err(Fault::new(key, found, accepted));
                 }
             }
         }
