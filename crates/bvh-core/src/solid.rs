@@ -98,17 +98,17 @@ impl Solid {
     /// Panics if `points` and `inside` are not equally many.
     pub fn contains(&self, wide: &WideBvh, points: &[Vec3], rule: InsideRule, inside: &mut [bool]) {
         assert_eq!(points.len(), inside.len(), "an answer for every point");
-        match (&self.turns, rule) {
-            (Turns::Angles(_), InsideRule::Auto) if self.is_paired => {
-                by_crossings(wide, points, inside, |hits| hits.len() % 2 == 1);
-            }
-            (_, InsideRule::Parity) => {
-                by_crossings(wide, points, inside, |hits| hits.len() % 2 == 1);
-            }
-            (Turns::Signs(signs), _) => by_crossings(wide, points, inside, |hits| {
+        let is_by_parity = match rule {
+            InsideRule::Auto => self.is_paired && matches!(self.turns, Turns::Angles(_)),
+            InsideRule::Parity => true,
+            InsideRule::Winding => false,
+        };
+        match &self.turns {
+            _ if is_by_parity => by_crossings(wide, points, inside, |hits| hits.len() % 2 == 1),
+            Turns::Signs(signs) => by_crossings(wide, points, inside, |hits| {
                 hits.iter().map(|hit| i64::from(signs[hit.object as usize])).sum::<i64>() != 0
             }),
-            (Turns::Angles(winding), _) => {
+            Turns::Angles(winding) => {
                 let mut open = Open::default();
                 for (point, inside) in points.iter().zip(inside) {
                     *inside = point.is_finite() && winding.is_inside(*point, &mut open);
