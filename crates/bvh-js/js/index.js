@@ -11,6 +11,7 @@ const ready = () => (loaded ??= load());
 export class Tree {
     #searched;
     #ids;
+    #fitted;
 
     constructor(searched, ids) {
         this.#searched = searched;
@@ -27,6 +28,11 @@ export class Tree {
         return this.#searched.save();
     }
 
+    /** The tree for three-mesh-bvh, fitted when it is first needed. */
+    get #three() {
+        return (this.#fitted ??= this.#searched.forThreeMesh());
+    }
+
     toMeshBVH(geometry, { indirect = geometry.groups.length > 0 || this.#ids !== null } = {}) {
         const count = this.#ids?.length ?? triangleCount(geometry);
         if (count !== this.#searched.triangles) {
@@ -35,7 +41,7 @@ export class Tree {
         if (!indirect && this.#ids !== null) {
             throw new Error('indirect is false; accepted: true for a geometry that is drawn in part');
         }
-        const three = this.#searched.forThreeMesh();
+        const three = this.#three;
         const roots = [three.nodes.buffer];
         let order = three.order;
         if (this.#ids !== null) order = order.map((id) => this.#ids[id]);
@@ -56,7 +62,7 @@ export class Tree {
     }
 
     get cost() {
-        return this.#searched.forThreeMesh().cost;
+        return this.#three.cost;
     }
 }
 

@@ -8,6 +8,7 @@ use bvh_search::{Budget, Event, Objects, Observer, Options, OwnedTree};
 use js_sys::{Float32Array, Function};
 use std::cell::{Cell, RefCell};
 use std::fmt::Display;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use wasm_bindgen::prelude::*;
 
 /// The tree that JavaScript traces by.
@@ -36,13 +37,13 @@ struct Watch {
     /// The limit in milliseconds.
     limit: Option<f64>,
     most_work: Option<u64>,
-    counted: std::sync::atomic::AtomicU64,
+    counted: AtomicU64,
 }
 
 impl Watch {
     fn fraction(&self) -> f64 {
         let of_time = self.limit.map(|limit| (now() - self.start) / limit);
-        let counted = self.counted.load(std::sync::atomic::Ordering::Relaxed);
+        let counted = self.counted.load(Relaxed);
         let of_work = self.most_work.map(|most| counted as f64 / most as f64);
         of_time.into_iter().chain(of_work).fold(0.0, f64::max).min(1.0)
     }
@@ -66,7 +67,7 @@ impl Observer for Watch {
     }
 
     fn counted(&self, _evaluations: u64, work: u64) {
-        self.counted.store(work, std::sync::atomic::Ordering::Relaxed);
+        self.counted.store(work, Relaxed);
         if now() - REPORTED.get() > BETWEEN_REPORTS {
             self.report(f64::NAN);
         }

@@ -46,5 +46,5 @@ pub mod shaders {
 pub use aila_laine::AilaLaineNode;
 pub use compressed::{CompressedBvh, CompressedNode};
 pub use first_count::FirstCountNode;
-pub use target::Target;
+pub use target::{Layout, Target};
 pub use three_mesh::ThreeMeshNode;

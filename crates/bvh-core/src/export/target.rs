@@ -18,6 +18,19 @@ pub struct Target {
     pub most_objects: u32,
     /// The most nodes from the root to a leaf, the root not counted.
     pub most_depth: usize,
+    /// The nodes in [files](Target::bytes) for the tracer.
+    pub layout: Layout,
+}
+
+/// A layout of binary nodes of 32 bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// [`FirstCountNode`](super::FirstCountNode)s.
+    FirstCount,
+    /// The same with an unused node at index 1.
+    FirstCountAligned,
+    /// [`ThreeMeshNode`](super::ThreeMeshNode)s.
+    ThreeMesh,
 }
 
 impl Target {
@@ -31,6 +44,7 @@ impl Target {
         constants: constants(1.8, 1.25),
         most_objects: 65_535,
         most_depth: 59,
+        layout: Layout::ThreeMesh,
     };
 
     /// The binary layout `BVH` of `tinybvh`, by the costs that the library builds with.
@@ -39,11 +53,17 @@ impl Target {
         constants: constants(1.0, 1.0),
         most_objects: 1 << 20,
         most_depth: 63,
+        layout: Layout::FirstCountAligned,
     };
 
     /// The layout `Bvh2` of `obvhs`, by the costs that the library builds with.
-    pub const OBVHS: Self =
-        Self { name: "obvhs", constants: constants(1.0, 1.0), most_objects: 255, most_depth: 95 };
+    pub const OBVHS: Self = Self {
+        name: "obvhs",
+        constants: constants(1.0, 1.0),
+        most_objects: 255,
+        most_depth: 95,
+        layout: Layout::FirstCount,
+    };
 
     /// Returns the tree for this tracer: binary, with the leaves that cost least there, no leaf too
     /// large and none too deep. O(n), and O(n depth) where subtrees are too deep.
@@ -52,7 +72,7 @@ impl Target {
     /// May panic on a tree that [`validate`](crate::validate()) rejects.
     pub fn fit(&self, tree: &Bvh) -> Bvh {
         let collapsed = collapse_at_most(tree, &self.constants, self.most_objects);
-        let divided = divide_leaves(&binary(&collapsed), self.most_objects);
+        let divided = divide_leaves(binary(&collapsed).into_owned(), self.most_objects);
         limit_depth(divided, self.most_depth)
     }
 
@@ -66,21 +86,17 @@ impl Target {
     /// | 12..16 | `u32` | number of object ids |
     /// | 16..20 | `u32` | [checksum](file::boxes_checksum) of the scene's boxes |
     /// | 20..32 | | zeros |
-    /// | 32.. | | the nodes, 32 bytes each, in the layout of the tracer, then a `u32` per object id |
-    ///
-    /// The layout is [`ThreeMeshNode`](super::ThreeMeshNode) for `three-mesh-bvh`, otherwise
-    /// [`FirstCountNode`](super::FirstCountNode), for `tinybvh` with the unused node at index 1.
+    /// | 32.. | | the nodes, 32 bytes each, in the target's [layout](Layout), then a `u32` per object id |
     ///
     /// # Panics
     /// May panic on a tree that [`validate`](crate::validate()) rejects, or that is not fitted.
     pub fn bytes(&self, tree: &Bvh, boxes: &[Aabb]) -> Vec<u8> {
-        let three = |tree: &Bvh| bytemuck::cast_slice(&tree.to_three_mesh()).to_vec();
-        let aligned = |tree: &Bvh| bytemuck::cast_slice(&tree.to_first_count_aligned()).to_vec();
-        let plain = |tree: &Bvh| bytemuck::cast_slice(&tree.to_first_count()).to_vec();
-        let nodes: Vec<u8> = match *self {
-            Self::THREE_MESH_BVH => three(tree),
-            Self::TINYBVH => aligned(tree),
-            _ => plain(tree),
+        let nodes: Vec<u8> = match self.layout {
+            Layout::FirstCount => bytemuck::cast_slice(&tree.to_first_count()).to_vec(),
+            Layout::FirstCountAligned => {
+                bytemuck::cast_slice(&tree.to_first_count_aligned()).to_vec()
+            }
+            Layout::ThreeMesh => bytemuck::cast_slice(&tree.to_three_mesh()).to_vec(),
         };
         let header = [
             1,
@@ -112,8 +128,7 @@ const fn constants(traversal: f64, intersection: f64) -> SahConstants {
 }
 
 /// Halves leaves with more than `most` objects.
-fn divide_leaves(tree: &Bvh, most: u32) -> Bvh {
-    let mut divided = tree.clone();
+fn divide_leaves(mut divided: Bvh, most: u32) -> Bvh {
     let mut index = 0;
     while index < divided.nodes.len() {
         let node = divided.nodes[index];
@@ -190,6 +205,6 @@ fn balance(tree: &mut Bvh, root: usize) {
 
 /// Returns the nodes that the root reaches, in depth-first order.
 fn compact(tree: &Bvh) -> Bvh {
-    // A traversal cost of zero keeps every inner node that has two leaves or more.
-    collapse_at_most(tree, &constants(0.0, 1.0), 0)
+    // No inner node becomes a leaf of at most no objects, whatever the constants.
+    collapse_at_most(tree, &SahConstants::default(), 0)
 }
