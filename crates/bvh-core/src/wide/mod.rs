@@ -20,6 +20,7 @@ mod lanes;
 mod layout;
 mod one_ray;
 mod packet;
+mod packet_vector;
 mod pairs;
 mod pinhole;
 mod portable;

@@ -11,8 +11,9 @@ use super::instructions::{Instructions, Task};
 use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::{Lanes, Mask};
 use super::layout::{Child, WideBvh, WideNode};
-use super::pairs::{Pairs, Plane};
-use super::pinhole::one_origin;
+use super::packet_vector::Vector;
+use super::pairs::Plane;
+use super::pinhole::{Seen, one_origin};
 use super::ray_lanes::{RayBounds, RayLanes};
 use super::triangles::TriangleBlock;
 use crate::slabs::{FAR, NEAR};
@@ -28,41 +29,13 @@ const VECTORS: usize = RAYS / 8;
 
 /// A packet of vectors of rays that [cohere](RayLanes::cohere), all of the same octant.
 pub(crate) struct Packet<K: Instructions> {
-    pub(super) vectors: [MaybeUninit<Vector<K::Rays>>; VECTORS],
-    pub(super) count: usize,
+    vectors: [MaybeUninit<Vector<K::Rays>>; VECTORS],
+    count: usize,
     /// One bit per axis: set where the rays run backwards.
     octant: u32,
     bounds: RayBounds<K::Rays>,
     /// The origin of all rays, if they have one, while the packet is traced.
     origin: Option<Vec3>,
-}
-
-/// Rays of a packet side by side.
-pub(super) struct Vector<L> {
-    near_factor: [L; 3],
-    far_factor: [L; 3],
-    pub(super) t_min: L,
-    /// The nearest hits so far, or the ends of the rays and `u32::MAX`.
-    pub(super) t: L,
-    pub(super) object: L,
-    /// The rays, and whether `pairs` has been made from them. Many packets meet no triangle.
-    pub(super) rays: RayLanes<L>,
-    pub(super) axes: [usize; 3],
-    pub(super) is_sheared: bool,
-    pub(super) pairs: MaybeUninit<Pairs<L>>,
-    /// The number of the first ray in its batch.
-    pub(super) first: usize,
-}
-
-impl<L: Lanes> Vector<L> {
-    /// Makes `pairs` for triangles within `bounds`, unless they have been made.
-    #[inline(always)]
-    pub(super) fn shear(&mut self, bounds: &Aabb) {
-        if !self.is_sheared {
-            self.pairs.write(self.rays.sheared(self.axes, bounds));
-            self.is_sheared = true;
-        }
-    }
 }
 
 /// The parent of a child that waits.
@@ -104,24 +77,10 @@ impl<K: Instructions> Packet<K> {
     /// Adds rays that cohere, of which the first is number `first` of its batch.
     #[inline(always)]
     pub(crate) fn add(&mut self, rays: RayLanes<K::Rays>, first: usize) {
-        // SAFETY: a value exists.
-        let [near, far, none] =
-            unsafe { [NEAR, FAR, f32::from_bits(u32::MAX)].map(|x| K::Rays::splat(x)) };
         self.bounds.add(&rays);
-        let [x, y, z] = rays.inverse;
         self.octant = rays.octant();
-        self.vectors[self.count].write(Vector {
-            near_factor: [x * near, y * near, z * near],
-            far_factor: [x * far, y * far, z * far],
-            t_min: rays.t_min,
-            t: rays.t_max,
-            object: none,
-            axes: rays.axes(),
-            rays,
-            is_sheared: false,
-            pairs: MaybeUninit::uninit(),
-            first,
-        });
+        // SAFETY: values of the rays exist.
+        self.vectors[self.count].write(unsafe { Vector::new(rays, first) });
         self.count += 1;
     }
 
@@ -265,7 +224,7 @@ impl<K: Instructions> Packet<K> {
     /// Returns a bit per ray of a vector that enters the box of these planes before its nearest
     /// hit.
     #[inline(always)]
-    pub(super) unsafe fn enter(&self, vector: usize, planes: &[[f32; 2]; 3]) -> u32 {
+    unsafe fn enter(&self, vector: usize, planes: &[[f32; 2]; 3]) -> u32 {
         // SAFETY: the vector is counted.
         unsafe {
             let vector = self.vectors.get_unchecked(vector).assume_init_ref();
@@ -345,7 +304,7 @@ impl<K: Instructions> Packet<K> {
     /// the vector `first` that enters the box of these planes, and earlier vectors do not enter it.
     /// Returns whether any ray has a new nearest hit.
     #[inline(always)]
-    pub(super) unsafe fn visit_leaf<const ANY: bool>(
+    unsafe fn visit_leaf<const ANY: bool>(
         &mut self,
         first: usize,
         mut entered: u32,
@@ -371,6 +330,38 @@ impl<K: Instructions> Packet<K> {
             }
         }
         is_hit
+    }
+
+    /// Does the same with rays from one origin.
+    #[inline(always)]
+    unsafe fn visit_leaf_from(
+        &mut self,
+        origin: Vec3,
+        first: usize,
+        entered: u32,
+        planes: &[[f32; 2]; 3],
+        mut block: *const TriangleBlock,
+        bounds: &Aabb,
+    ) -> bool {
+        let mut is_hit = false;
+        // SAFETY: the vectors are counted; a block that is not its leaf's last is followed by
+        // another.
+        unsafe {
+            loop {
+                let seen = Seen::new::<K::Block>(&*block, origin);
+                for i in first..self.count {
+                    let entered = if i > first { self.enter(i, planes) } else { entered };
+                    if entered != 0 {
+                        let vector = self.vectors.get_unchecked_mut(i).assume_init_mut();
+                        is_hit |= seen.test(vector, entered, &*block, bounds);
+                    }
+                }
+                if (*block).is_last() {
+                    return is_hit;
+                }
+                block = block.add(1);
+            }
+        }
     }
 
     /// Tests the triangles of a leaf with the rays of a vector that entered it. Returns whether any
@@ -488,7 +479,7 @@ pub(super) struct Culling<L> {
 }
 
 impl<L: Lanes> Culling<L> {
-    /// Returns the bounds of rays of one octant, for boxes whose coordinates are at most `largest`.
+    /// Returns the bounds of rays of one octant.
     ///
     /// # Safety
     /// The processor has the instructions.
@@ -569,11 +560,11 @@ impl<L: Lanes> Culling<L> {
     /// Returns the planes of a box that contains everything, by axis.
     #[inline(always)]
     pub(super) fn all_space(&self) -> [[f32; 2]; 3] {
-        let far = self.side.map(|margin| f32::INFINITY.copysign(margin));
+        let far = self.side.map(|side| f32::INFINITY.copysign(side));
         [[-far[0], far[0]], [-far[1], far[1]], [-far[2], far[2]]]
     }
 
-    /// Returns the near and the far plane of the child in a lane, by axis, moved by the margin.
+    /// Returns the near and the far plane of the child in a lane, by axis.
     ///
     /// # Safety
     /// There is such a lane.

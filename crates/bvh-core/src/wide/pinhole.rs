@@ -20,9 +20,8 @@
 //!
 //! What either leaves open is tested as in any packet.
 
-use super::instructions::Instructions;
 use super::lanes::{DoubleLanes, Lanes, Mask};
-use super::packet::Packet;
+use super::packet_vector::Vector;
 use super::pairs::Plane;
 use super::ray_lanes::RayBounds;
 use super::triangles::TriangleBlock;
@@ -56,7 +55,7 @@ pub(super) fn one_origin<L: Lanes>(rays: &RayBounds<L>, bounds: &Aabb) -> Option
 
 /// Four triangles as rays of one origin see them, lane by lane.
 #[repr(C)]
-struct Seen {
+pub(super) struct Seen {
     /// The components of B × C, C × A and A × B, and E / D.
     edges: [[f32; 4]; 10],
     /// The components of the normal, its product with A − O, and the bound of the distance's error
@@ -68,7 +67,7 @@ impl Seen {
     /// # Safety
     /// The processor has the instructions of `L`.
     #[inline(always)]
-    unsafe fn new<L: Lanes>(block: &TriangleBlock, origin: Vec3) -> Self {
+    pub(super) unsafe fn new<L: Lanes>(block: &TriangleBlock, origin: Vec3) -> Self {
         let mut seen = MaybeUninit::<Self>::uninit();
         // SAFETY: the processor has the instructions; all rows are written.
         unsafe {
@@ -99,65 +98,29 @@ impl Seen {
             seen.assume_init()
         }
     }
-}
-
-impl<K: Instructions> Packet<K> {
-    /// Tests the triangles of a leaf with the rays that enter it, all from one origin, as
-    /// [`visit_leaf`](Self::visit_leaf) does.
-    ///
-    /// # Safety
-    /// As for [`visit_leaf`](Self::visit_leaf).
-    #[inline(always)]
-    pub(super) unsafe fn visit_leaf_from(
-        &mut self,
-        origin: Vec3,
-        first: usize,
-        entered: u32,
-        planes: &[[f32; 2]; 3],
-        mut block: *const TriangleBlock,
-        bounds: &Aabb,
-    ) -> bool {
-        let mut is_hit = false;
-        // SAFETY: the vectors are counted; a block that is not its leaf's last is followed by
-        // another.
-        unsafe {
-            loop {
-                let seen = Seen::new::<K::Block>(&*block, origin);
-                for i in first..self.count {
-                    let entered = if i > first { self.enter(i, planes) } else { entered };
-                    if entered != 0 {
-                        is_hit |= self.test_from(i, entered, &*block, &seen, bounds);
-                    }
-                }
-                if (*block).is_last() {
-                    return is_hit;
-                }
-                block = block.add(1);
-            }
-        }
-    }
 
     /// Tests the triangles of a block with the rays of a vector that entered it. Returns whether
     /// any ray has a new nearest hit.
+    ///
+    /// # Safety
+    /// The processor has the instructions of `L`.
     #[inline(always)]
-    unsafe fn test_from(
-        &mut self,
-        vector: usize,
+    pub(super) unsafe fn test<L: Lanes>(
+        &self,
+        vector: &mut Vector<L>,
         entered: u32,
         block: &TriangleBlock,
-        seen: &Seen,
         bounds: &Aabb,
     ) -> bool {
-        // SAFETY: the vector is counted; lanes are below four.
+        // SAFETY: the processor has the instructions of `L`; lanes are below four.
         unsafe {
-            let vector = self.vectors.get_unchecked_mut(vector).assume_init_mut();
             let direction = vector.rays.direction;
             let longest = direction[vector.axes[2]].abs();
-            let underflow = K::Rays::splat(f32::MIN_POSITIVE);
-            let zero = <K::Rays as Lanes>::Double::splat(0.0);
+            let underflow = L::splat(f32::MIN_POSITIVE);
+            let zero = L::Double::splat(0.0);
             let mut is_hit = false;
             for lane in 0..block.len() {
-                let edge = |row: usize| K::Rays::splat(*seen.edges[row].get_unchecked(lane));
+                let edge = |row: usize| L::splat(*self.edges[row].get_unchecked(lane));
                 let value = |row: usize| {
                     let x = edge(row) * direction[0];
                     edge(row + 2).mul_add(direction[2], edge(row + 1).mul_add(direction[1], x))
@@ -168,15 +131,13 @@ impl<K: Instructions> Packet<K> {
                 let least = u.min(v).min(w);
                 let most = u.max(v).max(w);
                 let error = edge(9).mul_add(longest, underflow);
-                let below = K::Rays::splat(0.0) - error;
+                let below = L::splat(0.0) - error;
                 let possible = entered & !(least.lt(below) & error.lt(most)).bits();
                 if possible == 0 {
                     continue;
                 }
                 let certain = possible & (error.lt(least) | most.lt(below)).bits();
-                let plane = |row: usize| {
-                    <K::Rays as Lanes>::Double::splat(*seen.plane[row].get_unchecked(lane))
-                };
+                let plane = |row: usize| L::Double::splat(*self.plane[row].get_unchecked(lane));
                 let [dx, dy, dz] = direction;
                 let speed = plane(1).mul_add(dy.double(), plane(0) * dx.double());
                 let inverse = plane(2).mul_add(dz.double(), speed).inverse();
@@ -184,21 +145,21 @@ impl<K: Instructions> Packet<K> {
                 let slack = plane(4) * inverse.max(zero - inverse);
                 let low = distance - slack;
                 let high = distance + slack;
-                let mut t = K::Rays::single(high);
-                let meets = K::Rays::narrow(zero.le(low)) & K::Rays::single(low).eq(t);
-                let is_behind = K::Rays::narrow(high.lt(zero));
+                let mut t = L::single(high);
+                let meets = L::narrow(zero.le(low)) & L::single(low).eq(t);
+                let is_behind = L::narrow(high.lt(zero));
                 let mut inside = meets & Mask::from_bits(certain);
                 if possible & !(certain & (meets | is_behind).bits()) != 0 {
                     vector.shear(bounds);
                     let pairs = vector.pairs.assume_init_ref();
-                    let corners = block.splat_corners::<K::Rays>(lane, vector.axes);
+                    let corners = block.splat_corners::<L>(lane, vector.axes);
                     let plane = Plane::of_triangle(&block.doubles(lane, vector.axes));
                     let candidates = pairs.candidates(&corners);
                     (inside, t) = pairs.decide(&corners, &plane, &candidates, vector.t);
                     inside = inside & Mask::from_bits(entered);
                 }
                 let inside = inside & vector.t_min.le(t);
-                let object = K::Rays::splat_bits(block.id(lane));
+                let object = L::splat_bits(block.id(lane));
                 let hits = inside & (t.lt(vector.t) | t.eq(vector.t) & object.below(vector.object));
                 if hits.bits() != 0 {
                     is_hit = true;

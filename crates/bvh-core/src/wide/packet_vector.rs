@@ -1,0 +1,60 @@
+//! A vector of rays in a packet: what the tests of boxes and of triangles need of them.
+
+use super::lanes::Lanes;
+use super::pairs::Pairs;
+use super::ray_lanes::RayLanes;
+use crate::Aabb;
+use crate::slabs::{FAR, NEAR};
+use core::mem::MaybeUninit;
+
+/// Rays of a packet side by side.
+pub(super) struct Vector<L> {
+    pub(super) near_factor: [L; 3],
+    pub(super) far_factor: [L; 3],
+    pub(super) t_min: L,
+    /// The nearest hits so far, or the ends of the rays and `u32::MAX`.
+    pub(super) t: L,
+    pub(super) object: L,
+    /// The rays, and whether `pairs` has been made from them. Many packets meet no triangle.
+    pub(super) rays: RayLanes<L>,
+    pub(super) axes: [usize; 3],
+    pub(super) is_sheared: bool,
+    pub(super) pairs: MaybeUninit<Pairs<L>>,
+    /// The number of the first ray in its batch.
+    pub(super) first: usize,
+}
+
+impl<L: Lanes> Vector<L> {
+    /// Returns rays of which the first is number `first` of its batch.
+    ///
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    #[inline(always)]
+    pub(super) unsafe fn new(rays: RayLanes<L>, first: usize) -> Self {
+        // SAFETY: the processor has the instructions.
+        let [near, far, none] =
+            unsafe { [L::splat(NEAR), L::splat(FAR), L::splat(f32::from_bits(u32::MAX))] };
+        let [x, y, z] = rays.inverse;
+        Self {
+            near_factor: [x * near, y * near, z * near],
+            far_factor: [x * far, y * far, z * far],
+            t_min: rays.t_min,
+            t: rays.t_max,
+            object: none,
+            axes: rays.axes(),
+            rays,
+            is_sheared: false,
+            pairs: MaybeUninit::uninit(),
+            first,
+        }
+    }
+
+    /// Makes `pairs` for triangles within `bounds`, unless they have been made.
+    #[inline(always)]
+    pub(super) fn shear(&mut self, bounds: &Aabb) {
+        if !self.is_sheared {
+            self.pairs.write(self.rays.sheared(self.axes, bounds));
+            self.is_sheared = true;
+        }
+    }
+}
