@@ -21,8 +21,8 @@ table4:
 
 # Times of builders against other libraries.
 bench:
-    cargo bench -p harness --bench build --features peers
-    cargo bench -p harness --bench peers --features peers -- escher
+    cargo bench --manifest-path attic/Cargo.toml --bench build
+    cargo bench --manifest-path attic/Cargo.toml --bench peers -- escher
 
 docs:
     cargo doc --workspace --no-deps --open

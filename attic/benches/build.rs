@@ -4,6 +4,7 @@
 
 mod paired;
 
+use attic::{Preset, build_by_obvhs};
 use bvh_build::top_down::Workspace;
 use bvh_build::{Builder, Presorted, Watch, goldsmith_salmon, muller_fellner};
 use bvh_core::{Aabb, Bvh};
@@ -51,7 +52,9 @@ fn one_thread(scene: &Scene) {
     contenders.push((
         "Goldsmith–Salmon, a random order",
         Box::new(move || {
-            insertion.insert_all(&objects, &order, &mut workspace, &Watch::default()).expect("a permutation");
+            insertion
+                .insert_all(&objects, &order, &mut workspace, &Watch::default())
+                .expect("a permutation");
             workspace.write(&mut tree);
         }),
     ));
@@ -97,20 +100,10 @@ fn shuffled(n: u32) -> Vec<u32> {
     order
 }
 
-/// Returns no contenders: other libraries need the feature.
 fn peers(boxes: &[Aabb]) -> Vec<Contender<'_>> {
-    use obvhs::{BvhBuildParams, aabb, bvh2::builder::build_bvh2};
-    let theirs: Vec<aabb::Aabb> = boxes
-        .iter()
-        .map(|b| aabb::Aabb::new(b.min.to_array().into(), b.max.to_array().into()))
-        .collect();
-    let build = |preset: fn() -> BvhBuildParams| {
-        let theirs = theirs.clone();
-        Box::new(move || drop(build_bvh2(&theirs, preset(), &mut Default::default())))
-    };
     vec![
-        ("obvhs fast", build(BvhBuildParams::fast_build)),
-        ("obvhs medium", build(BvhBuildParams::medium_build)),
+        ("obvhs fast", Box::new(|| drop(build_by_obvhs(Preset::Fast, boxes)))),
+        ("obvhs medium", Box::new(|| drop(build_by_obvhs(Preset::Medium, boxes)))),
     ]
 }
 

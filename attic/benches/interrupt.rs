@@ -10,8 +10,9 @@ mod measured;
 use bvh_scenes::Scene;
 use bvh_search::Stream;
 use harness::processor::PROCESSOR;
-use harness::rows::InterruptRow;
+use harness::rows::Row;
 use rand::{RngExt, SeedableRng};
+use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -23,6 +24,25 @@ const SEGMENTS: usize = 1_000_000;
 /// Bakes are interrupted in the greedy build, in the first passes of reinsertion and far into the
 /// search; fractions keep the signals off the ends of phases that take whole seconds.
 const AFTER: [f64; 6] = [4.3, 9.1, 17.7, 24.2, 33.9, 46.4];
+
+/// One row of `timing_interrupt.csv`: one bake that was interrupted.
+#[derive(Serialize, Deserialize)]
+struct InterruptRow {
+    scene: String,
+    objects: usize,
+    /// The processor that was measured.
+    processor: String,
+    /// The number of recorded rays that the tree was searched for; 0 for a bake by area.
+    segments: usize,
+    /// The time from the start of the program to the signal.
+    after_seconds: f64,
+    /// The time from the signal to the end of the program, the file of the tree included.
+    seconds: f64,
+}
+
+impl Row for InterruptRow {
+    const FILE: &str = "timing_interrupt.csv";
+}
 
 fn main() {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

@@ -10,14 +10,30 @@
 use bvh_scenes::Scene;
 use bvh_search::{Problem, solve};
 use harness::contestant::Contestant;
-use harness::rows::{MemoryRow, to_bytes};
+use harness::rows::{Row, to_bytes};
 use harness::spec::{Experiment, Overrides};
 use peak_alloc::PeakAlloc;
+use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::Path;
 
 #[global_allocator]
 static ALLOCATED: PeakAlloc = PeakAlloc;
+
+/// One row of `memory.csv`: the most memory that a method had allocated at once, on one thread.
+#[derive(Serialize, Deserialize)]
+struct MemoryRow {
+    scene: String,
+    objects: usize,
+    method: String,
+    /// Trees, working memory and history; not the scene's boxes.
+    peak_bytes: usize,
+    bytes_per_object: f64,
+}
+
+impl Row for MemoryRow {
+    const FILE: &str = "memory.csv";
+}
 
 fn main() {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

@@ -10,11 +10,12 @@
 
 mod clock;
 
+use attic::{Preset, build_by_bvh, build_by_obvhs};
 use bvh_build::{Builder, muller_fellner};
-use bvh_core::cost;
+use bvh_core::{Aabb, cost};
 use bvh_scenes::Scene;
 use clap::Parser;
-use harness::peers::{NoSettings, Obvhs, Peer, Preset};
+use harness::peers::Built;
 
 /// The fraction of a library's time that `best` may plan with, because other programs disturb both.
 const PLANNED: f64 = 0.99;
@@ -50,7 +51,10 @@ fn main() {
     }
 }
 
-fn libraries() -> Vec<(String, Peer)> {
+/// A library's name and build.
+type Peer = (String, Box<dyn Fn(&[Aabb]) -> Built>);
+
+fn libraries() -> Vec<Peer> {
     let presets = [
         ("fastest", Preset::Fastest),
         ("very fast", Preset::VeryFast),
@@ -59,18 +63,20 @@ fn libraries() -> Vec<(String, Peer)> {
         ("slow", Preset::Slow),
         ("very slow", Preset::VerySlow),
     ];
-    let obvhs = presets.map(|(name, preset)| {
-        (format!("obvhs {name}"), Peer::Obvhs(Obvhs { preset, reinsertion: None }))
-    });
-    obvhs.into_iter().chain([("bvh".into(), Peer::Bvh(NoSettings {}))]).collect()
+    let mut libraries: Vec<Peer> = vec![("bvh".into(), Box::new(build_by_bvh))];
+    for (name, preset) in presets {
+        let build = move |boxes: &[Aabb]| build_by_obvhs(preset, boxes);
+        libraries.push((format!("obvhs {name}"), Box::new(build)));
+    }
+    libraries
 }
 
 fn measure(scene: &Scene, rounds: usize) {
     let greedy = muller_fellner::Config::default().build(&scene.boxes).expect("finite boxes");
     let base = cost::internal_area(&greedy);
     let name = scene.name.rsplit('/').next().unwrap_or_default();
-    for (library, peer) in libraries() {
-        let theirs = || peer.build(scene).expect("a library of this program");
+    for (library, build) in libraries() {
+        let theirs = || build(&scene.boxes);
         // The first builds warm memory and caches up, and their time sets the limit.
         let mut least = (0..3).map(|_| theirs().seconds).fold(f64::INFINITY, f64::min);
         let mut their_cost = f64::INFINITY;

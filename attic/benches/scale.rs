@@ -19,10 +19,11 @@ use bvh_scenes::{Scene, load};
 use bvh_search::best::{self, Horizon};
 use bvh_search::{Budget, Deadline, Kept, Problem, solve_or_keep};
 use harness::processor::PROCESSOR;
-use harness::rows::ScaleRow;
+use harness::rows::Row;
 use memmap2::Mmap;
 use peak_alloc::PeakAlloc;
 use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -33,6 +34,32 @@ static ALLOCATED: PeakAlloc = PeakAlloc;
 
 const FOLDER: &str = "results/scale";
 const DEFAULT: [&str; 3] = ["forest:1000000", "forest:8000000", "forest:20000000"];
+
+/// One row of `timing_scale.csv`: one phase on a scene of millions of triangles, on one thread.
+#[derive(Serialize, Deserialize)]
+struct ScaleRow {
+    scene: String,
+    objects: usize,
+    /// The processor that was measured.
+    processor: String,
+    /// Load, build, bake, save, map, inspect or lay out.
+    phase: String,
+    /// Wall time; of a bake, the greedy tree included.
+    seconds: f64,
+    /// The most bytes allocated at once, the scene and the trees that the phase needs included.
+    peak_bytes: usize,
+    bytes_per_object: f64,
+    /// Bytes that stay allocated after the phase.
+    bytes_after: usize,
+    /// Internal area over the greedy tree's, of phases that make a tree.
+    cost_over_base: Option<f64>,
+    /// Megabytes of the mesh file per second, of phases that load it.
+    megabytes_per_s: Option<f64>,
+}
+
+impl Row for ScaleRow {
+    const FILE: &str = "timing_scale.csv";
+}
 
 fn main() {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
@@ -184,11 +211,10 @@ impl Phases {
     }
 
     fn peers(&mut self, scene: &Scene, base: f64) {
-        use harness::peers::{Obvhs, Peer, Preset};
+        use attic::{Preset, build_by_obvhs};
         for preset in [Preset::Medium, Preset::VerySlow] {
-            let peer = Peer::Obvhs(Obvhs { preset, reinsertion: None });
             let name = format!("build obvhs {preset:?}");
-            let built = self.phase(&name, || peer.build(scene).expect("a tree"));
+            let built = self.phase(&name, || build_by_obvhs(preset, &scene.boxes));
             // The library's stopwatch excludes the conversion to our tree.
             self.rows.last_mut().expect("a phase").seconds = built.seconds;
             self.cost(&built.tree, base);

@@ -15,7 +15,8 @@ use bvh_core::cost;
 use bvh_scenes::Scene;
 use clap::Parser;
 use harness::processor::PROCESSOR;
-use harness::rows::ThreadsRow;
+use harness::rows::Row;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Every run by its name, its threads, and its time as a multiple of the limit.
@@ -27,6 +28,28 @@ const RUNS: [(&str, usize, f64); 3] =
 const PLANNED: f64 = 0.97;
 
 const FOLDER: &str = "results/threads";
+
+/// One row of `timing_threads.csv`: one run of `best` against the clock.
+#[derive(Serialize, Deserialize)]
+struct ThreadsRow {
+    scene: String,
+    objects: usize,
+    /// The processor that was measured.
+    processor: String,
+    /// The limit of a run of factor 1.
+    limit_seconds: f64,
+    /// The threads, and the time limit as a multiple of `limit_seconds` unless it is 1.
+    run: String,
+    seed: u64,
+    /// Wall time of the run.
+    seconds: f64,
+    /// Internal area over the greedy tree's.
+    cost_over_base: f64,
+}
+
+impl Row for ThreadsRow {
+    const FILE: &str = "timing_threads.csv";
+}
 
 #[derive(Parser)]
 struct Args {

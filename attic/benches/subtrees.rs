@@ -18,7 +18,8 @@ use bvh_scenes::Scene;
 use bvh_search::{Budget, Problem, best, solve};
 use clap::Parser;
 use harness::processor::PROCESSOR;
-use harness::rows::SubtreesRow;
+use harness::rows::Row;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
 
@@ -26,6 +27,28 @@ use std::time::Instant;
 const EXPECTED: [usize; 2] = [8, 64];
 
 const FOLDER: &str = "results/threads";
+
+/// One row of `timing_subtrees.csv`: one run of `best` with a budget of work.
+#[derive(Serialize, Deserialize)]
+struct SubtreesRow {
+    scene: String,
+    objects: usize,
+    /// The processor that was measured.
+    processor: String,
+    /// The subtrees, or the copies of the whole tree, that are annealed at once.
+    at_once: String,
+    /// The threads, and whether their seconds are expected by Amdahl's law or measured.
+    threads: String,
+    seed: u64,
+    /// Wall time of the run.
+    seconds: f64,
+    /// Internal area over the greedy tree's.
+    cost_over_base: f64,
+}
+
+impl Row for SubtreesRow {
+    const FILE: &str = "timing_subtrees.csv";
+}
 
 #[derive(Parser)]
 struct Args {

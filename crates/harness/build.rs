@@ -16,10 +16,6 @@ fn main() {
         "cargo:rustc-env=HARNESS_BUILD={profile}, opt-level {level}, target features {features}"
     );
     println!("cargo:rustc-env=HARNESS_REVISION={}", revision().as_deref().unwrap_or("unknown"));
-    for library in ["bvh", "obvhs"] {
-        let version = locked_version(library).unwrap_or_else(|| "unknown".into());
-        println!("cargo:rustc-env=HARNESS_{}={version}", library.to_uppercase());
-    }
     for source in SOURCES {
         println!("cargo:rerun-if-changed={source}");
     }
@@ -37,15 +33,6 @@ const SOURCES: [&str; 9] = [
     "../bvh-stress/src",
     "../figures/src",
 ];
-
-/// Returns the version of a package in the lock file of the workspace; the lowest of several.
-fn locked_version(package: &str) -> Option<String> {
-    const LOCK: &str = "../../Cargo.lock";
-    println!("cargo:rerun-if-changed={LOCK}");
-    let lock = std::fs::read_to_string(LOCK).ok()?;
-    let (_, after) = lock.split_once(&format!("name = \"{package}\"\nversion = \""))?;
-    Some(after.split('"').next()?.to_owned())
-}
 
 /// Returns the commit of the sources, with a `+` if they differ from it.
 ///

@@ -1,95 +1,135 @@
 //! Third-party libraries and programs as methods of experiments: our costs of their trees, and
 //! their traversals compared with ours.
 //!
-//! A library is one file and one line in [`Peer`]. Specs that name one are parsed even without the
-//! cargo feature `peers`, which lets the error name the missing feature.
+//! The harness contains no library. The program in `attic/` does: it brings each as a [`Library`],
+//! and is the same program otherwise. A program of your own needs no code here: see [`command`].
 
-#[cfg(feature = "peers")]
-mod bvh;
 pub mod command;
-pub mod comparison;
-pub mod external;
-#[cfg(feature = "peers")]
-mod obvhs;
 mod program;
 
+use crate::Error;
 use crate::measure::contender::Contender;
-use bvh_config::{Accepts, Check, OutOfRange};
-#[cfg(feature = "peers")]
-use bvh_core::Aabb;
-use bvh_core::Bvh;
-use bvh_scenes::Scene;
+use crate::measure::speed::Traced;
+use bvh_config::fault::Fault;
+use bvh_config::{Check, OutOfRange};
+use bvh_core::{Aabb, Bvh, Triangle};
 use serde::{Deserialize, Deserializer, Serialize};
+use std::path::Path;
+use std::sync::OnceLock;
+use toml::Table;
 
-/// A library with its settings, as a spec names it.
+/// A library that builds trees and traces rays.
 ///
 /// For costs and build times it builds a tree with one object per leaf, as our methods do. For rays
 /// it builds its native structures with the same settings: with its leaves, and with split
 /// triangles if it splits them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(tag = "method", rename_all = "snake_case")]
-pub enum Peer {
-    /// The crate `bvh`: binned surface area heuristic. It has no settings.
-    Bvh(NoSettings),
-    /// The crate `obvhs`: parallel locally ordered clustering, then reinsertion.
-    Obvhs(Obvhs),
-}
+pub trait Library: Sync {
+    /// The library's name in specs.
+    fn name(&self) -> &'static str;
 
-/// The settings of a library that has none.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct NoSettings {}
+    /// Checks settings, which are the keys of the method's entry.
+    ///
+    /// # Errors
+    ///
+    /// An unknown key, or a value that is not accepted.
+    fn check(&self, settings: &Table) -> Result<(), Fault>;
 
-/// Settings of `obvhs`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Obvhs {
-    /// The library's preset. Default medium.
-    pub preset: Preset,
-    /// The fraction of nodes that are reinserted, `reinsertion_batch_ratio`; above 1, nodes are
-    /// reinserted repeatedly. Default the preset's.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub reinsertion: Option<f32>,
-}
+    /// Builds the tree over the boxes of objects.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::check`].
+    fn build(&self, settings: &Table, boxes: &[Aabb]) -> Result<Built, Fault>;
 
-/// The presets of `obvhs`, named like its functions without `_build`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "snake_case")]
-#[allow(missing_docs, reason = "the library's names")]
-pub enum Preset {
-    Fastest,
-    VeryFast,
-    Fast,
-    #[default]
-    Medium,
-    Slow,
-    VerySlow,
+    /// Returns the library's ways to trace rays through triangles.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::check`].
+    fn contenders<'a>(
+        &self,
+        settings: &Table,
+        triangles: &'a [Triangle],
+    ) -> Result<Vec<Contender<'a>>, Fault>;
 }
 
 /// A library's tree.
 #[derive(Clone, Debug)]
 pub struct Built {
-    /// The tree as our type, with tight boxes.
+    /// The tree as our type, with tight boxes: a library may pad its own.
     pub tree: Bvh,
     /// The time that the library needed to build the tree, without conversions.
     pub seconds: f64,
 }
 
-impl Built {
-    #[cfg(feature = "peers")]
-    fn tight(mut tree: Bvh, seconds: f64, boxes: &[Aabb]) -> Self {
-        // Costs are compared by tight boxes; a library may pad its own.
-        tree.refit(boxes);
-        Self { tree, seconds }
-    }
+/// Programs that trace rays beside our trees, and the comparison of all speeds.
+pub trait Race: Sync {
+    /// Starts a program with a scene. Returns its modes, each with the name of its library.
+    ///
+    /// # Errors
+    ///
+    /// If the program cannot be started or its output is malformed.
+    fn start(
+        &self,
+        program: &Path,
+        triangles: &[Triangle],
+    ) -> Result<Vec<(String, Contender<'static>)>, String>;
+
+    /// Compares speeds. Returns files with their names, and lines for the terminal.
+    fn compare(&self, raced: &[Raced]) -> Result<(Vec<NamedBytes>, String), Error>;
+}
+
+/// The name of a file of results, and its bytes.
+pub type NamedBytes = (&'static str, Vec<u8>);
+
+/// The library of our own contenders.
+pub const OURS: &str = "ours";
+
+/// One contender's rays of one kind on one scene.
+pub struct Raced<'a> {
+    /// The contender's library, or [`OURS`].
+    pub library: String,
+    /// The seconds in which a tree of ours was built, to which its layout's are added.
+    pub search_seconds: f64,
+    /// Answers and seconds.
+    pub traced: &'a Traced,
+}
+
+/// The libraries and the race of this program, which do not change while it runs.
+static OTHERS: OnceLock<(&[&dyn Library], &dyn Race)> = OnceLock::new();
+
+/// Sets the libraries of this program, and its race. Only the first call counts.
+pub fn bring(libraries: &'static [&'static dyn Library], race: &'static dyn Race) {
+    OTHERS.get_or_init(|| (libraries, race));
+}
+
+/// Returns the race of this program, if it contains other libraries.
+pub(crate) fn race() -> Option<&'static dyn Race> {
+    OTHERS.get().map(|(_, race)| *race)
+}
+
+/// A library with its settings, as a spec names it.
+#[derive(Clone, Debug, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct Peer {
+    #[serde(rename = "method")]
+    name: Name,
+    /// Settings of the library, which checks them.
+    #[serde(flatten)]
+    #[schemars(with = "std::collections::BTreeMap<String, serde_json::Value>")]
+    settings: Table,
+}
+
+/// The libraries that specs may name.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+enum Name {
+    Bvh,
+    Obvhs,
 }
 
 impl Check for Peer {
     fn faults(&self) -> Vec<OutOfRange> {
-        match self {
-            Self::Obvhs(settings) => (0.0..=100.0).faults("reinsertion", &settings.reinsertion),
-            _ => vec![],
-        }
+        vec![]
     }
 }
 
@@ -102,125 +142,49 @@ impl Peer {
         name: &str,
         settings: D,
     ) -> Result<Option<Self>, D::Error> {
-        match name {
-            "bvh" => NoSettings::deserialize(settings).map(|settings| Some(Self::Bvh(settings))),
-            "obvhs" => Obvhs::deserialize(settings).map(|settings| Some(Self::Obvhs(settings))),
-            _ => Ok(None),
-        }
+        let name = match name {
+            "bvh" => Name::Bvh,
+            "obvhs" => Name::Obvhs,
+            _ => return Ok(None),
+        };
+        Table::deserialize(settings).map(|settings| Some(Self { name, settings }))
     }
 
     /// The library's name.
     pub fn name(&self) -> &'static str {
-        match self {
-            Self::Bvh(_) => "bvh",
-            Self::Obvhs(_) => "obvhs",
+        match self.name {
+            Name::Bvh => "bvh",
+            Name::Obvhs => "obvhs",
         }
     }
 
-    /// The cargo feature that this build of the program lacks for the library, if any.
-    pub fn missing_feature(&self) -> Option<&'static str> {
-        (!cfg!(feature = "peers")).then_some("peers")
+    /// Checks that this program contains the library, and that the library accepts the settings.
+    pub fn check_settings(&self) -> Result<(), Fault> {
+        self.library()?.check(&self.settings)
     }
 
-    /// Builds the tree over the scene's objects.
-    ///
-    /// # Errors
-    ///
-    /// If the library is not compiled in.
-    #[cfg_attr(
-        not(feature = "peers"),
-        allow(unused_variables, reason = "there is nothing to build")
-    )]
-    pub fn build(&self, scene: &Scene) -> Result<Built, String> {
-        match self {
-            #[cfg(feature = "peers")]
-            Self::Bvh(_) => Ok(bvh::build(&scene.boxes)),
-            #[cfg(feature = "peers")]
-            Self::Obvhs(config) => Ok(obvhs::build(config, &scene.boxes)),
-            #[cfg(not(feature = "peers"))]
-            _ => Err(format!("this program was built without the library {}", self.name())),
-        }
+    /// Builds the tree over the boxes of objects.
+    pub fn build(&self, boxes: &[Aabb]) -> Result<Built, String> {
+        let built = self.library().and_then(|library| library.build(&self.settings, boxes));
+        built.map_err(|fault| fault.to_string())
     }
 
-    /// Returns the library's ways to trace rays through the scene's triangles.
-    #[cfg_attr(
-        not(feature = "peers"),
-        allow(unused_variables, reason = "there is nothing to trace")
-    )]
-    pub fn contenders<'a>(&self, scene: &'a Scene) -> Result<Vec<Contender<'a>>, String> {
-        match self {
-            #[cfg(feature = "peers")]
-            Self::Bvh(_) => Ok(vec![bvh::contender(triangles(scene)?)]),
-            #[cfg(feature = "peers")]
-            Self::Obvhs(config) => Ok(obvhs::contenders(config, triangles(scene)?)),
-            #[cfg(not(feature = "peers"))]
-            _ => Err(format!("this program was built without the library {}", self.name())),
-        }
+    /// Returns the library's ways to trace rays through triangles.
+    pub fn contenders<'a>(&self, triangles: &'a [Triangle]) -> Result<Vec<Contender<'a>>, String> {
+        let made = self.library().and_then(|library| library.contenders(&self.settings, triangles));
+        made.map_err(|fault| fault.to_string())
+    }
+
+    fn library(&self) -> Result<&'static dyn Library, Fault> {
+        let here = OTHERS.get().map_or(&[][..], |(libraries, _)| libraries);
+        let library = here.iter().find(|library| library.name() == self.name());
+        library.copied().ok_or_else(|| {
+            let found = format!("{:?}, another library, which `{PROGRAM}` contains", self.name());
+            let ours = bvh_search::Method::NAMES.join(", ");
+            Fault::new("method", found, format!("without it {ours}"))
+        })
     }
 }
 
-#[cfg(feature = "peers")]
-fn triangles(scene: &Scene) -> Result<&[bvh_core::Triangle], String> {
-    scene.triangles().map_err(|error| error.to_string())
-}
-
-#[cfg(all(test, feature = "peers"))]
-mod tests {
-    use super::*;
-    use crate::measure::contender::{Batch, Tracer};
-    use crate::measure::disagreements;
-    use bvh_core::{Coherence, validate};
-    use bvh_scenes::rays::{Kind, rays};
-    use bvh_scenes::trace::{Accelerator, Query};
-
-    fn all() -> Vec<Peer> {
-        let mut peers = vec![Peer::Bvh(NoSettings {})];
-        let presets = [Preset::Fastest, Preset::Medium, Preset::VerySlow];
-        peers.extend(presets.map(|preset| Peer::Obvhs(Obvhs { preset, reinsertion: None })));
-        peers
-    }
-
-    #[test]
-    fn a_fraction_out_of_range_is_rejected_by_its_name() {
-        let settings = Obvhs { reinsertion: Some(-0.5), ..Default::default() };
-        let error = Peer::Obvhs(settings).check().unwrap_err();
-        assert_eq!(error.to_string(), "reinsertion is -0.5; accepted: 0 to 100");
-        let settings = Obvhs { reinsertion: Some(2.0), ..Default::default() };
-        assert_eq!(Peer::Obvhs(settings).check(), Ok(()));
-    }
-
-    #[test]
-    fn trees_of_other_libraries_are_valid_and_have_one_object_per_leaf() {
-        let scene = Scene::load("escher:500").unwrap();
-        for peer in all() {
-            let built = peer.build(&scene).unwrap();
-            validate(&built.tree, &scene.boxes).unwrap();
-            assert_eq!(built.tree.nodes.len(), 2 * 500 - 1, "{peer:?}");
-        }
-    }
-
-    #[test]
-    fn other_libraries_find_nearly_all_hits_and_nothing_else() {
-        let scene = Scene::load("escher:2000").unwrap();
-        let tree = Peer::Bvh(NoSettings {}).build(&scene).unwrap().tree;
-        let rays = rays(Kind::Incoherent, 4000, &scene, &tree, &Default::default(), 1);
-        let batch = Batch {
-            query: Query::Nearest,
-            coherence: Coherence::Incoherent,
-            in_squares: false,
-            rays: &rays,
-        };
-        let mut right = vec![None; rays.len()];
-        Tracer::Own(Accelerator::of_tree(&scene.primitives, &tree))
-            .trace(&batch, &mut right)
-            .unwrap();
-        for peer in all() {
-            for contender in peer.contenders(&scene).unwrap() {
-                let mut hits = vec![None; rays.len()];
-                contender.tracer.trace(&batch, &mut hits).unwrap();
-                let found = disagreements(&right, &hits, &tree, &rays);
-                assert!(found.missed + found.false_hits + found.other < 20, "{peer:?}: {found:?}");
-            }
-        }
-    }
-}
+/// How to run the program that contains the libraries.
+const PROGRAM: &str = "cargo run --release --manifest-path attic/Cargo.toml --";

@@ -166,31 +166,6 @@ rows! {
         objects_standard_error: f64,
     }
 
-    /// One row of `timing_rays.csv`, of a comparison with other libraries: the speed of rays of one
-    /// kind.
-    PeerRayRow in "timing_rays.csv" {
-        /// Name of the scene, or that the row is a mean over all scenes.
-        scene: String,
-        /// The processor that was measured.
-        processor: String,
-        /// The instruction set that the library is held to.
-        instructions: String,
-        /// The library, or ours.
-        library: String,
-        /// The version of the library.
-        version: String,
-        /// The library's settings and its structure for rays.
-        mode: String,
-        /// The kind of rays.
-        rays: String,
-        /// Million rays per second on one thread, each part of the rays by its fastest turn.
-        million_per_s: f64,
-        /// Wall time of building tree and layout; in the mean over scenes, their mean.
-        build_seconds: f64,
-        /// Rays that this contender answers otherwise than brute force.
-        disagreements: u64,
-    }
-
     /// One row of `renders.csv`: the tests that one picture took.
     RenderRow in "renders.csv" {
         scene: String,
@@ -217,85 +192,6 @@ rows! {
         build_seconds: f64,
         /// Wall time of drawing on one thread, the least of all repeats.
         render_seconds: f64,
-    }
-
-    /// One row of `memory.csv`: the most memory that a method had allocated at once, on one thread.
-    MemoryRow in "memory.csv" {
-        scene: String,
-        objects: usize,
-        method: String,
-        /// Trees, working memory and history; not the scene's boxes.
-        peak_bytes: usize,
-        bytes_per_object: f64,
-    }
-
-    /// One row of `timing_scale.csv`: one phase on a scene of millions of triangles, on one thread.
-    ScaleRow in "timing_scale.csv" {
-        scene: String,
-        objects: usize,
-        /// The processor that was measured.
-        processor: String,
-        /// Load, build, bake, save, map, inspect or lay out.
-        phase: String,
-        /// Wall time; of a bake, the greedy tree included.
-        seconds: f64,
-        /// The most bytes allocated at once, the scene and the trees that the phase needs included.
-        peak_bytes: usize,
-        bytes_per_object: f64,
-        /// Bytes that stay allocated after the phase.
-        bytes_after: usize,
-        /// Internal area over the greedy tree's, of phases that make a tree.
-        cost_over_base: Option<f64>,
-        /// Megabytes of the mesh file per second, of phases that load it.
-        megabytes_per_s: Option<f64>,
-    }
-
-    /// One row of `timing_threads.csv`: one run of `best` against the clock.
-    ThreadsRow in "timing_threads.csv" {
-        scene: String,
-        objects: usize,
-        /// The processor that was measured.
-        processor: String,
-        /// The limit of a run of factor 1.
-        limit_seconds: f64,
-        /// The threads, and the time limit as a multiple of `limit_seconds` unless it is 1.
-        run: String,
-        seed: u64,
-        /// Wall time of the run.
-        seconds: f64,
-        /// Internal area over the greedy tree's.
-        cost_over_base: f64,
-    }
-
-    /// One row of `timing_subtrees.csv`: one run of `best` with a budget of work.
-    SubtreesRow in "timing_subtrees.csv" {
-        scene: String,
-        objects: usize,
-        /// The processor that was measured.
-        processor: String,
-        /// The subtrees, or the copies of the whole tree, that are annealed at once.
-        at_once: String,
-        /// The threads, and whether their seconds are expected by Amdahl's law or measured.
-        threads: String,
-        seed: u64,
-        /// Wall time of the run.
-        seconds: f64,
-        /// Internal area over the greedy tree's.
-        cost_over_base: f64,
-    }
-
-    /// One row of `timing_interrupt.csv`: one bake that was interrupted.
-    InterruptRow in "timing_interrupt.csv" {
-        scene: String,
-        objects: usize,
-        /// The processor that was measured.
-        processor: String,
-        /// The number of recorded rays that the tree was searched for; 0 for a bake by area.
-        segments: usize,
-        /// The time from the start of the program to the signal.
-        after_seconds: f64,
-        /// The time from the signal to the end of the program, the file of the tree included.
-        seconds: f64,
     }
 
     /// One row of `bounds.csv`: a proven lower bound of a scene.

@@ -72,36 +72,6 @@ rows! {
         rays: u64,
     }
 
-    /// One row of `timing_ratios.csv`: the speed of rays of one kind in one of our modes, over the
-    /// fastest mode of other libraries on the same scene; after the scenes the geometric mean over
-    /// them.
-    RayRatioRow in "timing_ratios.csv" {
-        scene: String,
-        /// The processor that was measured, and the instruction set that all are held to.
-        processor: String,
-        /// Our mode.
-        mode: String,
-        /// The modes compared with: `any mode`, `single calls`, those of `whole triangles`, or
-        /// Embree's `robust` ones.
-        against: String,
-        /// The fastest of them on this scene; empty for means.
-        fastest: String,
-        rays: String,
-        /// Our speed over the fastest of theirs, to six decimals like all ratios here; more than 1
-        /// is faster.
-        ratio: f64,
-        /// The least ratio of one turn.
-        least_turn: f64,
-        /// The greatest ratio of one turn.
-        greatest_turn: f64,
-        /// Wall time of building tree and layout; in the mean over scenes, their mean.
-        build_seconds: f64,
-        /// The scene that lifts the mean most; empty for scenes.
-        carried_by: String,
-        /// The geometric mean without that scene; empty for scenes.
-        ratio_without: Option<f64>,
-    }
-
     /// One row of `visits.csv`: the cost of a run's tree for one kind of rays, others than those
     /// that are tested.
     VisitRow in "visits.csv" {

@@ -93,24 +93,23 @@ fn solve_or_build(
     stopwatch: &Stopwatch,
 ) -> Result<(Outcome, f64), Error> {
     let Job { scene, labelled, .. } = *job;
-    let (tree, seconds) =
-        match &labelled.method {
-            Contestant::Ours(method) => return search(experiment, job, method, seed, stopwatch),
-            Contestant::Peer(peer) => {
-                let Built { tree, seconds } = peer.build(scene).map_err(|message| {
-                    Error::Library { scene: scene.name.clone(), library: peer.name(), message }
-                })?;
-                (tree, seconds)
-            }
-            Contestant::External(program) => program
-                .build(&scene.boxes, &scene.primitives, seed, &|| stopwatch.watch.cancelled())
-                .map_err(|source| Error::External {
-                    scene: scene.name.clone(),
-                    method: labelled.label.clone(),
-                    command: program.command.join(" "),
-                    source,
-                })?,
-        };
+    let (tree, seconds) = match &labelled.method {
+        Contestant::Ours(method) => return search(experiment, job, method, seed, stopwatch),
+        Contestant::Peer(peer) => {
+            let Built { tree, seconds } = peer.build(&scene.boxes).map_err(|message| {
+                Error::Library { scene: scene.name.clone(), library: peer.name(), message }
+            })?;
+            (tree, seconds)
+        }
+        Contestant::External(program) => program
+            .build(&scene.boxes, &scene.primitives, seed, &|| stopwatch.watch.cancelled())
+            .map_err(|source| Error::External {
+                scene: scene.name.clone(),
+                method: labelled.label.clone(),
+                command: program.command.join(" "),
+                source,
+            })?,
+    };
     // Third-party methods report no events; their end is the only one.
     stopwatch.note(seconds);
     Ok((single_evaluation(tree, &experiment.objective), seconds))

@@ -4,6 +4,7 @@
 use super::resolved::{read_toml, to_toml};
 use crate::Error;
 use crate::files;
+use crate::peers;
 use crate::processor::PROCESSOR;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -22,8 +23,8 @@ pub struct Provenance {
     /// The compiler that built it.
     pub rustc: String,
     /// The harness's profile (in the dev profile the libraries have a higher opt-level), the target
-    /// features that the compiler could assume, debug assertions, and whether third-party libraries
-    /// are compiled in.
+    /// features that the compiler could assume, debug assertions, and whether the program contains
+    /// third-party libraries.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub build: String,
     /// Processor model and architecture.
@@ -56,7 +57,7 @@ impl Provenance {
                 "{}, debug assertions {}, peers {}",
                 env!("HARNESS_BUILD"),
                 on(cfg!(debug_assertions)),
-                on(cfg!(feature = "peers"))
+                on(peers::race().is_some())
             ),
             cpu: format!("{}, {}", PROCESSOR.name(), std::env::consts::ARCH),
             threads: rayon::current_num_threads(),

@@ -6,7 +6,7 @@ use crate::Error;
 use crate::contestant::Contestant;
 use crate::measure::layout::own_contenders;
 use crate::measure::speed::{self, Traced};
-use crate::peers::{comparison, external};
+use crate::peers::{OURS, Race, Raced, race};
 use crate::rows::{TimingRow, TraceRow, TraceTimeRow};
 use crate::spec::Experiment;
 use crate::statistics::median;
@@ -37,8 +37,8 @@ impl Measurement for Tracing<'_> {
         for runs in first_runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
             traced.extend(trace_scene(config, work, runs, &programs)?);
         }
-        if !config.ray_peers.is_empty() {
-            text += &compare_libraries(work, &first_runs, &traced)?;
+        if let Some(race) = race().filter(|_| !config.ray_peers.is_empty()) {
+            text += &compare_libraries(race, work, &first_runs, &traced)?;
         }
         write_rows(work, traced)?;
         Ok(text)
@@ -72,10 +72,11 @@ fn trace_scene(
     let experiment = work.experiment;
     let (first_job, first_tree) = runs[0];
     let scene = first_job.scene;
+    let triangles = || scene.triangles().map_err(|error| error.to_string());
     let mut contenders = Vec::new();
     for &(job, tree) in runs {
         let made = match &job.labelled.method {
-            Contestant::Peer(peer) => peer.contenders(scene),
+            Contestant::Peer(peer) => triangles().and_then(|all| peer.contenders(all)),
             Contestant::Ours(_) | Contestant::External(_) => {
                 let visits = job.visits(experiment, tree)?;
                 let visits = visits.as_deref();
@@ -86,8 +87,9 @@ fn trace_scene(
         contenders
             .extend(made.into_iter().map(|contender| (job.labelled.label.clone(), contender)));
     }
-    for program in programs {
-        let made = external::contenders(program, scene).map_err(tracing_error(scene))?;
+    for (program, race) in programs.iter().zip(race().into_iter().cycle()) {
+        let made = triangles().and_then(|all| race.start(program, all));
+        let made = made.map_err(tracing_error(scene))?;
         for (library, contender) in made {
             // A processor without AVX-512 makes all programs the same.
             if !contenders
@@ -106,17 +108,30 @@ fn trace_scene(
 }
 
 /// Writes the speeds of all libraries and the ratios between them. Returns the ratios' table.
-fn compare_libraries(work: &Work, first_runs: &[Run], traced: &[Traced]) -> Result<String, Error> {
-    let search_seconds = search_seconds(first_runs, work)?;
-    let speeds = comparison::speeds(
-        traced,
-        |label| library(work.experiment, label),
-        |scene, label| search_seconds[&(scene.to_owned(), label.to_owned())],
-    );
-    work.store.write_rows(&comparison::rows(&speeds))?;
-    let ratios = comparison::ratios(&speeds);
-    work.store.write_rows(&ratios)?;
-    Ok(comparison::text(&ratios))
+fn compare_libraries(
+    race: &dyn Race,
+    work: &Work,
+    first_runs: &[Run],
+    traced: &[Traced],
+) -> Result<String, Error> {
+    let seconds = search_seconds(first_runs, work)?;
+    let raced: Vec<Raced> = traced
+        .iter()
+        .map(|traced| {
+            let TraceRow { scene, method, .. } = &traced.answers;
+            let search_seconds = seconds.get(&(scene.clone(), method.clone()));
+            Raced {
+                library: library(work.experiment, method),
+                search_seconds: search_seconds.copied().unwrap_or(f64::NAN),
+                traced,
+            }
+        })
+        .collect();
+    let (files, text) = race.compare(&raced)?;
+    for (name, bytes) in files {
+        work.store.write(name, &bytes)?;
+    }
+    Ok(text)
 }
 
 /// Writes the rows of the experiment's methods.
@@ -163,7 +178,7 @@ fn search_seconds(
 fn library(experiment: &Experiment, label: &str) -> String {
     let labelled = experiment.methods.iter().find(|method| method.label == label);
     match labelled.map(|labelled| &labelled.method) {
-        Some(Contestant::Ours(_)) => comparison::OURS.into(),
+        Some(Contestant::Ours(_)) => OURS.into(),
         Some(Contestant::Peer(peer)) => peer.name().into(),
         Some(Contestant::External(_)) | None => label.into(),
     }

@@ -109,16 +109,11 @@ impl Experiment {
         let name = method.name();
         if self.suite.is_some() && !matches!(method, Contestant::Ours(_)) {
             // One that crashes must not end the suite; it runs each library in a separate process.
-            let accepted =
-                "methods of ours; the suite itself runs the libraries that are compiled in";
+            let accepted = "methods of ours";
             return Err(Fault::new("method", format!("{name:?}, none of ours"), accepted));
         }
         let Contestant::Peer(peer) = method else { return Ok(()) };
-        let Some(feature) = peer.missing_feature() else { return Ok(()) };
-        let command = format!("cargo run --release -p harness --features {feature}");
-        let found = format!("{name:?}, another library, which needs `{command}`");
-        let accepted = format!("without it {}", Method::NAMES.join(", "));
-        Err(Fault::new("method", found, accepted))
+        peer.check_settings()
     }
 
     /// Rejects a method that would run for hours because the spec sets no limit.

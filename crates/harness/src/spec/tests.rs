@@ -104,22 +104,12 @@ fn more_lights_leave_fewer_rays_to_train_on() {
 }
 
 #[test]
-fn another_library_is_accepted_exactly_with_its_feature() {
+fn another_library_is_refused_with_the_command_that_contains_it() {
     for name in Peer::NAMES {
         let text =
             format!("question = 'q'\nscenes = ['escher']\nmethods = [{{ method = '{name}' }}]\n");
-        let Contestant::Peer(peer) =
-            toml::from_str::<Experiment>(&text).unwrap().methods.remove(0).method
-        else {
-            panic!("{name} is no library");
-        };
-        match peer.missing_feature() {
-            Some(feature) => assert_rejected(
-                &text,
-                &["methods[0].method", name, "--features", feature, "muller_fellner"],
-            ),
-            None => assert_eq!(read(&text).err(), None),
-        }
+        let program = "cargo run --release --manifest-path attic/Cargo.toml --";
+        assert_rejected(&text, &["methods[0].method", name, program, "muller_fellner"]);
     }
 }
 

@@ -8,8 +8,6 @@ mod examples;
 mod external;
 mod faults;
 mod merge;
-#[cfg(feature = "peers")]
-mod obvhs;
 mod page;
 mod paper;
 mod pictures;

@@ -1,15 +1,13 @@
 //! Rays per second of all libraries for comparison: every mode on every scene, and geometric means
 //! over the scenes.
 
-use crate::measure::layout::{COMPILED, is_repeat, is_single};
-use crate::measure::speed::Traced;
-use crate::processor::PROCESSOR;
 use crate::rows::{PeerRayRow, RayRatioRow};
-use crate::statistics::{self, geometric_mean, range};
+use harness::measure::layout::{COMPILED, is_repeat, is_single};
+use harness::measure::speed::Traced;
+use harness::peers::{OURS, Raced};
+use harness::processor::PROCESSOR;
+use harness::statistics::{self, geometric_mean, range};
 use std::collections::{BTreeMap, BTreeSet};
-
-/// The library of our own contenders.
-pub const OURS: &str = "ours";
 
 /// The value of the column `scene` in rows that are means over all scenes.
 pub const MEAN: &str = "geometric mean";
@@ -28,17 +26,11 @@ pub struct Speed {
 }
 
 /// Returns the speeds of contenders that did not fail.
-///
-/// `library_of` names the library of a method's label. `search_seconds` returns the seconds in
-/// which the tree of a label was built on a scene, for contenders that get it ready-made.
-pub fn speeds(
-    traced: &[Traced],
-    library_of: impl Fn(&str) -> String,
-    search_seconds: impl Fn(&str, &str) -> f64,
-) -> Vec<Speed> {
-    let speed_of = |traced: &Traced| {
+pub fn speeds(raced: &[Raced]) -> Vec<Speed> {
+    let speed_of = |raced: &Raced| {
+        let traced = raced.traced;
         let Traced { answers, times, .. } = traced;
-        let library = library_of(&answers.method);
+        let library = raced.library.clone();
         let mode = if library == answers.method {
             answers.layout.clone()
         } else {
@@ -47,7 +39,7 @@ pub fn speeds(
         // Our trees come ready-made, so the seconds of their search are added; libraries build
         // theirs here.
         let build_seconds = match library.as_str() {
-            OURS => search_seconds(&answers.scene, &answers.method) + times.preparation_seconds,
+            OURS => raced.search_seconds + times.preparation_seconds,
             _ => times.preparation_seconds,
         };
         let million = times.count as f64 * 1e-6;
@@ -67,9 +59,11 @@ pub fn speeds(
             turns: traced.turns.iter().map(|seconds| million / seconds).collect(),
         }
     };
-    traced
+    raced
         .iter()
-        .filter(|traced| wrong_answers(traced) * WRONG_AT_MOST_ONE_IN <= traced.answers.count)
+        .filter(|Raced { traced, .. }| {
+            wrong_answers(traced) * WRONG_AT_MOST_ONE_IN <= traced.answers.count
+        })
         .map(speed_of)
         .collect()
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::rows::{TraceRow, TraceTimeRow};
+use harness::rows::{TraceRow, TraceTimeRow};
 
 fn speed(scene: &str, library: &str, mode: &str, million_per_s: f64) -> Speed {
     let row = PeerRayRow {
@@ -112,7 +112,7 @@ fn a_contender_that_answers_wrongly_has_no_speed() {
             version: String::new(),
             turns: vec![1.0],
         };
-        speeds(&[traced], str::to_owned, |_, _| 0.0).len()
+        speeds(&[Raced { library: "L".into(), search_seconds: 0.0, traced: &traced }]).len()
     };
     assert_eq!((shown(10), shown(11)), (1, 0));
 }

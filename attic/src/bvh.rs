@@ -1,17 +1,52 @@
-//! The crate `bvh`.
+//! The crate `bvh`: binned surface area heuristic. It has no settings.
 
-use super::Built;
-use crate::measure::contender::{Batch, Contender, Tracer, timed};
-use crate::measure::layout::COMPILED;
+use crate::tight;
 use ::bvh::aabb::{Aabb as TheirAabb, Bounded};
 use ::bvh::bounding_hierarchy::BHShape;
 use ::bvh::bvh::{Bvh as TheirBvh, BvhNode};
 use ::bvh::ray::Ray as TheirRay;
+use bvh_config::fault::{self, Fault};
 use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle};
 use bvh_scenes::trace::Query;
 use glam::Vec3;
+use harness::measure::contender::{Batch, Contender, Tracer, timed};
+use harness::measure::layout::COMPILED;
+use harness::peers::{Built, Library};
 use nalgebra::{Point3, Vector3};
 use std::time::Instant;
+use toml::Table;
+
+bvh_config::config! { serde;
+    /// The settings of the library, which has none.
+    pub struct NoSettings {}
+}
+
+/// The crate as a method.
+pub struct Crate;
+
+impl Library for Crate {
+    fn name(&self) -> &'static str {
+        "bvh"
+    }
+
+    fn check(&self, settings: &Table) -> Result<(), Fault> {
+        fault::deserialize::<NoSettings>(settings.clone()).map(|_| ())
+    }
+
+    fn build(&self, settings: &Table, boxes: &[Aabb]) -> Result<Built, Fault> {
+        self.check(settings)?;
+        Ok(build(boxes))
+    }
+
+    fn contenders<'a>(
+        &self,
+        settings: &Table,
+        triangles: &'a [Triangle],
+    ) -> Result<Vec<Contender<'a>>, Fault> {
+        self.check(settings)?;
+        Ok(vec![contender(triangles)])
+    }
+}
 
 /// An object as the library stores it. Only the tracing of rays reads the corners.
 #[derive(Clone)]
@@ -96,13 +131,13 @@ fn to_our_tree(theirs: &TheirBvh<f32, 3>, boxes: &[Aabb]) -> Bvh {
 }
 
 /// Builds on one thread; the library's leaves have one object.
-pub(super) fn build(boxes: &[Aabb]) -> Built {
+pub fn build(boxes: &[Aabb]) -> Built {
     let mut shapes: Vec<Shape> =
         (0..).zip(boxes).map(|(object, &aabb)| Shape::new(object, aabb, [aabb.min; 3])).collect();
     let start = Instant::now();
     let theirs = TheirBvh::build(&mut shapes);
     let seconds = start.elapsed().as_secs_f64();
-    Built::tight(to_our_tree(&theirs, boxes), seconds, boxes)
+    tight(to_our_tree(&theirs, boxes), seconds, boxes)
 }
 
 /// A ray of ours and the same ray as the library's type, which has a unit direction and no range.
@@ -173,7 +208,7 @@ impl PreparedRay {
 }
 
 /// Builds the library's tree over triangles and returns its traversal.
-pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
+fn contender(triangles: &[Triangle]) -> Contender<'_> {
     let mut shapes: Vec<Shape> = (0..)
         .zip(triangles)
         .map(|(object, triangle)| Shape::new(object, triangle.aabb(), triangle.0))
@@ -188,7 +223,7 @@ pub(super) fn contender(triangles: &[Triangle]) -> Contender<'_> {
     Contender {
         layout: "binary, their own".into(),
         instructions: COMPILED.into(),
-        version: env!("HARNESS_BVH").into(),
+        version: env!("ATTIC_BVH").into(),
         preparation_seconds,
         tracer: Tracer::Other(Box::new(trace)),
     }

@@ -1,18 +1,75 @@
-//! The crate `obvhs`.
+//! The crate `obvhs`: parallel locally ordered clustering, then reinsertion.
 
-use super::{Built, Obvhs, Preset};
-use crate::measure::contender::{Batch, Contender, Trace, Tracer, timed};
-use crate::measure::layout::COMPILED;
+use crate::tight;
 use ::obvhs::bvh2::{Bvh2, builder as binary};
 use ::obvhs::cwbvh::builder as wide;
 use ::obvhs::ray::{Ray as TheirRay, RayHit};
 use ::obvhs::rt_triangle::RtTriangle;
 use ::obvhs::triangle::Triangle as TheirTriangle;
 use ::obvhs::{BvhBuildParams, aabb};
+use bvh_config::fault::{self, Fault};
 use bvh_core::{Aabb, Bvh, FirstCountNode, Hit, Ray, Triangle};
 use bvh_scenes::trace::Query;
 use glam::Vec3A;
+use harness::measure::contender::{Batch, Contender, Trace, Tracer, timed};
+use harness::measure::layout::COMPILED;
+use harness::peers::{Built, Library};
+use serde::{Deserialize, Serialize};
 use std::time::Duration;
+use toml::Table;
+
+bvh_config::config! { serde;
+    /// Settings of `obvhs`.
+    pub struct Obvhs {
+        /// The library's preset.
+        preset: Preset;
+        /// The fraction of nodes that are reinserted, `reinsertion_batch_ratio`; above 1, nodes
+        /// are reinserted repeatedly. Default the preset's.
+        reinsertion: Option<f32>, in 0.0..=100.0;
+    }
+}
+
+/// The presets of `obvhs`, named like its functions without `_build`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Preset {
+    Fastest,
+    VeryFast,
+    Fast,
+    #[default]
+    Medium,
+    Slow,
+    VerySlow,
+}
+
+/// The crate as a method.
+pub struct Crate;
+
+impl Library for Crate {
+    fn name(&self) -> &'static str {
+        "obvhs"
+    }
+
+    fn check(&self, settings: &Table) -> Result<(), Fault> {
+        read(settings).map(|_| ())
+    }
+
+    fn build(&self, settings: &Table, boxes: &[Aabb]) -> Result<Built, Fault> {
+        Ok(build(&read(settings)?, boxes))
+    }
+
+    fn contenders<'a>(
+        &self,
+        settings: &Table,
+        triangles: &'a [Triangle],
+    ) -> Result<Vec<Contender<'a>>, Fault> {
+        Ok(contenders(&read(settings)?, triangles))
+    }
+}
+
+fn read(settings: &Table) -> Result<Obvhs, Fault> {
+    fault::deserialize(settings.clone())
+}
 
 fn parameters(config: &Obvhs) -> BvhBuildParams {
     let mut parameters = match config.preset {
@@ -62,14 +119,14 @@ fn to_their_ray(ray: &Ray) -> TheirRay {
 
 /// Builds over boxes, with one object per leaf and no split triangles. The library's stopwatch
 /// excludes conversions and checks.
-pub(super) fn build(config: &Obvhs, boxes: &[Aabb]) -> Built {
+pub fn build(config: &Obvhs, boxes: &[Aabb]) -> Built {
     let parameters =
         BvhBuildParams { max_prims_per_leaf: 1, pre_split: false, ..parameters(config) };
     let (theirs, time) = build_over(boxes, parameters);
-    Built::tight(to_our_tree(&theirs, boxes), time.as_secs_f64(), boxes)
+    tight(to_our_tree(&theirs, boxes), time.as_secs_f64(), boxes)
 }
 
-/// Makes a [`Trace`](crate::measure::contender::Trace) from a tree over `triangles` in the order of
+/// Makes a [`Trace`] from a tree over `triangles` in the order of
 /// its leaves. It is a macro because the library's trees share functions but no trait.
 macro_rules! traced_by {
     ($tree:ident, $triangles:expr) => {{
@@ -91,7 +148,7 @@ macro_rules! traced_by {
 /// Returns the preset's binary tree and its compressed eight-wide tree, with triangles in the order
 /// of leaves, as the library recommends. It expects rays with unit directions; ours have unit
 /// length up to rounding.
-pub(super) fn contenders(config: &Obvhs, triangles: &[Triangle]) -> Vec<Contender<'static>> {
+fn contenders(config: &Obvhs, triangles: &[Triangle]) -> Vec<Contender<'static>> {
     let theirs: Vec<TheirTriangle> = triangles
         .iter()
         .map(|&Triangle(corners)| {
@@ -120,7 +177,7 @@ fn contender(layout: &str, time: Duration, trace: Trace<'static>) -> Contender<'
     Contender {
         layout: layout.into(),
         instructions: COMPILED.into(),
-        version: env!("HARNESS_OBVHS").into(),
+        version: env!("ATTIC_OBVHS").into(),
         preparation_seconds: time.as_secs_f64(),
         tracer: Tracer::Other(trace),
     }

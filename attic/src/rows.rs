@@ -1,0 +1,69 @@
+//! The rows of comparisons with other libraries.
+
+use harness::rows::Row;
+use serde::{Deserialize, Serialize};
+
+/// One row of `timing_rays.csv`, of a comparison with other libraries: the speed of rays of one
+/// kind.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PeerRayRow {
+    /// Name of the scene, or that the row is a mean over all scenes.
+    pub scene: String,
+    /// The processor that was measured.
+    pub processor: String,
+    /// The instruction set that the library is held to.
+    pub instructions: String,
+    /// The library, or ours.
+    pub library: String,
+    /// The version of the library.
+    pub version: String,
+    /// The library's settings and its structure for rays.
+    pub mode: String,
+    /// The kind of rays.
+    pub rays: String,
+    /// Million rays per second on one thread, each part of the rays by its fastest turn.
+    pub million_per_s: f64,
+    /// Wall time of building tree and layout; in the mean over scenes, their mean.
+    pub build_seconds: f64,
+    /// Rays that this contender answers otherwise than brute force.
+    pub disagreements: u64,
+}
+
+impl Row for PeerRayRow {
+    const FILE: &str = "timing_rays.csv";
+}
+
+/// One row of `timing_ratios.csv`: the speed of rays of one kind in one of our modes, over the
+/// fastest mode of other libraries on the same scene; after the scenes the geometric mean over
+/// them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RayRatioRow {
+    pub scene: String,
+    /// The processor that was measured, and the instruction set that all are held to.
+    pub processor: String,
+    /// Our mode.
+    pub mode: String,
+    /// The modes compared with: `any mode`, `single calls`, those of `whole triangles`, or
+    /// Embree's `robust` ones.
+    pub against: String,
+    /// The fastest of them on this scene; empty for means.
+    pub fastest: String,
+    pub rays: String,
+    /// Our speed over the fastest of theirs, to six decimals like all ratios here; more than 1
+    /// is faster.
+    pub ratio: f64,
+    /// The least ratio of one turn.
+    pub least_turn: f64,
+    /// The greatest ratio of one turn.
+    pub greatest_turn: f64,
+    /// Wall time of building tree and layout; in the mean over scenes, their mean.
+    pub build_seconds: f64,
+    /// The scene that lifts the mean most; empty for scenes.
+    pub carried_by: String,
+    /// The geometric mean without that scene; empty for scenes.
+    pub ratio_without: Option<f64>,
+}
+
+impl Row for RayRatioRow {
+    const FILE: &str = "timing_ratios.csv";
+}
