@@ -213,12 +213,19 @@ def test_errors_name_the_ray(rays, message):
             ask(*rays)
 
 
-def test_the_lines_of_the_readme_run(tmp_path, monkeypatch, capsys):
-    readme = (Path(__file__).parents[1] / "README.md").read_text()
+def test_the_lines_of_the_readmes_run(tmp_path, monkeypatch, capsys):
+    def run(folder):
+        names = {}
+        exec((folder / "README.md").read_text().split("```python\n")[1].split("```")[0], names)
+        return names
+
+    package = Path(__file__).parents[1]
     monkeypatch.chdir(tmp_path)
-    exec(readme.split("```python\n")[1].split("```")[0], {})
+    run(package)
     assert capsys.readouterr().out == "0.0 [3.] [0]\n"
     assert (tmp_path / "scene.bvh").is_file()
+    names = run(package.parents[1])
+    assert (names["t"], names["triangle"]) == ([3], [0])
 
 
 def test_an_interrupt_ends_a_search_which_keeps_its_gains():

@@ -24,8 +24,11 @@ fn every_block_has_a_language_whose_examples_are_run() {
         );
         // `scripts/languages` compiles and runs the C example, pytest and node run the others.
         for language in ["c", "python", "js"] {
-            let page = format!("bvh-{language}/README.md");
-            assert!(block.language != language || block.page.ends_with(page), "{}", block.place());
+            let page = fs::canonicalize(&block.page).unwrap();
+            let is_run = page.ends_with(format!("crates/bvh-{language}/README.md"))
+                || language == "python"
+                    && page == fs::canonicalize(top().join("README.md")).unwrap();
+            assert!(block.language != language || is_run, "{}", block.place());
         }
     }
 }
