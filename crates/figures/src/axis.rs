@@ -1,7 +1,7 @@
 //! Chooses the shown part of an axis and its ticks.
 //!
 //! Panels are drawn in coordinates: the values of a linear axis, the decimal logarithms of a
-//! logarithmic axis, and the indices of categories. plotters' own logarithmic axis has no ticks
+//! logarithmic axis, and the negative indices of rows. plotters' own logarithmic axis has no ticks
 //! between powers of ten and takes logarithms from the system's library, whose last digit differs
 //! from machine to machine.
 
@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 
-use super::model::{Axis, Marks, Panel, Scale};
+use super::model::{Axis, Marks, Panel, Scale, Unit};
 
 /// Values of a larger magnitude count as non-finite, so that no difference overflows.
 const LARGEST: f64 = 1e300;
@@ -18,6 +18,9 @@ const LARGEST: f64 = 1e300;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Ruled {
     log: bool,
+    /// True for rows, which are counted downwards.
+    down: bool,
+    unit: Unit,
     pub low: f64,
     pub high: f64,
     /// Labelled ticks.
@@ -52,17 +55,18 @@ pub(super) fn axes(panel: &Panel) -> (Ruled, Ruled, bool) {
             Marks::Line(points) | Marks::Steps(points) | Marks::Points(points) => {
                 points.iter().for_each(|&(x, y)| add(x, &[y]));
             }
-            Marks::Band(points) | Marks::StepBand(points) => {
+            Marks::Band(points) => {
                 points.iter().for_each(|&(x, low, high)| add(x, &[low, high]));
             }
-            Marks::Bars { values, spread, base } => {
-                values.iter().zip(0..).for_each(|(&height, i)| add(f64::from(i), &[height]));
-                other_ys
-                    .extend(spread.iter().take(values.len()).flat_map(|&(low, high)| [low, high]));
-                other_ys.push(*base);
+            Marks::Spans(spans) => {
+                spans.iter().flatten().for_each(|&(x, y)| {
+                    other_xs.push(x);
+                    other_ys.push(y);
+                });
             }
             Marks::HLine(y) => other_ys.push(*y),
             Marks::VLine(x) => other_xs.push(*x),
+            Marks::Text(_) => {}
         }
     }
     let has_data = !xs.is_empty();
@@ -78,9 +82,9 @@ impl Ruled {
     /// margin of `margin` times their extent.
     pub fn new(axis: &Axis, values: &[f64], margin: f64) -> Self {
         let log = axis.scale == Scale::Log;
-        let any = Self { log, ..Self::default() };
-        if let Scale::Category(names) = &axis.scale {
-            return Self { low: -0.5, high: names.len().max(1) as f64 - 0.5, ..any };
+        let any = Self { log, unit: axis.unit, ..Self::default() };
+        if let Scale::Rows(names, _) = &axis.scale {
+            return Self { low: 0.5 - names.len().max(1) as f64, high: 0.5, down: true, ..any };
         }
         let shown = || values.iter().filter_map(|&value| any.coordinate(value));
         let least = shown().reduce(f64::min).unwrap_or(0.0);
@@ -96,8 +100,8 @@ impl Ruled {
             most + margin
         };
         let set = |end: Option<f64>| end.and_then(|value| any.coordinate(value));
-        let low = set(axis.low).unwrap_or(low);
-        let high = set(axis.high).filter(|&high| high > low).unwrap_or(high);
+        let low = set(axis.range.map(|range| range.0)).unwrap_or(low);
+        let high = set(axis.range.map(|range| range.1)).filter(|&high| high > low).unwrap_or(high);
         // A narrower range would have ends that are equal in ten digits.
         let narrowest = (1e-9 * low.abs().max(high.abs())).max(1e-200);
         Self {
@@ -111,7 +115,11 @@ impl Ruled {
     /// cannot show the value.
     pub fn coordinate(&self, value: f64) -> Option<f64> {
         let possible = value.abs() <= LARGEST && (value > 0.0 || !self.log);
-        possible.then(|| if self.log { libm::log10(value) } else { value })
+        possible.then(|| match (self.log, self.down) {
+            (true, _) => libm::log10(value),
+            (_, true) => -value,
+            _ => value,
+        })
     }
 
     /// Returns the coordinate if it is in the shown part or less than a pixel outside.
@@ -133,7 +141,13 @@ impl Ruled {
 
     /// Adds at most `most` ticks, and at least three if possible.
     pub fn rule(&mut self, most: usize) {
-        if !self.log || !self.rule_decades(most) {
+        if self.unit == Unit::Bare {
+            return;
+        }
+        if self.down {
+            // Faint lines guide the eye from a name to its marks.
+            self.minor = (0..=(-self.low) as i32).map(|row| f64::from(-row)).collect();
+        } else if !self.log || !self.rule_decades(most) {
             let (low, high) = if self.log {
                 (libm::exp10(self.low), libm::exp10(self.high))
             } else {
@@ -147,7 +161,8 @@ impl Ruled {
     fn rule_evenly(&mut self, low: f64, high: f64, most: usize) {
         // Labels of more than five digits would collide, so they share a power of ten.
         let size = libm::log10(low.abs().max(high.abs())).floor() as i32;
-        let factor = if (-3..5).contains(&size) { 0 } else { size };
+        let plain = self.unit != Unit::Number || (-3..5).contains(&size);
+        let factor = if plain { 0 } else { size };
         let first = libm::log10((high - low) / most as f64).floor() as i32;
         for (power, mantissa) in
             (first..first + 3).flat_map(|power| [1, 2, 5].map(|mantissa| (power, mantissa)))
@@ -160,7 +175,7 @@ impl Ruled {
                 let digits = (factor - power).clamp(0, 11) as usize;
                 let ticks = (0..=(to - from) as i64).filter_map(|index| {
                     let units = (from + index as f64) * f64::from(mantissa);
-                    let label = decimal(units * libm::exp10(f64::from(power - factor)), digits);
+                    let label = self.label(units * libm::exp10(f64::from(power - factor)), digits);
                     Some((self.coordinate(units * libm::exp10(f64::from(power)))?, label))
                 });
                 self.major = ticks.collect();
@@ -177,7 +192,7 @@ impl Ruled {
         let first = (self.low - 1e-9).ceil() as i32;
         let last = (self.high + 1e-9).floor() as i32;
         // Numbers of this size are easier to read than powers of ten.
-        let plain = first >= -3 && last < 5;
+        let plain = self.unit != Unit::Number || first >= -3 && last < 5;
         let at = |power: i32, mantissa: i32| f64::from(power) + libm::log10(f64::from(mantissa));
         let marks = |mantissas: &'static [i32]| -> Vec<(i32, i32)> {
             let all = (first - 1..=last)
@@ -187,10 +202,8 @@ impl Ruled {
         };
         let tick = |&(power, mantissa): &(i32, i32)| {
             let label = if plain {
-                decimal(
-                    f64::from(mantissa) * libm::exp10(f64::from(power)),
-                    (-power).max(0) as usize,
-                )
+                let value = f64::from(mantissa) * libm::exp10(f64::from(power));
+                self.label(value, (-power).max(0) as usize)
             } else if mantissa == 1 {
                 format!("10{}", superscript(power))
             } else {
@@ -204,7 +217,7 @@ impl Ruled {
                 .map(|power| (power, 1))
                 .collect()
         };
-        let multiples = [marks(&[1, 2, 3, 5]), marks(&[1, 2, 5])]
+        let multiples = [marks(&[1, 2, 3, 5]), marks(&[1, 2, 5]), marks(&[1, 3])]
             .into_iter()
             .filter(|_| plain || last <= first);
         let chosen = multiples
@@ -213,9 +226,24 @@ impl Ruled {
             .find(|ticks| ticks.len() <= most.max(3));
         let fine =
             if self.high - self.low <= 6.0 { marks(&[2, 3, 4, 5, 6, 7, 8, 9]) } else { every(1) };
+        let major = chosen.iter().flatten().map(tick).collect();
         self.minor = fine.iter().map(|&(power, mantissa)| at(power, mantissa)).collect();
-        self.major = chosen.iter().flatten().map(tick).collect();
+        self.major = major;
         chosen.is_some()
+    }
+}
+
+impl Ruled {
+    /// Writes a value that is exact in this many decimals.
+    fn label(&self, value: f64, digits: usize) -> String {
+        match self.unit {
+            Unit::Percent => format!("{} %", decimal(100.0 * value, digits.saturating_sub(2))),
+            Unit::Seconds if value < 0.099 => {
+                format!("{} ms", decimal(1000.0 * value, digits.saturating_sub(3)))
+            }
+            Unit::Seconds => format!("{} s", decimal(value, digits)),
+            Unit::Number | Unit::Bare => decimal(value, digits),
+        }
     }
 }
 

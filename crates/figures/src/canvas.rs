@@ -25,10 +25,9 @@ pub(super) type Fault = DrawingAreaErrorKind<std::io::Error>;
 pub(super) enum Align {
     Left,
     Center,
+    Right,
     /// Upwards, with the point in its middle.
-    UpCenter,
-    /// Upwards to the point.
-    UpTo,
+    Up,
 }
 
 /// A rectangle in pixels, y downwards.
@@ -82,8 +81,8 @@ impl Sheet<'_> {
         let (side, turn) = match align {
             Align::Left => (HPos::Left, FontTransform::None),
             Align::Center => (HPos::Center, FontTransform::None),
-            Align::UpCenter => (HPos::Center, FontTransform::Rotate270),
-            Align::UpTo => (HPos::Right, FontTransform::Rotate270),
+            Align::Right => (HPos::Right, FontTransform::None),
+            Align::Up => (HPos::Center, FontTransform::Rotate270),
         };
         let style = font(style, colour).pos(Pos::new(side, VPos::Center)).transform(turn);
         self.0.draw_text(&printable(text), &style, (steps(x), steps(y)))
@@ -106,7 +105,7 @@ impl Sheet<'_> {
     }
 
     /// Fills a rectangle.
-    pub(super) fn rectangle(&self, frame: Frame, colour: RGBColor) -> Result<(), Fault> {
+    pub(super) fn rectangle(&self, frame: Frame, colour: impl Color) -> Result<(), Fault> {
         let corner = |x: f64, y: f64| (steps(frame.left + x), steps(frame.top + y));
         self.0.draw(&Rectangle::new(
             [corner(0.0, 0.0), corner(frame.width, frame.height)],

@@ -2,20 +2,18 @@
 
 use std::collections::BTreeSet;
 
-use plotters::element::{DashedPathElement, EmptyElement, PathElement, Polygon, Rectangle};
-use plotters::prelude::{Cartesian2d, Color, DrawingArea, RGBColor, SVGBackend};
+use plotters::element::{DashedPathElement, EmptyElement, PathElement, Polygon};
+use plotters::prelude::{Cartesian2d, Color, DrawingArea, SVGBackend};
 
 use super::axis::Ruled;
 use super::canvas::{Fault, Frame, pen, steps};
 use super::model::{Layer, Marks};
-use super::style::{INK, REFERENCE_LINE, Stroke, Strokes, WHITE};
+use super::style::{BAND, REFERENCE_LINE, Stroke, Strokes, WHITE};
 
 /// Width of data lines.
-const LINE: f64 = 2.0;
-/// Width of whiskers and reference lines.
-const THIN: f64 = 1.3;
-/// Distance between markers on a line.
-const APART: f64 = 110.0;
+const LINE: f64 = 2.5;
+/// Width of spans and reference lines.
+const THIN: f64 = 1.5;
 
 type Point = (f64, f64);
 type Area<'a> = DrawingArea<SVGBackend<'a>, Cartesian2d<Ruled, Ruled>>;
@@ -38,15 +36,14 @@ impl Layers<'_, '_> {
     pub fn draw(&self) -> Result<(), Fault> {
         let layers = self.layers;
         layers.iter().try_for_each(|layer| self.band(layer))?;
-        self.bars()?;
         layers.iter().try_for_each(|layer| self.reference(layer))?;
+        layers.iter().try_for_each(|layer| self.spans(layer))?;
         layers.iter().try_for_each(|layer| self.line(layer))?;
         self.points()
     }
 
     fn band(&self, layer: &Layer) -> Result<(), Fault> {
-        let (Marks::Band(points) | Marks::StepBand(points)) = &layer.marks else { return Ok(()) };
-        let stairs = matches!(layer.marks, Marks::StepBand(_));
+        let Marks::Band(points) = &layer.marks else { return Ok(()) };
         let x = self.x;
         let y = self.y;
         let at = |&(at, low, high): &(f64, f64, f64)| {
@@ -54,61 +51,26 @@ impl Layers<'_, '_> {
         };
         for run in runs(points.iter().map(at)) {
             let side = |height: fn(&(f64, f64, f64)) -> f64| {
-                self.thinned(&stepped(
-                    run.iter().map(|point| (point.0, height(point))).collect(),
-                    stairs,
-                ))
+                let side: Vec<Point> = run.iter().map(|point| (point.0, height(point))).collect();
+                self.thinned(&side)
             };
             let upper = side(|point| point.2).into_iter().rev();
             let outline: Vec<Point> = side(|point| point.1).into_iter().chain(upper).collect();
             self.area
-                .draw(&Polygon::new(outline, self.strokes.of(&layer.name).1.colour.mix(0.2)))?;
+                .draw(&Polygon::new(outline, self.strokes.of(&layer.name).colour.mix(BAND)))?;
         }
         Ok(())
     }
 
-    /// Draws the bars of all series next to each other, and then their whiskers.
-    fn bars(&self) -> Result<(), Fault> {
-        let x = self.x;
-        let y = self.y;
-        let layers =
-            || self.layers.iter().filter(|layer| matches!(layer.marks, Marks::Bars { .. }));
-        let width = 0.8 / layers().count().max(1) as f64;
-        let mut whiskers = Vec::new();
-        for (order, layer) in layers().enumerate() {
-            let Marks::Bars { values, spread, base } = &layer.marks else { continue };
-            let base = y.coordinate(*base).map_or(y.low, |base| base.clamp(y.low, y.high));
-            for (index, &value) in values.iter().enumerate() {
-                let left = index as f64 - 0.4 + width * order as f64;
-                let Some((_, tip)) = x.shown(index as f64).zip(y.coordinate(value)) else {
-                    continue;
-                };
-                // A thin white gap separates neighbours of similar colours.
-                let corners =
-                    [(left + 0.03 * width, base), (left + 0.97 * width, tip.clamp(y.low, y.high))];
-                self.area.draw(&Rectangle::new(
-                    corners,
-                    self.strokes.of(&layer.name).1.colour.filled(),
-                ))?;
-                // Whiskers are drawn after all bars, so that no bar covers one.
-                whiskers
-                    .extend(spread.get(index).map(|&(low, high)| (left + width / 2.0, low, high)));
-            }
-        }
-        whiskers.into_iter().try_for_each(|(at, low, high)| self.whisker(at, low, high, INK))
-    }
-
-    /// Draws an upright bar with caps at the ends that are inside the panel.
-    fn whisker(&self, x: f64, low: f64, high: f64, colour: RGBColor) -> Result<(), Fault> {
-        let y = self.y;
-        let style = pen(colour, THIN);
-        let Some((from, to)) = y.nearest(low).zip(y.nearest(high)) else { return Ok(()) };
-        self.area.draw(&PathElement::new(vec![(x, from), (x, to)], style))?;
-        for end in [low, high].into_iter().filter_map(|end| y.shown(end)) {
-            let cap = PathElement::new(vec![(steps(-3.5), 0), (steps(3.5), 0)], style);
-            self.area.draw(&(EmptyElement::at((x, end)) + cap))?;
-        }
-        Ok(())
+    /// Draws the part of every span that is inside the panel.
+    fn spans(&self, layer: &Layer) -> Result<(), Fault> {
+        let Marks::Spans(spans) = &layer.marks else { return Ok(()) };
+        let style = pen(self.strokes.of(&layer.name).colour, THIN);
+        let end = |&(x, y): &Point| Some((self.x.nearest(x)?, self.y.nearest(y)?));
+        spans
+            .iter()
+            .filter_map(|[from, to]| Some(vec![end(from)?, end(to)?]))
+            .try_for_each(|ends| self.area.draw(&PathElement::new(ends, style)))
     }
 
     fn reference(&self, layer: &Layer) -> Result<(), Fault> {
@@ -122,19 +84,9 @@ impl Layers<'_, '_> {
         ends.map_or(Ok(()), |ends| self.stroke(ends, REFERENCE_LINE, THIN))
     }
 
-    /// Draws a line or staircase, with markers along it if lines carry markers.
     fn line(&self, layer: &Layer) -> Result<(), Fault> {
-        let (order, stroke) = self.strokes.of(&layer.name);
-        for path in self.paths(layer) {
-            let markers = if self.strokes.marked_lines {
-                self.along(&path, 37.0 * order as f64)
-            } else {
-                Vec::new()
-            };
-            self.stroke(path, stroke, LINE)?;
-            markers.into_iter().try_for_each(|at| self.marker(at, stroke, 3.5, 0.7))?;
-        }
-        Ok(())
+        let stroke = self.strokes.of(&layer.name);
+        self.paths(layer).into_iter().try_for_each(|path| self.stroke(path, stroke, LINE))
     }
 
     fn stroke(&self, path: Vec<Point>, stroke: Stroke, width: f64) -> Result<(), Fault> {
@@ -149,38 +101,29 @@ impl Layers<'_, '_> {
 
     /// Draws a marker with a white edge, which separates it from its neighbours.
     fn marker(&self, at: Point, stroke: Stroke, radius: f64, edge: f64) -> Result<(), Fault> {
-        for (radius, colour) in [(radius + edge, WHITE), (radius, stroke.colour)] {
+        let centre = if stroke.hollow { WHITE } else { stroke.colour };
+        let rings = [(radius + edge, WHITE), (radius, stroke.colour), (0.6 * radius, centre)];
+        for (radius, colour) in &rings[..if stroke.hollow { 3 } else { 2 }] {
             self.area
-                .draw(&(EmptyElement::at(at) + Polygon::new(stroke.outline(radius), colour)))?;
+                .draw(&(EmptyElement::at(at) + Polygon::new(stroke.outline(*radius), colour)))?;
         }
         Ok(())
     }
 
-    /// Draws points, smaller if there are many, and one marker for points that look the same. A
-    /// line of a single point would be invisible, so it gets a marker too.
+    /// Draws points, smaller if there are many, and one marker for points that look the same.
     fn points(&self) -> Result<(), Fault> {
         let x = self.x;
         let y = self.y;
         let mut all: Vec<(&str, Point)> = Vec::new();
         for layer in self.layers {
+            let Marks::Points(points) = &layer.marks else { continue };
+            let shown = |point: &Point| Some((x.shown(point.0)?, y.shown(point.1)?));
             let name = layer.name.as_str();
-            match &layer.marks {
-                Marks::Points(points) => {
-                    all.extend(
-                        points.iter().filter_map(|point| {
-                            Some((name, (x.shown(point.0)?, y.shown(point.1)?)))
-                        }),
-                    );
-                }
-                _ => {
-                    let alone = self.paths(layer).into_iter().filter(|path| path.len() == 1);
-                    all.extend(alone.flatten().map(|at| (name, at)));
-                }
-            }
+            all.extend(points.iter().filter_map(|point| Some((name, shown(point)?))));
         }
         // Many large points would hide each other.
         let (radius, edge, grain) = match all.len() {
-            0..300 => (4.0, 1.0, 0.25),
+            0..300 => (5.0, 1.0, 0.25),
             300..3000 => (2.5, 0.3, 0.5),
             _ => (1.5, 0.0, 1.0),
         };
@@ -193,7 +136,7 @@ impl Layers<'_, '_> {
             seen.insert((name, cell(x, at.0, self.frame.width), cell(y, at.1, self.frame.height)))
         });
         all.into_iter()
-            .try_for_each(|(name, at)| self.marker(at, self.strokes.of(name).1, radius, edge))
+            .try_for_each(|(name, at)| self.marker(at, self.strokes.of(name), radius, edge))
     }
 
     /// Returns the unbroken parts of a line or staircase. Points outside the panel move to its
@@ -233,35 +176,6 @@ impl Layers<'_, '_> {
             }
         }
         kept
-    }
-
-    /// Returns places for markers along a path: every [`APART`] pixels from an offset on, or the
-    /// middle of a short path.
-    fn along(&self, path: &[Point], offset: f64) -> Vec<Point> {
-        let pixel = |at: &Point| {
-            (self.x.fraction(at.0) * self.frame.width, self.y.fraction(at.1) * self.frame.height)
-        };
-        let lengths: Vec<f64> = path
-            .windows(2)
-            .map(|ends| {
-                let one = pixel(&ends[0]);
-                let next = pixel(&ends[1]);
-                ((next.0 - one.0) * (next.0 - one.0) + (next.1 - one.1) * (next.1 - one.1)).sqrt()
-            })
-            .collect();
-        // Offsets by series keep the markers of coinciding lines apart.
-        let mut missing = (10.0 + offset % APART).min(lengths.iter().sum::<f64>() / 2.0);
-        let mut places = Vec::new();
-        for (ends, &length) in path.windows(2).zip(&lengths) {
-            while missing < length {
-                let part = missing / length;
-                let (one, next) = (ends[0], ends[1]);
-                places.push((one.0 + part * (next.0 - one.0), one.1 + part * (next.1 - one.1)));
-                missing += APART;
-            }
-            missing -= length;
-        }
-        places
     }
 }
 

@@ -1,10 +1,11 @@
 //! The legend of a figure: its series and reference lines, shared by all panels.
 
 use plotters::element::{DashedPathElement, Polygon};
+use plotters::style::Color;
 
 use super::canvas::{Align, Fault, Frame, Sheet, pen, steps};
-use super::model::{Figure, Layer};
-use super::style::{INK, REFERENCE_LINE, Stroke, Strokes};
+use super::model::{Figure, Layer, Marks};
+use super::style::{BAND, INK, REFERENCE_LINE, Stroke, Strokes, WHITE};
 use super::text::{BODY, Fonts};
 
 /// Width of a sample.
@@ -12,7 +13,7 @@ const SAMPLE: f64 = 30.0;
 /// Distances from a sample to its name, and from a name to the next sample.
 const GAPS: (f64, f64) = (7.0, 18.0);
 /// Height of a row.
-const ROW: f64 = 20.0;
+const ROW: f64 = 23.0;
 
 /// One series with the kinds of marks it has.
 struct Entry {
@@ -20,7 +21,7 @@ struct Entry {
     stroke: Stroke,
     line: bool,
     marker: bool,
-    /// True if the series has bars or bands.
+    /// True if the series has nothing but bands.
     area: bool,
 }
 
@@ -40,11 +41,13 @@ impl Legend {
                 layers().any(|layer| layer.series() == Some(name) && kind(layer))
             };
             let line = has(Layer::is_line);
-            let marker = has(Layer::is_marked) || line && strokes.marked_lines;
-            let area = !line && has(|layer| !layer.is_marked());
-            Entry { name: name.clone(), stroke: *stroke, line, marker, area }
+            let marker = has(Layer::is_marked);
+            let entry =
+                Entry { name: name.clone(), stroke: *stroke, line, marker, area: !line && !marker };
+            // A name in a panel needs no second one here.
+            (!has(|layer| matches!(layer.marks, Marks::Text(_)))).then_some(entry)
         };
-        let mut entries: Vec<Entry> = strokes.series.iter().map(entry).collect();
+        let mut entries: Vec<Entry> = strokes.0.iter().filter_map(entry).collect();
         for layer in layers() {
             let is_new = entries.iter().all(|entry| entry.name != layer.name);
             if layer.series().is_none() && !layer.name.trim().is_empty() && is_new {
@@ -69,7 +72,10 @@ impl Legend {
     }
 
     pub fn height(&self) -> f64 {
-        ROW * self.entries.len().div_ceil(self.columns) as f64
+        match self.entries.len().div_ceil(self.columns) {
+            0 => 0.0,
+            rows => ROW * rows as f64 + 8.0,
+        }
     }
 
     /// Draws the entries with their upper left corner at a point.
@@ -93,7 +99,7 @@ impl Entry {
         if self.area {
             sheet.rectangle(
                 Frame { left: left + 8.0, top: middle - 6.0, width: 14.0, height: 12.0 },
-                colour,
+                colour.mix(BAND),
             )?;
         }
         if self.line {
@@ -103,9 +109,12 @@ impl Entry {
         if self.marker {
             let x = steps(left + SAMPLE / 2.0);
             let y = steps(middle);
-            let corners: Vec<_> =
-                self.stroke.outline(4.0).into_iter().map(|(dx, dy)| (x + dx, y + dy)).collect();
-            sheet.0.draw(&Polygon::new(corners, colour))?;
+            let rings = [(5.0, colour), (3.0, if self.stroke.hollow { WHITE } else { colour })];
+            for (radius, colour) in rings {
+                let outline = self.stroke.outline(radius).into_iter();
+                let corners: Vec<_> = outline.map(|(dx, dy)| (x + dx, y + dy)).collect();
+                sheet.0.draw(&Polygon::new(corners, colour))?;
+            }
         }
         Ok(())
     }

@@ -4,8 +4,9 @@
 //! of embedded fonts and draws it with plotters. The same picture gives the same bytes on every
 //! machine.
 //!
-//! Figures are 800 pixels wide with text of 12 pixels and more, the size of a README. Series differ
-//! in colour and in dash or marker, so that they survive printing in grey.
+//! Figures are 680 pixels wide with text of 16 pixels and more, so that it can still be read where a
+//! phone shows them 390 pixels wide. Series differ in colour and in dash or marker, so that they
+//! survive printing in grey.
 
 mod axis;
 mod canvas;
@@ -17,7 +18,7 @@ mod panel;
 mod style;
 mod text;
 
-pub use model::{Axis, COLOURS, Figure, FigureError, Layer, Marks, Panel, Scale};
+pub use model::{Axis, Figure, FigureError, Hue, Layer, Look, Marks, Panel, Scale, Shape, Unit};
 
 /// Draws a figure as an SVG document.
 ///
@@ -53,31 +54,34 @@ mod tests {
 
     /// One layer of each kind with all of `points`.
     fn all_layers(points: &[(f64, f64)]) -> Vec<Layer> {
-        let bands = || points.iter().map(|&(x, y)| (x, y, x)).collect();
+        let bands = points.iter().map(|&(x, y)| (x, y, x)).collect();
         let (x, y) = points.first().copied().unwrap_or_default();
-        let values = points.iter().map(|point| point.1).collect();
+        let spans = points.iter().map(|&point| [point, (y, x)]).collect();
         vec![
             Layer::new("line", Marks::Line(points.to_vec())),
             Layer::new("steps", Marks::Steps(points.to_vec())),
             Layer::new("points <&>", Marks::Points(points.to_vec())),
-            Layer::new("", Marks::Band(bands())),
-            Layer::new("steps", Marks::StepBand(bands())),
-            Layer::new("bars", Marks::Bars { values, spread: points.to_vec(), base: x }),
+            Layer::new("", Marks::Band(bands)),
+            Layer::new("spans", Marks::Spans(spans)),
+            Layer::new("steps", Marks::Text((x, y))),
             Layer::new("level", Marks::HLine(y)),
             Layer::new("upright", Marks::VLine(x)),
         ]
     }
 
     fn axes() -> Vec<Axis> {
-        let names = |count: usize| (0..count).map(|i| format!("category {i}")).collect();
+        let names = |count: usize| (0..count).map(|i| format!("row {i}")).collect();
         vec![
             Axis::linear("x"),
             Axis::log(""),
             Axis::linear("very long label ".repeat(30)).range(f64::NAN, -1e300),
             Axis::log("x").range(2.0, 1.0),
             Axis::linear("x").range(0.5, 0.5),
-            Axis::categories("x", names(0)),
-            Axis::categories("x", names(200)),
+            Axis::linear("").unit(Unit::Bare),
+            Axis::log("x").unit(Unit::Seconds),
+            Axis::linear("x").unit(Unit::Percent),
+            Axis::rows(names(0), 20.0),
+            Axis::rows(names(200), 20.0),
         ]
     }
 
@@ -91,7 +95,7 @@ mod tests {
                 let panel = |(index, layer): (usize, Layer)| Panel {
                     title: "title ".repeat(index),
                     x: x.clone(),
-                    y: axes().swap_remove(index % 5),
+                    y: axes().swap_remove(index % 10),
                     layers: if index == 0 { all_layers(&points) } else { vec![layer] },
                 };
                 let panels = all_layers(&points).into_iter().enumerate().map(panel).collect();

@@ -12,21 +12,61 @@ pub struct Figure {
     /// The caption under the title, wrapped. It names the quantity, the subjects and the number of
     /// repetitions.
     pub caption: String,
-    /// Panels per row, clamped to 1 to 4; rows are filled in order.
+    /// Panels per row, clamped to 1 to 2; rows are filled in order.
     pub columns: usize,
     /// The panels, row by row.
     pub panels: Vec<Panel>,
-    /// Looks of some series, so that a method looks the same in every figure: numbers, from 0, of
-    /// combinations of colour, dash and marker, which repeat after 84. Other series take the free
-    /// numbers in order of appearance.
-    pub looks: Vec<(String, usize)>,
+    /// Looks of some series, so that a method looks the same in every figure. Other series take
+    /// free colours in order of appearance.
+    pub looks: Vec<(String, Look)>,
 }
 
-/// Number of looks, from 0 on, that differ in colour.
-pub const COLOURS: usize = 12;
+/// The look of a series.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Look {
+    /// Its colour.
+    pub hue: Hue,
+    /// Its marker, which also chooses the dash of its lines.
+    pub shape: Shape,
+}
 
-/// One pair of axes with layers. Bands are drawn first, then bars, reference lines, lines and
-/// points; within a kind, the first layer is at the bottom.
+/// The colours of Okabe and Ito without yellow, which is invisible on white; then darker ones of
+/// Paul Tol, and the colour of text.
+#[allow(missing_docs, reason = "the names of colours")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hue {
+    Blue,
+    Orange,
+    Green,
+    Pink,
+    Amber,
+    Sky,
+    Wine,
+    Grey,
+    Indigo,
+    Olive,
+    Brown,
+    Forest,
+    Ink,
+}
+
+/// A marker. Lines of discs, diamonds and stars are solid; others have dashes.
+#[allow(missing_docs, reason = "the names of shapes")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    Disc,
+    Square,
+    Triangle,
+    Diamond,
+    Inverted,
+    Cross,
+    Star,
+    /// A disc with a white centre.
+    Ring,
+}
+
+/// One pair of axes with layers. Bands are drawn first, then reference lines, spans, lines, points
+/// and texts; within a kind, the first layer is at the bottom.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Panel {
     /// The title, printed bold above the panel; may be empty.
@@ -46,12 +86,11 @@ pub struct Axis {
     pub label: String,
     /// The map from values to positions.
     pub scale: Scale,
-    /// Lower end in data units; unused for categories. Without it, or if the scale cannot show it,
-    /// the axis begins just below the data.
-    pub low: Option<f64>,
-    /// Upper end in data units, above `low`. Without it, or if the scale cannot show it, the axis
-    /// ends just above the data.
-    pub high: Option<f64>,
+    /// How ticks are written.
+    pub unit: Unit,
+    /// Both ends in data units; unused for rows. Without them, or if the scale cannot show one, the
+    /// axis begins and ends a little beyond the data.
+    pub range: Option<(f64, f64)>,
 }
 
 /// The map from values to positions along an axis.
@@ -62,9 +101,23 @@ pub enum Scale {
     Linear,
     /// Equal ratios are equal distances; values of 0 and below have no position.
     Log,
-    /// Each name has a place of width 1, from the left or bottom; the value i, from 0, is its
-    /// middle.
-    Category(Vec<String>),
+    /// Named rows from the top, for vertical axes: names, and the height of a row in pixels. The
+    /// value i, from 0, is the middle of a row.
+    Rows(Vec<String>, f64),
+}
+
+/// How the ticks of an axis are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Unit {
+    /// As numbers.
+    #[default]
+    Number,
+    /// Fractions in per cent.
+    Percent,
+    /// Seconds, below a tenth in milliseconds.
+    Seconds,
+    /// Not at all: there are no ticks.
+    Bare,
 }
 
 impl Axis {
@@ -78,21 +131,21 @@ impl Axis {
         Self { scale: Scale::Log, ..Self::linear(label) }
     }
 
-    /// Makes an axis with one place for each name.
-    pub fn categories(label: impl Into<String>, names: Vec<String>) -> Self {
-        Self { scale: Scale::Category(names), ..Self::linear(label) }
+    /// Makes a vertical axis with a row of this height in pixels for each name.
+    pub fn rows(names: Vec<String>, height: f64) -> Self {
+        Self { scale: Scale::Rows(names, height), ..Self::default() }
+    }
+
+    /// Chooses how ticks are written.
+    #[must_use]
+    pub fn unit(self, unit: Unit) -> Self {
+        Self { unit, ..self }
     }
 
     /// Fixes the range to `low` to `high`, independent of the data.
     #[must_use]
     pub fn range(self, low: f64, high: f64) -> Self {
-        Self { low: Some(low), high: Some(high), ..self }
-    }
-
-    /// Fixes the lower end.
-    #[must_use]
-    pub fn starting_at(self, low: f64) -> Self {
-        Self { low: Some(low), ..self }
+        Self { range: Some((low, high)), ..self }
     }
 }
 
@@ -120,34 +173,20 @@ pub enum Marks {
     /// A translucent area between two lines: `(x, lower, upper)`, x ascending. A lower value of 0
     /// or below reaches the floor of a logarithmic axis.
     Band(Vec<(f64, f64, f64)>),
-    /// A translucent area like [`Marks::Band`] between two staircases: both values hold until the
-    /// next x.
-    StepBand(Vec<(f64, f64, f64)>),
-    /// One bar per category of a category x axis. Bars of several layers are next to each other.
-    Bars {
-        /// Height of each category's bar; skipped if not finite.
-        values: Vec<f64>,
-        /// Lower and upper end of the whisker on each bar; may be shorter than `values`, or empty.
-        spread: Vec<(f64, f64)>,
-        /// Value at which bars begin: 0, or 1 for ratios. Bars begin at the floor of an axis that
-        /// cannot show it.
-        base: f64,
-    },
+    /// Straight thin lines from point to point, such as the range of a value.
+    Spans(Vec<[(f64, f64); 2]>),
     /// A horizontal reference line at this height.
     HLine(f64),
     /// A vertical reference line at this place.
     VLine(f64),
+    /// A name in the colour of the series, to the right of this point; replaces the legend's entry.
+    Text((f64, f64)),
 }
 
 impl Layer {
     /// Makes a layer of these marks.
     pub fn new(name: impl Into<String>, marks: Marks) -> Self {
         Self { name: name.into(), marks }
-    }
-
-    /// Makes bars from `base` to these heights, without whiskers.
-    pub fn bars(name: impl Into<String>, values: Vec<f64>, base: f64) -> Self {
-        Self::new(name, Marks::Bars { values, spread: vec![], base })
     }
 
     /// Returns the series; `None` for reference lines, which belong to none.

@@ -5,14 +5,19 @@ use plotters::chart::ChartBuilder;
 use super::axis::{Ruled, axes};
 use super::canvas::{Align, Fault, Frame, Sheet, font, pen, steps};
 use super::layers::Layers;
-use super::model::{Panel, Scale};
-use super::style::{FAINT, GREY, GRID, INK, Strokes};
-use super::text::{BODY, Fonts, HEADING, SMALL};
+use super::model::{Marks, Panel, Scale, Unit};
+use super::style::{FAINT, GREY, GRID, INK, Strokes, WHITE};
+use super::text::{BODY, Fonts, HEADING};
+use plotters::style::Color;
 
 /// Length of ticks; their labels are twice as far from the axis.
 const TICK: f64 = 4.0;
 /// Distance from tick labels to the axis label.
 const LABEL: f64 = 5.0;
+/// The greatest width of the names of rows; longer ones are shortened.
+const NAMES: f64 = 310.0;
+/// Distance from a point to its text.
+const BESIDE: f64 = 9.0;
 
 /// A panel with the space it needs around its plot.
 pub(super) struct Plot<'a> {
@@ -20,10 +25,10 @@ pub(super) struct Plot<'a> {
     x: Ruled,
     y: Ruled,
     has_data: bool,
-    /// The names of categories below the plot, in lines, with their coordinates.
-    names: Vec<(f64, Vec<String>)>,
-    /// True if the names are written upwards.
-    upright: bool,
+    /// The names of rows.
+    names: Vec<String>,
+    /// Texts to the right of points: left end and middle in pixels of the plot, width and series.
+    texts: Vec<(f64, f64, f64, &'a str)>,
     title: Vec<String>,
     x_label: Vec<String>,
     y_label: Vec<String>,
@@ -31,68 +36,99 @@ pub(super) struct Plot<'a> {
     pub above: f64,
     pub left: f64,
     pub below: f64,
+    /// Height of the plot.
+    pub height: f64,
 }
 
 impl<'a> Plot<'a> {
-    /// Finds the ranges of both axes and the ticks of a y axis of this height.
+    /// Finds the ranges of both axes and the ticks of a y axis of this height, unless rows have
+    /// another.
     pub fn new(panel: &'a Panel, height: f64, fonts: &Fonts) -> Self {
         let (x, mut y, has_data) = axes(panel);
-        y.rule((height / 28.0) as usize);
+        y.rule((height / 34.0) as usize);
         let y_label = fonts.wrap(&format!("{} {}", panel.y.label, y.factor), height, BODY);
-        let widest = fonts.widest(y.major.iter().map(|tick| &tick.1), SMALL);
+        let (names, height) = match &panel.y.scale {
+            Scale::Rows(names, row) => (
+                names.iter().map(|name| fonts.shorten(name, NAMES, BODY)).collect(),
+                row * names.len() as f64,
+            ),
+            _ => (Vec::new(), height),
+        };
+        let widest = fonts.widest(y.major.iter().map(|tick| &tick.1).chain(&names), BODY);
         let left = (2.0 * TICK + widest + LABEL + BODY.line() * y_label.len() as f64).ceil();
-        let names = Vec::new();
-        let title = Vec::new();
-        let x_label = Vec::new();
         Self {
             panel,
             x,
             y,
             has_data,
             names,
-            upright: false,
-            title,
-            x_label,
+            texts: Vec::new(),
+            title: Vec::new(),
+            x_label: Vec::new(),
             y_label,
             above: 0.0,
             left,
             below: 0.0,
+            height,
         }
     }
 
-    /// Finds the ticks of an x axis of this width, and breaks the texts above and below into lines.
+    /// Returns the places of texts, as fractions of the plot from its upper left corner, and their
+    /// series.
+    fn anchors(&self) -> impl Iterator<Item = (f64, f64, &'a str)> {
+        self.panel.layers.iter().filter_map(|layer| {
+            let Marks::Text((x, y)) = layer.marks else { return None };
+            let x = self.x.fraction(self.x.nearest(x)?);
+            Some((x, 1.0 - self.y.fraction(self.y.nearest(y)?), layer.name.as_str()))
+        })
+    }
+
+    /// Returns the greatest width of the plot with which its texts are not wider than this.
+    pub fn width_beside_texts(&self, width: f64, fonts: &Fonts) -> f64 {
+        let fits = |(x, _, name): (f64, f64, &str)| (width - BESIDE - fonts.width(name, BODY)) / x;
+        self.anchors().map(fits).fold(width, f64::min).max(0.4 * width)
+    }
+
+    /// Finds the ticks of an x axis of this width, breaks the texts above and below into lines,
+    /// and finds places for the texts in the plot.
     pub fn fit_width(&mut self, width: f64, fonts: &Fonts) {
-        let mut depth = SMALL.line();
-        if let Scale::Category(names) = &self.panel.x.scale {
-            let room = width / names.len().max(1) as f64;
-            // Names are wrapped at blanks, so a name fits if each word does.
-            let fits = |name: &String| {
-                name.split_whitespace().all(|word| fonts.width(word, SMALL) <= room - 6.0)
-            };
-            self.upright = !names.iter().all(fits);
-            // Upright names need the height of a line each; names that have no room are skipped.
-            let every = if self.upright { (SMALL.line() / room).ceil() as usize } else { 1 };
-            let lines = |name: String| {
-                if self.upright { vec![name] } else { fonts.wrap(&name, room - 6.0, SMALL) }
-            };
-            let named = names.iter().zip(0..).step_by(every);
-            self.names = named.map(|(name, at)| (f64::from(at), lines(name.clone()))).collect();
-            let size = |(_, lines): &(f64, Vec<String>)| {
-                if self.upright {
-                    fonts.widest(lines, SMALL)
-                } else {
-                    SMALL.line() * lines.len() as f64
-                }
-            };
-            depth = self.names.iter().map(size).fold(0.0, f64::max);
-        } else {
-            self.x.rule((width / 46.0) as usize);
-        }
+        self.x.rule((width / 70.0) as usize);
+        // Labels of a logarithmic axis come closer and closer; of two that touch, one is enough.
+        let mut end = f64::NEG_INFINITY;
+        let axis = self.x.clone();
+        self.x.major.retain(|(at, label)| {
+            let half = fonts.width(label, BODY) / 2.0;
+            let middle = axis.fraction(*at) * width;
+            let fits = middle - half > end;
+            if fits {
+                end = middle + half + 6.0;
+            }
+            fits
+        });
         self.title = fonts.wrap(&self.panel.title, width, HEADING);
         self.above = HEADING.line() * self.title.len() as f64 + 5.0;
         self.x_label =
             fonts.wrap(&format!("{} {}", self.panel.x.label, self.x.factor), width, BODY);
-        self.below = (2.0 * TICK + depth + LABEL + BODY.line() * self.x_label.len() as f64).ceil();
+        let ticks = if self.panel.x.unit == Unit::Bare { 0.0 } else { 2.0 * TICK + BODY.line() };
+        self.below = (ticks + LABEL + BODY.line() * self.x_label.len() as f64).ceil();
+        let mut texts: Vec<_> = self
+            .anchors()
+            .map(|(x, y, name)| {
+                (x * width + BESIDE, y * self.height, fonts.width(name, BODY), name)
+            })
+            .collect();
+        texts.sort_by(|one, other| one.1.total_cmp(&other.1));
+        // A text moves below those above that it would cover.
+        for text in texts {
+            let mut text = text;
+            for above in &self.texts {
+                let is_beside = above.0 + above.2 < text.0 || text.0 + text.2 < above.0;
+                if !is_beside && text.1 < above.1 + BODY.line() {
+                    text.1 = above.1 + BODY.line();
+                }
+            }
+            self.texts.push(text);
+        }
     }
 
     /// Drops the label of the x axis if the panel below has the same label.
@@ -119,8 +155,8 @@ impl<'a> Plot<'a> {
             .bold_line_style(pen(GRID, 1.0))
             .light_line_style(pen(FAINT, 1.0))
             .axis_style(pen(INK, 1.0))
-            .label_style(font(SMALL, INK))
-            .set_all_tick_mark_size(steps(TICK))
+            .label_style(font(BODY, INK))
+            .set_all_tick_mark_size(steps(if self.panel.x.unit == Unit::Bare { 0.0 } else { TICK }))
             .draw()?;
         Layers {
             layers: &self.panel.layers,
@@ -139,20 +175,21 @@ impl<'a> Plot<'a> {
         if !self.has_data {
             sheet.text((centre, middle), "no data", BODY, GREY, Align::Center)?;
         }
-        for (at, lines) in &self.names {
-            let x = left + self.x.fraction(*at) * width;
-            match &lines[..] {
-                [name] if self.upright => {
-                    sheet.text((x, bottom + 2.0 * TICK), name, SMALL, INK, Align::UpTo)?
-                }
-                _ => sheet.lines((x, bottom + TICK), lines, SMALL, INK, Align::Center)?,
-            }
+        for (row, name) in (0..).zip(&self.names) {
+            let y = bottom - self.y.fraction(-f64::from(row)) * height;
+            sheet.text((left - 2.0 * TICK, y), name, BODY, INK, Align::Right)?;
+        }
+        for &(x, y, width, name) in &self.texts {
+            let height = BODY.size;
+            let ground = Frame { left: left + x, top: top + y - height / 2.0, width, height };
+            sheet.rectangle(ground, WHITE.mix(0.7))?;
+            sheet.text((left + x, top + y), name, BODY, strokes.of(name).colour, Align::Left)?;
         }
         let below = bottom + self.below - BODY.line() * self.x_label.len() as f64;
         sheet.lines((centre, below), &self.x_label, BODY, INK, Align::Center)?;
         self.y_label.iter().zip(0..).try_for_each(|(line, index)| {
             let beside = left - self.left + BODY.line() * (f64::from(index) + 0.5);
-            sheet.text((beside, middle), line, BODY, INK, Align::UpCenter)
+            sheet.text((beside, middle), line, BODY, INK, Align::Up)
         })
     }
 }

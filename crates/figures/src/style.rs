@@ -3,7 +3,7 @@
 use plotters::style::RGBColor;
 
 use super::canvas::steps;
-use super::model::{COLOURS, Figure};
+use super::model::{Figure, Hue, Look, Shape};
 
 /// The colour of the background.
 pub(super) const WHITE: RGBColor = RGBColor(255, 255, 255);
@@ -16,9 +16,11 @@ pub(super) const GRID: RGBColor = RGBColor(221, 221, 221);
 /// The colour of grid lines between labelled ticks.
 pub(super) const FAINT: RGBColor = RGBColor(240, 240, 240);
 
-/// The colours of Okabe and Ito without yellow, which is invisible on white, and black, which looks
-/// like the axes; then brown, grey and darker colours of Paul Tol.
-const PALETTE: [RGBColor; COLOURS] = [
+/// The opacity of bands.
+pub(super) const BAND: f64 = 0.2;
+
+/// The colours by [`Hue`].
+const PALETTE: [RGBColor; 13] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -31,12 +33,12 @@ const PALETTE: [RGBColor; COLOURS] = [
     RGBColor(153, 153, 51),
     RGBColor(140, 86, 75),
     RGBColor(17, 119, 51),
+    INK,
 ];
 
 /// Lengths of a dash and of the gap after it in pixels; `None` for a solid line.
 type Dash = Option<(f64, f64)>;
-/// The dashes of series. Four successive series share a dash, and the next series of the same
-/// colour has another.
+/// The dashes of series, by [`Shape`], repeating.
 const DASHES: [Dash; 3] = [None, Some((9.0, 3.0)), Some((3.0, 2.5))];
 /// The dash of reference lines.
 const REFERENCE_DASH: Dash = Some((5.0, 4.0));
@@ -44,8 +46,8 @@ const REFERENCE_DASH: Dash = Some((5.0, 4.0));
 /// A star: number of points, inner radius relative to the outer radius, and direction of the first
 /// point in turns, clockwise from the right. A regular polygon is a star without notches.
 type Star = (u32, f64, f64);
-/// The markers: disc, square, triangle, diamond, inverted triangle, upright cross and star.
-const MARKERS: [Star; 7] = [
+/// The markers by [`Shape`].
+const MARKERS: [Star; 8] = [
     (6, 1.0, 0.0),
     (4, 0.71, 0.125),
     (3, 0.5, 0.75),
@@ -53,6 +55,7 @@ const MARKERS: [Star; 7] = [
     (3, 0.5, 0.25),
     (4, 0.42, 0.0),
     (5, 0.45, 0.75),
+    (6, 1.0, 0.0),
 ];
 
 /// The colour, dash and marker of one series.
@@ -60,15 +63,18 @@ const MARKERS: [Star; 7] = [
 pub(super) struct Stroke {
     pub colour: RGBColor,
     pub dash: Dash,
+    /// True for markers with a white centre.
+    pub hollow: bool,
     marker: Star,
 }
 
 impl Stroke {
-    fn of(look: usize) -> Self {
+    fn of(Look { hue, shape }: Look) -> Self {
         Self {
-            colour: PALETTE[look % PALETTE.len()],
-            dash: DASHES[(look / 4 + look / 12) % DASHES.len()],
-            marker: MARKERS[look % MARKERS.len()],
+            colour: PALETTE[hue as usize],
+            dash: DASHES[shape as usize % DASHES.len()],
+            hollow: shape == Shape::Ring,
+            marker: MARKERS[shape as usize],
         }
     }
 
@@ -89,48 +95,62 @@ impl Stroke {
 
 /// The stroke of reference lines.
 pub(super) const REFERENCE_LINE: Stroke =
-    Stroke { colour: GREY, dash: REFERENCE_DASH, marker: MARKERS[0] };
+    Stroke { colour: GREY, dash: REFERENCE_DASH, hollow: false, marker: MARKERS[0] };
 /// The stroke of series without a name.
-const UNNAMED: Stroke = Stroke { colour: GREY, dash: None, marker: MARKERS[0] };
+const UNNAMED: Stroke = Stroke { colour: GREY, dash: None, hollow: false, marker: MARKERS[0] };
+
+/// The looks of series without a given one, in order.
+const FREE: [Look; 12] = {
+    use Hue::{Amber, Blue, Brown, Forest, Green, Grey, Indigo, Olive, Orange, Pink, Sky, Wine};
+    use Shape::{Cross, Diamond, Disc, Inverted, Square, Star, Triangle};
+    [
+        Look { hue: Blue, shape: Disc },
+        Look { hue: Orange, shape: Square },
+        Look { hue: Green, shape: Triangle },
+        Look { hue: Pink, shape: Diamond },
+        Look { hue: Amber, shape: Inverted },
+        Look { hue: Sky, shape: Cross },
+        Look { hue: Wine, shape: Star },
+        Look { hue: Grey, shape: Disc },
+        Look { hue: Indigo, shape: Square },
+        Look { hue: Olive, shape: Triangle },
+        Look { hue: Brown, shape: Diamond },
+        Look { hue: Forest, shape: Inverted },
+    ]
+};
 
 /// The strokes of all series of a figure, in order of their first appearance.
-pub(super) struct Strokes {
-    pub series: Vec<(String, Stroke)>,
-    /// True if lines carry markers: colours and dashes alone distinguish only four lines at a
-    /// glance.
-    pub marked_lines: bool,
-}
+pub(super) struct Strokes(pub Vec<(String, Stroke)>);
 
 impl Strokes {
     pub fn new(figure: &Figure) -> Self {
-        let layers = || figure.panels.iter().flat_map(|panel| &panel.layers);
-        let shown = |name: &str| layers().any(|layer| layer.series() == Some(name));
-        let set = |name: &str| {
-            figure.looks.iter().find(|(known, _)| known == name).map(|&(_, look)| look)
-        };
-        let taken = |number| figure.looks.iter().any(|(name, look)| *look == number && shown(name));
-        // Series without a given look avoid the looks of series that have one.
-        let mut free = (0..).filter(|&number| !taken(number));
-        let mut series: Vec<(String, Stroke)> = Vec::new();
-        let mut lines: Vec<&str> = Vec::new();
-        for layer in layers() {
-            let Some(name) = layer.series().filter(|name| !name.is_empty()) else { continue };
-            if series.iter().all(|(known, _)| known != name) {
-                let look = set(name).or_else(|| free.next()).unwrap_or(0);
-                series.push((name.to_owned(), Stroke::of(look)));
-            }
-            if layer.is_line() && !lines.contains(&name) {
-                lines.push(name);
+        let layers = figure.panels.iter().flat_map(|panel| &panel.layers);
+        let mut names: Vec<&str> = Vec::new();
+        for name in layers.filter_map(|layer| layer.series()).filter(|name| !name.is_empty()) {
+            if !names.contains(&name) {
+                names.push(name);
             }
         }
-        Self { series, marked_lines: lines.len() > 4 }
+        let given = |name: &str| {
+            figure.looks.iter().find(|(known, _)| known == name).map(|&(_, look)| look)
+        };
+        // Series without a look of their own get colours that no other has, while they last.
+        let is_free = |look: &&Look| {
+            names.iter().filter_map(|name| given(name)).all(|own| own.hue != look.hue)
+        };
+        let mut free = FREE.iter().filter(is_free).chain(FREE.iter().cycle()).copied();
+        let mut looks: Vec<Look> = Vec::new();
+        for name in &names {
+            let own = given(name).filter(|look| !looks.contains(look));
+            looks.extend(own.or_else(|| free.next()));
+        }
+        let stroke = |(name, look): (&str, Look)| (name.to_owned(), Stroke::of(look));
+        Self(names.iter().copied().zip(looks).map(stroke).collect())
     }
 
-    /// Returns the place of the named series in the order of appearance, and its stroke; solid grey
-    /// for a series without a name.
-    pub fn of(&self, name: &str) -> (usize, Stroke) {
-        let place = self.series.iter().position(|(known, _)| known == name);
-        place.map_or((0, UNNAMED), |place| (place, self.series[place].1))
+    /// Returns the stroke of the named series; solid grey for a series without a name.
+    pub fn of(&self, name: &str) -> Stroke {
+        self.0.iter().find(|(known, _)| known == name).map_or(UNNAMED, |(_, stroke)| *stroke)
     }
 }
 
@@ -139,33 +159,29 @@ mod tests {
     use super::super::model::{Layer, Marks, Panel};
     use super::*;
 
-    fn strokes(names: &[String], looks: Vec<(String, usize)>) -> Strokes {
+    fn strokes(names: &[String], looks: Vec<(String, Look)>) -> Vec<(String, Stroke)> {
         let line = |name: &String| Layer::new(name, Marks::Line(Vec::new()));
         let layers = names.iter().chain(names.iter().rev()).map(line).collect();
         let panel = Panel { layers, ..Panel::default() };
-        Strokes::new(&Figure { panels: vec![panel], looks, ..Figure::default() })
+        Strokes::new(&Figure { panels: vec![panel], looks, ..Figure::default() }).0
     }
 
     #[test]
-    fn every_series_has_its_own_look_and_twelve_their_own_colour() {
-        let names: Vec<String> = (0..84).map(|i| format!("series {i}")).collect();
-        let series = strokes(&names, Vec::new()).series;
+    fn twelve_series_have_their_own_colours_and_more_have_some() {
+        let names: Vec<String> = (0..30).map(|i| format!("series {i}")).collect();
+        let series = strokes(&names, Vec::new());
         assert!(series.iter().map(|(name, _)| name).eq(&names));
-        for (i, (_, one)) in series.iter().enumerate() {
+        for (i, (_, one)) in series[..12].iter().enumerate() {
             for (_, other) in &series[..i] {
-                assert!(
-                    one != other && (i >= 12 || one.colour != other.colour),
-                    "series {i} looks like another"
-                );
+                assert!(one.colour != other.colour, "series {i} looks like another");
             }
         }
     }
 
     #[test]
-    fn looks_given_in_advance_are_kept_and_not_given_again() {
-        let looks = vec![("GRASP".to_owned(), 0)];
-        let strokes = strokes(&["MF", "GRASP"].map(str::to_owned), looks);
-        assert_eq!(strokes.of("GRASP").1, Stroke::of(0));
-        assert_eq!(strokes.of("MF").1, Stroke::of(1));
+    fn looks_given_in_advance_are_kept_and_their_colours_not_given_again() {
+        let given = Look { hue: Hue::Blue, shape: Shape::Star };
+        let series = strokes(&["MF", "GRASP"].map(str::to_owned), vec![("GRASP".into(), given)]);
+        assert_eq!((series[0].1, series[1].1), (Stroke::of(FREE[1]), Stroke::of(given)));
     }
 }

@@ -31,13 +31,11 @@ impl Type {
 }
 
 /// The type of figure titles.
-pub(super) const TITLE: Type = Type { size: 17.0, bold: true };
+pub(super) const TITLE: Type = Type { size: 19.0, bold: true };
 /// The type of panel titles.
-pub(super) const HEADING: Type = Type { size: 14.0, bold: true };
-/// The type of captions, axis labels and legends.
-pub(super) const BODY: Type = Type { size: 13.0, bold: false };
-/// The type of tick labels.
-pub(super) const SMALL: Type = Type { size: 12.0, bold: false };
+pub(super) const HEADING: Type = Type { size: 16.0, bold: true };
+/// The type of all other text: legible where a phone shows the figure 390 pixels wide.
+pub(super) const BODY: Type = Type { size: 16.0, bold: false };
 
 /// The embedded fonts.
 pub struct Fonts {
@@ -153,9 +151,9 @@ mod tests {
             "incomprehensibilities"
         );
         assert_eq!((fonts.wrap("", 60.0, BODY).len(), fonts.wrap("ab", 0.0, BODY).len()), (0, 2));
-        let short = fonts.shorten("interlocking staircases", 80.0, SMALL);
-        assert!(short.ends_with('…') && fonts.width(&short, SMALL) <= 80.0);
-        assert_eq!(fonts.shorten("jewel", 80.0, SMALL), "jewel");
+        let short = fonts.shorten("interlocking staircases", 80.0, BODY);
+        assert!(short.ends_with('…') && fonts.width(&short, BODY) <= 80.0);
+        assert_eq!(fonts.shorten("jewel", 80.0, BODY), "jewel");
     }
 
     #[test]

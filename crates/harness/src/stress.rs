@@ -4,11 +4,14 @@
 
 use crate::Error;
 use crate::contestant::{Contestant, Labelled};
-use crate::report::output::Output;
+use crate::report::data::distinct;
+use crate::report::output::{Output, panel};
 use crate::rows::store::Store;
 use crate::rows::{read, to_bytes};
 use bvh_config::{Nested, config};
-use bvh_stress::{CASES, Case, Cell, Class, Effort, LargerScenes, Size, tracing};
+use bvh_search::Method;
+use bvh_stress::{CASES, Case, Cell, Class, Effort, LargerScenes, Size, is_builder, tracing};
+use figures::{Axis, Layer, Marks, Panel, Unit};
 use std::path::Path;
 
 config! {
@@ -43,7 +46,7 @@ impl Stability {
         methods: &[Labelled],
         store: &Store,
         interrupted: &dyn Fn() -> bool,
-    ) -> Result<String, Error> {
+    ) -> Result<(), Error> {
         let cases: Vec<&Case> = CASES
             .iter()
             .filter(|case| cases.is_empty() || cases.iter().any(|id| id == case.id))
@@ -67,14 +70,13 @@ impl Stability {
             cells.extend(ways.filter_map(|(name, way)| case.of_traversal(name, *way, self.rays)));
             cells.extend(case.of_parts());
         }
-        store.write("cells.csv", &to_bytes(&cells, Path::new("cells.csv"))?)?;
-        Ok(output(store.folder())?.text())
+        store.write("cells.csv", &to_bytes(&cells, Path::new("cells.csv"))?)
     }
 }
 
 const HEADING: &str = "Stiff and extreme cases";
 
-/// Makes the summary and the table of broken promises from the rows in the folder.
+/// Makes the summary, the table of broken promises and the figure from the rows in the folder.
 pub fn output(folder: &Path) -> Result<Output, Error> {
     let cells: Vec<Cell> = read(&folder.join("cells.csv"))?;
     let cells_with =
@@ -93,5 +95,100 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     if !broken.is_empty() {
         output.show("Broken promises:", &broken, "scene method outcome note")?;
     }
+    let cases = distinct(cells.iter().map(|cell| &cell.scene)).len();
+    let all = format!("{} checks on {cases} stiff and extreme cases", cells.len());
+    output.finding = Some(match broken.len() {
+        0 => format!("{all}: none fails"),
+        broken => format!("{broken} of {all} fail"),
+    });
+    let caption = "A square per case and method: builders, searches, traversals, then readers of \
+                   files and others. Empty where the case has no check of it.";
+    output.add_figure("matrix", caption, 1, panels(&cells));
     Ok(output)
+}
+
+/// Kinds of cases, in the order of the figure.
+const KINDS: [(&str, &[&str]); 10] = [
+    ("Nothing, one, two", &["S01", "S02", "S03", "S45"]),
+    ("All the same", &["S04", "S05", "S06", "S07", "S34"]),
+    ("Flat or on a line", &["S08", "S09", "S10", "S11", "S12", "S26"]),
+    ("Degenerate, slivers", &["S17", "S29", "S30"]),
+    ("Huge, tiny, far away", &["S21", "S22", "S23", "S24", "S25"]),
+    ("NaN, infinite, inverted", &["S18", "S19", "S20"]),
+    ("Uneven sizes", &["S27", "S28", "S31", "S36"]),
+    ("Symmetry, order", &["S32", "S33"]),
+    ("Odd rays", &["S13", "S14", "S15", "S16", "S44"]),
+    ("Files, budgets, edges", &["S35", "S37", "S38", "S39", "S40", "S41", "S42", "S43"]),
+];
+
+/// The outcomes by the name of their colour.
+const OUTCOMES: [(&str, Class); 3] = [
+    ("valid tree or right answer", Class::Kept),
+    ("refused with the promised error", Class::Refused),
+    ("broken promise", Class::Broken),
+];
+
+/// Groups of methods, in the order of the figure.
+const GROUPS: [&str; 4] = ["Build", "Search", "Trace", "Other"];
+
+fn group(method: &str) -> &'static str {
+    if tracing::TRAVERSALS.iter().any(|(name, _)| *name == method) {
+        return "Trace";
+    }
+    match Method::all().iter().find(|known| known.name() == method) {
+        Some(method) if is_builder(method) => "Build",
+        Some(_) => "Search",
+        None => "Other",
+    }
+}
+
+/// One panel per kind of cases: a row per case and a column per method.
+fn panels(cells: &[Cell]) -> Vec<Panel> {
+    let methods = distinct(cells.iter().map(|cell| cell.method.as_str()));
+    let mut columns: Vec<(&str, f64)> = Vec::new();
+    let mut heads = Vec::new();
+    let mut next = 0.0;
+    for name in GROUPS {
+        // Names stand a little to the right of their place.
+        heads.push(Layer::new(name, Marks::Text((next - 1.2, 0.0))));
+        for method in methods.iter().filter(|method| group(method) == name) {
+            columns.push((method, next));
+            next += 1.0;
+        }
+        next += 1.0;
+    }
+    let known =
+        |scene: &str| KINDS.iter().find(|(_, ids)| ids.iter().any(|id| scene.starts_with(id)));
+    let kind = |scene: &str| known(scene).map_or("Other cases", |(kind, _)| *kind);
+    let kinds = KINDS.iter().map(|(kind, _)| *kind).chain(["Other cases"]);
+    let mut panels = Vec::new();
+    for name in kinds {
+        let own: Vec<&Cell> = cells.iter().filter(|cell| kind(&cell.scene) == name).collect();
+        let mut scenes = distinct(own.iter().map(|cell| cell.scene.as_str()));
+        let mut layers = Vec::new();
+        if own.is_empty() {
+            continue;
+        }
+        if panels.is_empty() {
+            // The first row has the names of the columns.
+            scenes.insert(0, "");
+            layers.append(&mut heads);
+        }
+        for (name, outcome) in OUTCOMES {
+            let place = |cell: &&Cell| {
+                let column = columns.iter().find(|(method, _)| *method == cell.method)?;
+                let row = scenes.iter().position(|scene| *scene == cell.scene)?;
+                Some((column.1, row as f64))
+            };
+            let own = own.iter().filter(|cell| cell.outcome == outcome).copied();
+            let points: Vec<_> = own.filter_map(|cell| place(&cell)).collect();
+            if !points.is_empty() {
+                layers.push(Layer::new(name, Marks::Points(points)));
+            }
+        }
+        let names = scenes.iter().map(|scene| scene.get(4..).unwrap_or_default().to_owned());
+        let x = Axis::linear("").unit(Unit::Bare).range(-1.5, next - 1.0);
+        panels.push(panel(name, x, Axis::rows(names.collect(), 20.0), layers));
+    }
+    panels
 }

@@ -46,6 +46,11 @@ impl Section {
         })
     }
 
+    /// Returns what the experiment's rows say.
+    fn findings(&self) -> Vec<&String> {
+        self.outputs.iter().filter_map(|output| output.finding.as_ref()).collect()
+    }
+
     /// Returns the comparisons with the paper's numbers and words.
     fn paper(&self) -> Vec<&PaperRow> {
         let rows = self.outputs.iter().flat_map(|output| &output.paper);
@@ -97,7 +102,10 @@ fn page(sections: &[Section]) -> Markup {
                     h2 { "All questions" }
                     ul {
                         @for section in sections {
-                            li { a href={ "#" (in_url(&section.name)) } { (section.question) } }
+                            li {
+                                a href={ "#" (in_url(&section.name)) } { (section.question) }
+                                @for finding in section.findings() { " " (finding) "." }
+                            }
                         }
                     }
                     @for section in sections { (experiment(section)) }
@@ -140,6 +148,7 @@ fn experiment(section: &Section) -> Markup {
     html! {
         section id=(in_url(&section.name)) {
             h2 { (section.question) }
+            @for finding in section.findings() { p { (finding) "." } }
             @for (name, path) in &section.figures {
                 figure { img.sheet src=(path) alt=(name) loading="lazy"; }
             }

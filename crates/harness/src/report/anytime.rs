@@ -19,8 +19,6 @@ bvh_config::config! { serde;
         file: String = "anytime".into();
         /// Labels of the methods. One event per run, as a builder has, is shown as a point.
         methods: Vec<String>, in OneOrMore;
-        /// Panels next to each other in the figures.
-        panels_per_row: usize = 2, in 1..=4;
         /// Seconds, ascending, at which the table for the terminal reads the curves.
         at_seconds: Vec<f64> = vec![0.1, 1.0, 10.0, 60.0], in above(0.0);
     }
@@ -51,8 +49,8 @@ const PER_DECADE: f64 = 20.0;
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let mut output = Output::new(&self.source, &self.title);
-        let caption = "Cost of the incumbent over the best known cost of the scene, minus 1: median and quartiles over \
-                       repetitions. Points are builders. A curve falls through the floor where it is the best known.";
+        let caption = "Median and quartiles over repetitions. Points are builders. A curve falls \
+                       through the floor where it is the best known.";
         let mut points = Vec::new();
         let mut panels = Vec::new();
         for scene in rows.scenes() {
@@ -65,12 +63,14 @@ impl Config {
                 layers.extend(draw(method, &curve));
                 points.extend(curve);
             }
-            let x = Axis::log("time (s)");
-            let y = Axis::log("gap to the best known");
+            let x = Axis::log("time").unit(Unit::Seconds);
+            let y = Axis::log("above the best known").unit(Unit::Percent);
             panels.push(panel(rows.shown(scene), x, y, layers));
         }
         let file = format!("timing_{}", self.file);
-        output.add_figure(&file, caption, self.panels_per_row, panels);
+        output.finding = finding(&points);
+        let caption = format!("{}. {caption}", output.heading);
+        output.add_figure(&file, caption, 2, panels);
         output.add_csv(file, &corners(&points))?;
         self.add_table(&mut output, rows);
         Ok(output)
@@ -102,6 +102,23 @@ impl Config {
         }
         output.add_table("Median cost against the greedy tree's, after so many seconds:", table);
     }
+}
+
+/// Says which method ends closest to the best known cost on the most scenes.
+fn finding(points: &[Point]) -> Option<String> {
+    let scenes: Vec<_> = points.chunk_by(|a, b| a.scene == b.scene).collect();
+    let ends = |scene: &[Point]| {
+        let curves = scene.chunk_by(|a, b| a.method == b.method).filter_map(|curve| curve.last());
+        curves.min_by(|a, b| a.gap_median.total_cmp(&b.gap_median)).map(|end| end.method.to_owned())
+    };
+    let winners: Vec<String> = scenes.iter().filter_map(|scene| ends(scene)).collect();
+    let wins = |method: &String| winners.iter().filter(|other| *other == method).count();
+    let most = winners.iter().max_by_key(|method| wins(method))?;
+    Some(format!(
+        "‘{most}’ ends closest to the best known on {} of {} scenes",
+        wins(most),
+        winners.len()
+    ))
 }
 
 /// Returns the difference of a ratio to base from the base, in percent.
@@ -163,11 +180,12 @@ fn draw(method: &str, points: &[Point]) -> Vec<Layer> {
     if points.len() == 1 {
         return vec![Layer::new(method, Marks::Points(medians))];
     }
-    let band = points
-        .iter()
-        .map(|point| (point.seconds, point.gap_quartile_1, point.gap_quartile_3))
-        .collect();
-    vec![Layer::new(method, Marks::StepBand(band)), Layer::new(method, Marks::Steps(medians))]
+    // Both quartiles hold until the next corner.
+    let ends = |point: Point| (point.seconds, point.gap_quartile_1, point.gap_quartile_3);
+    let corners =
+        points.windows(2).flat_map(|ends| [ends[0], Point { seconds: ends[1].seconds, ..ends[0] }]);
+    let band = corners.chain(points.last().copied()).map(ends).collect();
+    vec![Layer::new(method, Marks::Band(band)), Layer::new(method, Marks::Steps(medians))]
 }
 
 #[cfg(test)]

@@ -49,6 +49,12 @@ bvh_config::config! { serde;
     }
 }
 
+impl Labels for Series {
+    fn labels(&self, key: &str) -> Vec<(String, &str)> {
+        self.methods.labels(&format!("{key}.methods"))
+    }
+}
+
 /// Rejects names of files that could lead to another folder.
 pub fn check_file(name: &str) -> Vec<OutOfRange> {
     // Other characters separate folders or are invalid on some system.

@@ -9,7 +9,7 @@ use super::data::distinct;
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
 use crate::rows::{RunRow, RunTestRow, VisitRow};
-use crate::statistics::{pearson, pearson_interval, spearman};
+use crate::statistics::{pearson, pearson_interval, range, spearman};
 use bvh_config::above;
 
 bvh_config::config! { serde;
@@ -110,11 +110,15 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     }
     let mut output = Output::new(&config.source, &config.title);
     output.add_csv("correlation", &correlations)?;
+    let own = correlations.iter().filter(|row| row.method == first(&config.methods));
+    let own = own.filter(|row| row.cost == OF_AREA).filter_map(|row| row.spearman);
+    output.finding = range(own)
+        .map(|(low, high)| format!("Cost ranks trees as rays do: ρ is {low:.2} to {high:.2}"));
     let caption = format!(
         "One point per tree, the same rays for all trees of a scene. ρ is Spearman's rank correlation over the trees of ‘{}’.",
         first(&config.methods)
     );
-    output.add_figure("correlation", caption, random.clamp(1, 3), panels);
+    output.add_figure("correlation", caption, random, panels);
     output.paper = config.compare(rows, &correlations);
     let columns = "scene method trees cost family query pearson spearman";
     output.show(

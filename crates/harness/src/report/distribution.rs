@@ -59,24 +59,28 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
             let costs = sorted(&rows.trial_costs(scene, method));
             summaries.push(summarise(scene, method, &costs, base_cost));
             let fraction = |rank: u32| f64::from(rank) / costs.len() as f64;
-            let steps = costs.iter().zip(1..).map(|(&cost, rank)| (cost, fraction(rank))).collect();
+            let steps = costs
+                .iter()
+                .zip(1..)
+                .map(|(&cost, rank)| (cost / base_cost, fraction(rank)))
+                .collect();
             layers.push(Layer::new(method, Marks::Steps(steps)));
         }
-        layers.push(Layer::new("Müller–Fellner", Marks::VLine(base_cost)));
-        let y = Axis::linear("fraction of trials at most as costly").range(0.0, 1.0);
-        let own = summaries.iter().filter(|row| row.scene == scene);
-        let ends = own.flat_map(|row| [row.lowest_cost, row.highest_cost]).chain([base_cost]);
-        let (low, high) = range(ends).unwrap_or((0.0, 1.0));
-        // The range covers the costs of all methods and the base, with room at both ends.
-        let margin = 0.05 * (high - low);
-        let x = Axis::linear("cost").range(low - margin, high + margin);
+        layers.push(Layer::new("greedy", Marks::VLine(1.0)));
+        let y = Axis::linear("trials at most as costly").range(0.0, 1.0).unit(Unit::Percent);
+        let x = Axis::linear("cost / greedy");
         panels.push(panel(rows.shown(scene), x, y, layers));
     }
     for method in &config.methods {
         output.paper.extend(config.majority(rows, method));
     }
     output.add_csv("distribution", &summaries)?;
-    output.add_figure("distribution", "Every trial of every repetition.", 2, panels);
+    let below = summaries.iter().map(|row| 100.0 * row.fraction_below_base);
+    output.finding = range(below).map(|(low, high)| {
+        format!("{low:.0} to {high:.0} % of the trials cost less than the greedy tree")
+    });
+    let caption = format!("{}. Every trial of every repetition.", output.heading);
+    output.add_figure("distribution", caption, 2, panels);
     let columns = "scene method lowest_cost median_cost highest_cost relative_deviation base_cost";
     output.show("Costs of all trials:", &summaries, columns)?;
     Ok(output)

@@ -138,18 +138,20 @@ impl Config {
                 let own = summaries
                     .iter()
                     .filter(|summary| summary.part == part && summary.method == method);
-                let points = own.map(|summary| (summary.objects as f64, value(summary))).collect();
-                Layer::new(method, Marks::Line(points))
+                let points: Vec<_> =
+                    own.map(|summary| (summary.objects as f64, value(summary))).collect();
+                let marks = [Marks::Line(points.clone()), Marks::Points(points)];
+                marks.map(|marks| Layer::new(method, marks))
             };
-            let lines = self.methods.iter().map(line).collect();
+            let lines = self.methods.iter().flat_map(line).collect();
             panel(format!("{part}, {title}"), Axis::linear("objects"), y, lines)
         };
         let both = |part| {
-            let fraction = Axis::linear("fraction of runs").range(0.0, 1.02);
-            let gap = Axis::linear("greatest gap (%)").starting_at(0.0);
+            let fraction = Axis::linear("runs").range(0.0, 1.02).unit(Unit::Percent);
+            let gap = Axis::linear("greatest gap").unit(Unit::Percent);
             [
                 draw(part, "solved", fraction, |summary| summary.solved_fraction),
-                draw(part, "greatest gap", gap, |summary| 100.0 * summary.maximum_gap.max(0.0)),
+                draw(part, "greatest gap", gap, |summary| summary.maximum_gap.max(0.0)),
             ]
         };
         parts.into_iter().flat_map(both).collect()
@@ -180,7 +182,7 @@ fn draw_bounds(tightness: &[Tightness]) -> Vec<Panel> {
             Layer::new("lower bound", Marks::Band(own().map(range).collect())),
             Layer::new("lower bound", Marks::Line(own().map(median).collect())),
         ];
-        let y = Axis::linear("bound / optimum").range(0.0, 1.02);
+        let y = Axis::linear("bound / optimum").range(0.0, 1.02).unit(Unit::Percent);
         panel(format!("{part}, lower bound"), Axis::linear("objects"), y, layers)
     };
     parts.into_iter().map(draw).collect()

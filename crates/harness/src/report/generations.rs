@@ -1,6 +1,7 @@
 //! Figures 2 to 4 of the paper: cost against generation, with the median run, the range of all
 //! runs, and random picking.
 
+use super::output::from_greedy;
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
 use crate::rows::TrialRow;
@@ -87,16 +88,23 @@ impl Config {
         let mut output = Output::new(&self.source, &self.title);
         let mut generations = Vec::new();
         let mut panels = Vec::new();
+        let mut ends = Vec::new();
         for scene in rows.scenes() {
             let Some(runs) = self.runs(rows, scene) else { continue };
             let own = runs.generations();
-            panels.push(draw(&rows.shown(scene), runs.runs.len(), &own));
+            panels.push(draw(&rows.shown(scene), runs.runs.len(), &own, rows.base_cost(scene)));
             generations.extend(own);
             let Some(end) = runs.end(rows.base_cost(scene)) else { continue };
             output.paper.extend(self.compare(&rows.shown(scene), &runs, &end));
+            ends.push(end.median / end.base);
         }
-        let caption = "Goldsmith–Salmon cost of the best tree so far: the run whose final cost is the median and, of several runs, the \
-                       range. Random picking: the exact expectation for as many orders, as far as so many were drawn.";
+        let caption = format!(
+            "{}. Goldsmith–Salmon cost of the best tree so far: the run whose final cost is the \
+             median and, of several runs, the range. Random picking: the exact expectation for as \
+             many orders, as far as so many were drawn.",
+            output.heading
+        );
+        output.finding = from_greedy(ends).map(|end| format!("The genetic algorithm ends {end}"));
         output.add_figure("generations", caption, 1, panels);
         output.add_csv("generations", &generations)?;
         Ok(output)
@@ -175,22 +183,29 @@ fn progress(run: &[&TrialRow]) -> Vec<Progress> {
     generations
 }
 
-/// Draws one scene. The paper's costs are of other scenes and in no unit that it names, so they are
-/// not drawn.
-fn draw(shown: &str, runs: usize, generations: &[Generation]) -> Panel {
+/// Draws one scene beside the cost of its greedy tree. The paper's costs are of other scenes and in
+/// no unit that it names, so they are not drawn.
+fn draw(shown: &str, runs: usize, generations: &[Generation], base: f64) -> Panel {
     let at = |generation: &Generation| generation.generation as f64;
-    let median: Vec<_> = generations.iter().map(|g| (at(g), g.median_run_cost)).collect();
-    let range = generations.iter().map(|g| (at(g), g.lowest_cost, g.highest_cost)).collect();
-    let random = generations.iter().filter_map(|g| Some((at(g), g.random_picking_cost?))).collect();
-    let mut layers = vec![Layer::new("random picking", Marks::Line(random))];
+    let over = |cost: f64| cost / base;
+    let median: Vec<_> = generations.iter().map(|g| (at(g), over(g.median_run_cost))).collect();
+    let range =
+        generations.iter().map(|g| (at(g), over(g.lowest_cost), over(g.highest_cost))).collect();
+    let random: Vec<_> =
+        generations.iter().filter_map(|g| Some((at(g), over(g.random_picking_cost?)))).collect();
     // One run has no range, so it is drawn as one line.
+    let name = if runs > 1 { "median run" } else { "one run" };
+    let mut layers = Vec::new();
     if runs > 1 {
-        layers.insert(0, Layer::new("median run", Marks::Line(median)));
-        layers.insert(0, Layer::new("range over runs", Marks::Band(range)));
-    } else {
-        layers.insert(0, Layer::new("one run", Marks::Line(median)));
+        layers.push(Layer::new("range over runs", Marks::Band(range)));
     }
-    panel(shown, Axis::linear("generation"), Axis::linear("cost (Goldsmith–Salmon)"), layers)
+    let greedy = generations.iter().map(|g| (at(g), 1.0)).collect();
+    for (name, line) in [(name, median), ("random picking", random), ("greedy", greedy)] {
+        let end = line.last().map(|end| Layer::new(name, Marks::Text(*end)));
+        layers.push(Layer::new(name, Marks::Line(line)));
+        layers.extend(end);
+    }
+    panel(shown, Axis::linear("generation"), Axis::linear("cost / greedy"), layers)
 }
 
 impl<'a> Runs<'a> {

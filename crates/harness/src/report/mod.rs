@@ -9,8 +9,10 @@ pub mod data;
 pub mod distribution;
 pub mod gaps;
 pub mod generations;
+mod looks;
 pub mod numbers;
 pub mod output;
+pub mod overview;
 pub mod paper;
 mod prelude;
 mod progress;
@@ -33,11 +35,9 @@ use crate::statistics::{median, minimum};
 use bvh_config::{Check, OutOfRange};
 use config::Labels as _;
 use data::Rows;
-use figures::{COLOURS, Figure, Layer};
 use output::Output;
 use paper::PaperRow;
 use serde::{Deserialize, Deserializer, Serialize};
-use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Declares the kinds of reports: name in specs (in snake case), configuration and its keys that
@@ -103,6 +103,8 @@ reports! {
     "correlation" => Correlation(correlation::Config: methods) by correlation::write;
     /// Error against run time.
     "anytime" => Anytime(anytime::Config: methods) by anytime::Config::write;
+    /// Error against run time of all scenes in one panel.
+    "overview" => Overview(overview::Config: points, line) by overview::Config::write;
     /// Gaps to the exact optimum of small scenes.
     "gaps" => Gaps(gaps::Config: methods, optimum) by gaps::Config::write;
     /// Medians, quartiles, and seconds until targets are reached.
@@ -135,7 +137,7 @@ impl Report {
 
     /// Returns true if the report measures gaps.
     pub fn needs_references(&self) -> bool {
-        matches!(self, Self::Anytime(_) | Self::Numbers(_))
+        matches!(self, Self::Anytime(_) | Self::Numbers(_) | Self::Overview(_))
     }
 }
 
@@ -156,15 +158,6 @@ pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> 
         outputs.iter_mut().flat_map(|output| std::mem::take(&mut output.paper)).collect();
     if !paper.is_empty() {
         outputs.push(beside_paper(&paper)?);
-    }
-    let shown: Vec<_> = outputs
-        .iter()
-        .flat_map(|output| &output.figures)
-        .map(|(_, figure)| series(figure))
-        .collect();
-    let looks = looks(&rows.methods(), &shown);
-    for (_, figure) in outputs.iter_mut().flat_map(|output| &mut output.figures) {
-        figure.looks.extend(looks.iter().cloned());
     }
     Ok(outputs)
 }
@@ -221,31 +214,6 @@ fn final_costs(rows: &Rows) -> Result<Output, Error> {
     Ok(output)
 }
 
-/// Returns the names of the series in a figure.
-fn series(figure: &Figure) -> BTreeSet<String> {
-    let layers = figure.panels.iter().flat_map(|panel| &panel.layers);
-    layers.filter_map(Layer::series).map(str::to_owned).collect()
-}
-
-/// Chooses the looks of an experiment's methods, the same in all its figures. If there are more
-/// methods than colours, methods that share no figure may share a look.
-fn looks(methods: &[&str], figures: &[BTreeSet<String>]) -> Vec<(String, usize)> {
-    let mut slots: Vec<usize> = Vec::new();
-    for (index, method) in methods.iter().enumerate() {
-        let shared = |other: &str| {
-            figures.iter().any(|shown| shown.contains(*method) && shown.contains(other))
-        };
-        let taken = |slot: usize| {
-            methods.iter().zip(&slots).any(|(other, at)| *at == slot && shared(other))
-        };
-        // Only more methods than colours share colours; otherwise each method keeps its number, and
-        // with it its colour in all figures.
-        let free = (0..COLOURS).find(|&slot| !taken(slot)).filter(|_| methods.len() > COLOURS);
-        slots.push(free.unwrap_or(index));
-    }
-    methods.iter().zip(slots).map(|(method, slot)| ((*method).to_owned(), slot)).collect()
-}
-
 /// Collects the comparisons with the paper of all reports.
 fn beside_paper(rows: &[PaperRow]) -> Result<Output, Error> {
     let mut output = Output::new("", "Ng & Trifonov 2003 beside our results");
@@ -258,32 +226,4 @@ fn beside_paper(rows: &[PaperRow]) -> Result<Output, Error> {
     )?;
     output.paper = rows.to_vec();
     Ok(output)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn methods_of_one_figure_share_no_colour_while_there_are_enough() {
-        let methods: Vec<String> = (0..16).map(|index| format!("method {index}")).collect();
-        let methods: Vec<&str> = methods.iter().map(String::as_str).collect();
-        let figure =
-            |shown: &[usize]| shown.iter().map(|&index| methods[index].to_owned()).collect();
-        let figures: [BTreeSet<String>; 2] = [
-            figure(&[0, 1, 2, 3, 4, 7, 11, 12, 13, 14, 15]),
-            figure(&[3, 4, 5, 6, 7, 8, 9, 10, 11, 14, 15]),
-        ];
-        let few = looks(&methods[..12], &figures);
-        assert!(few.iter().enumerate().all(|(index, (_, look))| *look == index));
-        let looks = looks(&methods, &figures);
-        for shown in &figures {
-            let colours: BTreeSet<usize> = looks
-                .iter()
-                .filter(|(method, _)| shown.contains(method))
-                .map(|(_, look)| look % COLOURS)
-                .collect();
-            assert_eq!(colours.len(), shown.len());
-        }
-    }
 }

@@ -6,7 +6,7 @@ use super::prelude::*;
 use super::target::Target;
 use super::to_target;
 use crate::rows::ReferenceRow;
-use crate::statistics::quartiles;
+use crate::statistics::{quartiles, range};
 use bvh_config::Nested;
 
 bvh_config::config! { serde;
@@ -85,8 +85,13 @@ impl Config {
         output.show("Seconds of the runs:", &timing, columns)?;
         // The figure shows bounds; medians alone are in the table.
         if !rows.bounds.is_empty() {
-            let caption = "Over the least known cost of the scene: the proven lower bound, below which no tree is, and the median \
-                           cost of every method's runs.";
+            let bounds = numbers.iter().filter_map(|row| row.lower_bound_over_reference);
+            output.finding = range(bounds).map(|(low, high)| {
+                let (low, high) = (100.0 * low, 100.0 * high);
+                format!("No tree costs less than {low:.0} to {high:.0} % of the best known")
+            });
+            let caption = "The proven lower bound, below which no tree is, and the median cost of \
+                           every method's runs, over the least known cost of the scene.";
             output.add_figure("numbers", caption, 1, vec![self.draw(rows, &numbers)]);
         }
         if !self.targets.is_empty() {
@@ -100,24 +105,17 @@ impl Config {
         let bound = |scene: &str| {
             rows.reference(scene).and_then(|row| Some(ratio(row.lower_bound?, row.cost)))
         };
-        let bounds =
-            rows.scenes().into_iter().map(|scene| bound(scene).unwrap_or(f64::NAN)).collect();
-        let cost = |method: &String| {
-            let own =
-                |scene: &str| numbers.iter().find(|row| row.scene == scene && row.method == method);
-            let scenes = rows.scenes().into_iter();
-            let values =
-                scenes.map(|scene| own(scene).map_or(f64::NAN, |row| 1.0 + row.gap_median));
-            Layer::bars(method, values.collect(), 0.0)
-        };
-        let bounds = Layer::bars("lower bound", bounds, 0.0);
-        let layers = std::iter::once(bounds).chain(self.methods.iter().map(cost)).collect();
-        panel(
-            "",
-            Axis::categories("", rows.all_shown()),
-            Axis::linear("cost / least known"),
-            layers,
-        )
+        let scenes = || rows.scenes().into_iter().enumerate();
+        let bounds = scenes().filter_map(|(at, scene)| Some((at, bound(scene)?, None)));
+        let mut series = vec![("lower bound".to_owned(), bounds.collect())];
+        for method in &self.methods {
+            let own = |scene| numbers.iter().find(|row| row.scene == scene && row.method == method);
+            let gap = |(at, scene)| Some((at, 1.0 + own(scene)?.gap_median, None));
+            series.push((method.clone(), scenes().filter_map(gap).collect()));
+        }
+        let mut panel = dots("", Axis::linear("cost / least known"), rows.all_shown(), series);
+        panel.layers.push(Layer::new("best known", Marks::VLine(1.0)));
+        panel
     }
 }
 

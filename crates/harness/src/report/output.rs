@@ -1,13 +1,15 @@
 //! The output of a report: CSV files, figures, comparisons with the paper, and text for the
 //! terminal.
 
+use super::looks::look;
 use super::paper::PaperRow;
 use super::query::Row;
 use crate::Error;
 use crate::rows::store::Store;
 use crate::rows::to_bytes;
+use crate::statistics::range;
 use comfy_table::{Table, presets};
-use figures::{Axis, Figure, Layer, Panel};
+use figures::{Axis, Figure, Layer, Marks, Panel};
 use serde::Serialize;
 use std::io;
 use std::path::Path;
@@ -15,8 +17,10 @@ use std::path::Path;
 /// The output of a report.
 #[derive(Clone, Debug, Default)]
 pub struct Output {
-    /// Source and title of the report; the title of its figures and the first line of its text.
+    /// Source and title of the report; the first line of its text.
     pub heading: String,
+    /// What the rows say, computed from them: the title of figures, which otherwise is the heading.
+    pub finding: Option<String>,
     /// CSV files: name without extension, and bytes. Names that begin with `timing` hold seconds.
     pub csv: Vec<(String, Vec<u8>)>,
     /// Figures: name without extension, and what they show.
@@ -63,8 +67,9 @@ impl Output {
         columns: usize,
         panels: Vec<Panel>,
     ) {
-        let title = self.heading.clone();
-        let looks = vec![];
+        let title = self.finding.as_ref().unwrap_or(&self.heading).clone();
+        let series = panels.iter().flat_map(|panel| &panel.layers).filter_map(Layer::series);
+        let looks = series.filter_map(|name| Some((name.to_owned(), look(name)?))).collect();
         self.figures
             .push((name.into(), Figure { title, caption: caption.into(), columns, panels, looks }));
     }
@@ -155,6 +160,52 @@ pub fn text_table<'a>(header: impl IntoIterator<Item = &'a str>) -> Table {
     table
 }
 
+/// A value in the row of this number, with the ends of its interval, if it has one.
+pub type Dot = (usize, f64, Option<(f64, f64)>);
+
+/// Makes a panel of values in named rows. The series of a row are below each other.
+pub fn dots(
+    title: impl Into<String>,
+    x: Axis,
+    names: Vec<String>,
+    series: Vec<(String, Vec<Dot>)>,
+) -> Panel {
+    let count = series.len() as f64;
+    let mut layers = Vec::new();
+    for ((name, dots), number) in series.into_iter().zip(0..) {
+        let height = |row: usize| row as f64 + 0.8 * ((f64::from(number) + 0.5) / count - 0.5);
+        let points = dots.iter().map(|&(row, value, _)| (value, height(row))).collect();
+        let spans = dots.iter().filter_map(|&(row, _, ends)| {
+            let (low, high) = ends?;
+            Some([(low, height(row)), (high, height(row))])
+        });
+        layers.push(Layer::new(&name, Marks::Spans(spans.collect())));
+        layers.push(Layer::new(name, Marks::Points(points)));
+    }
+    let y = Axis::rows(names, (10.0 * count + 6.0).max(24.0));
+    panel(title, x, y, layers)
+}
+
+/// Says how far ratios to the greedy tree's cost are from it; `None` if there are none.
+pub fn from_greedy(ratios: impl IntoIterator<Item = f64>) -> Option<String> {
+    let (low, high) = range(ratios)?;
+    let percent = |ratio: f64| match 100.0 * (ratio - 1.0).abs() {
+        small @ ..0.95 => format!("{small:.1}"),
+        whole => format!("{whole:.0}"),
+    };
+    let to = |from: f64, to: f64, side: &str| match [percent(from), percent(to)] {
+        [one, other] if one == other => format!("{one} % {side}"),
+        [one, other] => format!("{one} to {other} % {side}"),
+    };
+    Some(if high <= 1.0 {
+        to(high, low, "below the greedy tree")
+    } else if low >= 1.0 {
+        to(low, high, "above the greedy tree")
+    } else {
+        format!("from {} % below to {} % above the greedy tree", percent(low), percent(high))
+    })
+}
+
 /// Makes a panel.
 pub fn panel(title: impl Into<String>, x: Axis, y: Axis, layers: Vec<Layer>) -> Panel {
     Panel { title: title.into(), x, y, layers }
@@ -172,6 +223,18 @@ mod tests {
             shown,
             ["1.235", "0.01235", "12346", "1.500e-9", "0", "123456", "best", "-1.000"]
         );
+    }
+
+    #[test]
+    fn distances_from_the_greedy_tree_name_their_side() {
+        let said = [vec![0.92, 0.98], vec![1.344, 1.336], vec![0.997, 1.2]].map(from_greedy);
+        let expected = [
+            "2 to 8 % below the greedy tree",
+            "34 % above the greedy tree",
+            "from 0.3 % below to 20 % above the greedy tree",
+        ];
+        assert_eq!(said.map(Option::unwrap), expected);
+        assert_eq!(from_greedy([]), None);
     }
 
     #[test]

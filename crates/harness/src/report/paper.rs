@@ -136,18 +136,9 @@ pub enum Verdict {
 
 impl Verdict {
     /// Returns the name in `paper.csv`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Agrees => "agrees",
-            Self::SameDirectionHigher => "same direction, higher",
-            Self::SameDirectionLower => "same direction, lower",
-            Self::DiffersHigher => "differs, higher",
-            Self::DiffersLower => "differs, lower",
-            Self::Differs => "differs",
-            Self::Inconclusive => "inconclusive",
-            Self::NoVerdict => "no verdict",
-            Self::NotInPaper => "not in the paper",
-        }
+    pub fn name(self) -> String {
+        let name = serde_json::to_value(self).unwrap_or_default();
+        name.as_str().unwrap_or_default().to_owned()
     }
 
     /// Compares our ratio to base with the paper's: by the relative distance `tolerance`, and by

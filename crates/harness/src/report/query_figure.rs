@@ -17,11 +17,11 @@ bvh_config::config! { serde;
         /// Columns whose values are the panels; by default there is one panel.
         panels: Vec<String>;
         /// Panels per row.
-        per_row: usize = 2, in 1..=4;
-        /// The column along the horizontal axis: categories for bars.
+        per_row: usize = 2, in 1..=2;
+        /// The column along the horizontal axis. In rows, values have lines from end to end of
+        /// their intervals, if the table has those.
         x: String;
-        /// The column along the vertical axis, with whiskers if the table has the ends of its
-        /// intervals.
+        /// The column along the vertical axis; names for rows.
         y: String;
         /// Columns whose values are the series.
         series: Vec<String>;
@@ -35,14 +35,9 @@ bvh_config::config! { serde;
         log_x: bool;
         /// True for a logarithmic vertical axis.
         log_y: bool;
-        /// The height at which bars begin.
-        bars_from: f64, in 0.0..=1e300;
-        /// The power of x with which a line from the first point of every panel falls, for
-        /// comparison.
+        /// The value of a line across all rows, such as 1 for ratios.
         #[serde(skip_serializing_if = "Option::is_none")]
-        falls_by_power: Option<f64>, in 0.0..=10.0;
-        /// True for a staircase through the points that are lower than all points to their left.
-        front: bool;
+        line_at: Option<f64>, in 0.0..=1e300;
     }
 }
 
@@ -52,11 +47,9 @@ bvh_config::config! { serde;
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Shape {
-    /// A bar per category.
+    /// Named rows with a dot per value.
     #[default]
-    Bars,
-    /// Points.
-    Points,
+    Rows,
     /// Points with a line through them.
     Lines,
 }
@@ -88,39 +81,42 @@ impl Drawing {
     }
 
     fn panel(&self, rows: &Rows, title: String, table: &[&Row]) -> Panel {
-        let names = distinct(table.iter().map(|row| text_in(row, &self.x)));
+        if self.marks == Shape::Rows {
+            return self.rows(rows, title, table);
+        }
         let mut layers = Vec::new();
         for series in distinct(table.iter().map(|row| self.series_of(row))) {
             let rows_of_series: Vec<&Row> =
                 table.iter().filter(|row| self.series_of(row) == series).copied().collect();
-            // Bars of a category have one place each, also where a series has no value.
-            if self.marks == Shape::Bars {
-                layers.push(self.bars(series, &names, &rows_of_series));
-                continue;
-            }
             let points = self.points(&rows_of_series);
-            if self.marks == Shape::Lines {
-                layers.push(Layer::new(&series, Marks::Line(points.clone())));
-            }
+            layers.push(Layer::new(&series, Marks::Line(points.clone())));
             layers.push(Layer::new(series, Marks::Points(points)));
         }
-        let points = self.points(table);
-        if let (Some(power), Some(&(first, highest))) = (self.falls_by_power, points.first()) {
-            let line =
-                points.iter().map(|&(x, _)| (x, highest * (first / x).powf(power))).collect();
-            layers.push(Layer::new(format!("slope −{power}"), Marks::Line(line)));
-        }
-        if self.front {
-            layers.push(Layer::new("best so far", Marks::Steps(front(points))));
-        }
-        let x = match self.marks {
-            Shape::Bars => {
-                let shown = |name: String| if self.x == "scene" { rows.shown(&name) } else { name };
-                Axis::categories(&self.x_label, names.into_iter().map(shown).collect())
-            }
-            _ => axis(&self.x_label, self.log_x),
-        };
+        let x = axis(&self.x_label, self.log_x);
         panel(title, x, axis(&self.y_label, self.log_y), layers)
+    }
+
+    fn rows(&self, rows: &Rows, title: String, table: &[&Row]) -> Panel {
+        let names = distinct(table.iter().map(|row| text_in(row, &self.y)));
+        let series = |series: String| {
+            let own = table.iter().filter(|row| self.series_of(row) == series);
+            let dot = |row: &&Row| {
+                let number = |end: &str| number_in(row, &format!("{}{end}", self.x));
+                let at = names.iter().position(|name| *name == text_in(row, &self.y))?;
+                Some((at, number("")?, number("_low").zip(number("_high"))))
+            };
+            let dots = own.filter_map(dot).collect();
+            (series, dots)
+        };
+        let all = distinct(table.iter().map(|row| self.series_of(row)));
+        let all = all.into_iter().map(series).collect();
+        let shown = |name: &String| {
+            if self.y == "scene" { rows.shown(name) } else { name.clone() }
+        };
+        let x = axis(&self.x_label, self.log_x);
+        let mut panel = dots(title, x, names.iter().map(shown).collect(), all);
+        panel.layers.extend(self.line_at.map(|at| Layer::new("", Marks::VLine(at))));
+        panel
     }
 
     /// Returns the series of a row: the line that its method belongs to, or the values of its
@@ -136,21 +132,6 @@ impl Drawing {
         }
         let values: Vec<String> = self.series.iter().map(|column| text_in(row, column)).collect();
         values.join(", ")
-    }
-
-    fn bars(&self, series: String, names: &[String], table: &[&Row]) -> Layer {
-        let mut values = Vec::new();
-        let mut spread = Vec::new();
-        for name in names {
-            let row = table.iter().find(|row| text_in(row, &self.x) == *name);
-            let number = |end: &str| {
-                let value = row.and_then(|row| number_in(row, &format!("{}{end}", self.y)));
-                value.unwrap_or(f64::NAN)
-            };
-            values.push(number(""));
-            spread.push((number("_low"), number("_high")));
-        }
-        Layer::new(series, Marks::Bars { values, spread, base: self.bars_from })
     }
 
     /// Returns the points of some rows, by x.
@@ -170,26 +151,4 @@ fn text_in(row: &Row, column: &str) -> String {
 
 fn axis(label: &str, is_log: bool) -> Axis {
     if is_log { Axis::log(label) } else { Axis::linear(label) }
-}
-
-/// Returns the points, which are sorted by x, that have a lower y than all points of no greater x.
-fn front(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
-    let mut lowest = f64::INFINITY;
-    points.retain(|point| {
-        let is_lower = point.1 < lowest;
-        lowest = lowest.min(point.1);
-        is_lower
-    });
-    points
-}
-
-#[cfg(test)]
-mod tests {
-    use super::front;
-
-    #[test]
-    fn the_front_has_what_nothing_faster_beats() {
-        let points = vec![(1.0, 1.5), (1.0, 2.0), (2.0, 2.0), (3.0, 0.5), (4.0, 0.5), (5.0, 0.4)];
-        assert_eq!(front(points), [(1.0, 1.5), (3.0, 0.5), (5.0, 0.4)]);
-    }
 }

@@ -2,9 +2,13 @@
 
 use super::query::{QueryError, Row, cell};
 use crate::statistics::{geometric_mean, median, pearson, range, spearman};
+use serde::Deserialize;
+use serde::de::IntoDeserializer;
+use serde::de::value::{Error, StrDeserializer};
 
 /// The reduction of the values of some rows to one number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Aggregate {
     /// The value in which all rows agree.
     Only,
@@ -29,19 +33,6 @@ pub enum Aggregate {
 }
 
 impl Aggregate {
-    const NAMES: [(&str, Self); 10] = [
-        ("only", Self::Only),
-        ("first", Self::First),
-        ("min", Self::Min),
-        ("max", Self::Max),
-        ("sum", Self::Sum),
-        ("median", Self::Median),
-        ("geomean", Self::Geomean),
-        ("count", Self::Count),
-        ("pearson", Self::Pearson),
-        ("spearman", Self::Spearman),
-    ];
-
     /// Returns true for correlations, which need two values of every row.
     fn is_of_pairs(self) -> bool {
         matches!(self, Self::Pearson | Self::Spearman)
@@ -66,8 +57,8 @@ impl<'t> Measure<'t> {
                        spearman, and two",
         };
         let (name, rest) = text.split_once(' ').ok_or_else(malformed)?;
-        let (_, how) =
-            Aggregate::NAMES.into_iter().find(|(known, _)| *known == name).ok_or_else(malformed)?;
+        let name: StrDeserializer<Error> = name.into_deserializer();
+        let how = Aggregate::deserialize(name).map_err(|_| malformed())?;
         let values: Vec<&str> =
             if how.is_of_pairs() { rest.split(", ").collect() } else { vec![rest] };
         if values.len() != 1 + usize::from(how.is_of_pairs()) {

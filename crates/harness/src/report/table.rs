@@ -1,10 +1,10 @@
 //! Tables of the paper: ratios to base, scenes by columns, with the paper's ratios.
 
 use super::config::Labels;
-use super::output::text_table;
+use super::output::{from_greedy, text_table};
 use super::prelude::*;
 use crate::statistics::best_of::predicted_best;
-use crate::statistics::{expected_best_of, median, minimum, range};
+use crate::statistics::{expected_best_of, geometric_mean, median, minimum, range};
 use bvh_config::{Accepts, Nested, above};
 use std::collections::BTreeMap;
 
@@ -70,9 +70,6 @@ pub(super) struct Cell<'a> {
     pub paper_over_base: Option<f64>,
 }
 
-/// Bars that are higher than the paper's highest by more than this factor leave the panel.
-const MOST_OF_PAPER: f64 = 3.0;
-
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let scenes = rows.scenes();
@@ -82,7 +79,9 @@ impl Config {
         let cells: Vec<Cell> = scenes.iter().flat_map(row).collect();
         let mut output = Output::new(&self.source, &self.title);
         output.add_csv("table", &cells)?;
-        output.add_figure("table", self.caption(&cells), 1, vec![self.draw(rows, &cells)]);
+        output.finding = self.finding(&cells);
+        let caption = format!("{}. {}", output.heading, self.caption(&cells));
+        output.add_figure("table", caption, 1, vec![self.draw(rows, &cells)]);
         output.paper = self.compare_all(rows, &cells);
         self.add_table(&mut output, rows, &cells);
         Ok(output)
@@ -125,18 +124,25 @@ impl Config {
         })
     }
 
+    /// Says how far the cheapest column is from the greedy trees.
+    fn finding(&self, cells: &[Cell]) -> Option<String> {
+        let ratios =
+            |column| of_column(cells, column).map(|cell| cell.cost_over_base).collect::<Vec<f64>>();
+        let columns = self.columns.iter().skip(1).map(|column| (&column.name, ratios(column)));
+        let mean = |ratios: &[f64]| geometric_mean(ratios);
+        let (name, least) = columns.min_by(|a, b| mean(&a.1).total_cmp(&mean(&b.1)))?;
+        from_greedy(least).map(|distance| format!("{name}: {distance}"))
+    }
+
     /// Explains the marks that the figure shows.
     fn caption(&self, cells: &[Cell]) -> String {
         let mut caption =
             String::from("Total area of inner nodes over that of the greedy Müller–Fellner tree.");
         if cells.iter().any(|cell| cell.best_of.is_some()) {
-            caption += " Whiskers: at least nine of ten repetitions of as many fresh trials end between them.";
+            caption += " Lines: at least nine of ten repetitions of as many fresh trials end between them.";
         }
         if cells.iter().any(|cell| cell.paper_over_base.is_some()) {
-            caption += " Ours on stand-in scenes, the paper's on the originals: compare ratios within a column, not bar by bar.";
-        }
-        if is_cut(cells) {
-            caption += " Bars that reach the top go on beyond it.";
+            caption += " Ours on stand-in scenes, the paper's on the originals: compare ratios within a column, not dot by dot.";
         }
         caption
     }
@@ -146,37 +152,37 @@ impl Config {
     }
 
     fn draw(&self, rows: &Rows, cells: &[Cell]) -> Panel {
-        let columns = || self.columns.iter().skip(1);
-        let bars = |name: String, column: &Column, value: &dyn Fn(&Cell) -> Option<f64>, spread| {
-            let values =
-                rows.scenes().into_iter().map(|scene| find(cells, scene, column).and_then(value));
-            let values = values.map(|value| value.unwrap_or(f64::NAN)).collect();
-            Layer::new(name, Marks::Bars { values, spread, base: 1.0 })
+        let scenes = rows.scenes();
+        let series = |name: String, column: &Column, dot: fn(&Cell) -> Option<(f64, Interval)>| {
+            let dot = |cell: &Cell| {
+                let (value, ends) = dot(cell)?;
+                Some((scenes.iter().position(|scene| *scene == cell.scene)?, value, ends))
+            };
+            (name, of_column(cells, column).filter_map(dot).collect::<Vec<_>>())
         };
-        // Columns that are readings of one column of the paper share its bars.
+        // Columns that are readings of one column of the paper share its dots.
         let readings = self.are_readings();
-        let mut layers = Vec::new();
-        for (index, column) in columns().enumerate() {
-            if !column.paper.is_empty() && (index == 0 || !readings) {
-                let name =
-                    if readings { "paper".into() } else { format!("{}, paper", column.name) };
-                layers.push(bars(name, column, &|cell| cell.paper_over_base, vec![]));
+        let mut all = Vec::new();
+        for (index, column) in self.columns.iter().skip(1).enumerate() {
+            let name = &column.name;
+            let of_paper = !column.paper.is_empty();
+            if of_paper && (index == 0 || !readings) {
+                let name = if readings { "paper".into() } else { format!("paper, {name}") };
+                all.push(series(name, column, |cell| Some((cell.paper_over_base?, None))));
             }
-            let own = rows.scenes().into_iter().map(|scene| {
-                let cell = find(cells, scene, column);
-                let ends = cell.and_then(|cell| cell.low_over_base.zip(cell.high_over_base));
-                ends.unwrap_or((f64::NAN, f64::NAN))
-            });
-            let name = format!("{}, ours", column.name);
-            layers.push(bars(name, column, &|cell| Some(cell.cost_over_base), own.collect()));
+            let name = if of_paper { format!("{name}, ours") } else { name.clone() };
+            all.push(series(name, column, |cell| {
+                Some((cell.cost_over_base, cell.low_over_base.zip(cell.high_over_base)))
+            }));
         }
+        // Readings of a heuristic that peel off one object at a time cost hundreds of times as much.
+        let most = cells.iter().map(|cell| cell.cost_over_base).fold(1.0, f64::max);
+        let label = "cost / greedy";
+        let x = if most > 3.0 { Axis::log(label) } else { Axis::linear(label) };
+        let mut panel = dots("", x, rows.all_shown(), all);
         // Ratios are to the greedy tree, whose line separates savings from losses.
-        layers.push(Layer::new("greedy", Marks::HLine(1.0)));
-        // Readings of a heuristic that peel off one object at a time would hide all differences
-        // between the others.
-        let y = Axis::linear("cost / base");
-        let y = if is_cut(cells) { y.range(0.9, 1.2 * highest_of_paper(cells)) } else { y };
-        panel("", Axis::categories("", rows.all_shown()), y, layers)
+        panel.layers.push(Layer::new("greedy", Marks::VLine(1.0)));
+        panel
     }
 
     fn add_table(&self, output: &mut Output, rows: &Rows, cells: &[Cell]) {
@@ -198,16 +204,8 @@ impl Config {
     }
 }
 
-/// The paper's highest ratio, and at least 1.
-fn highest_of_paper(cells: &[Cell]) -> f64 {
-    cells.iter().filter_map(|cell| cell.paper_over_base).fold(1.0, f64::max)
-}
-
-/// Returns true if the figure ends below some bars.
-fn is_cut(cells: &[Cell]) -> bool {
-    let theirs = highest_of_paper(cells);
-    theirs > 1.0 && cells.iter().any(|cell| cell.cost_over_base > MOST_OF_PAPER * theirs)
-}
+/// The ends of an interval, if there is one.
+type Interval = Option<(f64, f64)>;
 
 /// Returns the cells of a column.
 pub(super) fn of_column<'c, 'a>(

@@ -2,7 +2,7 @@
 
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
-use crate::statistics::{expected_best_of, mean_interval, minimum};
+use crate::statistics::{expected_best_of, mean_interval, minimum, range};
 
 bvh_config::config! { serde;
     /// Cost against number of trials.
@@ -79,17 +79,23 @@ impl Config {
             if curves.iter().flatten().any(|point| point.expected_low.is_some()) {
                 expected.extend(bands);
             }
+            // One range for both panels, so that they can be compared.
+            let shown = curves.iter().flatten().flat_map(|point| {
+                [point.single_run_over_base, point.interval().0, point.interval().1, 1.0]
+            });
+            let (low, high) = range(shown).unwrap_or((0.0, 1.0));
+            let (low, high) = (low - 0.03 * (high - low), high + 0.03 * (high - low));
             for (what, mut layers) in [("one run", single), ("expected", expected)] {
                 layers.push(Layer::new("greedy", Marks::HLine(1.0)));
                 let x = Axis::log("number of trials");
-                let y = Axis::linear("best cost / base");
+                let y = Axis::linear("best cost / greedy").range(low, high);
                 panels.push(panel(format!("{}, {what}", rows.shown(scene)), x, y, layers));
             }
             self.compare(&rows.shown(scene), &curves, &mut output);
             points.extend(curves.into_iter().flatten());
         }
-        let caption = "Lowest cost among so many trials, over that of the greedy tree. Left, one run, as in the paper; \
-                       right, what is expected, with the 95 % interval of the mean over repetitions.";
+        let caption = "Lowest cost among so many trials. Left, one run, as in the paper; right, \
+                       what is expected, with the 95 % interval of the mean over repetitions.";
         output.add_figure("trials", caption, 2, panels);
         let last: Vec<&Point> =
             points.iter().filter(|point| point.trials == self.best_of).collect();

@@ -4,6 +4,7 @@
 use super::resolved::read_toml;
 use crate::Error;
 use crate::files;
+use crate::report::overview;
 use csv::StringRecord;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -148,7 +149,9 @@ fn shortened(file: &str, mut differences: Vec<String>) -> Vec<String> {
 /// Returns the names in a folder that end with `suffix`, without the files that hold seconds.
 fn untimed_files(folder: &Path, suffix: &str) -> Result<BTreeSet<String>, Error> {
     let mut names = files::names(folder)?;
-    names.retain(|name| name.ends_with(suffix) && !name.starts_with("timing"));
+    let overview = format!("{}.svg", overview::FIGURE);
+    let is_timed = |name: &str| name.starts_with("timing") || name == overview;
+    names.retain(|name| name.ends_with(suffix) && !is_timed(name));
     Ok(names)
 }
 

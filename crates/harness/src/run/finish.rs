@@ -45,13 +45,7 @@ pub(crate) fn conclude(
     store: Store,
 ) -> Result<String, Error> {
     store.join(resolved.run_count())?;
-    // The suite has made its table already, and its cases have no best known costs.
-    let text = if resolved.experiment.suite.is_some() {
-        store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
-        String::new()
-    } else {
-        report(resolved, best_known, provenance, &store)?
-    };
+    let text = report(resolved, best_known, provenance, &store)?;
     // Provenance comes last, so that it describes results that are complete.
     store.write("provenance.toml", to_toml(provenance)?.as_bytes())?;
     store.finish()?;

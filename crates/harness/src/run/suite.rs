@@ -16,6 +16,7 @@ impl Measurement for Suite<'_> {
     fn measure(&self, work: &mut Work) -> Result<String, Error> {
         let Work { experiment, store, watch, .. } = work;
         let Measure { stability } = self.0;
-        stability.execute(&experiment.scenes, &experiment.methods, store, &|| watch.cancelled())
+        stability.execute(&experiment.scenes, &experiment.methods, store, &|| watch.cancelled())?;
+        Ok(String::new())
     }
 }
