@@ -68,9 +68,12 @@ pub fn experiments() -> Vec<(String, String)> {
     names(&folder).into_iter().map(read).collect()
 }
 
-/// The pages at the top, of `docs/`, and of `results/`.
+/// The pages at the top, of `docs/`, of `results/`, and of the crates.
 pub fn pages() -> Vec<PathBuf> {
     let mut pages = vec![top().join("results/README.md")];
+    let crates = fs::read_dir(top().join("crates")).unwrap();
+    let of_crates = crates.map(|entry| entry.unwrap().path().join("README.md"));
+    pages.extend(of_crates.filter(|page| page.is_file()));
     for folder in [top(), top().join("docs")] {
         let entries = fs::read_dir(folder).unwrap();
         pages.extend(entries.map(|entry| entry.unwrap().path()));
