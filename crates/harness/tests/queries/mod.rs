@@ -35,7 +35,7 @@ fn paths(file: &str) -> Vec<PathBuf> {
 }
 
 /// The rows of a committed CSV that meet all conditions; at least one.
-fn rows(file: &str, conditions: &str) -> Vec<Row> {
+pub fn rows(file: &str, conditions: &str) -> Vec<Row> {
     let mut rows = Vec::new();
     for path in paths(file) {
         rows.extend(query::read(&path).unwrap_or_else(|error| panic!("{file}: {error}")));
