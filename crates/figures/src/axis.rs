@@ -1,13 +1,8 @@
 //! Chooses the shown part of an axis and its ticks.
 //!
 //! Panels are drawn in coordinates: the values of a linear axis, the decimal logarithms of a
-//! logarithmic axis, and the negative indices of rows. plotters' own logarithmic axis has no ticks
-//! between powers of ten and takes logarithms from the system's library, whose last digit differs
-//! from machine to machine.
-
-use std::ops::Range;
-
-use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+//! logarithmic axis, and the negative indices of rows. Logarithms come from a library whose last
+//! digit is the same on every machine.
 
 use super::model::{Axis, Marks, Panel, Scale, Unit};
 
@@ -26,9 +21,7 @@ pub(super) struct Ruled {
     /// Labelled ticks.
     pub major: Vec<(f64, String)>,
     /// Unlabelled grid lines.
-    minor: Vec<f64>,
-    /// The power of ten that multiplies every label, or empty.
-    pub factor: String,
+    pub minor: Vec<f64>,
 }
 
 /// Returns both axes of a panel, without ticks, and true if any series has data to show.
@@ -159,10 +152,12 @@ impl Ruled {
 
     /// Adds ticks at multiples of 1, 2 or 5 times a power of ten between two values.
     fn rule_evenly(&mut self, low: f64, high: f64, most: usize) {
-        // Labels of more than five digits would collide, so they share a power of ten.
         let size = libm::log10(low.abs().max(high.abs())).floor() as i32;
+        // Labels of more than five digits would collide, so they are multiples of a power of ten.
         let plain = self.unit != Unit::Number || (-3..5).contains(&size);
         let factor = if plain { 0 } else { size };
+        let power_of_ten =
+            if plain { String::new() } else { format!("×10{}", superscript(factor)) };
         let first = libm::log10((high - low) / most as f64).floor() as i32;
         for (power, mantissa) in
             (first..first + 3).flat_map(|power| [1, 2, 5].map(|mantissa| (power, mantissa)))
@@ -175,15 +170,14 @@ impl Ruled {
                 let digits = (factor - power).clamp(0, 11) as usize;
                 let ticks = (0..=(to - from) as i64).filter_map(|index| {
                     let units = (from + index as f64) * f64::from(mantissa);
-                    let label = self.label(units * libm::exp10(f64::from(power - factor)), digits);
+                    let label = self.label(units * libm::exp10(f64::from(power - factor)), digits)
+                        + &power_of_ten;
                     Some((self.coordinate(units * libm::exp10(f64::from(power)))?, label))
                 });
                 self.major = ticks.collect();
                 break;
             }
         }
-        self.factor =
-            if factor == 0 { String::new() } else { format!("×10{}", superscript(factor)) };
     }
 
     /// Adds ticks at powers of ten, and at their multiples if there are few powers. Returns false
@@ -247,33 +241,6 @@ impl Ruled {
     }
 }
 
-impl Ranged for Ruled {
-    type FormatOption = NoDefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, at: &f64, limits: (i32, i32)) -> i32 {
-        let length = f64::from(limits.1 - limits.0);
-        limits.0 + (length * self.fraction(*at).clamp(-10.0, 10.0)).round() as i32
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        if hint.weight().allow_light_points() {
-            return self.minor.clone();
-        }
-        self.major.iter().map(|tick| tick.0).collect()
-    }
-
-    fn range(&self) -> Range<f64> {
-        self.low..self.high
-    }
-}
-
-impl ValueFormatter<f64> for Ruled {
-    fn format_ext(&self, at: &f64) -> String {
-        self.major.iter().find(|tick| tick.0 == *at).map_or_else(String::new, |tick| tick.1.clone())
-    }
-}
-
 /// Formats a number with this many decimals and a true minus sign.
 fn decimal(value: f64, digits: usize) -> String {
     let text = format!("{:.digits$}", value.abs());
@@ -298,12 +265,7 @@ mod tests {
     fn labels(axis: &Axis, values: &[f64], most: usize) -> Vec<String> {
         let mut ruled = Ruled::new(axis, values, 0.0);
         ruled.rule(most);
-        ruled
-            .major
-            .into_iter()
-            .map(|tick| tick.1)
-            .chain(Some(ruled.factor).filter(|factor| !factor.is_empty()))
-            .collect()
+        ruled.major.into_iter().map(|tick| tick.1).collect()
     }
 
     #[test]
@@ -330,7 +292,7 @@ mod tests {
         );
         assert_eq!(
             labels(&Axis::linear(""), &[1.0e14, 1.3e14], 4),
-            ["1.0", "1.1", "1.2", "1.3", "×10¹⁴"]
+            ["1.0×10¹⁴", "1.1×10¹⁴", "1.2×10¹⁴", "1.3×10¹⁴"]
         );
     }
 

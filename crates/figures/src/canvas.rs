@@ -1,24 +1,17 @@
-//! A sheet for drawing through plotters, and the SVG document made from it.
+//! A sheet of SVG in pixels, y downwards.
 
 use std::fmt::Write as _;
 
-use plotters::coord::Shift;
-use plotters::drawing::DrawingAreaErrorKind;
-use plotters::element::Rectangle;
-use plotters::prelude::{Color, DrawingArea, IntoDrawingArea, RGBColor, SVGBackend, ShapeStyle};
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{FontDesc, FontFamily, FontStyle, FontTransform, TextStyle};
-
-use super::model::FigureError;
 use super::text::{FAMILY, Type};
 
-/// Steps of plotters' integer coordinates per pixel.
-pub(super) const STEPS: f64 = 4.0;
-/// plotters' SVG backend divides font sizes by this.
-pub(super) const FONT_SIZE: f64 = 1.24;
+/// A colour of SVG.
+pub(super) type Colour = &'static str;
 
-/// An error of plotters.
-pub(super) type Fault = DrawingAreaErrorKind<std::io::Error>;
+/// The colour of the background.
+pub(super) const WHITE: Colour = "#FFFFFF";
+
+/// A place in pixels.
+pub(super) type Point = (f64, f64);
 
 /// The position of a text relative to its point; always centred across the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +23,7 @@ pub(super) enum Align {
     Up,
 }
 
-/// A rectangle in pixels, y downwards.
+/// A rectangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Frame {
     pub left: f64,
@@ -39,156 +32,120 @@ pub(super) struct Frame {
     pub height: f64,
 }
 
-/// A drawing area with coordinates in pixels.
-pub(super) struct Sheet<'a>(pub(super) DrawingArea<SVGBackend<'a>, Shift>);
+/// Lengths of a dash and of the gap after it; `None` for a solid line.
+pub(super) type Dash = Option<(f64, f64)>;
 
-/// Converts pixels to steps. Casting saturates; the limit leaves room for plotters' own additions.
-pub(super) fn steps(pixels: f64) -> i32 {
-    (pixels * STEPS).clamp(-1e8, 1e8).round() as i32
+/// An SVG document that is being drawn.
+pub(super) struct Sheet(String);
+
+/// Writes a length to a tenth of a pixel, which is enough for the eye and the same on every
+/// machine.
+fn px(length: f64) -> f64 {
+    // Adding 0 turns −0 into 0.
+    (10.0 * length.clamp(-1e5, 1e5)).round() / 10.0 + 0.0
 }
 
-/// Returns the style of a line of this width in pixels.
-pub(super) fn pen(colour: RGBColor, width: f64) -> ShapeStyle {
-    colour.stroke_width(steps(width) as u32)
-}
-
-/// Returns plotters' text style of this type and colour.
-pub(super) fn font(style: Type, colour: RGBColor) -> TextStyle<'static> {
-    let weight = if style.bold { FontStyle::Bold } else { FontStyle::Normal };
-    let font = FontDesc::new(FontFamily::Name(FAMILY), style.size * STEPS * FONT_SIZE, weight);
-    TextStyle { color: colour.to_backend_color(), ..TextStyle::from(font) }
-}
-
-/// Removes control characters, which XML does not allow even escaped.
-pub(super) fn printable(text: &str) -> String {
+/// Replaces the characters that XML does not allow in texts.
+fn escaped(text: &str) -> String {
     let legal = |c: char| !c.is_control() && c != '\u{fffe}' && c != '\u{ffff}';
-    text.chars().map(|c| if legal(c) { c } else { ' ' }).collect()
+    let text: String = text.chars().map(|c| if legal(c) { c } else { ' ' }).collect();
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-impl Sheet<'_> {
+/// Returns the commands of a path through these points.
+fn path(points: &[Point]) -> String {
+    let mut commands = String::new();
+    for (x, y) in points {
+        let before = if commands.is_empty() { 'M' } else { ' ' };
+        let _ = write!(commands, "{before}{},{}", px(*x), px(*y));
+    }
+    commands
+}
+
+impl Sheet {
+    /// Begins a document of this size. Screen readers read the title.
+    pub fn new(title: &str, (width, height): (f64, f64)) -> Self {
+        let (width, height) = (width.ceil(), height.ceil());
+        Self(format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
+             viewBox=\"0 0 {width} {height}\" role=\"img\" stroke-linejoin=\"round\" fill=\"none\" \
+             font-family=\"{FAMILY}\">\n<title>{}</title>\n\
+             <rect width=\"100%\" height=\"100%\" fill=\"{WHITE}\"/>\n",
+            escaped(title),
+        ))
+    }
+
+    /// Ends the document.
+    pub fn finish(self) -> String {
+        self.0 + "</svg>\n"
+    }
+
     /// Draws a line of text.
-    pub(super) fn text(
-        &self,
-        (x, y): (f64, f64),
-        text: &str,
-        style: Type,
-        colour: RGBColor,
-        align: Align,
-    ) -> Result<(), Fault> {
-        if text.is_empty() {
-            return Ok(());
-        }
-        let (side, turn) = match align {
-            Align::Left => (HPos::Left, FontTransform::None),
-            Align::Center => (HPos::Center, FontTransform::None),
-            Align::Right => (HPos::Right, FontTransform::None),
-            Align::Up => (HPos::Center, FontTransform::Rotate270),
+    pub fn text(&mut self, (x, y): Point, text: &str, style: Type, colour: Colour, align: Align) {
+        let anchor = match align {
+            Align::Left => "start",
+            Align::Center | Align::Up => "middle",
+            Align::Right => "end",
         };
-        let style = font(style, colour).pos(Pos::new(side, VPos::Center)).transform(turn);
-        self.0.draw_text(&printable(text), &style, (steps(x), steps(y)))
+        let turn = if align == Align::Up { -90 } else { 0 };
+        let weight = if style.bold { " font-weight=\"bold\"" } else { "" };
+        let (x, y, size) = (px(x), px(y), style.size);
+        let _ = writeln!(
+            self.0,
+            "<text transform=\"translate({x} {y}) rotate({turn})\" y=\".35em\" \
+             text-anchor=\"{anchor}\" font-size=\"{size}\"{weight} fill=\"{colour}\">{}</text>",
+            escaped(text),
+        );
     }
 
     /// Draws lines of text, the first just below `top`.
-    pub(super) fn lines(
-        &self,
-        (x, top): (f64, f64),
+    pub fn lines(
+        &mut self,
+        (x, top): Point,
         lines: &[String],
         style: Type,
-        colour: RGBColor,
+        colour: Colour,
         align: Align,
-    ) -> Result<(), Fault> {
-        let place = |index: usize| (x, top + style.line() * (index as f64 + 0.5));
-        lines
-            .iter()
-            .enumerate()
-            .try_for_each(|(index, line)| self.text(place(index), line, style, colour, align))
+    ) {
+        for (line, index) in lines.iter().zip(0..) {
+            let middle = top + style.line() * (f64::from(index) + 0.5);
+            self.text((x, middle), line, style, colour, align);
+        }
+    }
+
+    /// Fills a polygon.
+    pub fn polygon(&mut self, corners: &[Point], colour: Colour, opacity: f64) {
+        let opacity = if opacity < 1.0 { format!(" opacity=\"{opacity}\"") } else { String::new() };
+        let _ = writeln!(self.0, "<path d=\"{}\" fill=\"{colour}\"{opacity}/>", path(corners));
+    }
+
+    /// Fills a polygon over its edge, of which the outer half is seen.
+    pub fn marker(&mut self, corners: &[Point], fill: Colour, edge: Colour, width: f64) {
+        let _ = writeln!(
+            self.0,
+            "<path d=\"{}z\" fill=\"{fill}\" stroke=\"{edge}\" stroke-width=\"{}\" \
+             paint-order=\"stroke\"/>",
+            path(corners),
+            px(width),
+        );
     }
 
     /// Fills a rectangle.
-    pub(super) fn rectangle(&self, frame: Frame, colour: impl Color) -> Result<(), Fault> {
-        let corner = |x: f64, y: f64| (steps(frame.left + x), steps(frame.top + y));
-        self.0.draw(&Rectangle::new(
-            [corner(0.0, 0.0), corner(frame.width, frame.height)],
-            colour.filled(),
-        ))
+    pub fn rectangle(&mut self, frame: Frame, colour: Colour, opacity: f64) {
+        let Frame { left, top, width, height } = frame;
+        let (right, bottom) = (left + width, top + height);
+        let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
+        self.polygon(&corners, colour, opacity);
     }
-}
 
-/// Makes an SVG document of this size in pixels, with integer coordinates, [`STEPS`] per pixel.
-/// Screen readers read the title.
-pub(super) fn svg(
-    title: &str,
-    (width, height): (f64, f64),
-    draw: impl FnOnce(&Sheet) -> Result<(), Fault>,
-) -> Result<String, FigureError> {
-    let across = steps(width.ceil());
-    let down = steps(height.ceil());
-    let mut body = String::new();
-    {
-        let area =
-            SVGBackend::with_string(&mut body, (across as u32, down as u32)).into_drawing_area();
-        let refused =
-            |fault: Fault| FigureError::Draw { title: title.to_owned(), reason: fault.to_string() };
-        draw(&Sheet(area.clone())).map_err(refused)?;
-        area.present().map_err(refused)?;
-    }
-    let title = printable(title).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
-    let mut document = String::new();
-    let _ = write!(
-        document,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" viewBox=\"0 0 {across} {down}\" \
-         role=\"img\" stroke-linejoin=\"round\">\n<title>{title}</title>\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>\n{}</svg>\n",
-        width.ceil(),
-        height.ceil(),
-        joined(&body),
-    );
-    Ok(document)
-}
-
-/// Joins successive lines of one style, such as the dashes of a line, into one element. The
-/// document shrinks to a fifth.
-fn joined(svg: &str) -> String {
-    let mut joined = String::with_capacity(svg.len());
-    let mut open: Option<&str> = None;
-    for line in svg.lines() {
-        let path = line.strip_prefix("<polyline ").and_then(|rest| rest.split_once(" points=\""));
-        if open.is_some() && open != path.map(|(style, _)| style) {
-            joined.push_str("\"/>\n");
-            open = None;
-        }
-        match path {
-            Some((style, points)) => {
-                if open.is_none() {
-                    let _ = write!(joined, "<path {style} d=\"");
-                    open = Some(style);
-                }
-                let _ = write!(joined, "M{}", points.trim_end_matches([' ', '"', '/', '>']));
-            }
-            None => {
-                joined.push_str(line);
-                joined.push('\n');
-            }
-        }
-    }
-    joined
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn dashes_of_one_style_become_one_path() {
-        let line =
-            |style: &str, points: &str| format!("<polyline {style} points=\"{points} \"/>\n");
-        let svg = format!(
-            "<svg>\n{}{}{}</svg>\n",
-            line("a", "1,2 3,4"),
-            line("a", "5,6 7,8"),
-            line("b", "1,1 2,2")
+    /// Draws a line through these points.
+    pub fn line(&mut self, points: &[Point], colour: Colour, width: f64, dash: Dash) {
+        let dash =
+            dash.map_or_else(String::new, |(on, off)| format!(" stroke-dasharray=\"{on} {off}\""));
+        let _ = writeln!(
+            self.0,
+            "<path d=\"{}\" stroke=\"{colour}\" stroke-width=\"{width}\"{dash}/>",
+            path(points),
         );
-        let paths = "<path a d=\"M1,2 3,4M5,6 7,8\"/>\n<path b d=\"M1,1 2,2\"/>\n";
-        assert_eq!(joined(&svg), format!("<svg>\n{paths}</svg>\n"));
     }
 }

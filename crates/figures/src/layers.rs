@@ -2,50 +2,46 @@
 
 use std::collections::BTreeSet;
 
-use plotters::element::{DashedPathElement, EmptyElement, PathElement, Polygon};
-use plotters::prelude::{Cartesian2d, Color, DrawingArea, SVGBackend};
-
 use super::axis::Ruled;
-use super::canvas::{Fault, Frame, pen, steps};
+use super::canvas::{Frame, Point, Sheet};
 use super::model::{Layer, Marks};
-use super::style::{BAND, REFERENCE_LINE, Stroke, Strokes, WHITE};
+use super::style::{BAND, REFERENCE_LINE, Stroke, Strokes};
 
 /// Width of data lines.
 const LINE: f64 = 2.5;
 /// Width of spans and reference lines.
 const THIN: f64 = 1.5;
 
-type Point = (f64, f64);
-type Area<'a> = DrawingArea<SVGBackend<'a>, Cartesian2d<Ruled, Ruled>>;
-
-/// The layers of a panel being drawn.
-pub(super) struct Layers<'a, 's> {
+/// The layers of a panel being drawn. Their points are in coordinates.
+pub(super) struct Layers<'a> {
     pub layers: &'a [Layer],
     /// The horizontal axis.
     pub x: &'a Ruled,
     /// The vertical axis.
     pub y: &'a Ruled,
-    pub area: &'a Area<'s>,
     pub strokes: &'a Strokes,
     /// The place of the plot on the sheet.
     pub frame: Frame,
 }
 
-impl Layers<'_, '_> {
+impl Layers<'_> {
     /// Draws all layers, each kind of marks on top of the kinds before.
-    pub fn draw(&self) -> Result<(), Fault> {
-        let layers = self.layers;
-        layers.iter().try_for_each(|layer| self.band(layer))?;
-        layers.iter().try_for_each(|layer| self.reference(layer))?;
-        layers.iter().try_for_each(|layer| self.spans(layer))?;
-        layers.iter().try_for_each(|layer| self.line(layer))?;
-        self.points()
+    pub fn draw(&self, sheet: &mut Sheet) {
+        self.layers.iter().for_each(|layer| self.band(sheet, layer));
+        self.layers.iter().for_each(|layer| self.thin(sheet, layer));
+        self.layers.iter().for_each(|layer| self.line(sheet, layer));
+        self.points(sheet);
     }
 
-    fn band(&self, layer: &Layer) -> Result<(), Fault> {
-        let Marks::Band(points) = &layer.marks else { return Ok(()) };
-        let x = self.x;
-        let y = self.y;
+    /// Returns the place of a point on the sheet.
+    fn place(&self, at: &Point) -> Point {
+        let Frame { left, top, width, height } = self.frame;
+        (left + self.x.fraction(at.0) * width, top + (1.0 - self.y.fraction(at.1)) * height)
+    }
+
+    fn band(&self, sheet: &mut Sheet, layer: &Layer) {
+        let Marks::Band(points) = &layer.marks else { return };
+        let (x, y) = (self.x, self.y);
         let at = |&(at, low, high): &(f64, f64, f64)| {
             Some((x.nearest(at)?, y.nearest(low)?, y.nearest(high)?))
         };
@@ -55,71 +51,61 @@ impl Layers<'_, '_> {
                 self.thinned(&side)
             };
             let upper = side(|point| point.2).into_iter().rev();
-            let outline: Vec<Point> = side(|point| point.1).into_iter().chain(upper).collect();
-            self.area
-                .draw(&Polygon::new(outline, self.strokes.of(&layer.name).colour.mix(BAND)))?;
+            let outline = side(|point| point.1).into_iter().chain(upper);
+            let outline: Vec<Point> = outline.map(|at| self.place(&at)).collect();
+            sheet.polygon(&outline, self.strokes.of(&layer.name).colour, BAND);
         }
-        Ok(())
     }
 
-    /// Draws the part of every span that is inside the panel.
-    fn spans(&self, layer: &Layer) -> Result<(), Fault> {
-        let Marks::Spans(spans) = &layer.marks else { return Ok(()) };
-        let style = pen(self.strokes.of(&layer.name).colour, THIN);
-        let end = |&(x, y): &Point| Some((self.x.nearest(x)?, self.y.nearest(y)?));
-        spans
-            .iter()
-            .filter_map(|[from, to]| Some(vec![end(from)?, end(to)?]))
-            .try_for_each(|ends| self.area.draw(&PathElement::new(ends, style)))
-    }
-
-    fn reference(&self, layer: &Layer) -> Result<(), Fault> {
-        let x = self.x;
-        let y = self.y;
-        let ends = match layer.marks {
-            Marks::HLine(at) => y.shown(at).map(|at| vec![(x.low, at), (x.high, at)]),
-            Marks::VLine(at) => x.shown(at).map(|at| vec![(at, y.low), (at, y.high)]),
-            _ => None,
+    /// Draws reference lines, and the part of every span that is inside the panel.
+    fn thin(&self, sheet: &mut Sheet, layer: &Layer) {
+        let (x, y) = (self.x, self.y);
+        let mut draw = |ends: [Point; 2], stroke: Stroke| {
+            sheet.line(&ends.map(|end| self.place(&end)), stroke.colour, THIN, stroke.dash);
         };
-        ends.map_or(Ok(()), |ends| self.stroke(ends, REFERENCE_LINE, THIN))
-    }
-
-    fn line(&self, layer: &Layer) -> Result<(), Fault> {
-        let stroke = self.strokes.of(&layer.name);
-        self.paths(layer).into_iter().try_for_each(|path| self.stroke(path, stroke, LINE))
-    }
-
-    fn stroke(&self, path: Vec<Point>, stroke: Stroke, width: f64) -> Result<(), Fault> {
-        let style = pen(stroke.colour, width);
-        match stroke.dash {
-            None => self.area.draw(&PathElement::new(path, style)),
-            Some((on, off)) => {
-                self.area.draw(&DashedPathElement::new(path, steps(on), steps(off), style))
+        match &layer.marks {
+            Marks::HLine(at) => {
+                let ends = y.shown(*at).map(|at| [(x.low, at), (x.high, at)]);
+                ends.into_iter().for_each(|ends| draw(ends, REFERENCE_LINE));
             }
+            Marks::VLine(at) => {
+                let ends = x.shown(*at).map(|at| [(at, y.low), (at, y.high)]);
+                ends.into_iter().for_each(|ends| draw(ends, REFERENCE_LINE));
+            }
+            Marks::Spans(spans) => {
+                let solid = Stroke { dash: None, ..self.strokes.of(&layer.name) };
+                let end = |&(at, height): &Point| Some((x.nearest(at)?, y.nearest(height)?));
+                let spans = spans.iter().filter_map(|[from, to]| Some([end(from)?, end(to)?]));
+                spans.for_each(|span| draw(span, solid));
+            }
+            _ => {}
         }
     }
 
-    /// Draws a marker with a white edge, which separates it from its neighbours.
-    fn marker(&self, at: Point, stroke: Stroke, radius: f64, edge: f64) -> Result<(), Fault> {
-        let centre = if stroke.hollow { WHITE } else { stroke.colour };
-        let rings = [(radius + edge, WHITE), (radius, stroke.colour), (0.6 * radius, centre)];
-        for (radius, colour) in &rings[..if stroke.hollow { 3 } else { 2 }] {
-            self.area
-                .draw(&(EmptyElement::at(at) + Polygon::new(stroke.outline(*radius), colour)))?;
+    /// Draws the unbroken parts of a line or staircase. Points outside the panel move to its edge.
+    fn line(&self, sheet: &mut Sheet, layer: &Layer) {
+        let (Marks::Line(points) | Marks::Steps(points)) = &layer.marks else { return };
+        let stairs = matches!(layer.marks, Marks::Steps(_));
+        let stroke = self.strokes.of(&layer.name);
+        let shown = |axis: &Ruled, value| {
+            axis.nearest(value).filter(|_| stairs || axis.coordinate(value).is_some())
+        };
+        let at = |point: &Point| Some((shown(self.x, point.0)?, shown(self.y, point.1)?));
+        for path in runs(points.iter().map(at)) {
+            let path = self.thinned(&stepped(path, stairs));
+            let path: Vec<Point> = path.iter().map(|at| self.place(at)).collect();
+            sheet.line(&path, stroke.colour, LINE, stroke.dash);
         }
-        Ok(())
     }
 
     /// Draws points, smaller if there are many, and one marker for points that look the same.
-    fn points(&self) -> Result<(), Fault> {
-        let x = self.x;
-        let y = self.y;
+    fn points(&self, sheet: &mut Sheet) {
         let mut all: Vec<(&str, Point)> = Vec::new();
         for layer in self.layers {
             let Marks::Points(points) = &layer.marks else { continue };
-            let shown = |point: &Point| Some((x.shown(point.0)?, y.shown(point.1)?));
-            let name = layer.name.as_str();
-            all.extend(points.iter().filter_map(|point| Some((name, shown(point)?))));
+            let shown = |point: &Point| Some((self.x.shown(point.0)?, self.y.shown(point.1)?));
+            let placed = points.iter().filter_map(shown).map(|at| self.place(&at));
+            all.extend(placed.map(|at| (layer.name.as_str(), at)));
         }
         // Many large points would hide each other.
         let (radius, edge, grain) = match all.len() {
@@ -127,31 +113,13 @@ impl Layers<'_, '_> {
             300..3000 => (2.5, 0.3, 0.5),
             _ => (1.5, 0.0, 1.0),
         };
-        let cell = |axis: &Ruled, at: f64, length: f64| {
-            (axis.fraction(at) * length / grain).round() as i32
-        };
         // A hundred thousand points would make an SVG of megabytes that looks the same.
+        let cell = |length: f64| (length / grain).round() as i32;
         let mut seen: BTreeSet<(&str, i32, i32)> = BTreeSet::new();
-        all.retain(|&(name, at)| {
-            seen.insert((name, cell(x, at.0, self.frame.width), cell(y, at.1, self.frame.height)))
-        });
-        all.into_iter()
-            .try_for_each(|(name, at)| self.marker(at, self.strokes.of(name), radius, edge))
-    }
-
-    /// Returns the unbroken parts of a line or staircase. Points outside the panel move to its
-    /// edge.
-    fn paths(&self, layer: &Layer) -> Vec<Vec<Point>> {
-        let (Marks::Line(points) | Marks::Steps(points)) = &layer.marks else { return Vec::new() };
-        let stairs = matches!(layer.marks, Marks::Steps(_));
-        let shown = |axis: &Ruled, value| {
-            axis.nearest(value).filter(|_| stairs || axis.coordinate(value).is_some())
-        };
-        let at = |point: &Point| Some((shown(self.x, point.0)?, shown(self.y, point.1)?));
-        runs(points.iter().map(at))
-            .into_iter()
-            .map(|path| self.thinned(&stepped(path, stairs)))
-            .collect()
+        all.retain(|&(name, (x, y))| seen.insert((name, cell(x), cell(y))));
+        for (name, at) in all {
+            self.strokes.of(name).mark(sheet, at, radius, edge);
+        }
     }
 
     /// Thins a path without a visible change: of successive points within half a pixel of x, keeps

@@ -1,11 +1,8 @@
 //! The legend of a figure: its series and reference lines, shared by all panels.
 
-use plotters::element::{DashedPathElement, Polygon};
-use plotters::style::Color;
-
-use super::canvas::{Align, Fault, Frame, Sheet, pen, steps};
+use super::canvas::{Align, Frame, Point, Sheet};
 use super::model::{Figure, Layer, Marks};
-use super::style::{BAND, INK, REFERENCE_LINE, Stroke, Strokes, WHITE};
+use super::style::{BAND, INK, REFERENCE_LINE, Stroke, Strokes};
 use super::text::{BODY, Fonts};
 
 /// Width of a sample.
@@ -79,43 +76,24 @@ impl Legend {
     }
 
     /// Draws the entries with their upper left corner at a point.
-    pub fn draw(&self, sheet: &Sheet, corner: (f64, f64)) -> Result<(), Fault> {
+    pub fn draw(&self, sheet: &mut Sheet, corner: Point) {
         for (index, entry) in self.entries.iter().enumerate() {
             let left = corner.0 + self.column_width * (index % self.columns) as f64;
             let middle = corner.1 + ROW * ((index / self.columns) as f64 + 0.5);
-            entry.draw(sheet, left, middle)?;
-            sheet.text((left + SAMPLE + GAPS.0, middle), &entry.name, BODY, INK, Align::Left)?;
-        }
-        Ok(())
-    }
-}
-
-impl Entry {
-    /// Draws a sample of the marks, its left end at a point.
-    fn draw(&self, sheet: &Sheet, left: f64, middle: f64) -> Result<(), Fault> {
-        let colour = self.stroke.colour;
-        let style = pen(self.stroke.colour, 2.0);
-        let ends = [left, left + SAMPLE].map(|x| (steps(x), steps(middle)));
-        if self.area {
-            sheet.rectangle(
-                Frame { left: left + 8.0, top: middle - 6.0, width: 14.0, height: 12.0 },
-                colour.mix(BAND),
-            )?;
-        }
-        if self.line {
-            let (on, off) = self.stroke.dash.unwrap_or((SAMPLE, 1.0));
-            sheet.0.draw(&DashedPathElement::new(ends, steps(on), steps(off), style))?;
-        }
-        if self.marker {
-            let x = steps(left + SAMPLE / 2.0);
-            let y = steps(middle);
-            let rings = [(5.0, colour), (3.0, if self.stroke.hollow { WHITE } else { colour })];
-            for (radius, colour) in rings {
-                let outline = self.stroke.outline(radius).into_iter();
-                let corners: Vec<_> = outline.map(|(dx, dy)| (x + dx, y + dy)).collect();
-                sheet.0.draw(&Polygon::new(corners, colour))?;
+            let Entry { stroke, .. } = entry;
+            if entry.area {
+                let frame =
+                    Frame { left: left + 8.0, top: middle - 6.0, width: 14.0, height: 12.0 };
+                sheet.rectangle(frame, stroke.colour, BAND);
             }
+            if entry.line {
+                let ends = [(left, middle), (left + SAMPLE, middle)];
+                sheet.line(&ends, stroke.colour, 2.0, stroke.dash);
+            }
+            if entry.marker {
+                stroke.mark(sheet, (left + SAMPLE / 2.0, middle), 5.0, 0.0);
+            }
+            sheet.text((left + SAMPLE + GAPS.0, middle), &entry.name, BODY, INK, Align::Left);
         }
-        Ok(())
     }
 }

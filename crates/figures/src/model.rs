@@ -82,7 +82,7 @@ pub struct Panel {
 /// The quantity along one side of a panel, and the part of it that is shown.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Axis {
-    /// Name and unit, such as `time (s)`. A power of ten that all ticks share is appended.
+    /// Name and unit, such as `time (s)`.
     pub label: String,
     /// The map from values to positions.
     pub scale: Scale,
@@ -210,9 +210,6 @@ impl Layer {
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "each message names its fields")]
 pub enum FigureError {
-    /// The drawing library failed.
-    #[error("figure '{title}' could not be drawn: {reason}")]
-    Draw { title: String, reason: String },
     /// One of the fonts in the program could not be read.
     #[error("the embedded font could not be read: {reason}")]
     Font { reason: String },

@@ -1,14 +1,11 @@
-//! Draws one panel as a plotters chart: ticks, labels and, by [`Layers`], the marks.
-
-use plotters::chart::ChartBuilder;
+//! Draws one panel: axes, ticks, names and, by [`Layers`], the marks.
 
 use super::axis::{Ruled, axes};
-use super::canvas::{Align, Fault, Frame, Sheet, font, pen, steps};
+use super::canvas::{Align, Frame, Sheet, WHITE};
 use super::layers::Layers;
 use super::model::{Marks, Panel, Scale, Unit};
-use super::style::{FAINT, GREY, GRID, INK, Strokes, WHITE};
+use super::style::{FAINT, GREY, GRID, INK, Strokes};
 use super::text::{BODY, Fonts, HEADING};
-use plotters::style::Color;
 
 /// Length of ticks; their labels are twice as far from the axis.
 const TICK: f64 = 4.0;
@@ -46,7 +43,7 @@ impl<'a> Plot<'a> {
     pub fn new(panel: &'a Panel, height: f64, fonts: &Fonts) -> Self {
         let (x, mut y, has_data) = axes(panel);
         y.rule((height / 34.0) as usize);
-        let y_label = fonts.wrap(&format!("{} {}", panel.y.label, y.factor), height, BODY);
+        let y_label = fonts.wrap(&panel.y.label, height, BODY);
         let (names, height) = match &panel.y.scale {
             Scale::Rows(names, row) => (
                 names.iter().map(|name| fonts.shorten(name, NAMES, BODY)).collect(),
@@ -92,8 +89,9 @@ impl<'a> Plot<'a> {
     /// Finds the ticks of an x axis of this width, breaks the texts above and below into lines,
     /// and finds places for the texts in the plot.
     pub fn fit_width(&mut self, width: f64, fonts: &Fonts) {
-        self.x.rule((width / 70.0) as usize);
-        // Labels of a logarithmic axis come closer and closer; of two that touch, one is enough.
+        let apart = if self.panel.x.scale == Scale::Log { 70.0 } else { 40.0 };
+        self.x.rule((width / apart) as usize);
+        // Of two labels that would touch, one is enough.
         let mut end = f64::NEG_INFINITY;
         let axis = self.x.clone();
         self.x.major.retain(|(at, label)| {
@@ -107,8 +105,7 @@ impl<'a> Plot<'a> {
         });
         self.title = fonts.wrap(&self.panel.title, width, HEADING);
         self.above = HEADING.line() * self.title.len() as f64 + 5.0;
-        self.x_label =
-            fonts.wrap(&format!("{} {}", self.panel.x.label, self.x.factor), width, BODY);
+        self.x_label = fonts.wrap(&self.panel.x.label, width, BODY);
         let ticks = if self.panel.x.unit == Unit::Bare { 0.0 } else { 2.0 * TICK + BODY.line() };
         self.below = (ticks + LABEL + BODY.line() * self.x_label.len() as f64).ceil();
         let mut texts: Vec<_> = self
@@ -140,56 +137,55 @@ impl<'a> Plot<'a> {
     }
 
     /// Draws the panel with its plot in a place of the sheet.
-    pub fn draw(&self, sheet: &Sheet, frame: Frame, strokes: &Strokes) -> Result<(), Fault> {
+    pub fn draw(&self, sheet: &mut Sheet, frame: Frame, strokes: &Strokes) {
         let Frame { left, top, width, height } = frame;
-        let area = sheet.0.clone().shrink(
-            (steps(left - self.left), steps(top)),
-            (steps(self.left + width), steps(height + self.below)),
-        );
-        let mut chart = ChartBuilder::on(&area)
-            .y_label_area_size(steps(self.left))
-            .x_label_area_size(steps(self.below))
-            .build_cartesian_2d(self.x.clone(), self.y.clone())?;
-        chart
-            .configure_mesh()
-            .bold_line_style(pen(GRID, 1.0))
-            .light_line_style(pen(FAINT, 1.0))
-            .axis_style(pen(INK, 1.0))
-            .label_style(font(BODY, INK))
-            .set_all_tick_mark_size(steps(if self.panel.x.unit == Unit::Bare { 0.0 } else { TICK }))
-            .draw()?;
-        Layers {
-            layers: &self.panel.layers,
-            x: &self.x,
-            y: &self.y,
-            area: chart.plotting_area(),
-            strokes,
-            frame,
+        let (right, bottom) = (left + width, top + height);
+        let (centre, middle) = (left + width / 2.0, top + height / 2.0);
+        let across = |at: f64| left + self.x.fraction(at) * width;
+        let down = |at: f64| bottom - self.y.fraction(at) * height;
+        let majors = |axis: &Ruled| axis.major.iter().map(|tick| tick.0).collect();
+        let minors: [Vec<f64>; 2] = [self.x.minor.clone(), self.y.minor.clone()];
+        for ([xs, ys], colour) in [(minors, FAINT), ([majors(&self.x), majors(&self.y)], GRID)] {
+            for x in xs.into_iter().map(across) {
+                sheet.line(&[(x, top), (x, bottom)], colour, 1.0, None);
+            }
+            for y in ys.into_iter().map(down) {
+                sheet.line(&[(left, y), (right, y)], colour, 1.0, None);
+            }
         }
-        .draw()?;
-
-        sheet.lines((left, top - self.above), &self.title, HEADING, INK, Align::Left)?;
-        let centre = left + width / 2.0;
-        let middle = top + height / 2.0;
-        let bottom = top + height;
-        if !self.has_data {
-            sheet.text((centre, middle), "no data", BODY, GREY, Align::Center)?;
+        sheet.line(&[(left, top), (left, bottom), (right, bottom)], INK, 1.0, None);
+        let (layers, x, y) = (&self.panel.layers, &self.x, &self.y);
+        Layers { layers, x, y, strokes, frame }.draw(sheet);
+        for (at, label) in &self.x.major {
+            let x = across(*at);
+            sheet.line(&[(x, bottom), (x, bottom + TICK)], INK, 1.0, None);
+            let below = bottom + 2.0 * TICK + BODY.line() / 2.0;
+            sheet.text((x, below), label, BODY, INK, Align::Center);
+        }
+        for (at, label) in &self.y.major {
+            let y = down(*at);
+            sheet.line(&[(left - TICK, y), (left, y)], INK, 1.0, None);
+            sheet.text((left - 2.0 * TICK, y), label, BODY, INK, Align::Right);
         }
         for (row, name) in (0..).zip(&self.names) {
-            let y = bottom - self.y.fraction(-f64::from(row)) * height;
-            sheet.text((left - 2.0 * TICK, y), name, BODY, INK, Align::Right)?;
+            let place = (left - 2.0 * TICK, down(-f64::from(row)));
+            sheet.text(place, name, BODY, INK, Align::Right);
         }
         for &(x, y, width, name) in &self.texts {
             let height = BODY.size;
             let ground = Frame { left: left + x, top: top + y - height / 2.0, width, height };
-            sheet.rectangle(ground, WHITE.mix(0.7))?;
-            sheet.text((left + x, top + y), name, BODY, strokes.of(name).colour, Align::Left)?;
+            sheet.rectangle(ground, WHITE, 0.7);
+            sheet.text((left + x, top + y), name, BODY, strokes.of(name).colour, Align::Left);
         }
+        if !self.has_data {
+            sheet.text((centre, middle), "no data", BODY, GREY, Align::Center);
+        }
+        sheet.lines((left, top - self.above), &self.title, HEADING, INK, Align::Left);
         let below = bottom + self.below - BODY.line() * self.x_label.len() as f64;
-        sheet.lines((centre, below), &self.x_label, BODY, INK, Align::Center)?;
-        self.y_label.iter().zip(0..).try_for_each(|(line, index)| {
+        sheet.lines((centre, below), &self.x_label, BODY, INK, Align::Center);
+        for (line, index) in self.y_label.iter().zip(0..) {
             let beside = left - self.left + BODY.line() * (f64::from(index) + 0.5);
-            sheet.text((beside, middle), line, BODY, INK, Align::Up)
-        })
+            sheet.text((beside, middle), line, BODY, INK, Align::Up);
+        }
     }
 }

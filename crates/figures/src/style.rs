@@ -1,51 +1,32 @@
 //! Gives every series of a figure its colour, dash and marker.
 
-use plotters::style::RGBColor;
-
-use super::canvas::steps;
+use super::canvas::{Colour, Dash, Point, Sheet, WHITE};
 use super::model::{Figure, Hue, Look, Shape};
 
-/// The colour of the background.
-pub(super) const WHITE: RGBColor = RGBColor(255, 255, 255);
 /// The colour of text and axes.
-pub(super) const INK: RGBColor = RGBColor(34, 34, 34);
+pub(super) const INK: Colour = "#222222";
 /// The colour of captions and reference lines.
-pub(super) const GREY: RGBColor = RGBColor(85, 85, 85);
+pub(super) const GREY: Colour = "#555555";
 /// The colour of grid lines at labelled ticks.
-pub(super) const GRID: RGBColor = RGBColor(221, 221, 221);
+pub(super) const GRID: Colour = "#DDDDDD";
 /// The colour of grid lines between labelled ticks.
-pub(super) const FAINT: RGBColor = RGBColor(240, 240, 240);
+pub(super) const FAINT: Colour = "#F0F0F0";
 
 /// The opacity of bands.
 pub(super) const BAND: f64 = 0.2;
 
 /// The colours by [`Hue`].
-const PALETTE: [RGBColor; 13] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
-    RGBColor(136, 34, 85),
-    RGBColor(130, 130, 130),
-    RGBColor(51, 34, 136),
-    RGBColor(153, 153, 51),
-    RGBColor(140, 86, 75),
-    RGBColor(17, 119, 51),
-    INK,
+const PALETTE: [Colour; 13] = [
+    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#882255", "#828282",
+    "#332288", "#999933", "#8C564B", "#117733", INK,
 ];
 
-/// Lengths of a dash and of the gap after it in pixels; `None` for a solid line.
-type Dash = Option<(f64, f64)>;
 /// The dashes of series, by [`Shape`], repeating.
 const DASHES: [Dash; 3] = [None, Some((9.0, 3.0)), Some((3.0, 2.5))];
-/// The dash of reference lines.
-const REFERENCE_DASH: Dash = Some((5.0, 4.0));
 
 /// A star: number of points, inner radius relative to the outer radius, and direction of the first
 /// point in turns, clockwise from the right. A regular polygon is a star without notches.
-type Star = (u32, f64, f64);
+pub(super) type Star = (u32, f64, f64);
 /// The markers by [`Shape`].
 const MARKERS: [Star; 8] = [
     (6, 1.0, 0.0),
@@ -61,11 +42,11 @@ const MARKERS: [Star; 8] = [
 /// The colour, dash and marker of one series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Stroke {
-    pub colour: RGBColor,
+    pub colour: Colour,
     pub dash: Dash,
     /// True for markers with a white centre.
     pub hollow: bool,
-    marker: Star,
+    pub marker: Star,
 }
 
 impl Stroke {
@@ -78,16 +59,25 @@ impl Stroke {
         }
     }
 
-    /// Returns the marker around the origin as a polygon with about the area of a disc of this
+    /// Draws the marker with a white edge, which separates it from its neighbours.
+    pub fn mark(&self, sheet: &mut Sheet, at: Point, radius: f64, edge: f64) {
+        let (fill, line, width) = match self.hollow {
+            true => (WHITE, self.colour, 0.7 * radius),
+            false => (self.colour, WHITE, 2.0 * edge),
+        };
+        sheet.marker(&self.outline(at, radius), fill, line, width);
+    }
+
+    /// Returns the marker around a point as a polygon with about the area of a disc of this
     /// radius.
-    pub fn outline(&self, radius: f64) -> Vec<(i32, i32)> {
+    fn outline(&self, (x, y): Point, radius: f64) -> Vec<Point> {
         let (points, inner, first) = self.marker;
         let outer = radius * (1.6 - 0.6 * inner);
         let corner = |index: u32| {
             let turn = f64::from(index) / f64::from(2 * points);
             let part = if index.is_multiple_of(2) { 1.0 } else { inner };
             let (sin, cos) = libm::sincos(std::f64::consts::TAU * (first + turn));
-            (steps(outer * part * cos), steps(outer * part * sin))
+            (x + outer * part * cos, y + outer * part * sin)
         };
         (0..2 * points).map(corner).collect()
     }
@@ -95,28 +85,18 @@ impl Stroke {
 
 /// The stroke of reference lines.
 pub(super) const REFERENCE_LINE: Stroke =
-    Stroke { colour: GREY, dash: REFERENCE_DASH, hollow: false, marker: MARKERS[0] };
+    Stroke { colour: GREY, dash: Some((5.0, 4.0)), hollow: false, marker: MARKERS[0] };
 /// The stroke of series without a name.
 const UNNAMED: Stroke = Stroke { colour: GREY, dash: None, hollow: false, marker: MARKERS[0] };
 
-/// The looks of series without a given one, in order.
-const FREE: [Look; 12] = {
+/// The colours of series without a given look, in order; their markers repeat.
+const FREE: [Hue; 12] = {
     use Hue::{Amber, Blue, Brown, Forest, Green, Grey, Indigo, Olive, Orange, Pink, Sky, Wine};
+    [Blue, Orange, Green, Pink, Amber, Sky, Wine, Grey, Indigo, Olive, Brown, Forest]
+};
+const SHAPES: [Shape; 7] = {
     use Shape::{Cross, Diamond, Disc, Inverted, Square, Star, Triangle};
-    [
-        Look { hue: Blue, shape: Disc },
-        Look { hue: Orange, shape: Square },
-        Look { hue: Green, shape: Triangle },
-        Look { hue: Pink, shape: Diamond },
-        Look { hue: Amber, shape: Inverted },
-        Look { hue: Sky, shape: Cross },
-        Look { hue: Wine, shape: Star },
-        Look { hue: Grey, shape: Disc },
-        Look { hue: Indigo, shape: Square },
-        Look { hue: Olive, shape: Triangle },
-        Look { hue: Brown, shape: Diamond },
-        Look { hue: Forest, shape: Inverted },
-    ]
+    [Disc, Square, Triangle, Diamond, Inverted, Cross, Star]
 };
 
 /// The strokes of all series of a figure, in order of their first appearance.
@@ -135,10 +115,11 @@ impl Strokes {
             figure.looks.iter().find(|(known, _)| known == name).map(|&(_, look)| look)
         };
         // Series without a look of their own get colours that no other has, while they last.
-        let is_free = |look: &&Look| {
+        let free = FREE.iter().zip(SHAPES.iter().cycle()).map(|(&hue, &shape)| Look { hue, shape });
+        let is_free = |look: &Look| {
             names.iter().filter_map(|name| given(name)).all(|own| own.hue != look.hue)
         };
-        let mut free = FREE.iter().filter(is_free).chain(FREE.iter().cycle()).copied();
+        let mut free = free.clone().filter(is_free).chain(free.cycle());
         let mut looks: Vec<Look> = Vec::new();
         for name in &names {
             let own = given(name).filter(|look| !looks.contains(look));
@@ -182,6 +163,9 @@ mod tests {
     fn looks_given_in_advance_are_kept_and_their_colours_not_given_again() {
         let given = Look { hue: Hue::Blue, shape: Shape::Star };
         let series = strokes(&["MF", "GRASP"].map(str::to_owned), vec![("GRASP".into(), given)]);
-        assert_eq!((series[0].1, series[1].1), (Stroke::of(FREE[1]), Stroke::of(given)));
+        assert_eq!(
+            (series[0].1, series[1].1),
+            (Stroke::of(Look { hue: Hue::Orange, shape: Shape::Square }), Stroke::of(given))
+        );
     }
 }

@@ -46,9 +46,9 @@ impl Section {
         })
     }
 
-    /// Returns what the experiment's rows say.
-    fn findings(&self) -> Vec<&String> {
-        self.outputs.iter().filter_map(|output| output.finding.as_ref()).collect()
+    /// Returns the first thing that the experiment's rows say.
+    fn finding(&self) -> Option<&String> {
+        self.outputs.iter().find_map(|output| output.finding.as_ref())
     }
 
     /// Returns the comparisons with the paper's numbers and words.
@@ -104,7 +104,7 @@ fn page(sections: &[Section]) -> Markup {
                         @for section in sections {
                             li {
                                 a href={ "#" (in_url(&section.name)) } { (section.question) }
-                                @for finding in section.findings() { " " (finding) "." }
+                                @if let Some(finding) = section.finding() { " " (finding) "." }
                             }
                         }
                     }
@@ -125,16 +125,16 @@ fn scoreboard(sections: &[Section]) -> Markup {
                     "Ng & Trifonov (2003) beside ours. Their scenes are gone; ours are stand-ins. \
                      Costs are ratios to the greedy Müller–Fellner tree."
                 } }
-                thead { tr { @for name in ["source", "scene", "quantity", "paper", "ours", "verdict"] {
+                thead { tr { @for name in ["source", "paper", "ours", "verdict", "scene", "quantity"] {
                     th scope="col" { (name) }
                 } } }
                 tbody { @for section in sections { @for row in section.paper() { tr {
                     th scope="row" { a href={ "#" (in_url(&section.name)) } { (row.source) } }
-                    td { (row.scene) }
-                    td { (row.quantity) }
                     td.number { (row.paper) }
                     td.number { (row.ours) }
                     td { (row.verdict.name()) }
+                    td { (row.scene) }
+                    td { (row.quantity) }
                 } } } }
             } }
         }
@@ -148,7 +148,7 @@ fn experiment(section: &Section) -> Markup {
     html! {
         section id=(in_url(&section.name)) {
             h2 { (section.question) }
-            @for finding in section.findings() { p { (finding) "." } }
+            @if let Some(finding) = section.finding() { p { (finding) "." } }
             @for (name, path) in &section.figures {
                 figure { img.sheet src=(path) alt=(name) loading="lazy"; }
             }

@@ -2,11 +2,9 @@
 
 use super::config::check_file;
 use super::data::ratio;
-use super::output::text_table;
 use super::prelude::*;
 use super::progress::{Series, WORST, series};
-use crate::statistics::{median, quartiles};
-use bvh_config::{OutOfRange, above};
+use crate::statistics::quartiles;
 
 bvh_config::config! { serde;
     /// Error against run time.
@@ -19,10 +17,8 @@ bvh_config::config! { serde;
         file: String = "anytime".into();
         /// Labels of the methods. One event per run, as a builder has, is shown as a point.
         methods: Vec<String>, in OneOrMore;
-        /// Seconds, ascending, at which the table for the terminal reads the curves.
-        at_seconds: Vec<f64> = vec![0.1, 1.0, 10.0, 60.0], in above(0.0);
     }
-    check Self::check_names;
+    check |config: &Self| check_file(&config.file);
 }
 
 /// One corner of a curve, which is flat up to the next, or its end, as written to
@@ -72,35 +68,7 @@ impl Config {
         let caption = format!("{}. {caption}", output.heading);
         output.add_figure(&file, caption, 2, panels);
         output.add_csv(file, &corners(&points))?;
-        self.add_table(&mut output, rows);
         Ok(output)
-    }
-
-    fn check_names(&self) -> impl Iterator<Item = OutOfRange> {
-        let falls = !self.at_seconds.is_sorted_by(|a, b| a < b);
-        let falls = falls.then(|| {
-            OutOfRange::new("at_seconds", format!("{:?}", self.at_seconds), "ascending numbers")
-        });
-        falls.into_iter().chain(check_file(&self.file))
-    }
-
-    fn add_table(&self, output: &mut Output, rows: &Rows) {
-        let seconds = self.at_seconds.iter().map(|seconds| format!("{seconds} s"));
-        let header: Vec<String> =
-            ["scene".into(), "method".into()].into_iter().chain(seconds).collect();
-        let mut table = text_table(header.iter().map(String::as_str));
-        for scene in rows.scenes() {
-            for method in &self.methods {
-                let runs = series(rows, scene, method);
-                let cell = |&at: &f64| {
-                    let cost = median(&incumbents(&runs, at)).filter(|cost| cost.is_finite());
-                    cost.map_or_else(String::new, |cost| percent(cost / rows.base_cost(scene)))
-                };
-                let name = [rows.shown(scene), method.clone()];
-                table.add_row(name.into_iter().chain(self.at_seconds.iter().map(cell)));
-            }
-        }
-        output.add_table("Median cost against the greedy tree's, after so many seconds:", table);
     }
 }
 
@@ -119,11 +87,6 @@ fn finding(points: &[Point]) -> Option<String> {
         wins(most),
         winners.len()
     ))
-}
-
-/// Returns the difference of a ratio to base from the base, in percent.
-fn percent(ratio: f64) -> String {
-    format!("{:+.2} %", 100.0 * (ratio - 1.0))
 }
 
 /// Returns the costs of the incumbents of all runs after `at` seconds, the worst cost where a run
@@ -191,6 +154,7 @@ fn draw(method: &str, points: &[Point]) -> Vec<Layer> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::statistics::median;
 
     #[test]
     fn the_median_of_incumbents_never_rises() {

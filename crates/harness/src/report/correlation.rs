@@ -110,10 +110,15 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     }
     let mut output = Output::new(&config.source, &config.title);
     output.add_csv("correlation", &correlations)?;
-    let own = correlations.iter().filter(|row| row.method == first(&config.methods));
-    let own = own.filter(|row| row.cost == OF_AREA).filter_map(|row| row.spearman);
-    output.finding = range(own)
-        .map(|(low, high)| format!("Cost ranks trees as rays do: ρ is {low:.2} to {high:.2}"));
+    let is_drawn = |row: &&Correlation| {
+        let kind = (row.family, row.query);
+        row.method == first(&config.methods)
+            && row.cost == OF_AREA
+            && rows.ray_kinds().contains(&kind)
+    };
+    let ranks = correlations.iter().filter(is_drawn).filter_map(|row| row.spearman);
+    output.finding = range(ranks)
+        .map(|(low, high)| format!("Rank correlation of cost and tests: {low:.2} to {high:.2}"));
     let caption = format!(
         "One point per tree, the same rays for all trees of a scene. ρ is Spearman's rank correlation over the trees of ‘{}’.",
         first(&config.methods)

@@ -1,5 +1,6 @@
 //! Distributions of the costs of independent trials.
 
+use super::output::percents;
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
 use crate::statistics::{mean, quantile, range, sorted};
@@ -75,9 +76,9 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
         output.paper.extend(config.majority(rows, method));
     }
     output.add_csv("distribution", &summaries)?;
-    let below = summaries.iter().map(|row| 100.0 * row.fraction_below_base);
+    let below = summaries.iter().map(|row| row.fraction_below_base);
     output.finding = range(below).map(|(low, high)| {
-        format!("{low:.0} to {high:.0} % of the trials cost less than the greedy tree")
+        format!("{} of the trials cost less than the greedy tree", percents(low, high))
     });
     let caption = format!("{}. Every trial of every repetition.", output.heading);
     output.add_figure("distribution", caption, 2, panels);

@@ -25,7 +25,6 @@ pub mod query_report;
 mod ray_cost;
 pub mod table;
 mod table_paper;
-pub mod target;
 mod to_target;
 pub mod trials;
 

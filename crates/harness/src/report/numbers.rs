@@ -2,12 +2,11 @@
 //! method and scene.
 
 use super::data::ratio;
+use super::output::percents;
 use super::prelude::*;
-use super::target::Target;
 use super::to_target;
 use crate::rows::ReferenceRow;
 use crate::statistics::{quartiles, range};
-use bvh_config::Nested;
 
 bvh_config::config! { serde;
     /// Numbers of every method on every scene.
@@ -16,10 +15,10 @@ bvh_config::config! { serde;
         title: String;
         /// Labels of the methods.
         methods: Vec<String>, in OneOrMore;
-        /// Costs to be reached, for a table of the seconds that the methods need.
-        /// Default none.
+        /// Distances above the best known cost or exact optimum in per cent, for a table of the
+        /// seconds that the methods need to get there. Default none.
         #[serde(skip_serializing_if = "Vec::is_empty")]
-        targets: Vec<Target> = vec![], in Nested;
+        targets: Vec<f64> = vec![], in 0.0..=1e6;
     }
 }
 
@@ -83,39 +82,14 @@ impl Config {
         output.show(explanation, &numbers, columns)?;
         let columns = "scene method seconds_quartile_1 seconds_median seconds_quartile_3";
         output.show("Seconds of the runs:", &timing, columns)?;
-        // The figure shows bounds; medians alone are in the table.
-        if !rows.bounds.is_empty() {
-            let bounds = numbers.iter().filter_map(|row| row.lower_bound_over_reference);
-            output.finding = range(bounds).map(|(low, high)| {
-                let (low, high) = (100.0 * low, 100.0 * high);
-                format!("No tree costs less than {low:.0} to {high:.0} % of the best known")
-            });
-            let caption = "The proven lower bound, below which no tree is, and the median cost of \
-                           every method's runs, over the least known cost of the scene.";
-            output.add_figure("numbers", caption, 1, vec![self.draw(rows, &numbers)]);
-        }
+        let bounds = numbers.iter().filter_map(|row| row.lower_bound_over_reference);
+        output.finding = range(bounds).map(|(low, high)| {
+            format!("No tree costs less than {} of the best known", percents(low, high))
+        });
         if !self.targets.is_empty() {
             to_target::add(&mut output, &self.methods, &self.targets, rows)?;
         }
         Ok(output)
-    }
-
-    /// Draws the lower bound and every method's cost on every scene, over the least known cost.
-    fn draw(&self, rows: &Rows, numbers: &[Numbers]) -> Panel {
-        let bound = |scene: &str| {
-            rows.reference(scene).and_then(|row| Some(ratio(row.lower_bound?, row.cost)))
-        };
-        let scenes = || rows.scenes().into_iter().enumerate();
-        let bounds = scenes().filter_map(|(at, scene)| Some((at, bound(scene)?, None)));
-        let mut series = vec![("lower bound".to_owned(), bounds.collect())];
-        for method in &self.methods {
-            let own = |scene| numbers.iter().find(|row| row.scene == scene && row.method == method);
-            let gap = |(at, scene)| Some((at, 1.0 + own(scene)?.gap_median, None));
-            series.push((method.clone(), scenes().filter_map(gap).collect()));
-        }
-        let mut panel = dots("", Axis::linear("cost / least known"), rows.all_shown(), series);
-        panel.layers.push(Layer::new("best known", Marks::VLine(1.0)));
-        panel
     }
 }
 

@@ -188,22 +188,30 @@ pub fn dots(
 
 /// Says how far ratios to the greedy tree's cost are from it; `None` if there are none.
 pub fn from_greedy(ratios: impl IntoIterator<Item = f64>) -> Option<String> {
-    let (low, high) = range(ratios)?;
-    let percent = |ratio: f64| match 100.0 * (ratio - 1.0).abs() {
+    // A difference of less than half a thousandth is none.
+    let (low, high) = range(ratios.into_iter().map(|ratio| (1e3 * ratio).round() / 1e3))?;
+    let [below, above] = [1.0 - low, high - 1.0];
+    Some(if high <= 1.0 {
+        format!("{} below the greedy tree", percents(-above, below))
+    } else if low >= 1.0 {
+        format!("{} above the greedy tree", percents(-below, above))
+    } else {
+        let (below, above) = (percents(below, below), percents(above, above));
+        format!("from {below} below to {above} above the greedy tree")
+    })
+}
+
+/// Writes a range of fractions in per cent, whole ones from 1 % on.
+pub fn percents(low: f64, high: f64) -> String {
+    let percent = |fraction: f64| match 100.0 * fraction {
+        ..0.05 => "0".to_owned(),
         small @ ..0.95 => format!("{small:.1}"),
         whole => format!("{whole:.0}"),
     };
-    let to = |from: f64, to: f64, side: &str| match [percent(from), percent(to)] {
-        [one, other] if one == other => format!("{one} % {side}"),
-        [one, other] => format!("{one} to {other} % {side}"),
-    };
-    Some(if high <= 1.0 {
-        to(high, low, "below the greedy tree")
-    } else if low >= 1.0 {
-        to(low, high, "above the greedy tree")
-    } else {
-        format!("from {} % below to {} % above the greedy tree", percent(low), percent(high))
-    })
+    match [percent(low), percent(high)] {
+        [one, other] if one == other => format!("{one} %"),
+        [one, other] => format!("{one} to {other} %"),
+    }
 }
 
 /// Makes a panel.
@@ -227,11 +235,13 @@ mod tests {
 
     #[test]
     fn distances_from_the_greedy_tree_name_their_side() {
-        let said = [vec![0.92, 0.98], vec![1.344, 1.336], vec![0.997, 1.2]].map(from_greedy);
+        let ratios = [vec![0.92, 0.98], vec![1.344, 1.336], vec![0.997, 1.2], vec![0.98, 1.0004]];
+        let said = ratios.map(from_greedy);
         let expected = [
             "2 to 8 % below the greedy tree",
             "34 % above the greedy tree",
             "from 0.3 % below to 20 % above the greedy tree",
+            "0 to 2 % below the greedy tree",
         ];
         assert_eq!(said.map(Option::unwrap), expected);
         assert_eq!(from_greedy([]), None);

@@ -57,21 +57,9 @@ pub(super) struct Paired<'a> {
     low: Option<f64>,
     /// The upper end.
     high: Option<f64>,
-    /// The verdict of the interval:
-    verdict: Verdict,
-}
-
-/// The verdict of an interval of a ratio of tests.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-enum Verdict {
-    /// It lies below 1.
-    Fewer,
-    /// It lies above 1.
-    More,
-    /// It holds 1, or there is none.
-    #[serde(rename = "inconclusive")]
-    Inconclusive,
+    /// `fewer` if the interval lies below 1, `more` if above; `inconclusive` if it holds 1, or if
+    /// there is none.
+    verdict: &'static str,
 }
 
 /// The scene of rows that are geometric means.
@@ -198,9 +186,9 @@ fn paired<'a>(rows: &'a Rows, [first, second]: &'a [String; 2]) -> Vec<Paired<'a
             low: over.over_base_low,
             high: over.over_base_high,
             verdict: match over.over_base_low.zip(over.over_base_high) {
-                Some((_, high)) if high < 1.0 => Verdict::Fewer,
-                Some((low, _)) if low > 1.0 => Verdict::More,
-                _ => Verdict::Inconclusive,
+                Some((_, high)) if high < 1.0 => "fewer",
+                Some((low, _)) if low > 1.0 => "more",
+                _ => "inconclusive",
             },
         })
     };

@@ -3,7 +3,6 @@
 
 use super::prelude::*;
 use super::progress::{Series, WORST, reached, series};
-use super::target::Target;
 use crate::statistics::order_quantile;
 
 /// One method and target on one scene, as written to `timing_to_target.csv`.
@@ -25,17 +24,22 @@ pub(super) struct Reached<'a> {
 pub(super) fn add(
     output: &mut Output,
     methods: &[String],
-    targets: &[Target],
+    targets: &[f64],
     rows: &Rows,
 ) -> Result<(), Error> {
     let mut table = Vec::new();
     for scene in rows.scenes() {
         let runs_of_methods: Vec<Vec<Series>> =
             methods.iter().map(|method| series(rows, scene, method)).collect();
-        for target in targets {
-            let Some(cost) = target.cost(rows, scene) else { continue };
+        let Some(reference) = rows.reference(scene) else { continue };
+        for percent in targets {
+            let cost = reference.cost * (1.0 + percent / 100.0);
+            let target = match percent {
+                0.0 => "best known".to_owned(),
+                percent => format!("best known +{percent} %"),
+            };
             for (method, runs) in methods.iter().zip(&runs_of_methods) {
-                table.push(Reached::new(scene, target, method, runs, cost));
+                table.push(Reached::new(scene, target.clone(), method, runs, cost));
             }
         }
     }
@@ -45,13 +49,13 @@ pub(super) fn add(
 }
 
 impl<'a> Reached<'a> {
-    fn new(scene: &'a str, target: &Target, method: &'a str, runs: &[Series], cost: f64) -> Self {
+    fn new(scene: &'a str, target: String, method: &'a str, runs: &[Series], cost: f64) -> Self {
         // Runs without success must count: dropping them would favour methods that rarely succeed.
         let times: Vec<f64> = runs.iter().map(|run| reached(run, cost).unwrap_or(WORST)).collect();
         let quantile = |q| order_quantile(&times, q).filter(|time| time.is_finite());
         Self {
             scene,
-            target: target.to_string(),
+            target,
             method,
             runs: runs.len(),
             solved: times.iter().filter(|time| time.is_finite()).count(),

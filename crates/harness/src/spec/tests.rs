@@ -39,10 +39,6 @@ const WRONG_LINES: &[(&str, &[&str])] = &[
     ("objective = { sah = { traversal = -1.0 } }", &["objective.sah.traversal: -1 is not"]),
     ("[ray_cost]\ntrained = 200_000", &["ray_cost.trained is 200000", "up to 174762", "6 rays"]),
     (
-        "[[reports]]\nkind = 'anytime'\nmethods = ['grasp']\nat_seconds = [1, 10, 2]",
-        &["reports[0].at_seconds is [1.0, 10.0, 2.0]", "ascending"],
-    ),
-    (
         "[[reports]]\nkind = 'anytime'\nmethods = ['grasp']\nfile = '../../x'",
         &["reports[0].file is \"../../x\"", "letters, digits"],
     ),
