@@ -50,10 +50,11 @@ fn create_buffer(device: &wgpu::Device, size: usize, usage: BufferUsages) -> wgp
 /// Returns the hits of `count` rays by a shader, as distances and objects.
 fn trace(
     (device, queue): &(wgpu::Device, wgpu::Queue),
-    source: ShaderSource,
+    shader: &str,
     data: [&[u8]; 4],
     count: usize,
 ) -> Result<Vec<(f32, u32)>, Box<dyn Error>> {
+    let source = ShaderSource::Wgsl(shader.into());
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
     let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: None,
@@ -122,27 +123,18 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let nodes = tree.to_first_count();
     let compressed = CompressedBvh::new(&tree, &boxes)?;
-    let pairs = tree.to_aila_laine();
-    let glsl = ShaderSource::Glsl {
-        shader: shaders::AILA_LAINE.into(),
-        stage: wgpu::naga::ShaderStage::Compute,
-        defines: &[],
-    };
     let binary: (&[u8], &[u32]) = (bytemuck::cast_slice(&nodes), &tree.prim_ids);
-    let child_boxes: (&[u8], &[u32]) = (bytemuck::cast_slice(&pairs), &tree.prim_ids);
     let wide: (&[u8], &[u32]) = (bytemuck::cast_slice(&compressed.nodes), &compressed.prim_ids);
-    for (name, source, (nodes, ids)) in [
-        ("binary", ShaderSource::Wgsl(shaders::BINARY.into()), binary),
-        ("children's boxes", glsl, child_boxes),
-        ("compressed", ShaderSource::Wgsl(shaders::COMPRESSED.into()), wide),
-    ] {
+    for (name, shader, (nodes, ids)) in
+        [("binary", shaders::BINARY, binary), ("compressed", shaders::COMPRESSED, wide)]
+    {
         let data = [
             nodes,
             bytemuck::cast_slice(ids),
             bytemuck::cast_slice(&corners),
             bytemuck::cast_slice(&ray_data),
         ];
-        let found = trace(&device, source, data, rays.len())?;
+        let found = trace(&device, shader, data, rays.len())?;
         let mut differences = 0;
         for ((t, object), expected) in found.iter().zip(&expected) {
             // Only distances are compared, because a ray through an edge may hit either triangle.

@@ -4,7 +4,6 @@
 //! | layout | bytes | to | from | used by |
 //! |---|---|---|---|---|
 //! | [binary](FirstCountNode) | 32 per node | [`to_first_count`](crate::Bvh::to_first_count) | [`from_first_count`](crate::Bvh::from_first_count) | `obvhs`, `tinybvh`, most GPU tracers |
-//! | [children's boxes](AilaLaineNode) | 64 per node | [`to_aila_laine`](crate::Bvh::to_aila_laine) | [`from_aila_laine`](crate::Bvh::from_aila_laine) | `tinybvh` (`BVH_GPU`), after Aila & Laine 2009 |
 //! | [three-mesh-bvh's](ThreeMeshNode) | 32 per node | [`to_three_mesh`](crate::Bvh::to_three_mesh) | [`from_three_mesh`](crate::Bvh::from_three_mesh) | `three-mesh-bvh`, `three-gpu-pathtracer` |
 //! | [compressed, eight-wide](CompressedNode) | 80 per node | [`CompressedBvh::new`] | [`CompressedBvh::decode`] | `obvhs`, `tinybvh`, after Ylitie et al. 2017 |
 //!
@@ -16,10 +15,8 @@
 //! back traces the same hits as the original tree, bit by bit, because no box is smaller than in
 //! the original tree.
 //!
-//! [`shaders`] trace rays through these layouts on a GPU; `examples/gpu` of the repository runs all
-//! of them.
+//! [`shaders`] trace rays through two of them on a GPU; `examples/gpu` of the repository runs both.
 
-mod aila_laine;
 mod compressed;
 mod first_count;
 mod target;
@@ -29,8 +26,6 @@ mod unpack;
 /// Complete compute shaders. Each one reads buffers of nodes, object ids, corners and rays, and
 /// writes a buffer of hits; its declarations define the bindings.
 pub mod shaders {
-    /// Traces [`AilaLaineNode`](super::AilaLaineNode)s. Written in GLSL for Vulkan.
-    pub const AILA_LAINE: &str = include_str!("../../shaders/aila_laine.comp");
     /// Traces [`FirstCountNode`](super::FirstCountNode)s. Written in WGSL.
     pub const BINARY: &str = concat!(
         include_str!("../../shaders/trace.wgsl"),
@@ -43,7 +38,6 @@ pub mod shaders {
     );
 }
 
-pub use aila_laine::AilaLaineNode;
 pub use compressed::{CompressedBvh, CompressedNode};
 pub use first_count::FirstCountNode;
 pub use target::{Layout, Target};

@@ -2,18 +2,15 @@
 //! has the documented bytes.
 
 use crate::support::{Random, SHAPES, ball, boxes, chain, grid_box, rays, scaled, soup, tree};
-use bvh_core::export::{
-    AilaLaineNode, CompressedBvh, CompressedNode, FirstCountNode, Target, ThreeMeshNode,
-};
+use bvh_core::export::{CompressedBvh, CompressedNode, FirstCountNode, Target, ThreeMeshNode};
 use bvh_core::{Aabb, Bvh, InvalidBvh, Node, Triangle, any_hit, nearest_hit, validate};
 use glam::Vec3;
 use proptest::prelude::*;
 
 /// Converts the tree to every layout and back.
-fn returned(tree: &Bvh, boxes: &[Aabb]) -> [(&'static str, Bvh); 4] {
+fn returned(tree: &Bvh, boxes: &[Aabb]) -> [(&'static str, Bvh); 3] {
     [
         ("binary", Bvh::from_first_count(&tree.to_first_count(), &tree.prim_ids).unwrap()),
-        ("Aila-Laine", Bvh::from_aila_laine(&tree.to_aila_laine(), &tree.prim_ids).unwrap()),
         ("three-mesh-bvh", Bvh::from_three_mesh(&tree.to_three_mesh(), &tree.prim_ids).unwrap()),
         ("compressed", CompressedBvh::new(tree, boxes).unwrap().decode().unwrap()),
     ]
@@ -104,11 +101,9 @@ fn small_trees_deep_trees_and_trees_of_points_have_layouts() {
 
 #[test]
 fn the_bytes_are_the_documented_ones() {
-    assert_eq!(
-        [size_of::<FirstCountNode>(), size_of::<AilaLaineNode>(), size_of::<CompressedNode>()],
-        [32, 64, 80]
-    );
-    assert_eq!(size_of::<ThreeMeshNode>(), 32);
+    let sizes =
+        [size_of::<FirstCountNode>(), size_of::<ThreeMeshNode>(), size_of::<CompressedNode>()];
+    assert_eq!(sizes, [32, 32, 80]);
     // Two cubes of side 1 at x = 0 and x = 509: the grid's step is 2 along x, and 1/128 along y and
     // z.
     let cube = |x: f32| Aabb::from([[x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]]);
@@ -121,14 +116,6 @@ fn the_bytes_are_the_documented_ones() {
     let tree = Bvh { nodes, prim_ids: vec![1, 0] };
     let mut refitted = tree.clone();
     refitted.refit(&boxes);
-    let nodes = refitted.to_aila_laine();
-    let bytes: &[u8] = bytemuck::cast_slice(&nodes);
-    let floats = [0, 16, 32, 48].map(|offset| float(bytes, offset));
-    assert_eq!(floats, [509.0, 510.0, 0.0, 1.0]);
-    assert_eq!([12, 28, 44].map(|offset| word(bytes, offset)), [1, 2, 0]);
-    let leaves = [64 + 44, 64 + 60, 128 + 44, 128 + 60].map(|offset| word(bytes, offset));
-    assert_eq!(leaves, [1, 0, 1, 1]);
-
     let nodes = refitted.to_three_mesh();
     let bytes: &[u8] = bytemuck::cast_slice(&nodes);
     // The root's children lie side by side along x; leaves have the mark 0xffff behind the count.
@@ -225,9 +212,8 @@ proptest! {
             bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect()
         }
         let compressed = CompressedBvh { nodes: nodes(&bytes), prim_ids: ids.clone() };
-        let trees: [Result<Bvh, InvalidBvh>; 4] = [
+        let trees: [Result<Bvh, InvalidBvh>; 3] = [
             Bvh::from_first_count(&nodes(&bytes), &ids),
-            Bvh::from_aila_laine(&nodes(&bytes), &ids),
             Bvh::from_three_mesh(&nodes(&bytes), &ids),
             compressed.decode(),
         ];
