@@ -82,7 +82,4 @@ pub enum FileError {
     /// Views need aligned bytes.
     #[error("the address of the bytes is not a multiple of {0}; load them instead")]
     Alignment(usize),
-    /// Views need a little-endian machine.
-    #[error("this machine is big-endian; load the bytes instead of viewing them")]
-    Machine,
 }

@@ -7,6 +7,7 @@ use crate::{Aabb, MAX_OBJECTS, Node};
 use alloc::borrow::ToOwned;
 use alloc::string::String;
 use alloc::vec::Vec;
+use bytemuck::{Pod, Zeroable};
 use core::cmp::Ordering;
 
 /// The header of a tree file. [The format](super) documents the position of each field.
@@ -89,36 +90,34 @@ impl Header {
         if name.len() > 64 || name.contains(&0) {
             return Err(FileError::Method);
         }
+        let mut method = [0; 64];
+        method[..name.len()].copy_from_slice(name);
         let (objective, constants) = match self.objective {
-            Objective::InternalArea => (0u32, [0.0; 2]),
+            Objective::InternalArea => (0, [0.0; 2]),
             Objective::GoldsmithSalmon => (1, [0.0; 2]),
             Objective::Sah(constants) => (2, [constants.traversal, constants.intersection]),
             Objective::Layout => (3, [0.0; 2]),
         };
-        let mut bytes = Vec::with_capacity(Self::BYTES);
-        bytes.extend_from_slice(&Self::MAGIC);
-        for word in [Self::VERSION, Self::ENDIANNESS, objective, self.scene] {
-            bytes.extend_from_slice(&word.to_le_bytes());
-        }
-        for word in [self.nodes as u64, self.objects as u64, self.seed, self.work] {
-            bytes.extend_from_slice(&word.to_le_bytes());
-        }
-        for number in [self.cost, constants[0], constants[1]] {
-            bytes.extend_from_slice(&number.to_le_bytes());
-        }
-        for corner in [self.bounds.min, self.bounds.max] {
-            for coordinate in corner.to_array() {
-                bytes.extend_from_slice(&coordinate.to_le_bytes());
-            }
-        }
-        let mut padded_name = [0; 64];
-        padded_name[..name.len()].copy_from_slice(name);
-        bytes.extend_from_slice(&padded_name);
-        let flags = if self.has_visits { Self::VISITS } else { 0 };
-        bytes.extend_from_slice(&(self.references as u64).to_le_bytes());
-        bytes.extend_from_slice(&flags.to_le_bytes());
-        bytes.resize(Self::BYTES, 0);
-        Ok(bytes)
+        let stored = Stored {
+            magic: Self::MAGIC,
+            version: Self::VERSION,
+            endianness: Self::ENDIANNESS,
+            objective,
+            scene: self.scene,
+            nodes: self.nodes as u64,
+            objects: self.objects as u64,
+            seed: self.seed,
+            work: self.work,
+            cost: self.cost,
+            constants,
+            bounds: self.bounds,
+            method,
+            references: self.references as u64,
+            flags: if self.has_visits { Self::VISITS } else { 0 },
+            reserved: [0; 2],
+            checksum: 0,
+        };
+        Ok(bytemuck::bytes_of(&stored).to_vec())
     }
 
     /// Reads all fields except the checksum.
@@ -126,40 +125,29 @@ impl Header {
     /// If there are several faults, reports the most informative one: first a wrong magic number,
     /// then the byte order, then the version, then any other field.
     pub(super) fn decode(bytes: &[u8]) -> Result<Self, FileError> {
-        let mut fields = Fields(bytes);
-        let magic: [u8; 8] = fields.take().ok_or(FileError::Magic)?;
-        if magic != Self::MAGIC {
+        if !bytes.starts_with(&Self::MAGIC) {
             return Err(FileError::Magic);
         }
-        let version: [u8; 4] = fields.need()?;
-        let mark: [u8; 4] = fields.need()?;
-        if mark == Self::ENDIANNESS.to_be_bytes() {
+        let bytes = bytes.get(..Self::BYTES).ok_or(FileError::Header)?;
+        let stored: Stored = bytemuck::pod_read_unaligned(bytes);
+        if stored.endianness == Self::ENDIANNESS.swap_bytes() {
             return Err(FileError::Endianness);
         }
-        check_version(u32::from_le_bytes(version))?;
-        if mark != Self::ENDIANNESS.to_le_bytes() {
+        check_version(stored.version)?;
+        if stored.endianness != Self::ENDIANNESS {
             return Err(FileError::Field("endianness mark"));
         }
-        let objective = fields.word()?;
-        let scene = fields.word()?;
-        let [nodes, objects, seed, work]: [u64; 4] = fields.words()?;
+        let Stored { nodes, objects, references, cost, constants, flags, .. } = stored;
         if objects > MAX_OBJECTS as u64 {
             return Err(FileError::Field("objects"));
         }
-        let [cost, traversal, intersection] = fields.words()?.map(f64::from_bits);
         if !(cost.is_finite() && cost >= 0.0) {
             return Err(FileError::Field("cost"));
         }
-        let objective = decode_objective(objective, traversal, intersection)?;
-        let mut corners = [[0.0; 3]; 2];
-        for coordinate in corners.as_flattened_mut() {
-            *coordinate = f32::from_le_bytes(fields.need()?);
-        }
-        let padded_name: [u8; 64] = fields.need()?;
-        let (name, padding) = split_name(&padded_name);
+        let objective = decode_objective(stored.objective, constants)?;
+        let end = stored.method.iter().position(|&byte| byte == 0).unwrap_or(64);
+        let (name, padding) = stored.method.split_at(end);
         let method = core::str::from_utf8(name).map_err(|_| FileError::Method)?;
-        let [references] = fields.words()?;
-        let flags = fields.word()?;
         // Every object has a reference, and there are none without objects.
         let fits = (objects..=MAX_OBJECTS as u64).contains(&references);
         if !fits || (objects == 0 && references > 0) {
@@ -169,10 +157,9 @@ impl Header {
         if nodes > 2 * references {
             return Err(FileError::Field("nodes"));
         }
-        let reserved: [u8; 8] = fields.need()?;
-        let _checksum: [u8; 4] = fields.need()?;
         let has_other_flags = flags & !Self::VISITS != 0;
-        if reserved != [0; 8] || has_other_flags || padding.iter().any(|&byte| byte != 0) {
+        let is_padded = stored.reserved == [0; 2] && padding.iter().all(|&byte| byte == 0);
+        if has_other_flags || !is_padded {
             return Err(FileError::Field("padding"));
         }
         Ok(Self {
@@ -181,14 +168,37 @@ impl Header {
             references: references as usize,
             objective,
             cost,
-            seed,
-            work,
-            scene,
-            bounds: Aabb::from(corners),
+            seed: stored.seed,
+            work: stored.work,
+            scene: stored.scene,
+            bounds: stored.bounds,
             method: method.to_owned(),
             has_visits: flags & Self::VISITS != 0,
         })
     }
+}
+
+/// The header as it is stored, without gaps.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Stored {
+    magic: [u8; 8],
+    version: u32,
+    endianness: u32,
+    objective: u32,
+    scene: u32,
+    nodes: u64,
+    objects: u64,
+    seed: u64,
+    work: u64,
+    cost: f64,
+    constants: [f64; 2],
+    bounds: Aabb,
+    method: [u8; 64],
+    references: u64,
+    flags: u32,
+    reserved: [u32; 2],
+    checksum: u32,
 }
 
 /// Rejects other versions than the only one that this crate reads.
@@ -201,58 +211,20 @@ fn check_version(found: u32) -> Result<(), FileError> {
 }
 
 /// Returns the objective with this number. Constants must be 0 unless the objective uses them.
-fn decode_objective(
-    number: u32,
-    traversal: f64,
-    intersection: f64,
-) -> Result<Objective, FileError> {
-    let constants =
+fn decode_objective(number: u32, constants: [f64; 2]) -> Result<Objective, FileError> {
+    let [traversal, intersection] = constants;
+    let accepted =
         SahConstants::new(traversal, intersection).map_err(|_| FileError::Field("constants"))?;
     let objective = match number {
         0 => Objective::InternalArea,
         1 => Objective::GoldsmithSalmon,
-        2 => return Ok(Objective::Sah(constants)),
+        2 => return Ok(Objective::Sah(accepted)),
         3 => Objective::Layout,
         _ => return Err(FileError::Field("objective")),
     };
     // Bits, because −0 is not what `encode` writes.
-    if traversal.to_bits() != 0 || intersection.to_bits() != 0 {
+    if constants.map(f64::to_bits) != [0; 2] {
         return Err(FileError::Field("constants"));
     }
     Ok(objective)
-}
-
-/// Splits a name from the zeros after it.
-fn split_name(padded: &[u8; 64]) -> (&[u8], &[u8]) {
-    let end = padded.iter().position(|&byte| byte == 0);
-    padded.split_at(end.unwrap_or(padded.len()))
-}
-
-/// The bytes that are still to be read.
-pub(super) struct Fields<'a>(pub(super) &'a [u8]);
-
-impl Fields<'_> {
-    /// Reads the next `N` bytes; `None` if there are fewer.
-    pub(super) fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
-        let (field, rest) = self.0.split_first_chunk()?;
-        self.0 = rest;
-        Some(*field)
-    }
-
-    /// Reads the next `N` bytes.
-    pub(super) fn need<const N: usize>(&mut self) -> Result<[u8; N], FileError> {
-        self.take().ok_or(FileError::Header)
-    }
-
-    pub(super) fn word(&mut self) -> Result<u32, FileError> {
-        Ok(u32::from_le_bytes(self.need()?))
-    }
-
-    pub(super) fn words<const N: usize>(&mut self) -> Result<[u64; N], FileError> {
-        let mut words = [0; N];
-        for word in &mut words {
-            *word = u64::from_le_bytes(self.need()?);
-        }
-        Ok(words)
-    }
 }

@@ -65,12 +65,11 @@
 //!
 //! # Loading without copying
 //!
-//! On little-endian machines [`TreeFile::view`] borrows the bytes. Their address must be a multiple
-//! of 4, which mapped files ensure. [`load`] copies and works everywhere.
+//! [`TreeFile::view`] borrows the bytes. Their address must be a multiple of 4, which mapped files
+//! ensure. [`load`] copies bytes of any address.
 
 mod error;
 mod header;
-mod words;
 
 pub use error::FileError;
 pub use header::Header;
@@ -80,9 +79,11 @@ use crate::validate::{Leaves, check_structure, for_each};
 use crate::{Aabb, Bvh, BvhView, Clip, InvalidBvh, Node, validate, validate_references};
 use alloc::borrow::Cow;
 use alloc::vec::Vec;
+use bytemuck::Pod;
 use crc32fast::Hasher;
 use glam::Vec3;
-use words::{cast, copied, le_bytes};
+
+const _: () = assert!(cfg!(target_endian = "little"), "tree files have the bytes of memory");
 
 /// The origin of a tree, as the header of its file records it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -128,15 +129,9 @@ pub fn save_references(
     saved(tree, boxes, origin)
 }
 
-/// Returns the nodes and the object ids as bytes: the file from byte [`Header::BYTES`] on. They can
-/// be written while the header is being computed.
-pub fn body(tree: &Bvh) -> [Cow<'_, [u8]>; 2] {
-    [le_bytes(&tree.nodes), le_bytes(&tree.prim_ids)]
-}
-
 /// Returns the sections of the same file as [`save_references`], to be written one after the other:
-/// the header, the nodes, the object ids and the visits. On little-endian machines all but the
-/// header are the tree's memory, which a file of gigabytes does not need twice.
+/// the header, the nodes, the object ids and the visits. All but the header are the tree's memory,
+/// which a file of gigabytes does not need twice.
 ///
 /// The caller has [validated](validate_references()) the tree and knows its cost under the origin's
 /// objective. Neither is checked here, because each takes as long as everything else, and several
@@ -150,8 +145,9 @@ pub fn sections<'a>(
     both: CallBoth,
 ) -> Result<[Cow<'a, [u8]>; 4], FileError> {
     let Origin { method, seed, work, objective, visits } = *origin;
-    let [nodes, prim_ids] = body(tree);
-    let visit_bytes = le_bytes(visits);
+    let nodes = bytemuck::cast_slice(&tree.nodes);
+    let prim_ids = bytemuck::cast_slice(&tree.prim_ids);
+    let visit_bytes = bytemuck::cast_slice(visits);
     let mut checked = Ok(());
     let mut scene = 0;
     let mut hasher = Hasher::new();
@@ -163,7 +159,7 @@ pub fn sections<'a>(
             scene = boxes_checksum(boxes);
         },
         &mut || {
-            for section in [&nodes, &prim_ids, &visit_bytes] {
+            for section in [nodes, prim_ids, visit_bytes] {
                 hasher.update(section);
             }
         },
@@ -185,7 +181,7 @@ pub fn sections<'a>(
     let mut header = header.encode()?;
     hasher.update(&header[..Header::CHECKSUM.start]);
     header[Header::CHECKSUM].copy_from_slice(&hasher.finalize().to_le_bytes());
-    Ok([header.into(), nodes, prim_ids, visit_bytes])
+    Ok([header.into(), nodes.into(), prim_ids.into(), visit_bytes.into()])
 }
 
 /// Rejects visits that no measure can give. Measures are monotone, so no child has more visits than
@@ -220,6 +216,13 @@ pub fn load(bytes: &[u8], boxes: &[Aabb]) -> Result<Bvh, FileError> {
     TreeFile::open(bytes)?.for_boxes(boxes)?.tree()
 }
 
+/// Copies bytes, which may have any address, to values.
+fn copied<T: Pod>(bytes: &[u8]) -> Vec<T> {
+    let mut values = alloc::vec![T::zeroed(); bytes.len() / size_of::<T>()];
+    bytemuck::cast_slice_mut(&mut values).copy_from_slice(bytes);
+    values
+}
+
 /// Returns the checksum that identifies a scene in a tree file: the CRC-32 of min x, y, z, max x,
 /// y, z of each box, as little-endian `f32`, with 0 for −0. O(n).
 pub fn boxes_checksum(boxes: &[Aabb]) -> u32 {
@@ -231,7 +234,7 @@ pub fn boxes_checksum(boxes: &[Aabb]) -> u32 {
             let zero = Vec3::ZERO;
             *without_sign = Aabb { min: given.min + zero, max: given.max + zero };
         }
-        hasher.update(&le_bytes(&piece[..boxes.len()]));
+        hasher.update(bytemuck::cast_slice(&piece[..boxes.len()]));
     }
     hasher.finalize()
 }
@@ -334,6 +337,13 @@ impl<'a> TreeFile<'a> {
 
     /// Returns the tree without copying or checking it.
     fn cast(&self) -> Result<BvhView<'a>, FileError> {
+        fn cast<T: Pod>(bytes: &[u8]) -> Result<&[T], FileError> {
+            // An empty slice may have any address, and `bytemuck` would reject it as misaligned.
+            if bytes.is_empty() {
+                return Ok(&[]);
+            }
+            bytemuck::try_cast_slice(bytes).map_err(|_| FileError::Alignment(align_of::<T>()))
+        }
         Ok(BvhView { nodes: cast(self.nodes)?, prim_ids: cast(self.prim_ids)? })
     }
 
