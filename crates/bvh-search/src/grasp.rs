@@ -136,7 +136,7 @@ struct Trial {
 impl Search for Config {
     /// Runs trials in parallel. They are independent, because each draws from a separate stream.
     fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
-        let scene = watched(run.observer(), |watch| Presorted::watched(problem.boxes, watch))?;
+        let scene = Presorted::new(problem.boxes)?;
         let construction = (2 * scene.len() as u64).saturating_sub(1);
         let observer = run.observer();
         // The work of trials with local search is not known in advance. Smaller batches waste less

@@ -2,7 +2,6 @@
 //! of joined clusters.
 
 use super::neighbours::{self, CHUNK, Scratch};
-use crate::{OBJECTS_PER_POLL, Watch};
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Node, PackedAabb};
 use std::mem::MaybeUninit;
@@ -68,54 +67,20 @@ impl Clusters {
     }
 
     /// Finds every cluster's nearest neighbour up to `radius` positions away, by half area or by a
-    /// measure. After a cancellation by the `watch`, some clusters have none.
-    pub(super) fn find_nearest(
-        &mut self,
-        radius: usize,
-        measure: Option<&dyn Measure>,
-        watch: &Watch,
-    ) {
-        let scale = self.scale;
-        let nearest = &mut self.nearest[..self.boxes.len()];
-        let chunks_per_poll = OBJECTS_PER_POLL / CHUNK;
-        let ends_at =
-            |number: usize| number % chunks_per_poll == chunks_per_poll - 1 && watch.is_cancelled();
+    /// measure.
+    pub(super) fn find_nearest(&mut self, radius: usize, measure: Option<&dyn Measure>) {
+        let Self { boxes, scale, scratch, .. } = self;
+        let nearest = &mut self.nearest[..boxes.len()];
+        let find = |scratch: &mut Scratch, (number, found): (usize, &mut [i32])| {
+            neighbours::find(boxes, *scale, measure, radius, number * CHUNK, found, scratch);
+        };
         #[cfg(feature = "rayon")]
         if nearest.len() * radius >= PARALLEL_PAIRS && rayon::current_num_threads() > 1 {
             use rayon::prelude::*;
-            nearest.par_chunks_mut(CHUNK).enumerate().for_each_init(
-                Scratch::default,
-                |scratch, (number, found)| {
-                    if ends_at(number) {
-                        return;
-                    }
-                    neighbours::find(
-                        &self.boxes,
-                        scale,
-                        measure,
-                        radius,
-                        number * CHUNK,
-                        found,
-                        scratch,
-                    );
-                },
-            );
-            return;
+            let chunks = nearest.par_chunks_mut(CHUNK).enumerate();
+            return chunks.for_each_init(Scratch::default, find);
         }
-        for (number, found) in nearest.chunks_mut(CHUNK).enumerate() {
-            if ends_at(number) {
-                return;
-            }
-            neighbours::find(
-                &self.boxes,
-                scale,
-                measure,
-                radius,
-                number * CHUNK,
-                found,
-                &mut self.scratch,
-            );
-        }
+        nearest.chunks_mut(CHUNK).enumerate().for_each(|chunk| find(scratch, chunk));
     }
 
     /// Returns whether the cluster is the nearest neighbour of its nearest neighbour.

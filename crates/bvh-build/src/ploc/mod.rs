@@ -18,7 +18,8 @@ mod morton;
 mod neighbours;
 
 use crate::error::check_scene;
-use crate::{BuildError, Builder, Check, OBJECTS_PER_POLL, Watch};
+use crate::watch::Pace;
+use crate::{BuildError, Builder, Check, Watch};
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh, PackedAabb};
 use clusters::Clusters;
@@ -44,11 +45,7 @@ impl Builder for Config {
         watch: &Watch,
     ) -> Result<Bvh, BuildError> {
         self.check()?;
-        let sorted = MortonOrder::new(boxes)?;
-        if boxes.len() >= OBJECTS_PER_POLL && watch.is_cancelled() {
-            return Err(BuildError::Cancelled);
-        }
-        sorted.build(self, measure, watch)
+        MortonOrder::new(boxes)?.build(self, measure, watch)
     }
 }
 
@@ -94,13 +91,15 @@ impl MortonOrder {
         }
         let boxes = order.iter().map(|&object| boxes[object as usize]).collect();
         let mut clusters = Clusters::new(boxes, &bounds);
+        let mut pace = Pace::new(watch);
         let mut round = 0;
         while clusters.count() > 1 {
             // The first rounds have most clusters, so a small radius saves most time there.
             let radius = if round < config.near_rounds { 1 } else { config.radius as usize };
-            clusters.find_nearest(radius, measure, watch);
-            // A cancelled search leaves clusters without a neighbour, which must not be joined.
-            watch.ensure_wanted()?;
+            if pace.ends_after(clusters.count()) {
+                return Err(BuildError::Cancelled);
+            }
+            clusters.find_nearest(radius, measure);
             clusters.join();
             round += 1;
         }

@@ -10,9 +10,7 @@
 #[cfg(feature = "rayon")]
 use super::presort::PARALLEL_OBJECTS;
 use super::presort::{Presorted, note_same_orders};
-#[cfg(feature = "rayon")]
-use super::rule::TakeBest;
-use super::rule::{Split, SplitRule};
+use super::rule::{Split, SplitRule, TakeBest};
 use super::split_cost::SplitCost;
 use super::stall::{LEAST_STALLED, is_stall};
 use super::sweep::{Block, Sweep, union_of};
@@ -113,19 +111,22 @@ impl<C: SplitCost> Division<'_, C> {
         self.finish(tree)
     }
 
-    /// Divides by the best splits on the threads of the current rayon pool, into the same bytes as
-    /// [`on_one_thread`](Self::on_one_thread).
-    #[cfg(feature = "rayon")]
-    pub fn on_all_threads(
+    /// Divides by the best splits, on the threads of the current rayon pool if the scene is large
+    /// enough, into the same bytes as [`on_one_thread`](Self::on_one_thread).
+    pub fn by_best_splits(
         &self,
         workspace: &mut Workspace,
         tree: &mut Bvh,
     ) -> Result<(), BuildError> {
-        if let Some((task, scratch)) = prepare(self.scene, workspace, tree) {
-            let scratches = &Mutex::new(vec![std::mem::take(scratch)]);
-            rayon::scope(|scope| spawn(scope, self, scratches, task));
+        #[cfg(feature = "rayon")]
+        if self.scene.len() >= PARALLEL_OBJECTS && rayon::current_num_threads() > 1 {
+            if let Some((task, scratch)) = prepare(self.scene, workspace, tree) {
+                let scratches = &Mutex::new(vec![std::mem::take(scratch)]);
+                rayon::scope(|scope| spawn(scope, self, scratches, task));
+            }
+            return self.finish(tree);
         }
-        self.finish(tree)
+        self.on_one_thread(&mut TakeBest, workspace, tree)
     }
 
     /// Clears the tree of a cancelled division.

@@ -8,10 +8,8 @@
 //! split, then to the lower axis and position.
 
 use super::divide::{Division, Workspace};
-#[cfg(feature = "rayon")]
-use super::presort::PARALLEL_OBJECTS;
 use super::presort::Presorted;
-use super::rule::{SplitRule, TakeBest};
+use super::rule::SplitRule;
 use super::split_cost::{
     AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, ByMeasure, SplitCost,
 };
@@ -105,65 +103,65 @@ impl Builder for Config {
         watch: &Watch,
     ) -> Result<Bvh, BuildError> {
         // All trees over a scene without area have the same area, but measures may differ.
-        let scene =
-            Presorted::sort(boxes, self.skip_sorted, self.skip_flat && measure.is_none(), watch)?;
+        let scene = &Presorted::sort(boxes, self.skip_sorted, self.skip_flat && measure.is_none())?;
         self.check()?;
+        let workspace = &mut Workspace::default();
         let mut tree = Bvh::default();
-        let greedy = Greedy { config: self, scene: &scene, watch, tree: &mut tree };
-        self.divide_by_heuristic(scene.len(), measure, greedy)?;
+        let by_heuristic = ByHeuristic {
+            config: self,
+            scene,
+            measure,
+            rule: None,
+            workspace,
+            tree: &mut tree,
+            watch,
+        };
+        by_heuristic.divide()?;
         Ok(tree)
     }
 }
 
 /// A division that is ready except for its split cost.
-trait Divide {
-    /// Divides by this split cost.
-    fn divide<C: SplitCost>(self, split_cost: &C) -> Result<(), BuildError>;
-}
-
-/// A division by the best splits.
-struct Greedy<'a> {
+struct ByHeuristic<'a, 'r> {
     config: &'a Config,
     scene: &'a Presorted,
-    watch: &'a Watch<'a>,
-    tree: &'a mut Bvh,
-}
-
-impl Divide for Greedy<'_> {
-    fn divide<C: SplitCost>(self, split_cost: &C) -> Result<(), BuildError> {
-        let skip_same_order = self.config.skip_same_order;
-        let division =
-            Division { scene: self.scene, split_cost, skip_same_order, watch: self.watch };
-        greedy(&division, self.tree)
-    }
-}
-
-/// A division by any rule.
-struct ByRule<'a> {
-    scene: &'a Presorted,
-    rule: &'a mut dyn SplitRule,
-    skip_same_order: bool,
-    watch: &'a Watch<'a>,
+    /// Instead of half areas.
+    measure: Option<&'a dyn Measure>,
+    /// Instead of the best splits.
+    rule: Option<&'r mut (dyn SplitRule + 'r)>,
     workspace: &'a mut Workspace,
     tree: &'a mut Bvh,
+    watch: &'a Watch<'a>,
 }
 
-impl Divide for ByRule<'_> {
-    fn divide<C: SplitCost>(self, split_cost: &C) -> Result<(), BuildError> {
-        let Self { scene, rule, skip_same_order, watch, workspace, tree } = self;
-        Division { scene, split_cost, skip_same_order, watch }.on_one_thread(rule, workspace, tree)
+impl ByHeuristic<'_, '_> {
+    fn divide(self) -> Result<(), BuildError> {
+        let objects = self.scene.len();
+        match self.config.heuristic {
+            Heuristic::AreaTimesCount => self.divide_by(&AreaTimesCount),
+            Heuristic::AreaTimesPower(p) => self.divide_by(&AreaTimesPower::new(objects, p)),
+            Heuristic::AreaOnly(reading) => self.divide_by(&reading),
+            Heuristic::AreaTimesCost(made_up) => {
+                self.divide_by(&AreaTimesWeight(&made_up.costs(objects)))
+            }
+        }
     }
-}
 
-/// Divides by this split cost, of the measure instead of half areas if there is one.
-fn divide_by(
-    cost: &impl SplitCost,
-    measure: Option<&dyn Measure>,
-    division: impl Divide,
-) -> Result<(), BuildError> {
-    match measure {
-        Some(measure) => division.divide(&ByMeasure { cost, measure }),
-        None => division.divide(cost),
+    fn divide_by(self, cost: &impl SplitCost) -> Result<(), BuildError> {
+        match self.measure {
+            Some(measure) => self.divide_by_cost(&ByMeasure { cost, measure }),
+            None => self.divide_by_cost(cost),
+        }
+    }
+
+    fn divide_by_cost(self, split_cost: &impl SplitCost) -> Result<(), BuildError> {
+        let Self { config, scene, rule, workspace, tree, watch, .. } = self;
+        let skip_same_order = config.skip_same_order;
+        let division = Division { scene, split_cost, skip_same_order, watch };
+        match rule {
+            Some(rule) => division.on_one_thread(rule, workspace, tree),
+            None => division.by_best_splits(workspace, tree),
+        }
     }
 }
 
@@ -171,8 +169,7 @@ impl Config {
     /// Builds with `weights[i]` as the expected cost C_obj of intersecting object `i`, in any unit,
     /// finite and not negative. The configured heuristic is not used.
     pub fn build_weighted(&self, boxes: &[Aabb], weights: &[f32]) -> Result<Bvh, BuildError> {
-        let watch = &Watch::default();
-        let scene = &Presorted::sort(boxes, self.skip_sorted, self.skip_flat, watch)?;
+        let scene = &Presorted::sort(boxes, self.skip_sorted, self.skip_flat)?;
         if weights.len() != boxes.len() {
             return Err(BuildError::WeightCount { weights: weights.len(), objects: boxes.len() });
         }
@@ -182,9 +179,13 @@ impl Config {
             return Err(BuildError::InvalidWeight { index, weight: weights[index].into() });
         }
         let mut tree = Bvh::default();
-        let split_cost = &AreaTimesWeight(weights);
-        let division = Division { scene, split_cost, skip_same_order: self.skip_same_order, watch };
-        greedy(&division, &mut tree)?;
+        let division = Division {
+            scene,
+            split_cost: &AreaTimesWeight(weights),
+            skip_same_order: self.skip_same_order,
+            watch: &Watch::default(),
+        };
+        division.by_best_splits(&mut Workspace::default(), &mut tree)?;
         Ok(tree)
     }
 
@@ -200,37 +201,7 @@ impl Config {
         tree: &mut Bvh,
         watch: &Watch,
     ) -> Result<(), BuildError> {
-        let skip_same_order = self.skip_same_order;
-        let division = ByRule { scene, rule, skip_same_order, watch, workspace, tree };
-        self.divide_by_heuristic(scene.len(), measure, division)
+        let rule = Some(rule);
+        ByHeuristic { config: self, scene, measure, rule, workspace, tree, watch }.divide()
     }
-
-    /// Divides by the split cost of the heuristic.
-    fn divide_by_heuristic(
-        &self,
-        objects: usize,
-        measure: Option<&dyn Measure>,
-        division: impl Divide,
-    ) -> Result<(), BuildError> {
-        match self.heuristic {
-            Heuristic::AreaTimesCount => divide_by(&AreaTimesCount, measure, division),
-            Heuristic::AreaTimesPower(p) => {
-                divide_by(&AreaTimesPower::new(objects, p), measure, division)
-            }
-            Heuristic::AreaOnly(reading) => divide_by(&reading, measure, division),
-            Heuristic::AreaTimesCost(made_up) => {
-                divide_by(&AreaTimesWeight(&made_up.costs(objects)), measure, division)
-            }
-        }
-    }
-}
-
-/// Divides by the best splits, on all threads if the scene is large enough.
-fn greedy<C: SplitCost>(division: &Division<C>, tree: &mut Bvh) -> Result<(), BuildError> {
-    let workspace = &mut Workspace::default();
-    #[cfg(feature = "rayon")]
-    if division.scene.len() >= PARALLEL_OBJECTS && rayon::current_num_threads() > 1 {
-        return division.on_all_threads(workspace, tree);
-    }
-    division.on_one_thread(&mut TakeBest, workspace, tree)
 }

@@ -1,7 +1,7 @@
 //! The objects of a scene, checked, packed and sorted once along every axis.
 
+use crate::BuildError;
 use crate::error::check_scene;
-use crate::{BuildError, OBJECTS_PER_POLL, Watch};
 use bvh_core::{Aabb, PackedAabb};
 
 /// Least number of objects that are sorted and divided in parallel. It is large enough that the
@@ -26,12 +26,7 @@ impl Presorted {
     /// Source: Ng & Trifonov 2003, Table 1, step 1: 'sort boxes along all three axes', by *box*
     /// centre.
     pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
-        Self::watched(boxes, &Watch::default())
-    }
-
-    /// Sorts like [`new`](Self::new), unless the `watch` cancels. Polls before every axis.
-    pub fn watched(boxes: &[Aabb], watch: &Watch) -> Result<Self, BuildError> {
-        Self::sort(boxes, true, false, watch)
+        Self::sort(boxes, true, false)
     }
 
     /// Sorts like [`new`](Self::new). Without `skip_sorted`, objects that are already in order are
@@ -42,17 +37,15 @@ impl Presorted {
         boxes: &[Aabb],
         skip_sorted: bool,
         x_without_area: bool,
-        watch: &Watch,
     ) -> Result<Self, BuildError> {
         check_scene(boxes)?;
-        let along = |axis| sorted_along(boxes, axis, skip_sorted, watch);
+        let along = |axis| sorted_along(boxes, axis, skip_sorted);
         let [x, y, z] = if x_without_area && Self::without_area(boxes) {
             let x = along(0);
             [x.clone(), x.clone(), x]
         } else {
             in_parallel(boxes.len(), || along(0), || along(1), || along(2))
         };
-        watch.ensure_wanted()?;
         let orders = [x.0, y.0, z.0];
         let in_order = [x.1, y.1, z.1];
         Ok(Self { boxes: boxes.iter().map(PackedAabb::from).collect(), orders, in_order })
@@ -91,10 +84,7 @@ impl Presorted {
 }
 
 /// Returns the objects sorted along an axis, and whether they were already in order.
-fn sorted_along(boxes: &[Aabb], axis: usize, skip_sorted: bool, watch: &Watch) -> (Vec<u32>, bool) {
-    if boxes.len() >= OBJECTS_PER_POLL && watch.is_cancelled() {
-        return (Vec::new(), false);
-    }
+fn sorted_along(boxes: &[Aabb], axis: usize, skip_sorted: bool) -> (Vec<u32>, bool) {
     let mut keyed: Vec<(f64, u32)> =
         boxes.iter().zip(0..).map(|(b, index)| (b.doubled_centroid()[axis], index)).collect();
     // The check ends at the first pair out of order, usually within a few objects.

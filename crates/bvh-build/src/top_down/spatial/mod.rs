@@ -116,12 +116,11 @@ impl Config {
             config: self,
             objects,
             extra: most.saturating_sub(boxes.len()),
-            watch,
             least_overlap: 0.0,
             powers: Vec::new(),
             axes: Default::default(),
         };
-        build.divide(boxes)
+        build.divide(boxes, Pace::new(watch))
     }
 }
 
@@ -131,7 +130,6 @@ struct Build<'a> {
     objects: &'a dyn Clip,
     /// Number of references that may be added.
     extra: usize,
-    watch: &'a Watch<'a>,
     /// Least common area for which spatial splits are tried.
     least_overlap: f64,
     /// The powers |side|^power, indexed by |side|.
@@ -143,12 +141,11 @@ struct Build<'a> {
 const MOST_STALLS: u8 = 8;
 
 impl Build<'_> {
-    fn divide(&mut self, boxes: &[Aabb]) -> Result<Bvh, BuildError> {
+    fn divide(&mut self, boxes: &[Aabb], mut pace: Pace) -> Result<Bvh, BuildError> {
         let mut tree = Bvh::default();
         if boxes.is_empty() {
             return Ok(tree);
         }
-        let mut pace = Pace::new(self.watch);
         self.powers = (0..=boxes.len()).map(|n| libm::pow(n as f64, self.config.power)).collect();
         let references: Vec<Reference> =
             boxes.iter().zip(0..).map(|(&aabb, object)| Reference { aabb, object }).collect();
@@ -168,8 +165,7 @@ impl Build<'_> {
                 continue;
             }
             let Sides { boxes, references: sides, .. } =
-                self.split(&aabb, &references, &mut stalls)?;
-            self.watch.ensure_wanted()?;
+                self.split(&aabb, &references, &mut stalls);
             // The sides hold copies, so the parent's references are freed at once.
             drop(references);
             let first = tree.nodes.len() as u32;
@@ -188,15 +184,10 @@ impl Build<'_> {
     }
 
     /// Divides two references or more by the better of the best object split and the best spatial
-    /// split, or by a balanced split after [`MOST_STALLS`] stalls. Fails if the watch cancels.
-    fn split(
-        &mut self,
-        aabb: &Aabb,
-        references: &[Reference],
-        stalled: &mut u8,
-    ) -> Result<Sides, BuildError> {
+    /// split, or by a balanced split after [`MOST_STALLS`] stalls.
+    fn split(&mut self, aabb: &Aabb, references: &[Reference], stalled: &mut u8) -> Sides {
         let extra = self.extra;
-        let sides = self.cheapest_split(aabb, references)?;
+        let sides = self.cheapest_split(aabb, references);
         let node_area = aabb.half_area();
         let is_last = *stalled == MOST_STALLS;
         if (is_last || references.len() >= LEAST_STALLED) && sides.stall(node_area) {
@@ -207,18 +198,14 @@ impl Build<'_> {
             }
             *stalled += 1;
         }
-        Ok(sides)
+        sides
     }
 
-    fn cheapest_split(
-        &mut self,
-        aabb: &Aabb,
-        references: &[Reference],
-    ) -> Result<Sides, BuildError> {
-        let by_objects = self.object_split(references, Candidates::All)?;
+    fn cheapest_split(&mut self, aabb: &Aabb, references: &[Reference]) -> Sides {
+        let by_objects = self.object_split(references, Candidates::All);
         let [left, right] = &by_objects.boxes;
         if self.extra == 0 || left.intersection(right).half_area() <= self.least_overlap {
-            return Ok(by_objects);
+            return by_objects;
         }
         let plane = self.best_plane(aabb, references, by_objects.cost);
         let by_plane = plane.and_then(|plane| self.spatial_split(references, plane));
@@ -226,9 +213,9 @@ impl Build<'_> {
             Some(by_plane) if by_plane.cost < by_objects.cost => {
                 let [left, right] = by_plane.references.each_ref().map(Vec::len);
                 self.extra -= left + right - references.len();
-                Ok(by_plane)
+                by_plane
             }
-            _ => Ok(by_objects),
+            _ => by_objects,
         }
     }
 }
@@ -286,12 +273,10 @@ mod tests {
         let triangles = needles(2000);
         let objects = &triangles.as_slice();
         let config = Config::default();
-        let watch = Watch::default();
         let build = Build {
             config: &config,
             objects,
             extra: usize::MAX,
-            watch: &watch,
             least_overlap: 0.0,
             powers: (0..=8).map(|n| libm::pow(f64::from(n), config.power)).collect(),
             axes: Default::default(),

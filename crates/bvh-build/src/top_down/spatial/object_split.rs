@@ -3,7 +3,6 @@
 
 use super::{Build, Reference, Sides, union};
 use crate::top_down::presort::in_parallel;
-use crate::{BuildError, OBJECTS_PER_POLL};
 use bvh_core::Aabb;
 
 /// The candidates of object splits along one axis.
@@ -80,23 +79,19 @@ const RADIX_SORTED: usize = 2048;
 
 impl Build<'_> {
     /// Returns the best object split in the orders of the centres along the axes; ties go to the
-    /// lower axis and position. Fails if the watch cancels.
+    /// lower axis and position.
     pub(super) fn object_split(
         &mut self,
         references: &[Reference],
         candidates: Candidates,
-    ) -> Result<Sides, BuildError> {
+    ) -> Sides {
         let count = references.len();
-        let Self { powers, axes: [x, y, z], watch, .. } = self;
+        let Self { powers, axes: [x, y, z], .. } = self;
         let best = |axis: &mut Axis, number: usize| {
-            if count >= OBJECTS_PER_POLL && watch.is_cancelled() {
-                return (f64::INFINITY, 1);
-            }
             axis.sort(references, number);
             axis.best(references, powers, candidates)
         };
         let found = in_parallel(count, || best(x, 0), || best(y, 1), || best(z, 2));
-        watch.ensure_wanted()?;
         let mut least = f64::INFINITY;
         let mut axis = 0;
         let mut left = 1;
@@ -116,6 +111,6 @@ impl Build<'_> {
         let sides = [ordered[..left].to_vec(), ordered.split_off(left)];
         let boxes = sides.each_ref().map(|side| union(side));
         let cost = self.cost(&boxes[0], left) + self.cost(&boxes[1], count - left);
-        Ok(Sides { cost, boxes, references: sides })
+        Sides { cost, boxes, references: sides }
     }
 }

@@ -2,7 +2,6 @@
 
 use super::{Build, Reference, Sides, union};
 use crate::top_down::presort::in_parallel;
-use crate::watch::Pace;
 use bvh_core::Aabb;
 
 /// A candidate of a spatial split.
@@ -87,13 +86,8 @@ impl Build<'_> {
         if !may_pay {
             return None;
         }
-        let mut pace = Pace::new(self.watch);
         for reference in references {
             let [first, last] = bins_of(reference);
-            // Clipping is the slow part, and a large reference is clipped once per bin.
-            if pace.ends_after(1 + last - first) {
-                return None;
-            }
             if first == last {
                 parts[first].0 = parts[first].0.union(&reference.aabb);
                 continue;
