@@ -1,5 +1,4 @@
-//! Queries other than the first hit of a ray: the objects in a region, the objects nearest to a
-//! point, and all hits of a ray.
+//! Queries other than hits of a ray: the objects in a region, and the objects nearest to a point.
 //!
 //! The objects may be of any kind. The caller passes a closure that examines one object and that
 //! can also skip it. Boxes are tested conservatively. For any tree, the answer is the same as the
@@ -7,16 +6,15 @@
 //!
 //! | query | function | boxes visited |
 //! |---|---|---|
-//! | objects that may overlap a box, a sphere or a frustum, or may contain a point | [`overlapping`] | boxes that do, and their siblings |
-//! | all hits of a ray | [`all_hits`] | boxes that the ray meets, and their siblings |
-//! | objects that a ray may meet | [`along`] | the same |
+//! | objects that may overlap a box or a sphere, or may contain a point | [`overlapping`] | boxes that do, and their siblings |
 //! | the object nearest to a point | [`nearest`] | about O(log n) for objects that are spread out |
 //! | the k objects nearest to a point | [`k_nearest`] | about O(k + log n) for such objects |
 //!
-//! All queries use the tree. The [wide layout](crate::WideBvh) is faster, but omits triangles
-//! without area. Its [`all_hits`](crate::WideBvh::all_hits) counts each crossing of a surface once,
-//! although triangles share edges; [`closest_points`](crate::WideBvh::closest_points) and
-//! [`Solid::contains`](crate::Solid::contains) answer batches of points.
+//! Both use the tree. The [wide layout](crate::WideBvh) is faster, but omits triangles without
+//! area: its [`closest_points`](crate::WideBvh::closest_points) and
+//! [`Solid::contains`](crate::Solid::contains) answer batches of points. All hits of a ray are
+//! [`WideBvh::all_hits`](crate::WideBvh::all_hits), or what [`any_hit_by`](crate::any_hit_by) shows
+//! a closure that returns false.
 //!
 //! ```
 //! use bvh_core::{Aabb, Bvh, Node, Triangle, query};
@@ -34,7 +32,7 @@
 //! assert_eq!((found.object, found.distance_squared), (1, 1.0));
 //! ```
 
-use crate::{Aabb, BvhView, Hit, NodeKind, Primitive, Ray, Sphere, any_hit_by};
+use crate::{Aabb, BvhView, NodeKind, Sphere};
 use alloc::collections::BTreeSet;
 use alloc::{vec, vec::Vec};
 use core::cmp::Ordering;
@@ -69,34 +67,6 @@ impl Region for Sphere {
         let radius = f64::from(self.radius);
         radius >= 0.0 && least_distance_squared(aabb, self.center) <= radius * radius
     }
-}
-
-/// The points on the inner sides of several planes: the view of a camera, for example.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Frustum {
-    /// `[a, b, c, d]` of each plane. The inner side is where a·x + b·y + c·z + d is not negative.
-    pub planes: Vec<[f32; 4]>,
-}
-
-impl Region for Frustum {
-    /// Returns whether the frustum may have a point in the box. A box beyond an edge of the frustum
-    /// may be accepted although no point of the box is inside.
-    #[inline]
-    fn may_meet(&self, aabb: &Aabb) -> bool {
-        self.planes.iter().all(|plane| is_partly_inside(aabb, plane))
-    }
-}
-
-/// Returns whether a box has a point on the inner side of a plane.
-#[inline]
-fn is_partly_inside(aabb: &Aabb, &[a, b, c, d]: &[f32; 4]) -> bool {
-    let normal = Vec3::new(a, b, c);
-    // The corner that is farthest inside decides.
-    let corner = Vec3::select(normal.cmpge(Vec3::ZERO), aabb.max, aabb.min);
-    let terms = normal.as_dvec3() * corner.as_dvec3();
-    // Products of f32 are exact in f64, but their sums are rounded, hence the margin.
-    let size = terms.abs().element_sum() + f64::from(d.abs());
-    terms.element_sum() + f64::from(d) >= -ROUNDING * size
 }
 
 /// A bound of the relative rounding error of any distance in this module.
@@ -145,52 +115,6 @@ pub fn overlapping<'t, B>(
         }
     }
     None
-}
-
-/// Calls `visit` with the objects of every leaf whose box the ray meets in its range, until `visit`
-/// breaks. Returns the value of the break. The order of the objects is not the order of their
-/// distances.
-pub fn along<'t, B>(
-    tree: impl Into<BvhView<'t>>,
-    ray: &Ray,
-    mut visit: impl FnMut(u32) -> ControlFlow<B>,
-) -> Option<B> {
-    let mut broken = None;
-    // No object counts as hit until `visit` breaks, so the traversal visits every leaf.
-    let breaks = |object| {
-        broken = visit(object).break_value();
-        broken.is_some()
-    };
-    any_hit_by(tree, ray, breaks, &mut ());
-    broken
-}
-
-/// Returns the hits of the ray, in its range, with all `objects` that `keep` accepts. The nearest
-/// hit comes first; of several hits at the same distance the hit with the lowest id comes first.
-/// `tree` is a tree over the [boxes](crate::boxes) of `objects`.
-pub fn all_hits<'t, P: Primitive>(
-    tree: impl Into<BvhView<'t>>,
-    objects: &[P],
-    ray: &Ray,
-    mut keep: impl FnMut(u32) -> bool,
-) -> Vec<Hit> {
-    let prepared = P::prepare(ray);
-    let mut hits = Vec::new();
-    along(tree, ray, |object| -> ControlFlow<()> {
-        if keep(object)
-            && let Some(t) = objects[object as usize].intersect(&prepared, ray.t_max())
-        {
-            hits.push(Hit { t, object });
-        }
-        ControlFlow::Continue(())
-    });
-    hits.sort_unstable_by(|a, b| {
-        let by_distance = a.t.total_cmp(&b.t);
-        by_distance.then(a.object.cmp(&b.object))
-    });
-    // A divided object is hit in several leaves, every time at the same distance.
-    hits.dedup();
-    hits
 }
 
 /// An object near a point.

@@ -52,11 +52,6 @@ impl Crossings {
         }
     }
 
-    /// Returns whether [`record`](Self::record) would count a segment.
-    pub fn would_record(from: DVec3, to: DVec3) -> bool {
-        clip_to_grid(from, to - from).is_some()
-    }
-
     /// Records the cells that a segment visits within the grid, face by face. Coordinates are in
     /// cells.
     pub fn record(&mut self, from: DVec3, to: DVec3) {

@@ -219,19 +219,6 @@ impl RayDensity {
         })
     }
 
-    /// Returns whether [`of_rays`](Self::of_rays) would count any of these segments, without making
-    /// the density. O(segments before the first that counts).
-    ///
-    /// # Errors
-    /// Returns a [`DensityError`] if the bounds are empty or not finite.
-    pub fn counts_any(bounds: &Aabb, segments: &[Segment]) -> Result<bool, DensityError> {
-        let grid = Grid::new(bounds)?;
-        Ok(segments
-            .iter()
-            .filter_map(|segment| grid.in_cells(segment, LENGTHENED))
-            .any(|[from, to]| Crossings::would_record(from, to)))
-    }
-
     /// Returns the number of segments that meet the bounds.
     pub fn segments(&self) -> u32 {
         self.segments

@@ -18,26 +18,6 @@ impl Random {
 }
 
 #[test]
-fn a_segment_counts_alone_if_it_makes_a_density() {
-    let mut random = Random(2);
-    let bounds = Aabb::from([[8.0; 3], [16.0; 3]]);
-    let mut counted = 0;
-    for _ in 0..40 {
-        let segment = Segment { from: random.point(), to: random.point() };
-        let makes_one = RayDensity::of_rays(&bounds, &[segment], 0.1).is_ok();
-        assert_eq!(RayDensity::counts_any(&bounds, &[segment]), Ok(makes_one), "{segment:?}");
-        counted += u32::from(makes_one);
-    }
-    assert!((5..35).contains(&counted), "{counted}");
-    // The extension of a quarter of a cell reaches the grid.
-    let near = Segment { from: [16.05, 9.0, 9.0], to: [17.0, 9.0, 9.0] };
-    let far = Segment { from: [16.07, 9.0, 9.0], to: [17.0, 9.0, 9.0] };
-    assert_eq!(RayDensity::counts_any(&bounds, &[far, near]), Ok(true));
-    assert_eq!(RayDensity::counts_any(&bounds, &[far]), Ok(false));
-    assert_eq!(RayDensity::counts_any(&Aabb::EMPTY, &[near]), Err(DensityError::Bounds));
-}
-
-#[test]
 fn the_shortcut_within_a_cell_and_the_sum_over_corners_give_the_same_bits() {
     let mut random = Random(1);
     let mut segments = Vec::new();

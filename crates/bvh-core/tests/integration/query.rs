@@ -1,11 +1,10 @@
 //! Every query gives the answer of examining every object, for any tree.
 
 use crate::support::{Random, SHAPES};
-use bvh_core::query::{self, Frustum, Near, Region};
-use bvh_core::{Aabb, Bvh, Hit, PreparedRay, Ray, Sphere, Triangle, validate};
+use bvh_core::query::{self, Near, Region};
+use bvh_core::{Aabb, Bvh, Sphere, Triangle, validate};
 use glam::Vec3;
 use proptest::prelude::*;
-use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 fn point() -> impl Strategy<Value = Vec3> {
@@ -52,38 +51,22 @@ fn check_region(triangles: &[Triangle], region: &impl Region) {
     assert_eq!(found, expected);
 }
 
-/// Returns whether a point is on the inner side of a plane.
-fn is_inside(point: Vec3, (normal, d): &(Vec3, f32)) -> bool {
-    normal.as_dvec3().dot(point.as_dvec3()) + f64::from(*d) >= 0.0
-}
-
-fn frustum(planes: &[(Vec3, f32)]) -> Frustum {
-    let mut frustum = Frustum { planes: Vec::new() };
-    for (normal, d) in planes {
-        frustum.planes.push([normal.x, normal.y, normal.z, *d]);
-    }
-    frustum
-}
-
 proptest! {
     #[test]
     fn regions_find_the_objects_that_examining_every_object_finds(
         triangles in triangles(),
         (a, b) in (point(), point()),
         radius in -0.5f32..6.0,
-        planes in prop::collection::vec((point(), -6.0f32..6.0), 0..6),
     ) {
         check_region(&triangles, &Aabb { min: a.min(b), max: a.max(b) });
         check_region(&triangles, &a);
         check_region(&triangles, &Sphere::new(b, radius));
-        check_region(&triangles, &frustum(&planes));
     }
 
     #[test]
     fn a_region_may_meet_every_box_that_has_one_of_its_points(
         (a, b, corner) in (point(), point(), point()),
         radius in 0.0f32..6.0,
-        planes in prop::collection::vec((point(), -6.0f32..6.0), 0..6),
     ) {
         let aabb = Aabb { min: corner.min(b), max: corner.max(b) };
         let region = Aabb { min: a.min(corner), max: a.max(corner) };
@@ -96,13 +79,7 @@ proptest! {
             if distance <= f64::from(radius) {
                 prop_assert!(Sphere::new(a, radius).may_meet(&aabb));
             }
-            if planes.iter().all(|plane| is_inside(inside, plane)) {
-                prop_assert!(frustum(&planes).may_meet(&aabb));
-            }
         }
-        // The full box is on the outer side of this plane.
-        let beyond = Frustum { planes: vec![[1.0, 0.0, 0.0, -aabb.max.x - 1.0]] };
-        prop_assert!(!beyond.may_meet(&aabb));
         let touching = Sphere::new(aabb.max + Vec3::X * (radius + 1.0), radius);
         prop_assert!(!touching.may_meet(&aabb));
     }
@@ -135,32 +112,6 @@ proptest! {
         if k > 0 {
             prop_assert_eq!(query::nearest(&tree, point, limit, distance), expected.first().copied());
         }
-    }
-
-    #[test]
-    fn all_hits_along_a_ray_are_found(triangles in triangles(), from in point(), to in point(), t_max in 0.0f32..3.0) {
-        let Ok(ray) = Ray::new(from, to - from, 0.0, t_max) else { return Ok(()) };
-        let prepared = PreparedRay::new(&ray);
-        let mut met = BTreeSet::new();
-        query::along(&tree(&triangles), &ray, |object| -> ControlFlow<()> {
-            met.insert(object);
-            ControlFlow::Continue(())
-        });
-        let keep = |object: u32| !object.is_multiple_of(3);
-        let mut expected = Vec::new();
-        for (object, triangle) in (0..).zip(&triangles) {
-            if let Some(t) = triangle.intersect(&prepared, t_max) {
-                prop_assert!(met.contains(&object), "{}", object);
-                if keep(object) {
-                    expected.push(Hit { t, object });
-                }
-            }
-        }
-        expected.sort_by(|a, b| {
-            let by_distance = a.t.total_cmp(&b.t);
-            by_distance.then(a.object.cmp(&b.object))
-        });
-        prop_assert_eq!(query::all_hits(&tree(&triangles), &triangles, &ray, keep), expected);
     }
 
     #[test]
