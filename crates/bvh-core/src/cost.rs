@@ -9,7 +9,7 @@ use crate::{Aabb, Bvh, Node, NodeKind, PackedAabb};
 
 pub(crate) use crate::layout_cost::call_in_turn;
 pub use crate::layout_cost::{
-    CallBoth, LayoutCost, LayoutTree, layout_area, layout_cost, layout_measure, layout_row,
+    CallBoth, LayoutCost, LayoutTree, layout_area, layout_cost, layout_row,
 };
 
 /// The cost that a search minimises and that results report in the column `cost`.
@@ -58,7 +58,7 @@ impl Objective {
             Self::Sah(constants) => {
                 over(root, by_tests(tree, constants, |node| size_by(measure, node)))
             }
-            Self::Layout => layout_measure(tree, measure),
+            Self::Layout => layout_cost(tree, Some(measure), &call_in_turn),
         }
     }
 }

@@ -116,11 +116,6 @@ pub fn layout_area(tree: &Bvh) -> f64 {
     layout_cost(tree, None, &call_in_turn)
 }
 
-/// Returns the same as [`layout_area`], with the measure instead of the half area. O(nodes).
-pub fn layout_measure(tree: &Bvh, measure: &dyn Measure) -> f64 {
-    layout_cost(tree, Some(measure), &call_in_turn)
-}
-
 /// Calls two functions one after the other.
 pub(crate) fn call_in_turn(first: &mut (dyn FnMut() + Send), second: &mut (dyn FnMut() + Send)) {
     first();
@@ -132,7 +127,7 @@ pub(crate) fn call_in_turn(first: &mut (dyn FnMut() + Send), second: &mut (dyn F
 /// at once.
 pub type CallBoth<'a> = &'a (dyn Fn(&mut (dyn FnMut() + Send), &mut (dyn FnMut() + Send)) + Sync);
 
-/// Returns the same as [`layout_area`], or as [`layout_measure`] with a measure. Passes the two
+/// Returns the same as [`layout_area`], or with a measure instead of the half area. Passes the two
 /// subtrees of nodes near the root to `both`; the result is the same, bit by bit, however it calls
 /// them. O(nodes).
 pub fn layout_cost(tree: &Bvh, measure: Option<&dyn Measure>, both: CallBoth) -> f64 {

@@ -37,19 +37,19 @@
 //! its bounds; no rounding decides an answer.
 
 use super::answer::ANY_HIT;
-use super::crossed_leaves::{AllHits, Decision, LineLanes, SlopedLine};
-use super::flight::RAYS;
-use super::instructions::{Instructions, Pending, Task};
-use super::kernel::{DeepStacks, SPARE, STACK};
-use super::lanes::Lanes;
+use super::flight::{RAYS, Traversal};
+use super::instructions::{Instructions, Task};
+use super::kernel::DeepStacks;
+use super::lanes::{Lanes, Mask};
 use super::layout::{Child, WideBvh, WideNode};
-use super::one_ray::traverse;
-use super::prepared::{Prepared, Ready};
+use super::one_ray::{LeafRay, Leaves, traverse};
+use super::pairs::Plane;
+use super::prepared::{Prepared, Ready, Test};
 use super::ray_lanes::RayLanes;
 use super::triangles::TriangleBlock;
 use super::{portable, vector};
 use crate::exact::Line;
-use crate::{Hit, Kernel, Ray};
+use crate::{Hit, Kernel, Ray, Triangle};
 use alloc::vec::Vec;
 use core::mem::MaybeUninit;
 
@@ -102,13 +102,13 @@ impl WideBvh {
     /// # Panics
     /// Panics if `rays` and `counts` are not equally many.
     pub fn count_hits(&self, rays: &[Ray], counts: &mut [u32]) {
+        /// The number of rays whose hits are kept at a time.
+        const AT_ONCE: usize = 16 * MOST;
         assert_eq!(rays.len(), counts.len(), "a count for every ray");
         let mut hits = Vec::new();
-        let mut found = Vec::new();
-        let parts = rays.chunks(MOST);
-        for (rays, counts) in parts.zip(counts.chunks_mut(MOST)) {
+        for (rays, counts) in rays.chunks(AT_ONCE).zip(counts.chunks_mut(AT_ONCE)) {
             hits.clear();
-            self.append_hits_of(rays, &mut hits, counts, &mut found);
+            self.all_hits_of(rays, &mut hits, counts);
         }
     }
 
@@ -170,20 +170,25 @@ impl WideBvh {
     /// Appends the hits of a ray, in no order; the hits of a divided triangle once for each of its
     /// leaves.
     fn append_hits(&self, ray: &Ray, hits: &mut Vec<Hit>) {
-        let line = Line::new(ray);
-        let sloped = SlopedLine::new(ray, &self.bounds);
-        let mut leaves = AllHits { ray, line, sloped, hits };
         if self.kernel != Kernel::Portable {
-            let task = OneRay { wide: self, ray, leaves: &mut leaves };
             // SAFETY: a layout's kernel is available.
-            unsafe { vector::dispatch::<_, ()>(self.kernel, task) };
-        } else {
-            portable::traverse::<ANY_HIT>(self, ray, &mut (), |block, _| {
-                leaves.test(block, (1 << block.len()) - 1);
-                false
-            });
+            return unsafe { vector::dispatch(self.kernel, OneRay { wide: self, ray, hits }) };
         }
+        let line = Line::new(ray);
+        portable::traverse::<ANY_HIT>(self, ray, &mut (), |block, _| {
+            for (object, triangle) in block.triangles() {
+                hits.extend(hit_of(ray, &line, object, &triangle));
+            }
+            false
+        });
     }
+}
+
+/// Returns the hit of a ray with a triangle, if it is in the ray's range.
+#[inline(always)]
+fn hit_of(ray: &Ray, line: &Line, object: u32, triangle: &Triangle) -> Option<Hit> {
+    let t = line.crossing(ray, &triangle.0)?;
+    (ray.t_min() <= t && t <= ray.t_max()).then_some(Hit { t, object })
 }
 
 /// Sorts the hits of one ray and moves each to the front once: a divided triangle is in several
@@ -226,20 +231,96 @@ pub(crate) struct Found {
 type Pair = u64;
 
 /// The search for all hits of one ray.
-struct OneRay<'a, 'b> {
+struct OneRay<'a> {
     wide: &'a WideBvh,
     ray: &'a Ray,
-    leaves: &'a mut AllHits<'b>,
+    hits: &'a mut Vec<Hit>,
 }
 
-impl<K: Instructions> Task<K> for OneRay<'_, '_> {
+impl<K: Instructions> Task<K> for OneRay<'_> {
     type Output = ();
 
     #[inline(always)]
     unsafe fn run(self) {
-        let Self { wide, ray, leaves } = self;
+        let Self { wide, ray, hits } = self;
         // SAFETY: the processor has the instructions of `K`.
-        unsafe { traverse::<K, ANY_HIT>(wide, ray, leaves) };
+        unsafe {
+            let leaf_ray = LeafRay::<K::Block>::new(ray, &wide.bounds);
+            traverse::<K, ANY_HIT>(wide, ray, &mut AllHits { ray, leaf_ray, hits });
+        }
+    }
+}
+
+/// Collects all hits of a ray.
+struct AllHits<'a, L> {
+    ray: &'a Ray,
+    leaf_ray: LeafRay<L>,
+    hits: &'a mut Vec<Hit>,
+}
+
+impl<L: Lanes> Leaves<L> for AllHits<'_, L> {
+    #[inline(always)]
+    unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool {
+        // SAFETY: the processor has the instructions.
+        let (rays, corners) = unsafe { (&self.leaf_ray.pairs, self.leaf_ray.corners(block)) };
+        let candidates = rays.candidates(&corners);
+        if candidates.possible != 0 {
+            let t_max = corners[0][0].filled(nearest.t);
+            let plane = Plane::of_lanes(&corners);
+            let decided = rays.decide_in_f64(&corners, &plane, &candidates, t_max);
+            Decided::new(decided).hits_of(0, block, self.ray, |hit| self.hits.push(hit));
+        }
+        false
+    }
+}
+
+/// The answers of a test in f64.
+struct Decided {
+    hits: u32,
+    unsure: u32,
+    distances: [f32; 16],
+}
+
+impl Decided {
+    #[inline(always)]
+    fn new<L: Lanes>((hits, unsure, t): (L::Mask, u32, L)) -> Self {
+        let mut distances = [0.0; 16];
+        // SAFETY: there is room for sixteen lanes.
+        unsafe { t.store(distances.as_mut_ptr()) };
+        Self { hits: hits.bits(), unsure, distances }
+    }
+
+    /// Calls `append` with the hits of a ray in a block, whose tests are in this quarter of the
+    /// lanes.
+    #[inline(always)]
+    fn hits_of(
+        &self,
+        quarter: usize,
+        block: &TriangleBlock,
+        ray: &Ray,
+        mut append: impl FnMut(Hit),
+    ) {
+        let first = 4 * quarter;
+        let mut hits = self.hits >> first & 0b1111;
+        while hits != 0 {
+            let lane = hits.trailing_zeros() as usize & 3;
+            hits &= hits - 1;
+            let hit = Hit { t: self.distances[(first + lane) & 15], object: block.id(lane) };
+            // An unused lane repeats a triangle.
+            if !hit.is_miss() {
+                append(hit);
+            }
+        }
+        let mut unsure = self.unsure >> first & 0b1111;
+        while unsure != 0 {
+            let lane = unsure.trailing_zeros() as usize & 3;
+            unsure &= unsure - 1;
+            if let Some((object, triangle)) = block.triangle(lane)
+                && let Some(hit) = hit_of(ray, &Line::new(ray), object, &triangle)
+            {
+                append(hit);
+            }
+        }
     }
 }
 
@@ -272,7 +353,6 @@ impl<K: Instructions> Task<K> for ManyRays<'_> {
         assert!(rays.len() <= MOST);
         let Some(root) = wide.root else { return };
         let mut prepared = [const { MaybeUninit::<Prepared>::uninit() }; MOST + RAYS];
-        let mut lines = [const { MaybeUninit::<SlopedLine>::uninit() }; MOST];
         let mut waiting = [0; MOST];
         let mut count = 0;
         // SAFETY: the processor has the instructions of `K`; there is room for the last lanes.
@@ -284,52 +364,20 @@ impl<K: Instructions> Task<K> for ManyRays<'_> {
                 let entered = ready.enter(&wide.bounds);
                 let last = rays.len().min(first + K::Rays::N);
                 for (lane, number) in (first..last).enumerate() {
-                    if entered >> lane & 1 == 1 {
-                        lines[number].write(SlopedLine::new(&rays[number], &wide.bounds));
-                        waiting[count] = number as u32;
-                        count += 1;
-                    }
+                    waiting[count] = number as u32;
+                    count += (entered >> lane & 1) as usize;
                 }
             }
-            let mut pairs = Pairs { wide, rays, lines: &lines, pairs: [0; PAIRS], count: 0, found };
-            let waiting = &waiting[..count];
+            let mut pairs =
+                Pairs { wide, rays, prepared: &prepared, pairs: [0; PAIRS], count: 0, found };
             if root.is_node() {
-                visit_nodes::<K>(&mut pairs, waiting, prepared.as_ptr().cast(), root);
+                visit_nodes::<K>(&mut pairs, &waiting[..count]);
             } else {
-                for &number in waiting {
+                for &number in &waiting[..count] {
                     pairs.append_leaf::<K>(root, number);
                 }
             }
             pairs.test::<K>();
-        }
-    }
-}
-
-/// The way of one ray through the layout. Without its nearest hit it needs no copy of the ray.
-#[repr(C, align(64))]
-struct Traversal {
-    ray: *const Prepared,
-    top: *mut Pending,
-    /// The node to visit next.
-    child: Child,
-    /// [`Child::END`], what waits, and room for stores of whole registers: `frame`, or on the heap.
-    stack: *mut Pending,
-    frame: [MaybeUninit<Pending>; STACK + SPARE],
-}
-
-impl Traversal {
-    /// Starts a ray at the root.
-    ///
-    /// # Safety
-    /// The stack has more than one place.
-    #[inline(always)]
-    unsafe fn start(&mut self, ray: *const Prepared, root: Child) {
-        self.ray = ray;
-        self.child = root;
-        // SAFETY: the stack has more than one place.
-        unsafe {
-            self.stack.write(u64::from(Child::END.bits()));
-            self.top = self.stack.add(1);
         }
     }
 }
@@ -340,12 +388,7 @@ impl Traversal {
 /// The processor has the instructions of `K`, and the caller is compiled with them; the rays are
 /// prepared, and the root is a node.
 #[inline(always)]
-unsafe fn visit_nodes<K: Instructions>(
-    pairs: &mut Pairs,
-    waiting: &[u32],
-    prepared: *const Prepared,
-    root: Child,
-) {
+unsafe fn visit_nodes<K: Instructions>(pairs: &mut Pairs, waiting: &[u32]) {
     let wide = pairs.wide;
     let mut traversals = MaybeUninit::<[Traversal; FLIGHT]>::uninit();
     let traversals = traversals.as_mut_ptr().cast::<Traversal>();
@@ -353,15 +396,13 @@ unsafe fn visit_nodes<K: Instructions>(
     let mut active = [core::ptr::null_mut(); FLIGHT];
     let mut count = FLIGHT.min(waiting.len());
     let (first, mut waiting) = waiting.split_at(count);
-    let nodes = wide.nodes.as_ptr();
     // SAFETY: the references of the layout are sound, and its stacks large enough; nothing is
-    // popped after `END`; a prefetch may name any address.
+    // popped after `END`.
     unsafe {
         for (i, &number) in first.iter().enumerate() {
             active[i] = traversals.add(i);
-            let frame = (&raw mut (*active[i]).frame).cast();
-            (*active[i]).stack = deep.as_mut().map_or(frame, |deep| deep.stack(i));
-            (*active[i]).start(prepared.add(number as usize), root);
+            Traversal::set_stack(active[i], deep.as_mut().map(|deep| deep.stack(i)));
+            (*active[i]).start::<K>(pairs.ray(number), wide);
         }
         while count > 0 {
             let visits = count;
@@ -370,20 +411,13 @@ unsafe fn visit_nodes<K: Instructions>(
             count = 0;
             for i in 0..visits {
                 let traversal = &mut *active[i];
-                let node = &*nodes.add(traversal.child.index());
-                let ray = &*traversal.ray;
-                let (_, entered) = ray.boxes::<K>(node, ray.t_max);
+                let node = traversal.node(wide);
+                let (_, entered) = traversal.ray.boxes::<K>(node, traversal.ray.t_max);
                 let leaves = K::Boxes::load(node.children.as_ptr().cast()).signs();
-                K::compress(node, entered & !leaves, traversal.top);
-                let inner = (entered & !leaves).count_ones() as usize;
-                pairs.append_leaves::<K>(node, entered & leaves, ray.number);
-                traversal.top = traversal.top.add(inner).sub(1);
-                traversal.child = Child::from_bits(*traversal.top as u32);
+                pairs.append_leaves::<K>(node, entered & leaves, traversal.ray.number);
+                traversal.enter_any::<K>(node, entered & !leaves);
+                traversal.fetch::<K>(wide);
                 let is_at_end = traversal.child == Child::END;
-                let line = nodes.wrapping_add(traversal.child.index()).cast::<u8>();
-                for offset in 0..size_of::<WideNode>() / 64 {
-                    K::prefetch(line.wrapping_add(64 * offset));
-                }
                 active[count] = traversal;
                 count += usize::from(!is_at_end);
                 ended[ends] = traversal;
@@ -392,7 +426,7 @@ unsafe fn visit_nodes<K: Instructions>(
             for &traversal in &ended[..ends] {
                 let Some((&number, rest)) = waiting.split_first() else { break };
                 waiting = rest;
-                (*traversal).start(prepared.add(number as usize), root);
+                (*traversal).start::<K>(pairs.ray(number), wide);
                 active[count] = traversal;
                 count += 1;
             }
@@ -407,15 +441,20 @@ unsafe fn visit_nodes<K: Instructions>(
 struct Pairs<'a> {
     wide: &'a WideBvh,
     rays: &'a [Ray],
-    /// Written for all rays in flight.
-    lines: &'a [MaybeUninit<SlopedLine>; MOST],
+    /// Written for all rays.
+    prepared: &'a [MaybeUninit<Prepared>],
     pairs: [Pair; PAIRS],
     count: usize,
     found: &'a mut Vec<Found>,
 }
 
-impl Pairs<'_> {
-    /// Appends a leaf.
+impl<'a> Pairs<'a> {
+    #[inline(always)]
+    unsafe fn ray(&self, number: u32) -> &'a Prepared {
+        // SAFETY: the rays are prepared.
+        unsafe { self.prepared[number as usize].assume_init_ref() }
+    }
+
     #[inline(always)]
     unsafe fn append_leaf<K: Instructions>(&mut self, leaf: Child, number: u32) {
         self.pairs[self.count] = u64::from(leaf.bits()) | u64::from(number) << 32;
@@ -429,7 +468,7 @@ impl Pairs<'_> {
     /// Appends the leaves among the children of a node, without a branch.
     ///
     /// # Safety
-    /// As for [`trace`]; there is room for eight more than are appended.
+    /// There is room for eight more than are appended.
     #[inline(always)]
     unsafe fn append_leaves<K: Instructions>(&mut self, node: &WideNode, leaves: u32, number: u32) {
         // SAFETY: there is room for eight more pairs.
@@ -445,76 +484,76 @@ impl Pairs<'_> {
     }
 
     /// Tests all pairs and empties the list.
-    ///
-    /// # Safety
-    /// As for [`trace`].
     #[inline(always)]
     unsafe fn test<K: Instructions>(&mut self) {
         /// The number of pairs between the one that is tested and the one that is fetched from
         /// memory.
         const AHEAD: usize = 8;
-        let blocks = self.wide.blocks.as_ptr();
-        let block_of = |pair: Pair| blocks.wrapping_add(Child::from_bits(pair as u32).index());
-        // SAFETY: pairs name rays in flight and blocks of the layout; after a block that is not the
-        // last of its leaf comes another; a prefetch may name any address.
-        unsafe {
-            while self.count > 0 {
-                let mut hopeful = [0; PAIRS];
-                let mut hopes = 0;
-                let mut rest = 0;
-                for i in 0..self.count {
-                    let ahead = block_of(self.pairs[(i + AHEAD).min(self.count - 1)]);
-                    for offset in 0..size_of::<TriangleBlock>().div_ceil(64) {
-                        K::prefetch(ahead.cast::<u8>().wrapping_add(64 * offset));
+        let quarters = K::Rays::N / 4;
+        while self.count > 0 {
+            let mut hopeful = [0; PAIRS];
+            let mut hopes = 0;
+            let mut rest = 0;
+            for i in (0..self.count).step_by(quarters) {
+                let four = self.tests(&self.pairs[..self.count], i);
+                // SAFETY: the processor has the instructions; a prefetch may name any address.
+                let possible = unsafe {
+                    for k in i..i + quarters {
+                        let ahead = self.block(self.pairs[(k + AHEAD).min(self.count - 1)]);
+                        K::prefetch_bytes(ahead.cast(), size_of::<TriangleBlock>());
                     }
-                    let pair = self.pairs[i];
-                    let block = &*block_of(pair);
-                    let line = self.lines[(pair >> 32) as usize].assume_init_ref();
-                    let line = LineLanes::<K::Block>::new(line);
+                    Test::rays::<K::Rays>(four).candidates(&Test::corners(four)).possible
+                };
+                for (k, test) in four.iter().enumerate().take(quarters.min(self.count - i)) {
+                    let pair = self.pairs[i + k];
                     hopeful[hopes] = pair;
-                    hopes += usize::from(line.candidates(block) != 0);
+                    hopes += usize::from(possible >> (4 * k) & 0b1111 != 0);
                     // The next block of the leaf takes the place of a pair that has been tested.
                     self.pairs[rest] = pair + 1;
-                    rest += usize::from(!block.is_last());
+                    rest += usize::from(!test.block.is_last());
                 }
-                self.count = rest;
-                for &pair in &hopeful[..hopes] {
-                    self.decide::<K>((pair >> 32) as u32, &*block_of(pair));
+            }
+            self.count = rest;
+            for i in (0..hopes).step_by(quarters) {
+                let four = self.tests(&hopeful[..hopes], i);
+                // SAFETY: the processor has the instructions.
+                let decided = unsafe {
+                    let rays = Test::rays::<K::Rays>(four);
+                    let corners = Test::corners(four);
+                    let plane = Plane::of_lanes(&corners);
+                    rays.decide_in_f64(
+                        &corners,
+                        &plane,
+                        &rays.candidates(&corners),
+                        Test::ends(four),
+                    )
+                };
+                let decided = Decided::new(decided);
+                for (k, test) in four.iter().enumerate().take(quarters.min(hopes - i)) {
+                    let number = test.ray.number;
+                    let ray = &self.rays[number as usize];
+                    let append = |hit| self.found.push(Found { number, hit });
+                    decided.hits_of(k, test.block, ray, append);
                 }
             }
         }
     }
 
-    /// Appends the hits of a ray in a block.
+    /// The block of a pair.
     #[inline(always)]
-    unsafe fn decide<K: Instructions>(&mut self, number: u32, block: &TriangleBlock) {
-        let ray = &self.rays[number as usize];
-        // SAFETY: the ray is one of those in flight.
-        let Decision { mut hits, mut unsure, distances } = unsafe {
-            let line = self.lines[number as usize].assume_init_ref();
-            LineLanes::<K::Block>::new(line).decide(block)
+    fn block(&self, pair: Pair) -> *const TriangleBlock {
+        self.wide.blocks.as_ptr().wrapping_add(Child::from_bits(pair as u32).index())
+    }
+
+    /// Returns the tests of four pairs from one on; the last pair fills up.
+    #[inline(always)]
+    fn tests(&self, pairs: &[Pair], first: usize) -> [Test<'a>; 4] {
+        let test = |k: usize| {
+            let pair = pairs[(first + k).min(pairs.len() - 1)];
+            // SAFETY: pairs name prepared rays and blocks of the layout; after a block that is not
+            // the last of its leaf comes another.
+            unsafe { Test { ray: self.ray((pair >> 32) as u32), block: &*self.block(pair) } }
         };
-        while hits != 0 {
-            let lane = hits.trailing_zeros() as usize & 3;
-            hits &= hits - 1;
-            self.append(number, ray, Hit { t: distances[lane], object: block.id(lane) });
-        }
-        while unsure != 0 {
-            let lane = unsure.trailing_zeros() as usize & 3;
-            unsure &= unsure - 1;
-            if let Some((object, triangle)) = block.triangle(lane)
-                && let Some(t) = Line::new(ray).crossing(ray, &triangle.0)
-            {
-                self.append(number, ray, Hit { t, object });
-            }
-        }
-    }
-
-    /// Appends a hit if it is in the range of its ray, and not of an unused lane.
-    #[inline(always)]
-    fn append(&mut self, number: u32, ray: &Ray, hit: Hit) {
-        if ray.t_min() <= hit.t && hit.t <= ray.t_max() && !hit.is_miss() {
-            self.found.push(Found { number, hit });
-        }
+        [test(0), test(1), test(2), test(3)]
     }
 }

@@ -104,6 +104,7 @@ impl WideBvh {
 
     /// Answers a batch by the layout's kernel.
     fn trace<const ANY: bool>(&self, mut batch: Batch, coherence: Coherence) {
+        assert!(u32::try_from(batch.rays.len()).is_ok(), "fewer than 2³² rays in a batch");
         if self.kernel != Kernel::Portable {
             let task = Trace::<ANY> { wide: self, batch: &mut batch, coherence };
             // SAFETY: a layout's kernel is available.

@@ -24,9 +24,6 @@ const PLANE: usize = size_of::<[f32; WideNode::LANES]>();
 pub(crate) trait BoxTest<K: Instructions> {
     /// Returns the distances at which the ray enters the eight boxes of a node, and a bit for each
     /// box that it enters by `t_max`.
-    ///
-    /// # Safety
-    /// The processor has the instructions of `K`, and the caller is compiled with them.
     unsafe fn boxes(&self, node: &WideNode, t_max: f32) -> (K::Boxes, u32);
 }
 
@@ -75,8 +72,6 @@ pub(crate) struct BoxRay<L> {
 }
 
 impl<L: Lanes> BoxRay<L> {
-    /// # Safety
-    /// The processor has the instructions.
     #[inline(always)]
     pub(crate) unsafe fn new(ray: &Ray) -> Self {
         let origin = ray.origin();

@@ -1,14 +1,17 @@
 //! The points of the triangles closest to given points.
 
+use super::answer::NEAREST_HIT;
+use super::box_ray::BoxTest;
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use super::layout::{Child, WideBvh, WideNode};
+use super::one_ray::{Leaves, visit};
 use super::triangles::TriangleBlock;
 use super::vector;
 use crate::query::Near;
 use crate::ray::pow2;
-use crate::{Aabb, Kernel};
+use crate::{Aabb, Hit, Kernel};
 use alloc::vec::Vec;
 use core::mem::MaybeUninit;
 use glam::{DVec3, Vec3};
@@ -185,72 +188,18 @@ impl<K: Instructions> Task<K> for ClosestPoints<'_> {
         let mut deep = DeepStacks::new(1, wide.stack_need);
         let stack = deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.stack(0));
         for (&point, closest) in points.iter().zip(closest) {
-            *closest = match wide.root {
-                // SAFETY: the processor has the instructions; the stack has room for `stack_need`
-                // children and one register more.
-                Some(root) if point.is_finite() => unsafe { one::<K>(wide, root, point, stack) },
-                _ => None,
-            };
-        }
-    }
-}
-
-/// Returns the closest point of one point.
-#[inline(always)]
-unsafe fn one<K: Instructions>(
-    wide: &WideBvh,
-    root: Child,
-    point: Vec3,
-    base: *mut Pending,
-) -> Option<Closest> {
-    let mut nearest = Nearest::new(point);
-    let nodes = wide.nodes.as_ptr();
-    let blocks = wide.blocks.as_ptr();
-    let mut top = base;
-    let mut child = root;
-    // SAFETY: references are sound, and the stack has room for `stack_need` children and one
-    // register more.
-    unsafe {
-        let boxes = PointLanes::<K::Boxes>::new(point, &wide.bounds);
-        let triangles = TargetLanes::<K::Block>::new(nearest.target);
-        // Unused lanes are infinitely far away.
-        let mut limit = f32::MAX;
-        loop {
-            while child.is_node() {
-                let node = &*nodes.add(child.index());
-                let bounds = boxes.bounds(node);
-                let mask = bounds.le(K::Boxes::splat(limit)).bits();
-                if mask & mask.wrapping_sub(1) == 0 {
-                    if mask == 0 {
-                        break;
-                    }
-                    child = *node.children.get_unchecked(mask.trailing_zeros() as usize);
-                    continue;
-                }
-                child = K::sort(node, bounds, mask, top);
-                top = top.add(mask.count_ones() as usize - 1);
+            if !point.is_finite() {
+                *closest = None;
+                continue;
             }
-            if !child.is_node() {
-                let mut block = blocks.add(child.index());
-                loop {
-                    if triangles.visit(&*block, &mut nearest) {
-                        limit = boxes.limit(nearest.near.distance_squared);
-                    }
-                    if (*block).is_last() {
-                        break;
-                    }
-                    block = block.add(1);
-                }
-            }
-            child = loop {
-                if top == base {
-                    return nearest.closest();
-                }
-                top = top.sub(1);
-                let pending = *top;
-                if (pending >> 32) as u32 <= limit.to_bits() | 7 {
-                    break Child::from_bits(pending as u32);
-                }
+            // SAFETY: the processor has the instructions; the stack has room for `stack_need`
+            // children and one register more.
+            *closest = unsafe {
+                let boxes = PointLanes::<K::Boxes>::new(point, &wide.bounds);
+                let mut triangles = TargetLanes::<K::Block>::new(point, boxes.scale_of_one);
+                // Unused lanes are infinitely far away.
+                visit::<K, NEAREST_HIT>(wide, f32::MAX, &boxes, &mut triangles, stack);
+                triangles.nearest.closest()
             };
         }
     }
@@ -260,7 +209,7 @@ unsafe fn one<K: Instructions>(
 /// coordinate about 1, so that no square overflows.
 ///
 /// The computed square of a distance exceeds the real one by at most 2⁻²⁰ of it, and by at most
-/// 2⁻¹⁴⁰ where numbers are subnormal. [`limit`](Self::limit) adds more than both.
+/// 2⁻¹⁴⁰ where numbers are subnormal. The limit of a [visit](TargetLanes::visit) adds more than both.
 struct PointLanes<L> {
     scaled: [L; 3],
     scale: L,
@@ -283,64 +232,67 @@ impl<L: Lanes> PointLanes<L> {
             }
         }
     }
+}
 
-    /// Returns bounds of the scaled squared distances from the boxes of a node; ∞ for unused
-    /// lanes.
+impl<K: Instructions> BoxTest<K> for PointLanes<K::Boxes> {
+    /// Returns bounds of the scaled squared distances from the boxes of a node, ∞ for unused lanes,
+    /// and a bit for each box whose bound is at most `limit`.
     #[inline(always)]
-    unsafe fn bounds(&self, node: &WideNode) -> L {
-        // SAFETY: the processor has the instructions; planes are aligned.
-        unsafe {
-            let zero = L::splat(0.0);
-            let mut sum = zero;
-            for axis in 0..3 {
-                let lower = L::load(node.planes[axis].as_ptr()) * self.scale;
-                let upper = L::load(node.planes[axis + 3].as_ptr()) * self.scale;
-                let below = lower - self.scaled[axis];
-                let above = self.scaled[axis] - upper;
-                let outside = zero.max(below.max(above));
-                sum = outside.mul_add(outside, sum);
-            }
-            sum
+    unsafe fn boxes(&self, node: &WideNode, limit: f32) -> (K::Boxes, u32) {
+        let zero = self.scale.filled(0.0);
+        let mut sum = zero;
+        for axis in 0..3 {
+            // SAFETY: planes are aligned.
+            let (lower, upper) = unsafe {
+                let lower = K::Boxes::load(node.planes[axis].as_ptr());
+                (lower, K::Boxes::load(node.planes[axis + 3].as_ptr()))
+            };
+            let below = lower * self.scale - self.scaled[axis];
+            let above = self.scaled[axis] - upper * self.scale;
+            let outside = zero.max(below.max(above));
+            sum = outside.mul_add(outside, sum);
         }
-    }
-
-    /// Returns the greatest bound that a box with a triangle at this squared distance may have.
-    #[inline(always)]
-    fn limit(&self, distance_squared: f64) -> f32 {
-        let scale = f64::from(self.scale_of_one);
-        let scaled = distance_squared * scale * scale;
-        (scaled * (1.0 + 1.0 / (1 << 18) as f64)) as f32 + f32::MIN_POSITIVE
+        (sum, sum.le(sum.filled(limit)).bits())
     }
 }
 
-/// A point in f64, in the lanes of a block of triangles.
-struct TargetLanes<L: Lanes>([L::Double; 3]);
+/// A point in f64, in the lanes of a block of triangles, and its nearest triangle.
+struct TargetLanes<L: Lanes> {
+    target: [L::Double; 3],
+    nearest: Nearest,
+    scale: f64,
+}
 
 type Vector<D> = [D; 3];
 
 impl<L: Lanes> TargetLanes<L> {
     #[inline(always)]
-    unsafe fn new(target: DVec3) -> Self {
+    unsafe fn new(point: Vec3, scale: f32) -> Self {
+        let nearest = Nearest::new(point);
+        let DVec3 { x, y, z } = nearest.target;
         // SAFETY: the processor has the instructions.
-        unsafe {
-            let x = L::Double::splat(target.x);
-            let y = L::Double::splat(target.y);
-            let z = L::Double::splat(target.z);
-            Self([x, y, z])
-        }
+        let target = unsafe { [L::Double::splat(x), L::Double::splat(y), L::Double::splat(z)] };
+        Self { target, nearest, scale: scale.into() }
     }
 
-    /// Offers the triangles of a block that are as near as the nearest so far. Returns whether
-    /// there are any.
     #[inline(always)]
-    unsafe fn visit(&self, block: &TriangleBlock, nearest: &mut Nearest) -> bool {
-        // SAFETY: the processor has the instructions; there is room for four
-        // numbers.
+    fn relative(&self, corner: [L; 3]) -> Vector<L::Double> {
+        let [x, y, z] = corner;
+        [x.double() - self.target[0], y.double() - self.target[1], z.double() - self.target[2]]
+    }
+}
+
+impl<L: Lanes> Leaves<L> for TargetLanes<L> {
+    /// Offers the triangles of a block that are as near as the nearest so far, and lowers `limit` to
+    /// the greatest bound that a box with a nearer triangle may have.
+    #[inline(always)]
+    unsafe fn visit(&mut self, block: &TriangleBlock, limit: &mut Hit) -> bool {
+        // SAFETY: the processor has the instructions; there is room for four numbers.
         unsafe {
             let [a, b, c] = block.corners_along::<L>([0, 1, 2]);
             let offset = offset(self.relative(a), self.relative(b), self.relative(c));
-            let limit = L::Double::splat(nearest.near.distance_squared);
-            let mut lanes = L::narrow(dot(offset, offset).le(limit)).bits();
+            let most = offset[0].filled(self.nearest.near.distance_squared);
+            let mut lanes = L::narrow(dot(offset, offset).le(most)).bits();
             if lanes == 0 {
                 return false;
             }
@@ -353,16 +305,12 @@ impl<L: Lanes> TargetLanes<L> {
                 let lane = lanes.trailing_zeros() as usize & 3;
                 lanes &= lanes - 1;
                 // An unused lane repeats a triangle, and its id is greater.
-                nearest.offer(block.id(lane), DVec3::new(x[lane], y[lane], z[lane]));
+                self.nearest.offer(block.id(lane), DVec3::new(x[lane], y[lane], z[lane]));
             }
+            let scaled = self.nearest.near.distance_squared * self.scale * self.scale;
+            limit.t = (scaled * (1.0 + 1.0 / (1 << 18) as f64)) as f32 + f32::MIN_POSITIVE;
             true
         }
-    }
-
-    #[inline(always)]
-    fn relative(&self, corner: [L; 3]) -> Vector<L::Double> {
-        let [x, y, z] = corner;
-        [x.double() - self.0[0], y.double() - self.0[1], z.double() - self.0[2]]
     }
 }
 
@@ -371,8 +319,7 @@ impl<L: Lanes> TargetLanes<L> {
 #[inline(always)]
 fn offset<D: DoubleLanes>(a: Vector<D>, b: Vector<D>, c: Vector<D>) -> Vector<D> {
     let normal = cross(minus(b, a), minus(c, a));
-    // SAFETY: values exist.
-    let zero = unsafe { D::splat(0.0) };
+    let zero = normal[0].filled(0.0);
     let is_inside = zero.lt(dot(normal, cross(a, b)))
         & zero.lt(dot(normal, cross(b, c)))
         & zero.lt(dot(normal, cross(c, a)));
@@ -400,8 +347,7 @@ fn nearest_of_edge<D: DoubleLanes>(from: Vector<D>, to: Vector<D>) -> Vector<D> 
     let first = select(is_ordered, from, to);
     let second = select(is_ordered, to, from);
     let edge = minus(second, first);
-    // SAFETY: values exist.
-    let zero = unsafe { D::splat(0.0) };
+    let zero = fx.filled(0.0);
     let along = zero - dot(first, edge);
     let length_squared = dot(edge, edge);
     let between = times(edge, along / length_squared);

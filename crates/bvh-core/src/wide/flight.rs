@@ -19,12 +19,10 @@ use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::{Lanes, Mask};
 use super::layout::{Child, WideBvh, WideNode};
-use super::pairs::Pairs;
-use super::prepared::{Prepared, Ready};
+use super::prepared::{Prepared, Ready, Test};
 use super::ray_lanes::{RayLanes, prefetch};
-use super::triangles::{TriangleBlock, three_by_three};
+use super::triangles::TriangleBlock;
 use crate::Hit;
-use crate::ray::AXES;
 use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 use core::ops::Range;
@@ -35,13 +33,7 @@ const FLIGHT: usize = 48;
 /// The maximum number of rays that are prepared at once.
 pub(super) const RAYS: usize = 16;
 
-/// The maximum number of rays of a batch that are numbered together.
-const MOST: usize = 1 << 31;
-
 /// Answers the rays of these numbers.
-///
-/// # Safety
-/// The processor has the instructions of `K`, and the caller is compiled with them.
 #[inline(always)]
 pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
     wide: &WideBvh,
@@ -56,59 +48,21 @@ pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
         }
         return;
     }
+    let flight = Flight::<K, ANY> {
+        wide,
+        batch,
+        from: numbers.start,
+        end: numbers.end,
+        ready: [MaybeUninit::uninit(); RAYS],
+        waiting: 0,
+        at_nodes: List::EMPTY,
+        at_leaves: List::EMPTY,
+        at_end: List::EMPTY,
+        idle: List::EMPTY,
+        instructions: PhantomData,
+    };
     // SAFETY: the processor has the instructions.
-    unsafe { K::call(Trace::<K, ANY>::new(wide, batch, numbers)) };
-}
-
-/// A flight of all rays up to the last number.
-struct Trace<'a, 'b, K, const ANY: bool> {
-    flight: Flight<'a, 'b, K, ANY>,
-    last: usize,
-}
-
-impl<'a, 'b, K, const ANY: bool> Trace<'a, 'b, K, ANY> {
-    #[inline(always)]
-    fn new(wide: &'a WideBvh, batch: &'a mut Batch<'b>, numbers: Range<usize>) -> Self {
-        let flight = Flight {
-            wide,
-            batch,
-            from: numbers.start,
-            end: numbers.start,
-            ready: [MaybeUninit::uninit(); RAYS],
-            waiting: 0,
-            at_nodes: List::EMPTY,
-            at_leaves: List::EMPTY,
-            at_end: List::EMPTY,
-            idle: List::EMPTY,
-            instructions: PhantomData,
-        };
-        Self { flight, last: numbers.end }
-    }
-}
-
-impl<K: Instructions, const ANY: bool> Task<K> for Trace<'_, '_, K, ANY> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run(self) {
-        let Self { mut flight, last } = self;
-        let mut traversals = MaybeUninit::<[Traversal; FLIGHT]>::uninit();
-        let traversals = traversals.as_mut_ptr().cast::<Traversal>();
-        let mut deep = DeepStacks::new(FLIGHT, flight.wide.stack_need);
-        for i in 0..FLIGHT {
-            // SAFETY: there is room for so many.
-            unsafe {
-                Traversal::set_stack(traversals.add(i), deep.as_mut().map(|deep| deep.stack(i)));
-            }
-        }
-        // Rays are numbered by 32 bits.
-        while flight.end < last {
-            flight.from = flight.end;
-            flight.end = last.min(flight.from + MOST);
-            // SAFETY: the processor has the instructions.
-            unsafe { flight.trace(traversals) };
-        }
-    }
+    unsafe { K::call(flight) };
 }
 
 /// Rays that wait for the same step.
@@ -155,35 +109,42 @@ struct Flight<'a, 'b, K, const ANY: bool> {
     instructions: PhantomData<K>,
 }
 
-impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
+impl<K: Instructions, const ANY: bool> Task<K> for Flight<'_, '_, K, ANY> {
+    type Output = ();
+
     /// Traces all rays.
     #[inline(always)]
-    unsafe fn trace(&mut self, traversals: *mut Traversal) {
+    unsafe fn run(mut self) {
+        let mut traversals = MaybeUninit::<[Traversal; FLIGHT]>::uninit();
+        let traversals = traversals.as_mut_ptr().cast::<Traversal>();
+        let mut deep = DeepStacks::new(FLIGHT, self.wide.stack_need);
         // SAFETY: the processor has the instructions; there is room for so many.
         unsafe {
-            let first = self.from;
             for i in 0..FLIGHT {
-                self.idle.append(traversals.add(i), true);
+                let traversal = traversals.add(i);
+                Traversal::set_stack(traversal, deep.as_mut().map(|deep| deep.stack(i)));
+                self.idle.append(traversal, true);
             }
             loop {
-                self.start_idle(first);
+                self.start_idle();
                 if self.at_nodes.count + self.at_leaves.count + self.at_end.count == 0 {
                     return;
                 }
                 self.visit_nodes();
                 let leaves_wait = self.at_leaves.count >= FLIGHT / 2 || self.at_nodes.count == 0;
                 if leaves_wait {
-                    self.visit_leaves(first);
-                    self.finish(first);
+                    self.visit_leaves();
+                    self.finish();
                 }
             }
         }
     }
+}
 
-    /// Starts the next rays in the idle places, as far as there are rays; number 0 is ray number
-    /// `first` of its batch.
+impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
+    /// Starts the next rays in the idle places, as far as there are rays.
     #[inline(always)]
-    unsafe fn start_idle(&mut self, first: usize) {
+    unsafe fn start_idle(&mut self) {
         let count = core::mem::replace(&mut self.idle.count, 0);
         for i in 0..count {
             while self.waiting == 0 {
@@ -191,7 +152,7 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
                     return;
                 }
                 // SAFETY: the processor has the instructions.
-                unsafe { self.prepare(first) };
+                unsafe { self.prepare() };
             }
             let next = self.waiting.trailing_zeros() as usize;
             self.waiting &= self.waiting - 1;
@@ -207,7 +168,7 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
 
     /// Prepares the next rays, and answers those that miss the box around everything.
     #[inline(always)]
-    unsafe fn prepare(&mut self, first: usize) {
+    unsafe fn prepare(&mut self) {
         let from = self.from;
         let count = (self.end - from).min(K::Rays::N);
         self.from += count;
@@ -220,7 +181,7 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
                 Ready::new(RayLanes::<K::Rays>::load_up_to(rays, from, self.end), self.wide);
             self.waiting = there & ready.enter(&self.wide.bounds);
             if self.waiting != 0 {
-                ready.write((from - first) as u32, self.ready.as_mut_ptr().cast());
+                ready.write(from as u32, self.ready.as_mut_ptr().cast());
             }
         }
         let mut others = there & !self.waiting;
@@ -258,28 +219,33 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
         unsafe {
             for i in 0..count {
                 let traversal = &*self.at_nodes.get(i);
-                let node = &*traversal.nodes.add(traversal.child.index());
+                let node = traversal.node(self.wide);
                 let (entry, mask) = traversal.ray.boxes::<K>(node, traversal.t);
                 entries.get_unchecked_mut(i).write(entry);
                 *masks.get_unchecked_mut(i) = mask;
             }
             for i in 0..count {
                 let traversal = &mut *self.at_nodes.get(i);
-                let node = &*traversal.nodes.add(traversal.child.index());
-                let entry = entries.get_unchecked(i).assume_init();
-                traversal.enter::<K, ANY>(node, entry, *masks.get_unchecked(i));
+                let node = traversal.node(self.wide);
+                let mask = *masks.get_unchecked(i);
+                if ANY {
+                    traversal.enter_any::<K>(node, mask);
+                } else {
+                    let entry = entries.get_unchecked(i).assume_init();
+                    traversal.enter::<K>(node, entry, mask);
+                }
             }
             self.at_nodes.count = 0;
             for i in 0..count {
                 let traversal = &mut *self.at_nodes.get(i);
-                traversal.fetch::<K>();
+                traversal.fetch::<K>(self.wide);
                 self.enlist(traversal);
             }
         }
     }
 
     #[inline(always)]
-    unsafe fn visit_leaves(&mut self, first: usize) {
+    unsafe fn visit_leaves(&mut self) {
         // SAFETY: as for nodes; a block that is not its leaf's last is followed by another.
         unsafe {
             let count = self.at_leaves.count;
@@ -290,7 +256,7 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
             for i in (0..count).step_by(quarters) {
                 let at = |k: usize| self.at_leaves.get((i + k).min(count - 1));
                 let four = [at(0), at(1), at(2), at(3)];
-                let (possible, sure) = candidates::<K::Rays>(four);
+                let (possible, sure) = candidates::<K::Rays>(self.wide, four);
                 for (k, &traversal) in four.iter().enumerate().take(quarters) {
                     let has = |pairs: u32| pairs >> (4 * k) & 0b1111 != 0;
                     let is_hit = ANY && accepts_all && has(sure);
@@ -307,9 +273,9 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
                 if let Some(accept) = &mut self.batch.accept {
                     // A traversal that only fills the lanes must not show its hits twice.
                     let rays = &four[..quarters.min(hopeful.count - i)];
-                    decide_accepted::<K::Rays>(rays, first, accept);
+                    decide_accepted::<K::Rays>(self.wide, rays, accept);
                 } else {
-                    decide::<K::Rays>(four);
+                    decide::<K::Rays>(self.wide, four);
                 }
                 if !ANY {
                     for &traversal in four.iter().take(quarters) {
@@ -319,8 +285,8 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
             }
             for i in 0..count {
                 let traversal = &mut *self.at_leaves.get(i);
-                traversal.leave_block::<ANY>();
-                traversal.fetch::<K>();
+                traversal.leave_block::<ANY>(self.wide);
+                traversal.fetch::<K>(self.wide);
                 self.enlist(traversal);
             }
         }
@@ -328,14 +294,14 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
 
     /// Writes the answers of rays at their end.
     #[inline(always)]
-    unsafe fn finish(&mut self, first: usize) {
+    unsafe fn finish(&mut self) {
         let count = core::mem::replace(&mut self.at_end.count, 0);
         for i in 0..count {
             // SAFETY: so many rays are at their end, and their places become idle.
             unsafe {
                 let traversal = self.at_end.get(i);
                 let Traversal { ray, t, object, .. } = &*traversal;
-                self.batch.answers.write(first + ray.number as usize, *t, *object);
+                self.batch.answers.write(ray.number as usize, *t, *object);
                 self.idle.append(traversal, true);
             }
         }
@@ -352,9 +318,6 @@ pub(super) struct Traversal {
     top: *mut Pending,
     /// The node or the block of triangles to visit next, or [`END`](Child::END).
     pub(super) child: Child,
-    /// The arrays of the layout in which the ray is.
-    pub(super) nodes: *const WideNode,
-    pub(super) blocks: *const TriangleBlock,
     /// [`END`](Child::END), the children that wait, the next block of the same leaf, and room for
     /// stores of whole registers: `frame`, or on the heap.
     stack: *mut Pending,
@@ -371,7 +334,7 @@ struct Frame([MaybeUninit<Pending>; STACK + SPARE]);
 impl Traversal {
     /// Chooses the stack of all rays that are started here: on the heap, or in the frame.
     #[inline(always)]
-    unsafe fn set_stack(this: *mut Self, deep: Option<*mut Pending>) {
+    pub(super) unsafe fn set_stack(this: *mut Self, deep: Option<*mut Pending>) {
         // SAFETY: the traversal exists; its fields need not be initialised to be named.
         unsafe { (*this).stack = deep.unwrap_or((&raw mut (*this).frame).cast()) };
     }
@@ -384,8 +347,6 @@ impl Traversal {
         // SAFETY: the processor has the instructions of `K`.
         unsafe { self.ray.copy::<K::Block>(ray) };
         self.child = wide.root.unwrap_or(Child::END);
-        self.nodes = wide.nodes.as_ptr();
-        self.blocks = wide.blocks.as_ptr();
         // SAFETY: the stack has more than one place.
         unsafe {
             self.stack.write(u64::from(Child::END.bits()));
@@ -395,7 +356,7 @@ impl Traversal {
 
     /// Goes on to what waits.
     #[inline(always)]
-    pub(super) unsafe fn pop(&mut self) {
+    unsafe fn pop(&mut self) {
         // SAFETY: the stack holds at least an end.
         unsafe {
             self.top = self.top.sub(1);
@@ -405,32 +366,40 @@ impl Traversal {
 
     /// Pushes the entered children, and goes on to the nearest of them, or else to what waits.
     #[inline(always)]
-    pub(super) unsafe fn enter<K: Instructions, const ANY: bool>(
-        &mut self,
-        node: &WideNode,
-        entry: K::Boxes,
-        mask: u32,
-    ) {
+    unsafe fn enter<K: Instructions>(&mut self, node: &WideNode, entry: K::Boxes, mask: u32) {
         // SAFETY: the stack holds at least an end, and has room for eight children.
         unsafe {
             let top = self.top;
             self.top = top.add(mask.count_ones() as usize).sub(1);
-            if ANY {
-                K::compress(node, mask, top);
-                self.child = Child::from_bits(*self.top as u32);
-            } else {
-                // The nearest child is on top of the stack, too. But a load from there would wait
-                // until the stores, which are wider, have reached the cache.
-                let waiting = Child::from_bits(*top.sub(1) as u32);
-                let nearest = K::sort(node, entry, mask, top);
-                self.child = if mask == 0 { waiting } else { nearest };
-            }
+            // The nearest child is on top of the stack, too. But a load from there would wait until
+            // the stores, which are wider, have reached the cache.
+            let waiting = Child::from_bits(*top.sub(1) as u32);
+            let nearest = K::sort(node, entry, mask, top);
+            self.child = if mask == 0 { waiting } else { nearest };
         }
+    }
+
+    /// Does the same where any order of the children will do.
+    #[inline(always)]
+    pub(super) unsafe fn enter_any<K: Instructions>(&mut self, node: &WideNode, mask: u32) {
+        // SAFETY: the stack holds at least an end, and has room for eight children.
+        unsafe {
+            K::compress(node, mask, self.top);
+            self.top = self.top.add(mask.count_ones() as usize).sub(1);
+            self.child = Child::from_bits(*self.top as u32);
+        }
+    }
+
+    /// Returns the node at which the ray is.
+    #[inline(always)]
+    pub(super) unsafe fn node<'a>(&self, wide: &'a WideBvh) -> &'a WideNode {
+        // SAFETY: references are sound.
+        unsafe { &*wide.nodes.as_ptr().add(self.child.index()) }
     }
 
     /// Takes the children behind the nearest hit from the stack.
     #[inline(always)]
-    pub(super) unsafe fn drop_farther<K: Instructions>(&mut self) {
+    unsafe fn drop_farther<K: Instructions>(&mut self) {
         // SAFETY: the stack is between its bottom and its top.
         self.top = unsafe { K::drop_farther(self.stack, self.top, self.t) };
     }
@@ -438,12 +407,12 @@ impl Traversal {
     /// Goes on from a block of triangles: to the next one of the leaf, to what waits, or to the end
     /// if any hit will do and there is one.
     #[inline(always)]
-    pub(super) unsafe fn leave_block<const ANY: bool>(&mut self) {
+    unsafe fn leave_block<const ANY: bool>(&mut self, wide: &WideBvh) {
         // SAFETY: a block that is not its leaf's last is followed by another; the stack holds at
         // least an end, and has room for one more.
         unsafe {
             let block = self.child.index();
-            let is_last = (*self.blocks.add(block)).is_last();
+            let is_last = (*wide.blocks.as_ptr().add(block)).is_last();
             *self.top = u64::from(Child::leaf(block as u32 + 1).bits());
             self.top = self.top.add(usize::from(!is_last));
             if ANY && self.object != u32::MAX {
@@ -455,82 +424,57 @@ impl Traversal {
 
     /// Fetches the next node or block of triangles from memory.
     #[inline(always)]
-    pub(super) unsafe fn fetch<K: Instructions>(&self) {
-        let child = self.child;
-        let (array, size) = if child.is_node() {
-            (self.nodes.cast::<u8>(), size_of::<WideNode>())
-        } else {
-            (self.blocks.cast::<u8>(), size_of::<TriangleBlock>())
-        };
-        let lines = array.wrapping_add(child.index().wrapping_mul(size));
-        for line in 0..4 {
-            // SAFETY: a prefetch may name any address.
-            unsafe { K::prefetch(lines.wrapping_add(64 * line)) };
-        }
+    pub(super) unsafe fn fetch<K: Instructions>(&self, wide: &WideBvh) {
+        // SAFETY: a prefetch may name any address.
+        unsafe { K::prefetch_bytes(wide.place(self.child), size_of::<WideNode>()) };
     }
 }
 
-/// Returns the rays as triangles are tested with them.
+/// Returns the tests of the blocks at which rays are.
 #[inline(always)]
-unsafe fn pairs<L: Lanes>(four: [*mut Traversal; 4]) -> Pairs<L> {
-    // SAFETY: the traversals exist, and the processor has the instructions.
-    unsafe { Prepared::pairs([&(*four[0]).ray, &(*four[1]).ray, &(*four[2]).ray, &(*four[3]).ray]) }
+unsafe fn tests(wide: &WideBvh, four: [*mut Traversal; 4]) -> [Test<'_>; 4] {
+    // SAFETY: the rays are at blocks.
+    unsafe {
+        let test = |i: usize| Test {
+            ray: &(*four[i]).ray,
+            block: &*wide.blocks.as_ptr().add((*four[i]).child.index()),
+        };
+        [test(0), test(1), test(2), test(3)]
+    }
 }
 
 /// Returns a bit for each triangle that its ray may hit, of the block at which each ray is, and a
 /// bit for each that it certainly hits: four bits per ray.
 #[inline(always)]
-unsafe fn candidates<L: Lanes>(four: [*mut Traversal; 4]) -> (u32, u32) {
+unsafe fn candidates<L: Lanes>(wide: &WideBvh, four: [*mut Traversal; 4]) -> (u32, u32) {
     // SAFETY: the processor has the instructions; the fields of a traversal from its distance on
     // are four aligned lanes.
     unsafe {
         let row = |i: usize| (&raw const (*four[i]).t);
         let t_max = L::load_quarters([row(0), row(1), row(2), row(3)]).spread::<0>();
-        let pairs = pairs::<L>(four);
-        pairs.within(&pairs.candidates(&corners(four)), t_max)
-    }
-}
-
-/// Returns the corners of the block at which each ray is, along the axes of its shear.
-#[inline(always)]
-unsafe fn corners<L: Lanes>(four: [*mut Traversal; 4]) -> [[L; 3]; 3] {
-    // SAFETY: the processor has the instructions; axes are below 3.
-    unsafe {
-        let lanes = |i: usize, corner: usize, axis: usize| {
-            let traversal = &*four[i];
-            let axis = AXES[traversal.ray.largest_axis as usize % 3][axis];
-            let block = traversal.blocks.wrapping_add(traversal.child.index());
-            block.cast::<f32>().wrapping_add((3 * corner + axis) * TriangleBlock::LANES)
-        };
-        let of = |corner: usize, axis: usize| {
-            L::load_quarters([
-                lanes(0, corner, axis),
-                lanes(1, corner, axis),
-                lanes(2, corner, axis),
-                lanes(3, corner, axis),
-            ])
-        };
-        three_by_three(of)
+        let tests = tests(wide, four);
+        let rays = Test::rays::<L>(tests);
+        rays.within(&rays.candidates(&Test::corners(tests)), t_max)
     }
 }
 
 /// Gives every ray the nearest hit among the hit it has and those in the block at which it is, by
 /// [`Hit::precedes`](crate::Hit::precedes) and without a branch.
 #[inline(always)]
-unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4]) {
+unsafe fn decide<L: Lanes>(wide: &WideBvh, four: [*mut Traversal; 4]) {
     // SAFETY: the processor has the instructions; ids are four aligned lanes, and so are the fields of a
     // traversal from its distance on.
     unsafe {
         let row = |i: usize| (&raw const (*four[i]).t);
         let before = L::load_quarters([row(0), row(1), row(2), row(3)]);
         let t_max = before.spread::<0>();
-        let corners = corners::<L>(four);
-        let (inside, t) = pairs::<L>(four).decide_alone(&corners, t_max);
-        let ids =
-            |i: usize| (*(*four[i]).blocks.wrapping_add((*four[i]).child.index())).ids().cast();
+        let tests = tests(wide, four);
+        let corners = Test::corners::<L>(tests);
+        let (inside, t) = Test::rays::<L>(tests).decide_alone(&corners, t_max);
+        let ids = |i: usize| tests[i].block.ids().cast();
         let ids = L::load_quarters([ids(0), ids(1), ids(2), ids(3)])
-            & L::splat_bits(!TriangleBlock::LAST);
-        let none = L::splat_bits(u32::MAX);
+            & t.filled_with_bits(!TriangleBlock::LAST);
+        let none = t.filled_with_bits(u32::MAX);
         let t = L::select(inside, t, t_max);
         let least = t.min(t.swap_twos());
         let least = least.min(least.swap_ones());
@@ -551,67 +495,37 @@ unsafe fn decide<L: Lanes>(four: [*mut Traversal; 4]) {
 }
 
 /// Gives every ray the nearest hit that `accept` accepts, among the hit it has and those in the
-/// block at which it is. The rays are numbered from `first` on.
+/// block at which it is.
 #[inline(always)]
-unsafe fn decide_accepted<L: Lanes>(four: &[*mut Traversal], first: usize, accept: &mut Accept) {
-    let last = four.len() - 1;
-    let rays = [four[0], four[1.min(last)], four[2.min(last)], four[3.min(last)]];
-    // SAFETY: the processor has the instructions; `four` has a traversal at least.
+unsafe fn decide_accepted<L: Lanes>(wide: &WideBvh, rays: &[*mut Traversal], accept: &mut Accept) {
+    let last = rays.len() - 1;
+    let four = [rays[0], rays[1.min(last)], rays[2.min(last)], rays[3.min(last)]];
+    // SAFETY: the processor has the instructions; the fields of a traversal from its distance on are
+    // four aligned lanes.
     unsafe {
-        let before = [nearest(rays[0]), nearest(rays[1]), nearest(rays[2]), nearest(rays[3])];
-        decide::<L>(rays);
-        // Filters accept most hits, so that the nearest one in the block is asked for first.
-        for (i, &traversal) in four.iter().enumerate() {
-            let hit = nearest(traversal);
-            let number = first + (*traversal).ray.number as usize;
-            if hit != before[i] && !accept(number, hit) {
-                (*traversal).t = before[i].t;
-                (*traversal).object = before[i].object;
-                decide_others::<L>(traversal, hit.object, number, accept);
-            }
-        }
-    }
-}
-
-/// Gives a ray the nearest hit that `accept` accepts, as [`decide_accepted`] does, where `accept`
-/// has rejected one object.
-#[inline(always)]
-unsafe fn decide_others<L: Lanes>(
-    traversal: *mut Traversal,
-    rejected: u32,
-    number: usize,
-    accept: &mut Accept,
-) {
-    // SAFETY: the processor has the instructions.
-    unsafe {
-        let ray = [traversal; 4];
-        let end = &raw const (*traversal).t;
-        let t_max = L::load_quarters([end; 4]).spread::<0>();
-        let corners = corners::<L>(ray);
-        let (inside, t) = pairs::<L>(ray).decide_alone(&corners, t_max);
+        let row = |i: usize| (&raw const (*four[i]).t);
+        let t_max = L::load_quarters([row(0), row(1), row(2), row(3)]).spread::<0>();
+        let tests = tests(wide, four);
+        let (inside, t) = Test::rays::<L>(tests).decide_alone(&Test::corners(tests), t_max);
         let mut distances = [0.0; 16];
         t.store(distances.as_mut_ptr());
-        let block = &*(*traversal).blocks.add((*traversal).child.index());
-        let mut left = inside.bits() & 0b1111;
-        while left != 0 {
-            let lane = left.trailing_zeros() as usize;
-            left &= left - 1;
-            let hit = Hit { t: distances[lane], object: block.id(lane) };
-            // An unused lane repeats a triangle, which may have been rejected.
-            let is_new = hit.object != rejected && !hit.is_miss();
-            if is_new && hit.precedes(&nearest(traversal)) && accept(number, hit) {
-                (*traversal).t = hit.t;
-                (*traversal).object = hit.object;
+        for (i, &traversal) in rays.iter().enumerate() {
+            let traversal = &mut *traversal;
+            let mut hits = inside.bits() >> (4 * i) & 0b1111;
+            while hits != 0 {
+                let lane = hits.trailing_zeros() as usize;
+                hits &= hits - 1;
+                let hit = Hit { t: distances[4 * i + lane], object: tests[i].block.id(lane) };
+                let nearest = Hit { t: traversal.t, object: traversal.object };
+                // An unused lane repeats a triangle, which may have been rejected.
+                let is_nearer = !hit.is_miss() && hit.precedes(&nearest);
+                if is_nearer && accept(traversal.ray.number as usize, hit) {
+                    traversal.t = hit.t;
+                    traversal.object = hit.object;
+                }
             }
         }
     }
-}
-
-/// Returns the nearest hit of a ray so far.
-#[inline(always)]
-unsafe fn nearest(traversal: *const Traversal) -> Hit {
-    // SAFETY: the traversal exists.
-    unsafe { Hit { t: (*traversal).t, object: (*traversal).object } }
 }
 
 /// Returns the lower of two ids.

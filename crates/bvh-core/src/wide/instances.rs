@@ -69,7 +69,7 @@ pub enum InvalidInstances {
 
 impl Instance {
     /// Returns the boxes of all instances in the scene's coordinates, in the same order, for any
-    /// builder.
+    /// builder. They do not depend on the trees of the parts.
     pub fn boxes(instances: &[Self], parts: &[WideBvh]) -> Result<Vec<Aabb>, InvalidInstances> {
         let numbered = instances.iter().enumerate();
         numbered.map(|(index, instance)| Ok(instance.check(index, parts)?.1)).collect()
@@ -184,15 +184,6 @@ pub struct InstanceHit {
 }
 
 impl InstanceHit {
-    /// The value that a batch writes for a ray without a hit.
-    pub const MISS: Self = Self { t: f32::INFINITY, instance: u32::MAX, triangle: u32::MAX };
-
-    /// Returns whether this is [`MISS`](Self::MISS).
-    #[inline]
-    pub fn is_miss(&self) -> bool {
-        self.instance == u32::MAX
-    }
-
     fn new(instance: u32, Hit { t, object: triangle }: Hit) -> Self {
         Self { t, instance, triangle }
     }
@@ -219,11 +210,6 @@ impl Instances {
         let bounds: Vec<Aabb> = placed.iter().map(|placed| placed.bounds).collect();
         validate(&top, &bounds)?;
         Ok(Self { parts, placed, top })
-    }
-
-    /// Returns the parts, for other instances of the same parts.
-    pub fn into_parts(self) -> Vec<WideBvh> {
-        self.parts
     }
 
     fn part_of(&self, instance: u32) -> &WideBvh {

@@ -1,4 +1,10 @@
 //! The operations of an instruction set that the kernels need besides its lanes.
+//!
+//! # Safety
+//!
+//! Every unsafe function of a kernel needs the instructions of its `K`, or of its lanes `L`: only a
+//! [`Task`] that [`dispatch`](super::vector::dispatch) runs has them, and what a task calls. Functions
+//! whose sections name something else need that, too.
 
 use super::lanes::Lanes;
 use super::layout::{Child, WideNode};
@@ -13,19 +19,15 @@ pub(crate) trait Task<K: Instructions> {
     /// The result.
     type Output;
 
-    /// Runs the task.
-    ///
-    /// # Safety
-    /// The processor has the instructions of `K`. This is inlined into a function that is compiled
-    /// with them.
+    /// Runs the task. Is inlined into a function that is compiled with the instructions.
     unsafe fn run(self) -> Self::Output;
 }
 
 /// An instruction set. Every function is inlined into one that is compiled with its instructions,
 /// or it is very slow.
 ///
-/// All functions are unsafe for the same reasons: the processor has the instructions, and there is
-/// room for eight places more than are written.
+/// # Safety
+/// All functions that write: there is room for eight places more than are written.
 pub(crate) trait Instructions: Sized {
     /// A register of one number per child of a node.
     type Boxes: Lanes;
@@ -54,6 +56,16 @@ pub(crate) trait Instructions: Sized {
 
     /// Fetches a line of memory, which may be anywhere.
     unsafe fn prefetch(line: *const u8);
+
+    /// Fetches the lines of so many bytes, which may be anywhere.
+    #[inline(always)]
+    unsafe fn prefetch_bytes(first: *const u8, bytes: usize) {
+        const LINE: usize = 64;
+        for line in 0..bytes.div_ceil(LINE) {
+            // SAFETY: a prefetch may name any address.
+            unsafe { Self::prefetch(first.wrapping_add(LINE * line)) };
+        }
+    }
 
     /// Runs a task in a function of its own that is compiled with the instructions.
     unsafe fn call<T: Task<Self>>(task: T) -> T::Output;

@@ -26,9 +26,6 @@ pub(crate) trait Lanes:
     type Double: DoubleLanes;
 
     /// The same number in all lanes.
-    ///
-    /// # Safety
-    /// The processor has the instructions.
     unsafe fn splat(x: f32) -> Self;
 
     /// `N` numbers from memory.
@@ -38,9 +35,6 @@ pub(crate) trait Lanes:
     unsafe fn load(from: *const f32) -> Self;
 
     /// Loads numbers from an address that need not be aligned.
-    ///
-    /// # Safety
-    /// The processor has the instructions.
     unsafe fn load_unaligned(from: *const f32) -> Self;
 
     /// Writes `N` numbers to any place.
@@ -119,21 +113,30 @@ pub(crate) trait Lanes:
     /// The lanes of every quarter in the order 1, 0, 3, 2.
     fn swap_ones(self) -> Self;
 
-    /// The same bits in all lanes.
-    ///
-    /// # Safety
-    /// Fills all lanes with one number.
+    /// A number in all lanes of a register like this one.
     #[inline(always)]
-    unsafe fn splat_bits(bits: u32) -> Self {
-        // SAFETY: the processor has the instructions.
-        unsafe { Self::splat(f32::from_bits(bits)) }
+    fn filled(self, x: f32) -> Self {
+        // SAFETY: a value exists.
+        unsafe { Self::splat(x) }
+    }
+
+    /// The same bits in all lanes of a register like this one.
+    #[inline(always)]
+    fn filled_with_bits(self, bits: u32) -> Self {
+        self.filled(f32::from_bits(bits))
+    }
+
+    /// The set of these bits.
+    #[inline(always)]
+    fn mask(self, bits: u32) -> Self::Mask {
+        // SAFETY: a value exists.
+        unsafe { Self::Mask::from_bits(bits) }
     }
 
     /// The sizes.
     #[inline(always)]
     fn abs(self) -> Self {
-        // SAFETY: a value exists.
-        unsafe { self & Self::splat_bits(u32::MAX >> 1) }
+        self & self.filled_with_bits(u32::MAX >> 1)
     }
 }
 
@@ -143,9 +146,6 @@ pub(crate) trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
     fn bits(self) -> u32;
 
     /// The set of these bits, of which those beyond the lanes are ignored.
-    ///
-    /// # Safety
-    /// The processor has the instructions.
     unsafe fn from_bits(bits: u32) -> Self;
 
     /// The lanes that are not in `other`.
@@ -160,9 +160,6 @@ pub(crate) trait DoubleLanes:
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
 
     /// The same number in all lanes.
-    ///
-    /// # Safety
-    /// The processor has the instructions.
     unsafe fn splat(x: f64) -> Self;
 
     /// Writes the numbers to any place.
@@ -174,11 +171,23 @@ pub(crate) trait DoubleLanes:
     /// Returns `yes` where the mask is set, otherwise `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
 
+    /// A number in all lanes of a register like this one.
+    #[inline(always)]
+    fn filled(self, x: f64) -> Self {
+        // SAFETY: a value exists.
+        unsafe { Self::splat(x) }
+    }
+
+    /// The sizes.
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.max(self.filled(0.0) - self)
+    }
+
     /// One over each number, off by at most 1.2 units of 2⁻⁵³ of it.
     #[inline(always)]
     fn inverse(self) -> Self {
-        // SAFETY: a value exists.
-        unsafe { Self::splat(1.0) / self }
+        self.filled(1.0) / self
     }
 
     /// The lesser, as [`Lanes::min`].

@@ -125,6 +125,17 @@ pub struct WideBvh {
 const OUTLINE: usize = 64;
 
 impl WideBvh {
+    /// Returns the beginning of a child in memory. It need not exist.
+    #[inline(always)]
+    pub(crate) fn place(&self, child: Child) -> *const u8 {
+        let (array, size) = if child.is_node() {
+            (self.nodes.as_ptr().cast::<u8>(), size_of::<WideNode>())
+        } else {
+            (self.blocks.as_ptr().cast::<u8>(), size_of::<TriangleBlock>())
+        };
+        array.wrapping_add(child.index().wrapping_mul(size))
+    }
+
     /// Returns boxes around all triangles, fewer than [`OUTLINE`] and eight: the subtrees of the
     /// layout from the root down.
     pub(crate) fn outline(&self) -> Vec<Aabb> {

@@ -10,7 +10,6 @@ mod batch;
 mod box_ray;
 mod build;
 mod closest;
-mod crossed_leaves;
 mod decide;
 mod flight;
 mod instances;

@@ -77,17 +77,11 @@ impl Filter for &mut dyn FnMut(Hit) -> bool {
 /// Tests of the triangles in the leaves that a ray enters.
 pub(crate) trait Leaves<L> {
     /// Tests the triangles of a block. Returns whether one of them is the new nearest hit.
-    ///
-    /// # Safety
-    /// The processor has the instructions of `L`, and the caller is compiled with them.
     unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool;
 }
 
 /// Visits the leaves that the ray enters up to the nearest hit, or with `ANY` up to the first hit
 /// that is found, in no order.
-///
-/// # Safety
-/// The processor has the instructions of `K`, and the caller is compiled with them.
 #[inline(always)]
 pub(crate) unsafe fn traverse<K: Instructions, const ANY: bool>(
     wide: &WideBvh,
@@ -102,7 +96,7 @@ pub(crate) unsafe fn traverse<K: Instructions, const ANY: bool>(
         }
         let mut stack = MaybeUninit::<Aligned<[Pending; STACK + SPARE]>>::uninit();
         let base = stack.as_mut_ptr().cast::<Pending>();
-        visit::<K, ANY>(wide, ray, &BoxRay::new(ray), leaves, base)
+        visit::<K, ANY>(wide, ray.t_max(), &BoxRay::new(ray), leaves, base)
     }
 }
 
@@ -125,24 +119,27 @@ impl<K: Instructions, L: Leaves<K::Block>, const ANY: bool> Task<K> for Rare<'_,
         // SAFETY: the stack has room for `stack_need` children; the rest is as in `traverse`.
         unsafe {
             if ray.begins_in(&wide.near) {
-                visit::<K, ANY>(wide, ray, &BoxRay::new(ray), leaves, base)
+                visit::<K, ANY>(wide, ray.t_max(), &BoxRay::new(ray), leaves, base)
             } else {
-                visit::<K, ANY>(wide, ray, &FarBoxRay::new(ray), leaves, base)
+                visit::<K, ANY>(wide, ray.t_max(), &FarBoxRay::new(ray), leaves, base)
             }
         }
     }
 }
 
-/// [`traverse`] with one of the tests of boxes, and a stack from `base` on.
+/// [`traverse`] up to `t_max` with one of the tests of boxes, and a stack from `base` on.
+///
+/// # Safety
+/// The stack has room for `stack_need` children and one register more.
 #[inline(always)]
-unsafe fn visit<K: Instructions, const ANY: bool>(
+pub(crate) unsafe fn visit<K: Instructions, const ANY: bool>(
     wide: &WideBvh,
-    ray: &Ray,
-    box_ray: &impl BoxTest<K>,
+    t_max: f32,
+    boxes: &impl BoxTest<K>,
     leaves: &mut impl Leaves<K::Block>,
     base: *mut Pending,
 ) -> Hit {
-    let mut nearest = Hit { t: ray.t_max(), object: u32::MAX };
+    let mut nearest = Hit { t: t_max, object: u32::MAX };
     let Some(root) = wide.root else { return nearest };
     // SAFETY: the processor has the instructions; references are sound, and the stack has room for
     // `stack_need` children and one register more.
@@ -154,7 +151,7 @@ unsafe fn visit<K: Instructions, const ANY: bool>(
         loop {
             while child.is_node() {
                 let node = &*nodes.add(child.index());
-                let (entry, mask) = box_ray.boxes(node, nearest.t);
+                let (entry, mask) = boxes.boxes(node, nearest.t);
                 let others = mask & mask.wrapping_sub(1);
                 if others == 0 {
                     if mask == 0 {
@@ -228,14 +225,14 @@ impl<L: Lanes, F: Filter, const ANY: bool> Leaves<L> for FirstHits<'_, L, F, ANY
 }
 
 /// A ray in all lanes, as triangles are tested with it.
-struct LeafRay<L> {
-    pairs: Pairs<L>,
+pub(crate) struct LeafRay<L> {
+    pub(crate) pairs: Pairs<L>,
     axes: [usize; 3],
 }
 
 impl<L: Lanes> LeafRay<L> {
     #[inline(always)]
-    unsafe fn new(ray: &Ray, bounds: &Aabb) -> Self {
+    pub(crate) unsafe fn new(ray: &Ray, bounds: &Aabb) -> Self {
         // Most rays in the open meet no leaf: without this the compiler does a part of this work
         // for all.
         let ray = black_box(ray);
@@ -260,6 +257,13 @@ impl<L: Lanes> LeafRay<L> {
         }
     }
 
+    /// Returns the corners of a block's triangles in the shear's order of axes.
+    #[inline(always)]
+    pub(crate) unsafe fn corners(&self, block: &TriangleBlock) -> [[L; 3]; 3] {
+        // SAFETY: the processor has the instructions; axes are below 3.
+        unsafe { block.corners_along::<L>(self.axes) }
+    }
+
     /// Tests the triangles of a block. Returns whether one of them is the new nearest hit.
     #[inline(always)]
     unsafe fn visit<F: Filter, const ANY: bool>(
@@ -270,7 +274,7 @@ impl<L: Lanes> LeafRay<L> {
     ) -> bool {
         // SAFETY: the processor has the instructions; axes are below 3.
         unsafe {
-            let corners = block.corners_along::<L>(self.axes);
+            let corners = self.corners(block);
             let t_max = L::splat(nearest.t);
             let mut candidates = self.pairs.candidates(&corners);
             if ANY {

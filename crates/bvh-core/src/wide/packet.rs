@@ -48,9 +48,6 @@ struct Parent {
 
 impl<K: Instructions> Packet<K> {
     /// Returns a packet without rays.
-    ///
-    /// # Safety
-    /// The processor has the instructions.
     #[inline(always)]
     pub(crate) unsafe fn new() -> Self {
         Self {
@@ -86,9 +83,6 @@ impl<K: Instructions> Packet<K> {
 
     /// Traces the packet, writes its answers, and empties it. With `ANY` a ray ends at its first
     /// hit, which need not be the nearest.
-    ///
-    /// # Safety
-    /// As for [`trace`](super::batch::trace).
     #[inline(always)]
     pub(crate) unsafe fn trace<const ANY: bool>(&mut self, wide: &WideBvh, batch: &mut Batch) {
         // SAFETY: the processor has the instructions.
@@ -242,27 +236,14 @@ impl<K: Instructions> Packet<K> {
     }
 }
 
-/// Has the beginnings of some children fetched, because the packet comes to most of them soon.
-///
-/// # Safety
-/// The processor has the instructions.
+/// Fetches the beginnings of some children, because the packet comes to most of them soon.
 #[inline(always)]
 unsafe fn fetch<K: Instructions>(wide: &WideBvh, node: &WideNode, mut mask: u32) {
-    /// A block of triangles is three lines, a node four.
-    const LINES: usize = 3;
     while mask != 0 {
         let lane = mask.trailing_zeros() as usize & 7;
         mask &= mask - 1;
-        let child = node.children[lane];
-        let beginning = if child.is_node() {
-            wide.nodes.as_ptr().wrapping_add(child.index()).cast::<u8>()
-        } else {
-            wide.blocks.as_ptr().wrapping_add(child.index()).cast::<u8>()
-        };
-        for line in 0..LINES {
-            // SAFETY: a prefetch may name any address.
-            unsafe { K::prefetch(beginning.wrapping_add(64 * line)) };
-        }
+        // SAFETY: a prefetch may name any address.
+        unsafe { K::prefetch_bytes(wide.place(node.children[lane]), size_of::<TriangleBlock>()) };
     }
 }
 
@@ -393,9 +374,9 @@ impl<K: Instructions> Packet<K> {
                         if sure != 0 {
                             is_hit = true;
                             // A ray that has its answer ends before it begins.
-                            let sure: <K::Rays as Lanes>::Mask = Mask::from_bits(sure);
-                            vector.t = Lanes::select(sure, K::Rays::splat(-1.0), vector.t);
-                            let object = K::Rays::splat_bits((*block).id(lane));
+                            let sure = vector.t.mask(sure);
+                            vector.t = Lanes::select(sure, vector.t.filled(-1.0), vector.t);
+                            let object = vector.t.filled_with_bits((*block).id(lane));
                             vector.object = Lanes::select(sure, object, vector.object);
                         }
                         candidates.possible = possible & !sure;
@@ -405,8 +386,8 @@ impl<K: Instructions> Packet<K> {
                     }
                     let plane = Plane::of_triangle(&(*block).doubles(lane, vector.axes));
                     let (inside, t) = pairs.decide(&corners, &plane, &candidates, vector.t);
-                    let inside = inside & Mask::from_bits(entered);
-                    let object = K::Rays::splat_bits((*block).id(lane));
+                    let inside = inside & t.mask(entered);
+                    let object = t.filled_with_bits((*block).id(lane));
                     let mut hits = if ANY {
                         inside
                     } else {
@@ -421,7 +402,7 @@ impl<K: Instructions> Packet<K> {
                     }
                     is_hit |= hits.bits() != 0;
                     // A ray that has its answer ends before it begins.
-                    let t = if ANY { K::Rays::splat(-1.0) } else { t };
+                    let t = if ANY { t.filled(-1.0) } else { t };
                     vector.t = Lanes::select(hits, t, vector.t);
                     vector.object = Lanes::select(hits, object, vector.object);
                 }
@@ -459,7 +440,7 @@ unsafe fn accepted<L: Lanes>(
                 accepted ^= 1 << lane;
             }
         }
-        if accepted == found { hits } else { Mask::from_bits(accepted) }
+        if accepted == found { hits } else { t.mask(accepted) }
     }
 }
 
@@ -480,9 +461,6 @@ pub(super) struct Culling<L> {
 
 impl<L: Lanes> Culling<L> {
     /// Returns the bounds of rays of one octant.
-    ///
-    /// # Safety
-    /// The processor has the instructions.
     #[inline(always)]
     pub(super) unsafe fn new<R: Lanes>(bounds: &RayBounds<R>, octant: u32) -> Self {
         // SAFETY: the processor has the instructions.
@@ -526,9 +504,6 @@ impl<L: Lanes> Culling<L> {
     /// Returns the least distance at which any ray may enter each child, and a bit per child that
     /// some ray may enter before `farthest`: the bounds of `(plane − origin) · scale` over all
     /// rays.
-    ///
-    /// # Safety
-    /// The processor has the instructions.
     #[inline(always)]
     pub(super) unsafe fn cull<K: Instructions<Boxes = L>>(
         &self,

@@ -26,9 +26,6 @@ pub(super) struct Vector<L> {
 
 impl<L: Lanes> Vector<L> {
     /// Returns rays of which the first is number `first` of its batch.
-    ///
-    /// # Safety
-    /// The processor has the instructions of `L`.
     #[inline(always)]
     pub(super) unsafe fn new(rays: RayLanes<L>, first: usize) -> Self {
         // SAFETY: the processor has the instructions.

@@ -136,28 +136,21 @@ impl<L: Lanes> Pairs<L> {
         reach: L,
         t_min: L,
     ) -> Self {
-        // SAFETY: values exist.
+        let error = reach * reach.filled(SINGLE_ERROR);
         // The least normal number, because arithmetic with subnormal ones is slow.
-        let [part, least, most, infinite] = unsafe {
-            [
-                L::splat(SINGLE_ERROR),
-                L::splat(f32::MIN_POSITIVE),
-                L::splat(pow2(40)),
-                L::splat(f32::INFINITY),
-            ]
-        };
-        let error = reach * part;
+        let least = reach.filled(f32::MIN_POSITIVE);
         let range_error = direction[2].abs().mul_add(least, error);
-        let range_error = L::select(reach.lt(most), range_error, infinite);
+        let is_small = reach.lt(reach.filled(pow2(40)));
+        let range_error = L::select(is_small, range_error, reach.filled(f32::INFINITY));
         Self { origin, direction, slope, reach, error, range_error, t_min }
     }
 
     /// Finds the pairs whose triangle the ray's line may cross, in f32.
     #[inline(always)]
     pub(crate) fn candidates(&self, corners: &[[L; 3]; 3]) -> Candidates<L> {
-        // SAFETY: values exist.
-        let (zero, underflow) = unsafe { (L::splat(0.0), L::splat(f32::MIN_POSITIVE)) };
-        let [a, b, c] = self.roughly_sheared(corners);
+        let underflow = self.reach.filled(f32::MIN_POSITIVE);
+        let [a, b, c] = corners;
+        let [a, b, c] = [self.corner(a), self.corner(b), self.corner(c)];
         let [ax, ay, az] = a;
         let [bx, by, bz] = b;
         let [cx, cy, cz] = c;
@@ -168,7 +161,7 @@ impl<L: Lanes> Pairs<L> {
         let most = u.max(v).max(w);
         let spread = self.spread(&[a, b, c]);
         let error = self.error.mul_add(spread, underflow);
-        let below = zero - error;
+        let below = error.filled(0.0) - error;
         let all = u32::MAX >> (32 - L::N);
         let possible = all & !(least.lt(below) & error.lt(most)).bits();
         let certain = (error.lt(least) | most.lt(below)).bits();
@@ -179,10 +172,7 @@ impl<L: Lanes> Pairs<L> {
     /// are, in f32.
     #[inline(always)]
     pub(crate) fn within(&self, candidates: &Candidates<L>, t_max: L) -> (u32, u32) {
-        // SAFETY: values exist.
-        let [zero, minus, eight] = unsafe { [L::splat(0.0), L::splat(-0.0), L::splat(8.0)] };
-        // SAFETY: a value exists.
-        let underflow = unsafe { L::splat(f32::MIN_POSITIVE) };
+        let underflow = t_max.filled(f32::MIN_POSITIVE);
         let [u, v, w] = candidates.edges;
         let [az, bz, cz] = candidates.depths;
         let depth = self.direction[2];
@@ -190,12 +180,12 @@ impl<L: Lanes> Pairs<L> {
         let side = bz - az;
         let other = cz - az;
         let tilt = v.mul_add(side, w * other);
-        let flip = minus & (area ^ depth);
-        let slack = (candidates.error * eight)
+        let flip = area.filled(-0.0) & (area ^ depth);
+        let slack = (candidates.error * area.filled(8.0))
             .mul_add(side.abs().max(other.abs()), self.range_error.mul_add(area.abs(), underflow));
         let begin = area.mul_add(self.t_min.mul_add(depth, az), tilt) ^ flip;
         let end = area.mul_add(t_max.mul_add(depth, az), tilt) ^ flip;
-        let no_slack = zero - slack;
+        let no_slack = slack.filled(0.0) - slack;
         let beyond = slack.lt(begin) | end.lt(no_slack);
         let within = begin.lt(no_slack) & slack.lt(end);
         let certain = candidates.certain & candidates.possible;
@@ -220,39 +210,50 @@ impl<L: Lanes> Pairs<L> {
         candidates: &Candidates<L>,
         t_max: L,
     ) -> (L::Mask, L) {
+        let (hits, unsure, t) = self.decide_in_f64(corners, plane, candidates, t_max);
+        if unsure != 0 {
+            return Self::decide_exactly(*self, *corners, t_max, unsure, hits, t);
+        }
+        (hits, t)
+    }
+
+    /// Does the same as far as f64 suffices, and returns a bit per pair that it leaves open. No line
+    /// of the others passes through an edge.
+    #[inline(always)]
+    pub(crate) fn decide_in_f64(
+        &self,
+        corners: &[[L; 3]; 3],
+        plane: &Plane<L>,
+        candidates: &Candidates<L>,
+        t_max: L,
+    ) -> (L::Mask, u32, L) {
         let possible = candidates.possible;
         let (is_hit, is_behind, t) = self.meet(&corners[0], plane);
-        // SAFETY: a value exists.
-        let mut crossed = unsafe { L::Mask::from_bits(candidates.certain & possible) };
+        let mut crossed = t.mask(candidates.certain & possible);
         let mut unsure = possible & !(crossed & (is_hit | is_behind)).bits();
         if unsure != 0 {
             let (is_inside, is_outside) = self.cross(corners, candidates.spread);
-            // SAFETY: a value exists.
-            crossed = is_inside & unsafe { L::Mask::from_bits(possible) };
+            crossed = is_inside & t.mask(possible);
             unsure = possible & !(is_outside | is_inside & (is_hit | is_behind)).bits();
-            if unsure != 0 {
-                return Self::decide_exactly(*self, *corners, t_max, unsure, is_hit & crossed, t);
-            }
         }
-        (is_hit & crossed & self.t_min.le(t) & t.le(t_max), t)
+        (is_hit & crossed & self.t_min.le(t) & t.le(t_max), unsure, t)
     }
 
     /// Returns the pairs whose ray meets the plane at the returned rounded distance, and those
     /// whose ray meets it before its origin, where the ray's line crosses the triangle.
     #[inline(always)]
     fn meet(&self, first: &[L; 3], plane: &Plane<L>) -> (L::Mask, L::Mask, L) {
-        // SAFETY: values exist.
-        let zero = unsafe { L::Double::splat(0.0) };
         let [nx, ny, nz] = plane.normal;
         let (height, slack) = plane.height(first, &self.origin);
         let [dx, dy, dz] = self.direction.map(L::double);
         let speed = nz.mul_add(dz, ny.mul_add(dy, nx * dx));
         let inverse = speed.inverse();
         let t = height * inverse;
-        let slack = slack * size(inverse);
+        let slack = slack * inverse.abs();
         let low = t - slack;
         let high = t + slack;
         let rounded = L::single(high);
+        let zero = t.filled(0.0);
         let is_hit = L::narrow(zero.le(low)) & L::single(low).eq(rounded);
         (is_hit, L::narrow(high.lt(zero)), rounded)
     }
@@ -261,10 +262,8 @@ impl<L: Lanes> Pairs<L> {
     /// it certainly does not, decided in f64.
     #[inline(always)]
     fn cross(&self, corners: &[[L; 3]; 3], spread: L) -> (L::Mask, L::Mask) {
-        // SAFETY: values exist.
-        let [zero, part]: [L::Double; 2] = unsafe { constants([0.0, ERROR]) };
-        let depth = size(self.direction[2].double());
-        let coordinate_error = self.reach.double() * part * depth;
+        let depth = self.direction[2].double().abs();
+        let coordinate_error = self.reach.double() * depth.filled(ERROR) * depth;
         let error = coordinate_error * (spread.double() * depth + coordinate_error);
         let [ax, ay] = self.sheared(&corners[0]);
         let [bx, by] = self.sheared(&corners[1]);
@@ -274,7 +273,7 @@ impl<L: Lanes> Pairs<L> {
         let w = bx.mul_sub(ay, by * ax);
         let least = u.min(v).min(w);
         let most = u.max(v).max(w);
-        let below = zero - error;
+        let below = error.filled(0.0) - error;
         let is_inside = error.lt(least) | most.lt(below);
         let is_outside = least.lt(below) & error.lt(most);
         (L::narrow(is_inside), L::narrow(is_outside))
@@ -287,13 +286,8 @@ impl<L: Lanes> Pairs<L> {
         self.decide(corners, &Plane::of_lanes(corners), &self.candidates(corners), t_max)
     }
 
-    /// Returns the corners of each triangle relative to the ray, sheared in f32; the last
-    /// coordinate is negated.
-    #[inline(always)]
-    fn roughly_sheared(&self, [a, b, c]: &[[L; 3]; 3]) -> [[L; 3]; 3] {
-        [self.corner(a), self.corner(b), self.corner(c)]
-    }
-
+    /// Returns a corner of each triangle relative to the ray, sheared in f32; the last coordinate is
+    /// negated.
     #[inline(always)]
     fn corner(&self, corner: &[L; 3]) -> [L; 3] {
         let z = self.origin[2] - corner[2];
@@ -351,39 +345,17 @@ impl<L: Lanes> Pairs<L> {
                 distances[lane] = t;
             }
         }
-        // SAFETY: values exist.
-        let (hits, t) =
-            unsafe { (L::Mask::from_bits(hits), L::load_unaligned(distances.as_ptr())) };
-        (hits & self.t_min.le(t) & t.le(t_max), t)
+        // SAFETY: there are sixteen numbers.
+        let t = unsafe { L::load_unaligned(distances.as_ptr()) };
+        (t.mask(hits) & self.t_min.le(t) & t.le(t_max), t)
     }
 }
 
 /// Returns each number in all lanes.
-///
-/// # Safety
-/// The processor has the instructions.
 #[inline(always)]
 unsafe fn constants<D: DoubleLanes, const N: usize>(numbers: [f64; N]) -> [D; N] {
     // SAFETY: the processor has the instructions.
     numbers.map(|number| unsafe { D::splat(number) })
-}
-
-/// Returns the absolute value.
-#[inline(always)]
-fn size<D: DoubleLanes>(x: D) -> D {
-    // SAFETY: a value exists.
-    let zero = unsafe { D::splat(0.0) };
-    x.max(zero - x)
-}
-
-/// Returns the corners in f64.
-#[inline(always)]
-fn doubled<L: Lanes>([a, b, c]: &[[L; 3]; 3]) -> [[L::Double; 3]; 3] {
-    [
-        [a[0].double(), a[1].double(), a[2].double()],
-        [b[0].double(), b[1].double(), b[2].double()],
-        [c[0].double(), c[1].double(), c[2].double()],
-    ]
 }
 
 impl<L: Lanes> Plane<L> {
@@ -396,9 +368,8 @@ impl<L: Lanes> Plane<L> {
         let y = self.corner[1] - origin[1].double();
         let z = self.corner[2] - origin[2].double();
         let reach = longest(origin, first) + self.sides;
-        // SAFETY: a value exists.
-        let part = unsafe { L::Double::splat(ERROR) };
-        (nz.mul_add(z, ny.mul_add(y, nx * x)), part * self.size * reach.double())
+        let error = self.size.filled(ERROR) * self.size * reach.double();
+        (nz.mul_add(z, ny.mul_add(y, nx * x)), error)
     }
 
     /// Returns the planes of triangles in lanes.
@@ -407,15 +378,14 @@ impl<L: Lanes> Plane<L> {
         let [a, b, c] = corners;
         let first = longest(a, b);
         let second = longest(a, c);
-        let [a, b, c] = doubled(corners);
+        let doubled =
+            |corner: &[L; 3]| [corner[0].double(), corner[1].double(), corner[2].double()];
+        let [a, b, c] = [doubled(a), doubled(b), doubled(c)];
         let size = (first.double() + first.double()) * second.double();
         Self { corner: a, normal: normal(&a, &b, &c), size, sides: first + second }
     }
 
     /// Returns the plane of one triangle in all lanes.
-    ///
-    /// # Safety
-    /// The processor has the instructions.
     #[inline(always)]
     pub(crate) unsafe fn of_triangle([a, b, c]: &[[f64; 3]; 3]) -> Self {
         let [x, y, z] = normal(a, b, c);

@@ -64,8 +64,6 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    /// # Safety
-    /// The processor has the instructions of `L`.
     #[inline(always)]
     pub(super) unsafe fn new<L: Lanes>(block: &TriangleBlock, origin: Vec3) -> Self {
         let mut seen = MaybeUninit::<Self>::uninit();
@@ -88,7 +86,7 @@ impl Seen {
                 component.store(edges.add(4 * row));
             }
             let reach = L::single(largest(&a).max(largest(&b)).max(largest(&c)));
-            let error = most * L::splat(pow2(-19)) + reach * reach * L::splat(pow2(-47));
+            let error = most * most.filled(pow2(-19)) + reach * reach * reach.filled(pow2(-47));
             error.store(edges.add(4 * 9));
             let [x, y, z] = plane.normal;
             let planes = (&raw mut (*seen.as_mut_ptr()).plane).cast::<f64>();
@@ -101,9 +99,6 @@ impl Seen {
 
     /// Tests the triangles of a block with the rays of a vector that entered it. Returns whether
     /// any ray has a new nearest hit.
-    ///
-    /// # Safety
-    /// The processor has the instructions of `L`.
     #[inline(always)]
     pub(super) unsafe fn test<L: Lanes>(
         &self,
@@ -116,8 +111,7 @@ impl Seen {
         unsafe {
             let direction = vector.rays.direction;
             let longest = direction[vector.axes[2]].abs();
-            let underflow = L::splat(f32::MIN_POSITIVE);
-            let zero = L::Double::splat(0.0);
+            let underflow = longest.filled(f32::MIN_POSITIVE);
             let mut is_hit = false;
             for lane in 0..block.len() {
                 let edge = |row: usize| L::splat(*self.edges[row].get_unchecked(lane));
@@ -131,7 +125,7 @@ impl Seen {
                 let least = u.min(v).min(w);
                 let most = u.max(v).max(w);
                 let error = edge(9).mul_add(longest, underflow);
-                let below = L::splat(0.0) - error;
+                let below = error.filled(0.0) - error;
                 let possible = entered & !(least.lt(below) & error.lt(most)).bits();
                 if possible == 0 {
                     continue;
@@ -142,13 +136,14 @@ impl Seen {
                 let speed = plane(1).mul_add(dy.double(), plane(0) * dx.double());
                 let inverse = plane(2).mul_add(dz.double(), speed).inverse();
                 let distance = plane(3) * inverse;
-                let slack = plane(4) * inverse.max(zero - inverse);
+                let slack = plane(4) * inverse.abs();
                 let low = distance - slack;
                 let high = distance + slack;
+                let zero = distance.filled(0.0);
                 let mut t = L::single(high);
                 let meets = L::narrow(zero.le(low)) & L::single(low).eq(t);
                 let is_behind = L::narrow(high.lt(zero));
-                let mut inside = meets & Mask::from_bits(certain);
+                let mut inside = meets & t.mask(certain);
                 if possible & !(certain & (meets | is_behind).bits()) != 0 {
                     vector.shear(bounds);
                     let pairs = vector.pairs.assume_init_ref();
@@ -156,10 +151,10 @@ impl Seen {
                     let plane = Plane::of_triangle(&block.doubles(lane, vector.axes));
                     let candidates = pairs.candidates(&corners);
                     (inside, t) = pairs.decide(&corners, &plane, &candidates, vector.t);
-                    inside = inside & Mask::from_bits(entered);
+                    inside = inside & t.mask(entered);
                 }
                 let inside = inside & vector.t_min.le(t);
-                let object = L::splat_bits(block.id(lane));
+                let object = t.filled_with_bits(block.id(lane));
                 let hits = inside & (t.lt(vector.t) | t.eq(vector.t) & object.below(vector.object));
                 if hits.bits() != 0 {
                     is_hit = true;
@@ -190,9 +185,5 @@ fn cross<D: DoubleLanes>(a: &[D; 3], b: &[D; 3]) -> [D; 3] {
 /// Returns the largest absolute value of a component.
 #[inline(always)]
 fn largest<D: DoubleLanes>([x, y, z]: &[D; 3]) -> D {
-    // SAFETY: a value exists.
-    let zero = unsafe { D::splat(0.0) };
-    let x = x.max(zero - *x);
-    let y = y.max(zero - *y);
-    x.max(y).max(z.max(zero - *z))
+    x.abs().max(y.abs()).max(z.abs())
 }

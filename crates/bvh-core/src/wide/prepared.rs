@@ -4,10 +4,10 @@
 use super::box_ray::{BoxTest, FarBoxRay};
 use super::instructions::{Instructions, Task};
 use super::lanes::{Lanes, Mask};
-use super::layout::WideBvh;
-use super::layout::WideNode;
+use super::layout::{WideBvh, WideNode};
 use super::pairs::Pairs;
 use super::ray_lanes::RayLanes;
+use super::triangles::{TriangleBlock, three_by_three};
 use crate::ray::AXES;
 use crate::slabs::{FAR, NEAR};
 use crate::{Aabb, Ray};
@@ -60,12 +60,10 @@ impl<L: Lanes> Ready<L> {
         let reach = rays.reach(&wide.bounds);
         let far = rays.beyond(&wide.near);
         let [x, y, z] = rays.inverse;
-        // SAFETY: values exist.
-        unsafe {
-            let (near, exit) = (L::splat(NEAR), L::splat(FAR));
-            let near_factor = [x * near, y * near, z * near];
-            Self { rays, near_factor, far_factor: [x * exit, y * exit, z * exit], far, reach }
-        }
+        let near = x.filled(NEAR);
+        let exit = x.filled(FAR);
+        let near_factor = [x * near, y * near, z * near];
+        Self { rays, near_factor, far_factor: [x * exit, y * exit, z * exit], far, reach }
     }
 
     /// Returns a bit per ray that may meet something within `bounds`. Those from far away all may.
@@ -74,8 +72,8 @@ impl<L: Lanes> Ready<L> {
         let mut entry = self.rays.t_min;
         let mut exit = self.rays.t_max;
         for axis in 0..3 {
-            // SAFETY: values exist.
-            let (low, high) = unsafe { (L::splat(bounds.min[axis]), L::splat(bounds.max[axis])) };
+            let low = entry.filled(bounds.min[axis]);
+            let high = entry.filled(bounds.max[axis]);
             let is_backwards = self.backwards(axis);
             let near = L::select(is_backwards, high, low);
             let far = L::select(is_backwards, low, high);
@@ -88,8 +86,8 @@ impl<L: Lanes> Ready<L> {
     /// Returns the rays that run backwards along an axis.
     #[inline(always)]
     fn backwards(&self, axis: usize) -> L::Mask {
-        // SAFETY: a value exists.
-        self.rays.inverse[axis].lt(unsafe { L::splat(0.0) })
+        let inverse = self.rays.inverse[axis];
+        inverse.lt(inverse.filled(0.0))
     }
 
     /// Writes the rays one after the other; the first is number `first` of its batch.
@@ -101,18 +99,18 @@ impl<L: Lanes> Ready<L> {
         let (second, third) = self.rays.largest();
         let origin = in_order(self.rays.origin, second, third);
         let [dx, dy, depth] = in_order(self.rays.direction, second, third);
-        // SAFETY: values exist; there is room for a ray per lane.
+        let bits = |bits: u32| depth.filled_with_bits(bits);
+        let axis = L::select(third, bits(2), L::select(second, bits(1), bits(0)));
+        let mut near = [bits(0); 3];
+        let mut far = [bits(0); 3];
+        for i in 0..3 {
+            let lower = bits(32 * i as u32);
+            let upper = bits(32 * (i as u32 + 3));
+            near[i] = L::select(self.backwards(i), upper, lower);
+            far[i] = L::select(self.backwards(i), lower, upper);
+        }
+        // SAFETY: there is room for a ray per lane.
         unsafe {
-            let bits = |bits: u32| L::splat_bits(bits);
-            let axis = L::select(third, bits(2), L::select(second, bits(1), bits(0)));
-            let mut near = [bits(0); 3];
-            let mut far = [bits(0); 3];
-            for i in 0..3 {
-                let lower = bits(32 * i as u32);
-                let upper = bits(32 * (i as u32 + 3));
-                near[i] = L::select(self.backwards(i), upper, lower);
-                far[i] = L::select(self.backwards(i), lower, upper);
-            }
             write_row(to, 0, self.near_factor, dx);
             write_row(to, 1, self.rays.origin, self.rays.t_max);
             write_row(to, 2, self.far_factor, dy);
@@ -131,9 +129,6 @@ impl<L: Lanes> Ready<L> {
 impl Prepared {
     /// Copies a ray as it was written, row by row: wider loads would wait until all rows have
     /// reached the cache.
-    ///
-    /// # Safety
-    /// The processor has the instructions.
     #[inline(always)]
     pub(crate) unsafe fn copy<L: Lanes>(&mut self, from: &Self) {
         const { assert!(L::N == 4) };
@@ -151,9 +146,6 @@ impl Prepared {
 
     /// Returns the distances at which the ray enters the eight boxes of a node, and a bit for each
     /// box that it enters before `t_max`.
-    ///
-    /// # Safety
-    /// The processor has the instructions.
     #[inline(always)]
     pub(crate) unsafe fn boxes<K: Instructions>(
         &self,
@@ -188,21 +180,27 @@ impl Prepared {
         direction[z] = self.depth;
         FarBoxRay::new(&Ray::assume_valid(self.box_origin, direction, self.t_min, self.t_max))
     }
+}
 
-    /// Returns a ray for each quarter of the lanes, as triangles are tested with it.
-    ///
-    /// # Safety
-    /// The processor has the instructions.
+/// A ray and the block of triangles that it is tested with, in a quarter of the lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct Test<'a> {
+    pub(crate) ray: &'a Prepared,
+    pub(crate) block: &'a TriangleBlock,
+}
+
+impl Test<'_> {
+    /// Returns the rays as triangles are tested with them.
     #[inline(always)]
-    pub(crate) unsafe fn pairs<L: Lanes>(rays: [&Self; 4]) -> Pairs<L> {
+    pub(crate) unsafe fn rays<L: Lanes>(four: [Self; 4]) -> Pairs<L> {
         // SAFETY: there are so many rows of four aligned lanes.
         unsafe {
             let row = |row: usize| {
                 L::load_quarters([
-                    rays[0].row(row),
-                    rays[1].row(row),
-                    rays[2].row(row),
-                    rays[3].row(row),
+                    four[0].ray.row(row),
+                    four[1].ray.row(row),
+                    four[2].ray.row(row),
+                    four[3].ray.row(row),
                 ])
             };
             let origin = row(3);
@@ -215,6 +213,45 @@ impl Prepared {
                 last.spread::<3>(),
             )
         }
+    }
+
+    /// Returns the corners of the blocks, along the axes of each ray's shear.
+    #[inline(always)]
+    pub(crate) unsafe fn corners<L: Lanes>(four: [Self; 4]) -> [[L; 3]; 3] {
+        let lanes = |i: usize, corner: usize, axis: usize| {
+            let Self { ray, block } = four[i];
+            let axis = AXES[ray.largest_axis as usize % 3][axis];
+            block
+                .corners
+                .as_ptr()
+                .cast::<f32>()
+                .wrapping_add((3 * corner + axis) * TriangleBlock::LANES)
+        };
+        // SAFETY: there are three axes of four aligned lanes for every corner.
+        let of = |corner: usize, axis: usize| unsafe {
+            L::load_quarters([
+                lanes(0, corner, axis),
+                lanes(1, corner, axis),
+                lanes(2, corner, axis),
+                lanes(3, corner, axis),
+            ])
+        };
+        three_by_three(of)
+    }
+
+    /// Returns the ends of the rays' ranges.
+    #[inline(always)]
+    pub(crate) unsafe fn ends<L: Lanes>(four: [Self; 4]) -> L {
+        // SAFETY: rows are four aligned lanes.
+        let row = unsafe {
+            L::load_quarters([
+                four[0].ray.row(1),
+                four[1].ray.row(1),
+                four[2].ray.row(1),
+                four[3].ray.row(1),
+            ])
+        };
+        row.spread::<3>()
     }
 }
 

@@ -87,9 +87,9 @@ impl<L: Lanes> RayLanes<L> {
         let all = u32::MAX >> (32 - L::N);
         let mut inside = all;
         for axis in 0..3 {
-            // SAFETY: values exist.
-            let (min, max) = unsafe { (L::splat(region.min[axis]), L::splat(region.max[axis])) };
-            inside &= (min.le(self.origin[axis]) & self.origin[axis].le(max)).bits();
+            let origin = self.origin[axis];
+            let (min, max) = (origin.filled(region.min[axis]), origin.filled(region.max[axis]));
+            inside &= (min.le(origin) & origin.le(max)).bits();
         }
         all & !inside
     }
@@ -114,9 +114,9 @@ impl<L: Lanes> RayLanes<L> {
     #[inline(always)]
     pub(crate) fn reach(&self, bounds: &Aabb) -> L {
         let along = |axis: usize| {
-            // SAFETY: values exist.
-            let (min, max) = unsafe { (L::splat(bounds.min[axis]), L::splat(bounds.max[axis])) };
-            (max - self.origin[axis]).max(self.origin[axis] - min)
+            let origin = self.origin[axis];
+            let (min, max) = (origin.filled(bounds.min[axis]), origin.filled(bounds.max[axis]));
+            (max - origin).max(origin - min)
         };
         along(0).max(along(1)).max(along(2))
     }
@@ -137,17 +137,11 @@ impl<L: Lanes> RayLanes<L> {
 
 /// Fetches the rays that follow number `first`, as many as a vector's. They need not exist. While a
 /// packet is traced, the processor does not see that the rays of the next one follow.
-///
-/// # Safety
-/// The processor has the instructions.
 #[inline(always)]
 pub(crate) unsafe fn prefetch<K: Instructions>(rays: &[Ray], first: usize) {
-    const LINE: usize = 64;
     let next = rays.as_ptr().wrapping_add(first).cast::<u8>();
-    for line in 0..(K::Rays::N * size_of::<Ray>()).div_ceil(LINE) {
-        // SAFETY: a prefetch may name any address.
-        unsafe { K::prefetch(next.wrapping_add(line * LINE)) };
-    }
+    // SAFETY: a prefetch may name any address.
+    unsafe { K::prefetch_bytes(next, K::Rays::N * size_of::<Ray>()) };
 }
 
 /// Returns one of the three vectors of rays, by component.
@@ -184,9 +178,6 @@ pub(crate) struct RayBounds<L> {
 
 impl<L: Lanes> RayBounds<L> {
     /// Returns the bounds of no rays.
-    ///
-    /// # Safety
-    /// The processor has the instructions.
     #[inline(always)]
     pub(crate) unsafe fn none() -> Self {
         // SAFETY: the processor has the instructions.
@@ -237,7 +228,5 @@ impl<L: Lanes> RayBounds<L> {
 /// Returns the least lane.
 #[inline(always)]
 fn least<L: Lanes>(lanes: L) -> f32 {
-    // SAFETY: a value exists.
-    let minus = unsafe { L::splat(-0.0) };
-    -(lanes ^ minus).greatest()
+    -(lanes ^ lanes.filled(-0.0)).greatest()
 }

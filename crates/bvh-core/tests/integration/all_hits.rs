@@ -1,8 +1,9 @@
 //! All hits of a ray: each crossing of a surface once, and a parity that is right on closed meshes
 //! for rays through edges and corners.
 
-use crate::support::{Random, SHAPES, ball, boxes, grid_box, rays, scaled, soup, tree};
-use bvh_core::{Hit, Kernel, PreparedRay, Ray, Triangle, WideBvh};
+use crate::support::layouts::{by_kernel, layout};
+use crate::support::{Random, SHAPES, ball, grid_box, rays, scaled, soup};
+use bvh_core::{Hit, PreparedRay, Ray, Triangle};
 use glam::{Quat, Vec3};
 use num_bigint::{BigInt, Sign};
 
@@ -66,11 +67,6 @@ pub fn closed_meshes() -> Vec<(&'static str, Vec<Triangle>, Vec3)> {
     ]
 }
 
-fn layout(triangles: &[Triangle], shape: usize, kernel: Kernel) -> Option<WideBvh> {
-    let tree = tree(&boxes(triangles), SHAPES[shape], &mut Random(5));
-    WideBvh::new(&tree, triangles).unwrap().with_kernel(kernel)
-}
-
 /// Returns all crossings by testing every triangle.
 fn all_of(triangles: &[Triangle], ray: &Ray) -> Vec<Hit> {
     let mut hits: Vec<Hit> = (0..)
@@ -90,9 +86,8 @@ fn every_kernel_finds_each_crossing_once_at_every_scale() {
             let triangles = scaled(&scene, libm::exp2f(exponent as f32));
             let rays = rays(&triangles, 1000, &mut random);
             let expected: Vec<Vec<Hit>> = rays.iter().map(|ray| all_of(&triangles, ray)).collect();
-            for kernel in Kernel::ALL {
-                for shape in 0..SHAPES.len() {
-                    let Some(wide) = layout(&triangles, shape, kernel) else { continue };
+            for shape in 0..SHAPES.len() {
+                for (kernel, wide) in by_kernel(&layout(&triangles, shape)) {
                     let mut hits = Vec::new();
                     let mut counts = vec![0; rays.len()];
                     wide.all_hits_of(&rays, &mut hits, &mut counts);
@@ -140,7 +135,7 @@ fn rays_through(
 fn a_half_line_crosses_a_closed_mesh_an_odd_number_of_times_from_inside_only() {
     let mut random = Random(4);
     for (name, triangles, inside) in closed_meshes() {
-        let wide = layout(&triangles, 0, Kernel::best()).unwrap();
+        let wide = layout(&triangles, 0);
         let outside = Vec3::new(7.0, -5.5, 6.25);
         for (origin, parity) in [(inside, 1), (outside, 0)] {
             let rays = rays_through(&triangles, origin, 10_000, &mut random);
@@ -241,7 +236,7 @@ fn a_million_rays_cross_ten_closed_meshes_as_in_exact_arithmetic() {
     let mut tested = 0;
     let mut crossed = 0;
     for (name, triangles, inside) in closed_meshes() {
-        let wide = layout(&triangles, 0, Kernel::best()).unwrap();
+        let wide = layout(&triangles, 0);
         let outside = Vec3::new(7.0, -5.5, 6.25);
         for (origin, parity) in [(inside, 1), (outside, 0)] {
             let rays = rays_through(&triangles, origin, 50_000, &mut random);

@@ -1,13 +1,9 @@
 //! Closest points by the wide layout agree with a test of every triangle.
 
-use crate::support::{Random, SHAPES, ball, boxes, grid_box, scaled, soup, tree};
-use bvh_core::{Kernel, Triangle, WideBvh};
+use crate::support::layouts::{by_kernel, layout};
+use crate::support::{Random, SHAPES, ball, grid_box, scaled, soup};
+use bvh_core::{Triangle, WideBvh};
 use glam::Vec3;
-
-fn layout(triangles: &[Triangle], shape: usize) -> WideBvh {
-    let tree = tree(&boxes(triangles), SHAPES[shape], &mut Random(5));
-    WideBvh::new(&tree, triangles).unwrap()
-}
 
 /// Returns the squared distance of the nearest triangle with an area, and the lowest id of the
 /// triangles at this distance.
@@ -37,8 +33,7 @@ fn the_closest_point_is_as_close_as_that_of_any_triangle_at_every_scale() {
                 let mut closest = vec![None; points.len()];
                 let wide = layout(&triangles, shape);
                 wide.closest_points(&points, &mut closest);
-                for kernel in Kernel::ALL {
-                    let Some(wide) = wide.clone().with_kernel(kernel) else { continue };
+                for (kernel, wide) in by_kernel(&wide) {
                     let mut same = vec![None; points.len()];
                     wide.closest_points(&points, &mut same);
                     assert_eq!(same, closest, "{kernel:?}, 2^{exponent}");
@@ -80,7 +75,7 @@ fn triangles_of_any_bits_are_compared_as_if_each_were_alone() {
             .collect();
         let alone: Vec<WideBvh> =
             triangles.iter().map(|&triangle| layout(&[triangle], 0)).collect();
-        let layouts = layouts(&triangles);
+        let layouts = by_kernel(&layout(&triangles, 0));
         for _ in 0..10 {
             let point = point_of_any_bits(&mut random);
             let distances = alone
@@ -88,7 +83,7 @@ fn triangles_of_any_bits_are_compared_as_if_each_were_alone() {
                 .filter_map(|wide| wide.closest_point(point))
                 .map(|closest| closest.distance);
             let least = distances.fold(f64::INFINITY, f64::min);
-            for wide in &layouts {
+            for (_, wide) in &layouts {
                 let found = wide.closest_point(point).unwrap();
                 assert_eq!(found.distance, least, "{point}");
                 let same = alone[found.object as usize].closest_point(point);
@@ -124,17 +119,11 @@ fn triangles_with_the_same_closest_point_tie_to_the_lowest_id() {
     }
 }
 
-/// Returns the layouts of a scene for all kernels of this machine.
-fn layouts(triangles: &[Triangle]) -> Vec<WideBvh> {
-    let of_kernel = |kernel| layout(triangles, 0).with_kernel(kernel);
-    Kernel::ALL.into_iter().filter_map(of_kernel).collect()
-}
-
 #[test]
 fn many_triangles_without_area_have_no_closest_point() {
     let triangles: Vec<Triangle> =
         (0..100u8).map(|i| Triangle([Vec3::splat(f32::from(i)); 3])).collect();
-    for wide in layouts(&triangles) {
+    for (_, wide) in by_kernel(&layout(&triangles, 0)) {
         for point in [Vec3::ZERO, Vec3::splat(3.5), Vec3::MAX] {
             assert_eq!(wide.closest_point(point), None);
         }
@@ -153,7 +142,7 @@ fn differences_of_the_largest_coordinates_do_not_overflow() {
                 .collect();
         let mut points = vec![Vec3::MAX, Vec3::MIN];
         points.extend((0..50).map(|_| random.point() * f32::MAX));
-        for wide in layouts(&triangles) {
+        for (_, wide) in by_kernel(&layout(&triangles, 0)) {
             for &point in &points {
                 let found = wide.closest_point(point).unwrap();
                 let (expected, _) = brute_force(&triangles, point);

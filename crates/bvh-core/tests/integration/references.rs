@@ -1,6 +1,7 @@
 //! Trees with divided triangles. Every traversal gives the answer of testing every triangle, bit by
 //! bit, and no ray passes between two parts of a triangle.
 
+use crate::support::layouts::by_kernel;
 use crate::support::{
     Random, SHAPES, ball, bits, boxes, brute_force, grid_box, rays, scaled, soup, tree,
 };
@@ -112,7 +113,7 @@ fn rays_on_planes(
 fn check(
     case: &str,
     tree: &Bvh,
-    kernels: &[WideBvh],
+    kernels: &[(Kernel, WideBvh)],
     triangles: &[Triangle],
     ray: &Ray,
     expected: Option<Hit>,
@@ -124,21 +125,11 @@ fn check(
     let found = any_hit_by(tree, ray, |id| test(id, ray.t_max()).is_some(), &mut ());
     assert_eq!(found, expected.is_some(), "{case}, {ray:?}");
     let crossings = triangles.iter().filter(|triangle| triangle.crossing(ray).is_some()).count();
-    for wide in kernels {
+    for (_, wide) in kernels {
         assert_eq!(wide.all_hits(ray).len(), crossings, "{case}, {ray:?}");
         assert_eq!(bits(wide.nearest_hit(ray)), bits(expected), "{case}, {ray:?}");
         assert_eq!(wide.any_hit(ray), expected.is_some(), "{case}, {ray:?}");
     }
-}
-
-/// Returns the wide layout of a tree for every kernel that the processor has.
-fn kernels(tree: &Bvh, triangles: &[Triangle]) -> Vec<WideBvh> {
-    let wide = WideBvh::new(tree, triangles).unwrap();
-    let mut layouts = Vec::new();
-    for kernel in Kernel::ALL {
-        layouts.extend(wide.clone().with_kernel(kernel));
-    }
-    layouts
 }
 
 #[test]
@@ -164,7 +155,7 @@ fn every_traversal_of_divided_triangles_answers_as_brute_force_at_every_scale() 
                 }
                 let case = format!("{name} * 2^{exponent}");
                 for tree in [&split, &collapsed] {
-                    let kernels = kernels(tree, &triangles);
+                    let kernels = by_kernel(&WideBvh::new(tree, &triangles).unwrap());
                     for ray in &rays {
                         let expected = brute_force(&triangles, ray);
                         check(&case, tree, &kernels, &triangles, ray, expected);

@@ -1,7 +1,7 @@
 //! Every kernel of the wide layout, ray by ray and in batches, gives the answer of testing every
 //! triangle, bit by bit.
 
-use crate::support::layouts::{bundles, layouts};
+use crate::support::layouts::{bundles, by_kernel, layouts};
 use crate::support::{
     Random, SHAPES, ball, bits, boxes, brute_force, chain, grid_box, rays, scaled, soup, tree,
 };
@@ -138,25 +138,18 @@ fn a_distance_that_rounds_to_zero_is_in_the_range_that_ends_there() {
 }
 
 #[test]
-fn batches_of_any_length_answer_as_their_rays_do() {
+fn batches_of_any_length_answer_as_brute_force() {
     let mut random = Random(9);
-    let triangles = soup(60, &mut random);
-    for (kernel, wide) in layouts(&triangles, &mut random) {
-        for count in (0..50).chain([63, 64, 65, 100, 257]) {
-            let mut batch = rays(&triangles, count, &mut random);
-            batch.truncate(count);
-            for coherence in [Coherence::Coherent, Coherence::Incoherent] {
-                let mut nearest = vec![Hit::MISS; batch.len()];
-                let mut any = vec![false; batch.len()];
-                wide.nearest_hits(&batch, &mut nearest, coherence);
-                wide.any_hits(&batch, &mut any, coherence);
-                let alone: Vec<Hit> =
-                    batch.iter().map(|ray| wide.nearest_hit(ray).unwrap_or(Hit::MISS)).collect();
-                assert_eq!(nearest, alone, "{kernel:?}, {coherence:?}, {count}");
-                let alone: Vec<bool> = batch.iter().map(|ray| wide.any_hit(ray)).collect();
-                assert_eq!(any, alone, "{kernel:?}, {coherence:?}, {count}");
-            }
-        }
+    let triangles = [soup(60, &mut random), ball(2)].concat();
+    let layouts = layouts(&triangles, &mut random);
+    for count in (0..50).chain([63, 64, 65, 100, 257]) {
+        let mut difficult = rays(&triangles, count, &mut random);
+        difficult.truncate(count);
+        check("difficult", &triangles, &layouts, &difficult);
+        let along = |i| Vec3::new(i as f32 * 0.03 - 1.5, 0.1, -3.0);
+        let in_line: Vec<Ray> =
+            (0..count).map(|i| Ray::half_line(along(i), Vec3::Z).unwrap()).collect();
+        check("in line", &triangles, &layouts, &in_line);
     }
 }
 
@@ -221,13 +214,6 @@ fn a_range_that_ends_at_either_zero_has_the_same_bits_from_every_kernel() {
     assert!(hits > 40, "{hits} of 64");
 }
 
-/// The answers to a batch of rays.
-fn of_batch(wide: &WideBvh, rays: &[Ray], coherence: Coherence) -> Vec<(u32, u32)> {
-    let mut hits = vec![Hit::MISS; rays.len()];
-    wide.nearest_hits(rays, &mut hits, coherence);
-    hits.iter().map(|hit| (hit.t.to_bits(), hit.object)).collect()
-}
-
 #[test]
 fn batches_miss_a_scene_in_which_no_triangle_has_an_area() {
     let line = Triangle::from([[-1.0; 3], [0.0; 3], [1.0; 3]]);
@@ -248,24 +234,14 @@ fn batches_miss_a_scene_in_which_no_triangle_has_an_area() {
 fn ranges_that_begin_below_zero_are_answered_as_from_zero() {
     let mut random = Random(6);
     let triangles = soup(200, &mut random);
-    let valid = rays(&triangles, 500, &mut random);
-    let invalid: Vec<Ray> = valid
-        .iter()
+    let below_zero: Vec<Ray> = (rays(&triangles, 500, &mut random).iter())
         .map(|ray| Ray::assume_valid(ray.origin(), ray.direction(), -1e30, f32::INFINITY))
         .collect();
-    let valid: Vec<Ray> =
-        valid.iter().map(|ray| Ray::half_line(ray.origin(), ray.direction()).unwrap()).collect();
-    for (kernel, wide) in layouts(&triangles, &mut random) {
-        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
-            let expected = of_batch(&wide, &valid, coherence);
-            let together = of_batch(&wide, &invalid, coherence);
-            assert_eq!(together, expected, "{kernel:?}, {coherence:?}");
-        }
-        for (ray, invalid) in valid.iter().zip(&invalid) {
-            let answer = bits(wide.nearest_hit(invalid));
-            assert_eq!(answer, bits(wide.nearest_hit(ray)), "{kernel:?}");
-        }
+    for ray in &below_zero {
+        assert_eq!(*ray, Ray::half_line(ray.origin(), ray.direction()).unwrap());
     }
+    let layouts = layouts(&triangles, &mut random);
+    assert!(check("below zero", &triangles, &layouts, &below_zero) > 100);
 }
 
 #[test]
@@ -416,9 +392,7 @@ fn every_kernel_traces_trees_of_any_depth() {
         .collect();
     for (name, triangles) in [("nested", nested), ("in a row", row)] {
         let wide = WideBvh::new(&chain(&boxes(&triangles)), &triangles).unwrap();
-        let kernels = Kernel::ALL.into_iter().filter(|kernel| kernel.is_available());
-        let layouts: Vec<_> =
-            kernels.map(|kernel| (kernel, wide.clone().with_kernel(kernel).unwrap())).collect();
+        let layouts = by_kernel(&wide);
         let mut rays: Vec<Ray> = (0..150)
             .map(|_| {
                 let origin = random.point() * random.of(&[0.1, 10.0, 5000.0]);
@@ -427,7 +401,7 @@ fn every_kernel_traces_trees_of_any_depth() {
             .collect();
         rays.extend(bundles(&triangles, 8, &mut random));
         assert!(check(name, &triangles, &layouts, &rays) > 30);
-        let expected = layouts[0].1.clone().with_kernel(Kernel::Portable).unwrap();
+        let expected = wide.with_kernel(Kernel::Portable).unwrap();
         for (kernel, wide) in &layouts {
             for ray in &rays {
                 assert_eq!(
@@ -445,18 +419,5 @@ fn every_kernel_traces_trees_of_any_depth() {
             let singly: Vec<Hit> = rays.iter().flat_map(|ray| wide.all_hits(ray)).collect();
             assert_eq!(hits, singly, "{name}, {kernel:?}");
         }
-    }
-}
-
-#[test]
-fn packets_and_what_is_left_over_are_answered_in_their_order() {
-    let mut random = Random(5);
-    let triangles = ball(2);
-    let layouts = layouts(&triangles, &mut random);
-    for count in [0, 1, 15, 16, 17, 33, 100] {
-        let rays: Vec<Ray> = (0..count)
-            .map(|i| Ray::half_line(Vec3::new(i as f32 * 0.03 - 1.5, 0.1, -3.0), Vec3::Z).unwrap())
-            .collect();
-        check("in line", &triangles, &layouts, &rays);
     }
 }

@@ -188,7 +188,7 @@ impl<const R: usize> Mask for Singles<R> {
     #[inline(always)]
     fn and_not(self, other: Self) -> Self {
         // Lanes of all bits are the only ones that are not below all bits.
-        unsafe { self & other.below(Self::splat_bits(u32::MAX)) }
+        self & other.below(other.filled_with_bits(u32::MAX))
     }
 }
 

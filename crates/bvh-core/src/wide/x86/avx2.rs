@@ -1,7 +1,7 @@
 //! The AVX2 kernel: eight boxes at once with fused multiply-add, entered children sorted without a
 //! branch.
 
-use super::lanes::{F32x4, F32x8, Mask8};
+use super::lanes::{F32x4, F32x8};
 use super::sort;
 use crate::wide::instructions::{Instructions, Pending, Task};
 use crate::wide::lanes::{Lanes as _, Mask as _};
@@ -34,37 +34,11 @@ impl Instructions for Avx2 {
     type Block = F32x4;
     type Rays = F32x8;
 
-    #[inline(always)]
-    unsafe fn prefetch(line: *const u8) {
-        // SAFETY: a prefetch may name any address.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(line.cast()) }
-    }
-
-    #[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-    #[inline(never)]
-    unsafe fn call<T: Task<Self>>(task: T) -> T::Output {
-        // SAFETY: the processor has the instructions, with which this function is compiled.
-        unsafe { task.run() }
-    }
+    shared!("avx2,fma,bmi1,bmi2,popcnt,lzcnt", compress, only);
 
     #[inline(always)]
     unsafe fn entered(entry: F32x8, exit: F32x8) -> u32 {
         entry.le(exit).bits()
-    }
-
-    #[inline(always)]
-    unsafe fn sort_keys(entry: F32x8, mask: u32, to: *mut u32) {
-        // SAFETY: the processor has the instructions, and there is room for eight.
-        unsafe {
-            let sorted = sort::descending(compress(sort::keys(entry.0), mask), mask.count_ones());
-            _mm256_storeu_si256(to.cast(), sorted);
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn compress_keys(entry: F32x8, mask: u32, to: *mut u32) {
-        // SAFETY: the processor has the instructions, and there is room for eight.
-        unsafe { _mm256_storeu_si256(to.cast(), compress(sort::keys(entry.0), mask)) }
     }
 
     #[inline(always)]
@@ -80,20 +54,6 @@ impl Instructions for Avx2 {
             );
         }
     }
-
-    #[inline(always)]
-    unsafe fn sort(node: &WideNode, F32x8(entry): F32x8, mask: u32, to: *mut Pending) -> Child {
-        // SAFETY: this instruction set includes AVX2; there is room for eight.
-        unsafe {
-            let keys = sort::keys(entry);
-            let entered = _mm256_castps_si256(Mask8::from_bits(mask).0);
-            let others = _mm256_set1_epi32(-1);
-            // The nearest child first: a traversal waits for it, and not for the rest of the work.
-            let nearest = sort::nearest(node, _mm256_blendv_epi8(others, keys, entered));
-            sort::write(node, compress(keys, mask), mask.count_ones(), to);
-            nearest
-        }
-    }
 }
 
 /// The entered lanes moved to the front, zeros behind them.
@@ -106,5 +66,15 @@ unsafe fn compress(lanes: __m256i, mask: u32) -> __m256i {
         let count = _mm256_set1_epi32(mask.count_ones() as i32);
         let used = _mm256_cmpgt_epi32(count, _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
         _mm256_and_si256(used, _mm256_permutevar8x32_epi32(lanes, order))
+    }
+}
+
+/// The entered lanes, among others of the greatest number.
+#[inline(always)]
+unsafe fn only(lanes: __m256i, mask: u32) -> __m256i {
+    // SAFETY: the caller has AVX2.
+    unsafe {
+        let entered = _mm256_castps_si256(F32x8::from_bits(mask).0);
+        _mm256_blendv_epi8(_mm256_set1_epi32(-1), lanes, entered)
     }
 }

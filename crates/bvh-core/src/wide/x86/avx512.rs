@@ -13,18 +13,7 @@ impl Instructions for Avx512 {
     type Block = F32x4;
     type Rays = F32x16;
 
-    #[inline(always)]
-    unsafe fn prefetch(line: *const u8) {
-        // SAFETY: a prefetch may name any address.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(line.cast()) }
-    }
-
-    #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-    #[inline(never)]
-    unsafe fn call<T: Task<Self>>(task: T) -> T::Output {
-        // SAFETY: the processor has the instructions, with which this function is compiled.
-        unsafe { task.run() }
-    }
+    shared!("avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt", compress, only);
 
     #[inline(always)]
     unsafe fn entered(F32x8(entry): F32x8, F32x8(exit): F32x8) -> u32 {
@@ -33,32 +22,11 @@ impl Instructions for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn sort_keys(entry: F32x8, mask: u32, to: *mut u32) {
-        // SAFETY: the processor has the instructions, and there is room for eight.
-        unsafe {
-            let keys = _mm256_maskz_compress_epi32(mask as u8, sort::keys(entry.0));
-            _mm256_storeu_si256(to.cast(), sort::descending(keys, mask.count_ones()));
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn compress_keys(entry: F32x8, mask: u32, to: *mut u32) {
-        // SAFETY: the processor has the instructions, and there is room for eight.
-        unsafe {
-            _mm256_storeu_si256(
-                to.cast(),
-                _mm256_maskz_compress_epi32(mask as u8, sort::keys(entry.0)),
-            )
-        }
-    }
-
-    #[inline(always)]
     unsafe fn compress(node: &WideNode, mask: u32, to: *mut Pending) {
         // SAFETY: the processor has the instructions, and there is room for eight.
         unsafe {
-            let children = _mm256_load_si256(node.children.as_ptr().cast());
-            let entered = _mm256_maskz_compress_epi32(mask as u8, children);
-            _mm512_storeu_si512(to.cast(), _mm512_cvtepu32_epi64(entered));
+            let children = compress(_mm256_load_si256(node.children.as_ptr().cast()), mask);
+            _mm512_storeu_si512(to.cast(), _mm512_cvtepu32_epi64(children));
         }
     }
 
@@ -80,18 +48,18 @@ impl Instructions for Avx512 {
             to
         }
     }
+}
 
-    #[inline(always)]
-    unsafe fn sort(node: &WideNode, F32x8(entry): F32x8, mask: u32, to: *mut Pending) -> Child {
-        // SAFETY: this instruction set includes AVX2; there is room for eight.
-        unsafe {
-            let keys = sort::keys(entry);
-            let others = _mm256_set1_epi32(-1);
-            // The nearest child first: a traversal waits for it, and not for the rest of the work.
-            let nearest = sort::nearest(node, _mm256_mask_mov_epi32(others, mask as u8, keys));
-            let keys = _mm256_maskz_compress_epi32(mask as u8, keys);
-            sort::write(node, keys, mask.count_ones(), to);
-            nearest
-        }
-    }
+/// The entered lanes moved to the front, zeros behind them.
+#[inline(always)]
+unsafe fn compress(lanes: __m256i, mask: u32) -> __m256i {
+    // SAFETY: the caller has AVX-512 VL.
+    unsafe { _mm256_maskz_compress_epi32(mask as u8, lanes) }
+}
+
+/// The entered lanes, among others of the greatest number.
+#[inline(always)]
+unsafe fn only(lanes: __m256i, mask: u32) -> __m256i {
+    // SAFETY: the caller has AVX-512 VL.
+    unsafe { _mm256_mask_mov_epi32(_mm256_set1_epi32(-1), mask as u8, lanes) }
 }

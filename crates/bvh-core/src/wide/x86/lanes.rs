@@ -98,11 +98,11 @@ macro_rules! quarters {
     };
 }
 
-/// Four numbers.
+/// Four numbers, or a set of lanes: all bits of a lane, or none.
 #[derive(Clone, Copy)]
 pub(crate) struct F32x4(pub(crate) __m128);
 
-/// Eight numbers.
+/// Eight numbers, or a set of lanes.
 #[derive(Clone, Copy)]
 pub(crate) struct F32x8(pub(crate) __m256);
 
@@ -110,7 +110,7 @@ pub(crate) struct F32x8(pub(crate) __m256);
 #[derive(Clone, Copy)]
 pub(crate) struct F32x16(pub(crate) __m512);
 
-/// Numbers of f64.
+/// Numbers of f64; four of them may be a set of lanes.
 #[derive(Clone, Copy)]
 pub(crate) struct F64x4(__m256d);
 #[derive(Clone, Copy)]
@@ -126,15 +126,13 @@ operators!(F32x8: Add add _mm256_add_ps, Sub sub _mm256_sub_ps, Mul mul _mm256_m
     BitAnd bitand _mm256_and_ps, BitOr bitor _mm256_or_ps, BitXor bitxor _mm256_xor_ps);
 operators!(F32x16: Add add _mm512_add_ps, Sub sub _mm512_sub_ps, Mul mul _mm512_mul_ps, Div div _mm512_div_ps,
     BitAnd bitand _mm512_and_ps, BitOr bitor _mm512_or_ps, BitXor bitxor _mm512_xor_ps);
-operators!(F64x4: Add add _mm256_add_pd, Sub sub _mm256_sub_pd, Mul mul _mm256_mul_pd, Div div _mm256_div_pd);
+operators!(F64x4: Add add _mm256_add_pd, Sub sub _mm256_sub_pd, Mul mul _mm256_mul_pd, Div div _mm256_div_pd,
+    BitAnd bitand _mm256_and_pd, BitOr bitor _mm256_or_pd);
 operators!(F64x8: Add add _mm512_add_pd, Sub sub _mm512_sub_pd, Mul mul _mm512_mul_pd, Div div _mm512_div_pd);
-operators!(WideMask4: BitAnd bitand _mm256_and_pd, BitOr bitor _mm256_or_pd);
-operators!(Mask4: BitAnd bitand _mm_and_ps, BitOr bitor _mm_or_ps);
-operators!(Mask8: BitAnd bitand _mm256_and_ps, BitOr bitor _mm256_or_ps);
 
 impl Lanes for F32x4 {
     const N: usize = 4;
-    type Mask = Mask4;
+    type Mask = Self;
     type Double = F64x4;
     memory!(_mm_set1_ps _mm_load_ps _mm_loadu_ps _mm_storeu_ps);
     #[inline(always)]
@@ -151,24 +149,24 @@ impl Lanes for F32x4 {
         max(a, b) -> Self = Self(_mm_max_ps(a.0, b.0));
         mul_add(a, b, c) -> Self = Self(_mm_fmadd_ps(a.0, b.0, c.0));
         mul_sub(a, b, c) -> Self = Self(_mm_fmsub_ps(a.0, b.0, c.0));
-        lt(a, b) -> Mask4 = Mask4(_mm_cmp_ps::<_CMP_LT_OQ>(a.0, b.0));
-        le(a, b) -> Mask4 = Mask4(_mm_cmp_ps::<_CMP_LE_OQ>(a.0, b.0));
-        eq(a, b) -> Mask4 = Mask4(_mm_cmp_ps::<_CMP_EQ_OQ>(a.0, b.0));
+        lt(a, b) -> Self = Self(_mm_cmp_ps::<_CMP_LT_OQ>(a.0, b.0));
+        le(a, b) -> Self = Self(_mm_cmp_ps::<_CMP_LE_OQ>(a.0, b.0));
+        eq(a, b) -> Self = Self(_mm_cmp_ps::<_CMP_EQ_OQ>(a.0, b.0));
         signs(a) -> u32 = _mm_movemask_ps(a.0) as u32;
         double(a) -> F64x4 = F64x4(_mm256_cvtps_pd(a.0));
         greatest(a) -> f32 = {
             let two = _mm_max_ps(a.0, _mm_movehl_ps(a.0, a.0));
             _mm_cvtss_f32(_mm_max_ss(two, _mm_permute_ps::<0b01>(two)))
         };
-        below(a, b) -> Mask4 = {
+        below(a, b) -> Self = {
             let a = _mm_castps_si128(a.0);
             let b = _mm_castps_si128(b.0);
             let not_below = _mm_cmpeq_epi32(_mm_max_epu32(a, b), a);
-            Mask4(_mm_castsi128_ps(_mm_xor_si128(not_below, _mm_set1_epi32(-1))))
+            Self(_mm_castsi128_ps(_mm_xor_si128(not_below, _mm_set1_epi32(-1))))
         };
     }
     #[inline(always)]
-    fn select(mask: Mask4, yes: Self, no: Self) -> Self {
+    fn select(mask: Self, yes: Self, no: Self) -> Self {
         unsafe { Self(_mm_blendv_ps(no.0, yes.0, mask.0)) }
     }
     #[inline(always)]
@@ -176,18 +174,18 @@ impl Lanes for F32x4 {
         unsafe { Self(_mm256_cvtpd_ps(double.0)) }
     }
     #[inline(always)]
-    fn narrow(mask: WideMask4) -> Mask4 {
+    fn narrow(mask: F64x4) -> Self {
         unsafe {
             let mask = _mm256_castpd_ps(mask.0);
             let high = _mm256_extractf128_ps::<1>(mask);
-            Mask4(_mm_shuffle_ps::<0b10_00_10_00>(_mm256_castps256_ps128(mask), high))
+            Self(_mm_shuffle_ps::<0b10_00_10_00>(_mm256_castps256_ps128(mask), high))
         }
     }
 }
 
 impl Lanes for F32x8 {
     const N: usize = 8;
-    type Mask = Mask8;
+    type Mask = Self;
     type Double = Two<F64x4>;
     memory!(_mm256_set1_ps _mm256_load_ps _mm256_loadu_ps _mm256_storeu_ps);
     #[inline(always)]
@@ -207,9 +205,9 @@ impl Lanes for F32x8 {
         max(a, b) -> Self = Self(_mm256_max_ps(a.0, b.0));
         mul_add(a, b, c) -> Self = Self(_mm256_fmadd_ps(a.0, b.0, c.0));
         mul_sub(a, b, c) -> Self = Self(_mm256_fmsub_ps(a.0, b.0, c.0));
-        lt(a, b) -> Mask8 = Mask8(_mm256_cmp_ps::<_CMP_LT_OQ>(a.0, b.0));
-        le(a, b) -> Mask8 = Mask8(_mm256_cmp_ps::<_CMP_LE_OQ>(a.0, b.0));
-        eq(a, b) -> Mask8 = Mask8(_mm256_cmp_ps::<_CMP_EQ_OQ>(a.0, b.0));
+        lt(a, b) -> Self = Self(_mm256_cmp_ps::<_CMP_LT_OQ>(a.0, b.0));
+        le(a, b) -> Self = Self(_mm256_cmp_ps::<_CMP_LE_OQ>(a.0, b.0));
+        eq(a, b) -> Self = Self(_mm256_cmp_ps::<_CMP_EQ_OQ>(a.0, b.0));
         signs(a) -> u32 = _mm256_movemask_ps(a.0) as u32;
         greatest(a) -> f32 =
             F32x4(_mm_max_ps(_mm256_castps256_ps128(a.0), _mm256_extractf128_ps::<1>(a.0))).greatest();
@@ -217,15 +215,15 @@ impl Lanes for F32x8 {
             F64x4(_mm256_cvtps_pd(_mm256_castps256_ps128(a.0))),
             F64x4(_mm256_cvtps_pd(_mm256_extractf128_ps::<1>(a.0))),
         );
-        below(a, b) -> Mask8 = {
+        below(a, b) -> Self = {
             let a = _mm256_castps_si256(a.0);
             let b = _mm256_castps_si256(b.0);
             let not_below = _mm256_cmpeq_epi32(_mm256_max_epu32(a, b), a);
-            Mask8(_mm256_castsi256_ps(_mm256_xor_si256(not_below, _mm256_set1_epi32(-1))))
+            Self(_mm256_castsi256_ps(_mm256_xor_si256(not_below, _mm256_set1_epi32(-1))))
         };
     }
     #[inline(always)]
-    fn select(mask: Mask8, yes: Self, no: Self) -> Self {
+    fn select(mask: Self, yes: Self, no: Self) -> Self {
         unsafe { Self(_mm256_blendv_ps(no.0, yes.0, mask.0)) }
     }
     #[inline(always)]
@@ -233,8 +231,8 @@ impl Lanes for F32x8 {
         unsafe { Self(_mm256_setr_m128(_mm256_cvtpd_ps(low.0), _mm256_cvtpd_ps(high.0))) }
     }
     #[inline(always)]
-    fn narrow(Two(low, high): Two<WideMask4>) -> Mask8 {
-        unsafe { Mask8(_mm256_setr_m128(F32x4::narrow(low).0, F32x4::narrow(high).0)) }
+    fn narrow(Two(low, high): Two<F64x4>) -> Self {
+        unsafe { Self(_mm256_setr_m128(F32x4::narrow(low).0, F32x4::narrow(high).0)) }
     }
 }
 
@@ -297,7 +295,7 @@ impl Lanes for F32x16 {
 }
 
 impl DoubleLanes for F64x4 {
-    type Mask = WideMask4;
+    type Mask = Self;
     #[inline(always)]
     unsafe fn splat(x: f64) -> Self {
         unsafe { Self(_mm256_set1_pd(x)) }
@@ -307,7 +305,7 @@ impl DoubleLanes for F64x4 {
         unsafe { _mm256_storeu_pd(to, self.0) }
     }
     #[inline(always)]
-    fn select(mask: WideMask4, yes: Self, no: Self) -> Self {
+    fn select(mask: Self, yes: Self, no: Self) -> Self {
         unsafe { Self(_mm256_blendv_pd(no.0, yes.0, mask.0)) }
     }
     functions! {
@@ -315,9 +313,9 @@ impl DoubleLanes for F64x4 {
         max(a, b) -> Self = Self(_mm256_max_pd(a.0, b.0));
         mul_add(a, b, c) -> Self = Self(_mm256_fmadd_pd(a.0, b.0, c.0));
         mul_sub(a, b, c) -> Self = Self(_mm256_fmsub_pd(a.0, b.0, c.0));
-        lt(a, b) -> WideMask4 = WideMask4(_mm256_cmp_pd::<_CMP_LT_OQ>(a.0, b.0));
-        le(a, b) -> WideMask4 = WideMask4(_mm256_cmp_pd::<_CMP_LE_OQ>(a.0, b.0));
-        eq(a, b) -> WideMask4 = WideMask4(_mm256_cmp_pd::<_CMP_EQ_OQ>(a.0, b.0));
+        lt(a, b) -> Self = Self(_mm256_cmp_pd::<_CMP_LT_OQ>(a.0, b.0));
+        le(a, b) -> Self = Self(_mm256_cmp_pd::<_CMP_LE_OQ>(a.0, b.0));
+        eq(a, b) -> Self = Self(_mm256_cmp_pd::<_CMP_EQ_OQ>(a.0, b.0));
     }
 }
 
@@ -404,22 +402,10 @@ impl<T: DoubleLanes> DoubleLanes for Two<T> {
     }
 }
 
-/// Four lanes: all bits of a lane, or none.
-#[derive(Clone, Copy)]
-pub(crate) struct Mask4(pub(super) __m128);
-
-/// Eight lanes.
-#[derive(Clone, Copy)]
-pub(crate) struct Mask8(pub(super) __m256);
-
-/// Four lanes of f64.
-#[derive(Clone, Copy)]
-pub(crate) struct WideMask4(pub(super) __m256d);
-
-impl Mask for Mask4 {
+impl Mask for F32x4 {
     #[inline(always)]
     fn bits(self) -> u32 {
-        unsafe { _mm_movemask_ps(self.0) as u32 }
+        self.signs()
     }
     #[inline(always)]
     unsafe fn from_bits(bits: u32) -> Self {
@@ -435,10 +421,10 @@ impl Mask for Mask4 {
     }
 }
 
-impl Mask for Mask8 {
+impl Mask for F32x8 {
     #[inline(always)]
     fn bits(self) -> u32 {
-        unsafe { _mm256_movemask_ps(self.0) as u32 }
+        self.signs()
     }
     #[inline(always)]
     unsafe fn from_bits(bits: u32) -> Self {

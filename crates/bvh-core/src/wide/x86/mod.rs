@@ -1,9 +1,10 @@
 //! The instruction sets of x86-64.
 
+mod lanes;
+#[macro_use]
+mod sort;
 mod avx2;
 mod avx512;
-mod lanes;
-mod sort;
 
 use super::instructions::{Instructions, Task};
 use crate::Kernel;

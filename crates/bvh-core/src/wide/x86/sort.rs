@@ -4,11 +4,55 @@ use crate::wide::instructions::Pending;
 use crate::wide::layout::{Child, WideNode};
 use core::arch::x86_64::*;
 
+/// The functions that both instruction sets have in common. `$features` are those of the set.
+/// `$compress` moves the lanes of a mask to the front, with zeros behind them, and `$only` fills all
+/// other lanes with the greatest number.
+macro_rules! shared {
+    ($features:tt, $compress:ident, $only:ident) => {
+        #[inline(always)]
+        unsafe fn prefetch(line: *const u8) {
+            // SAFETY: a prefetch may name any address.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(line.cast()) }
+        }
+
+        #[target_feature(enable = $features)]
+        #[inline(never)]
+        unsafe fn call<T: Task<Self>>(task: T) -> T::Output {
+            // SAFETY: the processor has the instructions, with which this function is compiled.
+            unsafe { task.run() }
+        }
+
+        #[inline(always)]
+        unsafe fn sort_keys(F32x8(entry): F32x8, mask: u32, to: *mut u32) {
+            // SAFETY: the processor has the instructions, and there is room for eight.
+            unsafe {
+                let keys = $compress(sort::keys(entry), mask);
+                _mm256_storeu_si256(to.cast(), sort::descending(keys, mask.count_ones()));
+            }
+        }
+
+        #[inline(always)]
+        unsafe fn compress_keys(F32x8(entry): F32x8, mask: u32, to: *mut u32) {
+            // SAFETY: the processor has the instructions, and there is room for eight.
+            unsafe { _mm256_storeu_si256(to.cast(), $compress(sort::keys(entry), mask)) }
+        }
+
+        #[inline(always)]
+        unsafe fn sort(node: &WideNode, F32x8(entry): F32x8, mask: u32, to: *mut Pending) -> Child {
+            // SAFETY: the processor has the instructions, and there is room for eight.
+            unsafe {
+                let keys = sort::keys(entry);
+                // The nearest child first: a traversal waits for it, and not for the rest.
+                let nearest = sort::nearest(node, $only(keys, mask));
+                sort::write(node, $compress(keys, mask), mask.count_ones(), to);
+                nearest
+            }
+        }
+    };
+}
+
 /// Returns the bits of the entries with the inverted lane in the last three: of equal entries the
 /// higher lane is nearer.
-///
-/// # Safety
-/// The caller has AVX2.
 #[inline(always)]
 pub(super) unsafe fn keys(entry: __m256) -> __m256i {
     // SAFETY: the caller has AVX2.
@@ -19,9 +63,6 @@ pub(super) unsafe fn keys(entry: __m256) -> __m256i {
 }
 
 /// Returns the first `count` keys in descending order, if all others are 0.
-///
-/// # Safety
-/// The caller has AVX2.
 #[inline(always)]
 pub(super) unsafe fn descending(keys: __m256i, count: u32) -> __m256i {
     // SAFETY: the caller has AVX2.
@@ -75,9 +116,6 @@ pub(super) unsafe fn write(node: &WideNode, keys: __m256i, count: u32, to: *mut 
 }
 
 /// Returns the child of the least key.
-///
-/// # Safety
-/// The caller has AVX2.
 #[inline(always)]
 pub(super) unsafe fn nearest(node: &WideNode, keys: __m256i) -> Child {
     // SAFETY: the caller has AVX2; a lane is below eight.

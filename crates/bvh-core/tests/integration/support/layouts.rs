@@ -4,21 +4,24 @@ use super::{Random, SHAPES, boxes, tree};
 use bvh_core::{Kernel, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants};
 use glam::Vec3;
 
-/// Returns the layouts of several trees over the triangles, for every kernel that this processor
-/// has.
+/// Returns a layout of the triangles by a tree of one of the shapes.
+pub fn layout(triangles: &[Triangle], shape: usize) -> WideBvh {
+    let tree = tree(&boxes(triangles), SHAPES[shape], &mut Random(5));
+    WideBvh::new(&tree, triangles).unwrap()
+}
+
+/// Returns the layout for every kernel that this processor has.
+pub fn by_kernel(wide: &WideBvh) -> Vec<(Kernel, WideBvh)> {
+    let of = |kernel| Some((kernel, wide.clone().with_kernel(kernel)?));
+    Kernel::ALL.into_iter().filter_map(of).collect()
+}
+
+/// Returns the layouts of several trees over the triangles, for every kernel.
 pub fn layouts(triangles: &[Triangle], random: &mut Random) -> Vec<(Kernel, WideBvh)> {
     let boxes = boxes(triangles);
     let mut trees: Vec<_> = SHAPES.iter().map(|&shape| tree(&boxes, shape, random)).collect();
     trees.push(collapse_leaves(&trees[0], &SahConstants::default()));
-    let layouts = trees.iter().map(|tree| WideBvh::new(tree, triangles).unwrap());
-    let kernels = Kernel::ALL.into_iter().filter(|kernel| kernel.is_available());
-    let of_kernel = |wide: WideBvh| {
-        kernels
-            .clone()
-            .map(move |kernel| (kernel, wide.clone().with_kernel(kernel).unwrap()))
-            .collect::<Vec<_>>()
-    };
-    layouts.flat_map(of_kernel).collect()
+    trees.iter().flat_map(|tree| by_kernel(&WideBvh::new(tree, triangles).unwrap())).collect()
 }
 
 /// Returns groups of sixteen rays that begin close to each other and run nearly in the same
