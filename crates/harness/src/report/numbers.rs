@@ -83,7 +83,8 @@ impl Config {
         let columns = "scene method seconds_quartile_1 seconds_median seconds_quartile_3";
         output.show("Seconds of the runs:", &timing, columns)?;
         let bounds = numbers.iter().filter_map(|row| row.lower_bound_over_reference);
-        output.finding = range(bounds).map(|(low, high)| {
+        let has_bounds = |_: &_| !rows.bounds.is_empty();
+        output.finding = range(bounds).filter(has_bounds).map(|(low, high)| {
             format!("No tree costs less than {} of the best known", percents(low, high))
         });
         if !self.targets.is_empty() {
