@@ -1,14 +1,26 @@
-//! A sheet of SVG in pixels, y downwards.
+//! A sheet for drawing through plotters in pixels, y downwards, and the SVG document made from it.
 
 use std::fmt::Write as _;
 
+use plotters::coord::Shift;
+use plotters::drawing::DrawingAreaErrorKind;
+use plotters::element::{DashedPathElement, Drawable, PathElement, Polygon};
+use plotters::prelude::{Color, DrawingArea, IntoDrawingArea, RGBColor, SVGBackend};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{FontDesc, FontFamily, FontStyle, FontTransform, TextStyle};
+
+use super::model::FigureError;
 use super::text::{FAMILY, Type};
 
-/// A colour of SVG.
-pub(super) type Colour = &'static str;
+pub(super) type Colour = RGBColor;
 
 /// The colour of the background.
-pub(super) const WHITE: Colour = "#FFFFFF";
+pub(super) const WHITE: Colour = RGBColor(0xFF, 0xFF, 0xFF);
+
+/// Steps of plotters' integer coordinates per pixel.
+const STEPS: f64 = 4.0;
+/// plotters' SVG backend divides font sizes by this.
+const FONT_SIZE: f64 = 1.24;
 
 /// A place in pixels.
 pub(super) type Point = (f64, f64);
@@ -35,67 +47,61 @@ pub(super) struct Frame {
 /// Lengths of a dash and of the gap after it; `None` for a solid line.
 pub(super) type Dash = Option<(f64, f64)>;
 
+type Fault = DrawingAreaErrorKind<std::io::Error>;
+
 /// An SVG document that is being drawn.
-pub(super) struct Sheet(String);
-
-/// Writes a length to a tenth of a pixel, which is enough for the eye and the same on every
-/// machine.
-fn px(length: f64) -> f64 {
-    // Adding 0 turns −0 into 0.
-    (10.0 * length.clamp(-1e5, 1e5)).round() / 10.0 + 0.0
+pub(super) struct Sheet<'a> {
+    area: DrawingArea<SVGBackend<'a>, Shift>,
+    /// The first error of plotters, after which the document is worthless.
+    fault: Option<Fault>,
 }
 
-/// Replaces the characters that XML does not allow in texts.
-fn escaped(text: &str) -> String {
+/// Converts pixels to steps. Casting saturates; the limit leaves room for plotters' own additions.
+fn steps(pixels: f64) -> i32 {
+    (pixels * STEPS).clamp(-1e8, 1e8).round() as i32
+}
+
+fn place((x, y): Point) -> (i32, i32) {
+    (steps(x), steps(y))
+}
+
+fn places(points: &[Point]) -> Vec<(i32, i32)> {
+    points.iter().copied().map(place).collect()
+}
+
+/// Removes control characters, which XML does not allow even escaped.
+fn printable(text: &str) -> String {
     let legal = |c: char| !c.is_control() && c != '\u{fffe}' && c != '\u{ffff}';
-    let text: String = text.chars().map(|c| if legal(c) { c } else { ' ' }).collect();
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    text.chars().map(|c| if legal(c) { c } else { ' ' }).collect()
 }
 
-/// Returns the commands of a path through these points.
-fn path(points: &[Point]) -> String {
-    let mut commands = String::new();
-    for (x, y) in points {
-        let before = if commands.is_empty() { 'M' } else { ' ' };
-        let _ = write!(commands, "{before}{},{}", px(*x), px(*y));
-    }
-    commands
-}
-
-impl Sheet {
-    /// Begins a document of this size. Screen readers read the title.
-    pub fn new(title: &str, (width, height): (f64, f64)) -> Self {
-        let (width, height) = (width.ceil(), height.ceil());
-        Self(format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
-             viewBox=\"0 0 {width} {height}\" role=\"img\" stroke-linejoin=\"round\" fill=\"none\" \
-             font-family=\"{FAMILY}\">\n<title>{}</title>\n\
-             <rect width=\"100%\" height=\"100%\" fill=\"{WHITE}\"/>\n",
-            escaped(title),
-        ))
-    }
-
-    /// Ends the document.
-    pub fn finish(self) -> String {
-        self.0 + "</svg>\n"
+impl<'a> Sheet<'a> {
+    fn draw<E>(&mut self, element: &E)
+    where
+        for<'b> &'b E: plotters::element::PointCollection<'b, (i32, i32)>,
+        E: Drawable<SVGBackend<'a>>,
+    {
+        let fault = self.area.draw(element).err();
+        self.fault = self.fault.take().or(fault);
     }
 
     /// Draws a line of text.
-    pub fn text(&mut self, (x, y): Point, text: &str, style: Type, colour: Colour, align: Align) {
-        let anchor = match align {
-            Align::Left => "start",
-            Align::Center | Align::Up => "middle",
-            Align::Right => "end",
+    pub fn text(&mut self, at: Point, text: &str, style: Type, colour: Colour, align: Align) {
+        if text.is_empty() {
+            return;
+        }
+        let (side, turn) = match align {
+            Align::Left => (HPos::Left, FontTransform::None),
+            Align::Center => (HPos::Center, FontTransform::None),
+            Align::Right => (HPos::Right, FontTransform::None),
+            Align::Up => (HPos::Center, FontTransform::Rotate270),
         };
-        let turn = if align == Align::Up { -90 } else { 0 };
-        let weight = if style.bold { " font-weight=\"bold\"" } else { "" };
-        let (x, y, size) = (px(x), px(y), style.size);
-        let _ = writeln!(
-            self.0,
-            "<text transform=\"translate({x} {y}) rotate({turn})\" y=\".35em\" \
-             text-anchor=\"{anchor}\" font-size=\"{size}\"{weight} fill=\"{colour}\">{}</text>",
-            escaped(text),
-        );
+        let weight = if style.bold { FontStyle::Bold } else { FontStyle::Normal };
+        let font = FontDesc::new(FontFamily::Name(FAMILY), style.size * STEPS * FONT_SIZE, weight);
+        let style = TextStyle { color: colour.to_backend_color(), ..TextStyle::from(font) };
+        let style = style.pos(Pos::new(side, VPos::Center)).transform(turn);
+        let fault = self.area.draw_text(&printable(text), &style, place(at)).err();
+        self.fault = self.fault.take().or(fault);
     }
 
     /// Draws lines of text, the first just below `top`.
@@ -115,19 +121,14 @@ impl Sheet {
 
     /// Fills a polygon.
     pub fn polygon(&mut self, corners: &[Point], colour: Colour, opacity: f64) {
-        let opacity = if opacity < 1.0 { format!(" opacity=\"{opacity}\"") } else { String::new() };
-        let _ = writeln!(self.0, "<path d=\"{}\" fill=\"{colour}\"{opacity}/>", path(corners));
+        self.draw(&Polygon::new(places(corners), colour.mix(opacity)));
     }
 
     /// Fills a polygon over its edge, of which the outer half is seen.
     pub fn marker(&mut self, corners: &[Point], fill: Colour, edge: Colour, width: f64) {
-        let _ = writeln!(
-            self.0,
-            "<path d=\"{}z\" fill=\"{fill}\" stroke=\"{edge}\" stroke-width=\"{}\" \
-             paint-order=\"stroke\"/>",
-            path(corners),
-            px(width),
-        );
+        let closed = [corners, &corners[..2]].concat();
+        self.line(&closed, edge, width, None);
+        self.polygon(corners, fill, 1.0);
     }
 
     /// Fills a rectangle.
@@ -140,12 +141,94 @@ impl Sheet {
 
     /// Draws a line through these points.
     pub fn line(&mut self, points: &[Point], colour: Colour, width: f64, dash: Dash) {
-        let dash =
-            dash.map_or_else(String::new, |(on, off)| format!(" stroke-dasharray=\"{on} {off}\""));
-        let _ = writeln!(
-            self.0,
-            "<path d=\"{}\" stroke=\"{colour}\" stroke-width=\"{width}\"{dash}/>",
-            path(points),
+        let style = colour.stroke_width(steps(width) as u32);
+        let points = places(points);
+        match dash {
+            None => self.draw(&PathElement::new(points, style)),
+            Some((on, off)) => {
+                self.draw(&DashedPathElement::new(points, steps(on), steps(off), style));
+            }
+        }
+    }
+}
+
+/// Makes an SVG document of this size. Screen readers read the title.
+pub(super) fn svg(
+    title: &str,
+    (width, height): (f64, f64),
+    draw: impl FnOnce(&mut Sheet),
+) -> Result<String, FigureError> {
+    let (across, down) = place((width.ceil(), height.ceil()));
+    let mut body = String::new();
+    {
+        let area =
+            SVGBackend::with_string(&mut body, (across as u32, down as u32)).into_drawing_area();
+        let mut sheet = Sheet { area, fault: None };
+        draw(&mut sheet);
+        let fault = sheet.fault.or_else(|| sheet.area.present().err());
+        if let Some(fault) = fault {
+            let title = title.to_owned();
+            return Err(FigureError::Draw { title, reason: fault.to_string() });
+        }
+    }
+    let title = printable(title).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    let mut document = String::new();
+    let _ = write!(
+        document,
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" \
+         viewBox=\"0 0 {across} {down}\" role=\"img\" stroke-linejoin=\"round\">\n\
+         <title>{title}</title>\n<rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>\n\
+         {}</svg>\n",
+        width.ceil(),
+        height.ceil(),
+        joined(&body),
+    );
+    Ok(document)
+}
+
+/// Joins successive lines of one style, such as the dashes of a line, into one element. The
+/// document shrinks to a fifth.
+fn joined(svg: &str) -> String {
+    let mut joined = String::with_capacity(svg.len());
+    let mut open: Option<&str> = None;
+    for line in svg.lines() {
+        let path = line.strip_prefix("<polyline ").and_then(|rest| rest.split_once(" points=\""));
+        if open.is_some() && open != path.map(|(style, _)| style) {
+            joined.push_str("\"/>\n");
+            open = None;
+        }
+        match path {
+            Some((style, points)) => {
+                if open.is_none() {
+                    let _ = write!(joined, "<path {style} d=\"");
+                    open = Some(style);
+                }
+                let _ = write!(joined, "M{}", points.trim_end_matches([' ', '"', '/', '>']));
+            }
+            None => {
+                joined.push_str(line);
+                joined.push('\n');
+            }
+        }
+    }
+    joined
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dashes_of_one_style_become_one_path() {
+        let line =
+            |style: &str, points: &str| format!("<polyline {style} points=\"{points} \"/>\n");
+        let svg = format!(
+            "<svg>\n{}{}{}</svg>\n",
+            line("a", "1,2 3,4"),
+            line("a", "5,6 7,8"),
+            line("b", "1,1 2,2")
         );
+        let paths = "<path a d=\"M1,2 3,4M5,6 7,8\"/>\n<path b d=\"M1,1 2,2\"/>\n";
+        assert_eq!(joined(&svg), format!("<svg>\n{paths}</svg>\n"));
     }
 }

@@ -1,6 +1,6 @@
 //! Lays out a figure: title, caption and legend above panels with aligned axes.
 
-use super::canvas::{Align, Frame, Sheet};
+use super::canvas::{self, Align, Frame};
 use super::legend::Legend;
 use super::model::{Figure, FigureError};
 use super::panel::Plot;
@@ -27,12 +27,12 @@ pub(super) fn svg(figure: &Figure) -> Result<String, FigureError> {
     let below_caption = below_title + BODY.line() * caption.len() as f64 + 8.0;
     let legend = Legend::new(figure, &strokes, room, &fonts);
     let (panels, height) = arrange(figure, below_caption + legend.height(), &fonts);
-    let mut sheet = Sheet::new(&figure.title, (WIDTH, height));
-    sheet.lines((BORDER, BORDER), &title, TITLE, INK, Align::Left);
-    sheet.lines((BORDER, below_title), &caption, BODY, GREY, Align::Left);
-    legend.draw(&mut sheet, (BORDER, below_caption));
-    panels.iter().for_each(|(plot, frame)| plot.draw(&mut sheet, *frame, &strokes));
-    Ok(sheet.finish())
+    canvas::svg(&figure.title, (WIDTH, height), |sheet| {
+        sheet.lines((BORDER, BORDER), &title, TITLE, INK, Align::Left);
+        sheet.lines((BORDER, below_title), &caption, BODY, GREY, Align::Left);
+        legend.draw(sheet, (BORDER, below_caption));
+        panels.iter().for_each(|(plot, frame)| plot.draw(sheet, *frame, &strokes));
+    })
 }
 
 /// Finds places for the plots of all panels, below `top`. Returns them and the figure's height.

@@ -210,6 +210,9 @@ impl Layer {
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "each message names its fields")]
 pub enum FigureError {
+    /// The drawing library failed.
+    #[error("figure '{title}' could not be drawn: {reason}")]
+    Draw { title: String, reason: String },
     /// One of the fonts in the program could not be read.
     #[error("the embedded font could not be read: {reason}")]
     Font { reason: String },
