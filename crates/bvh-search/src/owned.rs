@@ -79,25 +79,9 @@ impl OwnedTree {
         Ok(owned)
     }
 
-    /// Moves the tree to the same objects at other places: every box becomes tight again, and the
-    /// nodes remain. The growth of a [cost](Self::cost) tells when a search is worth its time.
-    /// O(n).
-    ///
-    /// # Errors
-    /// Returns the first object that has no valid box; the tree is then unchanged.
-    ///
-    /// # Panics
-    /// Panics if the number of objects differs.
-    pub fn refit(&mut self, objects: Objects) -> Result<(), InvalidBox> {
-        let (boxes, shapes) = self.moved(objects)?;
-        self.tree.refit(&boxes);
-        self.boxes = boxes;
-        self.shapes = shapes;
-        Ok(())
-    }
-
-    /// Returns a copy of the tree, moved as by [`refit`](Self::refit), for callers whose threads
-    /// still use this one. O(n).
+    /// Returns the tree over the same objects at other places: every box becomes tight again, and
+    /// the nodes remain. Other threads may still use this one. The growth of a [cost](Self::cost)
+    /// tells when a search is worth its time. O(n).
     ///
     /// # Errors
     /// Returns the first object that has no valid box.
@@ -105,20 +89,14 @@ impl OwnedTree {
     /// # Panics
     /// Panics if the number of objects differs.
     pub fn refitted(&self, objects: Objects) -> Result<Self, InvalidBox> {
-        let (boxes, shapes) = self.moved(objects)?;
+        let (boxes, shapes) = boxes_of(objects);
+        assert_eq!(boxes.len(), self.boxes.len(), "the same number of objects");
+        check_boxes(&boxes)?;
         let mut tree = self.tree.clone();
         tree.refit(&boxes);
         let density = self.density.clone();
         let Self { references, work, seed, .. } = *self;
         Ok(Self { tree, boxes, shapes, references, work, seed, density })
-    }
-
-    /// Returns the boxes and shapes of the objects at other places.
-    fn moved(&self, objects: Objects) -> Result<(Vec<Aabb>, Option<Primitives>), InvalidBox> {
-        let (boxes, shapes) = boxes_of(objects);
-        assert_eq!(boxes.len(), self.boxes.len(), "the same number of objects");
-        check_boxes(&boxes)?;
-        Ok((boxes, shapes))
     }
 
     /// Returns the layout of the tree that traces rays, for the rays of its search if there are
@@ -131,8 +109,8 @@ impl OwnedTree {
         })
     }
 
-    /// Reads a tree over these objects from `bytes`. Later searches may use as many references as
-    /// the tree has.
+    /// Reads a tree over these objects from `bytes`. Later searches have the seed of the file, and
+    /// may use as many references as the tree has.
     pub fn load(objects: Objects, bytes: &[u8]) -> Result<Self, FileError> {
         let mut owned = Self::bare(objects);
         let file = file::TreeFile::open(bytes)?.for_boxes(&owned.boxes)?;
@@ -141,6 +119,7 @@ impl OwnedTree {
         // down.
         owned.references = (owned.tree.prim_ids.len() as f64 + 0.5) / owned.boxes.len() as f64;
         owned.work = file.header().work;
+        owned.seed = file.header().seed;
         Ok(owned)
     }
 

@@ -61,7 +61,7 @@ fn a_tree_with_its_objects_is_improved_saved_and_loaded_divided_or_whole() {
         [(shapes(), 1.0), (shapes(), 2.0), (Objects::Boxes(boxes.clone()), 2.0)]
     {
         let deadline = || Deadline::after(Duration::from_millis(50));
-        let options = Options { references, ..Options::default() };
+        let options = Options { references, seed: 7, ..Options::default() };
         let mut owned = OwnedTree::find(objects.clone(), &options, &deadline()).unwrap();
         let first = cost::total_area(owned.tree());
         let may_divide = references > 1.0 && owned.triangles().is_some();
@@ -77,7 +77,9 @@ fn a_tree_with_its_objects_is_improved_saved_and_loaded_divided_or_whole() {
             time *= 2;
         };
         assert_eq!(divides, may_divide);
-        let mut loaded = OwnedTree::load(objects, &owned.save().unwrap()).unwrap();
+        let saved = owned.save().unwrap();
+        let mut loaded = OwnedTree::load(objects, &saved).unwrap();
+        assert!(loaded.save().unwrap() == saved, "another seed or work");
         assert_eq!((loaded.tree(), loaded.objects()), (owned.tree(), boxes.len()));
         improve_owned(&mut loaded, Duration::from_millis(50));
         assert!(cost::total_area(loaded.tree()) <= first * (1.0 + 1e-12));
@@ -107,12 +109,12 @@ fn a_tree_with_its_objects_follows_a_seed_a_budget_recorded_rays_and_moved_objec
     let error = OwnedTree::find(shapes(&triangles), &options, &()).unwrap_err();
     assert_eq!(error.to_string(), "rays: segment 0 has a coordinate that is not finite");
 
-    let mut owned = find(1, &rays);
+    let owned = find(1, &rays);
     let moved: Vec<Triangle> = triangles
         .iter()
         .map(|triangle| Triangle(triangle.0.map(|corner| corner * 2.0 + Vec3::Y)))
         .collect();
-    owned.refit(shapes(&moved)).unwrap();
+    let owned = owned.refitted(shapes(&moved)).unwrap();
     validate(owned.tree(), &boxes(&moved)).unwrap();
     let ray = Ray::half_line([0.5, 1.5, -5.0], [0.0, 0.0, 1.0]).unwrap();
     let hit = owned.layout().unwrap().unwrap().nearest_hit(&ray);
@@ -123,14 +125,24 @@ fn a_tree_with_its_objects_follows_a_seed_a_budget_recorded_rays_and_moved_objec
 #[test]
 fn no_bake_of_work_is_behind_reinsertion_within_the_same_work() {
     for (name, objects) in [("escher", 60), ("bijou", 500), ("konistil", 300), ("S04", 200)] {
-        let boxes = bvh_scenes::Scene::load(&format!("{name}:{objects}")).unwrap().boxes;
+        let scene = bvh_scenes::Scene::load(&format!("{name}:{objects}")).unwrap();
+        let boxes = &scene.boxes;
         for per_object in [1, 5, 20, 30, 50, 100, 200, 400, 1000, 3000, 20_000, 60_000] {
-            let work = per_object * boxes.len() as u64;
-            let budget = Budget { max_work: Some(work), ..Budget::UNLIMITED };
+            let budget = Budget { max_work: Some(per_object * objects), ..Budget::UNLIMITED };
             let method = bvh_search::reinsertion::Config::default();
-            let plain = solve(&method, &Problem::new(&boxes), 1, budget, &()).unwrap();
-            let baked = Bake { budget, ..Bake::new(&boxes) }.search(None, &()).unwrap().outcome;
-            assert!(baked.cost <= plain.cost, "{name}, {per_object}");
+            for objective in [Objective::InternalArea, Objective::Layout] {
+                let problem = Problem { objective, ..Problem::new(boxes) };
+                let plain = solve(&method, &problem, 1, budget, &()).unwrap();
+                let bake = Bake { objective: Some(objective), budget, ..Bake::new(boxes) };
+                let baked = bake.search(None, &()).unwrap().outcome;
+                assert!(baked.cost <= plain.cost, "{name}, {per_object}, {objective:?}");
+                if objective == Objective::InternalArea {
+                    let bake = Bake { shapes: Some(&scene.primitives), references: 1.2, ..bake };
+                    let baked = bake.search(None, &()).unwrap().outcome;
+                    let [baked, plain] = [baked, plain].map(|found| cost::total_area(&found.tree));
+                    assert!(baked <= plain, "{name}, {per_object}, divided: {baked} {plain}");
+                }
+            }
         }
     }
 }
