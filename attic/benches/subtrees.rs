@@ -1,13 +1,12 @@
-//! `best` with a budget of work by the number of subtrees, or of copies of the tree, that are
-//! annealed at once: cost over the cost of greedy Müller–Fellner, and seconds on one thread and on
-//! two.
+//! `best` with a budget of work by the number of subtrees that are annealed at once: cost over the
+//! cost of greedy Müller–Fellner, and seconds on one thread and on two.
 //!
-//! `cargo bench --manifest-path attic/Cargo.toml --bench subtrees -- [--subtrees 1,8,64,512] [--copies 2,8] [--million-work
+//! `cargo bench --manifest-path attic/Cargo.toml --bench subtrees -- [--subtrees 1,8,64,512] [--million-work
 //! 400] [--seeds 3] SCENE...` writes `results/threads/timing_subtrees.csv`, and keeps its rows of
 //! other scenes and processors.
 //!
 //! One thread and two alternate, and their trees are the same. The seconds of more threads are
-//! expected by Amdahl's law from these two, so far as there are that many subtrees or copies.
+//! expected by Amdahl's law from these two, so far as there are that many subtrees.
 
 mod landscape;
 mod measured;
@@ -58,9 +57,6 @@ struct Args {
     /// Numbers of subtrees.
     #[arg(long, value_delimiter = ',', default_value = "1,8,64,512")]
     subtrees: Vec<u32>,
-    /// Numbers of copies.
-    #[arg(long, value_delimiter = ',', default_value = "2,8")]
-    copies: Vec<u32>,
     /// The work of a run, in millions of nodes.
     #[arg(long, default_value_t = 400)]
     million_work: u64,
@@ -88,16 +84,12 @@ fn measure(scene: &Scene, args: &Args) -> Vec<SubtreesRow> {
     let greedy = muller_fellner::Config::default().build(&scene.boxes).expect("finite boxes");
     let base = cost::internal_area(&greedy);
     let mut rows = Vec::new();
-    let by_subtrees = args.subtrees.iter().map(|&count| (count, 1));
-    let by_copies = args.copies.iter().map(|&count| (1, count));
-    let parts: Vec<(u32, u32)> = by_subtrees.chain(by_copies).collect();
     for seed in 1..=args.seeds {
-        for &(subtrees, copies) in &parts {
-            let config = best::Config { pieces: subtrees, copies, ..Default::default() };
-            let at_once = match (subtrees, copies) {
-                (1, 1) => "the whole tree".to_string(),
-                (1, copies) => format!("{copies} copies"),
-                (subtrees, _) => format!("{subtrees} subtrees"),
+        for &subtrees in &args.subtrees {
+            let config = best::Config { pieces: subtrees, ..Default::default() };
+            let at_once = match subtrees {
+                1 => "the whole tree".to_string(),
+                _ => format!("{subtrees} subtrees"),
             };
             let (one, area) = run(scene, args.million_work, &config, seed, 1);
             let (two, area_of_two) = run(scene, args.million_work, &config, seed, 2);
@@ -115,7 +107,7 @@ fn measure(scene: &Scene, args: &Args) -> Vec<SubtreesRow> {
             rows.push(row("1".to_string(), one));
             rows.push(row("2".to_string(), two));
             for threads in EXPECTED {
-                let seconds = expected(one, two, threads.min(subtrees.max(copies) as usize));
+                let seconds = expected(one, two, threads.min(subtrees as usize));
                 rows.push(row(format!("{threads}, expected"), seconds));
             }
             println!(

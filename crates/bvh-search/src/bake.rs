@@ -230,10 +230,6 @@ impl<'a> Bake<'a> {
         splits: &Splits,
         observer: &dyn Observer,
     ) -> Result<Option<Bvh>, SearchError> {
-        // The division of a large scene takes tenths of a second before it looks at its watch.
-        if observer.cancelled() {
-            return Ok(None);
-        }
         unless_cancelled(watched(observer, |watch| splits.divide(self.boxes, watch)))
     }
 

@@ -216,7 +216,7 @@ mod tests {
             config(Candidates::KBest(5), None),
             config(Candidates::Within(0.05), Some(0.5)),
             Config {
-                local_search: LocalSearch::Treelet,
+                local_search: LocalSearch::Reinsertion,
                 ..config(Candidates::AxisBest, Some(0.1))
             },
         ]
@@ -270,24 +270,17 @@ mod tests {
             pool.install(|| solve(&config, &Problem::new(&boxes), 3, budget, &()).unwrap())
         };
         let plain = run(LocalSearch::None, 1, None);
-        for local_search in [LocalSearch::Rotation, LocalSearch::Treelet, LocalSearch::Reinsertion]
-        {
-            let improved = run(local_search, 1, None);
-            let pairs = plain.history.iter().zip(&improved.history);
-            assert!(
-                pairs
-                    .clone()
-                    .all(|(before, after)| after.cost < before.cost && after.work > before.work)
-            );
-            let cut = |threads| run(local_search, threads, Some(improved.work / 3));
-            let one = cut(1);
-            let three = cut(3);
-            assert_eq!((&one.tree, &one.history), (&three.tree, &three.history));
-            // The budget ends the search with the first trial that exceeds it.
-            let within =
-                improved.history.iter().take_while(|event| event.work < improved.work / 3).count();
-            assert_eq!(one.history, improved.history[..=within]);
-        }
+        let improved = run(LocalSearch::Reinsertion, 1, None);
+        let mut pairs = plain.history.iter().zip(&improved.history);
+        assert!(pairs.all(|(before, after)| after.cost < before.cost && after.work > before.work));
+        let cut = |threads| run(LocalSearch::Reinsertion, threads, Some(improved.work / 3));
+        let one = cut(1);
+        let three = cut(3);
+        assert_eq!((&one.tree, &one.history), (&three.tree, &three.history));
+        // The budget ends the search with the first trial that exceeds it.
+        let within =
+            improved.history.iter().take_while(|event| event.work < improved.work / 3).count();
+        assert_eq!(one.history, improved.history[..=within]);
     }
 
     #[test]

@@ -32,7 +32,6 @@ pub use bake::{Bake, BakeError, Baked, Division};
 pub use baselines::{LocalSearch, rebuild, rotation, treelet};
 pub use bvh_build;
 pub use bvh_core;
-pub use local::initial::Start;
 pub use local::reinsertion;
 pub use optimize::optimize;
 pub use orders::{genetic, random_orders};

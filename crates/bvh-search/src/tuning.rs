@@ -41,8 +41,6 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 1,10,60 SCENE..." {
     WINDOW: usize = 512, "nodes";
     /// Enlargement of the window in short runs; small windows would not cover the tree.
     WINDOW_OF_SHORT_RUNS: usize = 8, "factor";
-    /// Work of each copy of a tree between two exchanges of accepted moves.
-    WORK_PER_TURN: u64 = 1 << 17, "work";
     /// Work below which a run is short. A move takes about 200, so 64 per object visit every node
     /// about once.
     SHORT_RUN: f64 = 64.0, "work per object";
@@ -129,22 +127,11 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 SCENE..
     LEAST_LARGE_SUBTREES: u32 = 8, "subtrees";
     /// Maximum number of subtrees.
     MOST_SUBTREES: u32 = 4096, "subtrees";
-    /// Minimum size of a tree that is copied for several threads. In smaller trees, accepted moves
-    /// of one turn exclude each other more often.
-    COPIED_FROM: u64 = 1 << 14, "objects";
-    /// Maximum number of threads for which a tree is copied. Every copy repeats the accepted moves
-    /// of all.
-    MOST_COPIES: usize = 8, "threads";
-    /// Work of every copy but the first. It waits for the others, and repeats their moves.
-    WORK_OF_A_COPY: f64 = 0.8, "fraction of the work of one thread";
     /// Subtrees per thread; several unequal subtrees balance the threads.
     SUBTREES_PER_THREAD: u32 = 4, "subtrees";
     /// Maximum size of trees that are recombined after a cancellation. Recombination takes about a
     /// microsecond per object.
     RECOMBINED_AT_ONCE: usize = 100_000, "objects";
-    /// Maximum size of trees that are evaluated by rays or by their layout after a cancellation
-    /// although there is another tree. The evaluation takes a tenth of a microsecond per object.
-    EVALUATED_AT_ONCE: usize = 1_000_000, "objects";
     /// Ratio of the costs of a clustering and a top-down division below which annealing starts from
     /// the clustering, although it ends lower from a division of the same cost.
     CLUSTERING_MUCH_CHEAPER: f64 = 0.9, "fraction";
@@ -160,10 +147,7 @@ tuned! { "cargo bench -p harness --bench peers --features peers -- SCENE..." {
     ANNEAL_FROM_WORK: u64 = 20, "work per object";
     /// Minimum time in which annealing ends lower, with one thread.
     ANNEAL_FROM_TIME: f64 = 45.0, "sort times";
-    /// Minimum time in which both a clustering and a top-down build are tried, with one thread. The
-    /// top-down build is better on smooth surfaces.
-    TWO_STARTS_FROM_TIME: f64 = 28.0, "sort times";
-    /// Part of these two times that suffices with several threads. Two threads build top-down in
+    /// Part of this time that suffices with several threads. Two threads build top-down in
     /// 0.58 of the time of one, but sort no faster.
     SEVERAL_THREADS: f64 = 0.65, "fraction";
     /// Slowdown of the sort in memory that is used for the first time.
@@ -182,15 +166,6 @@ tuned! { "cargo bench -p harness --bench peers --features peers -- SCENE..." {
     /// The clustering that reinsertion starts from. A better clustering takes the time of more
     /// reinsertions than it saves.
     CLUSTERING: Clustering = Clustering { radius: 5, near_rounds: 1 }, "clusters, rounds";
-    /// Number of samples of the scene on which both builds are compared.
-    SAMPLES: usize = 8, "stretches of the Morton curve";
-    /// Size of all samples together.
-    SAMPLED_PART: usize = 8, "divisor of the number of objects";
-    /// Minimum size of scenes that are sampled. On smaller scenes, both builds are tried.
-    SAMPLED_FROM: usize = 2048, "objects";
-    /// Ratio on the samples below which the top-down build is better on the full scene, too. Smooth
-    /// surfaces have 0.92 to 0.97, other scenes 0.98 to 1.10.
-    TOP_DOWN_BELOW: f64 = 0.975, "cost over that of clustering";
     /// Part of the nodes that the first pass reinserts, the largest first. Every further pass
     /// doubles it.
     FIRST_PASS: f64 = 0.01, "fraction of the nodes";

@@ -11,7 +11,7 @@ use bvh_core::{Aabb, Bvh, Node, RayDensity, Triangle};
 use bvh_scenes::files::Reserved;
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_scenes::{Scene, is_allocatable};
-use bvh_search::{Bake, Baked, Budget, Division, Method, best};
+use bvh_search::{Bake, Baked, Budget, Division, Method};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -44,8 +44,6 @@ pub fn most_bytes(scene: &Scene, references: f64) -> usize {
 /// with two threads needs most: the greatest `bytes_per_object` of `results/scale`, as a test
 /// checks.
 const BYTES_PER_OBJECT: usize = 326;
-/// The bytes per object of each copy of the tree but the first.
-const BYTES_PER_COPY: usize = 256;
 /// The most bytes per permitted reference that a bake with divided objects has allocated at once,
 /// which the division needs: five million triangles with 1.2 references each.
 const BYTES_PER_REFERENCE: usize = 550;
@@ -64,8 +62,7 @@ pub fn check_memory(
     let per_object = if references > 1.0 {
         (references * BYTES_PER_REFERENCE as f64) as usize
     } else {
-        let copies = best::copies(objects as u64, rayon::current_num_threads());
-        BYTES_PER_OBJECT + (copies as usize - 1) * BYTES_PER_COPY
+        BYTES_PER_OBJECT
     };
     let bytes = objects.saturating_mul(per_object);
     if is_allocatable(objects.saturating_mul(per_object - per_loaded)) {

@@ -16,21 +16,6 @@ pub(crate) trait Mover: Send {
     -> bool;
     /// Nodes visited by all moves so far.
     fn work(&self) -> u64;
-    /// The reinsertions of the last move, which was accepted; `None` if they cannot be repeated on a
-    /// copy of the tree.
-    fn last_move(&self) -> Option<Reinsertions<'_>> {
-        None
-    }
-}
-
-/// A move, as a copy of the tree can repeat it.
-pub(crate) struct Reinsertions<'a> {
-    /// The roots of the subtrees, in the order of their removal.
-    pub removed: &'a [u32],
-    /// The same roots, each with its new sibling, in the order of their insertion.
-    pub inserted: &'a [[u32; 2]],
-    /// The area that the move may add.
-    pub limit: f64,
 }
 
 /// Work of a move after which the observer is polled at once, so that less than a millisecond
@@ -60,21 +45,6 @@ fn cool_plain<M: Mover>(
         return Tally::default();
     }
     mover.begin(tree, near);
-    moves(mover, tree, [hot, cold], quota, rng, observer, |_, _| ())
-}
-
-/// Makes moves until the quota is used up, while the temperature falls geometrically. Calls
-/// `accepted` after each move that is accepted.
-#[inline(always)]
-pub(super) fn moves<M: Mover, A: Metric>(
-    mover: &mut M,
-    tree: &mut Working<A>,
-    [hot, cold]: [f64; 2],
-    quota: Quota,
-    rng: &mut Stream,
-    observer: &dyn Observer,
-    mut accepted: impl FnMut(&M, &mut Working<A>),
-) -> Tally {
     let mut tally = Tally::default();
     let before = mover.work();
     let mut temperature = hot;
@@ -99,9 +69,6 @@ pub(super) fn moves<M: Mover, A: Metric>(
             return tally;
         }
         tally.moves += 1;
-        if mover.step(tree, temperature, rng) {
-            tally.kept += 1;
-            accepted(mover, tree);
-        }
+        tally.kept += u64::from(mover.step(tree, temperature, rng));
     }
 }

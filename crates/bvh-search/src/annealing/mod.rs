@@ -5,7 +5,6 @@
 //! `schedule` lowers the temperature. There are two kinds of moves, each a separate method: single
 //! reinsertions, here, and [`ruin_recreate`].
 
-mod copies;
 pub(crate) mod layout;
 mod metropolis;
 mod node_sampler;
@@ -17,4 +16,4 @@ mod single;
 mod subtrees;
 
 pub(crate) use metropolis::cool;
-pub use single::{Config, SingleMove, Target};
+pub use single::Config;

@@ -6,11 +6,10 @@
 //! sizes.
 
 use super::layout::Layout;
-use super::metropolis::{Mover, Reinsertions};
+use super::metropolis::Mover;
 use super::node_sampler::NodeSampler;
 use super::schedule::{AnnealingRun, check_fall};
 use super::side::Side;
-use crate::local::initial::Start;
 use crate::run::{Found, Problem, Run, Stream};
 use crate::tree::{ANCHOR, Metric, Node, PositionSearch, Scope, Working, search_by_metric};
 use crate::tuning::{DEARER_BY_AREA, LAYOUT_HEAT};
@@ -30,8 +29,6 @@ bvh_config::config! {
         cold: f64 = 0.003, in above(0.0);
         /// Work per object, unless the budget has less.
         work_per_object: u64 = 10_000;
-        /// The builder of the initial tree.
-        start: Start, in Nested;
     }
     check |config: &Config| check_fall(config.hot, config.cold);
 }
@@ -88,7 +85,7 @@ impl Config {
         run: &mut Run,
     ) -> Found {
         let Self { hot, cold, work_per_object, .. } = *self;
-        let annealing = AnnealingRun { heat: [hot, cold], work_per_object, start: &self.start };
+        let annealing = AnnealingRun { heat: [hot, cold], work_per_object };
         let length =
             work_per_object.min(run.left().work / problem.boxes.len().max(1) as u64) as f64;
         annealing.search(|| RuinMover::new(&self.ruin, length, false), metric, problem, seed, run)
@@ -114,12 +111,6 @@ pub(crate) struct RuinMover<'a> {
 struct Removed {
     /// Roots of the subtrees, each with its former sibling.
     roots: Vec<(u32, u32)>,
-    /// The roots in the order of their removal.
-    order: Vec<u32>,
-    /// The roots, each with its new sibling, in the order of their insertion.
-    inserted: Vec<[u32; 2]>,
-    /// The area that the move may add.
-    limit: f64,
     /// The area that their removal saves.
     saved: f64,
     /// The total area of the roots: a lower bound of the cost of their new positions.
@@ -129,8 +120,6 @@ struct Removed {
 impl Removed {
     fn clear(&mut self) {
         self.roots.clear();
-        self.order.clear();
-        self.inserted.clear();
         (self.saved, self.least) = (0.0, 0.0);
     }
 
@@ -141,7 +130,6 @@ impl Removed {
         self.saved += saved;
         self.least += tree.nodes[node as usize].area;
         self.roots.push((node, sibling));
-        self.order.push(node);
         visits
     }
 }
@@ -211,15 +199,6 @@ impl Mover for RuinMover<'_> {
         self.work + self.search.visits + self.layout.as_ref().map_or(0, |layout| layout.visits)
     }
 
-    fn last_move(&self) -> Option<Reinsertions<'_>> {
-        // The layout's costs would have to be repeated, too.
-        if self.layout.is_some() {
-            return None;
-        }
-        let Removed { order, inserted, limit, .. } = &self.removed;
-        Some(Reinsertions { removed: order, inserted, limit: *limit })
-    }
-
     fn begin(&mut self, tree: &Working<impl Metric>, near: Vec<u32>) {
         self.sampler.begin(tree, near);
         if let Some(layout) = &mut self.layout {
@@ -258,7 +237,7 @@ impl Mover for RuinMover<'_> {
         // Every removed subtree is inside the top's former box, and a scope must contain the boxes
         // of its items.
         let positions = if near { scope.around(tree, &top_box) } else { Scope::ALL };
-        let Removed { roots, order: _, inserted, limit: most, saved, least } = &mut self.removed;
+        let Removed { roots, saved, least } = &mut self.removed;
         // The order decides which subtree chooses first; a fixed order would always favour the same
         // ones.
         roots.shuffle(rng);
@@ -270,7 +249,6 @@ impl Mover for RuinMover<'_> {
             Scale::Top => top_area,
         };
         let worse = -temperature * scale * libm::log(chance);
-        *most = worse;
         // A tree of larger area may have a cheaper layout, so the area only rejects moves that are
         // far above the limit.
         let mut limit =
@@ -289,7 +267,6 @@ impl Mover for RuinMover<'_> {
                 return false;
             };
             self.work += tree.attach(node, position.sibling).1;
-            inserted.push([node, position.sibling]);
             limit -= position.cost;
         }
         let most = LAYOUT_HEAT * worse;

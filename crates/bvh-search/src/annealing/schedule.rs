@@ -12,11 +12,9 @@
 //!   cold                  └─────── passes of reinsertion to a local optimum
 //! ```
 
-use super::copies::Copies;
 use super::metropolis::Mover;
 use super::subtrees::{self, Round};
 use crate::local::incumbent::Incumbent;
-use crate::local::initial::Start;
 use crate::run::{Observer, Problem, Quota, Run, SearchError, Tally};
 use crate::tree::{Metric, Working};
 use crate::tuning::{FINAL_PASSES_PART, FINAL_PASSES_WORK, LAST_ROUND, ROUNDS, WORK_PER_ROUND};
@@ -37,23 +35,19 @@ pub(crate) struct Schedule {
     pub end: f64,
     /// Number of subtrees that are annealed at once, at least 1.
     pub subtrees: u32,
-    /// Number of copies on which moves are made at once, at least 1. With several, `subtrees` holds
-    /// for the final passes only.
-    pub copies: u32,
     /// True if passes of reinsertion follow. They lower the area, which is not always the
     /// objective.
     pub to_local_optimum: bool,
 }
 
 /// A search that consists of one annealing run.
-pub(crate) struct AnnealingRun<'a> {
+pub(crate) struct AnnealingRun {
     /// First and last temperature.
     pub heat: [f64; 2],
     pub work_per_object: u64,
-    pub start: &'a Start,
 }
 
-impl AnnealingRun<'_> {
+impl AnnealingRun {
     /// Anneals the initial tree by moves of one kind, until the work of the run or the budget is
     /// used up.
     pub fn search<M: Mover>(
@@ -65,11 +59,10 @@ impl AnnealingRun<'_> {
         run: &mut Run,
     ) -> Result<Bvh, SearchError> {
         let [hot, cold] = self.heat;
-        let (mut best, mut tree) = Incumbent::build(self.start, problem, metric, run)?;
+        let (mut best, mut tree) = Incumbent::build(problem, metric, run)?;
         let quota =
             run.left().at_most(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
-        let schedule =
-            Schedule { hot, cold, quota, end: 1.0, subtrees: 1, copies: 1, to_local_optimum: true };
+        let schedule = Schedule { hot, cold, quota, end: 1.0, subtrees: 1, to_local_optimum: true };
         let observer = run.observer();
         anneal(mover, &schedule, &mut tree, [seed, 0], observer, &mut |tree, tally| {
             run.count(tally);
@@ -114,7 +107,7 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
     let factor = schedule.cold / schedule.hot;
     let temperature = |fraction: f64| schedule.hot * libm::pow(factor, fraction.min(1.0));
     let began = observer.progress();
-    let [short, long] = WORK_PER_ROUND.map(|work| work * n * u64::from(schedule.copies));
+    let [short, long] = WORK_PER_ROUND.map(|work| work * n);
     let mut next = (work / ROUNDS).clamp(short, long).min(work);
     // The rate of work is still unknown, so the first round under a time limit is short.
     if began.is_some() {
@@ -131,21 +124,14 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
     // Every round uses the memory of the one before: fresh memory for the rows of costs of ten
     // million nodes takes more than a second.
     let mut whole = mover();
-    let mut copies = Copies::new();
     while fraction < 1.0 {
         let step = rate * next as f64;
         let heat = [fraction, fraction + step].map(temperature);
         let is_last = began.is_none() && fraction + LAST_ROUND * step >= 1.0;
         let end = if is_last { work } else { work.min(done.work + next) };
         let quota = Quota { work: end, moves }.less(&done);
-        let streams_here = [seed, streams];
-        let tally = if schedule.copies > 1 {
-            let cooling = Round { heat, quota, count: schedule.copies, streams: streams_here };
-            copies.cool(&cooling, &mover, &mut whole, tree, observer)
-        } else {
-            let cooling = Round { heat, quota, count: schedule.subtrees, streams: streams_here };
-            subtrees::cool(&cooling, &mover, &mut whole, tree, observer)
-        };
+        let cooling = Round { heat, quota, count: schedule.subtrees, streams: [seed, streams] };
+        let tally = subtrees::cool(&cooling, &mover, &mut whole, tree, observer);
         streams += subtrees::STREAMS;
         done += tally;
         round(tree, tally);
@@ -170,7 +156,6 @@ pub(crate) fn anneal<M: Mover, A: Metric>(
     }
     // The final passes need memory, too.
     drop(whole);
-    drop(copies);
     if schedule.to_local_optimum {
         let tally = subtrees::to_local_optimum(
             tree,
@@ -224,15 +209,8 @@ mod tests {
         let boxes = scatter(60);
         let mut tree = built(&muller_fellner::Config::default(), &boxes);
         let quota = Quota { moves: 300_000, work: u64::MAX / 1024 };
-        let schedule = Schedule {
-            hot: 0.5,
-            cold: 0.4,
-            quota,
-            end: 1.0,
-            subtrees: 1,
-            copies: 1,
-            to_local_optimum: true,
-        };
+        let schedule =
+            Schedule { hot: 0.5, cold: 0.4, quota, end: 1.0, subtrees: 1, to_local_optimum: true };
         let moves = AtomicU64::new(0);
         let mover = || Checked { inner: inner(), moves: &moves };
         anneal(mover, &schedule, &mut tree, [1, 0], &(), &mut |_, _| ());
@@ -246,9 +224,6 @@ mod tests {
         for by_layout in [false, true] {
             check(|| ruin_recreate::RuinMover::new(&ruin, 1000.0, by_layout));
         }
-        for target in [single::Target::Random, single::Target::Best] {
-            let step = single::SingleMove { target, ..Default::default() };
-            check(|| single::SingleMover::new(&step));
-        }
+        check(|| single::SingleMover::new(12));
     }
 }

@@ -8,62 +8,27 @@
 use super::metropolis::Mover;
 use super::node_sampler::NodeSampler;
 use super::schedule::{AnnealingRun, check_fall};
-use crate::local::initial::Start;
 use crate::run::{Found, Problem, Run, Stream};
 use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
-use bvh_config::{Accepts, Nested, OutOfRange, above};
+use bvh_config::above;
 use bvh_core::PackedAabb;
 use rand::RngExt;
 
 bvh_config::config! {
-    /// The move, the temperatures and the amount of work.
+    /// The move, the temperatures and the amount of work. A move removes a random subtree, more
+    /// often below a large node, and inserts it again at the best other position at most some
+    /// levels above its old one.
     pub struct Config {
-        /// The move; `move` in specs.
-        #[cfg_attr(feature = "serde", serde(rename = "move"))]
-        step: SingleMove;
+        /// Maximum number of levels up.
+        climb: u32 = 12, in 1..=u32::MAX - 1;
         /// First temperature, relative to the area saved by the removal.
         hot: f64 = 0.3, in above(0.0);
         /// Last temperature, not above `hot`.
         cold: f64 = 0.003, in above(0.0);
         /// Work per object, unless the budget has less.
         work_per_object: u64 = 10_000;
-        /// The builder of the initial tree.
-        start: Start, in Nested;
     }
-    check Self::check_together;
-}
-
-bvh_config::config! {
-    /// A move: removes a random subtree, more often below a large node, and inserts it again at
-    /// most some levels above its old position.
-    pub struct SingleMove {
-        /// Maximum number of levels up.
-        climb: u32 = 12, in 1..=u32::MAX - 1;
-        /// The position that the subtree gets, below the top of the climb.
-        target: Target = Target::Best;
-    }
-}
-
-impl Config {
-    fn check_together(&self) -> impl Iterator<Item = OutOfRange> {
-        // Specs call the step `move`, which is a keyword in Rust.
-        Nested.faults("move", &self.step).into_iter().chain(check_fall(self.hot, self.cold))
-    }
-}
-
-/// The position that a subtree gets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Target {
-    /// The end of a random descent from the top, at most one level longer than the climb.
-    Random,
-    /// The best of all positions except its previous one.
-    Best,
+    check |config: &Config| check_fall(config.hot, config.cold);
 }
 
 search_by_metric!(Config);
@@ -76,16 +41,17 @@ impl Config {
         seed: u64,
         run: &mut Run,
     ) -> Found {
-        let Self { hot, cold, work_per_object, .. } = *self;
-        let annealing = AnnealingRun { heat: [hot, cold], work_per_object, start: &self.start };
-        annealing.search(|| SingleMover::new(&self.step), metric, problem, seed, run)
+        let Self { climb, hot, cold, work_per_object } = *self;
+        let annealing = AnnealingRun { heat: [hot, cold], work_per_object };
+        annealing.search(|| SingleMover::new(climb), metric, problem, seed, run)
     }
 }
 
 /// Moves one subtree at a time.
 #[derive(Debug)]
-pub(crate) struct SingleMover<'a> {
-    config: &'a SingleMove,
+pub(crate) struct SingleMover {
+    /// Maximum number of levels up.
+    climb: u32,
     sampler: NodeSampler,
     /// Inner nodes whose children remain to be examined, each with the growth of the node and of
     /// all its ancestors up to the top.
@@ -93,9 +59,9 @@ pub(crate) struct SingleMover<'a> {
     work: u64,
 }
 
-impl<'a> SingleMover<'a> {
-    pub fn new(config: &'a SingleMove) -> Self {
-        Self { config, sampler: NodeSampler::default(), stack: Vec::new(), work: 0 }
+impl SingleMover {
+    pub fn new(climb: u32) -> Self {
+        Self { climb, sampler: NodeSampler::default(), stack: Vec::new(), work: 0 }
     }
 
     /// Returns the cheapest position for a detached item, next to `top` or below it, but not next
@@ -142,7 +108,7 @@ impl<'a> SingleMover<'a> {
     }
 }
 
-impl Mover for SingleMover<'_> {
+impl Mover for SingleMover {
     fn work(&self) -> u64 {
         self.work
     }
@@ -169,7 +135,7 @@ impl Mover for SingleMover<'_> {
         // decision.
         let (saved, sibling, visits) = tree.detach(node);
         self.work += visits;
-        let levels = rng.random_range(1..=self.config.climb);
+        let levels = rng.random_range(1..=self.climb);
         // The sibling has replaced the parent, so the climb starts there.
         let mut top = sibling;
         for _ in 0..levels {
@@ -183,26 +149,10 @@ impl Mover for SingleMover<'_> {
         // need not be examined.
         let chance = 1.0 - rng.random::<f64>();
         let limit = saved * (1.0 - temperature * libm::log(chance));
-        let target = match self.config.target {
-            Target::Random => {
-                let mut index = top;
-                for _ in 0..rng.random_range(0..=levels + 1) {
-                    if tree.nodes[index as usize].is_leaf() {
-                        break;
-                    }
-                    index = tree.nodes[index as usize].children[usize::from(rng.random::<bool>())];
-                    self.work += 1;
-                }
-                // A position next to the sibling would restore the tree.
-                Some(index).filter(|&index| index != sibling)
-            }
-            Target::Best => {
-                let item = &tree.nodes[node as usize];
-                let aabb = item.aabb;
-                let area = item.area;
-                self.best(tree, (&aabb, area), [top, sibling], limit)
-            }
-        };
+        let item = &tree.nodes[node as usize];
+        let aabb = item.aabb;
+        let area = item.area;
+        let target = self.best(tree, (&aabb, area), [top, sibling], limit);
         let accepted = target.is_some_and(|target| {
             let (added, visits) = tree.attach(node, target);
             self.work += visits;

@@ -175,30 +175,18 @@ fn improve_each<A: Metric>(
     let improved = parallel::map(tasks, |(number, nodes)| {
         // A cancelled search must return soon, and no move would change the copy.
         if observer.cancelled() {
-            return (Tally::default(), 0.0);
+            return Tally::default();
         }
         let subtree = &subtrees[number];
         let mut small = subtree.take(nodes, metric);
-        let before = small.area();
         let tally = improve(number, &mut small);
-        let added = small.area() - before;
         subtree.put_back(nodes, &small);
-        (tally, added)
+        tally
     });
     let mut done = Tally::default();
-    let mut added = 0.0;
-    for (tally, added_here) in improved {
-        done += tally;
-        added += added_here;
-    }
-    // The sum over the nodes of a large tree takes a tenth of a second, for which a cancelled
-    // search has no time. All others need it, because the sum of the differences gathers the errors
-    // of all rounds.
-    if observer.cancelled() {
-        tree.add_area(added);
-    } else {
-        tree.forget_changes();
-    }
+    improved.into_iter().for_each(|tally| done += tally);
+    // Sums of differences would gather the errors of all rounds.
+    tree.forget_changes();
     done
 }
 

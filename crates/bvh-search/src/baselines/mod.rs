@@ -1,7 +1,7 @@
 //! Published methods that [`best`](crate::best) is compared with and never calls.
 //!
 //! Two local searches, [`rotation`] and [`treelet`], and a way to continue from a local optimum,
-//! [`rebuild`]. GRASP and the latter share [`LocalSearch`], which names a local search.
+//! [`rebuild`]. [`LocalSearch`] names the local search of GRASP.
 
 pub mod rebuild;
 pub mod rotation;
@@ -12,17 +12,12 @@ use crate::run::{Observer, Quota, Tally};
 use crate::tree::{Metric, Working};
 
 bvh_config::config! {
-    /// A local search by name, with its default order of nodes: how other searches improve a tree
-    /// they have made.
+    /// A local search by name, which improves the trees that GRASP constructs.
     #[derive(Copy, Default, Eq)]
     pub enum LocalSearch {
         /// Leaves the tree as it is.
         #[default]
         None,
-        /// By [rotations](crate::rotation).
-        Rotation,
-        /// By [treelets](crate::treelet) of 7 leaves.
-        Treelet,
         /// By [reinsertion](crate::reinsertion).
         Reinsertion,
     }
@@ -44,8 +39,6 @@ impl LocalSearch {
     ) -> Tally {
         match self {
             Self::None => Tally::default(),
-            Self::Rotation => rotation::to_local_optimum(tree, quota, observer),
-            Self::Treelet => treelet::to_local_optimum(tree, quota, observer),
             Self::Reinsertion => reinsertion::to_local_optimum(tree, quota, observer),
         }
     }

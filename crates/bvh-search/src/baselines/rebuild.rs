@@ -11,11 +11,10 @@
 //! its nodes are then reinserted once anywhere in the tree, which makes the method an iterated
 //! local search (Lourenço, Martin & Stützle 2003).
 
-use super::LocalSearch;
 use crate::candidates::{Candidates, Randomised};
 use crate::local::TOLERANCE;
 use crate::local::incumbent::Incumbent;
-use crate::local::initial::{Start, construction};
+use crate::local::initial::construction;
 use crate::local::reinsertion;
 use crate::parallel;
 use crate::run::{
@@ -23,8 +22,7 @@ use crate::run::{
 };
 use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
 use bvh_build::top_down::Workspace;
-use bvh_build::{BuildError, Presorted, muller_fellner};
-use bvh_config::Nested;
+use bvh_build::{BuildError, Presorted};
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh};
 use rand::RngExt;
@@ -34,25 +32,13 @@ bvh_config::config! {
     pub struct Config {
         /// Maximum number of objects of a rebuilt subtree.
         objects: u32 = 200, in 3..=1_000_000;
-        /// Number of random nodes in a tournament. The node whose children have the largest area
-        /// wins. In measurements, larger tournaments, or the children's area relative to the
-        /// node's, found no better nodes, and a tournament of 1 found hardly worse nodes.
-        tournament: u32 = 2, in 1..=1000;
-        /// Maximum number of levels from that node up to the root of the rebuilt subtree, because a
+        /// Maximum number of levels from a node with large children up to the root of the rebuilt subtree, because a
         /// bad split shows below the split that caused it.
         climb: u32 = 6, in 0..=1000;
-        /// The splits that may be chosen, as in [`grasp`](crate::grasp).
-        candidates: Candidates = Candidates::AxisBest, in Nested;
         /// The probability of taking one of the candidates other than the best.
         noise: f64 = 0.3, in 0.0..=1.0;
-        /// The heuristic that ranks splits; by default the heuristic of the default initial tree.
-        construction: muller_fellner::Config = construction(), in Nested;
-        /// The local search that improves a rebuilt subtree before the comparison.
-        local_search: LocalSearch = LocalSearch::Reinsertion;
         /// Work per object, unless the budget has less.
         work_per_object: u64 = 10_000;
-        /// The builder of the initial tree, which is first improved to a local optimum.
-        start: Start, in Nested;
     }
 }
 
@@ -67,7 +53,7 @@ impl Config {
         seed: u64,
         run: &mut Run,
     ) -> Found {
-        let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
+        let (mut best, mut tree) = Incumbent::build(problem, metric, run)?;
         let n = tree.objects() as u64;
         if n < 3 {
             return Ok(best.tree);
@@ -121,6 +107,11 @@ impl Config {
         Ok(best.tree)
     }
 }
+
+/// Number of random nodes in a tournament. The node whose children have the largest area wins. In
+/// measurements, larger tournaments, or the children's area relative to the node's, found no better
+/// nodes, and a tournament of 1 found hardly worse nodes.
+const TOURNAMENT: u32 = 2;
 
 /// Number of subtrees that are rebuilt together.
 const BATCH: u64 = 4;
@@ -178,9 +169,9 @@ impl Config {
         let mut subtrees: Vec<Subtree> = Vec::new();
         for _ in 0..picks {
             tally.moves += 1;
-            tally.work += u64::from(self.tournament);
+            tally.work += u64::from(TOURNAMENT);
             let mut root = (-1.0, ANCHOR);
-            for _ in 0..self.tournament {
+            for _ in 0..TOURNAMENT {
                 let index = rng.random_range(1..tree.nodes.len() as u32);
                 let contribution = contribution(tree, index);
                 if contribution > root.0 {
@@ -222,19 +213,19 @@ impl Config {
             .iter()
             .map(|&leaf| Aabb::from(&tree.nodes[leaf as usize].aabb))
             .collect();
-        let mut rule = Randomised::new(self.candidates, Some(self.noise), rng);
+        let mut rule = Randomised::new(Candidates::AxisBest, Some(self.noise), rng);
         let mut other = Bvh::default();
         let scene = Presorted::new(&boxes)?;
         let workspace = &mut Workspace::default();
         let constructed = watched(observer, |watch| {
-            self.construction.construct(&scene, measure, &mut rule, workspace, &mut other, watch)
+            construction().construct(&scene, measure, &mut rule, workspace, &mut other, watch)
         });
         match constructed {
             Err(BuildError::Cancelled) => return Ok((None, Tally::default())),
             constructed => constructed?,
         }
         let mut other = Working::from_bvh(&other, tree.metric().internal(&other), tree.metric())?;
-        let mut tally = self.local_search.improve(&mut other, quota, observer);
+        let mut tally = reinsertion::to_local_optimum(&mut other, quota, observer);
         tally = Tally { moves: 0, kept: 0, work: tally.work + 2 * boxes.len() as u64 };
         let better = other.area() < subtree.area * (1.0 - TOLERANCE);
         Ok((better.then_some(other), tally))
@@ -341,7 +332,7 @@ mod tests {
     #[test]
     fn subtrees_of_one_batch_have_no_leaf_in_common() {
         let boxes = scatter(100);
-        let tree = built(&Config::default().start, &boxes);
+        let tree = built(&construction(), &boxes);
         let config = Config { objects: 30, ..Config::default() };
         let mut rng = stream(1, 0);
         let mut several = 0;

@@ -9,33 +9,15 @@
 
 use crate::local::TOLERANCE;
 use crate::local::incumbent::Incumbent;
-use crate::local::initial::Start;
-use crate::local::reinsertion::{repeat, sort_by_area};
 use crate::run::{Found, Observer, Problem, Quota, Run, Tally};
 use crate::tree::{Metric, Working, search_by_metric};
-use bvh_config::Nested;
 use bvh_core::with_vector_instructions;
 
 bvh_config::config! {
-    /// The order in which nodes are tried, the number of passes, and the initial tree.
+    /// The number of passes.
     pub struct Config {
-        /// The order of a pass over all nodes.
-        order: Order = Order::BottomUp;
         /// Maximum number of passes; the method ends earlier at a local optimum.
         sweeps: u32 = 1000, in 1..;
-        /// The builder of the initial tree.
-        start: Start, in Nested;
-    }
-}
-
-bvh_config::config! {
-    /// The order of a pass.
-    #[derive(Copy, Eq)]
-    pub enum Order {
-        /// Children before their parents.
-        BottomUp,
-        /// The largest node first; among equal nodes, parents first.
-        ByArea,
     }
 }
 
@@ -49,36 +31,17 @@ impl Config {
         _seed: u64,
         run: &mut Run,
     ) -> Found {
-        let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
-        best.improve(&mut tree, self.sweeps, run, |tree, _, quota, observer| {
-            pass(tree, &self.order.of(tree), quota, observer)
-        });
+        let (mut best, mut tree) = Incumbent::build(problem, metric, run)?;
+        best.improve(&mut tree, self.sweeps, run, pass_bottom_up);
         Ok(best.tree)
     }
 }
 
-impl Order {
-    /// Returns the nodes of a pass, in this order.
-    fn of(self, tree: &Working<impl Metric>) -> Vec<u32> {
-        let mut order = tree.preorder();
-        match self {
-            Self::BottomUp => order.reverse(),
-            Self::ByArea => sort_by_area(tree, &mut order),
-        }
-        order
-    }
-}
-
-/// Repeats passes from the bottom up until a local optimum.
-pub(crate) fn to_local_optimum(
-    tree: &mut Working<impl Metric>,
-    quota: Quota,
-    observer: &dyn Observer,
-) -> Tally {
-    repeat(quota, observer, |quota| {
-        let order = Order::BottomUp.of(tree);
-        pass(tree, &order, quota, observer)
-    })
+/// Performs one [`pass`] over all nodes, children before their parents.
+fn pass_bottom_up(tree: &mut Working<impl Metric>, quota: Quota, observer: &dyn Observer) -> Tally {
+    let mut order = tree.preorder();
+    order.reverse();
+    pass(tree, &order, quota, observer)
 }
 
 with_vector_instructions! {
@@ -165,6 +128,7 @@ fn best(tree: &Working<impl Metric>, top: u32) -> Option<Rotation> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::local::reinsertion::repeat;
     use crate::scatter::{built, scatter};
     use bvh_build::median_cut;
     use bvh_core::validate;
@@ -209,14 +173,11 @@ mod tests {
 
     #[test]
     fn a_local_optimum_is_better_than_every_neighbour_and_areas_stay_exact() {
-        for (n, order) in
-            [(40, Order::BottomUp), (60, Order::ByArea), (2, Order::ByArea), (3, Order::BottomUp)]
-        {
+        for n in [2, 3, 40, 60] {
             let boxes = scatter(n);
             let mut tree = built(&median_cut::Config::default(), &boxes);
             repeat(Quota::ENDLESS, &(), |quota| {
-                let nodes = order.of(&tree);
-                let done = pass(&mut tree, &nodes, quota, &());
+                let done = pass_bottom_up(&mut tree, quota, &());
                 let area = tree.internal_area();
                 assert!((tree.area() - area).abs() <= 1e-12 * area);
                 done

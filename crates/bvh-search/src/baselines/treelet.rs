@@ -11,11 +11,8 @@
 
 use crate::local::TOLERANCE;
 use crate::local::incumbent::Incumbent;
-use crate::local::initial::Start;
-use crate::local::reinsertion::repeat;
 use crate::run::{Found, Observer, Problem, Quota, Run, Tally};
 use crate::tree::{Metric, NONE, Subsets, Working, search_by_metric};
-use bvh_config::Nested;
 use bvh_core::with_vector_instructions;
 
 bvh_config::config! {
@@ -25,8 +22,6 @@ bvh_config::config! {
         size: u32 = 7, in 3..=12;
         /// Maximum number of passes over all nodes; the method ends earlier at a local optimum.
         sweeps: u32 = 1000, in 1..;
-        /// The builder of the initial tree.
-        start: Start, in Nested;
     }
 }
 
@@ -40,23 +35,13 @@ impl Config {
         _seed: u64,
         run: &mut Run,
     ) -> Found {
-        let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
+        let (mut best, mut tree) = Incumbent::build(problem, metric, run)?;
         let mut solver = Solver::new(self.size, &tree);
-        best.improve(&mut tree, self.sweeps, run, |tree, _, quota, observer| {
+        best.improve(&mut tree, self.sweeps, run, |tree, quota, observer| {
             pass(tree, &mut solver, quota, observer)
         });
         Ok(best.tree)
     }
-}
-
-/// Repeats passes with treelets of 7 leaves until a local optimum.
-pub(crate) fn to_local_optimum(
-    tree: &mut Working<impl Metric>,
-    quota: Quota,
-    observer: &dyn Observer,
-) -> Tally {
-    let mut solver = Solver::new(Config::default().size, tree);
-    repeat(quota, observer, |quota| pass(tree, &mut solver, quota, observer))
 }
 
 with_vector_instructions! {
@@ -197,6 +182,7 @@ impl Solver {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::local::reinsertion::repeat;
     use crate::scatter::{built, scatter};
     use crate::{Budget, Method, solve};
     use bvh_build::median_cut;

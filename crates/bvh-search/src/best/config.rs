@@ -1,7 +1,6 @@
 //! The parameters of `best`, and whether the search knows its end.
 
 use crate::annealing::ruin_recreate::{Ruin, Scale};
-use crate::local::initial::Start;
 use crate::run::Run;
 use crate::tuning::MOST_SUBTREES;
 use bvh_config::{Nested, above};
@@ -39,12 +38,6 @@ bvh_config::config! {
         /// several threads, one per 32 768 objects for a budget of work if they are at least eight,
         /// and otherwise 1.
         pieces: u32 = 0, in 0..=MOST_SUBTREES;
-        /// Number of copies of the tree on which moves are made at once, which limits the number of
-        /// useful threads; overrides `pieces`. Every copy needs the memory of a tree and repeats the
-        /// accepted moves of all. 0 means one per thread for a time limit with two to eight threads,
-        /// 16 384 to 262 143 objects, and the area as the objective, and otherwise 1. Trees judged
-        /// by their layout and divided objects are never copied.
-        copies: u32 = 0, in 0..=64;
         /// Minimum work per object of an annealing run whose temperatures are relative to the
         /// [top](Scale::Top) of a move, overriding the move's `scale`. Long runs end lower with it,
         /// short runs higher.
@@ -56,10 +49,6 @@ bvh_config::config! {
         horizon: Option<Horizon>;
         /// The move.
         ruin: Ruin, in Nested;
-        /// The builder of the initial tree. The default depends on the budget: clustering for
-        /// milliseconds, otherwise top-down division with |L|^0.9.
-        #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
-        start: Option<Start>, in Nested;
     }
 }
 

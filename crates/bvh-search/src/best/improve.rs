@@ -1,7 +1,6 @@
 //! From an initial tree to the end of the budget: the choice of annealing runs and their schedules.
 
 use super::config::{Config, Horizon};
-use super::copies;
 use super::improvement::{Improvement, ScheduledRun, TRIALS, cost};
 use super::plan::{Planned, plan};
 use crate::annealing::cool;
@@ -15,8 +14,8 @@ use crate::run::{Problem, Quota, Run, StopReason, Stream, Tally, stream};
 use crate::tree::{Metric, Working};
 use crate::tuning::{
     FINISH_AT_MOST, FINISH_WORK, LARGE_SUBTREE, LEAST_LARGE_SUBTREES, MOST_GENERATIONS,
-    MOST_SUBTREES, PROBE, SECURED_FROM, SUBTREES_PER_THREAD, TRIAL, WORK_OF_A_COPY,
-    WORTH_LARGE_SUBTREES, WORTH_SUBTREES,
+    MOST_SUBTREES, PROBE, SECURED_FROM, SUBTREES_PER_THREAD, TRIAL, WORTH_LARGE_SUBTREES,
+    WORTH_SUBTREES,
 };
 use bvh_core::cost::Objective;
 
@@ -77,9 +76,7 @@ impl Improvement<'_, '_, '_, '_> {
             self.run.count(tally);
             let now = observer.progress().unwrap_or(1.0);
             end_of_all = 1.0 - (1.0 - now) * (FINISH_WORK * n as f64 / in_time).min(FINISH_AT_MOST);
-            // The probe measures one copy.
-            let others = f64::from(self.copies(in_time / n as f64) - 1);
-            length = length.min((1.0 + WORK_OF_A_COPY * others) * in_time / n as f64);
+            length = length.min(in_time / n as f64);
             self.secure(tree, length);
         }
         let all = self.left;
@@ -121,9 +118,7 @@ impl Improvement<'_, '_, '_, '_> {
 
     /// Reinserts to a local optimum and offers it to the incumbent.
     fn reinsert(&mut self, tree: &mut Working<impl Metric>) {
-        self.best.improve(tree, u32::MAX, self.run, |tree, _, quota, observer| {
-            reinsertion::pass_by_area(tree, quota, observer)
-        });
+        self.best.improve(tree, u32::MAX, self.run, reinsertion::pass_by_area);
     }
 
     /// Keeps a local optimum of reinsertion. A caller who stops a time-limited search before
@@ -200,7 +195,6 @@ impl Improvement<'_, '_, '_, '_> {
             quota,
             end,
             subtrees: self.subtrees(length),
-            copies: self.copies(length),
             to_local_optimum: !self.by_layout,
         }
     }
@@ -222,25 +216,6 @@ impl Improvement<'_, '_, '_, '_> {
         };
         let worth = if large >= subtrees { WORTH_LARGE_SUBTREES } else { WORTH_SUBTREES };
         if length >= worth { subtrees } else { 1 }
-    }
-
-    /// Returns the number of copies that are annealed at once in a run of a search with `length`
-    /// work per object.
-    fn copies(&self, length: f64) -> u32 {
-        // Neither the costs of a layout nor changes of references are repeated on copies.
-        if self.by_layout || self.divider.is_some() {
-            return 1;
-        }
-        if self.config.copies > 0 {
-            return self.config.copies;
-        }
-        let is_timed = self.run.observer().progress().is_some();
-        // Without a clock the number of threads must not change the tree.
-        if is_timed && self.config.pieces == 0 && length >= WORTH_SUBTREES {
-            copies(self.n, threads())
-        } else {
-            1
-        }
     }
 
     /// Makes moves at the lowest temperature. Also returns the work that fits into the rest of the

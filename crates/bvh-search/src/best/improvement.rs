@@ -102,11 +102,6 @@ impl Improvement<'_, '_, '_, '_> {
         let cost_before = cost(tree, by_layout);
         let area_before = tree.area();
         let is_timed = observer.progress().is_some();
-        // The shape of a large tree takes tenths of a second, for which a cancelled search has no
-        // time. Other objectives offer the tree below.
-        if by_layout && run.stopped() == Some(StopReason::Cancelled) {
-            return;
-        }
         // Recombination needs both trees, and a run that ends worse is discarded. A first run under
         // a time limit is not recombined, so that the incumbent can take the place of the tree,
         // unless a divider changes references or a trial compares two trees.

@@ -23,15 +23,13 @@ mod time_limit;
 
 use crate::exact;
 use crate::local::incumbent::Incumbent;
+use crate::local::initial::construction;
 use crate::local::reinsertion;
 use crate::run::{
     Budget, Found, Kept, Observer, Outcome, Problem, Run, SearchError, StopReason, solve, watched,
 };
 use crate::tree::{Metric, Working, search_by_metric};
-use crate::tuning::{
-    CLUSTERING, CLUSTERING_MUCH_CHEAPER, COPIED_FROM, EVALUATED_AT_ONCE, LARGE_SUBTREE,
-    LEAST_LARGE_SUBTREES, MOST_COPIES, RECOMBINED_AT_ONCE, REINSERTED_BELOW, SECURED_FROM,
-};
+use crate::tuning::{CLUSTERING, CLUSTERING_MUCH_CHEAPER, REINSERTED_BELOW, SECURED_FROM};
 use bvh_build::ploc::{self, MortonOrder};
 use bvh_build::{BuildError, Builder, Watch};
 use bvh_core::Bvh;
@@ -60,13 +58,6 @@ pub(crate) fn fallback(
         .transpose()
 }
 
-/// Returns the number of copies of a tree of so many objects that a search within a time limit
-/// anneals at once on so many threads, by default. Each but the first needs 256 bytes per object.
-pub fn copies(objects: u64, threads: usize) -> u32 {
-    let is_copied = COPIED_FROM..LARGE_SUBTREE * u64::from(LEAST_LARGE_SUBTREES);
-    if is_copied.contains(&objects) && threads <= MOST_COPIES { threads as u32 } else { 1 }
-}
-
 /// Returns the outcome of a search, with the [`fallback`]'s tree if it costs less, which happens
 /// after an early stop.
 pub(crate) fn unless_behind(found: Outcome, fallback: Option<Outcome>) -> Outcome {
@@ -90,12 +81,6 @@ fn division(problem: &Problem, observer: &dyn Observer) -> Result<Option<Bvh>, S
         Err(BuildError::Cancelled) => Ok(None),
         divided => Ok(Some(divided?)),
     }
-}
-
-/// Returns whether the evaluation of a tree takes a noticeable part of a second.
-fn is_dear(problem: &Problem) -> bool {
-    let is_by_area = problem.measure.is_none() && problem.objective != Objective::Layout;
-    !is_by_area && problem.boxes.len() > EVALUATED_AT_ONCE
 }
 
 /// Builds a clustering whose larger neighbourhood pays where objects are as large as the scene.
@@ -125,8 +110,8 @@ impl Config {
         }
         // The search for small budgets supports the area only.
         let small = match problem.measure {
-            None if self.start.is_none() => small_budget::search(problem, run)?,
-            _ => SmallBudget::Large(None),
+            None => small_budget::search(problem, run)?,
+            Some(_) => SmallBudget::Large(None),
         };
         let mut best = match small {
             SmallBudget::Tree(tree) => return Ok(tree),
@@ -145,8 +130,8 @@ impl Config {
         Ok(best.tree)
     }
 
-    /// Builds the initial tree. Unless the configuration names a builder, also builds a clustering,
-    /// which takes a fraction of the time. If the clustering or the caller's tree is cheaper, a
+    /// Builds the initial tree from the top down, and a clustering, which takes a fraction of the
+    /// time. If the clustering or the caller's tree is cheaper, a
     /// more thorough clustering is built and kept aside, so no budget ends above it. If the first
     /// clustering is much cheaper, the cheapest of them becomes the initial tree. The work of a
     /// clustering counts only if it is used, like the work of the [`fallback`].
@@ -157,32 +142,18 @@ impl Config {
         run: &mut Run,
     ) -> Result<Kept, SearchError> {
         let boxes = problem.boxes;
-        let start = self.start.clone().unwrap_or_default();
-        let build = |watch: &Watch| start.build_watched(boxes, problem.measure, watch);
-        if self.start.is_some() {
-            return Ok(Kept::new(watched(run.observer(), build)?, problem));
-        }
+        let build = |watch: &Watch| construction().build_watched(boxes, problem.measure, watch);
         let morton = morton.map_or_else(|| MortonOrder::new(boxes), Ok)?;
         let clustered = watched(run.observer(), |watch| morton.build(&CLUSTERING, None, watch))?;
         // Only the cheapest tree is kept, because the division of a large scene needs most of the
         // memory of the search.
         run.keep_aside(Kept::new(clustered, problem));
-        // A large division takes tenths of a second before it looks at its watch. A cancelled
-        // search ends with the tree aside.
-        if boxes.len() > RECOMBINED_AT_ONCE && run.observer().cancelled() {
-            return Err(BuildError::Cancelled.into());
-        }
-        let started = watched(run.observer(), build)?;
-        // The evaluation takes a quarter of a second where it is dear.
-        if is_dear(problem) && run.observer().cancelled() {
-            return Err(BuildError::Cancelled.into());
-        }
-        let started = Kept::new(started, problem);
+        // A cancelled search ends with the tree aside.
+        let started = Kept::new(watched(run.observer(), build)?, problem);
         let Some(aside) = run.take_aside_below(started.cost) else {
             return Ok(started);
         };
         let is_much_cheaper = aside.cost < CLUSTERING_MUCH_CHEAPER * started.cost;
-        // A cancelled search ends with the tree aside.
         run.keep_aside(aside);
         if !is_much_cheaper {
             run.keep_aside(thorough_clustering(problem, run)?);

@@ -9,17 +9,13 @@
 
 use super::time_limit::TimeLimit;
 use crate::local::incumbent::Incumbent;
-use crate::local::initial::construction;
 use crate::local::reinsertion::pass;
-use crate::run::{Kept, Problem, Run, SearchError, Tally, watched};
+use crate::run::{Kept, Problem, Run, SearchError, Tally};
 use crate::tree::{Linked, Siblings};
-use crate::tuning::{
-    ANNEAL_FROM_WORK, CLUSTERING, FIRST_PASS, FRONT, MOVES_PER_READING, SAMPLED_FROM, SAMPLED_PART,
-    SAMPLES, TOP_DOWN_BELOW,
-};
+use crate::tuning::{ANNEAL_FROM_WORK, CLUSTERING, FIRST_PASS, FRONT, MOVES_PER_READING};
+use bvh_build::Watch;
 use bvh_build::ploc::MortonOrder;
-use bvh_build::{BuildError, Builder, Watch};
-use bvh_core::{Aabb, Bvh, cost};
+use bvh_core::Bvh;
 
 /// The result of a small budget.
 #[allow(clippy::large_enum_variant, reason = "one is made per search, and taken apart at once")]
@@ -34,8 +30,8 @@ pub(super) enum SmallBudget<'p> {
     LocalOptimum(Incumbent<'p>),
 }
 
-/// Searches within a small budget. Builds one tree or two, and improves the better one by
-/// reinsertion as far as the budget reaches.
+/// Searches within a small budget. Improves a clustering by reinsertion as far as the budget
+/// reaches.
 pub(super) fn search<'p>(
     problem: &Problem<'p>,
     run: &mut Run,
@@ -59,81 +55,18 @@ pub(super) fn search<'p>(
             return Ok(SmallBudget::Tree(Incumbent::begin_unbounded(tree, problem, run).tree));
         }
     }
-    let has_two_starts = limit.as_ref().is_some_and(TimeLimit::is_enough_for_two_starts);
-    let start = initial(morton, has_two_starts, problem, run)?;
-    Ok(improved(start, limit.as_ref(), problem, run))
-}
-
-/// The tree from which reinsertion starts.
-struct Start {
-    tree: Bvh,
-    /// The k largest nodes are sought among the first `front` · k nodes.
-    front: usize,
-}
-
-/// Builds the initial tree: a clustering, or with `has_two_starts` the cheaper one of a clustering
-/// and a top-down division.
-fn initial(
-    morton: MortonOrder,
-    has_two_starts: bool,
-    problem: &Problem,
-    run: &mut Run,
-) -> Result<Start, SearchError> {
-    let tries_division = has_two_starts && top_down_may_be_better(&morton, problem, run)?;
     let clustered = morton.build(&CLUSTERING, None, &Watch::default())?;
-    if tries_division && let Some(divided) = build_top_down(problem.boxes, run)? {
-        run.count(Tally { moves: 1, kept: 0, work: divided.nodes.len() as u64 });
-        if cost::internal_area(&divided) < cost::internal_area(&clustered) {
-            // A division has its largest nodes anywhere, not only at the front.
-            return Ok(Start { tree: divided, front: usize::MAX });
-        }
-    }
-    Ok(Start { tree: clustered, front: FRONT })
-}
-
-/// Returns the top-down division; `None` if the observer cancels first.
-fn build_top_down(boxes: &[Aabb], run: &Run) -> Result<Option<Bvh>, SearchError> {
-    match watched(run.observer(), |watch| construction().build_watched(boxes, None, watch)) {
-        Ok(tree) => Ok(Some(tree)),
-        Err(BuildError::Cancelled) => Ok(None),
-        Err(error) => Err(error.into()),
-    }
-}
-
-/// Returns whether a top-down build is worth its time: it must be better than clustering on samples
-/// of the scene. The samples take about a tenth of the full build's time.
-fn top_down_may_be_better(
-    morton: &MortonOrder,
-    problem: &Problem,
-    run: &mut Run,
-) -> Result<bool, SearchError> {
-    let order = morton.order();
-    if order.len() < SAMPLED_FROM {
-        return Ok(true);
-    }
-    let mut area_divided = 0.0;
-    let mut area_clustered = 0.0;
-    for stretch in order.chunks(order.len().div_ceil(SAMPLES)) {
-        let objects = &stretch[..stretch.len() / SAMPLED_PART];
-        let boxes: Vec<Aabb> =
-            objects.iter().map(|&object| problem.boxes[object as usize]).collect();
-        let Some(divided) = build_top_down(&boxes, run)? else { return Ok(false) };
-        area_divided += cost::internal_area(&divided);
-        area_clustered += cost::internal_area(&CLUSTERING.build(&boxes)?);
-        run.count(Tally { moves: 2, kept: 0, work: 4 * boxes.len() as u64 });
-    }
-    Ok(area_divided < TOP_DOWN_BELOW * area_clustered)
+    Ok(improved(clustered, limit.as_ref(), problem, run))
 }
 
 /// Improves the initial tree by reinsertion until a local optimum, or until the time or work is
 /// used up.
 fn improved<'p>(
-    start: Start,
+    tree: Bvh,
     limit: Option<&TimeLimit>,
     problem: &Problem<'p>,
     run: &mut Run,
 ) -> SmallBudget<'p> {
-    let Start { tree, front } = start;
     // A time-limited search does not evaluate the initial tree: reinsertion never makes it worse,
     // and the evaluation would take the time of many moves.
     let mut before = None;
@@ -144,7 +77,7 @@ fn improved<'p>(
     }
     let end = limit.map_or(f64::INFINITY, TimeLimit::end_of_reinsertion);
     let mut siblings = Siblings::new(tree);
-    let is_local_optimum = reinsert_largest(&mut siblings, front, end, run);
+    let is_local_optimum = reinsert_largest(&mut siblings, end, run);
     let tree = siblings.into_tree();
     let mut best = match before {
         Some(mut best) => {
@@ -163,14 +96,13 @@ fn improved<'p>(
 }
 
 /// Reinserts more and more of the largest nodes, until the observer's progress reaches `end` or the
-/// run stops. Returns whether it reached a local optimum first. `front` has the meaning that it has
-/// in [`select_largest`].
-fn reinsert_largest(tree: &mut Siblings, front: usize, end: f64, run: &mut Run) -> bool {
+/// run stops. Returns whether it reached a local optimum first.
+fn reinsert_largest(tree: &mut Siblings, end: f64, run: &mut Run) -> bool {
     let observer = run.observer();
     let mut part = FIRST_PASS;
     let mut order = Vec::new();
     loop {
-        select_largest(tree, part, front, &mut order);
+        select_largest(tree, part, FRONT, &mut order);
         let mut kept = 0;
         for some in order.chunks(MOVES_PER_READING) {
             if run.stopped().is_some() || observer.progress().is_some_and(|now| now >= end) {
@@ -215,8 +147,8 @@ mod tests {
     use crate::best;
     use crate::run::{Budget, Observer, solve};
     use crate::scatter::scatter;
-    use bvh_build::ploc;
-    use bvh_core::validate;
+    use bvh_build::{Builder, ploc};
+    use bvh_core::{cost, validate};
     use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
     /// A clock whose time is over after `most` readings.
@@ -264,17 +196,6 @@ mod tests {
             );
             validate(&found.unwrap().tree, &boxes).unwrap();
         }
-    }
-
-    #[test]
-    fn a_start_that_is_named_is_the_start() {
-        let boxes = scatter(300);
-        let start = crate::local::initial::Start::MullerFellner(Default::default());
-        let config = best::Config { start: Some(start), ..Default::default() };
-        let budget = Budget { max_work: Some(1), ..Budget::UNLIMITED };
-        let found = solve(&config, &Problem::new(&boxes), 1, budget, &()).unwrap();
-        let named = bvh_build::muller_fellner::Config::default().build(&boxes).unwrap();
-        assert_eq!(found.cost, cost::internal_area(&named));
     }
 
     #[test]

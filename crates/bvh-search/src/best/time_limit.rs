@@ -6,8 +6,7 @@
 use crate::parallel::threads;
 use crate::run::{Observer, Problem, SearchError};
 use crate::tuning::{
-    ANNEAL_FROM_TIME, BUILDS, COLD_MEMORY, FINISH_TIME, SEVERAL_THREADS, TWO_STARTS_FROM_TIME,
-    WARM_SAMPLE,
+    ANNEAL_FROM_TIME, BUILDS, COLD_MEMORY, FINISH_TIME, SEVERAL_THREADS, WARM_SAMPLE,
 };
 use bvh_build::ploc::{self, MortonOrder};
 
@@ -53,11 +52,6 @@ impl TimeLimit {
         // The sort may have been slow because it was the first to use its memory.
         let warm = Self { sort: warm_sort(problem, observer)?, ..*self };
         Ok(warm.sort_times() >= enough)
-    }
-
-    /// Returns whether both a clustering and a top-down build can be tried in this time.
-    pub fn is_enough_for_two_starts(&self) -> bool {
-        self.sort_times() >= for_threads(TWO_STARTS_FROM_TIME)
     }
 
     /// Returns the clustering that takes all of a very short time; `None` if reinsertion has time.

@@ -1,6 +1,7 @@
 //! The best tree of a local search. The working form is converted only when it is better.
 
 use super::TOLERANCE;
+use super::initial::construction;
 use crate::lower_bound;
 use crate::run::{Kept, Observer, Problem, Quota, Run, SearchError, Shortcut, Tally, watched};
 use crate::tree::{Metric, Working};
@@ -25,12 +26,12 @@ pub(crate) struct Incumbent<'p> {
 impl<'p> Incumbent<'p> {
     /// Builds the initial tree, the first evaluation of the run. Also returns its working form.
     pub fn build<A: Metric>(
-        builder: &dyn Builder,
         problem: &Problem<'p>,
         metric: A,
         run: &mut Run,
     ) -> Result<(Self, Working<A>), SearchError> {
-        let build = |watch: &Watch| builder.build_watched(problem.boxes, problem.measure, watch);
+        let build =
+            |watch: &Watch| construction().build_watched(problem.boxes, problem.measure, watch);
         let tree = watched(run.observer(), build)?;
         let incumbent = Self::begin(Kept::new(tree, problem), problem, run);
         let working = incumbent.working(metric)?;
@@ -69,7 +70,7 @@ impl<'p> Incumbent<'p> {
     /// it.
     pub fn begin_unbounded(kept: Kept, problem: &Problem<'p>, run: &mut Run) -> Self {
         let Kept { tree, cost } = kept;
-        let area = area(problem, &tree, cost, run);
+        let area = area(problem, &tree, cost);
         run.record(cost, tree.nodes.len() as u64);
         Self { problem: *problem, area, tree, lower_bound: f64::NEG_INFINITY }
     }
@@ -130,7 +131,7 @@ impl<'p> Incumbent<'p> {
         let Kept { tree: candidate, cost } = kept;
         let improved = run.improve(cost);
         if improved {
-            self.area = area(&self.problem, &candidate, cost, run);
+            self.area = area(&self.problem, &candidate, cost);
             self.tree = candidate;
             // Only a new incumbent can meet the bound.
             self.stop_if_optimal(run);
@@ -139,19 +140,19 @@ impl<'p> Incumbent<'p> {
     }
 
     /// Repeats a pass over `tree` until it keeps no move, at most `passes` times, and keeps the
-    /// best tree. `pass` receives the number of earlier passes.
+    /// best tree.
     pub fn improve<A: Metric>(
         &mut self,
         tree: &mut Working<A>,
         passes: u32,
         run: &mut Run,
-        mut pass: impl FnMut(&mut Working<A>, u32, Quota, &dyn Observer) -> Tally,
+        mut pass: impl FnMut(&mut Working<A>, Quota, &dyn Observer) -> Tally,
     ) {
-        for number in 0..passes {
+        for _ in 0..passes {
             if run.stopped().is_some() {
                 break;
             }
-            let done = pass(tree, number, run.left(), run.observer());
+            let done = pass(tree, run.left(), run.observer());
             run.count(done);
             self.offer(tree, run);
             if done.kept == 0 {
@@ -162,12 +163,7 @@ impl<'p> Incumbent<'p> {
 }
 
 /// Returns the total that the working form of a tree of this cost calls the area.
-fn area(problem: &Problem, tree: &Bvh, cost: f64, run: &Run) -> f64 {
-    // The measures of a large tree take a quarter of a second, and a cancelled search continues
-    // from no tree.
-    if problem.measure.is_some() && run.observer().cancelled() {
-        return f64::INFINITY;
-    }
+fn area(problem: &Problem, tree: &Bvh, cost: f64) -> f64 {
     match *problem {
         Problem { splits: Some(_), measure, .. } => measure
             .map_or_else(|| cost::total_area(tree), |measure| cost::total_measure(tree, measure)),

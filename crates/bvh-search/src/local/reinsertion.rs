@@ -26,33 +26,15 @@
 
 use super::TOLERANCE;
 use super::incumbent::Incumbent;
-use super::initial::Start;
-use crate::run::{Found, Observer, Problem, Quota, Run, Tally, WORK_PER_POLL, stream};
+use crate::run::{Found, Observer, Problem, Quota, Run, Tally, WORK_PER_POLL};
 use crate::tree::{Linked, Metric, PositionSearch, Working, search_by_metric};
-use bvh_config::Nested;
 use bvh_core::with_vector_instructions;
-use rand::seq::SliceRandom;
 
 bvh_config::config! {
-    /// The order in which nodes are tried, the number of passes, and the initial tree.
+    /// The number of passes.
     pub struct Config {
-        /// The order of a pass over all nodes.
-        order: Order = Order::ByArea;
         /// Maximum number of passes; the method ends earlier at a local optimum.
         sweeps: u32 = 1000, in 1..;
-        /// The builder of the initial tree.
-        start: Start, in Nested;
-    }
-}
-
-bvh_config::config! {
-    /// The order of a pass.
-    #[derive(Copy, Eq)]
-    pub enum Order {
-        /// The largest node first, equal nodes by index.
-        ByArea,
-        /// A new random order in every pass.
-        Random,
     }
 }
 
@@ -63,25 +45,12 @@ impl Config {
         &self,
         metric: A,
         problem: &Problem,
-        seed: u64,
+        _seed: u64,
         run: &mut Run,
     ) -> Found {
-        let (mut best, mut tree) = Incumbent::build(&self.start, problem, metric, run)?;
-        best.improve(&mut tree, self.sweeps, run, |tree, passes, quota, observer| {
-            let order = self.nodes_in_order(tree, seed, passes);
-            pass(tree, &order, quota, observer)
-        });
+        let (mut best, mut tree) = Incumbent::build(problem, metric, run)?;
+        best.improve(&mut tree, self.sweeps, run, pass_by_area);
         Ok(best.tree)
-    }
-
-    /// Returns all nodes of a tree in the order in which the pass after `passes` others tries them.
-    fn nodes_in_order(&self, tree: &Working<impl Metric>, seed: u64, passes: u32) -> Vec<u32> {
-        let mut nodes = tree.preorder();
-        match self.order {
-            Order::ByArea => sort_by_area(tree, &mut nodes),
-            Order::Random => nodes.shuffle(&mut stream(seed, passes.into())),
-        }
-        nodes
     }
 }
 

@@ -9,7 +9,6 @@
 //! special case. A detached subtree keeps its parent node, and attaching reuses that node, so no
 //! move allocates memory.
 
-mod checkpoint;
 mod convert;
 mod layout_cost;
 mod linked;
@@ -22,7 +21,6 @@ mod subsets;
 
 use bvh_core::PackedAabb;
 use bvh_core::cost::Sum;
-pub(crate) use checkpoint::Checkpoint;
 pub(crate) use linked::Linked;
 #[cfg(test)]
 pub(crate) use metric::AreaWithLeaves;
@@ -124,13 +122,6 @@ impl<M: Metric> Working<M> {
         let mut area = Sum::default();
         area.add(parts.value());
         self.restart(area);
-    }
-
-    /// Adds to the area what moves in copies of subtrees have added, to a rounding error. Their
-    /// nodes have the stamp 0.
-    pub fn add_area(&mut self, added: f64) {
-        self.begin();
-        self.area.add(added);
     }
 
     /// The root, unless there are no objects.

@@ -124,11 +124,9 @@ fn numbers_that_no_poll_could_interrupt_are_rejected() {
     fn error(method: Method, boxes: &[Aabb]) -> String {
         solve(&method, &Problem::new(boxes), 1, Budget::UNLIMITED, &()).unwrap_err().to_string()
     }
-    let tournament = rebuild::Config { tournament: 1 << 31, ..Default::default() };
-    assert_eq!(
-        error(Method::Rebuild(tournament), &[]),
-        "tournament is 2147483648; accepted: 1 to 1000"
-    );
+    let climb = rebuild::Config { climb: 1 << 31, ..Default::default() };
+    let message = "climb is 2147483648; accepted: 0 to 1000";
+    assert_eq!(error(Method::Rebuild(climb), &[]), message);
     let ruin = ruin_recreate::Ruin { removed: u32::MAX, ..Default::default() };
     let ruin = ruin_recreate::Config { ruin, ..Default::default() };
     assert_eq!(
