@@ -1,5 +1,6 @@
 //! The failures of the commands, and the exit code of each.
 
+use crate::answer::{short, whole};
 use bvh_core::DensityError;
 use bvh_scenes::SceneError;
 use bvh_scenes::files::{ReadError, WriteError};
@@ -33,8 +34,10 @@ pub enum Error {
     Write(#[from] WriteError),
     /// The scene is too large for the memory that the process can have.
     #[error(
-        "scene {scene}: a bake of {objects} objects needs {bytes} bytes of memory, more than this \
-         process can have; accepted: fewer objects"
+        "scene {scene}: a bake of {} objects needs {} bytes of memory, more than this process can \
+         have; accepted: fewer objects",
+        whole(*.objects),
+        whole(*.bytes)
     )]
     Memory { scene: String, objects: usize, bytes: usize },
     /// A search failed.
@@ -54,8 +57,9 @@ pub enum Error {
     Unmeasured,
     /// Ctrl-C ended a bake.
     #[error(
-        "interrupted; the best tree so far, of cost {cost}, is in {0}; `--from {0}` continues",
-        .path.display()
+        "interrupted; the best tree so far, of cost {1}, is in {0}; `--from {0}` continues",
+        .path.display(),
+        short(*.cost)
     )]
     Stopped { path: PathBuf, cost: f64 },
     /// Ctrl-C ended a bake of instances.

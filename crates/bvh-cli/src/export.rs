@@ -1,8 +1,8 @@
 //! `bvh export`: writes a tree for the tracer of another library.
 
 use crate::Error;
+use crate::answer::{Answer, Form, gain, short, whole};
 use crate::arguments::{output_file, reserve};
-use crate::output::print_line;
 use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::export::Target;
@@ -29,6 +29,9 @@ pub struct ExportArgs {
     /// Permits files outside the scene's folder.
     #[command(flatten)]
     pub files: SceneFiles,
+    /// The form of the costs.
+    #[command(flatten)]
+    pub form: Form,
 }
 
 /// Parses the names of the targets.
@@ -50,13 +53,20 @@ pub fn export(args: &ExportArgs) -> Result<(), Error> {
     // The loaded tree is over the same boxes, so that these can be built over, too.
     let greedy = muller_fellner::Config::default().build(&scene.boxes).unwrap_or(tree);
     let cost = target.cost(&fitted);
-    let own = target.cost(&target.fit(&greedy));
-    let relation = if cost < own { "less" } else { "more" };
-    print_line(&format!(
-        "{}: {} nodes, cost of a ray {cost:.2}, {:.1} % {relation} than in a greedy tree ({own:.2})",
+    let base = target.cost(&target.fit(&greedy));
+    let nodes = fitted.nodes.len();
+    let mut answer = Answer::new(args.form);
+    answer.say(&format!(
+        "{}: {} nodes, cost of a ray {}, {} a greedy tree's {}",
         args.out.display(),
-        fitted.nodes.len(),
-        100.0 * (cost / own - 1.0).abs(),
+        whole(nodes),
+        short(cost),
+        gain(cost, base),
+        short(base),
     ));
+    answer.record("nodes", nodes);
+    answer.record("cost of a ray", cost);
+    answer.record("cost of a ray in a greedy tree", base);
+    answer.end();
     Ok(())
 }

@@ -1,8 +1,8 @@
 //! The program `bvh`: parses the arguments, runs the command, and sets the exit code.
 
+mod answer;
 mod arguments;
 mod bake;
-mod csv_table;
 mod error;
 mod explain;
 mod export;
@@ -44,8 +44,7 @@ enum Command {
     Export(export::ExportArgs),
     Render(render::RenderArgs),
     Report(report::ReportArgs),
-    /// List the built-in scenes, their sizes, and the originals that they replace.
-    Scenes,
+    Scenes(scenes::ScenesArgs),
     /// Print the file with which a shell completes arguments.
     Completions {
         shell: Shell,
@@ -80,7 +79,7 @@ fn run(command: Command) -> Result<(), Error> {
         Command::Export(args) => export::export(&args),
         Command::Render(args) => render::render(&args),
         Command::Report(args) => report::report(&args),
-        Command::Scenes => scenes::scenes(),
+        Command::Scenes(args) => scenes::scenes(&args),
         Command::Completions { shell } => {
             let mut file = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "bvh", &mut file);

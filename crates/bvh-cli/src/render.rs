@@ -1,8 +1,8 @@
 //! `bvh render`: draws a scene into a PNG file, and prints times and counts.
 
 use crate::Error;
+use crate::answer::{Answer, Form, short, whole};
 use crate::arguments::{Jobs, input_file, output_file};
-use crate::output::print_line;
 use crate::scene_files::SceneFiles;
 use bvh_core::Aabb;
 use bvh_scenes::Scene;
@@ -36,45 +36,24 @@ pub struct RenderArgs {
     #[arg(long, value_name = "WxH", default_value = "960x540", value_parser = size)]
     pub size: (u32, u32),
     /// Smooth edges with N² rays per pixel.
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 2,
-        value_parser = clap::value_parser!(u32).range(1..=16)
-    )]
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=16))]
     pub samples: u32,
-    /// The number of mirror reflections to follow.
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 4,
-        value_parser = clap::value_parser!(u32).range(0..=64)
-    )]
-    pub depth: u32,
     /// The eye. The default shows the whole scene from outside.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub from: Option<DVec3>,
     /// The middle of the picture. The default is the centre of the scene.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub at: Option<DVec3>,
-    /// The angle of view from bottom to top, in degrees.
-    #[arg(long, value_name = "DEGREES", value_parser = angle)]
-    pub fov: Option<f64>,
-    /// A point light that replaces the automatic lights; may be repeated.
-    #[arg(long = "light", value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
-    pub lights: Vec<DVec3>,
-    /// Light surfaces from the eye, without lights and shadow rays.
-    #[arg(long, conflicts_with = "lights")]
-    pub no_lights: bool,
-    /// Draw no ground under a scene that is seen from outside.
-    #[arg(long)]
-    pub no_ground: bool,
     /// Permits files outside the scene's folder.
     #[command(flatten)]
     pub files: SceneFiles,
     /// Limits the threads.
     #[command(flatten)]
     pub jobs: Jobs,
+    /// The form of the times and counts.
+    #[command(flatten)]
+    pub form: Form,
 }
 
 /// The largest number of pixels of a picture. With their counts they need a gigabyte.
@@ -104,13 +83,6 @@ fn point(text: &str) -> Result<DVec3, String> {
     }
 }
 
-fn angle(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(angle) if (1.0..=170.0).contains(&angle) => Ok(angle),
-        _ => Err("accepted: 1 to 170".into()),
-    }
-}
-
 impl RenderArgs {
     fn options(&self, scene: &Scene) -> Options {
         let (width, height) = self.size;
@@ -118,18 +90,14 @@ impl RenderArgs {
         let automatic = framing::automatic(scene, &bounds, f64::from(width) / f64::from(height));
         // The automatic eye fits the automatic angle; any other pair gets the default angle.
         let view = match (self.from, self.at) {
-            (None, None) => View { fov: self.fov.unwrap_or(automatic.fov), ..automatic },
+            (None, None) => automatic,
             (from, at) => View {
                 from: from.unwrap_or(automatic.from),
                 at: at.unwrap_or(bounds.doubled_centroid() / 2.0),
-                fov: self.fov.unwrap_or(View::FOV),
+                fov: View::FOV,
             },
         };
-        let lights = (self.no_lights || !self.lights.is_empty()).then(|| self.lights.clone());
-        let samples = self.samples;
-        let depth = self.depth;
-        let ground = !self.no_ground;
-        Options { width, height, samples, depth, view: Some(view), lights, ground }
+        Options { width, height, samples: self.samples, view: Some(view), ..Options::default() }
     }
 }
 
@@ -163,46 +131,55 @@ pub fn render(args: &RenderArgs) -> Result<(), Error> {
     let rendered = start.elapsed().as_secs_f64() - built;
     let rays_per_pixel = options.samples * options.samples;
     write(args, &film, rays_per_pixel)?;
-    print_line(&summary(args, &scene, &film, rays_per_pixel, built, rendered));
+    let mut answer = Answer::new(args.form);
+    let objects = scene.boxes.len();
+    answer.say(&format!(
+        "{}: {} objects, {} rays; built in {built:.3} s, rendered in {rendered:.3} s",
+        scene.name,
+        whole(objects),
+        whole(film.rays)
+    ));
+    answer.record("objects", objects);
+    answer.record("rays", film.rays);
+    answer.record("seconds to build", built);
+    answer.record("seconds to render", rendered);
+    if args.accel != "wide" {
+        per_ray(&film, rays_per_pixel, &mut answer);
+    }
+    answer.say(&format!("picture: {}", args.out.display()));
+    answer.end();
     Ok(())
 }
 
 fn write(args: &RenderArgs, film: &Film, rays_per_pixel: u32) -> Result<(), Error> {
-    let action = "encode the picture";
-    let bytes = if args.heatmap {
-        let pixels = heat::map(film, rays_per_pixel, &heat::range(film, rays_per_pixel))
-            .map_err(io::Error::other)
-            .map_err(Error::io(&args.out, action))?;
-        image::png(film.width, &pixels)
-    } else {
-        image::png(film.width, &film.pixels)
-    };
-    let bytes = bytes.map_err(io::Error::other).map_err(Error::io(&args.out, action))?;
+    let heat = args.heatmap.then(|| heat::map(film, rays_per_pixel));
+    let bytes = heat
+        .transpose()
+        .map_err(io::Error::other)
+        .and_then(|heat| {
+            image::png(film.width, heat.as_ref().unwrap_or(&film.pixels)).map_err(io::Error::other)
+        })
+        .map_err(Error::io(&args.out, "encode the picture"))?;
     Ok(files::write(&args.out, &bytes)?)
 }
 
-fn summary(
-    args: &RenderArgs,
-    scene: &Scene,
-    film: &Film,
-    rays_per_pixel: u32,
-    built: f64,
-    rendered: f64,
-) -> String {
-    let mut text = format!(
-        "{}: {} objects, {} rays; built in {built:.3} s, rendered in {rendered:.3} s\n",
-        scene.name,
-        scene.boxes.len(),
-        film.rays
-    );
-    if args.accel != "wide" {
-        let boxes = film.counts.boxes as f64 / film.rays as f64;
-        let objects = film.counts.objects as f64 / film.rays as f64;
-        let heat::Range { min, median, max, .. } = heat::range(film, rays_per_pixel);
-        text += &format!(
-            "per ray: {boxes:.2} boxes, {objects:.2} objects; \
-             per pixel: at least {min:.0} tests, median {median:.0}, at most {max:.0}\n"
-        );
+fn per_ray(film: &Film, rays_per_pixel: u32, answer: &mut Answer) {
+    let boxes = film.counts.boxes as f64 / film.rays as f64;
+    let objects = film.counts.objects as f64 / film.rays as f64;
+    let heat::Range { min, median, max, .. } = heat::range(film, rays_per_pixel);
+    let [boxes_text, objects_text, min_text, median_text, max_text] =
+        [boxes, objects, min, median, max].map(short);
+    answer.say(&format!(
+        "per ray: {boxes_text} boxes, {objects_text} objects; \
+         per pixel: {min_text} to {max_text} tests, median {median_text}"
+    ));
+    for (name, value) in [
+        ("boxes per ray", boxes),
+        ("objects per ray", objects),
+        ("least tests of a pixel", min),
+        ("median tests of a pixel", median),
+        ("most tests of a pixel", max),
+    ] {
+        answer.record(name, value);
     }
-    text + &format!("Picture: {}", args.out.display())
 }

@@ -3,19 +3,20 @@
 mod page;
 
 use crate::Error;
+use crate::answer::{Answer, Form, whole};
 use crate::arguments::{Jobs, output_file, output_or_free, reserve};
-use crate::output::print_line;
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective};
-use bvh_scenes::render::{Film, Options, heat, image, render};
-use bvh_scenes::trace::{Accelerator, Structure};
+use bvh_scenes::rays::{Camera, View};
+use bvh_scenes::render::{Film, Options, framing, heat, image, render};
+use bvh_scenes::trace::Accelerator;
 use bvh_scenes::{Scene, tree_file};
 use clap::Args;
-use page::{Heat, Page, Row};
-use std::borrow::Cow;
+use page::{Page, Row};
+use serde_json::json;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -38,6 +39,9 @@ pub struct ReportArgs {
     /// Limits the threads.
     #[command(flatten)]
     pub jobs: Jobs,
+    /// The form of the facts.
+    #[command(flatten)]
+    pub form: Form,
 }
 
 /// One of the two trees on the page.
@@ -46,7 +50,13 @@ struct Measured {
     /// The expected tests of a ray in the wide layout, for triangles.
     tests: Option<f64>,
     film: Film,
+    /// Whether there is an object in each pixel.
+    hits: Vec<bool>,
 }
+
+/// The size of the pictures in pixels.
+const WIDTH: u32 = 640;
+const HEIGHT: u32 = 400;
 
 /// Measures the tree in a file and the greedy tree, draws both, and writes the page.
 pub fn report(args: &ReportArgs) -> Result<(), Error> {
@@ -58,41 +68,89 @@ pub fn report(args: &ReportArgs) -> Result<(), Error> {
     let greedy = muller_fellner::Config::default()
         .build(&scene.boxes)
         .map_err(Error::search(&scene.name, "muller_fellner"))?;
-    let baked = measure(tree, &scene)?;
-    let greedy = measure(greedy, &scene)?;
-    let title = format!("{} by {}", scene.name, header.method);
+    let view = {
+        let accelerator = Accelerator::of_tree(&scene.primitives, &tree);
+        framing::of_most_objects(&scene, &accelerator, f64::from(WIDTH) / f64::from(HEIGHT))
+    };
+    let baked = measure(tree, &scene, &view)?;
+    let greedy = measure(greedy, &scene, &view)?;
+    let rows = rows(&baked, &greedy);
+    let title = title(&scene.name, &rows[0]);
+    let mut answer = Answer::new(args.form);
+    answer.say(&format!("{}: {title}", out.display()));
+    answer.record("file", out.display().to_string());
+    for Row { name, baked, greedy } in &rows {
+        answer.record(name, json!({ "baked": baked, "greedy": greedy }));
+    }
+    let ranges = [&baked, &greedy].map(Measured::range);
+    // The same colour must mean the same number of tests in both.
+    let top = ranges[0].top.max(ranges[1].top);
     let page = Page {
         title: &title,
         origin: format!(
-            "{} objects, {} references; seed {}, {} nodes visited by the search.",
-            header.objects, header.references, header.seed, header.work
+            "{} objects, {} references; {}, seed {}, {} nodes visited by the search.",
+            whole(header.objects),
+            whole(header.references),
+            header.method,
+            header.seed,
+            whole(header.work)
         ),
-        rows: rows(&baked, &greedy),
-        scene: png(&out, &baked.film, &baked.film.pixels)?,
-        heat: heat_maps(&out, &baked.film, &greedy.film)?,
+        rows,
+        scene: png(&out, &baked.film.pixels)?,
+        heat: [
+            png(&out, &heat::colours(&baked.film, top))?,
+            png(&out, &heat::colours(&greedy.film, top))?,
+        ],
+        medians: ranges.map(|range| range.median),
+        top,
         levels: [area_by_level(&baked.tree), area_by_level(&greedy.tree)],
     };
     reserve(&out, args.out.is_some(), 0)?.write(&[page.html().as_bytes()])?;
-    print_line(&format!("{}: {title}", out.display()));
+    answer.end();
     Ok(())
 }
 
-fn measure(tree: Bvh, scene: &Scene) -> Result<Measured, Error> {
+/// Says what the tree is worth: its gain in the first row of the table.
+fn title(scene: &str, row: &Row) -> String {
+    let percent = if row.greedy > 0.0 { 100.0 * (1.0 - row.baked / row.greedy) } else { 0.0 };
+    match percent.round() {
+        0.0 => format!("{scene}: as cheap as a plain build"),
+        gain if gain > 0.0 => format!("{scene}: {gain:.0} % cheaper than a plain build"),
+        loss => format!("{scene}: {:.0} % dearer than a plain build", -loss),
+    }
+}
+
+impl Measured {
+    /// Returns the distribution of tests over the pixels in which there is an object.
+    fn range(&self) -> heat::Range {
+        let tests = self.film.tests.iter().zip(&self.hits);
+        let tests = tests.filter(|(_, is_hit)| **is_hit).map(|(&tests, _)| tests).collect();
+        heat::range(&Film { tests, ..Film::default() }, 1)
+    }
+}
+
+fn measure(tree: Bvh, scene: &Scene, view: &View) -> Result<Measured, Error> {
     let tests = match scene.triangles() {
         Ok(_) => Some(Rays::Default.expected_tests(&tree, scene)?),
         Err(_) => None,
     };
     let options = Options {
-        width: 640,
-        height: 400,
+        width: WIDTH,
+        height: HEIGHT,
         samples: 1,
         depth: 0,
+        view: Some(view.clone()),
         ground: false,
         ..Options::default()
     };
-    let accelerator = Accelerator::new(&scene.primitives, Structure::Tree(Cow::Borrowed(&tree)));
-    let film = render(scene, &accelerator, &options, &|| ());
-    Ok(Measured { tree, tests, film })
+    let (film, hits) = {
+        let accelerator = Accelerator::of_tree(&scene.primitives, &tree);
+        let camera = Camera::new(view, scene.up(), WIDTH, HEIGHT);
+        let pixels = 0..WIDTH * HEIGHT;
+        let is_hit = |pixel| camera.hit(&accelerator, pixel % WIDTH, pixel / WIDTH).is_some();
+        (render(scene, &accelerator, &options, &|| ()), pixels.map(is_hit).collect())
+    };
+    Ok(Measured { tree, tests, film, hits })
 }
 
 fn rows(baked: &Measured, greedy: &Measured) -> Vec<Row> {
@@ -100,7 +158,10 @@ fn rows(baked: &Measured, greedy: &Measured) -> Vec<Row> {
     let facts = |of: &Measured| {
         let counts = of.film.counts;
         [
-            ("Internal area over root area", over_root(of, cost::internal_area(&of.tree))),
+            (
+                "Total area of inner nodes over the root's",
+                over_root(of, cost::internal_area(&of.tree)),
+            ),
             ("Cost of the wide layout by area", over_root(of, Objective::Layout.cost(&of.tree))),
             ("Expected tests of a ray from anywhere", of.tests),
             (
@@ -135,25 +196,8 @@ fn area_by_level(tree: &Bvh) -> Vec<f64> {
     levels
 }
 
-fn heat_maps(out: &Path, baked: &Film, greedy: &Film) -> Result<[Heat; 2], Error> {
-    let [ours, theirs] = [baked, greedy].map(|film| heat::range(film, 1));
-    // The same colour must mean the same number of tests in both.
-    let top = ours.top.max(theirs.top);
-    Ok([
-        heat_map(out, baked, heat::Range { top, ..ours })?,
-        heat_map(out, greedy, heat::Range { top, ..theirs })?,
-    ])
-}
-
-fn heat_map(out: &Path, film: &Film, range: heat::Range) -> Result<Heat, Error> {
-    let pixels = heat::map(film, 1, &range)
-        .map_err(io::Error::other)
-        .map_err(Error::io(out, "encode the picture"))?;
-    Ok(Heat { png: png(out, film, &pixels)?, median: range.median, most: range.max })
-}
-
-fn png(out: &Path, film: &Film, pixels: &[[u8; 3]]) -> Result<Vec<u8>, Error> {
-    image::png(film.width, pixels)
+fn png(out: &Path, pixels: &[[u8; 3]]) -> Result<Vec<u8>, Error> {
+    image::png(WIDTH, pixels)
         .map_err(io::Error::other)
         .map_err(Error::io(out, "encode the picture"))
 }
@@ -171,5 +215,16 @@ mod tests {
         let expected = cost::over_root_area(&tree, cost::internal_area(&tree));
         assert!((sum - expected).abs() < 1e-12 * expected, "{sum} {expected}");
         assert_eq!((levels[0], levels.len()), (1.0, tree.depth() + 1));
+    }
+    #[test]
+    fn a_title_says_what_the_tree_is_worth() {
+        for (baked, title_of) in [
+            (0.8, "20 % cheaper than a plain build"),
+            (1.034, "3 % dearer than a plain build"),
+            (1.001, "as cheap as a plain build"),
+        ] {
+            let row = Row { name: "", baked, greedy: 1.0 };
+            assert_eq!(title("escher", &row), format!("escher: {title_of}"));
+        }
     }
 }

@@ -1,34 +1,50 @@
 //! `bvh scenes`: lists the scenes that need no path.
 
 use crate::Error;
-use crate::output::print_line;
+use crate::answer::{Answer, Form, whole};
 use bvh_scenes::builtin::stand_ins::STAND_INS;
 use bvh_scenes::{FETCHED, SPHERES, Scene, fetched_path};
+use serde_json::json;
+
+/// List the built-in scenes, their sizes, and the originals that they replace.
+#[derive(clap::Args, Clone, Copy, Debug)]
+pub struct ScenesArgs {
+    /// The form of the table.
+    #[command(flatten)]
+    pub form: Form,
+}
 
 /// Prints a table of the built-in scenes: their sizes, and the originals that they replace.
-pub fn scenes() -> Result<(), Error> {
-    let mut table = line("name", "objects", "kind", "description");
+pub fn scenes(args: &ScenesArgs) -> Result<(), Error> {
+    let mut answer = Answer::new(args.form);
+    answer.say(&line("name", "objects", "kind", "description"));
+    let mut add = |name: &str, objects: Option<usize>, kind: &str, description: &str| {
+        let count = objects.map_or_else(|| "not fetched".into(), whole);
+        answer.say(&line(name, &count, kind, description));
+        answer.list("scenes", json!({ "name": name, "objects": objects, "kind": kind }));
+    };
     for scene in STAND_INS {
         let kind = format!("stand-in for {}", scene.original);
-        table += &line(scene.name, &scene.triangle_count.to_string(), &kind, scene.character);
+        add(scene.name, Some(scene.triangle_count), &kind, scene.character);
     }
     for (name, count) in SPHERES {
         let origin = "Spheres, as in the second source document.";
-        table += &line(name, &count.to_string(), "procedural", origin);
+        add(name, Some(count), "procedural", origin);
     }
     for (name, package) in FETCHED {
         // The size of a scene is known only after it has been fetched.
         let objects = match fetched_path(name) {
-            Some(_) => Scene::load(name)?.boxes.len().to_string(),
-            None => "not fetched".into(),
+            Some(_) => Some(Scene::load(name)?.boxes.len()),
+            None => None,
         };
         let origin = format!("From the Rust package {package}, by scripts/fetch-scenes.");
-        table += &line(name, &objects, "file", &origin);
+        add(name, objects, "file", &origin);
     }
-    print_line(&format!("{table}\nAny OBJ, PLY, STL or glTF file can be named by its path."));
+    answer.say("\nAny OBJ, PLY, STL or glTF file can be named by its path.");
+    answer.end();
     Ok(())
 }
 
 fn line(name: &str, objects: &str, kind: &str, character: &str) -> String {
-    format!("{name:<12}{objects:>11}  {kind:<24}{character}\n")
+    format!("{name:<12}{objects:>11}  {kind:<24}{character}")
 }

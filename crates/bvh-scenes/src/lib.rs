@@ -26,5 +26,6 @@ pub mod tree_file;
 
 pub use fnv::fnv1a;
 pub use scene::{
-    FETCHED, NoTriangles, SPHERES, Scene, SceneError, SceneKind, fetched_path, is_allocatable,
+    FETCHED, NoTriangles, SPHERES, Scene, SceneError, SceneKind, did_you_mean, fetched_path,
+    is_allocatable,
 };

@@ -60,8 +60,11 @@ pub struct SceneError {
 }
 
 impl SceneError {
-    fn new(name: &str, message: impl ToString) -> Self {
-        Self { name: name.into(), message: message.to_string() }
+    /// Returns the rejection of a name. A message that begins with the name says it once.
+    pub fn new(name: &str, message: impl ToString) -> Self {
+        let message = message.to_string();
+        let fault = message.strip_prefix(name).and_then(|rest| rest.strip_prefix(": "));
+        Self { name: name.into(), message: fault.unwrap_or(&message).into() }
     }
 }
 
@@ -148,7 +151,8 @@ impl Scene {
         // A single word without an extension was meant as a scene's name, so that the error lists
         // the names. Anything else is a path, and the reader reports its fault.
         if path.extension().is_none() && path.components().count() == 1 && !path.exists() {
-            return Err(SceneError::new(name, format!("no such scene; {}", known_scenes())));
+            let meant = did_you_mean(name, known_names());
+            return Err(SceneError::new(name, format!("no such scene{meant}; {}", known_scenes())));
         }
         let mesh = load::load_with(&path, outside).map_err(|error| SceneError::new(name, error))?;
         let stem = path
@@ -243,14 +247,29 @@ pub fn fetched_path(name: &str) -> Option<PathBuf> {
         .find(|path| path.is_file())
 }
 
-fn known_scenes() -> String {
+fn known_names() -> impl Iterator<Item = &'static str> {
     let names = stand_ins::STAND_INS.iter().map(|scene| scene.name);
-    let names = names.chain(SPHERES.map(|(name, _)| name)).chain(FETCHED.map(|(name, _)| name));
+    names.chain(SPHERES.map(|(name, _)| name)).chain(FETCHED.map(|(name, _)| name))
+}
+
+/// Returns the question after the nearest of the `known` names, as `; did you mean escher?`, or
+/// nothing if none is near.
+pub fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    const NEAR: f64 = 0.6;
+    let near = |known| (strsim::normalized_damerau_levenshtein(name, known), known);
+    let nearest = known.into_iter().map(near).max_by(|a, b| a.0.total_cmp(&b.0));
+    match nearest {
+        Some((nearness, known)) if nearness >= NEAR => format!("; did you mean {known}?"),
+        _ => String::new(),
+    }
+}
+
+fn known_scenes() -> String {
     format!(
         "accepted: {}, the path of an OBJ, PLY, STL or glTF file, either of them with `:COUNT`, \
          `:random:COUNT:SEED` or `:cluster:COUNT:SEED` for a subset, or a case of the suite with a \
          number of objects such as S34:20000",
-        names.collect::<Vec<_>>().join(", ")
+        known_names().collect::<Vec<_>>().join(", ")
     )
 }
 
@@ -294,6 +313,20 @@ mod tests {
         {
             assert_eq!(Scene::generated_objects(other), None, "{other}");
         }
+    }
+
+    #[test]
+    fn a_misspelt_scene_is_met_with_the_name_that_was_probably_meant() {
+        for (wrong, meant) in [("esher", "escher"), ("Bijou", "bijou"), ("sphere75", "spheres75")] {
+            let message = Scene::load(wrong).unwrap_err().to_string();
+            assert!(
+                message.contains(&format!("no such scene; did you mean {meant}?")),
+                "{message}"
+            );
+        }
+        assert!(!Scene::load("sofa").unwrap_err().to_string().contains("did you mean"));
+        let message = Scene::load("none/file.glb").unwrap_err().to_string();
+        assert_eq!(message, "scene none/file.glb: no such file");
     }
 
     #[test]

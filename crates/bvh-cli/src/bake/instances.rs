@@ -3,11 +3,10 @@
 
 use super::BakeArgs;
 use super::plan::{Plan, Prepared};
-use super::watch::gain;
 use crate::Error;
+use crate::answer::{Answer, gain, short, whole};
 use crate::arguments::output_folder;
-use crate::csv_table;
-use crate::output::{print_error, print_line};
+use crate::output::print_error;
 use bvh_build::{Builder, median_cut};
 use bvh_core::cost::Objective;
 use bvh_core::{Instance, InvalidInstances, Primitives, Triangle, WideBvh};
@@ -15,6 +14,7 @@ use bvh_scenes::files;
 use bvh_scenes::load::{Format, OutsideFiles, gltf};
 use bvh_scenes::{Scene, SceneError, SceneKind};
 use glam::Affine3A;
+use serde_json::json;
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -55,7 +55,8 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     files::write(&path, &table)?;
 
     let objects: usize = scenes.iter().chain([&top]).map(|scene| scene.boxes.len()).sum();
-    let plan = args.with_budget(plan, objects);
+    let mut answer = Answer::new(args.form);
+    let plan = args.with_budget(plan, objects, &mut answer);
     // The top tree's objects are boxes, which cannot be divided, and no wide layout is made of it.
     let plan_of_top = Plan { references: 1.0, objective: Objective::InternalArea, ..plan.clone() };
     let names = parts.meshes.keys().map(|mesh| format!("mesh_{mesh}.bvh")).chain([TOP.into()]);
@@ -64,13 +65,21 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         // Every tree gets a share of the budget in proportion to its number of objects.
         let part = scene.boxes.len() as f64 / objects as f64;
         let plan = Plan { effort: plan.effort.share(part), ..plan.clone() };
-        bake_part(&plan, scene, &out.join(name), Interruption::Keeps, interrupted)?;
+        bake_part(&plan, scene, &out.join(name), Interruption::Keeps, interrupted, &mut answer)?;
     }
     if interrupted.load(Relaxed) {
         return Err(Error::StoppedInstances { path: out });
     }
-    let places = instances.len();
-    print_line(&format!("{}: {places} instances of {} meshes", path.display(), scenes.len()));
+    answer.say(&format!(
+        "{}: {} instances of {} meshes",
+        path.display(),
+        whole(instances.len()),
+        whole(scenes.len())
+    ));
+    answer.record("instances", instances.len());
+    answer.record("meshes", scenes.len());
+    answer.record("file", path.display().to_string());
+    answer.end();
     Ok(())
 }
 
@@ -88,6 +97,7 @@ pub(super) fn bake_part(
     path: &Path,
     interruption: Interruption,
     interrupted: &AtomicBool,
+    answer: &mut Answer,
 ) -> Result<(), Error> {
     let found = plan.search(scene, None, Prepared::default(), interrupted)?;
     if interruption == Interruption::Discards && interrupted.load(Relaxed) {
@@ -96,12 +106,19 @@ pub(super) fn bake_part(
     found.save(path, files::Reserved::new(path, 0)?)?;
     let cost = found.baked.outcome.cost;
     let Some(base) = found.baked.greedy else { return Ok(()) };
-    let count = scene.boxes.len();
-    let gain = gain(cost, base);
-    print_line(&format!(
-        "{}: {count} objects, cost {cost}, {gain} Müller–Fellner's",
-        path.display()
+    let objects = scene.boxes.len();
+    let file = path.display().to_string();
+    answer.say(&format!(
+        "{file}: {} objects, {} {}, {} the greedy tree's",
+        whole(objects),
+        found.unit().unwrap_or("total area of inner nodes"),
+        short(cost),
+        gain(cost, base)
     ));
+    answer.list(
+        "trees",
+        json!({ "file": file, "objects": objects, "cost": cost, "cost in the greedy tree": base }),
+    );
     Ok(())
 }
 
@@ -127,8 +144,7 @@ fn parts(path: &Path, outside: OutsideFiles) -> Result<gltf::Parts, Error> {
              accepted: glTF or GLB, whose nodes place meshes"
         )),
     };
-    let name = path.display().to_string();
-    Ok(parts.map_err(|message| SceneError { name, message })?)
+    Ok(parts.map_err(|message| SceneError::new(&path.display().to_string(), message))?)
 }
 
 /// Returns the instances. A part is the rank of its mesh among the meshes that are baked.
@@ -171,7 +187,7 @@ fn top(
             other => other.to_string(),
         })
     });
-    let boxes = boxes.map_err(|message| SceneError { name: name.clone(), message })?;
+    let boxes = boxes.map_err(|message| SceneError::new(&name, message))?;
     // A scene needs objects, and the search reads only their boxes.
     let triangles = boxes.iter().map(|aabb| Triangle([aabb.min, aabb.max, aabb.min])).collect();
     Ok(Scene::new(&name, SceneKind::File, Primitives::Triangles(triangles)))
@@ -180,7 +196,10 @@ fn top(
 /// Returns the text of [`INSTANCES`]: the node, the mesh and the transform of each instance.
 fn table(instances: &[Instance], parts: &gltf::Parts) -> Result<Vec<u8>, csv::Error> {
     let places = parts.places.iter().zip(instances);
-    let rows = places
-        .map(|(place, instance)| (place.node, place.mesh, instance.transform.to_cols_array()));
-    csv_table::to_bytes(COLUMNS, rows)
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(COLUMNS.split(','))?;
+    for (place, instance) in places {
+        writer.serialize((place.node, place.mesh, instance.transform.to_cols_array()))?;
+    }
+    writer.into_inner().map_err(|error| error.into_error().into())
 }

@@ -8,14 +8,14 @@ mod plan;
 mod watch;
 
 use crate::Error;
+use crate::answer::{Answer, Form, gain, whole};
 use crate::arguments::{Jobs, input_file, output_file, output_or_free, reserve};
 use crate::explain;
-use crate::output::print_line;
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
-use bvh_core::cost::Objective;
-use bvh_scenes::Scene;
+use bvh_core::cost::{Objective, internal_area};
 use bvh_scenes::files::Reserved;
+use bvh_scenes::{Scene, did_you_mean};
 use bvh_search::{Method, Outcome, StopReason};
 use clap::Args;
 use decide::{Decided, Open, decide};
@@ -23,7 +23,6 @@ use effort::Effort;
 use plan::{Found, Plan, Prepared, Start};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use watch::gain;
 
 /// Search for the best tree of a scene within a budget, and save it.
 #[derive(Args, Clone, Debug)]
@@ -70,15 +69,15 @@ pub struct BakeArgs {
     pub from: Option<PathBuf>,
     /// Cut the scene by space into N parts, bake each into the folder `FILE.parts`, and join their
     /// trees under a searched top. Finished parts are not baked again.
-    #[arg(long, value_name = "N", requires = "budget")]
+    #[arg(long, value_name = "N", requires = "budget", help_heading = ADVANCED)]
     #[arg(conflicts_with_all = ["rays", "from", "instances", "explain"])]
     #[arg(value_parser = clap::value_parser!(u32).range(2..=65_536))]
     pub parts: Option<u32>,
     /// With --parts, list the parts, one a line: identifier, estimated work, description.
-    #[arg(long, requires = "parts", conflicts_with = "part")]
+    #[arg(long, requires = "parts", conflicts_with = "part", help_heading = ADVANCED)]
     pub list: bool,
     /// With --parts, bake only the part with this identifier.
-    #[arg(long, value_name = "ID", requires = "parts")]
+    #[arg(long, value_name = "ID", requires = "parts", help_heading = ADVANCED)]
     pub part: Option<String>,
     /// Limits the threads.
     #[command(flatten)]
@@ -89,7 +88,13 @@ pub struct BakeArgs {
     /// First list the steps that the scene does not need and that are skipped, with reasons.
     #[arg(long)]
     pub explain: bool,
+    /// The form of the results.
+    #[command(flatten)]
+    pub form: Form,
 }
+
+/// The heading in the help of what few need.
+const ADVANCED: &str = "Advanced";
 
 /// The cost that a bake minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -110,6 +115,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     if let Some(from) = &args.from {
         input_file("--from", from)?;
     }
+    let mut answer = Answer::new(args.form);
     let out = args.out()?;
     output_file("--out", &out, "bvh")?;
     let plan = args.plan()?;
@@ -132,16 +138,17 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     }
     if args.explain {
         let text = explain::scene(&scene).map_err(Error::search(&scene.name, "--explain"))?;
-        print_line(&text);
+        answer.say(&text);
+        answer.record("explanation", text);
     }
     let start =
         args.from.as_ref().map(|path| Start::load(path, &scene, most_references)).transpose()?;
-    let plan = args.with_budget(plan, objects);
+    let plan = args.with_budget(plan, objects, &mut answer);
     // Reserving the file first reports a full disk before the search and not after it.
     let reserved = args.reserved(&out, plan::most_bytes(&scene, most_references))?;
-    let (plan, prepared) = args.decided(plan, &scene, interrupted)?;
+    let (plan, prepared) = args.decided(plan, &scene, interrupted, &mut answer)?;
     let found = plan.search(&scene, start.as_ref(), prepared, interrupted)?;
-    save(&found, &out, reserved, interrupted)
+    save(&found, &out, reserved, interrupted, answer)
 }
 
 /// Writes the best tree, and prints its cost.
@@ -150,63 +157,93 @@ fn save(
     out: &Path,
     reserved: Reserved,
     interrupted: &AtomicBool,
+    mut answer: Answer,
 ) -> Result<(), Error> {
     let (bytes, cost_for_lines) = found.save(out, reserved)?;
     if interrupted.load(Relaxed) {
         return Err(Error::Stopped { path: out.to_owned(), cost: found.baked.outcome.cost });
     }
-    print_line(&summary(found, cost_for_lines));
-    print_line(&format!("{}: {bytes} bytes", out.display()));
+    summarise(found, cost_for_lines, &mut answer);
+    answer.say(&format!("{}: {} bytes", out.display(), whole(bytes)));
+    answer.record("file", out.display().to_string());
+    answer.record("bytes", bytes);
+    answer.end();
     Ok(())
 }
 
 /// Describes the result of a search, whose tree has this cost for random lines.
-fn summary(found: &Found, cost_for_lines: f64) -> String {
-    let Found { plan, scene, baked, greedy_for_lines, seconds, .. } = found;
+fn summarise(found: &Found, cost_for_lines: f64, answer: &mut Answer) {
+    let Found { plan, scene, baked, greedy, seconds, .. } = found;
     let Outcome { tree, cost, evaluations: moves, work, stop, .. } = &baked.outcome;
     let objects = scene.boxes.len();
+    let references = tree.prim_ids.len();
     let method = plan.method.name();
-    let mut lines = vec![format!(
-        "{} ({}), {objects} objects, {method}, seed {}",
-        scene.name, scene.kind, plan.seed
-    )];
-    if let Some(greedy) = baked.greedy {
-        lines.push(format!(
-            "{} {cost}, {} Müller–Fellner's {greedy}",
-            found.unit(),
-            gain(*cost, greedy)
+    answer.say(&format!(
+        "{} ({}), {} objects, {method}, seed {}",
+        scene.name,
+        scene.kind,
+        whole(objects),
+        plan.seed
+    ));
+    answer.record("scene", scene.name.as_str());
+    answer.record("objects", objects);
+    answer.record("references", references);
+    answer.record("method", method);
+    answer.record("seed", plan.seed);
+    let area = internal_area(tree);
+    if let Some(greedy) = greedy {
+        answer.say(&format!(
+            "total area of inner nodes {} that of a greedy SAH sweep's tree",
+            gain(area, greedy.area)
         ));
+        answer.record("total area of inner nodes in the greedy tree", greedy.area);
     }
-    if let Some(greedy) = *greedy_for_lines {
-        lines.push(format!(
-            "risk: a tree for rays may be worse for others; for random lines it is {} Müller–Fellner's",
-            gain(cost_for_lines, greedy)
+    answer.record("total area of inner nodes", area);
+    // The gain in area is no measure of a search for another cost.
+    if let (Some(base), Some(unit)) = (baked.greedy, found.unit()) {
+        answer
+            .say(&format!("{unit}, which was minimised, {} the greedy tree's", gain(*cost, base)));
+        answer.record("cost in the greedy tree", base);
+    }
+    answer.record("cost", *cost);
+    if let Some(greedy) = greedy.as_ref().filter(|_| found.is_for_rays()) {
+        answer.say(&format!(
+            "risk: a tree for rays may be worse for others; for random lines it is {} the greedy \
+             tree's",
+            gain(cost_for_lines, greedy.cost_for_lines)
         ));
     }
     if let Some(before) = baked.start {
-        lines.push(format!("{} the tree it started from, {before}", gain(*cost, before)));
+        answer.say(&format!("{} the cost of the tree it started from", gain(*cost, before)));
+        answer.record("cost of the start", before);
     }
-    if plan.references > 1.0 {
-        let references = tree.prim_ids.len();
-        let allowed = plan.references;
-        lines.push(if references > objects {
-            format!("{references} references to {objects} objects, at most {allowed} per object")
-        } else {
-            "no object is divided, because that does not pay here".into()
-        });
+    if references > objects {
+        answer.say(&format!(
+            "{} references to {} objects, at most {} per object",
+            whole(references),
+            whole(objects),
+            plan.references
+        ));
+    } else if plan.references > 1.0 {
+        answer.say("no object is divided, because that does not pay here");
     }
     // A method that plans its time completes its plan just before the time is over, and then could
     // have used more.
     let in_time =
         matches!(plan.effort, Effort::Time(limit) if *seconds >= 0.5 * limit.as_secs_f64());
     let why = match stop {
-        StopReason::Completed if in_time => "",
-        StopReason::Completed => ", and the method has completed",
+        StopReason::Completed if !in_time => ", and the method has completed",
         StopReason::Optimal => ", and no tree is better",
         _ => "",
     };
-    lines.push(format!("{moves} moves, {work} nodes visited, {seconds:.1} s{why}"));
-    lines.join("\n")
+    answer.say(&format!(
+        "{} moves, {} nodes visited, {seconds:.1} s{why}",
+        whole(*moves),
+        whole(*work)
+    ));
+    answer.record("moves", *moves);
+    answer.record("work", *work);
+    answer.record("seconds", *seconds);
 }
 
 impl BakeArgs {
@@ -253,11 +290,13 @@ impl BakeArgs {
     }
 
     /// Adds the work for this many objects to a plan without a budget, and prints the reason.
-    fn with_budget(&self, plan: Plan, objects: usize) -> Plan {
+    fn with_budget(&self, plan: Plan, objects: usize, answer: &mut Answer) -> Plan {
         if self.budget.is_some() {
             return plan;
         }
-        print_line(&decide::reason_of_work(objects));
+        let reason = decide::reason_of_work(objects);
+        answer.say(&reason);
+        answer.list("choices", reason);
         Plan { effort: Effort::Work(decide::work(objects)), ..plan }
     }
 
@@ -268,6 +307,7 @@ impl BakeArgs {
         plan: Plan,
         scene: &Scene,
         interrupted: &AtomicBool,
+        answer: &mut Answer,
     ) -> Result<(Plan, Prepared), Error> {
         // Only `best` offers the choices, and only triangles have a wide layout. A search from an
         // earlier tree minimises the cost that is given.
@@ -281,25 +321,29 @@ impl BakeArgs {
             references: self.references.is_none(),
         };
         let Decided { plan, reasons, prepared } = decide(open, plan, scene, interrupted)?;
-        reasons.iter().for_each(|reason| print_line(reason));
+        for reason in reasons {
+            answer.say(&reason);
+            answer.list("choices", reason);
+        }
         Ok((plan, prepared))
     }
 
     /// Returns the named method. If a tree is given, rejects methods that cannot continue from it.
     fn method(&self) -> Result<Method, Error> {
         let name = &self.method;
-        let found = Method::all().into_iter().find(|method| method.name() == name);
-        match found {
-            None => {
-                let accepted = Method::NAMES.join(", ");
-                Err(Error::Usage(format!("--method {name}: no such method; accepted: {accepted}")))
-            }
-            Some(method) if self.from.is_some() && name != BEST => Err(Error::Usage(format!(
-                "--method {} cannot continue --from a tree; accepted: {BEST}",
-                method.name()
-            ))),
-            Some(method) => Ok(method),
+        let Some(method) = Method::all().into_iter().find(|method| method.name() == name) else {
+            let accepted = Method::NAMES.join(", ");
+            let meant = did_you_mean(name, Method::NAMES.iter().copied());
+            return Err(Error::Usage(format!(
+                "--method {name}: no such method{meant}; accepted: {accepted}"
+            )));
+        };
+        if self.from.is_some() && name != BEST {
+            return Err(Error::Usage(format!(
+                "--method {name} cannot continue --from a tree; accepted: {BEST}"
+            )));
         }
+        Ok(method)
     }
 
     /// Rejects numbers of references that are out of range, and methods that would ignore them.

@@ -5,12 +5,13 @@ use super::instances::{Interruption, bake_part};
 use super::plan::{Plan, Prepared, Start};
 use super::{BakeArgs, save};
 use crate::Error;
+use crate::answer::Answer;
 use crate::arguments::output_file;
-use crate::output::print_line;
 use bvh_core::{Aabb, Bvh, Node, NodeKind};
 use bvh_scenes::tree_file;
 use bvh_scenes::{Scene, fnv1a};
 use bvh_search::{Budget, Problem, best, solve};
+use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -49,12 +50,16 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
     args.jobs.apply()?;
     let scene = args.files.load(&args.scene)?;
     let parts = parts(&plan, &scene, count)?;
+    let mut answer = Answer::new(args.form);
     if args.list {
-        for (number, part) in (1..).zip(&parts) {
-            let objects = part.objects.len();
-            let work = part.plan.effort.work().unwrap_or(objects as u64);
-            print_line(&format!("{} {work} part {number} of {count}, {objects} objects", part.id));
+        for (number, Part { id, objects, plan }) in (1..).zip(&parts) {
+            let objects = objects.len();
+            let work = plan.effort.work().unwrap_or(objects as u64);
+            // Programs that start the parts read these lines.
+            answer.say(&format!("{id} {work} part {number} of {count}, {objects} objects"));
+            answer.list("parts", json!({ "id": id, "work": work, "objects": objects }));
         }
+        answer.end();
         return Ok(());
     }
     let folder = out.with_extension("parts");
@@ -70,20 +75,22 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
         if !path.exists() {
             // A part whose search was cut short would differ from run to run.
             let scene = part.scene(&scene);
-            bake_part(&part.plan, &scene, &path, Interruption::Discards, interrupted)?;
+            let ends = Interruption::Discards;
+            bake_part(&part.plan, &scene, &path, ends, interrupted, &mut answer)?;
         }
         if interrupted.load(Relaxed) {
             return Err(Error::StoppedParts { path: folder });
         }
     }
     if args.part.is_some() {
+        answer.end();
         return Ok(());
     }
     let reserved = args.reserved(&out, super::plan::most_bytes(&scene, plan.references))?;
     let start = join(&scene, &parts, &folder)?;
     let plan = Plan { effort: plan.effort.share(1.0 - SHARE_OF_PARTS), ..plan };
     let found = plan.search(&scene, Some(&start), Prepared::default(), interrupted)?;
-    save(&found, &out, reserved, interrupted)
+    save(&found, &out, reserved, interrupted, answer)
 }
 
 /// Cuts a scene, and gives every part a share of the budget in proportion to its objects.

@@ -5,7 +5,7 @@ use super::watch::{Interrupted, Watch};
 use crate::Error;
 use crate::interrupt;
 use crate::rays::Rays;
-use bvh_core::cost::Objective;
+use bvh_core::cost::{Objective, internal_area};
 use bvh_core::file::Header;
 use bvh_core::{Aabb, Bvh, Node, RayDensity, Triangle};
 use bvh_scenes::files::Reserved;
@@ -41,8 +41,7 @@ pub fn most_bytes(scene: &Scene, references: f64) -> usize {
 }
 
 /// The most bytes per object that a bake has allocated at once, the scene included, of which `best`
-/// with two threads needs most: the greatest `bytes_per_object` of `results/scale`, as a test
-/// checks.
+/// with two threads needs most: the greatest `bytes_per_object` of `results/scale`.
 const BYTES_PER_OBJECT: usize = 326;
 /// The most bytes per permitted reference that a bake with divided objects has allocated at once,
 /// which the division needs: five million triangles with 1.2 references each.
@@ -165,8 +164,10 @@ impl Plan {
             (None, Some(rays), Some(tree)) => rays.density(scene, tree, self.seed, interrupted)?,
             (density, ..) => density,
         };
-        let greedy_for_lines =
-            greedy.as_ref().filter(|_| density.is_some()).map(|tree| self.objective.cost(tree));
+        let costs_of_greedy = greedy.as_ref().map(|tree| Greedy {
+            area: internal_area(tree),
+            cost_for_lines: self.objective.cost(tree),
+        });
         let bake = Bake {
             division: prepared.division.as_ref(),
             start: start.map(|start| &start.tree),
@@ -179,8 +180,16 @@ impl Plan {
         let seconds = deadline.elapsed().as_secs_f64();
         // The work of all bakes that led to this tree, one after the other.
         let work = start.map_or(0, |start| start.work).saturating_add(baked.outcome.work);
-        Ok(Found { plan: self, scene, density, baked, greedy_for_lines, work, seconds })
+        Ok(Found { plan: self, scene, density, baked, greedy: costs_of_greedy, work, seconds })
     }
+}
+
+/// The costs of the greedy tree for random lines.
+pub struct Greedy {
+    /// The total area of inner nodes, which the documentation compares.
+    pub area: f64,
+    /// The cost by the plan's objective.
+    pub cost_for_lines: f64,
 }
 
 /// The result of a search, with what its file and its summary need.
@@ -192,8 +201,8 @@ pub struct Found<'a> {
     density: Option<RayDensity>,
     /// The tree, and the course of the search.
     pub baked: Baked,
-    /// The cost of the greedy tree for random lines, if the search was for other rays.
-    pub greedy_for_lines: Option<f64>,
+    /// The costs of the greedy tree.
+    pub greedy: Option<Greedy>,
     work: u64,
     /// The time since the greedy tree was built.
     pub seconds: f64,
@@ -210,37 +219,19 @@ impl Found<'_> {
         saved.map_err(TreeFileError::of(path))?
     }
 
-    /// Names the cost that the search minimised.
-    pub fn unit(&self) -> &'static str {
-        match (self.plan.objective, &self.density) {
-            (Objective::Layout, Some(_)) => "cost of the wide layout for rays, times root area,",
-            (Objective::Layout, None) => "cost of the wide layout, times root area,",
-            (_, Some(_)) => "visits of rays times root area",
-            (_, None) if self.baked.division == Division::Allowed => "area of all nodes",
-            (_, None) => "internal area",
-        }
+    /// Returns whether the tree is for other rays than random lines.
+    pub fn is_for_rays(&self) -> bool {
+        self.density.is_some()
     }
-}
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_memory_that_a_bake_asks_for_is_the_most_that_one_was_measured_to_take() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../results/scale/timing_scale.csv");
-        let mut reader = csv::Reader::from_path(path).unwrap();
-        let headers = reader.headers().unwrap().clone();
-        let column = |name: &str| headers.iter().position(|header| header == name).unwrap();
-        let phase = column("phase");
-        let bytes = column("bytes_per_object");
-        let mut most = 0.0f64;
-        for row in reader.records() {
-            let row = row.unwrap();
-            if row[phase].starts_with("bake") {
-                most = most.max(row[bytes].parse().unwrap());
-            }
+    /// Names the cost that the search minimised, unless it is the total area of inner nodes.
+    pub fn unit(&self) -> Option<&'static str> {
+        match (self.plan.objective, self.is_for_rays()) {
+            (Objective::Layout, true) => Some("cost of the wide layout for rays"),
+            (Objective::Layout, false) => Some("cost of the wide layout"),
+            (_, true) => Some("visits of rays"),
+            (_, false) if self.baked.division == Division::Allowed => Some("area of all nodes"),
+            (_, false) => None,
         }
-        assert_eq!(BYTES_PER_OBJECT, most.ceil() as usize);
     }
 }

@@ -106,13 +106,3 @@ impl Observer for Watch<'_> {
         matches!(self.effort, Effort::Time(_)).then(|| self.deadline.fraction())
     }
 }
-
-/// Describes by how much `cost` is below or above `base`.
-pub fn gain(cost: f64, base: f64) -> String {
-    let percent = if base > 0.0 { 100.0 * (1.0 - cost / base) } else { 0.0 };
-    if percent >= 0.0 {
-        format!("{percent:.2} % below")
-    } else {
-        format!("{:.2} % above", -percent)
-    }
-}

@@ -1,28 +1,17 @@
 //! The page as HTML: one file without scripts, with its pictures inside.
 
+use crate::answer::{short, whole};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use std::fmt::Write;
+use bvh_scenes::render::heat;
 
 const STYLE: &str = include_str!("style.css");
-/// The size of a chart, and the height of the part above its labels, in its own units.
-const CHART: (f64, f64, f64) = (720.0, 220.0, 180.0);
 
 /// A fact about both trees.
 pub struct Row {
     pub name: &'static str,
     pub baked: f64,
     pub greedy: f64,
-}
-
-/// The tests of each pixel's rays in a tree.
-pub struct Heat {
-    /// The heat map, a PNG file.
-    pub png: Vec<u8>,
-    /// The median over the pixels.
-    pub median: f64,
-    /// The largest number of a pixel.
-    pub most: f64,
 }
 
 /// The contents of a page. Pairs begin with the baked tree, and the greedy tree follows.
@@ -32,8 +21,12 @@ pub struct Page<'a> {
     pub rows: Vec<Row>,
     /// A picture of the scene, a PNG file.
     pub scene: Vec<u8>,
-    /// The heat of both trees under one scale.
-    pub heat: [Heat; 2],
+    /// The tests of each pixel's rays as colours, PNG files.
+    pub heat: [Vec<u8>; 2],
+    /// The medians of the tests over the pixels in which there is an object.
+    pub medians: [f64; 2],
+    /// The number of tests of the last colour.
+    pub top: f64,
     /// The area of the inner nodes at each depth, over the root's.
     pub levels: [Vec<f64>; 2],
 }
@@ -46,12 +39,16 @@ impl Page<'_> {
         let table = self.table();
         let scene = picture(&self.scene, "The scene.");
         let mut heat = String::new();
-        for (Heat { png, median, most }, tree) in self.heat.iter().zip(["baked", "greedy"]) {
-            let caption = format!(
-                "Tests of each pixel's rays in the {tree} tree: median {median:.0}, most {most:.0}."
-            );
+        for ((png, median), tree) in self.heat.iter().zip(self.medians).zip(["baked", "greedy"]) {
+            let median = number(median);
+            let caption =
+                format!("Tests of each pixel's rays in the {tree} tree: median {median}.");
             heat += &picture(png, &caption);
         }
+        let top = number(self.top);
+        let colours: Vec<String> =
+            heat::INFERNO.iter().map(|[r, g, b]| format!("rgb({r} {g} {b})")).collect();
+        let colours = colours.join(", ");
         let area = chart(&self.levels);
         let version = env!("CARGO_PKG_VERSION");
         format!(
@@ -63,12 +60,15 @@ impl Page<'_> {
 <h1>{title}</h1>
 <p>{origin}</p>
 <p><span class=\"key baked\"></span> the baked tree
-<span class=\"key greedy\"></span> the greedy Müller–Fellner tree, a library's plain build</p>
+<span class=\"key greedy\"></span> the greedy Müller–Fellner tree, a plain build</p>
 {table}
 <p>Less is better. A tree baked for the wide layout saves tests there, and not always in the binary
 tree.</p>
 <h2>Rays</h2>
 <div class=\"pictures\">{scene}{heat}</div>
+<div class=\"scale\" style=\"background: linear-gradient(to right, {colours})\"></div>
+<p class=\"ends\"><span>0 tests</span><span>{top} or more, in one pixel of 200</span></p>
+<p>Medians are over the pixels in which there is an object.</p>
 <h2>Cost by level</h2>
 <p>The area of the inner nodes at each depth over the root's area: how many of them a random line
 visits.</p>
@@ -101,7 +101,7 @@ visits.</p>
 }
 
 fn number(value: f64) -> String {
-    if value.fract() == 0.0 { format!("{value}") } else { format!("{value:.2}") }
+    if value.fract() == 0.0 && value >= 0.0 { whole(value as u64) } else { short(value) }
 }
 
 fn escaped(text: &str) -> String {
@@ -116,45 +116,66 @@ fn picture(png: &[u8], caption: &str) -> String {
     )
 }
 
-/// Draws one pair of bars per level.
+/// Draws one pair of bars per level, in a picture of 720 × 240 units.
 fn chart(levels: &[Vec<f64>; 2]) -> String {
-    let (width, height, base) = CHART;
+    const LEFT: f64 = 48.0;
+    const WIDTH: f64 = 672.0;
+    const BASE: f64 = 190.0;
+    /// The room above the axis, for the upper half of its last number.
+    const ABOVE: f64 = 12.0;
     let count = levels[0].len().max(levels[1].len()).max(1);
     let most = levels.iter().flatten().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let step = width / count as f64;
+    let tick = tick(most);
+    let height = |area: f64| (BASE - ABOVE) * area / (tick * (most / tick).ceil());
     let mut text =
-        format!("<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"By level\">\n");
+        String::from("<svg viewBox=\"0 0 720 240\" role=\"img\" aria-label=\"By level\">\n");
+    let mut add = |line: String| text.extend([&line, "\n"]);
+    for step in 0..=(most / tick).ceil() as u32 {
+        let value = tick * f64::from(step);
+        let y = BASE - height(value);
+        let shown = number(value);
+        add(format!(
+            "<line x1=\"{LEFT}\" x2=\"720\" y1=\"{y:.2}\" y2=\"{y:.2}\"/>\
+             <text x=\"{:.2}\" y=\"{:.2}\" text-anchor=\"end\">{shown}</text>",
+            LEFT - 6.0,
+            y + 4.0
+        ));
+    }
+    let step = WIDTH / count as f64;
     for (tree, class) in [(0, "baked"), (1, "greedy")] {
         for (depth, &area) in levels[tree].iter().enumerate() {
-            let bar = base * area / most;
-            let x = step * (depth as f64 + 0.1 + 0.4 * tree as f64);
-            let y = base - bar;
-            let breadth = 0.38 * step;
+            let bar = height(area);
+            let x = LEFT + step * (depth as f64 + 0.1 + 0.4 * tree as f64);
             let shown = number(area);
-            // Writing to a string cannot fail.
-            let _ = writeln!(
-                text,
-                "<rect class=\"{class}\" x=\"{x:.2}\" y=\"{y:.2}\" width=\"{breadth:.2}\" \
-                 height=\"{bar:.2}\"><title>depth {depth}: {shown}</title></rect>"
-            );
+            add(format!(
+                "<rect class=\"{class}\" x=\"{x:.2}\" y=\"{:.2}\" width=\"{:.2}\" \
+                 height=\"{bar:.2}\"><title>depth {depth}: {shown}</title></rect>",
+                BASE - bar,
+                0.38 * step
+            ));
         }
     }
     // Labels of ten levels or fewer have room on a phone.
-    let every = count.div_ceil(10);
-    for depth in (0..count).step_by(every) {
-        let x = step * (depth as f64 + 0.5);
-        let y = base + 20.0;
-        let _ =
-            writeln!(text, "<text x=\"{x:.2}\" y=\"{y}\" text-anchor=\"middle\">{depth}</text>");
+    for depth in (0..count).step_by(count.div_ceil(10)) {
+        let x = LEFT + step * (depth as f64 + 0.5);
+        add(format!(
+            "<text x=\"{x:.2}\" y=\"{}\" text-anchor=\"middle\">{depth}</text>",
+            BASE + 20.0
+        ));
     }
-    let _ = writeln!(text, "<text x=\"0\" y=\"10\">{}</text>", number(most));
-    let _ = writeln!(
-        text,
-        "<text x=\"{:.2}\" y=\"{}\" text-anchor=\"middle\">depth</text>",
-        width / 2.0,
-        base + 40.0
-    );
+    add(format!(
+        "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">depth</text>",
+        LEFT + WIDTH / 2.0,
+        BASE + 42.0
+    ));
     text + "</svg>"
+}
+
+/// Returns the distance of two to five ticks up to `most`: 1, 2 or 5 times a power of ten.
+fn tick(most: f64) -> f64 {
+    let power = 10f64.powf((most / 2.0).log10().floor());
+    let factor = [5.0, 2.0].into_iter().find(|factor| factor * power <= most / 2.0);
+    power * factor.unwrap_or(1.0)
 }
 
 #[cfg(test)]
@@ -168,13 +189,26 @@ mod tests {
             origin: "2 objects".into(),
             rows: vec![Row { name: "Depth", baked: 1.0, greedy: 2.0 }],
             scene: vec![1, 2, 3],
-            heat: [4, 5].map(|byte| Heat { png: vec![byte], median: 1.0, most: 2.0 }),
+            heat: [vec![4], vec![5]],
+            medians: [1.0, 2.0],
+            top: 1234.0,
             levels: [vec![1.0], vec![]],
         };
         let html = page.html();
         assert!(html.contains("<h1>&lt;b&gt; &amp; co</h1>"), "{html}");
         assert!(html.contains("<td>1</td><td>2</td><td>−50.0 %</td>"), "{html}");
+        assert!(html.contains("1 234 or more"), "{html}");
         assert_eq!(html.matches("data:image/png;base64,").count(), 3);
         assert!(!html.contains("http") && !html.contains("<script"), "{html}");
+    }
+
+    #[test]
+    fn an_axis_has_two_to_five_ticks_up_to_the_most() {
+        for (most, expected) in [(1.1, 0.5), (1.9, 0.5), (2.1, 1.0), (3.9, 1.0), (4.1, 2.0)] {
+            for scale in [1e-9, 1.0, 1e6] {
+                let found = tick(most * scale) / scale;
+                assert!((found / expected - 1.0).abs() < 1e-9, "{most} × {scale}: {found}");
+            }
+        }
     }
 }

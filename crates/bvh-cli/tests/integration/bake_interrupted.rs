@@ -1,5 +1,5 @@
 //! Ctrl-C while `bvh bake` searches: the best tree so far is written, and it is a good one.
-use crate::support::{begin, cost, ended, names, program, said, send, text};
+use crate::support::{begin, bvh, cost, ended, names, program, send, text, words};
 use bvh_scenes::Scene;
 use bvh_scenes::tree_file;
 use std::fs;
@@ -10,10 +10,9 @@ use std::time::{Duration, Instant};
 
 /// Bakes konistil into `a.bvh`, and interrupts the search this long after it has begun. Returns the
 /// messages.
-fn interrupted(folder: &Path, more: &[&str], after: Duration) -> String {
-    let args = [&["bake", "konistil", "--out", "a.bvh"], more].concat();
+fn interrupted(folder: &Path, more: &str, after: Duration) -> String {
     let before = fs::read_dir(folder).unwrap().count();
-    let child = begin(folder, &args);
+    let child = begin(folder, &words(&format!("bake konistil --out=a.bvh {more}")));
     // The file is reserved before the search begins.
     while fs::read_dir(folder).unwrap().count() == before {
         std::thread::sleep(Duration::from_millis(20));
@@ -28,7 +27,7 @@ fn interrupted(folder: &Path, more: &[&str], after: Duration) -> String {
 #[test]
 fn ctrl_c_keeps_the_best_tree_so_far() {
     let folder = tempfile::tempdir().unwrap();
-    let said = interrupted(folder.path(), &["--budget", "1h"], Duration::ZERO);
+    let said = interrupted(folder.path(), "--budget=1h", Duration::ZERO);
     assert!(said.contains("`--from a.bvh` continues"), "{said}");
     tree_file::load(&folder.path().join("a.bvh"), &Scene::load("konistil").unwrap()).unwrap();
     assert_eq!(names(folder.path()).len(), 1);
@@ -37,7 +36,7 @@ fn ctrl_c_keeps_the_best_tree_so_far() {
 #[test]
 fn ctrl_c_while_a_bake_decides_keeps_the_greedy_tree() {
     let folder = tempfile::tempdir().unwrap();
-    let mut child = program(folder.path(), &["bake", "konistil", "--out", "a.bvh"])
+    let mut child = program(folder.path(), &words("bake konistil --out=a.bvh"))
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -60,22 +59,16 @@ fn a_bake_that_is_interrupted_early_is_not_behind_plain_reinsertion() {
     let folder = tempfile::tempdir().unwrap();
     let cost = |file: &str| cost(folder.path(), file);
     let begin = Instant::now();
-    let plain =
-        ["bake", "konistil", "--method=reinsertion", "--budget=1000Gwork", "--out=plain.bvh"];
-    said(folder.path(), &plain);
+    bvh(folder.path(), "bake konistil --method=reinsertion --budget=1000Gwork --out=plain.bvh");
     // The time suffices for reinsertion and the trees built before it, also on a busy machine. The
     // heat of a long search has not paid by then.
     let plain = cost("plain.bvh");
     let after = Duration::from_secs(1) + 8 * begin.elapsed();
-    for more in [
-        &["--budget", "1h"][..],
-        &["--budget", "1000Gwork"],
-        &["--budget", "1h", "--references", "1.2"],
-    ] {
+    for more in ["--budget=1h", "--budget=1000Gwork", "--budget=1h --references=1.2"] {
         interrupted(folder.path(), more, after);
         // If leaves may be divided, they are part of the measure, and moves with equal gains come
         // in a different order.
-        let most = if more.contains(&"--references") { 1.0001 } else { 1.0 };
+        let most = if more.contains("--references") { 1.0001 } else { 1.0 };
         let found = cost("a.bvh");
         assert!(found <= most * plain, "{more:?}: {found} is above {plain}");
         fs::remove_file(folder.path().join("a.bvh")).unwrap();

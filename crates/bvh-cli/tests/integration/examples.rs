@@ -2,7 +2,7 @@
 
 #[path = "../program/pages.rs"]
 mod pages;
-use crate::support::said;
+use crate::support::bvh;
 use pages::{accepts_printed_commands, blocks_in};
 use std::fs;
 
@@ -12,10 +12,7 @@ fn a_bake_accepts_every_printed_description_of_rays() {
     for block in blocks_in("toml").into_iter().filter(|block| block.text.contains("cameras = ")) {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("rays.toml"), &block.text).unwrap();
-        said(
-            folder.path(),
-            &["bake", "escher:60", "--budget=1kwork", "--rays=rays.toml", "--out=x.bvh"],
-        );
+        bvh(folder.path(), "bake escher:60 --budget=1kwork --rays=rays.toml --out=x.bvh");
         descriptions += 1;
     }
     assert!(descriptions > 0);

@@ -1,81 +1,40 @@
 //! Inspecting and verifying tree files from the command line and from other languages.
 
-use crate::support::{facts, number, refused, said, text};
-use bvh_scenes::{Scene, tree_file};
+use crate::support::{bvh, facts, number, text};
+use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
 #[test]
-fn the_facts_are_the_same_in_json() {
-    let folder = tempfile::tempdir().unwrap();
-    said(folder.path(), &["bake", "spheres75", "--budget=0s", "--out=x.bvh"]);
-    let plain = facts(&said(folder.path(), &["inspect", "x.bvh", "spheres75"]));
-    let json = said(folder.path(), &["inspect", "x.bvh", "spheres75", "--json"]);
-    let json: BTreeMap<String, serde_json::Value> = serde_json::from_str(&json).unwrap();
-    assert!(
-        json["objects"] == 75 && json["method"] == "best" && json["depth"].is_u64(),
-        "{json:?}"
-    );
-    assert!(json.keys().eq(plain.keys()));
-    for name in ["internal area", "surface area heuristic", "internal area over Müller–Fellner's"]
-    {
-        assert_eq!(json[name].as_f64(), plain[name].parse().ok(), "{name}");
-    }
-}
-
-#[test]
-fn a_tree_from_elsewhere_is_verified_for_its_own_scene_only() {
+fn the_facts_begin_with_the_validity_and_are_the_same_in_json_and_from_verify() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    said(at, &["bake", "spheres75", "--budget=0s", "--out=x.bvh"]);
-    let inspected = said(at, &["inspect", "x.bvh", "spheres75"]);
-    assert_eq!(said(at, &["verify", "x.bvh", "spheres75"]), inspected);
-    refused(at, &["verify", "x.bvh", "spheres750"], 2, &["75 objects", "750"]);
-}
-
-#[test]
-fn the_nodes_are_written_in_full_precision() {
-    let folder = tempfile::tempdir().unwrap();
-    said(folder.path(), &["bake", "spheres75", "--budget", "0s", "--out", "a.bvh"]);
-    said(folder.path(), &["inspect", "a.bvh", "--nodes", "nodes.csv"]);
-    let scene = Scene::load("spheres75").unwrap();
-    let (tree, _) = tree_file::load(&folder.path().join("a.bvh"), &scene).unwrap();
-    let mut reader = csv::Reader::from_path(folder.path().join("nodes.csv")).unwrap();
-    let columns = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
-    let headers: Vec<&str> = reader.headers().unwrap().iter().collect();
-    assert_eq!(headers.join(","), columns);
-    let mut rows = 0;
-    for (index, row) in reader.records().enumerate() {
-        let row = row.unwrap();
-        let node = &tree.nodes[index];
-        let corners = [node.aabb.min.to_array(), node.aabb.max.to_array()].concat();
-        let written: Vec<f32> = (5..11).map(|column| row[column].parse().unwrap()).collect();
-        assert_eq!(written, corners);
-        let kind = if node.is_leaf() { "leaf" } else { "inner" };
-        assert_eq!((&row[0], &row[2]), (index.to_string().as_str(), kind));
-        // Only the root has an empty cell instead of a parent.
-        match row[1].parse::<usize>() {
-            Ok(parent) => assert!(tree.nodes[parent].children().contains(&index)),
-            Err(_) => assert_eq!((&row[1], index), ("", 0)),
-        }
-        rows += 1;
-    }
-    assert_eq!(rows, tree.nodes.len());
+    bvh(at, "bake spheres75 --budget=0s --out=x.bvh");
+    let said = bvh(at, "verify x.bvh spheres75");
+    assert_eq!(bvh(at, "inspect x.bvh spheres75"), said);
+    assert!(said.starts_with("valid: yes, over this scene's objects\n"), "{said}");
+    let mut names: Vec<&str> = said.lines().map(|line| line.split_once(": ").unwrap().0).collect();
+    names.sort_unstable();
+    let json = facts(at, "verify x.bvh spheres75");
+    assert!(json["objects"] == 75 && json["method"] == "best" && json["depth"].is_u64());
+    assert!(json.keys().eq(names), "{json:?}");
 }
 
 /// Compares the facts of another reader with the facts of `inspect`.
-fn agree(reader: &str, output: &Output, inspected: &BTreeMap<String, String>) {
+fn agree(reader: &str, output: &Output, inspected: &Map<String, Value>) {
     assert!(output.status.success(), "{reader}: {}", text(&output.stderr));
-    let read = facts(&text(&output.stdout));
+    let said = text(&output.stdout);
+    let read: BTreeMap<&str, &str> =
+        said.lines().filter_map(|line| line.split_once(": ")).collect();
     for name in ["method", "seed", "work", "objects", "nodes", "inner nodes", "leaves", "depth"] {
-        assert_eq!(read[name], inspected[name], "{reader}: {name}");
+        assert_eq!(read[name], inspected[name].to_string().trim_matches('"'), "{reader}: {name}");
     }
     // Another order of additions changes the last digits of a sum of areas.
     for name in ["cost when saved", "internal area"] {
-        let expected = number(inspected, name);
-        let found = number(&read, name);
+        let expected = inspected[name].as_f64().unwrap();
+        let found: f64 = read[name].parse().unwrap();
         let error = (found - expected).abs();
         assert!(error <= 1e-12 * expected, "{reader}: {name}: {found}, not {expected}");
     }
@@ -89,8 +48,8 @@ fn readers_in_python_and_cpp_agree_with_inspect_and_reject_damage() {
     let trees = [("best", "escher"), ("goldsmith_salmon", "spheres750"), ("best", "spheres75:1")];
     for (index, (method, scene)) in trees.iter().enumerate() {
         let out = format!("{index}.bvh");
-        let bake = ["bake", scene, "--budget=1Mwork", "--seed=18446744073709551615"];
-        said(at, &[&bake[..], &["--method", method, "--out", &out]].concat());
+        let bake = format!("bake {scene} --budget=1Mwork --seed=18446744073709551615");
+        bvh(at, &format!("{bake} --method={method} --out={out}"));
         // One flipped bit must not go unnoticed.
         let mut bytes = fs::read(at.join(&out)).unwrap();
         let middle = bytes.len() / 2;
@@ -116,7 +75,7 @@ fn readers_in_python_and_cpp_agree_with_inspect_and_reject_damage() {
         let read =
             |file: String| Command::new(&program).args(args).arg(at.join(file)).output().unwrap();
         for index in 0..trees.len() {
-            let inspected = facts(&said(at, &["inspect", &format!("{index}.bvh")]));
+            let inspected = facts(at, &format!("inspect {index}.bvh"));
             agree(name, &read(format!("{index}.bvh")), &inspected);
             let damaged = read(format!("{index}.damaged"));
             assert!(!damaged.status.success(), "{name} accepted a damaged file");
@@ -130,13 +89,9 @@ fn readers_in_python_and_cpp_agree_with_inspect_and_reject_damage() {
 fn an_inspection_with_rays_measures_their_expected_tests() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let measured = |method: &str| {
-        let bake = ["bake", "escher", "--budget=2Mwork", "--out=a.bvh", "--method", method];
-        said(at, &bake);
-        let facts = facts(&said(at, &["inspect", "a.bvh", "escher", "--rays", "default"]));
-        number(&facts, "expected tests of a ray")
-    };
-    let searched = measured("best");
-    assert!(0.0 < searched && searched < measured("muller_fellner"), "{searched}");
-    refused(at, &["inspect", "a.bvh", "--rays", "default"], 2, &["--rays", "SCENE"]);
+    let [searched, greedy] = ["best", "muller_fellner"].map(|method| {
+        bvh(at, &format!("bake escher --budget=2Mwork --out=a.bvh --method={method}"));
+        number(at, "inspect a.bvh escher --rays=default", "expected tests of a ray")
+    });
+    assert!(0.0 < searched && searched < greedy, "{searched}");
 }

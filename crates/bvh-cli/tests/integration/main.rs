@@ -5,11 +5,9 @@ mod bake_instances;
 #[cfg(unix)]
 mod bake_interrupted;
 mod bake_parts;
-mod bake_references;
-mod command_line;
+mod commands;
 mod examples;
 mod export;
 mod inspect;
 mod render;
-mod report;
 mod support;

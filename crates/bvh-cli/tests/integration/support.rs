@@ -1,4 +1,4 @@
-//! The program `bvh` as a child process, and its reports on trees.
+//! The program `bvh` as a child process, by its command lines.
 #![allow(dead_code, unused_imports)] // each test file uses some of it
 
 #[path = "../../../bvh-scenes/tests/integration/glb.rs"]
@@ -8,25 +8,37 @@ mod program;
 
 pub use glb::glb;
 pub use program::*;
-use std::collections::BTreeMap;
+use serde_json::{Map, Value};
 use std::path::Path;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_bvh");
 
-/// Parses the facts that `inspect` and the readers print.
-pub fn facts(text: &str) -> BTreeMap<String, String> {
-    text.lines()
-        .filter_map(|line| line.split_once(": "))
-        .map(|(name, value)| (name.into(), value.into()))
-        .collect()
+/// Splits a command line at its spaces.
+pub fn words(line: &str) -> Vec<&str> {
+    line.split_whitespace().collect()
 }
 
-/// Returns the internal area of the tree in a file, which `inspect` reports.
-pub fn cost(folder: &Path, file: &str) -> f64 {
-    facts(&said(folder, &["inspect", file]))["internal area"].parse().unwrap()
+/// Runs a command that must succeed, and returns its standard output.
+pub fn bvh(at: &Path, line: &str) -> String {
+    said(at, &words(line))
 }
 
-/// Returns a fact that is a number.
-pub fn number(facts: &BTreeMap<String, String>, name: &str) -> f64 {
-    facts[name].parse().unwrap()
+/// Runs a command that must be rejected with each of the parts on standard error.
+pub fn wrong(at: &Path, line: &str, parts: &[&str]) {
+    refused(at, &words(line), 2, parts);
+}
+
+/// Returns the results of a command, with all digits.
+pub fn facts(at: &Path, line: &str) -> Map<String, Value> {
+    serde_json::from_str(&bvh(at, &format!("{line} --json"))).unwrap()
+}
+
+/// Returns a result of a command that is a number.
+pub fn number(at: &Path, line: &str, name: &str) -> f64 {
+    facts(at, line)[name].as_f64().unwrap()
+}
+
+/// Returns the internal area of the tree in a file.
+pub fn cost(at: &Path, file: &str) -> f64 {
+    number(at, &format!("inspect {file}"), "internal area")
 }

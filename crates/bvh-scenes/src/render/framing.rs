@@ -1,9 +1,13 @@
 //! Finds a view of a whole scene.
 
 use crate::Scene;
-use crate::rays::{View, frame};
-use bvh_core::{Aabb, Primitives};
+use crate::rays::{Camera, View, frame};
+use crate::trace::Accelerator;
+use bvh_core::{Aabb, Primitives, Ray};
 use glam::DVec3;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
 
 /// Views of scenes that should be seen from inside: the name, the eye, the point in the middle of
 /// the picture, and the angle.
@@ -26,8 +30,70 @@ pub fn automatic(scene: &Scene, bounds: &Aabb, aspect: f64) -> View {
         Primitives::Triangles(_) => (0.62, 0.58),
         Primitives::Spheres(_) => (0.20, 0.17),
     };
-    let front = if up == DVec3::Y { DVec3::Z } else { -DVec3::Y };
+    let front = front(up);
     framing(bounds, up.cross(front) * side + up * height + front, up, aspect, View::FOV)
+}
+
+/// Returns the direction from the middle of a scene to its front.
+fn front(up: DVec3) -> DVec3 {
+    if up == DVec3::Y { DVec3::Z } else { -DVec3::Y }
+}
+
+/// Returns the view, of a few from all sides and distances, in which most objects are seen. Most
+/// rays hit the scene in it, unless no view is so.
+pub fn of_most_objects(scene: &Scene, accelerator: &Accelerator, aspect: f64) -> View {
+    const SIDES: u8 = 8;
+    /// The share of rays that hit in a picture without too much background.
+    const FULL: f64 = 0.7;
+    let bounds = Aabb::union_of(&scene.boxes);
+    let up = scene.up();
+    let front = front(up);
+    let right = up.cross(front);
+    let mut views = Vec::new();
+    for nearness in [1.0, 0.7, 0.45, 0.25] {
+        for height in [0.58, 0.2] {
+            for side in 0..SIDES {
+                let angle = TAU * (f64::from(side) + 0.6) / f64::from(SIDES);
+                let around = right * libm::cos(angle) + front * libm::sin(angle);
+                let view = framing(&bounds, around + up * height, up, aspect, View::FOV);
+                views.push(View { from: view.at.lerp(view.from, nearness), ..view });
+            }
+        }
+    }
+    let seen: Vec<(f64, usize)> =
+        views.par_iter().map(|view| seen(view, up, accelerator, aspect)).collect();
+    // Of equally good views, the first shows most around the scene.
+    let best = (0..views.len()).rev().max_by(|&a, &b| {
+        let [full_a, full_b] = [a, b].map(|view| seen[view].0.min(FULL));
+        full_a.total_cmp(&full_b).then(seen[a].1.cmp(&seen[b].1))
+    });
+    best.map_or_else(|| automatic(scene, &bounds, aspect), |best| views.swap_remove(best))
+}
+
+/// Returns the share of the rays of a small picture that hit, and the number of objects that they
+/// hit.
+fn seen(view: &View, up: DVec3, accelerator: &Accelerator, aspect: f64) -> (f64, usize) {
+    const ROWS: u32 = 40;
+    let columns = (f64::from(ROWS) * aspect) as u32;
+    let camera = Camera::new(view, up, columns, ROWS);
+    let mut hits = 0;
+    let mut objects = BTreeSet::new();
+    for pixel in 0..columns * ROWS {
+        if let Some(object) = camera.hit(accelerator, pixel % columns, pixel / columns) {
+            hits += 1;
+            objects.insert(object);
+        }
+    }
+    (f64::from(hits) / f64::from((columns * ROWS).max(1)), objects.len())
+}
+
+impl Camera {
+    /// Returns the object in the middle of a pixel, if there is one.
+    pub fn hit(&self, accelerator: &Accelerator, x: u32, y: u32) -> Option<u32> {
+        let direction = self.direction(f64::from(x) + 0.5, f64::from(y) + 0.5).as_vec3();
+        let ray = Ray::half_line(self.origin.as_vec3(), direction).ok()?;
+        accelerator.nearest_hit(&ray).map(|hit| hit.object)
+    }
 }
 
 /// Returns the view of a box from the direction `towards_eye`, at the smallest distance that shows
@@ -58,7 +124,9 @@ fn framing(bounds: &Aabb, towards_eye: DVec3, up: DVec3, aspect: f64, fov: f64) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rays::Camera;
+    use crate::SPHERES;
+    use crate::builtin::stand_ins::STAND_INS;
+    use bvh_build::{Builder, median_cut};
 
     #[test]
     fn every_corner_of_every_box_is_in_the_picture_and_one_is_near_its_edge() {
@@ -87,6 +155,19 @@ mod tests {
                 widest = widest.max(x / 150.0).max(y / 100.0);
             }
             assert!(widest > 0.9, "{bounds:?}: {widest}");
+        }
+    }
+
+    #[test]
+    fn most_rays_of_the_view_of_most_objects_hit_every_built_in_scene() {
+        let stand_ins = STAND_INS.map(|scene| scene.name);
+        for name in stand_ins.into_iter().chain(SPHERES.map(|(name, _)| name)) {
+            let scene = Scene::load(name).unwrap();
+            let tree = median_cut::Config::default().build(&scene.boxes).unwrap();
+            let accelerator = Accelerator::of_tree(&scene.primitives, &tree);
+            let view = of_most_objects(&scene, &accelerator, 1.6);
+            let (share, objects) = seen(&view, scene.up(), &accelerator, 1.6);
+            assert!(share > 0.5 && objects > 20, "{name}: {share} of the rays, {objects} objects");
         }
     }
 

@@ -5,7 +5,7 @@ use ab_glyph::{Font, FontRef, PxScale, point};
 
 /// Every sixteenth colour of matplotlib's 'inferno' (van der Walt & Smith 2015; CC0), whose
 /// brightness increases evenly to the eye.
-const INFERNO: [[u8; 3]; 17] = [
+pub const INFERNO: [[u8; 3]; 17] = [
     [0, 0, 4],
     [11, 7, 36],
     [32, 12, 74],
@@ -54,16 +54,20 @@ pub fn range(film: &Film, rays_per_pixel: u32) -> Range {
     Range { min, median, top, max }
 }
 
-/// Returns the pixels of a film's heat map and of the key below it. `range` is the film's
-/// [`range`], or has the top of another film with which this one is compared.
-pub fn map(film: &Film, rays_per_pixel: u32, range: &Range) -> Result<Vec<[u8; 3]>, BadFont> {
-    // A picture without tests has the top 0, and its colours would be 0 / 0.
-    let top = range.top.max(f64::MIN_POSITIVE) * f64::from(rays_per_pixel);
-    let mut pixels: Vec<[u8; 3]> =
-        film.tests.iter().map(|&tests| colour(tests as f64 / top)).collect();
+/// Returns the pixels of a film's heat map and of the key below it, with the film's [`range`].
+pub fn map(film: &Film, rays_per_pixel: u32) -> Result<Vec<[u8; 3]>, BadFont> {
+    let range = range(film, rays_per_pixel);
+    let mut pixels = colours(film, range.top * f64::from(rays_per_pixel));
     let colours: Vec<[u8; 3]> = (0..=255).map(|part| colour(f64::from(part) / 255.0)).collect();
-    pixels.extend(key(film.width, &colours, &labels(range))?);
+    pixels.extend(key(film.width, &colours, &labels(&range))?);
     Ok(pixels)
+}
+
+/// Returns the colours of a film's pixels, without a key. They end at `top` tests of a pixel.
+pub fn colours(film: &Film, top: f64) -> Vec<[u8; 3]> {
+    // A picture without tests has the top 0, and its colours would be 0 / 0.
+    let top = top.max(f64::MIN_POSITIVE);
+    film.tests.iter().map(|&tests| colour(tests as f64 / top)).collect()
 }
 
 /// Returns the colour of a value relative to the range, 0 to 1. Larger values have the last colour.
@@ -81,8 +85,8 @@ fn colour(value: f64) -> [u8; 3] {
 fn labels(range: &Range) -> [String; 3] {
     [
         "0".into(),
-        format!("tests per pixel: median {:.0}, most {:.0}", range.median, range.max),
-        format!("{:.0}", range.top),
+        format!("tests per pixel: median {:.0}", range.median),
+        format!("{:.0} or more", range.top),
     ]
 }
 
@@ -198,7 +202,7 @@ mod tests {
         for width in [64, 65] {
             let tests = (0..u64::from(width) * 8).collect();
             let film = film(width, tests);
-            let pixels = map(&film, 1, &range(&film, 1)).unwrap();
+            let pixels = map(&film, 1).unwrap();
             assert_eq!(pixels.len() % width as usize, 0);
             assert_eq!((pixels[0], pixels[width as usize * 8]), (INFERNO[0], [255; 3]));
         }
@@ -207,16 +211,13 @@ mod tests {
     #[test]
     fn the_same_number_of_tests_has_one_colour_under_one_scale() {
         let (few, many) = (film(64, vec![5; 64]), film(64, vec![10; 64]));
-        let range = Range { top: 10.0, ..range(&few, 1) };
-        let few = map(&few, 1, &range).unwrap();
-        let many = map(&many, 1, &range).unwrap();
-        assert_eq!((few[0], many[0]), (colour(0.5), colour(1.0)));
+        assert_eq!([colours(&few, 10.0)[0], colours(&many, 10.0)[0]], [colour(0.5), colour(1.0)]);
     }
 
     #[test]
     fn a_picture_without_tests_has_a_heat_map_too() {
         let film = film(40, vec![0; 40]);
-        let pixels = map(&film, 1, &range(&film, 1)).unwrap();
+        let pixels = map(&film, 1).unwrap();
         assert_eq!(pixels[..40], [INFERNO[0]; 40]);
     }
 

@@ -240,7 +240,7 @@ fn parameters_outside_their_range_are_named() {
     };
     let cold = ruin_recreate::Config { cold: 1.0, ..Default::default() };
     assert_eq!(error(Method::RuinRecreate(cold)), "cold is 1; accepted: above 0, not above hot");
-    let sweeps = reinsertion::Config { sweeps: 0, ..Default::default() };
+    let sweeps = reinsertion::Config { sweeps: 0 };
     assert_eq!(error(Method::Reinsertion(sweeps)), "sweeps is 0; accepted: 1 or more");
     let pieces = best::Config { pieces: 5000, ..Default::default() };
     assert_eq!(error(Method::Best(pieces)), "pieces is 5000; accepted: 0 to 4096");

@@ -1,0 +1,295 @@
+//! What all commands share: their output, their folders, and the rejection of invalid input.
+
+// Tests that send signals or make links and pipes are left out on Windows, and their imports stay.
+#![cfg_attr(windows, allow(unused_imports))]
+
+use crate::support::{
+    ReadOnly, bvh, ended, facts, names, outside_buffer, outside_scene, program, refused,
+    run_in_little_memory, unsaid, words, wrong, wrong_flags,
+};
+use bvh_core::{Aabb, Bvh, Node, file};
+use bvh_scenes::Scene;
+use std::fs;
+use std::path::Path;
+use std::process::Stdio;
+
+#[test]
+fn scenes_are_listed_with_the_originals_that_they_replace() {
+    let at = Path::new(".");
+    assert!(bvh(at, "scenes").contains("32 892  stand-in for bijou"));
+    assert_eq!(facts(at, "scenes")["scenes"][0]["objects"], 32_892);
+}
+
+#[test]
+fn every_shell_gets_all_commands() {
+    for shell in ["bash", "zsh", "fish"] {
+        let said = bvh(Path::new("."), &format!("completions {shell}"));
+        for part in ["inspect", "budget", "heatmap"] {
+            assert!(said.contains(part), "{shell}: {part}");
+        }
+    }
+}
+
+/// Returns the file of a tree of one node and its leaves.
+fn wide_file(boxes: &[Aabb]) -> Vec<u8> {
+    let count = boxes.len() as u32;
+    let root = Node::inner(Aabb::union_of(boxes), 1, count);
+    let mut tree = Bvh { nodes: vec![root], prim_ids: (0..count).collect() };
+    tree.nodes.extend(boxes.iter().zip(0..).map(|(&aabb, object)| Node::leaf(aabb, object, 1)));
+    file::save(&tree, boxes, &file::Origin::default()).unwrap()
+}
+
+/// Makes a folder with a valid tree file, damaged ones, a mesh, and things that are no files.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let write = |name: &str, bytes: &[u8]| fs::write(at.join(name), bytes).unwrap();
+    bvh(at, "bake spheres75 --budget=0s --out=good.bvh");
+    let good = fs::read(at.join("good.bvh")).unwrap();
+    write("cut.bvh", &good[..good.len() - 1]);
+    let mut flipped = good;
+    flipped[300] ^= 1;
+    write("flipped.bvh", &flipped);
+    write("wide.bvh", &wide_file(&Scene::load("spheres75:3").unwrap().boxes));
+    write("file", b"");
+    write("mesh.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write("wrong.toml", b"count = 9\nbouncy = 1\ncameras = []\n");
+    write("none.toml", b"bounces = 1");
+    fs::create_dir(at.join("full")).unwrap();
+    write("full/mine", b"mine");
+    folder
+}
+
+/// Lists the files of a folder with their contents.
+fn contents(at: &Path) -> Vec<(String, Option<Vec<u8>>)> {
+    names(at).into_iter().map(|name| (name.clone(), fs::read(at.join(name)).ok())).collect()
+}
+
+#[test]
+fn what_is_wrong_is_named_before_the_work_and_changes_no_file() {
+    let folder = folder();
+    let at = folder.path();
+    let before = contents(at);
+    let no_folder = &["no is no folder", "accepted: a path in a folder that is there"][..];
+    // The work would take so long that the test would time out.
+    let hour = "bake spheres75 --budget=1h --out=good.bvh";
+    let parts = "bake escher --budget=1000Gwork --out=x.bvh --parts";
+    let picture = "--size=8x8 --out=x.png";
+    for (line, parts) in [
+        // Outputs.
+        ("bake spheres75 --budget=1h --out=full".into(), &["--out: full", ".bvh"][..]),
+        ("bake spheres75 --budget=1h --out=file/x.bvh".into(), &["file is no folder"]),
+        ("bake spheres75 --budget=1h --out=no/x.bvh".into(), no_folder),
+        ("bake mesh.obj --budget=1h --out=mesh.obj".into(), &["--out: mesh.obj", ".bvh"]),
+        ("bake mesh.obj --budget=1h --out=tree".into(), &["--out: tree", ".bvh"]),
+        ("bake spheres7500 --parts=2 --budget=1000Gwork --out=no/x.bvh".into(), no_folder),
+        ("render spheres7500 --accel=brute --size=9999x9999 --out=no/x.png".into(), no_folder),
+        ("render mesh.obj --size=8x8 --out=mesh.obj".into(), &["--out: mesh.obj", ".png"]),
+        ("render spheres75 --out=/dev/full".into(), &["--out", "/dev/full"]),
+        ("report good.bvh spheres7500 --out=no/x.html".into(), no_folder),
+        ("report good.bvh spheres75 --out=good.bvh".into(), &["--out: good.bvh", ".html"]),
+        ("report good.bvh escher --out=x.html".into(), &["good.bvh", "scene"]),
+        ("export good.bvh spheres75 --for=obvhs --out=x.bvh".into(), &["--out", ".bin"]),
+        ("bake forest.glb --instances --budget=1h --out=full".into(), &["full", "new or empty"]),
+        // Scenes and trees.
+        (hour.replace("spheres75", "sofa"), &["scene sofa: no such scene; accepted: bijou"]),
+        (hour.replace("spheres75", "esher"), &["no such scene; did you mean escher?"]),
+        (hour.replace("spheres75", "no.glb"), &["error: scene no.glb: no such file"]),
+        ("bake mesh.obj --instances --budget=1h --out=x".into(), &["mesh.obj", "Obj", "glTF"]),
+        ("bake no.glb --instances --budget=1h --out=x".into(), &["no.glb", "no such file"]),
+        (format!("{hour} --from=cut.bvh"), &["cut.bvh", "cut or extended"]),
+        (format!("{hour} --from=flipped.bvh"), &["flipped.bvh", "checksum"]),
+        (format!("{hour} --from=file"), &["file", "not a tree file"]),
+        (format!("{hour} --from=x.bvh"), &["x.bvh", "no such file"]),
+        (
+            format!("{} --from=wide.bvh", hour.replace("75", "75:3")),
+            &["--from wide.bvh", "inner node 0 has 3 children", "nodes with two"],
+        ),
+        ("inspect good.bvh spheres750".into(), &["good.bvh", "75 objects", "750"]),
+        ("verify good.bvh spheres750".into(), &["good.bvh", "75 objects", "750"]),
+        ("inspect good.bvh spheres750:75".into(), &["good.bvh", "another scene"]),
+        ("inspect flipped.bvh".into(), &["flipped.bvh", "checksum"]),
+        ("export good.bvh escher:75 --for=obvhs --out=x.bin".into(), &["good.bvh", "scene"]),
+        (format!("render sofa {picture}"), &["no such scene", "spheres75"]),
+        (format!("render spheres75 {picture} --accel=none.bvh"), &["none.bvh"]),
+        // Values and their combinations.
+        (hour.replace("1h", "ten"), &["ten", "10s", "50Mwork"]),
+        (format!("{hour} --method=greedy"), &["greedy: no such method; accepted: muller_fellner"]),
+        (format!("{hour} --method=anealing"), &["no such method; did you mean annealing?"]),
+        (format!("{hour} --method=grasp --from=good.bvh"), &["grasp", "--from", "best"]),
+        (format!("{hour} --references=nan"), &["--references NaN; accepted: 1 to 16"]),
+        (format!("{hour} --rays=wrong.toml"), &["wrong.toml", "line 2", "bouncy", "bounces"]),
+        (format!("{hour} --rays=none.toml"), &["none.toml", "cameras is empty", "eye"]),
+        (format!("{hour} --rays=gone.toml"), &["--rays", "gone.toml", "no such file"]),
+        (format!("{parts}=4 --part=0123"), &["--part 0123", "no such part", "--list"]),
+        (format!("{parts}=4 --rays=default"), &["--parts", "--rays", "cannot be used with"]),
+        (parts.replace("escher", "spheres75") + "=76", &["--parts 76", "75 objects", "2 to 75"]),
+        // No number of parts suits a scene of one object.
+        (parts.replace("escher", "escher:1") + "=2", &["--parts 2", "accepted: no parts"]),
+        ("bake escher --parts=4".into(), &["--budget"]),
+        ("inspect good.bvh --rays=default".into(), &["--rays", "SCENE"]),
+        ("export good.bvh spheres75 --for=embree --out=x.bin".into(), &["embree", "obvhs"]),
+        (
+            format!("render spheres75 {picture} --accel=octree"),
+            &["octree", "brute, kdtree, bvh, wide"],
+        ),
+        (
+            format!("render spheres75 {picture} --accel=wide"),
+            &["spheres75 has spheres", "--accel brute"],
+        ),
+        (format!("render escher {picture} --accel=wide --heatmap"), &["counts no tests"]),
+        ("render spheres75 --out=x.png --size=0x10".into(), &["--size", "960x540"]),
+        (format!("render spheres75 {picture} --from=1,2"), &["--from", "three numbers"]),
+    ] {
+        wrong(at, &line, parts);
+    }
+    assert!(contents(at) == before, "a file was changed or left behind");
+}
+
+#[test]
+fn a_file_of_the_same_kind_is_replaced() {
+    let folder = folder();
+    for _ in 0..2 {
+        for line in [
+            "bake spheres75 --budget=0s --out=good.bvh --from=good.bvh",
+            "render spheres75 --size=8x8 --out=x.png",
+        ] {
+            bvh(folder.path(), line);
+        }
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_devices_and_folders_are_rejected_as_inputs() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let made = std::process::Command::new("mkfifo").arg("p.bvh").current_dir(at).status();
+    assert!(made.unwrap().success());
+    fs::create_dir(at.join("folder.bvh")).unwrap();
+    for (line, parts) in [
+        ("inspect p.bvh", &["p.bvh", "not a regular file"][..]),
+        ("bake spheres75 --budget=0s --from=p.bvh --out=x.bvh", &["p.bvh"]),
+        ("bake /dev/zero --budget=0s --out=x.bvh", &["/dev/zero"]),
+        ("inspect folder.bvh", &["folder.bvh", "a folder"]),
+        ("render spheres75 --accel=folder.bvh --out=x.png", &["--accel", "folder.bvh"]),
+    ] {
+        wrong(at, line, parts);
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_scene_that_needs_more_memory_than_the_limit_is_rejected_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let limited = |args: &str| run_in_little_memory(folder.path(), args, 4_000_000);
+    // A rejection of the scene's own size would end with code 2.
+    let output = limited("bake S21:100000000 --budget=0s --out=x.bvh");
+    let parts = ["S21:100000000", "100 000 000 objects", "32 600 000 000 bytes", "fewer"];
+    ended(&output, 1, &parts);
+    let output = limited("render S21:100000000 --out=x.png");
+    ended(&output, 2, &["S21:100000000", "6000000000 bytes"]);
+    assert_eq!(names(folder.path()), [""; 0]);
+    ended(&limited("bake S21:1000 --budget=0s --out=x.bvh"), 0, &[]);
+}
+
+// Linux stores holes of files, so that this file needs no space on the disk.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_of_64_gigabytes_is_rejected_by_its_header() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::File::create(folder.path().join("huge.bvh")).unwrap().set_len(64 << 30).unwrap();
+    wrong(folder.path(), "inspect huge.bvh", &["huge.bvh: not a tree file"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_output_is_an_error_and_a_closed_pipe_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for line in ["scenes", "--help", "--version", "-h", "bake --help", "help inspect"] {
+        unsaid(at, &words(line));
+        let mut child = program(at, &words(line)).stdout(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        assert!(child.wait().unwrap().success(), "{line}");
+    }
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_named() {
+    let folder = folder();
+    let at = folder.path();
+    let locked = at.join("locked");
+    fs::create_dir(&locked).unwrap();
+    let Some(_guard) = ReadOnly::new(&locked) else {
+        eprintln!("not tried: this user can write into any folder here");
+        return;
+    };
+    for (line, parts) in [
+        ("bake spheres75 --budget=1h --out=locked/x.bvh", ["locked", "cannot create"]),
+        ("render spheres75 --size=8x8 --out=locked/x.png", ["locked/x.png", "cannot"]),
+    ] {
+        refused(at, &words(line), 1, &parts);
+    }
+    assert_eq!(fs::read_dir(&locked).unwrap().count(), 0);
+}
+
+#[test]
+fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    bvh(at, "bake spheres75 --budget=0s --out=good.bvh");
+    // Every command needs its required arguments before a flag can be wrong.
+    let flags = wrong_flags(
+        at,
+        &[
+            ("bake", &["spheres75", "--budget=0s", "--out=x.bvh"]),
+            ("inspect", &["good.bvh", "spheres75"]),
+            ("verify", &["good.bvh", "spheres75"]),
+            ("export", &["good.bvh", "spheres75", "--for=obvhs", "--out=x.bin"]),
+            ("render", &["spheres75", "--out=x.png", "--size=8x8"]),
+            ("report", &["good.bvh", "spheres75"]),
+            ("scenes", &[]),
+            ("completions", &["bash"]),
+        ],
+    );
+    assert!(flags > 20, "{flags} flags");
+}
+
+#[test]
+fn every_command_reads_buffers_outside_the_folder_of_a_scene_only_with_permission() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = &folder.path().join("inner");
+    fs::create_dir(at).unwrap();
+    fs::write(at.join("scene.gltf"), outside_scene("../outside.bin")).unwrap();
+    fs::write(folder.path().join("outside.bin"), outside_buffer()).unwrap();
+    for line in [
+        "bake scene.gltf --budget=0s --out=x.bvh",
+        "bake scene.gltf --instances --budget=0s --out=x",
+        "inspect x.bvh scene.gltf",
+        "verify x.bvh scene.gltf",
+        "render scene.gltf --size=8x8 --out=x.png",
+        "report x.bvh scene.gltf",
+    ] {
+        wrong(at, line, &["buffers[0]", "outside the scene's folder", "--outside-files"]);
+        bvh(at, &format!("{line} --outside-files"));
+    }
+}
+
+#[test]
+fn every_command_that_prints_results_prints_them_as_json() {
+    let folder = folder();
+    for (line, fact) in [
+        ("bake spheres75 --budget=1kwork --out=x.bvh", "seconds"),
+        ("bake escher --budget=1Mwork --parts=2 --list", "parts"),
+        ("inspect good.bvh", "valid"),
+        ("verify good.bvh spheres75", "depth"),
+        ("export good.bvh spheres75 --for=obvhs --out=x.bin", "cost of a ray"),
+        ("render spheres75 --size=8x8 --out=x.png", "rays"),
+        ("report good.bvh spheres75", "Depth"),
+        ("scenes", "scenes"),
+    ] {
+        let facts = facts(folder.path(), line);
+        assert!(facts.contains_key(fact), "{line}: {facts:?}");
+    }
+}
