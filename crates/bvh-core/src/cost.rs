@@ -316,8 +316,16 @@ mod tests {
         let tree = two_cubes();
         assert_eq!(sah(&tree, &SahConstants::default()), 1.0 + 6.0 / 7.0);
         assert_eq!(sah(&tree, &SahConstants { traversal: 2.0, intersection: 0.0 }), 2.0);
-        assert_eq!(internal_area(&tree), 7.0);
-        assert_eq!(goldsmith_salmon(&tree), 2.0);
+        for (objective, cost) in [
+            (Objective::InternalArea, 7.0),
+            (Objective::GoldsmithSalmon, 2.0),
+            (Objective::Sah(SahConstants::default()), 1.0 + 6.0 / 7.0),
+            // Both cubes in one block.
+            (Objective::Layout, 7.0),
+        ] {
+            assert_eq!(objective.cost(&tree), cost, "{objective:?}");
+            assert_eq!(objective.cost_by(&tree, &Area), cost, "{objective:?}");
+        }
     }
 
     #[test]
