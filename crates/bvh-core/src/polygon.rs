@@ -96,6 +96,17 @@ mod tests {
     }
 
     #[test]
+    fn a_cut_that_fills_the_room_is_made() {
+        let octagon = [[3, 0], [2, 2], [0, 3], [-2, 2], [-3, 0], [-2, -2], [0, -3], [2, -2]]
+            .map(|[x, y]| DVec3::new(f64::from(x), f64::from(y), 0.0));
+        let mut polygon = Polygon { corners: [DVec3::ZERO; 9], len: 8 };
+        polygon.corners[..8].copy_from_slice(&octagon);
+        polygon.cut(Plane { axis: 0, position: 2.5, side: -1.0 }, |corner| corner);
+        assert_eq!(polygon.corners().len(), 9);
+        assert!(polygon.corners().iter().all(|corner| corner.x <= 2.5));
+    }
+
+    #[test]
     fn a_corner_in_the_plane_is_kept_once() {
         let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
         for (position, side, expected) in [
