@@ -1,8 +1,8 @@
-// The worker's side of `bakeInWorker`: one message in, reports of the progress and one result out.
+// The worker's side of `bakeInWorker`: one message in, reports of the progress and one result out. It
+// is told how to load, because an import map of the page does not hold in a worker.
 import { Tree } from '../wasm/bvh_js.js';
-import { load } from '#load';
 
-export async function answer({ corners, seconds, work, seed, references, follows }, say) {
+export async function answer(load, { corners, seconds, work, seed, references, follows }, say) {
     try {
         await load();
         const follow = follows ? (fraction, cost) => say({ fraction, cost }) : undefined;

@@ -1,4 +1,4 @@
-import type { BufferGeometry } from 'three';
+import type { BufferGeometry, Intersection, Material, Ray, Side } from 'three';
 import type { MeshBVH } from 'three-mesh-bvh';
 
 export interface BakeOptions {
@@ -41,3 +41,15 @@ export function bakeInWorker(geometry: BufferGeometry, options?: BakeOptions & {
 
 /** The cost of a ray in any `MeshBVH` with one root, to compare with `Tree.cost`. */
 export function costOf(meshBVH: MeshBVH): Promise<number>;
+
+/**
+ * Casts a ray by `meshBVH.raycastFirst` or, with `query`, by `meshBVH.raycast`, and counts the boxes of nodes and the
+ * triangles that it tests. The counts are the same on every machine, and tell with your own rays which of two trees is
+ * the better one.
+ */
+export function countTests(meshBVH: MeshBVH, ray: Ray, options?: {
+    side?: Side | Material | Material[];
+    near?: number;
+    far?: number;
+    query?: 'raycastFirst' | 'raycast';
+}): { hit: Intersection | Intersection[] | null; boxes: number; triangles: number };

@@ -4,6 +4,8 @@ import { Tree as Searched, costOfRoot } from '../wasm/bvh_js.js';
 import { load } from '#load';
 import { startWorker } from '#worker';
 
+export { countTests } from './tests.js';
+
 let loaded;
 const ready = () => (loaded ??= load());
 

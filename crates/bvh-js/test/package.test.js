@@ -6,10 +6,10 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import {
-    BufferAttribute, BufferGeometry, DoubleSide, InterleavedBuffer, InterleavedBufferAttribute, Ray, TorusKnotGeometry, Vector3,
+    Box3, BufferAttribute, BufferGeometry, DoubleSide, InterleavedBuffer, InterleavedBufferAttribute, Ray, TorusKnotGeometry, Vector3,
 } from 'three';
 import { MeshBVH, SAH } from 'three-mesh-bvh';
-import { bake, bakeInWorker, costOf, Tree } from 'bvh-search';
+import { bake, bakeInWorker, costOf, countTests, Tree } from 'bvh-search';
 import { loadExport } from '../examples/load-export.mjs';
 
 /** Numbers from 0 to 1, the same in every run. */
@@ -78,6 +78,39 @@ test('a searched tree has the hits of the library’s own and costs less', async
     const [cost, own] = [tree.cost, await costOf(theirs)];
     assert.ok(cost < 0.9 * own, `${cost} beside ${own}`);
     assert.ok(Math.abs((await costOf(ours)) / cost - 1) < 1e-3);
+});
+
+/** Tests of boxes and triangles, by the structure of the tree: what `raycast` visits without a limit. */
+function testsByHand(bvh, ray) {
+    let [boxes, triangles] = [0, 0];
+    bvh.traverse((depth, isLeaf, box, offset, count) => {
+        boxes++;
+        const [low, high] = [box.subarray(0, 3), box.subarray(3)].map((corner) => new Vector3(...corner));
+        const isHit = ray.intersectsBox(new Box3(low, high));
+        if (isLeaf && isHit) triangles += count;
+        return !isHit;
+    });
+    return { boxes, triangles };
+}
+
+test('counted tests are those of a walk over the nodes, and the hits stay the same', async () => {
+    const geometry = scene();
+    const searched = (await bake(geometry, { work: 1_000_000 })).toMeshBVH(geometry);
+    const own = new MeshBVH(scene(), { strategy: SAH, targetLeafSize: 1 });
+    const sums = [searched, own].map((bvh) => {
+        let sum = 0;
+        for (const ray of rays(3000)) {
+            const all = countTests(bvh, ray, { side: DoubleSide, query: 'raycast' });
+            const { boxes, triangles } = testsByHand(bvh, ray);
+            assert.deepEqual({ boxes: all.boxes, triangles: all.triangles }, { boxes, triangles });
+            const first = countTests(bvh, ray, { side: DoubleSide });
+            assert.equal(first.hit?.distance, bvh.raycastFirst(ray, DoubleSide)?.distance);
+            assert.ok(first.boxes <= all.boxes && first.triangles <= all.triangles);
+            sum += first.boxes + first.triangles;
+        }
+        return sum;
+    });
+    assert.ok(sums[0] < 0.9 * sums[1], sums.join());
 });
 
 test('geometries without an index, with groups, with a draw range and with interleaved corners are traced', async () => {
