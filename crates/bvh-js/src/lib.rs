@@ -111,7 +111,7 @@ impl Tree {
         FOLLOWER.set(None);
         match THROWN.take() {
             Some(thrown) => Err(thrown),
-            None => found.map(Self).map_err(error),
+            None => better(found.map_err(error)?, corners),
         }
     }
 
@@ -177,6 +177,17 @@ pub fn cost_of_root(bytes: &[u8], triangles: u32) -> Result<f64, JsValue> {
     let order: Vec<u32> = (0..triangles).collect();
     let tree = bvh_core::Bvh::from_three_mesh(&nodes, &order).map_err(error)?;
     Ok(TARGET.cost(&tree))
+}
+
+/// Returns a greedy tree instead of a searched one in which rays of three-mesh-bvh take more tests.
+fn better(searched: OwnedTree, corners: &Float32Array) -> Result<Tree, JsValue> {
+    // A search without any time is the greedy tree that others begin with.
+    let watch = Watch { start: now(), limit: Some(0.0), most_work: None, counted: 0.into() };
+    let greedy = OwnedTree::find(triangles(corners)?, &Options::default(), &watch);
+    let greedy = greedy.map_err(error)?;
+    let shapes = searched.triangles().unwrap_or_default();
+    let better = TARGET.fit_better(searched.tree(), greedy.tree(), shapes);
+    Ok(Tree(if better.is_searched() { searched } else { greedy }))
 }
 
 fn triangles(corners: &Float32Array) -> Result<Objects, JsValue> {

@@ -6,7 +6,8 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import {
-    Box3, BufferAttribute, BufferGeometry, DoubleSide, InterleavedBuffer, InterleavedBufferAttribute, Ray, TorusKnotGeometry, Vector3,
+    Box3, BufferAttribute, BufferGeometry, DoubleSide, InterleavedBuffer, InterleavedBufferAttribute, Ray, SphereGeometry,
+    TorusKnotGeometry, Vector3,
 } from 'three';
 import { MeshBVH, SAH } from 'three-mesh-bvh';
 import { bake, bakeInWorker, costOf, countTests, Tree } from 'bvh-search';
@@ -111,6 +112,31 @@ test('counted tests are those of a walk over the nodes, and the hits stay the sa
         return sum;
     });
     assert.ok(sums[0] < 0.9 * sums[1], sums.join());
+});
+
+test('no smooth mesh takes more tests with our tree than with the best of the library’s own', async () => {
+    for (const smooth of [new TorusKnotGeometry(1, 0.35, 160, 24), new SphereGeometry(1, 90, 60)]) {
+        const own = [1, 2, 4, 10].map((targetLeafSize) => new MeshBVH(smooth.clone(), { strategy: SAH, targetLeafSize }));
+        const ours = (await bake(smooth, { work: 3_000_000 })).toMeshBVH(smooth);
+        const next = random(3);
+        const point = (size) => new Vector3(next(), next(), next()).subScalar(0.5).multiplyScalar(size);
+        const within = Array.from({ length: 6000 }, () => new Ray(point(2), point(1).normalize()));
+        const towards = within.map(({ origin, direction }) => {
+            const eye = direction.clone().multiplyScalar(5);
+            return new Ray(eye, origin.clone().sub(eye).normalize());
+        });
+        for (const all of [within, towards]) {
+            const [searched, ...theirs] = [ours, ...own].map((bvh) => {
+                let cost = 0;
+                for (const ray of all) {
+                    const { boxes, triangles } = countTests(bvh, ray, { side: DoubleSide });
+                    cost += 0.9 * boxes + 1.25 * triangles;
+                }
+                return cost;
+            });
+            assert.ok(searched <= Math.min(...theirs), `${searched} beside ${theirs}`);
+        }
+    }
 });
 
 test('geometries without an index, with groups, with a draw range and with interleaved corners are traced', async () => {

@@ -30,7 +30,7 @@ pub struct ThreeMeshNode {
 }
 
 /// The upper half of `axis_or_count` in a leaf.
-const LEAF: u32 = 0xffff << 16;
+pub(super) const LEAF: u32 = 0xffff << 16;
 
 impl Bvh {
     /// Converts the tree to nodes of `three-mesh-bvh`. The positions of leaves refer to the tree's

@@ -1,0 +1,243 @@
+//! The better of two trees for a tracer, by the tests that rays take there.
+
+use super::three_mesh::LEAF;
+use super::{Layout, Target, ThreeMeshNode};
+use crate::traverse::{TestCounts, nearest_hit_by};
+use crate::{Aabb, Bvh, PreparedRay, Ray, Triangle};
+use alloc::vec::Vec;
+use core::f64::consts::TAU;
+use glam::DVec3;
+
+/// The number of rays of each kind. Both trees trace the same rays, so that few suffice.
+const RAYS: u32 = 4096;
+
+/// A tree for a tracer, by [`Target::fit_better`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Better {
+    /// The fitted tree.
+    pub tree: Bvh,
+    /// The cost of a ray in the library's kind of tree over that in the searched one: of rays that
+    /// begin inside the scene's box, and of rays that begin outside and go into it.
+    pub gains: [f64; 2],
+}
+
+impl Better {
+    /// Returns whether the tree is the searched one.
+    pub fn is_searched(&self) -> bool {
+        // NaN, of a box in which no ray can begin, is not less.
+        !self.gains.iter().any(|&gain| gain < 1.0)
+    }
+}
+
+impl Target {
+    /// Returns the searched tree, [fitted](Self::fit). If rays of either kind take more tests in it
+    /// than in the tree of the library's kind, returns that one: a greedy tree, such as of
+    /// `bvh_build::muller_fellner`, is at least as good as the binned ones that libraries build.
+    ///
+    /// The area of a tree does not tell which one is better, above all for a smooth mesh in
+    /// `three-mesh-bvh`, whose traversal leaves a box out only where a hit lies before it along one
+    /// axis. O(objects), and a few thousand rays.
+    ///
+    /// # Panics
+    /// May panic on trees that [`validate`](crate::validate()) rejects.
+    pub fn fit_better(&self, searched: &Bvh, own: &Bvh, triangles: &[Triangle]) -> Better {
+        let [searched, own] = [self.fit(searched), self.fit(own)];
+        let [ours, theirs] = [&searched, &own].map(|tree| self.counted_costs(tree, triangles));
+        let gains = [theirs[0] / ours[0], theirs[1] / ours[1]];
+        let better = Better { tree: searched, gains };
+        if better.is_searched() { better } else { Better { tree: own, ..better } }
+    }
+
+    /// Returns the costs of all rays of each kind in a fitted tree.
+    fn counted_costs(&self, tree: &Bvh, triangles: &[Triangle]) -> [f64; 2] {
+        let Some(bounds) = tree.root_aabb() else { return [0.0; 2] };
+        let nodes = match self.layout {
+            Layout::ThreeMesh => tree.to_three_mesh(),
+            Layout::FirstCount | Layout::FirstCountAligned => Vec::new(),
+        };
+        let mut open = Vec::new();
+        let mut cost = |ray: Ray| {
+            let mut counts = TestCounts::default();
+            if nodes.is_empty() {
+                let prepared = PreparedRay::new(&ray);
+                let test = |id, t_max| triangles[id as usize].intersect(&prepared, t_max);
+                nearest_hit_by(tree, &ray, test, &mut counts);
+            } else {
+                first_hit(&nodes, &tree.prim_ids, triangles, &ray, &mut open, &mut counts);
+            }
+            // A visit of an inner node tests the boxes of two children.
+            0.5 * self.constants.traversal * counts.boxes as f64
+                + self.constants.intersection * counts.objects as f64
+        };
+        let mut costs = [0.0; 2];
+        for [inside, outside] in (0..RAYS).filter_map(|index| rays(&bounds, index)) {
+            costs[0] += cost(inside);
+            costs[1] += cost(outside);
+        }
+        costs
+    }
+}
+
+/// Returns a ray from a point of the box in any direction, and a ray to that point from outside.
+///
+/// Five coordinates are from the additive sequence of the generalised golden ratio, which covers
+/// its cube evenly. Source: Roberts 2018, 'The unreasonable effectiveness of quasirandom sequences'.
+fn rays(bounds: &Aabb, index: u32) -> Option<[Ray; 2]> {
+    /// The positive root of x⁶ = x + 1.
+    const RATIO: f64 = 1.134_724_138_401_519_4;
+    let mut step = 1.0;
+    let [x, y, z, height, turn] = [(); 5].map(|()| {
+        step /= RATIO;
+        let place = 0.5 + step * f64::from(index);
+        place - libm::floor(place)
+    });
+    let up = 1.0 - 2.0 * height;
+    let (sin, cos) = libm::sincos(TAU * turn);
+    let direction = DVec3::new(cos, sin, 0.0) * libm::sqrt(1.0 - up * up) + DVec3::Z * up;
+    let extent = bounds.extent();
+    let point = bounds.min.as_dvec3() + DVec3::new(x, y, z) * extent;
+    let centre = 0.5 * bounds.doubled_centroid();
+    let eye = centre + direction * extent.length();
+    let ray = |origin: DVec3, direction: DVec3| {
+        Ray::half_line(origin.as_vec3(), direction.try_normalize()?.as_vec3()).ok()
+    };
+    Some([ray(point, direction)?, ray(eye, point - eye)?])
+}
+
+/// What is left to do for a node of [`first_hit`].
+#[derive(Clone, Copy)]
+enum Step {
+    Enter(usize),
+    /// The second child, if the distance found in the first one does not exclude it.
+    Second(usize),
+    /// The nearer of the second child's hit and this distance.
+    Nearer(f32),
+}
+
+/// Returns the distance of the first hit, infinite without one, and counts the tests of the
+/// traversal of `three-mesh-bvh`: no hit shortens the ray, and a node's second child is left out
+/// only if the hit in the first one lies before its box along the node's axis.
+fn first_hit(
+    nodes: &[ThreeMeshNode],
+    ids: &[u32],
+    triangles: &[Triangle],
+    ray: &Ray,
+    open: &mut Vec<Step>,
+    counts: &mut TestCounts,
+) -> f32 {
+    let [origin, direction] = [ray.origin().as_dvec3(), ray.direction().as_dvec3()];
+    let inverse = direction.recip();
+    let mut boxes = 0;
+    let mut is_hit = |node: &ThreeMeshNode| {
+        boxes += 1;
+        let (mut low, mut high) = (0.0, f64::INFINITY);
+        for axis in 0..3 {
+            let [a, b] = [node.min, node.max]
+                .map(|corner| (f64::from(corner[axis]) - origin[axis]) * inverse[axis]);
+            // `max` and `min` leave out NaN, of a ray in the plane of a face.
+            low = f64::max(low, a.min(b));
+            high = f64::min(high, a.max(b));
+        }
+        low <= high
+    };
+    let children = |index: usize| {
+        let node = &nodes[index];
+        let axis = node.axis_or_count as usize;
+        let [low, high] = [index + 1, index + node.below as usize];
+        if direction[axis] >= 0.0 { (axis, low, high) } else { (axis, high, low) }
+    };
+    let prepared = PreparedRay::new(ray);
+    let mut found = f32::INFINITY;
+    open.push(Step::Enter(0));
+    while let Some(step) = open.pop() {
+        match step {
+            Step::Enter(index) if nodes[index].axis_or_count >= LEAF => {
+                let first = nodes[index].below as usize;
+                let leaf = &ids[first..][..(nodes[index].axis_or_count - LEAF) as usize];
+                counts.objects += leaf.len() as u64;
+                found = leaf
+                    .iter()
+                    .filter_map(|&id| triangles[id as usize].intersect(&prepared, ray.t_max()))
+                    .fold(f32::INFINITY, f32::min);
+            }
+            Step::Enter(index) => {
+                let (_, first, _) = children(index);
+                found = f32::INFINITY;
+                open.push(Step::Second(index));
+                if is_hit(&nodes[first]) {
+                    open.push(Step::Enter(first));
+                }
+            }
+            Step::Second(index) => {
+                let (axis, first, second) = children(index);
+                let point = origin[axis] + f64::from(found) * direction[axis];
+                let is_before = if second > first {
+                    point <= f64::from(nodes[second].min[axis])
+                } else {
+                    point >= f64::from(nodes[second].max[axis])
+                };
+                if !(found < f32::INFINITY && is_before) && is_hit(&nodes[second]) {
+                    open.extend([Step::Nearer(found), Step::Enter(second)]);
+                }
+            }
+            Step::Nearer(other) => found = found.min(other),
+        }
+    }
+    counts.boxes += boxes;
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collapse::tests::scene;
+    use crate::{Node, boxes, nearest_hit};
+    use alloc::vec;
+
+    #[test]
+    fn the_traversal_of_three_mesh_bvh_finds_the_nearest_hit() {
+        let (triangles, tree) = scene(300, 1);
+        let fitted = Target::THREE_MESH_BVH.fit(&tree);
+        let nodes = fitted.to_three_mesh();
+        let bounds = tree.root_aabb().unwrap();
+        let mut hits = 0;
+        for ray in (0..2000).flat_map(|index| rays(&bounds, index).unwrap()) {
+            let mut counts = TestCounts::default();
+            let ids = &fitted.prim_ids;
+            let found = first_hit(&nodes, ids, &triangles, &ray, &mut Vec::new(), &mut counts);
+            let expected = nearest_hit(&tree, &triangles, &ray);
+            assert_eq!(found, expected.map_or(f32::INFINITY, |hit| hit.t));
+            hits += usize::from(expected.is_some());
+            // The root's box is not tested, and both children of a visited node are at most.
+            assert!(counts.boxes >= 1 && counts.boxes < nodes.len() as u64);
+            assert!(counts.objects <= 300);
+        }
+        assert!((500..3500).contains(&hits), "{hits}");
+    }
+
+    #[test]
+    fn the_tree_with_fewer_tests_is_kept() {
+        let (triangles, poor) = scene(300, 1);
+        // Halves of halves of the triangles along an axis.
+        let mut sorted = poor.prim_ids.clone();
+        sorted.sort_by(|&a, &b| {
+            let [a, b] = [a, b].map(|id| triangles[id as usize].0[0].x);
+            a.total_cmp(&b)
+        });
+        let leaf = Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, 300)], prim_ids: sorted };
+        let mut good = Target { most_objects: 1, ..Target::OBVHS }.fit(&leaf);
+        good.refit(&boxes(&triangles));
+        for target in Target::ALL {
+            let better = target.fit_better(&good, &poor, &triangles);
+            assert!(better.is_searched(), "{target:?}: {:?}", better.gains);
+            assert!(better.gains.iter().all(|&gain| gain > 1.02), "{:?}", better.gains);
+            assert_eq!(better.tree, target.fit(&good), "{target:?}");
+            let worse = target.fit_better(&poor, &good, &triangles);
+            assert!(!worse.is_searched(), "{target:?}");
+            assert_eq!(worse.tree, better.tree, "{target:?}");
+            assert_eq!(target.fit_better(&poor, &poor, &triangles).gains, [1.0; 2]);
+        }
+        let empty = Target::OBVHS.fit_better(&Bvh::default(), &Bvh::default(), &[]);
+        assert!(empty.is_searched() && empty.tree.nodes.is_empty());
+    }
+}
