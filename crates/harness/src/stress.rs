@@ -157,13 +157,10 @@ fn panels(cells: &[Cell]) -> Vec<Panel> {
         }
         next += 1.0;
     }
-    let known =
-        |scene: &str| KINDS.iter().find(|(_, ids)| ids.iter().any(|id| scene.starts_with(id)));
-    let kind = |scene: &str| known(scene).map_or("Other cases", |(kind, _)| *kind);
-    let kinds = KINDS.iter().map(|(kind, _)| *kind).chain(["Other cases"]);
     let mut panels = Vec::new();
-    for name in kinds {
-        let own: Vec<&Cell> = cells.iter().filter(|cell| kind(&cell.scene) == name).collect();
+    for (name, ids) in KINDS {
+        let is_own = |cell: &&Cell| ids.iter().any(|id| cell.scene.starts_with(id));
+        let own: Vec<&Cell> = cells.iter().filter(is_own).collect();
         let mut scenes = distinct(own.iter().map(|cell| cell.scene.as_str()));
         let mut layers = Vec::new();
         if own.is_empty() {
@@ -191,4 +188,39 @@ fn panels(cells: &[Cell]) -> Vec<Panel> {
         panels.push(panel(name, x, Axis::rows(names.collect(), 20.0), layers));
     }
     panels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_title_and_the_figure_tell_a_broken_promise() {
+        let cell = |scene: &str, outcome| Cell {
+            scene: scene.into(),
+            method: "grasp".into(),
+            outcome,
+            ..Cell::default()
+        };
+        let made = |last| {
+            let folder = tempfile::tempdir().unwrap();
+            let cells = [cell("S01 empty", Class::Kept), cell("S02 one object", last)];
+            let path = folder.path().join("cells.csv");
+            std::fs::write(&path, to_bytes(&cells, &path).unwrap()).unwrap();
+            output(folder.path()).unwrap()
+        };
+        let finding = |last| made(last).finding.unwrap();
+        assert_eq!(finding(Class::Kept), "2 checks on 2 stiff and extreme cases: none fails");
+        assert_eq!(finding(Class::Broken), "1 of 2 checks on 2 stiff and extreme cases fail");
+        let figure = made(Class::Broken).figures.remove(0).1;
+        let layers = figure.panels[0].layers.iter().map(|layer| layer.name.as_str());
+        assert_eq!(layers.collect::<Vec<_>>()[4..], [OUTCOMES[0].0, OUTCOMES[2].0]);
+    }
+
+    #[test]
+    fn every_case_has_one_kind() {
+        let mut known = KINDS.iter().flat_map(|(_, ids)| *ids).collect::<Vec<_>>();
+        known.sort();
+        assert!(known.into_iter().eq(CASES.iter().map(|case| &case.id)));
+    }
 }

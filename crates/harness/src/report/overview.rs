@@ -117,3 +117,15 @@ fn finding(line: &[OverScenes]) -> String {
     let most = (1e3 * most).ceil() / 10.0;
     format!("Within {most} % of the best tree known after {seconds:.1} s")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_title_is_of_the_point_at_about_a_second_and_rounds_its_worst_scene_up() {
+        let at = |seconds, most| OverScenes { scenes: 2, seconds, gap: 0.0, least: 0.0, most };
+        let line = [at(0.1, 0.03), at(0.83, 0.0121), at(9.0, 0.002)];
+        assert_eq!(finding(&line), "Within 1.3 % of the best tree known after 0.8 s");
+    }
+}
