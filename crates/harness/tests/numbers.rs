@@ -160,7 +160,8 @@ fn facts() -> BTreeMap<&'static str, bool> {
             "peers",
             others_win("amd-epyc-25-1", "against=any mode, rays=bounce")
                 && others_win("amd-epyc-25-17", on_512)
-                && others_win("amd-epyc-25-1", "against=single calls, rays=primary or bounce"),
+                && others_win("amd-epyc-25-1", "against=single calls, rays=primary or bounce")
+                && speeds("amd-epyc-25-1", "against=single calls, rays=incoherent")[1] == 0,
         ),
     ])
 }
