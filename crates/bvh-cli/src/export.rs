@@ -1,7 +1,7 @@
 //! `bvh export`: writes a tree for the tracer of another library.
 
 use crate::Error;
-use crate::answer::{Answer, Form, gain, short, whole};
+use crate::answer::{Answer, Form, gain, whole};
 use crate::arguments::{output_file, reserve};
 use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
@@ -12,7 +12,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
 
 /// Write a tree for the tracer of another library: with the leaves that cost least there, no deeper
-/// than it accepts, and in its order. docs/INTEROP.md has the lines that load the file.
+/// than it accepts, and in its order; or a greedy tree, where its rays take fewer tests. docs/INTEROP.md has the lines that load the file.
 #[derive(Args, Clone, Debug)]
 pub struct ExportArgs {
     /// The tree file.
@@ -41,32 +41,39 @@ fn tracers() -> impl TypedValueParser<Value = Target> {
     })
 }
 
-/// Writes the file, and prints the cost of the tree there beside that of a greedy tree.
+/// Writes the better of the tree and a greedy one for the tracer, and prints how they compare.
 pub fn export(args: &ExportArgs) -> Result<(), Error> {
     output_file("--out", &args.out, "bin")?;
     let target = args.tracer;
     let scene = args.files.load(&args.scene)?;
     let (tree, _) = tree_file::load(&args.file, &scene)?;
-    let fitted = target.fit(&tree);
-    let bytes = target.bytes(&fitted, &scene.boxes);
-    reserve(&args.out, true, bytes.len())?.write(&[&bytes])?;
+    // Only triangles can be traced there.
+    let triangles = scene.triangles().map_err(|fault| Error::Usage(fault.to_string()))?;
     // The loaded tree is over the same boxes, so that these can be built over, too.
-    let greedy = muller_fellner::Config::default().build(&scene.boxes).unwrap_or(tree);
-    let cost = target.cost(&fitted);
-    let base = target.cost(&target.fit(&greedy));
-    let nodes = fitted.nodes.len();
+    let greedy = muller_fellner::Config::default().build(&scene.boxes).unwrap_or_default();
+    let better = target.fit_better(&tree, &greedy, triangles);
+    let bytes = target.bytes(&better.tree, &scene.boxes);
+    reserve(&args.out, true, bytes.len())?.write(&[&bytes])?;
+    let which = match better.is_searched() {
+        true => "this tree",
+        false => "a greedy tree instead, which takes fewer tests",
+    };
+    let [inside, outside] = better.gains;
+    let nodes = better.tree.nodes.len();
     let mut answer = Answer::new(args.form);
     answer.say(&format!(
-        "{}: {} nodes, cost of a ray {}, {} a greedy tree's {}",
+        "{}: {} nodes of {which}; tests of rays from inside the scene {} a greedy tree's, of rays \
+         from outside {}",
         args.out.display(),
         whole(nodes),
-        short(cost),
-        gain(cost, base),
-        short(base),
+        gain(1.0, inside),
+        gain(1.0, outside),
     ));
     answer.record("nodes", nodes);
-    answer.record("cost of a ray", cost);
-    answer.record("cost of a ray in a greedy tree", base);
+    answer.record("cost of a ray", target.cost(&better.tree));
+    answer.record("is searched", better.is_searched());
+    answer.record("tests of rays from inside, in a greedy tree over this one", inside);
+    answer.record("tests of rays from outside, in a greedy tree over this one", outside);
     answer.end();
     Ok(())
 }

@@ -1,22 +1,48 @@
-//! `bvh scenes`: lists the scenes that need no path.
+//! `bvh scenes`: lists the scenes that need no path, and gives them to other programs.
 
 use crate::Error;
 use crate::answer::{Answer, Form, whole};
+use crate::output::print_bytes;
 use bvh_scenes::builtin::stand_ins::STAND_INS;
 use bvh_scenes::{FETCHED, SPHERES, Scene, fetched_path};
 use serde_json::json;
+use std::fmt::Write;
 
 /// List the built-in scenes, their sizes, and the originals that they replace.
-#[derive(clap::Args, Clone, Copy, Debug)]
+#[derive(clap::Args, Clone, Debug)]
 pub struct ScenesArgs {
+    /// Print this scene's triangles as an OBJ file instead.
+    #[arg(value_name = "SCENE", conflicts_with = "json")]
+    pub scene: Option<String>,
     /// The form of the table.
     #[command(flatten)]
     pub form: Form,
 }
 
-/// Prints a table of the built-in scenes: their sizes, and the originals that they replace.
+/// Prints the table, or a scene.
 pub fn scenes(args: &ScenesArgs) -> Result<(), Error> {
-    let mut answer = Answer::new(args.form);
+    match &args.scene {
+        Some(name) => print_obj(&Scene::load(name)?),
+        None => print_table(args.form),
+    }
+}
+
+/// Prints corners in the fewest digits that are read back as the same bits.
+fn print_obj(scene: &Scene) -> Result<(), Error> {
+    let triangles = scene.triangles().map_err(|fault| Error::Usage(fault.to_string()))?;
+    let mut file = String::new();
+    for triangle in triangles {
+        for corner in triangle.0 {
+            let _ = writeln!(file, "v {} {} {}", corner.x, corner.y, corner.z);
+        }
+        file += "f -3 -2 -1\n";
+    }
+    print_bytes(file.as_bytes());
+    Ok(())
+}
+
+fn print_table(form: Form) -> Result<(), Error> {
+    let mut answer = Answer::new(form);
     answer.say(&line("name", "objects", "kind", "description"));
     let mut add = |name: &str, objects: Option<usize>, kind: &str, description: &str| {
         let count = objects.map_or_else(|| "not fetched".into(), whole);

@@ -132,7 +132,7 @@ fn every_command_of_a_block_names_what_is_there_and_is_read_by_the_program() {
 
 /// Asserts that the files in a command of the project exist.
 fn check_files(command: &[String], place: &str) {
-    let known = ["bvh", "c++", "cargo", "harness"];
+    let known = ["bvh", "c++", "cargo", "harness", "npm", "rustup"];
     let program = &command[0];
     assert!(
         known.contains(&program.as_str()) || program.starts_with("scripts/"),
