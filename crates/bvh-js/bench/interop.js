@@ -1,5 +1,6 @@
 // What rays cost in three-mesh-bvh with its own trees and with searched ones, into results/interop.
-//   npm run bench              tracer_tests.csv: counted tests, the same on every machine
+//   npm run bench              tracer_tests.csv: counted tests, the same on every machine, and in
+//                              tracer_gains.csv the cost of the library's best tree over the searched one's
 //   npm run bench -- --time    timing_tracers.csv, too: speeds, on a machine that does nothing else
 // Needs the program bvh (BVH names it; otherwise that of `cargo build --release`), and scripts/fetch-scenes.
 import { execFileSync } from 'node:child_process';
@@ -19,6 +20,8 @@ const WORK = 100_000_000;
 const COUNTED = 65_536;
 const TIMED = 16_384;
 const ROUNDS = 15;
+/** What a test of a box and of a triangle costs there, as in `Target::THREE_MESH_BVH`. */
+const [BOX, TRIANGLE] = [0.9, 1.25];
 
 /** Reads a scene that `bvh` knows. */
 function named(name) {
@@ -181,6 +184,7 @@ mkdirSync(folder, { recursive: true });
 const isTimed = process.argv.includes('--time');
 const only = process.argv.find((argument) => argument in scenes);
 let tests = 'tracer,scene,triangles,rays,count,tree,hits,box_tests,triangle_tests\n';
+let gains = 'tracer,scene,rays,over,gain\n';
 let timing = 'tracer,processor,scene,rays,count,rounds,over,tree,ratio_median,ratio_low,ratio_high\n';
 const tracer = 'three-mesh-bvh';
 for (const [name, scene] of Object.entries(scenes)) {
@@ -202,16 +206,23 @@ for (const [name, scene] of Object.entries(scenes)) {
         }
     }
     for (const [kind, rays] of Object.entries(kindsOf(scene, bounds, trees.get('default'), COUNTED))) {
+        const costs = new Map();
         for (const [tree, meshBVH] of trees) {
             const { hits, boxes, triangles: tested } = counted(kind, rays, meshBVH);
             tests += line([tracer, name, triangles, kind, rays.length, tree, hits, boxes, tested]);
+            costs.set(tree, BOX * boxes + TRIANGLE * tested);
+        }
+        const least = (isOne) => Math.min(...[...costs].filter(([tree]) => isOne(tree)).map(([, cost]) => cost));
+        for (const [over, isOne] of [['best', (tree) => tree.startsWith('SAH')], ['default', (tree) => tree === 'default']]) {
+            gains += line([tracer, name, kind, over, (least(isOne) / costs.get('searched')).toFixed(4)]);
         }
     }
     console.error(name);
 }
 if (only) {
-    process.stdout.write(tests + (isTimed ? timing : ''));
+    process.stdout.write(tests + gains + (isTimed ? timing : ''));
 } else {
     writeFileSync(new URL('tracer_tests.csv', folder), tests);
+    writeFileSync(new URL('tracer_gains.csv', folder), gains);
     if (isTimed) writeFileSync(new URL('timing_tracers.csv', folder), timing);
 }
