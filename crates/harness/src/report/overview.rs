@@ -78,8 +78,8 @@ impl Config {
         }
         let scenes = line.first().map_or(0, |at| at.scenes);
         let caption = format!(
-            "Cost above the cheapest tree that any run has found: median of {scenes} scenes, and \
-             from least to greatest. The optimum is below by an unknown distance."
+            "Cost above the cheapest known binary tree of whole objects: median of {scenes} \
+             scenes, and from least to greatest. How far the optimum is below is unknown."
         );
         let x = Axis::log("time on one thread").unit(Unit::Seconds);
         let y = Axis::log("").unit(Unit::Percent);
