@@ -6,9 +6,10 @@ mod obvhs;
 mod programs;
 mod rows;
 
+pub use crate::obvhs::Preset;
+
 use crate::obvhs::Obvhs;
-use bvh_core::Triangle;
-use bvh_core::{Aabb, Bvh};
+use bvh_core::{Aabb, Bvh, Triangle};
 use harness::Error;
 use harness::measure::contender::Contender;
 use harness::peers::{Built, Library, NamedBytes, Race, Raced};
@@ -17,8 +18,6 @@ use std::path::Path;
 
 /// The libraries that specs may name.
 pub const LIBRARIES: &[&dyn Library] = &[&bvh::Crate, &obvhs::Crate];
-
-pub use crate::obvhs::Preset;
 
 /// Embree and tinybvh, which need a C++ compiler: `scripts/ray-peers/build` makes their programs.
 pub struct RayPrograms;

@@ -126,8 +126,8 @@ pub fn build(config: &Obvhs, boxes: &[Aabb]) -> Built {
     tight(to_our_tree(&theirs, boxes), time.as_secs_f64(), boxes)
 }
 
-/// Makes a [`Trace`] from a tree over `triangles` in the order of
-/// its leaves. It is a macro because the library's trees share functions but no trait.
+/// Makes a [`Trace`] from a tree over `triangles` in the order of its leaves. It is a macro because
+/// the library's trees share functions but no trait.
 macro_rules! traced_by {
     ($tree:ident, $triangles:expr) => {{
         let triangles: Vec<RtTriangle> = $triangles;
