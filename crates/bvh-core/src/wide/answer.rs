@@ -1,7 +1,9 @@
-//! A batch of rays: where the rays are, which hits count, and where the answers go.
+//! What is asked of every ray of a batch, and where the answers go.
 
+use super::all_hits::Found;
 use super::layout::WideBvh;
 use crate::{Hit, Ray};
+use alloc::vec::Vec;
 
 /// The value of the parameter `ANY` of a traversal that ends a ray at the first hit that is found.
 pub(crate) const ANY_HIT: bool = true;
@@ -9,73 +11,75 @@ pub(crate) const ANY_HIT: bool = true;
 /// The value of `ANY` of a traversal that finds a ray's nearest hit.
 pub(crate) const NEAREST_HIT: bool = false;
 
-/// Returns whether a hit of the ray with this number counts.
-pub(crate) type Accept<'a> = dyn FnMut(usize, Hit) -> bool + 'a;
+/// A question about rays, with the place of the answers by the number of the ray.
+pub(crate) trait Find {
+    /// Whether the first hit that is found ends a ray.
+    const ANY: bool = false;
+    /// Whether every hit counts, and none shortens a ray.
+    const ALL: bool = false;
 
-/// The place of the answers to the rays of a batch, by the number of the ray.
-pub(crate) trait Answers {
     /// Writes the answer for a ray: the distance at which its traversal ended, and the hit object,
     /// `u32::MAX` for none.
     fn write(&mut self, number: usize, t: f32, object: u32);
 
-    /// Writes the answers for consecutive rays from number `first` on, likewise. Slices are equally
-    /// long.
-    fn write_lanes(&mut self, first: usize, distances: &[f32], objects: &[u32]) {
-        for (lane, (&t, &object)) in distances.iter().zip(objects).enumerate() {
-            self.write(first + lane, t, object);
-        }
-    }
+    /// Takes one of all hits.
+    fn append(&mut self, number: usize, hit: Hit);
+
+    /// Answers one ray by itself.
+    fn alone(&mut self, wide: &WideBvh, number: usize, ray: &Ray);
 }
 
-/// A batch of rays and of their answers.
-// Not generic over any of these: each kernel would be compiled once more for every kind of rays and
-// of answers. A call through a pointer per ray, or per vector of rays, takes no measurable time.
-pub(crate) struct Batch<'a> {
-    pub(crate) rays: &'a [Ray],
-    pub(crate) answers: &'a mut dyn Answers,
-    /// Decides which hits count. Without it all hits count.
-    pub(crate) accept: Option<&'a mut Accept<'a>>,
-}
+/// The nearest hit of every ray.
+pub(crate) struct Nearest<'a>(pub(crate) &'a mut [Hit]);
 
-impl<'a> Batch<'a> {
-    /// Returns a batch whose hits all count.
-    #[inline]
-    pub(crate) fn new(rays: &'a [Ray], answers: &'a mut dyn Answers) -> Self {
-        Self { rays, answers, accept: None }
-    }
-
-    /// Traces one ray by itself, and writes its answer. With `ANY` the first hit that is found ends
-    /// the ray.
-    pub(crate) fn alone<const ANY: bool>(&mut self, number: usize, wide: &WideBvh, ray: &Ray) {
-        let any = Hit { t: 0.0, object: 0 };
-        let hit = match (&mut self.accept, ANY) {
-            (None, false) => wide.nearest_hit(ray),
-            (None, true) => wide.any_hit(ray).then_some(any),
-            (Some(accept), false) => wide.nearest_hit_where(ray, |hit| accept(number, hit)),
-            (Some(accept), true) => {
-                wide.any_hit_where(ray, |hit| accept(number, hit)).then_some(any)
-            }
-        };
-        let Hit { t, object } = hit.unwrap_or(Hit::MISS);
-        self.answers.write(number, t, object);
-    }
-}
-
-/// The distance of a hit, infinite for none.
-#[inline(always)]
-fn distance(t: f32, object: u32) -> f32 {
-    if object == u32::MAX { f32::INFINITY } else { t }
-}
-
-// Slices have no known size, which a trait object needs, so references to slices are the answers.
-impl Answers for &mut [Hit] {
+impl Find for Nearest<'_> {
+    #[inline(always)]
     fn write(&mut self, number: usize, t: f32, object: u32) {
-        self[number] = Hit { t: distance(t, object), object };
+        let t = if object == u32::MAX { f32::INFINITY } else { t };
+        self.0[number] = Hit { t, object };
+    }
+
+    fn append(&mut self, _: usize, _: Hit) {}
+
+    fn alone(&mut self, wide: &WideBvh, number: usize, ray: &Ray) {
+        self.0[number] = wide.nearest_hit(ray).unwrap_or(Hit::MISS);
     }
 }
 
-impl Answers for &mut [bool] {
+/// Whether each ray hits anything.
+pub(crate) struct Any<'a>(pub(crate) &'a mut [bool]);
+
+impl Find for Any<'_> {
+    const ANY: bool = true;
+
+    #[inline(always)]
     fn write(&mut self, number: usize, _: f32, object: u32) {
-        self[number] = object != u32::MAX;
+        self.0[number] = object != u32::MAX;
+    }
+
+    fn append(&mut self, _: usize, _: Hit) {}
+
+    fn alone(&mut self, wide: &WideBvh, number: usize, ray: &Ray) {
+        self.0[number] = wide.any_hit(ray);
+    }
+}
+
+/// All hits of every ray, in no order; the hits of a divided triangle once for each of its leaves.
+pub(crate) struct All<'a>(pub(crate) &'a mut Vec<Found>);
+
+impl Find for All<'_> {
+    const ALL: bool = true;
+
+    fn write(&mut self, _: usize, _: f32, _: u32) {}
+
+    #[inline(always)]
+    fn append(&mut self, number: usize, hit: Hit) {
+        self.0.push(Found { number: number as u32, hit });
+    }
+
+    fn alone(&mut self, wide: &WideBvh, number: usize, ray: &Ray) {
+        let mut hits = Vec::new();
+        wide.append_hits(ray, &mut hits);
+        hits.into_iter().for_each(|hit| self.append(number, hit));
     }
 }

@@ -14,15 +14,17 @@
 //! No branch depends on one ray: its next step decides the list that it is appended to, and the
 //! order of hits and the children behind them are found without branches, too.
 
-use super::answer::{Accept, Batch};
+use super::all_hits::Decided;
+use super::answer::Find;
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{DeepStacks, SPARE, STACK};
-use super::lanes::{Lanes, Mask};
+use super::lanes::Lanes;
 use super::layout::{Child, WideBvh, WideNode};
+use super::pairs::Plane;
 use super::prepared::{Prepared, Ready, Test};
 use super::ray_lanes::{RayLanes, prefetch};
 use super::triangles::TriangleBlock;
-use crate::Hit;
+use crate::Ray;
 use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 use core::ops::Range;
@@ -31,26 +33,28 @@ use core::ops::Range;
 const FLIGHT: usize = 48;
 
 /// The maximum number of rays that are prepared at once.
-pub(super) const RAYS: usize = 16;
+const RAYS: usize = 16;
 
 /// Answers the rays of these numbers.
 #[inline(always)]
-pub(crate) unsafe fn trace<K: Instructions, const ANY: bool>(
+pub(crate) unsafe fn trace<K: Instructions, F: Find>(
     wide: &WideBvh,
-    batch: &mut Batch,
+    rays: &[Ray],
     numbers: Range<usize>,
+    find: &mut F,
 ) {
     const { assert!(K::Rays::N <= RAYS) };
     // No triangle has an area. The flight below expects that every ray visits something.
     if wide.root.is_none() {
         for number in numbers {
-            batch.answers.write(number, f32::INFINITY, u32::MAX);
+            find.write(number, f32::INFINITY, u32::MAX);
         }
         return;
     }
-    let flight = Flight::<K, ANY> {
+    let flight = Flight::<K, F> {
         wide,
-        batch,
+        rays,
+        find,
         from: numbers.start,
         end: numbers.end,
         ready: [MaybeUninit::uninit(); RAYS],
@@ -91,10 +95,11 @@ impl List {
 }
 
 /// The rays of a batch that are in flight, that are prepared, and that are neither.
-struct Flight<'a, 'b, K, const ANY: bool> {
+struct Flight<'a, K, F> {
     /// The layout at whose root rays start.
     wide: &'a WideBvh,
-    batch: &'a mut Batch<'b>,
+    rays: &'a [Ray],
+    find: &'a mut F,
     /// The numbers of the rays that have not been prepared.
     from: usize,
     end: usize,
@@ -109,10 +114,9 @@ struct Flight<'a, 'b, K, const ANY: bool> {
     instructions: PhantomData<K>,
 }
 
-impl<K: Instructions, const ANY: bool> Task<K> for Flight<'_, '_, K, ANY> {
+impl<K: Instructions, F: Find> Task<K> for Flight<'_, K, F> {
     type Output = ();
 
-    /// Traces all rays.
     #[inline(always)]
     unsafe fn run(mut self) {
         let mut traversals = MaybeUninit::<[Traversal; FLIGHT]>::uninit();
@@ -141,7 +145,7 @@ impl<K: Instructions, const ANY: bool> Task<K> for Flight<'_, '_, K, ANY> {
     }
 }
 
-impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
+impl<K: Instructions, F: Find> Flight<'_, K, F> {
     /// Starts the next rays in the idle places, as far as there are rays.
     #[inline(always)]
     unsafe fn start_idle(&mut self) {
@@ -173,7 +177,7 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
         let count = (self.end - from).min(K::Rays::N);
         self.from += count;
         let there = u32::MAX >> (32 - count);
-        let rays = self.batch.rays;
+        let rays = self.rays;
         // SAFETY: the processor has the instructions; `ready` has room for sixteen.
         unsafe {
             prefetch::<K>(rays, self.from + K::Rays::N);
@@ -189,7 +193,7 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
             let lane = others.trailing_zeros();
             let number = from + lane as usize;
             others &= others - 1;
-            self.batch.answers.write(number, f32::INFINITY, u32::MAX);
+            self.find.write(number, f32::INFINITY, u32::MAX);
         }
     }
 
@@ -228,7 +232,7 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
                 let traversal = &mut *self.at_nodes.get(i);
                 let node = traversal.node(self.wide);
                 let mask = *masks.get_unchecked(i);
-                if ANY {
+                if F::ANY || F::ALL {
                     traversal.enter_any::<K>(node, mask);
                 } else {
                     let entry = entries.get_unchecked(i).assume_init();
@@ -252,15 +256,14 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
             self.at_leaves.count = 0;
             let quarters = K::Rays::N / 4;
             let mut hopeful = List::EMPTY;
-            let accepts_all = self.batch.accept.is_none();
             for i in (0..count).step_by(quarters) {
                 let at = |k: usize| self.at_leaves.get((i + k).min(count - 1));
                 let four = [at(0), at(1), at(2), at(3)];
                 let (possible, sure) = candidates::<K::Rays>(self.wide, four);
                 for (k, &traversal) in four.iter().enumerate().take(quarters) {
                     let has = |pairs: u32| pairs >> (4 * k) & 0b1111 != 0;
-                    let is_hit = ANY && accepts_all && has(sure);
-                    if ANY {
+                    let is_hit = F::ANY && has(sure);
+                    if F::ANY {
                         let object = (*traversal).object;
                         (*traversal).object = if is_hit { 0 } else { object };
                     }
@@ -270,14 +273,13 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
             for i in (0..hopeful.count).step_by(quarters) {
                 let at = |k: usize| hopeful.get((i + k).min(hopeful.count - 1));
                 let four = [at(0), at(1), at(2), at(3)];
-                if let Some(accept) = &mut self.batch.accept {
+                if F::ALL {
                     // A traversal that only fills the lanes must not show its hits twice.
-                    let rays = &four[..quarters.min(hopeful.count - i)];
-                    decide_accepted::<K::Rays>(self.wide, rays, accept);
+                    self.append_hits(four, quarters.min(hopeful.count - i));
                 } else {
                     decide::<K::Rays>(self.wide, four);
                 }
-                if !ANY {
+                if !F::ANY && !F::ALL {
                     for &traversal in four.iter().take(quarters) {
                         (*traversal).drop_farther::<K>();
                     }
@@ -285,9 +287,29 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
             }
             for i in 0..count {
                 let traversal = &mut *self.at_leaves.get(i);
-                traversal.leave_block::<ANY>(self.wide);
+                traversal.leave_block(self.wide, F::ANY);
                 traversal.fetch::<K>(self.wide);
                 self.enlist(traversal);
+            }
+        }
+    }
+
+    /// Appends all hits of the first `count` rays in the blocks at which they are.
+    #[inline(always)]
+    unsafe fn append_hits(&mut self, four: [*mut Traversal; 4], count: usize) {
+        // SAFETY: the processor has the instructions; the rays are at blocks.
+        unsafe {
+            let tests = tests(self.wide, four);
+            let rays = Test::rays::<K::Rays>(tests);
+            let corners = Test::corners(tests);
+            let plane = Plane::of_lanes(&corners);
+            let candidates = rays.candidates(&corners);
+            let decided = rays.decide_in_f64(&corners, &plane, &candidates, ends(four));
+            let decided = Decided::new(decided);
+            for (i, test) in tests.iter().enumerate().take(count) {
+                let number = test.ray.number as usize;
+                let ray = &self.rays[number];
+                decided.hits_of(i, test.block, ray, |hit| self.find.append(number, hit));
             }
         }
     }
@@ -301,7 +323,7 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
             unsafe {
                 let traversal = self.at_end.get(i);
                 let Traversal { ray, t, object, .. } = &*traversal;
-                self.batch.answers.write(ray.number as usize, *t, *object);
+                self.find.write(ray.number as usize, *t, *object);
                 self.idle.append(traversal, true);
             }
         }
@@ -310,14 +332,14 @@ impl<K: Instructions, const ANY: bool> Flight<'_, '_, K, ANY> {
 
 /// The traversal of the layout by one ray.
 #[repr(C, align(64))]
-pub(super) struct Traversal {
-    pub(super) ray: Prepared,
+struct Traversal {
+    ray: Prepared,
     /// The nearest hit so far, or the end of the ray and `u32::MAX`.
-    pub(super) t: f32,
-    pub(super) object: u32,
+    t: f32,
+    object: u32,
     top: *mut Pending,
     /// The node or the block of triangles to visit next, or [`END`](Child::END).
-    pub(super) child: Child,
+    child: Child,
     /// [`END`](Child::END), the children that wait, the next block of the same leaf, and room for
     /// stores of whole registers: `frame`, or on the heap.
     stack: *mut Pending,
@@ -334,14 +356,13 @@ struct Frame([MaybeUninit<Pending>; STACK + SPARE]);
 impl Traversal {
     /// Chooses the stack of all rays that are started here: on the heap, or in the frame.
     #[inline(always)]
-    pub(super) unsafe fn set_stack(this: *mut Self, deep: Option<*mut Pending>) {
+    unsafe fn set_stack(this: *mut Self, deep: Option<*mut Pending>) {
         // SAFETY: the traversal exists; its fields need not be initialised to be named.
         unsafe { (*this).stack = deep.unwrap_or((&raw mut (*this).frame).cast()) };
     }
 
-    /// Starts a ray at the root.
     #[inline(always)]
-    pub(super) unsafe fn start<K: Instructions>(&mut self, ray: &Prepared, wide: &WideBvh) {
+    unsafe fn start<K: Instructions>(&mut self, ray: &Prepared, wide: &WideBvh) {
         self.t = ray.t_max;
         self.object = u32::MAX;
         // SAFETY: the processor has the instructions of `K`.
@@ -354,7 +375,6 @@ impl Traversal {
         }
     }
 
-    /// Goes on to what waits.
     #[inline(always)]
     unsafe fn pop(&mut self) {
         // SAFETY: the stack holds at least an end.
@@ -381,7 +401,7 @@ impl Traversal {
 
     /// Does the same where any order of the children will do.
     #[inline(always)]
-    pub(super) unsafe fn enter_any<K: Instructions>(&mut self, node: &WideNode, mask: u32) {
+    unsafe fn enter_any<K: Instructions>(&mut self, node: &WideNode, mask: u32) {
         // SAFETY: the stack holds at least an end, and has room for eight children.
         unsafe {
             K::compress(node, mask, self.top);
@@ -390,9 +410,8 @@ impl Traversal {
         }
     }
 
-    /// Returns the node at which the ray is.
     #[inline(always)]
-    pub(super) unsafe fn node<'a>(&self, wide: &'a WideBvh) -> &'a WideNode {
+    unsafe fn node<'a>(&self, wide: &'a WideBvh) -> &'a WideNode {
         // SAFETY: references are sound.
         unsafe { &*wide.nodes.as_ptr().add(self.child.index()) }
     }
@@ -407,7 +426,7 @@ impl Traversal {
     /// Goes on from a block of triangles: to the next one of the leaf, to what waits, or to the end
     /// if any hit will do and there is one.
     #[inline(always)]
-    unsafe fn leave_block<const ANY: bool>(&mut self, wide: &WideBvh) {
+    unsafe fn leave_block(&mut self, wide: &WideBvh, ends_at_hit: bool) {
         // SAFETY: a block that is not its leaf's last is followed by another; the stack holds at
         // least an end, and has room for one more.
         unsafe {
@@ -415,16 +434,15 @@ impl Traversal {
             let is_last = (*wide.blocks.as_ptr().add(block)).is_last();
             *self.top = u64::from(Child::leaf(block as u32 + 1).bits());
             self.top = self.top.add(usize::from(!is_last));
-            if ANY && self.object != u32::MAX {
+            if ends_at_hit && self.object != u32::MAX {
                 self.top = self.stack.add(1);
             }
             self.pop();
         }
     }
 
-    /// Fetches the next node or block of triangles from memory.
     #[inline(always)]
-    pub(super) unsafe fn fetch<K: Instructions>(&self, wide: &WideBvh) {
+    unsafe fn fetch<K: Instructions>(&self, wide: &WideBvh) {
         // SAFETY: a prefetch may name any address.
         unsafe { K::prefetch_bytes(wide.place(self.child), size_of::<WideNode>()) };
     }
@@ -447,26 +465,40 @@ unsafe fn tests(wide: &WideBvh, four: [*mut Traversal; 4]) -> [Test<'_>; 4] {
 /// bit for each that it certainly hits: four bits per ray.
 #[inline(always)]
 unsafe fn candidates<L: Lanes>(wide: &WideBvh, four: [*mut Traversal; 4]) -> (u32, u32) {
+    // SAFETY: the processor has the instructions; the rays are at blocks.
+    unsafe {
+        let tests = tests(wide, four);
+        let rays = Test::rays::<L>(tests);
+        rays.within(&rays.candidates(&Test::corners(tests)), ends(four))
+    }
+}
+
+/// Returns the distances and the objects of the nearest hits so far, in the first two lanes of each
+/// quarter.
+#[inline(always)]
+unsafe fn nearest<L: Lanes>(four: [*mut Traversal; 4]) -> L {
     // SAFETY: the processor has the instructions; the fields of a traversal from its distance on
     // are four aligned lanes.
     unsafe {
         let row = |i: usize| (&raw const (*four[i]).t);
-        let t_max = L::load_quarters([row(0), row(1), row(2), row(3)]).spread::<0>();
-        let tests = tests(wide, four);
-        let rays = Test::rays::<L>(tests);
-        rays.within(&rays.candidates(&Test::corners(tests)), t_max)
+        L::load_quarters([row(0), row(1), row(2), row(3)])
     }
+}
+
+/// Returns the distances beyond which hits do not count.
+#[inline(always)]
+unsafe fn ends<L: Lanes>(four: [*mut Traversal; 4]) -> L {
+    // SAFETY: the processor has the instructions.
+    unsafe { nearest::<L>(four).spread::<0>() }
 }
 
 /// Gives every ray the nearest hit among the hit it has and those in the block at which it is, by
 /// [`Hit::precedes`](crate::Hit::precedes) and without a branch.
 #[inline(always)]
 unsafe fn decide<L: Lanes>(wide: &WideBvh, four: [*mut Traversal; 4]) {
-    // SAFETY: the processor has the instructions; ids are four aligned lanes, and so are the fields of a
-    // traversal from its distance on.
+    // SAFETY: the processor has the instructions; ids are four aligned lanes.
     unsafe {
-        let row = |i: usize| (&raw const (*four[i]).t);
-        let before = L::load_quarters([row(0), row(1), row(2), row(3)]);
+        let before = nearest::<L>(four);
         let t_max = before.spread::<0>();
         let tests = tests(wide, four);
         let corners = Test::corners::<L>(tests);
@@ -494,41 +526,6 @@ unsafe fn decide<L: Lanes>(wide: &WideBvh, four: [*mut Traversal; 4]) {
     }
 }
 
-/// Gives every ray the nearest hit that `accept` accepts, among the hit it has and those in the
-/// block at which it is.
-#[inline(always)]
-unsafe fn decide_accepted<L: Lanes>(wide: &WideBvh, rays: &[*mut Traversal], accept: &mut Accept) {
-    let last = rays.len() - 1;
-    let four = [rays[0], rays[1.min(last)], rays[2.min(last)], rays[3.min(last)]];
-    // SAFETY: the processor has the instructions; the fields of a traversal from its distance on are
-    // four aligned lanes.
-    unsafe {
-        let row = |i: usize| (&raw const (*four[i]).t);
-        let t_max = L::load_quarters([row(0), row(1), row(2), row(3)]).spread::<0>();
-        let tests = tests(wide, four);
-        let (inside, t) = Test::rays::<L>(tests).decide_alone(&Test::corners(tests), t_max);
-        let mut distances = [0.0; 16];
-        t.store(distances.as_mut_ptr());
-        for (i, &traversal) in rays.iter().enumerate() {
-            let traversal = &mut *traversal;
-            let mut hits = inside.bits() >> (4 * i) & 0b1111;
-            while hits != 0 {
-                let lane = hits.trailing_zeros() as usize;
-                hits &= hits - 1;
-                let hit = Hit { t: distances[4 * i + lane], object: tests[i].block.id(lane) };
-                let nearest = Hit { t: traversal.t, object: traversal.object };
-                // An unused lane repeats a triangle, which may have been rejected.
-                let is_nearer = !hit.is_miss() && hit.precedes(&nearest);
-                if is_nearer && accept(traversal.ray.number as usize, hit) {
-                    traversal.t = hit.t;
-                    traversal.object = hit.object;
-                }
-            }
-        }
-    }
-}
-
-/// Returns the lower of two ids.
 #[inline(always)]
 fn lower<L: Lanes>(a: L, b: L) -> L {
     L::select(a.below(b), a, b)

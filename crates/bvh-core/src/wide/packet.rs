@@ -6,7 +6,7 @@
 //! volume hierarchies'; Overbeck, Ramamoorthi & Mark 2008, 'Large ray packets for real-time Whitted
 //! ray tracing' (ranged traversal).
 
-use super::answer::{Accept, Batch};
+use super::answer::{ANY_HIT, Find, NEAREST_HIT};
 use super::instructions::{Instructions, Task};
 use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::{Lanes, Mask};
@@ -16,8 +16,8 @@ use super::pairs::Plane;
 use super::pinhole::{Seen, one_origin};
 use super::ray_lanes::{RayBounds, RayLanes};
 use super::triangles::TriangleBlock;
+use crate::Aabb;
 use crate::slabs::{FAR, NEAR};
-use crate::{Aabb, Hit};
 use core::mem::MaybeUninit;
 use glam::Vec3;
 
@@ -47,7 +47,6 @@ struct Parent {
 }
 
 impl<K: Instructions> Packet<K> {
-    /// Returns a packet without rays.
     #[inline(always)]
     pub(crate) unsafe fn new() -> Self {
         Self {
@@ -81,17 +80,15 @@ impl<K: Instructions> Packet<K> {
         self.count += 1;
     }
 
-    /// Traces the packet, writes its answers, and empties it. With `ANY` a ray ends at its first
-    /// hit, which need not be the nearest.
+    /// Traces the packet, writes its answers, and empties it.
     #[inline(always)]
-    pub(crate) unsafe fn trace<const ANY: bool>(&mut self, wide: &WideBvh, batch: &mut Batch) {
+    pub(crate) unsafe fn trace<F: Find>(&mut self, wide: &WideBvh, find: &mut F) {
         // SAFETY: the processor has the instructions.
-        unsafe { K::call(Trace::<K, ANY> { packet: self, wide, batch }) };
+        unsafe { K::call(Trace { packet: self, wide, find }) };
     }
 
-    /// Writes the answers.
     #[inline(always)]
-    unsafe fn write(&self, batch: &mut Batch) {
+    unsafe fn write(&self, find: &mut impl Find) {
         const { assert!(K::Rays::N <= 16) };
         let mut distances = [0.0; 16];
         let mut objects = [0; 16];
@@ -103,8 +100,10 @@ impl<K: Instructions> Packet<K> {
                 vector.object.store(objects.as_mut_ptr().cast());
                 vector.first
             };
-            let lanes = ..K::Rays::N;
-            batch.answers.write_lanes(first, &distances[lanes], &objects[lanes]);
+            for (lane, (&t, &object)) in distances.iter().zip(&objects).enumerate().take(K::Rays::N)
+            {
+                find.write(first + lane, t, object);
+            }
         }
     }
 
@@ -114,7 +113,6 @@ impl<K: Instructions> Packet<K> {
         wide: &WideBvh,
         root: Child,
         culling: &Culling<K::Boxes>,
-        batch: &mut Batch,
     ) {
         // SAFETY: the references of the layout are sound, and its stacks large enough.
         unsafe {
@@ -156,16 +154,7 @@ impl<K: Instructions> Packet<K> {
                     }
                 } else {
                     let block = blocks.add(child.index());
-                    let accept = &mut batch.accept;
-                    let is_hit = self.visit_leaf::<ANY>(
-                        first,
-                        entered,
-                        &planes,
-                        block,
-                        &wide.bounds,
-                        accept,
-                    );
-                    if is_hit {
+                    if self.visit_leaf::<ANY>(first, entered, &planes, block, &wide.bounds) {
                         farthest = self.farthest();
                         end = key_of(farthest);
                         if ANY && farthest < 0.0 {
@@ -202,7 +191,6 @@ impl<K: Instructions> Packet<K> {
         }
     }
 
-    /// Returns the greatest distance at which a ray may still have a nearer hit.
     #[inline(always)]
     unsafe fn farthest(&self) -> f32 {
         // SAFETY: as many vectors are written as are counted.
@@ -248,26 +236,30 @@ unsafe fn fetch<K: Instructions>(wide: &WideBvh, node: &WideNode, mut mask: u32)
 }
 
 /// A packet to trace.
-struct Trace<'p, 'a, K: Instructions, const ANY: bool> {
-    packet: &'p mut Packet<K>,
-    wide: &'p WideBvh,
-    batch: &'p mut Batch<'a>,
+struct Trace<'a, K: Instructions, F> {
+    packet: &'a mut Packet<K>,
+    wide: &'a WideBvh,
+    find: &'a mut F,
 }
 
-impl<K: Instructions, const ANY: bool> Task<K> for Trace<'_, '_, K, ANY> {
+impl<K: Instructions, F: Find> Task<K> for Trace<'_, K, F> {
     type Output = ();
 
     #[inline(always)]
     unsafe fn run(self) {
-        let Self { packet, wide, batch } = self;
+        let Self { packet, wide, find } = self;
         // SAFETY: the processor has the instructions.
         unsafe {
             let culling = Culling::<K::Boxes>::new(&packet.bounds, packet.octant);
             packet.origin = one_origin(&packet.bounds, &wide.bounds);
             if let Some(root) = wide.root {
-                packet.traverse::<ANY>(wide, root, &culling, batch);
+                if F::ANY {
+                    packet.traverse::<ANY_HIT>(wide, root, &culling);
+                } else {
+                    packet.traverse::<NEAREST_HIT>(wide, root, &culling);
+                }
             }
-            packet.write(batch);
+            packet.write(find);
             packet.count = 0;
             packet.bounds = RayBounds::none();
         }
@@ -292,9 +284,8 @@ impl<K: Instructions> Packet<K> {
         planes: &[[f32; 2]; 3],
         block: *const TriangleBlock,
         bounds: &Aabb,
-        accept: &mut Option<&mut Accept>,
     ) -> bool {
-        if let (false, Some(origin), None) = (ANY, self.origin, &accept) {
+        if let (false, Some(origin)) = (ANY, self.origin) {
             // SAFETY: as for this function.
             return unsafe { self.visit_leaf_from(origin, first, entered, planes, block, bounds) };
         }
@@ -306,7 +297,7 @@ impl<K: Instructions> Packet<K> {
                     entered = self.enter(i, planes);
                 }
                 if entered != 0 {
-                    is_hit |= self.test::<ANY>(i, entered, block, bounds, accept);
+                    is_hit |= self.test::<ANY>(i, entered, block, bounds);
                 }
             }
         }
@@ -354,7 +345,6 @@ impl<K: Instructions> Packet<K> {
         entered: u32,
         block: *const TriangleBlock,
         bounds: &Aabb,
-        accept: &mut Option<&mut Accept>,
     ) -> bool {
         // SAFETY: the processor has the instructions; a block that is not its leaf's last is followed by
         // another.
@@ -369,7 +359,7 @@ impl<K: Instructions> Packet<K> {
                     let corners = (*block).splat_corners::<K::Rays>(lane, vector.axes);
                     let mut candidates = pairs.candidates(&corners);
                     candidates.possible &= entered;
-                    if ANY && accept.is_none() {
+                    if ANY {
                         let (possible, sure) = pairs.within(&candidates, vector.t);
                         if sure != 0 {
                             is_hit = true;
@@ -388,7 +378,7 @@ impl<K: Instructions> Packet<K> {
                     let (inside, t) = pairs.decide(&corners, &plane, &candidates, vector.t);
                     let inside = inside & t.mask(entered);
                     let object = t.filled_with_bits((*block).id(lane));
-                    let mut hits = if ANY {
+                    let hits = if ANY {
                         inside
                     } else {
                         t.lt(vector.t) & inside
@@ -397,10 +387,7 @@ impl<K: Instructions> Packet<K> {
                     if hits.bits() == 0 {
                         continue;
                     }
-                    if let Some(accept) = accept {
-                        hits = accepted(accept, vector.first, hits, t, (*block).id(lane));
-                    }
-                    is_hit |= hits.bits() != 0;
+                    is_hit = true;
                     // A ray that has its answer ends before it begins.
                     let t = if ANY { t.filled(-1.0) } else { t };
                     vector.t = Lanes::select(hits, t, vector.t);
@@ -412,35 +399,6 @@ impl<K: Instructions> Packet<K> {
                 block = block.add(1);
             }
         }
-    }
-}
-
-/// Returns the hits with one object that `accept` accepts. The ray of the first lane is number
-/// `first` of its batch.
-#[inline(always)]
-unsafe fn accepted<L: Lanes>(
-    accept: &mut Accept,
-    first: usize,
-    hits: L::Mask,
-    t: L,
-    object: u32,
-) -> L::Mask {
-    let found = hits.bits();
-    let mut distances = [0.0; 16];
-    let mut left = found;
-    let mut accepted = found;
-    // SAFETY: there is room for sixteen lanes; the processor has the instructions.
-    unsafe {
-        t.store(distances.as_mut_ptr());
-        while left != 0 {
-            let lane = left.trailing_zeros() as usize;
-            left &= left - 1;
-            let hit = Hit { t: distances[lane], object };
-            if !accept(first + lane, hit) {
-                accepted ^= 1 << lane;
-            }
-        }
-        if accepted == found { hits } else { t.mask(accepted) }
     }
 }
 
@@ -460,7 +418,6 @@ pub(super) struct Culling<L> {
 }
 
 impl<L: Lanes> Culling<L> {
-    /// Returns the bounds of rays of one octant.
     #[inline(always)]
     pub(super) unsafe fn new<R: Lanes>(bounds: &RayBounds<R>, octant: u32) -> Self {
         // SAFETY: the processor has the instructions.

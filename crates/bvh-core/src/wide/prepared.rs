@@ -54,7 +54,6 @@ pub(crate) struct Prepared {
 }
 
 impl<L: Lanes> Ready<L> {
-    /// Rays for a layout.
     #[inline(always)]
     pub(crate) fn new(rays: RayLanes<L>, wide: &WideBvh) -> Self {
         let reach = rays.reach(&wide.bounds);
@@ -83,7 +82,6 @@ impl<L: Lanes> Ready<L> {
         entry.le(exit).bits() | self.far
     }
 
-    /// Returns the rays that run backwards along an axis.
     #[inline(always)]
     fn backwards(&self, axis: usize) -> L::Mask {
         let inverse = self.rays.inverse[axis];
@@ -138,7 +136,6 @@ impl Prepared {
         }
     }
 
-    /// Four lanes of it.
     #[inline(always)]
     fn row(&self, row: usize) -> *const f32 {
         (&raw const *self).cast::<f32>().wrapping_add(4 * row)
@@ -237,21 +234,6 @@ impl Test<'_> {
             ])
         };
         three_by_three(of)
-    }
-
-    /// Returns the ends of the rays' ranges.
-    #[inline(always)]
-    pub(crate) unsafe fn ends<L: Lanes>(four: [Self; 4]) -> L {
-        // SAFETY: rows are four aligned lanes.
-        let row = unsafe {
-            L::load_quarters([
-                four[0].ray.row(1),
-                four[1].ray.row(1),
-                four[2].ray.row(1),
-                four[3].ray.row(1),
-            ])
-        };
-        row.spread::<3>()
     }
 }
 

@@ -1,8 +1,8 @@
-//! Filters of hits, ray by ray and in batches, by every kernel.
+//! Filters of hits by every kernel.
 
-use crate::support::layouts::{bundles, layouts};
+use crate::support::layouts::layouts;
 use crate::support::{Random, rays, soup};
-use bvh_core::{Coherence, Hit, PreparedRay, Ray, Triangle};
+use bvh_core::{Hit, PreparedRay, Ray, Triangle};
 
 /// Returns all hits of a ray, in the order of their objects.
 fn all_hits(triangles: &[Triangle], ray: &Ray) -> Vec<Hit> {
@@ -48,51 +48,4 @@ fn a_filter_passes_over_hits_and_sees_all_of_them_if_it_accepts_none() {
         several += usize::from(all.len() > 1);
     }
     assert!(found > 300 && several > 100, "{found} {several}");
-}
-
-#[test]
-fn a_filter_of_a_batch_sees_the_number_of_the_ray_with_each_hit() {
-    let mut random = Random(10);
-    let triangles = soup(150, &mut random);
-    let layouts = layouts(&triangles, &mut random);
-    // Packets, single rays between them, and a length that fills no vector.
-    let mut rays = rays(&triangles, 501, &mut random);
-    rays.extend(bundles(&triangles, 40, &mut random));
-    let all: Vec<Vec<Hit>> = rays.iter().map(|ray| all_hits(&triangles, ray)).collect();
-    let is_kept = |number: usize, hit: &Hit| !(hit.object as usize + number).is_multiple_of(3);
-    let expected: Vec<Hit> = (0..)
-        .zip(&all)
-        .map(|(number, hits)| {
-            let kept = hits.iter().filter(|hit| is_kept(number, hit));
-            nearest(kept).unwrap_or(Hit::MISS)
-        })
-        .collect();
-    let differ = (0..)
-        .zip(&all)
-        .filter(|(number, hits)| nearest(hits.iter()).is_some_and(|hit| !is_kept(*number, &hit)));
-    assert!(differ.count() > 100);
-    for (kernel, layout) in &layouts {
-        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
-            let case = format!("{kernel:?}, {coherence:?}");
-            let mut hits = vec![Hit::MISS; rays.len()];
-            let mut any = vec![false; rays.len()];
-            layout.nearest_hits_where(&rays, &mut hits, coherence, |number, hit| {
-                is_kept(number, &hit)
-            });
-            layout.any_hits_where(&rays, &mut any, coherence, |number, hit| is_kept(number, &hit));
-            assert_eq!(hits, expected, "{case}");
-            let has_hit: Vec<bool> = expected.iter().map(|hit| !hit.is_miss()).collect();
-            assert_eq!(any, has_hit, "{case}");
-            let mut seen = vec![Vec::new(); rays.len()];
-            layout.nearest_hits_where(&rays, &mut hits, coherence, |number, hit| {
-                seen[number].push(hit);
-                false
-            });
-            for hits in &mut seen {
-                hits.sort_by_key(|hit| hit.object);
-            }
-            assert_eq!(seen, all, "{case}");
-            assert!(hits.iter().all(Hit::is_miss), "{case}");
-        }
-    }
 }
