@@ -8,7 +8,6 @@
 //! |---|---|---|
 //! | objects that may overlap a box or a sphere, or may contain a point | [`overlapping`] | boxes that do, and their siblings |
 //! | the object nearest to a point | [`nearest`] | about O(log n) for objects that are spread out |
-//! | the k objects nearest to a point | [`k_nearest`] | about O(k + log n) for such objects |
 //!
 //! Both use the tree. The [wide layout](crate::WideBvh) is faster, but omits triangles without
 //! area: its [`closest_points`](crate::WideBvh::closest_points) and
@@ -33,9 +32,7 @@
 //! ```
 
 use crate::{Aabb, BvhView, NodeKind, Sphere};
-use alloc::collections::BTreeSet;
-use alloc::{vec, vec::Vec};
-use core::cmp::Ordering;
+use alloc::vec::Vec;
 use core::ops::ControlFlow;
 use glam::{DVec3, Vec3};
 
@@ -126,19 +123,12 @@ pub struct Near {
     pub distance_squared: f64,
 }
 
-impl Eq for Near {}
-
-impl PartialOrd for Near {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Near {
-    /// Compares distances, then ids.
-    fn cmp(&self, other: &Self) -> Ordering {
-        let by_distance = self.distance_squared.total_cmp(&other.distance_squared);
-        by_distance.then(self.object.cmp(&other.object))
+impl Near {
+    /// Returns whether this object is nearer, or as near and of a lower id.
+    #[inline(always)]
+    pub(crate) fn precedes(&self, other: &Self) -> bool {
+        self.distance_squared < other.distance_squared
+            || self.distance_squared == other.distance_squared && self.object < other.object
     }
 }
 
@@ -152,67 +142,39 @@ pub fn nearest<'t>(
     tree: impl Into<BvhView<'t>>,
     point: impl Into<Vec3>,
     limit: f64,
-    distance_squared: impl FnMut(u32) -> Option<f64>,
-) -> Option<Near> {
-    k_nearest(tree, point, 1, limit, distance_squared).pop()
-}
-
-/// Returns the `k` objects nearest to `point`, the nearest first. There may be fewer than `k`
-/// objects within `limit`. Everything else is as for [`nearest`].
-pub fn k_nearest<'t>(
-    tree: impl Into<BvhView<'t>>,
-    point: impl Into<Vec3>,
-    k: usize,
-    limit: f64,
     mut distance_squared: impl FnMut(u32) -> Option<f64>,
-) -> Vec<Near> {
+) -> Option<Near> {
     let tree = tree.into();
     let point = point.into();
-    // A set, because a divided object is in several leaves.
-    let mut found: BTreeSet<Near> = BTreeSet::new();
-    if k == 0 || limit.is_nan() {
-        return vec![];
-    }
+    let mut nearest: Option<Near> = None;
     // Nodes with lower bounds of the distances of their objects.
     let mut open: Vec<(f64, usize)> = Vec::new();
     if let Some(root) = tree.nodes.first() {
         open.push((least_distance_squared(&root.aabb, point), 0));
     }
-    while let Some((distance, index)) = open.pop() {
-        // Only objects nearer than the worst of `k` objects matter.
-        let most = match found.last() {
-            Some(worst) if found.len() == k => worst.distance_squared,
-            _ => limit,
-        };
-        if distance > most {
-            continue;
-        }
+    while let Some((bound, index)) = open.pop() {
+        let most = nearest.map_or(limit, |nearest| nearest.distance_squared);
         let node = &tree.nodes[index];
-        if !node.is_leaf() {
-            let first_child = open.len();
-            for child in node.children() {
-                let bound = least_distance_squared(&tree.nodes[child].aabb, point);
-                if bound <= most {
-                    open.push((bound, child));
-                }
-            }
-            // The nearest child last, so that it is visited next.
-            open[first_child..].sort_by(|a, b| {
-                let by_distance = b.0.total_cmp(&a.0);
-                by_distance.then(b.1.cmp(&a.1))
-            });
+        if bound > most {
             continue;
         }
-        for &object in &tree.prim_ids[node.prims()] {
-            if let Some(distance_squared) = distance_squared(object)
-                && distance_squared <= limit
-            {
-                found.insert(Near { object, distance_squared });
+        let first_child = open.len();
+        for child in node.children() {
+            let bound = least_distance_squared(&tree.nodes[child].aabb, point);
+            if bound <= most {
+                open.push((bound, child));
             }
-            if found.len() > k {
-                found.pop_last();
+        }
+        // The nearest child last, so that it is visited next.
+        open[first_child..].sort_by(|a, b| b.0.total_cmp(&a.0));
+        for &object in &tree.prim_ids[node.prims()] {
+            if let Some(distance_squared) = distance_squared(object) {
+                let near = Near { object, distance_squared };
+                if distance_squared <= limit && nearest.is_none_or(|other| near.precedes(&other)) {
+                    nearest = Some(near);
+                }
             }
         }
     }
-    found.into_iter().collect()
+    nearest
 }

@@ -30,7 +30,6 @@
 use crate::{BvhView, Triangle};
 use alloc::collections::{BinaryHeap, VecDeque};
 use alloc::vec::Vec;
-use core::cmp::Ordering;
 use core::f64::consts::PI;
 use core::ops::Range;
 use glam::{DMat3, DVec3, Vec3};
@@ -156,37 +155,11 @@ fn solid_angle(triangle: &Triangle, point: DVec3) -> f64 {
     2.0 * libm::atan2(volume, cosines)
 }
 
-/// A patch whose solid angle is estimated, ordered by its error.
-struct Estimated {
-    error: f64,
-    value: f64,
-    patch: u32,
-}
-
-impl Ord for Estimated {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.error.total_cmp(&other.error).then(self.patch.cmp(&other.patch))
-    }
-}
-
-impl PartialOrd for Estimated {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Estimated {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Estimated {}
-
 /// The patches that are estimated, and those to be opened. Room that points share.
 #[derive(Default)]
 pub(crate) struct Open {
-    estimated: BinaryHeap<Estimated>,
+    /// The bits of each error, none of which is negative, with the patch and the bits of its value.
+    estimated: BinaryHeap<(u64, u32, u64)>,
     near: Vec<u32>,
 }
 
@@ -263,7 +236,7 @@ impl Winding {
                 if let Some([value, bound]) = patch.estimate(point) {
                     angle += value;
                     error += bound;
-                    open.estimated.push(Estimated { error: bound, value, patch: index });
+                    open.estimated.push((bound.to_bits(), index, value.to_bits()));
                 } else {
                     angle += self.opened(patch, point, &mut open.near);
                 }
@@ -272,10 +245,10 @@ impl Winding {
             if size.abs() > error + SLACK {
                 return size > 0.0;
             }
-            let Some(largest) = open.estimated.pop() else { return size > 0.0 };
-            angle -= largest.value;
-            error -= largest.error;
-            angle += self.opened(&self.patches[largest.patch as usize], point, &mut open.near);
+            let Some((bound, patch, value)) = open.estimated.pop() else { return size > 0.0 };
+            angle -= f64::from_bits(value);
+            error -= f64::from_bits(bound);
+            angle += self.opened(&self.patches[patch as usize], point, &mut open.near);
         }
     }
 

@@ -45,7 +45,7 @@ impl Nearest {
     #[inline(always)]
     fn offer(&mut self, object: u32, offset: DVec3) {
         let near = Near { object, distance_squared: offset.length_squared() };
-        if near < self.near {
+        if near.precedes(&self.near) {
             self.near = near;
             self.offset = offset;
         }
@@ -338,7 +338,6 @@ fn offset<D: DoubleLanes>(a: Vector<D>, b: Vector<D>, c: Vector<D>) -> Vector<D>
     select(is_inside, inside, nearest)
 }
 
-/// Returns the points of segments nearest to zero.
 #[inline(always)]
 fn nearest_of_edge<D: DoubleLanes>(from: Vector<D>, to: Vector<D>) -> Vector<D> {
     let [fx, fy, fz] = from;
@@ -365,7 +364,6 @@ fn select<D: DoubleLanes>(mask: D::Mask, yes: Vector<D>, no: Vector<D>) -> Vecto
     [x, y, z]
 }
 
-/// Returns the points of boxes that are nearest to points.
 #[inline(always)]
 fn into_box<D: DoubleLanes>(point: Vector<D>, min: Vector<D>, max: Vector<D>) -> Vector<D> {
     lesser(max, greater(min, point))

@@ -71,8 +71,9 @@ impl Instance {
     /// Returns the boxes of all instances in the scene's coordinates, in the same order, for any
     /// builder. They do not depend on the trees of the parts.
     pub fn boxes(instances: &[Self], parts: &[WideBvh]) -> Result<Vec<Aabb>, InvalidInstances> {
-        let numbered = instances.iter().enumerate();
-        numbered.map(|(index, instance)| Ok(instance.check(index, parts)?.1)).collect()
+        (instances.iter().enumerate())
+            .map(|(index, instance)| Ok(instance.check(index, parts)?.1))
+            .collect()
     }
 
     /// Checks the instance, and returns its inverse transform and its box. `instance` is its index,
@@ -143,13 +144,6 @@ fn transformed(transform: &DAffine3, aabb: &Aabb) -> Aabb {
 /// The growth of a transformed box: 8u, as a part of the largest coordinate on the way.
 const ROUNDING: f64 = 8.0 * (f32::EPSILON / 2.0) as f64;
 
-/// Prepares all instances for rays.
-fn place_all(instances: &[Instance], parts: &[WideBvh]) -> Result<Vec<Placed>, InvalidInstances> {
-    let outlines: Vec<Vec<Aabb>> = parts.iter().map(WideBvh::outline).collect();
-    let numbered = instances.iter().enumerate();
-    numbered.map(|(index, instance)| instance.place(index, parts, &outlines)).collect()
-}
-
 /// An instance that is prepared for rays.
 #[derive(Clone, Copy, Debug)]
 struct Placed {
@@ -206,7 +200,10 @@ impl Instances {
         instances: Vec<Instance>,
         top: Bvh,
     ) -> Result<Self, InvalidInstances> {
-        let placed = place_all(&instances, &parts)?;
+        let outlines: Vec<Vec<Aabb>> = parts.iter().map(WideBvh::outline).collect();
+        let placed: Vec<Placed> = (instances.iter().enumerate())
+            .map(|(index, instance)| instance.place(index, &parts, &outlines))
+            .collect::<Result<_, _>>()?;
         let bounds: Vec<Aabb> = placed.iter().map(|placed| placed.bounds).collect();
         validate(&top, &bounds)?;
         Ok(Self { parts, placed, top })
@@ -214,15 +211,6 @@ impl Instances {
 
     fn part_of(&self, instance: u32) -> &WideBvh {
         &self.parts[self.placed[instance as usize].part as usize]
-    }
-
-    /// Returns the ray in the coordinates of an instance's part. Returns `None` if the instance's
-    /// transform makes the direction vanish or overflow; such a ray does not hit the instance.
-    ///
-    /// # Panics
-    /// Panics if there is no such instance.
-    pub fn local_ray(&self, instance: u32, ray: &Ray) -> Option<Ray> {
-        self.placed[instance as usize].local(ray, ray.t_max())
     }
 
     /// Returns the nearest triangle of any instance that `ray` hits in its range. Among triangles

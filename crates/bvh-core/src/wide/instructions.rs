@@ -6,7 +6,7 @@
 //! [`Task`] that [`dispatch`](super::vector::dispatch) runs has them, and what a task calls. Functions
 //! whose sections name something else need that, too.
 
-use super::lanes::Lanes;
+use super::lanes::{Lanes, Mask};
 use super::layout::{Child, WideNode};
 
 /// A child to visit later: the bits of its entry, of which the last three are any, above those of
@@ -37,7 +37,10 @@ pub(crate) trait Instructions: Sized {
     type Rays: Lanes;
 
     /// Returns a bit per child whose entry is at most its exit.
-    unsafe fn entered(entry: Self::Boxes, exit: Self::Boxes) -> u32;
+    #[inline(always)]
+    unsafe fn entered(entry: Self::Boxes, exit: Self::Boxes) -> u32 {
+        entry.le(exit).bits()
+    }
 
     /// Writes the keys of the entered children, the nearest last: the bits of the entry, of which
     /// the last three are the inverted lane. Entries are not negative, so that keys are ordered as

@@ -9,7 +9,7 @@ use bvh_core::{
     Aabb, Bvh, Clip, Hit, InvalidBvh, Kernel, Node, PreparedRay, Ray, Triangle, WideBvh,
     any_hit_by, collapse_leaves,
     cost::{SahConstants, layout_area, layout_cost},
-    nearest_hit_by, query, validate, validate_references,
+    nearest_hit_by, validate, validate_references,
 };
 use glam::Vec3;
 use std::thread;
@@ -50,33 +50,6 @@ fn divided(
         index += 1;
     }
     (tree, planes)
-}
-
-#[test]
-fn a_divided_object_is_near_once() {
-    let mut random = Random(9);
-    let triangles = soup(60, &mut random);
-    let undivided = tree(&boxes(&triangles), SHAPES[0], &mut random);
-    let (split, planes) = divided(&undivided, &triangles, &mut random);
-    assert!(planes.len() > 10, "{}", planes.len());
-    for _ in 0..200 {
-        let point = random.point() * 2.0;
-        let distance = |id: u32| {
-            let closest = triangles[id as usize].closest_point(point);
-            closest.distance_squared(point.as_dvec3())
-        };
-        let mut expected: Vec<(f64, u32)> = (0..60).map(|id| (distance(id), id)).collect();
-        expected.sort_by(|a, b| a.partial_cmp(b).unwrap());
-        for k in [1, 7, 100] {
-            let nearest =
-                query::k_nearest(&split, point, k, f64::INFINITY, |id| Some(distance(id)));
-            let mut found = Vec::new();
-            for near in nearest {
-                found.push((near.distance_squared, near.object));
-            }
-            assert_eq!(found, expected[..k.min(60)], "{point}");
-        }
-    }
 }
 
 /// Makes rays through the points where planes divide triangles. Some rays cross the plane and some

@@ -1,25 +1,14 @@
 //! Every traversal gives the answer of testing every object, bit by bit.
 
 use crate::support::{
-    Random, SHAPES, ball, bits, boxes, chain, grid_box, rays, scaled, soup, tree,
+    Random, SHAPES, ball, bits, boxes, brute_force, chain, grid_box, rays, scaled, soup, tree,
 };
 use bvh_core::{
     Aabb, Bvh, Hit, PreparedRay, Ray, Sphere, TestCounts, Triangle, WideBvh, any_hit, any_hit_by,
-    any_hit_of_all, clip_to_box, collapse_leaves, cost::SahConstants, nearest_hit, nearest_hit_by,
+    clip_to_box, collapse_leaves, cost::SahConstants, nearest_hit, nearest_hit_by,
     nearest_hit_of_all, validate,
 };
 use glam::Vec3;
-
-/// Returns the nearest hit by testing every triangle.
-fn brute_force(triangles: &[Triangle], ray: &Ray) -> Option<Hit> {
-    let prepared = PreparedRay::new(ray);
-    let test = |id: u32, t_max| triangles[id as usize].intersect(&prepared, t_max);
-    let objects = triangles.len() as u32;
-    let nearest = nearest_hit_of_all(objects, ray, test, &mut ());
-    let any = any_hit_of_all(objects, |id| test(id, ray.t_max()).is_some(), &mut ());
-    assert_eq!(any, nearest.is_some());
-    nearest
-}
 
 fn check(name: &str, tree: &Bvh, triangles: &[Triangle], ray: &Ray, expected: Option<Hit>) {
     let hit = nearest_hit(tree, triangles, ray);
@@ -173,7 +162,6 @@ fn turned(axis: usize, x: f32, y: f32, z: f32) -> Vec3 {
     point
 }
 
-/// Counts the tests of the search for the nearest of some boxes.
 fn tests_of_nearest(tree: &Bvh, boxes: &[Aabb], ray: &Ray) -> TestCounts {
     let mut counts = TestCounts::default();
     let test = |id: u32, t_max| clip_to_box(ray, &boxes[id as usize], 0.0, t_max);

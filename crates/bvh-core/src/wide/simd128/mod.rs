@@ -7,7 +7,7 @@ mod lanes;
 mod registers;
 
 use super::instructions::{Instructions, Pending, Task};
-use super::lanes::{Lanes, Mask};
+use super::lanes::Lanes;
 use super::layout::{Child, WideNode};
 use crate::Kernel;
 use core::cmp::Reverse;
@@ -39,11 +39,6 @@ impl Instructions for Simd128 {
     type Boxes = Singles<2>;
     type Block = Singles<1>;
     type Rays = Singles<2>;
-
-    #[inline(always)]
-    unsafe fn entered(entry: Singles<2>, exit: Singles<2>) -> u32 {
-        entry.le(exit).bits()
-    }
 
     #[inline(always)]
     unsafe fn sort_keys(entry: Singles<2>, mask: u32, to: *mut u32) {

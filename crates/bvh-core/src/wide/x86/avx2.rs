@@ -4,7 +4,7 @@
 use super::lanes::{F32x4, F32x8};
 use super::sort;
 use crate::wide::instructions::{Instructions, Pending, Task};
-use crate::wide::lanes::{Lanes as _, Mask as _};
+use crate::wide::lanes::Mask as _;
 use crate::wide::layout::{Child, WideNode};
 use core::arch::x86_64::*;
 
@@ -35,11 +35,6 @@ impl Instructions for Avx2 {
     type Rays = F32x8;
 
     shared!("avx2,fma,bmi1,bmi2,popcnt,lzcnt", compress, only);
-
-    #[inline(always)]
-    unsafe fn entered(entry: F32x8, exit: F32x8) -> u32 {
-        entry.le(exit).bits()
-    }
 
     #[inline(always)]
     unsafe fn compress(node: &WideNode, mask: u32, to: *mut Pending) {

@@ -2,7 +2,9 @@
 
 pub mod layouts;
 
-use bvh_core::{Aabb, Bvh, Hit, Node, PreparedRay, Ray, Triangle, nearest_hit_of_all};
+use bvh_core::{
+    Aabb, Bvh, Hit, Node, PreparedRay, Ray, Triangle, any_hit_of_all, nearest_hit_of_all,
+};
 use glam::Vec3;
 use std::collections::VecDeque;
 
@@ -236,7 +238,11 @@ pub fn rays(triangles: &[Triangle], n: usize, random: &mut Random) -> Vec<Ray> {
 pub fn brute_force(triangles: &[Triangle], ray: &Ray) -> Option<Hit> {
     let prepared = PreparedRay::new(ray);
     let test = |id: u32, t_max| triangles[id as usize].intersect(&prepared, t_max);
-    nearest_hit_of_all(triangles.len() as u32, ray, test, &mut ())
+    let objects = triangles.len() as u32;
+    let nearest = nearest_hit_of_all(objects, ray, test, &mut ());
+    let any = any_hit_of_all(objects, |id| test(id, ray.t_max()).is_some(), &mut ());
+    assert_eq!(any, nearest.is_some());
+    nearest
 }
 
 /// Returns an answer as bits, for exact comparison.
