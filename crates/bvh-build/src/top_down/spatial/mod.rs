@@ -19,6 +19,7 @@ use crate::watch::Pace;
 use crate::{BuildError, Check, Watch};
 use bvh_core::{Aabb, Bvh, Clip, Node};
 use object_split::{Axis, Candidates};
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 bvh_config::config! {
@@ -43,35 +44,13 @@ struct Reference {
     object: u32,
 }
 
-/// A node to divide: the largest first, equal nodes in the order of their indices.
+/// A node to divide.
 #[derive(Debug)]
 struct Open {
-    area: f64,
-    node: u32,
     references: Vec<Reference>,
     /// Number of splits between the root and the node that have stalled.
     stalls: u8,
 }
-
-impl Ord for Open {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.area.total_cmp(&other.area).then(other.node.cmp(&self.node))
-    }
-}
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Open {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Open {}
 
 /// The two sides of a node, and their cost.
 #[derive(Debug)]
@@ -152,15 +131,17 @@ impl Build<'_> {
         let root = union(&references);
         self.least_overlap = self.config.overlap * root.half_area();
         tree.nodes.push(Node::leaf(root, 0, 1));
-        let mut open =
-            BinaryHeap::from([Open { area: root.half_area(), node: 0, references, stalls: 0 }]);
-        while let Some(Open { node, references, mut stalls, .. }) = open.pop() {
+        // By node, and the largest node first, of equal ones the first.
+        let mut open = vec![Some(Open { references, stalls: 0 })];
+        let mut order = BinaryHeap::from([(root.half_area().to_bits(), Reverse(0))]);
+        while let Some((_, Reverse(node))) = order.pop() {
+            let Some(Open { references, mut stalls }) = open[node].take() else { continue };
             if pace.ends_after(references.len()) {
                 return Err(BuildError::Cancelled);
             }
-            let aabb = tree.nodes[node as usize].aabb;
+            let aabb = tree.nodes[node].aabb;
             if let [one] = references.as_slice() {
-                tree.nodes[node as usize] = Node::leaf(aabb, tree.prim_ids.len() as u32, 1);
+                tree.nodes[node] = Node::leaf(aabb, tree.prim_ids.len() as u32, 1);
                 tree.prim_ids.push(one.object);
                 continue;
             }
@@ -168,17 +149,17 @@ impl Build<'_> {
                 self.split(&aabb, &references, &mut stalls);
             // The sides hold copies, so the parent's references are freed at once.
             drop(references);
-            let first = tree.nodes.len() as u32;
-            tree.nodes[node as usize] = Node::inner(aabb, first, 2);
-            for ((node, aabb), references) in (first..).zip(boxes).zip(sides) {
+            tree.nodes[node] = Node::inner(aabb, tree.nodes.len() as u32, 2);
+            for (aabb, references) in boxes.into_iter().zip(sides) {
+                // No area is negative, so that areas are ordered as their bits are.
+                order.push((aabb.half_area().to_bits(), Reverse(open.len())));
                 tree.nodes.push(Node::leaf(aabb, 0, 1));
-                open.push(Open { area: aabb.half_area(), node, references, stalls });
+                open.push(Some(Open { references, stalls }));
             }
         }
         Ok(tree)
     }
 
-    /// Returns the cost of a side.
     fn cost(&self, aabb: &Aabb, count: usize) -> f64 {
         aabb.half_area() * self.powers[count]
     }
@@ -220,7 +201,6 @@ impl Build<'_> {
     }
 }
 
-/// Returns the box around the references.
 fn union(references: &[Reference]) -> Aabb {
     references.iter().fold(Aabb::EMPTY, |aabb, reference| aabb.union(&reference.aabb))
 }

@@ -114,3 +114,73 @@ impl Build<'_> {
         Sides { cost, boxes, references: sides }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Config;
+    use super::*;
+    use bvh_core::Triangle;
+    use proptest::prelude::*;
+
+    /// Returns the objects on the left side of the first of the cheapest splits, found by trying
+    /// all of them.
+    fn brute_force(build: &Build, references: &[Reference], candidates: Candidates) -> Vec<u32> {
+        let count = references.len();
+        let mut least = f64::INFINITY;
+        let mut objects = vec![];
+        for axis in 0..3 {
+            let centre = |reference: &Reference| reference.aabb.doubled_centroid()[axis];
+            let mut sorted = references.to_vec();
+            sorted.sort_by(|a, b| centre(a).total_cmp(&centre(b)));
+            for left in 1..count {
+                if candidates == Candidates::Balanced && left.min(count - left) < count / 8 {
+                    continue;
+                }
+                let sides = [&sorted[..left], &sorted[left..]];
+                let [first, second] = sides.map(|side| {
+                    let load = match candidates {
+                        Candidates::All => build.powers[side.len()],
+                        Candidates::Balanced => side.len() as f64,
+                    };
+                    union(side).half_area() * load
+                });
+                if first + second < least {
+                    least = first + second;
+                    let is_equal = union(sides[0]) == union(sides[1]);
+                    let left = if is_equal { count / 2 } else { left };
+                    objects = sorted[..left].iter().map(|reference| reference.object).collect();
+                }
+            }
+        }
+        objects
+    }
+
+    proptest! {
+        #[test]
+        fn no_object_split_costs_less_than_the_chosen_one(
+            boxes in prop::collection::vec([0u8..12, 0u8..12, 0u8..12, 0u8..4, 0u8..4, 0u8..4], 2..60),
+        ) {
+            let references: Vec<Reference> = (0..).zip(&boxes).map(|(object, sides)| {
+                let [x, y, z, a, b, c] = sides.map(f32::from);
+                Reference { aabb: Aabb::from([[x, y, z], [x + a, y + b, z + c]]), object }
+            }).collect();
+            let config = Config::default();
+            let triangles: &[Triangle] = &[];
+            let mut build = Build {
+                config: &config,
+                objects: &triangles,
+                extra: 0,
+                least_overlap: 0.0,
+                powers: (0..=boxes.len()).map(|n| libm::pow(n as f64, config.power)).collect(),
+                axes: Default::default(),
+            };
+            for candidates in [Candidates::All, Candidates::Balanced] {
+                let expected = brute_force(&build, &references, candidates);
+                let Sides { references: [left, right], .. } = build.object_split(&references, candidates);
+                let found: Vec<u32> = left.iter().map(|reference| reference.object).collect();
+                prop_assert_eq!(found, expected);
+                prop_assert_eq!(left.len() + right.len(), boxes.len());
+            }
+        }
+    }
+}
