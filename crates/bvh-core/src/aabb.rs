@@ -183,7 +183,6 @@ pub fn check_boxes(boxes: &[Aabb]) -> Result<(), InvalidBox> {
     Ok(())
 }
 
-/// Returns the largest f32 that is not above `x`.
 #[inline]
 pub(crate) fn round_down(x: f64) -> f32 {
     let nearest = x as f32;

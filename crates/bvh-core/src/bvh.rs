@@ -178,7 +178,6 @@ impl Bvh {
         self.nodes.iter().all(|node| node.aabb == self.around(node, boxes))
     }
 
-    /// Returns the box around a node's children or objects.
     fn around(&self, node: &Node, boxes: &[Aabb]) -> Aabb {
         match node.kind() {
             NodeKind::Inner { .. } => {

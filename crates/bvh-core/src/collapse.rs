@@ -196,7 +196,6 @@ pub(crate) mod tests {
         least
     }
 
-    /// Returns the number of objects below a node.
     pub(crate) fn objects(tree: &Bvh, node: usize) -> f64 {
         let mut ids = Vec::new();
         collect(tree, node, &mut ids);

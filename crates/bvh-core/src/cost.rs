@@ -95,7 +95,6 @@ pub fn total_measure(tree: &Bvh, measure: &dyn Measure) -> f64 {
     sum_over(tree, |node| size_by(measure, node))
 }
 
-/// Returns the measure of a node's box.
 fn size_by(measure: &dyn Measure, node: &Node) -> f64 {
     measure.of(&PackedAabb::from(&node.aabb))
 }
@@ -162,7 +161,6 @@ impl SahConstants {
         self.intersection
     }
 
-    /// Returns the cost of visiting an inner node, or of testing all objects of a leaf.
     #[inline]
     pub(crate) fn cost_of(&self, node: &Node) -> f64 {
         match node.kind() {
@@ -197,7 +195,6 @@ pub fn internal_area(tree: &Bvh) -> f64 {
     sum_over(tree, inner_half_area)
 }
 
-/// Returns the half area of an inner node, and 0 for a leaf.
 #[inline]
 fn inner_half_area(node: &Node) -> f64 {
     // The processor cannot predict whether a node is a leaf. Both values are computed and one is
@@ -216,7 +213,6 @@ pub fn goldsmith_salmon(tree: &Bvh) -> f64 {
     over_root_area(tree, by_children(tree, |node| node.aabb.half_area()))
 }
 
-/// Returns Σ size(node) · number of children.
 fn by_children(tree: &Bvh, size: impl Fn(&Node) -> f64) -> f64 {
     sum_over(tree, |node| size(node) * node.children().len() as f64)
 }
@@ -237,7 +233,6 @@ fn by_tests(tree: &Bvh, constants: &SahConstants, size: impl Fn(&Node) -> f64) -
     sum_over(tree, |node| size(node) * constants.cost_of(node))
 }
 
-/// Returns the compensated sum of `term` over all nodes.
 #[inline]
 fn sum_over(tree: &Bvh, term: impl Fn(&Node) -> f64) -> f64 {
     let mut sum = Sum::default();

@@ -33,7 +33,6 @@ impl<const N: usize> Expansion<N> {
         wide
     }
 
-    /// Returns the terms, the smallest first.
     fn terms(&self) -> &[f64] {
         &self.terms[..self.len]
     }
@@ -109,7 +108,6 @@ impl<const N: usize> Expansion<N> {
 }
 
 impl Expansion<2> {
-    /// Returns the exact difference of two numbers.
     pub(crate) fn difference(a: f32, b: f32) -> Self {
         let (sum, rest) = two_sum(f64::from(a), -f64::from(b));
         let mut difference = Self::zero();

@@ -116,7 +116,6 @@ pub fn layout_area(tree: &Bvh) -> f64 {
     layout_cost(tree, None, &call_in_turn)
 }
 
-/// Calls two functions one after the other.
 pub(crate) fn call_in_turn(first: &mut (dyn FnMut() + Send), second: &mut (dyn FnMut() + Send)) {
     first();
     second();

@@ -45,7 +45,6 @@ impl<T: Copy, const N: usize> Stack<T, N> {
         self.grow(usize::from(condition));
     }
 
-    /// Removes the topmost entry and returns it; `None` if the stack is empty.
     #[inline(always)]
     pub(crate) fn pop(&mut self) -> Option<T> {
         if self.len == 0 {

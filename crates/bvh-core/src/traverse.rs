@@ -326,7 +326,6 @@ fn descend<C: Counter, const N: usize>(
     ControlFlow::Continue(Some(near.kind()))
 }
 
-/// Returns the objects of a leaf.
 #[inline(always)]
 fn objects(tree: BvhView<'_>, leaf: NodeKind) -> &[u32] {
     match leaf {

@@ -61,7 +61,6 @@ impl Block {
         area: [0.0; LANES],
     };
 
-    /// Returns the first inner child that contains `b`.
     #[inline(always)]
     pub(super) fn first_containing(&self, b: &[f32; 6]) -> Option<usize> {
         let lanes = self.containing(b);
@@ -101,7 +100,6 @@ impl Block {
         (0..LANES).map(|lane| u32::from(contains(lane)) << lane).sum()
     }
 
-    /// Returns the size of the union of a child and `b`.
     #[inline(always)]
     pub(super) fn union_size(&self, lane: usize, b: &[f32; 6], size: impl Size) -> f64 {
         size.of(std::array::from_fn(|i| larger(self.bounds[i][lane], b[i])))
@@ -153,7 +151,6 @@ fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// Returns the block and the lane of a node.
 #[inline(always)]
 pub(super) fn place(node: u32) -> (usize, usize) {
     (node as usize / LANES, node as usize % LANES)

@@ -61,7 +61,6 @@ impl Clusters {
         }
     }
 
-    /// Returns the number of clusters that are not yet joined.
     pub(super) fn count(&self) -> usize {
         self.boxes.len()
     }
@@ -83,7 +82,6 @@ impl Clusters {
         nearest.chunks_mut(CHUNK).enumerate().for_each(|chunk| find(scratch, chunk));
     }
 
-    /// Returns whether the cluster is the nearest neighbour of its nearest neighbour.
     #[inline(always)]
     fn is_mutual(&self, index: usize) -> bool {
         self.nearest[index.wrapping_add_signed(self.nearest[index] as isize)]
@@ -154,7 +152,6 @@ impl Clusters {
     }
 }
 
-/// Returns the node of a cluster.
 #[inline(always)]
 fn node((aabb, below): (PackedAabb, u32)) -> Node {
     let aabb = Aabb::from(&aabb);

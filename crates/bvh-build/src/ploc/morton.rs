@@ -19,7 +19,6 @@ pub(super) fn order(boxes: &[PackedAabb]) -> Vec<u32> {
     order.into_iter().map(|(_, index)| index).collect()
 }
 
-/// Returns the upper 32 bits of a code of 63 bits.
 fn upper_half(code: u64) -> u32 {
     (code >> 31) as u32
 }

@@ -129,7 +129,6 @@ impl<C: SplitCost> Division<'_, C> {
         self.on_one_thread(&mut TakeBest, workspace, tree)
     }
 
-    /// Clears the tree of a cancelled division.
     fn finish(&self, tree: &mut Bvh) -> Result<(), BuildError> {
         let finished = self.watch.ensure_wanted();
         if finished.is_err() {

@@ -69,7 +69,6 @@ pub struct MadeUpCosts {
 }
 
 impl MadeUpCosts {
-    /// Returns the costs of so many objects.
     fn costs(self, objects: usize) -> Vec<f32> {
         let mut costs = vec![1.0; objects];
         for (object, cost) in costs.iter_mut().enumerate() {

@@ -150,7 +150,6 @@ impl<C: SplitCost> Sweep<'_, C> {
         best
     }
 
-    /// Returns the better of `best` and the best candidate of `axis`.
     #[inline(always)]
     fn improve(&mut self, axis: u8, mut best: Split) -> Split {
         self.scan::<true>(axis, best.cost, |candidate| {
@@ -334,7 +333,6 @@ fn value_block<C: SplitCost>(
     lowest
 }
 
-/// Returns the box around several objects.
 #[inline(always)]
 pub(super) fn union_of(boxes: &[PackedAabb], objects: &[u32]) -> PackedAabb {
     let mut aabb = PackedAabb::EMPTY;

@@ -29,7 +29,6 @@ fn topology(tree: &Bvh) -> Vec<Result<usize, u32>> {
     nodes
 }
 
-/// Builds a tree, checks the tree and its cost, and returns both.
 fn insert(config: &Config, boxes: &[Aabb], order: &[u32], workspace: &mut Workspace) -> (Bvh, f64) {
     let scene = Scene::new(boxes).unwrap();
     let cost = config.insert_all(&scene, order, workspace, &Watch::default()).unwrap();
@@ -151,7 +150,6 @@ fn the_tree_is_the_brute_force_one_with_wide_nodes_too() {
     }
 }
 
-/// Returns a pseudo-random integer below `end`.
 fn hash(i: u32, salt: u32, end: u32) -> f32 {
     let bits = i.wrapping_mul(2_654_435_761).rotate_left(salt);
     (bits % end) as f32
@@ -161,7 +159,6 @@ fn integer_corner(i: u32, salt: u32) -> [f32; 3] {
     [hash(i, salt, 1021), hash(i, salt + 5, 1021), hash(i, salt + 9, 1021)]
 }
 
-/// Returns the largest number of inner nodes among the children of one node.
 fn most_inner_children(tree: &Bvh) -> usize {
     let mut most = 0;
     for node in &tree.nodes {

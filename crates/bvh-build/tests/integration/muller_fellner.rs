@@ -82,7 +82,6 @@ struct Candidate {
     parts: [Vec<u32>; 2],
 }
 
-/// Sorts by centroid, and by id where centroids are equal.
 fn sort_along(ids: &mut [u32], axis: usize, boxes: &[Aabb]) {
     let key = |id: u32| boxes[id as usize].doubled_centroid()[axis];
     ids.sort_unstable();
@@ -186,7 +185,6 @@ proptest! {
     }
 }
 
-/// Makes `n` small boxes at pseudo-random places.
 fn scatter(n: u32) -> Vec<Aabb> {
     let mut boxes = Vec::new();
     for i in 0..n {

@@ -26,7 +26,6 @@ impl Plain {
         aabb
     }
 
-    /// Returns the half area of the node's box after object `id` was added.
     fn area_with(&self, boxes: &[Aabb], id: u32) -> f64 {
         self.aabb(boxes).union(&boxes[id as usize]).half_area()
     }
@@ -87,7 +86,6 @@ impl Plain {
         best.1
     }
 
-    /// Returns the criterion of the descent for this child.
     fn growth(&self, config: &Config, boxes: &[Aabb], id: u32) -> f64 {
         let before = self.aabb(boxes).half_area();
         let after = self.area_with(boxes, id);
@@ -147,7 +145,6 @@ impl Plain {
     }
 }
 
-/// Returns the first of the cheapest trees.
 fn cheapest<'t>(trees: &'t [Plain], boxes: &[Aabb]) -> &'t Plain {
     let mut best = &trees[0];
     for tree in &trees[1..] {

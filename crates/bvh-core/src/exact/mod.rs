@@ -109,7 +109,6 @@ pub(crate) struct Line {
 pub(crate) const ERROR: f64 = 1.0 / (1_u64 << 47) as f64;
 
 impl Line {
-    /// Prepares a ray.
     pub(crate) fn new(ray: &Ray) -> Self {
         let origin = ray.origin();
         let direction = ray.direction();
@@ -283,13 +282,11 @@ fn normal([px, py, pz]: &[f64; 3], [qx, qy, qz]: &[f64; 3]) -> ([f64; 3], [f64; 
     (pairs.map(|[a, b]| a - b), pairs.map(|[a, b]| a.abs() + b.abs()))
 }
 
-/// Returns the scalar product.
 #[inline(always)]
 fn dot(p: &[f64; 3], q: &[f64; 3]) -> f64 {
     p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
-/// Returns the largest absolute value.
 #[inline(always)]
 fn largest(numbers: &[f64]) -> f64 {
     numbers.iter().fold(0.0, |most, number| larger(most, number.abs()))

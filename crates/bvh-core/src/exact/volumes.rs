@@ -18,7 +18,6 @@ pub(super) fn crossing(ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
 /// An exact difference of two points.
 type Vector = [Expansion<2>; 3];
 
-/// Returns the exact difference of two points.
 #[inline]
 fn difference(p: Vec3, q: Vec3) -> Vector {
     let mut vector = [Expansion::zero(); 3];
@@ -62,7 +61,6 @@ impl<'a> Volumes<'a> {
         Some(Self { direction, triangle, corners })
     }
 
-    /// Returns the sign of `u`, `v` or `w`.
     pub(super) fn side(&self, edge: usize) -> i32 {
         let [first, second] = EDGES[edge];
         let mut volume: Expansion<96> = Expansion::zero();

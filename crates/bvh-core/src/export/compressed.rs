@@ -62,7 +62,6 @@ fn step(exponent: u8) -> f32 {
 }
 
 impl CompressedNode {
-    /// Makes a node around `aabb` without children.
     fn around(aabb: &Aabb) -> Self {
         let extent = aabb.extent().to_array();
         Self { origin: aabb.min, exponents: extent.map(exponent), ..Self::zeroed() }
@@ -200,7 +199,6 @@ fn with_small_leaves(mut tree: Bvh, boxes: &[Aabb]) -> Bvh {
     tree
 }
 
-/// Makes a leaf over a range of a tree's object ids.
 fn leaf_over(tree: &Bvh, prims: Range<usize>, boxes: &[Aabb]) -> Node {
     let mut aabb = Aabb::EMPTY;
     for &id in &tree.prim_ids[prims.clone()] {

@@ -106,7 +106,6 @@ pub(super) fn unpack(
     Ok(tree)
 }
 
-/// Returns the box around all parts.
 fn around(parts: &[(Aabb, Part)]) -> Aabb {
     let mut aabb = Aabb::EMPTY;
     for (part, _) in parts {

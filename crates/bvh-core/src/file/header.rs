@@ -201,7 +201,6 @@ struct Stored {
     checksum: u32,
 }
 
-/// Rejects other versions than the only one that this crate reads.
 fn check_version(found: u32) -> Result<(), FileError> {
     match found.cmp(&VERSION) {
         Ordering::Less => Err(FileError::OldVersion { found }),

@@ -248,7 +248,6 @@ fn checksum(file: &[u8]) -> u32 {
     hasher.finalize()
 }
 
-/// Writes the checksum into a file.
 #[cfg(test)]
 fn seal(file: &mut [u8]) {
     let sum = checksum(file);

@@ -159,7 +159,6 @@ fn a_saved_tree_can_be_loaded_and_viewed() {
     }
 }
 
-/// Makes visits that halve from parent to child.
 fn halving(tree: &Bvh) -> Vec<f32> {
     let mut visits = vec![1.0; tree.nodes.len()];
     for (index, node) in tree.nodes.iter().enumerate() {
@@ -252,7 +251,6 @@ fn every_changed_byte_and_every_cut_is_rejected() {
     }
 }
 
-/// Copies a file and replaces one field.
 fn with_field(file: &[u8], offset: usize, field: &[u8]) -> Vec<u8> {
     let mut bytes = file.to_vec();
     bytes[offset..offset + field.len()].copy_from_slice(field);
@@ -323,7 +321,6 @@ fn rejection(file: &[u8], offset: usize, field: &[u8]) -> FileError {
     load_any(&bytes).unwrap_err()
 }
 
-/// Returns the tree of a file for any scene.
 fn load_any(bytes: &[u8]) -> Result<Bvh, FileError> {
     TreeFile::open(bytes)?.tree()
 }

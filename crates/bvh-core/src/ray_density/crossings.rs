@@ -13,7 +13,6 @@ const POINTS: usize = CELLS + 1;
 /// The upper end of the grid along each axis, in cells.
 const END: f64 = CELLS as f64;
 
-/// Returns the index of a cell in tables.
 #[inline]
 pub(super) fn index(cell: [usize; 3]) -> usize {
     (cell[2] * CELLS + cell[1]) * CELLS + cell[0]
@@ -210,7 +209,6 @@ impl Sums {
     }
 }
 
-/// Returns all cells in the order of tables.
 fn cells() -> impl Iterator<Item = [usize; 3]> {
     (0..CELLS * CELLS * CELLS).map(|i| [i % CELLS, i / CELLS % CELLS, i / (CELLS * CELLS)])
 }

@@ -302,7 +302,6 @@ impl RayDensity {
         fractions.clamp(DVec3::ZERO, end)
     }
 
-    /// Sums the signed counts at the eight corners of the box.
     fn across(&self, rounded: &Rounded) -> f64 {
         let ends = [&rounded.low, &rounded.high];
         let mut sum = 0.0;

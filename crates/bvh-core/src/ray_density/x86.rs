@@ -8,7 +8,6 @@ use super::{FRACTION_BITS, FRACTIONS, RayDensity};
 use crate::PackedAabb;
 use core::arch::x86_64::*;
 
-/// Returns whether the processor has the instructions of this module.
 #[inline]
 pub(super) fn is_available() -> bool {
     is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
@@ -141,7 +140,6 @@ impl Weights {
     }
 }
 
-/// Returns the sum of four lanes.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn sum(lanes: __m256d) -> f64 {

@@ -107,7 +107,6 @@ pub fn validate_references(
     Ok(())
 }
 
-/// Rejects a tree in which a child's box is not inside its parent's box.
 fn check_nesting(tree: &Bvh) -> Result<(), InvalidBvh> {
     let is_inner = |node: &Node| !node.is_leaf();
     for_each(&tree.nodes, is_inner, |index, node| {

@@ -27,7 +27,6 @@ impl WideNode {
         Self { planes, children: [Child::node(0); 8], padding: [0; 8] }
     };
 
-    /// Gives a lane a child with this box.
     pub(crate) fn set_box(&mut self, lane: usize, aabb: &Aabb) {
         for axis in 0..3 {
             self.planes[axis][lane] = aabb.min[axis];
@@ -56,7 +55,6 @@ impl Child {
         Self(index)
     }
 
-    /// The leaf that begins with this block.
     pub(crate) const fn leaf(first_block: u32) -> Self {
         Self(first_block | Self::LEAF)
     }
@@ -66,7 +64,6 @@ impl Child {
         self.0 & Self::LEAF == 0
     }
 
-    /// The index of the node, or of the leaf's first block.
     #[inline(always)]
     pub(crate) fn index(self) -> usize {
         (self.0 & !Self::LEAF) as usize

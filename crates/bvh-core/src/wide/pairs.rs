@@ -351,7 +351,6 @@ impl<L: Lanes> Pairs<L> {
     }
 }
 
-/// Returns each number in all lanes.
 #[inline(always)]
 unsafe fn constants<D: DoubleLanes, const N: usize>(numbers: [f64; N]) -> [D; N] {
     // SAFETY: the processor has the instructions.
@@ -372,7 +371,6 @@ impl<L: Lanes> Plane<L> {
         (nz.mul_add(z, ny.mul_add(y, nx * x)), error)
     }
 
-    /// Returns the planes of triangles in lanes.
     #[inline(always)]
     pub(crate) fn of_lanes(corners: &[[L; 3]; 3]) -> Self {
         let [a, b, c] = corners;
@@ -385,7 +383,6 @@ impl<L: Lanes> Plane<L> {
         Self { corner: a, normal: normal(&a, &b, &c), size, sides: first + second }
     }
 
-    /// Returns the plane of one triangle in all lanes.
     #[inline(always)]
     pub(crate) unsafe fn of_triangle([a, b, c]: &[[f64; 3]; 3]) -> Self {
         let [x, y, z] = normal(a, b, c);
@@ -409,7 +406,6 @@ impl<L: Lanes> Plane<L> {
     }
 }
 
-/// Returns the cross product of two sides of a triangle.
 #[inline(always)]
 fn normal<D: Copy + Sub<Output = D> + Mul<Output = D>>(
     a: &[D; 3],
@@ -421,7 +417,6 @@ fn normal<D: Copy + Sub<Output = D> + Mul<Output = D>>(
     [y * r - z * q, z * p - x * r, x * q - y * p]
 }
 
-/// Returns the largest distance of two points along an axis.
 #[inline(always)]
 fn longest<L: Lanes>(a: &[L; 3], b: &[L; 3]) -> L {
     let x = (b[0] - a[0]).abs();

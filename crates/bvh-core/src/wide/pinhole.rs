@@ -167,7 +167,6 @@ impl Seen {
     }
 }
 
-/// Returns the difference of vectors in f64.
 #[inline(always)]
 fn minus<L: Lanes>(a: &[L; 3], b: &[L; 3]) -> [L::Double; 3] {
     [a[0].double() - b[0].double(), a[1].double() - b[1].double(), a[2].double() - b[2].double()]
@@ -182,7 +181,6 @@ fn cross<D: DoubleLanes>(a: &[D; 3], b: &[D; 3]) -> [D; 3] {
     ]
 }
 
-/// Returns the largest absolute value of a component.
 #[inline(always)]
 fn largest<D: DoubleLanes>([x, y, z]: &[D; 3]) -> D {
     x.abs().max(y.abs()).max(z.abs())

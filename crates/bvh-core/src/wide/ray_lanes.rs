@@ -177,7 +177,6 @@ pub(crate) struct RayBounds<L> {
 }
 
 impl<L: Lanes> RayBounds<L> {
-    /// Returns the bounds of no rays.
     #[inline(always)]
     pub(crate) unsafe fn none() -> Self {
         // SAFETY: the processor has the instructions.
@@ -225,7 +224,6 @@ impl<L: Lanes> RayBounds<L> {
     }
 }
 
-/// Returns the least lane.
 #[inline(always)]
 fn least<L: Lanes>(lanes: L) -> f32 {
     -(lanes ^ lanes.filled(-0.0)).greatest()

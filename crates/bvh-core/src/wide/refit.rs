@@ -77,7 +77,6 @@ impl WideBvh {
         Aabb::around(corners)
     }
 
-    /// The blocks of a leaf.
     fn leaf(&self, leaf: Child) -> &[TriangleBlock] {
         let blocks = &self.blocks[leaf.index()..];
         let end =

@@ -46,7 +46,6 @@ impl TriangleBlock {
         }
     }
 
-    /// The triangles, each with its id.
     pub(crate) fn triangles(&self) -> impl Iterator<Item = (u32, Triangle)> {
         (0..Self::LANES).filter_map(|lane| self.triangle(lane))
     }
@@ -64,13 +63,11 @@ impl TriangleBlock {
         self.ids.as_ptr()
     }
 
-    /// Returns the number of used lanes, which are the first.
     #[inline(always)]
     pub(crate) fn len(&self) -> usize {
         1 + (1..Self::LANES).map(|lane| usize::from(self.ids[lane] != Self::UNUSED)).sum::<usize>()
     }
 
-    /// Returns whether this is a leaf's last block.
     #[inline(always)]
     pub(crate) fn is_last(&self) -> bool {
         self.ids[0] & Self::LAST != 0

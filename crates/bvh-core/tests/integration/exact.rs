@@ -17,13 +17,11 @@ fn integer(n: i64) -> BigRational {
     BigRational::from_integer(BigInt::from(n))
 }
 
-/// 2^k.
 fn power(k: i32) -> BigRational {
     let size = BigRational::from_integer(BigInt::from(1) << k.unsigned_abs());
     if k < 0 { size.recip() } else { size }
 }
 
-/// Returns the exact value of a finite number.
 fn exact(x: f32) -> BigRational {
     let bits = x.to_bits();
     let fraction = i64::from(bits & 0x7f_ffff);

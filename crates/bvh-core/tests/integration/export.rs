@@ -7,7 +7,6 @@ use bvh_core::{Aabb, Bvh, InvalidBvh, Node, Triangle, any_hit, nearest_hit, vali
 use glam::Vec3;
 use proptest::prelude::*;
 
-/// Converts the tree to every layout and back.
 fn returned(tree: &Bvh, boxes: &[Aabb]) -> [(&'static str, Bvh); 3] {
     [
         ("binary", Bvh::from_first_count(&tree.to_first_count(), &tree.prim_ids).unwrap()),

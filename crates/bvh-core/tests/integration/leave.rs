@@ -69,7 +69,6 @@ fn leave(triangle: &Triangle, random: &mut Random) -> usize {
     tested
 }
 
-/// Returns a normal of the triangle in f64.
 fn triangle_normal(triangle: &Triangle) -> glam::DVec3 {
     let [a, b, c] = triangle.0.map(Vec3::as_dvec3);
     (b - a).cross(c - a)

@@ -15,7 +15,6 @@ fn bounds() -> Aabb {
     Aabb::from([[0.0; 3], [GRID; 3]])
 }
 
-/// Makes segments inside the bounds, through them and outside of them.
 fn segments(count: usize, seed: u64) -> Vec<Segment> {
     let mut random = Random(seed);
     let mut segments = Vec::new();
@@ -70,7 +69,6 @@ fn boxes_on_the_grid_are_entered_as_often_as_segments_meet_them() {
     assert_eq!(density.measure(&bounds()), bounds().half_area());
 }
 
-/// Makes a box from two corners in any order.
 fn around(a: [f32; 3], b: [f32; 3]) -> Aabb {
     Aabb::around([a.into(), b.into()])
 }
@@ -200,12 +198,10 @@ fn rays_that_end_on_a_wall_enter_the_flat_box_around_it() {
     assert!((0.7..0.8).contains(&extended_share), "{extended_share}");
 }
 
-/// Returns a flat box across the bounds.
 fn wall_at(height: f32) -> Aabb {
     Aabb::from([[0.0, height, 0.0], [GRID, height, GRID]])
 }
 
-/// Returns vertical rays that end at this height instead.
 fn ending_at(rays: &[Segment], height: f32) -> Vec<Segment> {
     let end = |ray: &Segment| [ray.to[0], height, ray.to[2]];
     rays.iter().map(|ray| Segment { to: end(ray), ..*ray }).collect()

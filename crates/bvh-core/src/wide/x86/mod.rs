@@ -20,7 +20,6 @@ pub(super) fn has(kernel: Kernel) -> bool {
     }
 }
 
-/// Returns whether the processor has the instructions of the AVX2 kernel.
 fn has_avx2() -> bool {
     is_x86_feature_detected!("avx2")
         && is_x86_feature_detected!("fma")
@@ -30,7 +29,6 @@ fn has_avx2() -> bool {
         && is_x86_feature_detected!("lzcnt")
 }
 
-/// Returns whether the processor has the instructions of the AVX-512 kernel.
 fn has_avx512() -> bool {
     has_avx2()
         && is_x86_feature_detected!("avx512f")

@@ -115,7 +115,6 @@ pub(super) unsafe fn write(node: &WideNode, keys: __m256i, count: u32, to: *mut 
     }
 }
 
-/// Returns the child of the least key.
 #[inline(always)]
 pub(super) unsafe fn nearest(node: &WideNode, keys: __m256i) -> Child {
     // SAFETY: the caller has AVX2; a lane is below eight.
