@@ -1,7 +1,9 @@
-//! Other libraries as methods of experiments. The instruments of this package are its benchmarks.
+//! Other libraries as methods of experiments, and a lower bound. The instruments of this package
+//! are its benchmarks.
 
 mod bvh;
 mod comparison;
+pub mod lower_bound;
 mod obvhs;
 mod programs;
 mod rows;
@@ -12,12 +14,19 @@ use crate::obvhs::Obvhs;
 use bvh_core::{Aabb, Bvh, Triangle};
 use harness::Error;
 use harness::measure::contender::Contender;
-use harness::peers::{Built, Library, NamedBytes, Race, Raced};
+use harness::peers::{Built, Library, NamedBytes, Others, Race, Raced};
 use harness::rows::{Row, to_bytes};
 use std::path::Path;
 
 /// The libraries that specs may name.
 pub const LIBRARIES: &[&dyn Library] = &[&bvh::Crate, &obvhs::Crate];
+
+/// What the program contains beside the harness.
+pub const OTHERS: Others = Others {
+    libraries: LIBRARIES,
+    race: &RayPrograms,
+    lower_bound: lower_bound::internal_area,
+};
 
 /// Embree and tinybvh, which need a C++ compiler: `scripts/ray-peers/build` makes their programs.
 pub struct RayPrograms;

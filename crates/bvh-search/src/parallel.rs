@@ -26,11 +26,6 @@ pub(crate) fn map_init<S: Send, T: Send>(
     })
 }
 
-/// Returns the results of the tasks `0..count`, which may be many and short.
-pub(crate) fn map_numbers<T: Send>(count: usize, task: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    collect(count, usize::MAX, task)
-}
-
 /// Returns the results of a few long tasks. Each may run on another thread.
 pub(crate) fn map<I: Send, T: Send>(tasks: Vec<I>, task: impl Fn(I) -> T + Sync) -> Vec<T> {
     let inputs = slots(tasks.into_iter().map(Some));

@@ -1,7 +1,7 @@
 //! Every method of the registry against the exact optimum of hundreds of small scenes.
 
 use bvh_core::{Aabb, validate};
-use bvh_search::{Budget, Method, Problem, exact, lower_bound, solve};
+use bvh_search::{Budget, Method, Problem, exact, solve};
 
 /// Long and flat boxes on a wavy sheet, similar to a mesh.
 fn sheet() -> Vec<Aabb> {
@@ -43,7 +43,7 @@ fn instances(count: usize) -> Vec<Vec<Aabb>> {
 
 #[test]
 #[ignore = "slow: every method on 280 scenes; the suite asks it of fewer"]
-fn no_method_goes_below_the_optimum_the_bound_neither_above_and_the_best_reaches_it() {
+fn no_method_goes_below_the_optimum_and_the_best_reaches_it() {
     let instances = instances(280);
     let budget = Budget { max_evaluations: None, max_work: Some(300_000) };
     let mut reached = 0;
@@ -51,7 +51,6 @@ fn no_method_goes_below_the_optimum_the_bound_neither_above_and_the_best_reaches
         let problem = Problem::new(boxes);
         let optimum =
             solve(&exact::Config::default(), &problem, 1, Budget::UNLIMITED, &()).unwrap().cost;
-        assert!(lower_bound::internal_area(boxes, 8, &()).unwrap() <= optimum, "instance {number}");
         for method in Method::all() {
             let outcome = solve(&method, &problem, 1, budget, &()).unwrap();
             let name = format!("instance {number}, {}", method.name());

@@ -5,7 +5,7 @@ use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, SahConstants};
 use bvh_core::{Aabb, Bvh, check_boxes, collapse_leaves, file, validate};
 use bvh_scenes::trace::kd_tree;
-use bvh_search::{Budget, Method, Problem, SearchError, best, lower_bound, optimize, solve};
+use bvh_search::{Budget, Method, Problem, SearchError, best, optimize, solve};
 use bvh_stress::EXACT_OBJECTS;
 use bvh_stress::examine::{ROUNDING, check_outcome};
 
@@ -58,12 +58,10 @@ fn check_rejected(boxes: &[Aabb], object: usize, seed: u64, budget: Budget) {
         messages.push(error.to_string());
     }
     let kd_tree = kd_tree::Config::default().build(boxes);
-    let bound = lower_bound::internal_area(boxes, 1, &());
     let config = best::Config::default();
     let optimized = optimize(&Bvh::default(), &problem, &config, seed, budget, &());
     messages.push(check_boxes(boxes).unwrap_err().to_string());
     messages.push(kd_tree.unwrap_err().to_string());
-    messages.push(bound.unwrap_err().to_string());
     messages.push(optimized.unwrap_err().to_string());
     for message in messages {
         assert!(message.contains(&format!("object {object} ")), "{message}");
@@ -73,8 +71,6 @@ fn check_rejected(boxes: &[Aabb], object: usize, seed: u64, budget: Budget) {
 /// Checks that every method builds a tight tree of exact cost, twice the same, and that everything
 /// derived from the tree is valid too.
 fn check_built(boxes: &[Aabb], seed: u64, budget: Budget) {
-    let bound = lower_bound::internal_area(boxes, lower_bound::DEFAULT_EFFORT, &()).unwrap();
-    assert!(bound.is_finite() && bound >= 0.0);
     for method in Method::all() {
         let boxes = match method {
             Method::Exact(_) => &boxes[..boxes.len().min(EXACT_OBJECTS - 3)],

@@ -2,7 +2,7 @@
 //! their traversals compared with ours.
 //!
 //! The harness contains no library. The program in `attic/` does: it brings each as a [`Library`],
-//! and is the same program otherwise. A program of your own needs no code here: see [`command`].
+//! and a [lower bound](LowerBound), and is the same program otherwise. A program of your own needs no code here: see [`command`].
 
 pub mod command;
 mod program;
@@ -10,9 +10,11 @@ mod program;
 use crate::Error;
 use crate::measure::contender::Contender;
 use crate::measure::speed::Traced;
+use bvh_build::BuildError;
 use bvh_config::fault::Fault;
 use bvh_config::{Check, OutOfRange};
 use bvh_core::{Aabb, Bvh, Triangle};
+use bvh_search::Observer;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -95,17 +97,38 @@ pub struct Raced<'a> {
     pub traced: &'a Traced,
 }
 
-/// The libraries and the race of this program, which do not change while it runs.
-static OTHERS: OnceLock<(&[&dyn Library], &dyn Race)> = OnceLock::new();
+/// A proven lower bound of the internal area of every binary tree over boxes, which grows with an
+/// effort.
+pub type LowerBound = fn(&[Aabb], u32, &dyn Observer) -> Result<f64, BuildError>;
 
-/// Sets the libraries of this program, and its race. Only the first call counts.
-pub fn bring(libraries: &'static [&'static dyn Library], race: &'static dyn Race) {
-    OTHERS.get_or_init(|| (libraries, race));
+/// What a program contains beside the harness.
+pub struct Others {
+    /// The libraries that specs may name.
+    pub libraries: &'static [&'static dyn Library],
+    /// Programs that trace rays.
+    pub race: &'static dyn Race,
+    /// The bound of a spec's key `lower_bound`.
+    pub lower_bound: LowerBound,
+}
+
+/// What this program contains, which does not change while it runs.
+static OTHERS: OnceLock<Others> = OnceLock::new();
+
+/// Sets what this program contains. Only the first call counts.
+pub fn bring(others: Others) {
+    OTHERS.get_or_init(|| others);
 }
 
 /// Returns the race of this program, if it contains other libraries.
 pub(crate) fn race() -> Option<&'static dyn Race> {
-    OTHERS.get().map(|(_, race)| *race)
+    OTHERS.get().map(|others| others.race)
+}
+
+/// Returns the lower bound of this program.
+pub(crate) fn lower_bound() -> Result<LowerBound, Fault> {
+    OTHERS.get().map(|others| others.lower_bound).ok_or_else(|| {
+        Fault::new("lower_bound", format!("set, which `{PROGRAM}` computes"), "none without it")
+    })
 }
 
 /// A library with its settings, as a spec names it.
@@ -176,7 +199,7 @@ impl Peer {
     }
 
     fn library(&self) -> Result<&'static dyn Library, Fault> {
-        let here = OTHERS.get().map_or(&[][..], |(libraries, _)| libraries);
+        let here = OTHERS.get().map_or(&[][..], |others| others.libraries);
         let library = here.iter().find(|library| library.name() == self.name());
         library.copied().ok_or_else(|| {
             let found = format!("{:?}, another library, which `{PROGRAM}` contains", self.name());

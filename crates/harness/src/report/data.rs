@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::rows::{
-    self, BoundRow, ClockRow, HistoryRow, RayRow, ReferenceRow, Row, RunRow, RunTestRow, TestRow,
-    TimingRow, TrialRow, VisitRow,
+    self, ClockRow, HistoryRow, RayRow, ReferenceRow, Row, RunRow, RunTestRow, TestRow, TimingRow,
+    TrialRow, VisitRow,
 };
 use bvh_scenes::SceneKind;
 use std::path::{Path, PathBuf};
@@ -23,8 +23,6 @@ pub struct Rows {
     pub timing: Vec<TimingRow>,
     /// The rows of `rays.csv`; none if the spec requests no rays.
     pub rays: Vec<RayRow>,
-    /// The rows of `bounds.csv`; none if the spec requests no bounds.
-    pub bounds: Vec<BoundRow>,
     /// The rows of `timing_history.csv`: one for every row of `history`, in the same order, or none
     /// if no report needs them.
     pub clock: Vec<ClockRow>,
@@ -48,7 +46,6 @@ impl Rows {
             trials: rows::read_if_any(folder)?,
             timing: rows::read_if_any(folder)?,
             rays: rows::read_if_any(folder)?,
-            bounds: rows::read_if_any(folder)?,
             clock: rows::read_if_any(folder)?,
             references: rows::read_if_any(folder)?,
             tests: rows::read_if_any(folder)?,

@@ -1,4 +1,4 @@
-//! Gaps to the exact optimum of small scenes, by method, and the tightness of the lower bound.
+//! Gaps to the exact optimum of small scenes, by method.
 
 use super::prelude::*;
 use crate::statistics::quantile;
@@ -39,95 +39,50 @@ pub(super) struct Gaps<'a> {
     maximum_gap: f64,
 }
 
-/// The lower bound over the optimum, on all scenes of one kind and size, as written to
-/// `tightness.csv`.
-#[derive(Serialize)]
-pub(super) struct Tightness {
-    /// `random` or `cluster`.
-    part: &'static str,
-    objects: usize,
-    /// Number of scenes.
-    scenes: usize,
-    /// The least of all scenes.
-    minimum_bound_over_optimum: f64,
-    /// The median.
-    median_bound_over_optimum: f64,
-    /// The greatest.
-    maximum_bound_over_optimum: f64,
-}
-
-/// The gaps of all runs by method, kind of part and number of objects, and the bounds over the
-/// optimum of all scenes by the latter two.
-struct Found<'a> {
-    gaps: BTreeMap<(&'a str, &'static str, usize), Vec<f64>>,
-    bounds: BTreeMap<(&'static str, usize), Vec<f64>>,
-    optima: usize,
-}
-
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let found = self.find(rows);
-        let summaries = self.summaries(&found);
-        let tightness: Vec<Tightness> = found.bounds.iter().map(tightness).collect();
+        let summaries = self.summaries(rows);
         let mut output = Output::new("", &self.title);
         output.add_csv("gaps", &summaries)?;
-        if !tightness.is_empty() {
-            output.add_csv("tightness", &tightness)?;
-        }
+        let optima = rows.runs.iter().filter(|run| run.method == self.optimum).count();
         let caption = format!(
-            "{} small scenes. Left, the fraction of runs that end at the optimum; right, the worst gap of any. Below, \
-             the proven lower bound over the optimum: median, and from least to greatest.",
-            found.optima
+            "{optima} small scenes. Left, the fraction of runs that end at the optimum; right, the \
+             worst gap of any."
         );
-        let mut panels = self.draw(&summaries);
-        panels.extend(draw_bounds(&tightness));
-        output.add_figure("gaps", caption, 2, panels);
+        output.add_figure("gaps", caption, 2, self.draw(&summaries));
         let columns = "method part objects runs solved_fraction median_gap maximum_gap";
         output.show("Gaps to the exact optimum:", &summaries, columns)?;
         Ok(output)
     }
 
-    fn find<'a>(&self, rows: &'a Rows) -> Found<'a> {
+    fn summaries<'a>(&'a self, rows: &Rows) -> Vec<Gaps<'a>> {
         let optimal = rows.runs.iter().filter(|run| run.method == self.optimum);
         let optima: BTreeMap<&str, f64> =
             optimal.map(|run| (run.scene.as_str(), run.cost)).collect();
-        let mut found =
-            Found { gaps: BTreeMap::new(), bounds: BTreeMap::new(), optima: optima.len() };
-        for run in rows.runs.iter().filter(|run| self.methods.contains(&run.method)) {
-            if let Some(&optimum) = optima.get(run.scene.as_str()) {
+        let mut summaries = Vec::new();
+        for method in &self.methods {
+            let mut gaps_by_part: BTreeMap<(&'static str, usize), Vec<f64>> = BTreeMap::new();
+            let own = rows.runs.iter().filter(|run| run.method == *method);
+            for run in own {
+                let Some(&optimum) = optima.get(run.scene.as_str()) else { continue };
                 // An optimum of 0 has no relative gap, so the cost itself is the gap.
                 let gap = if optimum > 0.0 { run.cost / optimum - 1.0 } else { run.cost };
-                found
-                    .gaps
-                    .entry((&run.method, part(&run.scene), run.objects))
-                    .or_default()
-                    .push(gap);
+                gaps_by_part.entry((part(&run.scene), run.objects)).or_default().push(gap);
+            }
+            for ((part, objects), gaps) in gaps_by_part {
+                summaries.push(Gaps {
+                    method,
+                    part,
+                    objects,
+                    runs: gaps.len(),
+                    solved_fraction: solved(&gaps),
+                    median_gap: at(&gaps, 0.5),
+                    quantile_90_gap: at(&gaps, 0.9),
+                    maximum_gap: at(&gaps, 1.0),
+                });
             }
         }
-        for row in &rows.bounds {
-            if let Some(optimum) = optima.get(row.scene.as_str()).filter(|&&optimum| optimum > 0.0)
-            {
-                let same = found.bounds.entry((part(&row.scene), row.objects)).or_default();
-                same.push(row.lower_bound / optimum);
-            }
-        }
-        found
-    }
-
-    fn summaries<'a>(&self, found: &Found<'a>) -> Vec<Gaps<'a>> {
-        let summary =
-            |(&(method, part, objects), gaps): (&(&'a str, &'static str, usize), &Vec<f64>)| Gaps {
-                method,
-                part,
-                objects,
-                runs: gaps.len(),
-                solved_fraction: solved(gaps),
-                median_gap: at(gaps, 0.5),
-                quantile_90_gap: at(gaps, 0.9),
-                maximum_gap: at(gaps, 1.0),
-            };
-        let of = |method| found.gaps.iter().filter(move |((of, ..), _)| of == method);
-        self.methods.iter().flat_map(of).map(summary).collect()
+        summaries
     }
 
     /// Draws the fraction solved and the worst gap against size, for every kind of part.
@@ -156,36 +111,6 @@ impl Config {
         };
         parts.into_iter().flat_map(both).collect()
     }
-}
-
-fn tightness((&(part, objects), bounds): (&(&'static str, usize), &Vec<f64>)) -> Tightness {
-    Tightness {
-        part,
-        objects,
-        scenes: bounds.len(),
-        minimum_bound_over_optimum: at(bounds, 0.0),
-        median_bound_over_optimum: at(bounds, 0.5),
-        maximum_bound_over_optimum: at(bounds, 1.0),
-    }
-}
-
-/// Draws the lower bound over the optimum against size, for every kind of part.
-fn draw_bounds(tightness: &[Tightness]) -> Vec<Panel> {
-    let parts: BTreeSet<&str> = tightness.iter().map(|row| row.part).collect();
-    let draw = |part| {
-        let own = || tightness.iter().filter(move |row| row.part == part);
-        let range = |row: &Tightness| {
-            (row.objects as f64, row.minimum_bound_over_optimum, row.maximum_bound_over_optimum)
-        };
-        let median = |row: &Tightness| (row.objects as f64, row.median_bound_over_optimum);
-        let layers = vec![
-            Layer::new("lower bound", Marks::Band(own().map(range).collect())),
-            Layer::new("lower bound", Marks::Line(own().map(median).collect())),
-        ];
-        let y = Axis::linear("bound / optimum").range(0.0, 1.02).unit(Unit::Percent);
-        panel(format!("{part}, lower bound"), Axis::linear("objects"), y, layers)
-    };
-    parts.into_iter().map(draw).collect()
 }
 
 /// Returns the kind of part of a scene.

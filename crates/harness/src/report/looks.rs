@@ -34,7 +34,6 @@ const LOOKS: &[(&str, Hue, Shape)] = &[
     ("exact SAH sweep", Ink, Square),
     ("genetic", Indigo, Star),
     ("greedy", Ink, Square),
-    ("lower bound", Grey, Disc),
     ("median cut", Forest, Inverted),
     ("median run", Indigo, Disc),
     ("obvhs", Amber, Diamond),

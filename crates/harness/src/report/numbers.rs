@@ -2,11 +2,10 @@
 //! method and scene.
 
 use super::data::ratio;
-use super::output::percents;
 use super::prelude::*;
 use super::to_target;
 use crate::rows::ReferenceRow;
-use crate::statistics::{quartiles, range};
+use crate::statistics::quartiles;
 
 bvh_config::config! { serde;
     /// Numbers of every method on every scene.
@@ -82,11 +81,6 @@ impl Config {
         output.show(explanation, &numbers, columns)?;
         let columns = "scene method seconds_quartile_1 seconds_median seconds_quartile_3";
         output.show("Seconds of the runs:", &timing, columns)?;
-        let bounds = numbers.iter().filter_map(|row| row.lower_bound_over_reference);
-        let has_bounds = |_: &_| !rows.bounds.is_empty();
-        output.finding = range(bounds).filter(has_bounds).map(|(low, high)| {
-            format!("No tree costs less than {} of the best known", percents(low, high))
-        });
         if !self.targets.is_empty() {
             to_target::add(&mut output, &self.methods, &self.targets, rows)?;
         }

@@ -5,7 +5,7 @@ use super::judge::RayJudge;
 use super::solved::Solved;
 use crate::Error;
 use crate::contestant::{Contestant, Labelled};
-use crate::peers::Built;
+use crate::peers::{self, Built};
 use crate::rows::BoundRow;
 use crate::rows::finished_run::FinishedRun;
 use crate::spec::Experiment;
@@ -14,7 +14,7 @@ use bvh_core::{Bvh, validate_references};
 use bvh_scenes::Scene;
 use bvh_search::{
     Budget, Event, Judge, Method, Observer, Outcome, Problem, SearchError, Splits, StopReason,
-    exact, lower_bound, solve,
+    exact, solve,
 };
 use indicatif::ProgressBar;
 use std::sync::Mutex;
@@ -28,7 +28,8 @@ fn bound(experiment: &Experiment, scene: &Scene, watch: &Watch) -> Result<Option
         let problem = Problem::new(&scene.boxes);
         solve(&exact::Config {}, &problem, 0, Budget::UNLIMITED, &()).map(|outcome| outcome.cost)
     } else if let Some(effort) = experiment.lower_bound {
-        lower_bound::internal_area(&scene.boxes, effort, watch).map_err(SearchError::Build)
+        let bound = peers::lower_bound().map_err(|fault| Error::Usage(fault.to_string()))?;
+        bound(&scene.boxes, effort, watch).map_err(SearchError::Build)
     } else {
         return Ok(None);
     };

@@ -4,6 +4,7 @@
 
 use super::Experiment;
 use crate::contestant::{Contestant, EntryOptions, Labelled};
+use crate::peers;
 use bvh_config::OutOfRange;
 use bvh_config::fault::Fault;
 use bvh_scenes::subset;
@@ -20,6 +21,9 @@ impl Experiment {
         self.check_scenes()?;
         self.check_run_count()?;
         self.check_labels()?;
+        if self.lower_bound.is_some() {
+            peers::lower_bound()?;
+        }
         for (index, labelled) in self.methods.iter().enumerate() {
             let fault = self.check_method(labelled).err();
             if let Some(fault) = fault.or_else(|| self.check_end(labelled).err()) {

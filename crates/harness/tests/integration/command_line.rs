@@ -102,20 +102,6 @@ fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
     assert!(folder.path().join("results/spec/.partial/000000").is_dir());
 }
 
-#[cfg(unix)]
-#[test]
-fn a_signal_ends_a_lower_bound_of_any_effort() {
-    let spec = "question = 'q'\nscenes = ['escher']\nlower_bound = 4000000000\nmethods = [{ method = 'median_cut' }]\n";
-    let folder = folder_with("spec.toml", spec);
-    let child = begin(folder.path(), &["spec.toml"]);
-    wait_for(&folder.path().join("results/spec/.partial"));
-    // The tree takes milliseconds, so the signal interrupts the bound.
-    std::thread::sleep(std::time::Duration::from_millis(500));
-    send("-INT", &child);
-    // An interrupted bound is not a result.
-    ended(&child.wait_with_output().unwrap(), 130, &["0 of 1 runs are kept"]);
-}
-
 #[test]
 fn check_passes_on_equal_results_and_names_an_altered_number() {
     let folder = folder();

@@ -44,14 +44,11 @@
 mod clusters;
 mod smallest_box;
 
-use crate::parallel::map_numbers;
-use crate::run::Observer;
 use bvh_build::BuildError;
-use bvh_core::{Aabb, PackedAabb, cost::Sum};
+use bvh_core::{Aabb, cost::Sum};
+use bvh_search::{Observer, lower_bound::of_largest};
 use clusters::{Clusters, Grouped};
-
-/// The effort beyond which the bound improves too little for the time it takes.
-pub const DEFAULT_EFFORT: u32 = 16;
+use rayon::prelude::*;
 
 /// A lower bound of [`bvh_core::cost::internal_area`] of every binary tree over `boxes` with one
 /// object per leaf, in world units squared; 0 for fewer than two objects. See the [module](self)
@@ -108,33 +105,6 @@ pub fn internal_area(
         return Ok(of_largest(boxes));
     }
     Ok(shares.into_iter().collect::<Sum>().value() * (1.0 - 1e-12))
-}
-
-/// A lower bound in O(n): the area of the root plus the areas of all objects except the smallest
-/// and the largest, in world units squared; 0 for fewer than two objects. The optimum meets it if
-/// all boxes are equal, if every box is inside the next, or if no box has an area.
-///
-/// *Proof.* Every inner node has at least the area of the largest object below it. There are k − 2
-/// or more inner nodes above `k` of the objects, not counting the root, if these are all objects,
-/// and k − 1 or more otherwise: k paths to the root join in k − 1 nodes, and any other object joins
-/// them in one more. Choose the `k` objects of area t or more, and integrate over t. ∎
-pub fn of_largest(boxes: &[Aabb]) -> f64 {
-    if boxes.len() < 2 {
-        return 0.0;
-    }
-    let mut least = f64::INFINITY;
-    let mut most = 0.0f64;
-    let mut root = PackedAabb::EMPTY;
-    let mut sum = Sum::default();
-    for aabb in boxes.iter().map(PackedAabb::from) {
-        let area = aabb.half_area();
-        (least, most) = (least.min(area), most.max(area));
-        root.grow(&aabb);
-        sum.add(area);
-    }
-    let root = root.half_area();
-    [root, -least, -most].into_iter().for_each(|area| sum.add(area));
-    sum.value().max(root)
 }
 
 /// The objects of a group together weigh at most 1/8 of the size in question, so one search for the
@@ -222,6 +192,11 @@ fn rate(from: u64, first: u64, last: u64) -> f64 {
     share(y as f64 / x as f64) / y as f64
 }
 
+/// Returns the numbers of the tasks `0..count`, which all threads share.
+fn map_numbers(count: usize, task: impl Fn(usize) -> f64 + Sync + Send) -> Vec<f64> {
+    (0..count).into_par_iter().map(task).collect()
+}
+
 /// α: the fraction of a node's area that is charged to a child with this fraction of the node's
 /// weight.
 fn share(part: f64) -> f64 {
@@ -238,8 +213,8 @@ fn over_secant(p: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::exact;
-    use crate::run::{Budget, Problem, solve};
+    use bvh_scenes::Scene;
+    use bvh_search::{Budget, Problem, exact, solve};
     use proptest::prelude::*;
 
     /// Boxes of very different sizes, `flat` axes without extent; every fourth scene is on a coarse
@@ -257,6 +232,10 @@ mod tests {
             };
             boxes.into_iter().map(of).collect()
         })
+    }
+
+    fn boxes(scene: &str) -> Vec<Aabb> {
+        Scene::load(scene).unwrap().boxes
     }
 
     fn optimum(boxes: &[Aabb]) -> f64 {
@@ -286,7 +265,7 @@ mod tests {
             let boxes: Vec<Aabb> = (0..12)
                 .map(|i| Aabb::from((corner(i), corner(i).map(|c| c + number(i, 4) / 10.0))))
                 .collect();
-            let tightness = internal_area(&boxes, DEFAULT_EFFORT, &()).unwrap() / optimum(&boxes);
+            let tightness = internal_area(&boxes, 16, &()).unwrap() / optimum(&boxes);
             assert!(tightness > 0.8, "{tightness}");
         }
     }
@@ -300,7 +279,7 @@ mod tests {
 
     #[test]
     fn more_effort_never_hurts_and_shares_add_up() {
-        let boxes = crate::scatter::scatter(300);
+        let boxes = boxes("escher:300");
         let bounds = [0, 4, 16, 64].map(|effort| internal_area(&boxes, effort, &()).unwrap());
         assert!(bounds[0] > 0.0 && bounds.is_sorted(), "{bounds:?}");
         for part in [0.001, 0.2, 0.5, 0.93] {
@@ -318,7 +297,7 @@ mod tests {
                 self.0.fetch_update(Relaxed, Relaxed, |left| Some(left.saturating_sub(1))) == Ok(0)
             }
         }
-        let boxes = crate::scatter::scatter(3000);
+        let boxes = boxes("escher:3000");
         let whole = internal_area(&boxes, 1, &()).unwrap();
         for polls in [0, 1, 10_000] {
             // Without a cancellation, this effort would take hours.
@@ -329,7 +308,7 @@ mod tests {
 
     #[test]
     fn bad_boxes_are_rejected_and_extreme_ones_are_not() {
-        let mut boxes = crate::scatter::scatter(50);
+        let mut boxes = boxes("escher:50");
         for factor in [2f32.powi(-140), 2f32.powi(100)] {
             let scaled: Vec<Aabb> =
                 boxes.iter().map(|b| Aabb { min: b.min * factor, max: b.max * factor }).collect();

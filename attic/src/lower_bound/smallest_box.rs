@@ -2,8 +2,8 @@
 //! faces.
 
 use super::clusters::{Clusters, Reach};
-use crate::run::Observer;
 use bvh_core::with_vector_instructions;
+use bvh_search::Observer;
 use std::cmp::Ordering;
 
 /// A cluster that weighs at most 1/128 of the size in question counts as inside a box as soon as
