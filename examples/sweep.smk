@@ -1,5 +1,5 @@
 # Shares the runs of a spec among the workers that Snakemake has, on this machine or on any cluster
-# that one of its plug-ins reaches, and merges them:
+# that one of its plug-ins reaches, and joins them:
 #
 #     snakemake --snakefile examples/sweep.smk --cores 8 --keep-going --rerun-incomplete \
 #         --config spec=experiments/table4.toml out=mine
@@ -17,13 +17,13 @@ listed = subprocess.run([HARNESS, "jobs", SPEC], check=True, capture_output=True
 IDS = [line.split(" ")[0] for line in listed.splitlines()]
 
 
-rule merge:
+rule join:
     input:
         expand(f"{PARTS}/{{id}}.done", id=IDS),
     params:
         folders=expand(f"{PARTS}/{{id}}", id=IDS),
     shell:
-        "{HARNESS} merge {params.folders} --out {OUT}"
+        "{HARNESS} {SPEC} --from {params.folders} --out {OUT}"
 
 
 rule run:

@@ -1,4 +1,4 @@
-"""Shares the runs of a spec among the workers of a HyperQueue server, and merges them:
+"""Shares the runs of a spec among the workers of a HyperQueue server, and joins them:
 
     python3 examples/sweep_hyperqueue.py SPEC.toml OUT [SERVER_FOLDER]
 
@@ -52,7 +52,7 @@ def main(spec, out, server=None):
     if cluster:
         cluster.stop()
     parts = [f"{out}.parts/{run}" for run in runs]
-    return subprocess.run([HARNESS, "merge", *parts, "--out", out]).returncode
+    return subprocess.run([HARNESS, spec, "--from", *parts, "--out", out]).returncode
 
 
 if __name__ == "__main__":

@@ -79,9 +79,6 @@ pub enum Error {
     /// A finished run whose files no longer match their checksums.
     #[error("{}: {file} is damaged or missing", .run.display())]
     Damaged { run: PathBuf, file: String },
-    /// Parts of an experiment that cannot be joined.
-    #[error("{experiment}: {message}")]
-    Merge { experiment: String, message: String },
     /// Ctrl-C.
     #[error("interrupted; {finished} of {runs} runs are kept, `--resume` does the rest")]
     Interrupted { finished: usize, runs: usize },

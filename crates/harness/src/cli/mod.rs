@@ -2,7 +2,6 @@
 
 pub mod compare;
 pub mod jobs;
-pub mod merge;
 pub mod new;
 pub mod program;
 pub mod report;

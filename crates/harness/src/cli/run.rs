@@ -1,7 +1,7 @@
 //! `harness SPEC.toml...`: runs experiments, compares them with committed results, or makes their
 //! reports again.
 
-use super::terminal::{Jobs, output_folder, print_error, print_line};
+use super::terminal::{Jobs, input_folder, output_folder, print_error, print_line};
 use crate::Error;
 use crate::rows::store::Existing;
 use crate::run::execute::{Extent, Verbosity, execute};
@@ -38,14 +38,17 @@ pub struct RunArgs {
     /// Keep the finished runs of an interrupted experiment and perform the missing ones.
     #[arg(long)]
     pub resume: bool,
-    /// Replace existing results. Without this flag, finished results stay, and a repetition writes
-    /// to a folder next to them whose name ends with `.new`.
+    /// Replace existing results.
     #[arg(long, conflicts_with_all = ["check", "redraw", "resume"])]
     pub force: bool,
-    /// Perform only the run that `harness jobs` lists with this identifier, and keep it for
-    /// `harness merge`; may be repeated. Every process needs a different --out.
+    /// Perform only the run that `harness jobs` lists with this identifier, and keep it for `--from`;
+    /// may be repeated. Every process needs a different --out.
     #[arg(long = "run", value_name = "ID", conflicts_with = "check")]
     pub runs: Vec<String>,
+    /// Take the runs that were performed with --run and these folders as --out, and perform those
+    /// that are missing.
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["check", "redraw", "runs"])]
+    pub from: Vec<PathBuf>,
     /// Print only errors and, under --check, differences.
     #[arg(long)]
     pub quiet: bool,
@@ -58,6 +61,7 @@ pub struct RunArgs {
 pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     // A wrong folder is found before hours of work, not after them.
     output_folder("--out", &args.out)?;
+    args.from.iter().try_for_each(|folder| input_folder("--from", folder))?;
     args.jobs.apply()?;
     // A mistake in the last spec must not surface after hours of runs of the first.
     let experiments = args
@@ -82,7 +86,8 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         true => Selection::All,
         false => Selection::Runs(args.runs.clone()),
     };
-    let extent = Extent { existing, selection, verbosity: verbosity(args) };
+    let parts = args.from.clone();
+    let extent = Extent { existing, selection, parts, verbosity: verbosity(args) };
     let mut differences = 0;
     for experiment in &experiments {
         if args.check {
@@ -96,29 +101,19 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         };
         summary.remarks.iter().for_each(|remark| print_error(remark));
         if !args.quiet {
-            print_summary(experiment, &summary)?;
+            print_summary(experiment, &summary);
         }
     }
     if differences > 0 { Err(Error::Differs { differences }) } else { Ok(()) }
 }
 
-fn print_summary(experiment: &Experiment, summary: &Summary) -> Result<(), Error> {
-    let Summary { text, skipped_scenes, folder, previous, .. } = summary;
+fn print_summary(experiment: &Experiment, summary: &Summary) {
+    let Summary { text, skipped_scenes, folder, .. } = summary;
     print_line(&experiment.question);
     for name in skipped_scenes {
         print_line(&format!("(without {name}: scripts/fetch-scenes brings it)"));
     }
     print_line(&format!("\n{text}Results: {}", folder.display()));
-    if let Some(previous) = previous {
-        let differences = check::compare(folder, previous, skipped_scenes, !experiment.quick)?;
-        let relation = match differences.is_empty() {
-            true => "has the same rows",
-            false => "has different rows",
-        };
-        let previous = previous.display();
-        print_line(&format!("({previous} is kept and {relation}; --force would replace it)"));
-    }
-    Ok(())
 }
 
 fn verbosity(args: &RunArgs) -> Verbosity {
@@ -146,7 +141,7 @@ fn compare(
     reference::adopt(&committed, temporary.path())?;
     let extent = Extent { verbosity: verbosity(args), ..Extent::default() };
     let summary = execute(experiment, temporary.path(), &extent, interrupted)?;
-    let found = check::compare(&fresh, &committed, &summary.skipped_scenes, !experiment.quick)?;
+    let found = check::compare(&fresh, &committed, &summary.skipped_scenes)?;
     let name = &experiment.name;
     for scene in &summary.skipped_scenes {
         print_line(&format!("{name}: scene {scene} is not fetched; its rows are not compared"));

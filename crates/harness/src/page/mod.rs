@@ -58,15 +58,13 @@ impl Section {
     }
 }
 
-/// Writes a page of all finished experiments in `results` to `out`, without quick variants and
-/// without repetitions of experiments that are on the page. Returns the number of experiments.
+/// Writes a page of all finished experiments in `results` to `out`, without quick variants.
+/// Returns the number of experiments.
 pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
     let mut names = files::names(results)?;
     names.retain(|name| results.join(name).join("resolved.toml").is_file());
-    let repeats =
-        |name: &String| name.strip_suffix(".new").is_some_and(|first| names.contains(first));
     let mut sections = Vec::new();
-    for name in names.iter().filter(|name| !repeats(name)) {
+    for name in &names {
         sections.push(Section::read(results, name, out)?);
     }
     if sections.is_empty() {

@@ -19,8 +19,7 @@ use std::path::{Path, PathBuf};
 /// The treatment of results that are in the folder already.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Existing {
-    /// They stay. A repetition of the same runs goes into a folder next to them; other runs are
-    /// rejected.
+    /// They stay, and a run that would replace them is rejected.
     #[default]
     Keep,
     /// They stay, and those of an interrupted experiment are completed.
@@ -28,10 +27,6 @@ pub enum Existing {
     /// They are replaced.
     Replace,
 }
-
-/// The file in `.partial/` that tells on which machine, and of which part of the experiment, its
-/// runs come from.
-pub const PART_PROVENANCE: &str = "provenance.toml";
 
 /// The file in `.partial/` with the resolved spec of its runs.
 const SPEC: &str = "resolved.toml";
@@ -144,6 +139,28 @@ impl Store {
         fs::rename(&unfinished, &run_folder).map_err(Error::io(&run_folder, "rename the folder"))
     }
 
+    /// Keeps those of the runs 0 to `runs` − 1 that a part of the experiment in the folder `part` has
+    /// and this folder has not.
+    ///
+    /// # Errors
+    ///
+    /// If the part is of another spec, scene or seed, or if a run of it is damaged.
+    pub fn adopt(&self, part: &Path, runs: usize) -> Result<(), Error> {
+        let partial = part.join(".partial");
+        let spec = partial.join(SPEC);
+        if read_text(&spec)? != read_text(&self.partial.join(SPEC))? {
+            let spec = spec.display();
+            return Err(Error::Usage(format!("--from: {spec} has another spec, scene or seed")));
+        }
+        for index in 0..runs {
+            let run_folder = partial.join(run_folder_name(index));
+            if run_folder.is_dir() && !self.has(index)? {
+                self.keep(index, &FinishedRun::read(&run_folder)?)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Returns the rows of one kind of the kept run `index`; none if it has no such rows.
     pub fn rows<R: Row>(&self, index: usize) -> Result<Vec<R>, Error> {
         read_if_any(&self.run_folder(index))
@@ -182,11 +199,6 @@ impl Store {
     /// Writes another file of the results.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
         Ok(files::write(&self.folder.join(name), bytes)?)
-    }
-
-    /// Returns the path of the file [`PART_PROVENANCE`].
-    pub fn part_provenance(&self) -> PathBuf {
-        self.partial.join(PART_PROVENANCE)
     }
 
     /// Removes the kept runs, which only an interrupted experiment needs. The lock file stays:
@@ -237,7 +249,7 @@ fn without_header(bytes: &[u8]) -> &[u8] {
 }
 
 /// Returns the name of the folder of the kept run `index`.
-pub fn run_folder_name(index: usize) -> String {
+fn run_folder_name(index: usize) -> String {
     format!("{index:06}")
 }
 

@@ -1,10 +1,9 @@
-//! Compares fresh results with committed ones: the resolved spec key by key, CSV files row by row,
-//! and figures byte by byte. Files with times are not compared.
+//! Compares fresh results with committed ones: the resolved spec line by line, and CSV files row by
+//! row. Files with times and figures are not compared; `--redraw` makes figures again.
 
-use super::resolved::read_toml;
+use super::resolved::{read_toml, to_toml};
 use crate::Error;
 use crate::files;
-use crate::report::overview;
 use csv::StringRecord;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -21,19 +20,18 @@ struct Rows {
 
 /// Lists the differences between the folders `fresh` and `committed`, one line each.
 ///
-/// The rows of `skipped_scenes` are not compared. If any scene was skipped, neither are figures,
-/// nor the rows of files without a column `scene`, which summarise all scenes.
+/// The rows of `skipped_scenes` are not compared. If any scene was skipped, neither are the rows of
+/// files without a column `scene`, which summarise all scenes.
 pub fn compare(
     fresh: &Path,
     committed: &Path,
     skipped_scenes: &[String],
-    has_figures: bool,
 ) -> Result<Vec<String>, Error> {
-    let mut names = untimed_files(fresh, ".csv")?;
+    let mut names = untimed_tables(fresh)?;
     if !committed.is_dir() {
         return Ok(vec![format!("{}: no committed results to compare with", committed.display())]);
     }
-    names.extend(untimed_files(committed, ".csv")?);
+    names.extend(untimed_tables(committed)?);
     let mut differences = compare_specs(fresh, committed, skipped_scenes)?;
     for name in names {
         let fresh_file = fresh.join(&name);
@@ -49,48 +47,29 @@ pub fn compare(
             differences.extend(compare_rows(&name, &fresh_rows, &committed_rows, all_scenes));
         }
     }
-    if has_figures && skipped_scenes.is_empty() {
-        differences.extend(compare_figures(fresh, committed)?);
-    }
     Ok(differences)
 }
 
-/// Compares the bytes of all figures that show no seconds.
-fn compare_figures(fresh: &Path, committed: &Path) -> Result<Vec<String>, Error> {
-    let mut names = untimed_files(fresh, ".svg")?;
-    names.extend(untimed_files(committed, ".svg")?);
-    let mut differences = Vec::new();
-    for name in names {
-        let fresh_bytes = bvh_scenes::files::read(&fresh.join(&name)).ok();
-        let committed_bytes = bvh_scenes::files::read(&committed.join(&name)).ok();
-        if fresh_bytes == committed_bytes {
-            continue;
-        }
-        differences.push(if fresh_bytes.is_none() {
-            format!("{name} is committed but is no longer drawn")
-        } else if committed_bytes.is_none() {
-            format!("{name} is not among the committed results")
-        } else {
-            format!("{name} differs from the committed figure")
-        });
-    }
-    Ok(differences)
-}
-
-/// Compares the resolved specs key by key.
+/// Compares the resolved specs line by line.
 fn compare_specs(
     fresh: &Path,
     committed: &Path,
     skipped_scenes: &[String],
 ) -> Result<Vec<String>, Error> {
-    let fresh_spec = Value::Table(read_spec(fresh, skipped_scenes)?);
-    let committed_spec = Value::Table(read_spec(committed, skipped_scenes)?);
-    let mut differences = Vec::new();
-    compare_values("", &fresh_spec, &committed_spec, &mut differences);
+    let [fresh, committed] =
+        [read_spec(fresh, skipped_scenes)?, read_spec(committed, skipped_scenes)?];
+    let [now, then] = [&fresh, &committed].map(|text| text.lines().collect::<BTreeSet<_>>());
+    let added = now.difference(&then).map(|line| format!("not committed: {line}"));
+    let removed = then.difference(&now).map(|line| format!("only committed: {line}"));
+    let mut differences: Vec<String> = added.chain(removed).collect();
+    if differences.is_empty() && fresh != committed {
+        differences.push("its lines are in another order".into());
+    }
     Ok(shortened("resolved.toml", differences))
 }
 
-fn read_spec(folder: &Path, skipped_scenes: &[String]) -> Result<Table, Error> {
+/// Returns the text of a resolved spec without the skipped scenes.
+fn read_spec(folder: &Path, skipped_scenes: &[String]) -> Result<String, Error> {
     let mut spec: Table = read_toml(&folder.join("resolved.toml"))?;
     if let Some(Value::Array(scenes)) = spec.get_mut("scenes") {
         scenes.retain(|scene| {
@@ -98,41 +77,7 @@ fn read_spec(folder: &Path, skipped_scenes: &[String]) -> Result<Table, Error> {
             !skipped_scenes.iter().any(|skipped| Some(skipped.as_str()) == name)
         });
     }
-    Ok(spec)
-}
-
-fn compare_values(key: &str, fresh: &Value, committed: &Value, differences: &mut Vec<String>) {
-    match (fresh, committed) {
-        (Value::Table(fresh_table), Value::Table(committed_table)) => {
-            let names: BTreeSet<&String> =
-                fresh_table.keys().chain(committed_table.keys()).collect();
-            for name in names {
-                // The full path of a key is what its author searches for.
-                let key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
-                match (fresh_table.get(name), committed_table.get(name)) {
-                    (Some(fresh), Some(committed)) => {
-                        compare_values(&key, fresh, committed, differences)
-                    }
-                    (Some(fresh), None) => {
-                        differences.push(format!("{key} is {fresh}, not committed"))
-                    }
-                    (None, _) => {
-                        differences.push(format!("{key} is committed but is no longer a key"))
-                    }
-                }
-            }
-        }
-        (Value::Array(fresh_values), Value::Array(committed_values))
-            if fresh_values.len() == committed_values.len() =>
-        {
-            for (index, fresh) in fresh_values.iter().enumerate() {
-                let key = format!("{key}[{index}]");
-                compare_values(&key, fresh, &committed_values[index], differences);
-            }
-        }
-        _ if fresh == committed => {}
-        _ => differences.push(format!("{key} is {fresh}, committed {committed}")),
-    }
+    to_toml(&spec)
 }
 
 /// Returns the first differences in a file and the number of further ones.
@@ -146,12 +91,10 @@ fn shortened(file: &str, mut differences: Vec<String>) -> Vec<String> {
     differences.into_iter().map(|difference| format!("{file}: {difference}")).collect()
 }
 
-/// Returns the names in a folder that end with `suffix`, without the files that hold seconds.
-fn untimed_files(folder: &Path, suffix: &str) -> Result<BTreeSet<String>, Error> {
+/// Returns the names of the tables in a folder that hold no seconds.
+fn untimed_tables(folder: &Path) -> Result<BTreeSet<String>, Error> {
     let mut names = files::names(folder)?;
-    let overview = format!("{}.svg", overview::FIGURE);
-    let is_timed = |name: &str| name.starts_with("timing") || name == overview;
-    names.retain(|name| name.ends_with(suffix) && !is_timed(name));
+    names.retain(|name| name.ends_with(".csv") && !name.starts_with("timing"));
     Ok(names)
 }
 
@@ -219,7 +162,7 @@ mod tests {
         for folder in &folders {
             fs::write(folder.path().join("resolved.toml"), "").unwrap();
         }
-        compare(folders[0].path(), folders[1].path(), skipped_scenes, true).unwrap()
+        compare(folders[0].path(), folders[1].path(), skipped_scenes).unwrap()
     }
 
     const COMMITTED: &str = "scene,method,cost\na,m,1.5\nb,m,2.5\n";
@@ -250,44 +193,19 @@ mod tests {
     }
 
     #[test]
-    fn an_altered_figure_is_named_unless_it_shows_seconds_or_lacks_a_scene() {
-        let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
-        for (folder, text) in folders.iter().zip(["<svg/>", "<svg></svg>"]) {
-            fs::write(folder.path().join("resolved.toml"), "").unwrap();
-            for name in ["trials.svg", "timing_trials.svg"] {
-                fs::write(folder.path().join(name), text).unwrap();
-            }
-        }
-        let found = |skipped_scenes: &[String], has_figures| {
-            compare(folders[0].path(), folders[1].path(), skipped_scenes, has_figures).unwrap()
-        };
-        assert_eq!(found(&[], true), ["trials.svg differs from the committed figure"]);
-        assert!(found(&["sponza".into()], true).is_empty() && found(&[], false).is_empty());
-        fs::write(folders[1].path().join("trials.svg"), "<svg/>").unwrap();
-        assert!(found(&[], true).is_empty());
-        fs::remove_file(folders[0].path().join("trials.svg")).unwrap();
-        assert_eq!(found(&[], true), ["trials.svg is committed but is no longer drawn"]);
-    }
-
-    #[test]
-    fn a_stale_resolved_spec_is_named_by_its_keys() {
+    fn a_stale_resolved_spec_is_named_by_its_lines() {
         let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
         let specs = [
-            "[experiment]\nseed = 1\nm = [{ a = 1 }]\n[[scenes]]\nname = 'x'\n",
-            "[experiment]\nold = 1\nm = [{ a = 2 }]\n\
-             [[scenes]]\nname = 'x'\n[[scenes]]\nname = 'y'\n",
+            "[experiment]\nseed = 1\n[[scenes]]\nname = 'x'\n",
+            "[experiment]\nseed = 2\n[[scenes]]\nname = 'x'\n[[scenes]]\nname = 'y'\n",
         ];
         for (folder, spec) in folders.iter().zip(specs) {
             fs::write(folder.path().join("resolved.toml"), spec).unwrap();
         }
-        let found = compare(folders[0].path(), folders[1].path(), &["y".into()], true).unwrap();
+        let found = compare(folders[0].path(), folders[1].path(), &["y".into()]).unwrap();
         assert_eq!(
             found,
-            [
-                "resolved.toml: experiment.m[0].a is 1, committed 2",
-                "resolved.toml: experiment.old is committed but is no longer a key",
-                "resolved.toml: experiment.seed is 1, not committed",
-            ]
+            ["resolved.toml: not committed: seed = 1", "resolved.toml: only committed: seed = 2"]
         );
     }
 }

@@ -6,18 +6,17 @@ use super::measurement::{Measurement, Trees, Work};
 use super::perform::Watch;
 use super::provenance::Provenance;
 use super::ray_cost::Judging;
-use super::reference::BestKnown;
 use super::resolved::{Resolved, load_scenes, to_toml};
 use super::runs::Runs;
 use super::selection::Selection;
 use super::suite::Suite;
-use super::target::Target;
+use super::target;
 use super::trace::Tracing;
 use crate::Error;
 use crate::rows::store::{self, Existing, Store};
 use crate::spec::Experiment;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 pub use super::measurement::Verbosity;
@@ -27,8 +26,10 @@ pub use super::measurement::Verbosity;
 pub struct Extent {
     /// The treatment of existing results.
     pub existing: Existing,
-    /// The runs to perform. Those of a part are kept to be [merged](crate::run::merge::merge).
+    /// The runs to perform. Those of a part are kept for a harness that joins the parts.
     pub selection: Selection,
+    /// The `--out` of harnesses that have performed parts of the experiment.
+    pub parts: Vec<PathBuf>,
     /// The lines about runs on standard error.
     pub verbosity: Verbosity,
 }
@@ -87,12 +88,11 @@ fn run(
     extent: &Extent,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
-    let Extent { existing, ref selection, verbosity } = *extent;
+    let Extent { existing, ref selection, ref parts, verbosity } = *extent;
     let is_part = selection.is_part();
     let (scenes, skipped_scenes) = load_scenes(experiment)?;
     let resolved = Resolved::new(experiment, &scenes);
-    let target = Target::choose(out, &resolved, existing, is_part)?;
-    let Target { folder, previous, is_finished } = target;
+    let (folder, is_finished) = target::choose(out, &resolved, existing, is_part)?;
     if is_finished {
         store::remove_leftovers(&folder)?;
         return Ok(Summary { skipped_scenes, ..Summary::finished(folder) });
@@ -103,11 +103,17 @@ fn run(
     let runs = jobs.len();
     if is_part {
         // Before the runs, because a killed part may be resumed on another machine.
-        Provenance::add_to_part(&store.part_provenance())?;
+        Provenance::add_to_part(&folder)?;
     }
     let mut remarks: Vec<String> = scenes.iter().filter_map(|scene| scene.remark.clone()).collect();
     // The subsets of one mesh share its remark.
     remarks.dedup();
+    let mut provenance = Provenance::gather();
+    for part in parts.iter().map(|out| out.join(experiment.folder())) {
+        store.adopt(&part, runs)?;
+        provenance.parts.extend(Provenance::of_part(&part)?);
+    }
+    remarks.extend(provenance.unlike_processors());
     let mut work = Work {
         experiment,
         jobs: &jobs,
@@ -123,16 +129,11 @@ fn run(
     }
     let remarks = work.remarks;
     if is_part {
-        let text = format!("{runs} runs, {selection}; `harness merge` joins the parts.\n");
-        return Ok(Summary { text, skipped_scenes, remarks, folder, previous });
+        let text = format!("{runs} runs; `--from` joins the parts.\n");
+        return Ok(Summary { text, skipped_scenes, remarks, folder });
     }
-    // A repetition is compared with the previous results, which requires the same references.
-    let best_known = match previous {
-        Some(_) => BestKnown::Read(out),
-        None => BestKnown::Improve(out),
-    };
-    let text = conclude(&resolved, best_known, &Provenance::gather(), store)? + &text;
-    Ok(Summary { text, skipped_scenes, remarks, folder, previous })
+    let text = conclude(&resolved, out, &provenance, store)? + &text;
+    Ok(Summary { text, skipped_scenes, remarks, folder })
 }
 
 /// Creates a bar that shows the time left; it is hidden unless standard error is a terminal.

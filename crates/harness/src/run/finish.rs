@@ -6,7 +6,7 @@ use crate::report;
 use crate::report::output::Output;
 use crate::rows::store::{self, Existing, Store};
 use crate::run::provenance::Provenance;
-use crate::run::reference::{self, BestKnown};
+use crate::run::reference;
 use crate::run::resolved::{Resolved, read_toml, to_toml};
 use crate::spec::Experiment;
 use crate::stress;
@@ -24,8 +24,6 @@ pub struct Summary {
     pub remarks: Vec<String>,
     /// The folder of the results.
     pub folder: PathBuf,
-    /// The folder of the earlier results that this run repeats and leaves unchanged.
-    pub previous: Option<PathBuf>,
 }
 
 impl Summary {
@@ -37,15 +35,15 @@ impl Summary {
     }
 }
 
-/// Joins the kept runs and makes the reports. Returns the text for the terminal.
+/// Joins the kept runs and makes the reports of results in `out`. Returns the text for the terminal.
 pub(crate) fn conclude(
     resolved: &Resolved,
-    best_known: BestKnown,
+    out: &Path,
     provenance: &Provenance,
     store: Store,
 ) -> Result<String, Error> {
     store.join(resolved.run_count())?;
-    let text = report(resolved, best_known, provenance, &store)?;
+    let text = report(resolved, out, provenance, &store)?;
     // Provenance comes last, so that it describes results that are complete.
     store.write("provenance.toml", to_toml(provenance)?.as_bytes())?;
     store.finish()?;
@@ -56,12 +54,12 @@ pub(crate) fn conclude(
 /// terminal.
 fn report(
     resolved: &Resolved,
-    best_known: BestKnown,
+    out: &Path,
     provenance: &Provenance,
     store: &Store,
 ) -> Result<String, Error> {
     // Reports read references, so these are updated first.
-    reference::update(resolved, best_known, &provenance.revision, store)?;
+    reference::update(resolved, out, &provenance.revision, store)?;
     let made = outputs(&resolved.experiment, store.folder())?;
     store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
     // Only the rows of quick variants are ever read, so they need no figures.
@@ -109,9 +107,9 @@ pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
     let store = Store::open(&folder, &recorded_spec, Existing::Keep)?;
     // The rows are still the output of the program that ran, so its provenance is kept.
     let provenance: Provenance = read_toml(&folder.join("provenance.toml"))?;
-    let made = report(&resolved, BestKnown::Improve(out), &provenance, &store);
+    let made = report(&resolved, out, &provenance, &store);
     // A failing report leaves finished results, not an interrupted experiment.
     store.finish()?;
     let text = made?;
-    Ok(Summary { text, skipped_scenes: vec![], remarks: vec![], folder, previous: None })
+    Ok(Summary { text, skipped_scenes: vec![], remarks: vec![], folder })
 }

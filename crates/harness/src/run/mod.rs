@@ -7,7 +7,6 @@ pub mod finish;
 mod job;
 mod judge;
 mod measurement;
-pub mod merge;
 mod perform;
 pub mod provenance;
 mod ray_cost;

@@ -7,7 +7,8 @@ use crate::files;
 use crate::peers;
 use crate::processor::PROCESSOR;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 /// Contents of `provenance.toml`.
@@ -67,26 +68,35 @@ impl Provenance {
     }
 
     /// Records in the file of a part that this process adds runs to it.
-    pub fn add_to_part(path: &Path) -> Result<(), Error> {
+    pub fn add_to_part(folder: &Path) -> Result<(), Error> {
         let mut provenance = Self::gather();
-        if let Some(mut earlier) = Self::of_part(path)? {
+        if let Some(mut earlier) = Self::of_part(folder)? {
             provenance.parts = std::mem::take(&mut earlier.parts);
             provenance.parts.push(earlier);
             provenance.parts.retain(|part| part.cpu != provenance.cpu);
         }
-        files::write(path, to_toml(&provenance)?.as_bytes())?;
+        files::write(&file_of_part(folder), to_toml(&provenance)?.as_bytes())?;
         Ok(())
     }
 
     /// Reads the file of a part, if there is one.
-    pub fn of_part(path: &Path) -> Result<Option<Self>, Error> {
-        if path.is_file() { read_toml(path).map(Some) } else { Ok(None) }
+    pub fn of_part(folder: &Path) -> Result<Option<Self>, Error> {
+        let path = file_of_part(folder);
+        if path.is_file() { read_toml(&path).map(Some) } else { Ok(None) }
     }
 
-    /// Returns the processors of the results, with repetitions.
-    pub fn processors(&self) -> impl Iterator<Item = &str> {
-        self.parts.iter().chain([self]).map(|provenance| provenance.cpu.as_str())
+    /// Returns a remark if the seconds of the parts come from processors of several models.
+    pub fn unlike_processors(&self) -> Option<String> {
+        let parts = self.parts.iter().flat_map(|part| part.parts.iter().chain([part]));
+        let processors: BTreeSet<&str> = parts.map(|part| part.cpu.as_str()).collect();
+        let names = Vec::from_iter(processors).join("; ");
+        names.contains("; ").then(|| format!("the seconds come from unlike processors: {names}"))
     }
+}
+
+/// The file of a part: on which machines its runs were performed.
+fn file_of_part(folder: &Path) -> PathBuf {
+    folder.join(".partial/provenance.toml")
 }
 
 fn on(set: bool) -> &'static str {

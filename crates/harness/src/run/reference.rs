@@ -31,26 +31,16 @@ pub const BEST_KNOWN: &str = "best_known.csv";
 /// The file in the folder of an experiment.
 pub const REFERENCES: &str = ReferenceRow::FILE;
 
-/// The folder with the best known costs.
-#[derive(Clone, Copy, Debug)]
-pub enum BestKnown<'a> {
-    /// Read the costs, and improve those that a run has beaten.
-    Improve(&'a Path),
-    /// Only read the costs.
-    Read(&'a Path),
-}
-
-/// Improves the best known costs by the rows in the store's folder, and records the references
+/// Improves the best known costs in `out` by the rows in the store's folder, and records the references
 /// there if a report needs them.
 ///
 /// Only one harness at a time does this, and the file is replaced atomically.
 pub(crate) fn update(
     resolved: &Resolved,
-    best_known: BestKnown,
+    out: &Path,
     revision: &str,
     store: &Store,
 ) -> Result<(), Error> {
-    let (BestKnown::Improve(out) | BestKnown::Read(out)) = best_known;
     let runs: Vec<RunRow> = read_if_any(store.folder())?;
     let bounds: Vec<BoundRow> = read_if_any(store.folder())?;
     let _lock = wait_for_folder(out)?;
@@ -77,9 +67,7 @@ pub(crate) fn update(
         let reference = known.iter().find(|row| key_of(row) == key);
         references.extend(reference.cloned());
     }
-    if matches!(best_known, BestKnown::Improve(_)) {
-        write_all_known(out, known, &before)?;
-    }
+    write_all_known(out, known, &before)?;
     if experiment.reports.iter().any(Report::needs_references) {
         store.write_rows(&references)?;
     }

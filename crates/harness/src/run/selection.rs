@@ -7,7 +7,6 @@ use bvh_scenes::Scene;
 use bvh_search::{Budget, Method};
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
-use std::fmt;
 
 /// All runs of an experiment, or a part of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -53,15 +52,6 @@ impl Selection {
                 .collect::<Result<_, _>>()?,
         };
         Ok(selected.into_iter().collect())
-    }
-}
-
-impl fmt::Display for Selection {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::All => f.write_str("the whole experiment"),
-            Self::Runs(ids) => f.write_str(&ids.join(", ")),
-        }
     }
 }
 

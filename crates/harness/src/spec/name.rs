@@ -21,8 +21,8 @@ use std::fmt;
 pub struct Name(String);
 
 /// The accepted names, for error messages.
-pub const ACCEPTED: &str = "names that do not begin with a dot, are not `quick`, do not end with \
-     `.new`, and have no /, \\, : or control characters";
+pub const ACCEPTED: &str = "names that do not begin with a dot, are not `quick`, and have \
+     no /, \\, : or control characters";
 
 impl Name {
     /// Returns the name as text.
@@ -35,7 +35,7 @@ impl TryFrom<String> for Name {
     type Error = String;
 
     fn try_from(name: String) -> Result<Self, String> {
-        let is_reserved = name.starts_with('.') || name.ends_with(".new") || name == "quick";
+        let is_reserved = name.starts_with('.') || name == "quick";
         if is_reserved || name.contains(is_forbidden) {
             return Err(format!("{name:?} is not the name of an experiment; accepted: {ACCEPTED}"));
         }
@@ -64,7 +64,7 @@ mod tests {
             assert_eq!(Name::try_from(good.to_owned()).unwrap().as_str(), good);
         }
         let leading_elsewhere = [".", "..", "a/b", "..\\x", "c:x"];
-        let reserved = [".lock", ".partial", "x.new", "quick"];
+        let reserved = [".lock", ".partial", "quick"];
         let control = ["a\u{1b}[2J", "a\0"];
         for wrong in leading_elsewhere.iter().chain(&reserved).chain(&control) {
             assert!(Name::try_from((*wrong).to_owned()).is_err(), "{wrong:?}");

@@ -9,13 +9,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::PathBuf;
 
-/// The folders of committed results that compare something with the paper. A repetition beside
-/// finished results, `NAME.new`, is not committed.
+/// The folders of committed results that compare something with the paper.
 fn compared_folders() -> Vec<PathBuf> {
     let folders = fs::read_dir(top().join("results")).unwrap().map(|folder| folder.unwrap().path());
-    folders
-        .filter(|folder| folder.extension().is_none() && folder.join("paper.csv").is_file())
-        .collect()
+    folders.filter(|folder| folder.join("paper.csv").is_file()).collect()
 }
 
 #[test]

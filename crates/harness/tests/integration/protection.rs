@@ -42,7 +42,7 @@ fn refused(folder: &Path, args: &[&str], parts: &[&str]) {
 
 #[test]
 fn a_spec_whose_name_would_lead_elsewhere_is_rejected() {
-    for spec in ["...toml", "..toml", ".lock.toml", ".partial.toml", "quick.toml", "x.new.toml"] {
+    for spec in ["...toml", "..toml", ".lock.toml", ".partial.toml", "quick.toml"] {
         let folder = folder(spec);
         refused(folder.path(), &[spec, "--out", "out/below"], &[spec, "do not begin with a dot"]);
         assert_eq!(names(folder.path()), [spec]);
@@ -66,11 +66,7 @@ fn finished_results_are_replaced_by_force_only() {
     let results = dir.join("results/spec");
     let first = reproducible(&results);
     let first_timing = fs::read(results.join("timing.csv")).unwrap();
-    // A repetition writes to a folder next to them.
-    let repeated = said(dir, &["spec.toml"]);
-    assert!(repeated.contains("results/spec is kept and has the same rows"), "{repeated}");
-    assert!(reproducible(&dir.join("results/spec.new")) == first);
-    // Other runs are rejected.
+    refused(dir, &["spec.toml"], &["results/spec has finished results", "--check", "--force"]);
     let part = of_part(dir, "spec.toml", 0, 1000);
     for other in ["--scene=spheres750", "--seed=2", part[0].as_str()] {
         refused(dir, &["spec.toml", other], &["results/spec", "--force", "--out"]);
@@ -107,16 +103,6 @@ fn resuming_what_is_finished_does_nothing() {
     fs::create_dir_all(removed.join("000000")).unwrap();
     said(dir, &["spec.toml", "--resume"]);
     assert!(!removed.exists());
-    // An interrupted repetition in the neighbouring folder is completed.
-    said(dir, &["spec.toml"]);
-    fs::create_dir(dir.join("results/spec.new/.partial")).unwrap();
-    fs::copy(
-        dir.join("results/spec.new/resolved.toml"),
-        dir.join("results/spec.new/.partial/resolved.toml"),
-    )
-    .unwrap();
-    said(dir, &["spec.toml", "--resume"]);
-    assert!(!dir.join("results/spec.new/.partial").exists());
     // The suite of cases is no exception.
     fs::write(dir.join("suite.toml"), SUITE).unwrap();
     said(dir, &["suite.toml"]);
@@ -162,9 +148,9 @@ fn a_damaged_finished_run_is_named_and_repeated_or_rejected() {
     // The unit tests of the store try all kinds of damage.
     let part = dir.join("one/spec/.partial").join(damaged);
     fs::write(part.join("timing.csv"), "").unwrap();
-    let merge = ["merge", "one", "two", "--out=merged"];
-    crate::support::refused(dir, &merge, 1, &[damaged, "damaged"]);
-    assert!(!dir.join("merged").exists());
+    let join = ["spec.toml", "--from", "one", "two", "--out=joined"];
+    crate::support::refused(dir, &join, 1, &[damaged, "damaged"]);
+    assert!(!dir.join("joined/spec/runs.csv").exists());
     let resumed = run(dir, &["spec.toml", "--resume", "--out=one"]);
     ended(&resumed, 0, &["done again", damaged]);
     assert!(reproducible(&dir.join("one/spec")) == whole);
