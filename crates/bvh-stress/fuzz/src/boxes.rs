@@ -5,7 +5,7 @@ use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, SahConstants};
 use bvh_core::{Aabb, Bvh, check_boxes, collapse_leaves, file, validate};
 use bvh_scenes::trace::kd_tree;
-use bvh_search::{Budget, Method, Problem, SearchError, best, optimize, solve};
+use bvh_search::{Budget, Method, Problem, SearchError, best, lower_bound, optimize, solve};
 use bvh_stress::EXACT_OBJECTS;
 use bvh_stress::examine::{ROUNDING, check_outcome};
 
@@ -71,6 +71,7 @@ fn check_rejected(boxes: &[Aabb], object: usize, seed: u64, budget: Budget) {
 /// Checks that every method builds a tight tree of exact cost, twice the same, and that everything
 /// derived from the tree is valid too.
 fn check_built(boxes: &[Aabb], seed: u64, budget: Budget) {
+    let bound = lower_bound::of_largest(boxes);
     for method in Method::all() {
         let boxes = match method {
             Method::Exact(_) => &boxes[..boxes.len().min(EXACT_OBJECTS - 3)],
