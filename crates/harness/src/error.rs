@@ -53,7 +53,7 @@ pub enum Error {
     /// Rays cannot be traced through this scene.
     #[error("scene {scene}, tracing: {message}")]
     Tracing { scene: String, message: String },
-    /// A query of a report that the rows of a file cannot answer, or whose answer is not accepted.
+    /// A query of a report that the rows of a file cannot answer.
     #[error("{}: {message}", .path.display())]
     Query { path: PathBuf, message: String },
     /// A method returned something that is not a tree over the scene: a defect of the method.

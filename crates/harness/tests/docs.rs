@@ -151,25 +151,3 @@ fn a_file_name_means_the_same_columns_in_every_experiment() {
         assert_eq!(*known, header, "{}", path.display());
     }
 }
-
-/// Returns the total size of the committed results, in bytes. Unfinished runs that lie beside
-/// them are not committed.
-fn bytes_in(folder: &Path) -> u64 {
-    let mut bytes = 0;
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_name().unwrap_or_default();
-        let name = name.to_string_lossy();
-        if [".partial", ".lock", ".html"].iter().any(|ending| name.ends_with(ending)) {
-            continue;
-        }
-        bytes += if path.is_dir() { bytes_in(&path) } else { path.metadata().unwrap().len() };
-    }
-    bytes
-}
-
-#[test]
-fn all_results_take_less_than_20_megabytes() {
-    let bytes = bytes_in(&top().join("results"));
-    assert!(bytes < 20_000_000, "{bytes} bytes: thin histories, or do without twins of files");
-}

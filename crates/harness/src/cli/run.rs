@@ -4,7 +4,7 @@
 use super::terminal::{Jobs, input_folder, output_folder, print_error, print_line};
 use crate::Error;
 use crate::rows::store::Existing;
-use crate::run::execute::{Extent, Verbosity, execute};
+use crate::run::execute::{Extent, execute};
 use crate::run::finish::Summary;
 use crate::run::selection::Selection;
 use crate::run::{check, finish, reference};
@@ -87,7 +87,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         false => Selection::Runs(args.runs.clone()),
     };
     let parts = args.from.clone();
-    let extent = Extent { existing, selection, parts, verbosity: verbosity(args) };
+    let extent = Extent { existing, selection, parts, verbose: args.verbose };
     let mut differences = 0;
     for experiment in &experiments {
         if args.check {
@@ -116,14 +116,6 @@ fn print_summary(experiment: &Experiment, summary: &Summary) {
     print_line(&format!("\n{text}Results: {}", folder.display()));
 }
 
-fn verbosity(args: &RunArgs) -> Verbosity {
-    match (args.quiet, args.verbose) {
-        (true, _) => Verbosity::Bar,
-        (_, true) => Verbosity::EveryRun,
-        _ => Verbosity::Progress,
-    }
-}
-
 /// Runs into a temporary folder and prints how the rows differ from the committed ones.
 ///
 /// Returns the number of differences.
@@ -139,7 +131,7 @@ fn compare(
     let committed = args.out.join(experiment.folder());
     // Gaps are measured from the references of the committed run, not from later finds.
     reference::adopt(&committed, temporary.path())?;
-    let extent = Extent { verbosity: verbosity(args), ..Extent::default() };
+    let extent = Extent { verbose: args.verbose, ..Extent::default() };
     let summary = execute(experiment, temporary.path(), &extent, interrupted)?;
     let found = check::compare(&fresh, &committed, &summary.skipped_scenes)?;
     let name = &experiment.name;

@@ -193,7 +193,6 @@ impl OfKind<'_> {
 mod tests {
     use super::*;
     use crate::measure::layout::own_contenders;
-    use crate::measure::ray_cost::TrainedOn;
     use bvh_build::{Builder, median_cut, muller_fellner};
 
     #[test]
@@ -227,31 +226,5 @@ mod tests {
         assert!(boxes("good", "binary") < boxes("bad", "binary"));
         assert!(boxes("good", "wide") < boxes("bad", "wide"));
         assert_eq!(boxes("good", "wide"), boxes("good", "wide, portable"));
-    }
-
-    #[test]
-    fn a_tree_for_rays_is_traced_in_the_wide_layout_for_those_rays_and_answers_the_same() {
-        let scene = Scene::load("escher:3000").unwrap();
-        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
-        let trained = crate::measure::ray_cost::Config { trained: 5000, ..Default::default() };
-        let visits = trained.density(TrainedOn::Camera, &scene, 2).unwrap().visits(&tree);
-        let config: Config =
-            toml::from_str("count = 5000\nrounds = 1\nrays = ['primary']").unwrap();
-        let mut contenders = Vec::new();
-        for (rays, visits) in [("lines", None), ("camera", Some(&visits[..]))] {
-            let own = own_contenders(&config.layouts, &[], &scene, &tree, visits).unwrap();
-            contenders.extend(own.into_iter().map(|contender| (rays.to_owned(), contender)));
-        }
-        let traced = measure(&config, &scene, &tree, &contenders, 1, || false).unwrap().unwrap();
-        let rows: Vec<TraceRow> = traced.into_iter().map(|traced| traced.answers).collect();
-        assert!(
-            rows.iter().all(|row| (row.missed_hits, row.false_hits, row.other_hits) == (0, 0, 0))
-        );
-        let tests = |rays: &str, layout: &str| {
-            let row = rows.iter().find(|row| row.method == rays && row.layout == layout).unwrap();
-            row.boxes_per_ray.unwrap() / 8.0 + row.objects_per_ray.unwrap() / 4.0
-        };
-        assert_eq!(tests("lines", "binary"), tests("camera", "binary"));
-        assert!(tests("camera", "wide") < tests("lines", "wide"));
     }
 }

@@ -11,7 +11,7 @@ use crate::run::resolved::{Resolved, read_toml};
 use comfy_table::{Row, Table};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
-use std::path::{Component, Path};
+use std::path::{Path, PathBuf};
 
 const STYLE: &str = include_str!("style.css");
 
@@ -28,13 +28,13 @@ struct Section {
 
 impl Section {
     /// Reads what an experiment has written, and makes its reports again, which read CSV files only.
-    fn read(results: &Path, name: &str, page: &Path) -> Result<Self, Error> {
+    fn read(results: &Path, name: &str) -> Result<Self, Error> {
         let folder = results.join(name);
         let Resolved { experiment, .. } = read_toml(&folder.join("resolved.toml"))?;
         let names = files::names(&folder)?;
         let ending = |suffix: &str| {
             let ours = names.iter().filter(|file| file.ends_with(suffix));
-            ours.map(|file| (file.clone(), relative(page, &folder.join(file)))).collect()
+            ours.map(|file| (file.clone(), format!("{}/{}", in_url(name), in_url(file)))).collect()
         };
         Ok(Self {
             name: name.into(),
@@ -58,14 +58,14 @@ impl Section {
     }
 }
 
-/// Writes a page of all finished experiments in `results` to `out`, without quick variants.
-/// Returns the number of experiments.
-pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
+/// Writes a page of all finished experiments in `results`, without quick variants, into this folder.
+/// Returns the number of experiments and the page's path.
+pub fn write(results: &Path) -> Result<(usize, PathBuf), Error> {
     let mut names = files::names(results)?;
     names.retain(|name| results.join(name).join("resolved.toml").is_file());
     let mut sections = Vec::new();
     for name in &names {
-        sections.push(Section::read(results, name, out)?);
+        sections.push(Section::read(results, name)?);
     }
     if sections.is_empty() {
         return Err(Error::Usage(format!(
@@ -78,8 +78,9 @@ pub fn write(results: &Path, out: &Path) -> Result<usize, Error> {
         let source = section.paper().first().map(|row| row.source.clone());
         (source.is_none(), source, section.name.clone())
     });
-    files::write(out, page(&sections).into_string().as_bytes())?;
-    Ok(sections.len())
+    let out = results.join("report.html");
+    files::write(&out, page(&sections).into_string().as_bytes())?;
+    Ok((sections.len(), out))
 }
 
 fn page(sections: &[Section]) -> Markup {
@@ -196,21 +197,4 @@ fn in_url(name: &str) -> String {
     // These are the unreserved characters of URLs (RFC 3986); all others are encoded.
     const PLAIN: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
     utf8_percent_encode(name, PLAIN).to_string()
-}
-
-/// The path from the page to a file, as a relative reference of a URL. Only a relative one still
-/// works when the results are moved or published.
-fn relative(page: &Path, file: &Path) -> String {
-    let whole = |path: &Path| {
-        path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or_default()
-    };
-    let folder = page.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let (from, to) = (whole(folder.unwrap_or(Path::new("."))), whole(file));
-    let common = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
-    let up = from.components().skip(common).map(|_| "..".into());
-    let down = to.components().skip(common).filter_map(|part| match part {
-        Component::Normal(name) => Some(in_url(&name.to_string_lossy())),
-        _ => None,
-    });
-    up.chain(down).collect::<Vec<String>>().join("/")
 }

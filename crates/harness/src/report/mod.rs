@@ -115,11 +115,6 @@ reports! {
 }
 
 impl Report {
-    /// Returns true if the report needs the times of events.
-    pub fn needs_clock(&self) -> bool {
-        self.needs_references()
-    }
-
     /// Returns the labels of the methods whose single trials the report reads; `history.csv`
     /// suffices for all others.
     pub fn trial_methods(&self) -> Vec<&str> {
@@ -134,7 +129,7 @@ impl Report {
         }
     }
 
-    /// Returns true if the report measures gaps.
+    /// Returns true if the report measures gaps, for which it needs the times of events.
     pub fn needs_references(&self) -> bool {
         matches!(self, Self::Anytime(_) | Self::Numbers(_) | Self::Overview(_))
     }

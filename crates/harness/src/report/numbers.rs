@@ -75,7 +75,7 @@ impl Config {
         let mut output = Output::new("", &self.title);
         output.add_csv("numbers", &numbers)?;
         output.add_csv("timing_numbers", &timing)?;
-        let explanation = "Gaps are to the exact optimum or the best known cost; the lower bound is relative to that:";
+        let explanation = "Gaps are to the best known cost; the lower bound is relative to that:";
         let columns = "scene method runs cost_over_base_median gap_quartile_1 gap_median gap_quartile_3 \
                        lower_bound_over_reference";
         output.show(explanation, &numbers, columns)?;

@@ -33,9 +33,6 @@ pub enum QueryError {
     /// Conditions that no row meets.
     #[error("no row meets {0:?}")]
     NoRow(String),
-    /// A quotient outside its accepted range.
-    #[error("{column} of {group} is {found}; accepted: {accepted}")]
-    NotAccepted { column: String, group: String, found: f64, accepted: String },
 }
 
 /// Replaces commas within texts while conditions are split at commas.

@@ -26,9 +26,6 @@ bvh_config::config! { serde;
         /// Columns by which rows are paired with rows of the base, if quotients are computed pair
         /// by pair. A further column then holds the verdict of the interval.
         paired_by: Vec<String>;
-        /// Lowest and highest quotient accepted; others are an error.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        accepted: Option<[f64; 2]>, in 0.0..=1e300;
         /// The paper's numbers, for a further column. Quotients of a file without seconds are also
         /// compared with them in `paper.csv`.
         paper: Vec<OfPaper>, in Nested;
@@ -145,7 +142,6 @@ impl Column {
             let own = measure.of_rows(&group.rows)?;
             let base = measure.of_rows(&group.base)?;
             let value = own.zip(base).map(|(own, base)| ratio.of(own, base));
-            self.check_accepted(group, value)?;
             let of_all = |rows: &[&Row]| {
                 let values: Result<Vec<_>, _> =
                     rows.iter().map(|row| measure.of_row(row)).collect();
@@ -169,29 +165,12 @@ impl Column {
             let Some(partner) = group.base.iter().find(is_partner) else { continue };
             let own = measure.of_row(row)?;
             let base = measure.of_row(partner)?;
-            let quotient = own.zip(base).map(|(own, base)| ratio.of(own, base));
-            self.check_accepted(group, quotient)?;
-            quotients.extend(quotient);
+            quotients.extend(own.zip(base).map(|(own, base)| ratio.of(own, base)));
         }
         let value = measure.of_values(&quotients)?;
         // Fewer than six pairs enclose the median with a lower probability.
         let interval = median_interval(&quotients).filter(|_| quotients.len() >= 6);
         Ok(Compared { value, interval })
-    }
-
-    /// Rejects a quotient that is not accepted.
-    fn check_accepted(&self, group: &Group, quotient: Option<f64>) -> Result<(), QueryError> {
-        let Some(([low, high], quotient)) = self.accepted.zip(quotient) else { return Ok(()) };
-        if (low..=high).contains(&quotient) {
-            return Ok(());
-        }
-        let words: Vec<&str> = group.key.values().map(String::as_str).collect();
-        Err(QueryError::NotAccepted {
-            column: self.name.clone(),
-            group: words.join(", "),
-            found: quotient,
-            accepted: format!("{low} to {high}"),
-        })
     }
 }
 

@@ -264,18 +264,4 @@ mod tests {
         let [row] = &output.paper[..] else { panic!("one number of the paper") };
         assert_eq!((row.quantity.as_str(), row.ours_low), ("cost, a over b", Some(0.5)));
     }
-
-    #[test]
-    fn a_quotient_that_is_not_accepted_is_an_error_with_its_place() {
-        let message = made(
-            "base = 'method=a'\ncolumns = [{ name = 'r', value = 'max cost', ratio = 'over_base', accepted = [0.6, 1.0] }]",
-        );
-        assert_eq!(message.map(|_| ()), Ok(()));
-        let message = made(
-            "base = 'method=a'\ncolumns = [{ name = 'r', value = 'min cost', ratio = 'over_base', accepted = [0.6, 1.0] }]",
-        );
-        let message = message.unwrap_err();
-        let end = "costs.csv: r of b, s is 0.5; accepted: 0.6 to 1";
-        assert!(message.ends_with(end), "{message}");
-    }
 }

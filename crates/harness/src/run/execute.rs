@@ -19,8 +19,6 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-pub use super::measurement::Verbosity;
-
 /// The part of an experiment to execute.
 #[derive(Clone, Debug, Default)]
 pub struct Extent {
@@ -30,8 +28,8 @@ pub struct Extent {
     pub selection: Selection,
     /// The `--out` of harnesses that have performed parts of the experiment.
     pub parts: Vec<PathBuf>,
-    /// The lines about runs on standard error.
-    pub verbosity: Verbosity,
+    /// True for a line on standard error about every run.
+    pub verbose: bool,
 }
 
 /// Runs `experiment` into `out/NAME/`. Once `interrupted` is true, unfinished runs are abandoned
@@ -88,7 +86,7 @@ fn run(
     extent: &Extent,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
-    let Extent { existing, ref selection, ref parts, verbosity } = *extent;
+    let Extent { existing, ref selection, ref parts, verbose } = *extent;
     let is_part = selection.is_part();
     let (scenes, skipped_scenes) = load_scenes(experiment)?;
     let resolved = Resolved::new(experiment, &scenes);
@@ -119,7 +117,7 @@ fn run(
         jobs: &jobs,
         store: &store,
         watch: Watch { bar: progress(runs as u64), interrupted },
-        verbosity,
+        verbose,
         trees: Trees::new(),
         remarks,
     };

@@ -30,7 +30,8 @@ pub(crate) struct Work<'a> {
     pub jobs: &'a [Job<'a>],
     pub store: &'a Store,
     pub watch: Watch<'a>,
-    pub verbosity: Verbosity,
+    /// True for a line on standard error about every run.
+    pub verbose: bool,
     /// The trees of performed runs that later measurements need.
     pub trees: Trees,
     /// Peculiarities of scene files and damaged runs, one line each.
@@ -62,16 +63,4 @@ impl Work<'_> {
 
 fn all_finished(jobs: &[Job]) -> Error {
     Error::Interrupted { finished: jobs.len(), runs: jobs.len() }
-}
-
-/// The reports on the progress of runs on standard error.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Verbosity {
-    /// A bar on a terminal, otherwise nothing.
-    Bar,
-    /// A bar on a terminal, otherwise at most one line per second and one for the last run.
-    #[default]
-    Progress,
-    /// A line for every run.
-    EveryRun,
 }

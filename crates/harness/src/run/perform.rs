@@ -12,28 +12,18 @@ use crate::spec::Experiment;
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::{Bvh, validate_references};
 use bvh_scenes::Scene;
-use bvh_search::{
-    Budget, Event, Judge, Method, Observer, Outcome, Problem, SearchError, Splits, StopReason,
-    exact, solve,
-};
+use bvh_search::{Event, Judge, Method, Observer, Outcome, Problem, Splits, StopReason, solve};
 use indicatif::ProgressBar;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Instant;
 
-/// Computes a lower bound of the scene's internal area: the exact optimum if gaps are measured from
-/// it, otherwise the bound that the experiment requests, if any.
+/// Computes the lower bound of the scene's internal area that the experiment requests, if any.
 fn bound(experiment: &Experiment, scene: &Scene, watch: &Watch) -> Result<Option<BoundRow>, Error> {
-    let lower_bound = if experiment.needs_optimum(scene.boxes.len()) {
-        let problem = Problem::new(&scene.boxes);
-        solve(&exact::Config {}, &problem, 0, Budget::UNLIMITED, &()).map(|outcome| outcome.cost)
-    } else if let Some(effort) = experiment.lower_bound {
-        let bound = peers::lower_bound().map_err(|fault| Error::Usage(fault.to_string()))?;
-        bound(&scene.boxes, effort, watch).map_err(SearchError::Build)
-    } else {
-        return Ok(None);
-    };
-    let lower_bound = lower_bound.map_err(Error::search(&scene.name, "the lower bound"))?;
+    let Some(effort) = experiment.lower_bound else { return Ok(None) };
+    let bound = peers::lower_bound().map_err(|fault| Error::Usage(fault.to_string()))?;
+    let lower_bound = bound(&scene.boxes, effort, watch)
+        .map_err(Error::search(&scene.name, "the lower bound"))?;
     Ok(Some(BoundRow { scene: scene.name.clone(), objects: scene.boxes.len(), lower_bound }))
 }
 

@@ -1,5 +1,4 @@
-//! The references of gaps: the exact optimum of small scenes, otherwise the best known cost of all
-//! experiments.
+//! The references of gaps: the best known costs of all experiments.
 //!
 //! `best_known.csv` in the results folder has one row per scene and objective. Every experiment
 //! that finds a lower cost improves it when it ends. Reports that measure gaps read
@@ -12,7 +11,6 @@
 
 use crate::Error;
 use crate::files;
-use crate::report::Report;
 use crate::rows::lock::wait_for_folder;
 use crate::rows::store::Store;
 use crate::rows::{BoundRow, ROUNDING, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
@@ -50,9 +48,8 @@ pub(crate) fn update(
     let objective = objective_name(&experiment.objective);
     let mut references = Vec::new();
     for scene in &resolved.scenes {
-        let has_optimum = experiment.needs_optimum(scene.objects);
-        // Experiments solve other small scenes by the hundred, and nothing reads their costs later.
-        if scene.objects > exact::MOST_OBJECTS || has_optimum {
+        // Experiments solve small scenes by the hundred, and nothing reads their costs later.
+        if scene.objects > exact::MOST_OBJECTS || experiment.needs_references() {
             let bound =
                 bounds.iter().find(|row| row.scene == scene.name).map(|row| row.lower_bound);
             let eligible = runs
@@ -60,7 +57,7 @@ pub(crate) fn update(
                 .filter(|run| run.scene == scene.name && run.nodes + 1 == 2 * run.objects);
             for found in eligible.flat_map(|run| references_of(scene, &objective, run, bound)) {
                 let found = ReferenceRow { revision: revision.to_owned(), ..found };
-                offer(&mut known, found, has_optimum);
+                offer(&mut known, found);
             }
         }
         let key = (scene.name.as_str(), scene.objects, scene.checksum.as_str(), objective.as_str());
@@ -68,7 +65,7 @@ pub(crate) fn update(
         references.extend(reference.cloned());
     }
     write_all_known(out, known, &before)?;
-    if experiment.reports.iter().any(Report::needs_references) {
+    if experiment.needs_references() {
         store.write_rows(&references)?;
     }
     Ok(())
@@ -118,7 +115,7 @@ pub(crate) fn improve(
             revision: revision.clone(),
             lower_bound: None,
         };
-        offer(&mut known, found, false);
+        offer(&mut known, found);
     }
     write_all_known(results, known, &before)
 }
@@ -186,15 +183,7 @@ fn references_of(
 }
 
 /// Adds a row, or keeps the better of it and the known row with the same key.
-///
-/// If the bound is an optimum, it replaces the cost, whether or not a run has found it.
-fn offer(known: &mut Vec<ReferenceRow>, mut found: ReferenceRow, bound_is_optimum: bool) {
-    if let Some(least) = found.lower_bound
-        && bound_is_optimum
-        && least < found.cost * (1.0 - ROUNDING)
-    {
-        (found.cost, found.method, found.seed) = (least, "exact".into(), 0);
-    }
+fn offer(known: &mut Vec<ReferenceRow>, found: ReferenceRow) {
     let Some(old) = known.iter_mut().find(|row| key_of(row) == key_of(&found)) else {
         return known.push(found);
     };
@@ -230,7 +219,7 @@ mod tests {
         for (cost, bound) in
             [(9.0, None), (7.0, Some(3.0)), (8.0, Some(4.0)), (7.0 - 1e-14, Some(2.0))]
         {
-            offer(&mut known, row("a", cost, bound), false);
+            offer(&mut known, row("a", cost, bound));
         }
         assert_eq!(known, [row("a", 7.0, Some(4.0))]);
     }
@@ -238,19 +227,9 @@ mod tests {
     #[test]
     fn scenes_are_identified_by_their_boxes() {
         let mut known = vec![row("a", 1.0, None)];
-        offer(&mut known, ReferenceRow { checksum: "1".into(), ..row("a", 9.0, None) }, false);
-        offer(&mut known, ReferenceRow { objects: 99, ..row("a", 8.0, None) }, false);
+        offer(&mut known, ReferenceRow { checksum: "1".into(), ..row("a", 9.0, None) });
+        offer(&mut known, ReferenceRow { objects: 99, ..row("a", 8.0, None) });
         let costs: Vec<f64> = known.iter().map(|row| row.cost).collect();
         assert_eq!(costs, [1.0, 9.0, 8.0]);
-    }
-
-    #[test]
-    fn an_optimum_that_no_run_has_found_is_the_reference() {
-        let mut known = Vec::new();
-        offer(&mut known, row("a", 9.0, Some(6.0)), true);
-        assert!(known[0].cost == 6.0 && known[0].method == "exact" && known[0].is_optimum());
-        offer(&mut known, row("a", 6.0 + 1e-14, Some(6.0)), true);
-        assert_eq!((known.len(), known[0].cost), (1, 6.0));
-        assert!(!row("a", 6.0, Some(5.0)).is_optimum());
     }
 }

@@ -1,11 +1,10 @@
 //! The runs of an experiment as a measurement: in parallel or one by one, with progress reports.
 
 use super::job::Job;
-use super::measurement::{Measurement, Trees, Verbosity, Work};
+use super::measurement::{Measurement, Trees, Work};
 use super::perform::perform;
 use crate::Error;
 use crate::spec::Experiment;
-use indicatif::ProgressBar;
 use rayon::prelude::*;
 use std::io::Write;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -65,7 +64,6 @@ struct Progress {
     finished: AtomicUsize,
     total: usize,
     start: Instant,
-    last_report: Mutex<Instant>,
 }
 
 impl Progress {
@@ -78,7 +76,6 @@ impl Progress {
             finished: finished.into(),
             total: work.jobs.len(),
             start: Instant::now(),
-            last_report: Mutex::new(Instant::now()),
         }
     }
 
@@ -93,50 +90,28 @@ impl Progress {
         }
         let finished = self.finished.fetch_add(1, Relaxed) + 1;
         work.watch.bar.inc(1);
-        self.report(work, job, finished, start.elapsed());
+        if work.verbose {
+            self.report(work, job, finished, start.elapsed());
+        }
         Ok(())
     }
 
-    /// Prints the line about a finished run, if one is due.
+    /// Prints a line about a finished run.
     fn report(&self, work: &Work, job: &Job, finished: usize, duration: Duration) {
-        let mut last_report = self.last_report.lock().unwrap_or_else(PoisonError::into_inner);
-        let Work { experiment, verbosity, .. } = *work;
-        let bar: &ProgressBar = &work.watch.bar;
-        let is_last = finished == self.total;
-        let is_due = match verbosity {
-            Verbosity::Bar => false,
-            Verbosity::Progress => {
-                bar.is_hidden() && (is_last || last_report.elapsed() >= Duration::from_secs(1))
-            }
-            Verbosity::EveryRun => true,
-        };
-        if !is_due {
-            return;
-        }
-        *last_report = Instant::now();
-        let line = self.line(experiment, job, finished);
-        let details = match verbosity {
-            Verbosity::EveryRun => details(experiment, job, duration),
-            _ => String::new(),
-        };
-        // A closed standard error must not end the experiment.
-        let _ = bar.suspend(|| writeln!(std::io::stderr(), "{line}{details}"));
-    }
-
-    fn line(&self, experiment: &Experiment, job: &Job, finished: usize) -> String {
-        let name = &experiment.name;
+        let Experiment { name, .. } = work.experiment;
         let total = self.total;
-        let seconds = self.start.elapsed().as_secs();
+        let since_start = self.start.elapsed().as_secs();
         // Names of files may hold characters that a terminal would obey.
         let label = job.labelled.label.escape_debug();
         let scene = job.scene.name.escape_debug();
-        format!("{name}: {finished} of {total} runs, {seconds} s: {label} on {scene}")
+        let repetition = job.repetition;
+        let seed = job.seed(work.experiment);
+        let seconds = duration.as_secs_f64();
+        let line = format!(
+            "{name}: {finished} of {total} runs, {since_start} s: {label} on {scene}, repetition \
+             {repetition}, seed {seed}, took {seconds:.3} s"
+        );
+        // A closed standard error must not end the experiment.
+        let _ = work.watch.bar.suspend(|| writeln!(std::io::stderr(), "{line}"));
     }
-}
-
-fn details(experiment: &Experiment, job: &Job, duration: Duration) -> String {
-    let repetition = job.repetition;
-    let seed = job.seed(experiment);
-    let seconds = duration.as_secs_f64();
-    format!(", repetition {repetition}, seed {seed}, took {seconds:.3} s")
 }

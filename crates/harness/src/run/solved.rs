@@ -89,7 +89,7 @@ impl Solved<'_> {
     /// times of all events.
     pub fn clock_rows(&self, event_seconds: &[f64]) -> Vec<ClockRow> {
         let mut rows = Vec::new();
-        if !self.experiment.keeps_clock() {
+        if !self.experiment.needs_references() {
             return rows;
         }
         for (event, (index, _)) in milestones(&self.outcome.history).enumerate() {

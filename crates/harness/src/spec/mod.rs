@@ -19,7 +19,7 @@ use bvh_config::{Nested, config};
 use bvh_core::cost::Objective;
 use bvh_scenes::fnv1a;
 use bvh_scenes::rays::RandomRays;
-use bvh_search::{Budget, exact};
+use bvh_search::Budget;
 pub use name::Name;
 pub use read::Overrides;
 pub use schema::schema;
@@ -115,10 +115,9 @@ impl Experiment {
         self.ray_cost.as_ref().filter(|config| config.count > 0)
     }
 
-    /// Returns true if gaps on scenes with this number of objects are measured from the exact
-    /// optimum.
-    pub fn needs_optimum(&self, objects: usize) -> bool {
-        objects <= exact::MOST_OBJECTS && self.reports.iter().any(Report::needs_references)
+    /// Returns true if a report measures gaps, for which runs keep the times of improvements.
+    pub fn needs_references(&self) -> bool {
+        self.reports.iter().any(Report::needs_references)
     }
 
     /// Returns true if a report reads the costs of all trials of the method with this label.
@@ -129,12 +128,7 @@ impl Experiment {
     /// Returns true if runs keep their improvements: if a report reads them, or if there are no
     /// reports.
     pub fn keeps_history(&self) -> bool {
-        self.reports.is_empty() || self.keeps_clock()
-    }
-
-    /// Returns true if a report reads the times of improvements.
-    pub fn keeps_clock(&self) -> bool {
-        self.reports.iter().any(Report::needs_clock)
+        self.reports.is_empty() || self.needs_references()
     }
 
     /// Returns true if the rows of this experiment suffice for these reports.
@@ -142,7 +136,7 @@ impl Experiment {
         reports.iter().all(|report| {
             let labels = report.trial_methods();
             let has_trials = labels.iter().all(|label| self.keeps_trials_of(label));
-            let has_clock = !report.needs_clock() || self.keeps_clock();
+            let has_clock = !report.needs_references() || self.needs_references();
             has_trials && has_clock
         })
     }

@@ -172,7 +172,7 @@ fn mistakes_are_named_before_any_work() {
 
 const GAPS: &str = "
 question = 'What are gaps measured from?'
-scenes = ['escher:300', 'spheres75:12']
+scenes = ['escher:300']
 methods = [
     { label = 'greedy', method = 'muller_fellner' },
     { label = 'search', method = 'reinsertion', budget = { max_work = 2000 } },
@@ -183,13 +183,6 @@ title = 'gaps'
 methods = ['greedy', 'search']
 ";
 
-/// Returns the column of the first row of the scene and method.
-fn cell(path: &Path, scene: &str, method: &str, column: &str) -> f64 {
-    let rows = rows(path);
-    let row = rows.iter().find(|row| row["scene"] == scene && row["method"] == method).unwrap();
-    row[column].parse().unwrap()
-}
-
 #[test]
 fn gaps_are_to_the_best_known_cost_and_stay_until_they_are_redrawn() {
     let folder = tempfile::tempdir().unwrap();
@@ -199,9 +192,6 @@ fn gaps_are_to_the_best_known_cost_and_stay_until_they_are_redrawn() {
     fs::write(path.join("long.toml"), long).unwrap();
     said(path, &["short.toml"]);
     assert_eq!(gap(path), 0.0, "its own best is the best known");
-    // Small scenes are compared with their exact optimum, which no run needs to find.
-    let numbers = path.join("results/short/numbers.csv");
-    assert!(cell(&numbers, "spheres75:12", "greedy", "lower_bound_over_reference") >= 1.0 - 1e-12);
     let best_known = path.join("results/best_known.csv");
     let before = fs::read(&best_known).unwrap();
     said(path, &["long.toml"]);
@@ -220,22 +210,21 @@ fn gaps_are_to_the_best_known_cost_and_stay_until_they_are_redrawn() {
 }
 
 fn gap(folder: &Path) -> f64 {
-    let numbers = folder.join("results/short/numbers.csv");
-    cell(&numbers, "escher:300", "search", "gap_median")
+    let rows = rows(&folder.join("results/short/numbers.csv"));
+    rows.iter().find(|row| row["method"] == "search").unwrap()["gap_median"].parse().unwrap()
 }
 
 #[test]
-fn without_reports_there_is_a_table_and_without_a_terminal_a_line_for_the_last_run() {
+fn without_reports_there_is_a_table_and_on_request_a_line_for_every_run() {
     let spec = "question = 'q'\nscenes = ['spheres75']\nrepetitions = 3\nmethods = [{ method = 'median_cut' }]\n";
     let folder = folder_with("plain.toml", spec);
     let output = run(folder.path(), &["plain.toml"]);
     let out = text(&output.stdout);
-    let err = text(&output.stderr);
     assert!(
         ["spheres75", "median_cut", "least_over_base"].iter().all(|part| out.contains(part)),
         "{out}"
     );
-    assert!(err.contains("plain: 3 of 3 runs") && err.contains("median_cut on spheres75"), "{err}");
+    assert!(output.stderr.is_empty());
     let quiet = run(folder.path(), &["plain.toml", "--quiet", "--force"]);
     assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty());
     let verbose = run(folder.path(), &["plain.toml", "--verbose", "--force"]);

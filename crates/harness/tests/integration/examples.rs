@@ -4,7 +4,7 @@
 
 #[path = "../../../bvh-cli/tests/program/pages.rs"]
 mod pages;
-use crate::support::{ended, run, top};
+use crate::support::{said, top};
 use bvh_scenes::Scene;
 use pages::{accepts_printed_commands, blocks, blocks_in, commands};
 use std::collections::BTreeSet;
@@ -54,28 +54,6 @@ fn every_block_of_rust_is_a_doctest() {
     }
 }
 
-/// Nightly runs the examples in the Python module's comments. A rewrapped comment can join two of
-/// them, which every commit can see.
-#[test]
-fn every_python_example_in_a_comment_has_a_line_of_its_own() {
-    let mut examples = 0;
-    for entry in fs::read_dir(top().join("crates/bvh-python/src")).unwrap() {
-        let file = entry.unwrap().path();
-        let text = fs::read_to_string(&file).unwrap();
-        for line in text
-            .lines()
-            .map(str::trim_start)
-            .filter(|line| line.starts_with("///") && line.contains(">>> "))
-        {
-            let example = line.strip_prefix("/// >>> ");
-            let has_own_line = example.is_some_and(|example| !example.contains(">>> "));
-            assert!(has_own_line, "{}: {line}", file.display());
-            examples += 1;
-        }
-    }
-    assert!(examples >= 20, "{examples}");
-}
-
 /// A scene with fewer triangles than the scenes of examples.
 const SMALL: &str = "escher:60";
 
@@ -109,7 +87,7 @@ fn every_spec_runs_as_it_is_printed() {
                 continue;
             }
         }
-        ended(&run(dir, &["spec.toml", "--scene", SMALL]), 0, &["runs"]);
+        said(dir, &["spec.toml", "--scene", SMALL]);
         specs += 1;
     }
     assert!(specs > 0);

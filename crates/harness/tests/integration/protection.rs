@@ -157,19 +157,6 @@ fn a_damaged_finished_run_is_named_and_repeated_or_rejected() {
 }
 
 #[test]
-fn the_page_replaces_no_file_of_another_kind() {
-    let folder = folder("spec.toml");
-    let dir = folder.path();
-    said(dir, &["spec.toml"]);
-    refused(dir, &["report", "--out=spec.toml"], &["--out", "spec.toml", ".html"]);
-    refused(dir, &["report", "--out=results/spec/runs.csv"], &["--out", "runs.csv", ".html"]);
-    assert_eq!(fs::read_to_string(dir.join("spec.toml")).unwrap(), SPEC);
-    for _ in 0..2 {
-        said(dir, &["report", "--out=page.html"]);
-    }
-}
-
-#[test]
 fn results_come_from_the_programs_repository_and_not_from_the_current_folders() {
     let folder = folder("spec.toml");
     git(folder.path(), &["init"]);
