@@ -97,6 +97,27 @@ fn every_link_of_the_documentation_leads_somewhere() {
     }
 }
 
+/// The numbers before %, × or s that no comment of `numbers.toml` follows.
+fn unbound(text: &str) -> Vec<String> {
+    let code = Regex::new(r"(?s)```.*?```|<!-- pivot .*?<!-- end -->|`[^`]*`|\]\([^)]*\)").unwrap();
+    let number = Regex::new(r"([\d.]*\d)(<!-- =[^>]*-->)? ?(%|×|s\b)(\s*<!-- =)?").unwrap();
+    let text = code.replace_all(text, "\n\n");
+    let all = number.captures_iter(&text);
+    all.filter(|found| found.get(2).or(found.get(4)).is_none())
+        .map(|found| format!("{} {}", &found[1], &found[3]))
+        .collect()
+}
+
+#[test]
+fn the_numbers_of_what_readers_begin_with_are_bound() {
+    for name in ["README.md", "docs/CHOOSING.md"] {
+        let text = fs::read_to_string(top().join(name)).unwrap();
+        assert_eq!(unbound(&text), [""; 0], "{name}: numbers without an id of docs/numbers.toml");
+    }
+    let text = "8 to 25<!-- =a b --> %, 3 s, `4 %`, 1.5×, 6 %<!-- =c -->, 7 scenes";
+    assert_eq!(unbound(text), ["3 s", "1.5 ×"]);
+}
+
 #[test]
 fn the_first_page_is_short() {
     let readme = fs::read_to_string(top().join("README.md")).unwrap();

@@ -5,12 +5,14 @@
 //! trees are 8 to 25<!-- =gain.least gain.most --> % cheaper
 //! ```
 //!
-//! Any correct rounding at the digits shown is accepted, and the words are free.
+//! Any correct rounding at the digits shown is accepted, and the words are free. A word that judges
+//! has the id of a fact behind it, `<!-- ?table3 -->`, which [`facts`] tests.
 
 mod queries;
 mod support;
 
-use queries::value;
+use harness::report::query::{Row, number_in};
+use queries::{rows, value};
 use regex_lite::Regex;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -73,6 +75,126 @@ fn the_prose_shows_the_committed_numbers() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
     let unused: Vec<_> = queries.keys().filter(|id| !used.contains(*id)).collect();
     assert!(unused.is_empty(), "docs/numbers.toml: no page shows {unused:?}");
+}
+
+/// The number of rows of which all of the columns are below 1, above 1, and neither.
+fn sides(rows: &[Row], low: &[&str], high: &[&str]) -> [usize; 3] {
+    let one = |row: &Row, columns: &[&str], is_side: fn(&f64) -> bool| {
+        columns.iter().all(|column| number_in(row, column).is_some_and(|n| is_side(&n)))
+    };
+    let below = rows.iter().filter(|row| one(row, high, |n| *n < 1.0)).count();
+    let above = rows.iter().filter(|row| one(row, low, |n| *n > 1.0)).count();
+    [below, above, rows.len() - below - above]
+}
+
+/// The sides of 1 on which our speeds over others' are, as means over the scenes.
+fn speeds(processor: &str, conditions: &str) -> [usize; 3] {
+    let file = format!("peers/{processor}/timing_ratios.csv");
+    let mut rows = rows(&file, &format!("scene=geometric mean, {conditions}"));
+    rows.retain(|row| {
+        let of_batches = row["mode"].ends_with("batches");
+        !row["mode"].ends_with("again") && of_batches == (row["against"] == "any mode")
+    });
+    sides(&rows, &["ratio", "least_turn"], &["ratio", "greatest_turn"])
+}
+
+/// What words on the pages judge, by their ids.
+fn facts() -> BTreeMap<&'static str, bool> {
+    let costs =
+        |file, conditions| sides(&rows(file, conditions), &["low_over_base"], &["high_over_base"]);
+    let tests = |scene| {
+        let rows = rows("rays/paper.csv", &format!("scene={scene} (stand-in)"));
+        sides(&rows, &["ours_low"], &["ours_high"])
+    };
+    // Open is also what a second measurement of the same layout puts on the other side.
+    let is_open = |tree: &str| {
+        ["incoherent", "primary", "bounce", "shadow"].map(|rays| {
+            let mode = format!("{tree}: wide\\, batches");
+            let both = format!(
+                "scene=geometric mean, against=any mode, rays={rays}, mode={mode} or {mode}\\, again"
+            );
+            let both = rows("peers/amd-epyc-25-1/timing_ratios.csv", &both);
+            assert_eq!(both.len(), 2, "{tree}, {rays}");
+            let first = speeds("amd-epyc-25-1", &format!("mode={mode}, rays={rays}"));
+            first[2] == 1 || sides(&both, &["ratio"], &["ratio"])[0] == 1
+        })
+    };
+    let others_win = |processor, conditions| {
+        let [slower, faster, open] = speeds(processor, conditions);
+        faster == 0 && slower > 4 * open
+    };
+    let best_lists = rows("figure1/paper.csv", "*");
+    let best_lists: Vec<&str> = best_lists.iter().map(|row| row["ours"].as_str()).collect();
+    let no_list_helps =
+        sides(&rows("figure1/trials.csv", "trials=100"), &["expected_low"], &["expected_high"])[0]
+            == 0;
+    let on_512 = "processor=AMD EPYC (family 25\\, model 17)\\, AVX-512, against=any mode, \
+                  rays=primary or shadow";
+    let all =
+        |file, conditions, holds: &dyn Fn(&Row) -> bool| rows(file, conditions).iter().all(holds);
+    let costs_no_more = |row: &Row| number_in(row, "cost_ratio") <= Some(1.0);
+    let noisy = costs("table4/table.csv", "column=best of 100");
+    let less_noisy = costs("noise/table.csv", "column=1 %");
+    // The rays in batches after which the search for the last tree of the table has paid.
+    let per_ray = |mode: &str| {
+        let query = format!(
+            "peers/amd-epyc-25-1/timing_rays.csv | scene=geometric mean, library=ours, \
+             rays=incoherent, mode={mode}: wide\\, batches | only million_per_s"
+        );
+        1e-6 / value(&query)
+    };
+    let searched = r"best for any rays\, 1.2";
+    let seconds = value(&format!(
+        "peers/amd-epyc-25-1/timing_ratios.csv | scene=geometric mean, against=any mode, \
+         mode={searched}: wide\\, batches, rays=incoherent | only build_seconds"
+    ));
+    let pays_after = seconds / (per_ray("Müller–Fellner") - per_ray(searched));
+    BTreeMap::from([
+        ("pays", (1e8..1e9).contains(&pays_after)),
+        ("table3", costs("table3/table.csv", "column!=base") == [0, 16, 0]),
+        ("table4", noisy == [1, 4, 3] && less_noisy == [7, 0, 1]),
+        ("figure1", best_lists == ["k = 2 or k = 30", "k = 2", "k = 2"] && no_list_helps),
+        ("rays", tests("pinecon2") == [0, 1, 0] && tests("escher") == [1, 0, 0]),
+        ("stability", all("stability/cells.csv", "*", &|r| r["outcome"].ends_with("as promised"))),
+        (
+            "leave_out",
+            all("leave_out/omissions.csv", "*", &costs_no_more)
+                && all("leave_out/omissions_tiny.csv", "*", &costs_no_more),
+        ),
+        (
+            "optimality",
+            value("optimality/gaps.csv | method=ruin and recreate | min solved_fraction") == 1.0,
+        ),
+        (
+            "speed",
+            is_open("Müller–Fellner") == [false, false, false, true]
+                && is_open(r"best\, 6.5 M") == [true, false, false, false]
+                && is_open(r"best for any rays\, 1.2") == [true, false, true, false],
+        ),
+        (
+            "peers",
+            others_win("amd-epyc-25-1", "against=any mode, rays=bounce")
+                && others_win("amd-epyc-25-17", on_512)
+                && others_win("amd-epyc-25-1", "against=single calls, rays=primary or bounce")
+                && speeds("amd-epyc-25-1", "against=single calls, rays=incoherent")[1] == 0,
+        ),
+    ])
+}
+
+#[test]
+fn what_the_prose_judges_is_a_fact() {
+    let facts = facts();
+    let mut used = BTreeSet::new();
+    for page in pages() {
+        let text = fs::read_to_string(&page).unwrap();
+        for found in Regex::new(r"<!-- \?(\w+) -->").unwrap().captures_iter(&text) {
+            let fact = facts.get(&found[1]);
+            assert_eq!(fact, Some(&true), "{}: {}", page.display(), &found[0]);
+            used.insert(found[1].to_owned());
+        }
+    }
+    let all: BTreeSet<_> = facts.keys().map(|id| (*id).to_owned()).collect();
+    assert_eq!(used, all, "facts that no page states");
 }
 
 #[test]
