@@ -6,7 +6,6 @@ use crate::Error;
 use crate::rows::store::Existing;
 use crate::run::execute::{Extent, execute};
 use crate::run::finish::Summary;
-use crate::run::selection::Selection;
 use crate::run::{check, finish, reference};
 use crate::spec::{Experiment, Overrides};
 use std::collections::HashSet;
@@ -82,12 +81,8 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         (_, true) => Existing::Replace,
         _ => Existing::Keep,
     };
-    let selection = match args.runs.is_empty() {
-        true => Selection::All,
-        false => Selection::Runs(args.runs.clone()),
-    };
-    let parts = args.from.clone();
-    let extent = Extent { existing, selection, parts, verbose: args.verbose };
+    let (runs, parts) = (args.runs.clone(), args.from.clone());
+    let extent = Extent { existing, runs, parts, verbose: args.verbose };
     let mut differences = 0;
     for experiment in &experiments {
         if args.check {

@@ -74,11 +74,6 @@ impl Output {
             .push((name.into(), Figure { title, caption: caption.into(), columns, panels, looks }));
     }
 
-    /// Adds a table under a line that explains it.
-    pub fn add_table(&mut self, explanation: &str, table: Table) {
-        self.tables.push((explanation.into(), table));
-    }
-
     /// Adds a table of some columns of a CSV file's rows, numbers with four digits. `columns` are
     /// their names with blanks between them.
     pub fn show(
@@ -106,12 +101,13 @@ impl Output {
             .split(' ')
             .filter_map(|column| header.iter().position(|name| name == column))
             .collect();
-        let mut table = text_table(columns.split(' '));
+        let mut table = Table::new();
+        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(columns.split(' '));
         for record in reader.records() {
             let record = record.map_err(Error::csv(path))?;
             table.add_row(shown.iter().map(|&at| four_digits(&record[at])));
         }
-        self.add_table(explanation, table);
+        self.tables.push((explanation.into(), table));
         Ok(())
     }
 
@@ -151,13 +147,6 @@ fn four_digits(text: &str) -> String {
             format!("{number:.decimals$}")
         }
     }
-}
-
-/// Makes an empty table for the terminal.
-pub fn text_table<'a>(header: impl IntoIterator<Item = &'a str>) -> Table {
-    let mut table = Table::new();
-    table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(header);
-    table
 }
 
 /// A value in the row of this number, with the ends of its interval, if it has one.

@@ -11,30 +11,30 @@ impl Config {
     /// writes.
     pub(super) fn faults_of_queries(&self) -> Vec<OutOfRange> {
         let mut faults = check_file(&self.file);
-        let mut joined = vec![("rows", &self.rows)];
-        if !self.join.is_empty() {
-            joined.push(("join", &self.join));
-        }
         // A row that any number would fit into.
         let mut row = Row::new();
-        let mut are_known = true;
-        for (key, name) in joined {
-            if let Some((_, columns)) = rows::files().find(|(file, _)| file == name) {
-                let cells = columns.iter().map(|&column| (column.into(), "1".into()));
-                row.extend(cells);
-                continue;
+        for (key, name) in [("rows", &self.rows), ("join", &self.join)] {
+            match rows::files().find(|(file, _)| file == name) {
+                Some((_, columns)) => {
+                    row.extend(columns.iter().map(|&column| (column.into(), "1".into())));
+                }
+                None if key == "join" && name.is_empty() => {}
+                None => {
+                    let names: Vec<&str> = rows::files().map(|(file, _)| *file).collect();
+                    faults.push(OutOfRange::new(key, format!("{name:?}"), names.join(", ")));
+                }
             }
-            are_known = false;
-            let names: Vec<&str> = rows::files().map(|(file, _)| *file).collect();
-            faults.push(OutOfRange::new(key, format!("{name:?}"), names.join(", ")));
+        }
+        // The columns of an unknown file are unknown, too.
+        if !faults.is_empty() {
+            return faults;
         }
         for (key, result) in self.attempts(&row) {
             match result {
                 Err(QueryError::Malformed { found, accepted, .. }) => {
                     faults.push(OutOfRange::new(key, format!("{found:?}"), accepted));
                 }
-                // The columns of an unknown file are unknown, too.
-                Err(QueryError::Column { column, accepted }) if are_known => {
+                Err(QueryError::Column { column, accepted }) => {
                     faults.push(OutOfRange::new(key, format!("{column:?}"), accepted));
                 }
                 _ => {}
@@ -45,24 +45,17 @@ impl Config {
 
     /// Applies every part of the query to a row, and returns the result of each with its key.
     fn attempts(&self, row: &Row) -> Vec<(String, Result<(), QueryError>)> {
-        let has = |columns: &[&str]| {
-            columns.iter().try_for_each(|column| query::cell(row, column).map(|_| ()))
-        };
-        let has_all = |conditions: &str| {
-            let conditions = Conditions::parse(conditions)?;
-            has(&conditions.columns().collect::<Vec<_>>())
-        };
-        let mut attempts = vec![
-            ("select".to_owned(), has_all(&self.select)),
-            ("base".to_owned(), has_all(&self.base)),
-        ];
+        let has = |column: &str| query::cell(row, column).map(|_| ());
+        let has_all = |conditions: &str| Conditions::parse(conditions)?.columns().try_for_each(has);
+        let mut attempts =
+            vec![("select".into(), has_all(&self.select)), ("base".into(), has_all(&self.base))];
         for (index, column) in self.by.iter().enumerate() {
-            attempts.push((format!("by[{index}]"), has(&[column])));
+            attempts.push((format!("by[{index}]"), has(column)));
         }
         for (index, column) in self.columns.iter().enumerate() {
+            let partners = column.paired_by.iter().try_for_each(|column| has(column));
             attempts.push((format!("columns[{index}].value"), column.try_on(row)));
-            let paired_by: Vec<&str> = column.paired_by.iter().map(String::as_str).collect();
-            attempts.push((format!("columns[{index}].paired_by"), has(&paired_by)));
+            attempts.push((format!("columns[{index}].paired_by"), partners));
         }
         attempts
     }

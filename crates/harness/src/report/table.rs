@@ -1,7 +1,7 @@
 //! Tables of the paper: ratios to base, scenes by columns, with the paper's ratios.
 
 use super::config::Labels;
-use super::output::{from_greedy, text_table};
+use super::output::from_greedy;
 use super::prelude::*;
 use crate::statistics::best_of::predicted_best;
 use crate::statistics::{expected_best_of, geometric_mean, median, minimum, range};
@@ -83,7 +83,9 @@ impl Config {
         let caption = format!("{}. {}", output.heading, self.caption(&cells));
         output.add_figure("table", caption, 1, vec![self.draw(rows, &cells)]);
         output.paper = self.compare_all(rows, &cells);
-        self.add_table(&mut output, rows, &cells);
+        let columns = "scene scene_kind column cost_over_base low_over_base high_over_base \
+                       paper_over_base";
+        output.show("Cost over base (and the paper's, on its own scenes):", &cells, columns)?;
         Ok(output)
     }
 
@@ -184,24 +186,6 @@ impl Config {
         panel.layers.push(Layer::new("greedy", Marks::VLine(1.0)));
         panel
     }
-
-    fn add_table(&self, output: &mut Output, rows: &Rows, cells: &[Cell]) {
-        let names = self.columns.iter().map(|column| column.name.as_str());
-        let mut table = text_table(std::iter::once("scene").chain(names));
-        for scene in rows.scenes() {
-            let show = |column: &Column| {
-                let cell = find(cells, scene, column)?;
-                let ours = format!("{:.4}", cell.cost_over_base);
-                Some(
-                    cell.paper_over_base
-                        .map_or(ours.clone(), |paper| format!("{ours}  (paper {paper:.4})")),
-                )
-            };
-            let shown = self.columns.iter().map(|column| show(column).unwrap_or_default());
-            table.add_row(std::iter::once(rows.shown(scene)).chain(shown));
-        }
-        output.add_table("Cost over base, ours (and the paper's, on its own scenes):", table);
-    }
 }
 
 /// The ends of an interval, if there is one.
@@ -213,11 +197,6 @@ pub(super) fn of_column<'c, 'a>(
     column: &Column,
 ) -> impl Iterator<Item = &'c Cell<'a>> {
     cells.iter().filter(|cell| cell.column == column.name)
-}
-
-/// Returns the cell of a column on a scene.
-fn find<'c, 'a>(cells: &'c [Cell<'a>], scene: &str, column: &Column) -> Option<&'c Cell<'a>> {
-    of_column(cells, column).find(|cell| cell.scene == scene)
 }
 
 #[cfg(test)]

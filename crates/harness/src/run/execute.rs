@@ -2,19 +2,15 @@
 
 use super::finish::{Summary, conclude};
 use super::job::Job;
-use super::measurement::{Measurement, Trees, Work};
 use super::perform::Watch;
 use super::provenance::Provenance;
-use super::ray_cost::Judging;
 use super::resolved::{Resolved, load_scenes, to_toml};
-use super::runs::Runs;
-use super::selection::Selection;
-use super::suite::Suite;
-use super::target;
-use super::trace::Tracing;
+use super::work::{Trees, Work};
+use super::{ray_cost, runs, target, trace};
 use crate::Error;
 use crate::rows::store::{self, Existing, Store};
 use crate::spec::Experiment;
+use bvh_search::Observer;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -24,8 +20,9 @@ use std::sync::atomic::AtomicBool;
 pub struct Extent {
     /// The treatment of existing results.
     pub existing: Existing,
-    /// The runs to perform. Those of a part are kept for a harness that joins the parts.
-    pub selection: Selection,
+    /// The identifiers of the runs to perform, which are kept for a harness that joins the parts;
+    /// none for all runs.
+    pub runs: Vec<String>,
     /// The `--out` of harnesses that have performed parts of the experiment.
     pub parts: Vec<PathBuf>,
     /// True for a line on standard error about every run.
@@ -40,54 +37,42 @@ pub fn execute(
     extent: &Extent,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
-    if extent.selection.is_part() {
+    if !extent.runs.is_empty() {
         reject_indivisible(experiment)?;
     }
-    let measurements = measurements(experiment);
     // Without the key the program's pool serves, which `--jobs` has sized.
     let Some(threads) = experiment.threads else {
-        return run(experiment, &measurements, out, extent, interrupted);
+        return run(experiment, out, extent, interrupted);
     };
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads.into())
         .build()
         .map_err(|error| Error::Usage(format!("threads = {threads}: {error}")))?;
-    pool.install(|| run(experiment, &measurements, out, extent, interrupted))
+    pool.install(|| run(experiment, out, extent, interrupted))
 }
 
 /// Returns an error if several processes cannot share the experiment.
 pub fn reject_indivisible(experiment: &Experiment) -> Result<(), Error> {
-    let reason = measurements(experiment).iter().find_map(|measurement| measurement.indivisible());
-    match reason {
-        Some(reason) => Err(Error::Usage(format!("{}: {reason}", experiment.name))),
-        None => Ok(()),
-    }
-}
-
-/// Returns the measurements of an experiment in their order: later ones use the trees of the runs.
-fn measurements(experiment: &Experiment) -> Vec<Box<dyn Measurement + Sync + '_>> {
-    if let Some(measure) = &experiment.suite {
-        return vec![Box::new(Suite(measure))];
-    }
-    let mut measurements: Vec<Box<dyn Measurement + Sync>> = vec![Box::new(Runs)];
-    if let Some(config) = &experiment.tracing {
-        measurements.push(Box::new(Tracing(config)));
-    }
-    if let Some(config) = experiment.judges() {
-        measurements.push(Box::new(Judging(config)));
-    }
-    measurements
+    let reason = if experiment.suite.is_some() {
+        "the suite of cases cannot be split"
+    } else if experiment.tracing.is_some() {
+        "ray times are compared within one process"
+    } else if experiment.judges().is_some() {
+        "rays judge all trees of a scene together"
+    } else {
+        return Ok(());
+    };
+    Err(Error::Usage(format!("{}: {reason}; run it without --run", experiment.name)))
 }
 
 fn run(
     experiment: &Experiment,
-    measurements: &[Box<dyn Measurement + Sync + '_>],
     out: &Path,
     extent: &Extent,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
-    let Extent { existing, ref selection, ref parts, verbose } = *extent;
-    let is_part = selection.is_part();
+    let Extent { existing, runs: ref ids, ref parts, verbose } = *extent;
+    let is_part = !ids.is_empty();
     let (scenes, skipped_scenes) = load_scenes(experiment)?;
     let resolved = Resolved::new(experiment, &scenes);
     let (folder, is_finished) = target::choose(out, &resolved, existing, is_part)?;
@@ -96,7 +81,7 @@ fn run(
         return Ok(Summary { skipped_scenes, ..Summary::finished(folder) });
     }
     // An unknown identifier must not leave a folder.
-    let jobs = Job::selected(experiment, &scenes, selection)?;
+    let jobs = Job::selected(experiment, &scenes, ids)?;
     let store = Store::open(&folder, &to_toml(&resolved)?, existing)?;
     let runs = jobs.len();
     if is_part {
@@ -122,8 +107,17 @@ fn run(
         remarks,
     };
     let mut text = String::new();
-    for measurement in measurements {
-        text += &measurement.measure(&mut work)?;
+    if let Some(suite) = &experiment.suite {
+        let cancelled = || work.watch.cancelled();
+        suite.stability.execute(&experiment.scenes, &experiment.methods, &store, &cancelled)?;
+    } else {
+        runs::measure(&mut work)?;
+        if let Some(config) = &experiment.tracing {
+            text += &trace::measure(config, &mut work)?;
+        }
+        if let Some(config) = experiment.judges() {
+            ray_cost::measure(config, &mut work)?;
+        }
     }
     let remarks = work.remarks;
     if is_part {

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::contestant::Labelled;
-use crate::run::selection::Selection;
+use crate::run::selection::selected;
 use crate::spec::Experiment;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
@@ -24,13 +24,14 @@ pub(crate) struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
-    /// Returns the selected runs of an experiment, scene by scene, in the order of the spec.
+    /// Returns the runs of an experiment with these identifiers, all if there are none, scene by
+    /// scene, in the order of the spec.
     pub fn selected(
         experiment: &'a Experiment,
         scenes: &'a [Scene],
-        selection: &Selection,
+        ids: &[String],
     ) -> Result<Vec<Self>, Error> {
-        let selected = selection.of(experiment, scenes)?;
+        let selected = selected(ids, experiment, scenes)?;
         let runs: Vec<_> = experiment.runs().collect();
         let runs_of_scenes: Vec<&[usize]> =
             selected.chunk_by(|a, b| a / runs.len() == b / runs.len()).collect();

@@ -1,7 +1,7 @@
 //! Judges the trees of all runs by rays that they were not trained on.
 
 use super::job::{Job, tracing_error};
-use super::measurement::{Measurement, Work};
+use super::work::Work;
 use crate::Error;
 use crate::measure::layout::{collapsed_sah, widened};
 use crate::measure::ray_cost::{Config, TestRays, TrainedOn, test_rays};
@@ -17,25 +17,16 @@ use rayon::prelude::*;
 /// The name that results give to all trees trained on rays, whatever the label of their method.
 const RAYS: &str = "rays";
 
-/// Rays that judge the trees of all runs.
-pub(crate) struct Judging<'a>(pub &'a Config);
-
-impl Measurement for Judging<'_> {
-    fn indivisible(&self) -> Option<&'static str> {
-        Some("rays judge all trees of a scene together; run it without --run")
+/// Judges the trees of all runs.
+pub(crate) fn measure(config: &Config, work: &mut Work) -> Result<(), Error> {
+    work.complete_trees(|_| true)?;
+    let runs: Vec<Run> =
+        work.trees.iter().map(|(&index, tree)| (&work.jobs[index], tree)).collect();
+    let mut rows = Rows::default();
+    for scene_runs in runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
+        rows.judge_scene(config, work, scene_runs)?;
     }
-
-    fn measure(&self, work: &mut Work) -> Result<String, Error> {
-        work.complete_trees(|_| true)?;
-        let runs: Vec<Run> =
-            work.trees.iter().map(|(&index, tree)| (&work.jobs[index], tree)).collect();
-        let mut rows = Rows::default();
-        for scene_runs in runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
-            rows.judge_scene(self.0, work, scene_runs)?;
-        }
-        rows.write(work.store)?;
-        Ok(String::new())
-    }
+    rows.write(work.store)
 }
 
 /// A run and its tree.

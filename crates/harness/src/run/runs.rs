@@ -1,8 +1,8 @@
-//! The runs of an experiment as a measurement: in parallel or one by one, with progress reports.
+//! The runs of all methods on all scenes: in parallel or one by one, with progress reports.
 
 use super::job::Job;
-use super::measurement::{Measurement, Trees, Work};
 use super::perform::perform;
+use super::work::{Trees, Work};
 use crate::Error;
 use crate::spec::Experiment;
 use rayon::prelude::*;
@@ -11,28 +11,23 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// The runs of all methods on all scenes.
-pub(crate) struct Runs;
-
-impl Measurement for Runs {
-    /// Performs the runs that are missing or damaged in the store, and keeps each once it finishes.
-    fn measure(&self, work: &mut Work) -> Result<String, Error> {
-        let missing = missing_runs(work)?;
-        let progress = Progress::new(work, work.jobs.len() - missing.len());
-        let result = if work.experiment.sequential {
-            missing.iter().try_for_each(|job| progress.perform(work, job))
-        } else {
-            missing.par_iter().try_for_each(|job| progress.perform(work, job))
-        };
-        work.watch.bar.finish_and_clear();
-        result?;
-        let runs = work.jobs.len();
-        match progress.finished.into_inner() {
-            finished if finished < runs => Err(Error::Interrupted { finished, runs }),
-            _ => {
-                work.trees = progress.trees.into_inner().unwrap_or_else(PoisonError::into_inner);
-                Ok(String::new())
-            }
+/// Performs the runs that are missing or damaged in the store, and keeps each once it finishes.
+pub(crate) fn measure(work: &mut Work) -> Result<(), Error> {
+    let missing = missing_runs(work)?;
+    let progress = Progress::new(work, work.jobs.len() - missing.len());
+    let result = if work.experiment.sequential {
+        missing.iter().try_for_each(|job| progress.perform(work, job))
+    } else {
+        missing.par_iter().try_for_each(|job| progress.perform(work, job))
+    };
+    work.watch.bar.finish_and_clear();
+    result?;
+    let runs = work.jobs.len();
+    match progress.finished.into_inner() {
+        finished if finished < runs => Err(Error::Interrupted { finished, runs }),
+        _ => {
+            work.trees = progress.trees.into_inner().unwrap_or_else(PoisonError::into_inner);
+            Ok(())
         }
     }
 }

@@ -8,51 +8,31 @@ use bvh_search::{Budget, Method};
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
-/// All runs of an experiment, or a part of them.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub enum Selection {
-    /// All runs.
-    #[default]
-    All,
-    /// The runs with these identifiers.
-    Runs(Vec<String>),
-}
-
-impl Selection {
-    /// Returns true if other processes perform the rest.
-    pub fn is_part(&self) -> bool {
-        *self != Self::All
+/// Returns the indices of the runs with these identifiers, ascending; of all runs if there are none.
+///
+/// # Errors
+///
+/// If no run has one of the identifiers.
+pub(crate) fn selected(
+    ids: &[String],
+    experiment: &Experiment,
+    scenes: &[Scene],
+) -> Result<Vec<usize>, Error> {
+    let listed = listed(experiment, scenes);
+    if ids.is_empty() {
+        return Ok((0..listed.len()).collect());
     }
-
-    /// Returns the indices of the selected runs, ascending.
-    ///
-    /// # Errors
-    ///
-    /// If no run has one of the identifiers.
-    pub(crate) fn of(
-        &self,
-        experiment: &Experiment,
-        scenes: &[Scene],
-    ) -> Result<Vec<usize>, Error> {
-        let listed = listed(experiment, scenes);
-        let selected: BTreeSet<usize> = match self {
-            Self::All => listed.iter().map(|run| run.index).collect(),
-            Self::Runs(ids) => ids
-                .iter()
-                .map(|id| {
-                    let run = listed.iter().find(|run| run.id == *id);
-                    run.map(|run| run.index).ok_or_else(|| {
-                        let name = &experiment.name;
-                        Error::Usage(format!(
-                            "--run {id}: {name} has no such run; accepted: an identifier that \
-                             `harness jobs` lists"
-                        ))
-                    })
-                })
-                .collect::<Result<_, _>>()?,
-        };
-        Ok(selected.into_iter().collect())
-    }
+    let index = |id: &String| {
+        let run = listed.iter().find(|run| run.id == *id);
+        run.map(|run| run.index).ok_or_else(|| {
+            let name = &experiment.name;
+            Error::Usage(format!(
+                "--run {id}: {name} has no such run; accepted: an identifier that `harness jobs` lists"
+            ))
+        })
+    };
+    let indices: BTreeSet<usize> = ids.iter().map(index).collect::<Result<_, _>>()?;
+    Ok(indices.into_iter().collect())
 }
 
 /// One run in the list of all runs.
@@ -137,16 +117,14 @@ mod tests {
     #[test]
     fn every_run_has_one_identifier_and_those_with_most_work_come_first() {
         let (experiment, scenes) = experiment();
-        let all = Selection::All.of(&experiment, &scenes).unwrap();
-        assert_eq!(all, (0..12).collect::<Vec<_>>());
+        assert_eq!(selected(&[], &experiment, &scenes).unwrap(), Vec::from_iter(0..12));
         let runs = listed(&experiment, &scenes);
         let works: Vec<u64> = runs.iter().map(|run| run.work).collect();
         assert!(works.is_sorted_by(|a, b| a >= b), "{works:?}");
         assert_eq!(works[0], 9 * 2 * scenes[0].boxes.len().max(750) as u64);
         assert_eq!(works[11], 2 * scenes[0].boxes.len().min(750) as u64);
         for run in runs {
-            let selection = Selection::Runs(vec![run.id]);
-            assert_eq!(selection.of(&experiment, &scenes).unwrap(), [run.index]);
+            assert_eq!(selected(&[run.id], &experiment, &scenes).unwrap(), [run.index]);
         }
     }
 

@@ -1,7 +1,7 @@
 //! Traces rays through the trees of finished runs and, for comparison, with third-party libraries.
 
 use super::job::{Job, tracing_error};
-use super::measurement::{Measurement, Work};
+use super::work::Work;
 use crate::Error;
 use crate::contestant::Contestant;
 use crate::measure::layout::own_contenders;
@@ -15,34 +15,26 @@ use bvh_search::Observer;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-/// Rays through the trees of first runs, timed in interleaved rounds.
-pub(crate) struct Tracing<'a>(pub &'a speed::Config);
-
-impl Measurement for Tracing<'_> {
-    fn indivisible(&self) -> Option<&'static str> {
-        Some("ray times are compared within one process; run it without --run")
+/// Traces rays through the trees of first runs, timed in interleaved rounds. Returns the text for
+/// the terminal.
+pub(crate) fn measure(config: &speed::Config, work: &mut Work) -> Result<String, Error> {
+    work.complete_trees(|job| job.repetition == 0)?;
+    let (programs, mut text) = ray_programs(config);
+    let first_runs: Vec<Run> = work
+        .trees
+        .iter()
+        .map(|(&index, tree)| (&work.jobs[index], tree))
+        .filter(|(job, _)| job.repetition == 0)
+        .collect();
+    let mut traced = Vec::new();
+    for runs in first_runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
+        traced.extend(trace_scene(config, work, runs, &programs)?);
     }
-
-    fn measure(&self, work: &mut Work) -> Result<String, Error> {
-        work.complete_trees(|job| job.repetition == 0)?;
-        let config = self.0;
-        let (programs, mut text) = ray_programs(config);
-        let first_runs: Vec<Run> = work
-            .trees
-            .iter()
-            .map(|(&index, tree)| (&work.jobs[index], tree))
-            .filter(|(job, _)| job.repetition == 0)
-            .collect();
-        let mut traced = Vec::new();
-        for runs in first_runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
-            traced.extend(trace_scene(config, work, runs, &programs)?);
-        }
-        if let Some(race) = race().filter(|_| !config.ray_peers.is_empty()) {
-            text += &compare_libraries(race, work, &first_runs, &traced)?;
-        }
-        write_rows(work, traced)?;
-        Ok(text)
+    if let Some(race) = race().filter(|_| !config.ray_peers.is_empty()) {
+        text += &compare_libraries(race, work, &first_runs, &traced)?;
     }
+    write_rows(work, traced)?;
+    Ok(text)
 }
 
 /// A run and its tree.

@@ -16,7 +16,7 @@
 #![allow(dead_code)] // numbers and tables use a part each
 
 use super::support::top;
-use harness::report::query::{self, QueryError, Row, distinct, group, number_in, only_text};
+use harness::report::query::{self, Row, distinct, group, number_in, only_text};
 use harness::report::query_measure::Measure;
 use std::fs;
 use std::path::PathBuf;
@@ -72,8 +72,7 @@ pub fn table(query: &str) -> String {
     let [file, conditions, axes, measure, format] = parts[..] else {
         panic!("{query}: expected FILE | CONDITIONS | ROWS × COLUMNS | SHOWN | FORMAT")
     };
-    let table = pivot(&rows(file, conditions), axes, measure, format);
-    format!("\n{}\n", table.unwrap_or_else(|error| panic!("{query}: {error}")))
+    format!("\n{}\n", pivot(&rows(file, conditions), axes, measure, format))
 }
 
 /// Divides the number of each row by the least one among other rows of the file, `CONDITIONS by
@@ -103,16 +102,11 @@ fn divide_by_least(rows: &mut [Row], column: &str, others: &[Row], columns: &[&s
 }
 
 /// Writes a number in a format.
-fn write(value: f64, format: &str) -> Result<String, QueryError> {
-    let malformed = || QueryError::Malformed {
-        part: "format",
-        found: format.into(),
-        accepted: "a number of decimals, alone or before below, above or percent",
-    };
+fn write(value: f64, format: &str) -> String {
     let (digits, unit) = format.split_once(' ').unwrap_or((format, ""));
-    let digits: usize = digits.parse().map_err(|_| malformed())?;
-    let value = in_unit(value, unit).ok_or_else(malformed)?;
-    Ok(format!("{value:.digits$}"))
+    let digits: usize = digits.parse().unwrap_or_else(|_| panic!("{format:?} is no format"));
+    let value = in_unit(value, unit).unwrap_or_else(|| panic!("{format:?} is no format"));
+    format!("{value:.digits$}")
 }
 
 /// Percentages are differences from 1, which no column holds.
@@ -127,59 +121,54 @@ fn in_unit(value: f64, unit: &str) -> Option<f64> {
 }
 
 /// Returns the further column of a measure: a number in the format, a text as it is.
-fn further(rows: &[&Row], column: &str, format: &str) -> Result<Option<String>, QueryError> {
-    let is_number =
-        rows.iter().filter_map(|row| row.get(column)).any(|text| text.parse::<f64>().is_ok());
-    if is_number && format != "text" {
-        one(rows, &format!("only {column}"), format)
-    } else {
-        only_text(rows, column)
-    }
+fn further(rows: &[&Row], column: &str, format: &str) -> Option<String> {
+    let mut texts = rows.iter().filter_map(|row| row.get(column));
+    let is_number = format != "text" && texts.any(|text| text.parse::<f64>().is_ok());
+    one(rows, &format!("only {column}"), if is_number { format } else { "text" })
 }
 
 /// Returns one value of `AGGREGATE COLUMN` in the format.
-fn one(rows: &[&Row], measure: &str, format: &str) -> Result<Option<String>, QueryError> {
+fn one(rows: &[&Row], measure: &str, format: &str) -> Option<String> {
     if format == "text" {
-        return only_text(rows, measure.strip_prefix("only ").unwrap_or(measure));
+        return only_text(rows, measure.strip_prefix("only ").unwrap_or(measure)).unwrap();
     }
-    Measure::parse(measure)?.of_rows(rows)?.map(|value| write(value, format)).transpose()
+    Measure::parse(measure).unwrap().of_rows(rows).unwrap().map(|value| write(value, format))
 }
 
 /// Returns the text of a whole measure over some rows; empty if they have no value.
-fn show(rows: &[&Row], measure: &str, format: &str) -> Result<String, QueryError> {
+fn show(rows: &[&Row], measure: &str, format: &str) -> String {
     let (measure, beside) = measure.split_once(" (").unwrap_or((measure, ""));
     let (measure, ends) = measure.split_once(" [").unwrap_or((measure, ""));
-    let mut text = one(rows, measure, format)?.unwrap_or_default();
+    let mut text = one(rows, measure, format).unwrap_or_default();
     if let Some((low, high)) = ends.trim_end_matches(']').split_once(", ") {
-        let low = one(rows, &format!("min {low}"), format)?;
-        let high = one(rows, &format!("max {high}"), format)?;
+        let low = one(rows, &format!("min {low}"), format);
+        let high = one(rows, &format!("max {high}"), format);
         if let Some((low, high)) = low.zip(high) {
             text += &format!(" [{low}, {high}]");
         }
     }
-    if !beside.is_empty()
-        && let Some(beside) = further(rows, beside.trim_end_matches(')'), format)?
+    let beside = beside.trim_end_matches(')');
+    if let Some(beside) = Some(beside)
+        .filter(|column| !column.is_empty())
+        .and_then(|column| further(rows, column, format))
     {
         text += &format!(" ({beside})");
     }
-    Ok(text)
+    text
 }
 
 /// Returns a Markdown table of `ROWS × COLUMNS`; ROWS may be several columns, with ` + ` between.
-fn pivot(rows: &[Row], axes: &str, measure: &str, format: &str) -> Result<String, QueryError> {
-    let (down, across) = axes.split_once(" × ").ok_or_else(|| QueryError::Malformed {
-        part: "pair of axes",
-        found: axes.into(),
-        accepted: "ROWS × COLUMNS",
-    })?;
+fn pivot(rows: &[Row], axes: &str, measure: &str, format: &str) -> String {
+    let (down, across) =
+        axes.split_once(" × ").unwrap_or_else(|| panic!("{axes}: expected ROWS × COLUMNS"));
     let down: Vec<&str> = down.split(" + ").collect();
-    let columns = distinct(rows, &[across])?.concat();
+    let columns = distinct(rows, &[across]).unwrap().concat();
     let mut header: Vec<String> =
         down.iter().map(|column| escape(&column.replace('_', " "))).collect();
     header.extend(columns.iter().map(|column| escape(column)));
     let mut lines = vec![format!("| {} |", header.join(" | "))];
     lines.push(format!("|{}", "---|".repeat(header.len())));
-    for names in together(distinct(rows, &down)?) {
+    for names in together(distinct(rows, &down).unwrap()) {
         let of_line: Vec<Row> = group(rows, &down, &names).into_iter().cloned().collect();
         let mut cells: Vec<String> =
             down.iter().zip(&names).map(|(column, name)| escape(&heading(column, name))).collect();
@@ -189,11 +178,11 @@ fn pivot(rows: &[Row], axes: &str, measure: &str, format: &str) -> Result<String
         }
         for column in &columns {
             let here = group(&of_line, &[across], std::slice::from_ref(column));
-            cells.push(escape(&show(&here, measure, format)?));
+            cells.push(escape(&show(&here, measure, format)));
         }
         lines.push(format!("| {} |", cells.join(" | ")));
     }
-    Ok(lines.join("\n"))
+    lines.join("\n")
 }
 
 /// Sorts names so that those that begin alike follow each other.
@@ -235,14 +224,10 @@ fn values_are_written_in_their_format_and_a_table_has_empty_cells_where_no_row_i
     let rows: Vec<Row> = reader.deserialize().map(Result::unwrap).collect();
     let all: Vec<&Row> = rows.iter().collect();
     let shown = |measure: &str, format: &str| show(&all, measure, format);
-    assert_eq!(shown("median cost", "1").unwrap(), "3.0");
-    assert_eq!(shown("max cost [cost, cost]", "0").unwrap(), "5 [2, 5]");
-    assert_eq!(shown("min cost / rays (rays)", "0 percent").unwrap(), "50 (400)");
-    let message = shown("only scene", "text").unwrap_err().to_string();
-    assert!(message.contains("scene has several values, a, b"), "{message}");
-    let message = shown("max cost", "two").unwrap_err().to_string();
-    assert!(message.contains("\"two\" is no format"), "{message}");
-    let table = pivot(&rows, "scene × method", "only cost", "0").unwrap();
+    assert_eq!(shown("median cost", "1"), "3.0");
+    assert_eq!(shown("max cost [cost, cost]", "0"), "5 [2, 5]");
+    assert_eq!(shown("min cost / rays (rays)", "0 percent"), "50 (400)");
+    let table = pivot(&rows, "scene × method", "only cost", "0");
     assert_eq!(table, "| scene | x, y | z |\n|---|---|---|\n| a | 2 | 3 |\n| b |  | 5 |");
 }
 

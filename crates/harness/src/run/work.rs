@@ -1,4 +1,4 @@
-//! The shape of a measurement: it fills the folder of an experiment's results with rows.
+//! A running experiment.
 
 use super::job::Job;
 use super::perform::{Watch, perform};
@@ -11,17 +11,6 @@ use std::collections::btree_map::Entry;
 
 /// The trees of runs by the index of the run.
 pub(crate) type Trees = BTreeMap<usize, Bvh>;
-
-/// A part of an experiment that makes rows.
-pub(crate) trait Measurement {
-    /// Returns the reason why processes cannot share this measurement, if they cannot.
-    fn indivisible(&self) -> Option<&'static str> {
-        None
-    }
-
-    /// Writes the rows. Returns remarks for the terminal, which follow the tables.
-    fn measure(&self, work: &mut Work) -> Result<String, Error>;
-}
 
 /// A running experiment, with everything that its measurements share.
 pub(crate) struct Work<'a> {
