@@ -105,6 +105,15 @@ impl Observer for Unheard<'_> {
     }
 }
 
+/// Ends a search before its first step.
+struct Over;
+
+impl Observer for Over {
+    fn cancelled(&self) -> bool {
+        true
+    }
+}
+
 impl<'a> Bake<'a> {
     /// Returns a search with the defaults: whole objects, random lines, seed 1, no limit.
     pub fn new(boxes: &'a [Aabb]) -> Self {
@@ -134,7 +143,8 @@ impl<'a> Bake<'a> {
         unless_cancelled(watched(observer, |watch| config.build_watched(self.boxes, None, watch)))
     }
 
-    /// Searches until the budget is spent or the observer cancels.
+    /// Searches until the budget is spent or the observer cancels. A budget of no work gives the
+    /// greedy tree, or the [start](Self::start).
     ///
     /// Takes the `greedy` tree if the caller has it, and frees its memory as soon as there is a
     /// better tree. Otherwise builds it for a budget of work, in which its time does not count.
@@ -149,6 +159,8 @@ impl<'a> Bake<'a> {
             None if builds => self.greedy(observer)?,
             greedy => greedy,
         };
+        // Without work there is nothing to search for, and the first tree is the answer.
+        let observer = if self.budget.max_work == Some(0) { &Over } else { observer };
         let mut splits = self.splits();
         // A division may take all the time of a search that has no tree yet. Such a search divides
         // later itself.

@@ -3,6 +3,7 @@
 use crate::support::{
     begin, bvh, cost, ended, facts, names, number, run_on_a_small_disk, words, wrong,
 };
+use bvh_build::{Builder, muller_fellner};
 use bvh_core::Segment;
 use bvh_core::cost::{internal_area, layout_area};
 use bvh_core::file::TreeFile;
@@ -138,6 +139,26 @@ fn a_bake_from_an_earlier_tree_is_never_worse() {
     }
     assert!(before < greedy);
     assert_eq!(facts(at, "inspect a.bvh")["seed"], 5);
+}
+
+#[test]
+fn a_bake_of_no_time_or_no_work_gives_the_greedy_tree_or_the_tree_it_starts_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let scene = Scene::load("escher:200").unwrap();
+    let tree = |file: &str| tree_file::load(&at.join(file), &scene).unwrap().0;
+    bvh(at, "bake escher:200 --budget=300kwork --out=start.bvh");
+    let greedy = muller_fellner::Config::default().build(&scene.boxes).unwrap();
+    for budget in ["0s", "0work"] {
+        for more in ["", "--references=1.5", "--rays=default", "--method=reinsertion"] {
+            let bake = format!("bake escher:200 --budget={budget} --out=x.bvh {more}");
+            let found = facts(at, &bake);
+            assert_eq!((&found["moves"], &found["work"]), (&0.into(), &0.into()), "{bake}");
+            assert!(tree("x.bvh") == greedy, "{bake}");
+        }
+        bvh(at, &format!("bake escher:200 --budget={budget} --out=x.bvh --from=start.bvh"));
+        assert_eq!(cost(at, "x.bvh"), cost(at, "start.bvh"), "{budget}");
+    }
 }
 
 #[test]
