@@ -1,5 +1,6 @@
 //! Writes to the terminal, and records failures.
 
+use indicatif::{ProgressBar, ProgressStyle};
 use std::borrow::Cow;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
@@ -27,6 +28,12 @@ pub fn print_bytes(bytes: &[u8]) {
 pub fn print_error(line: &str) {
     // Without standard error there is no place to report the failure.
     let _ = writeln!(std::io::stderr(), "{}", plain(line));
+}
+
+/// Returns a bar of this length, which is hidden unless standard error is a terminal.
+pub fn bar(length: u64, template: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template(template);
+    ProgressBar::new(length).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
 /// Returns the exit code of a command that has succeeded. If output was lost, prints a message and

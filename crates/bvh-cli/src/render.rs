@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::answer::{Answer, Form, short, whole};
 use crate::arguments::{Jobs, input_file, output_file};
+use crate::output::bar;
 use crate::scene_files::SceneFiles;
 use bvh_core::Aabb;
 use bvh_scenes::Scene;
@@ -11,7 +12,6 @@ use bvh_scenes::rays::View;
 use bvh_scenes::render::{Film, Options, framing, heat, image, render as draw, structure, tiles};
 use bvh_scenes::trace::Accelerator;
 use glam::DVec3;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -120,11 +120,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Error> {
     let start = Instant::now();
     let accelerator = Accelerator::new(&scene.primitives, structure::by_name(&args.accel, &scene)?);
     let built = start.elapsed().as_secs_f64();
-    let bar = ProgressBar::new(tiles(&options));
-    let template = "{msg} {wide_bar} {pos}/{len} tiles, {eta} left";
-    bar.set_style(
-        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
-    );
+    let bar = bar(tiles(&options), "{msg} {wide_bar} {pos}/{len} tiles, {eta} left");
     bar.set_message(scene.name.clone());
     let film = draw(&scene, &accelerator, &options, &|| bar.inc(1));
     bar.finish_and_clear();
@@ -152,13 +148,10 @@ pub fn render(args: &RenderArgs) -> Result<(), Error> {
 }
 
 fn write(args: &RenderArgs, film: &Film, rays_per_pixel: u32) -> Result<(), Error> {
-    let heat = args.heatmap.then(|| heat::map(film, rays_per_pixel));
-    let bytes = heat
-        .transpose()
+    let range = heat::range(film, rays_per_pixel);
+    let heat = args.heatmap.then(|| heat::colours(film, range.top * f64::from(rays_per_pixel)));
+    let bytes = image::png(film.width, heat.as_ref().unwrap_or(&film.pixels))
         .map_err(io::Error::other)
-        .and_then(|heat| {
-            image::png(film.width, heat.as_ref().unwrap_or(&film.pixels)).map_err(io::Error::other)
-        })
         .map_err(Error::io(&args.out, "encode the picture"))?;
     Ok(files::write(&args.out, &bytes)?)
 }
@@ -166,18 +159,20 @@ fn write(args: &RenderArgs, film: &Film, rays_per_pixel: u32) -> Result<(), Erro
 fn per_ray(film: &Film, rays_per_pixel: u32, answer: &mut Answer) {
     let boxes = film.counts.boxes as f64 / film.rays as f64;
     let objects = film.counts.objects as f64 / film.rays as f64;
-    let heat::Range { min, median, max, .. } = heat::range(film, rays_per_pixel);
-    let [boxes_text, objects_text, min_text, median_text, max_text] =
-        [boxes, objects, min, median, max].map(short);
+    let heat::Range { min, median, top, max } = heat::range(film, rays_per_pixel);
+    let [boxes_text, objects_text, min_text, median_text, top_text, max_text] =
+        [boxes, objects, min, median, top, max].map(short);
     answer.say(&format!(
         "per ray: {boxes_text} boxes, {objects_text} objects; \
-         per pixel: {min_text} to {max_text} tests, median {median_text}"
+         per pixel: {min_text} to {max_text} tests, median {median_text}; \
+         the colours of --heatmap end at {top_text}"
     ));
     for (name, value) in [
         ("boxes per ray", boxes),
         ("objects per ray", objects),
         ("least tests of a pixel", min),
         ("median tests of a pixel", median),
+        ("tests of the last colour", top),
         ("most tests of a pixel", max),
     ] {
         answer.record(name, value);

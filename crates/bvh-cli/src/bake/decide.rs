@@ -9,13 +9,13 @@ use super::plan::{Plan, Prepared};
 use super::watch::Interrupted;
 use crate::Error;
 use crate::interrupt;
-use crate::output::print_error;
+use crate::output::{self, print_error};
 use crate::rays::Rays;
 use bvh_core::cost::Objective;
 use bvh_core::{Bvh, RayDensity};
 use bvh_scenes::Scene;
 use bvh_search::{Bake, Budget};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// The work per object of a bake that chooses its own budget. On the 7 scenes of
@@ -192,9 +192,7 @@ fn reason(name: &str, is_chosen: bool, saved: f64) -> String {
 
 /// Returns a bar over the trials, or without a terminal prints that they begin.
 fn bar(trials: usize) -> ProgressBar {
-    let bar = ProgressBar::new(trials as u64);
-    let style = ProgressStyle::with_template("{bar:10} {msg}, {pos} of {len}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let bar = output::bar(trials as u64, "{bar:10} {msg}, {pos} of {len}");
     bar.set_message("trying the choices");
     if bar.is_hidden() {
         print_error(&format!("trying {trials} combinations of the choices"));

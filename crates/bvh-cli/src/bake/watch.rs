@@ -1,9 +1,9 @@
 //! Observes a bake, ends it in time, and shows its progress.
 
 use super::effort::Effort;
-use crate::output::print_error;
+use crate::output::{bar, print_error};
 use bvh_search::{Deadline, Event, Observer};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
 
@@ -34,9 +34,7 @@ pub struct Watch<'a> {
 impl<'a> Watch<'a> {
     pub fn new(effort: Effort, deadline: Deadline, interrupted: &'a AtomicBool) -> Self {
         // The bar counts thousandths of the budget.
-        let bar = ProgressBar::new(1000);
-        let style = ProgressStyle::with_template("{bar:10} {wide_msg}");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let bar = bar(1000, "{bar:10} {wide_msg}");
         Self {
             bar,
             deadline,
