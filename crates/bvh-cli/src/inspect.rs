@@ -1,5 +1,4 @@
-//! `bvh inspect` and `bvh verify`: report the origin of a tree file, and the costs and the shape of
-//! its tree.
+//! `bvh inspect`: reports the origin of a tree file, and the costs and the shape of its tree.
 
 use crate::Error;
 use crate::answer::{Answer, Form};
@@ -21,8 +20,8 @@ pub struct InspectArgs {
     /// The tree file.
     #[arg(value_name = "FILE.bvh")]
     pub file: PathBuf,
-    /// The tree's scene, by name or path of a mesh file. Checks the tree against the scene's
-    /// objects, and compares it with the Müller–Fellner tree.
+    /// The tree's scene, by name or path of a mesh file. Proves that the file, from any source,
+    /// contains a tree over the scene's objects, and compares it with the Müller–Fellner tree.
     pub scene: Option<String>,
     /// Measure the expected tests of rays in the wide layout of the tree: `default` for rays that
     /// need no camera, or a file that describes the rays of a renderer. No bake trains on the same
@@ -54,33 +53,6 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     if let Some(tests) = tests {
         answer.fact("expected tests of a ray", tests);
     }
-    answer.end();
-    Ok(())
-}
-
-/// Prove that a tree file from any source contains a tree for a scene. Computes validity and costs
-/// again.
-#[derive(Args, Clone, Debug)]
-pub struct VerifyArgs {
-    /// The tree file.
-    #[arg(value_name = "FILE.bvh")]
-    pub file: PathBuf,
-    /// The tree's scene, by name or path of a mesh file.
-    pub scene: String,
-    /// Permits files outside the scene's folder.
-    #[command(flatten)]
-    pub files: SceneFiles,
-    /// The form of the facts.
-    #[command(flatten)]
-    pub form: Form,
-}
-
-/// Does the same as [`inspect`], and requires a scene.
-pub fn verify(args: &VerifyArgs) -> Result<(), Error> {
-    let scene = args.files.load(&args.scene)?;
-    let read = Read::new(&args.file, Some(&scene))?;
-    let mut answer = Answer::new(args.form);
-    read.describe(Some(&scene), &mut answer);
     answer.end();
     Ok(())
 }
