@@ -2,8 +2,8 @@
 //! contain, with a remark where a reader has to choose.
 
 use crate::samples::{
-    INDEXED, buffer, data_uri, error, floats, glb, gltf_json, ply_binary, ply_text, samples,
-    square, stl_binary, stl_text, with,
+    INDEXED, NODE, buffer, changes, data_uri, error, floats, glb, gltf_json, ply_binary, ply_text,
+    samples, square, stl_binary, stl_text, with,
 };
 use bvh_core::Triangle;
 use bvh_scenes::load::parse;
@@ -11,77 +11,50 @@ use std::path::Path;
 
 type Case = (&'static str, Vec<u8>, &'static str);
 
-/// Asserts that each file contains the square, and nothing but what the remark names.
-fn assert_read(name: &str, cases: Vec<Case>) {
-    for (case, bytes, remark) in cases {
-        let mesh = parse(&bytes, Path::new(name)).unwrap_or_else(|error| panic!("{case}: {error}"));
-        assert_eq!(mesh.triangles, square(), "{case}");
-        assert_eq!(mesh.remark().unwrap_or_default(), remark, "{case}");
-    }
+fn assert_square(case: &str, bytes: &[u8], name: &str, remark: &str) {
+    let mesh = parse(bytes, Path::new(name)).unwrap_or_else(|error| panic!("{case}: {error}"));
+    assert_eq!(mesh.triangles, square(), "{case}");
+    assert_eq!(mesh.remark().unwrap_or_default(), remark, "{case}");
 }
 
-fn replaced(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
-    String::from_utf8(bytes.to_vec()).unwrap().replace(from, to).into_bytes()
+/// Asserts that each file contains the square, and nothing but what the remark names.
+fn assert_read(name: &str, cases: Vec<Case>) {
+    cases.iter().for_each(|(case, bytes, remark)| assert_square(case, bytes, name, remark));
+}
+
+/// Asserts the same of each change of a file.
+fn assert_changes_read(name: &str, file: &[u8], table: &str) {
+    changes(file, table).for_each(|(line, bytes, remark)| {
+        assert_square(line, &bytes, name, remark[0]);
+    });
 }
 
 #[test]
 fn text_ply_files_as_programs_write_them() {
     let ply = ply_text();
-    let unused = with(&ply, "element vertex 4", "element vertex 5");
-    let face = "4 0 1 2 3\n";
-    assert_read(
+    assert_changes_read(
         "a.ply",
-        vec![
-            ("CR", replaced(&ply, "\n", "\r"), ""),
-            ("CRLF", replaced(&ply, "\n", "\r\n"), ""),
-            ("blank lines", replaced(&ply, "255\n", "255\n\n \n"), ""),
-            ("a blank line before the body", with(&ply, "end_header\n", "end_header\n\n"), ""),
-            ("no end of the last line", ply[..ply.len() - 1].to_vec(), ""),
-            ("an empty comment", with(&ply, "comment a square", "comment"), ""),
-            ("a comment in Latin-1", [&b"ply\ncomment caf\xe9\n"[..], &ply[4..]].concat(), ""),
-            ("obj_info", with(&ply, "comment a square", "obj_info num_cols 5"), ""),
-            ("tabs and blanks", replaced(&ply, " 255", "\t 255 "), ""),
-            (
-                "an unused NaN",
-                with(&unused, face, &format!("-nan(ind) nan 1.#QNAN 0\n{face}")),
-                "1 vertex is used by no face",
-            ),
-            ("NaN in a colour", replaced(&ply, "255", "nan"), ""),
-            (
-                "an element without properties",
-                with(&ply, "end_header", "element cell 4000000000\nend_header"),
-                "",
-            ),
-            (
-                "other elements and lists",
-                with(
-                    &with(
-                        &ply,
-                        "element vertex",
-                        "element camera 2\nproperty list uchar float m\nelement vertex",
-                    ),
-                    "0 0 0 255",
-                    "2 nan 5\n0\n0 0 0 255",
-                ),
-                "",
-            ),
-            ("a closed polygon", with(&ply, face, "5 0 1 2 3 0\n"), ""),
-            (
-                "more lines",
-                [&ply[..], b"1 2 3\n"].concat(),
-                "5 bytes after the last element were ignored",
-            ),
-            (
-                "a strip",
-                with(
-                    &with(&ply, "element face", "element tristrips"),
-                    face,
-                    "8 0 1 2 -1 0 2 3 -1\n",
-                ),
-                "",
-            ),
-        ],
+        &ply,
+        r"
+\n ⇒ \r |
+\n ⇒ \r\n |
+255\n ⇒ 255\n\n \n |
+end_header\n → end_header\n\n |
+0 1 2 3\n → 0 1 2 3 |
+comment a square → comment |
+ply\n → ply\ncomment caf\xe9\n |
+comment a square → obj_info num_cols 5 |
+ 255 ⇒ \x09 255  |
+255 ⇒ nan |
+4\nprop → 5\nprop & 4 0 1 2 → -nan(ind) nan 1.#QNAN 0\n4 0 1 2 | 1 vertex is used by no face
+end_header → element cell 4000000000\nend_header |
+element v → element camera 2\nproperty list uchar float m\nelement v & 0 0 0 → 2 nan 5\n0\n0 0 0 |
+4 0 1 2 3 → 5 0 1 2 3 0 |
+element face → element tristrips & 4 0 1 2 3 → 8 0 1 2 -1 0 2 3 -1 |
+",
     );
+    let more = [&ply[..], b"1 2 3\n"].concat();
+    assert_square("more lines", &more, "a.ply", "5 bytes after the last element were ignored");
 }
 
 #[test]
@@ -123,32 +96,25 @@ fn binary_ply_files_as_programs_write_them() {
 #[test]
 fn text_stl_files_as_programs_write_them() {
     let stl = stl_text();
-    assert_read(
+    assert_changes_read(
         "a.stl",
-        vec![
-            ("CR", replaced(&stl, "\r\n", "\r"), ""),
-            (
-                "end loop",
-                replaced(&replaced(&stl, "endloop", "end loop"), "endfacet", "end facet"),
-                "",
-            ),
-            ("end solid", replaced(&stl, "endsolid", "end solid"), ""),
-            ("END LOOP", replaced(&stl, "endloop", "END LOOP"), ""),
-            ("a normal of NaN", replaced(&stl, "normal 0 0 1", "normal NaN -nan(ind) 1.#QNAN"), ""),
-            ("commas in a normal", replaced(&stl, "normal 0 0 1", "normal 0,0 0,0 1,0"), ""),
-            ("no normal", replaced(&stl, " normal 0 0 1", ""), ""),
-            ("a colour", replaced(&stl, "facet normal", "color 1 0 0\r\nfacet normal"), ""),
-            (
-                "a colour in the line",
-                replaced(&stl, "facet normal", "color 1 0 0 facet normal"),
-                "",
-            ),
-            ("comments", [b"; made by x\n\n# and y\n", &stl[..]].concat(), ""),
-            ("a long name", with(&stl, "a square", &"n".repeat(5000)), ""),
-            ("keywords in the name", with(&stl, "a square", "facet vertex endloop"), ""),
-            ("no end", with(&stl, "endsolid\r\n", ""), ""),
-        ],
+        &stl,
+        r"
+\r\n ⇒ \r |
+endloop ⇒ end loop & endfacet ⇒ end facet |
+endsolid ⇒ end solid |
+endloop ⇒ END LOOP |
+normal 0 0 1 ⇒ normal NaN -nan(ind) 1.#QNAN |
+normal 0 0 1 ⇒ normal 0,0 0,0 1,0 |
+ normal 0 0 1 ⇒ |
+facet normal ⇒ color 1 0 0\r\nfacet normal |
+facet normal ⇒ color 1 0 0 facet normal |
+solid a square → ; made by x\n\n# and y\nsolid a square |
+a square → facet vertex endloop |
+endsolid\r\n → |
+",
     );
+    assert_square("a long name", &with(&stl, "a square", &"n".repeat(5000)), "a.stl", "");
 }
 
 #[test]
@@ -196,26 +162,22 @@ fn binary_stl_files_as_programs_write_them() {
 #[test]
 fn obj_files_as_programs_write_them() {
     let (_, _, obj) = samples()[0].clone();
-    assert_read(
+    assert_square("capitals", &obj.to_ascii_uppercase(), "a.obj", "");
+    assert_changes_read(
         "a.obj",
-        vec![
-            ("capitals", obj.to_ascii_uppercase(), ""),
-            ("fo", with(&obj, "f 1", "fo 1"), ""),
-            ("weights and colours", replaced(&obj, "\nv 1 1 0.5", "\nv 1 1 0.5 1 0.5 nan 0 1"), ""),
-            (
-                "an unused NaN",
-                [&obj[..], b"v nan 1.#QNAN -nan(ind)"].concat(),
-                "1 vertex is used by no face",
-            ),
-            ("a closed polygon", with(&obj, "f 1 2 3 4", "f 1 2 3 4 1"), ""),
-        ],
+        &obj,
+        r"
+f 1 → fo 1 |
+\nv 1 1 0.5 ⇒ \nv 1 1 0.5 1 0.5 nan 0 1 |
+f 1 → v nan 1.#QNAN -nan(ind)\nf 1 | 1 vertex is used by no face
+f 1 2 3 4 → f 1 2 3 4 1 |
+",
     );
 }
 
 #[test]
 fn gltf_files_as_programs_write_them() {
-    let node = r#"{"mesh": 0}"#;
-    let json = |uri: &str| gltf_json(uri, node, INDEXED).into_bytes();
+    let json = |uri: &str| gltf_json(uri, NODE, INDEXED).into_bytes();
     let base64 = data_uri().split_once(',').unwrap().1.to_owned();
     let percents: String = buffer().iter().map(|byte| format!("%{byte:02x}")).collect();
     let glb = glb();

@@ -1,87 +1,72 @@
 //! Extensions, missing parts and references of glTF files that are accepted or rejected.
 
 use crate::glb::glb;
-use bvh_core::Triangle;
+use crate::samples::{INDEXED, NODE, buffer, error, gltf_json, square};
 use bvh_scenes::load::mesh::Mesh;
 use bvh_scenes::load::{OutsideFiles, load, load_with, parse};
 use std::fs;
 use std::path::Path;
 
-const CORNERS: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-
-fn corner_bytes() -> Vec<u8> {
-    CORNERS.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect()
+fn mesh() -> Mesh {
+    Mesh::new(square(), vec![])
 }
 
-fn triangle() -> Mesh {
-    Mesh::new(Triangle::from_mesh(&CORNERS, &[[0, 1, 2]]).unwrap(), vec![])
+/// Returns the JSON of the square in the binary chunk, with further keys at the top.
+fn json(more: &str) -> String {
+    gltf_json("", NODE, INDEXED).replacen('{', &format!("{{{more}"), 1)
 }
 
-/// Returns a scene of one triangle in `buffers[0]`, with additional top-level keys.
-fn json(buffers: &str, more: &str) -> String {
-    format!(
-        r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0]}}], "nodes": [{{"mesh": 0}}],
-        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}}]}}],
-        "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}}],
-        "bufferViews": [{{"buffer": 0, "byteLength": 36}}], "buffers": [{buffers}]{more}}}"#
-    )
+fn glb_of(json: String) -> Vec<u8> {
+    glb(json, &buffer())
 }
 
-/// The buffer in the binary chunk of a GLB file.
-const CHUNK: &str = r#"{"byteLength": 36}"#;
+fn read(json: String) -> Mesh {
+    parse(&glb_of(json), Path::new("a.glb")).unwrap()
+}
 
 /// Creates a folder with `scene.gltf`, whose buffer is the file of this name.
 fn folder(name: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let text = json(&format!(r#"{{"uri": "{name}", "byteLength": 36}}"#), "");
-    fs::write(folder.path().join("scene.gltf"), text).unwrap();
+    fs::write(folder.path().join("scene.gltf"), gltf_json(name, NODE, INDEXED)).unwrap();
     folder
 }
 
 #[test]
-fn a_file_may_require_only_extensions_that_change_no_triangle() {
-    let required = |names: &str| {
-        glb(json(CHUNK, &format!(r#", "extensionsRequired": [{names}]"#)), &corner_bytes())
-    };
-    let path = Path::new("a.glb");
+fn a_file_may_require_only_extensions_that_change_no_mesh() {
+    let required = |names: &str| json(&format!(r#""extensionsRequired": [{names}], "#));
     for known in
         ["", r#""KHR_materials_unlit", "KHR_texture_basisu""#, r#""EXT_mesh_gpu_instancing""#]
     {
-        assert_eq!(parse(&required(known), path).unwrap(), triangle(), "{known}");
+        assert_eq!(read(required(known)), mesh(), "{known}");
     }
     for unknown in ["EVIL_no_such", "EXT_meshopt_compression", "KHR_draco_mesh_compression"] {
-        let message = parse(&required(&format!(r#""KHR_materials_unlit", "{unknown}""#)), path)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            message.contains(&format!("a.glb: extensionsRequired: `{unknown}`; expected")),
-            "{message}"
-        );
+        let names = format!(r#""KHR_materials_unlit", "{unknown}""#);
+        let message = error(glb_of(required(&names)), "a.glb");
+        let expected = format!("a.glb: extensionsRequired: `{unknown}`; expected");
+        assert!(message.contains(&expected), "{message}");
     }
     // The format lets a reader ignore extensions that are used but not required.
-    let used = json(CHUNK, r#", "extensionsUsed": ["EVIL_no_such", "KHR_materials_ior"]"#);
-    let mesh = parse(&glb(used, &corner_bytes()), path).unwrap();
-    assert_eq!(mesh.triangles, triangle().triangles);
-    assert_eq!(mesh.remarks, ["the extension EVIL_no_such was ignored"]);
+    let used = read(json(r#""extensionsUsed": ["EVIL_no_such", "KHR_materials_ior"], "#));
+    assert_eq!(used.triangles, square());
+    assert_eq!(used.remarks, ["the extension EVIL_no_such was ignored"]);
 }
 
 #[test]
 fn a_buffer_without_uri_is_the_binary_chunk_only_if_it_is_the_first() {
-    let bytes = |buffer: usize| {
-        let views = format!(r#""buffer": {buffer}, "#);
-        let json = json(&format!("{CHUNK}, {CHUNK}"), "").replace(r#""buffer": 0, "#, &views);
-        glb(json, &corner_bytes())
+    let of_buffer = |number: usize| {
+        let json = json("").replace(r#""buffer": 0"#, &format!(r#""buffer": {number}"#));
+        json.replace(r#"{"byteLength": 60}"#, r#"{"byteLength": 60}, {"byteLength": 60}"#)
     };
-    assert_eq!(parse(&bytes(0), Path::new("a.glb")).unwrap(), triangle());
-    let message = parse(&bytes(1), Path::new("a.glb")).unwrap_err().to_string();
-    assert!(message.contains("buffers[1]: no URI"), "{message}");
-    let message = parse(&bytes(2), Path::new("a.glb")).unwrap_err().to_string();
-    assert!(message.contains("no buffers[2]"), "{message}");
+    assert_eq!(read(of_buffer(0)), mesh());
+    for (number, words) in [(1, "buffers[1]: no URI"), (2, "no buffers[2]")] {
+        let message = error(glb_of(of_buffer(number)), "a.glb");
+        assert!(message.contains(words), "{message}");
+    }
 }
 
 #[test]
 fn extras_of_any_kind_are_ignored_in_any_place() {
-    let text = json(CHUNK, "");
+    let text = json("");
     // Attributes contain names of accessors and nothing else.
     let places = text.match_indices('{').map(|(place, _)| place);
     let places: Vec<usize> =
@@ -90,11 +75,7 @@ fn extras_of_any_kind_are_ignored_in_any_place() {
         for &place in &places {
             let mut text = text.clone();
             text.insert_str(place + 1, &format!(r#""extras": {extras}, "#));
-            assert_eq!(
-                parse(&glb(text, &corner_bytes()), Path::new("a.glb")).unwrap(),
-                triangle(),
-                "{extras}"
-            );
+            assert_eq!(read(text), mesh(), "{extras}");
         }
     }
 }
@@ -102,13 +83,13 @@ fn extras_of_any_kind_are_ignored_in_any_place() {
 #[test]
 fn a_buffer_that_no_mesh_needs_may_be_invalid() {
     for unused in [
-        r#"{"uri": "no_such_file.bin", "byteLength": 36}"#,
-        r#"{"uri": "../../outside.bin", "byteLength": 36}"#,
-        r#"{"uri": "data:nonsense", "byteLength": 36}"#,
-        r#"{"byteLength": 36}"#,
+        r#"{"uri": "no_such_file.bin", "byteLength": 60}"#,
+        r#"{"uri": "../../outside.bin", "byteLength": 60}"#,
+        r#"{"uri": "data:nonsense", "byteLength": 60}"#,
+        r#"{"byteLength": 60}"#,
     ] {
-        let bytes = glb(json(&format!("{CHUNK}, {unused}"), ""), &corner_bytes());
-        assert_eq!(parse(&bytes, Path::new("a.glb")).unwrap(), triangle(), "{unused}");
+        let more = format!(r#"{{"byteLength": 60}}, {unused}"#);
+        assert_eq!(read(json("").replace(r#"{"byteLength": 60}"#, &more)), mesh(), "{unused}");
     }
 }
 
@@ -116,7 +97,7 @@ fn a_buffer_that_no_mesh_needs_may_be_invalid() {
 fn a_buffer_outside_the_folder_of_the_scene_is_rejected_unless_it_is_allowed() {
     let outside = tempfile::tempdir().unwrap();
     let file = outside.path().join("outside.bin");
-    fs::write(&file, corner_bytes()).unwrap();
+    fs::write(&file, buffer()).unwrap();
     let absolute = file.to_str().unwrap();
     let folder_name = outside.path().file_name().unwrap().to_str().unwrap();
     for name in [
@@ -149,7 +130,7 @@ fn assert_outside(folder: &Path) {
     for part in ["buffers[0]", "outside the scene's folder", "--outside-files"] {
         assert!(message.contains(part), "{part}: {message}");
     }
-    assert_eq!(load_with(&path, OutsideFiles::Allowed).unwrap(), triangle());
+    assert_eq!(load_with(&path, OutsideFiles::Allowed).unwrap(), mesh());
 }
 
 #[test]
@@ -158,42 +139,32 @@ fn files_in_the_folder_of_the_scene_and_below_are_read() {
         let folder = folder(name);
         fs::create_dir(folder.path().join("a")).unwrap();
         let file = folder.path().join(name.replace("%20", " "));
-        fs::write(file, corner_bytes()).unwrap();
-        assert_eq!(load(&folder.path().join("scene.gltf")).unwrap(), triangle(), "{name}");
+        fs::write(file, buffer()).unwrap();
+        assert_eq!(load(&folder.path().join("scene.gltf")).unwrap(), mesh(), "{name}");
     }
 }
 
 #[test]
 fn an_index_of_33_bits_is_not_taken_for_its_lower_32() {
-    let whole = json(CHUNK, r#", "scene": 0"#);
-    let wrapped = |number: u64| (number + (1 << 32)).to_string();
-    for (key, number) in [
-        ("POSITION", 0),
-        ("buffer", 0),
-        ("bufferView", 0),
-        ("componentType", 5126),
-        ("mesh", 0),
-        ("scene", 0),
-    ] {
-        let old = format!(r#""{key}": {number}"#);
-        let new = format!(r#""{key}": {}"#, wrapped(number));
-        assert_eq!(whole.matches(&old).count(), 1, "{key}");
-        let damaged = glb(whole.replace(&old, &new), &corner_bytes());
-        let message = parse(&damaged, Path::new("a.glb")).unwrap_err().to_string();
-        assert!(message.contains(&wrapped(number)), "{message}");
+    let whole = json("");
+    for key in ["POSITION", "indices", "buffer", "bufferView", "componentType", "mesh", "scene"] {
+        let (before, number) = whole.split_once(&format!(r#""{key}": "#)).unwrap();
+        let digits = number.find(|c: char| !c.is_ascii_digit()).unwrap();
+        let wrapped = (number[..digits].parse::<u64>().unwrap() + (1 << 32)).to_string();
+        let damaged = format!(r#"{before}"{key}": {wrapped}{}"#, &number[digits..]);
+        let message = error(glb_of(damaged), "a.glb");
+        assert!(message.contains(&wrapped), "{message}");
     }
-    let damaged = whole.replace(r#"{"nodes": [0]}"#, r#"{"nodes": [4294967296]}"#);
-    assert!(parse(&glb(damaged, &corner_bytes()), Path::new("a.glb")).is_err());
+    error(glb_of(whole.replace(r#""nodes": [0]"#, r#""nodes": [4294967296]"#)), "a.glb");
     // Numbers that are no reference may be as large as they like.
-    let large = r#", "scene": 0, "extras": {"mesh": 4294967296}"#;
-    assert!(parse(&glb(json(CHUNK, large), &corner_bytes()), Path::new("a.glb")).is_ok());
+    assert_eq!(read(json(r#""extras": {"mesh": 4294967296}, "#)), mesh());
 }
 
 #[test]
 fn a_glb_file_shorter_than_its_header_says_is_rejected_as_a_part() {
-    let whole = glb(json(CHUNK, ""), &corner_bytes());
-    for length in [13, whole.len() - 36, whole.len() - 1] {
-        let message = parse(&whole[..length], Path::new("a.glb")).unwrap_err().to_string();
+    let whole = glb_of(json(""));
+    for length in [13, whole.len() - 60, whole.len() - 1] {
+        let message = error(&whole[..length], "a.glb");
         assert!(message.contains("expected a GLB file, and whole"), "{message}");
     }
 }
@@ -203,7 +174,7 @@ fn a_file_that_promises_too_many_triangles_is_rejected_before_its_buffers_are_re
     let folder = folder("missing.bin");
     let path = folder.path().join("scene.gltf");
     let text = fs::read_to_string(&path).unwrap();
-    fs::write(&path, text.replace(r#""count": 3,"#, r#""count": 300000003,"#)).unwrap();
+    fs::write(&path, text.replace(r#""count": 6,"#, r#""count": 300000003,"#)).unwrap();
     let message = load(&path).unwrap_err().to_string();
     assert!(message.contains("nodes[0]: more than 100000000 triangles"), "{message}");
 }

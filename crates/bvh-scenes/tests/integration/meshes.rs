@@ -1,7 +1,7 @@
 //! Mesh files of every format give the same triangles.
 
 use crate::samples::{
-    CORNERS, INDEXED, buffer, error, gltf, gltf_json, samples, square, stl_text, with,
+    CORNERS, INDEXED, NODE, buffer, error, gltf, gltf_json, samples, square, stl_text, with,
 };
 use bvh_core::Triangle;
 use bvh_scenes::Scene;
@@ -89,11 +89,11 @@ fn strips_fans_and_lists_without_indices_are_triangles_and_lines_are_not() {
     for (mode, triangles) in
         [(5, &[[0, 1, 2], [1, 3, 2]][..]), (6, &[[0, 1, 2], [0, 2, 3]]), (4, &[[0, 1, 2]])]
     {
-        let file = gltf(r#"{"mesh": 0}"#, &format!(r#", "mode": {mode}"#));
+        let file = gltf(NODE, &format!(r#", "mode": {mode}"#));
         let mesh = parse(&file, Path::new("a.gltf")).unwrap();
         assert_eq!(mesh.triangles, Triangle::from_mesh(&CORNERS, triangles).unwrap(), "{mode}");
     }
-    let lines = gltf(r#"{"mesh": 0}"#, r#", "mode": 1"#);
+    let lines = gltf(NODE, r#", "mode": 1"#);
     assert!(error(lines, "a.gltf").contains("no triangle"));
 }
 
@@ -101,7 +101,7 @@ fn strips_fans_and_lists_without_indices_are_triangles_and_lines_are_not() {
 fn buffers_are_files_in_the_folder_of_the_file_that_names_them() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.gltf");
-    std::fs::write(&path, gltf_json("my%20buffer.bin", r#"{"mesh": 0}"#, INDEXED)).unwrap();
+    std::fs::write(&path, gltf_json("my%20buffer.bin", NODE, INDEXED)).unwrap();
     let missing = load(&path).unwrap_err().to_string();
     assert!(
         missing.contains("buffers[0]") && missing.contains("my buffer.bin: no such file"),
@@ -112,7 +112,7 @@ fn buffers_are_files_in_the_folder_of_the_file_that_names_them() {
     std::fs::write(folder.path().join("my buffer.bin"), &buffer()[..50]).unwrap();
     let short = load(&path).unwrap_err().to_string();
     assert!(short.contains("buffers[0]: 50 bytes; expected 60"), "{short}");
-    let remote = error(gltf_json("http://example.org/a.bin", r#"{"mesh": 0}"#, INDEXED), "a.gltf");
+    let remote = error(gltf_json("http://example.org/a.bin", NODE, INDEXED), "a.gltf");
     assert!(remote.contains("a file in this folder"), "{remote}");
 }
 

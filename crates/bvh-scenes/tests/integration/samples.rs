@@ -91,6 +91,7 @@ pub fn gltf_json(uri: &str, nodes: &str, primitive: &str) -> String {
 }
 
 pub const INDEXED: &str = r#", "indices": 1"#;
+pub const NODE: &str = r#"{"mesh": 0}"#;
 
 pub fn buffer() -> Vec<u8> {
     let indices = FACES.as_flattened().iter().flat_map(|&index| (index as u16).to_le_bytes());
@@ -109,7 +110,7 @@ pub fn gltf(nodes: &str, primitive: &str) -> Vec<u8> {
 }
 
 pub fn glb() -> Vec<u8> {
-    crate::glb::glb(gltf_json("", r#"{"mesh": 0}"#, INDEXED), &buffer())
+    crate::glb::glb(gltf_json("", NODE, INDEXED), &buffer())
 }
 
 /// Returns files of a square in every format.
@@ -122,7 +123,7 @@ pub fn samples() -> [(&'static str, Format, Vec<u8>); 8] {
         ("big.ply", Format::Ply, ply_binary(true)),
         ("text.stl", Format::Stl, stl_text()),
         ("binary.stl", Format::Stl, stl_binary()),
-        ("square.gltf", Format::Gltf, gltf(r#"{"mesh": 0}"#, INDEXED)),
+        ("square.gltf", Format::Gltf, gltf(NODE, INDEXED)),
         ("square.glb", Format::Gltf, glb()),
     ]
 }
@@ -133,6 +134,54 @@ pub fn error(bytes: impl AsRef<[u8]>, name: &str) -> String {
 
 /// Replaces the first occurrence of a text.
 pub fn with(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
-    let start = bytes.windows(from.len()).position(|window| window == from.as_bytes()).expect(from);
-    [&bytes[..start], to.as_bytes(), &bytes[start + from.len()..]].concat()
+    replaced(bytes, from.as_bytes(), to.as_bytes(), 1)
+}
+
+fn replaced(bytes: &[u8], from: &[u8], to: &[u8], most: usize) -> Vec<u8> {
+    let mut changed = Vec::new();
+    let (mut rest, mut count) = (bytes, 0);
+    while count < most
+        && let Some(start) = rest.windows(from.len()).position(|window| window == from)
+    {
+        changed.extend([&rest[..start], to].concat());
+        rest = &rest[start + from.len()..];
+        count += 1;
+    }
+    assert!(count > 0, "no {}", from.escape_ascii());
+    [&changed, rest].concat()
+}
+
+/// Returns the bytes of a text in which `\n`, `\r` and `\xe9` stand for bytes.
+fn raw(text: &str) -> Vec<u8> {
+    let mut words = text.split('\\');
+    let mut bytes = words.next().unwrap().as_bytes().to_vec();
+    for word in words {
+        let (byte, length) = match word.as_bytes() {
+            [b'n', ..] => (b'\n', 1),
+            [b'r', ..] => (b'\r', 1),
+            _ => (u8::from_str_radix(&word[1..3], 16).unwrap(), 3),
+        };
+        bytes.push(byte);
+        bytes.extend_from_slice(&word.as_bytes()[length..]);
+    }
+    bytes
+}
+
+/// Reads a table with one line for each changed file: `from → to | words | words`. The first
+/// occurrence of `from` becomes `to`, or every occurrence with `⇒`; several changes are joined by
+/// `&`. Returns the line, the bytes of the file, and the words.
+pub fn changes<'a>(
+    file: &[u8],
+    table: &'a str,
+) -> impl Iterator<Item = (&'a str, Vec<u8>, Vec<&'a str>)> {
+    table.lines().filter(|line| !line.is_empty()).map(|line| {
+        let (changes, words) = line.split_once(" |").expect(line);
+        let mut bytes = file.to_vec();
+        for change in changes.split(" & ") {
+            let most = if change.contains(" ⇒") { usize::MAX } else { 1 };
+            let (from, to) = change.split_once([" →", " ⇒"][usize::from(most > 1)]).expect(line);
+            bytes = replaced(&bytes, &raw(from), &raw(to.strip_prefix(' ').unwrap_or(to)), most);
+        }
+        (line, bytes, words.split(" |").map(str::trim).collect())
+    })
 }
