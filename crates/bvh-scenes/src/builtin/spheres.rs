@@ -42,24 +42,6 @@ pub fn spheres(count: usize) -> Vec<Sphere> {
 mod tests {
     use super::*;
 
-    const COUNTS: [usize; 4] = [1, 75, 750, 7500];
-
-    #[test]
-    fn every_count_gives_that_many_finite_spheres_inside_the_region() {
-        assert!(spheres(0).is_empty());
-        for count in COUNTS {
-            let spheres = spheres(count);
-            assert_eq!(spheres.len(), count);
-            for sphere in spheres {
-                assert!(sphere.radius > 0.0 && sphere.radius.is_finite(), "{count}: {sphere:?}");
-                assert!(
-                    sphere.center.abs().cmple(HALF_SIZE.as_vec3()).all(),
-                    "{count}: {sphere:?}"
-                );
-            }
-        }
-    }
-
     #[test]
     fn no_machine_changes_a_bit_of_any_sphere() {
         let fingerprints = [75, 750, 7500].map(|count| {
@@ -70,21 +52,5 @@ mod tests {
         });
         let pinned = [0xfc00_d4e2_6fbf_f38a, 0xbb9c_cd48_f5fe_ee71, 0x8b82_4c8d_585f_1de7];
         assert_eq!(fingerprints, pinned, "{fingerprints:#x?}");
-    }
-
-    #[test]
-    fn no_sphere_contains_the_centre_of_another_and_few_touch() {
-        for count in [75, 750] {
-            let spheres = spheres(count);
-            let mut touching = 0;
-            for (i, a) in spheres.iter().enumerate() {
-                for b in &spheres[..i] {
-                    let distance = a.center.distance(b.center);
-                    assert!(distance > a.radius.max(b.radius), "{count}: {a:?} {b:?}");
-                    touching += usize::from(distance < a.radius + b.radius);
-                }
-            }
-            assert!(touching * 5 < count, "{touching} of {count}");
-        }
     }
 }

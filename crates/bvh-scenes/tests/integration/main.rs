@@ -1,6 +1,5 @@
 //! Scenes read from files, in one program, which links the library once.
 
-mod base_cost;
 mod damaged_meshes;
 mod dialects;
 mod glb;

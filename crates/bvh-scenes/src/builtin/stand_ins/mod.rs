@@ -79,26 +79,6 @@ mod tests {
     use crate::fnv1a;
 
     #[test]
-    fn every_stand_in_has_its_listed_count_and_only_finite_triangles_with_an_area() {
-        for scene in STAND_INS {
-            let triangles = (scene.triangles)();
-            assert_eq!(triangles.len(), scene.triangle_count, "{}", scene.name);
-            for triangle in triangles {
-                assert!(triangle.0.iter().all(|corner| corner.is_finite()), "{}", scene.name);
-                assert!(!triangle.is_degenerate(), "{}", scene.name);
-            }
-        }
-    }
-
-    #[test]
-    fn sizes_have_the_order_of_the_originals() {
-        let mut scenes = STAND_INS;
-        scenes.sort_by_key(|scene| scene.triangle_count);
-        let names = scenes.map(|scene| scene.name);
-        assert_eq!(names, ["escher", "pinecon2", "bijou", "konistil", "cloister"]);
-    }
-
-    #[test]
     fn no_machine_changes_a_bit_of_any_stand_in() {
         let pinned = [
             ("bijou", 0x9429_df24_df3f_272c),
@@ -109,6 +89,7 @@ mod tests {
         ];
         let made = STAND_INS.map(|scene| {
             let triangles = (scene.triangles)();
+            assert_eq!(triangles.len(), scene.triangle_count, "{}", scene.name);
             let coordinates = triangles
                 .iter()
                 .flat_map(|triangle| triangle.0)
