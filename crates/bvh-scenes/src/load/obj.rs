@@ -18,25 +18,23 @@ use super::mesh::{Fault, Mesh, Place, unused};
 use super::polygon::{Polygons, open};
 use geometry::Geometry;
 use glam::Vec3;
-use statements::{Keyword, Statements};
 use std::path::Path;
 
 /// Reads the bytes of an OBJ file; `path` only names it in errors. Any bytes give a mesh or an
 /// error. O(bytes), and more for faces that are not convex.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
-    let mut geometry = Geometry::new(bytes);
+    let at = |line: usize, message| Fault::new(path, Place::Line(line), message);
+    let geometry = Geometry::of(bytes).map_err(|(line, message)| at(line, message))?;
     let options =
         tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     // No statement names a material, so that `tobj` asks for no material file.
-    let loaded =
-        tobj::load_obj_buf(&mut geometry, &options, |_| Err(tobj::LoadError::OpenFileFailed));
-    // A fault of the file comes first, because it names a line and the error of `tobj` does not.
-    geometry.finish().map_err(|(line, message)| Fault::new(path, Place::Line(line), message))?;
+    let no_material = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+    let loaded = tobj::load_obj_buf(&mut &geometry.text[..], &options, no_material);
     let (models, _) = loaded.map_err(|error| {
         Fault::new(path, Place::File, format!("{error}; expected a Wavefront OBJ file"))
     })?;
     let mut polygons = Polygons::default();
-    let mut faces = 0;
+    let mut lines = geometry.lines.iter();
     let mut corners = Vec::new();
     let mut used = 0;
     for tobj::Model { mesh, .. } in models {
@@ -49,14 +47,8 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
             let (face, rest) = indices.split_at(arities.next().map_or(3, |&arity| arity as usize));
             corners.clear();
             corners.extend(open(face).iter().map(|&index| Vec3::from(positions[index as usize])));
-            polygons.add(&corners).map_err(|message| {
-                Fault::new(
-                    path,
-                    Place::Line(line_of_face(bytes, faces)),
-                    format!("face of {message}"),
-                )
-            })?;
-            faces += 1;
+            let line = lines.next().copied().unwrap_or_default();
+            polygons.add(&corners).map_err(|message| at(line, format!("face of {message}")))?;
             indices = rest;
         }
         used += positions.len();
@@ -68,17 +60,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     }
     polygons.short += geometry.short_faces;
     let unused = unused(geometry.vertices - used);
-    let remarks = unused.into_iter().chain(polygons.remarks()).chain(geometry.remark());
+    let remarks = unused.into_iter().chain(polygons.remarks()).chain(geometry.unknown);
     let remarks = remarks.collect();
     Ok(Mesh::new(polygons.triangles, remarks))
-}
-
-/// Returns the line of a face, counted from 0 without those of fewer than three vertices.
-fn line_of_face(bytes: &[u8], face: usize) -> usize {
-    let mut statements = Statements::new(bytes);
-    let mut words = Vec::new();
-    let lines =
-        std::iter::from_fn(|| statements.next(&mut words, 3).map(|found| (found, words.len())));
-    let mut faces = lines.filter(|((keyword, _), length)| *keyword == Keyword::Face && *length > 2);
-    faces.nth(face).map_or(0, |((_, line), _)| line)
 }

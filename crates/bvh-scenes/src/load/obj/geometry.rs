@@ -5,103 +5,74 @@ use super::super::mesh::counted;
 use super::super::polygon::MOST_CORNERS;
 use super::super::text::{number, shown};
 use super::statements::{Keyword, Statements};
-use std::io::{self, BufRead, Read};
-
-/// The number of bytes that are prepared at a time.
-const BLOCK: usize = 1 << 16;
 
 /// A line, counted from 1, and what is wrong with it.
 type Fault = (usize, String);
 
-/// A reader of checked statements, which ends at the first fault.
-pub struct Geometry<'a> {
-    statements: Statements<'a>,
-    words: Vec<&'a [u8]>,
-    /// Prepared statements; `tobj` has taken the first `taken` bytes.
-    block: Vec<u8>,
-    taken: usize,
-    fault: Option<Fault>,
+/// The checked statements of a file.
+#[derive(Default)]
+pub struct Geometry {
+    /// The statements for `tobj`.
+    pub text: Vec<u8>,
+    /// The line of each face in `text`.
+    pub lines: Vec<usize>,
+    /// The number of `v` statements.
+    pub vertices: usize,
+    /// The number of `f` statements with fewer than three vertices, which are skipped.
+    pub short_faces: usize,
+    /// The clause about lines that begin with no keyword.
+    pub unknown: Option<String>,
     /// The numbers of the vertices that no face may use, counted from 1, with the reasons.
     invalid: Vec<(usize, Fault)>,
     /// The vertices below a face that the face names, counted from 1, and the face's line.
     ahead: Vec<(usize, usize)>,
-    /// The number of `v` statements so far.
-    pub vertices: usize,
-    /// The number of `f` statements with fewer than three vertices so far; they are skipped.
-    pub short_faces: usize,
 }
 
-impl<'a> Geometry<'a> {
-    /// Creates a reader of a file's bytes.
-    pub fn new(bytes: &'a [u8]) -> Self {
-        Self {
-            statements: Statements::new(bytes),
-            words: Vec::new(),
-            block: Vec::new(),
-            taken: 0,
-            fault: None,
-            invalid: Vec::new(),
-            ahead: Vec::new(),
-            vertices: 0,
-            short_faces: 0,
-        }
-    }
-
-    /// Returns the clause about lines that begin with no keyword.
-    pub fn remark(&self) -> Option<String> {
-        let (count, line, word) = self.statements.unknown?;
-        let lines =
-            counted(count, "line with an unknown keyword was", "lines with unknown keywords were")?;
-        Some(format!("{lines} ignored (`{}` in line {line})", shown(word)))
-    }
-
-    /// Checks the rest of the file.
+impl Geometry {
+    /// Checks the statements of a file.
     ///
     /// # Errors
     ///
     /// The first fault in the order of the file. A fault of a vertex below the face that names it
     /// is found only at the end of the file, and is reported last.
-    pub fn finish(&mut self) -> Result<(), Fault> {
-        while self.add_statement() {}
-        if let Some(fault) = self.fault.take() {
-            return Err(fault);
+    pub fn of(bytes: &[u8]) -> Result<Self, Fault> {
+        let mut geometry = Self::default();
+        let mut statements = Statements::new(bytes);
+        let mut words = Vec::new();
+        while let Some((keyword, line)) = statements.next(&mut words, MOST_CORNERS + 1) {
+            match keyword {
+                Keyword::Vertex => {
+                    geometry.add_vertex(&words, line).map_err(|message| (line, message))?;
+                }
+                Keyword::Face => geometry.add_face(&words, line)?,
+            }
         }
-        for &(vertex, line) in &self.ahead {
-            if vertex > self.vertices {
-                let vertices = self.vertices;
-                let expected = format!("expected at most {vertices}, the file's vertex count");
+        for &(vertex, line) in &geometry.ahead {
+            if vertex > geometry.vertices {
+                let most = geometry.vertices;
+                let expected = format!("expected at most {most}, the file's vertex count");
                 return Err((line, format!("face vertex {vertex}; {expected}")));
             }
-            self.usable(vertex)?;
+            geometry.usable(vertex)?;
         }
-        Ok(())
-    }
-
-    /// Adds the next statement to the block. Returns false at the end of the file and at a fault.
-    fn add_statement(&mut self) -> bool {
-        if self.fault.is_some() {
-            return false;
-        }
-        let Some((keyword, line)) = self.statements.next(&mut self.words, MOST_CORNERS + 1) else {
-            return false;
-        };
-        let checked = match keyword {
-            Keyword::Vertex => self.add_vertex(line).map_err(|message| (line, message)),
-            Keyword::Face => self.add_face(line),
-        };
-        self.fault = checked.err();
-        self.fault.is_none()
+        geometry.unknown = statements.unknown.and_then(|(count, line, word)| {
+            let (one, many) =
+                ("line with an unknown keyword was", "lines with unknown keywords were");
+            let lines = counted(count, one, many)?;
+            Some(format!("{lines} ignored (`{}` in line {line})", shown(word)))
+        });
+        Ok(geometry)
     }
 
     /// Adds a vertex without its colour: its coordinates, and its weight if it has one.
-    fn add_vertex(&mut self, line: usize) -> Result<(), String> {
+    fn add_vertex(&mut self, words: &[&[u8]], line: usize) -> Result<(), String> {
         self.vertices += 1;
-        let length = self.words.len();
+        let length = words.len();
         if !matches!(length, 3 | 4 | 6..=8) {
             let expected = "3 (x y z), 4 (x y z and a weight), or 3 or 4 more (a colour)";
             return Err(format!("vertex of length {length}; expected {expected}"));
         }
-        let words = &self.words[..if matches!(length, 4 | 8) { 4 } else { 3 }];
+        let words = &words[..if matches!(length, 4 | 8) { 4 } else { 3 }];
         let mut position = [0.0; 3];
         for (coordinate, word) in position.iter_mut().zip(words) {
             let message = || {
@@ -112,7 +83,7 @@ impl<'a> Geometry<'a> {
             // Some programs write vertices that they do not use in this way.
             if !coordinate.is_finite() {
                 self.invalid.push((self.vertices, (line, message())));
-                add(b'v', [&b"0"[..]; 3].into_iter(), &mut self.block);
+                add(b'v', [&b"0"[..]; 3].into_iter(), &mut self.text);
                 return Ok(());
             }
         }
@@ -125,18 +96,18 @@ impl<'a> Geometry<'a> {
                 .filter(|w| w.is_finite() && position.iter().all(|x| (x / w).is_finite()))
                 .ok_or_else(|| format!("vertex weight `{}`; {expected}", shown(word)))?;
         }
-        add(b'v', words.iter().copied(), &mut self.block);
+        add(b'v', words.iter().copied(), &mut self.text);
         Ok(())
     }
 
-    fn add_face(&mut self, line: usize) -> Result<(), Fault> {
-        if self.words.len() > MOST_CORNERS {
+    fn add_face(&mut self, words: &[&[u8]], line: usize) -> Result<(), Fault> {
+        if words.len() > MOST_CORNERS {
             let message =
                 format!("face of more than {MOST_CORNERS} vertices; expected at most as many");
             return Err((line, message));
         }
         let vertices = self.vertices;
-        for corner in &self.words {
+        for corner in words {
             let index: isize = std::str::from_utf8(vertex_index(corner))
                 .ok()
                 .and_then(|word| word.parse().ok())
@@ -160,11 +131,11 @@ impl<'a> Geometry<'a> {
                 }
             }
         }
-        if self.words.len() < 3 {
+        if words.len() < 3 {
             self.short_faces += 1;
         } else {
-            let corners = self.words.iter().map(vertex_index);
-            add(b'f', corners, &mut self.block);
+            add(b'f', words.iter().map(vertex_index), &mut self.text);
+            self.lines.push(line);
         }
         Ok(())
     }
@@ -183,34 +154,11 @@ fn vertex_index<'a>(corner: &&'a [u8]) -> &'a [u8] {
     corner.split(|&b| b == b'/').next().unwrap_or_default()
 }
 
-fn add<'a>(keyword: u8, words: impl Iterator<Item = &'a [u8]>, block: &mut Vec<u8>) {
-    block.push(keyword);
+fn add<'a>(keyword: u8, words: impl Iterator<Item = &'a [u8]>, text: &mut Vec<u8>) {
+    text.push(keyword);
     for word in words {
-        block.push(b' ');
-        block.extend_from_slice(word);
+        text.push(b' ');
+        text.extend_from_slice(word);
     }
-    block.push(b'\n');
-}
-
-impl BufRead for Geometry<'_> {
-    fn fill_buf(&mut self) -> io::Result<&[u8]> {
-        if self.taken == self.block.len() {
-            self.block.clear();
-            self.taken = 0;
-            while self.block.len() < BLOCK && self.add_statement() {}
-        }
-        Ok(&self.block[self.taken..])
-    }
-
-    fn consume(&mut self, bytes: usize) {
-        self.taken += bytes;
-    }
-}
-
-impl Read for Geometry<'_> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let read = self.fill_buf()?.read(buffer)?;
-        self.consume(read);
-        Ok(read)
-    }
+    text.push(b'\n');
 }
