@@ -141,7 +141,6 @@ fn measure(tree: Bvh, scene: &Scene, view: &View) -> Result<Measured, Error> {
         depth: 0,
         view: Some(view.clone()),
         ground: false,
-        ..Options::default()
     };
     let (film, hits) = {
         let accelerator = Accelerator::of_tree(&scene.primitives, &tree);

@@ -3,12 +3,11 @@
 
 use super::framing;
 use super::image::Film;
-use super::light::{self, Light, World};
+use super::light::World;
 use crate::Scene;
 use crate::rays::{Camera, View};
 use crate::trace::Accelerator;
 use bvh_core::Aabb;
-use glam::DVec3;
 use rayon::prelude::*;
 
 /// The contents and the resolution of a picture.
@@ -24,24 +23,13 @@ pub struct Options {
     pub depth: u32,
     /// The view. The default shows the whole scene.
     pub view: Option<View>,
-    /// The lights. The default suits the view. With an empty list, surfaces are lit from the eye
-    /// without shadow rays.
-    pub lights: Option<Vec<DVec3>>,
     /// True to draw a ground below a scene that is seen from outside.
     pub ground: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self {
-            width: 960,
-            height: 540,
-            samples: 2,
-            depth: 4,
-            view: None,
-            lights: None,
-            ground: true,
-        }
+        Self { width: 960, height: 540, samples: 2, depth: 4, view: None, ground: true }
     }
 }
 
@@ -70,11 +58,7 @@ pub fn render(
         None => framing::automatic(scene, &bounds, aspect),
     };
     let camera = Camera::new(&view, up, width, height);
-    let lights = match &options.lights {
-        Some(positions) => Light::white(positions),
-        None => light::automatic(&view, up, &bounds),
-    };
-    let world = World::new(accelerator, &view, up, &bounds, lights, options.ground, options.depth);
+    let world = World::new(accelerator, &view, up, &bounds, options.ground, options.depth);
     let columns = width.div_ceil(TILE);
     // Tiles are collected in order, so that the picture does not depend on the order of completion.
     let tiles: Vec<Film> = (0..tiles(options) as u32)
@@ -117,16 +101,5 @@ mod tests {
             assert_eq!(films[0].pixels.len(), (width * height) as usize);
             assert_eq!(films[0], films[1]);
         }
-    }
-
-    #[test]
-    fn without_lights_no_shadow_ray_is_sent() {
-        let scene = Scene::load("escher:cluster:600:1").unwrap();
-        let options =
-            Options { width: 32, height: 18, samples: 1, ground: false, ..Options::default() };
-        let dark = Options { lights: Some(vec![]), ..options.clone() };
-        let dark_rays = picture(&scene, &dark).rays;
-        assert_eq!(dark_rays, 32 * 18, "triangles mirror nothing");
-        assert!(picture(&scene, &options).rays > dark_rays);
     }
 }

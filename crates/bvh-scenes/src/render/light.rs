@@ -11,7 +11,7 @@ use std::ops::Range;
 
 /// A point light.
 #[derive(Clone, Debug)]
-pub struct Light {
+struct Light {
     position: DVec3,
     /// Linear red, green and blue at distance 0.
     colour: DVec3,
@@ -22,13 +22,6 @@ pub struct Light {
 impl Light {
     fn new(position: DVec3, colour: [f64; 3], reach: f64) -> Self {
         Self { position, colour: colour.into(), reach }
-    }
-
-    /// Returns white lights at these positions. They do not fade with distance, and together they
-    /// are as bright as the automatic lights.
-    pub fn white(positions: &[DVec3]) -> Vec<Self> {
-        let colour = DVec3::splat(1.3 / positions.len().max(1) as f64);
-        positions.iter().map(|&position| Self { position, colour, reach: f64::INFINITY }).collect()
     }
 
     fn at(&self, distance: f64) -> DVec3 {
@@ -45,7 +38,7 @@ impl Light {
 /// Returns lights that suit a view. A scene seen from outside has a warm light at the upper left
 /// and a weak cool light at the right. A scene seen from inside has a sun overhead, sunlight
 /// reflected by the floor, and a weak lamp near the eye.
-pub fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
+fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
     if bounds.check().is_err() {
         return vec![];
     }
@@ -102,7 +95,6 @@ impl<'a> World<'a> {
         view: &View,
         up: DVec3,
         bounds: &Aabb,
-        lights: Vec<Light>,
         ground: bool,
         depth: u32,
     ) -> Self {
@@ -112,7 +104,7 @@ impl<'a> World<'a> {
         } else {
             None
         };
-        Self { accelerator, up, lights, ground, depth }
+        Self { accelerator, up, lights: automatic(view, up, bounds), ground, depth }
     }
 
     /// Draws a tile of the picture with `samples`² rays per pixel.
@@ -164,7 +156,7 @@ impl<'a> World<'a> {
             };
             let reflected = direction + surface.normal * (2.0 * facing);
             let start = self.lifted(&surface, origin);
-            let direct = self.direct(&surface, start, reflected, mirror, facing, tally);
+            let direct = self.direct(&surface, start, reflected, mirror, tally);
             light += weight * (direct * (1.0 - surface.haze) + HORIZON * surface.haze);
             weight *= mirror * (1.0 - surface.haze);
             // A smaller weight changes no byte of a pixel.
@@ -205,15 +197,11 @@ impl<'a> World<'a> {
         start: DVec3,
         reflected: DVec3,
         mirror: f64,
-        facing: f64,
         tally: &mut Tally,
     ) -> DVec3 {
         let height = 0.5 + 0.5 * surface.normal.dot(self.up);
         let mut diffuse = (BELOW + (ZENITH * 0.5 + HORIZON * 0.5 - BELOW) * height) * AMBIENT;
         let mut highlight = DVec3::ZERO;
-        if self.lights.is_empty() {
-            diffuse += DVec3::splat(facing.max(0.0));
-        }
         for light in &self.lights {
             let to_light = light.position - start;
             let distance = to_light.length();
