@@ -4,6 +4,7 @@
 use bvh_core::{Bvh, Ray, Triangle};
 use glam::Vec3;
 use num_bigint::{BigInt, BigUint, Sign};
+use num_traits::float::FloatCore;
 use num_traits::{ToPrimitive, Zero};
 
 /// Every f32 is an integer multiple of 2^-149, hence a product of two differences is an integer
@@ -14,12 +15,14 @@ const UNIT_F64: u32 = 1074;
 
 /// Returns a finite number in units of 2^-149.
 fn whole(x: f32) -> BigInt {
-    let bits = x.to_bits();
-    let exponent = bits >> 23 & 0xff;
-    let fraction = bits & 0x7f_ffff;
-    let size = if exponent == 0 { fraction } else { fraction | 1 << 23 };
-    let size = BigInt::from(size) << (exponent.max(1) - 1);
-    if x.is_sign_negative() { -size } else { size }
+    in_units(x.integer_decode(), 149)
+}
+
+/// Returns a number by its parts in units of 2^-`unit`, the size of the smallest of its type.
+fn in_units((size, exponent, sign): (u64, i16, i8), unit: i16) -> BigInt {
+    // The parts of a denormal number have twice the size and half the unit.
+    let doubled = BigInt::from(size) << (exponent + unit + 1);
+    (doubled >> 1) * sign
 }
 
 /// Returns the exact [`bvh_core::cost::internal_area`] of a valid tree in units of 2^-298.
@@ -45,12 +48,8 @@ pub fn relative_error(cost: f64, exact: &BigUint) -> f64 {
     if !(cost.is_finite() && cost >= 0.0) {
         return f64::INFINITY;
     }
-    let bits = cost.to_bits();
     let exact = exact << (UNIT_F64 - UNIT);
-    let exponent = bits >> 52;
-    let fraction = bits & ((1 << 52) - 1);
-    let size = if exponent == 0 { fraction } else { fraction | 1 << 52 };
-    let cost = BigUint::from(size) << (exponent.max(1) - 1);
+    let cost = in_units(cost.integer_decode(), UNIT_F64 as i16).into_parts().1;
     let difference = if cost > exact { &cost - &exact } else { &exact - &cost };
     if difference.is_zero() {
         return 0.0;

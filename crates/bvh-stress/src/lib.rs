@@ -40,7 +40,7 @@ pub mod transform;
 
 pub use case::{Case, Cell, Check, Class, Effort, LargerScenes, Size};
 pub use methods::{EXACT_OBJECTS, is_builder, methods};
-pub use table::{CASES, by_id, scenes};
+pub use table::{CASES, KINDS, by_id, scenes};
 
 /// A note, or the broken promise: an error whose text begins with `P1: ` to `P8: ` if the promise
 /// is a general one.

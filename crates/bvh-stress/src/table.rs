@@ -150,3 +150,17 @@ pub static CASES: [Case; 45] = [
     bare("S44", "ray estimator", &[Part("rays", rays::estimates_converge)]),
     case("S45", "two unit cubes", [2, 2, 2], &[Outcome(scenes::root_area_is_seven)]),
 ];
+
+/// The kinds of cases by name, in the order of figures. Every case has one.
+pub const KINDS: [(&str, &[&str]); 10] = [
+    ("Nothing, one, two", &["S01", "S02", "S03", "S45"]),
+    ("All the same", &["S04", "S05", "S06", "S07", "S34"]),
+    ("Flat or on a line", &["S08", "S09", "S10", "S11", "S12", "S26"]),
+    ("Degenerate, slivers", &["S17", "S29", "S30"]),
+    ("Huge, tiny, far away", &["S21", "S22", "S23", "S24", "S25"]),
+    ("NaN, infinite, inverted", &["S18", "S19", "S20"]),
+    ("Uneven sizes", &["S27", "S28", "S31", "S36"]),
+    ("Symmetry, order", &["S32", "S33"]),
+    ("Odd rays", &["S13", "S14", "S15", "S16", "S44"]),
+    ("Files, budgets, edges", &["S35", "S37", "S38", "S39", "S40", "S41", "S42", "S43"]),
+];

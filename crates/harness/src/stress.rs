@@ -10,7 +10,9 @@ use crate::rows::store::Store;
 use crate::rows::{read, to_bytes};
 use bvh_config::{Nested, config};
 use bvh_search::Method;
-use bvh_stress::{CASES, Case, Cell, Class, Effort, LargerScenes, Size, is_builder, tracing};
+use bvh_stress::{
+    CASES, Case, Cell, Class, Effort, KINDS, LargerScenes, Size, is_builder, tracing,
+};
 use figures::{Axis, Layer, Marks, Panel, Unit};
 use std::path::Path;
 
@@ -107,20 +109,6 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     Ok(output)
 }
 
-/// Kinds of cases, in the order of the figure.
-const KINDS: [(&str, &[&str]); 10] = [
-    ("Nothing, one, two", &["S01", "S02", "S03", "S45"]),
-    ("All the same", &["S04", "S05", "S06", "S07", "S34"]),
-    ("Flat or on a line", &["S08", "S09", "S10", "S11", "S12", "S26"]),
-    ("Degenerate, slivers", &["S17", "S29", "S30"]),
-    ("Huge, tiny, far away", &["S21", "S22", "S23", "S24", "S25"]),
-    ("NaN, infinite, inverted", &["S18", "S19", "S20"]),
-    ("Uneven sizes", &["S27", "S28", "S31", "S36"]),
-    ("Symmetry, order", &["S32", "S33"]),
-    ("Odd rays", &["S13", "S14", "S15", "S16", "S44"]),
-    ("Files, budgets, edges", &["S35", "S37", "S38", "S39", "S40", "S41", "S42", "S43"]),
-];
-
 /// The outcomes by the name of their colour.
 const OUTCOMES: [(&str, Class); 3] = [
     ("valid tree or right answer", Class::Kept),
@@ -215,12 +203,5 @@ mod tests {
         let figure = made(Class::Broken).figures.remove(0).1;
         let layers = figure.panels[0].layers.iter().map(|layer| layer.name.as_str());
         assert_eq!(layers.collect::<Vec<_>>()[4..], [OUTCOMES[0].0, OUTCOMES[2].0]);
-    }
-
-    #[test]
-    fn every_case_has_one_kind() {
-        let mut known = KINDS.iter().flat_map(|(_, ids)| *ids).collect::<Vec<_>>();
-        known.sort();
-        assert!(known.into_iter().eq(CASES.iter().map(|case| &case.id)));
     }
 }

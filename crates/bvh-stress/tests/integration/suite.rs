@@ -5,7 +5,7 @@ use bvh_scenes::builtin::stiff::{self, STIFF};
 use bvh_scenes::trace::{Accelerator, Structure};
 use bvh_search::{Budget, Method, Problem, StopReason, solve};
 use bvh_stress::{
-    CASES, Case, Cell, Check, Class, EXACT_OBJECTS, Effort, LargerScenes, Size, is_builder,
+    CASES, Case, Cell, Check, Class, EXACT_OBJECTS, Effort, KINDS, LargerScenes, Size, is_builder,
     kernels, scenes, tracing,
 };
 use rayon::prelude::*;
@@ -31,6 +31,9 @@ fn broken(Cell { scene, method, outcome, note, .. }: Cell) -> Option<String> {
 fn every_case_from_s01_to_s45_exists_and_is_checked() {
     let expected = (1..=45).map(|number| format!("S{number:02}"));
     assert!(CASES.iter().map(|case| case.id).eq(expected));
+    let mut with_kind: Vec<&str> = KINDS.iter().flat_map(|(_, ids)| *ids).copied().collect();
+    with_kind.sort_unstable();
+    assert!(with_kind.into_iter().eq(CASES.iter().map(|case| case.id)), "one kind each");
     for case in &CASES {
         assert!(case.sizes.is_some() || !case.checks.is_empty(), "{} has no check", case.id);
         for check in case.checks {
