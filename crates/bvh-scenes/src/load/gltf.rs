@@ -150,12 +150,21 @@ struct Loader<'a> {
     accessors: Accessors<'a>,
     nodes: Nodes,
     triangles: Vec<Triangle>,
-    /// The numbers of nodes, and of primitives, that are not read for a reason.
-    hidden: usize,
-    lines: usize,
-    without_positions: usize,
-    incomplete: usize,
+    /// The numbers of nodes and of primitives that are not read, by the clause about one and about
+    /// many of them.
+    left_out: BTreeMap<[&'static str; 2], usize>,
 }
+
+const HIDDEN: [&str; 2] = [
+    "invisible node was left out with its children",
+    "invisible nodes were left out with their children",
+];
+const LINES: [&str; 2] =
+    ["primitive of points or lines was left out", "primitives of points or lines were left out"];
+const WITHOUT_POSITIONS: [&str; 2] =
+    ["primitive without positions was left out", "primitives without positions were left out"];
+const INCOMPLETE: [&str; 2] =
+    ["primitive ends in an incomplete triangle", "primitives end in incomplete triangles"];
 
 /// Positions are floats, or integers by `KHR_mesh_quantization`.
 const POSITIONS: [u32; 5] = [F32, I8, U8, I16, U16];
@@ -168,15 +177,16 @@ impl<'a> Loader<'a> {
             accessors: Accessors::new(document, buffers, length),
             nodes: Nodes::default(),
             triangles: Vec::new(),
-            hidden: 0,
-            lines: 0,
-            without_positions: 0,
-            incomplete: 0,
+            left_out: BTreeMap::new(),
         }
     }
 
     fn fault(&self, place: String, message: impl std::fmt::Display) -> Fault {
         Fault::new(self.path, Place::Element(place), message)
+    }
+
+    fn leave_out(&mut self, part: [&'static str; 2]) {
+        *self.left_out.entry(part).or_default() += 1;
     }
 
     /// Returns the clauses about everything in the file that moves or adds a triangle and was not
@@ -188,30 +198,11 @@ impl<'a> Loader<'a> {
         let scenes = document.scenes.len();
         let scene = document.scene.unwrap_or(0);
         let other_scenes = (scenes > 1).then(|| format!("scenes[{scene}] of {scenes} was read"));
-        let counts = [
-            counted(document.animations.len(), "animation was ignored", "animations were ignored"),
-            counted(
-                self.hidden,
-                "invisible node was left out with its children",
-                "invisible nodes were left out with their children",
-            ),
-            counted(
-                self.lines,
-                "primitive of points or lines was left out",
-                "primitives of points or lines were left out",
-            ),
-            counted(
-                self.without_positions,
-                "primitive without positions was left out",
-                "primitives without positions were left out",
-            ),
-            counted(
-                self.incomplete,
-                "primitive ends in an incomplete triangle",
-                "primitives end in incomplete triangles",
-            ),
-        ];
-        extensions.chain(other_scenes).chain(counts.into_iter().flatten()).collect()
+        let animations = document.animations.len();
+        let animations = counted(animations, "animation was ignored", "animations were ignored");
+        let left_out = self.left_out.iter();
+        let left_out = left_out.filter_map(|([one, many], &count)| counted(count, one, many));
+        extensions.chain(other_scenes).chain(animations).chain(left_out).collect()
     }
 
     fn add_mesh(&mut self, place: &Placed, transform: &DMat4) -> Result<(), Fault> {
@@ -257,7 +248,7 @@ impl<'a> Loader<'a> {
     ) -> Result<(), String> {
         match primitive.mode {
             0..4 => {
-                self.lines += 1;
+                self.leave_out(LINES);
                 return Ok(());
             }
             4..7 => {}
@@ -268,7 +259,7 @@ impl<'a> Loader<'a> {
             None => Vec::new(),
         };
         if points.is_empty() {
-            self.without_positions += 1;
+            self.leave_out(WITHOUT_POSITIONS);
             return Ok(());
         }
         let moved: Vec<Vec3> = match joints {
@@ -298,7 +289,9 @@ impl<'a> Loader<'a> {
             4 => !indices.len().is_multiple_of(3),
             _ => matches!(indices.len(), 1 | 2),
         };
-        self.incomplete += usize::from(is_incomplete);
+        if is_incomplete {
+            self.leave_out(INCOMPLETE);
+        }
         self.triangles.extend((0..count).map(|i| {
             let corners = match primitive.mode {
                 4 => [3 * i, 3 * i + 1, 3 * i + 2],

@@ -2,7 +2,7 @@
 
 use super::accessors::{F32, I8, I16};
 use super::document::{Document, Instances, Node};
-use super::{Fault, Loader, MOST_TRIANGLES, Placed, get};
+use super::{Fault, HIDDEN, Loader, MOST_TRIANGLES, Placed, get};
 use glam::{DMat4, DQuat, DVec3};
 
 /// The nodes of a file.
@@ -106,7 +106,7 @@ impl Loader<'_> {
                 return Err(in_node("in its scene twice; expected each node once".to_owned()));
             }
             if !node.extensions.visibility.visible {
-                self.hidden += 1;
+                self.leave_out(HIDDEN);
                 continue;
             }
             open.extend(node.children.iter().rev());
