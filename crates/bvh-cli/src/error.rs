@@ -1,6 +1,6 @@
 //! The failures of the commands, and the exit code of each.
 
-use crate::answer::{short, whole};
+use crate::answer::whole;
 use bvh_core::DensityError;
 use bvh_scenes::SceneError;
 use bvh_scenes::files::{ReadError, WriteError};
@@ -52,28 +52,9 @@ pub enum Error {
     /// A picture cannot be traced with the structure.
     #[error(transparent)]
     Structure(#[from] StructureError),
-    /// Ctrl-C ended a measurement.
-    #[error("interrupted; nothing was written")]
-    Unmeasured,
-    /// Ctrl-C ended a bake.
-    #[error(
-        "interrupted; the best tree so far, of cost {1}, is in {0}; `--from {0}` continues",
-        .path.display(),
-        short(*.cost)
-    )]
-    Stopped { path: PathBuf, cost: f64 },
-    /// Ctrl-C ended a bake of instances.
-    #[error(
-        "interrupted; the best trees so far, of all meshes and over the instances, are in {}",
-        .path.display()
-    )]
-    StoppedInstances { path: PathBuf },
-    /// Ctrl-C ended a bake of parts.
-    #[error(
-        "interrupted; finished parts are in {}, and the same command bakes the rest",
-        .path.display()
-    )]
-    StoppedParts { path: PathBuf },
+    /// Ctrl-C ended the command, which left this on the disk.
+    #[error("interrupted; {0}")]
+    Interrupted(String),
 }
 
 impl Error {
@@ -90,10 +71,7 @@ impl Error {
                 | StructureError::File(_) => 2,
                 StructureError::Build { .. } | StructureError::Layout { .. } => 1,
             },
-            Self::Stopped { .. }
-            | Self::StoppedInstances { .. }
-            | Self::StoppedParts { .. }
-            | Self::Unmeasured => 130,
+            Self::Interrupted(_) => 130,
             Self::Io { .. }
             | Self::Write(_)
             | Self::Memory { .. }

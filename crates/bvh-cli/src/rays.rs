@@ -114,7 +114,7 @@ impl Rays {
     /// tree. No bake trains on the same default rays.
     pub fn expected_tests(&self, tree: &Bvh, scene: &Scene) -> Result<f64, Error> {
         let density = self.density(scene, tree, Self::JUDGING, &INTERRUPTED)?;
-        let density = density.ok_or(Error::Unmeasured)?;
+        let density = density.ok_or_else(|| Error::Interrupted("nothing was written".into()))?;
         let tests = Objective::Layout.cost_by(tree, &density);
         let root = tree.root_aabb().map_or(0.0, |root| density.measure(&root));
         Ok(if root > 0.0 { tests / root } else { 0.0 })

@@ -68,7 +68,10 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         bake_part(&plan, scene, &out.join(name), Interruption::Keeps, interrupted, &mut answer)?;
     }
     if interrupted.load(Relaxed) {
-        return Err(Error::StoppedInstances { path: out });
+        return Err(Error::Interrupted(format!(
+            "the best trees so far, of all meshes and over the instances, are in {}",
+            out.display()
+        )));
     }
     answer.say(&format!(
         "{}: {} instances of {} meshes",

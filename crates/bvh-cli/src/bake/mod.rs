@@ -8,7 +8,7 @@ mod plan;
 mod watch;
 
 use crate::Error;
-use crate::answer::{Answer, Form, gain, whole};
+use crate::answer::{Answer, Form, gain, short, whole};
 use crate::arguments::{Jobs, input_file, output_file, output_or_free, reserve};
 use crate::explain;
 use crate::rays::Rays;
@@ -109,7 +109,7 @@ pub enum BakeCost {
 const BEST: &str = "best";
 
 /// Searches until the budget is spent or `interrupted` becomes true, writes the best tree, and
-/// prints its cost. An interrupted bake writes the file as well, and returns [`Error::Stopped`].
+/// prints its cost. An interrupted bake writes the file as well, and returns [`Error::Interrupted`].
 pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     // Wrong paths are reported before the scene is loaded, which may take long.
     if let Some(from) = &args.from {
@@ -161,7 +161,11 @@ fn save(
 ) -> Result<(), Error> {
     let (bytes, cost_for_lines) = found.save(out, reserved)?;
     if interrupted.load(Relaxed) {
-        return Err(Error::Stopped { path: out.to_owned(), cost: found.baked.outcome.cost });
+        let out = out.display();
+        let cost = short(found.baked.outcome.cost);
+        return Err(Error::Interrupted(format!(
+            "the best tree so far, of cost {cost}, is in {out}; `--from {out}` continues"
+        )));
     }
     summarise(found, cost_for_lines, &mut answer);
     answer.say(&format!("{}: {} bytes", out.display(), whole(bytes)));

@@ -79,7 +79,10 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
             bake_part(&part.plan, &scene, &path, ends, interrupted, &mut answer)?;
         }
         if interrupted.load(Relaxed) {
-            return Err(Error::StoppedParts { path: folder });
+            let folder = folder.display();
+            let left =
+                format!("finished parts are in {folder}, and the same command bakes the rest");
+            return Err(Error::Interrupted(left));
         }
     }
     if args.part.is_some() {

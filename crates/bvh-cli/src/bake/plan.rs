@@ -82,36 +82,31 @@ impl Start {
     /// Reads the tree of `--from` over the scene. Rejects a tree that the bake could not improve.
     pub fn load(from: &Path, scene: &Scene, most_references: f64) -> Result<Self, Error> {
         let (tree, header) = tree_file::load(from, scene)?;
-        check_references(from, tree.prim_ids.len(), scene.boxes.len(), most_references)?;
-        check_binary(from, &tree)?;
+        check_start(&tree, scene.boxes.len(), most_references)
+            .map_err(|message| Error::Usage(format!("--from {}: {message}", from.display())))?;
         Ok(Self { tree, work: header.work })
     }
 }
 
-/// Rejects a start with more references than the bake may keep.
-fn check_references(from: &Path, found: usize, objects: usize, most: f64) -> Result<(), Error> {
-    if found <= objects || found <= (most * objects as f64) as usize {
-        return Ok(());
+/// Rejects a start that has more references than the bake may keep, or nodes that no search moves.
+fn check_start(tree: &Bvh, objects: usize, most: f64) -> Result<(), String> {
+    let references = tree.prim_ids.len();
+    if references > objects && references > (most * objects as f64) as usize {
+        // Rounded up, so that the message's number suffices.
+        let least = (100 * references).div_ceil(objects) as f64 / 100.0;
+        return Err(format!(
+            "the tree has {references} references to {objects} objects; accepted: --references \
+             {least:.2} or more"
+        ));
     }
-    let percent = (100 * found).div_ceil(objects);
-    Err(Error::Usage(format!(
-        "--from {}: the tree has {found} references to {objects} objects; accepted: --references \
-         {}.{:02} or more",
-        from.display(),
-        percent / 100,
-        percent % 100
-    )))
-}
-
-/// Rejects a start that no search can improve.
-fn check_binary(from: &Path, tree: &Bvh) -> Result<(), Error> {
-    let wide = tree.nodes.iter().position(|node| !node.is_leaf() && node.children().len() != 2);
-    let Some(node) = wide else { return Ok(()) };
-    Err(Error::Usage(format!(
-        "--from {}: inner node {node} has {} children; accepted: a tree of nodes with two",
-        from.display(),
-        tree.nodes[node].children().len()
-    )))
+    let is_wide = |node: &Node| !node.is_leaf() && node.children().len() != 2;
+    match tree.nodes.iter().position(is_wide) {
+        Some(wide) => Err(format!(
+            "inner node {wide} has {} children; accepted: a tree of nodes with two",
+            tree.nodes[wide].children().len()
+        )),
+        None => Ok(()),
+    }
 }
 
 /// The results of a decision that the search needs too, and would otherwise make again.
