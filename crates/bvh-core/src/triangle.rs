@@ -203,25 +203,6 @@ mod tests {
     }
 
     #[test]
-    fn both_sides_edges_and_corners_are_hit_and_the_plane_and_the_back_are_not() {
-        for p in [
-            Vec3::new(0.25, 0.25, 0.0),
-            Vec3::ZERO,
-            Vec3::X,
-            Vec3::X / 2.0,
-            Vec3::new(0.5, 0.5, 0.0),
-        ] {
-            for d in [Vec3::Z, -Vec3::Z, Vec3::new(0.5, -0.25, 1.0)] {
-                assert_eq!(hit(CORNER, p - 2.0 * d, d), Some(2.0), "{p} {d}");
-                assert_eq!(hit(CORNER, p, d), Some(0.0), "{p} {d}");
-                assert_eq!(hit(CORNER, p + d, d), None, "{p} {d}");
-            }
-        }
-        assert_eq!(hit(CORNER, Vec3::new(-1.0, 0.25, 0.0), Vec3::X), None);
-        assert_eq!(hit(CORNER, Vec3::new(0.5f32.next_up(), 0.5, -1.0), Vec3::Z), None);
-    }
-
-    #[test]
     fn the_weights_of_the_corners_are_those_of_the_point_that_is_hit() {
         let triangle = Triangle([
             Vec3::new(4.0, 0.0, 1.0),
@@ -258,17 +239,6 @@ mod tests {
     }
 
     #[test]
-    fn a_hit_behind_the_origin_is_none_though_the_box_reaches_forward() {
-        let slanted = Triangle([
-            Vec3::new(-9.0, -9.0, -9.0),
-            Vec3::new(9.0, -9.0, 9.0),
-            Vec3::new(0.0, 9.0, 0.0),
-        ]);
-        assert_eq!(hit(slanted, Vec3::new(-1.0, 0.0, 0.0), Vec3::Z), None);
-        assert_eq!(hit(slanted, Vec3::new(-1.0, 0.0, 0.0), -Vec3::Z), Some(1.0));
-    }
-
-    #[test]
     fn triangles_without_area_are_never_hit() {
         // Multiples of one eighth keep the products below exact, so the corners are truly
         // collinear.
@@ -289,28 +259,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn a_distance_scales_with_the_scene() {
-        let triangle = Triangle([
-            Vec3::new(0.2, 0.1, 3.0),
-            Vec3::new(1.7, 0.3, 2.5),
-            Vec3::new(0.4, 1.9, 2.2),
-        ]);
-        let origin = Vec3::new(0.1, -0.2, 0.3);
-        let direction = Vec3::new(0.2, 0.3, 1.0);
-        let distance = hit(triangle, origin, direction).unwrap();
-        for k in [-100, -60, 60, 100] {
-            let s = libm::exp2f(k as f32);
-            let scaled = Triangle(triangle.0.map(|p| p * s));
-            assert_eq!(hit(scaled, origin * s, direction), Some(distance * s), "2^{k}");
-        }
-        let huge = Triangle(CORNER.0.map(|p| (p - 0.5) * f32::MAX));
-        assert_eq!(
-            hit(huge, Vec3::splat(f32::MAX), Vec3::splat(-1.0)),
-            None,
-            "relative coordinates overflow"
-        );
     }
 }

@@ -6,26 +6,6 @@ use crate::watch::Pace;
 use bvh_core::cost::Sum;
 use std::ops::Range;
 
-/// A [`Config`](super::Config) known at compile time, so that the inner loop has no branch on it.
-pub(super) trait Rule {
-    const BY_AREA: bool;
-    const PAIR_INNER: bool;
-
-    /// Returns the area from which the growth of a leaf counts.
-    #[inline(always)]
-    fn leaf_area(object: &Object) -> f64 {
-        if Self::BY_AREA { object.area } else { 0.0 }
-    }
-}
-
-/// The rule with these constants.
-pub(super) struct Rules<const BY_AREA: bool, const PAIR_INNER: bool>;
-
-impl<const BY_AREA: bool, const PAIR_INNER: bool> Rule for Rules<BY_AREA, PAIR_INNER> {
-    const BY_AREA: bool = BY_AREA;
-    const PAIR_INNER: bool = PAIR_INNER;
-}
-
 /// Number of objects that descend together. A single descent would wait for memory at every node.
 const BATCH: usize = 4;
 
@@ -108,8 +88,9 @@ struct Stop {
 /// cancelled. The upper parts of the paths are found for a batch of objects at once. If an earlier
 /// insertion of the batch has changed the tree below a node of a path, the path is found again from
 /// that node.
+// The rules are constants, so that the inner loop has no branch on them.
 #[inline(always)]
-pub(super) fn insert_each<R: Rule>(
+pub(super) fn insert_each<const BY_AREA: bool, const PAIR_INNER: bool>(
     scene: &Scene,
     size: impl Size,
     order: &[u32],
@@ -121,7 +102,7 @@ pub(super) fn insert_each<R: Rule>(
     let Some((&first, rest)) = order.split_first() else { return Some(0.0) };
     let root = &scene.objects[first as usize];
     blocks.push(Block::EMPTY);
-    blocks[0].put_leaf(0, root, first, R::leaf_area(root));
+    blocks[0].put_leaf(0, root, first, leaf_area::<BY_AREA>(root));
     let mut cost = Sum::default();
     for batch in rest.chunks(BATCH) {
         let objects =
@@ -139,9 +120,10 @@ pub(super) fn insert_each<R: Rule>(
             }
             let row = walk.last[i];
             changes[i] = (row, walk.trail[row][i]);
-            let stop = find_stop::<R>(blocks, size, object, walk.trail[row][i], grown);
+            let stop =
+                find_stop::<BY_AREA, PAIR_INNER>(blocks, size, object, walk.trail[row][i], grown);
             examined += stop.examined;
-            let attached_to = attach::<R>(blocks, &stop, object, id);
+            let attached_to = attach::<BY_AREA>(blocks, &stop, object, id);
             // Only the nodes down to the stop grow; the search went further.
             grown.truncate(stop.grown);
             if let Some(last) = grown.last_mut() {
@@ -164,7 +146,7 @@ pub(super) fn insert_each<R: Rule>(
 /// Returns the stop of least increase on the path. `last` is the last node of the path that
 /// contains the object. Fills `grown` with the rest of the path.
 #[inline(always)]
-fn find_stop<R: Rule>(
+fn find_stop<const BY_AREA: bool, const PAIR_INNER: bool>(
     blocks: &[Block],
     size: impl Size,
     object: &Object,
@@ -188,7 +170,7 @@ fn find_stop<R: Rule>(
         for (index, block) in blocks.iter().enumerate().skip(first).take(count.div_ceil(LANES)) {
             // Only leaves follow. Each adds at least twice the object's area.
             if block.is_leaf(0) {
-                let beaten = !R::BY_AREA && least <= 2.0 * object.area;
+                let beaten = !BY_AREA && least <= 2.0 * object.area;
                 let useless = inherited + 2.0 * object.area >= stop.increase
                     && inherited + least + object.area >= stop.increase;
                 if beaten || useless {
@@ -198,8 +180,7 @@ fn find_stop<R: Rule>(
             for lane in 0..LANES.min(count - (index - first) * LANES) {
                 let area = block.union_size(lane, &object.bounds, size);
                 let growth = area - block.area[lane];
-                let growth =
-                    if R::BY_AREA { growth } else { growth * f64::from(block.count[lane]) };
+                let growth = if BY_AREA { growth } else { growth * f64::from(block.count[lane]) };
                 if growth < least {
                     (least, next) = (growth, Grown { node: (index * LANES + lane) as u32, area });
                 }
@@ -215,8 +196,7 @@ fn find_stop<R: Rule>(
         let is_leaf = blocks[block].is_leaf(lane);
         let above = inherited;
         if !is_leaf {
-            inherited +=
-                if R::BY_AREA { least * f64::from(blocks[block].count[lane]) } else { least };
+            inherited += if BY_AREA { least * f64::from(blocks[block].count[lane]) } else { least };
             if inherited + area < stop.increase {
                 stop = Stop {
                     increase: inherited + area,
@@ -227,7 +207,7 @@ fn find_stop<R: Rule>(
                 };
             }
         }
-        if (is_leaf || R::PAIR_INNER) && above + 2.0 * area < stop.increase {
+        if (is_leaf || PAIR_INNER) && above + 2.0 * area < stop.increase {
             let increase = above + 2.0 * area;
             stop =
                 Stop { increase, node, pair_among: Some(first), grown: grown.len(), examined: 0 };
@@ -240,10 +220,21 @@ fn find_stop<R: Rule>(
     Stop { examined, ..stop }
 }
 
+/// Returns the area from which the growth of a leaf counts.
+#[inline(always)]
+fn leaf_area<const BY_AREA: bool>(object: &Object) -> f64 {
+    if BY_AREA { object.area } else { 0.0 }
+}
+
 /// Makes the object a child of the stop, or of a new inner node that replaces the stop. Returns the
 /// grown node.
 #[inline(always)]
-fn attach<R: Rule>(blocks: &mut Vec<Block>, stop: &Stop, object: &Object, id: u32) -> u32 {
+fn attach<const BY_AREA: bool>(
+    blocks: &mut Vec<Block>,
+    stop: &Stop,
+    object: &Object,
+    id: u32,
+) -> u32 {
     let (mut block, mut lane) = place(stop.node);
     if let Some(among) = stop.pair_among {
         if blocks[block].is_leaf(lane) {
@@ -264,7 +255,7 @@ fn attach<R: Rule>(blocks: &mut Vec<Block>, stop: &Stop, object: &Object, id: u3
         }
         let mut pair = Block::EMPTY;
         pair.copy(0, &blocks[block], lane);
-        pair.put_leaf(1, object, id, R::leaf_area(object));
+        pair.put_leaf(1, object, id, leaf_area::<BY_AREA>(object));
         blocks[block].link[lane] = blocks.len() as u32;
         blocks[block].count[lane] = 2;
         blocks.push(pair);
@@ -279,7 +270,7 @@ fn attach<R: Rule>(blocks: &mut Vec<Block>, stop: &Stop, object: &Object, id: u3
             blocks[block].link[lane] = moved as u32;
             first = moved;
         }
-        blocks[first + full].put_leaf(count % LANES, object, id, R::leaf_area(object));
+        blocks[first + full].put_leaf(count % LANES, object, id, leaf_area::<BY_AREA>(object));
         blocks[block].count[lane] += 1;
     }
     (block * LANES + lane) as u32

@@ -36,7 +36,7 @@ use crate::{BuildError, Builder, Watch};
 use block::{Block, LANES, LEAF, Size, family, place};
 use bvh_core::cost::{Area, Measure};
 use bvh_core::{Aabb, Bvh, Node, PackedAabb};
-use insertion::{Rules, Walk, insert_each};
+use insertion::{Walk, insert_each};
 
 bvh_config::config! {
     /// The rules of the insertion. As a [`Builder`], inserts in the order of the indices.
@@ -184,8 +184,7 @@ impl Config {
         workspace: &mut Workspace,
         watch: &Watch,
     ) -> Option<f64> {
-        // The measure and the rules are types, so that the descent is compiled without branches on
-        // them.
+        // The measure is a type, so that the descent is compiled without branches on it.
         let pace = Pace::new(watch);
         match scene.measure {
             Some(measure) => self.insert_by(measure, scene, order, workspace, pace),
@@ -203,17 +202,15 @@ impl Config {
     ) -> Option<f64> {
         match (self.descent, self.pair_inner) {
             (Descent::Cost, false) => {
-                insert_each::<Rules<false, false>>(scene, size, order, workspace, pace)
+                insert_each::<false, false>(scene, size, order, workspace, pace)
             }
             (Descent::Cost, true) => {
-                insert_each::<Rules<false, true>>(scene, size, order, workspace, pace)
+                insert_each::<false, true>(scene, size, order, workspace, pace)
             }
             (Descent::Area, false) => {
-                insert_each::<Rules<true, false>>(scene, size, order, workspace, pace)
+                insert_each::<true, false>(scene, size, order, workspace, pace)
             }
-            (Descent::Area, true) => {
-                insert_each::<Rules<true, true>>(scene, size, order, workspace, pace)
-            }
+            (Descent::Area, true) => insert_each::<true, true>(scene, size, order, workspace, pace),
         }
     }
 }

@@ -139,15 +139,6 @@ mod tests {
     }
 
     #[test]
-    fn a_radius_over_all_objects_joins_the_closest_pair_first() {
-        let boxes = [0.0, 100.0, 10.0, 107.0].map(|x| cube([x, 0.0, 0.0], 1.0));
-        let tree = Config { radius: 4, ..Config::default() }.build(&boxes).unwrap();
-        let sides: Vec<f32> =
-            tree.nodes[0].children().map(|child| tree.nodes[child].aabb.max.x).collect();
-        assert_eq!(sides, [11.0, 108.0]);
-    }
-
-    #[test]
     fn clusters_without_a_difference_pair_off_into_a_balanced_tree() {
         for boxes in [vec![cube([0.1; 3], 1.0); 1 << 12], vec![cube([0.1; 3], 0.0); 1 << 12]] {
             assert_eq!(Config::default().build(&boxes).unwrap().depth(), 12);

@@ -115,23 +115,19 @@ mod tests {
     }
 
     #[test]
-    fn the_axes_alternate_from_level_to_level() {
-        let tree = Config::default().build(&zigzag(4)).unwrap();
-        assert_eq!(tree.nodes[1].aabb.max.x, 3.0, "the root is cut along x");
-        assert_eq!(tree.prim_ids, [0, 1, 2, 3], "its children along y");
-    }
-
-    #[test]
-    fn the_longest_axis_is_cut_when_asked_for() {
-        let tree =
-            Config { axis: CutAxis::Longest, ..Config::default() }.build(&zigzag(4)).unwrap();
-        assert_eq!(tree.prim_ids, [0, 2, 1, 3]);
-    }
-
-    #[test]
-    fn only_x_is_cut_when_asked_for() {
-        let tree = Config { axis: CutAxis::X, ..Config::default() }.build(&zigzag(5)[1..]).unwrap();
-        assert_eq!(tree.prim_ids, [0, 1, 2, 3], "along y, object 1 would be first");
+    fn the_chosen_axes_are_cut() {
+        for (axis, skipped, expected) in [
+            // The root is cut along x, its children along y.
+            (CutAxis::Alternating, 0, [0, 1, 2, 3]),
+            (CutAxis::Longest, 0, [0, 2, 1, 3]),
+            // Along y, object 1 would be first.
+            (CutAxis::X, 1, [0, 1, 2, 3]),
+        ] {
+            let boxes = &zigzag(4 + skipped)[skipped..];
+            let tree = Config { axis, ..Config::default() }.build(boxes).unwrap();
+            assert_eq!(tree.prim_ids, expected, "{axis:?}");
+            assert_eq!(tree.nodes[1].aabb.max.x == 3.0, axis == CutAxis::Alternating);
+        }
     }
 
     #[test]

@@ -191,37 +191,6 @@ fn no_object_one_and_two_make_no_node_a_leaf_and_a_pair() {
 }
 
 #[test]
-fn two_small_neighbours_in_a_large_scene_become_a_pair() {
-    let boxes = [cube([0.0; 3], 1.0), cube([100.0; 3], 1.0), cube([102.0, 100.0, 100.0], 1.0)];
-    let (tree, _) = by_index(&boxes, &Config::default());
-    assert_eq!(topology(&tree), [Ok(2), Ok(2), Err(1), Err(2), Err(0)]);
-}
-
-#[test]
-fn an_object_as_large_as_the_scene_stays_with_the_root() {
-    let boxes = [cube([0.0; 3], 1.0), cube([9.0; 3], 1.0), cube([0.0; 3], 10.0)];
-    for config in &CONFIGS {
-        assert_eq!(
-            topology(&by_index(&boxes, config).0),
-            [Ok(3), Err(0), Err(1), Err(2)],
-            "{config:?}"
-        );
-    }
-}
-
-#[test]
-fn pairing_with_inner_nodes_happens_when_allowed_and_cheaper() {
-    // A cluster of six, then a far object: enlarging the node of the six costs more than a node
-    // above it.
-    let mut boxes: Vec<Aabb> = (0..6).map(|i| cube([0.1 * i as f32, 0.0, 0.0], 10.0)).collect();
-    boxes.push(cube([1000.0; 3], 10.0));
-    for (pair_inner, children) in [(false, 7), (true, 2)] {
-        let (tree, _) = by_index(&boxes, &Config { pair_inner, ..Config::default() });
-        assert_eq!(topology(&tree)[0], Ok(children), "{pair_inner}");
-    }
-}
-
-#[test]
 fn identical_boxes_points_and_objects_on_a_line_make_one_wide_node() {
     let n = 100_000;
     let line = |i: usize| Aabb::from(([i as f32, 0.0, 0.0], [i as f32 + 1.0, 0.0, 0.0]));

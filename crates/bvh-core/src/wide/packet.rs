@@ -96,8 +96,8 @@ impl<K: Instructions> Packet<K> {
             // SAFETY: as many vectors are written as are counted; there is room for sixteen lanes.
             let first = unsafe {
                 let vector = vector.assume_init_ref();
-                vector.t.store(distances.as_mut_ptr());
-                vector.object.store(objects.as_mut_ptr().cast());
+                vector.nearest.t.store(distances.as_mut_ptr());
+                vector.nearest.object.store(objects.as_mut_ptr().cast());
                 vector.first
             };
             for (lane, (&t, &object)) in distances.iter().zip(&objects).enumerate().take(K::Rays::N)
@@ -195,9 +195,9 @@ impl<K: Instructions> Packet<K> {
     unsafe fn farthest(&self) -> f32 {
         // SAFETY: as many vectors are written as are counted.
         unsafe {
-            let mut t = self.vectors[0].assume_init_ref().t;
+            let mut t = self.vectors[0].assume_init_ref().nearest.t;
             for vector in &self.vectors[1..self.count] {
-                t = t.max(vector.assume_init_ref().t);
+                t = t.max(vector.assume_init_ref().nearest.t);
             }
             t.greatest()
         }
@@ -211,7 +211,7 @@ impl<K: Instructions> Packet<K> {
         unsafe {
             let vector = self.vectors.get_unchecked(vector).assume_init_ref();
             let mut entry = vector.t_min;
-            let mut exit = vector.t;
+            let mut exit = vector.nearest.t;
             for (axis, &[near, far]) in planes.iter().enumerate() {
                 let origin = vector.rays.origin[axis];
                 let near = (K::Rays::splat(near) - origin) * vector.near_factor[axis];
@@ -280,52 +280,26 @@ impl<K: Instructions> Packet<K> {
     unsafe fn visit_leaf<const ANY: bool>(
         &mut self,
         first: usize,
-        mut entered: u32,
-        planes: &[[f32; 2]; 3],
-        block: *const TriangleBlock,
-        bounds: &Aabb,
-    ) -> bool {
-        if let (false, Some(origin)) = (ANY, self.origin) {
-            // SAFETY: as for this function.
-            return unsafe { self.visit_leaf_from(origin, first, entered, planes, block, bounds) };
-        }
-        let mut is_hit = false;
-        for i in first..self.count {
-            // SAFETY: the processor has the instructions; so many vectors are counted.
-            unsafe {
-                if i > first {
-                    entered = self.enter(i, planes);
-                }
-                if entered != 0 {
-                    is_hit |= self.test::<ANY>(i, entered, block, bounds);
-                }
-            }
-        }
-        is_hit
-    }
-
-    /// Does the same with rays from one origin.
-    #[inline(always)]
-    unsafe fn visit_leaf_from(
-        &mut self,
-        origin: Vec3,
-        first: usize,
         entered: u32,
         planes: &[[f32; 2]; 3],
         mut block: *const TriangleBlock,
         bounds: &Aabb,
     ) -> bool {
         let mut is_hit = false;
-        // SAFETY: the vectors are counted; a block that is not its leaf's last is followed by
-        // another.
+        // SAFETY: the processor has the instructions; the vectors are counted; a block that is not
+        // its leaf's last is followed by another.
         unsafe {
             loop {
-                let seen = Seen::new::<K::Block>(&*block, origin);
+                let origin = if ANY { None } else { self.origin };
+                let seen = origin.map(|origin| Seen::new::<K::Block>(&*block, origin));
                 for i in first..self.count {
                     let entered = if i > first { self.enter(i, planes) } else { entered };
                     if entered != 0 {
                         let vector = self.vectors.get_unchecked_mut(i).assume_init_mut();
-                        is_hit |= seen.test(vector, entered, &*block, bounds);
+                        is_hit |= match &seen {
+                            Some(seen) => seen.test(vector, entered, &*block, bounds),
+                            None => test::<_, ANY>(vector, entered, &*block, bounds),
+                        };
                     }
                 }
                 if (*block).is_last() {
@@ -335,71 +309,48 @@ impl<K: Instructions> Packet<K> {
             }
         }
     }
+}
 
-    /// Tests the triangles of a leaf with the rays of a vector that entered it. Returns whether any
-    /// ray has a new nearest hit.
-    #[inline(always)]
-    unsafe fn test<const ANY: bool>(
-        &mut self,
-        vector: usize,
-        entered: u32,
-        block: *const TriangleBlock,
-        bounds: &Aabb,
-    ) -> bool {
-        // SAFETY: the processor has the instructions; a block that is not its leaf's last is followed by
-        // another.
-        unsafe {
-            let vector = self.vectors.get_unchecked_mut(vector).assume_init_mut();
-            vector.shear(bounds);
-            let pairs = vector.pairs.assume_init_ref();
-            let mut block = block;
-            let mut is_hit = false;
-            loop {
-                for lane in 0..(*block).len() {
-                    let corners = (*block).splat_corners::<K::Rays>(lane, vector.axes);
-                    let mut candidates = pairs.candidates(&corners);
-                    candidates.possible &= entered;
-                    if ANY {
-                        let (possible, sure) = pairs.within(&candidates, vector.t);
-                        if sure != 0 {
-                            is_hit = true;
-                            // A ray that has its answer ends before it begins.
-                            let sure = vector.t.mask(sure);
-                            vector.t = Lanes::select(sure, vector.t.filled(-1.0), vector.t);
-                            let object = vector.t.filled_with_bits((*block).id(lane));
-                            vector.object = Lanes::select(sure, object, vector.object);
-                        }
-                        candidates.possible = possible & !sure;
-                    }
-                    if candidates.possible == 0 {
-                        continue;
-                    }
-                    let plane = Plane::of_triangle(&(*block).doubles(lane, vector.axes));
-                    let (inside, t) = pairs.decide(&corners, &plane, &candidates, vector.t);
-                    let inside = inside & t.mask(entered);
-                    let object = t.filled_with_bits((*block).id(lane));
-                    let hits = if ANY {
-                        inside
-                    } else {
-                        t.lt(vector.t) & inside
-                            | t.eq(vector.t) & inside & object.below(vector.object)
-                    };
-                    if hits.bits() == 0 {
-                        continue;
-                    }
-                    is_hit = true;
-                    // A ray that has its answer ends before it begins.
-                    let t = if ANY { t.filled(-1.0) } else { t };
-                    vector.t = Lanes::select(hits, t, vector.t);
-                    vector.object = Lanes::select(hits, object, vector.object);
+/// Tests the triangles of a block with the rays of a vector that entered it. Returns whether any
+/// ray has a new nearest hit.
+#[inline(always)]
+unsafe fn test<L: Lanes, const ANY: bool>(
+    vector: &mut Vector<L>,
+    entered: u32,
+    block: &TriangleBlock,
+    bounds: &Aabb,
+) -> bool {
+    let mut is_hit = false;
+    vector.shear(bounds);
+    // SAFETY: the processor has the instructions of `L`; the vector has been sheared.
+    unsafe {
+        let pairs = vector.pairs.assume_init_ref();
+        for lane in 0..block.len() {
+            let corners = block.splat_corners::<L>(lane, vector.axes);
+            let mut candidates = pairs.candidates(&corners);
+            candidates.possible &= entered;
+            let nearest = &mut vector.nearest;
+            if ANY {
+                let (possible, sure) = pairs.within(&candidates, nearest.t);
+                if sure != 0 {
+                    is_hit |= nearest.end(nearest.t.mask(sure), block.id(lane));
                 }
-                if (*block).is_last() {
-                    return is_hit;
-                }
-                block = block.add(1);
+                candidates.possible = possible & !sure;
             }
+            if candidates.possible == 0 {
+                continue;
+            }
+            let plane = Plane::of_triangle(&block.doubles(lane, vector.axes));
+            let (inside, t) = pairs.decide(&corners, &plane, &candidates, nearest.t);
+            let inside = inside & t.mask(entered);
+            is_hit |= if ANY {
+                nearest.end(inside, block.id(lane))
+            } else {
+                nearest.offer(inside, t, block.id(lane))
+            };
         }
     }
+    is_hit
 }
 
 /// The bounds of a packet as boxes are tested with them: along each axis the origins for which the

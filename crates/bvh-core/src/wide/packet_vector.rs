@@ -1,20 +1,47 @@
 //! A vector of rays in a packet: what the tests of boxes and of triangles need of them.
 
-use super::lanes::Lanes;
+use super::lanes::{Lanes, Mask};
 use super::pairs::Pairs;
 use super::ray_lanes::RayLanes;
 use crate::Aabb;
 use crate::slabs::{FAR, NEAR};
 use core::mem::MaybeUninit;
 
+/// The nearest hits of rays so far, or their ends and `u32::MAX`.
+pub(super) struct Nearest<L> {
+    pub(super) t: L,
+    pub(super) object: L,
+}
+
+impl<L: Lanes> Nearest<L> {
+    /// Takes those of some hits with an object that are nearer. Returns whether there are any.
+    #[inline(always)]
+    pub(super) fn offer(&mut self, hits: L::Mask, t: L, object: u32) -> bool {
+        let object = t.filled_with_bits(object);
+        let nearer = hits & (t.lt(self.t) | t.eq(self.t) & object.below(self.object));
+        let is_hit = nearer.bits() != 0;
+        if is_hit {
+            self.t = L::select(nearer, t, self.t);
+            self.object = L::select(nearer, object, self.object);
+        }
+        is_hit
+    }
+
+    /// Ends rays that have their answer: before they begin. Returns whether there are any.
+    #[inline(always)]
+    pub(super) fn end(&mut self, hits: L::Mask, object: u32) -> bool {
+        self.t = L::select(hits, self.t.filled(-1.0), self.t);
+        self.object = L::select(hits, self.t.filled_with_bits(object), self.object);
+        hits.bits() != 0
+    }
+}
+
 /// Rays of a packet side by side.
 pub(super) struct Vector<L> {
     pub(super) near_factor: [L; 3],
     pub(super) far_factor: [L; 3],
     pub(super) t_min: L,
-    /// The nearest hits so far, or the ends of the rays and `u32::MAX`.
-    pub(super) t: L,
-    pub(super) object: L,
+    pub(super) nearest: Nearest<L>,
     /// The rays, and whether `pairs` has been made from them. Many packets meet no triangle.
     pub(super) rays: RayLanes<L>,
     pub(super) axes: [usize; 3],
@@ -36,8 +63,7 @@ impl<L: Lanes> Vector<L> {
             near_factor: [x * near, y * near, z * near],
             far_factor: [x * far, y * far, z * far],
             t_min: rays.t_min,
-            t: rays.t_max,
-            object: none,
+            nearest: Nearest { t: rays.t_max, object: none },
             axes: rays.axes(),
             rays,
             is_sheared: false,

@@ -150,17 +150,11 @@ impl Seen {
                     let corners = block.splat_corners::<L>(lane, vector.axes);
                     let plane = Plane::of_triangle(&block.doubles(lane, vector.axes));
                     let candidates = pairs.candidates(&corners);
-                    (inside, t) = pairs.decide(&corners, &plane, &candidates, vector.t);
+                    (inside, t) = pairs.decide(&corners, &plane, &candidates, vector.nearest.t);
                     inside = inside & t.mask(entered);
                 }
                 let inside = inside & vector.t_min.le(t);
-                let object = t.filled_with_bits(block.id(lane));
-                let hits = inside & (t.lt(vector.t) | t.eq(vector.t) & object.below(vector.object));
-                if hits.bits() != 0 {
-                    is_hit = true;
-                    vector.t = Lanes::select(hits, t, vector.t);
-                    vector.object = Lanes::select(hits, object, vector.object);
-                }
+                is_hit |= vector.nearest.offer(inside, t, block.id(lane));
             }
             is_hit
         }

@@ -124,8 +124,7 @@ fn no_ray_leaves_a_closed_mesh_through_an_edge_or_a_vertex() {
 /// Two adjacent triangles share an edge along one axis, and their boxes share a face. A ray that
 /// starts close to the edge and runs nearly along it hits the sheet next to the edge. There the
 /// rounding of the far corners moves the decision which triangle is hit by far more than the
-/// rounding of the box test moves the boxes. Without [`Slabs::MARGIN`](bvh_core::Slabs::MARGIN) one
-/// of thirty such rays is lost.
+/// rounding of the box test moves the boxes.
 #[test]
 fn no_ray_slips_between_the_boxes_beside_a_long_edge() {
     let mut random = Random(4);
