@@ -10,13 +10,16 @@ impl Triangle {
     /// Returns an origin for rays that leave the triangle at `point`, on the side toward which
     /// `side` points. No ray from there whose direction points to this side, or along the plane,
     /// hits the triangle again. Returns the rounded point for a triangle without area. `point` is
-    /// in the triangle up to rounding, and sizes are between 2⁻¹⁰⁰ and 2¹⁰⁰.
+    /// in the triangle up to rounding, sizes are between 2⁻¹⁰⁰ and 2¹⁰⁰, and the area is at least
+    /// 2⁻³⁰ of the square of the longest side along an axis: the normal of a thinner sliver is too
+    /// uncertain in f64, and a ray may hit it again.
     ///
     /// The origin is farther from the plane than 24 εR, ε = 2⁻²⁴, where R is the largest component
-    /// of the corners relative to the origin. In real arithmetic, in which every kernel answers,
-    /// any distance would do. This one also suffices for other tracers that round corners relative
-    /// to the origin and the slope of the ray to f32: they hit a triangle whose corners are moved
-    /// by less than 4 εR in each component. All its points are nearer to the plane than 7 εR.
+    /// of the corners relative to the origin; the normal of the thinnest slivers takes up to half
+    /// of it. In real arithmetic, in which every kernel answers, any distance would do. This one
+    /// also suffices for other tracers that round corners relative to the origin and the slope of
+    /// the ray to f32: they hit a triangle whose corners are moved by less than 4 εR in each
+    /// component. All its points are nearer to the plane than 7 εR.
     ///
     /// ```
     /// # use bvh_core::{PreparedRay, Ray, Triangle};

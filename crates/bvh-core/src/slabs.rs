@@ -14,7 +14,8 @@ use glam::{Vec3, Vec4, Vec4Swizzles};
 /// 2. *Monotone.* The interval of a box inside another box is inside the other's interval, bit by
 ///    bit: each operation rounds monotonically.
 /// 3. *Tight.* Boxes grow in proportion to their distance from the ray's origin alone: by less than
-///    2⁻²⁰ of it, and by less than 2⁻⁴⁷ of it if the ray begins far from the scene.
+///    2⁻²⁰ of it, and by less than 2⁻⁴⁷ of it if the ray begins far from the scene. Along an axis
+///    that the ray almost does not move along (see *Parallel*), a box may not bound the ray at all.
 ///
 /// # Proof of the first
 ///
@@ -32,17 +33,19 @@ use glam::{Vec3, Vec4, Vec4Swizzles};
 /// With u = 2⁻²⁴, the difference lower − origin is rounded by at most u of itself, subnormal or not,
 /// and so are the reciprocal of d and its product n with 1 − 4u. Before it is rounded, the product of
 /// the difference and n is at most (1 + u)³ (1 − 4u) < 1 times (lower − origin) / d ≤ t if the
-/// difference is positive, and below t if it is not. Rounding is monotone, so that the entry is at
+/// difference is positive, and at most t if it is not. Rounding is monotone, so that the entry is at
 /// most t rounded. In the same way the exit, with 1 + 4u, is at least t rounded.
 ///
 /// *Parallel.* Where the reciprocal of d would overflow, n is made of the largest number, which is
 /// below 1 / d, and the factor of exits is infinite. The origin is moved by one step up for lower
-/// faces and by one step down for upper faces. So a box that the ray meets has a negative difference
-/// below, and a positive one above, whose product is infinite: no 0 · ∞ occurs.
+/// faces and by one step down for upper faces. So if the ray begins between the faces, the product
+/// of the difference of the face ahead is infinite, and the exit does not bound the ray. If it begins
+/// one step beside the face that it enters by, that face gives 0 · ∞, a NaN, which bounds nothing
+/// either.
 ///
 /// *Far.* In the unit of a scene, the growth of its boxes increases with the distance from it. So
 /// rays from far away, and rays whose differences could overflow, are tested in f64. The quotient of
-/// a difference and d is rounded twice, by 2⁻⁵³ of itself; the factors are 1 ∓ 2⁻⁴⁹.
+/// a difference and d is rounded two or three times, by 2⁻⁵³ of itself; the factors are 1 ∓ 2⁻⁴⁹.
 #[derive(Clone, Copy, Debug)]
 pub struct Slabs {
     /// The origin, as it is subtracted from lower and from upper corners.
@@ -114,7 +117,8 @@ impl Slabs {
         let near = (low * self.near).min(high * self.near);
         let far = (low * self.far).max(high * self.far);
         let entry = larger(larger(near.x, near.y), larger(near.z, self.ray.t_min()));
-        (entry, smaller(smaller(far.x, far.y), far.z))
+        // A NaN bounds nothing: `smaller` returns its other operand.
+        (entry, smaller(far.x, smaller(far.y, smaller(far.z, f32::INFINITY))))
     }
 
     #[cold]
@@ -238,6 +242,7 @@ fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
+/// Returns the smaller of two numbers, the second if one is NaN.
 #[inline(always)]
 fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
@@ -292,6 +297,31 @@ mod tests {
                         let away = Ray::half_line(corner + 7.0 * direction, direction).unwrap();
                         assert!(!meets(&away, &b), "{away:?}");
                     }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn rays_from_one_step_beside_a_face_and_almost_along_it_meet_the_box() {
+        let long = libm::exp2f(110.0);
+        let cases = [
+            (libm::exp2f(-149.0), 0.0, libm::exp2f(-130.0)),
+            (1.0, 1.0f32.next_down(), libm::exp2f(-129.0)),
+        ];
+        for (from, face, slope) in cases {
+            for sign in [1.0, -1.0] {
+                let corners = [[0.0, 0.0, face - 1.0], [long, 1.0, face]];
+                let [origin, direction] = [[0.25, 0.5, from], [1.0, 0.0, -slope]];
+                for turns in 0..3 {
+                    let turned = |[x, y, z]: [f32; 3]| {
+                        let mut turned = [x, y, z * sign];
+                        turned.rotate_left(turns);
+                        Vec3::from(turned)
+                    };
+                    let b = Aabb::around(corners.map(turned));
+                    let ray = Ray::half_line(turned(origin), turned(direction)).unwrap();
+                    assert!(meets(&ray, &b), "{ray:?}");
                 }
             }
         }

@@ -63,12 +63,17 @@ fn step(exponent: u8) -> f32 {
 
 impl CompressedNode {
     fn around(aabb: &Aabb) -> Self {
-        let extent = aabb.extent().to_array();
-        Self { origin: aabb.min, exponents: extent.map(exponent), ..Self::zeroed() }
+        let mut exponents = aabb.extent().to_array().map(exponent);
+        for axis in 0..3 {
+            // The extent may be rounded to 255 steps, past which the upper corner lies.
+            let last = aabb.min[axis] + 255.0 * step(exponents[axis]);
+            exponents[axis] += u8::from(last < aabb.max[axis]);
+        }
+        Self { origin: aabb.min, exponents, ..Self::zeroed() }
     }
 
-    /// Stores the box of a slot, rounded outwards. All f64 operations are exact, the division by a
-    /// power of two included.
+    /// Stores the box of a slot, rounded outwards. The division by a power of two is exact. The
+    /// difference may round to a plane of the grid, past which the corner lies.
     fn set_box(&mut self, slot: usize, aabb: &Aabb) {
         let steps = DVec3::from(self.exponents.map(|exponent| f64::from(step(exponent))));
         let origin = self.origin.as_dvec3();
@@ -77,6 +82,9 @@ impl CompressedNode {
         for axis in 0..3 {
             self.low[axis][slot] = libm::floor(low[axis]) as u8;
             self.high[axis][slot] = libm::ceil(high[axis]) as u8;
+            let rounded = self.slot_box(slot);
+            self.low[axis][slot] -= u8::from(rounded.min[axis] > aabb.min[axis]);
+            self.high[axis][slot] += u8::from(rounded.max[axis] < aabb.max[axis]);
         }
     }
 

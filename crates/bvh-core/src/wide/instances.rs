@@ -2,9 +2,10 @@
 //!
 //! An instance is tested against the ray that `transform⁻¹` moves into the part's coordinates. The
 //! moved ray is computed in f64 and rounded to f32 once. The length of its direction changes with
-//! the transform, so a distance means the same for every instance. The answer is, bit by bit, the
-//! least distance that the parts' layouts return for the moved rays, for any tree over the
-//! instances.
+//! the transform, so a distance means the same for every instance. A distance that the part's layout
+//! returns for the moved ray is moved into the interval of the instance's box in the scene, and a
+//! ray that misses that box has no hit. The answer is, bit by bit, the least of these distances, for
+//! any tree over the instances.
 //!
 //! Compared with the same scene whose triangles are all written out, distances differ by the
 //! rounding of the moved rays and of the moved corners, about 10⁻⁷ of the coordinates. They do not

@@ -27,8 +27,9 @@
 //! and the sheared coordinate by less than 4.1uR + um < 6.3uR. The edge value is off by less than 4
 //! · 6.3uRm + 2 (6.3uR)² from its operands, and by 4um² < 8.5uRm from its own roundings: in total
 //! less than E = e (m + e) with e = 64uR. Underflow adds less than 2⁻¹²⁶, the last term of the
-//! bound in the code. The sum m + e is the *spread*: no real |x|, |y| exceeds it. If all edge
-//! values are above E, or all below −E, the line crosses the triangle.
+//! bound in the code, to an edge value, and less to a coordinate, whose e has it too. The sum m + e
+//! is the *spread*: no real |x|, |y| exceeds it. If all edge values are above E, or all below −E,
+//! the line crosses the triangle. From R = 2⁶² on products may overflow, and the bound is infinite.
 //!
 //! *Range in f32*. Where all edge values u, v, w are certain, they and their sum a have the signs of
 //! the real ones. With depths z of the corners relative to the origin and T a bound of the range,
@@ -42,11 +43,12 @@
 //! difference by 4uR: the computed X is off by at most 5EΔ / |a| + 22uR. The computed Δ may lack
 //! 4uR, and so 20EuR of 5EΔ, which is below 7uR|a|, because |a| is at least 3E. Where |T d_z| is at
 //! most 4R, roundings of the other terms are below 23uR together; where it is more, they are less
-//! than T d_z. A hit counts by its rounded distance, which is off by at most u|t|, and uR / |d_z|
-//! covers that, or by 2⁻¹⁵⁰, where it is subnormal. Hence a product beyond 8EΔ + (e + 2⁻¹²⁶|d_z|) |a|
-//! has the sign of the difference of T and the rounded distance, or that difference is 0 within the
-//! range. Below R = 2⁴⁰ nothing overflows but T d_z, which then has the right sign, and its
-//! products; other rays get an infinite bound.
+//! than T d_z, whose sign is then right, because |t d_z| is at most R. A hit counts by its rounded
+//! distance, which is off by at most u|t|, and uR / |d_z| covers that, or by 2⁻¹⁵⁰, where it is
+//! subnormal. Hence a product beyond 8EΔ + (e + 2⁻¹²⁶|d_z|) |a| has the sign of the difference of T
+//! and the rounded distance, or that difference is 0 within the range. Below R = 2⁴⁰ nothing
+//! overflows but T d_z, which then has the right sign, and its products; other rays get an infinite
+//! bound.
 //!
 //! *f64*, ε = 2⁻⁵³. Corners are sheared by multiplication with d_z, so S = spread · |d_z| is at
 //! least the largest |x|, |y|, and the edge values are within E = e (S + e) with e = 64εR|d_z|, as
@@ -93,6 +95,8 @@ pub(crate) struct Pairs<L> {
     pub(crate) reach: L,
     /// e, the bound of the error of a coordinate sheared in f32.
     error: L,
+    /// What underflow adds to the error of an edge value; infinite where products may overflow.
+    underflow: L,
     /// The bound of the error of a distance times the depth in f32, without the tilt's.
     range_error: L,
     pub(crate) t_min: L,
@@ -136,19 +140,21 @@ impl<L: Lanes> Pairs<L> {
         reach: L,
         t_min: L,
     ) -> Self {
-        let error = reach * reach.filled(SINGLE_ERROR);
         // The least normal number, because arithmetic with subnormal ones is slow.
         let least = reach.filled(f32::MIN_POSITIVE);
+        let error = reach.mul_add(reach.filled(SINGLE_ERROR), least);
         let range_error = direction[2].abs().mul_add(least, error);
-        let is_small = reach.lt(reach.filled(pow2(40)));
-        let range_error = L::select(is_small, range_error, reach.filled(f32::INFINITY));
-        Self { origin, direction, slope, reach, error, range_error, t_min }
+        let or_infinite = |bound: L, below: f32| {
+            L::select(reach.lt(reach.filled(below)), bound, reach.filled(f32::INFINITY))
+        };
+        let underflow = or_infinite(least, pow2(62));
+        let range_error = or_infinite(range_error, pow2(40));
+        Self { origin, direction, slope, reach, error, underflow, range_error, t_min }
     }
 
     /// Finds the pairs whose triangle the ray's line may cross, in f32.
     #[inline(always)]
     pub(crate) fn candidates(&self, corners: &[[L; 3]; 3]) -> Candidates<L> {
-        let underflow = self.reach.filled(f32::MIN_POSITIVE);
         let [a, b, c] = corners;
         let [a, b, c] = [self.corner(a), self.corner(b), self.corner(c)];
         let [ax, ay, az] = a;
@@ -160,7 +166,7 @@ impl<L: Lanes> Pairs<L> {
         let least = u.min(v).min(w);
         let most = u.max(v).max(w);
         let spread = self.spread(&[a, b, c]);
-        let error = self.error.mul_add(spread, underflow);
+        let error = self.error.mul_add(spread, self.underflow);
         let below = error.filled(0.0) - error;
         let all = u32::MAX >> (32 - L::N);
         let possible = all & !(least.lt(below) & error.lt(most)).bits();

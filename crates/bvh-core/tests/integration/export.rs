@@ -3,7 +3,7 @@
 
 use crate::support::{Random, SHAPES, ball, boxes, chain, grid_box, rays, scaled, soup, tree};
 use bvh_core::export::{CompressedBvh, CompressedNode, FirstCountNode, Target, ThreeMeshNode};
-use bvh_core::{Aabb, Bvh, InvalidBvh, Node, Triangle, any_hit, nearest_hit, validate};
+use bvh_core::{Aabb, Bvh, InvalidBvh, Node, Ray, Triangle, any_hit, nearest_hit, validate};
 use glam::Vec3;
 use proptest::prelude::*;
 
@@ -74,6 +74,33 @@ fn every_layout_traces_the_hits_of_the_tree_at_every_scale() {
         }
     }
     assert!(hits > 10_000, "{hits}");
+}
+
+#[test]
+fn a_corner_that_is_next_to_a_plane_of_the_grid_stays_in_its_box() {
+    // Relative to the node's lower corner −1, the corner −2⁻⁶⁰ is in no f64.
+    let least = -libm::exp2f(-60.0);
+    // Nor is the corner 2⁻⁶⁰ relative to −255, which is 255 steps of the grid below 0.
+    let wide = Triangle::from([[-255.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-least, 0.0, 0.0]]);
+    let boxed = Aabb::union_of(&boxes(&[wide]));
+    let tree = Bvh { nodes: vec![Node::leaf(boxed, 0, 1)], prim_ids: vec![0] };
+    let returned = CompressedBvh::new(&tree, &[boxed]).unwrap().decode().unwrap();
+    assert!(returned.nodes[0].aabb.contains(&boxed));
+    let left = Triangle::from([[-1.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [-0.5, 0.0, 0.0]]);
+    let right = Triangle::from([[least, -1.0, 0.0], [least, 1.0, 0.0], [1.0, 0.0, 0.0]]);
+    for sign in [1.0, -1.0] {
+        let triangles = [left, left, left, right, right, right]
+            .map(|triangle| Triangle(triangle.0.map(|corner| corner * sign)));
+        let boxes = boxes(&triangles);
+        let [a, b] = [boxes[0], boxes[3]];
+        let nodes = vec![Node::inner(a.union(&b), 1, 2), Node::leaf(a, 0, 3), Node::leaf(b, 3, 3)];
+        let tree = Bvh { nodes, prim_ids: (0..6).collect() };
+        let returned = CompressedBvh::new(&tree, &boxes).unwrap().decode().unwrap();
+        let ray = Ray::half_line([sign * least / 2.0, 0.0, -1.0], [0.0, 0.0, 1.0]).unwrap();
+        let expected = nearest_hit(&tree, &triangles, &ray);
+        assert!(expected.is_some());
+        assert_eq!(nearest_hit(&returned, &triangles, &ray), expected);
+    }
 }
 
 #[test]

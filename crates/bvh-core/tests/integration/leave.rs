@@ -25,6 +25,28 @@ fn no_kernel_hits_a_triangle_again_that_a_ray_has_left() {
     assert!(rays > 50_000, "{rays}");
 }
 
+#[test]
+fn no_ray_hits_a_sliver_again_as_thin_as_is_promised() {
+    let mut random = Random(2);
+    let mut rays = 0;
+    for _ in 0..20_000 {
+        // In the plane x + y + z = 0, up to the rounding of its corners, of which two directions
+        // are almost the same.
+        let along = random.point();
+        let along = along - along.element_sum() / 3.0;
+        let across = along.cross(Vec3::ONE).normalize_or_zero() * along.length();
+        let far = along * -random.unit() + across * random.unit() * libm::exp2f(-25.0);
+        let triangle = Triangle([Vec3::ZERO, along, far]);
+        let [b, c] = [along, far].map(Vec3::as_dvec3);
+        let scale = b.abs().max(c.abs()).max_element();
+        if b.cross(c).length() < 2f64.powi(-29) * scale * scale {
+            continue;
+        }
+        rays += leave(&triangle, &mut random);
+    }
+    assert!(rays > 50_000, "{rays}");
+}
+
 /// Tests rays from a triangle. Returns their number.
 fn leave(triangle: &Triangle, random: &mut Random) -> usize {
     let Some(normal) = triangle.normal() else { return 0 };

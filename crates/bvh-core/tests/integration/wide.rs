@@ -43,7 +43,7 @@ fn every_kernel_answers_as_brute_force_at_every_scale() {
     for (name, scene) in
         [("soup", soup(150, &mut random)), ("grid", grid_box(4)), ("ball", ball(2))]
     {
-        for exponent in [-120, -60, -20, 0, 20, 60, 120] {
+        for exponent in [-120, -60, -20, 0, 20, 60, 67, 71, 120] {
             let triangles = scaled(&scene, libm::exp2f(exponent as f32));
             let layouts = layouts(&triangles, &mut random);
             let name = format!("{name} * 2^{exponent}");
@@ -124,6 +124,17 @@ fn ranges_that_end_at_a_hit_or_next_to_it_are_answered_alike() {
         hits += check(&format!("soup * {scale}"), &triangles, &layouts, &ends);
     }
     assert!(hits > 500, "the rays should hit something: {hits}");
+}
+
+#[test]
+fn a_triangle_of_a_few_denormal_steps_is_hit_where_it_is() {
+    let step =
+        |[x, y, z]: [u32; 3]| Vec3::new(f32::from_bits(x), -f32::from_bits(y), f32::from_bits(z));
+    let triangle = Triangle([[6379, 1, 1], [5789, 1, 1], [7357, 2, 1]].map(step));
+    let direction = Vec3::new(-1.1368684e-13, 4.6157873e-17, -2.3078936e-17);
+    let ray = Ray::half_line(step([10976, 3, 2]), direction).unwrap();
+    let layouts = layouts(&[triangle], &mut Random(14));
+    assert_eq!(check("denormal", &[triangle], &layouts, &[ray; 40]), 40);
 }
 
 #[test]
