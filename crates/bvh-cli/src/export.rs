@@ -5,7 +5,7 @@ use crate::answer::{Answer, Form, gain, whole};
 use crate::arguments::{output_file, reserve};
 use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
-use bvh_core::export::Target;
+use bvh_core::export::{Layout, Target};
 use bvh_scenes::tree_file;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -24,8 +24,8 @@ pub struct ExportArgs {
     /// The tracer.
     #[arg(long = "for", value_name = "TRACER", value_parser = tracers())]
     pub tracer: Target,
-    /// The file to write, replaced when it is complete.
-    #[arg(long, value_name = "FILE.bin")]
+    /// The file to write, replaced when it is complete; `.json` for json.
+    #[arg(long, value_name = "FILE.bin|.json")]
     pub out: PathBuf,
     /// Permits files outside the scene's folder.
     #[command(flatten)]
@@ -36,16 +36,16 @@ pub struct ExportArgs {
 }
 
 /// Parses the names of the targets.
-fn tracers() -> impl TypedValueParser<Value = Target> {
-    PossibleValuesParser::new(Target::ALL.map(|target| target.name)).try_map(|name| {
-        Target::ALL.into_iter().find(|target| target.name == name).ok_or("no tracer")
-    })
+pub fn tracers() -> impl TypedValueParser<Value = Target> {
+    PossibleValuesParser::new(Target::ALL.map(|target| target.name))
+        .try_map(|name| Target::named(&name).ok_or("no tracer"))
 }
 
 /// Writes the better of the tree and a greedy one for the tracer, and prints how they compare.
 pub fn export(args: &ExportArgs) -> Result<(), Error> {
-    output_file("--out", &args.out, "bin")?;
     let target = args.tracer;
+    let extension = if target.layout == Layout::Json { "json" } else { "bin" };
+    output_file("--out", &args.out, extension)?;
     let scene = args.files.load(&args.scene)?;
     let (tree, _) = tree_file::load(&args.file, &scene)?;
     // Only triangles can be traced there.
@@ -73,8 +73,8 @@ pub fn export(args: &ExportArgs) -> Result<(), Error> {
     answer.record("nodes", nodes);
     answer.record("cost of a ray", target.cost(&better.tree));
     answer.record("is searched", better.is_searched());
-    answer.record("tests of rays from inside, in a greedy tree over this one", inside);
-    answer.record("tests of rays from outside, in a greedy tree over this one", outside);
+    answer.record("gain inside", inside);
+    answer.record("gain outside", outside);
     answer.end();
     Ok(())
 }

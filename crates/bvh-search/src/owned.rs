@@ -3,7 +3,9 @@
 
 use crate::bake::density_of;
 use crate::{Bake, BakeError, Baked, Budget, Division, Observer, SearchError};
+use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
+use bvh_core::export::Target;
 use bvh_core::file::{self, FileError};
 use bvh_core::{
     Aabb, Bvh, InvalidBox, InvalidBvh, Primitives, RayDensity, Segment, Triangle, WideBvh,
@@ -143,6 +145,17 @@ impl OwnedTree {
         if division == Division::Useless {
             self.references = 1.0;
         }
+    }
+
+    /// Returns the tree as a [file](Target::bytes) for another tracer; of triangles, the greedy tree
+    /// if it is [better](Target::fit_better) there.
+    pub fn export(&self, target: &Target) -> Vec<u8> {
+        let fitted = match (self.triangles(), muller_fellner::Config::default().build(&self.boxes))
+        {
+            (Some(triangles), Ok(greedy)) => target.fit_better(&self.tree, &greedy, triangles).tree,
+            _ => target.fit(&self.tree),
+        };
+        target.bytes(&fitted, &self.boxes)
     }
 
     /// Returns the tree as a file, which [`load`](Self::load) and the program `bvh` read.

@@ -11,9 +11,11 @@ use crate::Error;
 use crate::answer::{Answer, Form, gain, short, whole};
 use crate::arguments::{Jobs, input_file, output_file, output_or_free, reserve};
 use crate::explain;
+use crate::export::tracers;
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use bvh_core::cost::{Objective, internal_area};
+use bvh_core::export::Target;
 use bvh_scenes::files::Reserved;
 use bvh_scenes::{Scene, did_you_mean};
 use bvh_search::{Method, Outcome, StopReason};
@@ -61,6 +63,11 @@ pub struct BakeArgs {
     /// then includes the leaves. With --budget, the default is 1.
     #[arg(long, value_name = "N")]
     pub references: Option<f64>,
+    /// Search for the tracer of another library, for `bvh export`: by default with `--cost area`,
+    /// and with as many references as pay there.
+    #[arg(long = "for", value_name = "TRACER", value_parser = tracers())]
+    #[arg(conflicts_with_all = ["rays", "instances", "parts"])]
+    pub tracer: Option<Target>,
     /// The method, with its default parameters.
     #[arg(long, value_name = "NAME", default_value = BEST)]
     pub method: String,
@@ -276,7 +283,7 @@ impl BakeArgs {
     fn plan(&self) -> Result<Plan, Error> {
         let rays = self.rays.as_deref().map(Rays::read).transpose()?;
         let method = self.method()?;
-        self.check_references(&method)?;
+        let references = self.most_references(&method)?;
         // The cost of the layout saves more tests of rays than area does: `results/ray_objective`.
         let default_cost = if rays.is_some() { BakeCost::Layout } else { BakeCost::Area };
         let objective = match self.cost.unwrap_or(default_cost) {
@@ -288,7 +295,7 @@ impl BakeArgs {
             effort: self.budget.unwrap_or(Effort::Work(0)),
             seed: self.seed,
             objective,
-            references: self.references.unwrap_or(1.0),
+            references,
             rays,
         })
     }
@@ -316,7 +323,8 @@ impl BakeArgs {
         // Only `best` offers the choices, and only triangles have a wide layout. A search from an
         // earlier tree minimises the cost that is given.
         let has_choices = matches!(plan.method, Method::Best(_)) && scene.triangles().is_ok();
-        if self.budget.is_some() || !has_choices || self.from.is_some() {
+        let is_given = self.budget.is_some() || self.from.is_some() || self.tracer.is_some();
+        if is_given || !has_choices {
             return Ok((plan, Prepared::default()));
         }
         let open = Open {
@@ -350,18 +358,21 @@ impl BakeArgs {
         Ok(method)
     }
 
-    /// Rejects numbers of references that are out of range, and methods that would ignore them.
-    fn check_references(&self, method: &Method) -> Result<(), Error> {
-        let references = self.references.unwrap_or(1.0);
+    /// Returns the references per object. Rejects numbers that are out of range, and methods that
+    /// would ignore them.
+    fn most_references(&self, method: &Method) -> Result<f64, Error> {
+        let divides = matches!(method, Method::Best(_));
+        let default = self.tracer.filter(|_| divides).map_or(1.0, |tracer| tracer.references);
+        let references = self.references.unwrap_or(default);
         if !(1.0..=16.0).contains(&references) {
             return Err(Error::Usage(format!("--references {references}; accepted: 1 to 16")));
         }
-        if references > 1.0 && !matches!(method, Method::Best(_)) {
+        if references > 1.0 && !divides {
             let name = &self.method;
             let message =
                 format!("--references {references} with --method {name}; accepted: {BEST}");
             return Err(Error::Usage(message));
         }
-        Ok(())
+        Ok(references)
     }
 }

@@ -2,7 +2,8 @@
 
 use crate::support::bvh;
 use bvh_build::{Builder, goldsmith_salmon, muller_fellner};
-use bvh_core::export::Target;
+use bvh_core::cost::Objective;
+use bvh_core::export::{Layout, Target};
 use bvh_core::file::{self, Origin};
 use bvh_core::{Bvh, FirstCountNode};
 use bvh_scenes::{Scene, tree_file};
@@ -12,16 +13,29 @@ use std::fs;
 fn an_export_is_the_fitted_tree_and_says_how_it_compares() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    bvh(at, "bake escher:900 --budget=1Mwork --out=x.bvh");
+    bvh(at, "bake escher:900 --budget=1Mwork --for=three-mesh-bvh --out=x.bvh");
     let scene = Scene::load("escher:900").unwrap();
     let (tree, _) = tree_file::load(&at.join("x.bvh"), &scene).unwrap();
     for target in Target::ALL {
-        let line = bvh(at, &format!("export x.bvh escher:900 --for={} --out=x.bin", target.name));
+        let file = if target.layout == Layout::Json { "x.json" } else { "x.bin" };
+        let line = bvh(at, &format!("export x.bvh escher:900 --for={} --out={file}", target.name));
         assert!(line.contains("nodes of this tree; "), "{line}");
         assert!(line.contains(" % below a greedy tree's, "), "{line}");
-        let bytes = fs::read(at.join("x.bin")).unwrap();
+        let bytes = fs::read(at.join(file)).unwrap();
         let fitted = target.fit(&tree);
         assert_eq!(bytes, target.bytes(&fitted, &scene.boxes));
+        if target.layout == Layout::Json {
+            let text: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
+            let nodes = text["nodes"].as_array().unwrap().iter().map(|node| {
+                let number = |field: usize| node[field].as_f64().unwrap();
+                let corner = |from| [from, from + 1, from + 2].map(|field| number(field) as f32);
+                let [min, max] = [0, 3].map(corner);
+                FirstCountNode { min, first: number(6) as u32, max, count: number(7) as u32 }
+            });
+            let ids: Vec<u32> = serde_json::from_value(text["ids"].clone()).unwrap();
+            assert_eq!(Bvh::from_first_count(&nodes.collect::<Vec<_>>(), &ids).unwrap(), fitted);
+            continue;
+        }
         let words = [4, 8, 12, 16].map(|at| {
             let (word, _) = bytes[at..].split_first_chunk().unwrap();
             u32::from_le_bytes(*word)
@@ -39,6 +53,26 @@ fn an_export_is_the_fitted_tree_and_says_how_it_compares() {
             assert_eq!(Bvh::from_first_count(&nodes, &ids).unwrap(), fitted);
         }
     }
+}
+
+#[test]
+fn a_bake_for_a_tracer_has_the_cost_and_the_references_that_pay_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let scene = Scene::load("escher:900").unwrap();
+    for target in Target::ALL {
+        // Without a budget, other bakes choose the cost and the references themselves.
+        for budget in ["", " --budget=1Mwork"] {
+            bvh(at, &format!("bake escher:900 --for={}{budget} --out=x.bvh", target.name));
+            let (tree, header) = tree_file::load(&at.join("x.bvh"), &scene).unwrap();
+            let is_divided = tree.prim_ids.len() > 900;
+            assert_eq!(is_divided, target.references > 1.0, "{target:?}{budget}");
+            assert_eq!(header.objective, Objective::InternalArea);
+        }
+    }
+    bvh(at, "bake escher:900 --for=obvhs --references=1 --budget=1Mwork --out=x.bvh");
+    let (tree, _) = tree_file::load(&at.join("x.bvh"), &scene).unwrap();
+    assert_eq!(tree.prim_ids.len(), 900);
 }
 
 #[test]

@@ -53,7 +53,7 @@ impl Target {
         let Some(bounds) = tree.root_aabb() else { return [0.0; 2] };
         let nodes = match self.layout {
             Layout::ThreeMesh => tree.to_three_mesh(),
-            Layout::FirstCount | Layout::FirstCountAligned => Vec::new(),
+            _ => Vec::new(),
         };
         let mut open = Vec::new();
         let mut cost = |ray: Ray| {

@@ -1,10 +1,11 @@
 //! Tracers of others that take a ready tree: what a node and a triangle cost there, and which trees
 //! they accept.
 
+use super::FirstCountNode;
 use crate::collapse::{binary, collapse_at_most};
 use crate::cost::{self, SahConstants};
 use crate::{Aabb, Bvh, Node, file};
-use alloc::{vec, vec::Vec};
+use alloc::{format, string::String, vec, vec::Vec};
 
 /// A tracer that traces rays through a ready tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,11 +19,14 @@ pub struct Target {
     pub most_objects: u32,
     /// The most nodes from the root to a leaf, the root not counted.
     pub most_depth: usize,
+    /// The references per object that a search for the tracer should be permitted: 1, where a query
+    /// for all hits would find a divided object twice.
+    pub references: f64,
     /// The nodes in [files](Target::bytes) for the tracer.
     pub layout: Layout,
 }
 
-/// A layout of binary nodes of 32 bytes.
+/// A layout of binary nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
     /// [`FirstCountNode`](super::FirstCountNode)s.
@@ -31,11 +35,21 @@ pub enum Layout {
     FirstCountAligned,
     /// [`ThreeMeshNode`](super::ThreeMeshNode)s.
     ThreeMesh,
+    /// Text: `{"nodes": [[min x, y, z, max x, y, z, first, count], …], "ids": […]}`, with the fields
+    /// of [`FirstCountNode`](super::FirstCountNode)s.
+    Json,
 }
 
 impl Target {
     /// All targets.
-    pub const ALL: [Self; 3] = [Self::THREE_MESH_BVH, Self::TINYBVH, Self::OBVHS];
+    pub const ALL: [Self; 6] = [
+        Self::THREE_MESH_BVH,
+        Self::TINYBVH,
+        Self::OBVHS,
+        Self::BVH,
+        Self::MADMANN91_BVH,
+        Self::PLAIN,
+    ];
 
     /// `three-mesh-bvh` for three.js, and `three-gpu-pathtracer`. The costs are about those that the
     /// library builds with; its shaders have a stack of 60.
@@ -44,6 +58,7 @@ impl Target {
         constants: constants(1.8, 1.25),
         most_objects: 65_535,
         most_depth: 59,
+        references: 1.0,
         layout: Layout::ThreeMesh,
     };
 
@@ -53,17 +68,55 @@ impl Target {
         constants: constants(1.0, 1.0),
         most_objects: 1 << 20,
         most_depth: 63,
+        references: DIVIDED,
         layout: Layout::FirstCountAligned,
     };
 
-    /// The layout `Bvh2` of `obvhs`, by the costs that the library builds with.
+    /// The layout `Bvh2` of `obvhs`, by the costs that the library collapses leaves with.
     pub const OBVHS: Self = Self {
         name: "obvhs",
-        constants: constants(1.0, 1.0),
+        constants: constants(3.0, 1.0),
         most_objects: 255,
         most_depth: 95,
+        references: DIVIDED,
         layout: Layout::FirstCount,
     };
+
+    /// The Rust crate `bvh`, whose leaves have one shape, and whose iterator has a stack of 32.
+    pub const BVH: Self = Self {
+        name: "bvh",
+        constants: constants(1.0, 1.0),
+        most_objects: 1,
+        most_depth: 31,
+        references: 1.0,
+        layout: Layout::FirstCount,
+    };
+
+    /// Version 2 of `madmann91/bvh` in C++, which stores the size of a leaf in four bits, and whose
+    /// examples have a stack of 64.
+    pub const MADMANN91_BVH: Self = Self {
+        name: "madmann91-bvh",
+        constants: constants(1.0, 1.0),
+        most_objects: 15,
+        most_depth: 63,
+        references: DIVIDED,
+        layout: Layout::FirstCount,
+    };
+
+    /// Nodes as text, for any program with a stack of 64.
+    pub const PLAIN: Self = Self {
+        name: "json",
+        constants: constants(1.0, 1.0),
+        most_objects: 1 << 20,
+        most_depth: 63,
+        references: 1.0,
+        layout: Layout::Json,
+    };
+
+    /// Returns the target with this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|target| target.name == name)
+    }
 
     /// Returns the tree for this tracer: binary, with the leaves that cost least there, no leaf too
     /// large and none too deep. O(n), and O(n depth) where subtrees are too deep.
@@ -88,6 +141,8 @@ impl Target {
     /// | 20..32 | | zeros |
     /// | 32.. | | the nodes, 32 bytes each, in the target's [layout](Layout), then a `u32` per object id |
     ///
+    /// [Text](Layout::Json) has no header.
+    ///
     /// # Panics
     /// May panic on a tree that [`validate`](crate::validate()) rejects, or that is not fitted.
     pub fn bytes(&self, tree: &Bvh, boxes: &[Aabb]) -> Vec<u8> {
@@ -97,6 +152,7 @@ impl Target {
                 bytemuck::cast_slice(&tree.to_first_count_aligned()).to_vec()
             }
             Layout::ThreeMesh => bytemuck::cast_slice(&tree.to_three_mesh()).to_vec(),
+            Layout::Json => return text(tree).into_bytes(),
         };
         let header = [
             1,
@@ -121,6 +177,19 @@ impl Target {
     pub fn cost(&self, tree: &Bvh) -> f64 {
         cost::sah(tree, &self.constants)
     }
+}
+
+/// References per object that suffice: searches that may use twice as many hardly do.
+const DIVIDED: f64 = 1.3;
+
+/// Returns a binary tree as [text](Layout::Json). Numbers have the fewest digits that are read back
+/// as the same numbers.
+fn text(tree: &Bvh) -> String {
+    let node = |FirstCountNode { min: [a, b, c], max: [d, e, f], first, count }| {
+        format!("[{a:?},{b:?},{c:?},{d:?},{e:?},{f:?},{first},{count}]")
+    };
+    let nodes: Vec<String> = tree.to_first_count().into_iter().map(node).collect();
+    format!("{{\"nodes\":[\n{}\n],\"ids\":{:?}}}\n", nodes.join(",\n"), tree.prim_ids)
 }
 
 const fn constants(traversal: f64, intersection: f64) -> SahConstants {
