@@ -6,7 +6,7 @@
 
 enum { STEPS = 100 };
 
-/* Bakes a tree over a row of triangles for the rays of the last frame, and saves it. */
+/* Bakes a tree over a row of triangles for the rays of the last frame, and saves it, after a file for another tracer. */
 static int bake(const float *corners, size_t count, const char *path) {
     static float rays[STEPS][6]; /* an origin and a hit each */
     for (int i = 0; i < STEPS; i++) {
@@ -17,7 +17,7 @@ static int bake(const float *corners, size_t count, const char *path) {
     BvhBake search = {.corners = corners, .count = count, .rays = &rays[0][0], .ray_count = STEPS};
     search.seconds = 0.05;
     BvhTree *tree = bvh_tree_bake(&search);
-    int is_saved = tree && bvh_tree_save(tree, path) == 0;
+    int is_saved = tree && bvh_tree_export(tree, "obvhs", path) == 0 && bvh_tree_save(tree, path) == 0;
     bvh_tree_free(tree);
     return is_saved;
 }

@@ -202,6 +202,13 @@ BvhTree *bvh_tree_load_triangles(const char *path, const float *corners, size_t 
 // `tree` is a tree; `path` is a string.
 BvhStatus bvh_tree_save(const BvhTree *tree, const char *path);
 
+// Writes the tree to the file `path`, in UTF-8, for the tracer of another library: one of
+// `three-mesh-bvh`, `tinybvh`, `obvhs`, `bvh`, `madmann91-bvh` and `json`. The file is the same as
+// of `bvh export`.
+//
+// `tree` is a tree; `tracer` and `path` are strings.
+BvhStatus bvh_tree_export(const BvhTree *tree, const char *tracer, const char *path);
+
 // Frees a tree. Ignores null. Tracers of the tree remain valid.
 //
 // `tree` is null, or a tree that nobody uses any more.

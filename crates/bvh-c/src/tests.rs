@@ -4,6 +4,7 @@
 use crate::failure::{BvhStatus, bvh_last_error, status};
 use crate::{tracer::*, tree::*};
 use bvh_search::bvh_core::Primitives;
+use bvh_search::bvh_core::export::Target;
 use bvh_search::{Objects, Options, OwnedTree, prelude::*};
 use std::ffi::{CStr, CString, c_void};
 use std::ptr::{null, null_mut};
@@ -243,6 +244,28 @@ fn a_saved_tree_is_loaded_again_and_a_wrong_file_is_named() {
     }
 }
 
+#[test]
+fn an_export_is_the_file_of_every_tracer_and_others_are_named() {
+    let corners = corners(9);
+    let tree = tree(&corners);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tree.bin");
+    let named = CString::new(path.to_str().unwrap()).unwrap();
+    // SAFETY: the tree is freed last, and the strings end with a zero.
+    unsafe {
+        for target in Target::ALL {
+            let tracer = CString::new(target.name).unwrap();
+            let status = bvh_tree_export(tree, tracer.as_ptr(), named.as_ptr());
+            assert_eq!(status, BvhStatus::Ok, "{}", last_error());
+            assert_eq!(std::fs::read(&path).unwrap(), (*tree).owned.export(&target));
+        }
+        let status = bvh_tree_export(tree, c"embree".as_ptr(), named.as_ptr());
+        assert_eq!(status, BvhStatus::Invalid);
+        assert!(last_error().starts_with("tracer is \"embree\"; accepted: three-mesh-bvh, "));
+        bvh_tree_free(tree);
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn a_save_replaces_the_old_file_and_never_writes_into_it() {
@@ -341,7 +364,10 @@ fn a_budget_of_work_gives_the_file_of_the_rust_crates() {
     let corners = corners(40);
     let triangles = bytes_as_triangles(&corners);
     let segments: Vec<Segment> = (0..60u8)
-        .map(|i| Segment { from: [f32::from(i), 9.0, 0.5], to: [f32::from(i) + 0.5, 0.5, f32::from(i)] })
+        .map(|i| Segment {
+            from: [f32::from(i), 9.0, 0.5],
+            to: [f32::from(i) + 0.5, 0.5, f32::from(i)],
+        })
         .collect();
     let floats: Vec<f32> =
         segments.iter().flat_map(|segment| [segment.from, segment.to]).flatten().collect();

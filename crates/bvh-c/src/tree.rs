@@ -1,7 +1,9 @@
 //! Trees: found over boxes or triangles, improved, measured, saved, loaded, and lent as nodes.
 
 use crate::failure::{BvhStatus, Failure, array, given, given_mut, made, slice, status};
-use bvh_search::bvh_core::{FirstCountNode, Primitives, cost::Objective, cost::SahConstants};
+use bvh_search::bvh_core::Primitives;
+use bvh_search::bvh_core::cost::{Objective, SahConstants};
+use bvh_search::bvh_core::export::{FirstCountNode, Target};
 use bvh_search::prelude::*;
 use bvh_search::{Objects, Observer, Options, OwnedTree};
 use std::ffi::{CStr, c_char, c_void};
@@ -280,7 +282,7 @@ pub unsafe extern "C" fn bvh_tree_load_boxes(
 ) -> *mut BvhTree {
     made(|| {
         // SAFETY: `path` is null or ends with a zero.
-        let path = unsafe { text(path) }?;
+        let path = unsafe { text("path", path) }?;
         // SAFETY: `boxes` points to 6 floats for each of `count` boxes.
         let boxes = unsafe { boxes_of(boxes, count) }?;
         loaded(path, boxes)
@@ -299,7 +301,7 @@ pub unsafe extern "C" fn bvh_tree_load_triangles(
 ) -> *mut BvhTree {
     made(|| {
         // SAFETY: `path` is null or ends with a zero.
-        let path = unsafe { text(path) }?;
+        let path = unsafe { text("path", path) }?;
         // SAFETY: `corners` points to 9 floats for each of `count` triangles.
         let triangles = unsafe { triangles_of(corners, count) }?;
         loaded(path, triangles)
@@ -316,9 +318,33 @@ pub unsafe extern "C" fn bvh_tree_save(tree: *const BvhTree, path: *const c_char
         // SAFETY: nobody changes the tree during the call.
         let tree = unsafe { given("tree", tree) }?;
         // SAFETY: `path` is null or ends with a zero.
-        let path = unsafe { text(path) }?;
+        let path = unsafe { text("path", path) }?;
         let bytes = tree.owned.save().map_err(Failure::invalid)?;
         Ok(bvh_scenes::files::write(path.as_ref(), &bytes)?)
+    })
+}
+
+/// Writes the tree to the file `path`, in UTF-8, for the tracer of another library: one of
+/// `three-mesh-bvh`, `tinybvh`, `obvhs`, `bvh`, `madmann91-bvh` and `json`. The file is the same as
+/// of `bvh export`.
+///
+/// `tree` is a tree; `tracer` and `path` are strings.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvh_tree_export(
+    tree: *const BvhTree,
+    tracer: *const c_char,
+    path: *const c_char,
+) -> BvhStatus {
+    status(|| {
+        // SAFETY: nobody changes the tree during the call.
+        let tree = unsafe { given("tree", tree) }?;
+        // SAFETY: both are null or end with a zero.
+        let [tracer, path] = unsafe { [text("tracer", tracer)?, text("path", path)?] };
+        let target = Target::named(tracer).ok_or_else(|| {
+            let accepted = Target::ALL.map(|target| target.name).join(", ");
+            Failure::invalid(format!("tracer is {tracer:?}; accepted: {accepted}"))
+        })?;
+        Ok(bvh_scenes::files::write(path.as_ref(), &tree.owned.export(&target))?)
     })
 }
 
@@ -388,13 +414,13 @@ unsafe fn triangles_of(first: *const f32, count: usize) -> Result<Objects, Failu
     Ok(Objects::Shapes(Primitives::Triangles(triangles)))
 }
 
-/// Returns a path as text.
+/// Returns a string of C as text.
 ///
 /// # Safety
-/// `path` is null, or a string that ends with a zero and that nobody changes while the result is in
-/// use.
-unsafe fn text<'a>(path: *const c_char) -> Result<&'a str, Failure> {
+/// `string` is null, or a string that ends with a zero and that nobody changes while the result is
+/// in use.
+unsafe fn text<'a>(name: &str, string: *const c_char) -> Result<&'a str, Failure> {
     // SAFETY: a pointer that is not null points to a string that ends with a zero.
-    let path = unsafe { CStr::from_ptr(given("path", path)?) };
-    path.to_str().map_err(|_| Failure::invalid("path is not UTF-8"))
+    let string = unsafe { CStr::from_ptr(given(name, string)?) };
+    string.to_str().map_err(|_| Failure::invalid(format!("{name} is not UTF-8")))
 }

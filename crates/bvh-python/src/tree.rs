@@ -10,9 +10,11 @@ use bvh_scenes::files::{self, WriteError};
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_search::bvh_core::Segment;
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
+use bvh_search::bvh_core::export::Target;
 use bvh_search::{BakeError, Objects, Options, OwnedTree};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use std::fmt::Display;
 use std::io;
 use std::path::PathBuf;
@@ -174,6 +176,21 @@ impl Tree {
     fn save(&self, path: PathBuf) -> PyResult<()> {
         let bytes = self.owned().save().map_err(invalid)?;
         files::write(&path, &bytes).map_err(write_error)
+    }
+
+    /// Returns the file of `bvh export` for the tracer of another library: `three-mesh-bvh`,
+    /// `tinybvh`, `obvhs`, `bvh`, `madmann91-bvh`, or `json` for any other.
+    ///
+    /// >>> import json
+    /// >>> json.loads(square.export("json"))["nodes"]
+    /// [[0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0, 2]]
+    fn export<'py>(&self, py: Python<'py>, tracer: &str) -> PyResult<Bound<'py, PyBytes>> {
+        let target = Target::named(tracer).ok_or_else(|| {
+            let accepted = Target::ALL.map(|target| target.name).join(", ");
+            invalid(format!("tracer is {tracer:?}; accepted: {accepted}"))
+        })?;
+        let owned = self.owned();
+        Ok(PyBytes::new(py, &py.detach(|| owned.export(&target))))
     }
 
     /// Improves the tree for about `seconds`. Ctrl-C ends the search early, and the tree keeps its

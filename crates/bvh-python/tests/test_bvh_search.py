@@ -1,5 +1,6 @@
 """Compares trees and hits with brute force and with the Rust crates, and tests the errors."""
 
+import json
 import os
 import signal
 import struct
@@ -111,6 +112,19 @@ def test_a_budget_of_work_gives_the_file_of_the_program(tmp_path, references, ha
     tree = Tree.from_triangles(TRIANGLES, work=300_000, references=references, rays=rays if has_rays else None)
     tree.save(tmp_path / "python.bvh")
     assert (tmp_path / "python.bvh").read_bytes() == (tmp_path / "program.bvh").read_bytes()
+    export = ["export", "program.bvh", "mesh.obj", "--for=obvhs", "--out=program.bin"]
+    subprocess.run([program, *export], cwd=tmp_path, check=True)
+    assert tree.export("obvhs") == (tmp_path / "program.bin").read_bytes()
+
+
+def test_other_tracers_get_all_objects_and_unknown_ones_are_rejected():
+    for tree in [Tree.from_triangles(TRIANGLES, 0.05), Tree.from_boxes(boxes_of(TRIANGLES), 0.05)]:
+        plain = json.loads(tree.export("json"))
+        assert sorted(plain["ids"]) == list(range(len(tree)))
+        assert sum(node[7] for node in plain["nodes"]) == len(tree)
+        assert tree.export("three-mesh-bvh").startswith(b"BVHX")
+    with pytest.raises(ValueError, match='tracer is "embree"; accepted: three-mesh-bvh, '):
+        tree.export("embree")
 
 
 def test_a_save_that_fails_leaves_the_old_file_whole(tmp_path):
