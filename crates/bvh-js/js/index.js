@@ -35,14 +35,18 @@ export class Tree {
         return (this.#fitted ??= this.#searched.forThreeMesh());
     }
 
-    toMeshBVH(geometry, { indirect = geometry.groups.length > 0 || this.#ids !== null } = {}) {
+    /** Why the index of the geometry must not be changed, if it must not. */
+    get #kept() {
+        if (this.#ids !== null) return 'that is drawn in part';
+        if (this.#three.order.length > this.#searched.triangles) return 'whose triangles the tree divides';
+    }
+
+    toMeshBVH(geometry, { indirect = geometry.groups.length > 0 || this.#kept !== undefined } = {}) {
         const count = this.#ids?.length ?? triangleCount(geometry);
         if (count !== this.#searched.triangles) {
             throw new Error(`the geometry has ${count} triangles; accepted: the ${this.#searched.triangles} of the tree`);
         }
-        if (!indirect && this.#ids !== null) {
-            throw new Error('indirect is false; accepted: true for a geometry that is drawn in part');
-        }
+        if (!indirect && this.#kept) throw new Error(`indirect is false; accepted: true for a geometry ${this.#kept}`);
         const three = this.#three;
         const roots = [three.nodes.buffer];
         let order = three.order;
@@ -103,9 +107,9 @@ export async function bakeInWorker(geometry, options = {}) {
 
 export async function costOf(meshBVH) {
     await ready();
-    const { roots } = MeshBVH.serialize(meshBVH, { cloneBuffers: false });
+    const { roots, indirectBuffer } = MeshBVH.serialize(meshBVH, { cloneBuffers: false });
     if (roots.length !== 1) throw new Error(`the tree has ${roots.length} roots; accepted: one`);
-    const count = triangleCount(meshBVH.geometry);
+    const count = indirectBuffer?.length ?? triangleCount(meshBVH.geometry);
     return costOfRoot(new Uint8Array(roots[0]), count);
 }
 

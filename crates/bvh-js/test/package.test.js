@@ -81,6 +81,17 @@ test('a searched tree has the hits of the library’s own and costs less', async
     assert.ok(Math.abs((await costOf(ours)) / cost - 1) < 1e-3);
 });
 
+test('a tree that divides triangles has the same first hits, costs less, and leaves the index as it is', async () => {
+    const [geometry, other] = [scene(), scene()];
+    const index = geometry.index?.array.slice();
+    const [whole, divided] = await Promise.all([1, 1.3].map((references) => bake(geometry, { work: 3_000_000, references })));
+    assertSameHits(divided.toMeshBVH(geometry), new MeshBVH(other, { strategy: SAH, targetLeafSize: 1 }), 30_000);
+    assert.deepEqual(geometry.index?.array, index);
+    assert.ok(divided.cost < 0.95 * whole.cost, `${divided.cost} beside ${whole.cost}`);
+    assert.ok(Math.abs((await costOf(divided.toMeshBVH(geometry))) / divided.cost - 1) < 1e-3);
+    assert.throws(() => divided.toMeshBVH(geometry, { indirect: false }), /indirect is false.*divides/);
+});
+
 /** Tests of boxes and triangles, by the structure of the tree: what `raycast` visits without a limit. */
 function testsByHand(bvh, ray) {
     let [boxes, triangles] = [0, 0];
