@@ -1,6 +1,8 @@
 //! The crate `bvh`: binned surface area heuristic. It has no settings.
 
-use crate::tight;
+use crate::tracing::contender::{Batch, Contender, Tracer, timed};
+use crate::tracing::layout::COMPILED;
+use crate::{Racer, tight};
 use ::bvh::aabb::{Aabb as TheirAabb, Bounded};
 use ::bvh::bounding_hierarchy::BHShape;
 use ::bvh::bvh::{Bvh as TheirBvh, BvhNode};
@@ -9,8 +11,6 @@ use bvh_config::fault::{self, Fault};
 use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle};
 use bvh_scenes::trace::Query;
 use glam::Vec3;
-use harness::measure::contender::{Batch, Contender, Tracer, timed};
-use harness::measure::layout::COMPILED;
 use harness::peers::{Built, Library};
 use nalgebra::{Point3, Vector3};
 use std::time::Instant;
@@ -37,7 +37,9 @@ impl Library for Crate {
         self.check(settings)?;
         Ok(build(boxes))
     }
+}
 
+impl Racer for Crate {
     fn contenders<'a>(
         &self,
         settings: &Table,

@@ -2,9 +2,9 @@
 //! over the scenes.
 
 use crate::rows::{PeerRayRow, RayRatioRow};
-use harness::measure::layout::{COMPILED, is_repeat, is_single};
-use harness::measure::speed::Traced;
-use harness::peers::{OURS, Raced};
+use crate::tracing::layout::{COMPILED, is_repeat, is_single};
+use crate::tracing::speed::Traced;
+use harness::peers::OURS;
 use harness::processor::PROCESSOR;
 use harness::statistics::{self, geometric_mean, range};
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,6 +15,16 @@ pub const MEAN: &str = "geometric mean";
 /// The largest accepted share of wrong answers is one in this number of rays. The time of a
 /// contender above it is meaningless: tinybvh's packets overflow their stack in deep trees.
 const WRONG_AT_MOST_ONE_IN: u64 = 100;
+
+/// One contender's rays of one kind on one scene.
+pub struct Raced<'a> {
+    /// The contender's library, or [`OURS`].
+    pub library: String,
+    /// The seconds in which a tree of ours was built, to which its layout's are added.
+    pub search_seconds: f64,
+    /// Answers and seconds.
+    pub traced: &'a Traced,
+}
 
 /// The speed of one contender on one scene.
 #[derive(Clone, Debug, PartialEq)]

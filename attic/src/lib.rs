@@ -1,4 +1,4 @@
-//! Other libraries as methods of experiments, and a lower bound. The instruments of this package
+//! Other libraries as methods of experiments, the times of rays, and a lower bound. The instruments of this package
 //! are its benchmarks.
 
 mod bvh;
@@ -7,50 +7,42 @@ pub mod lower_bound;
 mod obvhs;
 mod programs;
 mod rows;
+pub mod tracing;
 
 pub use crate::obvhs::Preset;
 
 use crate::obvhs::Obvhs;
+use crate::tracing::contender::Contender;
+use bvh_config::fault::Fault;
 use bvh_core::{Aabb, Bvh, Triangle};
-use harness::Error;
-use harness::measure::contender::Contender;
-use harness::peers::{Built, Library, NamedBytes, Others, Race, Raced};
-use harness::rows::{Row, to_bytes};
-use std::path::Path;
+use harness::peers::{Built, Library, Others};
+use toml::Table;
+
+/// A library that also traces rays, by its native structures with the same settings: with its
+/// leaves, and with split triangles if it splits them.
+pub trait Racer: Library {
+    /// Returns the library's ways to trace rays through triangles.
+    ///
+    /// # Errors
+    ///
+    /// As [`Library::check`].
+    fn contenders<'a>(
+        &self,
+        settings: &Table,
+        triangles: &'a [Triangle],
+    ) -> Result<Vec<Contender<'a>>, Fault>;
+}
 
 /// The libraries that specs may name.
 pub const LIBRARIES: &[&dyn Library] = &[&bvh::Crate, &obvhs::Crate];
+const RACERS: &[&dyn Racer] = &[&bvh::Crate, &obvhs::Crate];
 
 /// What the program contains beside the harness.
 pub const OTHERS: Others = Others {
     libraries: LIBRARIES,
-    race: &RayPrograms,
+    tracing: &tracing::Rounds,
     lower_bound: lower_bound::internal_area,
 };
-
-/// Embree and tinybvh, which need a C++ compiler: `scripts/ray-peers/build` makes their programs.
-pub struct RayPrograms;
-
-impl Race for RayPrograms {
-    fn start(
-        &self,
-        program: &Path,
-        triangles: &[Triangle],
-    ) -> Result<Vec<(String, Contender<'static>)>, String> {
-        programs::contenders(program, triangles)
-    }
-
-    fn compare(&self, raced: &[Raced]) -> Result<(Vec<NamedBytes>, String), Error> {
-        let speeds = comparison::speeds(raced);
-        let ratios = comparison::ratios(&speeds);
-        let files = vec![file(&comparison::rows(&speeds))?, file(&ratios)?];
-        Ok((files, comparison::text(&ratios)))
-    }
-}
-
-fn file<R: Row>(rows: &[R]) -> Result<NamedBytes, Error> {
-    Ok((R::FILE, to_bytes(rows, Path::new(R::FILE))?))
-}
 
 /// Makes the result of a build. Costs are compared by tight boxes; a library may pad its own.
 fn tight(mut tree: Bvh, seconds: f64, boxes: &[Aabb]) -> Built {
@@ -71,19 +63,18 @@ pub fn build_by_bvh(boxes: &[Aabb]) -> Built {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tracing::answers::disagreements;
+    use crate::tracing::contender::{Batch, Tracer};
     use bvh_core::{Coherence, validate};
     use bvh_scenes::Scene;
     use bvh_scenes::rays::{Kind, rays};
     use bvh_scenes::trace::{Accelerator, Query};
-    use harness::measure::contender::{Batch, Tracer};
-    use harness::measure::disagreements;
-    use toml::Table;
 
-    fn all() -> Vec<(&'static dyn Library, Table)> {
+    fn all() -> Vec<(&'static dyn Racer, Table)> {
         let settings = ["", "preset = 'fastest'", "preset = 'medium'", "preset = 'very_slow'"];
         let mut all = Vec::new();
         for (index, settings) in settings.iter().enumerate() {
-            all.push((LIBRARIES[index.min(1)], settings.parse().unwrap()));
+            all.push((RACERS[index.min(1)], settings.parse().unwrap()));
         }
         all
     }

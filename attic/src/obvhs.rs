@@ -1,6 +1,8 @@
 //! The crate `obvhs`: parallel locally ordered clustering, then reinsertion.
 
-use crate::tight;
+use crate::tracing::contender::{Batch, Contender, Trace, Tracer, timed};
+use crate::tracing::layout::COMPILED;
+use crate::{Racer, tight};
 use ::obvhs::bvh2::{Bvh2, builder as binary};
 use ::obvhs::cwbvh::builder as wide;
 use ::obvhs::ray::{Ray as TheirRay, RayHit};
@@ -11,8 +13,6 @@ use bvh_config::fault::{self, Fault};
 use bvh_core::{Aabb, Bvh, FirstCountNode, Hit, Ray, Triangle};
 use bvh_scenes::trace::Query;
 use glam::Vec3A;
-use harness::measure::contender::{Batch, Contender, Trace, Tracer, timed};
-use harness::measure::layout::COMPILED;
 use harness::peers::{Built, Library};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -57,7 +57,9 @@ impl Library for Crate {
     fn build(&self, settings: &Table, boxes: &[Aabb]) -> Result<Built, Fault> {
         Ok(build(&read(settings)?, boxes))
     }
+}
 
+impl Racer for Crate {
     fn contenders<'a>(
         &self,
         settings: &Table,

@@ -5,9 +5,9 @@
 //! process per mode holds the scene as long as the contender lives, which lets all contenders
 //! alternate in one run.
 
+use crate::tracing::contender::{Batch, Contender, PART, Tracer};
 use bvh_core::{Hit, Triangle};
 use bvh_scenes::trace::Query;
-use harness::measure::contender::{Batch, Contender, PART, Tracer};
 use std::cell::RefCell;
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::Path;

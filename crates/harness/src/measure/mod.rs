@@ -1,11 +1,4 @@
-//! Measurements of rays through trees: the number of tests, the speed, and the correctness of
-//! answers.
+//! Measurements of trees: the tests of rays, and pictures.
 
-mod answers;
-pub mod contender;
-pub mod layout;
 pub mod picture;
 pub mod ray_cost;
-pub mod speed;
-
-pub use answers::disagreements;

@@ -1,30 +1,23 @@
-//! Third-party libraries and programs as methods of experiments: our costs of their trees, and
-//! their traversals compared with ours.
+//! Third-party libraries and programs as methods of experiments: our costs of their trees.
 //!
 //! The harness contains no library. The program in `attic/` does: it brings each as a [`Library`],
-//! and a [lower bound](LowerBound), and is the same program otherwise. A program of your own needs no code here: see [`command`].
+//! a [lower bound](LowerBound) and the [times of rays](Tracing), and is the same program otherwise. A program of your own needs no code here: see [`command`].
 
 pub mod command;
 mod program;
 
 use crate::Error;
-use crate::measure::contender::Contender;
-use crate::measure::speed::Traced;
 use bvh_build::BuildError;
 use bvh_config::fault::Fault;
 use bvh_config::{Check, OutOfRange};
-use bvh_core::{Aabb, Bvh, Triangle};
+use bvh_core::{Aabb, Bvh};
+use bvh_scenes::Scene;
 use bvh_search::Observer;
 use serde::{Deserialize, Deserializer, Serialize};
-use std::path::Path;
 use std::sync::OnceLock;
 use toml::Table;
 
-/// A library that builds trees and traces rays.
-///
-/// For costs and build times it builds a tree with one object per leaf, as our methods do. For rays
-/// it builds its native structures with the same settings: with its leaves, and with split
-/// triangles if it splits them.
+/// A library that builds trees, with one object per leaf, as our methods do.
 pub trait Library: Sync {
     /// The library's name in specs.
     fn name(&self) -> &'static str;
@@ -42,17 +35,6 @@ pub trait Library: Sync {
     ///
     /// As [`Self::check`].
     fn build(&self, settings: &Table, boxes: &[Aabb]) -> Result<Built, Fault>;
-
-    /// Returns the library's ways to trace rays through triangles.
-    ///
-    /// # Errors
-    ///
-    /// As [`Self::check`].
-    fn contenders<'a>(
-        &self,
-        settings: &Table,
-        triangles: &'a [Triangle],
-    ) -> Result<Vec<Contender<'a>>, Fault>;
 }
 
 /// A library's tree.
@@ -64,21 +46,41 @@ pub struct Built {
     pub seconds: f64,
 }
 
-/// Programs that trace rays beside our trees, and the comparison of all speeds.
-pub trait Race: Sync {
-    /// Starts a program with a scene. Returns its modes, each with the name of its library.
+/// Rays that are traced through trees, timed: the table `tracing` of a spec.
+pub trait Tracing: Sync {
+    /// Returns the table with every default spelled out.
     ///
     /// # Errors
     ///
-    /// If the program cannot be started or its output is malformed.
-    fn start(
-        &self,
-        program: &Path,
-        triangles: &[Triangle],
-    ) -> Result<Vec<(String, Contender<'static>)>, String>;
+    /// An unknown key, or a value that is not accepted.
+    fn resolve(&self, keys: Table) -> Result<Table, Fault>;
 
-    /// Compares speeds. Returns files with their names, and lines for the terminal.
-    fn compare(&self, raced: &[Raced]) -> Result<(Vec<NamedBytes>, String), Error>;
+    /// Traces rays through trees, scene by scene. Returns files with their names, and lines for the
+    /// terminal; `None` once `cancelled` returns true.
+    fn trace(
+        &self,
+        keys: &Table,
+        runs: &[FirstRun],
+        cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<(Vec<NamedBytes>, String)>, Error>;
+}
+
+/// The first run of a method on a scene.
+pub struct FirstRun<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The method's label.
+    pub label: &'a str,
+    /// The library, if the method is none of ours.
+    pub peer: Option<&'a Peer>,
+    /// The tree of the run.
+    pub tree: &'a Bvh,
+    /// How often the run's training rays enter each node, if it has any.
+    pub visits: Option<Vec<f32>>,
+    /// The median seconds of the method's runs on the scene.
+    pub search_seconds: f64,
+    /// The seed of the rays, the same for all methods of a scene.
+    pub seed: u64,
 }
 
 /// The name of a file of results, and its bytes.
@@ -86,16 +88,6 @@ pub type NamedBytes = (&'static str, Vec<u8>);
 
 /// The library of our own contenders.
 pub const OURS: &str = "ours";
-
-/// One contender's rays of one kind on one scene.
-pub struct Raced<'a> {
-    /// The contender's library, or [`OURS`].
-    pub library: String,
-    /// The seconds in which a tree of ours was built, to which its layout's are added.
-    pub search_seconds: f64,
-    /// Answers and seconds.
-    pub traced: &'a Traced,
-}
 
 /// A proven lower bound of the internal area of every binary tree over boxes, which grows with an
 /// effort.
@@ -105,8 +97,8 @@ pub type LowerBound = fn(&[Aabb], u32, &dyn Observer) -> Result<f64, BuildError>
 pub struct Others {
     /// The libraries that specs may name.
     pub libraries: &'static [&'static dyn Library],
-    /// Programs that trace rays.
-    pub race: &'static dyn Race,
+    /// The measurement of a spec's key `tracing`.
+    pub tracing: &'static dyn Tracing,
     /// The bound of a spec's key `lower_bound`.
     pub lower_bound: LowerBound,
 }
@@ -119,16 +111,26 @@ pub fn bring(others: Others) {
     OTHERS.get_or_init(|| others);
 }
 
-/// Returns the race of this program, if it contains other libraries.
-pub(crate) fn race() -> Option<&'static dyn Race> {
-    OTHERS.get().map(|others| others.race)
+/// Returns what this program contains for a key of a spec.
+fn others(key: &str) -> Result<&'static Others, Fault> {
+    OTHERS.get().ok_or_else(|| {
+        Fault::new(key, format!("set, which needs `{PROGRAM}`"), "none without that program")
+    })
 }
 
-/// Returns the lower bound of this program.
+/// Returns true if this program contains more than the harness.
+pub(crate) fn has_others() -> bool {
+    OTHERS.get().is_some()
+}
+
+/// Returns the measurement of the key `tracing`.
+pub(crate) fn tracing() -> Result<&'static dyn Tracing, Fault> {
+    Ok(others("tracing")?.tracing)
+}
+
+/// Returns the lower bound of the key `lower_bound`.
 pub(crate) fn lower_bound() -> Result<LowerBound, Fault> {
-    OTHERS.get().map(|others| others.lower_bound).ok_or_else(|| {
-        Fault::new("lower_bound", format!("set, which `{PROGRAM}` computes"), "none without it")
-    })
+    Ok(others("lower_bound")?.lower_bound)
 }
 
 /// A library with its settings, as a spec names it.
@@ -192,10 +194,9 @@ impl Peer {
         built.map_err(|fault| fault.to_string())
     }
 
-    /// Returns the library's ways to trace rays through triangles.
-    pub fn contenders<'a>(&self, triangles: &'a [Triangle]) -> Result<Vec<Contender<'a>>, String> {
-        let made = self.library().and_then(|library| library.contenders(&self.settings, triangles));
-        made.map_err(|fault| fault.to_string())
+    /// The settings of the library.
+    pub fn settings(&self) -> &Table {
+        &self.settings
     }
 
     fn library(&self) -> Result<&'static dyn Library, Fault> {

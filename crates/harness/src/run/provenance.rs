@@ -58,7 +58,7 @@ impl Provenance {
                 "{}, debug assertions {}, peers {}",
                 env!("HARNESS_BUILD"),
                 on(cfg!(debug_assertions)),
-                on(peers::race().is_some())
+                on(peers::has_others())
             ),
             cpu: format!("{}, {}", PROCESSOR.name(), std::env::consts::ARCH),
             threads: rayon::current_num_threads(),

@@ -3,14 +3,13 @@
 use super::job::{Job, tracing_error};
 use super::work::Work;
 use crate::Error;
-use crate::measure::layout::{collapsed_sah, widened};
 use crate::measure::ray_cost::{Config, TestRays, TrainedOn, test_rays};
 use crate::rows::store::Store;
 use crate::rows::{LayoutRow, RunTestRow, TestRow, VisitRow};
 use crate::spec::Experiment;
 use crate::statistics::mean;
-use bvh_core::cost::{self, Objective};
-use bvh_core::{Bvh, WideBvh};
+use bvh_core::cost::{self, Objective, SahConstants};
+use bvh_core::{Bvh, WideBvh, collapse_leaves};
 use bvh_search::Observer;
 use rayon::prelude::*;
 
@@ -153,9 +152,18 @@ fn visit_rows(
 fn layout(experiment: &Experiment, job: &Job, tree: &Bvh) -> Result<WideBvh, Error> {
     let triangles =
         job.scene.triangles().map_err(|error| job.tracing_error()(error.to_string()))?;
-    let visits = job.visits(experiment, tree)?;
-    widened(tree, triangles, visits.as_deref())
-        .map_err(|error| job.tracing_error()(error.to_string()))
+    let layout = match job.visits(experiment, tree)? {
+        Some(visits) => WideBvh::for_rays(tree, triangles, &visits),
+        None => WideBvh::new(tree, triangles),
+    };
+    layout.map_err(|error| job.tracing_error()(error.to_string()))
+}
+
+/// Returns the surface area heuristic of a tree with both constants 1, after the best collapse of
+/// leaves.
+fn collapsed_sah(tree: &Bvh) -> f64 {
+    let constants = SahConstants::default();
+    cost::sah(&collapse_leaves(tree, &constants), &constants)
 }
 
 /// Averages the sizes and costs of a method's trees and layouts over repetitions.

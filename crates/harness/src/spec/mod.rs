@@ -11,7 +11,7 @@ mod schema;
 
 use crate::contestant::{Contestant, Labelled};
 use crate::measure::picture;
-use crate::measure::{ray_cost, speed};
+use crate::measure::ray_cost;
 use crate::processor::PROCESSOR;
 use crate::report::Report;
 use crate::stress;
@@ -78,8 +78,10 @@ config! {
         rays: Vec<RandomRays>, in Nested;
         /// A picture drawn with every run's tree, with brute force and with a KD-tree.
         render: Option<picture::Config>, in Nested;
-        /// Rays traced through the tree of every method's first run, in all layouts, interleaved.
-        tracing: Option<speed::Config>, in Nested;
+        /// Rays traced through the tree of every method's first run, in all layouts, interleaved,
+        /// by the program in `attic/`.
+        #[schemars(with = "Option<std::collections::BTreeMap<String, serde_json::Value>>")]
+        tracing: Option<toml::Table>;
         /// Rays that methods with `for_rays` are trained on, and different rays that judge all
         /// trees by the number of their tests.
         ray_cost: Option<ray_cost::Config>, in Nested;

@@ -2,6 +2,7 @@
 
 use super::{Experiment, Labelled, Name};
 use crate::Error;
+use crate::peers;
 use crate::report::Report;
 use bvh_config::fault::{self, Fault};
 use bvh_scenes::files::read_text;
@@ -98,6 +99,10 @@ impl Experiment {
         // The suite is about all methods; a list in the spec would miss new ones.
         if experiment.suite.is_some() && experiment.methods.is_empty() {
             experiment.methods = Method::all().into_iter().map(Labelled::new).collect();
+        }
+        if let Some(keys) = experiment.tracing.take() {
+            let resolved = peers::tracing()?.resolve(keys);
+            experiment.tracing = Some(resolved.map_err(|fault| fault.below("tracing"))?);
         }
         experiment.check_together()?;
         Ok(experiment)

@@ -114,9 +114,10 @@ fn specs() -> Vec<Value> {
     for (_, text) in experiments() {
         let mut spec: Table = text.parse().unwrap();
         spec.remove("quick");
-        // The program in `attic/` contains the bound and other libraries. A method of ours replaces
+        // The program in `attic/` contains the bound, the times of rays and other libraries. A method of ours replaces
         // them.
         spec.remove("lower_bound");
+        spec.remove("tracing");
         for method in spec.get_mut("methods").and_then(Value::as_array_mut).into_iter().flatten() {
             if Peer::NAMES.contains(&method["method"].as_str().unwrap()) {
                 let label = method.get("label").unwrap_or(&method["method"]).clone();
@@ -141,7 +142,6 @@ objective = { sah = { traversal = 1.0, intersection = 2.0 } }
 rays = [{ family = 'lines', query = 'any', count = 7 }]
 render = { width = 8, height = 8, samples = 2 }
 reports = [{ kind = 'generations', source = 's', title = 't', method = 'genetic', baseline = 'grasp', reason = 'r' }]
-tracing = { cameras = { escher = { eye = [1.0, 2.0, 3.0], target = [0.5, 0.5, 0.5] } } }
 ";
     all.extend(text.parse::<Table>().unwrap());
     specs.push(Value::Table(all));

@@ -4,13 +4,13 @@
 use super::answers;
 use super::contender::{Batch, Contender, PART, Tracer};
 use super::layout::{Instructions, Layout};
-use crate::rows::{TraceRow, TraceTimeRow};
-use crate::statistics::{median, minimum};
 use bvh_config::config;
 use bvh_core::{Bvh, Hit, Ray, TestCounts};
 use bvh_scenes::Scene;
 use bvh_scenes::rays::{Kind, Viewpoint, rays};
 use bvh_scenes::trace::{Accelerator, Query};
+use harness::rows::{TraceRow, TraceTimeRow};
+use harness::statistics::{median, minimum};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -192,7 +192,7 @@ impl OfKind<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::layout::own_contenders;
+    use crate::tracing::layout::own_contenders;
     use bvh_build::{Builder, median_cut, muller_fellner};
 
     #[test]

@@ -1,8 +1,8 @@
 //! The layouts of our trees for tracing, and the instruction sets that they are limited to.
 
 use super::contender::{Contender, Tracer};
-use bvh_core::cost::{self, SahConstants};
-use bvh_core::{Bvh, InvalidBvh, Kernel, Triangle, WideBvh, collapse_leaves};
+use bvh_core::cost::SahConstants;
+use bvh_core::{Bvh, Kernel, WideBvh, collapse_leaves};
 use bvh_scenes::Scene;
 use bvh_scenes::trace::{Accelerator, Structure};
 use serde::{Deserialize, Serialize};
@@ -93,19 +93,6 @@ impl Layout {
     }
 }
 
-/// Returns the wide layout of a valid tree for rays that enter its nodes as often as `visits`
-/// states, otherwise for random lines.
-pub fn widened(
-    tree: &Bvh,
-    triangles: &[Triangle],
-    visits: Option<&[f32]>,
-) -> Result<WideBvh, InvalidBvh> {
-    match visits {
-        Some(visits) => WideBvh::for_rays(tree, triangles, visits),
-        None => WideBvh::new(tree, triangles),
-    }
-}
-
 /// Lays out a tree of ours, valid over the scene, in each of the layouts.
 ///
 /// Layouts with vector kernels are limited to each of the instruction sets in turn, by default to
@@ -155,7 +142,10 @@ fn own_contender<'a>(
     let start = Instant::now();
     let wide = match layout {
         Layout::Binary | Layout::BinaryLeaves => None,
-        _ => Some(widened(tree, triangles, visits)),
+        _ => Some(match visits {
+            Some(visits) => WideBvh::for_rays(tree, triangles, visits),
+            None => WideBvh::new(tree, triangles),
+        }),
     };
     let tracer = match wide {
         None => {
@@ -189,11 +179,4 @@ fn own_contender<'a>(
         preparation_seconds: start.elapsed().as_secs_f64(),
         tracer,
     })
-}
-
-/// Returns the surface area heuristic of a tree with both constants 1, after the best collapse of
-/// leaves.
-pub fn collapsed_sah(tree: &Bvh) -> f64 {
-    let constants = SahConstants::default();
-    cost::sah(&collapse_leaves(tree, &constants), &constants)
 }
