@@ -1,4 +1,4 @@
-//! Has rays traced through the trees of first runs.
+//! Rays through the trees of first runs, timed by the program in `attic/`.
 
 use super::job::Job;
 use super::work::Work;
@@ -10,7 +10,7 @@ use crate::statistics::median;
 use bvh_search::Observer;
 use toml::Table;
 
-/// Traces rays through the trees of first runs. Returns the text for the terminal.
+/// Writes the files of the times, and returns the text for the terminal.
 pub(crate) fn measure(keys: &Table, work: &mut Work) -> Result<String, Error> {
     let tracing = peers::tracing().map_err(|fault| Error::Usage(fault.to_string()))?;
     work.complete_trees(|job| job.repetition == 0)?;
