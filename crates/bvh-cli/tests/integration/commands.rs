@@ -4,7 +4,7 @@
 #![cfg_attr(windows, allow(unused_imports))]
 
 use crate::support::{
-    ReadOnly, bvh, ended, facts, names, outside_buffer, outside_scene, program, refused,
+    bvh, ended, facts, names, outside_buffer, outside_scene, program, refused,
     run_in_little_memory, unsaid, words, wrong, wrong_flags,
 };
 use bvh_core::{Aabb, Bvh, Node, file};
@@ -208,23 +208,17 @@ fn a_full_output_is_an_error_and_a_closed_pipe_is_none() {
     }
 }
 
+// Not even root can make files in this folder.
+#[cfg(target_os = "linux")]
 #[test]
 fn a_folder_that_cannot_be_written_is_named() {
     let folder = folder();
-    let at = folder.path();
-    let locked = at.join("locked");
-    fs::create_dir(&locked).unwrap();
-    let Some(_guard) = ReadOnly::new(&locked) else {
-        eprintln!("not tried: this user can write into any folder here");
-        return;
-    };
     for (line, parts) in [
-        ("bake spheres75 --budget=1h --out=locked/x.bvh", ["locked", "cannot create"]),
-        ("render spheres75 --size=8x8 --out=locked/x.png", ["locked/x.png", "cannot"]),
+        ("bake spheres75 --budget=1h --out=/proc/x.bvh", ["/proc/x.bvh", "cannot create"]),
+        ("render spheres75 --size=8x8 --out=/proc/x.png", ["/proc/x.png", "cannot create"]),
     ] {
-        refused(at, &words(line), 1, &parts);
+        refused(folder.path(), &words(line), 1, &parts);
     }
-    assert_eq!(fs::read_dir(&locked).unwrap().count(), 0);
 }
 
 #[test]

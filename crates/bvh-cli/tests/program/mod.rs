@@ -3,11 +3,9 @@
 #![allow(dead_code)] // each test file uses some of it
 
 mod flags;
-mod read_only;
 
 use super::PROGRAM;
 pub use flags::wrong_flags;
-pub use read_only::ReadOnly;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
