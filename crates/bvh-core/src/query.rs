@@ -1,4 +1,4 @@
-//! Queries other than hits of a ray: the objects in a region, and the objects nearest to a point.
+//! Queries other than hits of a ray: the objects in a region, and the object nearest to a point.
 //!
 //! The objects may be of any kind. The caller passes a closure that examines one object and that
 //! can also skip it. Boxes are tested conservatively. For any tree, the answer is the same as the

@@ -39,9 +39,10 @@
 use super::answer::{ANY_HIT, All};
 use super::instructions::{Instructions, Task};
 use super::lanes::{Lanes, Mask};
-use super::layout::WideBvh;
+use super::layout::{WideBvh, WideNode};
 use super::one_ray::{LeafRay, Leaves, traverse};
 use super::pairs::Plane;
+use super::portable::WideRay;
 use super::triangles::TriangleBlock;
 use super::{portable, vector};
 use crate::exact::Line;
@@ -114,7 +115,9 @@ impl WideBvh {
             return unsafe { vector::dispatch(self.kernel, OneRay { wide: self, ray, hits }) };
         }
         let line = Line::new(ray);
-        portable::traverse::<ANY_HIT>(self, ray, &mut (), |block, _| {
+        let wide_ray = WideRay::new(ray, &self.bounds);
+        let intervals = |node: &WideNode| wide_ray.intervals(node);
+        portable::traverse::<ANY_HIT>(self, ray.t_max(), intervals, &mut (), |block, _| {
             for (object, triangle) in block.triangles() {
                 hits.extend(hit_of(ray, &line, object, &triangle));
             }

@@ -20,10 +20,10 @@ pub(crate) trait Find {
 
     /// Writes the answer for a ray: the distance at which its traversal ended, and the hit object,
     /// `u32::MAX` for none.
-    fn write(&mut self, number: usize, t: f32, object: u32);
+    fn write(&mut self, _number: usize, _t: f32, _object: u32) {}
 
     /// Takes one of all hits.
-    fn append(&mut self, number: usize, hit: Hit);
+    fn append(&mut self, _number: usize, _hit: Hit) {}
 
     /// Answers one ray by itself.
     fn alone(&mut self, wide: &WideBvh, number: usize, ray: &Ray);
@@ -38,8 +38,6 @@ impl Find for Nearest<'_> {
         let t = if object == u32::MAX { f32::INFINITY } else { t };
         self.0[number] = Hit { t, object };
     }
-
-    fn append(&mut self, _: usize, _: Hit) {}
 
     fn alone(&mut self, wide: &WideBvh, number: usize, ray: &Ray) {
         self.0[number] = wide.nearest_hit(ray).unwrap_or(Hit::MISS);
@@ -57,8 +55,6 @@ impl Find for Any<'_> {
         self.0[number] = object != u32::MAX;
     }
 
-    fn append(&mut self, _: usize, _: Hit) {}
-
     fn alone(&mut self, wide: &WideBvh, number: usize, ray: &Ray) {
         self.0[number] = wide.any_hit(ray);
     }
@@ -69,8 +65,6 @@ pub(crate) struct All<'a>(pub(crate) &'a mut Vec<Found>);
 
 impl Find for All<'_> {
     const ALL: bool = true;
-
-    fn write(&mut self, _: usize, _: f32, _: u32) {}
 
     #[inline(always)]
     fn append(&mut self, number: usize, hit: Hit) {

@@ -5,14 +5,13 @@ use super::box_ray::BoxTest;
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::{DoubleLanes, Lanes, Mask};
-use super::layout::{Child, WideBvh, WideNode};
+use super::layout::{WideBvh, WideNode};
 use super::one_ray::{Leaves, visit};
 use super::triangles::TriangleBlock;
-use super::vector;
+use super::{portable, vector};
 use crate::query::Near;
 use crate::ray::pow2;
 use crate::{Aabb, Hit, Kernel};
-use alloc::vec::Vec;
 use core::mem::MaybeUninit;
 use glam::{DVec3, Vec3};
 
@@ -51,6 +50,13 @@ impl Nearest {
         }
     }
 
+    /// Returns the greatest [bound](PointLanes) that a box with a nearer triangle may have.
+    #[inline(always)]
+    fn limit(&self, scale: f32) -> f32 {
+        let scaled = self.near.distance_squared * f64::from(scale) * f64::from(scale);
+        (scaled * (1.0 + 1.0 / (1 << 18) as f64)) as f32 + f32::MIN_POSITIVE
+    }
+
     #[inline(always)]
     fn closest(&self) -> Option<Closest> {
         // A layout over triangles without area has nodes and no triangles.
@@ -61,13 +67,6 @@ impl Nearest {
             distance: libm::sqrt(self.near.distance_squared),
         })
     }
-}
-
-/// A child that is visited later, and a lower bound of the squared distances of its triangles.
-#[derive(Clone, Copy)]
-struct Waiting {
-    bound: f64,
-    child: Child,
 }
 
 impl WideBvh {
@@ -108,67 +107,47 @@ impl WideBvh {
             // SAFETY: a layout's kernel is available.
             return unsafe { vector::dispatch(self.kernel, task) };
         }
-        let mut stack = Vec::new();
         for (&point, closest) in points.iter().zip(closest) {
-            *closest = self.closest_portable(point, &mut stack);
+            *closest = self.closest_portable(point);
         }
     }
 
-    /// Returns the closest point by code for any machine.
-    fn closest_portable(&self, point: Vec3, stack: &mut Vec<Waiting>) -> Option<Closest> {
-        let mut child = self.root.filter(|_| point.is_finite())?;
+    fn closest_portable(&self, point: Vec3) -> Option<Closest> {
         let mut nearest = Nearest::new(point);
-        stack.clear();
-        loop {
-            if child.is_node() {
-                let node = &self.nodes[child.index()];
-                let first = stack.len();
-                for (lane, bound) in bounds(node, point).into_iter().enumerate() {
-                    // Unused lanes are infinitely far away.
-                    if bound <= nearest.near.distance_squared.min(f64::MAX) {
-                        stack.push(Waiting { bound, child: node.children[lane] });
-                    }
-                }
-                stack[first..].sort_by(|a, b| b.bound.total_cmp(&a.bound));
-            } else {
-                for block in &self.blocks[child.index()..] {
-                    for (object, triangle) in block.triangles() {
-                        nearest.offer(object, triangle.offset_from(nearest.target));
-                    }
-                    if block.is_last() {
-                        break;
-                    }
+        let scale = scale(point, &self.bounds);
+        let scaled = (point * scale).to_array();
+        let intervals = |node: &WideNode| {
+            let mut sums = [0.0; WideNode::LANES];
+            for (axis, &scaled) in scaled.iter().enumerate() {
+                for (lane, sum) in sums.iter_mut().enumerate() {
+                    let below = node.planes[axis][lane] * scale - scaled;
+                    let above = scaled - node.planes[axis + 3][lane] * scale;
+                    let outside = below.max(above).max(0.0);
+                    *sum += outside * outside;
                 }
             }
-            child = loop {
-                let Some(waiting) = stack.pop() else { return nearest.closest() };
-                if waiting.bound <= nearest.near.distance_squared {
-                    break waiting.child;
-                }
-            };
+            // Unused lanes are infinitely far away.
+            (sums, [f32::MAX; WideNode::LANES])
+        };
+        let visit = |block: &TriangleBlock, limit: &mut Hit| {
+            for (object, triangle) in block.triangles() {
+                nearest.offer(object, triangle.offset_from(nearest.target));
+            }
+            limit.t = nearest.limit(scale);
+            false
+        };
+        if point.is_finite() {
+            portable::traverse::<NEAREST_HIT>(self, f32::MAX, intervals, &mut (), visit);
         }
+        nearest.closest()
     }
 }
 
-/// Returns lower bounds of the squared distances of a point from the boxes of a node; ∞ for
-/// unused lanes.
-#[inline(always)]
-fn bounds(node: &WideNode, point: Vec3) -> [f64; WideNode::LANES] {
-    /// Covers the rounding in f64.
-    const ROUNDING: f64 = 1.0 - 1.0 / (1 << 21) as f64;
-    let mut bounds = [0.0; WideNode::LANES];
-    for axis in 0..3 {
-        let lower = &node.planes[axis];
-        let upper = &node.planes[axis + 3];
-        for lane in 0..WideNode::LANES {
-            // In f32 differences of the largest coordinates would overflow.
-            let below = f64::from(lower[lane]) - f64::from(point[axis]);
-            let above = f64::from(point[axis]) - f64::from(upper[lane]);
-            let outside = below.max(above).max(0.0);
-            bounds[lane] += outside * outside;
-        }
-    }
-    bounds.map(|bound| bound * ROUNDING)
+/// Returns the power of two that makes the largest coordinate about 1, so that no square overflows.
+fn scale(point: Vec3, bounds: &Aabb) -> f32 {
+    let size = point.abs().max(bounds.min.abs()).max(bounds.max.abs()).max_element();
+    let exponent = (size.to_bits() >> 23) as i32 - 127;
+    pow2((-exponent).clamp(-126, 126))
 }
 
 /// The search for the closest points of points by a vector kernel.
@@ -205,11 +184,10 @@ impl<K: Instructions> Task<K> for ClosestPoints<'_> {
     }
 }
 
-/// A point as boxes are tested with it: in f32, multiplied by a power of two that makes the largest
-/// coordinate about 1, so that no square overflows.
+/// A point as boxes are tested with it: in f32, [scaled](scale()).
 ///
 /// The computed square of a distance exceeds the real one by at most 2⁻²⁰ of it, and by at most
-/// 2⁻¹⁴⁰ where numbers are subnormal. The limit of a [visit](TargetLanes::visit) adds more than both.
+/// 2⁻¹⁴⁰ where numbers are subnormal. The [limit](Nearest::limit) adds more than both.
 struct PointLanes<L> {
     scaled: [L; 3],
     scale: L,
@@ -219,9 +197,7 @@ struct PointLanes<L> {
 impl<L: Lanes> PointLanes<L> {
     #[inline(always)]
     unsafe fn new(point: Vec3, bounds: &Aabb) -> Self {
-        let size = point.abs().max(bounds.min.abs()).max(bounds.max.abs()).max_element();
-        let exponent = (size.to_bits() >> 23) as i32 - 127;
-        let scale = pow2((-exponent).clamp(-126, 126));
+        let scale = scale(point, bounds);
         let [x, y, z] = (point * scale).to_array();
         // SAFETY: the processor has the instructions.
         unsafe {
@@ -260,7 +236,7 @@ impl<K: Instructions> BoxTest<K> for PointLanes<K::Boxes> {
 struct TargetLanes<L: Lanes> {
     target: [L::Double; 3],
     nearest: Nearest,
-    scale: f64,
+    scale: f32,
 }
 
 type Vector<D> = [D; 3];
@@ -272,7 +248,7 @@ impl<L: Lanes> TargetLanes<L> {
         let DVec3 { x, y, z } = nearest.target;
         // SAFETY: the processor has the instructions.
         let target = unsafe { [L::Double::splat(x), L::Double::splat(y), L::Double::splat(z)] };
-        Self { target, nearest, scale: scale.into() }
+        Self { target, nearest, scale }
     }
 
     #[inline(always)]
@@ -307,8 +283,7 @@ impl<L: Lanes> Leaves<L> for TargetLanes<L> {
                 // An unused lane repeats a triangle, and its id is greater.
                 self.nearest.offer(block.id(lane), DVec3::new(x[lane], y[lane], z[lane]));
             }
-            let scaled = self.nearest.near.distance_squared * self.scale * self.scale;
-            limit.t = (scaled * (1.0 + 1.0 / (1 << 18) as f64)) as f32 + f32::MIN_POSITIVE;
+            limit.t = self.nearest.limit(self.scale);
             true
         }
     }

@@ -14,7 +14,7 @@ struct Pending {
 }
 
 /// A ray prepared for wide nodes, with the numbers of [`Slabs`].
-struct WideRay {
+pub(super) struct WideRay {
     /// Which planes of a node the ray meets first, by axis, and which last.
     near: [usize; 3],
     far: [usize; 3],
@@ -26,9 +26,10 @@ struct WideRay {
     /// The ray itself, where f32 is too coarse.
     far_away: Option<Slabs>,
 }
+
 impl WideRay {
     #[inline(always)]
-    fn new(ray: &Ray, bounds: &Aabb) -> Self {
+    pub(super) fn new(ray: &Ray, bounds: &Aabb) -> Self {
         let slabs = Slabs::new(ray, bounds);
         let [lower, upper] = slabs.origins();
         let [near_factor, far_factor] = slabs.factors();
@@ -46,7 +47,7 @@ impl WideRay {
     /// Returns the distances at which the ray enters and leaves the boxes of a node. The first
     /// exceeds the second for a box that it misses.
     #[inline(always)]
-    fn intervals(&self, node: &WideNode) -> ([f32; 8], [f32; 8]) {
+    pub(super) fn intervals(&self, node: &WideNode) -> ([f32; 8], [f32; 8]) {
         let mut entry = [self.t_min; 8];
         let mut exit = [f32::INFINITY; 8];
         if let Some(slabs) = &self.far_away {
@@ -68,35 +69,6 @@ impl WideRay {
             }
         }
         (entry, exit)
-    }
-
-    /// The nearest of the children that the ray enters before `t_max`, and the number of the
-    /// others, which are written to `others`, the nearest last; with `ANY` the one in the last lane
-    /// is taken for the nearest. `None` if the ray enters none.
-    #[inline(always)]
-    fn enter<const ANY: bool>(
-        &self,
-        node: &WideNode,
-        t_max: f32,
-        others: &mut [Pending; 8],
-    ) -> Option<(Child, usize)> {
-        let (entry, exit) = self.intervals(node);
-        let mut count = 0;
-        for lane in 0..8 {
-            if entry[lane] <= exit[lane] && entry[lane] <= t_max {
-                // Insertion; the higher lane is nearer on ties, for example where the ray begins in
-                // both boxes.
-                let mut at = count;
-                while !ANY && at > 0 && others[at - 1].entry < entry[lane] {
-                    others[at] = others[at - 1];
-                    at -= 1;
-                }
-                others[at] = Pending { entry: entry[lane], child: node.children[lane] };
-                count += 1;
-            }
-        }
-        let last = count.checked_sub(1)?;
-        Some((others[last].child, last))
     }
 }
 
@@ -127,31 +99,35 @@ pub(crate) fn walk<const ANY: bool>(
         }
         is_nearer
     };
-    let nearest = traverse::<ANY>(wide, ray, counter, visit);
+    let wide_ray = WideRay::new(ray, &wide.bounds);
+    let intervals = |node: &WideNode| wide_ray.intervals(node);
+    let nearest = traverse::<ANY>(wide, ray.t_max(), intervals, counter, visit);
     (!nearest.is_miss()).then_some(nearest)
 }
 
-/// Visits the leaves that the ray enters up to the nearest hit, or with `ANY` up to the first hit
-/// that is found, in no order. `visit` tests a block, and returns whether the nearest hit is a new
-/// one.
+/// Visits the leaves up to the nearest hit, or with `ANY` up to the first hit that is found, in no
+/// order. `intervals` returns where the boxes of a node begin and end, and the first exceeds the
+/// second for a box to leave out. `visit` tests a block, and returns whether the nearest hit is a
+/// new one.
 #[inline(always)]
 pub(crate) fn traverse<const ANY: bool>(
     wide: &WideBvh,
-    ray: &Ray,
+    t_max: f32,
+    intervals: impl Fn(&WideNode) -> ([f32; 8], [f32; 8]),
     counter: &mut impl Counter,
     mut visit: impl FnMut(&TriangleBlock, &mut Hit) -> bool,
 ) -> Hit {
-    let mut nearest = Hit { t: ray.t_max(), object: u32::MAX };
+    let mut nearest = Hit { t: t_max, object: u32::MAX };
     let Some(mut child) = wide.root else { return nearest };
-    let wide_ray = WideRay::new(ray, &wide.bounds);
     let mut stack = Stack::<Pending, 32>::new(Pending { entry: 0.0, child: Child::node(0) });
     loop {
         if child.is_node() {
             counter.boxes(WideNode::LANES);
             let node = &wide.nodes[child.index()];
-            if let Some((first, others)) = wide_ray.enter::<ANY>(node, nearest.t, stack.room()) {
-                stack.grow(others);
-                child = first;
+            let others = stack.room();
+            if let Some(last) = enter::<ANY>(node, intervals(node), nearest.t, others) {
+                child = others[last].child;
+                stack.grow(last);
                 continue;
             }
         } else {
@@ -172,4 +148,30 @@ pub(crate) fn traverse<const ANY: bool>(
             }
         };
     }
+}
+
+/// Writes the children that are entered before `t_max`, the nearest last, or with `ANY` in the order
+/// of their lanes. Returns the index of the last; `None` if there are none.
+#[inline(always)]
+fn enter<const ANY: bool>(
+    node: &WideNode,
+    (entry, exit): ([f32; 8], [f32; 8]),
+    t_max: f32,
+    entered: &mut [Pending; 8],
+) -> Option<usize> {
+    let mut count = 0;
+    for lane in 0..8 {
+        if entry[lane] <= exit[lane] && entry[lane] <= t_max {
+            // Insertion; the higher lane is nearer on ties, for example where the ray begins in
+            // both boxes.
+            let mut at = count;
+            while !ANY && at > 0 && entered[at - 1].entry < entry[lane] {
+                entered[at] = entered[at - 1];
+                at -= 1;
+            }
+            entered[at] = Pending { entry: entry[lane], child: node.children[lane] };
+            count += 1;
+        }
+    }
+    count.checked_sub(1usize)
 }
