@@ -115,18 +115,18 @@ mod tests {
     }
 
     #[test]
-    fn the_chosen_axes_are_cut() {
-        for (axis, skipped, expected) in [
+    fn the_chosen_axes_are_cut_and_an_odd_object_goes_to_the_left() {
+        for (axis, boxes, expected, end_of_left) in [
             // The root is cut along x, its children along y.
-            (CutAxis::Alternating, 0, [0, 1, 2, 3]),
-            (CutAxis::Longest, 0, [0, 2, 1, 3]),
+            (CutAxis::Alternating, &zigzag(4)[..], &[0, 1, 2, 3][..], 3.0),
+            (CutAxis::Longest, &zigzag(4), &[0, 2, 1, 3], 5.0),
             // Along y, object 1 would be first.
-            (CutAxis::X, 1, [0, 1, 2, 3]),
+            (CutAxis::X, &zigzag(5)[1..], &[0, 1, 2, 3], 5.0),
+            (CutAxis::X, &zigzag(5), &[0, 1, 2, 3, 4], 5.0),
         ] {
-            let boxes = &zigzag(4 + skipped)[skipped..];
             let tree = Config { axis, ..Config::default() }.build(boxes).unwrap();
             assert_eq!(tree.prim_ids, expected, "{axis:?}");
-            assert_eq!(tree.nodes[1].aabb.max.x == 3.0, axis == CutAxis::Alternating);
+            assert_eq!(tree.nodes[1].aabb.max.x, end_of_left, "{axis:?}");
         }
     }
 
