@@ -149,3 +149,12 @@ fn a_visit_that_breaks_ends_the_query() {
     assert_eq!(visits, 3);
     assert!(broken.is_some());
 }
+
+#[test]
+fn of_objects_that_contain_the_point_the_first_is_nearest() {
+    let triangle = Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]);
+    for count in 2..40 {
+        let nearest = query::nearest(&tree(&vec![triangle; count]), Vec3::X, 0.0, |_| Some(0.0));
+        assert_eq!(nearest, Some(Near { object: 0, distance_squared: 0.0 }), "{count}");
+    }
+}
