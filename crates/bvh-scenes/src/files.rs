@@ -301,13 +301,17 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_stay_and_a_new_file_has_the_permissions_of_the_old_one() {
+    fn links_stay_and_a_file_has_the_permissions_of_the_old_one_or_those_of_any_new_file() {
         use std::os::unix::fs::{PermissionsExt, symlink};
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.bvh");
         let link = folder.path().join("link");
         symlink("x.bvh", &link).unwrap();
         fs::write(&path, "old").unwrap();
+        let new = folder.path().join("new");
+        write(&new, b"new").unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&new), mode(&path), "an ordinary file");
         for mode in [0o600, 0o666, 0o444] {
             fs::set_permissions(&path, PermissionsExt::from_mode(mode)).unwrap();
             write(&link, b"new").unwrap();

@@ -305,4 +305,18 @@ mod tests {
         let message = rays.check().unwrap_err().to_string();
         assert_eq!(message, "count is 349526; accepted: up to 349525, each with 3 rays in all");
     }
+
+    #[test]
+    fn a_renderer_sends_its_number_of_primary_rays_and_a_bounce_from_every_hit() {
+        let scene = Scene::load("escher:500").unwrap();
+        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
+        let pose = Pose { eye: [9.0, 5.0, 8.0], target: [0.0; 3] };
+        let rays = RenderedRays { cameras: vec![pose], count: 100, ..Default::default() };
+        let traced = of_renderer(&rays, &scene, &tree, &|| false);
+        let of_kind = |kind| traced.iter().filter(move |traced| traced.kind == kind);
+        let accelerator = Accelerator::of_tree(&scene.primitives, &tree);
+        let hits = of_kind(Kind::Primary).filter(|traced| accelerator.any_hit(&traced.ray)).count();
+        assert!(hits > 0);
+        assert_eq!([of_kind(Kind::Primary).count(), of_kind(Kind::Bounce).count()], [100, hits]);
+    }
 }

@@ -102,4 +102,13 @@ mod tests {
             assert_eq!(films[0], films[1]);
         }
     }
+
+    #[test]
+    fn rays_follow_as_many_reflections_as_the_options_say() {
+        let scene = Scene::load("spheres75").unwrap();
+        let options = Options { width: 32, height: 18, samples: 1, ..Options::default() };
+        let rays =
+            [0, 1, 2].map(|depth| picture(&scene, &Options { depth, ..options.clone() }).rays);
+        assert!(rays.is_sorted_by(|a, b| a < b), "{rays:?}");
+    }
 }

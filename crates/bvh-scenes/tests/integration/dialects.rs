@@ -50,6 +50,7 @@ comment a square → obj_info num_cols 5 |
 end_header → element cell 4000000000\nend_header |
 element v → element camera 2\nproperty list uchar float m\nelement v & 0 0 0 → 2 nan 5\n0\n0 0 0 |
 4 0 1 2 3 → 5 0 1 2 3 0 |
+face 1 → face 2 & 4 0 1 → 2 0 1\n4 0 1 | 1 face has fewer than three vertices and was skipped
 element face → element tristrips & 4 0 1 2 3 → 8 0 1 2 -1 0 2 3 -1 |
 ",
     );
@@ -156,7 +157,9 @@ fn binary_stl_files_as_programs_write_them() {
     {
         assert!(error(counted(count), "a.stl").contains(room));
     }
-    assert!(error(&counted(0)[..84], "a.stl").contains("no facet"));
+    for empty in [&counted(0)[..84], &[&counted(0)[..], &[0; 2]].concat()] {
+        assert!(error(empty, "a.stl").contains("no facet"));
+    }
 }
 
 #[test]
