@@ -52,7 +52,7 @@ impl Racer for Crate {
 
 /// An object as the library stores it. Only the tracing of rays reads the corners.
 #[derive(Clone)]
-struct Shape {
+pub struct Shape {
     aabb: TheirAabb<f32, 3>,
     corners: [Point3<f32>; 3],
     /// The object's index in the scene. The library keeps the order of the shapes, but its
@@ -60,6 +60,41 @@ struct Shape {
     object: u32,
     /// The index of the shape's leaf, which the library writes.
     node: usize,
+}
+
+/// Returns triangles as the library stores them.
+pub fn shapes(triangles: &[Triangle]) -> Vec<Shape> {
+    let shape =
+        |(object, triangle): (u32, &Triangle)| Shape::new(object, triangle.aabb(), triangle.0);
+    (0..).zip(triangles).map(shape).collect()
+}
+
+/// Converts a tree that [`Target::BVH`](bvh_core::export::Target::BVH) fits, and tells the shapes,
+/// in the order of its objects, their leaves. A divided shape is told the last one.
+pub fn to_theirs(tree: &Bvh, shapes: &mut [Shape]) -> TheirBvh<f32, 3> {
+    let ours = tree.to_first_count();
+    let mut parents = vec![0; ours.len()];
+    let mut nodes = Vec::new();
+    for (index, node) in ours.iter().enumerate() {
+        let (first, parent_index) = (node.first as usize, parents[index]);
+        if node.count > 0 {
+            let shape_index = tree.prim_ids[first] as usize;
+            shapes[shape_index].node = index;
+            nodes.push(BvhNode::Leaf { parent_index, shape_index });
+            continue;
+        }
+        parents[first..first + 2].fill(index);
+        let [child_l_aabb, child_r_aabb] = [first, first + 1]
+            .map(|child| TheirAabb { min: ours[child].min.into(), max: ours[child].max.into() });
+        nodes.push(BvhNode::Node {
+            parent_index,
+            child_l_index: first,
+            child_l_aabb,
+            child_r_index: first + 1,
+            child_r_aabb,
+        });
+    }
+    TheirBvh { nodes }
 }
 
 impl Shape {
@@ -104,7 +139,7 @@ fn to_our_box(aabb: TheirAabb<f32, 3>) -> Aabb {
 ///
 /// The library keeps the boxes of children in their parent, and none for the root or in leaves.
 /// Here an inner node gets the union of its children's boxes, and a leaf its object's box.
-fn to_our_tree(theirs: &TheirBvh<f32, 3>, boxes: &[Aabb]) -> Bvh {
+pub fn to_our_tree(theirs: &TheirBvh<f32, 3>, boxes: &[Aabb]) -> Bvh {
     if boxes.is_empty() {
         return Bvh::default();
     }
@@ -211,10 +246,7 @@ impl PreparedRay {
 
 /// Builds the library's tree over triangles and returns its traversal.
 fn contender(triangles: &[Triangle]) -> Contender<'_> {
-    let mut shapes: Vec<Shape> = (0..)
-        .zip(triangles)
-        .map(|(object, triangle)| Shape::new(object, triangle.aabb(), triangle.0))
-        .collect();
+    let mut shapes = shapes(triangles);
     let start = Instant::now();
     let tree = TheirBvh::build(&mut shapes);
     let preparation_seconds = start.elapsed().as_secs_f64();

@@ -1,10 +1,10 @@
 //! Other libraries as methods of experiments, the times of rays, and a lower bound. The instruments of this package
 //! are its benchmarks.
 
-mod bvh;
+pub mod bvh;
 mod comparison;
 pub mod lower_bound;
-mod obvhs;
+pub mod obvhs;
 mod programs;
 mod rows;
 pub mod tracing;

@@ -3,7 +3,7 @@
 use crate::tracing::contender::{Batch, Contender, Trace, Tracer, timed};
 use crate::tracing::layout::COMPILED;
 use crate::{Racer, tight};
-use ::obvhs::bvh2::{Bvh2, builder as binary};
+use ::obvhs::bvh2::{Bvh2, builder as binary, node::Bvh2Node};
 use ::obvhs::cwbvh::builder as wide;
 use ::obvhs::ray::{Ray as TheirRay, RayHit};
 use ::obvhs::rt_triangle::RtTriangle;
@@ -96,9 +96,25 @@ fn build_over(boxes: &[Aabb], parameters: BvhBuildParams) -> (Bvh2, Duration) {
     (binary::build_bvh2(&theirs, parameters, &mut time), time)
 }
 
+/// Converts a tree that [`Target::OBVHS`](bvh_core::export::Target::OBVHS) fits. `bvh2_to_cwbvh`
+/// makes the library's wide tree of the result.
+pub fn to_theirs(tree: &Bvh) -> Bvh2 {
+    let node = |node: FirstCountNode| {
+        let aabb = aabb::Aabb::new(node.min.into(), node.max.into());
+        Bvh2Node::new(aabb, node.count, node.first)
+    };
+    Bvh2 {
+        nodes: tree.to_first_count().into_iter().map(node).collect(),
+        primitive_indices: tree.prim_ids.clone(),
+        children_are_ordered_after_parents: true,
+        max_depth: tree.depth() + 1,
+        ..Default::default()
+    }
+}
+
 /// Converts a tree to our type.
-fn to_our_tree(theirs: &Bvh2, boxes: &[Aabb]) -> Bvh {
-    if boxes.is_empty() {
+pub fn to_our_tree(theirs: &Bvh2) -> Bvh {
+    if theirs.primitive_indices.is_empty() {
         return Bvh::default();
     }
     let nodes: Vec<FirstCountNode> = theirs
@@ -115,7 +131,8 @@ fn to_our_tree(theirs: &Bvh2, boxes: &[Aabb]) -> Bvh {
         .unwrap_or_else(|error| panic!("obvhs built no tree: {error}"))
 }
 
-fn to_their_ray(ray: &Ray) -> TheirRay {
+/// Converts a ray.
+pub fn to_their_ray(ray: &Ray) -> TheirRay {
     TheirRay::new(ray.origin().into(), ray.direction().into(), ray.t_min(), ray.t_max())
 }
 
@@ -125,7 +142,7 @@ pub fn build(config: &Obvhs, boxes: &[Aabb]) -> Built {
     let parameters =
         BvhBuildParams { max_prims_per_leaf: 1, pre_split: false, ..parameters(config) };
     let (theirs, time) = build_over(boxes, parameters);
-    tight(to_our_tree(&theirs, boxes), time.as_secs_f64(), boxes)
+    tight(to_our_tree(&theirs), time.as_secs_f64(), boxes)
 }
 
 /// Makes a [`Trace`] from a tree over `triangles` in the order of its leaves. It is a macro because

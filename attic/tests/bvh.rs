@@ -1,63 +1,15 @@
 //! Our trees in the crate `bvh`: the same shapes for every ray, by fewer tests.
 
-use ::bvh::aabb::{Aabb as TheirAabb, Bounded, IntersectsAabb};
-use ::bvh::bounding_hierarchy::BHShape;
-use ::bvh::bvh::{Bvh as TheirBvh, BvhNode};
+use ::bvh::aabb::{Aabb as TheirAabb, IntersectsAabb};
+use ::bvh::bvh::Bvh as TheirBvh;
 use ::bvh::ray::Ray as TheirRay;
-use bvh_core::{Bvh, Ray};
+use attic::bvh::{Shape, shapes, to_theirs};
+use bvh_core::Ray;
+use bvh_core::export::Target;
 use bvh_scenes::Scene;
 use bvh_scenes::rays::{Kind, Viewpoint, rays};
 use bvh_search::{Budget, Objects, Options, OwnedTree};
 use std::cell::Cell;
-
-/// Converts a tree with one object per leaf, and tells the shapes, in the order of its objects,
-/// their leaves.
-fn to_theirs<S: BHShape<f32, 3>>(tree: &Bvh, shapes: &mut [S]) -> TheirBvh<f32, 3> {
-    let ours = tree.to_first_count();
-    let mut parents = vec![0; ours.len()];
-    let mut nodes = Vec::new();
-    for (index, node) in ours.iter().enumerate() {
-        let (first, parent_index) = (node.first as usize, parents[index]);
-        if node.count > 0 {
-            let shape_index = tree.prim_ids[first] as usize;
-            shapes[shape_index].set_bh_node_index(index);
-            nodes.push(BvhNode::Leaf { parent_index, shape_index });
-            continue;
-        }
-        parents[first..first + 2].fill(index);
-        let [child_l_aabb, child_r_aabb] = [first, first + 1]
-            .map(|child| TheirAabb { min: ours[child].min.into(), max: ours[child].max.into() });
-        nodes.push(BvhNode::Node {
-            parent_index,
-            child_l_index: first,
-            child_l_aabb,
-            child_r_index: first + 1,
-            child_r_aabb,
-        });
-    }
-    TheirBvh { nodes }
-}
-
-struct Shape {
-    aabb: TheirAabb<f32, 3>,
-    leaf: usize,
-}
-
-impl Bounded<f32, 3> for Shape {
-    fn aabb(&self) -> TheirAabb<f32, 3> {
-        self.aabb
-    }
-}
-
-impl BHShape<f32, 3> for Shape {
-    fn set_bh_node_index(&mut self, leaf: usize) {
-        self.leaf = leaf;
-    }
-
-    fn bh_node_index(&self) -> usize {
-        self.leaf
-    }
-}
 
 /// A ray that counts the boxes that it is tested against.
 struct CountingRay {
@@ -91,13 +43,9 @@ fn the_crate_bvh_finds_the_same_shapes_in_our_trees_by_fewer_tests() {
         let options = Options { budget, ..Options::default() };
         let objects = Objects::Boxes(scene.boxes.clone());
         let searched = OwnedTree::find(objects, &options, &()).unwrap();
-        let shape = |aabb: &bvh_core::Aabb| Shape {
-            aabb: TheirAabb { min: aabb.min.to_array().into(), max: aabb.max.to_array().into() },
-            leaf: usize::MAX,
-        };
-        let mut shapes: Vec<Shape> = scene.boxes.iter().map(shape).collect();
+        let mut shapes = shapes(scene.triangles().unwrap());
         let built = TheirBvh::build(&mut shapes);
-        let ours = to_theirs(searched.tree(), &mut shapes);
+        let ours = to_theirs(&Target::BVH.fit(searched.tree()), &mut shapes);
         assert!(ours.is_consistent(&shapes), "{name}");
         let viewpoint = Viewpoint::default();
         let kinds = [Kind::Primary, Kind::Incoherent];

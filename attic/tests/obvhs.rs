@@ -1,12 +1,17 @@
 //! Trees can be converted to another library and back, and both libraries find the same hits in
 //! them.
 
-use ::obvhs::bvh2::{Bvh2, builder::build_bvh2, node::Bvh2Node};
+use ::obvhs::bvh2::builder::build_bvh2;
+use ::obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use ::obvhs::cwbvh::{CwBvh, node::CwBvhNode};
 use ::obvhs::ray::RayHit;
 use ::obvhs::{BvhBuildParams, aabb};
-use bvh_core::export::{CompressedBvh, CompressedNode};
-use bvh_core::{Aabb, Bvh, FirstCountNode, PreparedRay, Ray, Triangle, nearest_hit, validate};
+use attic::obvhs::{to_our_tree, to_their_ray, to_theirs};
+use bvh_core::export::{CompressedBvh, CompressedNode, Target};
+use bvh_core::{Aabb, Bvh, PreparedRay, Ray, Triangle, nearest_hit, validate};
+use bvh_scenes::Scene;
+use bvh_scenes::rays::{Kind, Viewpoint, rays};
+use bvh_search::{Bake, Budget};
 
 /// Makes small triangles at pseudo-random points.
 fn triangles(n: u32) -> Vec<Triangle> {
@@ -22,20 +27,6 @@ fn triangles(n: u32) -> Vec<Triangle> {
         ]));
     }
     triangles
-}
-
-/// Converts nodes of `obvhs`. They have the same fields in another order.
-fn from_theirs(bvh: &Bvh2) -> Vec<FirstCountNode> {
-    let mut nodes = Vec::new();
-    for node in &bvh.nodes {
-        nodes.push(FirstCountNode {
-            min: node.aabb().min.to_array(),
-            first: node.first_index,
-            max: node.aabb().max.to_array(),
-            count: node.prim_count,
-        });
-    }
-    nodes
 }
 
 /// Converts a tree to compressed nodes of `obvhs`, which have the planes in another order.
@@ -56,22 +47,6 @@ fn to_their_compressed_node(node: &CompressedNode) -> CwBvhNode {
     bytemuck::pod_read_unaligned(&theirs)
 }
 
-/// Converts a tree to a tree of `obvhs`.
-fn to_theirs(tree: &Bvh) -> Bvh2 {
-    let mut nodes = Vec::new();
-    for node in tree.to_first_count() {
-        let aabb = aabb::Aabb::new(node.min.into(), node.max.into());
-        nodes.push(Bvh2Node::new(aabb, node.count, node.first));
-    }
-    Bvh2 {
-        nodes,
-        primitive_indices: tree.prim_ids.clone(),
-        children_are_ordered_after_parents: true,
-        max_depth: tree.depth() + 1,
-        ..Default::default()
-    }
-}
-
 #[test]
 fn a_tree_of_obvhs_survives_a_round_trip_and_traces_the_same_hits() {
     for n in [1, 2, 3, 50, 4000] {
@@ -85,14 +60,12 @@ fn a_tree_of_obvhs_survives_a_round_trip_and_traces_the_same_hits() {
         }
         for params in [BvhBuildParams::fast_build(), BvhBuildParams::medium_build()] {
             let built = build_bvh2(&their_boxes, params, &mut Default::default());
-            let tree =
-                Bvh::from_first_count(&from_theirs(&built), &built.primitive_indices).unwrap();
+            let tree = to_our_tree(&built);
             validate(&tree, &boxes).unwrap();
             assert_eq!(tree.nodes.len(), built.nodes.len());
             let returned = to_theirs(&tree);
             returned.validate(&their_boxes, false, true);
-            let again = Bvh::from_first_count(&from_theirs(&returned), &returned.primitive_indices);
-            assert_eq!(again.as_ref(), Ok(&tree));
+            assert_eq!(to_our_tree(&returned), tree);
             let compressed = to_their_compressed(&tree, &boxes);
             compressed.validate(&their_boxes, false);
             for i in 0..200u8 {
@@ -114,6 +87,39 @@ fn a_tree_of_obvhs_survives_a_round_trip_and_traces_the_same_hits() {
             }
         }
     }
+}
+
+#[test]
+fn rays_find_the_same_hits_in_both_of_its_trees_made_of_divided_triangles() {
+    let scene = Scene::load("escher:5000").unwrap();
+    let triangles = scene.triangles().unwrap();
+    let budget = Budget { max_work: Some(5_000_000), ..Budget::UNLIMITED };
+    let references = Target::OBVHS.references;
+    let bake =
+        Bake { shapes: Some(&scene.primitives), references, budget, ..Bake::new(&scene.boxes) };
+    let tree = bake.search(None, &()).unwrap().outcome.tree;
+    assert!(tree.prim_ids.len() > 6000);
+    let binary = to_theirs(&Target::OBVHS.fit(&tree));
+    // Its conversion merges leaves itself.
+    let wide = bvh2_to_cwbvh(&to_theirs(&tree), 3, true, false);
+    let mut hits = 0;
+    for kind in [Kind::Primary, Kind::Incoherent] {
+        for ray in rays(kind, 50_000, &scene, &tree, &Viewpoint::default(), 1) {
+            let expected = nearest_hit(&tree, triangles, &ray).map(|hit| hit.t);
+            hits += usize::from(expected.is_some());
+            let mut hit = RayHit::none();
+            let is_hit = binary.ray_traverse(to_their_ray(&ray), &mut hit, |_, position| {
+                distance(triangles, &ray, binary.primitive_indices[position])
+            });
+            assert_eq!(is_hit.then_some(hit.t), expected, "{ray:?}");
+            let mut hit = RayHit::none();
+            let is_hit = wide.ray_traverse(to_their_ray(&ray), &mut hit, |_, position| {
+                distance(triangles, &ray, wide.primitive_indices[position])
+            });
+            assert_eq!(is_hit.then_some(hit.t), expected, "wide, {ray:?}");
+        }
+    }
+    assert!(hits > 20_000, "{hits}");
 }
 
 /// Returns the distance of a triangle, or infinity as `obvhs` expects it for a miss.
