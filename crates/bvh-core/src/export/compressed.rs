@@ -64,10 +64,10 @@ fn step(exponent: u8) -> f32 {
 impl CompressedNode {
     fn around(aabb: &Aabb) -> Self {
         let mut exponents = aabb.extent().to_array().map(exponent);
-        for axis in 0..3 {
+        for (axis, exponent) in exponents.iter_mut().enumerate() {
             // The extent may be rounded to 255 steps, past which the upper corner lies.
-            let last = aabb.min[axis] + 255.0 * step(exponents[axis]);
-            exponents[axis] += u8::from(last < aabb.max[axis]);
+            let last = aabb.min[axis] + 255.0 * step(*exponent);
+            *exponent += u8::from(last < aabb.max[axis]);
         }
         Self { origin: aabb.min, exponents, ..Self::zeroed() }
     }
