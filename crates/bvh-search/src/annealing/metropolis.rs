@@ -11,7 +11,8 @@ pub(crate) trait Mover: Send {
     /// none. O(n), in the memory of an earlier series.
     fn begin(&mut self, tree: &Working<impl Metric>, near: Vec<u32>);
     /// Changes the tree, and undoes the change unless Metropolis accepts it. Returns whether it was
-    /// accepted.
+    /// accepted. Calls `tree.begin()` before a change, or `undo` would revert the last accepted one,
+    /// and adds to the work in any case, or a run that only work ends would never end.
     fn step(&mut self, tree: &mut Working<impl Metric>, temperature: f64, rng: &mut Stream)
     -> bool;
     /// Nodes visited by all moves so far.

@@ -42,14 +42,14 @@ pub(crate) struct Schedule {
 
 /// A search that consists of one annealing run.
 pub(crate) struct AnnealingRun {
-    /// First and last temperature.
+    /// First and last temperature, above 0.
     pub heat: [f64; 2],
     pub work_per_object: u64,
 }
 
 impl AnnealingRun {
     /// Anneals the initial tree by moves of one kind, until the work of the run or the budget is
-    /// used up.
+    /// used up, and ends in passes of reinsertion to a local optimum.
     pub fn search<M: Mover>(
         &self,
         mover: impl Fn() -> M + Sync,
