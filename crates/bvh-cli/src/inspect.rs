@@ -1,15 +1,17 @@
-//! `bvh inspect`: reports the origin of a tree file, and the costs and the shape of its tree.
+//! `bvh inspect` and `bvh verify`: report the origin of a tree file, and the costs and the shape of
+//! its tree.
 
 use crate::Error;
 use crate::answer::{Answer, Form};
+use crate::arguments::output_file;
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_core::file::{FileError, Header};
 use bvh_core::{Bvh, NodeKind, validate_references};
-use bvh_scenes::Scene;
 use bvh_scenes::tree_file::{self, TreeFileError};
+use bvh_scenes::{Scene, files};
 use clap::Args;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,14 +22,17 @@ pub struct InspectArgs {
     /// The tree file.
     #[arg(value_name = "FILE.bvh")]
     pub file: PathBuf,
-    /// The tree's scene, by name or path of a mesh file. Proves that the file, from any source,
-    /// contains a tree over the scene's objects, and compares it with the Müller–Fellner tree.
+    /// The tree's scene, by name or path of a mesh file. Checks the tree against the scene's
+    /// objects, and compares it with the Müller–Fellner tree.
     pub scene: Option<String>,
     /// Measure the expected tests of rays in the wide layout of the tree: `default` for rays that
     /// need no camera, or a file that describes the rays of a renderer. No bake trains on the same
     /// default rays.
     #[arg(long, value_name = "default|FILE.toml", requires = "scene")]
     pub rays: Option<String>,
+    /// Write the nodes to a CSV file, one row each, in full precision.
+    #[arg(long, value_name = "NODES.csv")]
+    pub nodes: Option<PathBuf>,
     /// Permits files outside the scene's folder.
     #[command(flatten)]
     pub files: SceneFiles,
@@ -38,6 +43,10 @@ pub struct InspectArgs {
 
 /// Prints the facts about a file. Rejects a damaged file, and a file for a different scene.
 pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
+    // A wrong path is reported before the scene is loaded, which may take long.
+    if let Some(nodes) = &args.nodes {
+        output_file("--nodes", nodes, "csv")?;
+    }
     let rays = args.rays.as_deref().map(Rays::read).transpose()?;
     let scene = args.scene.as_deref().map(|name| args.files.load(name)).transpose()?;
     if let (Some(named), Some(rays), Some(scene)) = (&args.rays, &rays, &scene) {
@@ -53,6 +62,57 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     if let Some(tests) = tests {
         answer.fact("expected tests of a ray", tests);
     }
+    if let Some(path) = &args.nodes {
+        files::write(path, &nodes_table(&read.tree).map_err(Error::csv(path))?)?;
+    }
+    answer.end();
+    Ok(())
+}
+
+/// Returns the nodes as CSV, whose columns docs/TREE_FILES.md describes.
+fn nodes_table(tree: &Bvh) -> Result<Vec<u8>, csv::Error> {
+    // The flat tree stores no parents, so one pass over all children finds them.
+    let mut parents = vec![None; tree.nodes.len()];
+    for (index, node) in tree.nodes.iter().enumerate() {
+        parents[node.children()].fill(Some(index));
+    }
+    let columns = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(columns.split(','))?;
+    for (index, (node, parent)) in tree.nodes.iter().zip(parents).enumerate() {
+        let (kind, first, count) = match node.kind() {
+            NodeKind::Inner { first, count } => ("inner", first, count),
+            NodeKind::Leaf { first, count } => ("leaf", first, count),
+        };
+        let corners = [node.aabb.min.to_array(), node.aabb.max.to_array()];
+        writer.serialize((index, parent, kind, first, count, corners))?;
+    }
+    writer.into_inner().map_err(|error| error.into_error().into())
+}
+
+/// Prove that a tree file from any source contains a tree for a scene. Computes validity and costs
+/// again.
+#[derive(Args, Clone, Debug)]
+pub struct VerifyArgs {
+    /// The tree file.
+    #[arg(value_name = "FILE.bvh")]
+    pub file: PathBuf,
+    /// The tree's scene, by name or path of a mesh file.
+    pub scene: String,
+    /// Permits files outside the scene's folder.
+    #[command(flatten)]
+    pub files: SceneFiles,
+    /// The form of the facts.
+    #[command(flatten)]
+    pub form: Form,
+}
+
+/// Does the same as [`inspect`], and requires a scene.
+pub fn verify(args: &VerifyArgs) -> Result<(), Error> {
+    let scene = args.files.load(&args.scene)?;
+    let read = Read::new(&args.file, Some(&scene))?;
+    let mut answer = Answer::new(args.form);
+    read.describe(Some(&scene), &mut answer);
     answer.end();
     Ok(())
 }

@@ -40,6 +40,7 @@ struct Cli {
 enum Command {
     Bake(bake::BakeArgs),
     Inspect(inspect::InspectArgs),
+    Verify(inspect::VerifyArgs),
     Export(export::ExportArgs),
     Render(render::RenderArgs),
     Report(report::ReportArgs),
@@ -74,6 +75,7 @@ fn run(command: Command) -> Result<(), Error> {
             None => bake::bake(&args, &INTERRUPTED),
         },
         Command::Inspect(args) => inspect::inspect(&args),
+        Command::Verify(args) => inspect::verify(&args),
         Command::Export(args) => export::export(&args),
         Command::Render(args) => render::render(&args),
         Command::Report(args) => report::report(&args),

@@ -106,6 +106,7 @@ fn what_is_wrong_is_named_before_the_work_and_changes_no_file() {
             &["--from wide.bvh", "inner node 0 has 3 children", "nodes with two"],
         ),
         ("inspect good.bvh spheres750".into(), &["good.bvh", "75 objects", "750"]),
+        ("verify good.bvh spheres750".into(), &["good.bvh", "75 objects", "750"]),
         ("inspect good.bvh spheres750:75".into(), &["good.bvh", "another scene"]),
         ("inspect flipped.bvh".into(), &["flipped.bvh", "checksum"]),
         ("export good.bvh escher:75 --for=obvhs --out=x.bin".into(), &["good.bvh", "scene"]),
@@ -195,6 +196,15 @@ fn a_scene_that_needs_more_memory_than_the_limit_is_rejected_before_the_work() {
     ended(&limited("bake S21:1000 --budget=0s --out=x.bvh"), 0, &[]);
 }
 
+// Linux stores holes of files, so that this file needs no space on the disk.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_of_64_gigabytes_is_rejected_by_its_header() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::File::create(folder.path().join("huge.bvh")).unwrap().set_len(64 << 30).unwrap();
+    wrong(folder.path(), "inspect huge.bvh", &["huge.bvh: not a tree file"]);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_output_is_an_error_and_a_closed_pipe_is_none() {
@@ -232,6 +242,7 @@ fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
         &[
             ("bake", &["spheres75", "--budget=0s", "--out=x.bvh"]),
             ("inspect", &["good.bvh", "spheres75"]),
+            ("verify", &["good.bvh", "spheres75"]),
             ("export", &["good.bvh", "spheres75", "--for=obvhs", "--out=x.bin"]),
             ("render", &["spheres75", "--out=x.png", "--size=8x8"]),
             ("report", &["good.bvh", "spheres75"]),
@@ -253,6 +264,7 @@ fn every_command_reads_buffers_outside_the_folder_of_a_scene_only_with_permissio
         "bake scene.gltf --budget=0s --out=x.bvh",
         "bake scene.gltf --instances --budget=0s --out=x",
         "inspect x.bvh scene.gltf",
+        "verify x.bvh scene.gltf",
         "render scene.gltf --size=8x8 --out=x.png",
         "report x.bvh scene.gltf",
     ] {
@@ -268,6 +280,7 @@ fn every_command_that_prints_results_prints_them_as_json() {
         ("bake spheres75 --budget=1kwork --out=x.bvh", "seconds"),
         ("bake escher --budget=1Mwork --parts=2 --list", "parts"),
         ("inspect good.bvh", "valid"),
+        ("verify good.bvh spheres75", "depth"),
         ("bake escher:75 --budget=0s --out=e.bvh", "seconds"),
         ("export e.bvh escher:75 --for=obvhs --out=x.bin", "cost of a ray"),
         ("render spheres75 --size=8x8 --out=x.png", "rays"),

@@ -1,6 +1,7 @@
 //! Inspecting and verifying tree files from the command line and from other languages.
 
 use crate::support::{bvh, facts, number, text};
+use bvh_scenes::{Scene, tree_file};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,17 +9,45 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 #[test]
-fn the_facts_begin_with_the_validity_and_are_the_same_in_json() {
+fn the_facts_begin_with_the_validity_and_are_the_same_in_json_and_from_verify() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     bvh(at, "bake spheres75 --budget=0s --out=x.bvh");
-    let said = bvh(at, "inspect x.bvh spheres75");
+    let said = bvh(at, "verify x.bvh spheres75");
+    assert_eq!(bvh(at, "inspect x.bvh spheres75"), said);
     assert!(said.starts_with("valid: yes, over this scene's objects\n"), "{said}");
     let mut names: Vec<&str> = said.lines().map(|line| line.split_once(": ").unwrap().0).collect();
     names.sort_unstable();
-    let json = facts(at, "inspect x.bvh spheres75");
+    let json = facts(at, "verify x.bvh spheres75");
     assert!(json["objects"] == 75 && json["method"] == "best" && json["depth"].is_u64());
     assert!(json.keys().eq(names), "{json:?}");
+}
+
+#[test]
+fn the_nodes_are_written_in_full_precision() {
+    let folder = tempfile::tempdir().unwrap();
+    bvh(folder.path(), "bake spheres75 --budget=0s --out=a.bvh");
+    bvh(folder.path(), "inspect a.bvh --nodes=nodes.csv");
+    let scene = Scene::load("spheres75").unwrap();
+    let (tree, _) = tree_file::load(&folder.path().join("a.bvh"), &scene).unwrap();
+    let mut reader = csv::Reader::from_path(folder.path().join("nodes.csv")).unwrap();
+    let columns = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
+    let headers: Vec<&str> = reader.headers().unwrap().iter().collect();
+    assert_eq!(headers.join(","), columns);
+    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), tree.nodes.len());
+    for (index, (row, node)) in rows.iter().zip(&tree.nodes).enumerate() {
+        let corners = [node.aabb.min.to_array(), node.aabb.max.to_array()].concat();
+        let written: Vec<f32> = (5..11).map(|column| row[column].parse().unwrap()).collect();
+        assert_eq!(written, corners);
+        let kind = if node.is_leaf() { "leaf" } else { "inner" };
+        assert_eq!((&row[0], &row[2]), (index.to_string().as_str(), kind));
+        // Only the root has an empty cell instead of a parent.
+        match row[1].parse::<usize>() {
+            Ok(parent) => assert!(tree.nodes[parent].children().contains(&index)),
+            Err(_) => assert_eq!((&row[1], index), ("", 0)),
+        }
+    }
 }
 
 /// Compares the facts of another reader with the facts of `inspect`.

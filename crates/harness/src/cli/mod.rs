@@ -2,6 +2,7 @@
 
 pub mod compare;
 pub mod jobs;
+pub mod merge;
 pub mod new;
 pub mod program;
 pub mod report;

@@ -1,7 +1,7 @@
 //! The program: parses the arguments, dispatches to a command, and sets the exit code.
 
 use super::terminal::{self, INTERRUPTED, print_error};
-use super::{compare, jobs, new, report, run};
+use super::{compare, jobs, merge, new, report, run};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -24,6 +24,7 @@ struct Cli {
 enum Command {
     Report(report::ReportArgs),
     Jobs(jobs::JobsArgs),
+    Merge(merge::MergeArgs),
     Compare(compare::CompareArgs),
     New(new::NewArgs),
     /// Print the JSON schema of specs, which lets editors complete and check them.
@@ -38,6 +39,7 @@ pub fn main() -> ExitCode {
         None => run::run(&cli.run, &INTERRUPTED),
         Some(Command::Report(args)) => report::report(&args),
         Some(Command::Jobs(args)) => jobs::jobs(&args),
+        Some(Command::Merge(args)) => merge::merge(&args, &INTERRUPTED),
         Some(Command::Compare(args)) => compare::compare(&args),
         Some(Command::New(args)) => new::new(&args),
         Some(Command::Schema) => {

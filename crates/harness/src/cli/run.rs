@@ -82,7 +82,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         _ => Existing::Keep,
     };
     let (runs, parts) = (args.runs.clone(), args.from.clone());
-    let extent = Extent { existing, runs, parts, verbose: args.verbose };
+    let extent = Extent { existing, runs, parts, only_parts: false, verbose: args.verbose };
     let mut differences = 0;
     for experiment in &experiments {
         if args.check {
@@ -102,7 +102,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     if differences > 0 { Err(Error::Differs { differences }) } else { Ok(()) }
 }
 
-fn print_summary(experiment: &Experiment, summary: &Summary) {
+pub(super) fn print_summary(experiment: &Experiment, summary: &Summary) {
     let Summary { text, skipped_scenes, folder, .. } = summary;
     print_line(&experiment.question);
     for name in skipped_scenes {

@@ -161,6 +161,23 @@ impl Store {
         Ok(())
     }
 
+    /// Returns an error that names some of the runs 0 to `runs` − 1 that are not kept.
+    pub fn check_complete(&self, runs: usize, name: impl Fn(usize) -> String) -> Result<(), Error> {
+        let mut missing = Vec::new();
+        for index in 0..runs {
+            if !self.has(index)? {
+                missing.push(index);
+            }
+        }
+        if missing.is_empty() {
+            return Ok(());
+        }
+        // A part that never ran misses thousands of runs.
+        let names: Vec<String> = missing.iter().take(5).map(|&index| name(index)).collect();
+        let (count, names) = (missing.len(), names.join("; "));
+        Err(Error::Usage(format!("{count} of {runs} runs are missing: {names}")))
+    }
+
     /// Returns the rows of one kind of the kept run `index`; none if it has no such rows.
     pub fn rows<R: Row>(&self, index: usize) -> Result<Vec<R>, Error> {
         read_if_any(&self.run_folder(index))

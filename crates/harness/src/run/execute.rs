@@ -25,6 +25,8 @@ pub struct Extent {
     pub runs: Vec<String>,
     /// The `--out` of harnesses that have performed parts of the experiment.
     pub parts: Vec<PathBuf>,
+    /// True if a run that no part has is an error; otherwise it is performed.
+    pub only_parts: bool,
     /// True for a line on standard error about every run.
     pub verbose: bool,
 }
@@ -71,7 +73,7 @@ fn run(
     extent: &Extent,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
-    let Extent { existing, runs: ref ids, ref parts, verbose } = *extent;
+    let Extent { existing, runs: ref ids, ref parts, only_parts, verbose } = *extent;
     let is_part = !ids.is_empty();
     let (scenes, skipped_scenes) = load_scenes(experiment)?;
     let resolved = Resolved::new(experiment, &scenes);
@@ -95,6 +97,9 @@ fn run(
     for part in parts.iter().map(|out| out.join(experiment.folder())) {
         store.adopt(&part, runs)?;
         provenance.parts.extend(Provenance::of_part(&part)?);
+    }
+    if only_parts {
+        store.check_complete(runs, |index| resolved.run_name(index))?;
     }
     remarks.extend(provenance.unlike_processors());
     let mut work = Work {

@@ -29,6 +29,21 @@ fn runs_performed_apart_are_joined_to_the_bytes_of_one_process_and_missing_ones_
     assert_eq!(lines.matches(", took ").count(), 4, "the missing runs: {lines}");
     assert!(lines.contains("unlike processors") && lines.contains("another "), "{lines}");
     assert!(whole == reproducible(&dir.join("joined/spec")));
+    // `merge` needs no spec and performs nothing.
+    let merge = |parts: &[String]| -> Vec<String> {
+        let fixed = ["merge", "--out", "merged"].map(String::from);
+        fixed.into_iter().chain(parts.iter().cloned()).collect()
+    };
+    let arguments = merge(&parts);
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    refused(dir, &arguments, 2, &["4 of 18 runs are missing", "repetition 0"]);
+    let rest: Vec<String> = ids[..4].iter().map(|id| format!("rest/{id}")).collect();
+    for (id, part) in ids[..4].iter().zip(&rest) {
+        said(dir, &["spec.toml", "--run", id, "--out", part]);
+    }
+    let arguments = merge(&rest);
+    said(dir, &arguments.iter().map(String::as_str).collect::<Vec<_>>());
+    assert!(whole == reproducible(&dir.join("merged/spec")));
     let figures =
         ["whole", "joined"].map(|out| fs::read(dir.join(out).join("spec/table.svg")).unwrap());
     assert!(figures[0] == figures[1]);

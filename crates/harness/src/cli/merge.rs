@@ -1,0 +1,65 @@
+//! `harness merge`: joins the parts of experiments that ran with `--run`.
+
+use super::run::print_summary;
+use super::terminal::{input_folder, output_folder, print_error};
+use crate::rows::store::Existing;
+use crate::run::execute::{Extent, execute};
+use crate::run::resolved::{Resolved, read_toml};
+use crate::{Error, files};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// Join the parts of experiments that ran with --run into the files that one run writes.
+#[derive(clap::Args, Clone, Debug)]
+pub struct MergeArgs {
+    /// Folders that were given as --out to runs with --run.
+    #[arg(value_name = "DIR", required = true)]
+    pub folders: Vec<PathBuf>,
+    /// Folder for the results.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Replace existing results.
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Merges the parts and prints the tables of every experiment. Rejects parts that lack a run, which
+/// `--from` would perform.
+pub fn merge(args: &MergeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
+    output_folder("--out", &args.out)?;
+    let mut parts: BTreeMap<PathBuf, Vec<PathBuf>> = BTreeMap::new();
+    for out in &args.folders {
+        input_folder("DIR", out)?;
+        for name in names_of_parts(out)? {
+            parts.entry(name).or_default().push(out.clone());
+        }
+    }
+    if parts.is_empty() {
+        let message = "DIR: no part of an experiment; accepted: --out of runs with --run";
+        return Err(Error::Usage(message.into()));
+    }
+    for (name, parts) in parts {
+        let spec = parts[0].join(name).join(".partial/resolved.toml");
+        let Resolved { experiment, .. } = read_toml(&spec)?;
+        // What an earlier merge has taken is kept.
+        let existing = if args.force { Existing::Replace } else { Existing::Resume };
+        let extent = Extent { existing, parts, only_parts: true, ..Extent::default() };
+        let summary = execute(&experiment, &args.out, &extent, interrupted)?;
+        summary.remarks.iter().for_each(|remark| print_error(remark));
+        print_summary(&experiment, &summary);
+    }
+    Ok(())
+}
+
+/// Returns the folders of the experiments, full and quick, of which `out` has a part.
+fn names_of_parts(out: &Path) -> Result<Vec<PathBuf>, Error> {
+    let mut names: Vec<PathBuf> = files::names(out)?.into_iter().map(PathBuf::from).collect();
+    let quick = out.join("quick");
+    if quick.is_dir() {
+        let quick_names = files::names(&quick)?;
+        names.extend(quick_names.iter().map(|name| Path::new("quick").join(name)));
+    }
+    names.retain(|name| out.join(name).join(".partial/resolved.toml").is_file());
+    Ok(names)
+}
