@@ -295,6 +295,7 @@ fn a_wrong_value_of_any_flag_is_rejected_by_name() {
             ("", &["spec.toml"]),
             ("report", &["--results=."]),
             ("jobs", &["spec.toml"]),
+            ("merge", &["folder", "--out=x"]),
             ("compare", &["good.bvh", "spheres75"]),
             ("new", &["x.toml"]),
             ("schema", &[]),
