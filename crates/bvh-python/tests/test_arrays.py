@@ -108,7 +108,7 @@ CALLS = {
 }
 
 # Parameters that are no arrays of numbers.
-OTHERS = {"self", "seconds", "references", "seed", "work", "progress", "path", "kind", "coherent", "invalid"}
+OTHERS = {"self", "seconds", "references", "seed", "work", "progress", "path", "kind", "coherent", "invalid", "tracer"}
 OTHERS |= {"by", "nthreads", "nsamples", "args", "tnear", "tfar", "multiple_hits", "max_hits", "return_locations", "kwargs", "memo"}
 
 

@@ -229,11 +229,12 @@ def test_copies_keep_the_faces_and_move_alone():
 def test_a_search_follows_seed_work_rays_and_progress():
     low = RANDOM.uniform(0, 10, (3000, 3))
     boxes = np.stack([low, low + RANDOM.uniform(0, 1, (3000, 3))], axis=1)
-    same = [Tree.from_boxes(boxes, work=300_000, seed=seed).nodes() for seed in (1, 1, 2)]
+    # Within less work reinsertion, which has no seed, is ahead.
+    same = [Tree.from_boxes(boxes, work=3_000_000, seed=seed).nodes() for seed in (1, 1, 2)]
     np.testing.assert_array_equal(same[0], same[1])
     assert (same[0] != same[2]).any()
     rays = RANDOM.uniform(0, 2, (500, 2, 3))
-    assert (Tree.from_boxes(boxes, work=300_000, rays=rays).nodes() != same[0]).any()
+    assert (Tree.from_boxes(boxes, work=3_000_000, rays=rays).nodes() != same[0]).any()
     with pytest.raises(ValueError, match="rays: segment 3 has a coordinate that is not finite"):
         Tree.from_boxes(boxes, rays=np.where(np.arange(500)[:, None, None] == 3, np.nan, rays))
     calls = []
