@@ -2,7 +2,7 @@
 
 use super::run::print_summary;
 use super::terminal::{input_folder, output_folder, print_error};
-use crate::rows::store::Existing;
+use crate::rows::store::{Existing, spec_of_part};
 use crate::run::execute::{Extent, execute};
 use crate::run::resolved::{Resolved, read_toml};
 use crate::{Error, files};
@@ -40,8 +40,12 @@ pub fn merge(args: &MergeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         return Err(Error::Usage(message.into()));
     }
     for (name, parts) in parts {
-        let spec = parts[0].join(name).join(".partial/resolved.toml");
+        let spec = spec_of_part(&parts[0].join(name));
         let Resolved { experiment, .. } = read_toml(&spec)?;
+        // Somebody may have edited it.
+        experiment
+            .check_run_count()
+            .map_err(|fault| Error::Usage(format!("{}: {fault}", spec.display())))?;
         // What an earlier merge has taken is kept.
         let existing = if args.force { Existing::Replace } else { Existing::Resume };
         let extent = Extent { existing, parts, only_parts: true, ..Extent::default() };
@@ -60,6 +64,6 @@ fn names_of_parts(out: &Path) -> Result<Vec<PathBuf>, Error> {
         let quick_names = files::names(&quick)?;
         names.extend(quick_names.iter().map(|name| Path::new("quick").join(name)));
     }
-    names.retain(|name| out.join(name).join(".partial/resolved.toml").is_file());
+    names.retain(|name| spec_of_part(&out.join(name)).is_file());
     Ok(names)
 }

@@ -83,4 +83,13 @@ impl FinishedRun {
         }
         text
     }
+
+    /// Returns the name of the first file in which two runs differ. Files of seconds, whose names
+    /// begin with `timing`, are not compared: they differ always.
+    pub fn difference<'a>(&'a self, other: &'a Self) -> Option<&'a str> {
+        let names = self.files.keys().chain(other.files.keys()).map(String::as_str);
+        names
+            .filter(|name| !name.starts_with("timing"))
+            .find(|&name| self.files.get(name) != other.files.get(name))
+    }
 }

@@ -144,18 +144,26 @@ impl Store {
     ///
     /// # Errors
     ///
-    /// If the part is of another spec, scene or seed, or if a run of it is damaged.
+    /// If the part is of another spec, scene or seed, if a run of it is damaged, or if it has
+    /// another result than the run that this folder has.
     pub fn adopt(&self, part: &Path, runs: usize) -> Result<(), Error> {
-        let partial = part.join(".partial");
-        let spec = partial.join(SPEC);
+        let spec = spec_of_part(part);
         if read_text(&spec)? != read_text(&self.partial.join(SPEC))? {
             let spec = spec.display();
             return Err(Error::Usage(format!("--from: {spec} has another spec, scene or seed")));
         }
         for index in 0..runs {
-            let run_folder = partial.join(run_folder_name(index));
-            if run_folder.is_dir() && !self.has(index)? {
-                self.keep(index, &FinishedRun::read(&run_folder)?)?;
+            let run_folder = spec.with_file_name(run_folder_name(index));
+            if !run_folder.is_dir() {
+                continue;
+            }
+            let run = FinishedRun::read(&run_folder)?;
+            let kept = self.run_folder(index);
+            if !kept.is_dir() {
+                self.keep(index, &run)?;
+            } else if let Some(file) = FinishedRun::read(&kept)?.difference(&run) {
+                let (found, kept) = (run_folder.display(), kept.display());
+                return Err(Error::Usage(format!("{found} and {kept} have different {file}")));
             }
         }
         Ok(())
@@ -265,6 +273,11 @@ fn without_header(bytes: &[u8]) -> &[u8] {
     }
 }
 
+/// The file of a part in this folder with the resolved spec of its runs.
+pub fn spec_of_part(folder: &Path) -> PathBuf {
+    folder.join(".partial").join(SPEC)
+}
+
 /// Returns the name of the folder of the kept run `index`.
 fn run_folder_name(index: usize) -> String {
     format!("{index:06}")
@@ -295,6 +308,22 @@ mod tests {
 
     fn run() -> FinishedRun {
         FinishedRun::of_texts([("runs.csv", "a,b\n1,2\n"), ("history.csv", "a\n1\n")])
+    }
+
+    #[test]
+    fn a_part_with_another_result_of_a_kept_run_is_rejected_and_other_seconds_are_not() {
+        let folders = ["a", "b"].map(|_| tempfile::tempdir().unwrap());
+        let [kept, part] =
+            [0, 1].map(|i| Store::open(folders[i].path(), "", Existing::Keep).unwrap());
+        let run = |cost: &'static str, seconds: &'static str| {
+            FinishedRun::of_texts([("runs.csv", cost), ("timing.csv", seconds)])
+        };
+        kept.keep(0, &run("1\n", "0.1\n")).unwrap();
+        part.keep(0, &run("1\n", "0.2\n")).unwrap();
+        kept.adopt(part.folder(), 1).unwrap();
+        part.keep(0, &run("2\n", "0.1\n")).unwrap();
+        let error = kept.adopt(part.folder(), 1).unwrap_err().to_string();
+        assert!(error.ends_with("have different runs.csv"), "{error}");
     }
 
     /// Puts a device that never ends in the place of a file.

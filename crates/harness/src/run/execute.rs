@@ -84,6 +84,15 @@ fn run(
     }
     // An unknown identifier must not leave a folder.
     let jobs = Job::selected(experiment, &scenes, ids)?;
+    let parts: Vec<PathBuf> = parts.iter().map(|out| out.join(experiment.folder())).collect();
+    // A part that is discarded or finished would lose its runs. Symbolic links and `..` may hide
+    // that two paths are the same folder.
+    if let Ok(folder) = folder.canonicalize()
+        && parts.iter().any(|part| part.canonicalize().is_ok_and(|part| part == folder))
+    {
+        let out = out.display();
+        return Err(Error::Usage(format!("--out {out} is also one of the parts; choose another")));
+    }
     let store = Store::open(&folder, &to_toml(&resolved)?, existing)?;
     let runs = jobs.len();
     if is_part {
@@ -94,9 +103,9 @@ fn run(
     // The subsets of one mesh share its remark.
     remarks.dedup();
     let mut provenance = Provenance::gather();
-    for part in parts.iter().map(|out| out.join(experiment.folder())) {
-        store.adopt(&part, runs)?;
-        provenance.parts.extend(Provenance::of_part(&part)?);
+    for part in &parts {
+        store.adopt(part, runs)?;
+        provenance.parts.extend(Provenance::of_part(part)?);
     }
     if only_parts {
         store.check_complete(runs, |index| resolved.run_name(index))?;

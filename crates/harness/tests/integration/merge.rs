@@ -37,6 +37,13 @@ fn runs_performed_apart_are_joined_to_the_bytes_of_one_process_and_missing_ones_
     let arguments = merge(&parts);
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     refused(dir, &arguments, 2, &["4 of 18 runs are missing", "repetition 0"]);
+    // No part is lost, whatever is asked for.
+    let part = parts[0].as_str();
+    for flag in ["--force", "--resume"] {
+        let join = ["spec.toml", flag, "--out", part, "--from", part];
+        refused(dir, &join, 2, &["--out", part, "one of the parts"]);
+    }
+    refused(dir, &["merge", part, "--force", "--out", part], 2, &["--out", part]);
     let rest: Vec<String> = ids[..4].iter().map(|id| format!("rest/{id}")).collect();
     for (id, part) in ids[..4].iter().zip(&rest) {
         said(dir, &["spec.toml", "--run", id, "--out", part]);
@@ -44,6 +51,10 @@ fn runs_performed_apart_are_joined_to_the_bytes_of_one_process_and_missing_ones_
     let arguments = merge(&rest);
     said(dir, &arguments.iter().map(String::as_str).collect::<Vec<_>>());
     assert!(whole == reproducible(&dir.join("merged/spec")));
+    let resolved = dir.join(part).join("spec/.partial/resolved.toml");
+    let edited = fs::read_to_string(&resolved).unwrap();
+    fs::write(&resolved, edited.replace("repetitions = 3", "repetitions = 4294967295")).unwrap();
+    refused(dir, &["merge", part, "--out=huge"], 2, &["spec/.partial/resolved.toml: ", "runs"]);
     let figures =
         ["whole", "joined"].map(|out| fs::read(dir.join(out).join("spec/table.svg")).unwrap());
     assert!(figures[0] == figures[1]);
