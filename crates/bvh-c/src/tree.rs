@@ -340,10 +340,8 @@ pub unsafe extern "C" fn bvh_tree_export(
         let tree = unsafe { given("tree", tree) }?;
         // SAFETY: both are null or end with a zero.
         let [tracer, path] = unsafe { [text("tracer", tracer)?, text("path", path)?] };
-        let target = Target::named(tracer).ok_or_else(|| {
-            let accepted = Target::ALL.map(|target| target.name).join(", ");
-            Failure::invalid(format!("tracer is {tracer:?}; accepted: {accepted}"))
-        })?;
+        let target = Target::named(tracer)
+            .map_err(|unknown| Failure::invalid(format!("tracer is {unknown}")))?;
         Ok(bvh_scenes::files::write(path.as_ref(), &tree.owned.export(&target))?)
     })
 }

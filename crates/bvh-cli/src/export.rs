@@ -38,7 +38,7 @@ pub struct ExportArgs {
 /// Parses the names of the targets.
 pub fn tracers() -> impl TypedValueParser<Value = Target> {
     PossibleValuesParser::new(Target::ALL.map(|target| target.name))
-        .try_map(|name| Target::named(&name).ok_or("no tracer"))
+        .try_map(|name| Target::named(&name))
 }
 
 /// Writes the better of the tree and a greedy one for the tracer, and prints how they compare.

@@ -185,10 +185,8 @@ impl Tree {
     /// >>> json.loads(square.export("json"))["nodes"]
     /// [[0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0, 2]]
     fn export<'py>(&self, py: Python<'py>, tracer: &str) -> PyResult<Bound<'py, PyBytes>> {
-        let target = Target::named(tracer).ok_or_else(|| {
-            let accepted = Target::ALL.map(|target| target.name).join(", ");
-            invalid(format!("tracer is {tracer:?}; accepted: {accepted}"))
-        })?;
+        let target = Target::named(tracer)
+            .map_err(|unknown| invalid(format!("tracer is {unknown}")))?;
         let owned = self.owned();
         Ok(PyBytes::new(py, &py.detach(|| owned.export(&target))))
     }

@@ -43,5 +43,5 @@ pub mod shaders {
 pub use better::Better;
 pub use compressed::{CompressedBvh, CompressedNode};
 pub use first_count::FirstCountNode;
-pub use target::{Layout, Target};
+pub use target::{Layout, Target, UnknownTarget};
 pub use three_mesh::ThreeMeshNode;

@@ -26,6 +26,14 @@ pub struct Target {
     pub layout: Layout,
 }
 
+/// A name that no [`Target`] has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{name:?}; accepted: {}", Target::ALL.map(|target| target.name).join(", "))]
+pub struct UnknownTarget {
+    /// The name.
+    pub name: String,
+}
+
 /// A layout of binary nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
@@ -114,8 +122,9 @@ impl Target {
     };
 
     /// Returns the target with this name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|target| target.name == name)
+    pub fn named(name: &str) -> Result<Self, UnknownTarget> {
+        let target = Self::ALL.into_iter().find(|target| target.name == name);
+        target.ok_or_else(|| UnknownTarget { name: name.into() })
     }
 
     /// Returns the tree for this tracer: binary, with the leaves that cost least there, no leaf too
