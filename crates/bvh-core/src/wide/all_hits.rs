@@ -36,7 +36,7 @@
 //! origin is perturbed, so three terms suffice. [`exact`](crate::exact) has the filter in f64 and
 //! its bounds; no rounding decides an answer.
 
-use super::answer::{ANY_HIT, All};
+use super::answer::{ANY_HIT, Find};
 use super::instructions::{Instructions, Task};
 use super::lanes::{Lanes, Mask};
 use super::layout::{WideBvh, WideNode};
@@ -109,7 +109,7 @@ impl WideBvh {
 
     /// Appends the hits of one ray, in no order; the hits of a divided triangle once for each of its
     /// leaves.
-    pub(super) fn append_hits(&self, ray: &Ray, hits: &mut Vec<Hit>) {
+    fn append_hits(&self, ray: &Ray, hits: &mut Vec<Hit>) {
         if self.kernel != Kernel::Portable {
             // SAFETY: a layout's kernel is available.
             return unsafe { vector::dispatch(self.kernel, OneRay { wide: self, ray, hits }) };
@@ -188,9 +188,27 @@ const AT_ONCE: usize = 1024;
 
 /// A hit of the ray of this number.
 #[derive(Clone, Copy)]
-pub(crate) struct Found {
-    pub(super) number: u32,
-    pub(super) hit: Hit,
+struct Found {
+    number: u32,
+    hit: Hit,
+}
+
+/// All hits of every ray, in no order; the hits of a divided triangle once for each of its leaves.
+struct All<'a>(&'a mut Vec<Found>);
+
+impl Find for All<'_> {
+    const ALL: bool = true;
+
+    #[inline(always)]
+    fn append(&mut self, number: usize, hit: Hit) {
+        self.0.push(Found { number: number as u32, hit });
+    }
+
+    fn alone(&mut self, wide: &WideBvh, number: usize, ray: &Ray) {
+        let mut hits = Vec::new();
+        wide.append_hits(ray, &mut hits);
+        hits.into_iter().for_each(|hit| self.append(number, hit));
+    }
 }
 
 /// The search for all hits of one ray.

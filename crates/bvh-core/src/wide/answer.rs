@@ -1,9 +1,7 @@
 //! What is asked of every ray of a batch, and where the answers go.
 
-use super::all_hits::Found;
 use super::layout::WideBvh;
 use crate::{Hit, Ray};
-use alloc::vec::Vec;
 
 /// The value of the parameter `ANY` of a traversal that ends a ray at the first hit that is found.
 pub(crate) const ANY_HIT: bool = true;
@@ -57,23 +55,5 @@ impl Find for Any<'_> {
 
     fn alone(&mut self, wide: &WideBvh, number: usize, ray: &Ray) {
         self.0[number] = wide.any_hit(ray);
-    }
-}
-
-/// All hits of every ray, in no order; the hits of a divided triangle once for each of its leaves.
-pub(crate) struct All<'a>(pub(crate) &'a mut Vec<Found>);
-
-impl Find for All<'_> {
-    const ALL: bool = true;
-
-    #[inline(always)]
-    fn append(&mut self, number: usize, hit: Hit) {
-        self.0.push(Found { number: number as u32, hit });
-    }
-
-    fn alone(&mut self, wide: &WideBvh, number: usize, ray: &Ray) {
-        let mut hits = Vec::new();
-        wide.append_hits(ray, &mut hits);
-        hits.into_iter().for_each(|hit| self.append(number, hit));
     }
 }
