@@ -82,7 +82,9 @@ impl CompressedNode {
         for axis in 0..3 {
             self.low[axis][slot] = libm::floor(low[axis]) as u8;
             self.high[axis][slot] = libm::ceil(high[axis]) as u8;
-            let rounded = self.slot_box(slot);
+        }
+        let rounded = self.slot_box(slot);
+        for axis in 0..3 {
             self.low[axis][slot] -= u8::from(rounded.min[axis] > aabb.min[axis]);
             self.high[axis][slot] += u8::from(rounded.max[axis] < aabb.max[axis]);
         }

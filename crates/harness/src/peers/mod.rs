@@ -1,7 +1,8 @@
 //! Third-party libraries and programs as methods of experiments: our costs of their trees.
 //!
 //! The harness contains no library. The program in `attic/` does: it brings each as a [`Library`],
-//! a [lower bound](LowerBound) and the [times of rays](Tracing), and is the same program otherwise. A program of your own needs no code here: see [`command`].
+//! a [lower bound](LowerBound) and the [times of rays](Tracing), and is the same program otherwise.
+//! A program of your own needs no code here: see [`command`].
 
 pub mod command;
 mod program;
