@@ -185,8 +185,8 @@ impl Tree {
     /// >>> json.loads(square.export("json"))["nodes"]
     /// [[0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0, 2]]
     fn export<'py>(&self, py: Python<'py>, tracer: &str) -> PyResult<Bound<'py, PyBytes>> {
-        let target = Target::named(tracer)
-            .map_err(|unknown| invalid(format!("tracer is {unknown}")))?;
+        let target =
+            Target::named(tracer).map_err(|unknown| invalid(format!("tracer is {unknown}")))?;
         let owned = self.owned();
         Ok(PyBytes::new(py, &py.detach(|| owned.export(&target))))
     }
