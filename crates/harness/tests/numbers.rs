@@ -143,6 +143,17 @@ fn facts() -> BTreeMap<&'static str, bool> {
         );
         1e-6 / value(&query)
     };
+    let in_three_mesh = |scenes| {
+        let conditions = format!(
+            "tracer=three-mesh-bvh, scene={scenes}, rays=primary or incoherent, tree=searched, \
+             over=best"
+        );
+        sides(
+            &rows("interop/timing_tracers.csv", &conditions),
+            &["ratio_low"],
+            &["ratio_high"],
+        )
+    };
     let searched = r"best for any rays\, 1.2";
     let seconds = value(&format!(
         "peers/amd-epyc-25-1/timing_ratios.csv | scene=geometric mean, against=any mode, \
@@ -150,6 +161,11 @@ fn facts() -> BTreeMap<&'static str, bool> {
     ));
     let pays_after = seconds / (per_ray("Müller–Fellner") - per_ray(searched));
     BTreeMap::from([
+        (
+            "interop",
+            in_three_mesh("sponza or kitchen or cloister") == [0, 6, 0]
+                && in_three_mesh("spot or knot or pebble")[1] == 0,
+        ),
         ("pays", (1e8..1e9).contains(&pays_after)),
         ("table3", costs("table3/table.csv", "column!=base") == [0, 16, 0]),
         ("table4", noisy == [1, 4, 3] && less_noisy == [7, 0, 1]),
