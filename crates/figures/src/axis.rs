@@ -136,7 +136,7 @@ impl Ruled {
         (at - self.low) / (self.high - self.low)
     }
 
-    /// Adds at most `most` ticks, and at least three if possible.
+    /// Adds at most `most` ticks, and at least two if possible.
     pub fn rule(&mut self, most: usize) {
         if self.unit == Unit::Bare {
             return;
@@ -146,14 +146,16 @@ impl Ruled {
             self.minor = (0..=(-self.low) as i32).map(|row| f64::from(-row)).collect();
             return;
         }
-        let most = most.max(3);
         let (low, high) = match self.log {
             true => (libm::exp10(self.low), libm::exp10(self.high)),
             false => (self.low, self.high),
         };
         let mut ticks = if self.log { self.decades(most) } else { vec![] };
-        if ticks.len() < 3 {
-            ticks = RangedCoordf64::from(low..high).key_points(most);
+        // One tick tells no distance.
+        if ticks.len() < 2 {
+            let linear = |most| RangedCoordf64::from(low..high).key_points(most);
+            let ample = (most..most + 4).map(linear).find(|ticks| ticks.len() > 1);
+            ticks = ample.unwrap_or_else(|| linear(most));
         }
         let tick = |value| Some((self.coordinate(value)?, self.label(value)));
         self.major = ticks.into_iter().filter_map(tick).collect();
@@ -214,6 +216,9 @@ mod tests {
             (Axis::log(""), [1.5, 60.0], 6, "2 5 10 20 50"),
             (Axis::log(""), [1.01, 1.04], 6, "1.01 1.02 1.03 1.04"),
             (Axis::log("").unit(Unit::Seconds), [0.01, 10.0], 4, "10 ms 0.1 s 1 s 10 s"),
+            (Axis::log("").unit(Unit::Seconds), [0.0057, 8.4], 4, "10 ms 0.1 s 1 s"),
+            (Axis::log("").unit(Unit::Seconds), [0.0057, 14.0], 3, "10 ms 1 s"),
+            (Axis::linear(""), [33.0, 47.0], 2, "35 40 45"),
         ] {
             assert_eq!(labels(&axis, &ends, most).join(" "), ticks, "{axis:?}");
         }

@@ -37,13 +37,21 @@ pub(super) fn svg(figure: &Figure) -> Result<String, FigureError> {
 
 /// Finds places for the plots of all panels, below `top`. Returns them and the figure's height.
 fn arrange<'a>(figure: &'a Figure, top: f64, fonts: &Fonts) -> (Vec<(Plot<'a>, Frame)>, f64) {
-    let columns = figure.columns.clamp(1, HEIGHTS.len()).min(figure.panels.len().max(1));
-    let column_width = (WIDTH - 2.0 * BORDER) / columns as f64;
+    let most = figure.columns.clamp(1, HEIGHTS.len()).min(figure.panels.len().max(1));
     // Labels next to the plots determine the width left for them, and with it the lines below.
-    let plot = |panel| Plot::new(panel, HEIGHTS[columns - 1], fonts);
-    let mut plots: Vec<Plot> = figure.panels.iter().map(plot).collect();
-    let beside = plots.iter().map(|plot| plot.left).fold(0.0, f64::max);
-    let room = (column_width - beside - GUTTER.0).max(60.0);
+    let side_by_side = |columns: usize| {
+        let plot = |panel| Plot::new(panel, HEIGHTS[columns - 1], fonts);
+        let plots: Vec<Plot> = figure.panels.iter().map(plot).collect();
+        let beside = plots.iter().map(|plot| plot.left).fold(0.0, f64::max);
+        let column_width = (WIDTH - 2.0 * BORDER) / columns as f64;
+        (columns, plots, beside, column_width)
+    };
+    let room = |beside: f64, column_width: f64| (column_width - beside - GUTTER.0).max(60.0);
+    // Long names leave plots side by side too narrow.
+    let (columns, mut plots, beside, column_width) = Some(side_by_side(most))
+        .filter(|(_, _, beside, width)| room(*beside, *width) >= 0.5 * width)
+        .unwrap_or_else(|| side_by_side(1));
+    let room = room(beside, column_width);
     let width = plots.iter().map(|plot| plot.width_beside_texts(room, fonts)).fold(room, f64::min);
     plots.iter_mut().for_each(|plot| plot.fit_width(width, fonts));
     for upper in 0..plots.len().saturating_sub(columns) {

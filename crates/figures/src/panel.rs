@@ -89,20 +89,14 @@ impl<'a> Plot<'a> {
     /// Finds the ticks of an x axis of this width, breaks the texts above and below into lines,
     /// and finds places for the texts in the plot.
     pub fn fit_width(&mut self, width: f64, fonts: &Fonts) {
-        let apart = if self.panel.x.scale == Scale::Log { 70.0 } else { 40.0 };
-        self.x.rule((width / apart) as usize);
-        // Of two labels that would touch, one is enough.
-        let mut end = f64::NEG_INFINITY;
-        let axis = self.x.clone();
-        self.x.major.retain(|(at, label)| {
-            let half = fonts.width(label, BODY) / 2.0;
-            let middle = axis.fraction(*at) * width;
-            let fits = middle - half > end;
-            if fits {
-                end = middle + half + 6.0;
+        let apart = if self.panel.x.scale == Scale::Log { 55.0 } else { 40.0 };
+        // Fewer ticks, not some without a label, keep the distances between them regular.
+        for most in (2..=((width / apart) as usize).max(2)).rev() {
+            self.x.rule(most);
+            if !self.labels_touch(width, fonts) {
+                break;
             }
-            fits
-        });
+        }
         self.title = fonts.wrap(&self.panel.title, width, HEADING);
         self.above = HEADING.line() * self.title.len() as f64 + 5.0;
         self.x_label = fonts.wrap(&self.panel.x.label, width, BODY);
@@ -126,6 +120,16 @@ impl<'a> Plot<'a> {
             }
             self.texts.push(text);
         }
+    }
+
+    /// Returns true if two neighbouring labels of the x axis leave no gap between them.
+    fn labels_touch(&self, width: f64, fonts: &Fonts) -> bool {
+        let ends = self.x.major.iter().map(|(at, label)| {
+            let (middle, half) = (self.x.fraction(*at) * width, fonts.width(label, BODY) / 2.0);
+            (middle - half, middle + half)
+        });
+        let ends: Vec<(f64, f64)> = ends.collect();
+        ends.windows(2).any(|pair| pair[1].0 < pair[0].1 + 6.0)
     }
 
     /// Drops the label of the x axis if the panel below has the same label.

@@ -102,10 +102,11 @@ pub(super) const REFERENCE_LINE: Stroke =
 /// The stroke of series without a name.
 const UNNAMED: Stroke = Stroke { colour: GREY, dash: None, hollow: false, marker: MARKERS[0] };
 
-/// The colours of series without a given look, in order; their markers repeat.
+/// The colours of series without a given look, in order, those that methods have most often last;
+/// their markers repeat.
 const FREE: [Hue; 12] = {
     use Hue::{Amber, Blue, Brown, Forest, Green, Grey, Indigo, Olive, Orange, Pink, Sky, Wine};
-    [Blue, Orange, Green, Pink, Amber, Sky, Wine, Grey, Indigo, Olive, Brown, Forest]
+    [Wine, Amber, Sky, Pink, Olive, Forest, Brown, Grey, Indigo, Green, Orange, Blue]
 };
 const SHAPES: [Shape; 7] = {
     use Shape::{Cross, Diamond, Disc, Inverted, Square, Star, Triangle};
@@ -174,11 +175,11 @@ mod tests {
 
     #[test]
     fn looks_given_in_advance_are_kept_and_their_colours_not_given_again() {
-        let given = Look { hue: Hue::Blue, shape: Shape::Star };
+        let given = Look { hue: Hue::Wine, shape: Shape::Star };
         let series = strokes(&["MF", "GRASP"].map(str::to_owned), vec![("GRASP".into(), given)]);
         assert_eq!(
             (series[0].1, series[1].1),
-            (Stroke::of(Look { hue: Hue::Orange, shape: Shape::Square }), Stroke::of(given))
+            (Stroke::of(Look { hue: Hue::Amber, shape: Shape::Square }), Stroke::of(given))
         );
     }
 }
