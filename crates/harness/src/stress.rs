@@ -16,6 +16,9 @@ use bvh_stress::{
 use figures::{Axis, Layer, Marks, Panel, Unit};
 use std::path::Path;
 
+/// The name of the figure of all checks.
+pub const FIGURE: &str = "matrix";
+
 config! {
     serde;
     /// A measurement over the suite, selected by a spec.
@@ -105,7 +108,7 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     });
     let caption = "A square per case and method: builders, searches, traversals, then readers of \
                    files and others. Empty where the case has no check of it.";
-    output.add_figure("matrix", caption, 1, panels(&cells));
+    output.add_figure(FIGURE, caption, 1, panels(&cells));
     Ok(output)
 }
 

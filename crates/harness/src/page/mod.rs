@@ -4,10 +4,12 @@
 use crate::Error;
 use crate::files;
 use crate::report::output::Output;
+use crate::report::overview;
 use crate::report::paper::{PaperRow, Verdict};
 use crate::run::finish::outputs;
 use crate::run::provenance::Provenance;
 use crate::run::resolved::{Resolved, read_toml};
+use crate::stress;
 use comfy_table::{Row, Table};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
@@ -97,6 +99,7 @@ fn page(sections: &[Section]) -> Markup {
             body {
                 h1 { "BVH by stochastic search: results" }
                 main {
+                    (pictures(sections))
                     (scoreboard(sections))
                     h2 { "All questions" }
                     ul {
@@ -111,6 +114,18 @@ fn page(sections: &[Section]) -> Markup {
                 }
                 footer { p { "Made by harness " (env!("CARGO_PKG_VERSION")) " from the CSV files that it leads to." } }
             }
+        }
+    }
+}
+
+/// The two pictures that say the most, wherever they are: error against run time, and all checks of
+/// extreme scenes.
+fn pictures(sections: &[Section]) -> Markup {
+    let files = [overview::FIGURE, stress::FIGURE].map(|name| format!("{name}.svg"));
+    let figures = sections.iter().flat_map(|section| &section.figures);
+    html! {
+        @for (name, path) in figures.filter(|(name, _)| files.contains(name)) {
+            figure { img.sheet src=(path) alt=(name); }
         }
     }
 }
