@@ -45,6 +45,7 @@ impl Config {
         let mut output = Output::new("", &self.title);
         output.add_csv("gaps", &summaries)?;
         let optima = rows.runs.iter().filter(|run| run.method == self.optimum).count();
+        output.finding = self.finding(&summaries);
         let caption = format!(
             "{optima} small scenes. Left, the fraction of runs that end at the optimum; right, the \
              worst gap of any."
@@ -83,6 +84,22 @@ impl Config {
             }
         }
         summaries
+    }
+
+    /// Says which methods solve the most.
+    fn finding(&self, summaries: &[Gaps]) -> Option<String> {
+        let solved = |method: &String| {
+            let own = summaries.iter().filter(|summary| summary.method == method);
+            own.map(|own| own.solved_fraction * own.runs as f64).sum::<f64>().round() as usize
+        };
+        let most = self.methods.iter().map(solved).max()?;
+        let best = self.methods.iter().filter(|method| solved(method) == most);
+        let best: Vec<String> = best.map(|method| format!("‘{method}’")).collect();
+        let runs = summaries.iter().filter(|summary| summary.method == self.methods[0]);
+        let runs = runs.map(|summary| summary.runs).sum::<usize>();
+        let (names, of) = (best.join(" and "), format!("{most} of {runs}"));
+        let of = if most == runs { format!("all {runs}") } else { of };
+        Some(format!("At the optimum in {of} runs: {names}"))
     }
 
     /// Draws the fraction solved and the worst gap against size, for every kind of part.

@@ -96,7 +96,7 @@ impl Config {
             generations.extend(own);
             let Some(end) = runs.end(rows.base_cost(scene)) else { continue };
             output.paper.extend(self.compare(&rows.shown(scene), &runs, &end));
-            ends.push(end.median / end.base);
+            ends.push(end);
         }
         let caption = format!(
             "{}. Goldsmith–Salmon cost of the best tree so far: the run whose final cost is the \
@@ -104,7 +104,7 @@ impl Config {
              many orders, as far as so many were drawn.",
             output.heading
         );
-        output.finding = from_greedy(ends).map(|end| format!("The genetic algorithm ends {end}"));
+        output.finding = finding(&ends);
         output.add_figure("generations", caption, 1, panels);
         output.add_csv("generations", &generations)?;
         Ok(output)
@@ -169,6 +169,22 @@ impl Config {
         };
         [gain, says, spread, Some(over_base)].into_iter().flatten().collect()
     }
+}
+
+/// Says where the median runs end, or all runs if they end on both sides of the greedy trees.
+fn finding(ends: &[Final]) -> Option<String> {
+    let over = |cost: fn(&Final) -> f64| ends.iter().map(move |end| cost(end) / end.base);
+    let (low, _) = range(over(|end| end.low))?;
+    let (_, high) = range(over(|end| end.high))?;
+    let is_level = ends.iter().all(|end| end.low < end.base && end.base < end.high);
+    if is_level {
+        let [low, high] = [low, high].map(|ratio| 100.0 * (ratio - 1.0));
+        let ends = format!(
+            "The genetic algorithm ends about level with greedy ({low:+.1} to {high:+.1} %)"
+        );
+        return Some(ends.replace('-', "−"));
+    }
+    from_greedy(over(|end| end.median)).map(|end| format!("The genetic algorithm ends {end}"))
 }
 
 /// Returns the incumbents of a run, generation by generation.

@@ -12,6 +12,7 @@ const LOOKS: &[(&str, Hue, Shape)] = &[
     ("Goldsmith–Salmon", Olive, Triangle),
     ("Build", Ink, Disc),
     ("GRASP", Green, Triangle),
+    ("GRASP, noise", Forest, Diamond),
     ("GRASP, reinsertion", Green, Square),
     ("Müller–Fellner", Ink, Square),
     ("Other", Ink, Diamond),
@@ -22,20 +23,24 @@ const LOOKS: &[(&str, Hue, Shape)] = &[
     ("annealing", Wine, Star),
     ("best", Blue, Disc),
     ("best by rays", Sky, Square),
+    ("best of each axis", Pink, Diamond),
     ("best of 10", Green, Triangle),
     ("best of 100", Forest, Square),
     ("best, 0.1 s", Blue, Triangle),
     ("best, 1 s", Blue, Square),
     ("best, 60 s", Blue, Ring),
-    ("best, no end", Sky, Diamond),
+    ("best, never exact", Olive, Inverted),
+    ("best, no end", Amber, Diamond),
     ("broken", Orange, Square),
     ("bvh", Grey, Star),
     ("clustering", Brown, Diamond),
     ("exact SAH sweep", Ink, Square),
     ("genetic", Indigo, Star),
     ("greedy", Ink, Square),
+    ("k = 2", Green, Disc),
     ("median cut", Forest, Inverted),
     ("median run", Indigo, Disc),
+    ("noise", Green, Disc),
     ("obvhs", Amber, Diamond),
     ("obvhs, reinsertion", Amber, Cross),
     ("one run", Indigo, Disc),
@@ -43,8 +48,8 @@ const LOOKS: &[(&str, Hue, Shape)] = &[
     ("paper, best of 100", Grey, Square),
     ("random orders", Amber, Inverted),
     ("random picking", Amber, Inverted),
-    ("range over runs", Indigo, Disc),
-    ("rebuild", Indigo, Diamond),
+    ("range over runs", Indigo, Square),
+    ("rebuild", Olive, Diamond),
     ("refused", Blue, Square),
     ("reinsertion", Orange, Square),
     ("rotations", Sky, Inverted),
@@ -70,6 +75,6 @@ mod tests {
         assert_eq!(look("best, 1 s").hue, look("best").hue);
         assert_ne!(look("best, 1 s").shape, look("best, 0.1 s").shape);
         assert_eq!(look("obvhs slow").hue, look("obvhs fast").hue);
-        assert_eq!(super::look("k = 2"), None);
+        assert_eq!(super::look("primary, same path"), None);
     }
 }

@@ -5,7 +5,7 @@ use super::data::ratio;
 use super::prelude::*;
 use super::to_target;
 use crate::rows::ReferenceRow;
-use crate::statistics::quartiles;
+use crate::statistics::{minimum, quartiles};
 
 bvh_config::config! { serde;
     /// Numbers of every method on every scene.
@@ -73,6 +73,12 @@ impl Config {
             }
         }
         let mut output = Output::new("", &self.title);
+        let bounds = numbers.iter().filter_map(|row| row.lower_bound_over_reference);
+        // Rounded up, so that no scene is above it.
+        output.finding = minimum(bounds).map(|least| {
+            let most = (10.0 / least).ceil() / 10.0;
+            format!("Where a bound is proven, the best known cost at most {most} times the optimum")
+        });
         output.add_csv("numbers", &numbers)?;
         output.add_csv("timing_numbers", &timing)?;
         let explanation = "Gaps are to the best known cost; the lower bound is relative to that:";

@@ -2,6 +2,7 @@
 
 use super::config::check_file;
 use super::query::{self, Conditions, QueryError, Row};
+use super::query_measure::filled;
 use super::query_report::Config;
 use crate::rows;
 use bvh_config::OutOfRange;
@@ -35,6 +36,7 @@ impl Config {
                     faults.push(OutOfRange::new(key, format!("{found:?}"), accepted));
                 }
                 Err(QueryError::Column { column, accepted }) => {
+                    let accepted = format!("the columns {accepted}");
                     faults.push(OutOfRange::new(key, format!("{column:?}"), accepted));
                 }
                 _ => {}
@@ -56,6 +58,10 @@ impl Config {
             let partners = column.paired_by.iter().try_for_each(|column| has(column));
             attempts.push((format!("columns[{index}].value"), column.try_on(row)));
             attempts.push((format!("columns[{index}].paired_by"), partners));
+        }
+        let table = [self.header().into_iter().map(|column| (column, "1".into())).collect()];
+        for part in self.finding.split_inclusive('}') {
+            attempts.push(("finding".into(), filled(part, &table).map(|_| ())));
         }
         attempts
     }
@@ -87,6 +93,8 @@ mod tests {
             ("select = 'method=a, seconds=1'", "select"),
             ("by = ['scene', 'rays']", "by[1]"),
             ("columns = [{ name = 'c', value = 'max cost - work' }]", "columns[0].value"),
+            ("finding = 'Of {scene=a | max c} to {scene=b | max cost}'", "finding"),
+            ("finding = 'Of {max c}'", "finding"),
         ] {
             assert_eq!(faults(change), [key], "{change}");
         }

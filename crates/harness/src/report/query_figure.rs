@@ -6,6 +6,7 @@ use super::prelude::*;
 use super::query::{Row, number_in};
 use bvh_config::Nested;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 
 bvh_config::config! { serde;
     /// A figure of the table.
@@ -35,7 +36,14 @@ bvh_config::config! { serde;
         log_x: bool;
         /// True for a logarithmic vertical axis.
         log_y: bool;
-        /// The value of a line across all rows, such as 1 for ratios.
+        /// True for fractions along the vertical axis, which are written in per cent.
+        percent_y: bool;
+        /// Names in words for scenes, rows and series, by what they are called in the table.
+        names: BTreeMap<String, String>;
+        /// Label of a method that is compared with itself: rows of scenes and methods where it
+        /// differs from itself are not drawn.
+        control: String;
+        /// The value of a line across all rows, such as 1 for ratios, or at this height.
         #[serde(skip_serializing_if = "Option::is_none")]
         line_at: Option<f64>, in 0.0..=1e300;
     }
@@ -58,14 +66,11 @@ impl Drawing {
     /// Returns one panel for all rows that agree in the columns `panels`.
     pub(super) fn panels(&self, rows: &Rows, table: &[Row]) -> Vec<Panel> {
         let mut panels = Vec::new();
+        let table = self.sound(table);
         let titles: Vec<String> = table.iter().map(|row| self.title(rows, row)).collect();
         for title in distinct(titles.iter()) {
-            let rows_of_panel: Vec<&Row> = table
-                .iter()
-                .zip(&titles)
-                .filter(|(_, of_row)| *of_row == title)
-                .map(|(row, _)| row)
-                .collect();
+            let own = table.iter().zip(&titles).filter(|(_, of_row)| *of_row == title);
+            let rows_of_panel: Vec<&Row> = own.map(|(row, _)| *row).collect();
             panels.push(self.panel(rows, title.clone(), &rows_of_panel));
         }
         panels
@@ -75,7 +80,7 @@ impl Drawing {
         let mut names = Vec::new();
         for column in &self.panels {
             let name = text_in(row, column);
-            names.push(if column == "scene" { rows.shown(&name) } else { name });
+            names.push(self.shown(rows, column, &name));
         }
         names.join(": ")
     }
@@ -92,8 +97,10 @@ impl Drawing {
             layers.push(Layer::new(&series, Marks::Line(points.clone())));
             layers.push(Layer::new(series, Marks::Points(points)));
         }
-        let x = axis(&self.x_label, self.log_x);
-        panel(title, x, axis(&self.y_label, self.log_y), layers)
+        layers.extend(self.line_at.map(|at| Layer::new("", Marks::HLine(at))));
+        let unit = if self.percent_y { Unit::Percent } else { Unit::Number };
+        let (x, y) = (axis(&self.x_label, self.log_x), axis(&self.y_label, self.log_y));
+        panel(title, x, y.unit(unit), layers)
     }
 
     fn rows(&self, rows: &Rows, title: String, table: &[&Row]) -> Panel {
@@ -110,9 +117,7 @@ impl Drawing {
         };
         let all = distinct(table.iter().map(|row| self.series_of(row)));
         let all = all.into_iter().map(series).collect();
-        let shown = |name: &String| {
-            if self.y == "scene" { rows.shown(name) } else { name.clone() }
-        };
+        let shown = |name: &String| self.shown(rows, &self.y, name);
         let x = axis(&self.x_label, self.log_x);
         let mut panel = dots(title, x, names.iter().map(shown).collect(), all);
         panel.layers.extend(self.line_at.map(|at| Layer::new("", Marks::VLine(at))));
@@ -131,7 +136,24 @@ impl Drawing {
             return line.name.clone();
         }
         let values: Vec<String> = self.series.iter().map(|column| text_in(row, column)).collect();
-        values.join(", ")
+        let name = values.join(", ");
+        self.names.get(&name).cloned().unwrap_or(name)
+    }
+
+    /// Returns the name in words of a text in a column.
+    fn shown(&self, rows: &Rows, column: &str, text: &str) -> String {
+        let own = self.names.get(text).cloned();
+        own.unwrap_or_else(|| if column == "scene" { rows.shown(text) } else { text.into() })
+    }
+
+    /// Returns the rows of the table without those whose noise the control shows to be biased.
+    fn sound<'t>(&self, table: &'t [Row]) -> Vec<&'t Row> {
+        let is_control = |row: &&Row| text_in(row, "against") == self.control;
+        let key = |row: &Row| ["scene", "method"].map(|column| text_in(row, column));
+        let is_biased = |row: &&Row| text_in(row, &format!("{}_verdict", self.x)) != "inconclusive";
+        let controls = table.iter().filter(|_| !self.control.is_empty()).filter(is_control);
+        let biased: Vec<_> = controls.filter(is_biased).map(key).collect();
+        table.iter().filter(|row| !biased.contains(&key(row))).collect()
     }
 
     /// Returns the points of some rows, by x.

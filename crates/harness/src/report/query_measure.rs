@@ -1,6 +1,6 @@
 //! The measures of the query language: an aggregate of a value that is computed row by row.
 
-use super::query::{QueryError, Row, cell};
+use super::query::{QueryError, Row, cell, select};
 use crate::statistics::{geometric_mean, median, pearson, range, spearman};
 use serde::Deserialize;
 use serde::de::IntoDeserializer;
@@ -126,6 +126,33 @@ impl<'t> Measure<'t> {
     }
 }
 
+/// Replaces every `{CONDITIONS | MEASURE}` of a text by a number of the rows: whole, or from 10 on
+/// rounded to whole ones, or with one decimal.
+pub fn filled(text: &str, rows: &[Row]) -> Result<String, QueryError> {
+    let mut filled = String::new();
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once('{') {
+        let (query, after) = after.split_once('}').unwrap_or((after, ""));
+        let (conditions, measure) =
+            query.split_once(" | ").ok_or_else(|| QueryError::Malformed {
+                part: "number",
+                found: query.into(),
+                accepted: "{CONDITIONS | MEASURE}",
+            })?;
+        let measure = Measure::parse(measure)?;
+        // A wrong column is an error even where no row meets the conditions.
+        measure.of_rows(&rows.iter().take(1).collect::<Vec<_>>())?;
+        let chosen = select(rows.to_vec(), conditions)?;
+        let number = measure.of_rows(&chosen.iter().collect::<Vec<_>>())?;
+        let number = number.ok_or_else(|| QueryError::NoRow(query.into()))?;
+        let is_whole = number.fract() == 0.0 || number.abs() >= 9.95;
+        filled += before;
+        filled += &format!("{number:.0$}", usize::from(!is_whole));
+        rest = after;
+    }
+    Ok(filled + rest)
+}
+
 /// Returns a value of a row, computed from left to right; `None` where a cell holds no number.
 fn number(row: &Row, value: &str) -> Result<Option<f64>, QueryError> {
     let mut words = value.split(' ');
@@ -179,6 +206,13 @@ mod tests {
         assert_eq!(value("scene=a or b", "max cost"), Ok(Some(5.0)));
         assert_eq!(value("scene=a", "min cost / rays"), Ok(Some(0.5)));
         assert_eq!(value("scene=b", "only rays"), Ok(None));
+    }
+
+    #[test]
+    fn numbers_in_a_sentence_are_those_of_the_rows() {
+        let text = "{scene=a | count cost} trees, {scene=a | min cost / rays * 100 + -0.4} to {* | max cost / 2}";
+        assert_eq!(filled(text, &rows()).unwrap(), "2 trees, 50 to 2.5");
+        assert!(filled("{scene=c | max cost}", &rows()).is_err());
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::data::distinct;
 use super::prelude::*;
 use crate::rows::TestRow;
 use crate::statistics::{geometric_mean, student};
+use std::collections::BTreeMap;
 
 bvh_config::config! { serde;
     /// A comparison of trees by the tests of rays that they were not trained on.
@@ -19,6 +20,8 @@ bvh_config::config! { serde;
         /// Default none.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         pairs: Vec<[String; 2]>;
+        /// Names of trees in figures, by their labels with what they were trained on.
+        names: BTreeMap<String, String>;
     }
 }
 
@@ -106,7 +109,7 @@ impl Config {
         let trees = distinct(means().map(|row| (row.tree, row.trained_on)));
         let fewest = trees.into_iter().min_by(|a, b| mean(*a).total_cmp(&mean(*b)))?;
         let percent = 100.0 * (1.0 - mean(fewest));
-        let name = tree_name(fewest.0, fewest.1);
+        let name = self.tree_name(fewest.0, fewest.1);
         let side = if percent < 0.0 { "more" } else { "fewer" };
         Some(format!("‘{name}’: {:.0} % {side} tests than ‘{}’", percent.abs(), self.base))
     }
@@ -129,18 +132,20 @@ impl Config {
             (name, of_kind.filter_map(dot).collect())
         };
         let kinds = distinct(own.iter().map(|row| (row.judged_on, row.camera)));
-        let names = trees.iter().map(|(tree, trained_on)| tree_name(tree, trained_on)).collect();
+        let names =
+            trees.iter().map(|(tree, trained_on)| self.tree_name(tree, trained_on)).collect();
         let x = Axis::linear(format!("tests per ray, over those of {}", self.base));
         let mut panel = dots(title, x, names, kinds.into_iter().map(series).collect());
         panel.layers.push(Layer::new(&self.base, Marks::VLine(1.0)));
         panel
     }
-}
 
-/// Names a tree with what it was trained on, unless its label says so.
-fn tree_name(tree: &str, trained_on: &str) -> String {
-    let is_said = trained_on == "none" || tree.contains(trained_on);
-    if is_said { tree.into() } else { format!("{tree}, {trained_on}") }
+    /// Names a tree with what it was trained on, unless its label says so.
+    fn tree_name(&self, tree: &str, trained_on: &str) -> String {
+        let is_said = trained_on == "none" || tree.contains(trained_on);
+        let name = if is_said { tree.into() } else { format!("{tree}, {trained_on}") };
+        self.names.get(&name).cloned().unwrap_or(name)
+    }
 }
 
 /// A tree's tests over those of the trees of the method `base`.
