@@ -148,11 +148,7 @@ fn facts() -> BTreeMap<&'static str, bool> {
             "tracer=three-mesh-bvh, scene={scenes}, rays=primary or incoherent, tree=searched, \
              over=best"
         );
-        sides(
-            &rows("interop/timing_tracers.csv", &conditions),
-            &["ratio_low"],
-            &["ratio_high"],
-        )
+        sides(&rows("interop/timing_tracers.csv", &conditions), &["ratio_low"], &["ratio_high"])
     };
     let searched = r"best for any rays\, 1.2";
     let seconds = value(&format!(
