@@ -74,6 +74,22 @@ pub(super) fn axes(panel: &Panel) -> (Ruled, Ruled, bool) {
     (Ruled::new(&panel.x, &xs, margin), Ruled::new(&panel.y, &ys, 0.05), has_data)
 }
 
+/// Gives the axes of all panels, which have the same scales, the ranges that show the data of all of
+/// them.
+pub fn share_axes(panels: &mut [Panel]) {
+    let ruled: Vec<(Ruled, Ruled, bool)> = panels.iter().map(axes).collect();
+    let range = |of: fn(&(Ruled, Ruled, bool)) -> &Ruled| {
+        let low = ruled.iter().map(|axes| of(axes).low).fold(f64::INFINITY, f64::min);
+        let high = ruled.iter().map(|axes| of(axes).high).fold(f64::NEG_INFINITY, f64::max);
+        let is_log = ruled.iter().any(|axes| of(axes).log);
+        if is_log { (libm::exp10(low), libm::exp10(high)) } else { (low, high) }
+    };
+    let (x, y) = (range(|axes| &axes.0), range(|axes| &axes.1));
+    for panel in panels {
+        (panel.x.range, panel.y.range) = (Some(x), Some(y));
+    }
+}
+
 impl Ruled {
     /// Chooses the shown part of `axis`: its own range if it has one, otherwise all `values` with a
     /// margin of `margin` times their extent.
@@ -240,6 +256,22 @@ mod tests {
                 let ticks = labels(&axis, &values, 8);
                 assert!(ticks.len() <= 9, "{values:?} gave {ticks:?}");
             }
+        }
+    }
+
+    #[test]
+    fn shared_axes_show_the_data_of_all_panels() {
+        let panel = |x: f64, y: f64| Panel {
+            x: Axis::log(""),
+            layers: vec![Layer::new("", Marks::Line(vec![(x, y), (2.0 * x, 2.0 * y)]))],
+            ..Panel::default()
+        };
+        let mut panels = [panel(1.0, 5.0), panel(50.0, 1.0)];
+        share_axes(&mut panels);
+        for panel in &panels {
+            let (x, y, _) = axes(panel);
+            assert!(x.shown(1.0).is_some() && x.shown(100.0).is_some());
+            assert!(y.shown(1.0).is_some() && y.shown(10.0).is_some());
         }
     }
 

@@ -17,6 +17,7 @@ mod panel;
 mod style;
 mod text;
 
+pub use axis::share_axes;
 pub use model::{Axis, Figure, FigureError, Hue, Layer, Look, Marks, Panel, Scale, Shape, Unit};
 
 /// Draws a figure as an SVG document.

@@ -257,3 +257,18 @@ impl<'a> Runs<'a> {
         Some(Final { low, median: median(&costs)?, high, average, base })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_that_end_on_both_sides_of_greedy_are_about_level_with_it() {
+        let said = |low, median, high| {
+            finding(&[Final { low, median, high, average: 2.0, base: 1.0 }]).unwrap()
+        };
+        let level = "The genetic algorithm ends about level with greedy (−1.5 to +1.3 %)";
+        assert_eq!(said(0.985, 0.995, 1.013), level);
+        assert_eq!(said(0.8, 0.82, 0.84), "The genetic algorithm ends 18 % below the greedy tree");
+    }
+}

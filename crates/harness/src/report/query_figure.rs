@@ -24,6 +24,8 @@ bvh_config::config! { serde;
         x: String;
         /// The column along the vertical axis; names for rows.
         y: String;
+        /// True for the same ranges in all panels.
+        same_axes: bool;
         /// Columns whose values are the series.
         series: Vec<String>;
         /// Series of several methods each, by name.
@@ -72,6 +74,9 @@ impl Drawing {
             let own = table.iter().zip(&titles).filter(|(_, of_row)| *of_row == title);
             let rows_of_panel: Vec<&Row> = own.map(|(row, _)| *row).collect();
             panels.push(self.panel(rows, title.clone(), &rows_of_panel));
+        }
+        if self.same_axes {
+            figures::share_axes(&mut panels);
         }
         panels
     }

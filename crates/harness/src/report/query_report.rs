@@ -222,6 +222,7 @@ fn find<'r>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use figures::Scale;
     use std::fs;
 
     /// Makes the report of a spec's table over two files, in which `b` costs less than `a` and less
@@ -257,6 +258,24 @@ mod tests {
         let expected = "scene,method,r,r_low,r_high,r_verdict\n\
                         s,a,1,1,1,inconclusive\ns,b,0.625,0.5,0.75,lower\n";
         assert_eq!(csv(&output), expected);
+    }
+
+    #[test]
+    fn a_figure_has_the_names_of_people_and_leaves_out_what_its_control_shows_to_be_biased() {
+        let drawn = |control: &str| {
+            let output = made(&format!(
+                "pairs = [['b', 'a'], ['a', 'a']]\nfinding = 'Of {{* | count r}}'\n\
+                 columns = [{{ name = 'r', value = 'median cost', ratio = 'base_over', paired_by = ['repetition'] }}]\n\
+                 figure = {{ x = 'r', y = 'scene', series = ['against'], control = '{control}', names = {{ s = 'a hill' }} }}"
+            ));
+            let (_, figure) = output.unwrap().figures.remove(0);
+            assert_eq!(figure.title, "Of 2");
+            let panels = figure.panels.into_iter();
+            panels.map(|panel| (panel.y.scale, panel.layers.len())).collect::<Vec<_>>()
+        };
+        let names = || Scale::Rows(vec!["a hill".into()], 26.0);
+        assert_eq!(drawn("a"), [(names(), 4)]);
+        assert_eq!(drawn("b"), []);
     }
 
     #[test]

@@ -85,7 +85,9 @@ impl Config {
         // The mean of all scenes says the most, so it comes first.
         let scenes = rows.scenes().into_iter().map(|scene| (rows.shown(scene), scene));
         let panels = [(ALL.to_owned(), ALL)].into_iter().chain(scenes);
-        let panels = panels.map(|(title, scene)| self.draw(title, scene, &table)).collect();
+        let mut panels: Vec<Panel> =
+            panels.map(|(title, scene)| self.draw(title, scene, &table)).collect();
+        figures::share_axes(&mut panels[1..]);
         output.add_figure("ray_cost", caption, 1, panels);
         let columns =
             "scene tree trained_on judged_on camera over_base_low tests_over_base over_base_high";
