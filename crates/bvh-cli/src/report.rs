@@ -79,7 +79,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Error> {
     let mut answer = Answer::new(args.form);
     answer.say(&format!("{}: {title}", out.display()));
     answer.record("file", out.display().to_string());
-    for Row { name, baked, greedy } in &rows {
+    for Row { name, baked, greedy, .. } in &rows {
         answer.record(name, json!({ "baked": baked, "greedy": greedy }));
     }
     let ranges = [&baked, &greedy].map(Measured::range);
@@ -156,26 +156,23 @@ fn rows(baked: &Measured, greedy: &Measured) -> Vec<Row> {
     let over_root = |of: &Measured, cost| Some(cost::over_root_area(&of.tree, cost));
     let facts = |of: &Measured| {
         let counts = of.film.counts;
+        let area = over_root(of, cost::internal_area(&of.tree));
+        let layout = over_root(of, Objective::Layout.cost(&of.tree));
+        let tests = (counts.boxes + counts.objects) as f64 / of.film.rays.max(1) as f64;
         [
-            (
-                "Total area of inner nodes over the root's",
-                over_root(of, cost::internal_area(&of.tree)),
-            ),
-            ("Cost of the wide layout by area", over_root(of, Objective::Layout.cost(&of.tree))),
-            ("Expected tests of a ray from anywhere", of.tests),
-            (
-                "Tests per ray of the picture, in the binary tree",
-                Some((counts.boxes + counts.objects) as f64 / of.film.rays.max(1) as f64),
-            ),
-            ("Depth", Some(of.tree.depth() as f64)),
-            ("Nodes", Some(of.tree.nodes.len() as f64)),
+            ("Total area of inner nodes over the root's", true, area),
+            ("Cost of the wide layout by area", true, layout),
+            ("Expected tests of a ray from anywhere", true, of.tests),
+            ("Tests per ray of the picture, in the binary tree", true, Some(tests)),
+            ("Depth", false, Some(of.tree.depth() as f64)),
+            ("Nodes", false, Some(of.tree.nodes.len() as f64)),
         ]
     };
     facts(baked)
         .into_iter()
         .zip(facts(greedy))
-        .filter_map(|((name, baked), (_, greedy))| {
-            Some(Row { name, baked: baked?, greedy: greedy? })
+        .filter_map(|((name, is_cost, baked), (.., greedy))| {
+            Some(Row { name, baked: baked?, greedy: greedy?, is_cost })
         })
         .collect()
 }
@@ -222,7 +219,7 @@ mod tests {
             (1.034, "3 % dearer than a plain build"),
             (1.001, "as cheap as a plain build"),
         ] {
-            let row = Row { name: "", baked, greedy: 1.0 };
+            let row = Row { name: "", baked, greedy: 1.0, is_cost: true };
             assert_eq!(title("escher", &row), format!("escher: {title_of}"));
         }
     }

@@ -12,6 +12,8 @@ pub struct Row {
     pub name: &'static str,
     pub baked: f64,
     pub greedy: f64,
+    /// True if less is better.
+    pub is_cost: bool,
 }
 
 /// The contents of a page. Pairs begin with the baked tree, and the greedy tree follows.
@@ -62,7 +64,7 @@ impl Page<'_> {
 <p><span class=\"key baked\"></span> the baked tree
 <span class=\"key greedy\"></span> the greedy Müller–Fellner tree, a plain build</p>
 {table}
-<p>Less is better. A tree baked for the wide layout saves tests there, and not always in the binary
+<p>Less is better, but depth and nodes are no costs. A tree baked for the wide layout saves tests there, and not always in the binary
 tree.</p>
 <h2>Rays</h2>
 <div class=\"pictures\">{scene}{heat}</div>
@@ -83,8 +85,8 @@ visits.</p>
         let mut text = String::from(
             "<table>\n<tr><th></th><th>baked</th><th>greedy</th><th>difference</th></tr>\n",
         );
-        for Row { name, baked, greedy } in &self.rows {
-            let difference = if *greedy > 0.0 {
+        for Row { name, baked, greedy, is_cost } in &self.rows {
+            let difference = if *is_cost && *greedy > 0.0 {
                 // A hyphen would be shorter than the plus.
                 format!("{:+.1} %", 100.0 * (baked / greedy - 1.0)).replace('-', "−")
             } else {
@@ -187,7 +189,9 @@ mod tests {
         let page = Page {
             title: "<b> & co",
             origin: "2 objects".into(),
-            rows: vec![Row { name: "Depth", baked: 1.0, greedy: 2.0 }],
+            rows: [true, false]
+                .map(|is_cost| Row { name: "r", baked: 1.0, greedy: 2.0, is_cost })
+                .into(),
             scene: vec![1, 2, 3],
             heat: [vec![4], vec![5]],
             medians: [1.0, 2.0],
@@ -196,7 +200,9 @@ mod tests {
         };
         let html = page.html();
         assert!(html.contains("<h1>&lt;b&gt; &amp; co</h1>"), "{html}");
-        assert!(html.contains("<td>1</td><td>2</td><td>−50.0 %</td>"), "{html}");
+        for difference in ["−50.0 %", ""] {
+            assert!(html.contains(&format!("<td>1</td><td>2</td><td>{difference}</td>")), "{html}");
+        }
         assert!(html.contains("1 234 or more"), "{html}");
         assert_eq!(html.matches("data:image/png;base64,").count(), 3);
         assert!(!html.contains("http") && !html.contains("<script"), "{html}");
