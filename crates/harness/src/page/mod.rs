@@ -49,8 +49,10 @@ impl Section {
     }
 
     /// Returns the first thing that the experiment's rows say.
-    fn finding(&self) -> Option<&String> {
-        self.outputs.iter().find_map(|output| output.finding.as_ref())
+    fn finding(&self) -> Option<String> {
+        let said = self.outputs.iter().find_map(|output| output.finding.as_ref())?;
+        // No line ends between a number and its sign.
+        Some(said.replace(" %", "\u{a0}%"))
     }
 
     /// Returns the comparisons with the paper's numbers and words.

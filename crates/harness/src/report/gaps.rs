@@ -153,6 +153,31 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_title_names_all_methods_that_solve_the_most() {
+        let methods = ["a", "b", "c"].map(str::to_owned).to_vec();
+        let config = Config { methods, ..Config::default() };
+        let said = |solved: [f64; 3]| {
+            let of = |(method, solved_fraction)| {
+                let [median_gap, quantile_90_gap, maximum_gap] = [0.0; 3];
+                let (part, objects, runs) = ("whole", 8, 4);
+                Gaps {
+                    method,
+                    part,
+                    objects,
+                    runs,
+                    solved_fraction,
+                    median_gap,
+                    quantile_90_gap,
+                    maximum_gap,
+                }
+            };
+            config.finding(&["a", "b", "c"].into_iter().zip(solved).map(of).collect::<Vec<_>>())
+        };
+        assert_eq!(said([0.5, 1.0, 1.0]).unwrap(), "At the optimum in all 4 runs: ‘b’ and ‘c’");
+        assert_eq!(said([0.75, 0.5, 0.0]).unwrap(), "At the optimum in 3 of 4 runs: ‘a’");
+    }
+
+    #[test]
     fn rounding_is_no_gap() {
         assert_eq!(solved(&[0.0, -1e-15, 1e-14, 1e-9]), 0.75);
     }

@@ -146,7 +146,7 @@ impl Config {
             };
             let readings = read().len();
             return Some(match read().find(fits) {
-                Some(column) => format!("{} fits the paper on all scenes", column.shown()),
+                Some(column) => format!("‘{}’ fits the paper on all scenes", column.shown()),
                 None => format!("None of {readings} readings fits the paper on all scenes"),
             });
         }
@@ -162,10 +162,10 @@ impl Config {
         let losses = ends.iter().filter(|(low, _)| *low > 1.0).count();
         if wins > 0 && losses > 0 {
             return Some(format!(
-                "{name} beats greedy on {wins} of {scenes} scenes, loses on {losses}"
+                "‘{name}’ beats greedy on {wins} of {scenes} scenes, loses on {losses}"
             ));
         }
-        from_greedy(least).map(|distance| format!("{name}: {distance}"))
+        from_greedy(least).map(|distance| format!("‘{name}’ ends {distance}"))
     }
 
     /// Explains the marks that the figure shows.
@@ -284,7 +284,7 @@ mod tests {
             written(readings.clone(), &[("base", 1.0), ("sum", 9.0), ("difference", difference)])
         };
         assert_eq!(said(3.0).finding.unwrap(), "None of 2 readings fits the paper on all scenes");
-        assert_eq!(said(1.9).finding.unwrap(), "difference fits the paper on all scenes");
+        assert_eq!(said(1.9).finding.unwrap(), "‘difference’ fits the paper on all scenes");
         let columns = vec![column("base", 1.0), column("best of 10", 1.1)];
         let said = |spread: f64| {
             let mut rows = Rows::default();
@@ -296,10 +296,10 @@ mod tests {
             }
             Config { columns: columns.clone(), ..Config::default() }.write(&rows).unwrap().finding
         };
-        assert_eq!(said(0.06).unwrap(), "best of 10 beats greedy on 1 of 3 scenes, loses on 1");
+        assert_eq!(said(0.06).unwrap(), "‘best of 10’ beats greedy on 1 of 3 scenes, loses on 1");
         assert_eq!(
             said(0.11).unwrap(),
-            "best of 10: from 10 % below to 20 % above the greedy tree"
+            "‘best of 10’ ends from 10 % below to 20 % above the greedy tree"
         );
     }
 

@@ -43,6 +43,13 @@ pub(super) fn add(
             }
         }
     }
+    let solved = |method: &&String| -> usize {
+        table.iter().filter(|row| row.method == *method).map(|row| row.solved).sum()
+    };
+    let runs: usize = table.iter().map(|row| row.runs).sum::<usize>() / methods.len();
+    output.finding = methods.iter().max_by_key(solved).map(|method| {
+        format!("‘{method}’ reaches the target in {} of {runs} runs", solved(&method))
+    });
     output.add_csv("timing_to_target", &table)?;
     let columns = "scene target method runs solved median quantile_90";
     output.show("Seconds until the target is reached, over all runs:", &table, columns)
