@@ -59,10 +59,12 @@ pub(crate) unsafe fn trace<K: Instructions, F: Find>(
         end: numbers.end,
         ready: [MaybeUninit::uninit(); RAYS],
         waiting: 0,
-        at_nodes: List::EMPTY,
-        at_leaves: List::EMPTY,
-        at_end: List::EMPTY,
-        idle: List::EMPTY,
+        counts: Counts { at_nodes: 0, at_leaves: 0, at_end: 0 },
+        at_nodes: EMPTY,
+        at_leaves: EMPTY,
+        at_end: EMPTY,
+        idle: EMPTY,
+        idle_count: 0,
         instructions: PhantomData,
     };
     // SAFETY: the processor has the instructions.
@@ -70,28 +72,25 @@ pub(crate) unsafe fn trace<K: Instructions, F: Find>(
 }
 
 /// Rays that wait for the same step.
-struct List {
-    rays: [*mut Traversal; FLIGHT],
-    count: usize,
+type List = [*mut Traversal; FLIGHT];
+
+const EMPTY: List = [core::ptr::null_mut(); FLIGHT];
+
+/// How many rays wait for each step. A loop that appends rays has a copy, which stays in registers.
+#[derive(Clone, Copy)]
+struct Counts {
+    at_nodes: usize,
+    at_leaves: usize,
+    at_end: usize,
 }
 
-impl List {
-    const EMPTY: Self = Self { rays: [core::ptr::null_mut(); FLIGHT], count: 0 };
-
-    /// Appends a ray if it `belongs` here, without a branch. While a list is gone through it may be
-    /// filled again from its beginning.
-    #[inline(always)]
-    unsafe fn append(&mut self, traversal: *mut Traversal, belongs: bool) {
-        // SAFETY: a list is never full when a ray is not in it.
-        unsafe { *self.rays.get_unchecked_mut(self.count) = traversal };
-        self.count += usize::from(belongs);
-    }
-
-    #[inline(always)]
-    unsafe fn get(&self, i: usize) -> *mut Traversal {
-        // SAFETY: `i` is less than the count.
-        unsafe { *self.rays.get_unchecked(i) }
-    }
+/// Appends a ray to a list if it `belongs` there, without a branch. While a list is gone through it
+/// may be filled again from its beginning.
+#[inline(always)]
+unsafe fn append(list: &mut List, count: &mut usize, traversal: *mut Traversal, belongs: bool) {
+    // SAFETY: a list is never full when a ray is not in it.
+    unsafe { *list.get_unchecked_mut(*count) = traversal };
+    *count += usize::from(belongs);
 }
 
 /// The rays of a batch that are in flight, that are prepared, and that are neither.
@@ -106,11 +105,13 @@ struct Flight<'a, K, F> {
     /// The last that have been, and a bit for each that has not been started.
     ready: [MaybeUninit<Prepared>; RAYS],
     waiting: u32,
+    counts: Counts,
     at_nodes: List,
     at_leaves: List,
     at_end: List,
     /// The places of rays whose answers are written.
     idle: List,
+    idle_count: usize,
     instructions: PhantomData<K>,
 }
 
@@ -127,15 +128,17 @@ impl<K: Instructions, F: Find> Task<K> for Flight<'_, K, F> {
             for i in 0..FLIGHT {
                 let traversal = traversals.add(i);
                 Traversal::set_stack(traversal, deep.as_mut().map(|deep| deep.stack(i)));
-                self.idle.append(traversal, true);
+                append(&mut self.idle, &mut self.idle_count, traversal, true);
             }
             loop {
                 self.start_idle();
-                if self.at_nodes.count + self.at_leaves.count + self.at_end.count == 0 {
+                let Counts { at_nodes, at_leaves, at_end } = self.counts;
+                if at_nodes + at_leaves + at_end == 0 {
                     return;
                 }
                 self.visit_nodes();
-                let leaves_wait = self.at_leaves.count >= FLIGHT / 2 || self.at_nodes.count == 0;
+                let Counts { at_nodes, at_leaves, .. } = self.counts;
+                let leaves_wait = at_leaves >= FLIGHT / 2 || at_nodes == 0;
                 if leaves_wait {
                     self.visit_leaves();
                     self.finish();
@@ -149,7 +152,7 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
     /// Starts the next rays in the idle places, as far as there are rays.
     #[inline(always)]
     unsafe fn start_idle(&mut self) {
-        let count = core::mem::replace(&mut self.idle.count, 0);
+        let count = core::mem::replace(&mut self.idle_count, 0);
         for i in 0..count {
             while self.waiting == 0 {
                 if self.from == self.end {
@@ -162,10 +165,12 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
             self.waiting &= self.waiting - 1;
             // SAFETY: so many places are idle; `ready` is written where `waiting` had a bit.
             unsafe {
-                let traversal = &mut *self.idle.get(i);
+                let traversal = &mut **self.idle.get_unchecked(i);
                 let ray = self.ready.get_unchecked(next).assume_init_ref();
                 traversal.start::<K>(ray, self.wide);
-                self.enlist(traversal);
+                let mut counts = self.counts;
+                self.enlist(traversal, traversal.child, &mut counts);
+                self.counts = counts;
             }
         }
     }
@@ -199,14 +204,14 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
 
     /// Puts a ray where its next visit is.
     #[inline(always)]
-    unsafe fn enlist(&mut self, traversal: &mut Traversal) {
-        let child = traversal.child;
+    unsafe fn enlist(&mut self, traversal: *mut Traversal, child: Child, counts: &mut Counts) {
         // SAFETY: every list has a place for every traversal.
         unsafe {
-            self.at_nodes.append(traversal, child.is_node());
+            append(&mut self.at_nodes, &mut counts.at_nodes, traversal, child.is_node());
             let is_at_end = child == Child::END;
-            self.at_leaves.append(traversal, !child.is_node() & !is_at_end);
-            self.at_end.append(traversal, is_at_end);
+            let is_at_leaf = !child.is_node() & !is_at_end;
+            append(&mut self.at_leaves, &mut counts.at_leaves, traversal, is_at_leaf);
+            append(&mut self.at_end, &mut counts.at_end, traversal, is_at_end);
         }
     }
 
@@ -215,51 +220,57 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
     /// visit of one ray fills half of its window of instructions.
     #[inline(always)]
     unsafe fn visit_nodes(&mut self) {
-        let count = self.at_nodes.count;
+        let wide = self.wide;
+        let mut counts = self.counts;
+        let count = core::mem::replace(&mut counts.at_nodes, 0);
         let mut entries = [const { MaybeUninit::<K::Boxes>::uninit() }; FLIGHT];
         let mut masks = [0; FLIGHT];
         // SAFETY: there are at most `FLIGHT` rays; the references of the layout are sound, and its
         // stacks large enough.
         unsafe {
             for i in 0..count {
-                let traversal = &*self.at_nodes.get(i);
-                let node = traversal.node(self.wide);
+                let traversal = &**self.at_nodes.get_unchecked(i);
+                let node = traversal.node(wide);
                 let (entry, mask) = traversal.ray.boxes::<K>(node, traversal.t);
                 entries.get_unchecked_mut(i).write(entry);
                 *masks.get_unchecked_mut(i) = mask;
             }
             for i in 0..count {
-                let traversal = &mut *self.at_nodes.get(i);
-                let node = traversal.node(self.wide);
+                let traversal = &mut **self.at_nodes.get_unchecked(i);
+                let node = traversal.node(wide);
                 let mask = *masks.get_unchecked(i);
                 if F::ANY || F::ALL {
-                    traversal.enter_any::<K>(node, mask);
+                    K::compress(node, mask, traversal.top);
                 } else {
-                    let entry = entries.get_unchecked(i).assume_init();
-                    traversal.enter::<K>(node, entry, mask);
+                    K::sort(node, entries.get_unchecked(i).assume_init(), mask, traversal.top);
                 }
+                traversal.top = traversal.top.add(mask.count_ones() as usize).sub(1);
             }
-            self.at_nodes.count = 0;
+            // Only now, when what was pushed has reached the cache: a load would wait for the
+            // stores, which are wider.
             for i in 0..count {
-                let traversal = &mut *self.at_nodes.get(i);
-                traversal.fetch::<K>(self.wide);
-                self.enlist(traversal);
+                let traversal = &mut **self.at_nodes.get_unchecked(i);
+                let child = traversal.go_on::<K>(wide);
+                self.enlist(traversal, child, &mut counts);
             }
         }
+        self.counts = counts;
     }
 
     #[inline(always)]
     unsafe fn visit_leaves(&mut self) {
         // SAFETY: as for nodes; a block that is not its leaf's last is followed by another.
         unsafe {
-            let count = self.at_leaves.count;
-            self.at_leaves.count = 0;
+            let wide = self.wide;
+            let mut counts = self.counts;
+            let count = core::mem::replace(&mut counts.at_leaves, 0);
             let quarters = K::Rays::N / 4;
-            let mut hopeful = List::EMPTY;
+            let mut hopeful = EMPTY;
+            let mut hopeful_count = 0;
             for i in (0..count).step_by(quarters) {
-                let at = |k: usize| self.at_leaves.get((i + k).min(count - 1));
+                let at = |k: usize| *self.at_leaves.get_unchecked((i + k).min(count - 1));
                 let four = [at(0), at(1), at(2), at(3)];
-                let (possible, sure) = candidates::<K::Rays>(self.wide, four);
+                let (possible, sure) = candidates::<K::Rays>(wide, four);
                 for (k, &traversal) in four.iter().enumerate().take(quarters) {
                     let has = |pairs: u32| pairs >> (4 * k) & 0b1111 != 0;
                     let is_hit = F::ANY && has(sure);
@@ -267,17 +278,18 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
                         let object = (*traversal).object;
                         (*traversal).object = if is_hit { 0 } else { object };
                     }
-                    hopeful.append(traversal, has(possible) & !is_hit & (i + k < count));
+                    let is_hopeful = has(possible) & !is_hit & (i + k < count);
+                    append(&mut hopeful, &mut hopeful_count, traversal, is_hopeful);
                 }
             }
-            for i in (0..hopeful.count).step_by(quarters) {
-                let at = |k: usize| hopeful.get((i + k).min(hopeful.count - 1));
+            for i in (0..hopeful_count).step_by(quarters) {
+                let at = |k: usize| *hopeful.get_unchecked((i + k).min(hopeful_count - 1));
                 let four = [at(0), at(1), at(2), at(3)];
                 if F::ALL {
                     // A traversal that only fills the lanes must not show its hits twice.
-                    self.append_hits(four, quarters.min(hopeful.count - i));
+                    self.append_hits(four, quarters.min(hopeful_count - i));
                 } else {
-                    decide::<K::Rays>(self.wide, four);
+                    decide::<K::Rays>(wide, four);
                 }
                 if !F::ANY && !F::ALL {
                     for &traversal in four.iter().take(quarters) {
@@ -286,11 +298,12 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
                 }
             }
             for i in 0..count {
-                let traversal = &mut *self.at_leaves.get(i);
-                traversal.leave_block(self.wide, F::ANY);
-                traversal.fetch::<K>(self.wide);
-                self.enlist(traversal);
+                let traversal = &mut **self.at_leaves.get_unchecked(i);
+                traversal.leave_block(wide, F::ANY);
+                let child = traversal.go_on::<K>(wide);
+                self.enlist(traversal, child, &mut counts);
             }
+            self.counts = counts;
         }
     }
 
@@ -317,14 +330,14 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
     /// Writes the answers of rays at their end.
     #[inline(always)]
     unsafe fn finish(&mut self) {
-        let count = core::mem::replace(&mut self.at_end.count, 0);
+        let count = core::mem::replace(&mut self.counts.at_end, 0);
         for i in 0..count {
             // SAFETY: so many rays are at their end, and their places become idle.
             unsafe {
-                let traversal = self.at_end.get(i);
+                let traversal = *self.at_end.get_unchecked(i);
                 let Traversal { ray, t, object, .. } = &*traversal;
                 self.find.write(ray.number as usize, *t, *object);
-                self.idle.append(traversal, true);
+                append(&mut self.idle, &mut self.idle_count, traversal, true);
             }
         }
     }
@@ -375,38 +388,14 @@ impl Traversal {
         }
     }
 
+    /// Goes on to the child at the top of the stack, and fetches it.
     #[inline(always)]
-    unsafe fn pop(&mut self) {
-        // SAFETY: the stack holds at least an end.
+    unsafe fn go_on<K: Instructions>(&mut self, wide: &WideBvh) -> Child {
+        // SAFETY: the top of the stack holds at least an end; a prefetch may name any address.
         unsafe {
-            self.top = self.top.sub(1);
             self.child = Child::from_bits(*self.top as u32);
-        }
-    }
-
-    /// Pushes the entered children, and goes on to the nearest of them, or else to what waits.
-    #[inline(always)]
-    unsafe fn enter<K: Instructions>(&mut self, node: &WideNode, entry: K::Boxes, mask: u32) {
-        // SAFETY: the stack holds at least an end, and has room for eight children.
-        unsafe {
-            let top = self.top;
-            self.top = top.add(mask.count_ones() as usize).sub(1);
-            // The nearest child is on top of the stack, too. But a load from there would wait until
-            // the stores, which are wider, have reached the cache.
-            let waiting = Child::from_bits(*top.sub(1) as u32);
-            let nearest = K::sort(node, entry, mask, top);
-            self.child = if mask == 0 { waiting } else { nearest };
-        }
-    }
-
-    /// Does the same where any order of the children will do.
-    #[inline(always)]
-    unsafe fn enter_any<K: Instructions>(&mut self, node: &WideNode, mask: u32) {
-        // SAFETY: the stack holds at least an end, and has room for eight children.
-        unsafe {
-            K::compress(node, mask, self.top);
-            self.top = self.top.add(mask.count_ones() as usize).sub(1);
-            self.child = Child::from_bits(*self.top as u32);
+            K::prefetch_bytes(wide.place(self.child), size_of::<WideNode>());
+            self.child
         }
     }
 
@@ -423,8 +412,8 @@ impl Traversal {
         self.top = unsafe { K::drop_farther(self.stack, self.top, self.t) };
     }
 
-    /// Goes on from a block of triangles: to the next one of the leaf, to what waits, or to the end
-    /// if any hit will do and there is one.
+    /// Leaves a block of triangles, so that the top of the stack holds the next one of the leaf, or
+    /// what waits, or the end if any hit will do and there is one.
     #[inline(always)]
     unsafe fn leave_block(&mut self, wide: &WideBvh, ends_at_hit: bool) {
         // SAFETY: a block that is not its leaf's last is followed by another; the stack holds at
@@ -437,14 +426,8 @@ impl Traversal {
             if ends_at_hit && self.object != u32::MAX {
                 self.top = self.stack.add(1);
             }
-            self.pop();
+            self.top = self.top.sub(1);
         }
-    }
-
-    #[inline(always)]
-    unsafe fn fetch<K: Instructions>(&self, wide: &WideBvh) {
-        // SAFETY: a prefetch may name any address.
-        unsafe { K::prefetch_bytes(wide.place(self.child), size_of::<WideNode>()) };
     }
 }
 

@@ -107,6 +107,13 @@ pub(super) unsafe fn write(node: &WideNode, keys: __m256i, count: u32, to: *mut 
         let order = _mm256_andnot_si256(sorted, _mm256_set1_epi32(7));
         let children = _mm256_load_si256(node.children.as_ptr().cast());
         let children = _mm256_permutevar8x32_epi32(children, order);
+        if count <= 4 {
+            let children = _mm256_castsi256_si128(children);
+            let sorted = _mm256_castsi256_si128(sorted);
+            _mm_storeu_si128(to.cast(), _mm_unpacklo_epi32(children, sorted));
+            _mm_storeu_si128(to.add(2).cast(), _mm_unpackhi_epi32(children, sorted));
+            return;
+        }
         let low = _mm256_unpacklo_epi32(children, sorted);
         let high = _mm256_unpackhi_epi32(children, sorted);
         let to = to.cast::<__m256i>();
