@@ -244,12 +244,12 @@ impl<L: Lanes> Leaves<L> for AllHits<'_, L> {
     unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool {
         // SAFETY: the processor has the instructions.
         let (rays, corners) = unsafe { (&self.leaf_ray.pairs, self.leaf_ray.corners(block)) };
-        let candidates = rays.candidates(&corners);
-        if candidates.possible != 0 {
+        let crossings = rays.candidates(&corners).crossings;
+        if crossings.possible != 0 {
             let t_max = corners[0][0].filled(nearest.t);
             let plane = Plane::of_lanes(&corners);
-            let decided = rays.decide_in_f64(&corners, &plane, &candidates, t_max);
-            Decided::new(decided).hits_of(0, block, self.ray, |hit| self.hits.push(hit));
+            let decided = rays.decide_in_f64(&corners, &plane, crossings, t_max);
+            Decided::new(decided).hits_of(block, self.ray, |hit| self.hits.push(hit));
         }
         false
     }
@@ -271,36 +271,36 @@ impl Decided {
         Self { hits: hits.bits(), unsure, distances }
     }
 
-    /// Calls `append` with the hits of a ray in a block, whose tests are in this quarter of the
-    /// lanes.
+    /// Calls `append` with the hits of a ray in a block.
     #[inline(always)]
-    pub(super) fn hits_of(
+    fn hits_of(&self, block: &TriangleBlock, ray: &Ray, mut append: impl FnMut(Hit)) {
+        for lane in 0..block.len() {
+            self.hit_of(lane, block, lane, ray).into_iter().for_each(&mut append);
+        }
+    }
+
+    /// Returns the bits of a pair's distance above those of `object`; the greatest number if it is
+    /// no hit.
+    #[inline(always)]
+    pub(super) fn key(&self, pair: usize, object: u32) -> u64 {
+        let key = u64::from(self.distances[pair & 15].to_bits()) << 32 | u64::from(object);
+        if self.hits >> pair & 1 != 0 { key } else { u64::MAX }
+    }
+
+    /// Returns the hit of the pair in this lane, of a ray and a triangle of a block.
+    #[inline(always)]
+    pub(super) fn hit_of(
         &self,
-        quarter: usize,
+        pair: usize,
         block: &TriangleBlock,
+        lane: usize,
         ray: &Ray,
-        mut append: impl FnMut(Hit),
-    ) {
-        let first = 4 * quarter;
-        let mut hits = self.hits >> first & 0b1111;
-        while hits != 0 {
-            let lane = hits.trailing_zeros() as usize & 3;
-            hits &= hits - 1;
-            let hit = Hit { t: self.distances[(first + lane) & 15], object: block.id(lane) };
-            // An unused lane repeats a triangle.
-            if !hit.is_miss() {
-                append(hit);
-            }
+    ) -> Option<Hit> {
+        if self.unsure >> pair & 1 != 0 {
+            let (object, triangle) = block.triangle(lane)?;
+            return hit_of(ray, &Line::new(ray), object, &triangle);
         }
-        let mut unsure = self.unsure >> first & 0b1111;
-        while unsure != 0 {
-            let lane = unsure.trailing_zeros() as usize & 3;
-            unsure &= unsure - 1;
-            if let Some((object, triangle)) = block.triangle(lane)
-                && let Some(hit) = hit_of(ray, &Line::new(ray), object, &triangle)
-            {
-                append(hit);
-            }
-        }
+        let hit = Hit { t: self.distances[pair & 15], object: block.id(lane) };
+        (self.hits >> pair & 1 != 0).then_some(hit)
     }
 }

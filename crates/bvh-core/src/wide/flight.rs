@@ -14,13 +14,13 @@
 //! No branch depends on one ray: its next step decides the list that it is appended to, and the
 //! order of hits and the children behind them are found without branches, too.
 
-use super::all_hits::Decided;
 use super::answer::Find;
+use super::gathered::Gathered;
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::Lanes;
 use super::layout::{Child, WideBvh, WideNode};
-use super::pairs::Plane;
+use super::pairs::Crossings;
 use super::prepared::{Prepared, Ready, Test};
 use super::ray_lanes::{RayLanes, prefetch};
 use super::triangles::TriangleBlock;
@@ -59,6 +59,7 @@ pub(crate) unsafe fn trace<K: Instructions, F: Find>(
         end: numbers.end,
         ready: [MaybeUninit::uninit(); RAYS],
         waiting: 0,
+        gathered: Gathered::EMPTY,
         counts: Counts { at_nodes: 0, at_leaves: 0, at_end: 0 },
         at_nodes: EMPTY,
         at_leaves: EMPTY,
@@ -105,6 +106,7 @@ struct Flight<'a, K, F> {
     /// The last that have been, and a bit for each that has not been started.
     ready: [MaybeUninit<Prepared>; RAYS],
     waiting: u32,
+    gathered: Gathered,
     counts: Counts,
     at_nodes: List,
     at_leaves: List,
@@ -231,7 +233,7 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
             for i in 0..count {
                 let traversal = &**self.at_nodes.get_unchecked(i);
                 let node = traversal.node(wide);
-                let (entry, mask) = traversal.ray.boxes::<K>(node, traversal.t);
+                let (entry, mask) = traversal.ray.boxes::<K>(node, traversal.t());
                 entries.get_unchecked_mut(i).write(entry);
                 *masks.get_unchecked_mut(i) = mask;
             }
@@ -265,37 +267,30 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
             let mut counts = self.counts;
             let count = core::mem::replace(&mut counts.at_leaves, 0);
             let quarters = K::Rays::N / 4;
-            let mut hopeful = EMPTY;
+            let mut hopeful = [MaybeUninit::<Hopeful>::uninit(); FLIGHT + 1];
             let mut hopeful_count = 0;
             for i in (0..count).step_by(quarters) {
                 let at = |k: usize| *self.at_leaves.get_unchecked((i + k).min(count - 1));
                 let four = [at(0), at(1), at(2), at(3)];
-                let (possible, sure) = candidates::<K::Rays>(wide, four);
+                let (crossings, sure) = candidates::<K::Rays, F>(wide, four);
                 for (k, &traversal) in four.iter().enumerate().take(quarters) {
-                    let has = |pairs: u32| pairs >> (4 * k) & 0b1111 != 0;
-                    let is_hit = F::ANY && has(sure);
+                    let four = |pairs: u32| pairs >> (4 * k) & 0b1111;
+                    let is_hit = F::ANY && four(sure) != 0;
                     if F::ANY {
-                        let object = (*traversal).object;
-                        (*traversal).object = if is_hit { 0 } else { object };
+                        let nearest = (*traversal).nearest;
+                        (*traversal).nearest = if is_hit { 0 } else { nearest };
                     }
-                    let is_hopeful = has(possible) & !is_hit & (i + k < count);
-                    append(&mut hopeful, &mut hopeful_count, traversal, is_hopeful);
+                    let possible = four(crossings.possible);
+                    let certain = four(crossings.certain);
+                    let next = hopeful.get_unchecked_mut(hopeful_count);
+                    next.write(Hopeful { traversal, possible, certain });
+                    let is_hopeful = (possible != 0) & !is_hit & (i + k < count);
+                    hopeful_count += usize::from(is_hopeful);
                 }
             }
-            for i in (0..hopeful_count).step_by(quarters) {
-                let at = |k: usize| *hopeful.get_unchecked((i + k).min(hopeful_count - 1));
-                let four = [at(0), at(1), at(2), at(3)];
-                if F::ALL {
-                    // A traversal that only fills the lanes must not show its hits twice.
-                    self.append_hits(four, quarters.min(hopeful_count - i));
-                } else {
-                    decide::<K::Rays>(wide, four);
-                }
-                if !F::ANY && !F::ALL {
-                    for &traversal in four.iter().take(quarters) {
-                        (*traversal).drop_farther::<K>();
-                    }
-                }
+            let hopeful = hopeful.get_unchecked(..hopeful_count).assume_init_ref();
+            for some in hopeful.chunks(Gathered::RAYS) {
+                self.decide(some);
             }
             for i in 0..count {
                 let traversal = &mut **self.at_leaves.get_unchecked(i);
@@ -307,22 +302,47 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
         }
     }
 
-    /// Appends all hits of the first `count` rays in the blocks at which they are.
+    /// Gives every ray the nearest among the hit that it has and those in the block at which it is,
+    /// or appends all of the block. Pairs that may be hits are few, and side by side their
+    /// decisions take little time.
     #[inline(always)]
-    unsafe fn append_hits(&mut self, four: [*mut Traversal; 4], count: usize) {
+    unsafe fn decide(&mut self, hopeful: &[Hopeful]) {
+        let wide = self.wide;
+        let pairs = &mut self.gathered;
         // SAFETY: the processor has the instructions; the rays are at blocks.
         unsafe {
-            let tests = tests(self.wide, four);
-            let rays = Test::rays::<K::Rays>(tests);
-            let corners = Test::corners(tests);
-            let plane = Plane::of_lanes(&corners);
-            let candidates = rays.candidates(&corners);
-            let decided = rays.decide_in_f64(&corners, &plane, &candidates, ends(four));
-            let decided = Decided::new(decided);
-            for (i, test) in tests.iter().enumerate().take(count) {
-                let number = test.ray.number as usize;
-                let ray = &self.rays[number];
-                decided.hits_of(i, test.block, ray, |hit| self.find.append(number, hit));
+            pairs.clear();
+            for (i, &Hopeful { traversal, possible, certain }) in hopeful.iter().enumerate() {
+                let traversal = &*traversal;
+                let block = traversal.block(wide);
+                let mut lanes = possible & block.used::<K::Block>();
+                while lanes != 0 {
+                    let lane = lanes.trailing_zeros();
+                    lanes &= lanes - 1;
+                    let is_certain = certain >> lane & 1;
+                    pairs.push(&traversal.ray, block, traversal.t(), lane, i as u32, is_certain);
+                }
+            }
+            for first in (0..pairs.count()).step_by(K::Rays::N) {
+                let decided = pairs.decide::<K::Rays>(first, F::ALL);
+                for pair in first..(first + K::Rays::N).min(pairs.count()) {
+                    let (ray, lane) = pairs.names(pair);
+                    let traversal = &mut *hopeful.get_unchecked(ray).traversal;
+                    let block = traversal.block(wide);
+                    if F::ALL {
+                        let number = traversal.ray.number as usize;
+                        let hit = decided.hit_of(pair - first, block, lane, &self.rays[number]);
+                        hit.into_iter().for_each(|hit| self.find.append(number, hit));
+                    } else {
+                        let key = decided.key(pair - first, block.id(lane));
+                        traversal.nearest = traversal.nearest.min(key);
+                    }
+                }
+            }
+            if !F::ANY && !F::ALL {
+                for &Hopeful { traversal, .. } in hopeful {
+                    (*traversal).drop_farther::<K>();
+                }
             }
         }
     }
@@ -335,8 +355,8 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
             // SAFETY: so many rays are at their end, and their places become idle.
             unsafe {
                 let traversal = *self.at_end.get_unchecked(i);
-                let Traversal { ray, t, object, .. } = &*traversal;
-                self.find.write(ray.number as usize, *t, *object);
+                let Traversal { ray, nearest, .. } = &*traversal;
+                self.find.write(ray.number as usize, (*traversal).t(), *nearest as u32);
                 append(&mut self.idle, &mut self.idle_count, traversal, true);
             }
         }
@@ -347,9 +367,9 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
 #[repr(C, align(64))]
 struct Traversal {
     ray: Prepared,
-    /// The nearest hit so far, or the end of the ray and `u32::MAX`.
-    t: f32,
-    object: u32,
+    /// The bits of the nearest hit's distance so far, above its object; or those of the end of the
+    /// ray, above `u32::MAX`. Distances are not negative, so that the nearer hit is less.
+    nearest: u64,
     top: *mut Pending,
     /// The node or the block of triangles to visit next, or [`END`](Child::END).
     child: Child,
@@ -376,8 +396,7 @@ impl Traversal {
 
     #[inline(always)]
     unsafe fn start<K: Instructions>(&mut self, ray: &Prepared, wide: &WideBvh) {
-        self.t = ray.t_max;
-        self.object = u32::MAX;
+        self.nearest = u64::from(ray.t_max.to_bits()) << 32 | u64::from(u32::MAX);
         // SAFETY: the processor has the instructions of `K`.
         unsafe { self.ray.copy::<K::Block>(ray) };
         self.child = wide.root.unwrap_or(Child::END);
@@ -405,11 +424,23 @@ impl Traversal {
         unsafe { &*wide.nodes.as_ptr().add(self.child.index()) }
     }
 
+    #[inline(always)]
+    unsafe fn block<'a>(&self, wide: &'a WideBvh) -> &'a TriangleBlock {
+        // SAFETY: references are sound.
+        unsafe { &*wide.blocks.as_ptr().add(self.child.index()) }
+    }
+
+    /// The distance beyond which nothing counts.
+    #[inline(always)]
+    fn t(&self) -> f32 {
+        f32::from_bits((self.nearest >> 32) as u32)
+    }
+
     /// Takes the children behind the nearest hit from the stack.
     #[inline(always)]
     unsafe fn drop_farther<K: Instructions>(&mut self) {
         // SAFETY: the stack is between its bottom and its top.
-        self.top = unsafe { K::drop_farther(self.stack, self.top, self.t) };
+        self.top = unsafe { K::drop_farther(self.stack, self.top, self.t()) };
     }
 
     /// Leaves a block of triangles, so that the top of the stack holds the next one of the leaf, or
@@ -419,11 +450,10 @@ impl Traversal {
         // SAFETY: a block that is not its leaf's last is followed by another; the stack holds at
         // least an end, and has room for one more.
         unsafe {
-            let block = self.child.index();
-            let is_last = (*wide.blocks.as_ptr().add(block)).is_last();
-            *self.top = u64::from(Child::leaf(block as u32 + 1).bits());
+            let is_last = self.block(wide).is_last();
+            *self.top = u64::from(Child::leaf(self.child.index() as u32 + 1).bits());
             self.top = self.top.add(usize::from(!is_last));
-            if ends_at_hit && self.object != u32::MAX {
+            if ends_at_hit && self.nearest as u32 != u32::MAX {
                 self.top = self.stack.add(1);
             }
             self.top = self.top.sub(1);
@@ -431,85 +461,36 @@ impl Traversal {
     }
 }
 
-/// Returns the tests of the blocks at which rays are.
-#[inline(always)]
-unsafe fn tests(wide: &WideBvh, four: [*mut Traversal; 4]) -> [Test<'_>; 4] {
-    // SAFETY: the rays are at blocks.
-    unsafe {
-        let test = |i: usize| Test {
-            ray: &(*four[i]).ray,
-            block: &*wide.blocks.as_ptr().add((*four[i]).child.index()),
-        };
-        [test(0), test(1), test(2), test(3)]
-    }
+/// A ray at a block, and a bit for each of its triangles that the ray may hit and that it certainly
+/// crosses.
+#[derive(Clone, Copy)]
+struct Hopeful {
+    traversal: *mut Traversal,
+    possible: u32,
+    certain: u32,
 }
 
-/// Returns a bit for each triangle that its ray may hit, of the block at which each ray is, and a
-/// bit for each that it certainly hits: four bits per ray.
+/// Tests the blocks at which rays are, four pairs per ray. Returns also a bit for each triangle that
+/// its ray certainly hits.
 #[inline(always)]
-unsafe fn candidates<L: Lanes>(wide: &WideBvh, four: [*mut Traversal; 4]) -> (u32, u32) {
-    // SAFETY: the processor has the instructions; the rays are at blocks.
+unsafe fn candidates<L: Lanes, F: Find>(
+    wide: &WideBvh,
+    four: [*mut Traversal; 4],
+) -> (Crossings, u32) {
+    // SAFETY: the processor has the instructions; the rays are at blocks; the bits of the nearest
+    // hit are the first two of four aligned lanes.
     unsafe {
-        let tests = tests(wide, four);
+        let test = |i: usize| Test { ray: &(*four[i]).ray, block: (*four[i]).block(wide) };
+        let tests = [test(0), test(1), test(2), test(3)];
         let rays = Test::rays::<L>(tests);
-        rays.within(&rays.candidates(&Test::corners(tests)), ends(four))
-    }
-}
-
-/// Returns the distances and the objects of the nearest hits so far, in the first two lanes of each
-/// quarter.
-#[inline(always)]
-unsafe fn nearest<L: Lanes>(four: [*mut Traversal; 4]) -> L {
-    // SAFETY: the processor has the instructions; the fields of a traversal from its distance on
-    // are four aligned lanes.
-    unsafe {
-        let row = |i: usize| (&raw const (*four[i]).t);
-        L::load_quarters([row(0), row(1), row(2), row(3)])
-    }
-}
-
-/// Returns the distances beyond which hits do not count.
-#[inline(always)]
-unsafe fn ends<L: Lanes>(four: [*mut Traversal; 4]) -> L {
-    // SAFETY: the processor has the instructions.
-    unsafe { nearest::<L>(four).spread::<0>() }
-}
-
-/// Gives every ray the nearest hit among the hit it has and those in the block at which it is, by
-/// [`Hit::precedes`](crate::Hit::precedes) and without a branch.
-#[inline(always)]
-unsafe fn decide<L: Lanes>(wide: &WideBvh, four: [*mut Traversal; 4]) {
-    // SAFETY: the processor has the instructions; ids are four aligned lanes.
-    unsafe {
-        let before = nearest::<L>(four);
-        let t_max = before.spread::<0>();
-        let tests = tests(wide, four);
-        let corners = Test::corners::<L>(tests);
-        let (inside, t) = Test::rays::<L>(tests).decide_alone(&corners, t_max);
-        let ids = |i: usize| tests[i].block.ids().cast();
-        let ids = L::load_quarters([ids(0), ids(1), ids(2), ids(3)])
-            & t.filled_with_bits(!TriangleBlock::LAST);
-        let none = t.filled_with_bits(u32::MAX);
-        let t = L::select(inside, t, t_max);
-        let least = t.min(t.swap_twos());
-        let least = least.min(least.swap_ones());
-        let ids = L::select(inside & t.eq(least), ids, none);
-        let own = L::select(t_max.eq(least), before.spread::<1>(), none);
-        let ids = lower(ids, own);
-        let ids = lower(ids, ids.swap_twos());
-        let ids = lower(ids, ids.swap_ones());
-        let mut distances = [0.0; 16];
-        let mut objects = [0.0; 16];
-        least.store(distances.as_mut_ptr());
-        ids.store(objects.as_mut_ptr());
-        for (i, &traversal) in four.iter().enumerate().take(L::N / 4) {
-            (*traversal).t = distances[4 * i];
-            (*traversal).object = f32::to_bits(objects[4 * i]);
+        let candidates = rays.candidates(&Test::corners(tests));
+        let crossings = candidates.crossings;
+        if F::ALL {
+            return (crossings, 0);
         }
+        let nearest = |i: usize| (&raw const (*four[i]).nearest).cast();
+        let t_max = L::load_quarters([nearest(0), nearest(1), nearest(2), nearest(3)]);
+        let (possible, sure) = rays.within(&candidates, t_max.spread::<1>());
+        (Crossings { possible, ..crossings }, sure)
     }
-}
-
-#[inline(always)]
-fn lower<L: Lanes>(a: L, b: L) -> L {
-    L::select(a.below(b), a, b)
 }

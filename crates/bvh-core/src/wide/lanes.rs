@@ -107,12 +107,6 @@ pub(crate) trait Lanes:
     /// One of its four lanes in every lane of a quarter.
     fn spread<const LANE: usize>(self) -> Self;
 
-    /// The lanes of every quarter in the order 2, 3, 0, 1.
-    fn swap_twos(self) -> Self;
-
-    /// The lanes of every quarter in the order 1, 0, 3, 2.
-    fn swap_ones(self) -> Self;
-
     /// A number in all lanes of a register like this one.
     #[inline(always)]
     fn filled(self, x: f32) -> Self {

@@ -12,6 +12,7 @@ mod build;
 mod closest;
 mod decide;
 mod flight;
+mod gathered;
 mod instances;
 mod instructions;
 mod kernel;

@@ -283,13 +283,14 @@ impl<L: Lanes> LeafRay<L> {
                     nearest.object = block.id(sure.trailing_zeros() as usize & 3);
                     return true;
                 }
-                candidates.possible = possible;
+                candidates.crossings.possible = possible;
             }
-            if candidates.possible == 0 {
+            let crossings = candidates.crossings;
+            if crossings.possible == 0 {
                 return false;
             }
             let plane = Plane::of_lanes(&corners);
-            let (inside, t) = self.pairs.decide(&corners, &plane, &candidates, t_max);
+            let (inside, t) = self.pairs.decide(&corners, &plane, crossings, t_max);
             let mut hits = inside.bits();
             if hits == 0 {
                 return false;

@@ -328,20 +328,21 @@ unsafe fn test<L: Lanes, const ANY: bool>(
         for lane in 0..block.len() {
             let corners = block.splat_corners::<L>(lane, vector.axes);
             let mut candidates = pairs.candidates(&corners);
-            candidates.possible &= entered;
+            candidates.crossings.possible &= entered;
             let nearest = &mut vector.nearest;
             if ANY {
                 let (possible, sure) = pairs.within(&candidates, nearest.t);
                 if sure != 0 {
                     is_hit |= nearest.end(nearest.t.mask(sure), block.id(lane));
                 }
-                candidates.possible = possible & !sure;
+                candidates.crossings.possible = possible & !sure;
             }
-            if candidates.possible == 0 {
+            let crossings = candidates.crossings;
+            if crossings.possible == 0 {
                 continue;
             }
             let plane = Plane::of_triangle(&block.doubles(lane, vector.axes));
-            let (inside, t) = pairs.decide(&corners, &plane, &candidates, nearest.t);
+            let (inside, t) = pairs.decide(&corners, &plane, crossings, nearest.t);
             let inside = inside & t.mask(entered);
             is_hit |= if ANY {
                 nearest.end(inside, block.id(lane))

@@ -103,18 +103,22 @@ pub(crate) struct Pairs<L> {
 }
 
 /// The answers of the layer in f32.
-pub(crate) struct Candidates<L> {
+#[derive(Clone, Copy)]
+pub(crate) struct Crossings {
     /// A bit per pair whose triangle the ray's line may cross.
     pub(crate) possible: u32,
     /// A bit per pair whose triangle the ray's line certainly crosses.
-    certain: u32,
+    pub(crate) certain: u32,
+}
+
+/// The same, with what the layer's next question needs.
+pub(crate) struct Candidates<L> {
+    pub(crate) crossings: Crossings,
     /// The edge values, and their error bound.
     edges: [L; 3],
     error: L,
     /// The negated depths of the corners.
     depths: [L; 3],
-    /// The spread of each pair.
-    spread: L,
 }
 
 /// The planes of triangles, a triangle per lane. Vectors are in the shear's order of axes.
@@ -165,13 +169,13 @@ impl<L: Lanes> Pairs<L> {
         let w = bx.mul_sub(ay, by * ax);
         let least = u.min(v).min(w);
         let most = u.max(v).max(w);
-        let spread = self.spread(&[a, b, c]);
-        let error = self.error.mul_add(spread, self.underflow);
+        let error = self.error.mul_add(self.spread(&[a, b, c]), self.underflow);
         let below = error.filled(0.0) - error;
         let all = u32::MAX >> (32 - L::N);
         let possible = all & !(least.lt(below) & error.lt(most)).bits();
         let certain = (error.lt(least) | most.lt(below)).bits();
-        Candidates { possible, certain, edges: [u, v, w], error, depths: [az, bz, cz], spread }
+        let crossings = Crossings { possible, certain };
+        Candidates { crossings, edges: [u, v, w], error, depths: [az, bz, cz] }
     }
 
     /// Returns the candidates that may be hits in the range up to `t_max`, and those that certainly
@@ -194,8 +198,9 @@ impl<L: Lanes> Pairs<L> {
         let no_slack = slack.filled(0.0) - slack;
         let beyond = slack.lt(begin) | end.lt(no_slack);
         let within = begin.lt(no_slack) & slack.lt(end);
-        let certain = candidates.certain & candidates.possible;
-        (candidates.possible & !(certain & beyond.bits()), certain & within.bits())
+        let Crossings { possible, certain } = candidates.crossings;
+        let certain = certain & possible;
+        (possible & !(certain & beyond.bits()), certain & within.bits())
     }
 
     #[inline(always)]
@@ -213,10 +218,10 @@ impl<L: Lanes> Pairs<L> {
         &self,
         corners: &[[L; 3]; 3],
         plane: &Plane<L>,
-        candidates: &Candidates<L>,
+        crossings: Crossings,
         t_max: L,
     ) -> (L::Mask, L) {
-        let (hits, unsure, t) = self.decide_in_f64(corners, plane, candidates, t_max);
+        let (hits, unsure, t) = self.decide_in_f64(corners, plane, crossings, t_max);
         if unsure != 0 {
             return Self::decide_exactly(*self, *corners, t_max, unsure, hits, t);
         }
@@ -230,15 +235,15 @@ impl<L: Lanes> Pairs<L> {
         &self,
         corners: &[[L; 3]; 3],
         plane: &Plane<L>,
-        candidates: &Candidates<L>,
+        crossings: Crossings,
         t_max: L,
     ) -> (L::Mask, u32, L) {
-        let possible = candidates.possible;
+        let possible = crossings.possible;
         let (is_hit, is_behind, t) = self.meet(&corners[0], plane);
-        let mut crossed = t.mask(candidates.certain & possible);
+        let mut crossed = t.mask(crossings.certain & possible);
         let mut unsure = possible & !(crossed & (is_hit | is_behind)).bits();
         if unsure != 0 {
-            let (is_inside, is_outside) = self.cross(corners, candidates.spread);
+            let (is_inside, is_outside) = self.cross(corners);
             crossed = is_inside & t.mask(possible);
             unsure = possible & !(is_outside | is_inside & (is_hit | is_behind)).bits();
         }
@@ -267,7 +272,9 @@ impl<L: Lanes> Pairs<L> {
     /// Returns the pairs whose triangle the ray's line certainly crosses, and those whose triangle
     /// it certainly does not, decided in f64.
     #[inline(always)]
-    fn cross(&self, corners: &[[L; 3]; 3], spread: L) -> (L::Mask, L::Mask) {
+    fn cross(&self, corners: &[[L; 3]; 3]) -> (L::Mask, L::Mask) {
+        let [a, b, c] = corners;
+        let spread = self.spread(&[self.corner(a), self.corner(b), self.corner(c)]);
         let depth = self.direction[2].double().abs();
         let coordinate_error = self.reach.double() * depth.filled(ERROR) * depth;
         let error = coordinate_error * (spread.double() * depth + coordinate_error);
@@ -283,13 +290,6 @@ impl<L: Lanes> Pairs<L> {
         let is_inside = error.lt(least) | most.lt(below);
         let is_outside = least.lt(below) & error.lt(most);
         (L::narrow(is_inside), L::narrow(is_outside))
-    }
-
-    /// Returns the same as [`decide`](Self::decide) for pairs whose candidates were found
-    /// elsewhere.
-    #[inline(always)]
-    pub(crate) fn decide_alone(&self, corners: &[[L; 3]; 3], t_max: L) -> (L::Mask, L) {
-        self.decide(corners, &Plane::of_lanes(corners), &self.candidates(corners), t_max)
     }
 
     /// Returns a corner of each triangle relative to the ray, sheared in f32; the last coordinate is

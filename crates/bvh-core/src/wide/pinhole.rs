@@ -149,8 +149,8 @@ impl Seen {
                     let pairs = vector.pairs.assume_init_ref();
                     let corners = block.splat_corners::<L>(lane, vector.axes);
                     let plane = Plane::of_triangle(&block.doubles(lane, vector.axes));
-                    let candidates = pairs.candidates(&corners);
-                    (inside, t) = pairs.decide(&corners, &plane, &candidates, vector.nearest.t);
+                    let crossings = pairs.candidates(&corners).crossings;
+                    (inside, t) = pairs.decide(&corners, &plane, crossings, vector.nearest.t);
                     inside = inside & t.mask(entered);
                 }
                 let inside = inside & vector.t_min.le(t);

@@ -168,9 +168,24 @@ impl Prepared {
         }
     }
 
+    /// Returns the origin, the direction, the slope, the reach and the beginning, as [`Pairs`] has
+    /// them.
+    #[inline(always)]
+    pub(crate) fn of_pairs(&self) -> [f32; 10] {
+        let [x, y, z] = self.origin;
+        let [dx, dy, dz] = [self.x_direction, self.y_direction, self.depth];
+        [x, y, z, dx, dy, dz, self.x_slope, self.y_slope, self.reach, self.t_min]
+    }
+
+    /// The axes of the shear.
+    #[inline(always)]
+    pub(crate) fn axes(&self) -> &'static [usize; 3] {
+        &AXES[self.largest_axis as usize % 3]
+    }
+
     /// Returns the ray as [`boxes`](Self::boxes) tests it if it begins far from the scene.
     fn far_away(&self) -> FarBoxRay {
-        let [x, y, z] = AXES[self.largest_axis as usize % 3];
+        let [x, y, z] = *self.axes();
         let mut direction = [0.0; 3];
         direction[x] = self.x_direction;
         direction[y] = self.y_direction;
@@ -217,7 +232,7 @@ impl Test<'_> {
     pub(crate) unsafe fn corners<L: Lanes>(four: [Self; 4]) -> [[L; 3]; 3] {
         let lanes = |i: usize, corner: usize, axis: usize| {
             let Self { ray, block } = four[i];
-            let axis = AXES[ray.largest_axis as usize % 3][axis];
+            let axis = ray.axes()[axis];
             block
                 .corners
                 .as_ptr()

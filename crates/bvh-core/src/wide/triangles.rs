@@ -57,10 +57,15 @@ impl TriangleBlock {
         if lane == 0 { id & !Self::LAST } else { id }
     }
 
-    /// All four ids, the first with its mark, as [`LAST`](Self::LAST) says.
+    /// Returns a bit per lane that holds a triangle.
+    ///
+    /// # Safety
+    /// The processor has the instructions, and `L` has four lanes.
     #[inline(always)]
-    pub(crate) fn ids(&self) -> *const u32 {
-        self.ids.as_ptr()
+    pub(crate) unsafe fn used<L: Lanes>(&self) -> u32 {
+        const { assert!(L::N == Self::LANES && Self::UNUSED > i32::MAX as u32) };
+        // SAFETY: ids are four aligned lanes. Those of triangles have no sign.
+        0b1111 & !unsafe { L::load(self.ids.as_ptr().cast()) }.signs()
     }
 
     #[inline(always)]

@@ -74,8 +74,6 @@ impl<const R: usize> Lanes for Singles<R> {
         le(a, b) = le(a, b);
         eq(a, b) = eq(a, b);
         below(a, b) = below(a, b);
-        swap_twos(a) = swap_twos(a);
-        swap_ones(a) = swap_ones(a);
     }
 
     #[inline(always)]
@@ -119,9 +117,10 @@ impl<const R: usize> Lanes for Singles<R> {
     fn greatest(self) -> f32 {
         let four = self.0.map(|register| Singles([register]));
         let four = four.into_iter().fold(four[0], Lanes::max);
-        let two = four.max(four.swap_twos());
+        let two = four.max(Singles([unsafe { swap_twos(four.0[0]) }]));
+        let one = two.max(Singles([unsafe { swap_ones(two.0[0]) }]));
         let mut greatest = [0.0; 4];
-        unsafe { two.max(two.swap_ones()).store(greatest.as_mut_ptr()) };
+        unsafe { one.store(greatest.as_mut_ptr()) };
         greatest[0]
     }
 

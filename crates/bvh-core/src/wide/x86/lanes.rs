@@ -87,14 +87,6 @@ macro_rules! quarters {
                 }
             }
         }
-        #[inline(always)]
-        fn swap_twos(self) -> Self {
-            unsafe { Self($permute::<0b01_00_11_10>(self.0)) }
-        }
-        #[inline(always)]
-        fn swap_ones(self) -> Self {
-            unsafe { Self($permute::<0b10_11_00_01>(self.0)) }
-        }
     };
 }
 
