@@ -12,7 +12,7 @@
 //! distances of any ray of the packet.
 
 use super::instructions::Instructions;
-use super::lanes::{DoubleLanes, Lanes, Mask};
+use super::lanes::{DoubleLanes, Lanes};
 use super::layout::WideNode;
 use crate::Ray;
 use crate::slabs::{FAR, FAR_DOUBLE, NEAR, NEAR_DOUBLE};
@@ -22,8 +22,8 @@ const PLANE: usize = size_of::<[f32; WideNode::LANES]>();
 
 /// A ray as boxes are tested with it.
 pub(crate) trait BoxTest<K: Instructions> {
-    /// Returns the distances at which the ray enters the eight boxes of a node, and a bit for each
-    /// box that it enters by `t_max`.
+    /// Returns the [keys](super::instructions::Pending) of the boxes of a node that the ray enters
+    /// by `t_max`, and a bit for each of them.
     unsafe fn boxes(&self, node: &WideNode, t_max: f32) -> (K::Boxes, u32);
 }
 
@@ -104,7 +104,7 @@ impl<K: Instructions> BoxTest<K> for BoxRay<K::Boxes> {
             }
             let entry = near[0].max(near[1]).max(near[2].max(self.t_min));
             let exit = far[0].min(far[1]).min(far[2].min(K::Boxes::splat(t_max)));
-            (entry, K::entered(entry, exit))
+            K::keys(entry, entry.le(exit))
         }
     }
 }
@@ -151,7 +151,7 @@ impl<K: Instructions> BoxTest<K> for FarBoxRay {
             let t_min = K::Boxes::splat(self.t_min);
             let entry = K::Boxes::single(entry).max(t_min);
             let is_in_range = t_min.le(K::Boxes::single(exit)) & entry.le(K::Boxes::splat(t_max));
-            (entry, (crosses & is_in_range).bits())
+            K::keys(entry, crosses & is_in_range)
         }
     }
 }

@@ -211,8 +211,8 @@ impl<L: Lanes> PointLanes<L> {
 }
 
 impl<K: Instructions> BoxTest<K> for PointLanes<K::Boxes> {
-    /// Returns bounds of the scaled squared distances from the boxes of a node, ∞ for unused lanes,
-    /// and a bit for each box whose bound is at most `limit`.
+    /// Returns keys by bounds of the scaled squared distances from the boxes of a node, ∞ for unused
+    /// lanes, and a bit for each box whose bound is at most `limit`.
     #[inline(always)]
     unsafe fn boxes(&self, node: &WideNode, limit: f32) -> (K::Boxes, u32) {
         let zero = self.scale.filled(0.0);
@@ -228,7 +228,8 @@ impl<K: Instructions> BoxTest<K> for PointLanes<K::Boxes> {
             let outside = zero.max(below.max(above));
             sum = outside.mul_add(outside, sum);
         }
-        (sum, sum.le(sum.filled(limit)).bits())
+        // SAFETY: the processor has the instructions.
+        unsafe { K::keys(sum, sum.le(sum.filled(limit))) }
     }
 }
 

@@ -19,7 +19,7 @@ use super::gathered::Gathered;
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::Lanes;
-use super::layout::{Child, WideBvh, WideNode};
+use super::layout::{Child, Places, WideBvh, WideNode};
 use super::pairs::Crossings;
 use super::prepared::{Prepared, Ready, Test};
 use super::ray_lanes::{RayLanes, prefetch};
@@ -225,7 +225,7 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
         let wide = self.wide;
         let mut counts = self.counts;
         let count = core::mem::replace(&mut counts.at_nodes, 0);
-        let mut entries = [const { MaybeUninit::<K::Boxes>::uninit() }; FLIGHT];
+        let mut keys = [const { MaybeUninit::<K::Boxes>::uninit() }; FLIGHT];
         let mut masks = [0; FLIGHT];
         // SAFETY: there are at most `FLIGHT` rays; the references of the layout are sound, and its
         // stacks large enough.
@@ -233,8 +233,8 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
             for i in 0..count {
                 let traversal = &**self.at_nodes.get_unchecked(i);
                 let node = traversal.node(wide);
-                let (entry, mask) = traversal.ray.boxes::<K>(node, traversal.t());
-                entries.get_unchecked_mut(i).write(entry);
+                let (entries, mask) = traversal.ray.boxes::<K>(node, traversal.t());
+                keys.get_unchecked_mut(i).write(entries);
                 *masks.get_unchecked_mut(i) = mask;
             }
             for i in 0..count {
@@ -244,15 +244,16 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
                 if F::ANY || F::ALL {
                     K::compress(node, mask, traversal.top);
                 } else {
-                    K::sort(node, entries.get_unchecked(i).assume_init(), mask, traversal.top);
+                    K::sort(node, keys.get_unchecked(i).assume_init(), mask, traversal.top);
                 }
                 traversal.top = traversal.top.add(mask.count_ones() as usize).sub(1);
             }
             // Only now, when what was pushed has reached the cache: a load would wait for the
             // stores, which are wider.
+            let places = wide.places();
             for i in 0..count {
                 let traversal = &mut **self.at_nodes.get_unchecked(i);
-                let child = traversal.go_on::<K>(wide);
+                let child = traversal.go_on::<K>(places);
                 self.enlist(traversal, child, &mut counts);
             }
         }
@@ -292,10 +293,11 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
             for some in hopeful.chunks(Gathered::RAYS) {
                 self.decide(some);
             }
+            let places = wide.places();
             for i in 0..count {
                 let traversal = &mut **self.at_leaves.get_unchecked(i);
                 traversal.leave_block(wide, F::ANY);
-                let child = traversal.go_on::<K>(wide);
+                let child = traversal.go_on::<K>(places);
                 self.enlist(traversal, child, &mut counts);
             }
             self.counts = counts;
@@ -409,11 +411,11 @@ impl Traversal {
 
     /// Goes on to the child at the top of the stack, and fetches it.
     #[inline(always)]
-    unsafe fn go_on<K: Instructions>(&mut self, wide: &WideBvh) -> Child {
+    unsafe fn go_on<K: Instructions>(&mut self, places: Places) -> Child {
         // SAFETY: the top of the stack holds at least an end; a prefetch may name any address.
         unsafe {
             self.child = Child::from_bits(*self.top as u32);
-            K::prefetch_bytes(wide.place(self.child), size_of::<WideNode>());
+            K::prefetch_bytes(places.of(self.child), size_of::<WideNode>());
             self.child
         }
     }

@@ -9,9 +9,30 @@
 use super::lanes::{Lanes, Mask};
 use super::layout::{Child, WideNode};
 
-/// A child to visit later: the bits of its entry, of which the last three are any, above those of
-/// the child. Entries are not negative, so that their bits are ordered as they are.
+/// A child to visit later: its key, or 0, above the bits of the child.
+///
+/// The *key* of an entered child is the bits of its entry, of which the last four are those of 8
+/// minus its lane. Entries are not negative, so that keys are ordered as they are; and they are
+/// distinct and not 0.
 pub(crate) type Pending = u64;
+
+/// The last bits of the keys.
+#[repr(align(32))]
+pub(crate) struct LastBits(pub(crate) [u32; 8]);
+
+pub(crate) static LAST_BITS: LastBits = LastBits([8, 7, 6, 5, 4, 3, 2, 1]);
+
+/// Returns the lane of a key.
+#[inline(always)]
+pub(crate) fn lane_of(key: u32) -> usize {
+    (key.wrapping_neg() & 7) as usize
+}
+
+/// Returns the greatest key that is not behind a hit at this distance.
+#[inline(always)]
+pub(crate) fn last_key(nearest: f32) -> u32 {
+    nearest.to_bits() | 15
+}
 
 /// A part of a kernel that is compiled once for an instruction set and called, so that its callers
 /// stay small, or are compiled without the instructions.
@@ -36,25 +57,30 @@ pub(crate) trait Instructions: Sized {
     /// The widest register: one ray per lane.
     type Rays: Lanes;
 
-    /// Returns a bit per child whose entry is at most its exit.
+    /// Returns the [keys](Pending) of the children that are entered, with 0 in other lanes, and a bit
+    /// per child.
     #[inline(always)]
-    unsafe fn entered(entry: Self::Boxes, exit: Self::Boxes) -> u32 {
-        entry.le(exit).bits()
+    unsafe fn keys(
+        entry: Self::Boxes,
+        is_entered: <Self::Boxes as Lanes>::Mask,
+    ) -> (Self::Boxes, u32) {
+        // SAFETY: there are eight aligned lanes.
+        let last_bits = unsafe { Self::Boxes::load(LAST_BITS.0.as_ptr().cast()) };
+        let keys = entry & entry.filled_with_bits(!15) | last_bits;
+        (Self::Boxes::select(is_entered, keys, entry.filled(0.0)), is_entered.bits())
     }
 
-    /// Writes the keys of the entered children, the nearest last: the bits of the entry, of which
-    /// the last three are the inverted lane. Entries are not negative, so that keys are ordered as
-    /// they are, and distinct.
-    unsafe fn sort_keys(entry: Self::Boxes, mask: u32, to: *mut u32);
+    /// Writes the keys of the entered children, the nearest last.
+    unsafe fn sort_keys(keys: Self::Boxes, mask: u32, to: *mut u32);
 
     /// Writes the keys of the entered children in the order of their lanes.
-    unsafe fn compress_keys(entry: Self::Boxes, mask: u32, to: *mut u32);
+    unsafe fn compress_keys(keys: Self::Boxes, mask: u32, to: *mut u32);
 
     /// Writes the entered children to `to`, the nearest last, and returns the nearest. If none was
     /// entered, returns any child.
-    unsafe fn sort(node: &WideNode, entry: Self::Boxes, mask: u32, to: *mut Pending) -> Child;
+    unsafe fn sort(node: &WideNode, keys: Self::Boxes, mask: u32, to: *mut Pending) -> Child;
 
-    /// Writes the entered children in the order of their lanes, with entries of 0.
+    /// Writes the entered children in the order of their lanes, with keys of 0.
     unsafe fn compress(node: &WideNode, mask: u32, to: *mut Pending);
 
     /// Fetches a line of memory, which may be anywhere.
@@ -96,5 +122,5 @@ pub(crate) trait Instructions: Sized {
 /// Returns the greatest [`Pending`] that is not behind a hit at this distance.
 #[inline(always)]
 pub(crate) fn last_pending(nearest: f32) -> Pending {
-    u64::from(nearest.to_bits() | 7) << 32 | u64::from(u32::MAX)
+    u64::from(last_key(nearest)) << 32 | u64::from(u32::MAX)
 }

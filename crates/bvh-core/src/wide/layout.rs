@@ -80,6 +80,23 @@ impl Child {
     }
 }
 
+/// Where the nodes and the blocks of a layout begin.
+#[derive(Clone, Copy)]
+pub(crate) struct Places {
+    nodes: *const u8,
+    blocks: *const u8,
+}
+
+impl Places {
+    /// Returns the beginning of a child in memory. It need not exist.
+    #[inline(always)]
+    pub(crate) fn of(self, child: Child) -> *const u8 {
+        let node = self.nodes.wrapping_add(child.index() * size_of::<WideNode>());
+        let block = self.blocks.wrapping_add(child.index() * size_of::<TriangleBlock>());
+        if child.is_node() { node } else { block }
+    }
+}
+
 /// An immutable copy of a [`Bvh`](crate::Bvh) and its triangles, for tracing only.
 ///
 /// Gives the answers of [`nearest_hit`](crate::nearest_hit) with
@@ -122,15 +139,9 @@ pub struct WideBvh {
 const OUTLINE: usize = 64;
 
 impl WideBvh {
-    /// Returns the beginning of a child in memory. It need not exist.
     #[inline(always)]
-    pub(crate) fn place(&self, child: Child) -> *const u8 {
-        let (array, size) = if child.is_node() {
-            (self.nodes.as_ptr().cast::<u8>(), size_of::<WideNode>())
-        } else {
-            (self.blocks.as_ptr().cast::<u8>(), size_of::<TriangleBlock>())
-        };
-        array.wrapping_add(child.index().wrapping_mul(size))
+    pub(crate) fn places(&self) -> Places {
+        Places { nodes: self.nodes.as_ptr().cast(), blocks: self.blocks.as_ptr().cast() }
     }
 
     /// Returns boxes around all triangles, fewer than [`OUTLINE`] and eight: the subtrees of the

@@ -1,7 +1,7 @@
 //! The traversal of one ray in vector registers.
 
 use super::box_ray::{BoxRay, BoxTest, FarBoxRay};
-use super::instructions::{Instructions, Pending, Task};
+use super::instructions::{Instructions, Pending, Task, last_pending};
 use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::{Lanes, Mask};
 use super::layout::{Child, WideBvh};
@@ -151,7 +151,7 @@ pub(crate) unsafe fn visit<K: Instructions, const ANY: bool>(
         loop {
             while child.is_node() {
                 let node = &*nodes.add(child.index());
-                let (entry, mask) = boxes.boxes(node, nearest.t);
+                let (keys, mask) = boxes.boxes(node, nearest.t);
                 let others = mask & mask.wrapping_sub(1);
                 if others == 0 {
                     if mask == 0 {
@@ -172,7 +172,7 @@ pub(crate) unsafe fn visit<K: Instructions, const ANY: bool>(
                     }
                     continue;
                 }
-                child = K::sort(node, entry, mask, top);
+                child = K::sort(node, keys, mask, top);
                 top = top.add(mask.count_ones() as usize - 1);
             }
             if !child.is_node() {
@@ -193,7 +193,7 @@ pub(crate) unsafe fn visit<K: Instructions, const ANY: bool>(
                 }
                 top = top.sub(1);
                 let pending = *top;
-                if ANY || (pending >> 32) as u32 <= nearest.t.to_bits() | 7 {
+                if ANY || pending <= last_pending(nearest.t) {
                     break Child::from_bits(pending as u32);
                 }
             };

@@ -7,7 +7,7 @@
 //! ray tracing' (ranged traversal).
 
 use super::answer::{ANY_HIT, Find, NEAREST_HIT};
-use super::instructions::{Instructions, Task};
+use super::instructions::{Instructions, Task, lane_of, last_key};
 use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::{Lanes, Mask};
 use super::layout::{Child, WideBvh, WideNode};
@@ -119,7 +119,7 @@ impl<K: Instructions> Packet<K> {
             let nodes = wide.nodes.as_ptr();
             let blocks = wide.blocks.as_ptr();
             let mut farthest = self.bounds.end();
-            let mut end = key_of(farthest);
+            let mut end = last_key(farthest);
             let mut keys = MaybeUninit::<[u32; STACK + SPARE]>::uninit();
             let mut parents = MaybeUninit::<[Parent; STACK + SPARE]>::uninit();
             let mut deep_keys = DeepStacks::new(1, wide.stack_need);
@@ -139,12 +139,12 @@ impl<K: Instructions> Packet<K> {
                 if child.is_node() {
                     let parent = Parent { node: child.index() as u32, vector: first as u32 };
                     let node = &*nodes.add(child.index());
-                    let (entry, mask) = culling.cull::<K>(node, farthest);
+                    let (entries, mask) = culling.cull::<K>(node, farthest);
                     if mask != 0 {
                         if ANY {
-                            K::compress_keys(entry, mask, keys.add(top));
+                            K::compress_keys(entries, mask, keys.add(top));
                         } else {
-                            K::sort_keys(entry, mask, keys.add(top));
+                            K::sort_keys(entries, mask, keys.add(top));
                         }
                         for i in 0..8 {
                             *parents.add(top + i) = parent;
@@ -156,7 +156,7 @@ impl<K: Instructions> Packet<K> {
                     let block = blocks.add(child.index());
                     if self.visit_leaf::<ANY>(first, entered, &planes, block, &wide.bounds) {
                         farthest = self.farthest();
-                        end = key_of(farthest);
+                        end = last_key(farthest);
                         if ANY && farthest < 0.0 {
                             return;
                         }
@@ -171,7 +171,7 @@ impl<K: Instructions> Packet<K> {
                     if key > end {
                         continue;
                     }
-                    let lane = (!key & 7) as usize;
+                    let lane = lane_of(key);
                     let waiting = *parents.add(top);
                     let node = &*nodes.add(waiting.node as usize);
                     planes = culling.planes(node, lane);
@@ -231,7 +231,9 @@ unsafe fn fetch<K: Instructions>(wide: &WideBvh, node: &WideNode, mut mask: u32)
         let lane = mask.trailing_zeros() as usize & 7;
         mask &= mask - 1;
         // SAFETY: a prefetch may name any address.
-        unsafe { K::prefetch_bytes(wide.place(node.children[lane]), size_of::<TriangleBlock>()) };
+        unsafe {
+            K::prefetch_bytes(wide.places().of(node.children[lane]), size_of::<TriangleBlock>())
+        };
     }
 }
 
@@ -264,12 +266,6 @@ impl<K: Instructions, F: Find> Task<K> for Trace<'_, K, F> {
             packet.bounds = RayBounds::none();
         }
     }
-}
-
-/// Returns the greatest key of a child that a ray may enter before `farthest`.
-#[inline(always)]
-fn key_of(farthest: f32) -> u32 {
-    farthest.to_bits() | 7
 }
 
 impl<K: Instructions> Packet<K> {
@@ -410,9 +406,9 @@ impl<L: Lanes> Culling<L> {
         }
     }
 
-    /// Returns the least distance at which any ray may enter each child, and a bit per child that
-    /// some ray may enter before `farthest`: the bounds of `(plane − origin) · scale` over all
-    /// rays.
+    /// Returns the [keys](super::instructions::Pending) of the children that some ray may enter by
+    /// `farthest`, by the least distance of all rays, and a bit for each of them: the bounds of
+    /// `(plane − origin) · scale` over all rays.
     #[inline(always)]
     pub(super) unsafe fn cull<K: Instructions<Boxes = L>>(
         &self,
@@ -437,7 +433,7 @@ impl<L: Lanes> Culling<L> {
                 // `min` returns the second of a NaN and a number.
                 exit = far.min(exit);
             }
-            (entry, K::entered(entry, exit))
+            K::keys(entry, entry.le(exit))
         }
     }
 

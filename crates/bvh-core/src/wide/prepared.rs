@@ -141,8 +141,8 @@ impl Prepared {
         (&raw const *self).cast::<f32>().wrapping_add(4 * row)
     }
 
-    /// Returns the distances at which the ray enters the eight boxes of a node, and a bit for each
-    /// box that it enters before `t_max`.
+    /// Returns the [keys](super::instructions::Pending) of the boxes of a node that the ray enters
+    /// by `t_max`, and a bit for each of them.
     #[inline(always)]
     pub(crate) unsafe fn boxes<K: Instructions>(
         &self,
@@ -164,7 +164,7 @@ impl Prepared {
             let begin = K::Boxes::splat(self.t_min);
             let entry = near(0).max(near(1)).max(near(2).max(begin));
             let exit = far(0).min(far(1)).min(far(2).min(K::Boxes::splat(t_max)));
-            (entry, K::entered(entry, exit))
+            K::keys(entry, entry.le(exit))
         }
     }
 

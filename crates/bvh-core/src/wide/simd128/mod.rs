@@ -6,7 +6,7 @@ mod lanes;
 #[cfg_attr(target_arch = "wasm32", path = "wasm.rs")]
 mod registers;
 
-use super::instructions::{Instructions, Pending, Task};
+use super::instructions::{Instructions, Pending, Task, lane_of};
 use super::lanes::Lanes;
 use super::layout::{Child, WideNode};
 use crate::Kernel;
@@ -41,36 +41,36 @@ impl Instructions for Simd128 {
     type Rays = Singles<2>;
 
     #[inline(always)]
-    unsafe fn sort_keys(entry: Singles<2>, mask: u32, to: *mut u32) {
+    unsafe fn sort_keys(keys: Singles<2>, mask: u32, to: *mut u32) {
         // SAFETY: the target has the instructions; as many keys are written as there are bits.
         unsafe {
-            Self::compress_keys(entry, mask, to);
+            Self::compress_keys(keys, mask, to);
             let keys = core::slice::from_raw_parts_mut(to, mask.count_ones() as usize);
             keys.sort_unstable_by_key(|&key| Reverse(key));
         }
     }
 
     #[inline(always)]
-    unsafe fn compress_keys(entry: Singles<2>, mask: u32, to: *mut u32) {
-        let mut entries = [0.0; 8];
+    unsafe fn compress_keys(keys: Singles<2>, mask: u32, to: *mut u32) {
+        let mut lanes = [0.0; 8];
         // SAFETY: there is room for eight, and for a key per bit.
         unsafe {
-            entry.store(entries.as_mut_ptr());
+            keys.store(lanes.as_mut_ptr());
             for (i, lane) in lanes_of(mask).enumerate() {
-                *to.add(i) = entries[lane].to_bits() & !7 | (7 - lane as u32);
+                *to.add(i) = lanes[lane].to_bits();
             }
         }
     }
 
     #[inline(always)]
-    unsafe fn sort(node: &WideNode, entry: Singles<2>, mask: u32, to: *mut Pending) -> Child {
-        let mut keys = [0; 8];
+    unsafe fn sort(node: &WideNode, keys: Singles<2>, mask: u32, to: *mut Pending) -> Child {
+        let mut sorted = [0; 8];
         let mut nearest = Child::node(0);
         // SAFETY: the target has the instructions; there is room for a key per bit.
         unsafe {
-            Self::sort_keys(entry, mask, keys.as_mut_ptr());
-            for (i, &key) in keys.iter().enumerate().take(mask.count_ones() as usize) {
-                nearest = node.children[(!key & 7) as usize];
+            Self::sort_keys(keys, mask, sorted.as_mut_ptr());
+            for (i, &key) in sorted.iter().enumerate().take(mask.count_ones() as usize) {
+                nearest = node.children[lane_of(key)];
                 *to.add(i) = u64::from(key) << 32 | u64::from(nearest.bits());
             }
         }

@@ -4,17 +4,18 @@
 use super::lanes::{F32x4, F32x8};
 use super::sort;
 use crate::wide::instructions::{Instructions, Pending, Task};
-use crate::wide::lanes::Mask as _;
 use crate::wide::layout::{Child, WideNode};
 use core::arch::x86_64::*;
 
 pub(crate) struct Avx2;
 
-/// The lanes of each mask, the lowest first: what compresses eight lanes by one permutation.
+/// The lanes of each mask, the lowest first, then another lane as often as there is room: what
+/// compresses eight lanes by one permutation.
 static LANES_OF: [[u8; 8]; 256] = {
     let mut lanes_of = [[0; 8]; 256];
     let mut mask = 0;
     while mask < 256 {
+        lanes_of[mask] = [mask.trailing_ones() as u8 & 7; 8];
         let mut lane = 0;
         let mut count = 0;
         while lane < 8 {
@@ -34,7 +35,7 @@ impl Instructions for Avx2 {
     type Block = F32x4;
     type Rays = F32x8;
 
-    shared!("avx2,fma,bmi1,bmi2,popcnt,lzcnt", compress, only);
+    shared!("avx2,fma,bmi1,bmi2,popcnt,lzcnt", compress);
 
     #[inline(always)]
     unsafe fn compress(node: &WideNode, mask: u32, to: *mut Pending) {
@@ -51,25 +52,12 @@ impl Instructions for Avx2 {
     }
 }
 
-/// The entered lanes moved to the front, zeros behind them.
+/// The entered lanes moved to the front, one of the others behind them.
 #[inline(always)]
 unsafe fn compress(lanes: __m256i, mask: u32) -> __m256i {
     // SAFETY: the caller has AVX2.
     unsafe {
-        let order =
-            _mm256_cvtepu8_epi32(_mm_loadl_epi64(LANES_OF[mask as usize & 255].as_ptr().cast()));
-        let count = _mm256_set1_epi32(mask.count_ones() as i32);
-        let used = _mm256_cmpgt_epi32(count, _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
-        _mm256_and_si256(used, _mm256_permutevar8x32_epi32(lanes, order))
-    }
-}
-
-/// The entered lanes, among others of the greatest number.
-#[inline(always)]
-unsafe fn only(lanes: __m256i, mask: u32) -> __m256i {
-    // SAFETY: the caller has AVX2.
-    unsafe {
-        let entered = _mm256_castps_si256(F32x8::from_bits(mask).0);
-        _mm256_blendv_epi8(_mm256_set1_epi32(-1), lanes, entered)
+        let order = _mm_loadl_epi64(LANES_OF[mask as usize & 255].as_ptr().cast());
+        _mm256_permutevar8x32_epi32(lanes, _mm256_cvtepu8_epi32(order))
     }
 }

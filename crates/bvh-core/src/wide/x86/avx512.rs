@@ -13,13 +13,7 @@ impl Instructions for Avx512 {
     type Block = F32x4;
     type Rays = F32x16;
 
-    shared!("avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt", compress, only);
-
-    #[inline(always)]
-    unsafe fn entered(F32x8(entry): F32x8, F32x8(exit): F32x8) -> u32 {
-        // SAFETY: the caller has AVX-512 VL.
-        u32::from(unsafe { _mm256_cmp_ps_mask::<_CMP_LE_OQ>(entry, exit) })
-    }
+    shared!("avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,popcnt,lzcnt", compress);
 
     #[inline(always)]
     unsafe fn compress(node: &WideNode, mask: u32, to: *mut Pending) {
@@ -55,11 +49,4 @@ impl Instructions for Avx512 {
 unsafe fn compress(lanes: __m256i, mask: u32) -> __m256i {
     // SAFETY: the caller has AVX-512 VL.
     unsafe { _mm256_maskz_compress_epi32(mask as u8, lanes) }
-}
-
-/// The entered lanes, among others of the greatest number.
-#[inline(always)]
-unsafe fn only(lanes: __m256i, mask: u32) -> __m256i {
-    // SAFETY: the caller has AVX-512 VL.
-    unsafe { _mm256_mask_mov_epi32(_mm256_set1_epi32(-1), mask as u8, lanes) }
 }

@@ -5,10 +5,9 @@ use crate::wide::layout::{Child, WideNode};
 use core::arch::x86_64::*;
 
 /// The functions that both instruction sets have in common. `$features` are those of the set.
-/// `$compress` moves the lanes of a mask to the front, with zeros behind them, and `$only` fills all
-/// other lanes with the greatest number.
+/// `$compress` moves the lanes of a mask to the front. If all others are 0, zeros follow.
 macro_rules! shared {
-    ($features:tt, $compress:ident, $only:ident) => {
+    ($features:tt, $compress:ident) => {
         #[inline(always)]
         unsafe fn prefetch(line: *const u8) {
             // SAFETY: a prefetch may name any address.
@@ -23,43 +22,34 @@ macro_rules! shared {
         }
 
         #[inline(always)]
-        unsafe fn sort_keys(F32x8(entry): F32x8, mask: u32, to: *mut u32) {
+        unsafe fn sort_keys(F32x8(keys): F32x8, mask: u32, to: *mut u32) {
             // SAFETY: the processor has the instructions, and there is room for eight.
             unsafe {
-                let keys = $compress(sort::keys(entry), mask);
+                let keys = $compress(_mm256_castps_si256(keys), mask);
                 _mm256_storeu_si256(to.cast(), sort::descending(keys, mask.count_ones()));
             }
         }
 
         #[inline(always)]
-        unsafe fn compress_keys(F32x8(entry): F32x8, mask: u32, to: *mut u32) {
+        unsafe fn compress_keys(F32x8(keys): F32x8, mask: u32, to: *mut u32) {
             // SAFETY: the processor has the instructions, and there is room for eight.
-            unsafe { _mm256_storeu_si256(to.cast(), $compress(sort::keys(entry), mask)) }
+            unsafe {
+                _mm256_storeu_si256(to.cast(), $compress(_mm256_castps_si256(keys), mask));
+            }
         }
 
         #[inline(always)]
-        unsafe fn sort(node: &WideNode, F32x8(entry): F32x8, mask: u32, to: *mut Pending) -> Child {
+        unsafe fn sort(node: &WideNode, F32x8(keys): F32x8, mask: u32, to: *mut Pending) -> Child {
             // SAFETY: the processor has the instructions, and there is room for eight.
             unsafe {
-                let keys = sort::keys(entry);
+                let keys = _mm256_castps_si256(keys);
                 // The nearest child first: a traversal waits for it, and not for the rest.
-                let nearest = sort::nearest(node, $only(keys, mask));
+                let nearest = sort::nearest(node, keys);
                 sort::write(node, $compress(keys, mask), mask.count_ones(), to);
                 nearest
             }
         }
     };
-}
-
-/// Returns the bits of the entries with the inverted lane in the last three: of equal entries the
-/// higher lane is nearer.
-#[inline(always)]
-pub(super) unsafe fn keys(entry: __m256) -> __m256i {
-    // SAFETY: the caller has AVX2.
-    unsafe {
-        let cut = _mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(entry));
-        _mm256_or_si256(cut, _mm256_setr_epi32(7, 6, 5, 4, 3, 2, 1, 0))
-    }
 }
 
 /// Returns the first `count` keys in descending order, if all others are 0.
@@ -104,7 +94,8 @@ pub(super) unsafe fn write(node: &WideNode, keys: __m256i, count: u32, to: *mut 
     // SAFETY: the caller has AVX2, and there is room for eight.
     unsafe {
         let sorted = descending(keys, count);
-        let order = _mm256_andnot_si256(sorted, _mm256_set1_epi32(7));
+        // The last bits of a key are those of 8 minus the lane.
+        let order = _mm256_sub_epi32(_mm256_setzero_si256(), sorted);
         let children = _mm256_load_si256(node.children.as_ptr().cast());
         let children = _mm256_permutevar8x32_epi32(children, order);
         if count <= 4 {
@@ -122,10 +113,13 @@ pub(super) unsafe fn write(node: &WideNode, keys: __m256i, count: u32, to: *mut 
     }
 }
 
+/// Returns the child that has the least of these keys, of which 0 is none.
 #[inline(always)]
 pub(super) unsafe fn nearest(node: &WideNode, keys: __m256i) -> Child {
     // SAFETY: the caller has AVX2; a lane is below eight.
     unsafe {
+        // 0 becomes the greatest.
+        let keys = _mm256_add_epi32(keys, _mm256_set1_epi32(-1));
         let least =
             _mm_min_epu32(_mm256_castsi256_si128(keys), _mm256_extracti128_si256::<1>(keys));
         let least = _mm_min_epu32(least, _mm_shuffle_epi32::<0x4e>(least));
