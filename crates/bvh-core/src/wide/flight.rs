@@ -6,18 +6,19 @@
 //! the next:
 //!
 //! ```text
-//!            ┌─> at a node: boxes ────────────────────────────┐
-//!  in flight ┼─> at a leaf: candidates ─> exact decisions ────┼─> pop, fetch what comes next ─> in flight
-//!            └─> at the end: write the answer, start another ─┘
+//!            ┌─> at a node: boxes ────────────────────────────────┐
+//!  in flight ┼─> at a leaf: candidates ─> pairs, decided exactly ─┼─> pop, fetch what comes next ─> in flight
+//!            └─> at the end: write the answer, start another ─────┘
 //! ```
 //!
-//! No branch depends on one ray: its next step decides the list that it is appended to, and the
-//! order of hits and the children behind them are found without branches, too.
+//! Hardly a branch depends on one ray: its next step decides the list that it is appended to, and
+//! the order of children and those behind a hit are found without branches, too. A ray is at the
+//! end when its stack is empty, which is seen with the leaves.
 
 use super::answer::Find;
 use super::gathered::Gathered;
 use super::instructions::{Instructions, Pending, Task};
-use super::kernel::{DeepStacks, SPARE, STACK};
+use super::kernel::{DeepStacks, LINE, SPARE, STACK};
 use super::lanes::Lanes;
 use super::layout::{Child, Places, WideBvh, WideNode};
 use super::pairs::Crossings;
@@ -57,13 +58,10 @@ pub(crate) unsafe fn trace<K: Instructions, F: Find>(
         find,
         from: numbers.start,
         end: numbers.end,
-        ready: [MaybeUninit::uninit(); RAYS],
-        waiting: 0,
         gathered: Gathered::EMPTY,
-        counts: Counts { at_nodes: 0, at_leaves: 0, at_end: 0 },
+        counts: Counts { at_nodes: 0, at_leaves: 0 },
         at_nodes: EMPTY,
         at_leaves: EMPTY,
-        at_end: EMPTY,
         idle: EMPTY,
         idle_count: 0,
         instructions: PhantomData,
@@ -82,7 +80,6 @@ const EMPTY: List = [core::ptr::null_mut(); FLIGHT];
 struct Counts {
     at_nodes: usize,
     at_leaves: usize,
-    at_end: usize,
 }
 
 /// Appends a ray to a list if it `belongs` there, without a branch. While a list is gone through it
@@ -94,7 +91,7 @@ unsafe fn append(list: &mut List, count: &mut usize, traversal: *mut Traversal, 
     *count += usize::from(belongs);
 }
 
-/// The rays of a batch that are in flight, that are prepared, and that are neither.
+/// The rays of a batch that are in flight, and that are not yet.
 struct Flight<'a, K, F> {
     /// The layout at whose root rays start.
     wide: &'a WideBvh,
@@ -103,14 +100,11 @@ struct Flight<'a, K, F> {
     /// The numbers of the rays that have not been prepared.
     from: usize,
     end: usize,
-    /// The last that have been, and a bit for each that has not been started.
-    ready: [MaybeUninit<Prepared>; RAYS],
-    waiting: u32,
     gathered: Gathered,
     counts: Counts,
     at_nodes: List,
+    /// Rays at leaves and at their end.
     at_leaves: List,
-    at_end: List,
     /// The places of rays whose answers are written.
     idle: List,
     idle_count: usize,
@@ -124,26 +118,31 @@ impl<K: Instructions, F: Find> Task<K> for Flight<'_, K, F> {
     unsafe fn run(mut self) {
         let mut traversals = MaybeUninit::<[Traversal; FLIGHT]>::uninit();
         let traversals = traversals.as_mut_ptr().cast::<Traversal>();
-        let mut deep = DeepStacks::new(FLIGHT, self.wide.stack_need);
-        // SAFETY: the processor has the instructions; there is room for so many.
+        let need = self.wide.stack_need;
+        let mut stacks = MaybeUninit::<Stacks>::uninit();
+        let mut deep = DeepStacks::new(FLIGHT, need);
+        let stacks =
+            deep.as_mut().map_or(stacks.as_mut_ptr().cast::<Pending>(), |deep| deep.stack(0));
+        // SAFETY: the processor has the instructions; there is room for so many, since stacks that
+        // are not deep fit in the frame.
         unsafe {
             for i in 0..FLIGHT {
-                let traversal = traversals.add(i);
-                Traversal::set_stack(traversal, deep.as_mut().map(|deep| deep.stack(i)));
-                append(&mut self.idle, &mut self.idle_count, traversal, true);
+                // The stacks are dense, so that few pages hold them.
+                (*traversals.add(i)).stack = stacks.add(i * places_of_stack(need));
+                append(&mut self.idle, &mut self.idle_count, traversals.add(i), true);
             }
             loop {
                 self.start_idle();
-                let Counts { at_nodes, at_leaves, at_end } = self.counts;
-                if at_nodes + at_leaves + at_end == 0 {
+                let Counts { at_nodes, at_leaves } = self.counts;
+                if at_nodes + at_leaves == 0 {
                     return;
                 }
                 self.visit_nodes();
-                let Counts { at_nodes, at_leaves, .. } = self.counts;
+                let Counts { at_nodes, at_leaves } = self.counts;
                 let leaves_wait = at_leaves >= FLIGHT / 2 || at_nodes == 0;
                 if leaves_wait {
-                    self.visit_leaves();
                     self.finish();
+                    self.visit_leaves();
                 }
             }
         }
@@ -151,57 +150,47 @@ impl<K: Instructions, F: Find> Task<K> for Flight<'_, K, F> {
 }
 
 impl<K: Instructions, F: Find> Flight<'_, K, F> {
-    /// Starts the next rays in the idle places, as far as there are rays.
+    /// Starts the next rays, a vector at a time, while there are places for them. Answers those
+    /// that miss the box around everything.
     #[inline(always)]
     unsafe fn start_idle(&mut self) {
-        let count = core::mem::replace(&mut self.idle_count, 0);
-        for i in 0..count {
-            while self.waiting == 0 {
-                if self.from == self.end {
-                    return;
-                }
-                // SAFETY: the processor has the instructions.
-                unsafe { self.prepare() };
-            }
-            let next = self.waiting.trailing_zeros() as usize;
-            self.waiting &= self.waiting - 1;
-            // SAFETY: so many places are idle; `ready` is written where `waiting` had a bit.
+        let Self { wide, rays, .. } = *self;
+        let root = wide.root.unwrap_or(Child::END);
+        let mut counts = self.counts;
+        while self.idle_count >= K::Rays::N && self.from < self.end {
+            let from = self.from;
+            self.from = (from + K::Rays::N).min(self.end);
+            let there = u32::MAX >> (32 - (self.from - from));
+            // SAFETY: the processor has the instructions; as many places as lanes are idle.
             unsafe {
-                let traversal = &mut **self.idle.get_unchecked(i);
-                let ray = self.ready.get_unchecked(next).assume_init_ref();
-                traversal.start::<K>(ray, self.wide);
-                let mut counts = self.counts;
-                self.enlist(traversal, traversal.child, &mut counts);
-                self.counts = counts;
+                prefetch::<K>(rays, self.from + K::Rays::N);
+                let ready = Ready::new(RayLanes::<K::Rays>::load_up_to(rays, from, self.end), wide);
+                let mut entering = there & ready.enter(&wide.bounds);
+                let mut others = !entering & u32::MAX >> (32 - K::Rays::N);
+                self.idle_count -= K::Rays::N;
+                let idle = self.idle.as_ptr().add(self.idle_count);
+                let places: [_; RAYS] = core::array::from_fn(|i| *idle.add(i % K::Rays::N));
+                if entering != 0 {
+                    ready.write(from as u32, places.map(|traversal| &raw mut (*traversal).ray));
+                }
+                while entering != 0 {
+                    let traversal = *places.get_unchecked(entering.trailing_zeros() as usize);
+                    entering &= entering - 1;
+                    (*traversal).start(root);
+                    self.enlist(traversal, root, &mut counts);
+                }
+                while others != 0 {
+                    let lane = others.trailing_zeros() as usize;
+                    others &= others - 1;
+                    let place = *places.get_unchecked(lane);
+                    append(&mut self.idle, &mut self.idle_count, place, true);
+                    if from + lane < self.from {
+                        self.find.write(from + lane, f32::INFINITY, u32::MAX);
+                    }
+                }
             }
         }
-    }
-
-    /// Prepares the next rays, and answers those that miss the box around everything.
-    #[inline(always)]
-    unsafe fn prepare(&mut self) {
-        let from = self.from;
-        let count = (self.end - from).min(K::Rays::N);
-        self.from += count;
-        let there = u32::MAX >> (32 - count);
-        let rays = self.rays;
-        // SAFETY: the processor has the instructions; `ready` has room for sixteen.
-        unsafe {
-            prefetch::<K>(rays, self.from + K::Rays::N);
-            let ready =
-                Ready::new(RayLanes::<K::Rays>::load_up_to(rays, from, self.end), self.wide);
-            self.waiting = there & ready.enter(&self.wide.bounds);
-            if self.waiting != 0 {
-                ready.write(from as u32, self.ready.as_mut_ptr().cast());
-            }
-        }
-        let mut others = there & !self.waiting;
-        while others != 0 {
-            let lane = others.trailing_zeros();
-            let number = from + lane as usize;
-            others &= others - 1;
-            self.find.write(number, f32::INFINITY, u32::MAX);
-        }
+        self.counts = counts;
     }
 
     /// Puts a ray where its next visit is.
@@ -210,10 +199,7 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
         // SAFETY: every list has a place for every traversal.
         unsafe {
             append(&mut self.at_nodes, &mut counts.at_nodes, traversal, child.is_node());
-            let is_at_end = child == Child::END;
-            let is_at_leaf = !child.is_node() & !is_at_end;
-            append(&mut self.at_leaves, &mut counts.at_leaves, traversal, is_at_leaf);
-            append(&mut self.at_end, &mut counts.at_end, traversal, is_at_end);
+            append(&mut self.at_leaves, &mut counts.at_leaves, traversal, !child.is_node());
         }
     }
 
@@ -289,7 +275,7 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
                     hopeful_count += usize::from(is_hopeful);
                 }
             }
-            let hopeful = hopeful.get_unchecked(..hopeful_count).assume_init_ref();
+            let hopeful = core::slice::from_raw_parts(hopeful.as_ptr().cast(), hopeful_count);
             for some in hopeful.chunks(Gathered::RAYS) {
                 self.decide(some);
             }
@@ -352,17 +338,29 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
     /// Writes the answers of rays at their end.
     #[inline(always)]
     unsafe fn finish(&mut self) {
-        let count = core::mem::replace(&mut self.counts.at_end, 0);
-        for i in 0..count {
-            // SAFETY: so many rays are at their end, and their places become idle.
-            unsafe {
-                let traversal = *self.at_end.get_unchecked(i);
-                let Traversal { ray, nearest, .. } = &*traversal;
-                self.find.write(ray.number as usize, (*traversal).t(), *nearest as u32);
-                append(&mut self.idle, &mut self.idle_count, traversal, true);
+        let count = core::mem::replace(&mut self.counts.at_leaves, 0);
+        let first = self.idle_count;
+        // SAFETY: so many rays are at leaves or at their end, whose places become idle.
+        unsafe {
+            for i in 0..count {
+                let traversal = *self.at_leaves.get_unchecked(i);
+                let is_at_end = (*traversal).child == Child::END;
+                let at_leaves = &mut self.counts.at_leaves;
+                append(&mut self.at_leaves, at_leaves, traversal, !is_at_end);
+                append(&mut self.idle, &mut self.idle_count, traversal, is_at_end);
+            }
+            for i in first..self.idle_count {
+                let traversal = &**self.idle.get_unchecked(i);
+                let number = traversal.ray.number as usize;
+                self.find.write(number, traversal.t(), traversal.nearest as u32);
             }
         }
     }
+}
+
+/// The number of places of a stack that holds so many children: whole cache lines.
+fn places_of_stack(need: usize) -> usize {
+    (need + SPARE).next_multiple_of(LINE)
 }
 
 /// The traversal of the layout by one ray.
@@ -376,32 +374,23 @@ struct Traversal {
     /// The node or the block of triangles to visit next, or [`END`](Child::END).
     child: Child,
     /// [`END`](Child::END), the children that wait, the next block of the same leaf, and room for
-    /// stores of whole registers: `frame`, or on the heap.
+    /// stores of whole registers.
     stack: *mut Pending,
-    frame: Frame,
 }
 
+/// The stacks of layouts that are not deep.
 #[repr(C, align(64))]
-struct Frame([MaybeUninit<Pending>; STACK + SPARE]);
+struct Stacks([MaybeUninit<Pending>; FLIGHT * (STACK + SPARE)]);
 
 /// # Safety
 ///
 /// All functions: the processor has the instructions of `K`, the traversal was started, and the
 /// references of the layout are sound, so that the stack has room for what a visit pushes.
 impl Traversal {
-    /// Chooses the stack of all rays that are started here: on the heap, or in the frame.
     #[inline(always)]
-    unsafe fn set_stack(this: *mut Self, deep: Option<*mut Pending>) {
-        // SAFETY: the traversal exists; its fields need not be initialised to be named.
-        unsafe { (*this).stack = deep.unwrap_or((&raw mut (*this).frame).cast()) };
-    }
-
-    #[inline(always)]
-    unsafe fn start<K: Instructions>(&mut self, ray: &Prepared, wide: &WideBvh) {
-        self.nearest = u64::from(ray.t_max.to_bits()) << 32 | u64::from(u32::MAX);
-        // SAFETY: the processor has the instructions of `K`.
-        unsafe { self.ray.copy::<K::Block>(ray) };
-        self.child = wide.root.unwrap_or(Child::END);
+    unsafe fn start(&mut self, root: Child) {
+        self.nearest = u64::from(self.ray.t_max.to_bits()) << 32 | u64::from(u32::MAX);
+        self.child = root;
         // SAFETY: the stack has more than one place.
         unsafe {
             self.stack.write(u64::from(Child::END.bits()));

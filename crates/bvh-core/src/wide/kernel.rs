@@ -32,10 +32,13 @@ pub(crate) const STACK: usize = 256;
 /// same leaf, and room for stores of whole registers.
 pub(crate) const SPARE: usize = 24;
 
+/// The number of u64 in a cache line.
+pub(crate) const LINE: usize = 8;
+
 /// Stacks for a layout in which more than [`STACK`] children can wait.
 pub(crate) struct DeepStacks<T> {
     /// Cache lines, so that every stack is aligned to them.
-    lines: Vec<MaybeUninit<[u64; 8]>>,
+    lines: Vec<MaybeUninit<[u64; LINE]>>,
     lines_of_one: usize,
     entries: PhantomData<T>,
 }
@@ -46,7 +49,7 @@ impl<T> DeepStacks<T> {
         if need <= STACK {
             return None;
         }
-        let lines_of_one = (size_of::<T>() * (need + SPARE)).div_ceil(size_of::<[u64; 8]>());
+        let lines_of_one = (size_of::<T>() * (need + SPARE)).div_ceil(size_of::<[u64; LINE]>());
         let mut lines = Vec::with_capacity(stacks * lines_of_one + 1);
         // SAFETY: there is such a capacity, and nothing is claimed of the entries.
         unsafe { lines.set_len(stacks * lines_of_one + 1) };
@@ -57,7 +60,7 @@ impl<T> DeepStacks<T> {
     pub(crate) fn stack(&mut self, index: usize) -> *mut T {
         assert!(index < self.lines.len() / self.lines_of_one);
         let first = self.lines.as_mut_ptr().cast::<u8>();
-        let line = size_of::<[u64; 8]>();
+        let line = size_of::<[u64; LINE]>();
         // One more line is there than stacks need.
         let aligned = first.wrapping_add(first.align_offset(line));
         aligned.wrapping_add(line * self.lines_of_one * index).cast()

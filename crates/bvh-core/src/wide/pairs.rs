@@ -93,12 +93,10 @@ pub(crate) struct Pairs<L> {
     pub(crate) slope: [L; 2],
     /// At least the coordinates of corners relative to the origin.
     pub(crate) reach: L,
-    /// e, the bound of the error of a coordinate sheared in f32.
-    error: L,
-    /// What underflow adds to the error of an edge value; infinite where products may overflow.
-    underflow: L,
-    /// The bound of the error of a distance times the depth in f32, without the tilt's.
-    range_error: L,
+    /// e, the bound of the error of a coordinate sheared in f32; what underflow adds to the error
+    /// of an edge value, infinite where products may overflow; and the bound of the error of a
+    /// distance times the depth in f32, without the tilt's.
+    errors: [L; 3],
     pub(crate) t_min: L,
 }
 
@@ -144,16 +142,35 @@ impl<L: Lanes> Pairs<L> {
         reach: L,
         t_min: L,
     ) -> Self {
+        Self::with(origin, direction, slope, reach, Self::errors_of(reach, direction[2]), t_min)
+    }
+
+    /// Returns the same with the errors that [`errors_of`](Self::errors_of) returned.
+    #[inline(always)]
+    pub(crate) fn with(
+        origin: [L; 3],
+        direction: [L; 3],
+        slope: [L; 2],
+        reach: L,
+        errors: [L; 3],
+        t_min: L,
+    ) -> Self {
+        Self { origin, direction, slope, reach, errors, t_min }
+    }
+
+    /// Returns the errors of rays of this reach and this largest component of the direction.
+    #[inline(always)]
+    pub(crate) fn errors_of(reach: L, depth: L) -> [L; 3] {
         // The least normal number, because arithmetic with subnormal ones is slow.
         let least = reach.filled(f32::MIN_POSITIVE);
         let error = reach.mul_add(reach.filled(SINGLE_ERROR), least);
-        let range_error = direction[2].abs().mul_add(least, error);
+        let range_error = depth.abs().mul_add(least, error);
         let or_infinite = |bound: L, below: f32| {
             L::select(reach.lt(reach.filled(below)), bound, reach.filled(f32::INFINITY))
         };
         let underflow = or_infinite(least, pow2(62));
         let range_error = or_infinite(range_error, pow2(40));
-        Self { origin, direction, slope, reach, error, underflow, range_error, t_min }
+        [error, underflow, range_error]
     }
 
     /// Finds the pairs whose triangle the ray's line may cross, in f32.
@@ -169,7 +186,8 @@ impl<L: Lanes> Pairs<L> {
         let w = bx.mul_sub(ay, by * ax);
         let least = u.min(v).min(w);
         let most = u.max(v).max(w);
-        let error = self.error.mul_add(self.spread(&[a, b, c]), self.underflow);
+        let [error, underflow, _] = self.errors;
+        let error = error.mul_add(self.spread(&[a, b, c]), underflow);
         let below = error.filled(0.0) - error;
         let all = u32::MAX >> (32 - L::N);
         let possible = all & !(least.lt(below) & error.lt(most)).bits();
@@ -183,6 +201,7 @@ impl<L: Lanes> Pairs<L> {
     #[inline(always)]
     pub(crate) fn within(&self, candidates: &Candidates<L>, t_max: L) -> (u32, u32) {
         let underflow = t_max.filled(f32::MIN_POSITIVE);
+        let [_, _, range_error] = self.errors;
         let [u, v, w] = candidates.edges;
         let [az, bz, cz] = candidates.depths;
         let depth = self.direction[2];
@@ -192,7 +211,7 @@ impl<L: Lanes> Pairs<L> {
         let tilt = v.mul_add(side, w * other);
         let flip = area.filled(-0.0) & (area ^ depth);
         let slack = (candidates.error * area.filled(8.0))
-            .mul_add(side.abs().max(other.abs()), self.range_error.mul_add(area.abs(), underflow));
+            .mul_add(side.abs().max(other.abs()), range_error.mul_add(area.abs(), underflow));
         let begin = area.mul_add(self.t_min.mul_add(depth, az), tilt) ^ flip;
         let end = area.mul_add(t_max.mul_add(depth, az), tilt) ^ flip;
         let no_slack = slack.filled(0.0) - slack;
@@ -208,7 +227,7 @@ impl<L: Lanes> Pairs<L> {
         let a = a[0].abs().max(a[1].abs());
         let b = b[0].abs().max(b[1].abs());
         let c = c[0].abs().max(c[1].abs());
-        a.max(b).max(c) + self.error
+        a.max(b).max(c) + self.errors[0]
     }
 
     /// Returns the candidates whose triangle the ray hits at most at `t_max`, and the distances. No

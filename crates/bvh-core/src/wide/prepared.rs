@@ -49,8 +49,10 @@ pub(crate) struct Prepared {
     pub(crate) far: [u32; 3],
     /// Among the rays of the batch.
     pub(crate) number: u32,
+    /// 1 for a ray that begins [far](Ray::is_far_from) from the scene.
     is_far: u32,
-    padding: [u32; 3],
+    /// As in [`Pairs`].
+    errors: [f32; 3],
 }
 
 impl<L: Lanes> Ready<L> {
@@ -88,16 +90,18 @@ impl<L: Lanes> Ready<L> {
         inverse.lt(inverse.filled(0.0))
     }
 
-    /// Writes the rays one after the other; the first is number `first` of its batch.
+    /// Writes every ray to the place of its lane; the first is number `first` of its batch.
     ///
     /// # Safety
-    /// There is room for as many as there are lanes.
+    /// There are as many places as lanes.
     #[inline(always)]
-    pub(crate) unsafe fn write(&self, first: u32, to: *mut Prepared) {
+    pub(crate) unsafe fn write(&self, first: u32, to: [*mut Prepared; 16]) {
         let (second, third) = self.rays.largest();
         let origin = in_order(self.rays.origin, second, third);
         let [dx, dy, depth] = in_order(self.rays.direction, second, third);
         let bits = |bits: u32| depth.filled_with_bits(bits);
+        let is_far = L::select(depth.mask(self.far), bits(1), bits(0));
+        let [error, underflow, range_error] = Pairs::errors_of(self.reach, depth);
         let axis = L::select(third, bits(2), L::select(second, bits(1), bits(0)));
         let mut near = [bits(0); 3];
         let mut far = [bits(0); 3];
@@ -109,33 +113,22 @@ impl<L: Lanes> Ready<L> {
         }
         // SAFETY: there is room for a ray per lane.
         unsafe {
-            write_row(to, 0, self.near_factor, dx);
-            write_row(to, 1, self.rays.origin, self.rays.t_max);
-            write_row(to, 2, self.far_factor, dy);
-            write_row(to, 3, origin, dx / depth);
-            write_row(to, 4, [dy / depth, self.reach, depth], self.rays.t_min);
-            write_row(to, 5, near, axis);
-            write_row(to, 6, far, bits(0));
-            for (lane, number) in (first..).enumerate().take(L::N) {
-                (*to.add(lane)).number = number;
-                (*to.add(lane)).is_far = self.far >> lane & 1;
+            write_row(&to, 0, self.near_factor, dx);
+            write_row(&to, 1, self.rays.origin, self.rays.t_max);
+            write_row(&to, 2, self.far_factor, dy);
+            write_row(&to, 3, origin, dx / depth);
+            write_row(&to, 4, [dy / depth, self.reach, depth], self.rays.t_min);
+            write_row(&to, 5, near, axis);
+            write_row(&to, 6, far, bits(0));
+            write_row(&to, 7, [is_far, error, underflow], range_error);
+            for (number, to) in (first..).zip(to).take(L::N) {
+                (*to).number = number;
             }
         }
     }
 }
 
 impl Prepared {
-    /// Copies a ray as it was written, row by row: wider loads would wait until all rows have
-    /// reached the cache.
-    #[inline(always)]
-    pub(crate) unsafe fn copy<L: Lanes>(&mut self, from: &Self) {
-        const { assert!(L::N == 4) };
-        for row in 0..size_of::<Self>() / size_of::<[f32; 4]>() {
-            // SAFETY: rows are four aligned lanes.
-            unsafe { L::load(from.row(row)).store(self.row(row).cast_mut()) };
-        }
-    }
-
     #[inline(always)]
     fn row(&self, row: usize) -> *const f32 {
         (&raw const *self).cast::<f32>().wrapping_add(4 * row)
@@ -180,7 +173,8 @@ impl Prepared {
     /// The axes of the shear.
     #[inline(always)]
     pub(crate) fn axes(&self) -> &'static [usize; 3] {
-        &AXES[self.largest_axis as usize % 3]
+        // SAFETY: it is an axis.
+        unsafe { AXES.get_unchecked(self.largest_axis as usize) }
     }
 
     /// Returns the ray as [`boxes`](Self::boxes) tests it if it begins far from the scene.
@@ -217,11 +211,13 @@ impl Test<'_> {
             };
             let origin = row(3);
             let last = row(4);
-            Pairs::new(
+            let errors = row(7);
+            Pairs::with(
                 [origin.spread::<0>(), origin.spread::<1>(), origin.spread::<2>()],
                 [row(0).spread::<3>(), row(2).spread::<3>(), last.spread::<2>()],
                 [origin.spread::<3>(), last.spread::<0>()],
                 last.spread::<1>(),
+                [errors.spread::<1>(), errors.spread::<2>(), errors.spread::<3>()],
                 last.spread::<3>(),
             )
         }
@@ -282,19 +278,11 @@ fn in_order<L: Lanes>([x, y, z]: [L; 3], second: L::Mask, third: L::Mask) -> [L;
 
 /// Writes four lanes of each ray.
 #[inline(always)]
-unsafe fn write_row<L: Lanes>(to: *mut Prepared, row: usize, [a, b, c]: [L; 3], d: L) {
-    const NEXT: usize = size_of::<Prepared>() / 4;
-    // SAFETY: there are so many rows of four aligned lanes.
-    unsafe {
-        let to = to.cast::<f32>().wrapping_add(4 * row);
-        for (i, row) in L::transpose_quarters([a, b, c, d]).into_iter().enumerate() {
-            let to = to.wrapping_add(i * NEXT);
-            row.store_quarters([
-                to,
-                to.wrapping_add(4 * NEXT),
-                to.wrapping_add(8 * NEXT),
-                to.wrapping_add(12 * NEXT),
-            ]);
-        }
+unsafe fn write_row<L: Lanes>(to: &[*mut Prepared; 16], row: usize, [a, b, c]: [L; 3], d: L) {
+    let to = |lane: usize| to[lane].cast::<f32>().wrapping_add(4 * row);
+    for (i, row) in L::transpose_quarters([a, b, c, d]).into_iter().enumerate() {
+        // SAFETY: there are so many rows of four aligned lanes; only the quarters of `L` are
+        // written.
+        unsafe { row.store_quarters([to(i), to(i + 4), to(i + 8), to(i + 12)]) };
     }
 }

@@ -96,7 +96,8 @@ impl<K: Instructions> Task<K> for Entered<'_> {
                 }
                 NodeTest::InFlight => {
                     let mut rays = [const { MaybeUninit::<Prepared>::zeroed() }; 16];
-                    Ready::new(lanes, wide).write(0, rays.as_mut_ptr().cast());
+                    let places = rays.each_mut().map(MaybeUninit::as_mut_ptr);
+                    Ready::new(lanes, wide).write(0, places);
                     rays[0].assume_init_ref().boxes::<K>(node, t_max).1
                 }
                 _ if is_near => BoxTest::<K>::boxes(&BoxRay::<K::Boxes>::new(ray), node, t_max).1,
