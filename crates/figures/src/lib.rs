@@ -123,6 +123,19 @@ mod tests {
     }
 
     #[test]
+    fn long_names_put_plots_below_each_other() {
+        let height = |name: &str| -> f64 {
+            let y = Axis::rows(vec![name.to_owned(); 4], 24.0);
+            let layers = vec![Layer::new("", Marks::Points(vec![(1.0, 0.0)]))];
+            let panels = vec![Panel { y, layers, ..Panel::default() }; 2];
+            let picture = svg(&Figure { columns: 2, panels, ..Figure::default() }).unwrap();
+            let (_, size) = picture.split_once("width=\"680\" height=\"").unwrap();
+            size.split('"').next().unwrap().parse().unwrap()
+        };
+        assert!(height("Goldsmith–Salmon, rays") > 1.7 * height("greedy"));
+    }
+
+    #[test]
     fn the_same_figure_gives_the_same_bytes() {
         let points: Vec<(f64, f64)> =
             (0..50).map(|i| (f64::from(i), f64::from(i * i % 17))).collect();

@@ -193,3 +193,29 @@ impl<'a> Plot<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::model::Axis;
+    use super::*;
+
+    #[test]
+    fn labels_below_a_plot_of_any_width_are_as_far_apart_as_each_other_and_touch_nowhere() {
+        let fonts = Fonts::new().unwrap();
+        let ends = [(1.0, 1.065), (0.0, 256_000.0), (-0.04, 0.01)];
+        for (low, high) in ends {
+            let panel = Panel { x: Axis::linear("").range(low, high), ..Panel::default() };
+            for width in (160..600).step_by(10) {
+                let mut plot = Plot::new(&panel, 100.0, &fonts);
+                plot.fit_width(f64::from(width), &fonts);
+                let ticks: Vec<f64> = plot.x.major.iter().map(|tick| tick.0).collect();
+                let gaps: Vec<f64> = ticks.windows(2).map(|pair| pair[1] - pair[0]).collect();
+                assert!(
+                    ticks.len() > 1 && !plot.labels_touch(f64::from(width), &fonts),
+                    "{ticks:?}"
+                );
+                assert!(gaps.iter().all(|gap| (gap / gaps[0] - 1.0).abs() < 1e-6), "{ticks:?}");
+            }
+        }
+    }
+}

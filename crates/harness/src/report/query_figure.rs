@@ -155,7 +155,8 @@ impl Drawing {
     fn sound<'t>(&self, table: &'t [Row]) -> Vec<&'t Row> {
         let is_control = |row: &&Row| text_in(row, "against") == self.control;
         let key = |row: &Row| ["scene", "method"].map(|column| text_in(row, column));
-        let is_biased = |row: &&Row| text_in(row, &format!("{}_verdict", self.x)) != "inconclusive";
+        let verdict = format!("{}_verdict", self.x);
+        let is_biased = |row: &&Row| ["lower", "higher"].contains(&text_in(row, &verdict).as_str());
         let controls = table.iter().filter(|_| !self.control.is_empty()).filter(is_control);
         let biased: Vec<_> = controls.filter(is_biased).map(key).collect();
         table.iter().filter(|row| !biased.contains(&key(row))).collect()
