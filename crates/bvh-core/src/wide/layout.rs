@@ -91,8 +91,11 @@ impl Places {
     /// Returns the beginning of a child in memory. It need not exist.
     #[inline(always)]
     pub(crate) fn of(self, child: Child) -> *const u8 {
-        let node = self.nodes.wrapping_add(child.index() * size_of::<WideNode>());
-        let block = self.blocks.wrapping_add(child.index() * size_of::<TriangleBlock>());
+        // Both are computed, though only one is asked for, and the index of the end is the greatest:
+        // where addresses have 32 bits, the products wrap.
+        let node = self.nodes.wrapping_add(child.index().wrapping_mul(size_of::<WideNode>()));
+        let block =
+            self.blocks.wrapping_add(child.index().wrapping_mul(size_of::<TriangleBlock>()));
         if child.is_node() { node } else { block }
     }
 }
