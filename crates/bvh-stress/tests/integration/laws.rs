@@ -137,7 +137,7 @@ fn close(a: f64, b: f64) -> bool {
     (a - b).abs() <= ROUNDING * a.max(b)
 }
 
-/// The number of scenes per law: few in the quick tier, `PROPTEST_CASES` in the slow one.
+/// The number of scenes per law: few, or `PROPTEST_CASES`, which `.ci/nightly` sets.
 fn cases() -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(60)
 }
