@@ -8,11 +8,11 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-/// Bakes konistil into `a.bvh`, and interrupts the search this long after it has begun. Returns the
+/// Bakes a scene into `a.bvh`, and interrupts the search this long after it has begun. Returns the
 /// messages.
-fn interrupted(folder: &Path, more: &str, after: Duration) -> String {
+fn interrupted(folder: &Path, bake: &str, after: Duration) -> String {
     let before = fs::read_dir(folder).unwrap().count();
-    let child = begin(folder, &words(&format!("bake konistil --out=a.bvh {more}")));
+    let child = begin(folder, &words(&format!("bake --out=a.bvh {bake}")));
     // The file is reserved before the search begins.
     while fs::read_dir(folder).unwrap().count() == before {
         std::thread::sleep(Duration::from_millis(20));
@@ -27,7 +27,7 @@ fn interrupted(folder: &Path, more: &str, after: Duration) -> String {
 #[test]
 fn ctrl_c_keeps_the_best_tree_so_far() {
     let folder = tempfile::tempdir().unwrap();
-    let said = interrupted(folder.path(), "--budget=1h", Duration::ZERO);
+    let said = interrupted(folder.path(), "konistil --budget=1h", Duration::ZERO);
     assert!(said.contains("`--from a.bvh` continues"), "{said}");
     tree_file::load(&folder.path().join("a.bvh"), &Scene::load("konistil").unwrap()).unwrap();
     assert_eq!(names(folder.path()).len(), 1);
@@ -59,13 +59,13 @@ fn a_bake_that_is_interrupted_early_is_not_behind_plain_reinsertion() {
     let folder = tempfile::tempdir().unwrap();
     let cost = |file: &str| cost(folder.path(), file);
     let begin = Instant::now();
-    bvh(folder.path(), "bake konistil --method=reinsertion --budget=1000Gwork --out=plain.bvh");
+    bvh(folder.path(), "bake escher --method=reinsertion --budget=1000Gwork --out=plain.bvh");
     // The time suffices for reinsertion and the trees built before it, also on a busy machine. The
     // heat of a long search has not paid by then.
     let plain = cost("plain.bvh");
     let after = Duration::from_secs(1) + 8 * begin.elapsed();
     for more in ["--budget=1h", "--budget=1000Gwork", "--budget=1h --references=1.2"] {
-        interrupted(folder.path(), more, after);
+        interrupted(folder.path(), &format!("escher {more}"), after);
         // If leaves may be divided, they are part of the measure, and moves with equal gains come
         // in a different order.
         let most = if more.contains("--references") { 1.0001 } else { 1.0 };

@@ -14,6 +14,7 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
+use std::sync::LazyLock;
 use toml::{Table, Value};
 
 /// A step from a table to a value in it.
@@ -272,8 +273,8 @@ proptest! {
             1..8,
         ),
     ) {
-        let specs = experiments();
-        let (_, mut text) = which.get(&specs).clone();
+        static SPECS: LazyLock<Vec<(String, String)>> = LazyLock::new(experiments);
+        let (_, mut text) = which.get(&SPECS).clone();
         for (place, length, word) in edits {
             let start = boundary(&text, place.index(text.len() + 1));
             let end = boundary(&text, (start + length).min(text.len()));
