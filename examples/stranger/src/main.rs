@@ -5,6 +5,7 @@
 
 use bvh_search::prelude::*;
 use std::error::Error;
+use std::f32::consts::TAU;
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -73,7 +74,7 @@ fn ray(i: u32, bounds: &Aabb) -> Result<Ray, Box<dyn Error>> {
     let size = bounds.max - bounds.min;
     // Points with uniform z are uniform on the sphere (Archimedes).
     let z = 2.0 * scattered(i, 2_654_435_769) - 1.0;
-    let angle = 6.283 * scattered(i, 3_242_174_889);
+    let angle = TAU * scattered(i, 3_242_174_889);
     let radius = (1.0 - z * z).sqrt();
     let direction = Vec3::new(angle.cos() * radius, angle.sin() * radius, z);
     let from = bounds.min + 0.5 * size + size.length() * direction;
