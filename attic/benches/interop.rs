@@ -1,174 +1,417 @@
-//! The tests that rays take in the trees of other libraries in Rust, and in searched trees, counted
-//! into `results/interop`: the same on every machine.
+//! What rays cost in other people's tracers, in their own trees and in searched ones, written to
+//! `results/interop`: counted tests, the same on every machine, and speeds.
 //!
-//! `cargo bench --manifest-path attic/Cargo.toml --bench interop [-- SCENE]`
-//!
-//! Needs `scripts/fetch-scenes`. With a scene, prints its rows instead.
+//! `scripts/interop [--time] [SCENE...]` builds the programs that this one calls, and runs it. With
+//! scenes, it only prints their table.
 
 use ::bvh::bvh::Bvh as TheirBvh;
 use ::obvhs::bvh2::builder::build_bvh2_from_tris;
 use ::obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris, bvh2_to_cwbvh::bvh2_to_cwbvh};
-use ::obvhs::triangle::Triangle as TheirTriangle;
 use ::obvhs::{BvhBuildParams, traverse};
+use attic::tracing::contender::{Batch, Trace};
 use attic::{bvh, obvhs};
-use bvh_core::cost::Objective;
+use bvh_build::{Builder, muller_fellner};
 use bvh_core::export::Target;
-use bvh_core::{Bvh, PreparedRay, Ray, TestCounts, Triangle, any_hit_by, nearest_hit_by};
+use bvh_core::{
+    Bvh, PreparedRay, Primitives, Ray, TestCounts, Triangle, any_hit_by, nearest_hit_by,
+};
 use bvh_scenes::rays::{Kind, Viewpoint, rays};
-use bvh_scenes::{Scene, files, trace::Query};
+use bvh_scenes::{Scene, SceneKind, files, trace::Query};
 use bvh_search::{Bake, Budget};
-use glam::{UVec2, Vec3A};
+use glam::{DVec3, UVec2, Vec3, dvec3};
+use harness::processor::PROCESSOR;
+use harness::statistics::quantile;
+use libm::{cos, sin};
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
 use std::path::Path;
+use std::process::Command;
 
 /// What every scene is searched for, in nodes visited.
 const WORK: u64 = 100_000_000;
-const RAYS: u32 = 65_536;
+const RAYS: u32 = 16_384;
+const ROUNDS: usize = 15;
+const KINDS: [Kind; 3] = [Kind::Primary, Kind::Incoherent, Kind::Shadow];
+/// The searched trees, and the references per triangle.
+const SEARCHED: [(&str, f64); 2] = [("searched", 1.0), ("divided", 1.3)];
+const OUTSIDE: [[f64; 3]; 2] = [[1.9, 1.3, 2.2], [0.5; 3]];
 /// The scenes, and what is seen in fractions of their boxes, as in experiments/peers.toml.
-const SCENES: [(&str, [[f64; 3]; 2]); 5] = [
+const SCENES: [(&str, [[f64; 3]; 2]); 7] = [
     ("sponza", [[0.15, 0.25, 0.5], [0.9, 0.35, 0.5]]),
     ("kitchen", [[0.5, 0.6, 0.5], [0.9, 0.4, 0.9]]),
     ("cloister", [[0.2, 0.3, 0.3], [0.8, 0.4, 0.6]]),
-    ("escher", [[1.9, 1.3, 2.2], [0.5; 3]]),
-    ("spot", [[1.9, 1.3, 2.2], [0.5; 3]]),
+    ("escher", OUTSIDE),
+    ("spot", OUTSIDE),
+    ("knot", OUTSIDE),
+    ("pebble", OUTSIDE),
 ];
-/// What the library's wide tree is made by: a test of a triangle over one of a node.
-const WIDE_TRIANGLE: f64 = 0.3;
 
-/// A tree as its library traces it.
-enum Traced {
+/// The scenes of the geometric means.
+const BUILDINGS: &str = "sponza and kitchen";
+
+/// What a test of a box, or a visit of a wide node, and a test of a triangle, or a block of four,
+/// cost in a tracer.
+fn costs(tracer: &str) -> [f64; 2] {
+    match tracer {
+        // What the library's wide tree is made by.
+        "obvhs CwBvh" => [1.0, 0.3],
+        "tinybvh BVH4_CPU" | "tinybvh BVH8_CPU" => [1.0, 1.0],
+        binary => {
+            let constants = Target::named(binary).expect("a target").constants;
+            [0.5 * constants.traversal(), constants.intersection()]
+        }
+    }
+}
+
+/// Rays of one kind through a tree in a tracer.
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
+struct Case {
+    tracer: String,
+    rays: String,
+    tree: String,
+}
+
+/// What programs have measured in a scene.
+#[derive(Default)]
+struct Measured {
+    /// The number of hits, tests of boxes, and tests of triangles.
+    tests: BTreeMap<Case, [u64; 3]>,
+    /// The seconds of each round.
+    seconds: BTreeMap<Case, Vec<f64>>,
+}
+
+fn main() {
+    let arguments: Vec<String> =
+        std::env::args().skip(1).filter(|word| word != "--bench").collect();
+    let (flags, only): (Vec<_>, Vec<_>) =
+        arguments.into_iter().partition(|word| word.starts_with("--"));
+    assert!(flags.iter().all(|flag| flag == "--time"), "{flags:?}; accepted: --time");
+    let known = SCENES.map(|(name, _)| name);
+    assert!(only.iter().all(|name| known.contains(&&**name)), "{only:?}; accepted: {known:?}");
+    let rounds = if flags.is_empty() { 0 } else { ROUNDS };
+    let mut of_buildings = BTreeMap::new();
+    println!("{}", PROCESSOR.name());
+    let mut tests =
+        "tracer,scene,triangles,rays,count,tree,hits,box_tests,triangle_tests\n".to_owned();
+    let mut gains = "tracer,scene,rays,tree,over,gain\n".to_owned();
+    let mut speeds = "tracer,processor,scene,rays,count,rounds,tree,over,over_tree,ratio_median,\
+                      ratio_low,ratio_high\n"
+        .to_owned();
+    for (name, [eye, target]) in SCENES {
+        if only.is_empty() || only.iter().any(|one| one == name) {
+            let scene = scene(name);
+            let measured = measure(&scene, &Viewpoint { eye, target }, rounds);
+            for (Case { tracer, rays, tree }, [hits, boxes, triangles]) in &measured.tests {
+                let all = scene.boxes.len();
+                tests += &format!(
+                    "{tracer},{name},{all},{rays},{RAYS},{tree},{hits},{boxes},{triangles}\n"
+                );
+            }
+            compare(name, &measured, &mut gains, &mut speeds, &mut of_buildings);
+        }
+    }
+    // Without the trees that a library can trace in one of the scenes only.
+    of_buildings.retain(|_, [_, count]| *count == 2.0);
+    for ((Case { tracer, rays, tree }, over), [sum, count]) in &of_buildings {
+        let mean = f64::exp(sum / count);
+        println!("{BUILDINGS:18} {tracer:16} {rays:10} {tree:8}  tests {mean:.2} over {over}");
+        gains += &format!("{tracer},{BUILDINGS},{rays},{tree},{over},{mean:.4}\n");
+    }
+    if only.is_empty() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../results/interop");
+        let mut tables = vec![("tracer_tests.csv", tests), ("tracer_gains.csv", gains)];
+        if rounds > 0 {
+            tables.push(("timing_tracers.csv", speeds));
+        }
+        for (file, text) in tables {
+            files::write(&folder.join(file), text.as_bytes()).expect("a folder of results");
+        }
+    }
+}
+
+/// Compares the searched trees of a scene with the best of each tracer's own ones, with the best of
+/// those that divide no triangle, and with the default. Prints the first comparison.
+fn compare(
+    scene: &str,
+    measured: &Measured,
+    gains: &mut String,
+    speeds: &mut String,
+    of_buildings: &mut BTreeMap<(Case, &str), [f64; 2]>,
+) {
+    let processor = PROCESSOR.name();
+    let is_ours = |case: &Case| SEARCHED.iter().any(|(name, _)| case.tree == *name);
+    let cases: BTreeSet<&Case> = measured.tests.keys().chain(measured.seconds.keys()).collect();
+    let median = |seconds: &[f64]| quantile(seconds, 0.5).expect("rounds");
+    for case in cases.iter().filter(|case| is_ours(case)) {
+        let Case { tracer, rays, tree } = case;
+        let cost = |case: &Case| {
+            let &[_, boxes, triangles] = measured.tests.get(case)?;
+            let [node, triangle] = costs(tracer);
+            Some(node * boxes as f64 + triangle * triangles as f64)
+        };
+        let own: Vec<&Case> = cases
+            .iter()
+            .filter(|own| !is_ours(own) && own.tracer == *tracer && own.rays == *rays)
+            .copied()
+            .collect();
+        let whole = own.iter().filter(|own| !own.tree.contains("divided")).copied().collect();
+        let default = own.iter().filter(|own| own.tree == "default").copied().collect();
+        for (over, own) in [("best", own), ("best whole", whole), ("default", default)] {
+            let mut line = format!("{scene:8} {tracer:16} {rays:10} {tree:8}");
+            let best = own.iter().filter_map(|own| cost(own)).min_by(f64::total_cmp);
+            if let (Some(theirs), Some(ours)) = (best, cost(case)) {
+                let gain = theirs / ours;
+                *gains += &format!("{tracer},{scene},{rays},{tree},{over},{gain:.4}\n");
+                line += &format!("  tests {gain:.2}");
+                if BUILDINGS.contains(scene) {
+                    let mean = of_buildings.entry(((**case).clone(), over)).or_default();
+                    *mean = [mean[0] + gain.ln(), mean[1] + 1.0];
+                }
+            }
+            let timed = own.iter().filter_map(|own| Some((own, measured.seconds.get(own)?)));
+            let fastest = timed.min_by(|(_, a), (_, b)| median(a).total_cmp(&median(b)));
+            if let (Some((own, theirs)), Some(ours)) = (fastest, measured.seconds.get(case)) {
+                let mut ratios: Vec<f64> = theirs.iter().zip(ours).map(|(a, b)| a / b).collect();
+                ratios.sort_by(f64::total_cmp);
+                // The fourth of fifteen values from either end is an interval of 96 % for the median.
+                let [low, middle, high] = [3, ROUNDS / 2, ROUNDS - 4].map(|place| ratios[place]);
+                let own = &own.tree;
+                *speeds += &format!(
+                    "{tracer},{processor},{scene},{rays},{RAYS},{ROUNDS},{tree},{over},{own},\
+                     {middle:.4},{low:.4},{high:.4}\n"
+                );
+                line += &format!("  speed {middle:.2} [{low:.2}, {high:.2}] over {own}");
+            }
+            if over == "best" {
+                println!("{line}");
+            }
+        }
+    }
+}
+
+fn scene(name: &str) -> Scene {
+    let triangles = match name {
+        "knot" => knot(),
+        "pebble" => pebble(),
+        name => return Scene::load(name).unwrap_or_else(|error| panic!("{error}")),
+    };
+    Scene::new(name, SceneKind::Procedural, Primitives::Triangles(triangles))
+}
+
+/// A tube around a curve that winds three times around a torus while it goes round twice.
+fn knot() -> Vec<Triangle> {
+    let on_curve = |turn: f64| {
+        let radius = 2.0 + cos(1.5 * turn);
+        0.5 * dvec3(radius * cos(turn), radius * sin(turn), sin(1.5 * turn))
+    };
+    surface([1250, 40], |[around, across]| {
+        let (turn, angle) = (4.0 * PI * around, 2.0 * PI * across);
+        let point = on_curve(turn);
+        let ahead = on_curve(turn + 0.01);
+        let side = (ahead - point).cross(ahead + point).normalize();
+        let up = side.cross(ahead - point).normalize();
+        point + 0.35 * (cos(angle) * up + sin(angle) * side)
+    })
+}
+
+/// A smooth closed surface of bumps, over a sphere.
+fn pebble() -> Vec<Triangle> {
+    surface([350, 175], |[around, down]| {
+        let (azimuth, polar) = (2.0 * PI * around, PI * down);
+        let point = dvec3(sin(polar) * cos(azimuth), cos(polar), sin(polar) * sin(azimuth));
+        let DVec3 { x, y, z } = point;
+        let coarse = sin(5.0 * x + 1.0) * sin(6.0 * y);
+        let fine = sin(17.0 * z + 3.0 * x) * sin(13.0 * y + 2.0);
+        (1.0 + 0.12 * coarse + 0.05 * fine) * point
+    })
+}
+
+/// Triangles over a grid of parameters from 0 to 1, without those that have no area.
+fn surface([columns, rows]: [u32; 2], point: impl Fn([f64; 2]) -> DVec3) -> Vec<Triangle> {
+    let corner = |column: u32, row: u32| -> Vec3 {
+        let fraction = |place: u32, of: u32| f64::from(place % of) / f64::from(of);
+        // A row may end at 1, where a sphere has a pole.
+        let down = if row == rows { 1.0 } else { fraction(row, rows) };
+        point([fraction(column, columns), down]).as_vec3()
+    };
+    let mut triangles = Vec::new();
+    for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+        let [a, b] = [corner(column, row), corner(column + 1, row)];
+        let [c, d] = [corner(column, row + 1), corner(column + 1, row + 1)];
+        triangles.extend([Triangle([a, b, c]), Triangle([b, d, c])]);
+    }
+    triangles.retain(|Triangle([a, b, c])| (b - a).cross(c - a).length_squared() > 1e-16);
+    triangles
+}
+
+/// Measures all tracers. Those in other languages read the scene from a folder.
+fn measure(scene: &Scene, view: &Viewpoint, rounds: usize) -> Measured {
+    let triangles = scene.triangles().expect("triangles");
+    let greedy = muller_fellner::Config::default().build(&scene.boxes).expect("a tree");
+    let searched = SEARCHED.map(|(name, references)| {
+        let budget = Budget { max_work: Some(WORK), ..Budget::UNLIMITED };
+        let bake = Bake { references, budget, ..Bake::new(&scene.boxes) };
+        let bake = Bake { shapes: Some(&scene.primitives), ..bake };
+        (name, bake.search(None, &()).expect("a tree").outcome.tree)
+    });
+    let fitted = |target: &Target, tree: &Bvh| target.fit_better(tree, &greedy, triangles).tree;
+    let rays = KINDS.map(|kind| (kind, rays(kind, RAYS, scene, &greedy, view, 1)));
+    let mut measured = Measured::default();
+
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let folder = top.join("target/interop").join(&scene.name);
+    let write = |file: &str, bytes: &[u8]| {
+        files::write(&folder.join(file), bytes).expect("a folder of scenes");
+    };
+    std::fs::create_dir_all(&folder).expect("a folder of scenes");
+    write("triangles.bin", bytemuck::cast_slice(triangles));
+    for (kind, rays) in &rays {
+        let numbers: Vec<f32> = rays.iter().flat_map(numbers).collect();
+        write(&format!("{}.bin", kind.name()), bytemuck::cast_slice(&numbers));
+    }
+    for target in [Target::THREE_MESH_BVH, Target::TINYBVH, Target::MADMANN91_BVH] {
+        for (name, tree) in &searched {
+            let bytes = target.bytes(&fitted(&target, tree), &scene.boxes);
+            write(&format!("{name}.{}.bin", target.name), &bytes);
+        }
+    }
+    let compiled = top.join("target/ray-peers/interop");
+    let script = top.join("crates/bvh-js/bench/interop.js");
+    let mut node = Command::new("node");
+    node.arg(script);
+    for mut program in [Command::new(compiled), node] {
+        program.arg(&folder).arg(rounds.to_string());
+        let output = program.args(SEARCHED.map(|(name, _)| name)).output();
+        let output = output.unwrap_or_else(|error| panic!("{program:?}: {error}"));
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{program:?}: {errors}");
+        let said = String::from_utf8_lossy(&output.stdout);
+        // tinybvh adds warnings.
+        let is_row = |line: &&str| line.starts_with("tests,") || line.starts_with("times,");
+        for line in said.lines().filter(is_row) {
+            measured.read(line).unwrap_or_else(|| panic!("{program:?}: {line}"));
+        }
+    }
+    let contenders = contenders(&searched, &fitted, scene, triangles);
+    for (kind, rays) in &rays {
+        let case = |contender: &Contender| Case {
+            tracer: contender.tracer.into(),
+            rays: kind.name().into(),
+            tree: contender.tree.into(),
+        };
+        for contender in &contenders {
+            let mut counts = TestCounts::default();
+            let query = kind.query();
+            let is_hit = |ray: &&Ray| hits(&contender.counted, triangles, ray, query, &mut counts);
+            let found = rays.iter().filter(is_hit).count() as u64;
+            measured.tests.insert(case(contender), [found, counts.boxes, counts.objects]);
+        }
+        let coherence = kind.coherence();
+        let batch = Batch { query: kind.query(), coherence, in_squares: false, rays };
+        let mut answers = vec![None; rays.len()];
+        for round in 0..rounds {
+            for turn in 0..contenders.len() {
+                // Each round begins with another contender.
+                let contender = &contenders[(turn + round) % contenders.len()];
+                let seconds = (contender.trace)(&batch, &mut answers).expect("answers");
+                measured.seconds.entry(case(contender)).or_default().push(seconds.iter().sum());
+            }
+        }
+    }
+    eprintln!("{}", scene.name);
+    measured
+}
+
+impl Measured {
+    /// Adds what a program has written: a tracer, rays, a tree, and either three numbers of tests
+    /// or the seconds of the rounds.
+    fn read(&mut self, line: &str) -> Option<()> {
+        let [what, tracer, rays, tree, numbers] =
+            line.split(',').collect::<Vec<_>>().try_into().ok()?;
+        let [tracer, rays, tree] = [tracer, rays, tree].map(str::to_owned);
+        let case = Case { tracer, rays, tree };
+        let numbers = numbers.split(' ');
+        if what == "tests" {
+            let tests = numbers.map(|number| number.parse().ok()).collect::<Option<Vec<u64>>>()?;
+            self.tests.insert(case, tests.try_into().ok()?);
+        } else {
+            let seconds = numbers.map(|number| number.parse().ok()).collect::<Option<_>>()?;
+            self.seconds.insert(case, seconds);
+        }
+        Some(())
+    }
+}
+
+/// The eight numbers of a ray in a file.
+fn numbers(ray: &Ray) -> [f32; 8] {
+    let [[x, y, z], [dx, dy, dz]] = [ray.origin(), ray.direction()].map(|v| v.to_array());
+    [x, y, z, ray.t_min(), dx, dy, dz, ray.t_max()]
+}
+
+/// A tree as its library traces it, for counts.
+enum Counted {
     /// By the nearer child of two first. Where the library looks into a far leaf before a near
     /// node, it tests more triangles than are counted.
     Binary(Bvh),
     Wide(CwBvh),
 }
 
-/// A tree of a library, or a searched one.
+/// A tree in a tracer in Rust.
 struct Contender {
     tracer: &'static str,
     tree: &'static str,
-    traced: Traced,
-    /// What a test of a node's box and of a triangle cost.
-    costs: [f64; 2],
+    counted: Counted,
+    trace: Trace<'static>,
 }
 
-fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let only = arguments.iter().find(|name| SCENES.iter().any(|(scene, _)| scene == name));
-    let mut tests =
-        "tracer,scene,triangles,rays,count,tree,hits,box_tests,triangle_tests\n".to_owned();
-    let mut gains = "tracer,scene,rays,tree,over,gain\n".to_owned();
-    for (name, [eye, target]) in SCENES.iter().filter(|(name, _)| only.is_none_or(|o| o == name)) {
-        let scene = Scene::load(name).unwrap_or_else(|error| panic!("{error}"));
-        count(name, &scene, &Viewpoint { eye: *eye, target: *target }, &mut tests, &mut gains);
-    }
-    if only.is_some() {
-        print!("{tests}{gains}");
-        return;
-    }
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../results/interop");
-    for (file, text) in [("crate_tests.csv", tests), ("crate_gains.csv", gains)] {
-        files::write(&folder.join(file), text.as_bytes()).expect("a folder of results");
-    }
-}
-
-/// Appends the rows of a scene.
-fn count(name: &str, scene: &Scene, view: &Viewpoint, tests: &mut String, gains: &mut String) {
-    let triangles = scene.triangles().expect("a scene of triangles");
-    let contenders = contenders(scene, triangles);
-    let tree = &contenders.iter().find_map(|contender| match &contender.traced {
-        Traced::Binary(tree) => Some(tree),
-        Traced::Wide(_) => None,
-    });
-    for kind in [Kind::Primary, Kind::Incoherent, Kind::Shadow] {
-        let rays = rays(kind, RAYS, scene, tree.expect("a binary tree"), view, 1);
-        let mut costs = Vec::new();
-        for Contender { tracer, tree, traced, costs: [node, triangle] } in &contenders {
-            let mut counts = TestCounts::default();
-            let is_hit = |ray: &&Ray| hits(traced, triangles, ray, kind.query(), &mut counts);
-            let found = rays.iter().filter(is_hit).count();
-            let TestCounts { boxes, objects } = counts;
-            *tests += &format!(
-                "{tracer},{name},{},{},{},{tree},{found},{boxes},{objects}\n",
-                triangles.len(),
-                kind.name(),
-                rays.len(),
-            );
-            costs.push((*tracer, *tree, node * boxes as f64 + triangle * objects as f64));
-        }
-        for (tracer, tree, cost) in &costs {
-            let own = costs.iter().filter(|(of, tree, _)| of == tracer && !is_ours(tree));
-            let best = own.map(|(.., cost)| *cost).fold(f64::INFINITY, f64::min);
-            if is_ours(tree) {
-                *gains +=
-                    &format!("{tracer},{name},{},{tree},best,{:.4}\n", kind.name(), best / cost);
-            }
-        }
-    }
-    eprintln!("{name}");
-}
-
-fn is_ours(tree: &str) -> bool {
-    tree.starts_with("searched") || tree.starts_with("divided")
-}
-
-/// Returns the trees of all libraries, and for each the searched ones.
-fn contenders(scene: &Scene, triangles: &[Triangle]) -> Vec<Contender> {
-    let theirs: Vec<TheirTriangle> = triangles
-        .iter()
-        .map(|triangle| {
-            let [v0, v1, v2] = triangle.0.map(Vec3A::from);
-            TheirTriangle { v0, v1, v2 }
-        })
-        .collect();
-    let binary = |target: Target, tree, built| {
-        let costs = [0.5 * target.constants.traversal(), target.constants.intersection()];
-        Contender { tracer: target.name, tree, traced: Traced::Binary(built), costs }
-    };
-    let wide = |tree, built| Contender {
-        tracer: "obvhs CwBvh",
-        tree,
-        traced: Traced::Wide(built),
-        costs: [1.0, WIDE_TRIANGLE],
-    };
+/// Returns the trees of the libraries in Rust, and for each the searched ones.
+fn contenders(
+    searched: &[(&'static str, Bvh)],
+    fitted: &dyn Fn(&Target, &Bvh) -> Bvh,
+    scene: &Scene,
+    triangles: &[Triangle],
+) -> Vec<Contender> {
     let mut contenders = Vec::new();
-    let own = TheirBvh::build(&mut bvh::shapes(triangles));
-    contenders.push(binary(Target::BVH, "own", bvh::to_our_tree(&own, &scene.boxes)));
+    let mut add = |tracer, tree, counted, trace| {
+        contenders.push(Contender { tracer, tree, counted, trace });
+    };
+    let mut shapes = bvh::shapes(triangles);
+    let own = TheirBvh::build(&mut shapes);
+    let counted = Counted::Binary(bvh::to_our_tree(&own, &scene.boxes));
+    add("bvh", "own", counted, bvh::trace(own, shapes.clone()));
+    let theirs = obvhs::triangles(triangles);
     let slow = BvhBuildParams::very_slow_build();
-    let slowest = BvhBuildParams { reinsertion_batch_ratio: 4.0, ..slow };
     for (name, parameters) in [
         ("medium", BvhBuildParams::medium_build()),
-        ("very slow", slow),
-        ("reinsertion 4", slowest),
+        ("very slow whole", BvhBuildParams { pre_split: false, ..slow }),
+        ("very slow divided", slow),
+        ("reinsertion 4 divided", BvhBuildParams { reinsertion_batch_ratio: 4.0, ..slow }),
     ] {
         let mut time = Default::default();
-        let built = build_bvh2_from_tris(&theirs, parameters, &mut time);
-        contenders.push(binary(Target::OBVHS, name, obvhs::to_our_tree(&built)));
-        contenders.push(wide(name, build_cwbvh_from_tris(&theirs, parameters, &mut time)));
+        let binary = build_bvh2_from_tris(&theirs, parameters, &mut time);
+        let counted = Counted::Binary(obvhs::to_our_tree(&binary));
+        add("obvhs", name, counted, obvhs::trace_binary(binary, &theirs));
+        let wide = build_cwbvh_from_tris(&theirs, parameters, &mut time);
+        let counted = Counted::Wide(wide.clone());
+        add("obvhs CwBvh", name, counted, obvhs::trace_wide(wide, &theirs));
     }
-    for (name, references, objective) in [
-        ("searched", 1.0, Objective::InternalArea),
-        ("divided", 1.3, Objective::InternalArea),
-        ("searched by layout", 1.0, Objective::Layout),
-        ("divided by layout", 1.3, Objective::Layout),
-    ] {
-        let budget = Budget { max_work: Some(WORK), ..Budget::UNLIMITED };
-        let bake =
-            Bake { objective: Some(objective), references, budget, ..Bake::new(&scene.boxes) };
-        let bake = Bake { shapes: Some(&scene.primitives), ..bake };
-        let tree = bake.search(None, &()).expect("a tree").outcome.tree;
-        if objective == Objective::InternalArea {
-            for target in [Target::BVH, Target::OBVHS] {
-                contenders.push(binary(target, name, target.fit(&tree)));
-            }
-        }
-        contenders.push(wide(name, bvh2_to_cwbvh(&obvhs::to_theirs(&tree), 3, true, false)));
+    for (name, tree) in searched {
+        let ours = fitted(&Target::BVH, tree);
+        let binary = bvh::to_theirs(&ours, &mut shapes);
+        add("bvh", name, Counted::Binary(ours), bvh::trace(binary, shapes.clone()));
+        let ours = fitted(&Target::OBVHS, tree);
+        let binary = obvhs::to_theirs(&ours);
+        add("obvhs", name, Counted::Binary(ours), obvhs::trace_binary(binary, &theirs));
+        let wide = bvh2_to_cwbvh(&obvhs::to_theirs(tree), 3, true, false);
+        let counted = Counted::Wide(wide.clone());
+        add("obvhs CwBvh", name, counted, obvhs::trace_wide(wide, &theirs));
     }
     contenders
 }
 
 /// Returns whether a ray hits anything, and counts its tests.
 fn hits(
-    traced: &Traced,
+    counted: &Counted,
     triangles: &[Triangle],
     ray: &Ray,
     query: Query,
@@ -176,12 +419,12 @@ fn hits(
 ) -> bool {
     let prepared = PreparedRay::new(ray);
     let distance = |id: u32, most| triangles[id as usize].intersect(&prepared, most);
-    match (traced, query) {
-        (Traced::Binary(tree), Query::Any) => {
+    match (counted, query) {
+        (Counted::Binary(tree), Query::Any) => {
             any_hit_by(tree, ray, |id| distance(id, ray.t_max()).is_some(), counts)
         }
-        (Traced::Binary(tree), _) => nearest_hit_by(tree, ray, distance, counts).is_some(),
-        (Traced::Wide(tree), query) => {
+        (Counted::Binary(tree), _) => nearest_hit_by(tree, ray, distance, counts).is_some(),
+        (Counted::Wide(tree), query) => {
             let mut theirs = obvhs::to_their_ray(ray);
             let mut is_hit = false;
             let mut state = tree.new_traversal(theirs.direction);

@@ -1,6 +1,6 @@
 //! The crate `bvh`: binned surface area heuristic. It has no settings.
 
-use crate::tracing::contender::{Batch, Contender, Tracer, timed};
+use crate::tracing::contender::{Batch, Contender, Trace, Tracer, timed};
 use crate::tracing::layout::COMPILED;
 use crate::{Racer, tight};
 use ::bvh::aabb::{Aabb as TheirAabb, Bounded};
@@ -244,21 +244,25 @@ impl PreparedRay {
     }
 }
 
+/// Returns the traversal of a tree over shapes, which know their leaves.
+pub fn trace(tree: TheirBvh<f32, 3>, shapes: Vec<Shape>) -> Trace<'static> {
+    Box::new(move |batch: &Batch, hits: &mut [Option<Hit>]| {
+        let rays: Vec<PreparedRay> = batch.rays.iter().map(PreparedRay::new).collect();
+        Ok(timed(&rays, hits, |ray| ray.hit(&tree, &shapes, batch.query)))
+    })
+}
+
 /// Builds the library's tree over triangles and returns its traversal.
 fn contender(triangles: &[Triangle]) -> Contender<'_> {
     let mut shapes = shapes(triangles);
     let start = Instant::now();
     let tree = TheirBvh::build(&mut shapes);
     let preparation_seconds = start.elapsed().as_secs_f64();
-    let trace = move |batch: &Batch, hits: &mut [Option<Hit>]| {
-        let rays: Vec<PreparedRay> = batch.rays.iter().map(PreparedRay::new).collect();
-        Ok(timed(&rays, hits, |ray| ray.hit(&tree, &shapes, batch.query)))
-    };
     Contender {
         layout: "binary, their own".into(),
         instructions: COMPILED.into(),
         version: env!("ATTIC_BVH").into(),
         preparation_seconds,
-        tracer: Tracer::Other(Box::new(trace)),
+        tracer: Tracer::Other(trace(tree, shapes)),
     }
 }

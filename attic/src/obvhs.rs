@@ -4,7 +4,7 @@ use crate::tracing::contender::{Batch, Contender, Trace, Tracer, timed};
 use crate::tracing::layout::COMPILED;
 use crate::{Racer, tight};
 use ::obvhs::bvh2::{Bvh2, builder as binary, node::Bvh2Node};
-use ::obvhs::cwbvh::builder as wide;
+use ::obvhs::cwbvh::{CwBvh, builder as wide};
 use ::obvhs::ray::{Ray as TheirRay, RayHit};
 use ::obvhs::rt_triangle::RtTriangle;
 use ::obvhs::triangle::Triangle as TheirTriangle;
@@ -145,12 +145,13 @@ pub fn build(config: &Obvhs, boxes: &[Aabb]) -> Built {
     tight(to_our_tree(&theirs), time.as_secs_f64(), boxes)
 }
 
-/// Makes a [`Trace`] from a tree over `triangles` in the order of its leaves. It is a macro because
-/// the library's trees share functions but no trait.
+/// Makes a [`Trace`] from a tree and its library's triangles. It is a macro because the library's
+/// trees share functions but no trait. Triangles are in the order of leaves, as it recommends.
 macro_rules! traced_by {
     ($tree:ident, $triangles:expr) => {{
-        let triangles: Vec<RtTriangle> = $triangles;
-        move |batch: &Batch, hits: &mut [Option<Hit>]| {
+        let triangles: Vec<RtTriangle> =
+            $tree.primitive_indices.iter().map(|&id| (&$triangles[id as usize]).into()).collect();
+        Box::new(move |batch: &Batch, hits: &mut [Option<Hit>]| {
             let traverse = |any, ray, hit: &mut RayHit| {
                 let test = |ray: &TheirRay, id: usize| triangles[id].intersect(ray);
                 if any {
@@ -160,36 +161,40 @@ macro_rules! traced_by {
                 }
             };
             Ok(trace(batch, hits, traverse, &$tree.primitive_indices))
-        }
+        })
     }};
 }
 
-/// Returns the preset's binary tree and its compressed eight-wide tree, with triangles in the order
-/// of leaves, as the library recommends. It expects rays with unit directions; ours have unit
-/// length up to rounding.
-fn contenders(config: &Obvhs, triangles: &[Triangle]) -> Vec<Contender<'static>> {
-    let theirs: Vec<TheirTriangle> = triangles
-        .iter()
-        .map(|&Triangle(corners)| {
-            let [v0, v1, v2] = corners.map(Vec3A::from);
-            TheirTriangle { v0, v1, v2 }
-        })
-        .collect();
-    let mut binary_time = Duration::ZERO;
-    let mut wide_time = Duration::ZERO;
-    let tree = binary::build_bvh2_from_tris(&theirs, parameters(config), &mut binary_time);
-    let trace_binary = traced_by!(tree, in_order(&theirs, &tree.primitive_indices));
-    let compressed = wide::build_cwbvh_from_tris(&theirs, parameters(config), &mut wide_time);
-    let trace_wide = traced_by!(compressed, in_order(&theirs, &compressed.primitive_indices));
-    vec![
-        contender("binary, their own", binary_time, Box::new(trace_binary)),
-        contender("wide, their own", wide_time, Box::new(trace_wide)),
-    ]
+/// Returns the traversal of a binary tree. The library expects rays with unit directions; ours have
+/// unit length up to rounding.
+pub fn trace_binary(tree: Bvh2, triangles: &[TheirTriangle]) -> Trace<'static> {
+    traced_by!(tree, triangles)
 }
 
-/// Returns the triangles in the order of `ids`, prepared for the library's test.
-fn in_order(triangles: &[TheirTriangle], ids: &[u32]) -> Vec<RtTriangle> {
-    ids.iter().map(|&id| (&triangles[id as usize]).into()).collect()
+/// Returns the traversal of a compressed eight-wide tree.
+pub fn trace_wide(tree: CwBvh, triangles: &[TheirTriangle]) -> Trace<'static> {
+    traced_by!(tree, triangles)
+}
+
+/// Returns triangles as the library builds over them.
+pub fn triangles(triangles: &[Triangle]) -> Vec<TheirTriangle> {
+    let theirs = |&Triangle(corners)| {
+        let [v0, v1, v2] = corners.map(Vec3A::from);
+        TheirTriangle { v0, v1, v2 }
+    };
+    triangles.iter().map(theirs).collect()
+}
+
+/// Returns the preset's binary tree and its compressed eight-wide tree.
+fn contenders(config: &Obvhs, over: &[Triangle]) -> Vec<Contender<'static>> {
+    let theirs = triangles(over);
+    let mut times = [Duration::ZERO; 2];
+    let tree = binary::build_bvh2_from_tris(&theirs, parameters(config), &mut times[0]);
+    let compressed = wide::build_cwbvh_from_tris(&theirs, parameters(config), &mut times[1]);
+    vec![
+        contender("binary, their own", times[0], trace_binary(tree, &theirs)),
+        contender("wide, their own", times[1], trace_wide(compressed, &theirs)),
+    ]
 }
 
 fn contender(layout: &str, time: Duration, trace: Trace<'static>) -> Contender<'static> {

@@ -2,49 +2,22 @@
 // with those in the tree that the library builds itself.
 
 #include "bvh.h"
+#include "load_madmann91.h"
 
-#include <bvh/v2/bvh.h>
 #include <bvh/v2/default_builder.h>
-#include <bvh/v2/node.h>
 #include <bvh/v2/stack.h>
 #include <bvh/v2/tri.h>
 
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
-#include <fstream>
 #include <random>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
-using Node = bvh::v2::Node<float, 3>;
-using Bvh = bvh::v2::Bvh<Node>;
 using Vec3 = bvh::v2::Vec<float, 3>;
 using Tri = bvh::v2::Tri<float, 3>;
 using Triangles = std::vector<bvh::v2::PrecomputedTri<float>>;
 using Ray = bvh::v2::Ray<float, 3>;
-
-/// Loads a file of `bvh export --for madmann91-bvh`.
-Bvh load(const char *path) {
-    struct { char magic[4]; uint32_t version, nodes, ids, rest[4]; } header;
-    struct { float min[3]; uint32_t first; float max[3]; uint32_t count; } from;
-    std::ifstream file(path, std::ios::binary);
-    file.read(reinterpret_cast<char *>(&header), sizeof header);
-    if (!file || std::memcmp(header.magic, "BVHX", 4) != 0 || header.version != 1) throw std::runtime_error("no file of bvh export");
-    Bvh bvh;
-    bvh.nodes.resize(header.nodes);
-    for (Node &node : bvh.nodes) {
-        file.read(reinterpret_cast<char *>(&from), sizeof from);
-        node.set_bbox({{from.min[0], from.min[1], from.min[2]}, {from.max[0], from.max[1], from.max[2]}});
-        node.index = Bvh::Index(from.first << Bvh::Index::prim_count_bits | from.count);
-    }
-    std::vector<uint32_t> ids(header.ids);
-    file.read(reinterpret_cast<char *>(ids.data()), std::streamsize(4 * ids.size()));
-    if (!file) throw std::runtime_error("the file is too short");
-    bvh.prim_ids.assign(ids.begin(), ids.end());
-    return bvh;
-}
 
 /// The nearest hit's distance, and the number of triangles that were tested.
 std::pair<float, size_t> nearest(const Bvh &bvh, const Triangles &triangles, Ray ray) {
@@ -84,7 +57,7 @@ int main(int count, char **arguments) {
     bvh_tree_free(tree);
     Bvh ours = load(path);
 
-    Bvh own = bvh::v2::DefaultBuilder<Node>::build(boxes, centers, {});
+    Bvh own = bvh::v2::DefaultBuilder<bvh::v2::Node<float, 3>>::build(boxes, centers, {});
 
     size_t hits = 0, wrong = 0, tests[2] = {0, 0};
     for (int i = 0; i < 100000; i++) {

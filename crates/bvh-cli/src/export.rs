@@ -5,8 +5,9 @@ use crate::answer::{Answer, Form, gain, whole};
 use crate::arguments::{output_file, reserve};
 use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
-use bvh_core::export::{Layout, Target};
-use bvh_scenes::tree_file;
+use bvh_core::export::{Better, Layout, Target};
+use bvh_core::{Bvh, Triangle};
+use bvh_scenes::{Scene, tree_file};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
@@ -50,31 +51,39 @@ pub fn export(args: &ExportArgs) -> Result<(), Error> {
     let (tree, _) = tree_file::load(&args.file, &scene)?;
     // Only triangles can be traced there.
     let triangles = scene.triangles().map_err(|fault| Error::Usage(fault.to_string()))?;
-    // The loaded tree is over the same boxes, so that these can be built over, too.
-    let greedy = muller_fellner::Config::default().build(&scene.boxes).unwrap_or_default();
-    let better = target.fit_better(&tree, &greedy, triangles);
+    let (better, compared) = compare(&target, &tree, &scene, triangles);
     let bytes = target.bytes(&better.tree, &scene.boxes);
     reserve(&args.out, true, bytes.len())?.write(&[&bytes])?;
+    let nodes = better.tree.nodes.len();
+    let mut answer = Answer::new(args.form);
+    answer.say(&format!("{}: {} nodes of {compared}", args.out.display(), whole(nodes)));
+    answer.record("nodes", nodes);
+    answer.record("cost of a ray", target.cost(&better.tree));
+    answer.record("is searched", better.is_searched());
+    answer.record("gain inside", better.gains[0]);
+    answer.record("gain outside", better.gains[1]);
+    answer.end();
+    Ok(())
+}
+
+/// Returns the better of the tree and a greedy one for the tracer, and which one it is and why.
+pub fn compare(
+    target: &Target,
+    tree: &Bvh,
+    scene: &Scene,
+    triangles: &[Triangle],
+) -> (Better, String) {
+    // The loaded tree is over the same boxes, so that these can be built over, too.
+    let greedy = muller_fellner::Config::default().build(&scene.boxes).unwrap_or_default();
+    let better = target.fit_better(tree, &greedy, triangles);
     let which = match better.is_searched() {
         true => "this tree",
         false => "a greedy tree instead, which takes fewer tests",
     };
-    let [inside, outside] = better.gains;
-    let nodes = better.tree.nodes.len();
-    let mut answer = Answer::new(args.form);
-    answer.say(&format!(
-        "{}: {} nodes of {which}; tests of rays from inside the scene {} a greedy tree's, of rays \
-         from outside {}",
-        args.out.display(),
-        whole(nodes),
-        gain(1.0, inside),
-        gain(1.0, outside),
-    ));
-    answer.record("nodes", nodes);
-    answer.record("cost of a ray", target.cost(&better.tree));
-    answer.record("is searched", better.is_searched());
-    answer.record("gain inside", inside);
-    answer.record("gain outside", outside);
-    answer.end();
-    Ok(())
+    let [inside, outside] = better.gains.map(|times| gain(1.0, times));
+    let compared = format!(
+        "{which}; tests of rays from inside the scene {inside} a greedy tree's, of rays from \
+         outside {outside}"
+    );
+    (better, compared)
 }

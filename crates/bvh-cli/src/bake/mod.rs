@@ -11,7 +11,7 @@ use crate::Error;
 use crate::answer::{Answer, Form, gain, short, whole};
 use crate::arguments::{Jobs, input_file, output_file, output_or_free, reserve};
 use crate::explain;
-use crate::export::tracers;
+use crate::export::{compare, tracers};
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use bvh_core::cost::{Objective, internal_area};
@@ -155,6 +155,10 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let reserved = args.reserved(&out, plan::most_bytes(&scene, most_references))?;
     let (plan, prepared) = args.decided(plan, &scene, interrupted, &mut answer)?;
     let found = plan.search(&scene, start.as_ref(), prepared, interrupted)?;
+    if let (Some(target), Ok(triangles)) = (&args.tracer, scene.triangles()) {
+        let (_, compared) = compare(target, &found.baked.outcome.tree, &scene, triangles);
+        answer.say(&format!("for {}, export writes {compared}", target.name));
+    }
     save(&found, &out, reserved, interrupted, answer)
 }
 

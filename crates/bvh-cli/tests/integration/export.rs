@@ -63,7 +63,10 @@ fn a_bake_for_a_tracer_has_the_cost_and_the_references_that_pay_there() {
     for target in Target::ALL {
         // Without a budget, other bakes choose the cost and the references themselves.
         for budget in ["", " --budget=1Mwork"] {
-            bvh(at, &format!("bake escher:900 --for={}{budget} --out=x.bvh", target.name));
+            let said =
+                bvh(at, &format!("bake escher:900 --for={}{budget} --out=x.bvh", target.name));
+            let expected = format!("for {}, export writes", target.name);
+            assert!(said.contains(&expected), "{said}");
             let (tree, header) = tree_file::load(&at.join("x.bvh"), &scene).unwrap();
             let is_divided = tree.prim_ids.len() > 900;
             assert_eq!(is_divided, target.references > 1.0, "{target:?}{budget}");
