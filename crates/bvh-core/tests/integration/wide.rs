@@ -387,6 +387,31 @@ fn a_range_of_one_distance_has_the_hit_at_that_distance_from_near_and_from_afar(
 }
 
 #[test]
+fn rays_whose_distances_from_planes_overflow_are_answered_alike() {
+    let mut random = Random(23);
+    let size = libm::exp2f(127.0);
+    let mut hits = 0;
+    for (name, scene) in [("grid", grid_box(3)), ("ball", ball(2))] {
+        let triangles = scaled(&scene, size);
+        let layouts = layouts(&triangles, &mut random);
+        let mut rays = Vec::new();
+        for _ in 0..400 {
+            // Outside of the scene, on any side of it, and in it.
+            let mut origin = random.point() * size;
+            origin[random.below(3)] *= random.of(&[1.0, 1.9, -1.9]);
+            let Triangle([a, b, c]) = random.of(&triangles);
+            let target = random.of(&[a, a * 0.5 + b * 0.5, a * 0.25 + b * 0.5 + c * 0.25]);
+            let towards = (target.as_dvec3() - origin.as_dvec3()) / f64::from(size);
+            // The target is at `size`; what is in front of it hides most of the far side.
+            let t_min = random.of(&[0.0, 0.75 * size]);
+            rays.extend(Ray::new(origin, towards.as_vec3(), t_min, f32::MAX));
+        }
+        hits += check(name, &triangles, &layouts, &rays);
+    }
+    assert!(hits > 500, "the rays should hit something: {hits}");
+}
+
+#[test]
 fn every_kernel_traces_trees_of_any_depth() {
     let mut random = Random(21);
     // Boxes inside boxes, so that a ray enters all of them and the stack is as full as can be; and
