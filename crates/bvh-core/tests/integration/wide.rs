@@ -391,7 +391,8 @@ fn rays_whose_distances_from_planes_overflow_are_answered_alike() {
     let mut random = Random(23);
     let size = libm::exp2f(127.0);
     let mut hits = 0;
-    for (name, scene) in [("grid", grid_box(3)), ("ball", ball(2))] {
+    let aside = scaled(&grid_box(3), 0.25).iter().map(|t| Triangle(t.0.map(|p| p - 1.5))).collect();
+    for (name, scene) in [("grid", grid_box(3)), ("ball", ball(2)), ("aside", aside)] {
         let triangles = scaled(&scene, size);
         let layouts = layouts(&triangles, &mut random);
         let mut rays = Vec::new();
