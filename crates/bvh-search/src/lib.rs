@@ -47,3 +47,8 @@ pub use run::{
 pub use run::{Deadline, Watched};
 #[cfg(feature = "std")]
 pub use timed::{bake, bake_for_rays, bake_instances, improve};
+
+/// The example of the project's README, compiled and run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;

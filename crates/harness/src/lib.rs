@@ -20,8 +20,3 @@ pub mod statistics;
 pub mod stress;
 
 pub use error::Error;
-
-/// The README's example, compiled and run as a test.
-#[cfg(doctest)]
-#[doc = include_str!("../../../README.md")]
-struct Readme;
