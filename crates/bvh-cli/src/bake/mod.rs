@@ -155,11 +155,14 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let reserved = args.reserved(&out, plan::most_bytes(&scene, most_references))?;
     let (plan, prepared) = args.decided(plan, &scene, interrupted, &mut answer)?;
     let found = plan.search(&scene, start.as_ref(), prepared, interrupted)?;
+    save(&found, &out, reserved, interrupted, &mut answer)?;
+    // Rays are counted once the tree is safe.
     if let (Some(target), Ok(triangles)) = (&args.tracer, scene.triangles()) {
         let (_, compared) = compare(target, &found.baked.outcome.tree, &scene, triangles);
         answer.say(&format!("for {}, export writes {compared}", target.name));
     }
-    save(&found, &out, reserved, interrupted, answer)
+    answer.end();
+    Ok(())
 }
 
 /// Writes the best tree, and prints its cost.
@@ -168,7 +171,7 @@ fn save(
     out: &Path,
     reserved: Reserved,
     interrupted: &AtomicBool,
-    mut answer: Answer,
+    answer: &mut Answer,
 ) -> Result<(), Error> {
     let (bytes, cost_for_lines) = found.save(out, reserved)?;
     if interrupted.load(Relaxed) {
@@ -178,11 +181,10 @@ fn save(
             "the best tree so far, of cost {cost}, is in {out}; `--from {out}` continues"
         )));
     }
-    summarise(found, cost_for_lines, &mut answer);
+    summarise(found, cost_for_lines, answer);
     answer.say(&format!("{}: {} bytes", out.display(), whole(bytes)));
     answer.record("file", out.display().to_string());
     answer.record("bytes", bytes);
-    answer.end();
     Ok(())
 }
 

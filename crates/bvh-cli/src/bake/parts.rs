@@ -93,7 +93,9 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
     let start = join(&scene, &parts, &folder)?;
     let plan = Plan { effort: plan.effort.share(1.0 - SHARE_OF_PARTS), ..plan };
     let found = plan.search(&scene, Some(&start), Prepared::default(), interrupted)?;
-    save(&found, &out, reserved, interrupted, answer)
+    save(&found, &out, reserved, interrupted, &mut answer)?;
+    answer.end();
+    Ok(())
 }
 
 /// Cuts a scene, and gives every part a share of the budget in proportion to its objects.
