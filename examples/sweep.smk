@@ -23,7 +23,7 @@ rule join:
     params:
         folders=expand(f"{PARTS}/{{id}}", id=IDS),
     shell:
-        "{HARNESS} {SPEC} --from {params.folders} --out {OUT}"
+        "{HARNESS} merge {params.folders} --out {OUT}"
 
 
 rule run:

@@ -52,7 +52,7 @@ def main(spec, out, server=None):
     if cluster:
         cluster.stop()
     parts = [f"{out}.parts/{run}" for run in runs]
-    return subprocess.run([HARNESS, spec, "--from", *parts, "--out", out]).returncode
+    return subprocess.run([HARNESS, "merge", *parts, "--out", out]).returncode
 
 
 if __name__ == "__main__":

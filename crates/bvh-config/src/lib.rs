@@ -57,29 +57,22 @@ impl OutOfRange {
 
 /// A value that can check its parameters.
 pub trait Check {
-    /// Returns all parameters that are out of range, in order.
-    fn faults(&self) -> Vec<OutOfRange> {
-        Vec::new()
-    }
-
     /// Rejects the first parameter that is out of range.
     fn check(&self) -> Result<(), OutOfRange> {
-        self.faults().into_iter().next().map_or(Ok(()), Err)
+        Ok(())
     }
 }
 
 impl<C: Check> Check for Option<C> {
-    fn faults(&self) -> Vec<OutOfRange> {
-        self.iter().flat_map(C::faults).collect()
+    fn check(&self) -> Result<(), OutOfRange> {
+        self.iter().try_for_each(C::check)
     }
 }
 
 impl<C: Check> Check for Vec<C> {
-    fn faults(&self) -> Vec<OutOfRange> {
-        self.iter()
-            .enumerate()
-            .flat_map(|(index, inner)| Nested.faults(&format!("[{index}]"), inner))
-            .collect()
+    fn check(&self) -> Result<(), OutOfRange> {
+        let mut inner = self.iter().enumerate();
+        inner.try_for_each(|(index, inner)| Nested.check(&format!("[{index}]"), inner))
     }
 }
 
@@ -88,43 +81,14 @@ impl<C: Check> Check for Vec<C> {
 /// Implemented by the ranges of the standard library for numbers and for collections of them, and
 /// by [`Nested`].
 pub trait Accepts<V: ?Sized> {
-    /// Returns all faults of the value `found` of the parameter `key`.
-    fn faults(&self, key: &str, found: &V) -> Vec<OutOfRange>;
-
-    /// Rejects a value that is not accepted.
-    fn check(&self, key: &str, found: &V) -> Result<(), OutOfRange> {
-        self.faults(key, found).into_iter().next().map_or(Ok(()), Err)
-    }
-
-    /// Returns the accepted values in words; `None` if the type accepts no others.
-    fn accepted(&self) -> Option<String> {
-        None
-    }
+    /// Rejects a value `found` of the parameter `key` that is not accepted.
+    fn check(&self, key: &str, found: &V) -> Result<(), OutOfRange>;
 }
 
 /// The fields of a configuration, as [`config!`](crate::config!) declares them.
 pub trait Keys {
     /// The names of the fields, in order.
     const KEYS: &[&str];
-
-    /// Returns the accepted values of each field in words; `None` if the type accepts no others.
-    fn accepted() -> Vec<Option<String>>;
-}
-
-/// Adds the accepted values of each field to its description in the JSON schema of the
-/// configuration.
-#[cfg(feature = "schema")]
-pub fn describe_accepted<C: Keys>(schema: &mut schemars::Schema) {
-    let Some(fields) = schema.get_mut("properties").and_then(|fields| fields.as_object_mut())
-    else {
-        return;
-    };
-    for (key, accepted) in C::KEYS.iter().zip(C::accepted()) {
-        let description = fields.get_mut(*key).and_then(|field| field.get_mut("description"));
-        if let (Some(words), Some(text)) = (accepted, description) {
-            *text = format!("{}\nAccepted: {words}.", text.as_str().unwrap_or_default()).into();
-        }
-    }
 }
 
 /// Accepts the values that pass their [`Check`]: nested configurations.
@@ -132,28 +96,23 @@ pub fn describe_accepted<C: Keys>(schema: &mut schemars::Schema) {
 pub struct Nested;
 
 impl<C: Check> Accepts<C> for Nested {
-    fn faults(&self, key: &str, found: &C) -> Vec<OutOfRange> {
-        found.faults().into_iter().map(|fault| fault.below(key)).collect()
+    fn check(&self, key: &str, found: &C) -> Result<(), OutOfRange> {
+        found.check().map_err(|fault| fault.below(key))
     }
 }
 
 macro_rules! ranges {
     ($($range:ty,)*) => { $(
         impl<V: Numbers + ?Sized> Accepts<V> for $range {
-            fn faults(&self, key: &str, found: &V) -> Vec<OutOfRange> {
+            fn check(&self, key: &str, found: &V) -> Result<(), OutOfRange> {
                 // `1.0..` contains infinity, which is accepted only if the range names it.
                 let unlimited = matches!(self.end_bound(), Unbounded);
-                let mut faults = Vec::new();
                 found.each(key, &mut |key, number| {
                     if !self.contains(number) || unlimited && !number.is_finite() {
-                        faults.push(OutOfRange::new(key, number, in_words(self)));
+                        return Err(OutOfRange::new(key, number, in_words(self)));
                     }
-                });
-                faults
-            }
-
-            fn accepted(&self) -> Option<String> {
-                Some(in_words(self))
+                    Ok(())
+                })
             }
         }
     )* };
@@ -185,13 +144,6 @@ fn in_words<N: Display>(range: &impl RangeBounds<N>) -> String {
     }
 }
 
-/// Adds the faults of combinations of fields, except for fields that are out of range themselves.
-#[doc(hidden)]
-pub fn add_together(faults: &mut Vec<OutOfRange>, together: impl IntoIterator<Item = OutOfRange>) {
-    let known: Vec<String> = faults.iter().map(|fault| fault.key.clone()).collect();
-    faults.extend(together.into_iter().filter(|late| !known.contains(&late.key)));
-}
-
 /// Declares a configuration: a struct with public fields, each
 /// `name: type = default, in accepted;`.
 ///
@@ -204,7 +156,7 @@ pub fn add_together(faults: &mut Vec<OutOfRange>, together: impl IntoIterator<It
 /// Without `= default`, a field has the default of its type, and the documentation does not mention
 /// it. Without `in`, every value is accepted. The right side of `in` is any value that
 /// [`Accepts`](crate::Accepts) the field's type. A function after the struct may check combinations
-/// of fields and returns their faults, as in `check Self::temperatures_fall;`.
+/// of fields, each of which is in range, as in `check Self::check_temperatures;`.
 ///
 /// An `enum` instead of the struct gets the same traits except [`Default`] and
 /// [`Check`](crate::Check), and names in snake case:
@@ -239,8 +191,6 @@ macro_rules! config {
     };
     (@default) => { ::core::default::Default::default() };
     (@default $default:expr) => { $default };
-    (@accepted $type:ty) => { ::core::option::Option::None };
-    (@accepted $type:ty, $range:expr) => { $crate::Accepts::<$type>::accepted(&($range)) };
     (@doc [] []) => { "" };
     (@doc [] [$range:expr]) => { concat!("Accepted: `", stringify!($range), "`.") };
     (@doc [$default:expr] []) => { concat!("Default `", stringify!($default), "`.") };
@@ -267,10 +217,6 @@ macro_rules! config {
 
         impl $crate::Keys for $name {
             const KEYS: &[&str] = &[$(stringify!($field)),*];
-
-            fn accepted() -> ::std::vec::Vec<::core::option::Option<::std::string::String>> {
-                ::std::vec![$($crate::config!(@accepted $type $(, $range)?)),*]
-            }
         }
 
         impl ::core::default::Default for $name {
@@ -280,12 +226,10 @@ macro_rules! config {
         }
 
         impl $crate::Check for $name {
-            fn faults(&self) -> ::std::vec::Vec<$crate::OutOfRange> {
-                #[allow(unused_mut, reason = "some configurations accept every value")]
-                let mut faults = ::std::vec::Vec::new();
-                $($(faults.extend($crate::Accepts::faults(&($range), stringify!($field), &self.$field));)?)*
-                $($crate::add_together(&mut faults, $together(self));)?
-                faults
+            fn check(&self) -> ::core::result::Result<(), $crate::OutOfRange> {
+                $($($crate::Accepts::check(&($range), stringify!($field), &self.$field)?;)?)*
+                $($together(self)?;)?
+                Ok(())
             }
         }
     };
@@ -294,7 +238,6 @@ macro_rules! config {
             @struct {
                 #[derive(::serde::Serialize, ::serde::Deserialize, ::schemars::JsonSchema)]
                 #[serde(deny_unknown_fields, default)]
-                #[schemars(transform = $crate::describe_accepted::<Self>)]
             }
             $($tokens)*
         }
@@ -307,11 +250,7 @@ macro_rules! config {
                     derive(::serde::Serialize, ::serde::Deserialize),
                     serde(deny_unknown_fields, default)
                 )]
-                #[cfg_attr(
-                    feature = "schema",
-                    derive(::schemars::JsonSchema),
-                    schemars(transform = $crate::describe_accepted::<Self>)
-                )]
+                #[cfg_attr(feature = "schema", derive(::schemars::JsonSchema))]
             }
             $($tokens)*
         }

@@ -21,11 +21,11 @@ bvh_config::config! {
 }
 
 impl Check for Candidates {
-    fn faults(&self) -> Vec<OutOfRange> {
+    fn check(&self) -> Result<(), OutOfRange> {
         match self {
-            Self::AxisBest => vec![],
-            Self::KBest(k) => (1..).faults("k_best", k),
-            Self::Within(alpha) => (0.0..).faults("within", alpha),
+            Self::AxisBest => Ok(()),
+            Self::KBest(k) => (1..).check("k_best", k),
+            Self::Within(alpha) => (0.0..).check("within", alpha),
         }
     }
 }

@@ -135,8 +135,8 @@ struct From<'a> {
 }
 
 impl Check for From<'_> {
-    fn faults(&self) -> Vec<OutOfRange> {
-        self.config.faults()
+    fn check(&self) -> Result<(), OutOfRange> {
+        self.config.check()
     }
 }
 

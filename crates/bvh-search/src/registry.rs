@@ -44,8 +44,8 @@ macro_rules! methods {
         }
 
         impl Check for Method {
-            fn faults(&self) -> Vec<OutOfRange> {
-                match self { $(Self::$variant(config) => config.faults()),* }
+            fn check(&self) -> Result<(), OutOfRange> {
+                match self { $(Self::$variant(config) => config.check()),* }
             }
         }
 

@@ -54,7 +54,7 @@ pub enum Error {
     #[error("scene {scene}, tracing: {message}")]
     Tracing { scene: String, message: String },
     /// A query of a report that the rows of a file cannot answer.
-    #[error("{}: {message}", .path.display())]
+    #[error("{}: {message}; the runs are kept, --redraw makes the reports again", .path.display())]
     Query { path: PathBuf, message: String },
     /// A method returned something that is not a tree over the scene: a defect of the method.
     #[error(
@@ -76,9 +76,9 @@ pub enum Error {
          if they are intended, run again without --check"
     )]
     Differs { differences: usize },
-    /// A finished run whose files no longer match their checksums.
-    #[error("{}: {file} is damaged or missing", .run.display())]
-    Damaged { run: PathBuf, file: String },
+    /// A file of a finished run that no longer matches its checksum.
+    #[error("{} is damaged", .0.display())]
+    Damaged(PathBuf),
     /// Ctrl-C.
     #[error("interrupted; {finished} of {runs} runs are kept, `--resume` does the rest")]
     Interrupted { finished: usize, runs: usize },

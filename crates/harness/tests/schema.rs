@@ -23,8 +23,10 @@ fn fault(root: &Value, schema: &Value, value: &Value, at: &str) -> Option<String
         let exact = right == 1 || schema.get("anyOf").is_some() && right > 1;
         return (!exact).then(|| format!("{at}: {right} choices accept it: {faults:?}"));
     }
-    let kind = schema.get("type").and_then(Value::as_str);
-    let is_accepted = kind.is_none_or(|kind| is_of_type(value, kind))
+    let kinds =
+        schema.get("type").map(|kind| kind.as_array().cloned().unwrap_or(vec![kind.clone()]));
+    let is_of = |kind: &Value| is_of_type(value, kind.as_str().unwrap());
+    let is_accepted = kinds.is_none_or(|kinds| kinds.iter().any(is_of))
         && schema.get("const").is_none_or(|one| one == value)
         && list("enum").is_none_or(|all| all.contains(value));
     if !is_accepted {
@@ -63,6 +65,7 @@ fn is_of_type(value: &Value, kind: &str) -> bool {
         "boolean" => value.is_boolean(),
         "integer" => value.is_i64() || value.is_u64(),
         "number" => value.is_number(),
+        "null" => value.is_null(),
         _ => panic!("{kind}"),
     }
 }

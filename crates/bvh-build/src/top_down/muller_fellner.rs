@@ -81,15 +81,14 @@ impl MadeUpCosts {
 }
 
 impl Check for Heuristic {
-    fn faults(&self) -> Vec<OutOfRange> {
+    fn check(&self) -> Result<(), OutOfRange> {
         match self {
-            Self::AreaTimesPower(power) => (0.0..=1.0).faults("area_times_power", power),
+            Self::AreaTimesPower(power) => (0.0..=1.0).check("area_times_power", power),
             Self::AreaTimesCost(MadeUpCosts { every, cost }) => {
-                let mut faults = (1..).faults("area_times_cost.every", every);
-                faults.extend((0.0..=1e6).faults("area_times_cost.cost", cost));
-                faults
+                (1..).check("area_times_cost.every", every)?;
+                (0.0..=1e6).check("area_times_cost.cost", cost)
             }
-            _ => vec![],
+            _ => Ok(()),
         }
     }
 }

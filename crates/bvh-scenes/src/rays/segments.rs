@@ -45,18 +45,15 @@ config! {
 }
 
 impl RenderedRays {
-    fn check_cameras(&self) -> Option<OutOfRange> {
+    fn check_cameras(&self) -> Result<(), OutOfRange> {
         let numbers =
             self.cameras.iter().flat_map(|pose| [pose.eye, pose.target]).chain(self.lights.clone());
         if self.cameras.is_empty() {
-            return Some(OutOfRange::new(
-                "cameras",
-                "empty",
-                "at least one table with `eye` and `target`",
-            ));
+            let accepted = "at least one table with `eye` and `target`";
+            return Err(OutOfRange::new("cameras", "empty", accepted));
         }
         if let Some(wrong) = numbers.flatten().find(|number| !number.is_finite()) {
-            return Some(OutOfRange::new("cameras and lights", wrong, "finite coordinates"));
+            return Err(OutOfRange::new("cameras and lights", wrong, "finite coordinates"));
         }
         check_count("count", self.count, 1 + self.bounces as usize + self.lights.len())
     }
@@ -84,12 +81,12 @@ pub const OF_ANYTHING: usize = 6;
 
 /// Rejects a count if that many rays, each leading to `rays` in total, exceed the limit of a
 /// density.
-pub fn check_count(key: &str, count: u32, rays: usize) -> Option<OutOfRange> {
+pub fn check_count(key: &str, count: u32, rays: usize) -> Result<(), OutOfRange> {
     let most = RayDensity::MOST_SEGMENTS / rays;
     if count as usize <= most {
-        return None;
+        return Ok(());
     }
-    Some(OutOfRange::new(key, count, format!("up to {most}, each with {rays} rays in all")))
+    Err(OutOfRange::new(key, count, format!("up to {most}, each with {rays} rays in all")))
 }
 
 /// A traced ray with its kind and its segment up to the hit.

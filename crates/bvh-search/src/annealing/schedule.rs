@@ -73,9 +73,8 @@ impl AnnealingRun {
 }
 
 /// Rejects a last temperature above the first.
-pub(crate) fn check_fall(hot: f64, cold: f64) -> Option<OutOfRange> {
-    let rises = hot > 0.0 && cold > hot;
-    rises.then(|| OutOfRange::new("cold", cold, "above 0, not above hot"))
+pub(crate) fn check_fall(hot: f64, cold: f64) -> Result<(), OutOfRange> {
+    if cold > hot { Err(OutOfRange::new("cold", cold, "above 0, not above hot")) } else { Ok(()) }
 }
 
 /// Anneals `tree`, then improves it to a local optimum of reinsertion. Calls `round` after every

@@ -3,8 +3,8 @@
 use super::terminal::print_line;
 use crate::Error;
 use crate::run::execute::reject_indivisible;
+use crate::run::job::listed;
 use crate::run::resolved::load_scenes;
-use crate::run::selection::listed;
 use crate::spec::{Experiment, Overrides};
 use std::path::PathBuf;
 

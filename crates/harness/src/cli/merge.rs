@@ -1,7 +1,7 @@
 //! `harness merge`: joins the parts of experiments that ran with `--run`.
 
 use super::run::print_summary;
-use super::terminal::{input_folder, output_folder, print_error};
+use super::terminal::{Jobs, input_folder, output_folder, print_error};
 use crate::rows::store::{Existing, spec_of_part};
 use crate::run::execute::{Extent, execute};
 use crate::run::resolved::{Resolved, read_toml};
@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-/// Join the parts of experiments that ran with --run into the files that one run writes.
+/// Join the parts of experiments that ran with --run into the files that one process writes, and
+/// perform the runs that no part has.
 #[derive(clap::Args, Clone, Debug)]
 pub struct MergeArgs {
     /// Folders that were given as --out to runs with --run.
@@ -22,12 +23,15 @@ pub struct MergeArgs {
     /// Replace existing results.
     #[arg(long)]
     pub force: bool,
+    /// Limits the threads.
+    #[command(flatten)]
+    pub jobs: Jobs,
 }
 
-/// Merges the parts and prints the tables of every experiment. Rejects parts that lack a run, which
-/// `--from` would perform.
+/// Merges the parts and prints the tables of every experiment.
 pub fn merge(args: &MergeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     output_folder("--out", &args.out)?;
+    args.jobs.apply()?;
     let mut parts: BTreeMap<PathBuf, Vec<PathBuf>> = BTreeMap::new();
     for out in &args.folders {
         input_folder("DIR", out)?;
@@ -48,7 +52,7 @@ pub fn merge(args: &MergeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
             .map_err(|fault| Error::Usage(format!("{}: {fault}", spec.display())))?;
         // What an earlier merge has taken is kept.
         let existing = if args.force { Existing::Replace } else { Existing::Resume };
-        let extent = Extent { existing, parts, only_parts: true, ..Extent::default() };
+        let extent = Extent { existing, parts, ..Extent::default() };
         let summary = execute(&experiment, &args.out, &extent, interrupted)?;
         summary.remarks.iter().for_each(|remark| print_error(remark));
         print_summary(&experiment, &summary);

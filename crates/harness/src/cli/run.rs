@@ -1,7 +1,7 @@
 //! `harness SPEC.toml...`: runs experiments, compares them with committed results, or makes their
 //! reports again.
 
-use super::terminal::{Jobs, input_folder, output_folder, print_error, print_line};
+use super::terminal::{Jobs, output_folder, print_error, print_line};
 use crate::Error;
 use crate::rows::store::Existing;
 use crate::run::execute::{Extent, execute};
@@ -40,14 +40,10 @@ pub struct RunArgs {
     /// Replace existing results.
     #[arg(long, conflicts_with_all = ["check", "redraw", "resume"])]
     pub force: bool,
-    /// Perform only the run that `harness jobs` lists with this identifier, and keep it for `--from`;
-    /// may be repeated. Every process needs a different --out.
+    /// Perform only the run that `harness jobs` lists with this identifier, and keep it for `harness
+    /// merge`; may be repeated. Every process needs a different --out.
     #[arg(long = "run", value_name = "ID", conflicts_with = "check")]
     pub runs: Vec<String>,
-    /// Take the runs that were performed with --run and these folders as --out, and perform those
-    /// that are missing.
-    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["check", "redraw", "runs"])]
-    pub from: Vec<PathBuf>,
     /// Print only errors and, under --check, differences.
     #[arg(long)]
     pub quiet: bool,
@@ -60,7 +56,6 @@ pub struct RunArgs {
 pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     // A wrong folder is found before hours of work, not after them.
     output_folder("--out", &args.out)?;
-    args.from.iter().try_for_each(|folder| input_folder("--from", folder))?;
     args.jobs.apply()?;
     // A mistake in the last spec must not surface after hours of runs of the first.
     let experiments = args
@@ -81,8 +76,8 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         (_, true) => Existing::Replace,
         _ => Existing::Keep,
     };
-    let (runs, parts) = (args.runs.clone(), args.from.clone());
-    let extent = Extent { existing, runs, parts, only_parts: false, verbose: args.verbose };
+    let runs = args.runs.clone();
+    let extent = Extent { existing, runs, verbose: args.verbose, ..Extent::default() };
     let mut differences = 0;
     for experiment in &experiments {
         if args.check {

@@ -110,22 +110,21 @@ fn towards_centre(eyes: [[f64; 3]; 3]) -> Vec<Viewpoint> {
 }
 
 impl Config {
-    fn check_rays(&self) -> Vec<OutOfRange> {
+    fn check_rays(&self) -> Result<(), OutOfRange> {
         // A primary ray, one that it reflects, and one to every light.
         let rays_per_pixel = self.cameras.values().map(|cameras| 2 + cameras.lights.len());
         let most_rays = rays_per_pixel.fold(OF_ANYTHING, usize::max);
-        let mut faults = Vec::new();
-        faults.extend(check_count("trained", self.trained, most_rays));
+        check_count("trained", self.trained, most_rays)?;
         for (scene, cameras) in &self.cameras {
             let paths = [("same", &cameras.same, true), ("other", &cameras.other, self.count > 0)];
             for (name, path, is_used) in paths {
                 if is_used && path.is_empty() {
                     let key = format!("cameras.{scene}.{name}");
-                    faults.push(OutOfRange::new(key, "empty", "at least one viewpoint"));
+                    return Err(OutOfRange::new(key, "empty", "at least one viewpoint"));
                 }
             }
         }
-        faults
+        Ok(())
     }
 
     /// Returns a renderer's rays from one of the paths through a scene.

@@ -30,24 +30,25 @@ bvh_config::config! { serde;
         #[serde(skip_serializing_if = "Option::is_none")]
         timeout_seconds: Option<f64>, in above(0.0);
     }
-    check Self::names_a_program;
+    check Self::check_command;
 }
 
 impl Config {
     /// The method's name in specs.
     pub const NAME: &str = "external";
 
-    fn names_a_program(&self) -> Option<OutOfRange> {
-        let is_empty = self.command.first().is_none_or(String::is_empty);
-        is_empty
-            .then(|| OutOfRange::new("command", "empty", "a list of a program and its arguments"))
+    fn check_command(&self) -> Result<(), OutOfRange> {
+        match self.command.first() {
+            Some(program) if !program.is_empty() => Ok(()),
+            _ => Err(OutOfRange::new("command", "empty", "a list of a program and its arguments")),
+        }
     }
 
     /// Runs the program over `boxes`, the boxes of `objects`. Returns its tree and the seconds that
     /// it needed, including its start and its files.
     ///
-    /// Kills the program once the run is `cancelled`. Whenever the program ends, all processes that
-    /// it has started are killed as well.
+    /// Kills the program once the run is `cancelled`. Whenever the program ends, all processes of
+    /// its group are killed as well.
     pub fn build(
         &self,
         boxes: &[Aabb],
@@ -76,8 +77,7 @@ impl Config {
         // Standard error goes to a file: a full pipe that nobody reads would stop the program.
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(errors.try_clone()?);
         let start = Instant::now();
-        let mut program =
-            Program::start(&mut command, folder.path()).map_err(CommandFault::NotStarted)?;
+        let mut program = Program::start(&mut command).map_err(CommandFault::NotStarted)?;
         let status = loop {
             if let Some(status) = program.status()? {
                 break status;

@@ -10,7 +10,6 @@ mod program;
 use crate::Error;
 use bvh_build::BuildError;
 use bvh_config::fault::Fault;
-use bvh_config::{Check, OutOfRange};
 use bvh_core::{Aabb, Bvh};
 use bvh_scenes::Scene;
 use bvh_search::Observer;
@@ -138,25 +137,12 @@ pub(crate) fn lower_bound() -> Result<LowerBound, Fault> {
 #[derive(Clone, Debug, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Peer {
     #[serde(rename = "method")]
-    name: Name,
+    #[schemars(extend("enum" = Self::NAMES))]
+    name: &'static str,
     /// Settings of the library, which checks them.
     #[serde(flatten)]
     #[schemars(with = "std::collections::BTreeMap<String, serde_json::Value>")]
     settings: Table,
-}
-
-/// The libraries that specs may name.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, schemars::JsonSchema)]
-#[serde(rename_all = "snake_case")]
-enum Name {
-    Bvh,
-    Obvhs,
-}
-
-impl Check for Peer {
-    fn faults(&self) -> Vec<OutOfRange> {
-        vec![]
-    }
 }
 
 impl Peer {
@@ -168,20 +154,13 @@ impl Peer {
         name: &str,
         settings: D,
     ) -> Result<Option<Self>, D::Error> {
-        let name = match name {
-            "bvh" => Name::Bvh,
-            "obvhs" => Name::Obvhs,
-            _ => return Ok(None),
-        };
+        let Some(name) = Self::NAMES.iter().find(|known| **known == name) else { return Ok(None) };
         Table::deserialize(settings).map(|settings| Some(Self { name, settings }))
     }
 
     /// The library's name.
     pub fn name(&self) -> &'static str {
-        match self.name {
-            Name::Bvh => "bvh",
-            Name::Obvhs => "obvhs",
-        }
+        self.name
     }
 
     /// Checks that this program contains the library, and that the library accepts the settings.
@@ -202,9 +181,9 @@ impl Peer {
 
     fn library(&self) -> Result<&'static dyn Library, Fault> {
         let here = OTHERS.get().map_or(&[][..], |others| others.libraries);
-        let library = here.iter().find(|library| library.name() == self.name());
+        let library = here.iter().find(|library| library.name() == self.name);
         library.copied().ok_or_else(|| {
-            let found = format!("{:?}, another library, which `{PROGRAM}` contains", self.name());
+            let found = format!("{:?}, another library, which `{PROGRAM}` contains", self.name);
             let ours = bvh_search::Method::NAMES.join(", ");
             Fault::new("method", found, format!("without it {ours}"))
         })

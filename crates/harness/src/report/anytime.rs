@@ -1,9 +1,8 @@
 //! Error against run time: the gap of the incumbent to the exact optimum or the best known cost.
 
 use super::config::check_file;
-use super::data::ratio;
+use super::data::{Series, ratio};
 use super::prelude::*;
-use super::progress::{Series, WORST, series};
 use crate::statistics::quartiles;
 
 bvh_config::config! { serde;
@@ -13,6 +12,8 @@ bvh_config::config! { serde;
         source: String;
         /// Heading.
         title: String;
+        /// What the rows say, the title of the figure, as in a report of the kind `query`.
+        finding: String;
         /// Name of the files; several such reports of one experiment need different ones.
         file: String = "anytime".into();
         /// Labels of the methods. One event per run, as a builder has, is shown as a point.
@@ -54,7 +55,7 @@ impl Config {
             let Some(reference) = rows.reference(scene) else { continue };
             let mut layers = Vec::new();
             for method in &self.methods {
-                let runs = series(rows, scene, method);
+                let runs = rows.series(scene, method);
                 let curve = curve(scene, method, &runs, reference.cost);
                 layers.extend(draw(method, &curve));
                 points.extend(curve);
@@ -64,38 +65,21 @@ impl Config {
             panels.push(panel(rows.shown(scene), x, y, layers));
         }
         let file = format!("timing_{}", self.file);
-        output.finding = finding(&points);
         let caption = format!("{}. {caption}", output.heading);
-        output.add_figure(&file, caption, 2, panels);
-        output.add_csv(file, &corners(&points))?;
+        output.add_csv(&file, &corners(&points))?;
+        output.say(&self.finding, rows)?;
+        output.add_figure(file, caption, 2, panels);
         Ok(output)
     }
 }
 
-/// Says which method ends closest to the best known cost on the most scenes.
-fn finding(points: &[Point]) -> Option<String> {
-    let scenes: Vec<_> = points.chunk_by(|a, b| a.scene == b.scene).collect();
-    let ends = |scene: &[Point]| {
-        let curves = scene.chunk_by(|a, b| a.method == b.method).filter_map(|curve| curve.last());
-        curves.min_by(|a, b| a.gap_median.total_cmp(&b.gap_median)).map(|end| end.method.to_owned())
-    };
-    let winners: Vec<String> = scenes.iter().filter_map(|scene| ends(scene)).collect();
-    let wins = |method: &String| winners.iter().filter(|other| *other == method).count();
-    let most = winners.iter().max_by_key(|method| wins(method))?;
-    Some(format!(
-        "‘{most}’ ends closest to the best known on {} of {} scenes",
-        wins(most),
-        winners.len()
-    ))
-}
-
-/// Returns the costs of the incumbents of all runs after `at` seconds, the worst cost where a run
-/// has none yet, so that their median never rises.
+/// Returns the costs of the incumbents of all runs after `at` seconds, infinite where a run has none
+/// yet, so that their median never rises.
 fn incumbents(runs: &[Series], at: f64) -> Vec<f64> {
     let incumbent = |run: &Series| {
         run.iter().take_while(|(seconds, _)| *seconds <= at).last().map(|point| point.1)
     };
-    runs.iter().map(|run| incumbent(run).unwrap_or(WORST)).collect()
+    runs.iter().map(|run| incumbent(run).unwrap_or(f64::INFINITY)).collect()
 }
 
 /// Median and quartiles of the gap from the first moment at which every run has an incumbent to the

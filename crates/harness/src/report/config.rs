@@ -7,8 +7,8 @@ use bvh_config::{Accepts, OutOfRange};
 pub struct OneOrMore;
 
 impl<T> Accepts<Vec<T>> for OneOrMore {
-    fn faults(&self, key: &str, found: &Vec<T>) -> Vec<OutOfRange> {
-        if found.is_empty() { vec![OutOfRange::new(key, "empty", "one or more")] } else { vec![] }
+    fn check(&self, key: &str, found: &Vec<T>) -> Result<(), OutOfRange> {
+        if found.is_empty() { Err(OutOfRange::new(key, "empty", "one or more")) } else { Ok(()) }
     }
 }
 
@@ -56,17 +56,11 @@ impl Labels for Series {
 }
 
 /// Rejects names of files that could lead to another folder.
-pub fn check_file(name: &str) -> Vec<OutOfRange> {
+pub fn check_file(name: &str) -> Result<(), OutOfRange> {
     // Other characters separate folders or are invalid on some system.
     let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if !name.is_empty() && name.chars().all(is_plain) {
-        return vec![];
+        return Ok(());
     }
-    vec![OutOfRange::new("file", format!("{name:?}"), "letters, digits, - and _")]
-}
-
-/// Returns the label of the first method, which the others are compared with; empty if there is
-/// none.
-pub fn first(methods: &[String]) -> &str {
-    methods.first().map_or("", String::as_str)
+    Err(OutOfRange::new("file", format!("{name:?}"), "letters, digits, - and _"))
 }

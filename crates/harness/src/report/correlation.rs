@@ -4,12 +4,11 @@
 //! Trees of different methods are never pooled: a ranking of binary and n-ary trees together mostly
 //! separates the two kinds (Simpson 1951).
 
-use super::config::first;
 use super::data::distinct;
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
 use crate::rows::{RunRow, RunTestRow, VisitRow};
-use crate::statistics::{pearson, pearson_interval, range, spearman};
+use crate::statistics::{pearson, pearson_interval, spearman};
 use bvh_config::above;
 
 bvh_config::config! { serde;
@@ -19,6 +18,8 @@ bvh_config::config! { serde;
         source: String;
         /// Heading.
         title: String;
+        /// What the rows say, the title of the figure, as in a report of the kind `query`.
+        finding: String;
         /// Labels of the methods, the paper's own case first. Trees of each method are compared
         /// with each other only.
         methods: Vec<String>, in OneOrMore;
@@ -110,18 +111,10 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     }
     let mut output = Output::new(&config.source, &config.title);
     output.add_csv("correlation", &correlations)?;
-    let is_drawn = |row: &&Correlation| {
-        let kind = (row.family, row.query);
-        row.method == first(&config.methods)
-            && row.cost == OF_AREA
-            && rows.ray_kinds().contains(&kind)
-    };
-    let ranks = correlations.iter().filter(is_drawn).filter_map(|row| row.spearman);
-    output.finding = range(ranks)
-        .map(|(low, high)| format!("Rank correlation of cost and tests: {low:.2} to {high:.2}"));
+    output.say(&config.finding, rows)?;
     let caption = format!(
         "One point per tree, the same rays for all trees of a scene. ρ is Spearman's rank correlation over the trees of ‘{}’.",
-        first(&config.methods)
+        config.case()
     );
     output.add_figure("correlation", caption, random, panels);
     output.paper = config.compare(rows, &correlations);
@@ -135,14 +128,17 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
 }
 
 impl Config {
+    /// The label of the paper's own case.
+    fn case(&self) -> &str {
+        self.methods.first().map_or("", String::as_str)
+    }
+
     /// Compares the paper's words with the correlation of its cost and its rays over the trees of
     /// its case, scene by scene.
     fn compare(&self, rows: &Rows, correlations: &[Correlation]) -> Vec<PaperRow> {
         let Some(says) = &self.paper_says else { return Vec::new() };
         let is_of_paper = |row: &&Correlation| {
-            row.method == first(&self.methods)
-                && row.cost == OF_AREA
-                && (row.family, row.query) == OF_PAPER
+            row.method == self.case() && row.cost == OF_AREA && (row.family, row.query) == OF_PAPER
         };
         let compare = |row: &Correlation| {
             let pearson = row.pearson?;

@@ -8,6 +8,9 @@ use crate::rows::{
 use bvh_scenes::SceneKind;
 use std::path::{Path, PathBuf};
 
+/// The incumbents of a run: seconds since its start, and cost.
+pub type Series = Vec<(f64, f64)>;
+
 /// An experiment's rows.
 #[derive(Clone, Debug, Default)]
 pub struct Rows {
@@ -105,6 +108,19 @@ impl Rows {
     pub fn seconds_of(&self, scene: &str, method: &str) -> Vec<f64> {
         let own = self.timing.iter().filter(|row| row.scene == scene && row.method == method);
         own.map(|row| row.seconds).collect()
+    }
+
+    /// Returns the incumbents of every run of one method on one scene.
+    pub fn series(&self, scene: &str, method: &str) -> Vec<Series> {
+        let mut points = Vec::new();
+        for (index, row) in self.history.iter().enumerate() {
+            if row.scene == scene && row.method == method {
+                let seconds = self.clock.get(index).map_or(f64::NAN, |clock| clock.seconds);
+                points.push((row.repetition, (seconds, row.incumbent)));
+            }
+        }
+        let runs = points.chunk_by(|a, b| a.0 == b.0);
+        runs.map(|run| run.iter().map(|(_, point)| *point).collect()).collect()
     }
 
     /// Returns the trials of one method on one scene, one list per repetition.

@@ -1,6 +1,5 @@
 //! Distributions of the costs of independent trials.
 
-use super::output::percents;
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
 use crate::statistics::{mean, quantile, range, sorted};
@@ -14,6 +13,8 @@ bvh_config::config! { serde;
         source: String;
         /// Heading.
         title: String;
+        /// What the rows say, the title of the figure, as in a report of the kind `query`.
+        finding: String;
         /// Labels of the methods.
         methods: Vec<String>, in OneOrMore;
         /// Within which fraction of the greedy tree's cost the paper finds the majority of trials.
@@ -76,10 +77,7 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
         output.paper.extend(config.majority(rows, method));
     }
     output.add_csv("distribution", &summaries)?;
-    let below = summaries.iter().map(|row| row.fraction_below_base);
-    output.finding = range(below).map(|(low, high)| {
-        format!("{} of the trials cost less than the greedy tree", percents(low, high))
-    });
+    output.say(&config.finding, rows)?;
     let caption = format!("{}. Every trial of every repetition.", output.heading);
     output.add_figure("distribution", caption, 2, panels);
     let columns = "scene method lowest_cost median_cost highest_cost relative_deviation base_cost";

@@ -10,6 +10,8 @@ bvh_config::config! { serde;
     pub struct Config {
         /// Heading.
         title: String;
+        /// What the rows say, the title of the figure, as in a report of the kind `query`.
+        finding: String;
         /// Labels of the methods to compare. Their trees must be binary with one object per leaf.
         methods: Vec<String>, in OneOrMore;
         /// Label of the method that finds the optimum.
@@ -45,7 +47,7 @@ impl Config {
         let mut output = Output::new("", &self.title);
         output.add_csv("gaps", &summaries)?;
         let optima = rows.runs.iter().filter(|run| run.method == self.optimum).count();
-        output.finding = self.finding(&summaries);
+        output.say(&self.finding, rows)?;
         let caption = format!(
             "{optima} small scenes. Left, the fraction of runs that end at the optimum; right, the \
              worst gap of any."
@@ -84,22 +86,6 @@ impl Config {
             }
         }
         summaries
-    }
-
-    /// Says which methods solve the most.
-    fn finding(&self, summaries: &[Gaps]) -> Option<String> {
-        let solved = |method: &String| {
-            let own = summaries.iter().filter(|summary| summary.method == method);
-            own.map(|own| own.solved_fraction * own.runs as f64).sum::<f64>().round() as usize
-        };
-        let most = self.methods.iter().map(solved).max()?;
-        let best = self.methods.iter().filter(|method| solved(method) == most);
-        let best: Vec<String> = best.map(|method| format!("‘{method}’")).collect();
-        let runs = summaries.iter().filter(|summary| summary.method == self.methods[0]);
-        let runs = runs.map(|summary| summary.runs).sum::<usize>();
-        let (names, of) = (best.join(" and "), format!("{most} of {runs}"));
-        let of = if most == runs { format!("all {runs}") } else { of };
-        Some(format!("At the optimum in {of} runs: {names}"))
     }
 
     /// Draws the fraction solved and the worst gap against size, for every kind of part.
@@ -151,31 +137,6 @@ fn solved(gaps: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_title_names_all_methods_that_solve_the_most() {
-        let methods = ["a", "b", "c"].map(str::to_owned).to_vec();
-        let config = Config { methods, ..Config::default() };
-        let said = |solved: [f64; 3]| {
-            let of = |(method, solved_fraction)| {
-                let [median_gap, quantile_90_gap, maximum_gap] = [0.0; 3];
-                let (part, objects, runs) = ("whole", 8, 4);
-                Gaps {
-                    method,
-                    part,
-                    objects,
-                    runs,
-                    solved_fraction,
-                    median_gap,
-                    quantile_90_gap,
-                    maximum_gap,
-                }
-            };
-            config.finding(&["a", "b", "c"].into_iter().zip(solved).map(of).collect::<Vec<_>>())
-        };
-        assert_eq!(said([0.5, 1.0, 1.0]).unwrap(), "At the optimum in all 4 runs: ‘b’ and ‘c’");
-        assert_eq!(said([0.75, 0.5, 0.0]).unwrap(), "At the optimum in 3 of 4 runs: ‘a’");
-    }
 
     #[test]
     fn rounding_is_no_gap() {

@@ -15,7 +15,6 @@ pub mod output;
 pub mod overview;
 pub mod paper;
 mod prelude;
-mod progress;
 pub mod query;
 mod query_check;
 mod query_column;
@@ -25,7 +24,6 @@ pub mod query_report;
 mod ray_cost;
 pub mod table;
 mod table_paper;
-mod to_target;
 pub mod trials;
 
 use crate::Error;
@@ -52,9 +50,9 @@ macro_rules! reports {
         }
 
         impl Check for Report {
-            fn faults(&self) -> Vec<OutOfRange> {
+            fn check(&self) -> Result<(), OutOfRange> {
                 match self {
-                    $(Self::$kind(config) => config.faults(),)*
+                    $(Self::$kind(config) => config.check(),)*
                 }
             }
         }

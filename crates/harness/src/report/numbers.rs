@@ -1,11 +1,10 @@
 //! Medians and quartiles of costs and gaps, lower bounds, and times until targets are reached, by
 //! method and scene.
 
-use super::data::ratio;
+use super::data::{Series, ratio};
 use super::prelude::*;
-use super::to_target;
 use crate::rows::ReferenceRow;
-use crate::statistics::{minimum, quartiles};
+use crate::statistics::{order_quantile, quartiles};
 
 bvh_config::config! { serde;
     /// Numbers of every method on every scene.
@@ -52,6 +51,21 @@ pub(super) struct Timing<'a> {
     seconds_quartile_3: f64,
 }
 
+/// One method and target on one scene, as written to `timing_to_target.csv`.
+#[derive(Serialize)]
+pub(super) struct Reached<'a> {
+    scene: &'a str,
+    target: String,
+    method: &'a str,
+    runs: usize,
+    solved: usize,
+    /// Median over all runs, counting runs that never reach the target as last; empty if such a run
+    /// is the median.
+    median: Option<f64>,
+    /// The same for the quantile 0.9.
+    quantile_90: Option<f64>,
+}
+
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let mut numbers = Vec::new();
@@ -73,12 +87,6 @@ impl Config {
             }
         }
         let mut output = Output::new("", &self.title);
-        let bounds = numbers.iter().filter_map(|row| row.lower_bound_over_reference);
-        // Rounded up, so that no scene is above it.
-        output.finding = minimum(bounds).map(|least| {
-            let most = (10.0 / least).ceil() / 10.0;
-            format!("Where a bound is proven, the best known cost at most {most} times the optimum")
-        });
         output.add_csv("numbers", &numbers)?;
         output.add_csv("timing_numbers", &timing)?;
         let explanation = "Gaps are to the best known cost; the lower bound is relative to that:";
@@ -88,9 +96,34 @@ impl Config {
         let columns = "scene method seconds_quartile_1 seconds_median seconds_quartile_3";
         output.show("Seconds of the runs:", &timing, columns)?;
         if !self.targets.is_empty() {
-            to_target::add(&mut output, &self.methods, &self.targets, rows)?;
+            let reached = self.reached(rows);
+            output.add_csv("timing_to_target", &reached)?;
+            let columns = "scene target method runs solved median quantile_90";
+            let explanation = "Seconds until the target is reached, over all runs:";
+            output.show(explanation, &reached, columns)?;
         }
         Ok(output)
+    }
+
+    /// Returns the seconds until all methods reach all targets.
+    fn reached<'a>(&'a self, rows: &'a Rows) -> Vec<Reached<'a>> {
+        let mut reached = Vec::new();
+        for scene in rows.scenes() {
+            let runs_of_methods: Vec<Vec<Series>> =
+                self.methods.iter().map(|method| rows.series(scene, method)).collect();
+            let Some(reference) = rows.reference(scene) else { continue };
+            for percent in &self.targets {
+                let cost = reference.cost * (1.0 + percent / 100.0);
+                let target = match percent {
+                    0.0 => "best known".to_owned(),
+                    percent => format!("best known +{percent} %"),
+                };
+                for (method, runs) in self.methods.iter().zip(&runs_of_methods) {
+                    reached.push(Reached::new(scene, target.clone(), method, runs, cost));
+                }
+            }
+        }
+        reached
     }
 }
 
@@ -116,5 +149,40 @@ fn of_costs<'a>(
         gap_quartile_3: gaps[2],
         lower_bound: reference.lower_bound,
         lower_bound_over_reference: reference.lower_bound.map(|bound| ratio(bound, reference.cost)),
+    }
+}
+
+impl<'a> Reached<'a> {
+    fn new(scene: &'a str, target: String, method: &'a str, runs: &[Series], cost: f64) -> Self {
+        // Runs without success must count: dropping them would favour methods that rarely succeed.
+        let time = |run: &Series| {
+            run.iter().find(|(_, incumbent)| *incumbent <= cost).map_or(f64::INFINITY, |at| at.0)
+        };
+        let times: Vec<f64> = runs.iter().map(time).collect();
+        let quantile = |q| order_quantile(&times, q).filter(|time| time.is_finite());
+        Self {
+            scene,
+            target,
+            method,
+            runs: runs.len(),
+            solved: times.iter().filter(|time| time.is_finite()).count(),
+            median: quantile(0.5),
+            quantile_90: quantile(0.9),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_target_is_reached_by_the_first_incumbent_at_or_below_it_or_never() {
+        let runs = [vec![(1.0, 9.0), (2.0, 7.0), (5.0, 6.0)], vec![(3.0, 7.0)]];
+        let when = [9.5, 7.0, 6.0, 1.0].map(|cost| {
+            let reached = Reached::new("", String::new(), "", &runs, cost);
+            (reached.solved, reached.median)
+        });
+        assert_eq!(when, [(2, Some(1.0)), (2, Some(2.0)), (1, Some(5.0)), (0, None)]);
     }
 }

@@ -1,13 +1,14 @@
 //! The output of a report: CSV files, figures, comparisons with the paper, and text for the
 //! terminal.
 
+use super::data::Rows;
 use super::looks::look;
 use super::paper::PaperRow;
-use super::query::Row;
+use super::query::{QueryError, Row};
+use super::query_measure::filled;
 use crate::Error;
+use crate::rows::csv_file::{parse, read, to_bytes};
 use crate::rows::store::Store;
-use crate::rows::to_bytes;
-use crate::statistics::range;
 use comfy_table::{Table, presets};
 use figures::{Axis, Figure, Layer, Marks, Panel};
 use serde::Serialize;
@@ -56,6 +57,27 @@ impl Output {
         let name = name.into();
         let bytes = to_bytes(rows, Path::new(&name))?;
         self.csv.push((name, bytes));
+        Ok(())
+    }
+
+    /// Sets what the rows say, the title of figures: a text in which numbers of the CSV file that
+    /// was added last and of other files are [filled in](filled). Nothing if the text is empty, or
+    /// if there is no such row, as in a quick variant with other scenes.
+    pub fn say(&mut self, finding: &str, rows: &Rows) -> Result<(), Error> {
+        let own = self.csv.last().map_or(&[][..], |(_, bytes)| bytes);
+        let read = |file: &str| match file {
+            "" => parse(own, Path::new("the table")),
+            file => read(&rows.folder.join(file)),
+        };
+        let read = |file: &str| read(file).map_err(|error| QueryError::File(error.to_string()));
+        self.finding = match filled(finding, &read) {
+            Err(QueryError::NoRow(_)) => None,
+            Ok(said) => Some(said).filter(|said| !said.is_empty()),
+            Err(error) => {
+                let message = format!("finding: {error}");
+                return Err(Error::Query { path: rows.folder.clone(), message });
+            }
+        };
         Ok(())
     }
 
@@ -175,34 +197,6 @@ pub fn dots(
     panel(title, x, y, layers)
 }
 
-/// Says how far ratios to the greedy tree's cost are from it; `None` if there are none.
-pub fn from_greedy(ratios: impl IntoIterator<Item = f64>) -> Option<String> {
-    // A difference of less than half a thousandth is none.
-    let (low, high) = range(ratios.into_iter().map(|ratio| (1e3 * ratio).round() / 1e3))?;
-    let [below, above] = [1.0 - low, high - 1.0];
-    Some(if high <= 1.0 {
-        format!("{} below the greedy tree", percents(-above, below))
-    } else if low >= 1.0 {
-        format!("{} above the greedy tree", percents(-below, above))
-    } else {
-        let (below, above) = (percents(below, below), percents(above, above));
-        format!("from {below} below to {above} above the greedy tree")
-    })
-}
-
-/// Writes a range of fractions in per cent, whole ones from 1 % on.
-pub fn percents(low: f64, high: f64) -> String {
-    let percent = |fraction: f64| match 100.0 * fraction {
-        ..0.05 => "0".to_owned(),
-        small @ ..0.95 => format!("{small:.1}"),
-        whole => format!("{whole:.0}"),
-    };
-    match [percent(low), percent(high)] {
-        [one, other] if one == other => format!("{one} %"),
-        [one, other] => format!("{one} to {other} %"),
-    }
-}
-
 /// Makes a panel.
 pub fn panel(title: impl Into<String>, x: Axis, y: Axis, layers: Vec<Layer>) -> Panel {
     Panel { title: title.into(), x, y, layers }
@@ -220,20 +214,6 @@ mod tests {
             shown,
             ["1.235", "0.01235", "12346", "1.500e-9", "0", "123456", "best", "-1.000"]
         );
-    }
-
-    #[test]
-    fn distances_from_the_greedy_tree_name_their_side() {
-        let ratios = [vec![0.92, 0.98], vec![1.344, 1.336], vec![0.997, 1.2], vec![0.98, 1.0004]];
-        let said = ratios.map(from_greedy);
-        let expected = [
-            "2 to 8 % below the greedy tree",
-            "34 % above the greedy tree",
-            "from 0.3 % below to 20 % above the greedy tree",
-            "0 to 2 % below the greedy tree",
-        ];
-        assert_eq!(said.map(Option::unwrap), expected);
-        assert_eq!(from_greedy([]), None);
     }
 
     #[test]

@@ -8,41 +8,34 @@ use crate::rows;
 use bvh_config::OutOfRange;
 
 impl Config {
-    /// Returns the parts of the query that cannot be read, and the files and columns that no run
-    /// writes.
-    pub(super) fn faults_of_queries(&self) -> Vec<OutOfRange> {
-        let mut faults = check_file(&self.file);
+    /// Rejects parts of the query that cannot be read, and files and columns that no run writes.
+    pub(super) fn check_queries(&self) -> Result<(), OutOfRange> {
+        check_file(&self.file)?;
         // A row that any number would fit into.
         let mut row = Row::new();
         for (key, name) in [("rows", &self.rows), ("join", &self.join)] {
-            match rows::files().find(|(file, _)| file == name) {
-                Some((_, columns)) => {
-                    row.extend(columns.iter().map(|&column| (column.into(), "1".into())));
-                }
-                None if key == "join" && name.is_empty() => {}
-                None => {
-                    let names: Vec<&str> = rows::files().map(|(file, _)| *file).collect();
-                    faults.push(OutOfRange::new(key, format!("{name:?}"), names.join(", ")));
-                }
+            if key == "join" && name.is_empty() {
+                continue;
             }
-        }
-        // The columns of an unknown file are unknown, too.
-        if !faults.is_empty() {
-            return faults;
+            let (_, columns) = rows::files().find(|(file, _)| file == name).ok_or_else(|| {
+                let names: Vec<&str> = rows::files().map(|(file, _)| *file).collect();
+                OutOfRange::new(key, format!("{name:?}"), names.join(", "))
+            })?;
+            row.extend(columns.iter().map(|&column| (column.into(), "1".into())));
         }
         for (key, result) in self.attempts(&row) {
             match result {
                 Err(QueryError::Malformed { found, accepted, .. }) => {
-                    faults.push(OutOfRange::new(key, format!("{found:?}"), accepted));
+                    return Err(OutOfRange::new(key, format!("{found:?}"), accepted));
                 }
                 Err(QueryError::Column { column, accepted }) => {
                     let accepted = format!("the columns {accepted}");
-                    faults.push(OutOfRange::new(key, format!("{column:?}"), accepted));
+                    return Err(OutOfRange::new(key, format!("{column:?}"), accepted));
                 }
                 _ => {}
             }
         }
-        faults
+        Ok(())
     }
 
     /// Applies every part of the query to a row, and returns the result of each with its key.
@@ -59,9 +52,15 @@ impl Config {
             attempts.push((format!("columns[{index}].value"), column.try_on(row)));
             attempts.push((format!("columns[{index}].paired_by"), partners));
         }
-        let table = [self.header().into_iter().map(|column| (column, "1".into())).collect()];
+        let ones = |columns: &mut dyn Iterator<Item = String>| {
+            Ok(vec![columns.map(|column| (column, "1".into())).collect()])
+        };
+        let read = |name: &str| match rows::files().find(|(file, _)| *file == name) {
+            Some((_, columns)) => ones(&mut columns.iter().map(|column| (*column).to_owned())),
+            None => ones(&mut self.header().into_iter()),
+        };
         for part in self.finding.split_inclusive('}') {
-            attempts.push(("finding".into(), filled(part, &table).map(|_| ())));
+            attempts.push(("finding".into(), filled(part, &read).map(|_| ())));
         }
         attempts
     }
@@ -74,7 +73,7 @@ mod tests {
 
     #[test]
     fn files_and_columns_that_runs_do_not_write_are_rejected_by_key() {
-        let faults = |change: &str| {
+        let fault = |change: &str| {
             let mut config: toml::Table =
                 "source = 's'\ntitle = 't'\nfile = 'x'\nrows = 'runs.csv'\n\
                 by = ['scene']\ncolumns = [{ name = 'c', value = 'max cost / work' }]"
@@ -82,10 +81,9 @@ mod tests {
                     .unwrap();
             config.extend(change.parse::<toml::Table>().unwrap());
             let config: Config = config.try_into().unwrap();
-            let keys = config.faults().into_iter().map(|fault| fault.key);
-            keys.collect::<Vec<String>>()
+            config.check().err().map(|fault| fault.key)
         };
-        assert_eq!(faults(""), Vec::<String>::new());
+        assert_eq!(fault(""), None);
         for (change, key) in [
             ("rows = '../runs.csv'", "rows"),
             // The columns of an unknown file are unknown, too.
@@ -96,8 +94,8 @@ mod tests {
             ("finding = 'Of {scene=a | max c} to {scene=b | max cost}'", "finding"),
             ("finding = 'Of {max c}'", "finding"),
         ] {
-            assert_eq!(faults(change), [key], "{change}");
+            assert_eq!(fault(change).as_deref(), Some(key), "{change}");
         }
-        assert_eq!(faults("join = 'timing.csv'\nbase = 'threads=1'"), Vec::<String>::new());
+        assert_eq!(fault("join = 'timing.csv'\nbase = 'threads=1'"), None);
     }
 }

@@ -126,28 +126,41 @@ impl<'t> Measure<'t> {
     }
 }
 
-/// Replaces every `{CONDITIONS | MEASURE}` of a text by a number of the rows: whole, or from 10 on
-/// rounded to whole ones, or with one decimal.
-pub fn filled(text: &str, rows: &[Row]) -> Result<String, QueryError> {
+/// Replaces every `{CONDITIONS | MEASURE}` of a text by a number of the rows that `read` returns for
+/// the empty name, and `{FILE | CONDITIONS | MEASURE}` by one of a file: whole, or from 10 on rounded
+/// to whole ones, or with one decimal.
+pub fn filled(
+    text: &str,
+    read: &dyn Fn(&str) -> Result<Vec<Row>, QueryError>,
+) -> Result<String, QueryError> {
     let mut filled = String::new();
     let mut rest = text;
     while let Some((before, after)) = rest.split_once('{') {
         let (query, after) = after.split_once('}').unwrap_or((after, ""));
-        let (conditions, measure) =
-            query.split_once(" | ").ok_or_else(|| QueryError::Malformed {
-                part: "number",
-                found: query.into(),
-                accepted: "{CONDITIONS | MEASURE}",
-            })?;
+        let (file, conditions, measure) = match query.split(" | ").collect::<Vec<_>>()[..] {
+            [conditions, measure] => ("", conditions, measure),
+            [file, conditions, measure] => (file, conditions, measure),
+            _ => {
+                let accepted = "{CONDITIONS | MEASURE}, {FILE | CONDITIONS | MEASURE}";
+                return Err(QueryError::Malformed {
+                    part: "number",
+                    found: query.into(),
+                    accepted,
+                });
+            }
+        };
+        let rows = read(file)?;
         let measure = Measure::parse(measure)?;
         // A wrong column is an error even where no row meets the conditions.
         measure.of_rows(&rows.iter().take(1).collect::<Vec<_>>())?;
-        let chosen = select(rows.to_vec(), conditions)?;
+        let chosen = select(rows, conditions)?;
         let number = measure.of_rows(&chosen.iter().collect::<Vec<_>>())?;
         let number = number.ok_or_else(|| QueryError::NoRow(query.into()))?;
+        // No zero has a sign.
+        let number = if number.abs() < 0.05 { 0.0 } else { number };
         let is_whole = number.fract() == 0.0 || number.abs() >= 9.95;
         filled += before;
-        filled += &format!("{number:.0$}", usize::from(!is_whole));
+        filled += &format!("{number:.0$}", usize::from(!is_whole)).replace('-', "−");
         rest = after;
     }
     Ok(filled + rest)
@@ -184,7 +197,6 @@ fn operand(row: &Row, word: &str) -> Result<Option<f64>, QueryError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::query::select;
     use super::*;
 
     fn rows() -> Vec<Row> {
@@ -211,8 +223,15 @@ mod tests {
     #[test]
     fn numbers_in_a_sentence_are_those_of_the_rows() {
         let text = "{scene=a | count cost} trees, {scene=a | min cost / rays * 100 + -0.4} to {* | max cost / 2}";
-        assert_eq!(filled(text, &rows()).unwrap(), "2 trees, 50 to 2.5");
-        assert!(filled("{scene=c | max cost}", &rows()).is_err());
+        let filled = |text| {
+            filled(text, &|file| match file {
+                "" => Ok(rows()),
+                file => select(rows(), &format!("method={file}")),
+            })
+        };
+        assert_eq!(filled(text).unwrap(), "2 trees, 50 to 2.5");
+        assert_eq!(filled("{z | scene=a | only cost * -1}").unwrap(), "−3");
+        assert!(filled("{scene=c | max cost}").is_err());
     }
 
     #[test]

@@ -7,7 +7,6 @@ use super::prelude::*;
 use super::query::{self, Conditions, QueryError, Row, number_in};
 use super::query_column::{Column, Group};
 use super::query_figure::Drawing;
-use super::query_measure;
 use bvh_config::Nested;
 
 bvh_config::config! { serde;
@@ -42,13 +41,13 @@ bvh_config::config! { serde;
         /// Reason for differences from the paper.
         reason: String;
         /// What the table says, the title of the figure. `{CONDITIONS | MEASURE}` in it is a number
-        /// from the table.
+        /// of the table, `{FILE | CONDITIONS | MEASURE}` of another file of the experiment.
         finding: String;
         /// A figure of the table.
         #[serde(skip_serializing_if = "Option::is_none")]
         figure: Option<Drawing>, in Nested;
     }
-    check Self::faults_of_queries;
+    check Self::check_queries;
 }
 
 impl Config {
@@ -69,11 +68,7 @@ impl Config {
         output.show_csv(&format!("{}:", self.title), &bytes, &columns.join(" "))?;
         output.csv.push((self.file.clone(), bytes));
         output.paper = self.compare(rows, &table).map_err(named)?;
-        output.finding = match query_measure::filled(&self.finding, &table) {
-            // A quick variant has other scenes.
-            Err(QueryError::NoRow(_)) => None,
-            said => Some(said.map_err(named)?).filter(|said| !said.is_empty()),
-        };
+        output.say(&self.finding, rows)?;
         if let Some(figure) = &self.figure {
             let panels = figure.panels(rows, &table);
             output.add_figure(&self.file, &figure.caption, figure.per_row, panels);

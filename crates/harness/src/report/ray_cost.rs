@@ -14,6 +14,8 @@ bvh_config::config! { serde;
         source: String;
         /// Heading.
         title: String;
+        /// What the rows say, the title of the figure, as in a report of the kind `query`.
+        finding: String;
         /// Label of the method that the others are compared with.
         base: String;
         /// Pairs of labels: whether trees of the second take more tests than those of the first.
@@ -76,7 +78,7 @@ impl Config {
         table.extend(means);
         let mut output = Output::new(&self.source, &self.title);
         output.add_csv("ray_cost", &table)?;
-        output.finding = self.finding(&table);
+        output.say(&self.finding, rows)?;
         let caption = format!(
             "{}. Tests of nodes and blocks of triangles in the wide layout, of rays that no tree was \
              trained on; lines are 95 % intervals, which means have not.",
@@ -99,21 +101,6 @@ impl Config {
             output.show("Tests per ray over those of another method:", &paired, columns)?;
         }
         Ok(output)
-    }
-
-    /// Says which tree takes the fewest tests in the mean of all scenes and rays.
-    fn finding(&self, table: &[Compared]) -> Option<String> {
-        let means = || table.iter().filter(|row| row.scene == ALL && row.tree != self.base);
-        let mean = |(tree, trained_on)| {
-            let own = means().filter(|row| (row.tree, row.trained_on) == (tree, trained_on));
-            geometric_mean(&own.map(|row| row.tests_over_base).collect::<Vec<f64>>())
-        };
-        let trees = distinct(means().map(|row| (row.tree, row.trained_on)));
-        let fewest = trees.into_iter().min_by(|a, b| mean(*a).total_cmp(&mean(*b)))?;
-        let percent = 100.0 * (1.0 - mean(fewest));
-        let name = self.tree_name(fewest.0, fewest.1);
-        let side = if percent < 0.0 { "more" } else { "fewer" };
-        Some(format!("‘{name}’: {:.0} % {side} tests than ‘{}’", percent.abs(), self.base))
     }
 
     /// A row per tree, with the intervals that scenes have and means have not.

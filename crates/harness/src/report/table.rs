@@ -1,11 +1,9 @@
 //! Tables of the paper: ratios to base, scenes by columns, with the paper's ratios.
 
 use super::config::Labels;
-use super::output::from_greedy;
 use super::prelude::*;
-use super::table_paper::is_close;
 use crate::statistics::best_of::predicted_best;
-use crate::statistics::{expected_best_of, geometric_mean, median, minimum, range};
+use crate::statistics::{expected_best_of, median, minimum, range};
 use bvh_config::{Accepts, Nested, above};
 use std::collections::BTreeMap;
 
@@ -16,12 +14,14 @@ bvh_config::config! { serde;
         source: String;
         /// Heading.
         title: String;
+        /// What the rows say, the title of the figure, as in a report of the kind `query`.
+        finding: String;
         /// Ratios within this relative distance of the paper's agree with it.
         tolerance: f64 = 0.02, in 0.0..=1.0;
         /// The columns; the paper's ratios are to its values in the first.
         columns: Vec<Column>, in Nested;
     }
-    check |config: &Self| OneOrMore.faults("columns", &config.columns);
+    check |config: &Self| OneOrMore.check("columns", &config.columns);
 }
 
 bvh_config::config! { serde;
@@ -88,7 +88,7 @@ impl Config {
         let cells: Vec<Cell> = scenes.iter().flat_map(row).collect();
         let mut output = Output::new(&self.source, &self.title);
         output.add_csv("table", &cells)?;
-        output.finding = self.finding(&cells);
+        output.say(&self.finding, rows)?;
         let caption = format!("{}. {}", output.heading, self.caption(&cells));
         output.add_figure("table", caption, 1, vec![self.draw(rows, &cells)]);
         output.paper = self.compare_all(rows, &cells);
@@ -133,39 +133,6 @@ impl Config {
             high_over_base,
             paper_over_base: self.paper_ratio(column, scene),
         })
-    }
-
-    /// Says whether a reading fits the paper, or how far the cheapest column is from the greedy
-    /// trees: on how many scenes it beats them, if its intervals lie on both sides.
-    fn finding(&self, cells: &[Cell]) -> Option<String> {
-        if self.are_readings() {
-            let read = || self.columns.iter().skip(1);
-            let fits = |column: &&Column| {
-                let compared = |cell: &&Cell| cell.paper_over_base.is_some();
-                of_column(cells, column).filter(compared).all(|cell| is_close(cell, self.tolerance))
-            };
-            let readings = read().len();
-            return Some(match read().find(fits) {
-                Some(column) => format!("‘{}’ fits the paper on all scenes", column.shown()),
-                None => format!("None of {readings} readings fits the paper on all scenes"),
-            });
-        }
-        let ratios =
-            |column| of_column(cells, column).map(|cell| cell.cost_over_base).collect::<Vec<f64>>();
-        let columns = self.columns.iter().skip(1).map(|column| (column, ratios(column)));
-        let mean = |ratios: &[f64]| geometric_mean(ratios);
-        let (column, least) = columns.min_by(|a, b| mean(&a.1).total_cmp(&mean(&b.1)))?;
-        let (name, scenes) = (column.shown(), least.len());
-        let ends = of_column(cells, column).map(|cell| cell.low_over_base.zip(cell.high_over_base));
-        let ends = ends.collect::<Option<Vec<_>>>().unwrap_or_default();
-        let wins = ends.iter().filter(|(_, high)| *high < 1.0).count();
-        let losses = ends.iter().filter(|(low, _)| *low > 1.0).count();
-        if wins > 0 && losses > 0 {
-            return Some(format!(
-                "‘{name}’ beats greedy on {wins} of {scenes} scenes, loses on {losses}"
-            ));
-        }
-        from_greedy(least).map(|distance| format!("‘{name}’ ends {distance}"))
     }
 
     /// Explains the marks that the figure shows.
@@ -275,32 +242,6 @@ mod tests {
         );
         let far = written(readings(), &[("base", 1.0), ("sum", 500.0), ("difference", 3.0)]);
         assert_eq!(far.paper[0].verdict, Verdict::Differs);
-    }
-
-    #[test]
-    fn the_title_counts_what_the_marks_show() {
-        let readings = vec![column("base", 1.0), column("sum", 2.0), column("difference", 2.0)];
-        let said = |difference| {
-            written(readings.clone(), &[("base", 1.0), ("sum", 9.0), ("difference", difference)])
-        };
-        assert_eq!(said(3.0).finding.unwrap(), "None of 2 readings fits the paper on all scenes");
-        assert_eq!(said(1.9).finding.unwrap(), "‘difference’ fits the paper on all scenes");
-        let columns = vec![column("base", 1.0), column("best of 10", 1.1)];
-        let said = |spread: f64| {
-            let mut rows = Rows::default();
-            for (scene, cost) in [("a", 0.9), ("b", 1.05), ("c", 1.2)] {
-                for cost in [cost - spread, cost + spread] {
-                    let run = run("best of 10", 0, 1, 0);
-                    rows.runs.push(RunRow { scene: scene.into(), cost, base_cost: 1.0, ..run });
-                }
-            }
-            Config { columns: columns.clone(), ..Config::default() }.write(&rows).unwrap().finding
-        };
-        assert_eq!(said(0.06).unwrap(), "‘best of 10’ beats greedy on 1 of 3 scenes, loses on 1");
-        assert_eq!(
-            said(0.11).unwrap(),
-            "‘best of 10’ ends from 10 % below to 20 % above the greedy tree"
-        );
     }
 
     #[test]

@@ -85,6 +85,6 @@ impl Config {
 }
 
 /// Returns true if the ratio is within the tolerance of the paper's.
-pub(super) fn is_close(cell: &Cell, tolerance: f64) -> bool {
+fn is_close(cell: &Cell, tolerance: f64) -> bool {
     cell.paper_over_base.is_some_and(|paper| (cell.cost_over_base / paper - 1.0).abs() <= tolerance)
 }

@@ -11,6 +11,8 @@ bvh_config::config! { serde;
         source: String;
         /// Heading.
         title: String;
+        /// What the rows say, the title of the figure, as in a report of the kind `query`.
+        finding: String;
         /// Labels of the methods to compare.
         methods: Vec<String>, in OneOrMore;
         /// Number of trials whose best is compared, and at which figures end. Use fewer than are
@@ -58,7 +60,6 @@ impl Config {
         let mut output = Output::new(&self.source, &self.title);
         let mut points = Vec::new();
         let mut panels = Vec::new();
-        let mut best = Vec::new();
         for scene in rows.scenes() {
             let curves: Vec<Vec<Point>> =
                 self.methods.iter().map(|method| self.curve(rows, scene, method)).collect();
@@ -93,16 +94,12 @@ impl Config {
                 panels.push(panel(format!("{}, {what}", rows.shown(scene)), x, y, layers));
             }
             self.compare(&rows.shown(scene), &curves, &mut output);
-            best.extend(self.best(&curves).into_iter().map(|point| point.method));
             points.extend(curves.into_iter().flatten());
         }
         let caption = "Lowest cost among so many trials. Left, one run, as in the paper; right, \
                        what is expected, with the 95 % interval of the mean over repetitions.";
-        let scenes_of = |method: &&&str| best.iter().filter(|other| other == method).count();
-        output.finding = best.iter().max_by_key(scenes_of).map(|method| {
-            let (found, all) = (scenes_of(&method), rows.scenes().len());
-            format!("‘{method}’ is the best or one of them on {found} of {all} scenes")
-        });
+        output.add_csv("trials", &points)?;
+        output.say(&self.finding, rows)?;
         let caption = format!("{}. {caption}", output.heading);
         output.add_figure("trials", caption, 2, panels);
         let last: Vec<&Point> =
@@ -113,7 +110,6 @@ impl Config {
             &last,
             columns,
         )?;
-        output.add_csv("trials", &points)?;
         Ok(output)
     }
 

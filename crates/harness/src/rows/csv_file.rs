@@ -12,8 +12,12 @@ pub trait Row: Serialize + DeserializeOwned {
 
 /// Reads all rows of a CSV file.
 pub fn read<R: DeserializeOwned>(path: &Path) -> Result<Vec<R>, Error> {
-    let bytes = bvh_scenes::files::read(path)?;
-    let mut reader = csv::Reader::from_reader(&bytes[..]);
+    parse(&bvh_scenes::files::read(path)?, path)
+}
+
+/// Reads all rows of the bytes of a CSV file.
+pub fn parse<R: DeserializeOwned>(bytes: &[u8], path: &Path) -> Result<Vec<R>, Error> {
+    let mut reader = csv::Reader::from_reader(bytes);
     reader.deserialize().collect::<Result<_, _>>().map_err(Error::csv(path))
 }
 

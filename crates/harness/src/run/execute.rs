@@ -5,11 +5,12 @@ use super::job::Job;
 use super::perform::Watch;
 use super::provenance::Provenance;
 use super::resolved::{Resolved, load_scenes, to_toml};
-use super::work::{Trees, Work};
-use super::{ray_cost, runs, target, trace};
+use super::runs::{self, Trees, Work};
+use super::{ray_cost, trace};
 use crate::Error;
-use crate::rows::store::{self, Existing, Store};
+use crate::rows::store::{Existing, Store, is_unfinished};
 use crate::spec::Experiment;
+use bvh_scenes::files::read_text;
 use bvh_search::Observer;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
@@ -23,10 +24,8 @@ pub struct Extent {
     /// The identifiers of the runs to perform, which are kept for a harness that joins the parts;
     /// none for all runs.
     pub runs: Vec<String>,
-    /// The `--out` of harnesses that have performed parts of the experiment.
+    /// The `--out` of harnesses that have performed parts of the experiment, whose runs are taken.
     pub parts: Vec<PathBuf>,
-    /// True if a run that no part has is an error; otherwise it is performed.
-    pub only_parts: bool,
     /// True for a line on standard error about every run.
     pub verbose: bool,
 }
@@ -73,13 +72,12 @@ fn run(
     extent: &Extent,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
-    let Extent { existing, runs: ref ids, ref parts, only_parts, verbose } = *extent;
+    let Extent { existing, runs: ref ids, ref parts, verbose } = *extent;
     let is_part = !ids.is_empty();
     let (scenes, skipped_scenes) = load_scenes(experiment)?;
     let resolved = Resolved::new(experiment, &scenes);
-    let (folder, is_finished) = target::choose(out, &resolved, existing, is_part)?;
-    if is_finished {
-        store::remove_leftovers(&folder)?;
+    let folder = out.join(experiment.folder());
+    if is_finished(&folder, &resolved, existing, is_part)? {
         return Ok(Summary { skipped_scenes, ..Summary::finished(folder) });
     }
     // An unknown identifier must not leave a folder.
@@ -107,9 +105,6 @@ fn run(
         store.adopt(part, runs)?;
         provenance.parts.extend(Provenance::of_part(part)?);
     }
-    if only_parts {
-        store.check_complete(runs, |index| resolved.run_name(index))?;
-    }
     remarks.extend(provenance.unlike_processors());
     let mut work = Work {
         experiment,
@@ -135,11 +130,41 @@ fn run(
     }
     let remarks = work.remarks;
     if is_part {
-        let text = format!("{runs} runs; `--from` joins the parts.\n");
+        let text = format!("{runs} runs; `harness merge` joins the parts.\n");
         return Ok(Summary { text, skipped_scenes, remarks, folder });
     }
     let text = conclude(&resolved, out, &provenance, store)? + &text;
     Ok(Summary { text, skipped_scenes, remarks, folder })
+}
+
+/// Returns true if a folder already holds all requested results.
+///
+/// Finished results may also cover optional scenes that are missing now. Resuming them leaves
+/// nothing to do.
+///
+/// # Errors
+///
+/// If the folder holds finished results that are neither replaced nor resumed.
+fn is_finished(
+    folder: &Path,
+    resolved: &Resolved,
+    existing: Existing,
+    is_part: bool,
+) -> Result<bool, Error> {
+    let recorded = folder.join("resolved.toml");
+    if existing == Existing::Replace || is_unfinished(folder) || !recorded.is_file() {
+        return Ok(false);
+    }
+    let text = read_text(&recorded)?;
+    let is_same = toml::from_str(&text).is_ok_and(|found| resolved.repeats(&found));
+    let found = match (is_same, existing == Existing::Resume && !is_part) {
+        (true, true) => return Ok(true),
+        (true, false) => "finished results; --check compares a repetition with them",
+        (false, _) => "the results of another spec, scene or seed",
+    };
+    let folder = folder.display();
+    let message = format!("{folder} has {found}, --force replaces them, another --out keeps them");
+    Err(Error::Usage(message))
 }
 
 /// Creates a bar that shows the time left; it is hidden unless standard error is a terminal.

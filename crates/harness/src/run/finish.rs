@@ -43,11 +43,15 @@ pub(crate) fn conclude(
     store: Store,
 ) -> Result<String, Error> {
     store.join(resolved.run_count())?;
-    let text = report(resolved, out, provenance, &store)?;
-    // Provenance comes last, so that it describes results that are complete.
-    store.write("provenance.toml", to_toml(provenance)?.as_bytes())?;
-    store.finish()?;
-    Ok(text)
+    let text = report(resolved, out, provenance, &store);
+    // A mistake in a report must not cost the runs: `--redraw` makes the reports again.
+    if matches!(text, Ok(_) | Err(Error::Query { .. })) {
+        store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
+        // Provenance comes last, so that it describes results that are complete.
+        store.write("provenance.toml", to_toml(provenance)?.as_bytes())?;
+        store.finish()?;
+    }
+    text
 }
 
 /// Improves the best known costs and makes the reports of joined rows. Returns the text for the
@@ -61,7 +65,6 @@ fn report(
     // Reports read references, so these are updated first.
     reference::update(resolved, out, &provenance.revision, store)?;
     let made = outputs(&resolved.experiment, store.folder())?;
-    store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
     // Only the rows of quick variants are ever read, so they need no figures.
     report::write_all(&made, store, !resolved.experiment.quick)
 }
@@ -108,6 +111,9 @@ pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
     // The rows are still the output of the program that ran, so its provenance is kept.
     let provenance: Provenance = read_toml(&folder.join("provenance.toml"))?;
     let made = report(&resolved, out, &provenance, &store);
+    if made.is_ok() {
+        store.write("resolved.toml", to_toml(&resolved)?.as_bytes())?;
+    }
     // A failing report leaves finished results, not an interrupted experiment.
     store.finish()?;
     let text = made?;

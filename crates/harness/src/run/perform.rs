@@ -1,7 +1,6 @@
 //! Performs one run of an experiment: applies a method to a scene and observes it.
 
 use super::job::Job;
-use super::judge::RayJudge;
 use super::solved::Solved;
 use crate::Error;
 use crate::contestant::{Contestant, Labelled};
@@ -12,6 +11,7 @@ use crate::spec::Experiment;
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::{Bvh, validate_references};
 use bvh_scenes::Scene;
+use bvh_scenes::rays::{RandomRays, empirical_cost};
 use bvh_search::{Event, Judge, Method, Observer, Outcome, Problem, Splits, StopReason, solve};
 use indicatif::ProgressBar;
 use std::sync::Mutex;
@@ -137,6 +137,29 @@ fn search(
         outcome.cost = experiment.objective.cost(&outcome.tree);
     }
     Ok((outcome, seconds))
+}
+
+/// Judges a tree by the mean number of box tests of random rays, the same rays for every tree.
+///
+/// Ng & Trifonov 2003, section 4: 'The intention was to use actual simulation instead of the cost
+/// function for evaluating fitness, but using a small number of rays gave unstable evaluations and
+/// poor performance.'
+///
+/// Differs from the paper: the rays are the same for all trees of a run. The paper leaves this
+/// open, but new rays for every evaluation would explain the instability.
+#[derive(Debug)]
+struct RayJudge<'a> {
+    rays: &'a RandomRays,
+    scene: &'a Scene,
+    /// Seed of the rays. Every repetition uses different rays, and none of them reappear in the
+    /// final measurement.
+    seed: u64,
+}
+
+impl Judge for RayJudge<'_> {
+    fn judge(&self, tree: &Bvh) -> f64 {
+        empirical_cost(self.rays, &self.scene.primitives, tree, self.seed).boxes.mean
+    }
 }
 
 /// Returns how the method may divide the scene's objects, if it may.

@@ -1,7 +1,7 @@
 //! Judges the trees of all runs by rays that they were not trained on.
 
 use super::job::{Job, tracing_error};
-use super::work::Work;
+use super::runs::Work;
 use crate::Error;
 use crate::measure::ray_cost::{Config, TestRays, TrainedOn, test_rays};
 use crate::rows::store::Store;

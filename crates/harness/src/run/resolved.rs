@@ -64,14 +64,6 @@ impl Resolved {
     pub fn run_count(&self) -> usize {
         self.experiment.runs().count() * self.scenes.len()
     }
-
-    /// Names run `index` in an error message.
-    pub fn run_name(&self, index: usize) -> String {
-        let runs: Vec<_> = self.experiment.runs().collect();
-        let (labelled, repetition, _) = runs[index % runs.len()];
-        let scene = &self.scenes[index / runs.len()].name;
-        format!("scene {scene}, method {}, repetition {repetition}", labelled.label)
-    }
 }
 
 /// Loads an experiment's scenes. Returns them and the names of optional scenes that are missing.

@@ -1,7 +1,7 @@
 //! Rays through the trees of first runs, timed by the program in `attic/`.
 
 use super::job::Job;
-use super::work::Work;
+use super::runs::Work;
 use crate::Error;
 use crate::contestant::Contestant;
 use crate::peers::{self, FirstRun};
@@ -47,7 +47,11 @@ fn search_seconds(job: &Job, work: &Work) -> Result<f64, Error> {
     let mut seconds = Vec::new();
     for (index, other) in work.jobs.iter().enumerate() {
         if other.scene.name == job.scene.name && other.labelled.label == job.labelled.label {
-            seconds.extend(work.store.rows::<TimingRow>(index)?.iter().map(|row| row.seconds));
+            let rows: Vec<TimingRow> = match work.store.kept(index)? {
+                Some(run) => run.rows()?,
+                None => vec![],
+            };
+            seconds.extend(rows.iter().map(|row| row.seconds));
         }
     }
     Ok(median(&seconds).unwrap_or(f64::NAN))

@@ -48,7 +48,6 @@ fn properties(schema: &Value) -> Map<String, Value> {
 pub fn schema() -> Value {
     let settings = SchemaSettings::draft07().with(|settings| settings.inline_subschemas = true);
     let mut schema = settings.into_generator().into_root_schema_for::<Experiment>().to_value();
-    tidy(&mut schema);
     let mut keys = properties(&schema);
     // The name comes from the file, and the command line selects the quick variant.
     keys.remove("name");
@@ -66,68 +65,4 @@ pub fn schema() -> Value {
     keys.insert("quick".into(), quick);
     schema["properties"] = keys.into();
     schema
-}
-
-/// Turns a schema of Rust types into one of TOML: without `null`, and without the parts of
-/// descriptions that are about Rust.
-fn tidy(schema: &mut Value) {
-    match schema {
-        Value::Array(all) => all.iter_mut().for_each(tidy),
-        Value::Object(map) => {
-            if map.get("default").is_some_and(Value::is_null) {
-                map.remove("default");
-            }
-            if let Some(Value::Array(types)) = map.get_mut("type") {
-                // TOML has no null: an optional key is omitted.
-                types.retain(|kind| kind != "null");
-                if let [one] = &types[..] {
-                    let one = one.clone();
-                    map.insert("type".into(), one);
-                }
-            }
-            if let Some(Value::Array(any)) = map.get_mut("anyOf") {
-                any.retain(|choice| choice.get("type").is_none_or(|kind| kind != "null"));
-                if let [Value::Object(one)] = &mut any[..] {
-                    let one = std::mem::take(one);
-                    map.remove("anyOf");
-                    // The description of the key takes precedence over the description of its type.
-                    one.into_iter().for_each(|(key, value)| {
-                        map.entry(key).or_insert(value);
-                    });
-                }
-            }
-            if let Some(Value::String(text)) = map.get_mut("description") {
-                *text = described(text);
-            }
-            map.values_mut().for_each(tidy);
-        }
-        _ => {}
-    }
-}
-
-/// Returns a description without links, and without the lines that repeat default and range as Rust
-/// expressions.
-fn described(text: &str) -> String {
-    let lines: Vec<&str> = text
-        .lines()
-        .filter(|line| !line.is_empty())
-        .filter(|line| !line.starts_with("Default `") && !line.starts_with("Accepted: `"))
-        .collect();
-    let joined = lines.join(" ");
-    let mut plain = String::new();
-    let mut rest = joined.trim();
-    while let Some((before, after)) = rest.split_once('[') {
-        let Some((name, after)) = after
-            .split_once(']')
-            .filter(|(name, after)| name.starts_with('`') || after.starts_with('('))
-        else {
-            plain += &format!("{before}[");
-            rest = after;
-            continue;
-        };
-        plain += &format!("{before}{name}");
-        let target = after.strip_prefix('(').and_then(|after| after.split_once(')'));
-        rest = target.map_or(after, |(_, after)| after);
-    }
-    plain + rest
 }

@@ -92,14 +92,14 @@ fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
         TABLE.replace("repetitions = 3", "repetitions = 40").replace("trials = 12", "trials = 100");
     let folder = folder_with("spec.toml", &spec);
     let child = begin(folder.path(), &["spec.toml"]);
-    wait_for(&folder.path().join("results/spec/.partial/000000"));
+    wait_for(&folder.path().join("results/spec/.partial/000000.run"));
     send("-INT", &child);
     ended(
         &child.wait_with_output().unwrap(),
         130,
         &["of 240 runs are kept, `--resume` does the rest"],
     );
-    assert!(folder.path().join("results/spec/.partial/000000").is_dir());
+    assert!(folder.path().join("results/spec/.partial/000000.run").is_file());
 }
 
 #[test]
@@ -240,22 +240,24 @@ fn without_reports_there_is_a_table_and_on_request_a_line_for_every_run() {
 }
 
 #[test]
-fn a_redraw_that_fails_leaves_finished_results() {
+fn reports_that_fail_leave_finished_results() {
     let spec = "question = 'q'\nscenes = ['spheres75']\nmethods = [{ method = 'median_cut' }]\n";
     let report = "[[reports]]\nkind = 'query'\nfile = 'x'\nrows = 'runs.csv'\nby = ['scene']\n\
                   select = 'scene=SCENE'\ncolumns = [{ name = 'a', value = 'only objects' }]\n";
-    let folder = folder_with("plain.toml", spec);
+    let wrong = format!("{spec}{report}");
+    let folder = folder_with("plain.toml", &wrong);
     let path = folder.path();
-    said(path, &["plain.toml"]);
+    let parts = ["results/plain/runs.csv", "no row meets \"scene=SCENE\"", "--redraw"];
+    refused(path, &["plain.toml"], 1, &parts);
+    fs::write(path.join("plain.toml"), spec).unwrap();
+    said(path, &["plain.toml", "--redraw"]);
     let resolved = path.join("results/plain/resolved.toml");
     let before = fs::read(&resolved).unwrap();
-    fs::write(path.join("plain.toml"), format!("{spec}{report}")).unwrap();
-    let parts = ["results/plain/runs.csv", "no row meets \"scene=SCENE\""];
+    fs::write(path.join("plain.toml"), &wrong).unwrap();
     refused(path, &["plain.toml", "--redraw"], 1, &parts);
     assert!(!path.join("results/plain/.partial").exists());
     assert!(fs::read(&resolved).unwrap() == before);
-    let report = report.replace("SCENE", "spheres75");
-    fs::write(path.join("plain.toml"), format!("{spec}{report}")).unwrap();
+    fs::write(path.join("plain.toml"), wrong.replace("SCENE", "spheres75")).unwrap();
     said(path, &["plain.toml", "--redraw"]);
     let table = fs::read_to_string(path.join("results/plain/x.csv")).unwrap();
     assert_eq!(table, "scene,a\nspheres75,75\n");

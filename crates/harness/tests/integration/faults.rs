@@ -97,14 +97,14 @@ fn a_second_harness_on_the_same_folder_is_rejected_and_disturbs_nothing() {
     let long = SPEC.replace("trials = 60", "trials = 1000000");
     fs::write(folder.path().join("long.toml"), long).unwrap();
     let first = Killed(command(folder.path(), &["long.toml"]).spawn().unwrap());
-    wait_for(&folder.path().join("results/long/.partial/000000"));
+    wait_for(&folder.path().join("results/long/.partial/000000.run"));
     for more in [&[][..], &["--resume"], &["--seed=3"]] {
         let args = [&["long.toml"], more].concat();
         refused(folder.path(), &args, 1, &["results/long is in use by another harness", "--out"]);
     }
     // Other folders are free, and the kept run still exists.
     said(folder.path(), &["spec.toml"]);
-    assert!(folder.path().join("results/long/.partial/000000/runs.csv").is_file());
+    assert!(folder.path().join("results/long/.partial/000000.run").is_file());
     // The first harness must be alive until here, otherwise its lock proves nothing.
     drop(first);
     // The lock died with its owner.

@@ -98,11 +98,6 @@ fn resuming_what_is_finished_does_nothing() {
         (names(&dir.join("results")), written()),
         (vec![".lock".into(), "best_known.csv".into(), "spec".into()], first)
     );
-    // A harness that is killed after its results are complete leaves its runs under this name.
-    let removed = dir.join("results/spec/.removed");
-    fs::create_dir_all(removed.join("000000")).unwrap();
-    said(dir, &["spec.toml", "--resume"]);
-    assert!(!removed.exists());
     // The suite of cases is no exception.
     fs::write(dir.join("suite.toml"), SUITE).unwrap();
     said(dir, &["suite.toml"]);
@@ -119,7 +114,7 @@ fn a_missing_folder_is_named_before_the_work() {
 /// Returns the names of the runs that the results of an interrupted experiment keep.
 fn kept_runs(results: &Path) -> Vec<String> {
     let mut kept = names(&results.join(".partial"));
-    kept.retain(|name| name.bytes().all(|byte| byte.is_ascii_digit()));
+    kept.retain(|name| name.ends_with(".run"));
     kept
 }
 
@@ -146,9 +141,8 @@ fn a_damaged_finished_run_is_named_and_repeated_or_rejected() {
     let kept = kept_runs(&dir.join("one/spec"));
     let damaged = kept.last().unwrap();
     // The unit tests of the store try all kinds of damage.
-    let part = dir.join("one/spec/.partial").join(damaged);
-    fs::write(part.join("timing.csv"), "").unwrap();
-    let join = ["spec.toml", "--from", "one", "two", "--out=joined"];
+    fs::write(dir.join("one/spec/.partial").join(damaged), "").unwrap();
+    let join = ["merge", "one", "two", "--out=joined"];
     crate::support::refused(dir, &join, 1, &[damaged, "damaged"]);
     assert!(!dir.join("joined/spec/runs.csv").exists());
     let resumed = run(dir, &["spec.toml", "--resume", "--out=one"]);
