@@ -4,7 +4,6 @@ mod damaged_meshes;
 mod dialects;
 mod glb;
 mod gltf;
-mod gltf_places;
 mod meshes;
 mod obj;
 mod polygons;

@@ -1,14 +1,10 @@
 //! Mesh files of every format give the same triangles.
 
-use crate::samples::{
-    CORNERS, INDEXED, NODE, buffer, error, gltf, gltf_json, samples, square, stl_text, with,
-};
-use bvh_core::Triangle;
+use crate::samples::{INDEXED, NODE, buffer, error, gltf_json, samples, square, stl_text, with};
 use bvh_scenes::Scene;
 use bvh_scenes::files::ReadError;
 use bvh_scenes::load::mesh::Mesh;
 use bvh_scenes::load::{Format, MeshError, load, parse};
-use glam::Vec3;
 use std::path::Path;
 
 #[test]
@@ -66,35 +62,6 @@ fn the_path_of_a_mesh_file_names_a_scene_and_a_missing_file_is_reported() {
         Err(MeshError::Read(ReadError::NotRegular { .. }))
     ));
     assert!(matches!(parse(b" \r\n", Path::new("a.ply")), Err(MeshError::Empty(_))));
-}
-
-#[test]
-fn nodes_move_their_meshes_and_their_children() {
-    let nodes = r#"{"children": [1, 2], "translation": [10, 0, 0]},
-        {"mesh": 0, "scale": [2, 2, 2]},
-        {"mesh": 0, "matrix": [0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1]}"#;
-    let mesh = parse(&gltf(nodes, INDEXED), Path::new("a.gltf")).unwrap();
-    let mut expected = Vec::new();
-    for triangle in square() {
-        expected.push(Triangle(triangle.0.map(|p| p * 2.0 + Vec3::X * 10.0)));
-    }
-    for triangle in square() {
-        expected.push(Triangle(triangle.0.map(|p| Vec3::new(10.0 - p.y, p.x, p.z + 5.0))));
-    }
-    assert_eq!(mesh.triangles, expected);
-}
-
-#[test]
-fn strips_fans_and_lists_without_indices_are_triangles_and_lines_are_not() {
-    for (mode, triangles) in
-        [(5, &[[0, 1, 2], [1, 3, 2]][..]), (6, &[[0, 1, 2], [0, 2, 3]]), (4, &[[0, 1, 2]])]
-    {
-        let file = gltf(NODE, &format!(r#", "mode": {mode}"#));
-        let mesh = parse(&file, Path::new("a.gltf")).unwrap();
-        assert_eq!(mesh.triangles, Triangle::from_mesh(&CORNERS, triangles).unwrap(), "{mode}");
-    }
-    let lines = gltf(NODE, r#", "mode": 1"#);
-    assert!(error(lines, "a.gltf").contains("no triangle"));
 }
 
 #[test]
