@@ -9,13 +9,14 @@ use ::obvhs::bvh2::builder::build_bvh2_from_tris;
 use ::obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris, bvh2_to_cwbvh::bvh2_to_cwbvh};
 use ::obvhs::{BvhBuildParams, traverse};
 use attic::tracing::contender::{Batch, Trace};
+use attic::tracing::rays::{coherence, query, rays};
 use attic::{bvh, obvhs};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::export::Target;
 use bvh_core::{
     Bvh, PreparedRay, Primitives, Ray, TestCounts, Triangle, any_hit_by, nearest_hit_by,
 };
-use bvh_scenes::rays::{Kind, Viewpoint, rays};
+use bvh_scenes::rays::{Kind, Viewpoint};
 use bvh_scenes::{Scene, SceneKind, files, trace::Query};
 use bvh_search::{Bake, Budget};
 use glam::{DVec3, UVec2, Vec3, dvec3};
@@ -301,13 +302,13 @@ fn measure(scene: &Scene, view: &Viewpoint, rounds: usize) -> Measured {
         };
         for contender in &contenders {
             let mut counts = TestCounts::default();
-            let query = kind.query();
+            let query = query(*kind);
             let is_hit = |ray: &&Ray| hits(&contender.counted, triangles, ray, query, &mut counts);
             let found = rays.iter().filter(is_hit).count() as u64;
             measured.tests.insert(case(contender), [found, counts.boxes, counts.objects]);
         }
-        let coherence = kind.coherence();
-        let batch = Batch { query: kind.query(), coherence, in_squares: false, rays };
+        let coherence = coherence(*kind);
+        let batch = Batch { query: query(*kind), coherence, in_squares: false, rays };
         let mut answers = vec![None; rays.len()];
         for round in 0..rounds {
             for turn in 0..contenders.len() {

@@ -65,9 +65,10 @@ mod tests {
     use super::*;
     use crate::tracing::answers::disagreements;
     use crate::tracing::contender::{Batch, Tracer};
+    use crate::tracing::rays::rays;
     use bvh_core::{Coherence, validate};
     use bvh_scenes::Scene;
-    use bvh_scenes::rays::{Kind, rays};
+    use bvh_scenes::rays::Kind;
     use bvh_scenes::trace::{Accelerator, Query};
 
     fn all() -> Vec<(&'static dyn Racer, Table)> {

@@ -4,10 +4,11 @@ use ::bvh::aabb::{Aabb as TheirAabb, IntersectsAabb};
 use ::bvh::bvh::Bvh as TheirBvh;
 use ::bvh::ray::Ray as TheirRay;
 use attic::bvh::{Shape, shapes, to_theirs};
+use attic::tracing::rays::rays;
 use bvh_core::Ray;
 use bvh_core::export::Target;
 use bvh_scenes::Scene;
-use bvh_scenes::rays::{Kind, Viewpoint, rays};
+use bvh_scenes::rays::{Kind, Viewpoint};
 use bvh_search::{Budget, Objects, Options, OwnedTree};
 use std::cell::Cell;
 

@@ -7,10 +7,11 @@ use ::obvhs::cwbvh::{CwBvh, node::CwBvhNode};
 use ::obvhs::ray::RayHit;
 use ::obvhs::{BvhBuildParams, aabb};
 use attic::obvhs::{to_our_tree, to_their_ray, to_theirs};
+use attic::tracing::rays::rays;
 use bvh_core::export::{CompressedBvh, CompressedNode, Target};
 use bvh_core::{Aabb, Bvh, PreparedRay, Ray, Triangle, nearest_hit, validate};
 use bvh_scenes::Scene;
-use bvh_scenes::rays::{Kind, Viewpoint, rays};
+use bvh_scenes::rays::{Kind, Viewpoint};
 use bvh_search::{Bake, Budget};
 
 /// Makes small triangles at pseudo-random points.

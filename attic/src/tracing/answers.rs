@@ -62,9 +62,10 @@ fn compare(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tracing::rays::rays;
     use bvh_build::{Builder, muller_fellner};
     use bvh_scenes::Scene;
-    use bvh_scenes::rays::{Kind, Viewpoint, rays};
+    use bvh_scenes::rays::{Kind, Viewpoint};
 
     #[test]
     fn answers_are_compared_by_place_and_not_by_object() {

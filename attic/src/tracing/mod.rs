@@ -3,6 +3,7 @@
 pub mod answers;
 pub mod contender;
 pub mod layout;
+pub mod rays;
 pub mod speed;
 
 use crate::comparison::{self, Raced};

@@ -4,10 +4,11 @@
 use super::answers;
 use super::contender::{Batch, Contender, PART, Tracer};
 use super::layout::{Instructions, Layout};
+use super::rays::{coherence, is_in_squares, query, rays};
 use bvh_config::config;
 use bvh_core::{Bvh, Hit, Ray, TestCounts};
 use bvh_scenes::Scene;
-use bvh_scenes::rays::{Kind, Viewpoint, rays};
+use bvh_scenes::rays::{Kind, Viewpoint};
 use bvh_scenes::trace::{Accelerator, Query};
 use harness::rows::{TraceRow, TraceTimeRow};
 use harness::statistics::{median, minimum};
@@ -83,9 +84,9 @@ pub fn measure(
     for &kind in &config.rays {
         let rays = rays(kind, config.count, scene, tree, &viewpoint, seed);
         let batch = Batch {
-            query: kind.query(),
-            coherence: kind.coherence(),
-            in_squares: kind.is_in_squares(config.count),
+            query: query(kind),
+            coherence: coherence(kind),
+            in_squares: is_in_squares(kind, config.count),
             rays: &rays,
         };
         let mut right = vec![None; rays.len()];
@@ -153,7 +154,7 @@ struct OfKind<'a> {
 impl OfKind<'_> {
     /// Compares a contender's answers with the right ones and counts its tests.
     fn row(&self, method: &str, contender: &Contender, hits: &[Option<Hit>]) -> TraceRow {
-        let query = self.kind.query();
+        let query = query(self.kind);
         let found = match (&contender.tracer, query) {
             (Tracer::Own(_) | Tracer::Batches(_), Query::Nearest) => {
                 answers::exact_disagreements(self.right, hits)

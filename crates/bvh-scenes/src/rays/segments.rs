@@ -2,7 +2,7 @@
 //! renderer, or any through a scene.
 
 use super::camera::{Camera, View};
-use super::random::{Family, JUST_BEFORE, Kind, in_box, on_sphere, random_ray};
+use super::random::{Family, Kind, in_box, on_sphere, random_ray};
 use crate::Scene;
 use crate::trace::Accelerator;
 use bvh_config::{OutOfRange, above, config};
@@ -76,6 +76,10 @@ impl RenderedRays {
     }
 }
 
+/// The fraction of the distance to a hit at which the next ray begins, so that it does not hit the
+/// surface that it starts from.
+const JUST_BEFORE: f32 = 1.0 - 1.0 / 2048.0;
+
 /// The largest number of rays that [`of_anything`] makes per unit of its count.
 pub const OF_ANYTHING: usize = 6;
 
@@ -90,6 +94,7 @@ pub fn check_count(key: &str, count: u32, rays: usize) -> Result<(), OutOfRange>
 }
 
 /// A traced ray with its kind and its segment up to the hit.
+#[derive(Clone, Copy, Debug)]
 pub struct TracedRay {
     /// The purpose of the ray.
     pub kind: Kind,

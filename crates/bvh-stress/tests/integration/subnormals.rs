@@ -1,13 +1,12 @@
 //! Ordinary rays lead no kernel to subnormal numbers, each of which costs Intel processors about
 //! 150 cycles.
 use bvh_build::{Builder, muller_fellner};
-use bvh_core::{Coherence, Hit, Kernel, Ray, WideBvh};
+use bvh_core::{Bvh, Coherence, Hit, Kernel, Ray, WideBvh};
 use bvh_scenes::Scene;
 use bvh_scenes::builtin::stand_ins::STAND_INS;
-use bvh_scenes::rays::{Kind, Viewpoint, rays};
+use bvh_scenes::rays::{Pose, RenderedRays, TracedRay, Viewpoint, in_box, of_inside, of_renderer};
 use std::arch::asm;
 
-const KINDS: [Kind; 4] = [Kind::Primary, Kind::Bounce, Kind::Shadow, Kind::Incoherent];
 const INSIDE: Viewpoint = Viewpoint { eye: [0.3, 0.4, 0.6], target: [0.8, 0.5, 0.3] };
 
 /// The flags of the control and status register for subnormal operands and results.
@@ -64,6 +63,23 @@ fn flags(wide: &WideBvh, rays: &[Ray]) -> Vec<(&'static str, Option<&'static str
     ]
 }
 
+/// Returns the rays of cameras outside and inside of a scene, sorted by their kind.
+fn of_cameras(scene: &Scene, tree: &Bvh) -> Vec<TracedRay> {
+    let root = tree.root_aabb().unwrap();
+    let in_scene = |place| in_box(&root, place).to_array();
+    let pose = |view: Viewpoint| Pose { eye: in_scene(view.eye), target: in_scene(view.target) };
+    let lights = vec![in_scene([0.5, 0.95, 0.5])];
+    let mut rays = Vec::new();
+    for view in [Viewpoint::default(), INSIDE] {
+        let cameras = vec![pose(view)];
+        let config =
+            RenderedRays { cameras, lights: lights.clone(), count: 4096, ..Default::default() };
+        rays.extend(of_renderer(&config, scene, tree, &|| false));
+    }
+    rays.sort_by_key(|traced| traced.kind.name());
+    rays
+}
+
 #[test]
 fn ordinary_rays_make_no_kernel_meet_subnormal_numbers() {
     let mut broken = Vec::new();
@@ -72,17 +88,17 @@ fn ordinary_rays_make_no_kernel_meet_subnormal_numbers() {
         let scene = Scene::load(&format!("{name}:4000")).unwrap();
         let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
         let wide = WideBvh::new(&tree, scene.triangles().unwrap()).unwrap();
-        for viewpoint in [Viewpoint::default(), INSIDE] {
-            for kind in KINDS {
-                let rays = rays(kind, 4096, &scene, &tree, &viewpoint, 1);
-                for kernel in Kernel::ALL {
-                    let Some(wide) = wide.clone().with_kernel(kernel) else { continue };
-                    for (call, raised) in flags(&wide, &rays) {
-                        let raised = raised.map(|raised| {
-                            format!("{name}, {}, {kernel:?}, {call}: {raised}", kind.name())
-                        });
-                        broken.extend(raised);
-                    }
+        let rays = [of_inside(4096, &scene, &tree, 1), of_cameras(&scene, &tree)].concat();
+        for rays in rays.chunk_by(|a, b| a.kind == b.kind) {
+            let kind = rays[0].kind.name();
+            let rays: Vec<Ray> = rays.iter().map(|traced| traced.ray).collect();
+            for kernel in Kernel::ALL {
+                let Some(wide) = wide.clone().with_kernel(kernel) else { continue };
+                for (call, raised) in flags(&wide, &rays) {
+                    broken.extend(
+                        raised
+                            .map(|raised| format!("{name}, {kind}, {kernel:?}, {call}: {raised}")),
+                    );
                 }
             }
         }
