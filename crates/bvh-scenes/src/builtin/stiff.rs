@@ -4,6 +4,7 @@
 //! All scenes consist of triangles, so that rays can be traced; a scene of boxes has in each box
 //! the triangle over its diagonal. The same number gives the same scene on every machine.
 
+pub use bvh_core::boxes;
 use bvh_core::{Aabb, Triangle};
 use glam::Vec3;
 use rand::rngs::ChaCha8Rng;
@@ -53,11 +54,6 @@ pub const STIFF: [(&str, Generator); 31] = [
 /// Returns the generator of the case `id`, such as `S34`.
 pub fn by_id(id: &str) -> Option<Generator> {
     STIFF.iter().find(|(known, _)| *known == id).map(|(_, generator)| *generator)
-}
-
-/// Returns the boxes of the triangles.
-pub fn boxes(triangles: &[Triangle]) -> Vec<Aabb> {
-    triangles.iter().map(Triangle::aabb).collect()
 }
 
 fn diagonal(Aabb { min, max }: Aabb) -> Triangle {

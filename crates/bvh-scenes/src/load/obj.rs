@@ -11,12 +11,9 @@
 //! texture coordinates are ignored. Lines may end in LF, CRLF or CR, and a backslash at the end
 //! continues a statement on the next line.
 
-mod geometry;
-mod statements;
-
-use super::mesh::{Fault, Mesh, Place, unused};
-use super::polygon::{Polygons, open};
-use geometry::Geometry;
+use super::mesh::{Fault, Mesh, Place, counted, unused};
+use super::polygon::{MOST_CORNERS, Polygons, open};
+use super::text::{self, number, shown};
 use glam::Vec3;
 use std::path::Path;
 
@@ -63,4 +60,268 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     let remarks = unused.into_iter().chain(polygons.remarks()).chain(geometry.unknown);
     let remarks = remarks.collect();
     Ok(Mesh::new(polygons.triangles, remarks))
+}
+
+/// A line, counted from 1, and what is wrong with it.
+type LineFault = (usize, String);
+
+/// The checked statements of a file.
+#[derive(Default)]
+struct Geometry {
+    /// The statements for `tobj`.
+    text: Vec<u8>,
+    /// The line of each face in `text`.
+    lines: Vec<usize>,
+    /// The number of `v` statements.
+    vertices: usize,
+    /// The number of `f` statements with fewer than three vertices, which are skipped.
+    short_faces: usize,
+    /// The clause about lines that begin with no keyword.
+    unknown: Option<String>,
+    /// The numbers of the vertices that no face may use, counted from 1, with the reasons.
+    invalid: Vec<(usize, LineFault)>,
+    /// The vertices below a face that the face names, counted from 1, and the face's line.
+    ahead: Vec<(usize, usize)>,
+}
+
+impl Geometry {
+    /// Checks the statements of a file.
+    ///
+    /// # Errors
+    ///
+    /// The first fault in the order of the file. A fault of a vertex below the face that names it
+    /// is found only at the end of the file, and is reported last.
+    fn of(bytes: &[u8]) -> Result<Self, LineFault> {
+        let mut geometry = Self::default();
+        let mut statements = Statements::new(bytes);
+        let mut words = Vec::new();
+        while let Some((keyword, line)) = statements.next(&mut words, MOST_CORNERS + 1) {
+            match keyword {
+                Keyword::Vertex => {
+                    geometry.add_vertex(&words, line).map_err(|message| (line, message))?;
+                }
+                Keyword::Face => geometry.add_face(&words, line)?,
+            }
+        }
+        for &(vertex, line) in &geometry.ahead {
+            if vertex > geometry.vertices {
+                let most = geometry.vertices;
+                let expected = format!("expected at most {most}, the file's vertex count");
+                return Err((line, format!("face vertex {vertex}; {expected}")));
+            }
+            geometry.usable(vertex)?;
+        }
+        geometry.unknown = statements.unknown.and_then(|(count, line, word)| {
+            let (one, many) =
+                ("line with an unknown keyword was", "lines with unknown keywords were");
+            let lines = counted(count, one, many)?;
+            Some(format!("{lines} ignored (`{}` in line {line})", shown(word)))
+        });
+        Ok(geometry)
+    }
+
+    /// Adds a vertex without its colour: its coordinates, and its weight if it has one.
+    fn add_vertex(&mut self, words: &[&[u8]], line: usize) -> Result<(), String> {
+        self.vertices += 1;
+        let length = words.len();
+        if !matches!(length, 3 | 4 | 6..=8) {
+            let expected = "3 (x y z), 4 (x y z and a weight), or 3 or 4 more (a colour)";
+            return Err(format!("vertex of length {length}; expected {expected}"));
+        }
+        let words = &words[..if matches!(length, 4 | 8) { 4 } else { 3 }];
+        let mut position = [0.0; 3];
+        for (coordinate, word) in position.iter_mut().zip(words) {
+            let message = || {
+                let expected = "expected a finite number up to ±3.4e38";
+                format!("vertex coordinate `{}`; {expected}", shown(word))
+            };
+            *coordinate = number(word).ok_or_else(message)?;
+            // Some programs write vertices that they do not use in this way.
+            if !coordinate.is_finite() {
+                self.invalid.push((self.vertices, (line, message())));
+                add(b'v', [&b"0"[..]; 3].into_iter(), &mut self.text);
+                return Ok(());
+            }
+        }
+        if let [_, _, _, word] = words {
+            // `tobj` divides by the weight. The quotients reject the weight 0; an infinite weight
+            // needs its own test, because x / ∞ is finite.
+            let expected = "expected a finite number other than 0 that keeps the divided \
+                            coordinates within ±3.4e38";
+            number(word)
+                .filter(|w| w.is_finite() && position.iter().all(|x| (x / w).is_finite()))
+                .ok_or_else(|| format!("vertex weight `{}`; {expected}", shown(word)))?;
+        }
+        add(b'v', words.iter().copied(), &mut self.text);
+        Ok(())
+    }
+
+    fn add_face(&mut self, words: &[&[u8]], line: usize) -> Result<(), LineFault> {
+        if words.len() > MOST_CORNERS {
+            let message =
+                format!("face of more than {MOST_CORNERS} vertices; expected at most as many");
+            return Err((line, message));
+        }
+        let vertices = self.vertices;
+        for corner in words {
+            let index: isize = std::str::from_utf8(vertex_index(corner))
+                .ok()
+                .and_then(|word| word.parse().ok())
+                .filter(|&index| index != 0)
+                .ok_or_else(|| {
+                    let expected = "expected a whole number, from 1 for the first vertex of the \
+                                    file or from -1 for the latest one";
+                    (line, format!("face vertex `{}`; {expected}", shown(corner)))
+                })?;
+            let vertex = match usize::try_from(index) {
+                Ok(index) => Some(index),
+                Err(_) => (vertices + 1).checked_sub(index.unsigned_abs()).filter(|&v| v > 0),
+            };
+            match vertex {
+                Some(vertex) if vertex > vertices => self.ahead.push((vertex, line)),
+                Some(vertex) => self.usable(vertex)?,
+                None => {
+                    let expected =
+                        format!("expected at least -{vertices}, the number of vertices above");
+                    return Err((line, format!("face vertex {index}; {expected}")));
+                }
+            }
+        }
+        if words.len() < 3 {
+            self.short_faces += 1;
+        } else {
+            add(b'f', words.iter().map(vertex_index), &mut self.text);
+            self.lines.push(line);
+        }
+        Ok(())
+    }
+
+    /// Rejects a vertex without finite coordinates.
+    fn usable(&self, vertex: usize) -> Result<(), LineFault> {
+        match self.invalid.binary_search_by_key(&vertex, |(invalid, _)| *invalid) {
+            Ok(found) => Err(self.invalid[found].1.clone()),
+            Err(_) => Ok(()),
+        }
+    }
+}
+
+/// Returns the `7` of `7`, `7/1`, `7//3` and `7/1/3`.
+fn vertex_index<'a>(corner: &&'a [u8]) -> &'a [u8] {
+    corner.split(|&b| b == b'/').next().unwrap_or_default()
+}
+
+fn add<'a>(keyword: u8, words: impl Iterator<Item = &'a [u8]>, text: &mut Vec<u8>) {
+    text.push(keyword);
+    for word in words {
+        text.push(b' ');
+        text.extend_from_slice(word);
+    }
+    text.push(b'\n');
+}
+
+/// A statement that defines geometry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Keyword {
+    /// `v`, or a capital one.
+    Vertex,
+    /// `f`, a capital one, or the obsolete `fo`.
+    Face,
+}
+
+/// Keywords of the format that are ignored (Wavefront, "Object Files", version 3.0).
+const IGNORED: &str = "vt vn vp p l curv curv2 surf parm trim hole scrv sp end con cstype deg bmat \
+    step g o s mg bevel c_interp d_interp lod maplib usemap usemtl mtllib shadow_obj trace_obj \
+    ctech stech call csh bsp bzp cdc cdp res vw";
+
+/// The statements of a file, in order.
+struct Statements<'a> {
+    rest: &'a [u8],
+    /// The number of lines taken so far.
+    lines: usize,
+    /// True if the previous line was ignored and continues on the next one.
+    ignoring: bool,
+    /// The number of lines whose first word is no keyword, with the first such line's number and
+    /// word.
+    unknown: Option<(usize, usize, &'a [u8])>,
+}
+
+impl<'a> Statements<'a> {
+    /// Starts at the first statement.
+    fn new(bytes: &'a [u8]) -> Self {
+        let mut rest = bytes;
+        // A file can have several byte order marks if several programs have each added one.
+        while let Some(further) = rest.strip_prefix(b"\xef\xbb\xbf") {
+            rest = further;
+        }
+        Self { rest, lines: 0, ignoring: false, unknown: None }
+    }
+
+    /// Returns the next `v` or `f` statement and the number of its first line. Replaces the
+    /// contents of `words` by the words after the keyword, at most `most` of them.
+    fn next(&mut self, words: &mut Vec<&'a [u8]>, most: usize) -> Option<(Keyword, usize)> {
+        loop {
+            let (code, mut continued) = self.line()?;
+            let number = self.lines;
+            let mut on_line = text::words(code);
+            let keyword = match on_line.next() {
+                Some(b"v" | b"V") => Keyword::Vertex,
+                Some(b"f" | b"F" | b"fo") => Keyword::Face,
+                word => {
+                    // A line that ends in a backslash by accident, such as a path, must not swallow
+                    // a vertex. The line after it is therefore ignored only if it is no `v` or `f`
+                    // statement.
+                    if let Some(word) = word.filter(|word| !self.ignoring && !is_ignored(word)) {
+                        let (count, line, first) = self.unknown.unwrap_or((0, number, word));
+                        self.unknown = Some((count + 1, line, first));
+                    }
+                    self.ignoring = continued;
+                    continue;
+                }
+            };
+            self.ignoring = false;
+            words.clear();
+            words.extend(on_line.take(most));
+            while continued && let Some((code, more)) = self.line() {
+                words.extend(text::words(code).take(most - words.len()));
+                continued = more;
+            }
+            return Some((keyword, number));
+        }
+    }
+
+    /// Returns the next line without its end (LF, CRLF or CR) and comment, and whether a backslash
+    /// continues it.
+    fn line(&mut self) -> Option<(&'a [u8], bool)> {
+        let line = text::line(&mut self.rest)?;
+        self.lines += 1;
+        // `1.#QNAN` is a number of Microsoft's C library and no comment.
+        let comment = (0..line.len()).find(|&i| line[i] == b'#' && !line[..i].ends_with(b"."));
+        let code = line[..comment.unwrap_or(line.len())].trim_ascii_end();
+        Some(match code.strip_suffix(b"\\") {
+            Some(code) => (code, true),
+            None => (code, false),
+        })
+    }
+}
+
+fn is_ignored(word: &[u8]) -> bool {
+    IGNORED.split(' ').any(|known| known.as_bytes().eq_ignore_ascii_case(word))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_endless_statement_needs_memory_for_a_limited_number_of_words() {
+        for text in ["f 1 2 3 4 5 6 7 8 9", "f 1 2 \\\n3 4 \\\n5 6 7 8 9"] {
+            let mut words = Vec::new();
+            let found = Statements::new(text.as_bytes()).next(&mut words, 4);
+            assert_eq!(
+                (found, words),
+                (Some((Keyword::Face, 1)), vec![b"1", b"2", b"3", &b"4"[..]]),
+                "{text}"
+            );
+        }
+    }
 }

@@ -101,32 +101,19 @@ impl<'a> Accelerator<'a> {
 
     /// Returns the nearest object in the ray's range; of several at the same distance, the object
     /// with the lowest id.
-    #[inline]
     pub fn nearest_hit(&self, ray: &Ray) -> Option<Hit> {
         match &self.structure {
             Structure::Wide(wide) => wide.nearest_hit(ray),
-            _ => self.nearest_hit_uncounted(ray),
+            _ => self.find(ray, &mut ()),
         }
     }
 
     /// Returns whether any object is in the ray's range. The first hit ends the traversal.
-    #[inline]
     pub fn any_hit(&self, ray: &Ray) -> bool {
         match &self.structure {
             Structure::Wide(wide) => wide.any_hit(ray),
-            _ => self.any_hit_uncounted(ray),
+            _ => self.meets(ray, &mut ()),
         }
-    }
-
-    // The methods below are not generic, so that they are compiled and optimised in this crate even
-    // if the callers are not optimised.
-
-    fn nearest_hit_uncounted(&self, ray: &Ray) -> Option<Hit> {
-        self.find(ray, &mut ())
-    }
-
-    fn any_hit_uncounted(&self, ray: &Ray) -> bool {
-        self.meets(ray, &mut ())
     }
 
     /// Answers as [`nearest_hit`](Self::nearest_hit) does and counts the tests, except in

@@ -19,20 +19,13 @@ pub fn nearest_hit(
     counter: &mut impl Counter,
 ) -> Option<Hit> {
     let mut nearest: Option<Hit> = None;
-    let mut pending = Pending::default();
-    if !tree.nodes.is_empty() {
-        pending.push(0);
-    }
+    let mut pending: Vec<u32> = (0..tree.nodes.len().min(1) as u32).collect();
     while let Some(index) = pending.pop() {
         let node = &tree.nodes[index as usize];
         counter.boxes(1);
         let Some(inside) = interval(ray, &node.aabb) else { continue };
         match node.kind() {
-            NodeKind::Inner { first, count } => {
-                for child in first..first + count {
-                    pending.push(child);
-                }
-            }
+            NodeKind::Inner { first, count } => pending.extend(first..first + count),
             NodeKind::Leaf { first, count } => {
                 for &object in &tree.prim_ids[first as usize..first as usize + count as usize] {
                     counter.object();
@@ -61,37 +54,6 @@ fn interval(ray: &Ray, aabb: &Aabb) -> Option<RangeInclusive<f32>> {
     let enter = low.min(high).max_element();
     let out = low.max(high).min_element();
     (enter <= out && out >= 0.0).then_some(enter..=out)
-}
-
-/// The nodes that are visited later. A deep tree needs memory from the heap, others need none.
-#[derive(Default)]
-struct Pending {
-    inline: [u32; 32],
-    len: usize,
-    /// Entries above a full `inline`.
-    spilled: Vec<u32>,
-}
-
-impl Pending {
-    #[inline]
-    fn push(&mut self, node: u32) {
-        match self.inline.get_mut(self.len) {
-            Some(slot) => {
-                *slot = node;
-                self.len += 1;
-            }
-            None => self.spilled.push(node),
-        }
-    }
-
-    #[inline]
-    fn pop(&mut self) -> Option<u32> {
-        if let Some(node) = self.spilled.pop() {
-            return Some(node);
-        }
-        self.len = self.len.checked_sub(1)?;
-        Some(self.inline[self.len])
-    }
 }
 
 #[cfg(test)]
@@ -142,19 +104,5 @@ mod tests {
             let hit = nearest_hit(&tree, &along_x(), |_, _| Some(t), &mut ());
             assert_eq!(hit.is_some(), counts, "{t}");
         }
-    }
-
-    #[test]
-    fn trees_deeper_than_the_inline_stack_are_visited_whole() {
-        let boxes = row(200);
-        let bounds = boxes[0].union(&boxes[199]);
-        let leaves = (0..200).map(|i| Node::leaf(boxes[i as usize], i, 1));
-        let mut nodes = vec![Node::inner(bounds, 1, 200)];
-        nodes.extend(leaves);
-        let tree = Bvh { nodes, prim_ids: (0..200).collect() };
-        let mut counts = TestCounts::default();
-        let hit = nearest_hit(&tree, &along_x(), entry, &mut counts);
-        assert_eq!(hit.map(|hit| hit.object), Some(0));
-        assert_eq!(counts, TestCounts { boxes: 201, objects: 200 });
     }
 }
