@@ -1,6 +1,5 @@
 //! The failures of the commands, and the exit code of each.
 
-use crate::answer::whole;
 use bvh_core::DensityError;
 use bvh_scenes::SceneError;
 use bvh_scenes::files::{ReadError, WriteError};
@@ -32,14 +31,6 @@ pub enum Error {
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// The scene is too large for the memory that the process can have.
-    #[error(
-        "scene {scene}: a bake of {} objects needs {} bytes of memory, more than this process can \
-         have; accepted: fewer objects",
-        whole(*.objects),
-        whole(*.bytes)
-    )]
-    Memory { scene: String, objects: usize, bytes: usize },
     /// A search failed.
     #[error("scene {scene}, method {method}: {source}")]
     Search { scene: String, method: String, source: Box<SearchError> },
@@ -74,7 +65,6 @@ impl Error {
             Self::Interrupted(_) => 130,
             Self::Io { .. }
             | Self::Write(_)
-            | Self::Memory { .. }
             | Self::Search { .. }
             | Self::Tracing { .. } => 1,
         }

@@ -27,5 +27,4 @@ pub mod tree_file;
 pub use fnv::fnv1a;
 pub use scene::{
     FETCHED, NoTriangles, SPHERES, Scene, SceneError, SceneKind, did_you_mean, fetched_path,
-    is_allocatable,
 };

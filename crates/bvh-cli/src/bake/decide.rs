@@ -69,33 +69,24 @@ pub struct Open {
     pub references: bool,
 }
 
-/// The outcome of a decision.
-pub struct Decided {
-    /// The plan with the choices that pay.
-    pub plan: Plan,
-    /// The explanation of each choice, in one line.
-    pub reasons: Vec<String>,
-    /// The parts of the decision that the bake needs too.
-    pub prepared: Prepared,
-}
-
-/// Tries the combinations of the open choices, and chooses one of them. Keeps the plan as it is if
-/// `interrupted` becomes true.
+/// Tries the combinations of the open choices, and chooses one of them. Returns the plan with the
+/// choices that pay, the explanation of each choice in one line, and the parts of the decision that
+/// the bake needs too. Keeps the plan as it is if `interrupted` becomes true.
 pub fn decide(
     open: Open,
     plan: Plan,
     scene: &Scene,
     interrupted: &AtomicBool,
-) -> Result<Decided, Error> {
+) -> Result<(Plan, Vec<String>, Prepared), Error> {
     let costs = open.costs(&plan);
     let references = open.references(&plan);
     if costs.len() * references.len() == 1 {
-        return Ok(Decided { plan, reasons: Vec::new(), prepared: Prepared::default() });
+        return Ok((plan, Vec::new(), Prepared::default()));
     }
     // From here on there is a tree soon, which Ctrl-C must save instead of ending the program.
     interrupt::hold();
     let Some(mut trials) = Trials::begin(&open, &plan, scene, interrupted)? else {
-        return Ok(Decided { plan, reasons: Vec::new(), prepared: Prepared::default() });
+        return Ok((plan, Vec::new(), Prepared::default()));
     };
     let mut table = Table { columns: costs.len(), tests: Vec::new() };
     let bar = bar(costs.len() * references.len());
@@ -111,7 +102,7 @@ pub fn decide(
     // An interrupted search says nothing about the choices.
     if interrupted.load(Relaxed) {
         let prepared = Prepared { greedy: Some(trials.greedy), ..Prepared::default() };
-        return Ok(Decided { plan, reasons: Vec::new(), prepared });
+        return Ok((plan, Vec::new(), prepared));
     }
     let (row, column) = table.simplest();
     let (objective, rays) = costs[column].clone();
@@ -121,7 +112,7 @@ pub fn decide(
         density: trials.trained.take_if(|_| plan.rays.is_some()),
         division: trials.division.take_if(|_| plan.references > 1.0),
     };
-    Ok(Decided { plan, reasons: table.reasons(&open, row, column), prepared })
+    Ok((plan, table.reasons(&open, row, column), prepared))
 }
 
 impl Open {

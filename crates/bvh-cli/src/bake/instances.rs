@@ -2,7 +2,7 @@
 //! instances that its nodes place, into a folder.
 
 use super::BakeArgs;
-use super::plan::{Plan, Prepared};
+use super::plan::{Found, Plan, Prepared};
 use crate::Error;
 use crate::answer::{Answer, gain, short, whole};
 use crate::arguments::output_folder;
@@ -65,7 +65,8 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         // Every tree gets a share of the budget in proportion to its number of objects.
         let part = scene.boxes.len() as f64 / objects as f64;
         let plan = Plan { effort: plan.effort.share(part), ..plan.clone() };
-        bake_part(&plan, scene, &out.join(name), Interruption::Keeps, interrupted, &mut answer)?;
+        let found = plan.search(scene, None, Prepared::default(), interrupted)?;
+        save_part(&found, &out.join(name), &mut answer)?;
     }
     if interrupted.load(Relaxed) {
         return Err(Error::Interrupted(format!(
@@ -86,30 +87,12 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     Ok(())
 }
 
-/// What becomes of a tree whose search was interrupted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Interruption {
-    Keeps,
-    Discards,
-}
-
-/// Searches for the tree over a part of a scene, and writes it.
-pub(super) fn bake_part(
-    plan: &Plan,
-    scene: &Scene,
-    path: &Path,
-    interruption: Interruption,
-    interrupted: &AtomicBool,
-    answer: &mut Answer,
-) -> Result<(), Error> {
-    let found = plan.search(scene, None, Prepared::default(), interrupted)?;
-    if interruption == Interruption::Discards && interrupted.load(Relaxed) {
-        return Ok(());
-    }
+/// Writes the tree over a part of a scene.
+pub(super) fn save_part(found: &Found, path: &Path, answer: &mut Answer) -> Result<(), Error> {
     found.save(path, files::Reserved::new(path, 0)?)?;
     let cost = found.baked.outcome.cost;
     let Some(base) = found.baked.greedy else { return Ok(()) };
-    let objects = scene.boxes.len();
+    let objects = found.scene.boxes.len();
     let file = path.display().to_string();
     answer.say(&format!(
         "{file}: {} objects, {} {}, {} the greedy tree's",

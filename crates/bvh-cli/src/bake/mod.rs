@@ -20,7 +20,7 @@ use bvh_scenes::files::Reserved;
 use bvh_scenes::{Scene, did_you_mean};
 use bvh_search::{Method, Outcome, StopReason};
 use clap::Args;
-use decide::{Decided, Open, decide};
+use decide::{Open, decide};
 use effort::Effort;
 use plan::{Found, Plan, Prepared, Start};
 use std::path::{Path, PathBuf};
@@ -50,9 +50,8 @@ pub struct BakeArgs {
     pub seed: u64,
     /// Minimise the cost of rays instead of area: `default` for rays that need no camera, a TOML
     /// file that describes the rays of a renderer, or a file of recorded segments: six numbers
-    /// each, from the origin to the hit, as an array of numpy, lines of CSV, or little-endian
-    /// `f32`.
-    #[arg(long, value_name = "default|FILE.toml|.npy|.csv|.bin")]
+    /// each, from the origin to the hit, as lines of CSV or as little-endian `f32`.
+    #[arg(long, value_name = "default|FILE.toml|.csv|.bin")]
     pub rays: Option<String>,
     /// The cost to minimise: `area`, the internal area, which suits every tracer; or `layout`, the
     /// tests of nodes and of blocks of triangles in this project's wide layout. With --budget, the
@@ -133,13 +132,8 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     } else {
         plan.references
     };
-    // The number of objects of a mesh file is known when it is loaded.
-    if let Some(objects) = Scene::generated_objects(&args.scene) {
-        plan::check_memory(&args.scene, objects, most_references, 0)?;
-    }
     let scene = args.files.load(&args.scene)?;
     let objects = scene.boxes.len();
-    plan::check_memory(&scene.name, objects, most_references, plan::BYTES_PER_LOADED)?;
     if let (Some(named), Some(rays)) = (&args.rays, &plan.rays) {
         rays.check(named, &scene)?;
     }
@@ -152,7 +146,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         args.from.as_ref().map(|path| Start::load(path, &scene, most_references)).transpose()?;
     let plan = args.with_budget(plan, objects, &mut answer);
     // Reserving the file first reports a full disk before the search and not after it.
-    let reserved = args.reserved(&out, plan::most_bytes(&scene, most_references))?;
+    let reserved = reserve(&out, args.out.is_some(), plan::most_bytes(&scene, most_references))?;
     let (plan, prepared) = args.decided(plan, &scene, interrupted, &mut answer)?;
     let found = plan.search(&scene, start.as_ref(), prepared, interrupted)?;
     save(&found, &out, reserved, interrupted, &mut answer)?;
@@ -269,11 +263,6 @@ impl BakeArgs {
         output_or_free("--out", self.out.as_ref(), || self.name_after_scene())
     }
 
-    /// Reserves the file to write.
-    fn reserved(&self, out: &Path, bytes: usize) -> Result<Reserved, Error> {
-        Ok(reserve(out, self.out.is_some(), bytes)?)
-    }
-
     /// Returns the name that an output has if none is given.
     fn name_after_scene(&self) -> PathBuf {
         let scene = Path::new(&self.scene);
@@ -338,7 +327,7 @@ impl BakeArgs {
             rays: self.rays.is_none(),
             references: self.references.is_none(),
         };
-        let Decided { plan, reasons, prepared } = decide(open, plan, scene, interrupted)?;
+        let (plan, reasons, prepared) = decide(open, plan, scene, interrupted)?;
         for reason in reasons {
             answer.say(&reason);
             answer.list("choices", reason);

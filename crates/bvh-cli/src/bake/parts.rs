@@ -1,12 +1,12 @@
 //! `bvh bake --parts`: cuts a scene by space into parts, bakes each as a job of its own, and joins
 //! the trees of the parts under a searched top.
 
-use super::instances::{Interruption, bake_part};
-use super::plan::{Plan, Prepared, Start};
+use super::instances::save_part;
+use super::plan::{Plan, Prepared, Start, most_bytes};
 use super::{BakeArgs, save};
 use crate::Error;
 use crate::answer::Answer;
-use crate::arguments::output_file;
+use crate::arguments::{output_file, reserve};
 use bvh_core::{Aabb, Bvh, Node, NodeKind};
 use bvh_scenes::tree_file;
 use bvh_scenes::{Scene, fnv1a};
@@ -72,24 +72,26 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
     fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;
     for part in chosen {
         let path = part.path(&folder);
-        if !path.exists() {
-            // A part whose search was cut short would differ from run to run.
-            let scene = part.scene(&scene);
-            let ends = Interruption::Discards;
-            bake_part(&part.plan, &scene, &path, ends, interrupted, &mut answer)?;
+        if path.exists() {
+            continue;
         }
+        let scene = part.scene(&scene);
+        let found = part.plan.search(&scene, None, Prepared::default(), interrupted)?;
+        // A part whose search was cut short would differ from run to run.
         if interrupted.load(Relaxed) {
             let folder = folder.display();
             let left =
                 format!("finished parts are in {folder}, and the same command bakes the rest");
             return Err(Error::Interrupted(left));
         }
+        save_part(&found, &path, &mut answer)?;
     }
     if args.part.is_some() {
         answer.end();
         return Ok(());
     }
-    let reserved = args.reserved(&out, super::plan::most_bytes(&scene, plan.references))?;
+    let bytes = most_bytes(&scene, plan.references);
+    let reserved = reserve(&out, args.out.is_some(), bytes)?;
     let start = join(&scene, &parts, &folder)?;
     let plan = Plan { effort: plan.effort.share(1.0 - SHARE_OF_PARTS), ..plan };
     let found = plan.search(&scene, Some(&start), Prepared::default(), interrupted)?;

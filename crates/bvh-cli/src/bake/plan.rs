@@ -7,10 +7,10 @@ use crate::interrupt;
 use crate::rays::Rays;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::file::Header;
-use bvh_core::{Aabb, Bvh, Node, RayDensity, Triangle};
+use bvh_core::{Bvh, Node, RayDensity};
+use bvh_scenes::Scene;
 use bvh_scenes::files::Reserved;
 use bvh_scenes::tree_file::{self, TreeFileError};
-use bvh_scenes::{Scene, is_allocatable};
 use bvh_search::{Bake, Baked, Budget, Division, Method};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -38,36 +38,6 @@ pub fn most_bytes(scene: &Scene, references: f64) -> usize {
     // A tree with n leaves has fewer than 2n nodes; each node may have a number of visits.
     let reference = 2 * (size_of::<Node>() + size_of::<f32>()) + size_of::<u32>();
     Header::BYTES + (references * scene.boxes.len() as f64) as usize * reference
-}
-
-/// The most bytes per object that a bake has allocated at once, the scene included, of which `best`
-/// with two threads needs most: the greatest `bytes_per_object` of `results/scale`.
-const BYTES_PER_OBJECT: usize = 326;
-/// The most bytes per permitted reference that a bake with divided objects has allocated at once,
-/// which the division needs: five million triangles with 1.2 references each.
-const BYTES_PER_REFERENCE: usize = 550;
-/// The bytes per object of a loaded scene.
-pub const BYTES_PER_LOADED: usize = size_of::<Triangle>() + size_of::<Aabb>();
-
-/// Rejects a scene with so many objects if the process cannot have the memory of a bake with at
-/// most so many `references` per object, of which a loaded scene has `per_loaded` bytes per object.
-/// An allocation that fails in the middle of the work would end the program without a result.
-pub fn check_memory(
-    scene: &str,
-    objects: usize,
-    references: f64,
-    per_loaded: usize,
-) -> Result<(), Error> {
-    let per_object = if references > 1.0 {
-        (references * BYTES_PER_REFERENCE as f64) as usize
-    } else {
-        BYTES_PER_OBJECT
-    };
-    let bytes = objects.saturating_mul(per_object);
-    if is_allocatable(objects.saturating_mul(per_object - per_loaded)) {
-        return Ok(());
-    }
-    Err(Error::Memory { scene: scene.to_owned(), objects, bytes })
 }
 
 /// The tree of an earlier bake, from which a search continues.

@@ -1,8 +1,6 @@
 //! Baking from the command line: the trees, the choices, and the files in all circumstances.
 
-use crate::support::{
-    begin, bvh, cost, ended, facts, names, number, run_on_a_small_disk, words, wrong,
-};
+use crate::support::{begin, bvh, cost, ended, facts, names, number, run_on_a_small_disk, wrong};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::Segment;
 use bvh_core::cost::{internal_area, layout_area};
@@ -280,28 +278,6 @@ fn a_file_that_somebody_creates_at_the_name_after_the_scene_stays_and_the_tree_i
     assert_eq!(fs::read(&notes).unwrap(), b"notes");
     let kept = names(at).into_iter().find(|name| name != "spheres75.bvh").unwrap();
     tree_file::load(&at.join(kept), &Scene::load("spheres75").unwrap()).unwrap();
-}
-
-#[test]
-fn a_kill_leaves_the_old_file_or_a_complete_new_one() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let path = at.join("a.bvh");
-    let scene = Scene::load("spheres750").unwrap();
-    bvh(at, "bake spheres750 --method=muller_fellner --budget=0s --out=a.bvh");
-    let old = fs::read(&path).unwrap();
-    let mut replaced = 0;
-    // The kills come before, during and after the write, also on a busy machine.
-    for milliseconds in [0, 5, 10, 20, 30, 40, 60, 80, 120, 160, 240, 320] {
-        fs::write(&path, &old).unwrap();
-        let mut child = begin(at, &words("bake spheres750 --budget=20ms --out=a.bvh --seed=2"));
-        sleep(Duration::from_millis(milliseconds));
-        child.kill().unwrap();
-        child.wait().unwrap();
-        tree_file::load(&path, &scene).unwrap();
-        replaced += usize::from(fs::read(&path).unwrap() != old);
-    }
-    eprintln!("{replaced} of 12 were killed too late");
 }
 
 #[test]
