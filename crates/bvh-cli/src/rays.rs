@@ -8,11 +8,10 @@ use bvh_core::cost::Objective;
 use bvh_core::query::Region;
 use bvh_core::{Aabb, Bvh, Ray, RayDensity, Segment, Slabs};
 use bvh_scenes::Scene;
-use bvh_scenes::files::read_text;
+use bvh_scenes::files::{read, read_text};
 use bvh_scenes::rays::{RenderedRays, TRAINED, density, of_anything, of_renderer};
 use bvh_search::ray_density;
 use glam::Vec3;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -42,16 +41,14 @@ impl Rays {
         let path = Path::new(named);
         input_file("--rays", path)?;
         let extension = path.extension().and_then(|extension| extension.to_str());
-        if let Some(format @ ("npy" | "csv" | "bin")) = extension {
-            let invalid = |message| Error::Rays { file: path.to_owned(), message };
-            let bytes = fs::read(path).map_err(|error| invalid(error.to_string()))?;
-            let segments = recorded::read(format, &bytes).map_err(invalid)?;
-            return Ok(Self::Recorded(segments));
+        let invalid = |message| Error::Rays { file: path.to_owned(), message };
+        match extension {
+            Some("toml") => fault::parse(&read_text(path)?).map(Self::Rendered).map_err(invalid),
+            Some(format @ ("csv" | "bin")) => {
+                recorded::read(format, &read(path)?).map(Self::Recorded).map_err(invalid)
+            }
+            _ => Err(invalid("--rays accepts files that end with .toml, .csv or .bin".into())),
         }
-        let text = read_text(path)?;
-        fault::parse(&text)
-            .map(Self::Rendered)
-            .map_err(|message| Error::Rays { file: path.to_owned(), message })
     }
 
     /// Rejects recorded rays of the file `named` if no ray meets the scene. The search could not
