@@ -3,7 +3,6 @@
 use bvh_core::DensityError;
 use bvh_scenes::SceneError;
 use bvh_scenes::files::{ReadError, WriteError};
-use bvh_scenes::render::StructureError;
 use bvh_scenes::tree_file::TreeFileError;
 use bvh_search::SearchError;
 use std::io;
@@ -40,9 +39,6 @@ pub enum Error {
     /// A tree file is damaged or belongs to a different scene.
     #[error(transparent)]
     TreeFile(#[from] TreeFileError),
-    /// A picture cannot be traced with the structure.
-    #[error(transparent)]
-    Structure(#[from] StructureError),
     /// Ctrl-C ended the command, which left this on the disk.
     #[error("interrupted; {0}")]
     Interrupted(String),
@@ -55,18 +51,8 @@ impl Error {
             Self::Scene(_) | Self::Usage(_) | Self::Rays { .. } => 2,
             Self::Read(error) | Self::TreeFile(TreeFileError::Read(error)) => read_code(error),
             Self::TreeFile(_) => 2,
-            Self::Structure(error) => match error {
-                StructureError::File(TreeFileError::Read(error)) => read_code(error),
-                StructureError::Unknown(_)
-                | StructureError::Spheres(_)
-                | StructureError::File(_) => 2,
-                StructureError::Build { .. } | StructureError::Layout { .. } => 1,
-            },
             Self::Interrupted(_) => 130,
-            Self::Io { .. }
-            | Self::Write(_)
-            | Self::Search { .. }
-            | Self::Tracing { .. } => 1,
+            Self::Io { .. } | Self::Write(_) | Self::Search { .. } | Self::Tracing { .. } => 1,
         }
     }
 

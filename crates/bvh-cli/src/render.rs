@@ -5,13 +5,15 @@ use crate::answer::{Answer, Form, short, whole};
 use crate::arguments::{Jobs, input_file, output_file};
 use crate::output::bar;
 use crate::scene_files::SceneFiles;
-use bvh_core::Aabb;
-use bvh_scenes::Scene;
+use bvh_build::{Builder, muller_fellner};
+use bvh_core::{Aabb, WideBvh};
 use bvh_scenes::files;
 use bvh_scenes::rays::View;
-use bvh_scenes::render::{Film, Options, framing, heat, image, render as draw, structure, tiles};
-use bvh_scenes::trace::Accelerator;
+use bvh_scenes::render::{Film, Options, framing, heat, image, render as draw};
+use bvh_scenes::trace::{Accelerator, Structure, kd_tree};
+use bvh_scenes::{Scene, tree_file};
 use glam::DVec3;
+use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -118,9 +120,9 @@ pub fn render(args: &RenderArgs) -> Result<(), Error> {
     }
     let options = args.options(&scene);
     let start = Instant::now();
-    let accelerator = Accelerator::new(&scene.primitives, structure::by_name(&args.accel, &scene)?);
+    let accelerator = Accelerator::new(&scene.primitives, structure(&args.accel, &scene)?);
     let built = start.elapsed().as_secs_f64();
-    let bar = bar(tiles(&options), "{msg} {wide_bar} {pos}/{len} tiles, {eta} left");
+    let bar = bar(options.height.into(), "{msg} {wide_bar} {pos}/{len} rows, {eta} left");
     bar.set_message(scene.name.clone());
     let film = draw(&scene, &accelerator, &options, &|| bar.inc(1));
     bar.finish_and_clear();
@@ -145,6 +147,37 @@ pub fn render(args: &RenderArgs) -> Result<(), Error> {
     answer.say(&format!("picture: {}", args.out.display()));
     answer.end();
     Ok(())
+}
+
+/// Builds the structure that `--accel` names over the scene. Trees are built by greedy Müller–Fellner
+/// division.
+fn structure(name: &str, scene: &Scene) -> Result<Structure<'static>, Error> {
+    let greedy = || {
+        let tree = muller_fellner::Config::default().build(&scene.boxes);
+        tree.map_err(Error::search(&scene.name, name))
+    };
+    Ok(match name {
+        "brute" => Structure::Brute,
+        "kdtree" => {
+            let tree = kd_tree::Config::default().build(&scene.boxes);
+            Structure::KdTree(tree.map_err(Error::search(&scene.name, name))?)
+        }
+        "bvh" => Structure::Tree(Cow::Owned(greedy()?)),
+        "wide" => {
+            let triangles = scene.triangles().map_err(|fault| {
+                Error::Usage(format!("--accel wide: {fault}, or --accel brute, kdtree, bvh"))
+            })?;
+            let layout = WideBvh::new(&greedy()?, triangles);
+            Structure::Wide(layout.map_err(Error::search(&scene.name, name))?)
+        }
+        _ if name.ends_with(".bvh") => {
+            Structure::Tree(Cow::Owned(tree_file::load(Path::new(name), scene)?.0))
+        }
+        _ => {
+            let accepted = "brute, kdtree, bvh, wide, or the path of a .bvh file";
+            return Err(Error::Usage(format!("--accel is {name:?}; accepted: {accepted}")));
+        }
+    })
 }
 
 fn write(args: &RenderArgs, film: &Film, rays_per_pixel: u32) -> Result<(), Error> {

@@ -3,7 +3,6 @@
 use bvh_core::file::FileError;
 use bvh_scenes::SceneError;
 use bvh_scenes::files::{ReadError, WriteError};
-use bvh_scenes::render::StructureError;
 use bvh_scenes::tree_file::TreeFileError;
 use bvh_search::SearchError;
 use std::io;
@@ -64,9 +63,6 @@ pub enum Error {
     /// A tree file that is damaged, or for another scene.
     #[error(transparent)]
     TreeFile(#[from] TreeFileError),
-    /// A structure that a picture cannot be traced with.
-    #[error(transparent)]
-    Structure(#[from] StructureError),
     /// A figure could not be drawn.
     #[error(transparent)]
     Figure(#[from] figures::FigureError),

@@ -1,5 +1,5 @@
-//! Draws a picture of a scene from a view. Tiles are drawn in parallel, and the picture has the
-//! same bytes for any number of threads.
+//! Draws a picture of a scene from a view. Rows are drawn in parallel, and the picture has the same
+//! bytes for any number of threads.
 
 use super::framing;
 use super::image::Film;
@@ -33,24 +33,15 @@ impl Default for Options {
     }
 }
 
-/// The side of a tile in pixels. A thread reports progress after every tile.
-const TILE: u32 = 16;
-
-/// Returns the number of tiles that [`render`] reports.
-pub fn tiles(options: &Options) -> u64 {
-    u64::from(options.width.div_ceil(TILE)) * u64::from(options.height.div_ceil(TILE))
-}
-
-/// Draws the scene on all threads of the current rayon pool. Calls `tile_done` after every tile.
+/// Draws the scene on all threads of the current rayon pool. Calls `row_done` after every row.
 pub fn render(
     scene: &Scene,
     accelerator: &Accelerator,
     options: &Options,
-    tile_done: &(dyn Fn() + Sync),
+    row_done: &(dyn Fn() + Sync),
 ) -> Film {
     let bounds = Aabb::union_of(&scene.boxes);
-    let width = options.width;
-    let height = options.height;
+    let &Options { width, height, samples, .. } = options;
     let up = scene.up();
     let aspect = f64::from(width) / f64::from(height);
     let view = match &options.view {
@@ -59,24 +50,18 @@ pub fn render(
     };
     let camera = Camera::new(&view, up, width, height);
     let world = World::new(accelerator, &view, up, &bounds, options.ground, options.depth);
-    let columns = width.div_ceil(TILE);
-    // Tiles are collected in order, so that the picture does not depend on the order of completion.
-    let tiles: Vec<Film> = (0..tiles(options) as u32)
+    // Rows are collected in order, so that the picture does not depend on the order of completion.
+    let rows: Vec<Film> = (0..height)
         .into_par_iter()
-        .map(|index| {
-            let x = index % columns * TILE;
-            let y = index / columns * TILE;
-            let tile = world.tile(
-                &camera,
-                x..(x + TILE).min(width),
-                y..(y + TILE).min(height),
-                options.samples,
-            );
-            tile_done();
-            tile
+        .map(|y| {
+            let row = world.row(&camera, y, width, samples);
+            row_done();
+            row
         })
         .collect();
-    Film::of_tiles(width, &tiles, columns as usize)
+    let mut film = Film { width, ..Film::default() };
+    rows.into_iter().for_each(|row| film.append(row));
+    film
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
-//! Pictures in memory: assembled from tiles, exposed, and as the bytes of a PNG file.
+//! Pictures in memory: assembled from rows, exposed, and as the bytes of a PNG file.
 
 use bvh_core::TestCounts;
 use glam::DVec3;
 
-/// A picture, or a tile that one thread has drawn, with its numbers of rays and tests. Rows run
+/// A picture, or a row that one thread has drawn, with its numbers of rays and tests. Rows run
 /// from the top, and pixels from the left.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Film {
@@ -21,24 +21,11 @@ pub struct Film {
 }
 
 impl Film {
-    /// Assembles tiles in rows of `columns`.
-    pub fn of_tiles(width: u32, tiles: &[Self], columns: usize) -> Self {
-        let mut film = Self { width, ..Self::default() };
-        for row in tiles.chunks(columns) {
-            // The last row's tiles may be lower than the others.
-            let lines = row[0].pixels.len() / row[0].width as usize;
-            for y in 0..lines {
-                for tile in row {
-                    let line = y * tile.width as usize..(y + 1) * tile.width as usize;
-                    film.pixels.extend(&tile.pixels[line.clone()]);
-                    film.tests.extend(&tile.tests[line]);
-                }
-            }
-        }
-        for tile in tiles {
-            film.count(tile.counts, tile.rays);
-        }
-        film
+    /// Adds the rows of another picture below the last row.
+    pub fn append(&mut self, mut below: Self) {
+        self.pixels.append(&mut below.pixels);
+        self.tests.append(&mut below.tests);
+        self.count(below.counts, below.rays);
     }
 
     /// Adds to the tests and rays of the whole picture.

@@ -7,7 +7,6 @@ use crate::rays::{Camera, View};
 use crate::trace::Accelerator;
 use bvh_core::{Aabb, Ray, TestCounts};
 use glam::DVec3;
-use std::ops::Range;
 
 /// A point light.
 #[derive(Clone, Debug)]
@@ -107,35 +106,27 @@ impl<'a> World<'a> {
         Self { accelerator, up, lights: automatic(view, up, bounds), ground, depth }
     }
 
-    /// Draws a tile of the picture with `samples`² rays per pixel.
-    pub fn tile(
-        &self,
-        camera: &Camera,
-        columns: Range<u32>,
-        rows: Range<u32>,
-        samples: u32,
-    ) -> Film {
-        let mut tile = Film { width: columns.end - columns.start, ..Film::default() };
-        for y in rows {
-            for x in columns.clone() {
-                let mut sum = DVec3::ZERO;
-                let mut tally = Tally::default();
-                for v in 0..samples {
-                    for u in 0..samples {
-                        let right = f64::from(x) + (f64::from(u) + 0.5) / f64::from(samples);
-                        let down = f64::from(y) + (f64::from(v) + 0.5) / f64::from(samples);
-                        let direction = camera.direction(right, down);
-                        let light = self.radiance(camera.origin, direction, &mut tally);
-                        // Exposure before the average keeps the edges of highlights smooth.
-                        sum += image::expose(light);
-                    }
+    /// Draws a row of the picture with `samples`² rays per pixel.
+    pub fn row(&self, camera: &Camera, y: u32, width: u32, samples: u32) -> Film {
+        let mut row = Film { width, ..Film::default() };
+        for x in 0..width {
+            let mut sum = DVec3::ZERO;
+            let mut tally = Tally::default();
+            for v in 0..samples {
+                for u in 0..samples {
+                    let right = f64::from(x) + (f64::from(u) + 0.5) / f64::from(samples);
+                    let down = f64::from(y) + (f64::from(v) + 0.5) / f64::from(samples);
+                    let direction = camera.direction(right, down);
+                    let light = self.radiance(camera.origin, direction, &mut tally);
+                    // Exposure before the average keeps the edges of highlights smooth.
+                    sum += image::expose(light);
                 }
-                tile.pixels.push(image::encode(sum / f64::from(samples * samples)));
-                tile.tests.push(tally.counts.boxes + tally.counts.objects);
-                tile.count(tally.counts, tally.rays);
             }
+            row.pixels.push(image::encode(sum / f64::from(samples * samples)));
+            row.tests.push(tally.counts.boxes + tally.counts.objects);
+            row.count(tally.counts, tally.rays);
         }
-        tile
+        row
     }
 
     /// Returns the light from `direction`. A loop follows reflections, because each surface has

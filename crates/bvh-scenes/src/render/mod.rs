@@ -16,9 +16,7 @@ pub mod framing;
 pub mod heat;
 pub mod image;
 mod light;
-pub mod structure;
 mod surface;
 
-pub use draw::{Options, render, tiles};
+pub use draw::{Options, render};
 pub use image::Film;
-pub use structure::StructureError;

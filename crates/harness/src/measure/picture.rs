@@ -5,8 +5,8 @@ use crate::Error;
 use crate::rows::{RenderRow, RenderTimeRow, RunRow};
 use bvh_config::config;
 use bvh_core::Bvh;
-use bvh_scenes::render::{Film, Options, render, structure};
-use bvh_scenes::trace::{Accelerator, Structure};
+use bvh_scenes::render::{Film, Options, render};
+use bvh_scenes::trace::{Accelerator, Structure, kd_tree};
 use bvh_scenes::{Scene, fnv1a};
 use std::borrow::Cow;
 use std::time::Instant;
@@ -27,10 +27,6 @@ config! {
     }
 }
 
-/// The structures other than our trees: their names in tables, and the names that `--accel`
-/// accepts.
-pub const BASELINES: [(&str, &str); 2] = [("brute force", "brute"), ("KD-tree", "kdtree")];
-
 /// Returns the name in tables of the pictures that a method's trees draw without pruning.
 pub fn unpruned(method: &str) -> String {
     format!("{method}, unpruned")
@@ -43,7 +39,7 @@ const MOST_REPEATS: usize = 25;
 
 impl Config {
     /// Draws the scene on one thread with the tree of `run`, which was built in `build_seconds`. If
-    /// `first`, draws it with each of the [`BASELINES`] before.
+    /// `first`, draws it by brute force and with a KD-tree before.
     pub fn measure(
         &self,
         scene: &Scene,
@@ -53,10 +49,13 @@ impl Config {
         first: bool,
     ) -> Result<(Vec<RenderRow>, Vec<RenderTimeRow>), Error> {
         let mut structures = Vec::new();
-        for (label, name) in BASELINES.into_iter().filter(|_| first) {
+        if first {
+            structures.push(("brute force".to_owned(), Structure::Brute, 0, 0.0));
             let start = Instant::now();
-            let structure = structure::by_name(name, scene)?;
-            structures.push((label.into(), structure, 0, start.elapsed().as_secs_f64()));
+            let cells = kd_tree::Config::default().build(&scene.boxes);
+            let cells = cells.map_err(Error::search(&scene.name, "KD-tree"))?;
+            let seconds = start.elapsed().as_secs_f64();
+            structures.push(("KD-tree".to_owned(), Structure::KdTree(cells), 0, seconds));
         }
         // The tree is borrowed: a copy would cost memory and no time of the drawing.
         let own = Structure::Tree(Cow::Borrowed(tree));
