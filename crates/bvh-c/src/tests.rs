@@ -266,28 +266,6 @@ fn an_export_is_the_file_of_every_tracer_and_others_are_named() {
     }
 }
 
-#[cfg(unix)]
-#[test]
-fn a_save_replaces_the_old_file_and_never_writes_into_it() {
-    let corners = corners(9);
-    let tree = tree(&corners);
-    let folder = tempfile::tempdir().unwrap();
-    let [path, link] = ["tree.bvh", "link"].map(|name| folder.path().join(name));
-    std::fs::write(&path, "precious").unwrap();
-    // A write into the old file would change its contents under the second name as well.
-    std::fs::hard_link(&path, &link).unwrap();
-    let named = CString::new(path.to_str().unwrap()).unwrap();
-    // SAFETY: the tree is freed last, and the string ends with a zero.
-    unsafe {
-        assert_eq!(bvh_tree_save(tree, named.as_ptr()), BvhStatus::Ok, "{}", last_error());
-        bvh_tree_free(tree);
-    }
-    assert_eq!(std::fs::read(&link).unwrap(), b"precious");
-    let saved = std::fs::read(&path).unwrap();
-    assert!(saved.starts_with(b"\x89BVH"));
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
-}
-
 /// Asserts that the last error contains this text.
 #[track_caller]
 fn rejected(part: &str) {

@@ -20,7 +20,7 @@ use serde_json::json;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Write a page about a tree file: costs by level and tests of rays as heat, each compared with the
+/// Write a page about a tree file: its costs and the tests of rays as heat, each compared with the
 /// greedy tree of the same scene.
 #[derive(Args, Clone, Debug)]
 pub struct ReportArgs {
@@ -103,7 +103,6 @@ pub fn report(args: &ReportArgs) -> Result<(), Error> {
         ],
         medians: ranges.map(|range| range.median),
         top,
-        levels: [area_by_level(&baked.tree), area_by_level(&greedy.tree)],
     };
     reserve(&out, args.out.is_some(), 0)?.write(&[page.html().as_bytes()])?;
     answer.end();
@@ -177,21 +176,6 @@ fn rows(baked: &Measured, greedy: &Measured) -> Vec<Row> {
         .collect()
 }
 
-/// Returns the sum of the inner nodes' areas at each depth over the root's area: the expected
-/// number of them that a random line visits.
-fn area_by_level(tree: &Bvh) -> Vec<f64> {
-    // The areas of a scene without area are all 0.
-    let unit = tree.root_aabb().map_or(0.0, |root| root.half_area()).max(f64::MIN_POSITIVE);
-    let mut levels = Vec::new();
-    let mut row: Vec<usize> = (0..tree.nodes.len().min(1)).collect();
-    while !row.is_empty() {
-        let inner = row.iter().map(|&index| &tree.nodes[index]).filter(|node| !node.is_leaf());
-        levels.push(inner.clone().map(|node| node.aabb.half_area() / unit).sum());
-        row = inner.flat_map(|node| node.children()).collect();
-    }
-    levels
-}
-
 fn png(out: &Path, pixels: &[[u8; 3]]) -> Result<Vec<u8>, Error> {
     image::png(WIDTH, pixels)
         .map_err(io::Error::other)
@@ -202,16 +186,6 @@ fn png(out: &Path, pixels: &[[u8; 3]]) -> Result<Vec<u8>, Error> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn the_areas_of_all_levels_add_up_to_the_cost() {
-        let scene = Scene::load("escher:300").unwrap();
-        let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
-        let levels = area_by_level(&tree);
-        let sum: f64 = levels.iter().sum();
-        let expected = cost::over_root_area(&tree, cost::internal_area(&tree));
-        assert!((sum - expected).abs() < 1e-12 * expected, "{sum} {expected}");
-        assert_eq!((levels[0], levels.len()), (1.0, tree.depth() + 1));
-    }
     #[test]
     fn a_title_says_what_the_tree_is_worth() {
         for (baked, title_of) in [

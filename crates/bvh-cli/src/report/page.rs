@@ -29,8 +29,6 @@ pub struct Page<'a> {
     pub medians: [f64; 2],
     /// The number of tests of the last colour.
     pub top: f64,
-    /// The area of the inner nodes at each depth, over the root's.
-    pub levels: [Vec<f64>; 2],
 }
 
 impl Page<'_> {
@@ -51,7 +49,6 @@ impl Page<'_> {
         let colours: Vec<String> =
             heat::INFERNO.iter().map(|[r, g, b]| format!("rgb({r} {g} {b})")).collect();
         let colours = colours.join(", ");
-        let area = chart(&self.levels);
         let version = env!("CARGO_PKG_VERSION");
         format!(
             "<!DOCTYPE html>
@@ -61,20 +58,15 @@ impl Page<'_> {
 <body>
 <h1>{title}</h1>
 <p>{origin}</p>
-<p><span class=\"key baked\"></span> the baked tree
-<span class=\"key greedy\"></span> the greedy Müller–Fellner tree, a plain build</p>
 {table}
-<p>Less is better, but depth and nodes are no costs. A tree baked for the wide layout saves tests there, and not always in the binary
+<p>The greedy tree is a plain build, as by Müller and Fellner. Less is better, but depth and nodes
+are no costs. A tree baked for the wide layout saves tests there, and not always in the binary
 tree.</p>
 <h2>Rays</h2>
 <div class=\"pictures\">{scene}{heat}</div>
 <div class=\"scale\" style=\"background: linear-gradient(to right, {colours})\"></div>
 <p class=\"ends\"><span>0 tests</span><span>{top} or more, in one pixel of 200</span></p>
 <p>Medians are over the pixels in which there is an object.</p>
-<h2>Cost by level</h2>
-<p>The area of the inner nodes at each depth over the root's area: how many of them a random line
-visits.</p>
-{area}
 <footer><p>Written by bvh {version}.</p></footer>
 </body></html>
 "
@@ -118,68 +110,6 @@ fn picture(png: &[u8], caption: &str) -> String {
     )
 }
 
-/// Draws one pair of bars per level, in a picture of 720 × 240 units.
-fn chart(levels: &[Vec<f64>; 2]) -> String {
-    const LEFT: f64 = 48.0;
-    const WIDTH: f64 = 672.0;
-    const BASE: f64 = 190.0;
-    /// The room above the axis, for the upper half of its last number.
-    const ABOVE: f64 = 12.0;
-    let count = levels[0].len().max(levels[1].len()).max(1);
-    let most = levels.iter().flatten().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let tick = tick(most);
-    let height = |area: f64| (BASE - ABOVE) * area / (tick * (most / tick).ceil());
-    let mut text =
-        String::from("<svg viewBox=\"0 0 720 240\" role=\"img\" aria-label=\"By level\">\n");
-    let mut add = |line: String| text.extend([&line, "\n"]);
-    for step in 0..=(most / tick).ceil() as u32 {
-        let value = tick * f64::from(step);
-        let y = BASE - height(value);
-        let shown = number(value);
-        add(format!(
-            "<line x1=\"{LEFT}\" x2=\"720\" y1=\"{y:.2}\" y2=\"{y:.2}\"/>\
-             <text x=\"{:.2}\" y=\"{:.2}\" text-anchor=\"end\">{shown}</text>",
-            LEFT - 6.0,
-            y + 4.0
-        ));
-    }
-    let step = WIDTH / count as f64;
-    for (tree, class) in [(0, "baked"), (1, "greedy")] {
-        for (depth, &area) in levels[tree].iter().enumerate() {
-            let bar = height(area);
-            let x = LEFT + step * (depth as f64 + 0.1 + 0.4 * tree as f64);
-            let shown = number(area);
-            add(format!(
-                "<rect class=\"{class}\" x=\"{x:.2}\" y=\"{:.2}\" width=\"{:.2}\" \
-                 height=\"{bar:.2}\"><title>depth {depth}: {shown}</title></rect>",
-                BASE - bar,
-                0.38 * step
-            ));
-        }
-    }
-    // Labels of ten levels or fewer have room on a phone.
-    for depth in (0..count).step_by(count.div_ceil(10)) {
-        let x = LEFT + step * (depth as f64 + 0.5);
-        add(format!(
-            "<text x=\"{x:.2}\" y=\"{}\" text-anchor=\"middle\">{depth}</text>",
-            BASE + 20.0
-        ));
-    }
-    add(format!(
-        "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">depth</text>",
-        LEFT + WIDTH / 2.0,
-        BASE + 42.0
-    ));
-    text + "</svg>"
-}
-
-/// Returns the distance of two to five ticks up to `most`: 1, 2 or 5 times a power of ten.
-fn tick(most: f64) -> f64 {
-    let power = 10f64.powf((most / 2.0).log10().floor());
-    let factor = [5.0, 2.0].into_iter().find(|factor| factor * power <= most / 2.0);
-    power * factor.unwrap_or(1.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -196,7 +126,6 @@ mod tests {
             heat: [vec![4], vec![5]],
             medians: [1.0, 2.0],
             top: 1234.0,
-            levels: [vec![1.0], vec![]],
         };
         let html = page.html();
         assert!(html.contains("<h1>&lt;b&gt; &amp; co</h1>"), "{html}");
@@ -206,15 +135,5 @@ mod tests {
         assert!(html.contains("1 234 or more"), "{html}");
         assert_eq!(html.matches("data:image/png;base64,").count(), 3);
         assert!(!html.contains("http") && !html.contains("<script"), "{html}");
-    }
-
-    #[test]
-    fn an_axis_has_two_to_five_ticks_up_to_the_most() {
-        for (most, expected) in [(1.1, 0.5), (1.9, 0.5), (2.1, 1.0), (3.9, 1.0), (4.1, 2.0)] {
-            for scale in [1e-9, 1.0, 1e6] {
-                let found = tick(most * scale) / scale;
-                assert!((found / expected - 1.0).abs() < 1e-9, "{most} × {scale}: {found}");
-            }
-        }
     }
 }
