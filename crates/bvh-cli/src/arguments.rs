@@ -1,7 +1,7 @@
 //! Arguments of several commands, and the check of paths before any work.
 
 use crate::Error;
-use bvh_scenes::files::{Reserved, WriteError};
+use bvh_scenes::files::{Reserved, WriteError, folder_of};
 use std::path::{Path, PathBuf};
 
 /// The limit on the program's threads.
@@ -46,10 +46,6 @@ pub fn output_file(flag: &str, path: &Path, ending: &str) -> Result<(), Error> {
         }
         _ => Ok(()),
     }
-}
-
-fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Returns the output that the flag gives, or otherwise the `derived` path. A path that nobody gave

@@ -178,7 +178,8 @@ fn create_beside(path: &Path) -> Result<NamedTempFile, WriteError> {
     Ok(new)
 }
 
-fn folder_of(path: &Path) -> &Path {
+/// Returns the folder of a file.
+pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 

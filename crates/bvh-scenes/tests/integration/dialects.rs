@@ -1,41 +1,15 @@
 //! Files as programs write them, beside the letter of the formats, are read as the square that they
-//! contain, with a remark where a reader has to choose.
+//! contain, with a remark where a reader has to choose. Faults are named.
 
 use crate::samples::{
-    INDEXED, NODE, buffer, changes, data_uri, error, floats, glb, gltf_json, ply_binary, ply_text,
-    samples, square, stl_binary, stl_text, with,
+    INDEXED, NODE, buffer, changes, data_uri, error, floats, glb, gltf, gltf_json, ply_binary,
+    ply_text, samples, square, stl_binary, stl_text, with,
 };
 use bvh_core::Triangle;
 use bvh_scenes::load::parse;
 use std::path::Path;
 
-type Case = (&'static str, Vec<u8>, &'static str);
-
-fn assert_square(case: &str, bytes: &[u8], name: &str, remark: &str) {
-    let mesh = parse(bytes, Path::new(name)).unwrap_or_else(|error| panic!("{case}: {error}"));
-    assert_eq!(mesh.triangles, square(), "{case}");
-    assert_eq!(mesh.remark().unwrap_or_default(), remark, "{case}");
-}
-
-/// Asserts that each file contains the square, and nothing but what the remark names.
-fn assert_read(name: &str, cases: Vec<Case>) {
-    cases.iter().for_each(|(case, bytes, remark)| assert_square(case, bytes, name, remark));
-}
-
-/// Asserts the same of each change of a file.
-fn assert_changes_read(name: &str, file: &[u8], table: &str) {
-    changes(file, table).for_each(|(line, bytes, remark)| {
-        assert_square(line, &bytes, name, remark[0]);
-    });
-}
-
-#[test]
-fn text_ply_files_as_programs_write_them() {
-    let ply = ply_text();
-    assert_changes_read(
-        "a.ply",
-        &ply,
-        r"
+const PLY: &str = r"
 \n ⇒ \r |
 \n ⇒ \r\n |
 255\n ⇒ 255\n\n \n |
@@ -52,10 +26,120 @@ element v → element camera 2\nproperty list uchar float m\nelement v & 0 0 0 �
 4 0 1 2 3 → 5 0 1 2 3 0 |
 face 1 → face 2 & 4 0 1 → 2 0 1\n4 0 1 | 1 face has fewer than three vertices and was skipped
 element face → element tristrips & 4 0 1 2 3 → 8 0 1 2 -1 0 2 3 -1 |
-",
-    );
-    let more = [&ply[..], b"1 2 3\n"].concat();
+1 1 0.5 → 1 nan 0.5 ! face 0 | vertex 2 at [1, NaN, 0.5]
+1 1 0.5 → 1 1e99 0.5 ! face 0 | vertex 2 at [1, inf, 0.5]
+1 1 0.5 → 1 one 0.5 ! a.ply:14: vertex 2 | y: `one`
+1 1 0.5 → 1 1 ! a.ply:14: vertex 2 | red: its line ends
+1 1 0.5 → 1 1 0.5 7 ! a.ply:14: | `255` after its last
+4 0 1 2 3 → 4 0 1 2 4 ! face 0 | vertex 4 | below 4
+4 0 1 2 3 → 4 0 1 2 -1 ! face 0 | vertex -1
+4 0 1 2 3 → -4 0 1 2 3 ! face 0 | list of length -4
+4 0 1 2 3 → 4 0 1 2 3.0 ! a.ply:16: face 0 | `3.0`
+4 0 1 2 3 → 2 0 1 ! 4 vertices and 0 triangles
+property float x → property float u ! element vertex has other properties; expected x, y and z
+element vertex 4 → element vertex 4000000000 ! a.ply:16: vertex 4, counted from 0
+format ascii → format octal ! a.ply:2: format `octal`; expected ascii, binary_little
+ply\n → p\x00ly\n ! a.ply:1: `p\x00ly`; expected ply
+format ascii 1.0 → format ascii 2.0 ! a.ply:2: version 2.0; expected 1.0
+format ascii 1.0 → comment ! no format; expected a line
+list uchar int → list float int ! a.ply:10: a length of type float; expected an integer type
+list uchar int → list uchar double ! a.ply:10: indices of type double; expected an integer type
+list uchar int → int ! `vertex_indices`; expected a list
+property float x → property f x ! a.ply:5: type `f`
+end_header → end ! a.ply:11: `end`; expected format, comment
+element face 1 → element vertex 1 ! a.ply:9: element `vertex` repeats a name
+property float z → property float x ! a.ply:7: property `x` repeats a name
+";
+
+const STL: &str = r"
+\r\n ⇒ \r |
+endloop ⇒ end loop & endfacet ⇒ end facet |
+endsolid ⇒ end solid |
+endloop ⇒ END LOOP |
+normal 0 0 1 ⇒ normal NaN -nan(ind) 1.#QNAN |
+normal 0 0 1 ⇒ normal 0,0 0,0 1,0 |
+ normal 0 0 1 ⇒ |
+facet normal ⇒ color 1 0 0\r\nfacet normal |
+facet normal ⇒ color 1 0 0 facet normal |
+solid a square → ; made by x\n\n# and y\nsolid a square |
+a square → facet vertex endloop |
+endsolid\r\n → |
+vertex 1 0e0 0\r → vertex 1 0 0 4\r ! a.stl:5: `4`; expected a keyword
+vertex 1 0e0 0\r → vertex 1 0 inf\r ! a.stl:5: | `1 0 inf` | three finite
+vertex 1 0e0 0\r → vertex 1 0\r ! a.stl:5: | `1 0`
+   vertex 1 0e0 0\r\n → \r\n ! a.stl:7: | 2 vertices
+endfacet\r\nendsolid\r\nsolid\r → vertecks\r ! a.stl:8: | `vertecks`
+";
+
+const OBJ: &str = r"
+f 1 → fo 1 |
+\nv 1 1 0.5 ⇒ \nv 1 1 0.5 1 0.5 nan 0 1 |
+f 1 → v nan 1.#QNAN -nan(ind)\nf 1 | 1 vertex is used by no face
+f 1 2 3 4 → f 1 2 3 4 1 |
+";
+
+const GLTF: &str = r#"
+"mesh": 0 → "mesh": 7 ! a.gltf: nodes[0]: no meshes[7]
+"count": 6 → "count": 7 ! meshes[0].primitives[0] at nodes[0] | accessors[1]: bufferViews[1] | 7 items
+"byteOffset": 48 → "byteOffset": 46 ! index | below 4
+"version": "2.0" → "version": "1.0" ! a.gltf: asset: version `1.0`; expected 2.0
+"2.0" → "2.1", "minVersion": "2.1" ! a.gltf: asset: version `2.1`; expected 2.0
+"indices": 1 → "indices": 1, "mode": 99 ! meshes[0].primitives[0] at nodes[0] | mode 99; expected 0 to 6
+5126 → 5125 ! accessors[0]: VEC3 of unsigned int; expected VEC3 of float or byte
+"byteLength": 60 → "byteLength": 61 ! buffers[0]: 60 bytes; expected 61
+"#;
+
+type Case = (&'static str, Vec<u8>, &'static str);
+
+fn assert_square(case: &str, bytes: &[u8], name: &str, remark: &str) {
+    let mesh = parse(bytes, Path::new(name)).unwrap_or_else(|error| panic!("{case}: {error}"));
+    assert_eq!(mesh.triangles, square(), "{case}");
+    assert_eq!(mesh.remark().unwrap_or_default(), remark, "{case}");
+}
+
+/// Asserts that each file contains the square, and nothing but what the remark names.
+fn assert_read(name: &str, cases: Vec<Case>) {
+    cases.iter().for_each(|(case, bytes, remark)| assert_square(case, bytes, name, remark));
+}
+
+/// Asserts that the file is rejected in one short line with each of these words.
+fn assert_refused(bytes: impl AsRef<[u8]>, name: &str, words: &[&str]) {
+    let message = error(bytes, name);
+    assert!(words.iter().all(|words| message.contains(words)), "{words:?}: {message}");
+    assert!(message.len() < 400 && !message.contains('\n'), "{message}");
+}
+
+#[test]
+fn files_as_programs_write_them_are_read_and_faults_are_named_with_their_places() {
+    let (_, _, obj) = samples()[0].clone();
+    let json = gltf(NODE, INDEXED);
+    for (name, file, table) in [
+        ("a.ply", ply_text(), PLY),
+        ("a.stl", stl_text(), STL),
+        ("a.obj", obj, OBJ),
+        ("a.gltf", json, GLTF),
+    ] {
+        for (line, bytes, is_fault, words) in changes(&file, table) {
+            match is_fault {
+                true => assert_refused(bytes, name, &words),
+                false => assert_square(line, &bytes, name, words[0]),
+            }
+        }
+    }
+    let more = [&ply_text()[..], b"1 2 3\n"].concat();
     assert_square("more lines", &more, "a.ply", "5 bytes after the last element were ignored");
+    assert_square("a long name", &with(&stl_text(), "a square", &"n".repeat(5000)), "a.stl", "");
+    assert_square("capitals", &samples()[0].2.to_ascii_uppercase(), "a.obj", "");
+    let face = format!("element {} 9000", "face".repeat(1000));
+    let long = with(&ply_text(), "element face 1", &face);
+    assert_refused(long, "a.ply", &["a.ply:16: facefaceface", "…"]);
+    let cut = &["a.ply: vertex 1, counted from 0: z: the file ends"];
+    assert_refused(&ply_binary(false)[..190], "a.ply", cut);
+    let mut nan = stl_binary();
+    nan[84 + 50 + 20..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
+    assert_refused(nan, "a.stl", &["a.stl: facet 1", "NaN"]);
+    assert_refused(&stl_binary()[..150], "a.stl", &["room for 1 facets; expected the 2"]);
+    assert_refused(&gltf(NODE, INDEXED)[..200], "a.gltf", &["a.gltf: ", "EOF"]);
 }
 
 #[test]
@@ -92,30 +176,6 @@ fn binary_ply_files_as_programs_write_them() {
             }
         }
     }
-}
-
-#[test]
-fn text_stl_files_as_programs_write_them() {
-    let stl = stl_text();
-    assert_changes_read(
-        "a.stl",
-        &stl,
-        r"
-\r\n ⇒ \r |
-endloop ⇒ end loop & endfacet ⇒ end facet |
-endsolid ⇒ end solid |
-endloop ⇒ END LOOP |
-normal 0 0 1 ⇒ normal NaN -nan(ind) 1.#QNAN |
-normal 0 0 1 ⇒ normal 0,0 0,0 1,0 |
- normal 0 0 1 ⇒ |
-facet normal ⇒ color 1 0 0\r\nfacet normal |
-facet normal ⇒ color 1 0 0 facet normal |
-solid a square → ; made by x\n\n# and y\nsolid a square |
-a square → facet vertex endloop |
-endsolid\r\n → |
-",
-    );
-    assert_square("a long name", &with(&stl, "a square", &"n".repeat(5000)), "a.stl", "");
 }
 
 #[test]
@@ -160,22 +220,6 @@ fn binary_stl_files_as_programs_write_them() {
     for empty in [&counted(0)[..84], &[&counted(0)[..], &[0; 2]].concat()] {
         assert!(error(empty, "a.stl").contains("no facet"));
     }
-}
-
-#[test]
-fn obj_files_as_programs_write_them() {
-    let (_, _, obj) = samples()[0].clone();
-    assert_square("capitals", &obj.to_ascii_uppercase(), "a.obj", "");
-    assert_changes_read(
-        "a.obj",
-        &obj,
-        r"
-f 1 → fo 1 |
-\nv 1 1 0.5 ⇒ \nv 1 1 0.5 1 0.5 nan 0 1 |
-f 1 → v nan 1.#QNAN -nan(ind)\nf 1 | 1 vertex is used by no face
-f 1 2 3 4 → f 1 2 3 4 1 |
-",
-    );
 }
 
 #[test]

@@ -167,21 +167,23 @@ fn raw(text: &str) -> Vec<u8> {
     bytes
 }
 
-/// Reads a table with one line for each changed file: `from → to | words | words`. The first
-/// occurrence of `from` becomes `to`, or every occurrence with `⇒`; several changes are joined by
-/// `&`. Returns the line, the bytes of the file, and the words.
+/// Reads a table with one line for each changed file: `from → to | remark` if it is read, or
+/// `from → to ! words | words` if it is at fault. The first occurrence of `from` becomes `to`, or
+/// every occurrence with `⇒`; several changes are joined by `&`. Returns the line, the bytes of the
+/// file, whether it is at fault, and the words.
 pub fn changes<'a>(
     file: &[u8],
     table: &'a str,
-) -> impl Iterator<Item = (&'a str, Vec<u8>, Vec<&'a str>)> {
+) -> impl Iterator<Item = (&'a str, Vec<u8>, bool, Vec<&'a str>)> {
     table.lines().filter(|line| !line.is_empty()).map(|line| {
-        let (changes, words) = line.split_once(" |").expect(line);
+        let fault = line.split_once(" !");
+        let (changes, words) = fault.or_else(|| line.split_once(" |")).expect(line);
         let mut bytes = file.to_vec();
         for change in changes.split(" & ") {
             let most = if change.contains(" ⇒") { usize::MAX } else { 1 };
             let (from, to) = change.split_once([" →", " ⇒"][usize::from(most > 1)]).expect(line);
             bytes = replaced(&bytes, &raw(from), &raw(to.strip_prefix(' ').unwrap_or(to)), most);
         }
-        (line, bytes, words.split(" |").map(str::trim).collect())
+        (line, bytes, fault.is_some(), words.split(" |").map(str::trim).collect())
     })
 }

@@ -2,7 +2,7 @@
 
 use super::accessors::{F32, I8, I16};
 use super::document::{Document, Instances, Node};
-use super::{Fault, HIDDEN, Loader, MOST_TRIANGLES, Placed, get};
+use super::{Fault, HIDDEN, Loader, MOST_TRIANGLES, Place, Placed, get};
 use glam::{DMat4, DQuat, DVec3};
 
 /// The nodes of a file.
@@ -86,7 +86,10 @@ impl Loader<'_> {
         let document = self.document;
         self.nodes = Nodes::new(document)
             .map_err(|(node, message)| self.fault(format!("nodes[{node}]"), message))?;
-        let in_scene = |message| self.fault("scene".into(), message);
+        let path = self.path;
+        let fault =
+            |place: String, message: String| Fault::new(path, Place::Element(place), message);
+        let in_scene = |message| fault("scene".into(), message);
         let roots = match (document.scene, &document.scenes[..]) {
             (Some(scene), scenes) => &get(scenes, scene, "scenes").map_err(in_scene)?.nodes,
             (None, [first, ..]) => &first.nodes,
@@ -97,11 +100,8 @@ impl Loader<'_> {
         // Nodes are pushed in reverse, so that the stack returns them in the order of the file.
         let mut open: Vec<usize> = roots.iter().rev().copied().collect();
         while let Some(number) = open.pop() {
-            let node =
-                get(&document.nodes, number, "nodes").map_err(|m| self.fault("scene".into(), m))?;
-            let in_node = |message| {
-                Fault::new(self.path, super::Place::Element(format!("nodes[{number}]")), message)
-            };
+            let node = get(&document.nodes, number, "nodes").map_err(in_scene)?;
+            let in_node = |message| fault(format!("nodes[{number}]"), message);
             if std::mem::replace(&mut reached[number], true) {
                 return Err(in_node("in its scene twice; expected each node once".to_owned()));
             }
@@ -122,18 +122,13 @@ impl Loader<'_> {
                     ));
                 }
                 Some(instances) => {
-                    let transforms = self
-                        .instances(instances)
-                        .map_err(|m| self.fault(format!("nodes[{number}]"), m))?;
-                    places
-                        .extend(transforms.into_iter().map(|instance| place(transform * instance)));
+                    let transforms = self.instances(instances).map_err(in_node)?;
+                    places.extend(transforms.into_iter().map(|t| place(transform * t)));
                 }
             }
             if places.len() > MOST_TRIANGLES {
-                return Err(self.fault(
-                    format!("nodes[{number}]"),
-                    format!("more than {MOST_TRIANGLES} meshes placed; expected no more"),
-                ));
+                let found = format!("more than {MOST_TRIANGLES} meshes placed");
+                return Err(in_node(format!("{found}; expected no more")));
             }
         }
         Ok(places)
