@@ -55,15 +55,19 @@ pub enum Size {
     All,
 }
 
-/// The amount of work for the methods on every scene.
-#[derive(Clone, Copy, Debug)]
-pub struct Effort {
-    /// Size of the scenes that builders get.
-    pub builders: Size,
-    /// Nodes per object that a search may make or visit on a scene of few objects.
-    pub work_per_object: u64,
-    /// Larger scenes for searches, if any.
-    pub larger: Option<LargerScenes>,
+bvh_config::config! { serde;
+    /// The amount of work for the methods and traversals on every scene.
+    #[derive(Copy)]
+    pub struct Effort {
+        /// Size of the scenes that builders get.
+        builders: Size = Size::Many;
+        /// Nodes per object that a search may make or visit on a scene of few objects.
+        work_per_object: u64 = 1000, in 1..;
+        /// Larger scenes for searches, in addition to those of few objects. Default none.
+        larger_searches: Option<LargerScenes>;
+        /// Rays per scene and traversal.
+        rays: usize = 5000, in 1..=100_000_000;
+    }
 }
 
 /// Scenes for searches beyond those of few objects.
@@ -208,7 +212,7 @@ fn extents(sizes: [usize; 3], method: &Method, effort: &Effort) -> Vec<(usize, u
         Method::Exact(_) => return vec![(few.0.min(EXACT_OBJECTS), few.1)],
         builder if is_builder(builder) => Some((sizes[effort.builders as usize], few.1)),
         _ => effort
-            .larger
+            .larger_searches
             .map(|larger| (larger.objects.min(sizes[Size::Many as usize]), larger.work_per_object)),
     };
     [few].into_iter().chain(further.filter(|further| further.0 > few.0)).collect()

@@ -2,7 +2,7 @@
 //! testing every triangle; and makes rays where rounding decides.
 
 use crate::exact::is_rounded_distance;
-use crate::tracing::{self, bits, wide_layouts};
+use crate::tracing::{self, compare, wide_layouts};
 use anyhow::{Context, Result, ensure};
 use bvh_core::{Coherence, Hit, Primitives, Ray, Triangle};
 use bvh_scenes::trace::{Accelerator, Structure};
@@ -33,7 +33,10 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize> {
         let nearest: Vec<_> = rays.iter().map(|ray| wide.nearest_hit(ray)).collect();
         let any: Vec<_> = rays.iter().map(|ray| wide.any_hit(ray)).collect();
         let compared = |way: &str, nearest: &[Option<Hit>], any: &[bool]| {
-            compare(rays, &expected, nearest, any).with_context(|| format!("{kernel:?}, {way}"))
+            let mut answers = nearest.iter().zip(any).zip(rays.iter().zip(&expected));
+            answers
+                .try_for_each(|((nearest, any), (ray, hit))| compare(ray, *nearest, *any, *hit))
+                .with_context(|| format!("{kernel:?}, {way}"))
         };
         compared("ray by ray", &nearest, &any)?;
         for coherence in [Coherence::Coherent, Coherence::Incoherent] {
@@ -56,26 +59,6 @@ pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize> {
         }
     }
     Ok(expected.iter().flatten().count())
-}
-
-/// Checks both kinds of answers to each ray against testing every triangle.
-fn compare(
-    rays: &[Ray],
-    expected: &[Option<Hit>],
-    nearest: &[Option<Hit>],
-    any: &[bool],
-) -> Result<()> {
-    for (index, ray) in rays.iter().enumerate() {
-        let expected = expected[index];
-        let nearest = nearest[index];
-        let any = any[index];
-        let is_right = bits(nearest) == bits(expected) && any == expected.is_some();
-        ensure!(
-            is_right,
-            "P3: {ray:?} gives {nearest:?} and {any}, testing every triangle {expected:?}"
-        );
-    }
-    Ok(())
 }
 
 /// Returns rays of [`tracing::rays`], half of them single, half in bundles.

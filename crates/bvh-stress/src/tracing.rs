@@ -81,6 +81,13 @@ pub fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {
     hit.map(|hit| (hit.t.to_bits(), hit.object))
 }
 
+/// Checks both kinds of answers to a ray, bit by bit, against that of testing every object.
+pub fn compare(ray: &Ray, nearest: Option<Hit>, any: bool, expected: Option<Hit>) -> Result<()> {
+    let same = bits(nearest) == bits(expected) && any == expected.is_some();
+    ensure!(same, "P3: {ray:?} gives {nearest:?} and {any}, testing every object {expected:?}");
+    Ok(())
+}
+
 /// Checks P3: for all rays the traversal gives the answers of testing every object, bit by bit. The
 /// note reports the number of hits.
 pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Verdict {
@@ -91,13 +98,7 @@ pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Verdic
         let expected = brute_force.nearest_hit(ray);
         hits += usize::from(expected.is_some());
         for accelerator in &accelerators {
-            let nearest = accelerator.nearest_hit(ray);
-            let any = accelerator.any_hit(ray);
-            let same = bits(nearest) == bits(expected) && any == expected.is_some();
-            ensure!(
-                same,
-                "P3: {ray:?} gives {nearest:?} and {any}, testing every object {expected:?}"
-            );
+            compare(ray, accelerator.nearest_hit(ray), accelerator.any_hit(ray), expected)?;
         }
     }
     Ok(format!("{hits} of {} rays hit", rays.len()))

@@ -3,13 +3,11 @@
 use std::fmt::Write as _;
 
 use plotters::coord::Shift;
-use plotters::drawing::DrawingAreaErrorKind;
 use plotters::element::{DashedPathElement, Drawable, PathElement, Polygon};
 use plotters::prelude::{Color, DrawingArea, IntoDrawingArea, RGBColor, SVGBackend};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{FontDesc, FontFamily, FontStyle, FontTransform, TextStyle};
 
-use super::model::FigureError;
 use super::text::{FAMILY, Type};
 
 pub(super) type Colour = RGBColor;
@@ -47,14 +45,11 @@ pub(super) struct Frame {
 /// Lengths of a dash and of the gap after it; `None` for a solid line.
 pub(super) type Dash = Option<(f64, f64)>;
 
-type Fault = DrawingAreaErrorKind<std::io::Error>;
-
 /// An SVG document that is being drawn.
-pub(super) struct Sheet<'a> {
-    area: DrawingArea<SVGBackend<'a>, Shift>,
-    /// The first error of plotters, after which the document is worthless.
-    fault: Option<Fault>,
-}
+pub(super) struct Sheet<'a>(DrawingArea<SVGBackend<'a>, Shift>);
+
+/// Why nothing that is drawn here fails.
+const IN_MEMORY: &str = "a text in memory takes whatever is drawn";
 
 /// Converts pixels to steps. Casting saturates; the limit leaves room for plotters' own additions.
 fn steps(pixels: f64) -> i32 {
@@ -81,8 +76,7 @@ impl<'a> Sheet<'a> {
         for<'b> &'b E: plotters::element::PointCollection<'b, (i32, i32)>,
         E: Drawable<SVGBackend<'a>>,
     {
-        let fault = self.area.draw(element).err();
-        self.fault = self.fault.take().or(fault);
+        self.0.draw(element).expect(IN_MEMORY);
     }
 
     /// Draws a line of text.
@@ -100,8 +94,7 @@ impl<'a> Sheet<'a> {
         let font = FontDesc::new(FontFamily::Name(FAMILY), style.size * STEPS * FONT_SIZE, weight);
         let style = TextStyle { color: colour.to_backend_color(), ..TextStyle::from(font) };
         let style = style.pos(Pos::new(side, VPos::Center)).transform(turn);
-        let fault = self.area.draw_text(&printable(text), &style, place(at)).err();
-        self.fault = self.fault.take().or(fault);
+        self.0.draw_text(&printable(text), &style, place(at)).expect(IN_MEMORY);
     }
 
     /// Draws lines of text, the first just below `top`.
@@ -157,24 +150,18 @@ pub(super) fn svg(
     title: &str,
     (width, height): (f64, f64),
     draw: impl FnOnce(&mut Sheet),
-) -> Result<String, FigureError> {
+) -> String {
     let (across, down) = place((width.ceil(), height.ceil()));
     let mut body = String::new();
     {
         let area =
             SVGBackend::with_string(&mut body, (across as u32, down as u32)).into_drawing_area();
-        let mut sheet = Sheet { area, fault: None };
+        let mut sheet = Sheet(area);
         draw(&mut sheet);
-        let fault = sheet.fault.or_else(|| sheet.area.present().err());
-        if let Some(fault) = fault {
-            let title = title.to_owned();
-            return Err(FigureError::Draw { title, reason: fault.to_string() });
-        }
+        sheet.0.present().expect(IN_MEMORY);
     }
     let title = printable(title).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
-    let mut document = String::new();
-    let _ = write!(
-        document,
+    format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" \
          viewBox=\"0 0 {across} {down}\" role=\"img\" stroke-linejoin=\"round\">\n\
          <title>{title}</title>\n<rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>\n\
@@ -182,8 +169,7 @@ pub(super) fn svg(
         width.ceil(),
         height.ceil(),
         joined(&body),
-    );
-    Ok(document)
+    )
 }
 
 /// Joins successive lines of one style, such as the dashes of a line, into one element. The

@@ -2,7 +2,7 @@
 
 use super::canvas::{self, Align, Frame};
 use super::legend::Legend;
-use super::model::{Figure, FigureError};
+use super::model::Figure;
 use super::panel::Plot;
 use super::style::{GREY, INK, Strokes};
 use super::text::{BODY, Fonts, TITLE};
@@ -17,8 +17,10 @@ const HEIGHTS: [f64; 2] = [340.0, 230.0];
 const GUTTER: (f64, f64) = (16.0, 16.0);
 
 /// Draws a figure as an SVG document.
-pub(super) fn svg(figure: &Figure) -> Result<String, FigureError> {
-    let fonts = Fonts::new()?;
+///
+/// Skips points that an axis cannot show: see [`Marks`](super::Marks).
+pub fn svg(figure: &Figure) -> String {
+    let fonts = Fonts::new();
     let strokes = Strokes::new(figure);
     let room = WIDTH - 2.0 * BORDER;
     let title = fonts.wrap(&figure.title, room, TITLE);

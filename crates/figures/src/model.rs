@@ -1,7 +1,5 @@
 //! The parts of a figure: panels, axes and layers of data series, in data units, without layout.
 
-use thiserror::Error;
-
 /// Panels in a grid under one title, with one legend for all of them.
 ///
 /// A series name means the same colour, dash, marker and legend entry wherever it occurs.
@@ -204,16 +202,4 @@ impl Layer {
     pub(super) fn is_marked(&self) -> bool {
         matches!(self.marks, Marks::Points(_))
     }
-}
-
-/// The reason why there is no picture.
-#[derive(Debug, Error)]
-#[allow(missing_docs, reason = "each message names its fields")]
-pub enum FigureError {
-    /// The drawing library failed.
-    #[error("figure '{title}' could not be drawn: {reason}")]
-    Draw { title: String, reason: String },
-    /// One of the fonts in the program could not be read.
-    #[error("the embedded font could not be read: {reason}")]
-    Font { reason: String },
 }

@@ -201,7 +201,7 @@ mod tests {
 
     #[test]
     fn labels_below_a_plot_of_any_width_are_as_far_apart_as_each_other_and_touch_nowhere() {
-        let fonts = Fonts::new().unwrap();
+        let fonts = Fonts::new();
         let ends = [(1.0, 1.065), (0.0, 256_000.0), (-0.04, 0.01)];
         for (low, high) in ends {
             let panel = Panel { x: Axis::linear("").range(low, high), ..Panel::default() };

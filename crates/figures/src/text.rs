@@ -4,8 +4,6 @@ use std::collections::HashMap;
 
 use ab_glyph::{Font, FontRef};
 
-use super::model::FigureError;
-
 /// The font DejaVu Sans, reduced to the characters that figures use.
 const REGULAR: &[u8] = include_bytes!("../assets/DejaVuSans-subset.ttf");
 /// The font DejaVu Sans Bold, reduced to the same characters.
@@ -51,14 +49,13 @@ struct Face {
 }
 
 impl Face {
-    fn new(bytes: &'static [u8]) -> Result<Self, FigureError> {
-        let font = FontRef::try_from_slice(bytes)
-            .map_err(|error| FigureError::Font { reason: error.to_string() })?;
+    fn new(bytes: &'static [u8]) -> Self {
+        let font = FontRef::try_from_slice(bytes).expect("the file is a font");
         let advances = font
             .codepoint_ids()
             .map(|(_, character)| (character, advance(&font, character)))
             .collect();
-        Ok(Self { font, advances })
+        Self { font, advances }
     }
 }
 
@@ -71,8 +68,8 @@ fn advance(font: &FontRef, character: char) -> f64 {
 
 impl Fonts {
     /// Parses the embedded fonts.
-    pub fn new() -> Result<Self, FigureError> {
-        Ok(Self { regular: Face::new(REGULAR)?, bold: Face::new(BOLD)? })
+    pub fn new() -> Self {
+        Self { regular: Face::new(REGULAR), bold: Face::new(BOLD) }
     }
 
     fn face(&self, style: Type) -> &Face {
@@ -141,7 +138,7 @@ mod tests {
 
     #[test]
     fn text_is_broken_at_blanks_into_lines_that_fit_or_cut_with_an_ellipsis() {
-        let fonts = Fonts::new().unwrap();
+        let fonts = Fonts::new();
         let words = "gap against seconds, median and quartiles of 25 seeds";
         let lines = fonts.wrap(words, 120.0, BODY);
         assert!(lines.len() > 1 && fonts.widest(&lines, BODY) <= 120.0);
@@ -158,7 +155,7 @@ mod tests {
 
     #[test]
     fn the_fonts_have_the_characters_of_figures() {
-        let fonts = Fonts::new().unwrap();
+        let fonts = Fonts::new();
         for character in "aZ09 äéñß αΩπσ ×÷±−≤≥≈∞√∑ ⁰¹²³⁴⁵⁶⁷⁸⁹⁻ ₀₁₉ ←→↑↓ …–—’“” °µ½ ✓✗ ●■▲".chars()
         {
             assert_ne!(fonts.regular.font.glyph_id(character).0, 0, "no {character}");

@@ -63,9 +63,6 @@ pub enum Error {
     /// A tree file that is damaged, or for another scene.
     #[error(transparent)]
     TreeFile(#[from] TreeFileError),
-    /// A figure could not be drawn.
-    #[error(transparent)]
-    Figure(#[from] figures::FigureError),
     /// `--check` found numbers that differ from the committed ones.
     #[error(
         "{differences} difference(s) from the committed results; \

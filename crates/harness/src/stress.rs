@@ -8,75 +8,41 @@ use crate::report::data::distinct;
 use crate::report::output::{Output, panel};
 use crate::rows::store::Store;
 use crate::rows::{read, to_bytes};
-use bvh_config::{Nested, config};
 use bvh_search::Method;
-use bvh_stress::{
-    CASES, Case, Cell, Class, Effort, KINDS, LargerScenes, Size, is_builder, tracing,
-};
+use bvh_stress::{CASES, Case, Cell, Class, Effort, KINDS, is_builder, tracing};
 use figures::{Axis, Layer, Marks, Panel, Unit};
 use std::path::Path;
 
 /// The name of the figure of all checks.
 pub const FIGURE: &str = "matrix";
 
-config! {
-    serde;
-    /// A measurement over the suite, selected by a spec.
-    pub struct Measure {
-        /// Every case with every method, traversal and part.
-        stability: Stability, in Nested;
-    }
-}
-
-config! {
-    serde;
-    /// Parameters of the measurement.
-    pub struct Stability {
-        /// Size of the scenes for builders.
-        builders: Size = Size::Many;
-        /// Budget of a search: nodes per object that it may make or visit.
-        work_per_object: u64 = 1000, in 1..;
-        /// Larger scenes for searches, in addition to the scenes of few objects. Default none.
-        larger_searches: Option<LargerScenes>;
-        /// Rays per scene and traversal.
-        rays: usize = 5000, in 1..=100_000_000;
-    }
-}
-
-impl Stability {
-    /// Runs the cases (all if none are named) and writes rows.
-    pub fn execute(
-        &self,
-        cases: &[String],
-        methods: &[Labelled],
-        store: &Store,
-        interrupted: &dyn Fn() -> bool,
-    ) -> Result<(), Error> {
-        let cases: Vec<&Case> = CASES
-            .iter()
-            .filter(|case| cases.is_empty() || cases.iter().any(|id| id == case.id))
-            .collect();
-        let effort = Effort {
-            builders: self.builders,
-            work_per_object: self.work_per_object,
-            larger: self.larger_searches,
-        };
-        let mut cells = Vec::new();
-        for (done, case) in cases.iter().enumerate() {
-            if interrupted() {
-                return Err(Error::Interrupted { finished: done, runs: cases.len() });
-            }
-            for Labelled { label, method, .. } in methods {
-                // Specs accept only methods of ours here.
-                let Contestant::Ours(method) = method else { continue };
-                cells.extend(case.of_method(label, method, &effort));
-            }
-            let ways = tracing::TRAVERSALS.iter();
-            cells.extend(ways.filter_map(|(name, way)| case.of_traversal(name, *way, self.rays)));
-            cells.extend(case.of_parts());
+/// Runs the cases (all if none are named) and writes rows.
+pub fn execute(
+    effort: &Effort,
+    cases: &[String],
+    methods: &[Labelled],
+    store: &Store,
+    interrupted: &dyn Fn() -> bool,
+) -> Result<(), Error> {
+    let cases: Vec<&Case> = CASES
+        .iter()
+        .filter(|case| cases.is_empty() || cases.iter().any(|id| id == case.id))
+        .collect();
+    let mut cells = Vec::new();
+    for (done, case) in cases.iter().enumerate() {
+        if interrupted() {
+            return Err(Error::Interrupted { finished: done, runs: cases.len() });
         }
-        store.write("cells.csv", &to_bytes(&cells, Path::new("cells.csv"))?)
+        for Labelled { label, method, .. } in methods {
+            // Specs accept only methods of ours here.
+            let Contestant::Ours(method) = method else { continue };
+            cells.extend(case.of_method(label, method, effort));
+        }
+        let ways = tracing::TRAVERSALS.iter();
+        cells.extend(ways.filter_map(|(name, way)| case.of_traversal(name, *way, effort.rays)));
+        cells.extend(case.of_parts());
     }
+    store.write("cells.csv", &to_bytes(&cells, Path::new("cells.csv"))?)
 }
 
 const HEADING: &str = "Stiff and extreme cases";

@@ -9,7 +9,8 @@ use bvh_core::{Aabb, cost};
 use bvh_scenes::builtin::stiff;
 use bvh_search::grasp::{self, Candidates};
 use bvh_search::{
-    Budget, Event, Method, Observer, Outcome, Problem, Search, annealing, exact, genetic, solve,
+    Budget, Event, Method, Observer, Outcome, Problem, Search, StopReason, annealing, exact,
+    genetic, solve,
 };
 use glam::Vec3;
 use std::time::{Duration, Instant};
@@ -95,11 +96,17 @@ pub fn budgets_end(method: &Method) -> Verdict {
     let one = Budget { max_evaluations: Some(1), max_work: None };
     let soon = Deadline(Some(Instant::now() + Duration::from_millis(1)));
     let free = Budget::UNLIMITED;
-    let watchers: [(Budget, &dyn Observer); 4] =
-        [(nothing, &()), (one, &()), (free, &Deadline(None)), (free, &soon)];
-    for (budget, observer) in watchers {
+    let watchers: [(Budget, &dyn Observer, Option<StopReason>); 4] = [
+        (nothing, &(), None),
+        (one, &(), None),
+        (free, &Deadline(None), Some(StopReason::Cancelled)),
+        (free, &soon, None),
+    ];
+    for (budget, observer, reason) in watchers {
         let outcome = solve(method, &Problem::new(&boxes), 1, budget, observer)?;
         check_outcome(&boxes, &outcome)?;
+        let is_reported = reason.is_none_or(|reason| outcome.stop == reason);
+        ensure!(is_reported, "cancelled, and stopped for {:?}", outcome.stop);
     }
     Ok(String::new())
 }

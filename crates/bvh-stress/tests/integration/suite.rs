@@ -3,10 +3,10 @@
 use bvh_core::{Primitives, Triangle};
 use bvh_scenes::builtin::stiff::{self, STIFF};
 use bvh_scenes::trace::{Accelerator, Structure};
-use bvh_search::{Budget, Method, Problem, StopReason, solve};
+use bvh_search::Method;
 use bvh_stress::{
-    CASES, Case, Cell, Check, Class, EXACT_OBJECTS, Effort, KINDS, LargerScenes, Size, is_builder,
-    kernels, scenes, tracing,
+    CASES, Case, Cell, Check, Class, Effort, KINDS, LargerScenes, Size, is_builder, kernels,
+    scenes, tracing,
 };
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -15,7 +15,8 @@ use std::collections::BTreeSet;
 const WORK: u64 = 150;
 
 /// The effort for every method in the quick tier.
-const QUICK: Effort = Effort { builders: Size::Few, work_per_object: WORK, larger: None };
+const QUICK: Effort =
+    Effort { builders: Size::Few, work_per_object: WORK, larger_searches: None, rays: 500 };
 
 /// Panics with all broken promises at once.
 fn assert_kept(broken: Vec<String>) {
@@ -76,10 +77,8 @@ fn every_case_holds_for_every_method() {
 #[ignore = "slow: thousands of objects for builders and searches alike"]
 fn every_case_holds_for_every_method_at_a_larger_size() {
     let larger = Some(LargerScenes { objects: 2000, work_per_object: 60 });
-    check_methods(
-        &bvh_stress::methods(),
-        Effort { builders: Size::Many, work_per_object: WORK, larger },
-    );
+    let effort = Effort { builders: Size::Many, larger_searches: larger, ..QUICK };
+    check_methods(&bvh_stress::methods(), effort);
 }
 
 #[test]
@@ -94,7 +93,9 @@ fn every_scene_holds_for_every_builder_at_its_full_size() {
 #[test]
 fn every_traversal_answers_as_brute_force_on_every_scene() {
     let cells = CASES.par_iter().flat_map_iter(|case| {
-        tracing::TRAVERSALS.iter().filter_map(|&(name, way)| case.of_traversal(name, way, 500))
+        tracing::TRAVERSALS
+            .iter()
+            .filter_map(|&(name, way)| case.of_traversal(name, way, QUICK.rays))
     });
     assert_kept(cells.filter_map(broken).collect());
 }
@@ -180,20 +181,4 @@ fn the_rays_of_the_suite_hit_miss_and_cover_every_kind() {
         rays.iter().any(|ray| ray.t_min() > ray.t_max())
             && rays.iter().any(|ray| ray.t_min() == ray.t_max())
     );
-}
-
-#[test]
-fn a_cancelled_method_reports_it() {
-    struct Impatient;
-    impl bvh_search::Observer for Impatient {
-        fn cancelled(&self) -> bool {
-            true
-        }
-    }
-    let boxes = stiff::boxes(&stiff::uniform(EXACT_OBJECTS));
-    for (label, method) in bvh_stress::methods() {
-        let cancelled =
-            solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &Impatient).unwrap();
-        assert_eq!(cancelled.stop, StopReason::Cancelled, "{label}");
-    }
 }

@@ -159,8 +159,7 @@ fn scoreboard(sections: &[Section]) -> Markup {
 
 /// An experiment with all that belongs to it.
 fn experiment(section: &Section) -> Markup {
-    let Provenance { command, revision, rustc, cpu, threads, date, parts, .. } =
-        &section.provenance;
+    let Provenance { command, revision, rustc, cpu, threads, date, .. } = &section.provenance;
     html! {
         section id=(in_url(&section.name)) {
             h2 { (section.question) }
@@ -181,7 +180,6 @@ fn experiment(section: &Section) -> Markup {
             p.files {
                 code { (command) } ", revision " (revision) ", " (rustc) ", " (cpu) ", "
                 (threads) " thread(s), " (date)
-                @if !parts.is_empty() { ", merged from " (parts.len()) " parts" }
             }
         }
     }

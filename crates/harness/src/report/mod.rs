@@ -16,14 +16,12 @@ pub mod overview;
 pub mod paper;
 mod prelude;
 pub mod query;
-mod query_check;
 mod query_column;
 mod query_figure;
 pub mod query_measure;
 pub mod query_report;
 mod ray_cost;
 pub mod table;
-mod table_paper;
 pub mod trials;
 
 use crate::Error;

@@ -43,7 +43,7 @@ impl Output {
     /// Writes the figures into the store's folder, as SVG.
     pub fn draw(&self, store: &Store) -> Result<(), Error> {
         for (name, figure) in &self.figures {
-            store.write(&format!("{name}.svg"), figures::svg(figure)?.as_bytes())?;
+            store.write(&format!("{name}.svg"), figures::svg(figure).as_bytes())?;
         }
         Ok(())
     }

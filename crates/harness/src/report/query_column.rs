@@ -74,11 +74,8 @@ pub(super) struct Group<'r> {
     pub base: Vec<&'r Row>,
 }
 
-/// A quotient with the ends of its interval.
-struct Compared {
-    value: Option<f64>,
-    interval: Option<(f64, f64)>,
-}
+/// A quotient, and the ends of its interval.
+type Compared = (Option<f64>, Option<(f64, f64)>);
 
 impl Column {
     /// Computes the value of a group of one row, for its errors alone.
@@ -109,8 +106,8 @@ impl Column {
             return Ok(());
         }
         let measure = Measure::parse(&self.value)?;
-        let Compared { value, interval } = match self.ratio {
-            None => Compared { value: measure.of_rows(&group.rows)?, interval: None },
+        let (value, interval) = match self.ratio {
+            None => (measure.of_rows(&group.rows)?, None),
             Some(ratio) => self.quotient(group, &measure, ratio)?,
         };
         row.insert(self.name.clone(), text_of(value));
@@ -153,7 +150,7 @@ impl Column {
                 let ends = [ratio.of(own.0, base.1), ratio.of(own.1, base.0)];
                 (ends[0].min(ends[1]), ends[0].max(ends[1]))
             });
-            return Ok(Compared { value, interval });
+            return Ok((value, interval));
         }
         let mut quotients = Vec::new();
         for row in &group.rows {
@@ -170,7 +167,7 @@ impl Column {
         let value = measure.of_values(&quotients)?;
         // Fewer than six pairs enclose the median with a lower probability.
         let interval = median_interval(&quotients).filter(|_| quotients.len() >= 6);
-        Ok(Compared { value, interval })
+        Ok((value, interval))
     }
 }
 

@@ -1,10 +1,12 @@
 //! Tables of the paper: ratios to base, scenes by columns, with the paper's ratios.
 
 use super::config::Labels;
+use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
 use crate::statistics::best_of::predicted_best;
 use crate::statistics::{expected_best_of, median, minimum, range};
 use bvh_config::{Accepts, Nested, above};
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 bvh_config::config! { serde;
@@ -59,24 +61,24 @@ impl Column {
 /// One cell, as written to `table.csv`.
 #[derive(Serialize)]
 pub(super) struct Cell<'a> {
-    pub scene: &'a str,
-    pub scene_kind: &'a str,
+    scene: &'a str,
+    scene_kind: &'a str,
     /// Name of the table's column.
-    pub column: &'a str,
-    pub method: &'a str,
+    column: &'a str,
+    method: &'a str,
     /// Trials of which the best counts; empty for runs as a whole.
-    pub best_of: Option<usize>,
-    pub cost_over_base: f64,
+    best_of: Option<usize>,
+    cost_over_base: f64,
     /// Expected best of `best_of` trials, from all trials run.
-    pub expected_over_base: Option<f64>,
+    expected_over_base: Option<f64>,
     /// Lower end of the interval that has the best of as many new trials in at least nine of ten
     /// repetitions, predicted from the order statistics of all trials, or from an exponential tail
     /// below the lowest. For full runs, the lowest of the repetitions.
-    pub low_over_base: Option<f64>,
+    low_over_base: Option<f64>,
     /// Upper end of this interval.
-    pub high_over_base: Option<f64>,
+    high_over_base: Option<f64>,
     /// The paper's ratio, where it has one.
-    pub paper_over_base: Option<f64>,
+    paper_over_base: Option<f64>,
 }
 
 impl Config {
@@ -191,18 +193,98 @@ impl Config {
 type Interval = Option<(f64, f64)>;
 
 /// Returns the cells of a column.
-pub(super) fn of_column<'c, 'a>(
-    cells: &'c [Cell<'a>],
-    column: &Column,
-) -> impl Iterator<Item = &'c Cell<'a>> {
+fn of_column<'c, 'a>(cells: &'c [Cell<'a>], column: &Column) -> impl Iterator<Item = &'c Cell<'a>> {
     cells.iter().filter(|cell| cell.column == column.name)
+}
+
+impl Config {
+    /// Compares a number of the paper with ours.
+    fn compare(&self, rows: &Rows, column: &Column, cell: &Cell) -> Option<PaperRow> {
+        let paper = cell.paper_over_base?;
+        let ours = cell.cost_over_base;
+        let quantity = format!("{}, cost over base", column.name);
+        let row = PaperRow::new(&self.source, rows.shown(cell.scene), quantity, &column.reason);
+        let interval = cell.low_over_base.zip(cell.high_over_base);
+        Some(row.compare_ratios(paper, ours, interval, self.tolerance))
+    }
+
+    /// Compares a number of the paper with the closest of the columns that read it in different
+    /// ways.
+    fn compare_readings(&self, rows: &Rows, scene: &str, cells: &[Cell]) -> Option<PaperRow> {
+        let distance = |cell: &&Cell| {
+            cell.paper_over_base.map(|paper| (cell.cost_over_base / paper).ln().abs())
+        };
+        let base = &self.columns.first()?.name;
+        let read = cells.iter().filter(|cell| {
+            cell.scene == scene && cell.column != base && cell.paper_over_base.is_some()
+        });
+        let closest =
+            read.min_by(|a, b| distance(a).partial_cmp(&distance(b)).unwrap_or(Ordering::Equal))?;
+        let paper = closest.paper_over_base?;
+        // The paper prints no formula, so the closest reading is the most favourable to it.
+        let close = is_close(closest, self.tolerance);
+        let column = self.columns.iter().find(|column| column.name == closest.column)?;
+        let row = PaperRow::new(
+            &self.source,
+            rows.shown(scene),
+            "cost over base, the closest reading",
+            &column.reason,
+        );
+        let row = row.compare(
+            format!("{paper:.4}"),
+            format!("{:.4}, by {}", closest.cost_over_base, closest.column),
+            if close { Verdict::Inconclusive } else { Verdict::Differs },
+            format!(
+                "differs if no reading is within {} % of the paper's; the paper prints no formula, so that a reading which is within cannot \
+                 be distinguished from the paper's",
+                100.0 * self.tolerance
+            ),
+        );
+        Some(PaperRow {
+            paper_over_base: Some(paper),
+            ours_over_base: Some(closest.cost_over_base),
+            ..row
+        })
+    }
+
+    /// Returns true if all columns except the base are readings of one column of the paper.
+    fn are_readings(&self) -> bool {
+        let mut others = self.columns.iter().skip(1);
+        match others.next() {
+            Some(first) => {
+                !first.paper.is_empty()
+                    && others.len() > 0
+                    && others.all(|column| column.paper == first.paper)
+            }
+            None => false,
+        }
+    }
+
+    /// Returns the rows of `paper.csv`, one for each number of the paper.
+    fn compare_all(&self, rows: &Rows, cells: &[Cell]) -> Vec<PaperRow> {
+        if self.are_readings() {
+            let scenes = rows.scenes().into_iter();
+            return scenes.filter_map(|scene| self.compare_readings(rows, scene, cells)).collect();
+        }
+        let mut compared = Vec::new();
+        for column in self.columns.iter().skip(1) {
+            compared.extend(
+                of_column(cells, column).filter_map(|cell| self.compare(rows, column, cell)),
+            );
+        }
+        compared
+    }
+}
+
+/// Returns true if the ratio is within the tolerance of the paper's.
+fn is_close(cell: &Cell, tolerance: f64) -> bool {
+    cell.paper_over_base.is_some_and(|paper| (cell.cost_over_base / paper - 1.0).abs() <= tolerance)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::report::data::run;
-    use crate::report::paper::Verdict;
     use crate::rows::RunRow;
 
     /// Rows of methods by their costs over base.

@@ -1,19 +1,28 @@
 //! The rows of one finished run, and the file in which a run is kept.
 
 use super::csv_file::{Row, parse, to_bytes};
+use crate::processor::PROCESSOR;
 use crate::{Error, files};
 use bvh_scenes::{files::read_text, fnv1a};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The rows of one finished run: one CSV file for every kind of rows that it has.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FinishedRun {
+    /// The processor that performed it.
+    pub(super) processor: String,
     /// The texts of the files by their names.
     pub(super) files: BTreeMap<String, String>,
 }
 
 impl FinishedRun {
+    /// Makes a run of this processor without rows.
+    pub fn here() -> Self {
+        Self { processor: PROCESSOR.name(), files: BTreeMap::new() }
+    }
+
     /// Adds rows of one kind, once per kind. An empty slice adds no file.
     pub fn add<R: Row>(&mut self, rows: &[R]) -> Result<(), Error> {
         if !rows.is_empty() {
@@ -37,18 +46,17 @@ impl FinishedRun {
     pub fn read(path: &Path) -> Result<Self, Error> {
         let damaged = || Error::Damaged(path.to_owned());
         let text = read_text(path).map_err(|_| damaged())?;
-        let (sum, files) = text.split_once('\n').ok_or_else(damaged)?;
-        if sum != checksum(files) {
+        let (sum, run) = text.split_once('\n').ok_or_else(damaged)?;
+        if sum != checksum(run) {
             return Err(damaged());
         }
-        let files = serde_json::from_str(files).map_err(|_| damaged())?;
-        Ok(Self { files })
+        serde_json::from_str(run).map_err(|_| damaged())
     }
 
     /// Writes the run whole or not at all, and waits until it is on the disk.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
-        let files = serde_json::json!(self.files).to_string();
-        let text = format!("{}\n{files}", checksum(&files));
+        let run = serde_json::json!(self).to_string();
+        let text = format!("{}\n{run}", checksum(&run));
         Ok(files::write(path, text.as_bytes())?)
     }
 

@@ -12,7 +12,7 @@ use super::{Row, to_bytes};
 use crate::Error;
 use crate::files;
 use bvh_scenes::files::{ReadError, read_text};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
@@ -170,11 +170,15 @@ impl Store {
         Ok(())
     }
 
-    /// Joins the CSV files of runs 0 to `runs` − 1, which have been kept, in this order.
-    pub fn join(&self, runs: usize) -> Result<(), Error> {
+    /// Joins the CSV files of runs 0 to `runs` − 1, which have been kept, in this order. Returns the
+    /// names of the processors that performed them.
+    pub fn join(&self, runs: usize) -> Result<BTreeSet<String>, Error> {
         let mut joined: BTreeMap<String, String> = BTreeMap::new();
+        let mut processors = BTreeSet::new();
         for index in 0..runs {
-            for (name, text) in FinishedRun::read(&self.run_file(index))?.files {
+            let run = FinishedRun::read(&self.run_file(index))?;
+            processors.insert(run.processor);
+            for (name, text) in run.files {
                 match joined.get_mut(&name) {
                     // All runs have the same header, which would be a row in the middle of the file.
                     Some(rows) => *rows += text.split_once('\n').map_or("", |(_, rows)| rows),
@@ -185,7 +189,7 @@ impl Store {
         for (name, text) in joined {
             self.write(&name, text.as_bytes())?;
         }
-        Ok(())
+        Ok(processors)
     }
 
     /// Writes the file of one kind of rows.
@@ -238,7 +242,7 @@ mod tests {
 
     fn run<const N: usize>(files: [(&str, &str); N]) -> FinishedRun {
         let files = files.map(|(name, text)| (name.to_owned(), text.to_owned()));
-        FinishedRun { files: files.into() }
+        FinishedRun { files: files.into(), ..FinishedRun::here() }
     }
 
     #[test]

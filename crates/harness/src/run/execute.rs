@@ -3,13 +3,13 @@
 use super::finish::{Summary, conclude};
 use super::job::Job;
 use super::perform::Watch;
-use super::provenance::Provenance;
 use super::resolved::{Resolved, load_scenes, to_toml};
 use super::runs::{self, Trees, Work};
 use super::{ray_cost, trace};
 use crate::Error;
 use crate::rows::store::{Existing, Store, is_unfinished};
 use crate::spec::Experiment;
+use crate::stress;
 use bvh_scenes::files::read_text;
 use bvh_search::Observer;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -93,19 +93,12 @@ fn run(
     }
     let store = Store::open(&folder, &to_toml(&resolved)?, existing)?;
     let runs = jobs.len();
-    if is_part {
-        // Before the runs, because a killed part may be resumed on another machine.
-        Provenance::add_to_part(&folder)?;
-    }
     let mut remarks: Vec<String> = scenes.iter().filter_map(|scene| scene.remark.clone()).collect();
     // The subsets of one mesh share its remark.
     remarks.dedup();
-    let mut provenance = Provenance::gather();
     for part in &parts {
         store.adopt(part, runs)?;
-        provenance.parts.extend(Provenance::of_part(part)?);
     }
-    remarks.extend(provenance.unlike_processors());
     let mut work = Work {
         experiment,
         jobs: &jobs,
@@ -116,9 +109,9 @@ fn run(
         remarks,
     };
     let mut text = String::new();
-    if let Some(suite) = &experiment.suite {
+    if let Some(effort) = &experiment.suite {
         let cancelled = || work.watch.cancelled();
-        suite.stability.execute(&experiment.scenes, &experiment.methods, &store, &cancelled)?;
+        stress::execute(effort, &experiment.scenes, &experiment.methods, &store, &cancelled)?;
     } else {
         runs::measure(&mut work)?;
         if let Some(config) = &experiment.tracing {
@@ -128,12 +121,14 @@ fn run(
             ray_cost::measure(config, &mut work)?;
         }
     }
-    let remarks = work.remarks;
+    let mut remarks = work.remarks;
     if is_part {
         let text = format!("{runs} runs; `harness merge` joins the parts.\n");
         return Ok(Summary { text, skipped_scenes, remarks, folder });
     }
-    let text = conclude(&resolved, out, &provenance, store)? + &text;
+    let (tables, remark) = conclude(&resolved, out, store)?;
+    let text = tables + &text;
+    remarks.extend(remark);
     Ok(Summary { text, skipped_scenes, remarks, folder })
 }
 

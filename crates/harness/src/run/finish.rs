@@ -35,23 +35,27 @@ impl Summary {
     }
 }
 
-/// Joins the kept runs and makes the reports of results in `out`. Returns the text for the terminal.
+/// Joins the kept runs and makes the reports of results in `out`. Returns the text for the terminal,
+/// and a remark if the seconds come from processors of several models.
 pub(crate) fn conclude(
     resolved: &Resolved,
     out: &Path,
-    provenance: &Provenance,
     store: Store,
-) -> Result<String, Error> {
-    store.join(resolved.run_count())?;
-    let text = report(resolved, out, provenance, &store);
+) -> Result<(String, Option<String>), Error> {
+    let processors = store.join(resolved.run_count())?;
+    let are_unlike = processors.len() > 1;
+    let provenance = Provenance::gather(processors);
+    let text = report(resolved, out, &provenance, &store);
     // A mistake in a report must not cost the runs: `--redraw` makes the reports again.
     if matches!(text, Ok(_) | Err(Error::Query { .. })) {
         store.write("resolved.toml", to_toml(resolved)?.as_bytes())?;
         // Provenance comes last, so that it describes results that are complete.
-        store.write("provenance.toml", to_toml(provenance)?.as_bytes())?;
+        store.write("provenance.toml", to_toml(&provenance)?.as_bytes())?;
         store.finish()?;
     }
-    text
+    let cpu = provenance.cpu;
+    let remark = are_unlike.then(|| format!("the seconds come from unlike processors: {cpu}"));
+    Ok((text?, remark))
 }
 
 /// Improves the best known costs and makes the reports of joined rows. Returns the text for the

@@ -54,7 +54,7 @@ pub(crate) fn perform(
     })?;
     let solved = Solved { experiment, job, seed, outcome: &outcome, seconds };
     let run = solved.run_row();
-    let mut finished = FinishedRun::default();
+    let mut finished = FinishedRun::here();
     let bounds = if job.first_of_scene { bound(experiment, scene, watch)? } else { None };
     let (renders, render_times) = match &experiment.render {
         Some(config) => config.measure(scene, &outcome.tree, &run, seconds, job.first_of_scene)?,

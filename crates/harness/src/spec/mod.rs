@@ -14,13 +14,11 @@ use crate::measure::picture;
 use crate::measure::ray_cost;
 use crate::processor::PROCESSOR;
 use crate::report::Report;
-use crate::stress;
 use bvh_config::{Nested, config};
 use bvh_core::cost::Objective;
 use bvh_scenes::fnv1a;
 use bvh_scenes::rays::RandomRays;
 use bvh_search::Budget;
-pub use name::Name;
 pub use read::Overrides;
 pub use schema::schema;
 use std::path::{Path, PathBuf};
@@ -34,14 +32,15 @@ config! {
     /// out, it is `resolved.toml`.
     pub struct Experiment {
         /// Name of the results folder, from the spec's file.
-        name: Name;
+        #[serde(deserialize_with = "name::read")]
+        name: String;
         /// True for the smaller variant of `--quick`.
         #[serde(skip_serializing_if = "std::ops::Not::not")]
         quick: bool;
         /// The question that the experiment answers, for its readers.
         question: String;
         /// A measurement over the suite of stiff cases instead of runs on scenes.
-        suite: Option<stress::Measure>, in Nested;
+        suite: Option<bvh_stress::Effort>, in Nested;
         /// Names or paths of the scenes; `A..B` after a colon means all numbers from A to B. With
         /// `suite`, names of cases, none for all.
         scenes: Vec<String>;

@@ -1,6 +1,6 @@
 //! Reads a spec's text, with the overrides of the command line, into a checked [`Experiment`].
 
-use super::{Experiment, Labelled, Name};
+use super::{Experiment, Labelled, name};
 use crate::Error;
 use crate::peers;
 use crate::report::Report;
@@ -61,7 +61,7 @@ impl Experiment {
         Ok(experiment)
     }
 
-    fn from_table(mut table: Table, name: Name, overrides: &Overrides) -> Result<Self, Fault> {
+    fn from_table(mut table: Table, name: String, overrides: &Overrides) -> Result<Self, Fault> {
         check_numbers(&table, "")?;
         match table.remove("quick") {
             Some(Value::Table(quick)) if overrides.quick => replace(&mut table, quick),
@@ -80,7 +80,7 @@ impl Experiment {
             fault::tagged(table, "kind", |kind, config| Report::read(kind, config), accepted)
         })?;
         let mut experiment: Self = fault::deserialize(table)?;
-        if experiment.name != Name::default() {
+        if !experiment.name.is_empty() {
             return Err(Fault::new("name", experiment.name, "none, the file's name is used"));
         }
         experiment.name = name;
@@ -109,9 +109,10 @@ impl Experiment {
     }
 }
 
-fn name_of(path: &Path) -> Result<Name, String> {
+fn name_of(path: &Path) -> Result<String, String> {
     let stem = path.file_stem().and_then(OsStr::to_str).ok_or("no UTF-8")?;
-    Name::try_from(stem.to_owned())
+    name::check(stem)?;
+    Ok(stem.to_owned())
 }
 
 /// Returns true if a scene is a mesh file; plain words are names.

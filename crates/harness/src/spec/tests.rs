@@ -72,10 +72,20 @@ const WRONG_METHODS: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// Scenes of a spec, and the parts of the error.
-const WRONG_SCENES: &[(&str, &[&str])] = &[
-    ("a:0..9999:0..99999:0..4294967295", &["scenes", "4294967296000000000 runs"]),
-    ("a:5..4", &["scenes", "a:5..4", "A up to B"]),
+/// Replacements in [`GOOD`], and the parts of the error.
+const WRONG_PARTS: &[(&str, &str, &[&str])] = &[
+    ("escher", "a:0..9999:0..99999:0..4294967295", &["scenes", "4294967296000000000 runs"]),
+    ("escher", "a:5..4", &["scenes", "a:5..4", "A up to B"]),
+    (
+        "}]",
+        "},\n{ method = 'grasp' }]",
+        &["line 4: methods[1].label is \"grasp\" for the second time", "unique labels"],
+    ),
+    (
+        "}]",
+        "}]\n[[reports]]\nkind = 'numbers'\nmethods = ['grasp', 'a']",
+        &["line 6: reports[0].methods[1] is \"a\"", "accepted: grasp"],
+    ),
 ];
 
 #[test]
@@ -87,8 +97,8 @@ fn errors_name_wrong_keys_and_the_accepted_values() {
         let text = format!("question = 'q'\nscenes = ['escher']\nmethods = {methods}\n");
         assert_rejected(&text, parts);
     }
-    for (scene, parts) in WRONG_SCENES {
-        assert_rejected(&GOOD.replace("escher", scene), parts);
+    for (from, to, parts) in WRONG_PARTS {
+        assert_rejected(&GOOD.replace(from, to), parts);
     }
 }
 
@@ -112,18 +122,19 @@ fn another_library_is_refused_with_the_command_that_contains_it() {
 }
 
 #[test]
-fn quick_rejects_infinity_too() {
-    let text = format!("{GOOD}[quick]\nobjective = {{ sah = {{ traversal = inf }} }}\n");
-    let error = read_quick(&text).unwrap_err().to_string();
-    assert!(error.contains("quick.objective.sah.traversal is inf"), "{error}");
-}
-
-#[test]
 fn quick_replaces_keys_and_has_a_separate_folder() {
     let text = format!("{GOOD}repetitions = 5\n[quick]\nrepetitions = 2\n");
     let quick = read_quick(&text).unwrap();
     assert_eq!((quick.repetitions, quick.folder()), (2, "quick/spec".into()));
     assert_eq!(read(&text).unwrap().repetitions, 5);
+    let infinite = text.replace("repetitions = 2", "objective = { sah = { traversal = inf } }");
+    for (text, part) in [
+        (&*infinite, "quick.objective.sah.traversal is inf"),
+        (GOOD, "quick is missing; accepted: with --quick"),
+    ] {
+        let error = read_quick(text).unwrap_err();
+        assert!(error.contains(part), "{error}");
+    }
 }
 
 #[test]
@@ -159,19 +170,6 @@ fn seeds_differ_between_runs_and_depend_only_on_the_spec() {
 }
 
 #[test]
-fn labels_are_unique_and_reports_name_labels_of_methods() {
-    let text = "question = 'q'\nscenes = ['escher']\n[[methods]]\nmethod = 'grasp'\n";
-    assert_rejected(
-        &format!("{text}[[methods]]\nmethod = 'grasp'\n"),
-        &["line 5: methods[1].label is \"grasp\" for the second time"],
-    );
-    assert_rejected(
-        &format!("{text}[[reports]]\nkind = 'numbers'\nmethods = ['grasp', 'a']\n"),
-        &["line 7: reports[0].methods[1] is \"a\"", "accepted: grasp"],
-    );
-}
-
-#[test]
 fn a_search_without_a_limit_is_rejected() {
     let endless = "question = 'q'\nscenes = ['escher']\nREST\n\
                    methods = [{ method = 'grasp' }, { method = 'best'KEYS }]\n";
@@ -188,13 +186,6 @@ fn a_search_without_a_limit_is_rejected() {
         let text = endless.replace("REST", rest).replace("KEYS", keys);
         assert_eq!(read(&text).err(), None, "{text}");
     }
-}
-
-#[test]
-fn quick_is_rejected_without_its_table() {
-    let text = "question = 'q'\nscenes = ['escher']\n[[methods]]\nmethod = 'median_cut'\n";
-    let message = read_quick(text).unwrap_err();
-    assert!(message.contains("quick is missing") && message.contains("--quick"), "{message}");
 }
 
 #[test]

@@ -149,8 +149,11 @@ fn mistakes_are_named_before_any_work() {
         ("nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n"),
         ("empty.obj", ""),
         ("file", ""),
+        ("other/spec.toml", TABLE),
     ] {
-        fs::write(folder.path().join(name), text).unwrap();
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
     }
     for (args, parts) in [
         (&["missing.toml"][..], &["missing.toml"][..]),
@@ -163,6 +166,8 @@ fn mistakes_are_named_before_any_work() {
         (&["spec.toml", "--sed", "1"], &["--sed", "--seed"]),
         (&["spec.toml", "--out", "file"], &["--out", "file is a file", "a folder"]),
         (&["spec.toml", "--check", "--resume"], &["--check", "--resume"]),
+        (&["spec.toml", "other/spec.toml"], &["two specs are called spec"]),
+        (&["report"], &["--results", "results is no folder"]),
         (&[], &["Usage"]),
     ] {
         refused(folder.path(), args, 2, parts);

@@ -23,7 +23,7 @@ const SUITE: &str = "
 question = 'q'
 scenes = ['S01']
 methods = [{ method = 'median_cut' }]
-[suite.stability]
+[suite]
 builders = 'few'
 work_per_object = 1
 larger_searches = { objects = 0, work_per_object = 1 }
@@ -47,15 +47,6 @@ fn a_spec_whose_name_would_lead_elsewhere_is_rejected() {
         refused(folder.path(), &[spec, "--out", "out/below"], &[spec, "do not begin with a dot"]);
         assert_eq!(names(folder.path()), [spec]);
     }
-}
-
-#[test]
-fn two_specs_with_one_name_in_one_command_are_rejected_before_the_work() {
-    let folder = folder("spec.toml");
-    fs::create_dir(folder.path().join("other")).unwrap();
-    fs::write(folder.path().join("other/spec.toml"), SPEC).unwrap();
-    refused(folder.path(), &["spec.toml", "other/spec.toml"], &["two specs are called spec"]);
-    assert!(!folder.path().join("results").exists());
 }
 
 #[test]
@@ -102,13 +93,6 @@ fn resuming_what_is_finished_does_nothing() {
     fs::write(dir.join("suite.toml"), SUITE).unwrap();
     said(dir, &["suite.toml"]);
     assert!(said(dir, &["suite.toml", "--resume"]).contains("nothing was done"));
-}
-
-#[test]
-fn a_missing_folder_is_named_before_the_work() {
-    let folder = folder("spec.toml");
-    refused(folder.path(), &["report"], &["--results", "results is no folder"]);
-    assert_eq!(names(folder.path()), ["spec.toml"]);
 }
 
 /// Returns the names of the runs that the results of an interrupted experiment keep.
