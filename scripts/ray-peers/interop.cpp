@@ -10,6 +10,7 @@
 #define TINYBVH_IMPLEMENTATION
 #include "load_madmann91.h"
 #include "load_tinybvh.h"
+#include "ray_triangle.h"
 
 #include <bvh/v2/default_builder.h>
 #include <bvh/v2/stack.h>
@@ -68,6 +69,8 @@ struct Counted {
     std::vector<Part> parts;
     const uint32_t *ids;
     bool is_wide;
+    /// Whether queries for any hit visit children in their order.
+    bool any_in_order = false;
 };
 
 Counted counted(const Node *nodes, size_t count, const uint32_t *ids) {
@@ -91,28 +94,8 @@ template <int M> Counted counted(const tinybvh::MBVH<M> &wide) {
     return tree;
 }
 
-/// Möller & Trumbore 1997 in double precision: the same on every machine.
-double meets(const Ray &ray, const float *corner) {
-    double edge[2][3], from[3], across[3], around[3], det = 0, u = 0, v = 0, t = 0;
-    for (int i = 0; i < 3; i++) {
-        edge[0][i] = double(corner[3 + i]) - corner[i], edge[1][i] = double(corner[6 + i]) - corner[i];
-        from[i] = double(ray.origin[i]) - corner[i];
-    }
-    for (int i = 0; i < 3; i++) {
-        int j = (i + 1) % 3, k = (i + 2) % 3;
-        across[i] = ray.direction[j] * edge[1][k] - ray.direction[k] * edge[1][j];
-        around[i] = from[j] * edge[0][k] - from[k] * edge[0][j];
-    }
-    for (int i = 0; i < 3; i++) {
-        det += edge[0][i] * across[i], u += from[i] * across[i];
-        v += ray.direction[i] * around[i], t += edge[1][i] * around[i];
-    }
-    u /= det, v /= det, t /= det;
-    return det != 0 && u >= 0 && v >= 0 && u + v <= 1 && t >= ray.t_min ? t : INFINITY;
-}
-
 /// Counts boxes of a binary tree and triangles, or nodes of a wide tree and blocks of up to four triangles. Visits the nearer
-/// children first, as the libraries do.
+/// children first, or children in their order, as the libraries do.
 void count(const Counted &tree, const std::vector<float> &corners, const Ray &ray, bool any, uint64_t (&sums)[3]) {
     double nearest = ray.t_max;
     auto enters = [&](uint32_t index) {
@@ -135,7 +118,7 @@ void count(const Counted &tree, const std::vector<float> &corners, const Ray &ra
         if (part.count > 0) {
             sums[2] += tree.is_wide ? (part.count + 3) / 4 : 0;
             for (uint32_t i = 0; i < part.count && !(any && is_hit); i++) {
-                double t = meets(ray, &corners[9 * size_t(tree.ids[part.first + i])]);
+                double t = ray_triangle(ray.origin, ray.direction, ray.t_min, &corners[9 * size_t(tree.ids[part.first + i])]);
                 sums[2] += !tree.is_wide;
                 if (t < nearest) is_hit = true, nearest = t;
             }
@@ -145,7 +128,8 @@ void count(const Counted &tree, const std::vector<float> &corners, const Ray &ra
         hit.clear();
         for (uint32_t child : part.children)
             if (double at = enters(child); at < INFINITY) hit.push_back({at, child});
-        std::stable_sort(hit.begin(), hit.end(), [](auto &a, auto &b) { return a.first > b.first; });
+        if (any && tree.any_in_order) std::reverse(hit.begin(), hit.end());
+        else std::stable_sort(hit.begin(), hit.end(), [](auto &a, auto &b) { return a.first > b.first; });
         open.insert(open.end(), hit.begin(), hit.end());
     }
     sums[0] += is_hit;
@@ -265,6 +249,7 @@ void add_madmann91(Scene &scene, const std::string &name, const Bvh &tree) {
         return Result{hits, now() - start};
     };
     scene.trees.push_back({"madmann91-bvh", name, trace, counted(nodes->data(), nodes->size(), ids->data()), true});
+    scene.trees.back().counted.any_in_order = true;
 }
 
 /// Builds madmann91's tree at its highest quality, which is its default.

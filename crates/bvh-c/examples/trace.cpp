@@ -1,6 +1,7 @@
 // Finds a tree in a moment, traces its nodes as tinybvh does, and compares every hit with the library's own tracer.
 
 #include "bvh.h"
+#include "ray_triangle.h"
 
 #include <algorithm>
 #include <atomic>
@@ -43,27 +44,6 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// The distance at which a ray meets a triangle, infinity if it does not (Möller & Trumbore 1997).
-float triangle(const BvhRay &ray, const float *corner) {
-    double edge[2][3], from[3], across[3], around[3], det = 0, u = 0, v = 0, t = 0;
-    for (int i = 0; i < 3; i++) {
-        edge[0][i] = double(corner[3 + i]) - corner[i], edge[1][i] = double(corner[6 + i]) - corner[i];
-        from[i] = double(ray.origin[i]) - corner[i];
-    }
-    for (int i = 0; i < 3; i++) {
-        int j = (i + 1) % 3, k = (i + 2) % 3;
-        across[i] = ray.direction[j] * edge[1][k] - ray.direction[k] * edge[1][j];
-        around[i] = from[j] * edge[0][k] - from[k] * edge[0][j];
-    }
-    for (int i = 0; i < 3; i++) {
-        det += edge[0][i] * across[i], u += from[i] * across[i];
-        v += ray.direction[i] * around[i], t += edge[1][i] * around[i];
-    }
-    u /= det, v /= det, t /= det;
-    bool hit = det != 0 && u >= 0 && v >= 0 && u + v <= 1 && t >= ray.t_min && t <= ray.t_max;
-    return hit ? float(t) : INFINITY;
-}
-
 /// Where a ray enters a box before `nearest`, infinity if it does not.
 float enters(const WaldNode &node, const BvhRay &ray, float nearest) {
     float low = ray.t_min, high = std::min(ray.t_max, nearest);
@@ -83,7 +63,8 @@ BvhHit nearest_in(const WaldNode *nodes, const uint32_t *ids, const float *corne
         if (enters(node, ray, hit.t) == INFINITY) continue;
         for (uint32_t i = 0; i < node.triCount; i++) {
             uint32_t id = ids[node.leftFirst + i];
-            float t = triangle(ray, corners + 9 * id);
+            float t = float(ray_triangle(ray.origin, ray.direction, ray.t_min, corners + 9 * id));
+            if (std::isinf(t) || t > ray.t_max) continue;
             if (t < hit.t || (t == hit.t && id < hit.object)) hit = {t, id};
         }
         if (node.triCount > 0) continue;
