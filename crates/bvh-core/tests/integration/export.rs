@@ -194,6 +194,9 @@ fn a_fitted_tree_has_what_the_tracer_accepts_and_traces_the_same_hits() {
             for node in &fitted.nodes {
                 assert!(node.prims().len() <= target.most_objects as usize);
                 assert!(node.is_leaf() || node.children().len() == 2);
+                let areas =
+                    fitted.nodes[node.children()].iter().map(|child| child.aabb.half_area());
+                assert!(areas.is_sorted_by(|first, second| first >= second), "{target:?}");
             }
             // A tree that is accepted as it is never becomes dearer.
             let binary = Bvh::from_first_count(&tree.to_first_count(), &tree.prim_ids).unwrap();
