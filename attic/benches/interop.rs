@@ -21,7 +21,7 @@ use bvh_scenes::{Scene, SceneKind, files, trace::Query};
 use bvh_search::{Bake, Budget};
 use glam::{DVec3, UVec2, Vec3, dvec3};
 use harness::processor::PROCESSOR;
-use harness::statistics::quantile;
+use harness::statistics::{geometric_mean, quantile};
 use libm::{cos, sin};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
@@ -111,12 +111,24 @@ fn main() {
             compare(name, &measured, &mut gains, &mut speeds, &mut of_buildings);
         }
     }
-    // Without the trees that a library can trace in one of the scenes only.
-    of_buildings.retain(|_, [_, count]| *count == 2.0);
-    for ((Case { tracer, rays, tree }, over), [sum, count]) in &of_buildings {
-        let mean = f64::exp(sum / count);
-        println!("{BUILDINGS:18} {tracer:16} {rays:10} {tree:8}  tests {mean:.2} over {over}");
-        gains += &format!("{tracer},{BUILDINGS},{rays},{tree},{over},{mean:.4}\n");
+    let processor = PROCESSOR.name();
+    for ((Case { tracer, rays, tree }, over), Ratios { tests, speeds: of_scenes }) in &of_buildings {
+        let line = format!("{BUILDINGS:18} {tracer:16} {rays:10} {tree:8}");
+        // Without the trees that a library can trace in one of the scenes only.
+        if let [_, _] = tests[..] {
+            let mean = geometric_mean(tests);
+            println!("{line}  tests {mean:.2} over {over}");
+            gains += &format!("{tracer},{BUILDINGS},{rays},{tree},{over},{mean:.4}\n");
+        }
+        if let [one, other] = of_scenes[..] {
+            let mean = |of: usize| geometric_mean(&[one[of], other[of]]);
+            let [low, middle, high] = [0, 1, 2].map(mean);
+            println!("{line}  speed {middle:.2} [{low:.2}, {high:.2}] over {over}");
+            speeds += &format!(
+                "{tracer},\"{processor}\",{BUILDINGS},{rays},{RAYS},{ROUNDS},{tree},{over},,\
+                 {middle:.4},{low:.4},{high:.4}\n"
+            );
+        }
     }
     if only.is_empty() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../results/interop");
@@ -130,6 +142,14 @@ fn main() {
     }
 }
 
+/// A searched tree over a tracer's own, one for each building: tests, and the low end, the median
+/// and the high end of speeds.
+#[derive(Default)]
+struct Ratios {
+    tests: Vec<f64>,
+    speeds: Vec<[f64; 3]>,
+}
+
 /// Compares the searched trees of a scene with the best of each tracer's own ones, with the best of
 /// those that divide no triangle, and with the default. Prints the first comparison.
 fn compare(
@@ -137,7 +157,7 @@ fn compare(
     measured: &Measured,
     gains: &mut String,
     speeds: &mut String,
-    of_buildings: &mut BTreeMap<(Case, &str), [f64; 2]>,
+    of_buildings: &mut BTreeMap<(Case, &str), Ratios>,
 ) {
     let processor = PROCESSOR.name();
     let is_ours = |case: &Case| SEARCHED.iter().any(|(name, _)| case.tree == *name);
@@ -159,15 +179,13 @@ fn compare(
         let default = own.iter().filter(|own| own.tree == "default").copied().collect();
         for (over, own) in [("best", own), ("best whole", whole), ("default", default)] {
             let mut line = format!("{scene:8} {tracer:16} {rays:10} {tree:8}");
+            let mut of_case = Ratios::default();
             let best = own.iter().filter_map(|own| cost(own)).min_by(f64::total_cmp);
             if let (Some(theirs), Some(ours)) = (best, cost(case)) {
                 let gain = theirs / ours;
                 *gains += &format!("{tracer},{scene},{rays},{tree},{over},{gain:.4}\n");
                 line += &format!("  tests {gain:.2}");
-                if BUILDINGS.contains(scene) {
-                    let mean = of_buildings.entry(((**case).clone(), over)).or_default();
-                    *mean = [mean[0] + gain.ln(), mean[1] + 1.0];
-                }
+                of_case.tests.push(gain);
             }
             let timed = own.iter().filter_map(|own| Some((own, measured.seconds.get(own)?)));
             let fastest = timed.min_by(|(_, a), (_, b)| median(a).total_cmp(&median(b)));
@@ -178,13 +196,19 @@ fn compare(
                 let [low, middle, high] = [3, ROUNDS / 2, ROUNDS - 4].map(|place| ratios[place]);
                 let own = &own.tree;
                 *speeds += &format!(
-                    "{tracer},{processor},{scene},{rays},{RAYS},{ROUNDS},{tree},{over},{own},\
+                    "{tracer},\"{processor}\",{scene},{rays},{RAYS},{ROUNDS},{tree},{over},{own},\
                      {middle:.4},{low:.4},{high:.4}\n"
                 );
                 line += &format!("  speed {middle:.2} [{low:.2}, {high:.2}] over {own}");
+                of_case.speeds.push([low, middle, high]);
             }
             if over == "best" {
                 println!("{line}");
+            }
+            if BUILDINGS.contains(scene) {
+                let ratios = of_buildings.entry(((**case).clone(), over)).or_default();
+                ratios.tests.extend(of_case.tests);
+                ratios.speeds.extend(of_case.speeds);
             }
         }
     }
