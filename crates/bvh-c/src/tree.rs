@@ -14,7 +14,7 @@ use std::sync::Arc;
 pub struct BvhTree {
     /// Tracers share the tree until it is improved.
     pub(crate) owned: Arc<OwnedTree>,
-    nodes: Vec<BvhNode>,
+    nodes: Vec<FirstCountNode>,
 }
 
 /// A binary node of 32 bytes with the layout of tinybvh's `BVH::BVHNode`. Node 0 is the root. If
@@ -173,7 +173,7 @@ pub unsafe extern "C" fn bvh_tree_improve_until(
         let improvement =
             tree.owned.improvement(Budget::UNLIMITED, &until).map_err(Failure::invalid)?;
         Arc::make_mut(&mut tree.owned).apply(improvement);
-        tree.nodes = nodes(&tree.owned);
+        tree.nodes = tree.owned.tree().to_first_count_aligned();
         Ok(())
     })
 }
@@ -246,7 +246,8 @@ pub unsafe extern "C" fn bvh_tree_nodes(tree: *const BvhTree, count: *mut usize)
         // SAFETY: `count` points to a size that nobody else uses during the call.
         let count = unsafe { given_mut("count", count) }?;
         *count = tree.nodes.len();
-        Ok(tree.nodes.as_ptr())
+        // Both types have the same fields in the order of C.
+        Ok(tree.nodes.as_ptr().cast())
     })
 }
 
@@ -358,15 +359,7 @@ pub unsafe extern "C" fn bvh_tree_free(tree: *mut BvhTree) {
 }
 
 fn whole(owned: OwnedTree) -> BvhTree {
-    BvhTree { nodes: nodes(&owned), owned: Arc::new(owned) }
-}
-
-fn nodes(owned: &OwnedTree) -> Vec<BvhNode> {
-    let nodes = owned.tree().to_first_count_aligned();
-    nodes
-        .into_iter()
-        .map(|FirstCountNode { min, first, max, count }| BvhNode { min, first, max, count })
-        .collect()
+    BvhTree { nodes: owned.tree().to_first_count_aligned(), owned: Arc::new(owned) }
 }
 
 fn found(objects: Objects, options: &Options, seconds: Option<f64>) -> Result<BvhTree, Failure> {

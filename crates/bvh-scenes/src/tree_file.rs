@@ -49,11 +49,6 @@ pub fn read(path: &Path) -> Result<Vec<u8>, TreeFileError> {
     Ok(bytes)
 }
 
-/// Opens the bytes of a tree file; `path` names it in errors.
-pub fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<TreeFile<'a>, TreeFileError> {
-    TreeFile::open(bytes).map_err(TreeFileError::of(path))
-}
-
 /// Reads the tree over a scene's objects from the file at `path`, and the file's header.
 ///
 /// # Errors
@@ -62,14 +57,14 @@ pub fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<TreeFile<'a>, TreeFileEr
 /// [valid](validate_references) over these objects.
 pub fn load(path: &Path, scene: &Scene) -> Result<(Bvh, Header), TreeFileError> {
     let bytes = read(path)?;
-    let file = open(path, &bytes)?.for_boxes(&scene.boxes).map_err(TreeFileError::of(path))?;
-    let tree = file.tree().map_err(TreeFileError::of(path))?;
-    let header = file.header().clone();
-    // The checksums prove only that the file is intact: a forged tree can have right ones.
-    validate_references(&tree, &scene.boxes, &scene.primitives)
-        .map_err(FileError::Tree)
-        .map_err(TreeFileError::of(path))?;
-    Ok((tree, header))
+    let checked = || {
+        let file = TreeFile::open(&bytes)?.for_boxes(&scene.boxes)?;
+        let tree = file.tree()?;
+        // The checksums prove only that the file is intact: a forged tree can have right ones.
+        validate_references(&tree, &scene.boxes, &scene.primitives)?;
+        Ok((tree, file.header().clone()))
+    };
+    checked().map_err(TreeFileError::of(path))
 }
 
 #[cfg(test)]

@@ -25,7 +25,7 @@ pub struct Page<'a> {
     pub scene: Vec<u8>,
     /// The tests of each pixel's rays as colours, PNG files.
     pub heat: [Vec<u8>; 2],
-    /// The medians of the tests over the pixels in which there is an object.
+    /// The medians of the tests over the pixels whose rays meet the box of the scene.
     pub medians: [f64; 2],
     /// The number of tests of the last colour.
     pub top: f64,
@@ -66,7 +66,7 @@ tree.</p>
 <div class=\"pictures\">{scene}{heat}</div>
 <div class=\"scale\" style=\"background: linear-gradient(to right, {colours})\"></div>
 <p class=\"ends\"><span>0 tests</span><span>{top} or more, in one pixel of 200</span></p>
-<p>Medians are over the pixels in which there is an object.</p>
+<p>Medians are over the pixels whose rays meet the box of the scene.</p>
 <footer><p>Written by bvh {version}.</p></footer>
 </body></html>
 "

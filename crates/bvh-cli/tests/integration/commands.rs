@@ -124,6 +124,7 @@ fn what_is_wrong_is_named_before_the_work_and_changes_no_file() {
         (format!("{hour} --rays=wrong.toml"), &["wrong.toml", "line 2", "bouncy", "bounces"]),
         (format!("{hour} --rays=none.toml"), &["none.toml", "cameras is empty", "eye"]),
         (format!("{hour} --rays=gone.toml"), &["--rays", "gone.toml", "no such file"]),
+        (format!("{hour} --rays=mesh.obj"), &["mesh.obj: --rays accepts", ".csv or .bin"]),
         (format!("{parts}=4 --part=0123"), &["--part 0123", "no such part", "--list"]),
         (format!("{parts}=4 --rays=default"), &["--parts", "--rays", "cannot be used with"]),
         (parts.replace("escher", "spheres75") + "=76", &["--parts 76", "75 objects", "2 to 75"]),

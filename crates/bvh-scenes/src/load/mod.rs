@@ -74,24 +74,15 @@ fn without_mark(bytes: &[u8]) -> &[u8] {
 }
 
 /// Reads the mesh file at `path`. Any bytes give a mesh with at least one triangle or an error.
-/// Takes O(bytes) time, and a few hundred bytes of memory per triangle besides the file.
-pub fn load(path: &Path) -> Result<Mesh, MeshError> {
-    load_with(path, OutsideFiles::Rejected)
+/// `outside` decides whether a glTF file may refer to files outside its folder. Takes O(bytes) time,
+/// and a few hundred bytes of memory per triangle besides the file.
+pub fn load(path: &Path, outside: OutsideFiles) -> Result<Mesh, MeshError> {
+    parse(&read(path)?, path, outside)
 }
 
-/// Reads a mesh file as [`load`] does. `outside` decides whether a glTF file may refer to files
-/// outside its folder.
-pub fn load_with(path: &Path, outside: OutsideFiles) -> Result<Mesh, MeshError> {
-    parse_with(&read(path)?, path, outside)
-}
-
-/// Reads the bytes of a mesh file. `path` names the file in errors, and a glTF file's references
-/// are relative to its folder.
-pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
-    parse_with(bytes, path, OutsideFiles::Rejected)
-}
-
-fn parse_with(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Mesh, MeshError> {
+/// Reads the bytes of a mesh file as [`load`] does. `path` names the file in errors, and a glTF
+/// file's references are relative to its folder.
+pub fn parse(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Mesh, MeshError> {
     if bytes.trim_ascii().is_empty() {
         return Err(MeshError::Empty(path.to_path_buf()));
     }

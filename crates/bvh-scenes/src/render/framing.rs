@@ -79,21 +79,14 @@ fn seen(view: &View, up: DVec3, accelerator: &Accelerator, aspect: f64) -> (f64,
     let mut hits = 0;
     let mut objects = BTreeSet::new();
     for pixel in 0..columns * ROWS {
-        if let Some(object) = camera.hit(accelerator, pixel % columns, pixel / columns) {
+        let [x, y] = [pixel % columns, pixel / columns].map(|place| f64::from(place) + 0.5);
+        let ray = Ray::half_line(camera.origin.as_vec3(), camera.direction(x, y).as_vec3());
+        if let Some(hit) = ray.ok().and_then(|ray| accelerator.nearest_hit(&ray)) {
             hits += 1;
-            objects.insert(object);
+            objects.insert(hit.object);
         }
     }
     (f64::from(hits) / f64::from((columns * ROWS).max(1)), objects.len())
-}
-
-impl Camera {
-    /// Returns the object in the middle of a pixel, if there is one.
-    pub fn hit(&self, accelerator: &Accelerator, x: u32, y: u32) -> Option<u32> {
-        let direction = self.direction(f64::from(x) + 0.5, f64::from(y) + 0.5).as_vec3();
-        let ray = Ray::half_line(self.origin.as_vec3(), direction).ok()?;
-        accelerator.nearest_hit(&ray).map(|hit| hit.object)
-    }
 }
 
 /// Returns the view of a box from the direction `towards_eye`, at the smallest distance that shows

@@ -1,9 +1,7 @@
 //! Any bytes give a mesh or an error that names its place.
 
-use crate::samples::{INDEXED, NODE, error, glb, gltf, samples, stl_binary, with};
-use bvh_scenes::load::parse;
+use crate::samples::{INDEXED, NODE, error, glb, gltf, read, samples, stl_binary, with};
 use proptest::prelude::*;
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 #[test]
@@ -64,7 +62,7 @@ fn cut_files_give_a_mesh_or_an_error() {
 
 /// Asserts that the bytes give an error, or a mesh with triangles that are all finite.
 fn check(bytes: &[u8], name: &str) {
-    if let Ok(mesh) = parse(bytes, Path::new(name)) {
+    if let Ok(mesh) = read(bytes, name) {
         assert!(!mesh.triangles.is_empty());
         assert!(mesh.triangles.iter().flat_map(|t| t.0).all(|corner| corner.is_finite()));
     }

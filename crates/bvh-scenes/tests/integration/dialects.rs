@@ -3,11 +3,9 @@
 
 use crate::samples::{
     INDEXED, NODE, buffer, changes, data_uri, error, floats, glb, gltf, gltf_json, ply_binary,
-    ply_text, samples, square, stl_binary, stl_text, with,
+    ply_text, read, samples, square, stl_binary, stl_text, with,
 };
 use bvh_core::Triangle;
-use bvh_scenes::load::parse;
-use std::path::Path;
 
 const PLY: &str = r"
 \n ⇒ \r |
@@ -92,7 +90,7 @@ const GLTF: &str = r#"
 type Case = (&'static str, Vec<u8>, &'static str);
 
 fn assert_square(case: &str, bytes: &[u8], name: &str, remark: &str) {
-    let mesh = parse(bytes, Path::new(name)).unwrap_or_else(|error| panic!("{case}: {error}"));
+    let mesh = read(bytes, name).unwrap_or_else(|error| panic!("{case}: {error}"));
     assert_eq!(mesh.triangles, square(), "{case}");
     assert_eq!(mesh.remark().unwrap_or_default(), remark, "{case}");
 }
@@ -170,7 +168,7 @@ fn binary_ply_files_as_programs_write_them() {
                     } else {
                         f32::from_le_bytes(*first)
                     };
-                    let mesh = parse(&bytes, Path::new("a.ply")).unwrap();
+                    let mesh = read(&bytes, "a.ply").unwrap();
                     assert_eq!(mesh.triangles[0].0[0].x.to_bits(), number.to_bits());
                 }
             }
@@ -275,7 +273,7 @@ fn a_strip_turns_every_second_triangle_and_ends_at_minus_one() {
     let bytes = [header.as_bytes(), &floats(corners.concat()), &strips].concat();
     let expected = [[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]];
     assert_eq!(
-        parse(&bytes, Path::new("a.ply")).unwrap().triangles,
+        read(&bytes, "a.ply").unwrap().triangles,
         Triangle::from_mesh(&corners, &expected).unwrap()
     );
 }

@@ -1,11 +1,11 @@
 //! The triangles of glTF files, and the files to which they may refer.
 
 use crate::glb::glb;
-use crate::samples::{INDEXED, NODE, buffer, error, gltf_json, square};
+use crate::samples::{INDEXED, NODE, buffer, error, gltf_json, read, square};
 use bvh_core::Triangle;
 use bvh_scenes::load::gltf::{self, Parts};
 use bvh_scenes::load::mesh::Mesh;
-use bvh_scenes::load::{OutsideFiles, load, load_with, parse};
+use bvh_scenes::load::{OutsideFiles, load};
 use glam::Vec3;
 use serde_json::{Value, json};
 use std::fs;
@@ -138,7 +138,7 @@ fn everything_that_moves_hides_or_repeats_a_vertex_is_read_or_named() {
                 assert!(message.contains(words), "{name}: {message}");
                 continue;
             }
-            let mesh = parse(&bytes, path).unwrap_or_else(|error| panic!("{name}: {error}"));
+            let mesh = read(&bytes, "a.glb").unwrap_or_else(|error| panic!("{name}: {error}"));
             let expected: Vec<[f32; 9]> =
                 serde_json::from_value(case["triangles"].clone()).unwrap();
             let expected: Vec<Triangle> = expected.into_iter().map(Triangle::from).collect();
@@ -171,8 +171,8 @@ fn glb_of(json: String) -> Vec<u8> {
     glb(json, &buffer())
 }
 
-fn read(json: String) -> Mesh {
-    parse(&glb_of(json), Path::new("a.glb")).unwrap()
+fn read_glb(json: String) -> Mesh {
+    read(glb_of(json), "a.glb").unwrap()
 }
 
 /// Creates a folder with `scene.gltf`, whose buffer is the file of this name.
@@ -193,7 +193,7 @@ fn extras_of_any_kind_are_ignored_in_any_place() {
         for &place in &places {
             let mut text = text.clone();
             text.insert_str(place + 1, &format!(r#""extras": {extras}, "#));
-            assert_eq!(read(text), mesh(), "{extras}");
+            assert_eq!(read_glb(text), mesh(), "{extras}");
         }
     }
 }
@@ -218,7 +218,9 @@ fn a_buffer_outside_the_folder_of_the_scene_is_rejected_unless_it_is_allowed() {
     }
     // The message must not reveal whether the file exists.
     let scene_folder = folder("../no_such_file");
-    let message = load(&scene_folder.path().join("scene.gltf")).unwrap_err().to_string();
+    let message = load(&scene_folder.path().join("scene.gltf"), OutsideFiles::Rejected)
+        .unwrap_err()
+        .to_string();
     assert!(message.contains("`../no_such_file` is outside"), "{message}");
     #[cfg(unix)]
     {
@@ -231,11 +233,11 @@ fn a_buffer_outside_the_folder_of_the_scene_is_rejected_unless_it_is_allowed() {
 /// Asserts that the folder's scene is rejected, and that it is read with permission.
 fn assert_outside(folder: &Path) {
     let path = folder.join("scene.gltf");
-    let message = load(&path).unwrap_err().to_string();
+    let message = load(&path, OutsideFiles::Rejected).unwrap_err().to_string();
     for part in ["buffers[0]", "outside the scene's folder", "--outside-files"] {
         assert!(message.contains(part), "{part}: {message}");
     }
-    assert_eq!(load_with(&path, OutsideFiles::Allowed).unwrap(), mesh());
+    assert_eq!(load(&path, OutsideFiles::Allowed).unwrap(), mesh());
 }
 
 #[test]
@@ -245,7 +247,8 @@ fn files_in_the_folder_of_the_scene_and_below_are_read() {
         fs::create_dir(folder.path().join("a")).unwrap();
         let file = folder.path().join(name.replace("%20", " "));
         fs::write(file, buffer()).unwrap();
-        assert_eq!(load(&folder.path().join("scene.gltf")).unwrap(), mesh(), "{name}");
+        let read = load(&folder.path().join("scene.gltf"), OutsideFiles::Rejected);
+        assert_eq!(read.unwrap(), mesh(), "{name}");
     }
 }
 
@@ -262,7 +265,7 @@ fn an_index_of_33_bits_is_not_taken_for_its_lower_32() {
     }
     error(glb_of(whole.replace(r#""nodes": [0]"#, r#""nodes": [4294967296]"#)), "a.glb");
     // Numbers that are no reference may be as large as they like.
-    assert_eq!(read(json(r#""extras": {"mesh": 4294967296}, "#)), mesh());
+    assert_eq!(read_glb(json(r#""extras": {"mesh": 4294967296}, "#)), mesh());
 }
 
 #[test]

@@ -1,10 +1,12 @@
 //! Mesh files of every format give the same triangles.
 
-use crate::samples::{INDEXED, NODE, buffer, error, gltf_json, samples, square, stl_text, with};
+use crate::samples::{
+    INDEXED, NODE, buffer, error, gltf_json, read, samples, square, stl_text, with,
+};
 use bvh_scenes::Scene;
 use bvh_scenes::files::ReadError;
 use bvh_scenes::load::mesh::Mesh;
-use bvh_scenes::load::{Format, MeshError, load, parse};
+use bvh_scenes::load::{Format, MeshError, OutsideFiles, load};
 use std::path::Path;
 
 #[test]
@@ -15,11 +17,7 @@ fn every_format_gives_the_same_triangles_under_any_file_name() {
                 continue; // OBJ has no signature.
             }
             assert_eq!(Format::of(&bytes, Path::new(name)), format);
-            assert_eq!(
-                parse(&bytes, Path::new(name)).unwrap(),
-                Mesh::new(square(), vec![]),
-                "{name}"
-            );
+            assert_eq!(read(&bytes, name).unwrap(), Mesh::new(square(), vec![]), "{name}");
         }
     }
 }
@@ -29,8 +27,8 @@ fn text_formats_may_begin_with_a_byte_order_mark() {
     for (name, _, bytes) in samples() {
         if ["square.obj", "text.ply", "text.stl", "square.gltf"].contains(&name) {
             let marked = [b"\xef\xbb\xbf", &bytes[..]].concat();
-            for path in [Path::new(name), Path::new("scene")] {
-                assert_eq!(parse(&marked, path).unwrap(), Mesh::new(square(), vec![]), "{name}");
+            for name in [name, "scene"] {
+                assert_eq!(read(&marked, name).unwrap(), Mesh::new(square(), vec![]), "{name}");
             }
         }
     }
@@ -55,13 +53,16 @@ fn the_path_of_a_mesh_file_names_a_scene_and_a_missing_file_is_reported() {
         let message = Scene::load(missing).unwrap_err().to_string();
         assert!(message.contains(&format!("{missing}: no such file")), "{message}");
     }
-    assert!(matches!(load(folder.path()), Err(MeshError::Read(ReadError::Folder { .. }))));
+    assert!(matches!(
+        load(folder.path(), OutsideFiles::Rejected),
+        Err(MeshError::Read(ReadError::Folder { .. }))
+    ));
     #[cfg(unix)]
     assert!(matches!(
-        load(Path::new("/dev/zero")),
+        load(Path::new("/dev/zero"), OutsideFiles::Rejected),
         Err(MeshError::Read(ReadError::NotRegular { .. }))
     ));
-    assert!(matches!(parse(b" \r\n", Path::new("a.ply")), Err(MeshError::Empty(_))));
+    assert!(matches!(read(b" \r\n", "a.ply"), Err(MeshError::Empty(_))));
 }
 
 #[test]
@@ -69,15 +70,15 @@ fn buffers_are_files_in_the_folder_of_the_file_that_names_them() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.gltf");
     std::fs::write(&path, gltf_json("my%20buffer.bin", NODE, INDEXED)).unwrap();
-    let missing = load(&path).unwrap_err().to_string();
+    let missing = load(&path, OutsideFiles::Rejected).unwrap_err().to_string();
     assert!(
         missing.contains("buffers[0]") && missing.contains("my buffer.bin: no such file"),
         "{missing}"
     );
     std::fs::write(folder.path().join("my buffer.bin"), buffer()).unwrap();
-    assert_eq!(load(&path).unwrap().triangles, square());
+    assert_eq!(load(&path, OutsideFiles::Rejected).unwrap().triangles, square());
     std::fs::write(folder.path().join("my buffer.bin"), &buffer()[..50]).unwrap();
-    let short = load(&path).unwrap_err().to_string();
+    let short = load(&path, OutsideFiles::Rejected).unwrap_err().to_string();
     assert!(short.contains("buffers[0]: 50 bytes; expected 60"), "{short}");
     let remote = error(gltf_json("http://example.org/a.bin", NODE, INDEXED), "a.gltf");
     assert!(remote.contains("a file in this folder"), "{remote}");
@@ -93,9 +94,6 @@ fn text_stl_is_a_sequence_of_words_of_any_case_on_any_lines() {
     let in_capitals = facets.to_uppercase();
     for facets in [facets.as_str(), &in_capitals, &one_line, &one_line.replace("loop ", "loop\n")] {
         let file = format!("{first}\n{facets}\nendsolid a square");
-        assert_eq!(
-            parse(file.as_bytes(), Path::new("a.stl")).unwrap(),
-            Mesh::new(square(), vec![])
-        );
+        assert_eq!(read(file.as_bytes(), "a.stl").unwrap(), Mesh::new(square(), vec![]));
     }
 }

@@ -1,11 +1,10 @@
 //! Polygons are covered once by their triangles, whatever their shape and their first corner.
 
+use crate::samples::read;
 use bvh_core::Triangle;
 use bvh_scenes::load::mesh::Mesh;
-use bvh_scenes::load::parse;
 use proptest::prelude::*;
 use std::fmt::Write;
-use std::path::Path;
 
 /// Reads one polygon as an OBJ file and as a PLY file, which must agree.
 fn mesh(corners: &[[f32; 3]]) -> Mesh {
@@ -23,8 +22,8 @@ fn mesh(corners: &[[f32; 3]]) -> Mesh {
         |first: usize| (first..first + corners.len()).map(|i| format!(" {i}")).collect::<String>();
     writeln!(obj, "f{}", indices(1)).unwrap();
     writeln!(ply, "{}{}", corners.len(), indices(0)).unwrap();
-    let obj = parse(obj.as_bytes(), Path::new("a.obj")).unwrap();
-    assert_eq!(parse(ply.as_bytes(), Path::new("a.ply")).unwrap(), obj);
+    let obj = read(obj.as_bytes(), "a.obj").unwrap();
+    assert_eq!(read(ply.as_bytes(), "a.ply").unwrap(), obj);
     obj
 }
 
@@ -69,7 +68,7 @@ fn polygons_of_many_corners_are_covered_or_rejected_before_they_take_long() {
     }
     let face = (1..=corners.len()).map(|i| format!(" {i}")).collect::<String>();
     let text = text + "f 1 2 3\nf 1 2\n" + &format!("f{face}\n").repeat(1000);
-    let message = parse(text.as_bytes(), Path::new("a.obj")).unwrap_err().to_string();
+    let message = read(text.as_bytes(), "a.obj").unwrap_err().to_string();
     assert!(message.starts_with("a.obj:4105: face of 4096 vertices that are not"), "{message}");
 }
 

@@ -2,7 +2,8 @@
 
 use base64::Engine as _;
 use bvh_core::Triangle;
-use bvh_scenes::load::{Format, parse};
+use bvh_scenes::load::mesh::Mesh;
+use bvh_scenes::load::{Format, MeshError, OutsideFiles, parse};
 use std::path::Path;
 
 pub const CORNERS: [[f32; 3]; 4] =
@@ -128,8 +129,13 @@ pub fn samples() -> [(&'static str, Format, Vec<u8>); 8] {
     ]
 }
 
+/// Reads a file that may not refer to files outside its folder.
+pub fn read(bytes: impl AsRef<[u8]>, name: &str) -> Result<Mesh, MeshError> {
+    parse(bytes.as_ref(), Path::new(name), OutsideFiles::Rejected)
+}
+
 pub fn error(bytes: impl AsRef<[u8]>, name: &str) -> String {
-    parse(bytes.as_ref(), Path::new(name)).unwrap_err().to_string()
+    read(bytes, name).unwrap_err().to_string()
 }
 
 /// Replaces the first occurrence of a text.

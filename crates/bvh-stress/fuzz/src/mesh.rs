@@ -8,7 +8,7 @@ use std::path::Path;
 /// read again, and that the parts of a glTF file are its triangles.
 pub fn mesh(bytes: &[u8]) {
     let path = Path::new("scene.obj");
-    let mesh = match parse(bytes, path) {
+    let mesh = match parse(bytes, path, OutsideFiles::Rejected) {
         Ok(mesh) => mesh,
         Err(error) => {
             let message = error.to_string();
@@ -35,6 +35,6 @@ pub fn mesh(bytes: &[u8]) {
         }
         text += "f -3 -2 -1\n";
     }
-    let again = parse(text.as_bytes(), path).unwrap();
+    let again = parse(text.as_bytes(), path, OutsideFiles::Rejected).unwrap();
     assert_eq!(again.triangles, mesh.triangles);
 }
