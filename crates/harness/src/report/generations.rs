@@ -54,29 +54,14 @@ pub(super) struct Generation<'a> {
 /// The generations of all runs on a scene, and the costs of random orders.
 struct Runs<'a> {
     scene: &'a str,
-    runs: Vec<Vec<Progress>>,
+    runs: Vec<Progress>,
     /// Index of the run with the median final cost, the lower of two.
     middle: usize,
     random: Vec<f64>,
 }
 
-/// The state of a run after one generation.
-struct Progress {
-    evaluations: u64,
-    /// The lowest cost so far.
-    incumbent: f64,
-}
-
-/// The final costs of the runs on a scene.
-struct Final {
-    low: f64,
-    median: f64,
-    high: f64,
-    /// The mean cost of random orders.
-    average: f64,
-    /// The cost of the greedy Müller–Fellner tree.
-    base: f64,
-}
+/// A run, generation by generation: trees evaluated so far, and the lowest cost so far.
+type Progress = Vec<(u64, f64)>;
 
 /// The quantity that the paper reports as the gain.
 const GAIN: &str = "final cost over the average order's";
@@ -94,8 +79,8 @@ impl Config {
             let own = runs.generations();
             panels.push(draw(&rows.shown(scene), runs.runs.len(), &own, rows.base_cost(scene)));
             generations.extend(own);
-            let Some(end) = runs.end(rows.base_cost(scene)) else { continue };
-            output.paper.extend(self.compare(&rows.shown(scene), &runs, &end));
+            let base = rows.base_cost(scene);
+            output.paper.extend(self.compare(&rows.shown(scene), &runs, base));
         }
         let caption = format!(
             "{}. Goldsmith–Salmon cost of the best tree so far: the run whose final cost is the \
@@ -120,9 +105,9 @@ impl Config {
     }
 
     fn runs<'a>(&self, rows: &'a Rows, scene: &'a str) -> Option<Runs<'a>> {
-        let runs: Vec<Vec<Progress>> =
+        let runs: Vec<Progress> =
             rows.trials_of(scene, &self.method).iter().map(|run| progress(run)).collect();
-        let last = |run: usize| runs[run].last().map_or(f64::INFINITY, |row| row.incumbent);
+        let last = |run: usize| runs[run].last().map_or(f64::INFINITY, |end| end.1);
         let mut order: Vec<usize> = (0..runs.len()).collect();
         order.sort_by(|&a, &b| last(a).total_cmp(&last(b)));
         // Of an even number of runs there is no median run, so the lower one stands for it.
@@ -131,11 +116,15 @@ impl Config {
     }
 
     /// Compares our final costs with the paper's spread and gain, if the spec has them.
-    fn compare(&self, shown: &str, runs: &Runs, end: &Final) -> Vec<PaperRow> {
+    fn compare(&self, shown: &str, runs: &Runs, base: f64) -> Vec<PaperRow> {
+        let ends: Vec<f64> = runs.runs.iter().filter_map(|run| Some(run.last()?.1)).collect();
+        let ends = range(ends.iter().copied()).zip(median(&ends));
+        let Some(((lowest, highest), middle)) = ends else { return vec![] };
+        let average = mean(runs.random.iter().copied());
         let row = |quantity: &str| PaperRow::new(&self.source, shown, quantity, &self.reason);
         let spread = self.paper_final.get(runs.scene).map(|&[low, high]| {
             let [theirs, ours] =
-                [(low, high), (end.low, end.high)].map(|(l, h)| 2.0 * (h - l) / (h + l));
+                [(low, high), (lowest, highest)].map(|(l, h)| 2.0 * (h - l) / (h + l));
             let verdict =
                 if (ours / theirs - 1.0).abs() <= 0.5 { Verdict::Agrees } else { Verdict::Differs };
             let rule = "between half and one and a half times the paper's";
@@ -147,19 +136,14 @@ impl Config {
             )
         });
         let says = self.paper_says.as_ref().map(|says| {
-            let ours = format!("{:.3}", end.median / end.average);
+            let ours = format!("{:.3}", middle / average);
             row(GAIN).compare(says, ours, Verdict::NoVerdict, "the paper gives no number")
         });
-        let interval = (end.low / end.average, end.high / end.average);
+        let interval = (lowest / average, highest / average);
         let gain = self.paper_gain.map(|paper| {
-            row(GAIN).compare_ratios(
-                paper,
-                end.median / end.average,
-                Some(interval),
-                GAIN_TOLERANCE,
-            )
+            row(GAIN).compare_ratios(paper, middle / average, Some(interval), GAIN_TOLERANCE)
         });
-        let ours = end.median / end.base;
+        let ours = middle / base;
         let over_base = PaperRow {
             ours: format!("{ours:.3}"),
             ours_over_base: Some(ours),
@@ -170,13 +154,13 @@ impl Config {
 }
 
 /// Returns the incumbents of a run, generation by generation.
-fn progress(run: &[&TrialRow]) -> Vec<Progress> {
+fn progress(run: &[&TrialRow]) -> Progress {
     let mut incumbent = f64::INFINITY;
     let mut generations = Vec::new();
     for row in run {
         // Rows hold the best of each generation, which need not be the best so far.
         incumbent = incumbent.min(row.cost);
-        generations.push(Progress { evaluations: row.evaluations, incumbent });
+        generations.push((row.evaluations, incumbent));
     }
     generations
 }
@@ -208,34 +192,20 @@ fn draw(shown: &str, runs: usize, generations: &[Generation], base: f64) -> Pane
 
 impl<'a> Runs<'a> {
     fn generations(&self) -> Vec<Generation<'a>> {
-        let generation = |(generation, row): (usize, &Progress)| {
+        let generation = |(generation, &(evaluations, incumbent)): (usize, &(u64, f64))| {
             // A run that has ended keeps its best tree.
-            let costs = self
-                .runs
-                .iter()
-                .filter_map(|run| Some(run.get(generation).or(run.last())?.incumbent));
+            let costs =
+                self.runs.iter().filter_map(|run| Some(run.get(generation).or(run.last())?.1));
             let (lowest_cost, highest_cost) = range(costs).unwrap_or((f64::NAN, f64::NAN));
             Generation {
                 scene: self.scene,
                 generation,
-                median_run_cost: row.incumbent,
+                median_run_cost: incumbent,
                 lowest_cost,
                 highest_cost,
-                random_picking_cost: expected_best_of(&self.random, row.evaluations as usize),
+                random_picking_cost: expected_best_of(&self.random, evaluations as usize),
             }
         };
         self.runs[self.middle].iter().enumerate().map(generation).collect()
-    }
-
-    /// Returns the final costs of the runs.
-    fn costs(&self) -> Vec<f64> {
-        self.runs.iter().filter_map(|run| Some(run.last()?.incumbent)).collect()
-    }
-
-    fn end(&self, base: f64) -> Option<Final> {
-        let costs = self.costs();
-        let (low, high) = range(costs.iter().copied())?;
-        let average = mean(self.random.iter().copied());
-        Some(Final { low, median: median(&costs)?, high, average, base })
     }
 }

@@ -159,7 +159,8 @@ impl Config {
         let quantity = format!("best of the compared, by the expected best of {}", self.best_of);
         let row = PaperRow::new(&self.source, scene, quantity, &self.reason);
         let rule = "its 95 % interval lies below those of all others; it differs if that of another lies below its own";
-        let row = row.compare(paper, in_words(&best), verdict, rule);
+        let names: Vec<&str> = best.iter().map(|point| point.method).collect();
+        let row = row.compare(paper, names.join(" or "), verdict, rule);
         output.paper.push(PaperRow {
             ours_over_base: Some(least.expected_over_base),
             ours_low: least.expected_low,
@@ -167,10 +168,6 @@ impl Config {
             ..row
         });
     }
-}
-
-fn in_words(best: &[&Point]) -> String {
-    best.iter().map(|point| point.method).collect::<Vec<_>>().join(" or ")
 }
 
 #[cfg(test)]

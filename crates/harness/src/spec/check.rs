@@ -122,10 +122,14 @@ impl Experiment {
 
     /// Rejects a method that would run for hours because the spec sets no limit.
     fn check_end(&self, labelled: &Labelled) -> Result<(), Fault> {
-        if !self.is_endless(labelled) {
+        let work = best::Config::default().work_per_object;
+        let is_endless = matches!(&labelled.method, Contestant::Ours(Method::Best(config))
+            if config.work_per_object == work)
+            && self.budget_of(labelled) == Budget::UNLIMITED
+            && self.suite.is_none();
+        if !is_endless {
             return Ok(());
         }
-        let work = best::Config::default().work_per_object;
         let found = format!(
             "missing for best, which would spend {work} nodes of work per object: hours on a large \
              scene"
@@ -133,14 +137,6 @@ impl Experiment {
         let accepted = "`budget = { max_work = 300_000_000 }`, some seconds on one thread, here or \
                         for all methods, or another `work_per_object`";
         Err(Fault::new("budget", found, accepted))
-    }
-
-    /// Returns true if nothing but the generous default limits a method's runs.
-    fn is_endless(&self, labelled: &Labelled) -> bool {
-        let Contestant::Ours(Method::Best(config)) = &labelled.method else { return false };
-        config.work_per_object == best::Config::default().work_per_object
-            && self.budget_of(labelled) == Budget::UNLIMITED
-            && self.suite.is_none()
     }
 
     /// Rejects a label of two methods, and a label in a report that no method has.

@@ -5,7 +5,6 @@
 //! `methods` is a [`Labelled`].
 
 mod check;
-mod name;
 mod read;
 mod schema;
 
@@ -32,7 +31,7 @@ config! {
     /// out, it is `resolved.toml`.
     pub struct Experiment {
         /// Name of the results folder, from the spec's file.
-        #[serde(deserialize_with = "name::read")]
+        #[serde(deserialize_with = "read::read_name")]
         name: String;
         /// True for the smaller variant of `--quick`.
         #[serde(skip_serializing_if = "std::ops::Not::not")]

@@ -1,12 +1,13 @@
 //! Reads a spec's text, with the overrides of the command line, into a checked [`Experiment`].
 
-use super::{Experiment, Labelled, name};
+use super::{Experiment, Labelled};
 use crate::Error;
 use crate::peers;
 use crate::report::Report;
 use bvh_config::fault::{self, Fault};
 use bvh_scenes::files::read_text;
 use bvh_search::Method;
+use serde::{Deserialize, Deserializer, de};
 use std::ffi::OsStr;
 use std::path::Path;
 use toml::{Table, Value};
@@ -109,9 +110,32 @@ impl Experiment {
     }
 }
 
+/// The accepted names, for error messages.
+const ACCEPTED: &str = "names that do not begin with a dot, are not `quick`, and have \
+     no /, \\, : or control characters";
+
+/// Rejects a name that is not safe for a folder in the results: one that leads outside, or that the
+/// harness gives to one of its files.
+fn check_name(name: &str) -> Result<(), String> {
+    let is_reserved = name.starts_with('.') || name == "quick";
+    // Separators of paths, on any system, and characters that terminals obey.
+    let is_forbidden = |c: char| c.is_control() || ['/', '\\', ':'].contains(&c);
+    if is_reserved || name.contains(is_forbidden) {
+        return Err(format!("{name:?} is not the name of an experiment; accepted: {ACCEPTED}"));
+    }
+    Ok(())
+}
+
+/// Reads a checked name.
+pub(super) fn read_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    let name = String::deserialize(deserializer)?;
+    check_name(&name).map_err(de::Error::custom)?;
+    Ok(name)
+}
+
 fn name_of(path: &Path) -> Result<String, String> {
     let stem = path.file_stem().and_then(OsStr::to_str).ok_or("no UTF-8")?;
-    name::check(stem)?;
+    check_name(stem)?;
     Ok(stem.to_owned())
 }
 
@@ -170,6 +194,24 @@ fn replace(table: &mut Table, replacements: Table) {
             (_, value) => {
                 table.insert(key, value);
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_lead_elsewhere_or_are_reserved_are_rejected() {
+        for good in ["table4", "two words", "größe", "v1.2", "a..b"] {
+            assert_eq!(check_name(good), Ok(()));
+        }
+        let leading_elsewhere = [".", "..", "a/b", "..\\x", "c:x"];
+        let reserved = [".lock", ".partial", "quick"];
+        let control = ["a\u{1b}[2J", "a\0"];
+        for wrong in leading_elsewhere.iter().chain(&reserved).chain(&control) {
+            assert!(check_name(wrong).is_err(), "{wrong:?}");
         }
     }
 }
