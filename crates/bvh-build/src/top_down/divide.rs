@@ -20,8 +20,7 @@ use bvh_core::{Aabb, Bvh, Node, PackedAabb, with_vector_instructions};
 #[cfg(feature = "rayon")]
 use std::sync::Mutex;
 
-/// Buffers of a build. Further builds over the same number of objects reuse them without
-/// allocating.
+/// Buffers of a build, which further builds over the same number of objects reuse.
 #[derive(Debug, Default)]
 pub struct Workspace {
     orders: [Vec<u32>; 2],
@@ -38,19 +37,6 @@ struct Scratch {
     goes_right: Vec<u32>,
     blocks: [Vec<Block>; 3],
     shortlist: Vec<Split>,
-    stack: Vec<Frame>,
-}
-
-/// A node to divide: its objects, its place in the tree, and its descendants' block.
-#[derive(Clone, Copy, Debug)]
-struct Frame {
-    /// First object, relative to the task.
-    start: u32,
-    /// Number of objects, at least 2.
-    len: u32,
-    /// First of the two children's nodes, relative to the task's block.
-    below: u32,
-    known: Known,
 }
 
 /// Facts about a node that are known before it is divided.
@@ -160,7 +146,7 @@ fn spawn<'s, C: SplitCost>(
         if pace.ends_after(task.objects()) {
             return;
         }
-        let (left, right) = split_task(division, task, &mut scratch);
+        let [left, right] = split_task(division, task, &mut TakeBest, &mut scratch);
         let (larger, smaller) =
             if left.objects() > right.objects() { (left, right) } else { (right, left) };
         if smaller.objects() >= PARALLEL_OBJECTS {
@@ -198,23 +184,24 @@ fn prepare<'a>(
     Some((task, scratch))
 }
 
-#[cfg(feature = "rayon")]
 impl Task<'_> {
+    #[inline(always)]
     fn objects(&self) -> usize {
         self.orders[0].len()
     }
 }
 
-/// Divides the task's node, of two or more objects, writes its children and returns them as tasks.
-#[cfg(feature = "rayon")]
+/// Divides the task's node, of two or more objects, writes its children and returns them as tasks,
+/// left before right.
+#[inline(always)]
 fn split_task<'a, C: SplitCost>(
     division: &Division<'_, C>,
     task: Task<'a>,
+    rule: &mut dyn SplitRule,
     scratch: &mut Scratch,
-) -> (Task<'a>, Task<'a>) {
+) -> [Task<'a>; 2] {
     let Task { below, below_at, objects_at, orders: [x, y, z], known } = task;
-    let (left, [known_left, known_right]) =
-        split_node(division, [x, y, z], known, &mut TakeBest, scratch);
+    let (left, [known_left, known_right]) = split_node(division, [x, y, z], known, rule, scratch);
     let (children, below) = below.split_at_mut(2);
     let (below_left, below_right) = below.split_at_mut(2 * left - 2);
     let [x, y, z] = [x, y, z].map(|order| order.split_at_mut(left));
@@ -241,7 +228,7 @@ fn split_task<'a, C: SplitCost>(
             _ => Node::inner(aabb, side.below_at, 2),
         };
     }
-    sides.into()
+    sides
 }
 
 with_vector_instructions! {
@@ -259,51 +246,24 @@ fn build<C: SplitCost>(
     rule: &mut dyn SplitRule,
     scratch: &mut Scratch,
 ) {
-    let Task { below: nodes, below_at, objects_at, orders: [x, y, z], known } = task;
-    let mut stack = std::mem::take(&mut scratch.stack);
-    if x.len() > 1 {
-        stack.push(Frame { start: 0, len: x.len() as u32, below: 0, known });
-    }
     let mut pace = Pace::new(division.watch);
-    while let Some(Frame { start, len, below, known }) = stack.pop() {
-        if pace.ends_after(len as usize) {
+    let mut stack = vec![task];
+    while let Some(task) = stack.pop() {
+        if pace.ends_after(task.objects()) {
             // The tree is incomplete, and `finish` clears it.
-            stack.clear();
-            break;
+            return;
         }
-        let range = start as usize..(start + len) as usize;
         // Two objects have one split, and the order along x decides which is left.
-        if len == 2 {
-            for (index, &object) in x[range].iter().enumerate() {
+        if task.objects() == 2 {
+            for ((leaf, &object), at) in task.below.iter_mut().zip(&*task.orders[0]).zip(0..) {
                 let aabb = (&division.scene.boxes[object as usize]).into();
-                nodes[below as usize + index] =
-                    Node::leaf(aabb, objects_at + start + index as u32, 1);
+                *leaf = Node::leaf(aabb, task.objects_at + at, 1);
             }
-            continue;
-        }
-        let orders = [&mut x[range.clone()], &mut y[range.clone()], &mut z[range]];
-        let (left, known) = split_node(division, orders, known, rule, scratch);
-        let left = left as u32;
-        let sides = [
-            Frame { start, len: left, below: below + 2, known: known[0] },
-            Frame {
-                start: start + left,
-                len: len - left,
-                below: below + 2 * left,
-                known: known[1],
-            },
-        ];
-        for (index, side) in sides.into_iter().enumerate().rev() {
-            let aabb = (&side.known.aabb).into();
-            nodes[below as usize + index] = if side.len == 1 {
-                Node::leaf(aabb, objects_at + side.start, 1)
-            } else {
-                stack.push(side);
-                Node::inner(aabb, below_at + side.below, 2)
-            };
+        } else if task.objects() > 2 {
+            let [left, right] = split_task(division, task, rule, scratch);
+            stack.extend([right, left]);
         }
     }
-    scratch.stack = stack;
 }
 
 /// Lets the rule split a node of two or more objects and partitions its orders. Returns the number
