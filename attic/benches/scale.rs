@@ -162,9 +162,7 @@ impl Phases {
         let triangles = scene.triangles().expect("triangles");
         self.phase("build with spatial splits", || {
             let most = boxes.len() * 6 / 5;
-            spatial::Config::default()
-                .build_watched(most, boxes, &triangles, &Watch::default())
-                .expect("finite boxes")
+            spatial::build(most, boxes, &triangles, &Watch::default()).expect("finite boxes")
         });
         self.peers(&scene, base);
         drop(self.bake(boxes, base, 10, 1));

@@ -72,14 +72,8 @@ fn every_builder_ends_when_its_watch_says_so_whenever_that_is() {
             }
         }
     }
-    let divide = |watch: &Watch| {
-        spatial::Config::default().build_watched(
-            boxes.len() * 6 / 5,
-            &boxes,
-            &triangles.as_slice(),
-            watch,
-        )
-    };
+    let divide =
+        |watch: &Watch| spatial::build(boxes.len() * 6 / 5, &boxes, &triangles.as_slice(), watch);
     assert_eq!(asked(2, divide), (Err(BuildError::Cancelled), 2));
     let scene = Presorted::new(&boxes).unwrap();
     let mut workspace = Workspace::default();
@@ -129,9 +123,7 @@ fn spatial_splits_of_objects_as_large_as_the_scene_visit_each_reference_a_few_hu
         let triangles = soup(n);
         let boxes = boxes(&triangles);
         let most = boxes.len() * 6 / 5;
-        let divide = |watch: &Watch| {
-            spatial::Config::default().build_watched(most, &boxes, &triangles.as_slice(), watch)
-        };
+        let divide = |watch: &Watch| spatial::build(most, &boxes, &triangles.as_slice(), watch);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let (tree, questions) = pool.install(|| asked(usize::MAX, divide));
         assert!(tree.unwrap().prim_ids.len() <= most);

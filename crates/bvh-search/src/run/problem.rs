@@ -38,7 +38,7 @@ impl<'a> Splits<'a> {
     /// saves anything. A search would then hardly find a saving either, and would spend its work on
     /// looking.
     pub fn divide(&self, boxes: &[Aabb], watch: &Watch) -> Result<Bvh, BuildError> {
-        spatial::Config::default().build_watched(self.most, boxes, self.objects, watch)
+        spatial::build(self.most, boxes, self.objects, watch)
     }
 }
 

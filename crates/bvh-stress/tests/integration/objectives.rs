@@ -181,9 +181,7 @@ fn divided_trees_are_the_same_on_any_number_of_threads_and_at_any_scale() {
             let boxes = stiff::boxes(&scaled);
             let objects = Primitives::Triangles(scaled);
             let most = boxes.len() * 3 / 2;
-            let built = spatial::Config::default()
-                .build_watched(most, &boxes, &objects, &Watch::default())
-                .unwrap();
+            let built = spatial::build(most, &boxes, &objects, &Watch::default()).unwrap();
             let searched = [Objective::Layout, Objective::InternalArea].map(|objective| {
                 let splits = Splits::at_most(most, &boxes, &objects);
                 let problem = Problem { objective, splits, ..Problem::new(&boxes) };

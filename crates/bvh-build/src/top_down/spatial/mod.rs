@@ -16,25 +16,39 @@ mod plane;
 use super::stall::{LEAST_STALLED, is_stall};
 use crate::error::check_scene;
 use crate::watch::Pace;
-use crate::{BuildError, Check, Watch};
+use crate::{BuildError, Watch};
 use bvh_core::{Aabb, Bvh, Clip, Node};
 use object_split::{Axis, Candidates};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-bvh_config::config! {
-    /// The number of references, and the search for spatial splits.
-    pub struct Config {
-        /// Maximum number of references per object, 1 or more. With 1, no object is divided.
-        references: f64 = 1.2, in 1.0..=16.0;
-        /// Least common area of the sides of the best object split, relative to the root's box, for
-        /// which spatial splits are tried.
-        overlap: f64 = 1e-5, in 0.0..=1.0;
-        /// Bins along every axis. Their borders are the candidates of spatial splits.
-        bins: u32 = 32, in 2..=1024;
-        /// The power of the number of references in the cost of a side.
-        power: f64 = 0.9, in 0.0..=1.0;
-    }
+/// Bins along every axis. Their borders are the candidates of spatial splits.
+const BINS: usize = 32;
+
+/// Least common area of the sides of the best object split, relative to the root's box, for which
+/// spatial splits are tried.
+const OVERLAP: f64 = 1e-5;
+
+/// The power of the number of references in the cost of a side.
+const POWER: f64 = 0.9;
+
+/// Number of stalls above a node after which a balanced split replaces a split that would stall.
+const MOST_STALLS: u8 = 8;
+
+/// Builds a tree over `boxes`, one per object, with at most `most` references, but at least one per
+/// object, unless the `watch` cancels. Objects may be in several leaves, and each leaf has one
+/// reference. [`validate_references`](bvh_core::validate_references) accepts the tree, and boxes are
+/// the boxes of the parts. O(r log² r) time for r references and balanced splits, not counting the
+/// clipping.
+pub fn build(
+    most: usize,
+    boxes: &[Aabb],
+    objects: &dyn Clip,
+    watch: &Watch,
+) -> Result<Bvh, BuildError> {
+    check_scene(boxes)?;
+    let extra = most.saturating_sub(boxes.len());
+    Build::new(objects, extra, boxes.len()).divide(boxes, Pace::new(watch))
 }
 
 /// A part of an object, for one leaf.
@@ -69,43 +83,8 @@ impl Sides {
     }
 }
 
-impl Config {
-    /// Builds a tree over `boxes`, one per object. Objects may be in several leaves, and each leaf
-    /// has one reference. [`validate_references`](bvh_core::validate_references) accepts the tree,
-    /// and boxes are the boxes of the parts. O(r log² r) time for r references and balanced splits,
-    /// not counting the clipping.
-    pub fn build(&self, boxes: &[Aabb], objects: &dyn Clip) -> Result<Bvh, BuildError> {
-        self.check()?;
-        let most = (self.references * boxes.len() as f64) as usize;
-        self.build_watched(most, boxes, objects, &Watch::default())
-    }
-
-    /// Builds a tree like [`build`](Self::build), with at most `most` references, but at least one
-    /// per object, unless the `watch` cancels.
-    pub fn build_watched(
-        &self,
-        most: usize,
-        boxes: &[Aabb],
-        objects: &dyn Clip,
-        watch: &Watch,
-    ) -> Result<Bvh, BuildError> {
-        self.check()?;
-        check_scene(boxes)?;
-        let mut build = Build {
-            config: self,
-            objects,
-            extra: most.saturating_sub(boxes.len()),
-            least_overlap: 0.0,
-            powers: Vec::new(),
-            axes: Default::default(),
-        };
-        build.divide(boxes, Pace::new(watch))
-    }
-}
-
 /// A build in progress.
 struct Build<'a> {
-    config: &'a Config,
     objects: &'a dyn Clip,
     /// Number of references that may be added.
     extra: usize,
@@ -116,20 +95,22 @@ struct Build<'a> {
     axes: [Axis; 3],
 }
 
-/// Number of stalls above a node after which a balanced split replaces a split that would stall.
-const MOST_STALLS: u8 = 8;
+impl<'a> Build<'a> {
+    /// Prepares a build with `extra` more references than `count` objects.
+    fn new(objects: &'a dyn Clip, extra: usize, count: usize) -> Self {
+        let powers = (0..=count).map(|n| libm::pow(n as f64, POWER)).collect();
+        Self { objects, extra, least_overlap: 0.0, powers, axes: Default::default() }
+    }
 
-impl Build<'_> {
     fn divide(&mut self, boxes: &[Aabb], mut pace: Pace) -> Result<Bvh, BuildError> {
         let mut tree = Bvh::default();
         if boxes.is_empty() {
             return Ok(tree);
         }
-        self.powers = (0..=boxes.len()).map(|n| libm::pow(n as f64, self.config.power)).collect();
         let references: Vec<Reference> =
             boxes.iter().zip(0..).map(|(&aabb, object)| Reference { aabb, object }).collect();
         let root = union(&references);
-        self.least_overlap = self.config.overlap * root.half_area();
+        self.least_overlap = OVERLAP * root.half_area();
         tree.nodes.push(Node::leaf(root, 0, 1));
         // By node, and the largest node first, of equal ones the first.
         let mut open = vec![Some(Open { references, stalls: 0 })];
@@ -232,13 +213,11 @@ mod tests {
         let objects = &triangles.as_slice();
         let mut before = f64::INFINITY;
         for references in [1.0, 1.1, 1.5, 3.0] {
-            let tree = Config { references, ..Config::default() }.build(&boxes, objects).unwrap();
+            let most = (references * 400.0) as usize;
+            let tree = build(most, &boxes, objects, &Watch::default()).unwrap();
             validate_references(&tree, &boxes, objects).unwrap();
             let count = tree.prim_ids.len();
-            assert!(
-                count <= (references * 400.0) as usize && (count > 400) == (references > 1.0),
-                "{count}"
-            );
+            assert!(count <= most && (count > 400) == (references > 1.0), "{count}");
             let cost = cost::total_area(&tree);
             assert!(cost <= before, "{cost} {before}");
             before = cost;
@@ -252,15 +231,7 @@ mod tests {
     fn planes_that_cannot_cost_less_than_the_object_split_are_skipped_and_no_other() {
         let triangles = needles(2000);
         let objects = &triangles.as_slice();
-        let config = Config::default();
-        let build = Build {
-            config: &config,
-            objects,
-            extra: usize::MAX,
-            least_overlap: 0.0,
-            powers: (0..=8).map(|n| libm::pow(f64::from(n), config.power)).collect(),
-            axes: Default::default(),
-        };
+        let build = Build::new(objects, usize::MAX, 8);
         let mut kept = 0;
         for (group, first) in triangles.chunks(8).zip((0..).step_by(8)) {
             let references: Vec<Reference> = group
@@ -286,17 +257,13 @@ mod tests {
             [vec![], needles(1), vec![Triangle([Vec3::ONE; 3]); 30], vec![needles(1)[0]; 3000]]
         {
             let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
-            let tree = Config::default().build(&boxes, &triangles.as_slice()).unwrap();
+            let most = 2 * boxes.len();
+            let tree = build(most, &boxes, &triangles.as_slice(), &Watch::default()).unwrap();
             validate_references(&tree, &boxes, &triangles.as_slice()).unwrap();
             assert_eq!(tree.prim_ids.len(), triangles.len(), "there is nothing to split");
             assert!(tree.depth() <= 12, "objects in one place are not halved: {}", tree.depth());
         }
         let wrong = [Aabb::from([[f32::NAN; 3], [1.0; 3]])];
-        assert!(Config::default().build(&wrong, &needles(1).as_slice()).is_err());
-        assert!(
-            Config { references: 0.5, ..Config::default() }
-                .build(&[], &needles(1).as_slice())
-                .is_err()
-        );
+        assert!(build(1, &wrong, &needles(1).as_slice(), &Watch::default()).is_err());
     }
 }

@@ -117,7 +117,6 @@ impl Build<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Config;
     use super::*;
     use bvh_core::Triangle;
     use proptest::prelude::*;
@@ -164,16 +163,8 @@ mod tests {
                 let [x, y, z, a, b, c] = sides.map(f32::from);
                 Reference { aabb: Aabb::from([[x, y, z], [x + a, y + b, z + c]]), object }
             }).collect();
-            let config = Config::default();
             let triangles: &[Triangle] = &[];
-            let mut build = Build {
-                config: &config,
-                objects: &triangles,
-                extra: 0,
-                least_overlap: 0.0,
-                powers: (0..=boxes.len()).map(|n| libm::pow(n as f64, config.power)).collect(),
-                axes: Default::default(),
-            };
+            let mut build = Build::new(&triangles, 0, boxes.len());
             for candidates in [Candidates::All, Candidates::Balanced] {
                 let expected = brute_force(&build, &references, candidates);
                 let Sides { references: [left, right], .. } = build.object_split(&references, candidates);

@@ -1,6 +1,6 @@
 //! Spatial splits of a node: the borders of bins, and the references on either side or on both.
 
-use super::{Build, Reference, Sides, union};
+use super::{BINS, Build, Reference, Sides, union};
 use crate::top_down::presort::in_parallel;
 use bvh_core::Aabb;
 
@@ -37,7 +37,7 @@ impl Build<'_> {
         references: &[Reference],
         most: f64,
     ) -> Option<Plane> {
-        let bins = self.config.bins as usize;
+        let bins = BINS;
         let all = references.len();
         let low = f64::from(aabb.min[axis]);
         let extent = aabb.extent()[axis];
