@@ -16,22 +16,6 @@ pub enum BuildError {
         /// The number of objects.
         objects: usize,
     },
-    /// The number of weights differs from the number of objects.
-    #[error("{weights} weights were given for {objects} objects")]
-    WeightCount {
-        /// The number of weights.
-        weights: usize,
-        /// The number of boxes.
-        objects: usize,
-    },
-    /// A weight is not finite or is negative. Weights are expected costs.
-    #[error("the weight of object {index} is {weight}; it must be finite and not negative")]
-    InvalidWeight {
-        /// Index of the object.
-        index: usize,
-        /// The weight of the object.
-        weight: f64,
-    },
     /// A parameter of the builder is out of its range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),

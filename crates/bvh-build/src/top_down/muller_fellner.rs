@@ -47,7 +47,7 @@ bvh_config::config! {
         /// Only areas: the heuristic of Table 2, in one of its readings.
         AreaOnly(AreaOnly),
         /// S(L)·ΣC_obj(L) + S(R)·ΣC_obj(R) with made-up costs, to measure the effect of object
-        /// costs. Pass known costs to [`Config::build_weighted`].
+        /// costs.
         AreaTimesCost(MadeUpCosts),
     }
 }
@@ -164,29 +164,6 @@ impl ByHeuristic<'_, '_> {
 }
 
 impl Config {
-    /// Builds with `weights[i]` as the expected cost C_obj of intersecting object `i`, in any unit,
-    /// finite and not negative. The configured heuristic is not used.
-    pub fn build_weighted(&self, boxes: &[Aabb], weights: &[f32]) -> Result<Bvh, BuildError> {
-        let scene = &Presorted::sort(boxes, self.skip_sorted, self.skip_flat)?;
-        if weights.len() != boxes.len() {
-            return Err(BuildError::WeightCount { weights: weights.len(), objects: boxes.len() });
-        }
-        if let Some(index) =
-            weights.iter().position(|weight| !(weight.is_finite() && *weight >= 0.0))
-        {
-            return Err(BuildError::InvalidWeight { index, weight: weights[index].into() });
-        }
-        let mut tree = Bvh::default();
-        let division = Division {
-            scene,
-            split_cost: &AreaTimesWeight(weights),
-            skip_same_order: self.skip_same_order,
-            watch: &Watch::default(),
-        };
-        division.by_best_splits(&mut Workspace::default(), &mut tree)?;
-        Ok(tree)
-    }
-
     /// Divides by any rule, for example a randomised one, on one thread, by half area or by a
     /// measure, unless the `watch` cancels. Reuses the memory of `workspace` and `tree`. The
     /// heuristic's parameter must be [in range](Check).

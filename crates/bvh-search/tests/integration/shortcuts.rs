@@ -131,17 +131,3 @@ fn a_flat_axis_that_orders_like_no_other_may_have_the_best_split() {
     let interleaved: Vec<Aabb> = row.iter().zip(&column).flat_map(|(a, b)| [*a, *b]).collect();
     assert!(cost(&one_by_one) < cost(&interleaved));
 }
-
-/// Between equal boxes, the value of a split is linear in the number on the left, so none is better
-/// than the splits at the ends of the run. One may be equally good and more balanced.
-#[test]
-fn a_tie_may_part_equal_boxes_so_that_merging_them_would_change_the_cost() {
-    let large = cube([0.0; 3], 4.0);
-    let small = cube([1.0; 3], 2.0);
-    let apart = Config::default().build(&[large, small, small, small, small, large]).unwrap();
-    let merged =
-        Config::default().build_weighted(&[large, small, large], &[1.0, 4.0, 1.0]).unwrap();
-    let expanded = internal_area(&merged) + 3.0 * small.half_area();
-    assert_eq!(internal_area(&apart), 3.0 * large.half_area() + 2.0 * small.half_area());
-    assert_eq!(expanded, 2.0 * large.half_area() + 3.0 * small.half_area());
-}
