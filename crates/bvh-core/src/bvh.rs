@@ -156,6 +156,25 @@ impl Bvh {
         depth.into_iter().max().unwrap_or(0) as usize
     }
 
+    /// Halves leaves of more than `most` objects, at least 1, in the order of their objects. The
+    /// halves keep the leaf's box; [`refit`](Self::refit) makes them tight. O(nodes).
+    pub fn halve_leaves(&mut self, most: usize) {
+        let mut index = 0;
+        // The halves are appended, and so they are visited and halved again if necessary.
+        while index < self.nodes.len() {
+            let Node { aabb, .. } = self.nodes[index];
+            let range = self.nodes[index].prims();
+            if range.len() > most {
+                let half = (range.len() / 2) as u32;
+                let start = range.start as u32;
+                self.nodes[index] = Node::inner(aabb, self.nodes.len() as u32, 2);
+                self.nodes.push(Node::leaf(aabb, start, half));
+                self.nodes.push(Node::leaf(aabb, start + half, range.len() as u32 - half));
+            }
+            index += 1;
+        }
+    }
+
     /// Recomputes every box from the leaves up. Makes boxes tight again after objects have moved,
     /// or after another library has padded the boxes. O(nodes + objects).
     ///

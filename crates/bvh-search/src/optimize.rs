@@ -1,7 +1,10 @@
 //! Improvement of any binary tree, for callers with their own builder.
 
 use crate::best;
-use crate::run::{Budget, Found, Kept, Observer, Outcome, Problem, Run, SearchError, solve};
+use crate::local::incumbent::Incumbent;
+use crate::run::{
+    Budget, Found, Kept, Observer, Outcome, Problem, Run, SearchError, Splits, solve,
+};
 use crate::tree::{Metric, search_by_metric};
 use bvh_config::{Check, OutOfRange};
 use bvh_core::cost::Objective;
@@ -85,44 +88,22 @@ pub fn optimize(
 /// are halved in their order.
 fn one_reference_per_leaf(tree: &Bvh, problem: &Problem) -> Bvh {
     let mut single = tree.clone();
-    let mut index = 0;
-    while index < single.nodes.len() {
-        let node = single.nodes[index];
-        let range = node.prims();
-        if range.len() > 1 {
-            let middle = range.start + range.len() / 2;
-            // The halves are appended and so visited later in this loop, until every leaf has one
-            // reference.
-            single.nodes[index] = Node::inner(node.aabb, single.nodes.len() as u32, 2);
-            let halves = [range.start..middle, middle..range.end];
-            single.nodes.extend(
-                halves.map(|half| Node::leaf(node.aabb, half.start as u32, half.len() as u32)),
-            );
-        }
-        index += 1;
-    }
+    single.halve_leaves(1);
     let split = problem.splits.filter(|_| tree.prim_ids.len() > problem.boxes.len());
+    let Some(Splits { objects, .. }) = split else {
+        single.refit(problem.boxes);
+        return single;
+    };
     // Children come after their parents, so a pass from the back makes boxes tight.
     for index in (0..single.nodes.len()).rev() {
         let node = single.nodes[index];
-        let below = single.nodes[node.children()].iter();
-        let aabb = match (node.kind(), split) {
-            (NodeKind::Inner { .. }, _) => {
-                below.fold(Aabb::EMPTY, |aabb, child| aabb.union(&child.aabb))
-            }
-            (NodeKind::Leaf { first, .. }, None) => {
-                problem.boxes[single.prim_ids[first as usize] as usize]
-            }
-            (NodeKind::Leaf { first, .. }, Some(splits)) => {
-                let part = splits.objects.clip(single.prim_ids[first as usize], &node.aabb);
-                // A degenerate object may have no part in its leaf. The leaf's box is then as tight
-                // as known.
-                if part == Aabb::EMPTY { node.aabb } else { part }
-            }
-        };
-        single.nodes[index] = match node.kind() {
-            NodeKind::Inner { first, count } => Node::inner(aabb, first, count),
-            NodeKind::Leaf { first, count } => Node::leaf(aabb, first, count),
+        single.nodes[index].aabb = if let NodeKind::Leaf { first, .. } = node.kind() {
+            let part = objects.clip(single.prim_ids[first as usize], &node.aabb);
+            // A degenerate object may have no part in its leaf. The leaf's box is then as tight as
+            // known.
+            if part == Aabb::EMPTY { node.aabb } else { part }
+        } else {
+            Aabb::union_of(single.nodes[node.children()].iter().map(|child| &child.aabb))
         };
     }
     single

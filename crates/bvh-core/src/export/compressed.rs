@@ -4,10 +4,9 @@
 use super::unpack::{Part, unpack};
 use crate::collapse::{binary, collect};
 use crate::wide::{areas, children, decide};
-use crate::{Aabb, Bvh, InvalidBvh, Node, validate};
+use crate::{Aabb, Bvh, InvalidBvh, validate};
 use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
-use core::ops::Range;
 use glam::{DVec3, Vec3};
 
 /// The largest number of objects in a leaf. Three bits store the number in unary.
@@ -122,7 +121,10 @@ impl CompressedBvh {
         if tree.nodes.is_empty() {
             return Ok(compressed);
         }
-        let tree = &with_small_leaves(binary(tree).into_owned(), boxes);
+        let mut tree = binary(tree).into_owned();
+        tree.halve_leaves(LEAF);
+        tree.refit(boxes);
+        let tree = &tree;
         let visits = areas(tree);
         let (decisions, _) =
             decide(tree, &visits, |objects| (objects <= LEAF as u32).then_some(1.0));
@@ -189,32 +191,6 @@ impl CompressedBvh {
             Ok(())
         })
     }
-}
-
-/// Halves the larger leaves of a binary tree, in the order of their objects.
-fn with_small_leaves(mut tree: Bvh, boxes: &[Aabb]) -> Bvh {
-    let mut index = 0;
-    // The halves are appended, and so they are visited and halved again if necessary.
-    while index < tree.nodes.len() {
-        let prims = tree.nodes[index].prims();
-        if prims.len() > LEAF {
-            let middle = prims.start + prims.len() / 2;
-            let lower = leaf_over(&tree, prims.start..middle, boxes);
-            let upper = leaf_over(&tree, middle..prims.end, boxes);
-            tree.nodes[index] = Node::inner(tree.nodes[index].aabb, tree.nodes.len() as u32, 2);
-            tree.nodes.extend([lower, upper]);
-        }
-        index += 1;
-    }
-    tree
-}
-
-fn leaf_over(tree: &Bvh, prims: Range<usize>, boxes: &[Aabb]) -> Node {
-    let mut aabb = Aabb::EMPTY;
-    for &id in &tree.prim_ids[prims.clone()] {
-        aabb = aabb.union(&boxes[id as usize]);
-    }
-    Node::leaf(aabb, prims.start as u32, prims.len() as u32)
 }
 
 /// Puts every child into the slot whose corner of the node it is nearest to. The child with the

@@ -135,7 +135,8 @@ impl Target {
     /// May panic on a tree that [`validate`](crate::validate()) rejects.
     pub fn fit(&self, tree: &Bvh) -> Bvh {
         let collapsed = collapse_at_most(tree, &self.constants, self.most_objects);
-        let divided = divide_leaves(binary(&collapsed).into_owned(), self.most_objects);
+        let mut divided = binary(&collapsed).into_owned();
+        divided.halve_leaves(self.most_objects as usize);
         let mut fitted = limit_depth(divided, self.most_depth);
         larger_first(&mut fitted);
         compact(&fitted)
@@ -219,24 +220,6 @@ fn larger_first(tree: &mut Bvh) {
             core::mem::swap(first, second);
         }
     }
-}
-
-/// Halves leaves with more than `most` objects.
-fn divide_leaves(mut divided: Bvh, most: u32) -> Bvh {
-    let mut index = 0;
-    while index < divided.nodes.len() {
-        let node = divided.nodes[index];
-        let range = node.prims();
-        if range.len() > most as usize {
-            let (first, start) = (divided.nodes.len() as u32, range.start as u32);
-            let half = range.len() as u32 / 2;
-            divided.nodes[index] = Node::inner(node.aabb, first, 2);
-            divided.nodes.push(Node::leaf(node.aabb, start, half));
-            divided.nodes.push(Node::leaf(node.aabb, start + half, range.len() as u32 - half));
-        }
-        index += 1;
-    }
-    divided
 }
 
 /// Replaces subtrees that reach below `most` levels by balanced ones over the same leaves, as far

@@ -31,24 +31,15 @@ fn scene_of(n: u32, children: usize, leaf: usize) -> (Vec<Aabb>, Bvh) {
         let [x, y, z] = [i as f32, (i % 3) as f32, (i % 5) as f32 * 0.5];
         boxes.push(Aabb::from([[x, y, z], [x + 1.5, y + 1.0, z + 0.5]]));
     }
-    let mut tree =
-        Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, n)], prim_ids: (0..n).rev().collect() };
-    let mut index = 0;
-    while index < tree.nodes.len() && n as usize > leaf {
-        let range = tree.nodes[index].prims();
-        let parts = if index == 0 { children } else { 2 };
-        if range.len() > leaf {
-            let first = tree.nodes.len() as u32;
-            let cut = |part: usize| (range.start + range.len() * part / parts) as u32;
-            for part in 0..parts {
-                tree.nodes.push(Node::leaf(Aabb::EMPTY, cut(part), cut(part + 1) - cut(part)));
-            }
-            tree.nodes[index] = Node::inner(Aabb::EMPTY, first, parts as u32);
-        }
-        index += 1;
-    }
-    if n == 0 {
-        tree.nodes.clear();
+    let mut tree = Bvh { nodes: vec![], prim_ids: (0..n).rev().collect() };
+    if n as usize > leaf {
+        let cut = |part: usize| (n as usize * part / children) as u32;
+        let leaf_of = |part| Node::leaf(Aabb::EMPTY, cut(part), cut(part + 1) - cut(part));
+        tree.nodes.push(Node::inner(Aabb::EMPTY, 1, children as u32));
+        tree.nodes.extend((0..children).map(leaf_of));
+        tree.halve_leaves(leaf);
+    } else if n > 0 {
+        tree.nodes.push(Node::leaf(Aabb::EMPTY, 0, n));
     }
     tree.refit(&boxes);
     (boxes, tree)
