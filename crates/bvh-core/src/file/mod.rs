@@ -76,7 +76,7 @@ pub use header::Header;
 
 use crate::cost::{CallBoth, Objective, call_in_turn};
 use crate::validate::{Leaves, check_structure, for_each};
-use crate::{Aabb, Bvh, BvhView, Clip, InvalidBvh, Node, validate, validate_references};
+use crate::{Aabb, Bvh, BvhView, InvalidBvh, Node, validate};
 use alloc::borrow::Cow;
 use alloc::vec::Vec;
 use bytemuck::Pod;
@@ -108,34 +108,17 @@ pub struct Origin<'a> {
 /// [valid](validate()) over `boxes`. O(nodes + objects).
 pub fn save(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, FileError> {
     validate(tree, boxes)?;
-    saved(tree, boxes, origin)
-}
-
-/// Returns the file of a valid tree.
-fn saved(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, FileError> {
     let cost = origin.objective.cost(tree);
     Ok(sections(tree, boxes, cost, origin, &call_in_turn)?.concat())
 }
 
-/// Returns the file of a tree whose `objects` may be divided among leaves. Rejects a tree that is
-/// not [valid](validate_references()); otherwise the same as [`save`].
-pub fn save_references(
-    tree: &Bvh,
-    boxes: &[Aabb],
-    objects: &dyn Clip,
-    origin: &Origin,
-) -> Result<Vec<u8>, FileError> {
-    validate_references(tree, boxes, objects)?;
-    saved(tree, boxes, origin)
-}
-
-/// Returns the sections of the same file as [`save_references`], to be written one after the other:
-/// the header, the nodes, the object ids and the visits. All but the header are the tree's memory,
-/// which a file of gigabytes does not need twice.
+/// Returns the sections of a file like that of [`save`], to be written one after the other: the
+/// header, the nodes, the object ids and the visits. All but the header are the tree's memory, which
+/// a file of gigabytes does not need twice. The tree's objects may be divided among leaves.
 ///
-/// The caller has [validated](validate_references()) the tree and knows its cost under the origin's
-/// objective. Neither is checked here, because each takes as long as everything else, and several
-/// threads can do both at once. Passes to `both` the check of the visits with the scene's checksum,
+/// The caller has [validated](crate::validate_references()) the tree and knows its cost under the
+/// origin's objective. Neither is checked here, because each takes as long as everything else, and
+/// several threads can do both at once. Passes to `both` the check of the visits with the scene's checksum,
 /// and the file's checksum. Rejects visits that no measure gives.
 pub fn sections<'a>(
     tree: &'a Bvh,

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::cost::SahConstants;
-use crate::{Ray, nearest_hit_by};
+use crate::{Clip, Ray, nearest_hit_by, validate_references};
 use alloc::string::ToString;
 use alloc::vec;
 
@@ -55,6 +55,13 @@ impl Clip for Filled<'_> {
     }
 }
 
+/// Returns the file of a tree whose objects may be divided.
+fn save_parts(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, FileError> {
+    validate_references(tree, boxes, &Filled(boxes))?;
+    let cost = origin.objective.cost(tree);
+    Ok(sections(tree, boxes, cost, origin, &call_in_turn)?.concat())
+}
+
 /// Makes a [`scene_of`] single objects per leaf, in which every third leaf is divided at the middle
 /// of its box.
 fn split_scene(n: u32) -> (Vec<Aabb>, Bvh) {
@@ -80,7 +87,7 @@ fn a_tree_with_divided_objects_comes_back_and_is_rejected_if_a_part_is_missing()
     let (boxes, tree) = split_scene(11);
     assert_eq!(tree.prim_ids.len(), 15);
     let origin = Origin { objective: Objective::Layout, ..ORIGIN };
-    let bytes = save_references(&tree, &boxes, &Filled(&boxes), &origin).unwrap();
+    let bytes = save_parts(&tree, &boxes, &origin).unwrap();
     assert_eq!(load(&bytes, &boxes), Ok(tree.clone()));
     assert_eq!(TreeFile::open(&bytes).unwrap().header().references, 15);
     let wrong_count = FileError::Tree(InvalidBvh::ObjectCount { named: 15, objects: 11 });
@@ -91,9 +98,7 @@ fn a_tree_with_divided_objects_comes_back_and_is_rejected_if_a_part_is_missing()
         }
         let mut smaller = tree.clone();
         smaller.nodes[index].aabb.max.y -= 0.25;
-        let Err(FileError::Tree(fault)) =
-            save_references(&smaller, &boxes, &Filled(&boxes), &origin)
-        else {
+        let Err(FileError::Tree(fault)) = save_parts(&smaller, &boxes, &origin) else {
             panic!("node {index} does not cover its object");
         };
         // Leaf nodes of divided objects leave a gap, other leaves lose their object.
@@ -365,7 +370,7 @@ fn a_forged_file_is_rejected_or_can_be_traced_to_the_end() {
     let words = forged_words();
     let mut accepted = 0;
     for (boxes, tree) in [scene(11), scene_of(11, 2, 1), split_scene(11)] {
-        let file = save_references(&tree, &boxes, &Filled(&boxes), &ORIGIN).unwrap();
+        let file = save_parts(&tree, &boxes, &ORIGIN).unwrap();
         for offset in (16..file.len()).step_by(4 * ONE_OF) {
             if Header::CHECKSUM.contains(&offset) {
                 continue;

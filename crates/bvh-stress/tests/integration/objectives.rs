@@ -7,7 +7,7 @@ use bvh_core::{
     Aabb, Primitives, RayDensity, Segment, Triangle, WideBvh, file, validate, validate_references,
 };
 use bvh_scenes::builtin::stiff;
-use bvh_search::{Method, Problem, Splits, optimize, solve};
+use bvh_search::{Bake, Method, Problem, Splits, optimize, solve};
 use bvh_stress::{
     Case, EXACT_OBJECTS, examine, methods, scenes, tracing,
     transform::{same_topology, scale_range, scaled, scaled_area},
@@ -132,18 +132,9 @@ fn every_case_holds_with_divided_objects_and_with_the_cost_of_the_layout() {
                 divided += usize::from(outcome.tree.prim_ids.len() > boxes.len());
                 assert_reported(case.id, outcome.cost, problem.cost(&outcome.tree));
                 let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
-                let bytes = file::save_references(
-                    &outcome.tree,
-                    &boxes,
-                    &objects,
-                    &file::Origin::default(),
-                );
-                assert_eq!(
-                    file::load(&bytes.unwrap(), &boxes),
-                    Ok(outcome.tree.clone()),
-                    "{}",
-                    case.id
-                );
+                let bake = Bake { shapes: Some(&objects), ..Bake::new(&boxes) };
+                let bytes = bake.write(&outcome.tree, 0, |sections, _| sections.concat()).unwrap();
+                assert_eq!(file::load(&bytes, &boxes), Ok(outcome.tree.clone()), "{}", case.id);
                 let wide = WideBvh::new(&outcome.tree, &triangles).unwrap();
                 let plain = WideBvh::new(&greedy, &triangles).unwrap();
                 assert_same_answers(case, &wide, &plain, &triangles);
