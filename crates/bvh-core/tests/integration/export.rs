@@ -7,10 +7,12 @@ use bvh_core::{Aabb, Bvh, InvalidBvh, Node, Ray, Triangle, any_hit, nearest_hit,
 use glam::Vec3;
 use proptest::prelude::*;
 
-fn returned(tree: &Bvh, boxes: &[Aabb]) -> [(&'static str, Bvh); 3] {
+fn returned(tree: &Bvh, boxes: &[Aabb]) -> [(&'static str, Bvh); 4] {
+    let ids = &tree.prim_ids;
     [
-        ("binary", Bvh::from_first_count(&tree.to_first_count(), &tree.prim_ids).unwrap()),
-        ("three-mesh-bvh", Bvh::from_three_mesh(&tree.to_three_mesh(), &tree.prim_ids).unwrap()),
+        ("binary", Bvh::from_first_count(&tree.to_first_count(), ids).unwrap()),
+        ("aligned", Bvh::from_first_count(&tree.to_first_count_aligned(), ids).unwrap()),
+        ("three-mesh-bvh", Bvh::from_three_mesh(&tree.to_three_mesh(), ids).unwrap()),
         ("compressed", CompressedBvh::new(tree, boxes).unwrap().decode().unwrap()),
     ]
 }
@@ -164,6 +166,31 @@ fn the_bytes_are_the_documented_ones() {
         [0, 0, 0, 255, 128, 128]
     );
     assert_eq!(compressed.prim_ids, [1, 0]);
+}
+
+#[test]
+fn pairs_begin_at_even_indices_if_aligned_and_invalid_indices_are_rejected() {
+    let tree = chain(&boxes(&soup(4, &mut Random(5))));
+    for (index, node) in tree.to_first_count_aligned().iter().enumerate() {
+        // Index 1 is the unused node.
+        assert!(index == 1 || node.count > 0 || node.first % 2 == 0, "{index}");
+    }
+    // The error after the fields of one node were replaced.
+    let rejection = |index: usize, first, count| {
+        let mut nodes = tree.to_first_count();
+        nodes[index] = FirstCountNode { first, count, ..nodes[index] };
+        Bvh::from_first_count(&nodes, &tree.prim_ids).unwrap_err()
+    };
+    for first in [6, u32::MAX] {
+        let bad_children = InvalidBvh::BadChildren { node: 0, first, count: 2, nodes: 7 };
+        assert_eq!(rejection(0, first, 0), bad_children);
+    }
+    assert!(matches!(rejection(0, 0, 0), InvalidBvh::Parents { parents: 2, .. }));
+    for (first, count) in [(4, 1), (1, u32::MAX)] {
+        let bad_leaf = InvalidBvh::BadLeaf { node: 1, first, count, objects: 4 };
+        assert_eq!(rejection(1, first, count), bad_leaf);
+    }
+    assert!(matches!(rejection(1, 0, 4), InvalidBvh::ObjectCount { objects: 4, .. }));
 }
 
 fn float(bytes: &[u8], offset: usize) -> f32 {
