@@ -208,9 +208,7 @@ impl<'a> Bake<'a> {
         // An early end of a long search leaves a tree that is behind reinsertion's.
         let reinserted = match budget.max_work {
             Some(work) if observer.progress().is_none() && !observer.cancelled() => {
-                let known = greedy.as_ref().map(|greedy| &greedy.tree);
-                let problem = Problem { known, ..*problem };
-                best::fallback(&problem, work, &Unheard(observer))?
+                best::fallback(problem, work, &Unheard(observer))?
             }
             _ => None,
         };

@@ -56,12 +56,8 @@ pub fn optimize(
     tight.prim_ids = (0..leaves.len() as u32).collect();
     let leaf_boxes: Vec<Aabb> = leaves.iter().map(|(aabb, _)| *aabb).collect();
     let mut outcome = {
-        let problem = Problem {
-            boxes: &leaf_boxes,
-            objective: Objective::InternalArea,
-            known: None,
-            ..*problem
-        };
+        let problem =
+            Problem { boxes: &leaf_boxes, objective: Objective::InternalArea, ..*problem };
         solve(&From { tree: tight, config }, &problem, seed, budget, observer)?
     };
     let mut prim_ids = Vec::with_capacity(boxes.len());
@@ -73,14 +69,6 @@ pub fn optimize(
         }
     }
     outcome.tree.prim_ids = prim_ids;
-    // The search ran on leaves as objects, for which the caller's known tree would not be valid.
-    if let Some(known) = problem.known {
-        let cost = Problem { objective: Objective::InternalArea, ..*problem }.cost(known);
-        if cost < outcome.cost {
-            outcome.cost = cost;
-            outcome.tree = known.clone();
-        }
-    }
     Ok(outcome)
 }
 

@@ -144,19 +144,19 @@ impl<'a> Run<'a> {
         self.aside.take_if(|aside| aside.cost < cost)
     }
 
-    /// Returns the cheapest of the tree that the search `found`, the tree kept aside, and the
-    /// caller's `known` tree. Builds a tree with the fastest builder if a cancellation left none.
-    fn cheapest(&mut self, found: Found, problem: &Problem, known: Option<(f64, &Bvh)>) -> Found {
-        let mut tree = match found {
+    /// Returns the cheaper of the tree that the search `found` and the tree kept aside. Builds a
+    /// tree with the fastest builder if a cancellation left none.
+    fn cheapest(&mut self, found: Found, problem: &Problem) -> Found {
+        let tree = match found {
             // A cancelled first construction leaves no tree; any other error is the caller's.
             Err(SearchError::Build(BuildError::Cancelled)) => None,
             found => Some(found?),
         };
-        if let Some(aside) = self.aside.take() {
-            self.prefer(&mut tree, aside.cost, || aside.tree);
-        }
-        if let Some((cost, known)) = known {
-            self.prefer(&mut tree, cost, || known.clone());
+        let aside = self.aside.take();
+        // Strictly cheaper, so that equal trees do not depend on the order of the offers.
+        if let Some(aside) = aside.filter(|aside| tree.is_none() || aside.cost < self.incumbent) {
+            self.improve(aside.cost);
+            return Ok(aside.tree);
         }
         if let Some(tree) = tree {
             return Ok(tree);
@@ -164,15 +164,6 @@ impl<'a> Run<'a> {
         let tree = FASTEST.build_watched(problem.boxes, problem.measure, &Watch::default())?;
         self.record(problem.cost(&tree), tree.nodes.len() as u64);
         Ok(tree)
-    }
-
-    /// Replaces the tree by another of this cost, if the other is cheaper or if there is no tree.
-    fn prefer(&mut self, tree: &mut Option<Bvh>, cost: f64, other: impl FnOnce() -> Bvh) {
-        // Strictly cheaper, so that equal trees do not depend on the order of the offers.
-        if tree.is_none() || cost < self.incumbent {
-            self.improve(cost);
-            *tree = Some(other());
-        }
     }
 
     /// The lowest cost so far.
@@ -257,8 +248,7 @@ pub struct Outcome {
 }
 
 /// Runs one search within `budget`, after a [check](Check) of its parameters. All randomness comes
-/// from `seed`. The outcome never costs more than any tree built during the search, nor than the
-/// problem's [known](Problem::known) tree.
+/// from `seed`. The outcome never costs more than any tree built during the search.
 ///
 /// A cancelled search returns soon, even during a construction.
 pub fn solve(
@@ -271,9 +261,8 @@ pub fn solve(
     solve_or_keep(search, problem, None, seed, budget, observer)
 }
 
-/// Searches as [`solve`] does. The caller hands over a tree, as an alternative to lending it as
-/// [`Problem::known`]: the outcome never costs more, and the memory of the tree is free as soon as
-/// the search has a tree that costs no more.
+/// Searches as [`solve`] does. The caller hands over a tree: the outcome never costs more, and the
+/// memory of the tree is free as soon as the search has a tree that costs no more.
 pub fn solve_or_keep(
     search: &dyn Search,
     problem: &Problem,
@@ -294,17 +283,14 @@ pub fn solve_or_keep(
         history: Vec::new(),
     };
     search.check()?;
-    // Evaluate the known tree first: a cancelled search has no time for it at its end.
-    let known = problem.known.map(|tree| (problem.cost(tree), tree));
     // The first tree of a large scene takes seconds, which a search that is cancelled before it
     // begins does not need.
-    let has_tree = known.is_some() || run.aside.is_some();
-    let found = if has_tree && observer.cancelled() {
+    let found = if run.aside.is_some() && observer.cancelled() {
         Err(BuildError::Cancelled.into())
     } else {
         search.search(problem, seed, &mut run)
     };
-    let tree = run.cheapest(found, problem, known)?;
+    let tree = run.cheapest(found, problem)?;
     // Before the first tree no reason counts, but the caller's tree needs none.
     let otherwise =
         if observer.cancelled() { StopReason::Cancelled } else { StopReason::Completed };

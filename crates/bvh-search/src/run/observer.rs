@@ -26,8 +26,8 @@ pub trait Observer: Sync {
     /// A search may run long without an event.
     fn counted(&self, _evaluations: u64, _work: u64) {}
     /// Polled often, by constructions too. The search returns its incumbent soon after this becomes
-    /// true. Without an incumbent, it returns the caller's [known](crate::Problem::known) tree, or
-    /// a tree of the fastest builder.
+    /// true. Without an incumbent, it returns the tree that the caller [kept](crate::solve_or_keep),
+    /// or a tree of the fastest builder.
     fn cancelled(&self) -> bool {
         false
     }

@@ -61,8 +61,6 @@ pub struct Problem<'a> {
     /// tree: builders, GRASP without local search, insertion orders. The other searches add up
     /// parts of a cost and ignore the judge.
     pub judge: Option<&'a dyn Judge>,
-    /// A valid tree over these objects that the caller already has. The outcome never costs more.
-    pub known: Option<&'a Bvh>,
     /// Shortcuts to disable, so that their savings can be measured. Empty in production.
     pub disabled: &'a [Shortcut],
 }
@@ -76,7 +74,6 @@ impl<'a> Problem<'a> {
             measure: None,
             splits: None,
             judge: None,
-            known: None,
             disabled: &[],
         }
     }

@@ -152,8 +152,10 @@ fn a_search_that_is_cancelled_during_its_first_construction_returns_the_known_tr
     for method in constructing() {
         for (known, expected) in [(Some(&known), &known), (None, &fastest)] {
             let polls = Polls { polled: 0.into(), until: 0 };
-            let problem = Problem { known, ..Problem::new(&boxes) };
-            let outcome = solve(&method, &problem, 1, Budget::UNLIMITED, &polls).unwrap();
+            let problem = Problem::new(&boxes);
+            let kept = known.map(|known| Kept::new(known.clone(), &problem));
+            let outcome =
+                solve_or_keep(&method, &problem, kept, 1, Budget::UNLIMITED, &polls).unwrap();
             assert_eq!(outcome.tree, *expected, "{}", method.name());
             assert_eq!(outcome.cost, problem.cost(expected), "{}", method.name());
             assert_eq!(outcome.stop, StopReason::Cancelled, "{}", method.name());

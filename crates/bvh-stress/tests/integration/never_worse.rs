@@ -9,7 +9,7 @@ use bvh_build::{Builder, muller_fellner, ploc};
 use bvh_core::{Aabb, Triangle, cost, validate};
 use bvh_scenes::Scene;
 use bvh_scenes::builtin::stiff;
-use bvh_search::{Budget, Method, Observer, Outcome, Problem, best, solve};
+use bvh_search::{Budget, Kept, Method, Observer, Outcome, Problem, best, solve, solve_or_keep};
 use bvh_stress::EXACT_OBJECTS;
 use bvh_stress::examine::ROUNDING;
 use rand::{RngExt, SeedableRng};
@@ -76,10 +76,14 @@ fn no_method_ends_above_a_tree_that_it_has_evaluated_or_that_its_caller_has() {
                     found.history.iter().map(|event| event.cost).fold(f64::INFINITY, f64::min);
                 assert!(at_most(found.cost, least), "{here}: {} after {least}", found.cost);
                 assert!(at_most(cost::internal_area(&found.tree), found.cost), "{here}");
-                let problem = Problem { known: Some(&known), ..Problem::new(boxes) };
-                let informed = solved(&method, &problem, work, &());
-                let least = found.cost.min(cost::internal_area(&known));
-                assert_eq!(informed.cost, least, "{here}");
+                let max_work = Some(work * boxes.len() as u64);
+                let budget = Budget { max_work, ..Budget::UNLIMITED };
+                let problem = Problem::new(boxes);
+                let kept = Kept::new(known.clone(), &problem);
+                let limit = kept.cost;
+                let informed =
+                    solve_or_keep(&method, &problem, Some(kept), 1, budget, &()).unwrap();
+                assert!(informed.cost <= limit, "{here}: {} above {limit}", informed.cost);
             }
         }
     }
@@ -179,8 +183,10 @@ fn a_clock_ends_no_search_above_the_tree_that_its_caller_has() {
     for method in Method::all().iter().filter(|method| method.name() != "exact") {
         for most in [1, 3, 10, 100, 1000] {
             let clock = Questions { asked: AtomicU64::new(0), most };
-            let problem = Problem { known: Some(&known), ..Problem::new(&boxes) };
-            let found = solve(method, &problem, 1, Budget::UNLIMITED, &clock).unwrap();
+            let problem = Problem::new(&boxes);
+            let kept = Some(Kept::new(known.clone(), &problem));
+            let found =
+                solve_or_keep(method, &problem, kept, 1, Budget::UNLIMITED, &clock).unwrap();
             validate(&found.tree, &boxes).unwrap();
             assert!(found.cost <= limit, "{}, {most}: {} above {limit}", method.name(), found.cost);
         }
