@@ -120,6 +120,7 @@ impl From<'_> {
         run: &mut Run,
     ) -> Found {
         let tree = Kept::new(self.tree.clone(), problem);
-        self.config.improved(tree, None, metric, problem, seed, run)
+        let best = Incumbent::begin(tree, problem, run);
+        self.config.improved(best, None, metric, problem, seed, run)
     }
 }

@@ -155,14 +155,7 @@ tuned! { "cargo bench -p harness --bench peers --features peers -- SCENE..." {
     /// Part of the scene on which the sort is timed a second time, in warm memory.
     WARM_SAMPLE: usize = 16, "divisor of the number of objects";
     /// Time reserved for ordering and evaluating the tree after reinsertion.
-    FINISH_TIME: f64 = 0.75, "sort times";
-    /// The fastest builds and the time below which each is used, without reinsertion.
-    BUILDS: [(f64, Clustering); 4] = [
-        (2.5, Clustering { radius: 1, near_rounds: 0 }),
-        (2.75, Clustering { radius: 2, near_rounds: 0 }),
-        (3.0, Clustering { radius: 4, near_rounds: 2 }),
-        (3.5, CLUSTERING),
-    ], "sort times";
+    FINISH_TIME: f64 = 1.0, "sort times";
     /// The clustering that reinsertion starts from. A better clustering takes the time of more
     /// reinsertions than it saves.
     CLUSTERING: Clustering = Clustering { radius: 5, near_rounds: 1 }, "clusters, rounds";

@@ -4,8 +4,8 @@
 //! short: the [exact solver](crate::exact) for a few objects; clustering and reinsertion of the
 //! largest nodes in milliseconds (`small_budget`); one long run of
 //! [annealed ruin and recreate](crate::ruin_recreate) and short runs after it if the end is known,
-//! from the budget's work or the observer's [progress](crate::Observer::progress) (`plan`);
-//! generations of growing length if the end is open (`improve`).
+//! from the budget's work or the observer's [progress](crate::Observer::progress), and generations
+//! of growing length if the end is open (`improve`).
 //!
 //! The result of an annealing run is recombined with the incumbent (`recombine`). The first run of
 //! a plan is an exception: it replaces the incumbent if it ends better. If it ends worse under a
@@ -15,11 +15,8 @@
 
 mod config;
 mod improve;
-mod improvement;
-mod plan;
 mod recombine;
 mod small_budget;
-mod time_limit;
 
 use crate::exact;
 use crate::local::incumbent::Incumbent;
@@ -35,7 +32,7 @@ use bvh_build::{BuildError, Builder, Watch};
 use bvh_core::Bvh;
 use bvh_core::cost::Objective;
 pub use config::{Config, Horizon};
-pub(crate) use improve::improve;
+use improve::improve;
 use small_budget::SmallBudget;
 
 search_by_metric!(Config);
@@ -102,7 +99,8 @@ impl Config {
         if problem.splits.is_some() || problem.objective == Objective::Layout {
             let tree = self.initial(None, problem, run)?;
             let other = division(problem, run.observer())?;
-            return self.improved(tree, other, metric, problem, seed, run);
+            let best = Incumbent::begin(tree, problem, run);
+            return self.improved(best, other, metric, problem, seed, run);
         }
         let (_, work) = self.horizon(problem.boxes.len() as u64, run);
         if let Some(optimum) = exact::instead(problem, work, run)? {
@@ -113,21 +111,14 @@ impl Config {
             None => small_budget::search(problem, run)?,
             Some(_) => SmallBudget::Large(None),
         };
-        let mut best = match small {
+        let best = match small {
             SmallBudget::Tree(tree) => return Ok(tree),
             SmallBudget::LocalOptimum(best) => best,
             SmallBudget::Large(morton) => {
-                let best = Incumbent::begin(self.initial(morton, problem, run)?, problem, run);
-                // The working form of a large tree takes half a second.
-                if run.stopped() == Some(StopReason::Cancelled) {
-                    return Ok(best.tree);
-                }
-                best
+                Incumbent::begin(self.initial(morton, problem, run)?, problem, run)
             }
         };
-        let mut tree = best.working(metric)?;
-        improve(self, &mut tree, None, seed, problem, &mut best, run);
-        Ok(best.tree)
+        self.improved(best, None, metric, problem, seed, run)
     }
 
     /// Builds the initial tree from the top down, and a clustering, which takes a fraction of the
@@ -169,14 +160,14 @@ impl Config {
     /// trial shows that the other tree is better, improves the other tree instead.
     pub(crate) fn improved<A: Metric>(
         &self,
-        tree: Kept,
+        mut best: Incumbent,
         other: Option<Bvh>,
         metric: A,
         problem: &Problem,
         seed: u64,
         run: &mut Run,
     ) -> Found {
-        let mut best = Incumbent::begin(tree, problem, run);
+        // The working form of a large tree takes half a second.
         if run.stopped() == Some(StopReason::Cancelled) {
             return Ok(best.tree);
         }

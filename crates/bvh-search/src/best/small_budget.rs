@@ -5,14 +5,19 @@
 //! the root hold most of the area that can be saved. With larger budgets, annealing from a top-down
 //! division ends lower.
 //!
-//! Under a time limit, the Morton sort tells how long the other steps will take (`time_limit`).
+//! Under a time limit, the Morton sort, which always runs first, tells how long the other steps will
+//! take: its duration follows the machine and the scene as theirs do. Clocks tell fractions of all
+//! time.
 
-use super::time_limit::TimeLimit;
 use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion::pass;
-use crate::run::{Kept, Problem, Run, SearchError, Tally};
+use crate::parallel::threads;
+use crate::run::{Kept, Observer, Problem, Run, SearchError, Tally};
 use crate::tree::{Linked, Siblings};
-use crate::tuning::{ANNEAL_FROM_WORK, CLUSTERING, FIRST_PASS, FRONT, MOVES_PER_READING};
+use crate::tuning::{
+    ANNEAL_FROM_TIME, ANNEAL_FROM_WORK, CLUSTERING, COLD_MEMORY, FINISH_TIME, FIRST_PASS, FRONT,
+    MOVES_PER_READING, SEVERAL_THREADS, WARM_SAMPLE,
+};
 use bvh_build::Watch;
 use bvh_build::ploc::MortonOrder;
 use bvh_core::Bvh;
@@ -45,54 +50,73 @@ pub(super) fn search<'p>(
         return Ok(SmallBudget::Large(None));
     }
     let morton = MortonOrder::new(problem.boxes)?;
-    let limit = TimeLimit::after_sort(began, observer);
-    if let Some(limit) = &limit {
-        if limit.is_enough_for_annealing(problem, observer)? {
+    // Reinsertion must end early enough for the order and the evaluation of the tree.
+    let mut end = None;
+    if let (Some(began), Some(now)) = (began, observer.progress()) {
+        let sort = (now - began).max(SHORTEST_SORT);
+        if is_enough_for_annealing(1.0 - began, sort, problem, observer)? {
             return Ok(SmallBudget::Large(Some(morton)));
         }
-        if let Some(clustering) = limit.only_build() {
-            let tree = Kept::new(morton.build(&clustering, None, &Watch::default())?, problem);
-            return Ok(SmallBudget::Tree(Incumbent::begin_unbounded(tree, problem, run).tree));
-        }
+        end = Some(1.0 - FINISH_TIME * sort);
     }
     let clustered = morton.build(&CLUSTERING, None, &Watch::default())?;
-    Ok(improved(clustered, limit.as_ref(), problem, run))
+    Ok(improved(clustered, end, problem, run))
 }
 
-/// Improves the initial tree by reinsertion until a local optimum, or until the time or work is
-/// used up.
+/// The shortest duration of a sort, as a fraction of all time: a coarse clock may not advance during
+/// one.
+const SHORTEST_SORT: f64 = 1e-9;
+
+/// Returns whether annealing ends lower than clustering and reinsertion in this time, after a sort
+/// of this duration.
+fn is_enough_for_annealing(
+    time: f64,
+    sort: f64,
+    problem: &Problem,
+    observer: &dyn Observer,
+) -> Result<bool, SearchError> {
+    let several = if threads() > 1 { SEVERAL_THREADS } else { 1.0 };
+    let sorts = several * ANNEAL_FROM_TIME;
+    if time >= sorts * sort || time < sorts / COLD_MEMORY * sort {
+        return Ok(time >= sorts * sort);
+    }
+    // The sort may have been slow because it was the first to use its memory. The later steps run
+    // in warm memory.
+    let sample = &problem.boxes[..problem.boxes.len().div_ceil(WARM_SAMPLE)];
+    let began = observer.progress().unwrap_or(0.0);
+    MortonOrder::new(sample)?;
+    let took = observer.progress().unwrap_or(0.0) - began;
+    let warm = took * problem.boxes.len() as f64 / sample.len() as f64;
+    Ok(time >= sorts * warm.max(SHORTEST_SORT))
+}
+
+/// Improves the initial tree by reinsertion until a local optimum, until the work is used up, or
+/// until the observer's progress reaches `end`, if the time is limited.
 fn improved<'p>(
     tree: Bvh,
-    limit: Option<&TimeLimit>,
+    end: Option<f64>,
     problem: &Problem<'p>,
     run: &mut Run,
 ) -> SmallBudget<'p> {
     // A time-limited search does not evaluate the initial tree: reinsertion never makes it worse,
     // and the evaluation would take the time of many moves.
     let mut before = None;
-    if limit.is_none() {
+    if end.is_none() {
         before = Some(Incumbent::begin(Kept::new(tree.clone(), problem), problem, run));
     } else {
         run.count(Tally { moves: 1, kept: 0, work: tree.nodes.len() as u64 });
     }
-    let end = limit.map_or(f64::INFINITY, TimeLimit::end_of_reinsertion);
     let mut siblings = Siblings::new(tree);
-    let is_local_optimum = reinsert_largest(&mut siblings, end, run);
+    let is_local_optimum = reinsert_largest(&mut siblings, end.unwrap_or(f64::INFINITY), run);
     let tree = siblings.into_tree();
-    let mut best = match before {
+    let best = match before {
         Some(mut best) => {
             best.offer_tree(tree, run);
             best
         }
-        None => Incumbent::begin_unbounded(Kept::new(tree, problem), problem, run),
+        None => Incumbent::begin(Kept::new(tree, problem), problem, run),
     };
-    if !is_local_optimum {
-        return SmallBudget::Tree(best.tree);
-    }
-    if limit.is_some() {
-        best.bound(run);
-    }
-    SmallBudget::LocalOptimum(best)
+    if is_local_optimum { SmallBudget::LocalOptimum(best) } else { SmallBudget::Tree(best.tree) }
 }
 
 /// Reinserts more and more of the largest nodes, until the observer's progress reaches `end` or the
@@ -145,7 +169,7 @@ fn select_largest(tree: &Siblings, part: f64, front: usize, order: &mut Vec<u32>
 mod tests {
     use super::*;
     use crate::best;
-    use crate::run::{Budget, Observer, solve};
+    use crate::run::{Budget, solve};
     use crate::scatter::scatter;
     use bvh_build::{Builder, ploc};
     use bvh_core::{cost, validate};

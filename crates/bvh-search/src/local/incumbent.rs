@@ -48,31 +48,20 @@ impl<'p> Incumbent<'p> {
         tree.refill(&self.tree, self.area)
     }
 
-    /// Starts with a valid tree whose boxes are tight.
+    /// Starts with a valid tree whose boxes are tight. Ends the run if it meets the lower bound.
     pub fn begin(kept: Kept, problem: &Problem<'p>, run: &mut Run) -> Self {
-        let mut incumbent = Self::begin_unbounded(kept, problem, run);
-        incumbent.bound(run);
-        incumbent
-    }
-
-    /// Computes the lower bound and ends the run if the tree meets it, now or later.
-    pub fn bound(&mut self, run: &mut Run) {
-        // The bound holds for areas and undivided objects only.
-        let Problem { measure, splits, objective, .. } = self.problem;
-        let of_areas = measure.is_none() && splits.is_none() && objective != Objective::Layout;
-        if of_areas && self.problem.allows(Shortcut::BoundMet) {
-            self.lower_bound = lower_bound::of_largest(self.problem.boxes);
-        }
-        self.stop_if_optimal(run);
-    }
-
-    /// Like [`begin`](Self::begin), without a lower bound, for searches without the time to compute
-    /// it.
-    pub fn begin_unbounded(kept: Kept, problem: &Problem<'p>, run: &mut Run) -> Self {
         let Kept { tree, cost } = kept;
         let area = area(problem, &tree, cost);
         run.record(cost, tree.nodes.len() as u64);
-        Self { problem: *problem, area, tree, lower_bound: f64::NEG_INFINITY }
+        // The bound holds for areas and undivided objects only.
+        let Problem { boxes, measure, splits, objective, .. } = *problem;
+        let of_areas = measure.is_none() && splits.is_none() && objective != Objective::Layout;
+        let is_bounded = of_areas && problem.allows(Shortcut::BoundMet);
+        let lower_bound =
+            if is_bounded { lower_bound::of_largest(boxes) } else { f64::NEG_INFINITY };
+        let incumbent = Self { problem: *problem, area, tree, lower_bound };
+        incumbent.stop_if_optimal(run);
+        incumbent
     }
 
     /// Ends the run if no tree is better by more than rounding errors.
