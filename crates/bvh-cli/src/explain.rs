@@ -1,32 +1,33 @@
 //! Lists, before the work begins, the steps that a scene does not need and that are skipped.
 
 use bvh_build::BuildError;
-use bvh_core::Primitives;
+use bvh_core::{Aabb, Primitives};
 use bvh_scenes::Scene;
-use bvh_search::shortcuts::Facts;
+use bvh_search::shortcuts;
 
 /// Lists the skipped steps of a scene, one line each.
 pub fn scene(scene: &Scene) -> Result<String, BuildError> {
-    let facts = Facts::of(&scene.boxes)?;
+    let boxes = &scene.boxes;
     let kind = match scene.primitives {
         Primitives::Triangles(_) => "triangles",
         Primitives::Spheres(_) => "spheres",
     };
-    let size = facts.bounds.max - facts.bounds.min;
+    let bounds = Aabb::union_of(boxes);
+    let size = bounds.max - bounds.min;
     let mut text =
-        format!("{} ({}): {} {kind} within {size}\n", scene.name, scene.kind, facts.objects);
+        format!("{} ({}): {} {kind} within {size}\n", scene.name, scene.kind, boxes.len());
     if let Some(remark) = &scene.remark {
         text += &format!("  {remark}\n");
     }
-    for (_, why) in facts.shortcuts() {
+    for (_, why) in shortcuts::of(boxes)? {
         text += &format!("  skipped: {why}\n");
     }
     text += &format!("  skipped: tests of other shapes: a traversal for {kind} exists\n");
-    if facts.repeated > 0 {
+    let repeated = boxes.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    if repeated > 0 {
         text += &format!(
-            "  not skipped: {} objects with the same box as the object before; \
-             a split between them may be as good as any\n",
-            facts.repeated
+            "  not skipped: {repeated} objects with the same box as the object before; \
+             a split between them may be as good as any\n"
         );
     }
     Ok(text)

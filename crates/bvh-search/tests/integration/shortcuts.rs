@@ -3,8 +3,9 @@
 use bvh_build::{Builder, muller_fellner::Config};
 use bvh_core::{Aabb, cost::internal_area};
 use bvh_search::Shortcut;
-use bvh_search::shortcuts::Facts;
-use bvh_search::{Budget, Outcome, Problem, StopReason, best, exact, lower_bound, solve};
+use bvh_search::{
+    Budget, Outcome, Problem, StopReason, best, exact, lower_bound, shortcuts, solve,
+};
 
 fn cube(min: [f32; 3], size: f32) -> Aabb {
     Aabb::from((min, min.map(|c| c + size)))
@@ -100,9 +101,9 @@ fn no_tree_is_below_the_bound_and_stiff_scenes_meet_it() {
 }
 
 #[test]
-fn facts_report_the_shortcuts_of_a_scene() {
+fn the_shortcuts_of_a_scene_are_known_before_the_search() {
     fn shortcuts(boxes: &[Aabb]) -> Vec<Shortcut> {
-        let found = Facts::of(boxes).unwrap().shortcuts();
+        let found = shortcuts::of(boxes).unwrap();
         found.into_iter().map(|(shortcut, _)| shortcut).collect()
     }
     assert_eq!(shortcuts(&scattered(1)), []);
@@ -110,8 +111,6 @@ fn facts_report_the_shortcuts_of_a_scene() {
     assert_eq!(shortcuts(&scattered(12)), [Shortcut::Tiny, Shortcut::BoundMet]);
     let line = &stiff(50)[3];
     assert_eq!(shortcuts(line), [Shortcut::Flat, Shortcut::BoundMet]);
-    let repeated: Vec<Aabb> = scattered(5).into_iter().flat_map(|b| [b; 10]).collect();
-    assert_eq!(Facts::of(&repeated).unwrap().repeated, 45);
 }
 
 /// A flat axis orders the objects by index, and that may be the best order of all.
