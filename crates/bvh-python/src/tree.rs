@@ -334,7 +334,7 @@ fn found(
     raised?;
     found.map(Tree::new).map_err(|error| match error {
         BakeError::Rays(_) => invalid(error),
-        BakeError::Search(_) | BakeError::Instances(_) => invalid_argument(name, error),
+        BakeError::Search(_) => invalid_argument(name, error),
     })
 }
 

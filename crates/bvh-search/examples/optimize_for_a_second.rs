@@ -2,8 +2,30 @@
 //!
 //! `cargo run -p bvh-search --example optimize_for_a_second`
 
-use bvh_search::prelude::*;
+use bvh_search::{Event, Observer, prelude::*};
 use std::error::Error;
+
+/// A time limit that prints every improvement of a tree of this cost.
+struct Progress {
+    deadline: Deadline,
+    before: f64,
+}
+
+impl Observer for Progress {
+    fn event(&self, event: &Event) {
+        let ms = self.deadline.elapsed().as_millis();
+        let part = event.incumbent / self.before;
+        println!("{ms:4} ms: {part:.4} of the original after {} moves", event.evaluations);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.deadline.cancelled()
+    }
+
+    fn progress(&self) -> Option<f64> {
+        self.deadline.progress()
+    }
+}
 
 /// Boxes of many sizes along a spiral.
 fn spiral() -> Vec<Aabb> {
@@ -25,15 +47,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let tree = median_cut::Config { leaf_fraction: 0.001, ..Default::default() }.build(&boxes)?;
     let before = cost::internal_area(&tree);
     // `improve(&tree, &boxes, Duration::from_secs(1))` does the same without progress.
-    let deadline = Deadline::after(Duration::from_secs(1));
-    let watched = deadline.watched(|event| {
-        let ms = deadline.elapsed().as_millis();
-        let part = event.incumbent / before;
-        println!("{ms:4} ms: {part:.4} of the original after {} moves", event.evaluations);
-    });
+    let observer = Progress { deadline: Deadline::after(Duration::from_secs(1)), before };
     let problem = Problem::new(&boxes);
     let found =
-        optimize(&tree, &problem, &best::Config::default(), 1, Budget::UNLIMITED, &watched)?;
+        optimize(&tree, &problem, &best::Config::default(), 1, Budget::UNLIMITED, &observer)?;
     validate(&found.tree, &boxes)?;
     println!("{:?}: {:.4} of the original", found.stop, found.cost / before);
     assert!(found.cost < before);

@@ -98,6 +98,12 @@ impl World {
     }
 }
 
+/// Builds a tree over the instances.
+fn scene_of(parts: Vec<WideBvh>, world: &World) -> Result<Instances, Box<dyn Error>> {
+    let top = bake(&Instance::boxes(&world.instances, &parts)?, Duration::ZERO)?.tree;
+    Ok(Instances::new(parts, world.instances.clone(), top)?)
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let scene = Scene::load(&arguments.next().unwrap_or("cloister".into()))?;
@@ -128,7 +134,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Record a frame, and bake for its rays.
     let view = |from, at| View { from: in_box(&all, from), at: in_box(&all, at), fov: 70.0 };
     let first = view([0.5, 0.6, 0.5], [0.9, 0.4, 0.9]);
-    let old_scene = bake_instances(parts.clone(), world.instances.clone(), Duration::ZERO)?;
+    let old_scene = scene_of(parts.clone(), &world)?;
     let (brightness, recorded) = world.frame(&old_scene, &first)?;
     println!("first frame: {} rays, brightness {brightness:.3}", recorded.len());
     let segments: Vec<Segment> = recorded.iter().map(|traced| traced.segment).collect();
@@ -140,9 +146,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         corner.y += 0.1 * (0.4 + corner.x).sin();
     }
     parts[2].refit(&world.parts[2])?;
-    let old_scene = bake_instances(parts.clone(), world.instances.clone(), Duration::ZERO)?;
+    let old_scene = scene_of(parts.clone(), &world)?;
     parts[0] = for_rays.clone();
-    let new_scene = bake_instances(parts, world.instances.clone(), Duration::ZERO)?;
+    let new_scene = scene_of(parts, &world)?;
     let next = view([0.51, 0.59, 0.48], [0.88, 0.4, 0.88]);
     let elsewhere = view([0.4, 0.7, 0.3], [0.6, 0.2, 0.9]);
     for (frame, view) in [("next frame", next), ("elsewhere", elsewhere)] {

@@ -10,8 +10,7 @@ use bvh_build::{BuildError, Builder, muller_fellner};
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::file::{self, FileError, Origin};
 use bvh_core::{
-    Aabb, Bvh, DensityError, InvalidInstances, Primitives, RayDensity, Segment, validate,
-    validate_references,
+    Aabb, Bvh, DensityError, Primitives, RayDensity, Segment, validate, validate_references,
 };
 
 /// A search for the best tree of a scene.
@@ -90,9 +89,6 @@ pub enum BakeError {
     /// The rays are invalid.
     #[error("rays: {0}")]
     Rays(#[from] DensityError),
-    /// An instance is invalid.
-    #[error(transparent)]
-    Instances(#[from] InvalidInstances),
 }
 
 /// Asks the observer to cancel and tells it nothing, because what it hears of belongs to another

@@ -39,14 +39,14 @@ pub use owned::{Improvement, Objects, Options, OwnedTree};
 pub use rays::ray_density;
 #[cfg(feature = "serde")]
 pub use registry::Method;
+#[cfg(feature = "std")]
+pub use run::Deadline;
 pub use run::{
     Budget, Event, Judge, Kept, Observer, Outcome, Problem, Quota, Run, Search, SearchError,
     Shortcut, Splits, StopReason, Stream, Tally, solve, solve_or_keep,
 };
 #[cfg(feature = "std")]
-pub use run::{Deadline, Watched};
-#[cfg(feature = "std")]
-pub use timed::{bake, bake_for_rays, bake_instances, improve};
+pub use timed::{bake, bake_for_rays, improve};
 
 /// The example of the project's README, compiled and run as a test.
 #[cfg(doctest)]

@@ -2,7 +2,7 @@
 
 pub use crate::{Bake, Budget, Outcome, Problem, StopReason, best, optimize, solve};
 #[cfg(feature = "std")]
-pub use crate::{Deadline, bake, bake_for_rays, bake_instances, improve};
+pub use crate::{Deadline, bake, bake_for_rays, improve};
 pub use bvh_build::{Builder, median_cut, muller_fellner, ploc};
 pub use bvh_core::cost::Objective;
 pub use bvh_core::glam::{Affine3A, Vec3};

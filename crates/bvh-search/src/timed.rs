@@ -2,9 +2,7 @@
 
 use crate::bake::density_of;
 use crate::{Bake, BakeError, Deadline, Outcome, SearchError};
-use bvh_core::{
-    Aabb, Bvh, Instance, Instances, Primitives, RayDensity, Segment, Triangle, WideBvh,
-};
+use bvh_core::{Aabb, Bvh, Primitives, RayDensity, Segment, Triangle};
 use std::time::Duration;
 
 /// Returns the best tree over `boxes` that [`best`](crate::best) finds in about `time`, from the
@@ -24,30 +22,6 @@ use std::time::Duration;
 /// ```
 pub fn bake(boxes: &[Aabb], time: Duration) -> Result<Outcome, SearchError> {
     Ok(Bake::new(boxes).search(None, &Deadline::after(time))?.outcome)
-}
-
-/// Returns a scene of instances with the best tree over them that [`best`](crate::best) finds in
-/// about `time`. The trees of the parts are as they are.
-///
-/// ```
-/// use bvh_search::prelude::*;
-/// let triangles = [Triangle::from([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])];
-/// let tree = bake(&boxes(&triangles), Duration::ZERO)?.tree;
-/// let part = WideBvh::new(&tree, &triangles)?;
-/// let row = (0..9u8).map(|i| Affine3A::from_translation(Vec3::X * f32::from(i)));
-/// let instances: Vec<Instance> = row.map(|transform| Instance { part: 0, transform }).collect();
-/// let scene = bake_instances(vec![part], instances, Duration::from_millis(10))?;
-/// let hit = scene.nearest_hit(&Ray::half_line([4.2, 0.2, 3.0], [0.0, 0.0, -1.0])?);
-/// assert_eq!(hit, Some(InstanceHit { t: 3.0, instance: 4, triangle: 0 }));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn bake_instances(
-    parts: Vec<WideBvh>,
-    instances: Vec<Instance>,
-    time: Duration,
-) -> Result<Instances, BakeError> {
-    let top = bake(&Instance::boxes(&instances, &parts)?, time)?.tree;
-    Ok(Instances::new(parts, instances, top)?)
 }
 
 /// Improves a tree over `boxes` for about `time`: a tree from another library, or one that has been

@@ -1,6 +1,6 @@
 //! Time limits for searches: the only code of this crate that reads a wall clock.
 
-use super::observer::{Event, Observer};
+use super::observer::Observer;
 use std::time::{Duration, Instant};
 
 /// A time limit for a search, which starts with the construction of this value.
@@ -17,12 +17,6 @@ impl Deadline {
     /// Returns a limit that begins now.
     pub fn after(limit: Duration) -> Self {
         Self { start: Instant::now(), limit }
-    }
-
-    /// Returns an observer with the same limit that calls `watch` for every event of the search, in
-    /// order.
-    pub fn watched<F: Fn(&Event) + Sync>(self, watch: F) -> Watched<F> {
-        Watched { deadline: self, watch }
     }
 
     /// The time since the limit began.
@@ -49,27 +43,6 @@ impl Observer for Deadline {
 
     fn progress(&self) -> Option<f64> {
         Some(self.fraction())
-    }
-}
-
-/// A [`Deadline`] with a function that follows the search; see [`Deadline::watched`].
-#[derive(Clone, Copy, Debug)]
-pub struct Watched<F> {
-    deadline: Deadline,
-    watch: F,
-}
-
-impl<F: Fn(&Event) + Sync> Observer for Watched<F> {
-    fn event(&self, event: &Event) {
-        (self.watch)(event);
-    }
-
-    fn cancelled(&self) -> bool {
-        self.deadline.cancelled()
-    }
-
-    fn progress(&self) -> Option<f64> {
-        self.deadline.progress()
     }
 }
 

@@ -15,7 +15,7 @@ use bvh_build::{BuildError, Builder, Watch};
 use bvh_config::Check;
 use bvh_core::Bvh;
 #[cfg(feature = "std")]
-pub use deadline::{Deadline, Watched};
+pub use deadline::Deadline;
 pub(crate) use error::Found;
 pub use error::SearchError;
 pub use observer::{Event, Observer};
