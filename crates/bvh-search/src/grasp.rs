@@ -16,11 +16,11 @@
 //! how noise acts; here it is the probability of choosing a candidate other than the best, each
 //! equally likely.
 
-use crate::baselines::LocalSearch;
 pub use crate::candidates::Candidates;
 use crate::candidates::Randomised;
+use crate::local::reinsertion;
 use crate::parallel::{KEPT_NODES, map_init};
-use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, Tally, stream, watched};
+use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, stream, watched};
 use crate::tree::{Area, Measured, Metric, Working};
 use bvh_build::top_down::Workspace;
 use bvh_build::{BuildError, Presorted, Watch, muller_fellner};
@@ -49,6 +49,25 @@ bvh_config::config! {
     }
 }
 
+bvh_config::config! {
+    /// A local search by name, which improves the trees that GRASP constructs.
+    #[derive(Copy, Default, Eq)]
+    pub enum LocalSearch {
+        /// Leaves the tree as it is.
+        #[default]
+        None,
+        /// By [reinsertion](crate::reinsertion).
+        Reinsertion,
+    }
+}
+
+impl LocalSearch {
+    /// Returns whether the tree is left as it is.
+    pub fn is_none(&self) -> bool {
+        *self == Self::None
+    }
+}
+
 impl Config {
     /// Makes the construction number `trial` and writes it into `tree`.
     fn construct(
@@ -73,27 +92,13 @@ impl Config {
         problem: &Problem,
         observer: &dyn Observer,
     ) -> Result<u64, SearchError> {
-        if self.local_search.is_none() {
-            return Ok(0);
+        match (self.local_search, problem.measure) {
+            (LocalSearch::None, _) => Ok(0),
+            (LocalSearch::Reinsertion, Some(measure)) => {
+                reinserted(Measured::new(measure), tree, observer)
+            }
+            (LocalSearch::Reinsertion, None) => reinserted(Area, tree, observer),
         }
-        match problem.measure {
-            Some(measure) => self.improve_by(Measured::new(measure), tree, observer),
-            None => self.improve_by(Area, tree, observer),
-        }
-    }
-
-    fn improve_by(
-        &self,
-        metric: impl Metric,
-        tree: &mut Bvh,
-        observer: &dyn Observer,
-    ) -> Result<u64, SearchError> {
-        let mut working = Working::from_bvh(tree, metric.internal(tree), metric)?;
-        let Tally { work, .. } = self.local_search.improve(&mut working, Quota::ENDLESS, observer);
-        if !observer.cancelled() {
-            *tree = working.to_bvh();
-        }
-        Ok(work)
     }
 
     /// Makes the trial number `trial`: constructs and improves `tree`. Returns `None` if the
@@ -121,6 +126,20 @@ impl Config {
         let work = self.improve(tree, problem, observer)?;
         Ok(Some(Trial { cost: problem.cost(tree), work, tree: None }))
     }
+}
+
+/// Reinserts to a local optimum; the rest as for [`Config::improve`].
+fn reinserted(
+    metric: impl Metric,
+    tree: &mut Bvh,
+    observer: &dyn Observer,
+) -> Result<u64, SearchError> {
+    let mut working = Working::from_bvh(tree, metric.internal(tree), metric)?;
+    let tally = reinsertion::to_local_optimum(&mut working, Quota::ENDLESS, observer);
+    if !observer.cancelled() {
+        *tree = working.to_bvh();
+    }
+    Ok(tally.work)
 }
 
 /// A constructed and improved tree.

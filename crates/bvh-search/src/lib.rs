@@ -29,13 +29,13 @@ mod tuning;
 
 pub use annealing::ruin_recreate;
 pub use bake::{Bake, BakeError, Baked, Division};
-pub use baselines::{LocalSearch, rebuild, rotation, treelet};
+pub use baselines::{rebuild, rotation, treelet};
 pub use bvh_build;
 pub use bvh_core;
 pub use local::reinsertion;
 pub use optimize::optimize;
 pub use orders::{genetic, random_orders};
-pub use owned::{Improvement, Objects, Options, OwnedTree};
+pub use owned::{Objects, Options, OwnedTree};
 pub use rays::ray_density;
 #[cfg(feature = "serde")]
 pub use registry::Method;

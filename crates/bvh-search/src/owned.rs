@@ -41,10 +41,6 @@ impl Default for Options<'_> {
     }
 }
 
-/// A better tree over the objects of an [`OwnedTree`], from [`OwnedTree::improvement`].
-#[derive(Clone, Debug)]
-pub struct Improvement(Baked);
-
 /// The tree of a [`Bake`], with its objects.
 #[derive(Clone, Debug)]
 pub struct OwnedTree {
@@ -77,7 +73,7 @@ impl OwnedTree {
             owned.density = Some(density);
         }
         let baked = Bake { budget, start: None, ..owned.bake() }.search(greedy, observer)?;
-        owned.apply(Improvement(baked));
+        owned.apply(baked);
         Ok(owned)
     }
 
@@ -132,13 +128,13 @@ impl OwnedTree {
         &self,
         budget: Budget,
         observer: &dyn Observer,
-    ) -> Result<Improvement, SearchError> {
-        Bake { budget, ..self.bake() }.search(None, observer).map(Improvement)
+    ) -> Result<Baked, SearchError> {
+        Bake { budget, ..self.bake() }.search(None, observer)
     }
 
-    /// Replaces the tree by an improvement of this very tree.
-    pub fn apply(&mut self, improvement: Improvement) {
-        let Baked { outcome, division, .. } = improvement.0;
+    /// Replaces the tree by an [improvement](Self::improvement) of this very tree.
+    pub fn apply(&mut self, improvement: Baked) {
+        let Baked { outcome, division, .. } = improvement;
         self.tree = outcome.tree;
         self.work = self.work.saturating_add(outcome.work);
         // Later searches need not look again.
