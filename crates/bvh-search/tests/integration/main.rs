@@ -4,5 +4,4 @@ mod bake;
 mod cancellation;
 mod local_search;
 mod measure;
-mod optimality;
 mod shortcuts;

@@ -106,19 +106,19 @@ fn a_local_search_begins_with_a_tree_by_the_measure() {
 }
 
 #[test]
-fn no_search_goes_below_the_exact_optimum_of_the_measure_and_best_reaches_it() {
-    for n in 3..9 {
+fn no_search_goes_below_the_exact_optimum_and_best_reaches_it() {
+    // Goldsmith–Salmon trees are not binary: their wider nodes have fewer terms.
+    const NOT_BINARY: [&str; 3] = ["goldsmith_salmon", "random_orders", "genetic"];
+    for n in 3..13 {
         let boxes = boxes(10 * n)[9 * n as usize..].to_vec();
-        let optimum = run(&Method::Exact(exact::Config::default()), &boxes, Some(&AlongX)).cost;
-        for method in methods().filter(|method| {
-            !["goldsmith_salmon", "random_orders", "genetic"].contains(&method.name())
-        }) {
-            let cost = run(&method, &boxes, Some(&AlongX)).cost;
-            assert!(cost >= optimum * (1.0 - 1e-12), "{} {n}: {cost} {optimum}", method.name());
-            assert!(
-                method.name() != "best" || cost <= optimum * (1.0 + 1e-12),
-                "{n}: {cost} {optimum}"
-            );
+        for measure in [None, Some(&AlongX as &dyn Measure)] {
+            let optimum = run(&Method::Exact(exact::Config::default()), &boxes, measure).cost;
+            for method in methods().filter(|method| !NOT_BINARY.contains(&method.name())) {
+                let cost = run(&method, &boxes, measure).cost;
+                assert!(cost >= optimum * (1.0 - 1e-12), "{} {n}: {cost} {optimum}", method.name());
+                let is_reached = cost <= optimum * (1.0 + 1e-12);
+                assert!(method.name() != "best" || is_reached, "{n}: {cost} {optimum}");
+            }
         }
     }
 }
