@@ -78,50 +78,47 @@ impl<'p> Incumbent<'p> {
 
     /// Keeps `tree` if it is the best so far. O(n).
     pub fn offer(&mut self, tree: &Working<impl Metric>, run: &mut Run) -> bool {
-        // The incremental area rejects most trees without the conversion. The layout's cost does
-        // not follow the area, so every tree is converted for it.
-        let may_be_better = tree.area() < self.area || self.problem.objective == Objective::Layout;
+        let Problem { objective, measure, splits, judge, .. } = self.problem;
+        if objective == Objective::Layout && judge.is_none() {
+            // The nodes have their sizes already, so the cost is known before the conversion.
+            let cost = tree.layout_cost();
+            if cost >= run.incumbent() {
+                return false;
+            }
+            let tree = tree.to_bvh_in(std::mem::take(&mut self.tree));
+            debug_assert_eq!(cost.to_bits(), self.problem.cost(&tree).to_bits());
+            return self.keep(tree, cost, run);
+        }
+        // The incremental area rejects most trees without the conversion.
+        if tree.area() >= self.area && objective != Objective::Layout {
+            return false;
+        }
         // A tree that is better by more than rounding errors is certain to be kept, so it takes the
         // memory of the tree that it replaces.
-        let Problem { objective, measure, splits, judge, .. } = self.problem;
         let is_plain = measure.is_none() && splits.is_none() && judge.is_none();
-        if is_plain
+        let is_certain = is_plain
             && objective == Objective::InternalArea
-            && tree.area() < run.incumbent().min(self.area) * (1.0 - CERTAIN)
-        {
+            && tree.area() < run.incumbent().min(self.area) * (1.0 - CERTAIN);
+        let memory = if is_certain {
             run.drop_aside(tree.area() * (1.0 + CERTAIN));
-            let memory = std::mem::take(&mut self.tree);
-            return self.offer_tree(tree.to_bvh_in(memory), run);
-        }
-        if !may_be_better {
-            return false;
-        }
-        let is_by_sizes = measure.is_some() && judge.is_none() && objective == Objective::Layout;
-        if !is_by_sizes {
-            return self.offer_tree(tree.to_bvh(), run);
-        }
-        // The nodes have their measures already, so the cost is known before the conversion.
-        let cost = tree.layout_cost();
-        let is_better = cost < run.incumbent();
-        if !is_better {
-            return false;
-        }
-        let candidate = tree.to_bvh_in(std::mem::take(&mut self.tree));
-        debug_assert_eq!(cost.to_bits(), self.problem.cost(&candidate).to_bits());
-        self.offer_kept(Kept { tree: candidate, cost }, run)
+            std::mem::take(&mut self.tree)
+        } else {
+            Bvh::default()
+        };
+        self.offer_tree(tree.to_bvh_in(memory), run)
     }
 
     /// Like [`offer`](Self::offer), for a valid tree that needs no conversion.
-    pub fn offer_tree(&mut self, candidate: Bvh, run: &mut Run) -> bool {
-        self.offer_kept(Kept::new(candidate, &self.problem), run)
+    pub fn offer_tree(&mut self, tree: Bvh, run: &mut Run) -> bool {
+        let cost = self.problem.cost(&tree);
+        self.keep(tree, cost, run)
     }
 
-    fn offer_kept(&mut self, kept: Kept, run: &mut Run) -> bool {
-        let Kept { tree: candidate, cost } = kept;
+    fn keep(&mut self, tree: Bvh, cost: f64, run: &mut Run) -> bool {
         let improved = run.improve(cost);
         if improved {
-            self.area = area(&self.problem, &candidate, cost);
-            self.tree = candidate;
+            self.area = area(&self.problem, &tree, cost);
+            self.tree = tree;
             // Only a new incumbent can meet the bound.
             self.stop_if_optimal(run);
         }
