@@ -206,7 +206,8 @@ impl Subtree {
     fn put_back(&self, nodes: &mut [Node], small: &Working<impl Metric>) {
         // The root's link leads out of the subtree.
         let above = nodes[0].parent;
-        small.visit_in_preorder(|node, place, parent, side| {
+        small.visit_in_preorder(|index, place, parent, side| {
+            let node = &small.nodes[index as usize];
             let parent = parent + self.root - 1;
             nodes[place as usize - 1] = Node { parent, stamp: 0, ..*node };
             // The place of the small tree's anchor is not in the subtree.

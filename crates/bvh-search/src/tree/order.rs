@@ -13,14 +13,7 @@ impl<M: Metric> Working<M> {
     /// Returns all nodes except the anchor, parents before children, left before right. O(n).
     pub fn preorder(&self) -> Vec<u32> {
         let mut order = Vec::with_capacity(self.nodes.len());
-        let mut stack: Vec<u32> = self.root().into_iter().collect();
-        while let Some(index) = stack.pop() {
-            order.push(index);
-            let node = &self.nodes[index as usize];
-            if !node.is_leaf() {
-                stack.extend([node.children[1], node.children[0]]);
-            }
-        }
+        self.visit_in_preorder(|index, _, _, _| order.push(index));
         order
     }
 
@@ -95,18 +88,18 @@ impl<M: Metric> Working<M> {
         self.restart(area);
     }
 
-    /// Calls a function with every node except the anchor in preorder: the node, its place, which
+    /// Calls a function with every node except the anchor in preorder: its index, its place, which
     /// is 1 for the root, the place of its parent, and its side there. O(n).
     #[inline(always)]
-    pub fn visit_in_preorder(&self, mut visit: impl FnMut(&Node, u32, u32, usize)) {
+    pub fn visit_in_preorder(&self, mut visit: impl FnMut(u32, u32, u32, usize)) {
         // Pending nodes: index, place of the parent, side.
         let mut stack: Vec<(u32, u32, usize)> =
             self.root().map(|root| (root, ANCHOR, 0)).into_iter().collect();
         let mut place = 0;
         while let Some((index, parent, side)) = stack.pop() {
             place += 1;
+            visit(index, place, parent, side);
             let node = &self.nodes[index as usize];
-            visit(node, place, parent, side);
             if !node.is_leaf() {
                 stack.extend([(node.children[1], place, 1), (node.children[0], place, 0)]);
             }
@@ -118,7 +111,8 @@ impl<M: Metric> Working<M> {
         nodes.reserve(self.nodes.len());
         nodes.push(Node { stamp: 0, ..self.nodes[0] });
         let mut area = Sum::default();
-        self.visit_in_preorder(|node, place, parent, side| {
+        self.visit_in_preorder(|index, place, parent, side| {
+            let node = &self.nodes[index as usize];
             nodes.push(Node { parent, stamp: 0, ..*node });
             nodes[parent as usize].children[side] = place;
             if let Some(part) = self.part(node) {

@@ -12,16 +12,10 @@ impl<M: Metric> Working<M> {
     /// Returns the shape. Leaves hold whole objects. O(n).
     pub fn shape(&self) -> Shape {
         let mut objects = Vec::with_capacity(self.nodes.len());
-        let mut stack: Vec<u32> = self.root().into_iter().collect();
-        while let Some(index) = stack.pop() {
+        self.visit_in_preorder(|index, _, _, _| {
             let node = &self.nodes[index as usize];
-            if node.is_leaf() {
-                objects.push(node.children[1]);
-            } else {
-                objects.push(NONE);
-                stack.extend([node.children[1], node.children[0]]);
-            }
-        }
+            objects.push(if node.is_leaf() { node.children[1] } else { NONE });
+        });
         Shape(objects)
     }
 
