@@ -63,12 +63,11 @@ fn find_plain(
     }
     let [a, b, c, d, e, f] =
         planes.each_mut().map(|plane| &mut plane[offset..offset + last - first]);
+    let scaled = |x: f32| (f64::from(x) * scale).clamp(-FARTHEST, FARTHEST) as f32;
     for (index, aabb) in boxes[first..last].iter().enumerate() {
-        let [low, high] = aabb
-            .planes()
-            .map(|plane| plane.map(|x| (f64::from(x) * scale).clamp(-FARTHEST, FARTHEST) as f32));
-        [a[index], b[index], c[index]] = [low[0], low[1], low[2]];
-        [d[index], e[index], f[index]] = [high[0], high[1], high[2]];
+        let [low, high] = aabb.planes();
+        [a[index], b[index], c[index]] = [scaled(low[0]), scaled(low[1]), scaled(low[2])];
+        [d[index], e[index], f[index]] = [scaled(high[0]), scaled(high[1]), scaled(high[2])];
     }
     sides.iter_mut().for_each(|side| side.resize(len + radius, 0.0));
     least.clear();
