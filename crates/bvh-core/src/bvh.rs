@@ -258,19 +258,4 @@ mod tests {
         assert_eq!(tree.depth(), 2);
         assert_eq!(Bvh::default().depth(), 0);
     }
-
-    #[test]
-    fn refitting_restores_tight_boxes() {
-        let boxes = [Aabb::from(([0.0; 3], [1.0; 3])), Aabb::from(([4.0; 3], [5.0; 3]))];
-        let wide = Aabb::from(([-9.0; 3], [9.0; 3]));
-        let mut tree = Bvh {
-            nodes: vec![Node::inner(wide, 1, 2), Node::leaf(wide, 0, 1), Node::leaf(wide, 1, 1)],
-            prim_ids: vec![1, 0],
-        };
-        tree.refit(&boxes);
-        assert_eq!(tree.nodes[0].aabb, boxes[0].union(&boxes[1]));
-        // The first leaf has object 1, the second has object 0.
-        assert_eq!(tree.nodes[1].aabb, boxes[1]);
-        assert_eq!(tree.nodes[2].aabb, boxes[0]);
-    }
 }

@@ -33,9 +33,7 @@ impl Triangle {
     /// ```
     pub fn leave(&self, point: DVec3, side: Vec3) -> Vec3 {
         let [a, b, c] = self.0.map(Vec3::as_dvec3);
-        let scale = (b - a).abs().max((c - a).abs()).max_element();
-        let normal = ((b - a) / scale).cross((c - a) / scale).try_normalize();
-        let Some(normal) = normal else { return point.as_vec3() };
+        let (scale, Some(normal)) = self.scale_and_normal() else { return point.as_vec3() };
         let toward = if normal.dot(side.as_dvec3()) < 0.0 { -normal } else { normal };
         // The first try covers the rounding of the origin, too.
         let mut distance = ROUNDING * (32.0 * scale + 2.0 * point.abs().max_element());

@@ -95,11 +95,16 @@ impl Triangle {
     /// Returns the unit vector perpendicular to the triangle, on the side from which its corners
     /// run counterclockwise, computed in f64; `None` for a degenerate triangle.
     pub fn normal(&self) -> Option<Vec3> {
+        self.scale_and_normal().1.map(|normal| normal.as_vec3())
+    }
+
+    /// Returns the length of the longest side along an axis, and the [normal](Self::normal).
+    pub(crate) fn scale_and_normal(&self) -> (f64, Option<DVec3>) {
         let [a, b, c] = self.0.map(Vec3::as_dvec3);
         // Scaled edges have lengths of about one, so their product neither overflows nor
         // underflows.
         let scale = (b - a).abs().max((c - a).abs()).max_element();
-        ((b - a) / scale).cross((c - a) / scale).try_normalize().map(|normal| normal.as_vec3())
+        (scale, ((b - a) / scale).cross((c - a) / scale).try_normalize())
     }
 
     /// Returns whether the corners coincide or are collinear, in real arithmetic. Such a triangle is

@@ -188,7 +188,6 @@ fn check_visits(nodes: &[Node], visits: &[f32]) -> Result<(), FileError> {
     )
 }
 
-/// Rejects visits of a node that are not between 0 and `most`.
 fn check_range(visits: &[f32], node: usize, most: f32) -> Result<(), FileError> {
     // NaN is in no range.
     if (0.0..=most).contains(&visits[node]) { Ok(()) } else { Err(FileError::Visits(node)) }

@@ -79,7 +79,6 @@ impl Crossings {
         }
     }
 
-    /// Records that a segment has entered a cell across an axis.
     fn cross(&mut self, axis: usize, downward: bool, into: [usize; 3]) {
         let plane = into[axis] + usize::from(downward);
         self.faces[axis][usize::from(downward)][face(axis, plane, into)] += 1;

@@ -321,7 +321,6 @@ impl RayDensity {
     }
 }
 
-/// Rounds a number that is not negative up.
 #[inline]
 fn round_up(value: f64) -> u32 {
     let down = value as u32;

@@ -89,7 +89,6 @@ fn rounded(x: &BigRational) -> f32 {
     (f64::from(whole) * 2f64.powi(exponent)) as f32
 }
 
-/// Returns the distance of the hit by the definition.
 fn expected(ray: &Ray, triangle: &Triangle) -> Option<f32> {
     let [t, v, w] = cramer(ray, triangle)?;
     let is_inside = v >= zero() && w >= zero() && &v + &w <= integer(1);
