@@ -217,7 +217,6 @@ impl<'a> Bake<'a> {
         Ok(best::unless_behind(outcome, reinserted))
     }
 
-    /// Returns the permission to divide objects, if there is any.
     fn splits(&self) -> Option<Splits<'a>> {
         let most = (self.references * self.boxes.len() as f64) as usize;
         let splits = Splits::at_most(most, self.boxes, self.shapes?)?;

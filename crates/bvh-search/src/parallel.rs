@@ -81,7 +81,6 @@ pub(crate) fn call_both(first: &mut (dyn FnMut() + Send), second: &mut (dyn FnMu
     }
 }
 
-/// The number of threads that share the tasks.
 pub(crate) fn threads() -> usize {
     #[cfg(feature = "rayon")]
     return rayon::current_num_threads();

@@ -105,7 +105,6 @@ impl Block {
         size.of(std::array::from_fn(|i| larger(self.bounds[i][lane], b[i])))
     }
 
-    /// Returns the first block of an inner child's children, and their number.
     #[inline(always)]
     pub(super) fn family(&self, lane: usize) -> (usize, usize) {
         (self.link[lane] as usize, self.count[lane] as usize)

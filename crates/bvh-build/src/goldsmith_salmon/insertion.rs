@@ -20,7 +20,6 @@ pub(super) struct Walk {
 }
 
 impl Walk {
-    /// Descends from the nodes in row `from`.
     #[inline(always)]
     fn descend(
         &mut self,

@@ -68,7 +68,6 @@ impl NodeSampler {
         self.node(self.position(self.window.clone(), rng.random()))
     }
 
-    /// Returns the node at this position.
     #[inline(always)]
     fn node(&self, position: usize) -> u32 {
         self.only.get(position).map_or(position as u32 + 1, |&node| node)
@@ -85,7 +84,6 @@ impl NodeSampler {
         window.start + before
     }
 
-    /// Chooses the next window.
     #[inline(never)]
     fn next_window(&mut self, rng: &mut Stream) {
         let before = match self.middle {

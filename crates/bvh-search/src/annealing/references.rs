@@ -63,7 +63,6 @@ impl<'a> Divider<'a> {
         tally
     }
 
-    /// Nodes visited so far.
     fn work(&self) -> u64 {
         self.visits + self.search.visits + self.layout.as_ref().map_or(0, |layout| layout.visits)
     }
@@ -279,7 +278,6 @@ impl<'a> Divider<'a> {
     }
 }
 
-/// Returns the cost of leaves of this size.
 fn leaf_cost<A: Metric>(tree: &Working<A>, area: f64) -> f64 {
     tree.metric().leaf_cost() * area
 }

@@ -72,7 +72,6 @@ impl AnnealingRun {
     }
 }
 
-/// Rejects a last temperature above the first.
 pub(crate) fn check_fall(hot: f64, cold: f64) -> Result<(), OutOfRange> {
     if cold > hot { Err(OutOfRange::new("cold", cold, "above 0, not above hot")) } else { Ok(()) }
 }

@@ -154,7 +154,6 @@ impl Solver {
         least < before * (1.0 - TOLERANCE)
     }
 
-    /// Gives the treelet the best shape.
     #[inline(always)]
     fn restructure(&mut self, tree: &mut Working<impl Metric>) {
         let all = (1usize << self.leaves.len()) - 1;

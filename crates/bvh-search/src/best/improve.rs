@@ -173,7 +173,6 @@ impl Improvement<'_, '_, '_, '_> {
         }
     }
 
-    /// Reinserts to a local optimum and offers it to the incumbent.
     fn reinsert(&mut self, tree: &mut Working<impl Metric>) {
         self.best.improve(tree, u32::MAX, self.run, reinsertion::pass_by_area);
     }
@@ -428,7 +427,6 @@ fn plan(config: &Config, length: f64, n: u64) -> (Vec<Planned>, f64) {
     (plan, length_of_run)
 }
 
-/// Returns the cost of a tree. O(n).
 fn cost(tree: &Working<impl Metric>, by_layout: bool) -> f64 {
     if by_layout { tree.layout_cost() } else { tree.area() }
 }

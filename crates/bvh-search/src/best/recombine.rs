@@ -72,7 +72,6 @@ impl Clades {
         Self { occurrences, numbers, count: number_by_key.len() }
     }
 
-    /// Returns the number of the clade below a node.
     fn number(&self, tree: u32, node: u32) -> u32 {
         self.numbers[tree as usize][node as usize]
     }

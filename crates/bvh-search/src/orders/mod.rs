@@ -30,7 +30,6 @@ impl<'p> Insertion<'p> {
         })
     }
 
-    /// Number of objects.
     fn len(&self) -> usize {
         self.scene.len()
     }

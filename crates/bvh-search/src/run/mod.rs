@@ -139,7 +139,6 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Takes the tree kept aside, if it costs less.
     pub(crate) fn take_aside_below(&mut self, cost: f64) -> Option<Kept> {
         self.aside.take_if(|aside| aside.cost < cost)
     }
@@ -219,7 +218,6 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Returns the rest of a limit after `count`; endless without a limit.
 fn remaining(limit: Option<u64>, count: u64) -> u64 {
     limit.map_or(u64::MAX, |limit| limit.saturating_sub(count))
 }

@@ -311,7 +311,6 @@ impl<M: Metric> Working<M> {
     }
 }
 
-/// Returns whether one box contains another.
 #[inline(always)]
 fn contains(whole: &PackedAabb, part: &PackedAabb) -> bool {
     whole.union(part) == *whole

@@ -18,13 +18,11 @@ pub(crate) struct Siblings {
     parents: Vec<u32>,
 }
 
-/// Returns the pair of a node other than the root.
 #[inline(always)]
 fn pair(index: u32) -> usize {
     (index as usize - 1) / 2
 }
 
-/// Returns the first node of a pair.
 #[inline(always)]
 fn first(pair: u32) -> usize {
     2 * pair as usize + 1
