@@ -85,8 +85,8 @@ impl Siblings {
 
     /// Returns the tree with parents before their children again. O(n).
     pub fn into_tree(self) -> Bvh {
-        let Self { mut tree, parents } = self;
-        let PairOrder { sequence, late } = PairOrder::of(&parents);
+        let Self { tree: Bvh { nodes, prim_ids }, parents } = self;
+        let sequence = order_of_pairs(&parents);
         let mut places = vec![0; sequence.len()];
         sequence.iter().zip(0..).for_each(|(&from, to)| places[from as usize] = to);
         let moved = |mut node: Node| {
@@ -97,69 +97,44 @@ impl Siblings {
             node.set_first(select_unpredictable(node.is_leaf(), before, after));
             node
         };
-        // Reorder in place: late pairs wait in a copy, and all other pairs move towards the front
-        // or stay, so no unread pair is overwritten.
-        let nodes = tree.nodes.as_mut_slice();
-        let aside: Vec<Node> =
-            late.iter().flat_map(|&pair| &nodes[first(pair)..][..2]).copied().collect();
-        let mut aside = aside.chunks_exact(2);
-        let mut next = 0;
-        nodes[0] = moved(nodes[0]);
-        for (to, from) in (0..).zip(sequence) {
-            let (to, from, late) = (first(to), first(from), from < next);
-            if late {
-                let siblings = aside.next().expect("as many as late");
-                (nodes[to], nodes[to + 1]) = (moved(siblings[0]), moved(siblings[1]));
-            } else {
-                (nodes[to], nodes[to + 1]) = (moved(nodes[from]), moved(nodes[from + 1]));
-                next = (from / 2) as u32 + 1;
-            }
+        let mut ordered = Vec::with_capacity(nodes.len());
+        ordered.push(moved(nodes[0]));
+        for from in sequence.into_iter().map(first) {
+            ordered.extend([moved(nodes[from]), moved(nodes[from + 1])]);
         }
-        tree
+        Bvh { nodes: ordered, prim_ids }
     }
 }
 
-/// An order of the pairs in which each comes after its parent's pair: by number, except that a pair
-/// with a lower number than its parent's pair follows that pair at once.
-struct PairOrder {
-    sequence: Vec<u32>,
-    /// The pairs that follow a pair with a higher number.
-    late: Vec<u32>,
-}
-
-impl PairOrder {
-    fn of(parents: &[u32]) -> Self {
-        const DONE: u32 = NONE - 1;
-        // Linked lists: per pair, the last entry of `waiting` that waits for it. An entry is a pair
-        // and the previous entry.
-        let mut last = vec![NONE; parents.len()];
-        let mut waiting = Vec::new();
-        let mut sequence = Vec::with_capacity(parents.len());
-        let mut late = Vec::new();
-        let mut ready = Vec::new();
-        for (number, &parent) in (0..).zip(parents) {
-            if parent != 0 && last[pair(parent)] != DONE {
-                let entry = waiting.len() as u32;
-                waiting.push((number, std::mem::replace(&mut last[pair(parent)], entry)));
-                continue;
-            }
-            ready.push(number);
-            while let Some(index) = ready.pop() {
-                sequence.push(index);
-                if index != number {
-                    late.push(index);
-                }
-                // Everything that waited for this pair may follow now, the last entry first.
-                let mut entry = std::mem::replace(&mut last[index as usize], DONE);
-                while entry != NONE {
-                    let (waits, before) = waiting[entry as usize];
-                    ready.push(waits);
-                    entry = before;
-                }
+/// Returns an order of the pairs in which each comes after its parent's pair: by number, except that
+/// a pair with a lower number than its parent's pair follows that pair at once.
+fn order_of_pairs(parents: &[u32]) -> Vec<u32> {
+    const DONE: u32 = NONE - 1;
+    // Linked lists: per pair, the last entry of `waiting` that waits for it. An entry is a pair and
+    // the previous entry.
+    let mut last = vec![NONE; parents.len()];
+    let mut waiting = Vec::new();
+    let mut sequence = Vec::with_capacity(parents.len());
+    let mut ready = Vec::new();
+    for (number, &parent) in (0..).zip(parents) {
+        if parent != 0 && last[pair(parent)] != DONE {
+            let entry = waiting.len() as u32;
+            waiting.push((number, std::mem::replace(&mut last[pair(parent)], entry)));
+            continue;
+        }
+        ready.push(number);
+        while let Some(index) = ready.pop() {
+            sequence.push(index);
+            // Everything that waited for this pair may follow now, the last entry first.
+            let mut entry = std::mem::replace(&mut last[index as usize], DONE);
+            while entry != NONE {
+                let (waits, before) = waiting[entry as usize];
+                ready.push(waits);
+                entry = before;
             }
         }
-        Self { sequence, late }
     }
+    sequence
 }
 
 impl Linked for Siblings {
