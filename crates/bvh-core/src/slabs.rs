@@ -184,8 +184,12 @@ impl Ray {
 
     #[inline(always)]
     pub(crate) fn begins_in(&self, region: &Aabb) -> bool {
-        let origin = self.origin();
-        (region.min.cmple(origin) & origin.cmple(region.max)).all()
+        // Two overlapping loads of four lanes, of which one does not count.
+        let Aabb { min, max } = *region;
+        let [origin, ..] = self.vectors();
+        let is_above = Vec4::new(min.x, min.y, min.z, max.x).cmple(origin);
+        let is_below = origin.cmple(Vec4::new(min.z, max.x, max.y, max.z).yzwx());
+        (is_above & is_below).bitmask() & 0b111 == 0b111
     }
 
     /// Returns the largest coordinate of a point of `bounds` relative to the origin, rounded.

@@ -239,7 +239,7 @@ struct AllHits<'a, L> {
     hits: &'a mut Vec<Hit>,
 }
 
-impl<L: Lanes> Leaves<L> for AllHits<'_, L> {
+impl<K: Instructions> Leaves<K> for AllHits<'_, K::Block> {
     #[inline(always)]
     unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool {
         // SAFETY: the processor has the instructions.

@@ -259,17 +259,17 @@ impl<L: Lanes> TargetLanes<L> {
     }
 }
 
-impl<L: Lanes> Leaves<L> for TargetLanes<L> {
+impl<K: Instructions> Leaves<K> for TargetLanes<K::Block> {
     /// Offers the triangles of a block that are as near as the nearest so far, and lowers `limit` to
     /// the greatest bound that a box with a nearer triangle may have.
     #[inline(always)]
     unsafe fn visit(&mut self, block: &TriangleBlock, limit: &mut Hit) -> bool {
         // SAFETY: the processor has the instructions; there is room for four numbers.
         unsafe {
-            let [a, b, c] = block.corners_along::<L>([0, 1, 2]);
+            let [a, b, c] = block.corners_along::<K::Block>(TriangleBlock::ROWS);
             let offset = offset(self.relative(a), self.relative(b), self.relative(c));
             let most = offset[0].filled(self.nearest.near.distance_squared);
-            let mut lanes = L::narrow(dot(offset, offset).le(most)).bits();
+            let mut lanes = K::Block::narrow(dot(offset, offset).le(most)).bits();
             if lanes == 0 {
                 return false;
             }

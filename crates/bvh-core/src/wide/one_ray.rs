@@ -5,7 +5,7 @@ use super::instructions::{Instructions, Pending, Task, last_pending};
 use super::kernel::{DeepStacks, SPARE, STACK};
 use super::lanes::{Lanes, Mask};
 use super::layout::{Child, WideBvh};
-use super::pairs::{Pairs, Plane};
+use super::pairs::{Crossings, Pairs, Plane};
 use super::triangles::TriangleBlock;
 use crate::ray::{AXES, largest_axis};
 use crate::{Aabb, Hit, Ray};
@@ -32,10 +32,11 @@ impl<K: Instructions, F: Filter, const ANY: bool> Task<K> for OneRay<'_, F, ANY>
     #[inline(always)]
     unsafe fn run(self) -> Hit {
         let Self { wide, ray, filter } = self;
+        let leaf_ray = MaybeUninit::<LeafRay<K::Block>>::uninit();
         let mut leaves = FirstHits::<_, _, ANY> {
             ray,
             bounds: &wide.bounds,
-            leaf_ray: MaybeUninit::uninit(),
+            leaf_ray,
             is_prepared: false,
             filter,
         };
@@ -75,7 +76,7 @@ impl Filter for &mut dyn FnMut(Hit) -> bool {
 }
 
 /// Tests of the triangles in the leaves that a ray enters.
-pub(crate) trait Leaves<L> {
+pub(crate) trait Leaves<K> {
     /// Tests the triangles of a block. Returns whether one of them is the new nearest hit.
     unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool;
 }
@@ -86,7 +87,7 @@ pub(crate) trait Leaves<L> {
 pub(crate) unsafe fn traverse<K: Instructions, const ANY: bool>(
     wide: &WideBvh,
     ray: &Ray,
-    leaves: &mut impl Leaves<K::Block>,
+    leaves: &mut impl Leaves<K>,
 ) -> Hit {
     // SAFETY: the processor has the instructions; the stack has room for `stack_need` children and
     // one register more.
@@ -107,7 +108,7 @@ struct Rare<'a, L, const ANY: bool> {
     leaves: &'a mut L,
 }
 
-impl<K: Instructions, L: Leaves<K::Block>, const ANY: bool> Task<K> for Rare<'_, L, ANY> {
+impl<K: Instructions, L: Leaves<K>, const ANY: bool> Task<K> for Rare<'_, L, ANY> {
     type Output = Hit;
 
     #[inline(always)]
@@ -136,7 +137,7 @@ pub(crate) unsafe fn visit<K: Instructions, const ANY: bool>(
     wide: &WideBvh,
     t_max: f32,
     boxes: &impl BoxTest<K>,
-    leaves: &mut impl Leaves<K::Block>,
+    leaves: &mut impl Leaves<K>,
     base: *mut Pending,
 ) -> Hit {
     let mut nearest = Hit { t: t_max, object: u32::MAX };
@@ -210,7 +211,7 @@ struct FirstHits<'r, L, F, const ANY: bool> {
     filter: F,
 }
 
-impl<L: Lanes, F: Filter, const ANY: bool> Leaves<L> for FirstHits<'_, L, F, ANY> {
+impl<K: Instructions, F: Filter, const ANY: bool> Leaves<K> for FirstHits<'_, K::Block, F, ANY> {
     #[inline(always)]
     unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool {
         // SAFETY: the processor has the instructions; the ray is prepared before its use.
@@ -219,15 +220,38 @@ impl<L: Lanes, F: Filter, const ANY: bool> Leaves<L> for FirstHits<'_, L, F, ANY
                 self.leaf_ray.write(LeafRay::new(self.ray, self.bounds));
                 self.is_prepared = true;
             }
-            self.leaf_ray.assume_init_ref().visit::<F, ANY>(block, nearest, &mut self.filter)
+            let ray = self.leaf_ray.assume_init_ref();
+            ray.visit::<K, F, ANY>(block, nearest, &mut self.filter)
         }
+    }
+}
+
+/// The decision of pairs that certain crossings leave open. It begins anew, so that the test before
+/// it keeps nothing in registers for it.
+struct Doubt<'a, L> {
+    ray: &'a LeafRay<L>,
+    block: &'a TriangleBlock,
+    crossings: Crossings,
+    t_max: f32,
+}
+
+impl<K: Instructions> Task<K> for Doubt<'_, K::Block> {
+    type Output = (<K::Block as Lanes>::Mask, K::Block);
+
+    #[inline(always)]
+    unsafe fn run(self) -> Self::Output {
+        let Self { ray, block, crossings, t_max } = self;
+        // SAFETY: the processor has the instructions.
+        let (corners, t_max) = unsafe { (ray.corners(block), K::Block::splat(t_max)) };
+        ray.pairs.decide(&corners, &Plane::of_lanes(&corners), crossings, t_max)
     }
 }
 
 /// A ray in all lanes, as triangles are tested with it.
 pub(crate) struct LeafRay<L> {
     pub(crate) pairs: Pairs<L>,
-    axes: [usize; 3],
+    /// Of [`TriangleBlock::ROWS`], in the shear's order of axes.
+    rows: [usize; 3],
 }
 
 impl<L: Lanes> LeafRay<L> {
@@ -253,26 +277,26 @@ impl<L: Lanes> LeafRay<L> {
                 L::splat(reach),
                 L::splat(ray.t_min()),
             );
-            Self { pairs, axes }
+            Self { pairs, rows: axes.map(|axis| axis * TriangleBlock::LANES) }
         }
     }
 
     /// Returns the corners of a block's triangles in the shear's order of axes.
     #[inline(always)]
     pub(crate) unsafe fn corners(&self, block: &TriangleBlock) -> [[L; 3]; 3] {
-        // SAFETY: the processor has the instructions; axes are below 3.
-        unsafe { block.corners_along::<L>(self.axes) }
+        // SAFETY: the processor has the instructions; these are rows.
+        unsafe { block.corners_along::<L>(self.rows) }
     }
 
     /// Tests the triangles of a block. Returns whether one of them is the new nearest hit.
     #[inline(always)]
-    unsafe fn visit<F: Filter, const ANY: bool>(
+    unsafe fn visit<K: Instructions<Block = L>, F: Filter, const ANY: bool>(
         &self,
         block: &TriangleBlock,
         nearest: &mut Hit,
         filter: &mut F,
     ) -> bool {
-        // SAFETY: the processor has the instructions; axes are below 3.
+        // SAFETY: the processor has the instructions.
         unsafe {
             let corners = self.corners(block);
             let t_max = L::splat(nearest.t);
@@ -290,7 +314,12 @@ impl<L: Lanes> LeafRay<L> {
                 return false;
             }
             let plane = Plane::of_lanes(&corners);
-            let (inside, t) = self.pairs.decide(&corners, &plane, crossings, t_max);
+            let (mut inside, unsure, mut t) =
+                self.pairs.decide_certain(&corners[0], &plane, crossings, t_max);
+            if unsure != 0 {
+                let t_max = nearest.t;
+                (inside, t) = K::call(Doubt { ray: self, block, crossings, t_max });
+            }
             let mut hits = inside.bits();
             if hits == 0 {
                 return false;

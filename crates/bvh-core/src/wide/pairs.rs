@@ -269,6 +269,21 @@ impl<L: Lanes> Pairs<L> {
         (is_hit & crossed & self.t_min.le(t) & t.le(t_max), unsure, t)
     }
 
+    /// Does the same for pairs that are certainly crossed, and leaves the others open.
+    #[inline(always)]
+    pub(crate) fn decide_certain(
+        &self,
+        first: &[L; 3],
+        plane: &Plane<L>,
+        Crossings { possible, certain }: Crossings,
+        t_max: L,
+    ) -> (L::Mask, u32, L) {
+        let (is_hit, is_behind, t) = self.meet(first, plane);
+        let crossed = t.mask(certain & possible);
+        let unsure = possible & !(crossed & (is_hit | is_behind)).bits();
+        (is_hit & crossed & self.t_min.le(t) & t.le(t_max), unsure, t)
+    }
+
     /// Returns the pairs whose ray meets the plane at the returned rounded distance, and those
     /// whose ray meets it before its origin, where the ray's line crosses the triangle.
     #[inline(always)]

@@ -69,7 +69,7 @@ impl Seen {
         let mut seen = MaybeUninit::<Self>::uninit();
         // SAFETY: the processor has the instructions; all rows are written.
         unsafe {
-            let corners = block.corners_along::<L>([0, 1, 2]);
+            let corners = block.corners_along::<L>(TriangleBlock::ROWS);
             let plane = Plane::of_lanes(&corners);
             let origin = [L::splat(origin.x), L::splat(origin.y), L::splat(origin.z)];
             let (height, slack) = plane.height(&corners[0], &origin);

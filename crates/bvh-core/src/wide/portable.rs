@@ -73,7 +73,7 @@ impl WideRay {
 }
 
 /// Returns the nearest hit, or with `ANY` the first one found, among those that `accept` accepts.
-#[inline(always)]
+#[inline(never)]
 pub(crate) fn walk<const ANY: bool>(
     wide: &WideBvh,
     ray: &Ray,

@@ -17,6 +17,8 @@ pub(crate) struct TriangleBlock {
 
 impl TriangleBlock {
     pub(crate) const LANES: usize = 4;
+    /// The coordinates of a corner before those along each axis.
+    pub(crate) const ROWS: [usize; 3] = [0, Self::LANES, 2 * Self::LANES];
     const UNUSED: u32 = u32::MAX;
     /// Added to the first id of a leaf's last block; ids themselves are below [`MAX_OBJECTS`].
     pub(crate) const LAST: u32 = MAX_OBJECTS as u32;
@@ -78,20 +80,21 @@ impl TriangleBlock {
         self.ids[0] & Self::LAST != 0
     }
 
-    /// Returns the corners of all four triangles along these axes.
+    /// Returns the corners of all four triangles along the axes of these rows.
     ///
     /// # Safety
-    /// The processor has the instructions; axes are below 3, and `L` has four lanes.
+    /// The processor has the instructions; rows are of [`ROWS`](Self::ROWS), and `L` has four
+    /// lanes.
     #[inline(always)]
-    pub(crate) unsafe fn corners_along<L: Lanes>(&self, axes: [usize; 3]) -> [[L; 3]; 3] {
+    pub(crate) unsafe fn corners_along<L: Lanes>(&self, rows: [usize; 3]) -> [[L; 3]; 3] {
         const { assert!(L::N == Self::LANES) };
         // SAFETY: there are three axes of four aligned lanes for every corner.
         unsafe {
             let lanes = self.corners.as_ptr().cast::<f32>();
             let mut corners = [[L::splat(0.0); 3]; 3];
             for (corner, coordinates) in corners.iter_mut().enumerate() {
-                for (coordinate, axis) in coordinates.iter_mut().zip(axes) {
-                    *coordinate = L::load(lanes.add((3 * corner + axis) * Self::LANES));
+                for (coordinate, row) in coordinates.iter_mut().zip(rows) {
+                    *coordinate = L::load(lanes.add(3 * corner * Self::LANES + row));
                 }
             }
             corners
