@@ -22,7 +22,7 @@ macro_rules! tuned {
 }
 
 // Annealing, at equal work.
-tuned! { "cargo bench -p harness --bench search -- --seconds 1,10,60 SCENE..." {
+tuned! { "cd attic; cargo bench --bench search -- --seconds 1,10,60 SCENE..." {
     /// Length of a round, after which the nodes are sorted. Shorter rounds sort too often; longer
     /// rounds miss the cache.
     WORK_PER_ROUND: [u64; 2] = [64, 256], "work per object, shortest and longest";
@@ -96,7 +96,7 @@ tuned! { "bvh bake SCENE --references 1.2 --budget 100Mwork --out FILE" {
 }}
 
 // `best`, from a second on.
-tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 SCENE..." {
+tuned! { "cd attic; cargo bench --bench search -- --seconds 0.1,1,10,60 SCENE..." {
     /// Minimum gain for which the incumbent is converted and reported during an annealing run.
     WORTH_AN_EVENT: f64 = 1e-3, "fraction of the cost";
     /// Longest useful annealing run of the smallest scenes. Beyond it, two runs end lower than one.
@@ -142,7 +142,7 @@ tuned! { "cargo bench -p harness --bench search -- --seconds 0.1,1,10,60 SCENE..
 // `best` within milliseconds. With 35 instead of 45 sort times, annealing gains one percent on some
 // scenes and loses ten on others: its top-down initial build takes 14 to 20 sort times, 27 where
 // objects are sorted quickly, and half as much again on a busy machine.
-tuned! { "cargo bench -p harness --bench peers --features peers -- SCENE..." {
+tuned! { "cd attic; cargo bench --bench peers -- SCENE..." {
     /// Minimum work with which annealing ends lower than clustering and reinsertion.
     ANNEAL_FROM_WORK: u64 = 20, "work per object";
     /// Minimum time in which annealing ends lower, with one thread.
@@ -154,7 +154,7 @@ tuned! { "cargo bench -p harness --bench peers --features peers -- SCENE..." {
     COLD_MEMORY: f64 = 2.5, "factor";
     /// Part of the scene on which the sort is timed a second time, in warm memory.
     WARM_SAMPLE: usize = 16, "divisor of the number of objects";
-    /// Time reserved for ordering and evaluating the tree after reinsertion.
+    /// Time reserved for ordering, evaluating and bounding the tree after reinsertion.
     FINISH_TIME: f64 = 1.0, "sort times";
     /// The clustering that reinsertion starts from. A better clustering takes the time of more
     /// reinsertions than it saves.

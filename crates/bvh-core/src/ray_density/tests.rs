@@ -17,14 +17,17 @@ impl Random {
     }
 }
 
+/// Returns random segments over a grid whose cells have a side of 1, and their random numbers.
+fn segments(seed: u64) -> (Aabb, Vec<Segment>, Random) {
+    let mut random = Random(seed);
+    let segment = |_| Segment { from: random.point(), to: random.point() };
+    let segments = (0..2000).map(segment).collect();
+    (Aabb::from([[0.0; 3], [CELLS as f32; 3]]), segments, random)
+}
+
 #[test]
 fn the_shortcut_within_a_cell_and_the_sum_over_corners_give_the_same_bits() {
-    let mut random = Random(1);
-    let mut segments = Vec::new();
-    for _ in 0..2000 {
-        segments.push(Segment { from: random.point(), to: random.point() });
-    }
-    let bounds = Aabb::from([[0.0; 3], [CELLS as f32; 3]]);
+    let (bounds, segments, mut random) = segments(1);
     let density = RayDensity::new(&bounds, &segments, 0.0).unwrap();
     let mut entered = 0;
     for _ in 0..20_000 {
@@ -50,12 +53,7 @@ fn the_shortcut_within_a_cell_and_the_sum_over_corners_give_the_same_bits() {
 
 #[test]
 fn every_processor_counts_the_same_entries() {
-    let mut random = Random(2);
-    let mut segments = Vec::new();
-    for _ in 0..2000 {
-        segments.push(Segment { from: random.point(), to: random.point() });
-    }
-    let bounds = Aabb::from([[0.0; 3], [CELLS as f32; 3]]);
+    let (bounds, segments, mut random) = segments(2);
     let density = RayDensity::of_rays(&bounds, &segments, 0.1).unwrap();
     let mut entered = 0;
     for number in 0..20_000 {
