@@ -151,7 +151,7 @@ impl<K: Instructions, F: Find> Task<K> for Flight<'_, K, F> {
 
 impl<K: Instructions, F: Find> Flight<'_, K, F> {
     /// Starts the next rays, a vector at a time, while there are places for them. Answers those
-    /// that miss the box around everything.
+    /// that miss the box around everything, and by themselves those that begin far from it.
     #[inline(always)]
     unsafe fn start_idle(&mut self) {
         let Self { wide, rays, .. } = *self;
@@ -184,8 +184,14 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
                     others &= others - 1;
                     let place = *places.get_unchecked(lane);
                     append(&mut self.idle, &mut self.idle_count, place, true);
-                    if from + lane < self.from {
-                        self.find.write(from + lane, f32::INFINITY, u32::MAX);
+                    let number = from + lane;
+                    if number >= self.from {
+                        continue;
+                    }
+                    if ready.far >> lane & 1 != 0 {
+                        self.find.alone(wide, number, &rays[number]);
+                    } else {
+                        self.find.write(number, f32::INFINITY, u32::MAX);
                     }
                 }
             }

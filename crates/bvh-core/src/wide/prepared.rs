@@ -1,24 +1,23 @@
 //! Rays made ready for rays in flight: what the tests of boxes and triangles need of one, together
 //! in memory.
 
-use super::box_ray::{BoxTest, FarBoxRay};
-use super::instructions::{Instructions, Task};
+use super::instructions::Instructions;
 use super::lanes::{Lanes, Mask};
 use super::layout::{WideBvh, WideNode};
 use super::pairs::Pairs;
 use super::ray_lanes::RayLanes;
 use super::triangles::{TriangleBlock, three_by_three};
+use crate::Aabb;
 use crate::ray::AXES;
 use crate::slabs::{FAR, NEAR};
-use crate::{Aabb, Ray};
 
 /// Rays side by side that are about to be written one after the other.
 pub(crate) struct Ready<L> {
     rays: RayLanes<L>,
     near_factor: [L; 3],
     far_factor: [L; 3],
-    /// A bit per ray that begins [far](Ray::is_far_from) from the scene.
-    far: u32,
+    /// A bit per ray that begins [far](Ray::is_far_from) from the scene, and is not traced here.
+    pub(crate) far: u32,
     reach: L,
 }
 
@@ -49,8 +48,7 @@ pub(crate) struct Prepared {
     pub(crate) far: [u32; 3],
     /// Among the rays of the batch.
     pub(crate) number: u32,
-    /// 1 for a ray that begins [far](Ray::is_far_from) from the scene.
-    is_far: u32,
+    padding: u32,
     /// As in [`Pairs`].
     errors: [f32; 3],
 }
@@ -67,7 +65,7 @@ impl<L: Lanes> Ready<L> {
         Self { rays, near_factor, far_factor: [x * exit, y * exit, z * exit], far, reach }
     }
 
-    /// Returns a bit per ray that may meet something within `bounds`. Those from far away all may.
+    /// Returns a bit per ray that begins near the scene and may meet something within `bounds`.
     #[inline(always)]
     pub(crate) fn enter(&self, bounds: &Aabb) -> u32 {
         let mut entry = self.rays.t_min;
@@ -81,7 +79,7 @@ impl<L: Lanes> Ready<L> {
             entry = entry.max((near - self.rays.origin[axis]) * self.near_factor[axis]);
             exit = ((far - self.rays.origin[axis]) * self.far_factor[axis]).min(exit);
         }
-        entry.le(exit).bits() | self.far
+        entry.le(exit).bits() & !self.far
     }
 
     #[inline(always)]
@@ -100,7 +98,6 @@ impl<L: Lanes> Ready<L> {
         let origin = in_order(self.rays.origin, second, third);
         let [dx, dy, depth] = in_order(self.rays.direction, second, third);
         let bits = |bits: u32| depth.filled_with_bits(bits);
-        let is_far = L::select(depth.mask(self.far), bits(1), bits(0));
         let [error, underflow, range_error] = Pairs::errors_of(self.reach, depth);
         let axis = L::select(third, bits(2), L::select(second, bits(1), bits(0)));
         let mut near = [bits(0); 3];
@@ -120,7 +117,7 @@ impl<L: Lanes> Ready<L> {
             write_row(&to, 4, [dy / depth, self.reach, depth], self.rays.t_min);
             write_row(&to, 5, near, axis);
             write_row(&to, 6, far, bits(0));
-            write_row(&to, 7, [is_far, error, underflow], range_error);
+            write_row(&to, 7, [bits(0), error, underflow], range_error);
             for (number, to) in (first..).zip(to).take(L::N) {
                 (*to).number = number;
             }
@@ -144,9 +141,6 @@ impl Prepared {
     ) -> (K::Boxes, u32) {
         // SAFETY: the ray names whole, aligned planes.
         unsafe {
-            if self.is_far != 0 {
-                return K::call(FarBoxes { ray: self, node, t_max });
-            }
             let distance = |axis: usize, plane: u32, factor: f32| {
                 let planes = node.planes.as_ptr().cast::<u8>();
                 let plane = K::Boxes::load(planes.add(plane as usize).cast());
@@ -175,16 +169,6 @@ impl Prepared {
     pub(crate) fn axes(&self) -> &'static [usize; 3] {
         // SAFETY: it is an axis.
         unsafe { AXES.get_unchecked(self.largest_axis as usize) }
-    }
-
-    /// Returns the ray as [`boxes`](Self::boxes) tests it if it begins far from the scene.
-    fn far_away(&self) -> FarBoxRay {
-        let [x, y, z] = *self.axes();
-        let mut direction = [0.0; 3];
-        direction[x] = self.x_direction;
-        direction[y] = self.y_direction;
-        direction[z] = self.depth;
-        FarBoxRay::new(&Ray::assume_valid(self.box_origin, direction, self.t_min, self.t_max))
     }
 }
 
@@ -245,23 +229,6 @@ impl Test<'_> {
             ])
         };
         three_by_three(of)
-    }
-}
-
-/// A box test of a ray that begins far from the scene.
-struct FarBoxes<'a> {
-    ray: &'a Prepared,
-    node: &'a WideNode,
-    t_max: f32,
-}
-
-impl<K: Instructions> Task<K> for FarBoxes<'_> {
-    type Output = (K::Boxes, u32);
-
-    #[inline(always)]
-    unsafe fn run(self) -> (K::Boxes, u32) {
-        // SAFETY: this is compiled with the instructions, which the processor has.
-        unsafe { BoxTest::<K>::boxes(&self.ray.far_away(), self.node, self.t_max) }
     }
 }
 

@@ -94,7 +94,8 @@ impl<K: Instructions> Task<K> for Entered<'_> {
                     bounds.add(&lanes);
                     Culling::new(&bounds, lanes.octant()).cull::<K>(node, t_max).1
                 }
-                NodeTest::InFlight => {
+                // In flight are rays that begin near the scene, too.
+                NodeTest::InFlight if is_near => {
                     let mut rays = [const { MaybeUninit::<Prepared>::zeroed() }; 16];
                     let places = rays.each_mut().map(MaybeUninit::as_mut_ptr);
                     Ready::new(lanes, wide).write(0, places);
