@@ -249,7 +249,10 @@ impl<K: Instructions> Leaves<K> for AllHits<'_, K::Block> {
             let t_max = corners[0][0].filled(nearest.t);
             let plane = Plane::of_lanes(&corners);
             let decided = rays.decide_in_f64(&corners, &plane, crossings, t_max);
-            Decided::new(decided).hits_of(block, self.ray, |hit| self.hits.push(hit));
+            let decided = Decided::new(decided);
+            for lane in 0..block.len() {
+                self.hits.extend(decided.hit_of(lane, block, lane, self.ray));
+            }
         }
         false
     }
@@ -269,14 +272,6 @@ impl Decided {
         // SAFETY: there is room for sixteen lanes.
         unsafe { t.store(distances.as_mut_ptr()) };
         Self { hits: hits.bits(), unsure, distances }
-    }
-
-    /// Calls `append` with the hits of a ray in a block.
-    #[inline(always)]
-    fn hits_of(&self, block: &TriangleBlock, ray: &Ray, mut append: impl FnMut(Hit)) {
-        for lane in 0..block.len() {
-            self.hit_of(lane, block, lane, ray).into_iter().for_each(&mut append);
-        }
     }
 
     /// Returns the bits of a pair's distance above those of `object`; the greatest number if it is

@@ -9,7 +9,6 @@ use super::pairs::{Crossings, Pairs, Plane};
 use super::triangles::TriangleBlock;
 use crate::ray::{AXES, largest_axis};
 use crate::{Aabb, Hit, Ray};
-use core::hint::black_box;
 use core::mem::MaybeUninit;
 
 /// Aligns the frame of the function that holds it. Otherwise the compiler keeps vectors of 32 bytes
@@ -217,12 +216,29 @@ impl<K: Instructions, F: Filter, const ANY: bool> Leaves<K> for FirstHits<'_, K:
         // SAFETY: the processor has the instructions; the ray is prepared before its use.
         unsafe {
             if !self.is_prepared {
-                self.leaf_ray.write(LeafRay::new(self.ray, self.bounds));
+                K::call(Prepare { ray: self.ray, bounds: self.bounds, to: &mut self.leaf_ray });
                 self.is_prepared = true;
             }
             let ray = self.leaf_ray.assume_init_ref();
             ray.visit::<K, F, ANY>(block, nearest, &mut self.filter)
         }
+    }
+}
+
+/// The preparation of a ray for triangles: most rays in the open meet none.
+struct Prepare<'a, L> {
+    ray: &'a Ray,
+    bounds: &'a Aabb,
+    to: &'a mut MaybeUninit<LeafRay<L>>,
+}
+
+impl<K: Instructions> Task<K> for Prepare<'_, K::Block> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run(self) {
+        // SAFETY: the processor has the instructions.
+        self.to.write(unsafe { LeafRay::new(self.ray, self.bounds) });
     }
 }
 
@@ -257,9 +273,6 @@ pub(crate) struct LeafRay<L> {
 impl<L: Lanes> LeafRay<L> {
     #[inline(always)]
     pub(crate) unsafe fn new(ray: &Ray, bounds: &Aabb) -> Self {
-        // Most rays in the open meet no leaf: without this the compiler does a part of this work
-        // for all.
-        let ray = black_box(ray);
         let origin = ray.origin().to_array();
         let direction = ray.direction().to_array();
         let reach = ray.reach(bounds);
