@@ -56,7 +56,8 @@ impl Target {
         let Some(bounds) = tree.root_aabb() else { return [0.0; 2] };
         let nodes = match self.layout {
             Layout::ThreeMesh => tree.to_three_mesh(),
-            _ => Vec::new(),
+            // Visited by the nearer child first.
+            Layout::FirstCount | Layout::FirstCountAligned | Layout::Json => Vec::new(),
         };
         let mut open = Vec::new();
         let mut cost = |ray: Ray| {

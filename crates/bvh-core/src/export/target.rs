@@ -36,6 +36,7 @@ pub struct UnknownTarget {
 
 /// A layout of binary nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Layout {
     /// [`FirstCountNode`](super::FirstCountNode)s.
     FirstCount,

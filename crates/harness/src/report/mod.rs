@@ -33,6 +33,7 @@ use data::Rows;
 use output::Output;
 use paper::PaperRow;
 use serde::{Deserialize, Deserializer, Serialize};
+use std::collections::HashSet;
 use std::path::Path;
 
 /// Declares the kinds of reports: name in specs (in snake case), configuration and its keys that
@@ -149,7 +150,25 @@ pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> 
     if !paper.is_empty() {
         outputs.push(beside_paper(&paper)?);
     }
+    check_names(&outputs, folder)?;
     Ok(outputs)
+}
+
+/// Rejects reports of which one would overwrite what another made.
+fn check_names(outputs: &[Output], folder: &Path) -> Result<(), Error> {
+    let mut names = HashSet::new();
+    for output in outputs {
+        let tables = output.csv.iter().map(|(name, _)| format!("{name}.csv"));
+        let figures = output.figures.iter().map(|(name, _)| format!("{name}.svg"));
+        for name in tables.chain(figures) {
+            let path = folder.join(&name);
+            if !names.insert(name) {
+                let message = "two reports make this file; expected another `file` in one of them";
+                return Err(Error::Query { path, message: message.into() });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Writes the output of reports into the store's folder. Returns the text for the terminal, which

@@ -105,7 +105,8 @@ impl Output {
         columns: &str,
     ) -> Result<(), Error> {
         let bytes = to_bytes(rows, Path::new("table"))?;
-        self.show_csv(explanation, &bytes, columns)
+        let columns: Vec<&str> = columns.split(' ').collect();
+        self.show_csv(explanation, &bytes, &columns)
     }
 
     /// Adds a table of some columns of a CSV file.
@@ -113,18 +114,19 @@ impl Output {
         &mut self,
         explanation: &str,
         bytes: &[u8],
-        columns: &str,
+        columns: &[impl AsRef<str>],
     ) -> Result<(), Error> {
         let path = Path::new("table");
         let mut reader = csv::Reader::from_reader(bytes);
         let header = reader.headers().map_err(Error::csv(path))?.clone();
         // Columns are found by name, so that tables do not depend on their order in the file.
+        let columns: Vec<&str> = columns.iter().map(AsRef::as_ref).collect();
         let shown: Vec<usize> = columns
-            .split(' ')
-            .filter_map(|column| header.iter().position(|name| name == column))
+            .iter()
+            .filter_map(|column| header.iter().position(|name| name == *column))
             .collect();
         let mut table = Table::new();
-        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(columns.split(' '));
+        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(columns);
         for record in reader.records() {
             let record = record.map_err(Error::csv(path))?;
             table.add_row(shown.iter().map(|&at| four_digits(&record[at])));

@@ -68,7 +68,7 @@ impl Config {
         let mut output = Output::new(&self.source, &self.title);
         let columns = self.header();
         let bytes = table_bytes(&columns, &table)?;
-        output.show_csv(&format!("{}:", self.title), &bytes, &columns.join(" "))?;
+        output.show_csv(&format!("{}:", self.title), &bytes, &columns)?;
         output.csv.push((self.file.clone(), bytes));
         output.paper = self.compare(rows, &table).map_err(named)?;
         output.say(&self.finding, rows)?;
@@ -116,6 +116,10 @@ impl Config {
     fn groups<'r>(&self, rows: &'r [Row]) -> Result<Vec<Group<'r>>, QueryError> {
         let by: Vec<&str> = self.by.iter().map(String::as_str).collect();
         let base = Conditions::parse(&self.base)?;
+        let mut is_base = rows.iter().map(|row| base.are_met(row));
+        if !self.base.is_empty() && !is_base.any(|met| met.unwrap_or(true)) {
+            return Err(QueryError::NoRow(self.base.clone()));
+        }
         let mut groups = Vec::new();
         for values in query::distinct(rows, &by)? {
             let mut key = Row::new();
@@ -200,6 +204,22 @@ impl Config {
     /// Rejects parts of the query that cannot be read, and files and columns that no run writes.
     pub(super) fn check_queries(&self) -> Result<(), OutOfRange> {
         check_file(&self.file)?;
+        let is_taken = |(file, _): &(&str, _)| file.strip_suffix(".csv") == Some(&self.file);
+        if rows::files().any(is_taken) {
+            let accepted = "a name that no file of runs has";
+            return Err(OutOfRange::new("file", format!("{:?}", self.file), accepted));
+        }
+        let header = self.header();
+        if let Some(twice) =
+            header.iter().find(|&name| header.iter().filter(|&n| n == name).count() > 1)
+        {
+            let found = format!("the name {twice:?} twice");
+            return Err(OutOfRange::new(
+                "columns",
+                found,
+                "different names, and not those of `by`",
+            ));
+        }
         // A row that any number would fit into.
         let mut row = Row::new();
         for (key, name) in [("rows", &self.rows), ("join", &self.join)] {
@@ -337,6 +357,19 @@ mod tests {
     }
 
     #[test]
+    fn a_base_that_no_row_meets_is_rejected() {
+        let columns = "columns = [{ name = 'r', value = 'median cost', ratio = 'over_base' }]";
+        let error = made(&format!("base = 'method=A'\n{columns}")).unwrap_err();
+        assert!(error.contains("no row meets \"method=A\""), "{error}");
+    }
+
+    #[test]
+    fn the_name_of_a_column_may_have_blanks() {
+        let output = made("columns = [{ name = 'the cost', value = 'median cost' }]").unwrap();
+        assert!(output.text().contains(" the cost "), "{}", output.text());
+    }
+
+    #[test]
     fn quotients_of_medians_lie_between_those_of_all_pairs_of_runs() {
         let output = made(
             "join = 'timing.csv'\npairs = [['b', 'a']]\nreason = 'none'\ncolumns = [\
@@ -366,6 +399,13 @@ mod tests {
         assert_eq!(fault(""), None);
         for (change, key) in [
             ("rows = '../runs.csv'", "rows"),
+            // Runs would be lost.
+            ("file = 'runs'", "file"),
+            (
+                "columns = [{ name = 'c', value = 'max cost' }, { name = 'c', value = 'min cost' }]",
+                "columns",
+            ),
+            ("columns = [{ name = 'scene', value = 'max cost' }]", "columns"),
             // The columns of an unknown file are unknown, too.
             ("join = 'costs.csv'\nbase = 'threads=1'", "join"),
             ("select = 'method=a, seconds=1'", "select"),
