@@ -169,7 +169,7 @@ impl<M: Metric> Working<M> {
         self.journal.iter().map(|node| node.index)
     }
 
-    /// Undoes the current change exactly, to the last bit.
+    /// Undoes the current change exactly, to the last bit: the tree is as it was after `begin`.
     #[inline(always)]
     pub fn undo(&mut self) {
         self.added = 0.0;

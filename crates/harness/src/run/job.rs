@@ -178,7 +178,14 @@ fn estimated_work(labelled: &Labelled, budget: Budget, objects: u64) -> u64 {
         Method::Rebuild(config) => (0, config.work_per_object),
         Method::RuinRecreate(config) => (0, config.work_per_object),
         Method::Best(config) => (0, config.work_per_object),
-        _ => (1, 0),
+        Method::MullerFellner(_)
+        | Method::MedianCut(_)
+        | Method::GoldsmithSalmon(_)
+        | Method::Agglomerative(_)
+        | Method::Reinsertion(_)
+        | Method::Rotation(_)
+        | Method::Treelet(_)
+        | Method::Exact(_) => (1, 0),
     };
     // An evaluation is a tree of these methods, and a move of all others.
     let trees = trees.min(budget.max_evaluations.unwrap_or(u64::MAX));

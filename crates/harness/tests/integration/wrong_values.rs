@@ -228,11 +228,12 @@ fn a_wrong_value_under_any_key_of_a_spec_is_rejected_by_name() {
     }
     eprintln!("{} keys", seen.len());
     for method in Method::NAMES {
-        assert!(seen.contains_key(&format!(".methods[{method}].label")), "{method}");
+        let is_seen = seen.contains_key(&format!(".methods[{method}].label"));
+        assert!(is_seen, "{method} is in no spec of experiments/; add it to one");
     }
     for kind in Report::NAMES {
         if !seen.contains_key(&format!(".reports[{kind}].kind")) {
-            complain(format!("no report of kind {kind} was tried"));
+            complain(format!("{kind} is in no spec of experiments/; add a report of this kind"));
         }
     }
     let found = found.take();
