@@ -105,9 +105,9 @@ def test_a_budget_of_work_gives_the_file_of_the_program(tmp_path, references, ha
     faces = "".join(f"f {3 * i + 1} {3 * i + 2} {3 * i + 3}\n" for i in range(len(TRIANGLES)))
     (tmp_path / "mesh.obj").write_text(corners + faces)
     rays = RANDOM.uniform(0, 10, (90, 2, 3)).astype(np.float32)
-    np.save(tmp_path / "rays.npy", rays.reshape(-1, 6))
+    rays.astype("<f4").tofile(tmp_path / "rays.bin")
     flags = ["--budget=300kwork", f"--references={references}", "--out=program.bvh"]
-    flags += ["--rays=rays.npy"] if has_rays else []
+    flags += ["--rays=rays.bin"] if has_rays else []
     subprocess.run([program, "bake", "mesh.obj", *flags], cwd=tmp_path, check=True)
     tree = Tree.from_triangles(TRIANGLES, work=300_000, references=references, rays=rays if has_rays else None)
     tree.save(tmp_path / "python.bvh")
