@@ -19,7 +19,7 @@ bvh_config::config! { serde;
         /// Labels of the methods. One event per run, as a builder has, is shown as a point.
         methods: Vec<String>, in OneOrMore;
     }
-    check |config: &Self| check_file(&config.file);
+    check |config: &Self| check_file("timing_", &config.file);
 }
 
 /// One corner of a curve, which is flat up to the next, or its end, as written to

@@ -1,5 +1,6 @@
 //! Keys that several kinds of reports share, and checks of their lists.
 
+use crate::rows;
 use bvh_config::{Accepts, OutOfRange};
 
 /// Accepts lists that are not empty.
@@ -55,12 +56,40 @@ impl Labels for Series {
     }
 }
 
-/// Rejects names of files that could lead to another folder.
-pub fn check_file(name: &str) -> Result<(), OutOfRange> {
+/// Rejects names of CSV files that could lead to another folder or replace rows of the runs.
+/// `before` stands before the name.
+pub fn check_file(before: &str, name: &str) -> Result<(), OutOfRange> {
     // Other characters separate folders or are invalid on some system.
     let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    if !name.is_empty() && name.chars().all(is_plain) {
-        return Ok(());
+    if name.is_empty() || !name.chars().all(is_plain) {
+        return Err(OutOfRange::new("file", format!("{name:?}"), "letters, digits, - and _"));
     }
-    Err(OutOfRange::new("file", format!("{name:?}"), "letters, digits, - and _"))
+    let csv = format!("{before}{name}.csv");
+    if rows::files().any(|(file, _)| *file == csv) {
+        let accepted = format!("a name other than that of {csv}, which runs write");
+        return Err(OutOfRange::new("file", format!("{name:?}"), accepted));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_lead_elsewhere_or_replace_rows_of_runs_are_rejected() {
+        for (before, name, is_accepted) in [
+            ("", "builds", true),
+            ("timing_", "builds", true),
+            ("timing_", "runs", true),
+            ("", "runs", false),
+            ("", "timing_history", false),
+            ("timing_", "history", false),
+            ("", "", false),
+            ("timing_", "", false),
+            ("", "../runs", false),
+        ] {
+            assert_eq!(check_file(before, name).is_ok(), is_accepted, "{before}{name}");
+        }
+    }
 }
