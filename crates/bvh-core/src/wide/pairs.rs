@@ -257,15 +257,15 @@ impl<L: Lanes> Pairs<L> {
         crossings: Crossings,
         t_max: L,
     ) -> (L::Mask, u32, L) {
+        let decided = self.decide_certain(&corners[0], plane, crossings, t_max);
+        if decided.1 == 0 {
+            return decided;
+        }
         let possible = crossings.possible;
         let (is_hit, is_behind, t) = self.meet(&corners[0], plane);
-        let mut crossed = t.mask(crossings.certain & possible);
-        let mut unsure = possible & !(crossed & (is_hit | is_behind)).bits();
-        if unsure != 0 {
-            let (is_inside, is_outside) = self.cross(corners);
-            crossed = is_inside & t.mask(possible);
-            unsure = possible & !(is_outside | is_inside & (is_hit | is_behind)).bits();
-        }
+        let (is_inside, is_outside) = self.cross(corners);
+        let crossed = is_inside & t.mask(possible);
+        let unsure = possible & !(is_outside | is_inside & (is_hit | is_behind)).bits();
         (is_hit & crossed & self.t_min.le(t) & t.le(t_max), unsure, t)
     }
 
