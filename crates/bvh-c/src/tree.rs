@@ -7,6 +7,7 @@ use bvh_search::bvh_core::export::{FirstCountNode, Target};
 use bvh_search::prelude::*;
 use bvh_search::{Objects, Observer, Options, OwnedTree};
 use std::ffi::{CStr, c_char, c_void};
+use std::mem::offset_of;
 use std::sync::Arc;
 
 /// A tree with its objects. Any number of threads may read a tree at the same time. A thread that
@@ -32,6 +33,16 @@ pub struct BvhNode {
     /// The number of object ids of a leaf; 0 for an inner node.
     pub count: u32,
 }
+
+// `bvh_tree_nodes` lends the library's nodes as these.
+const _: () = assert!(
+    size_of::<BvhNode>() == size_of::<FirstCountNode>()
+        && align_of::<BvhNode>() == align_of::<FirstCountNode>()
+        && offset_of!(BvhNode, min) == offset_of!(FirstCountNode, min)
+        && offset_of!(BvhNode, first) == offset_of!(FirstCountNode, first)
+        && offset_of!(BvhNode, max) == offset_of!(FirstCountNode, max)
+        && offset_of!(BvhNode, count) == offset_of!(FirstCountNode, count)
+);
 
 /// A kind of cost. Tree files use the same numbers.
 #[repr(C)]
@@ -246,7 +257,6 @@ pub unsafe extern "C" fn bvh_tree_nodes(tree: *const BvhTree, count: *mut usize)
         // SAFETY: `count` points to a size that nobody else uses during the call.
         let count = unsafe { given_mut("count", count) }?;
         *count = tree.nodes.len();
-        // Both types have the same fields in the order of C.
         Ok(tree.nodes.as_ptr().cast())
     })
 }

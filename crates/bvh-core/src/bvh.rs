@@ -156,15 +156,15 @@ impl Bvh {
         depth.into_iter().max().unwrap_or(0) as usize
     }
 
-    /// Halves leaves of more than `most` objects, at least 1, in the order of their objects. The
-    /// halves keep the leaf's box; [`refit`](Self::refit) makes them tight. O(nodes).
+    /// Halves leaves of more than `most` objects, and of more than one, in the order of their
+    /// objects. The halves keep the leaf's box; [`refit`](Self::refit) makes them tight. O(nodes).
     pub fn halve_leaves(&mut self, most: usize) {
         let mut index = 0;
         // The halves are appended, and so they are visited and halved again if necessary.
         while index < self.nodes.len() {
             let Node { aabb, .. } = self.nodes[index];
             let range = self.nodes[index].prims();
-            if range.len() > most {
+            if range.len() > most.max(1) {
                 let half = (range.len() / 2) as u32;
                 let start = range.start as u32;
                 self.nodes[index] = Node::inner(aabb, self.nodes.len() as u32, 2);

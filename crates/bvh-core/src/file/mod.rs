@@ -118,8 +118,8 @@ pub fn save(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, File
 ///
 /// The caller has [validated](crate::validate_references()) the tree and knows its cost under the
 /// origin's objective. Neither is checked here, because each takes as long as everything else, and
-/// several threads can do both at once. Passes to `both` the check of the visits with the scene's checksum,
-/// and the file's checksum. Rejects visits that no measure gives.
+/// several threads can do both at once. Passes to `both` the check of the visits with the scene's
+/// checksum, and the file's checksum. Rejects visits that no measure gives.
 pub fn sections<'a>(
     tree: &'a Bvh,
     boxes: &[Aabb],
