@@ -30,7 +30,7 @@ bvh_config::config! { serde;
 }
 
 /// The presets of `obvhs`, named like its functions without `_build`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Preset {
     Fastest,

@@ -10,7 +10,7 @@ use std::borrow::Cow;
 use std::time::Instant;
 
 /// A way to lay out one of our trees.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Layout {
     /// The unmodified tree.
@@ -31,7 +31,7 @@ pub enum Layout {
 }
 
 /// An instruction set of the vector kernels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Instructions {
     /// AVX-512, with packets and many rays in flight.
     #[serde(rename = "AVX-512")]

@@ -150,8 +150,8 @@ fn in_words<N: Display>(range: &impl RangeBounds<N>) -> String {
 /// The macro generates the struct with `Clone`, `Debug`, `PartialEq` and [`Default`], and
 /// [`Check`](crate::Check). The documentation of every field ends with its default and its accepted
 /// values. Under the feature `serde` of the calling crate, the macro derives serde's traits, which
-/// reject unknown keys and replace missing ones by defaults; under the feature `schema`, it derives
-/// a JSON schema by `schemars`. A crate that always depends on both writes `serde;` first.
+/// reject unknown keys and replace missing ones by defaults. A crate that always depends on serde
+/// writes `serde;` first.
 ///
 /// Without `= default`, a field has the default of its type, and the documentation does not mention
 /// it. Without `in`, every value is accepted. The right side of `in` is any value that
@@ -183,7 +183,6 @@ macro_rules! config {
             derive(::serde::Serialize, ::serde::Deserialize),
             serde(rename_all = "snake_case")
         )]
-        #[cfg_attr(feature = "schema", derive(::schemars::JsonSchema))]
         $(#[$meta])*
         $visibility enum $name {
             $($variants)*
@@ -236,7 +235,7 @@ macro_rules! config {
     (serde; $($tokens:tt)*) => {
         $crate::config! {
             @struct {
-                #[derive(::serde::Serialize, ::serde::Deserialize, ::schemars::JsonSchema)]
+                #[derive(::serde::Serialize, ::serde::Deserialize)]
                 #[serde(deny_unknown_fields, default)]
             }
             $($tokens)*
@@ -250,7 +249,6 @@ macro_rules! config {
                     derive(::serde::Serialize, ::serde::Deserialize),
                     serde(deny_unknown_fields, default)
                 )]
-                #[cfg_attr(feature = "schema", derive(::schemars::JsonSchema))]
             }
             $($tokens)*
         }

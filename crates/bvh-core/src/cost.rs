@@ -19,7 +19,6 @@ pub use crate::layout_cost::{
     derive(serde::Serialize, serde::Deserialize),
     serde(rename_all = "snake_case")
 )]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Objective {
     /// [`internal_area`], the paper's objective.
     #[default]
@@ -116,7 +115,6 @@ pub fn total_area(tree: &Bvh) -> f64 {
     derive(serde::Serialize, serde::Deserialize),
     serde(deny_unknown_fields, default)
 )]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SahConstants {
     /// Cost of visiting an inner node. Default 1.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "checked"))]

@@ -12,7 +12,6 @@ macro_rules! methods {
         /// the name and whose other keys are the configuration's fields. Unknown names and keys are
         /// rejected.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-        #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
         #[serde(tag = "method")]
         pub enum Method {
             $($(#[$doc])* #[serde(rename = $name)] $variant($config),)*

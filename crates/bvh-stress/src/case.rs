@@ -8,7 +8,6 @@ use anyhow::{Result, anyhow, ensure};
 use bvh_core::{Aabb, Primitives, Triangle};
 use bvh_scenes::builtin::stiff;
 use bvh_search::{Method, Outcome};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -44,7 +43,7 @@ pub enum Check {
 }
 
 /// The size of a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Size {
     /// For every method and every ray.
@@ -71,7 +70,7 @@ bvh_config::config! { serde;
 }
 
 /// Scenes for searches beyond those of few objects.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LargerScenes {
     /// Objects per scene; less where [`Size::Many`] is less.

@@ -23,7 +23,7 @@ pub struct Labelled {
 }
 
 /// A method of ours, another library, or a program.
-#[derive(Clone, Debug, PartialEq, Serialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 #[allow(missing_docs, reason = "the line above names the variants in order")]
 pub enum Contestant {

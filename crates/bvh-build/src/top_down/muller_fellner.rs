@@ -60,7 +60,6 @@ bvh_config::config! {
     derive(serde::Serialize, serde::Deserialize),
     serde(rename_all = "snake_case", deny_unknown_fields)
 )]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MadeUpCosts {
     /// The objects 0, `every`, 2 · `every` and so on are expensive, `every` ≥ 1.
     pub every: u32,

@@ -93,7 +93,6 @@ impl Kind {
     derive(serde::Serialize, serde::Deserialize),
     serde(deny_unknown_fields)
 )]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Viewpoint {
     /// The camera's position.
     pub eye: [f64; 3],

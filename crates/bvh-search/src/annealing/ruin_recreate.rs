@@ -65,7 +65,6 @@ bvh_config::config! {
     derive(serde::Serialize, serde::Deserialize),
     serde(rename_all = "snake_case")
 )]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Scale {
     /// The area that the removal saves.
     #[default]

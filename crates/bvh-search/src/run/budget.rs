@@ -11,7 +11,6 @@ use std::ops::AddAssign;
     derive(serde::Serialize, serde::Deserialize),
     serde(deny_unknown_fields)
 )]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Budget {
     /// Maximum number of trees or moves to evaluate.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]

@@ -1,9 +1,7 @@
 //! The commands of the program, one file each: arguments in, files and terminal output out.
 
-pub mod compare;
 pub mod jobs;
 pub mod merge;
-pub mod new;
 pub mod program;
 pub mod report;
 pub mod run;

@@ -1,7 +1,7 @@
 //! The program: parses the arguments, dispatches to a command, and sets the exit code.
 
 use super::terminal::{self, INTERRUPTED, print_error};
-use super::{compare, jobs, merge, new, report, run};
+use super::{jobs, merge, report, run};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -25,10 +25,6 @@ enum Command {
     Report(report::ReportArgs),
     Jobs(jobs::JobsArgs),
     Merge(merge::MergeArgs),
-    Compare(compare::CompareArgs),
-    New(new::NewArgs),
-    /// Print the JSON schema of specs, which lets editors complete and check them.
-    Schema,
 }
 
 /// Runs the program with the arguments of this process.
@@ -40,12 +36,6 @@ pub fn main() -> ExitCode {
         Some(Command::Report(args)) => report::report(&args),
         Some(Command::Jobs(args)) => jobs::jobs(&args),
         Some(Command::Merge(args)) => merge::merge(&args, &INTERRUPTED),
-        Some(Command::Compare(args)) => compare::compare(&args),
-        Some(Command::New(args)) => new::new(&args),
-        Some(Command::Schema) => {
-            new::schema();
-            Ok(())
-        }
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

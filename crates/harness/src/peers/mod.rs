@@ -134,14 +134,12 @@ pub(crate) fn lower_bound() -> Result<LowerBound, Fault> {
 }
 
 /// A library with its settings, as a spec names it.
-#[derive(Clone, Debug, PartialEq, Serialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Peer {
     #[serde(rename = "method")]
-    #[schemars(extend("enum" = Self::NAMES))]
     name: &'static str,
     /// Settings of the library, which checks them.
     #[serde(flatten)]
-    #[schemars(with = "std::collections::BTreeMap<String, serde_json::Value>")]
     settings: Table,
 }
 

@@ -41,7 +41,7 @@ use std::path::Path;
 macro_rules! reports {
     ($($(#[$doc:meta])* $name:literal => $kind:ident($config:ty: $($label:ident),*) by $write:path;)*) => {
         /// One report of a spec.
-        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "kind")]
         #[allow(clippy::large_enum_variant, reason = "a spec has few reports")]
         pub enum Report {

@@ -3,6 +3,7 @@
 //!
 //! ```text
 //! CONDITIONS   COLUMN=TEXT, COLUMN!=TEXT or TEXT, …   `*` for all rows; a comma in a text is `\,`
+//!              COLUMN<NUMBER, COLUMN>NUMBER           rows with a number in the column
 //!              COLUMN=max                             rows with the greatest number of the column
 //! MEASURE      AGGREGATE VALUE
 //!              spearman VALUE, VALUE                  the rank correlation; also pearson
@@ -11,6 +12,7 @@
 //! ```
 
 use crate::Error;
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -62,27 +64,33 @@ pub fn number_in(row: &Row, column: &str) -> Option<f64> {
 /// A condition on one column.
 struct Condition {
     column: String,
+    sign: &'static str,
     texts: Vec<String>,
-    /// True if the cell must be one of the texts, false if it must be none of them.
-    wanted: bool,
 }
+
+/// `=` if the cell must be one of the texts, `!=` if it must be none of them.
+const SIGNS: [&str; 4] = ["!=", "=", "<", ">"];
 
 impl Condition {
     fn parse(text: &str) -> Result<Self, QueryError> {
-        let wanted = !text.contains("!=");
-        let sign = if wanted { "=" } else { "!=" };
-        let (column, texts) = text.split_once(sign).ok_or_else(|| QueryError::Malformed {
+        let malformed = || QueryError::Malformed {
             part: "condition",
             found: text.into(),
-            accepted: "COLUMN=TEXT, COLUMN!=TEXT",
-        })?;
-        let texts = texts.split(" or ").map(str::to_owned).collect();
-        Ok(Self { column: column.into(), texts, wanted })
+            accepted: "COLUMN=TEXT, COLUMN!=TEXT, COLUMN<NUMBER, COLUMN>NUMBER",
+        };
+        // The first sign ends the column; texts may hold others.
+        let signs = SIGNS.iter().filter_map(|sign| Some((text.find(sign)?, *sign)));
+        let (at, sign) = signs.min_by_key(|(at, _)| *at).ok_or_else(malformed)?;
+        let texts: Vec<String> = text[at + sign.len()..].split(" or ").map(str::to_owned).collect();
+        if "<>".contains(sign) && (texts.len() > 1 || texts[0].parse::<f64>().is_err()) {
+            return Err(malformed());
+        }
+        Ok(Self { column: text[..at].into(), sign, texts })
     }
 
     /// Replaces the text `max` by the greatest number of the column, if it holds numbers.
     fn resolve(&mut self, rows: &[Row]) -> Result<(), QueryError> {
-        if self.texts != ["max"] {
+        if self.texts != ["max"] || self.sign != "=" {
             return Ok(());
         }
         let mut greatest: Option<(f64, &String)> = None;
@@ -101,8 +109,15 @@ impl Condition {
     }
 
     fn is_met(&self, row: &Row) -> Result<bool, QueryError> {
-        let found = self.texts.contains(cell(row, &self.column)?);
-        Ok(found == self.wanted)
+        let found = cell(row, &self.column)?;
+        let number = |text: &str| text.parse::<f64>().ok();
+        let order = number(found).zip(number(&self.texts[0])).map(|(a, b)| a.total_cmp(&b));
+        Ok(match self.sign {
+            "=" => self.texts.contains(found),
+            "!=" => !self.texts.contains(found),
+            "<" => order == Some(Ordering::Less),
+            _ => order == Some(Ordering::Greater),
+        })
     }
 }
 
@@ -125,7 +140,7 @@ impl Conditions {
     /// Returns the condition that a column has a text.
     pub fn equal(column: &str, text: &str) -> Self {
         let texts = vec![text.to_owned()];
-        Self(vec![Condition { column: column.into(), texts, wanted: true }])
+        Self(vec![Condition { column: column.into(), sign: "=", texts }])
     }
 
     /// Returns the columns of the conditions.

@@ -5,7 +5,6 @@ use super::query::{self, Conditions, QueryError, Row};
 use super::query_measure::Measure;
 use crate::statistics::{median_interval, range};
 use bvh_config::{Nested, above};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 bvh_config::config! { serde;
@@ -45,7 +44,7 @@ bvh_config::config! { serde;
 }
 
 /// A quotient of a group and its base.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Ratio {
     /// The group's value over the base's.

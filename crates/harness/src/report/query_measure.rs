@@ -216,6 +216,7 @@ mod tests {
         assert_eq!(value("method=x\\, y", "only cost"), Ok(Some(2.0)));
         assert_eq!(value("scene!=a", "count scene"), Ok(Some(1.0)));
         assert_eq!(value("scene=a or b", "max cost"), Ok(Some(5.0)));
+        assert_eq!(value("cost>2, cost<5", "only cost"), Ok(Some(3.0)));
         assert_eq!(value("scene=a", "min cost / rays"), Ok(Some(0.5)));
         assert_eq!(value("scene=b", "only rays"), Ok(None));
     }

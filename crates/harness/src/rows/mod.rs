@@ -202,19 +202,6 @@ rows! {
         lower_bound: f64,
     }
 
-    /// One row of `trees.csv`: a file of the archive of best known trees.
-    TreeRow in "trees.csv" {
-        scene: String,
-        objects: usize,
-        /// Checksum of the boxes, hexadecimal.
-        checksum: String,
-        internal_area: f64,
-        /// The greatest proven lower bound known of `internal_area`.
-        lower_bound: Option<f64>,
-        /// The command that made the tree.
-        command: String,
-    }
-
     /// One row of `best_known.csv` and `references.csv`: what gaps are measured from. Trees are
     /// binary, with one object per leaf.
     ReferenceRow in "references.csv" {

@@ -1,6 +1,5 @@
 //! Runs an experiment: jobs in, rows out, none lost.
 
-pub mod archive;
 pub mod check;
 pub mod execute;
 pub mod finish;

@@ -14,12 +14,8 @@ use crate::files;
 use crate::rows::lock::wait_for_folder;
 use crate::rows::store::Store;
 use crate::rows::{BoundRow, ROUNDING, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
-use crate::run::provenance::REVISION;
-use crate::run::resolved::{LoadedScene, Resolved, checksum};
-use bvh_core::Bvh;
+use crate::run::resolved::{LoadedScene, Resolved};
 use bvh_core::cost::Objective;
-use bvh_core::file::Header;
-use bvh_scenes::Scene;
 use bvh_search::exact;
 use std::fs;
 use std::path::Path;
@@ -42,7 +38,8 @@ pub(crate) fn update(
     let runs: Vec<RunRow> = read_if_any(store.folder())?;
     let bounds: Vec<BoundRow> = read_if_any(store.folder())?;
     let _lock = wait_for_folder(out)?;
-    let before = all_known(out)?;
+    let path = out.join(BEST_KNOWN);
+    let before: Vec<ReferenceRow> = if path.is_file() { read(&path)? } else { vec![] };
     let mut known = before.clone();
     let experiment = &resolved.experiment;
     let objective = objective_name(&experiment.objective);
@@ -64,59 +61,15 @@ pub(crate) fn update(
         let reference = known.iter().find(|row| key_of(row) == key);
         references.extend(reference.cloned());
     }
-    write_all_known(out, known, &before)?;
-    if experiment.needs_references() {
-        store.write_rows(&references)?;
-    }
-    Ok(())
-}
-
-fn all_known(results: &Path) -> Result<Vec<ReferenceRow>, Error> {
-    let path = results.join(BEST_KNOWN);
-    if path.is_file() { read(&path) } else { Ok(vec![]) }
-}
-
-/// Writes the best known costs if they differ from `before`.
-fn write_all_known(
-    results: &Path,
-    mut known: Vec<ReferenceRow>,
-    before: &[ReferenceRow],
-) -> Result<(), Error> {
     known.sort_by(|a, b| key_of(a).cmp(&key_of(b)));
-    let path = results.join(BEST_KNOWN);
     // An unchanged file keeps its time stamp and needs no commit.
     if known != before {
         files::write(&path, &to_bytes(&known, &path)?)?;
     }
-    Ok(())
-}
-
-/// Improves the best known costs of a scene by the costs of a binary tree with one object per leaf.
-///
-/// The caller has locked the folder.
-pub(crate) fn improve(
-    results: &Path,
-    scene: &Scene,
-    tree: &Bvh,
-    header: &Header,
-) -> Result<(), Error> {
-    let before = all_known(results)?;
-    let mut known = before.clone();
-    for objective in [Objective::InternalArea, Objective::GoldsmithSalmon] {
-        let found = ReferenceRow {
-            scene: scene.name.clone(),
-            objects: scene.boxes.len(),
-            checksum: checksum(scene),
-            objective: objective_name(&objective),
-            cost: objective.cost(tree),
-            method: header.method.clone(),
-            seed: header.seed,
-            revision: REVISION.into(),
-            lower_bound: None,
-        };
-        offer(&mut known, found);
+    if experiment.needs_references() {
+        store.write_rows(&references)?;
     }
-    write_all_known(results, known, &before)
+    Ok(())
 }
 
 /// Copies the references recorded in `folder`, if any, to the best known costs in `out`.
@@ -127,14 +80,6 @@ pub fn adopt(folder: &Path, out: &Path) -> Result<(), Error> {
         fs::copy(&recorded, &path).map_err(Error::io(&path, "write the file"))?;
     }
     Ok(())
-}
-
-/// Returns the least known internal area of a scene with exactly these boxes.
-pub fn best_known(results: &Path, scene: &Scene) -> Result<Option<ReferenceRow>, Error> {
-    let checksum = checksum(scene);
-    let objective = objective_name(&Objective::InternalArea);
-    let key = (scene.name.as_str(), scene.boxes.len(), checksum.as_str(), objective.as_str());
-    Ok(all_known(results)?.into_iter().find(|row| key_of(row) == key))
 }
 
 /// The key of a reference: scene, number of objects, checksum of the boxes, and objective.

@@ -6,9 +6,8 @@
 
 mod check;
 mod read;
-mod schema;
 
-use crate::contestant::{Contestant, Labelled};
+use crate::contestant::Labelled;
 use crate::measure::picture;
 use crate::measure::ray_cost;
 use crate::processor::PROCESSOR;
@@ -19,7 +18,6 @@ use bvh_scenes::fnv1a;
 use bvh_scenes::rays::RandomRays;
 use bvh_search::Budget;
 pub use read::Overrides;
-pub use schema::schema;
 use std::path::{Path, PathBuf};
 
 config! {
@@ -78,7 +76,6 @@ config! {
         render: Option<picture::Config>, in Nested;
         /// Rays traced through the tree of every method's first run, in all layouts, interleaved,
         /// by the program in `attic/`.
-        #[schemars(with = "Option<std::collections::BTreeMap<String, serde_json::Value>>")]
         tracing: Option<toml::Table>;
         /// Rays that methods with `for_rays` are trained on, and different rays that judge all
         /// trees by the number of their tests.
