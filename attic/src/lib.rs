@@ -70,6 +70,7 @@ mod tests {
     use bvh_scenes::Scene;
     use bvh_scenes::rays::Kind;
     use bvh_scenes::trace::{Accelerator, Query};
+    use harness::peers::Task;
 
     fn all() -> Vec<(&'static dyn Racer, Table)> {
         let settings = ["", "preset = 'fastest'", "preset = 'medium'", "preset = 'very_slow'"];
@@ -100,7 +101,13 @@ mod tests {
     fn trees_of_other_libraries_are_valid_and_have_one_object_per_leaf() {
         let scene = Scene::load("escher:500").unwrap();
         for (library, settings) in all() {
-            let built = library.build(&settings, &scene.boxes).unwrap();
+            let task = Task {
+                boxes: &scene.boxes,
+                objects: &scene.primitives,
+                seed: 1,
+                cancelled: &|| false,
+            };
+            let built = library.build(&settings, &task).unwrap();
             validate(&built.tree, &scene.boxes).unwrap();
             assert_eq!(built.tree.nodes.len(), 2 * 500 - 1, "{} {settings}", library.name());
         }

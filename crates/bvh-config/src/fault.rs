@@ -57,6 +57,8 @@ impl fmt::Display for Fault {
     }
 }
 
+impl std::error::Error for Fault {}
+
 impl From<OutOfRange> for Fault {
     fn from(OutOfRange { key, found, accepted }: OutOfRange) -> Self {
         Self { key, rest: format!(" is {found}; accepted: {accepted}") }

@@ -1,7 +1,7 @@
 //! One entry of a spec's `methods`: a method with its label, limits and seeds.
 
 use crate::measure::ray_cost::TrainedOn;
-use crate::peers::{Peer, command};
+use crate::peers::Peer;
 use bvh_config::fault::{self, Fault};
 use bvh_config::{Check, Keys, Nested, OutOfRange};
 use bvh_core::cost::Objective;
@@ -22,14 +22,13 @@ pub struct Labelled {
     pub options: EntryOptions,
 }
 
-/// A method of ours, another library, or a program.
+/// A method of ours, or another library or program.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 #[allow(missing_docs, reason = "the line above names the variants in order")]
 pub enum Contestant {
     Ours(Method),
     Peer(Peer),
-    External(command::Config),
 }
 
 impl Contestant {
@@ -38,7 +37,6 @@ impl Contestant {
         match self {
             Self::Ours(method) => method.name(),
             Self::Peer(peer) => peer.name(),
-            Self::External(_) => command::Config::NAME,
         }
     }
 
@@ -46,14 +44,11 @@ impl Contestant {
         name: &str,
         parameters: D,
     ) -> Result<Option<Self>, D::Error> {
-        match name {
-            command::Config::NAME => command::Config::deserialize(parameters)
-                .map(|program| Some(Self::External(program))),
-            // Our methods come first, so that no library can take the name of one.
-            _ if Method::NAMES.contains(&name) => {
-                Method::read(name, parameters).map(|method| method.map(Self::Ours))
-            }
-            _ => Peer::read(name, parameters).map(|peer| peer.map(Self::Peer)),
+        // Our methods come first, so that no library can take the name of one.
+        if Method::NAMES.contains(&name) {
+            Method::read(name, parameters).map(|method| method.map(Self::Ours))
+        } else {
+            Peer::read(name, parameters).map(|peer| peer.map(Self::Peer))
         }
     }
 }
@@ -64,7 +59,6 @@ impl Check for Contestant {
             Self::Ours(method) => method.check(),
             // The library checks its settings.
             Self::Peer(_) => Ok(()),
-            Self::External(program) => program.check(),
         }
     }
 }
@@ -132,8 +126,7 @@ impl Labelled {
 
 fn accepted_methods() -> String {
     let ours = Method::NAMES.join(", ");
-    let libraries = Peer::NAMES.join(", ");
-    format!("{ours}, the libraries {libraries}, or {}", command::Config::NAME)
+    format!("{ours}, or the libraries and programs {}", Peer::NAMES.join(", "))
 }
 
 impl<'de> Deserialize<'de> for Labelled {

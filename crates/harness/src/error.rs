@@ -1,13 +1,10 @@
 //! The failures of the harness and their exit codes.
 
-use bvh_core::file::FileError;
 use bvh_scenes::SceneError;
 use bvh_scenes::files::{ReadError, WriteError};
-use bvh_scenes::tree_file::TreeFileError;
 use bvh_search::SearchError;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::process::ExitStatus;
 
 /// A failure, with the file or object it concerns.
 #[derive(Debug, thiserror::Error)]
@@ -43,12 +40,9 @@ pub enum Error {
     /// A run failed.
     #[error("scene {scene}, method {method}: {source}")]
     Search { scene: String, method: String, source: Box<SearchError> },
-    /// Another library rejected a scene.
-    #[error("scene {scene}, library {library}: {message}")]
-    Library { scene: String, library: &'static str, message: String },
-    /// An external method failed.
-    #[error("scene {scene}, method {method}, command `{command}`: {source}")]
-    External { scene: String, method: String, command: String, source: CommandFault },
+    /// Another library or a program built no tree.
+    #[error("scene {scene}, method {method}, {source}")]
+    Library { scene: String, method: String, source: Box<dyn std::error::Error + Send + Sync> },
     /// Rays cannot be traced through this scene.
     #[error("scene {scene}, tracing: {message}")]
     Tracing { scene: String, message: String },
@@ -60,9 +54,6 @@ pub enum Error {
         "scene {scene}, method {method} returned an invalid tree: {source}; please report this"
     )]
     InvalidTree { scene: String, method: String, source: bvh_core::InvalidBvh },
-    /// A tree file that is damaged, or for another scene.
-    #[error(transparent)]
-    TreeFile(#[from] TreeFileError),
     /// `--check` found numbers that differ from the committed ones.
     #[error(
         "{differences} difference(s) from the committed results; \
@@ -77,52 +68,13 @@ pub enum Error {
     Interrupted { finished: usize, runs: usize },
 }
 
-/// The failure of an external method.
-#[derive(Debug, thiserror::Error)]
-pub enum CommandFault {
-    /// The program does not exist or is not executable.
-    #[error("it cannot be started: {0}")]
-    NotStarted(io::Error),
-    /// The program reported a failure.
-    #[error("{status}: {last_line}")]
-    Failed {
-        /// The exit status.
-        status: ExitStatus,
-        /// The last line on standard error.
-        last_line: String,
-    },
-    /// The program ended without writing a tree.
-    #[error("it wrote no file at the path that is its last argument")]
-    NoTree,
-    /// The tree is damaged or was built over other boxes.
-    #[error("its tree is invalid: {0}")]
-    InvalidTree(#[from] FileError),
-    /// The program exceeded its time limit.
-    #[error("it did not end within {0} s")]
-    TimedOut(f64),
-    /// The run was interrupted, which kills the program.
-    #[error("it was interrupted")]
-    Interrupted,
-    /// The files for the program could not be written or read.
-    #[error("its input or output files cannot be written or read: {0}")]
-    Exchange(#[from] io::Error),
-}
-
 impl Error {
     /// Returns 2 for mistakes in a spec or a command line, 130 after Ctrl-C, otherwise 1.
     pub fn exit_code(&self) -> u8 {
         match self {
             // A wrong path is the user's mistake; a failing disk is not.
-            Self::Read(error) | Self::TreeFile(TreeFileError::Read(error))
-                if !error.is_of_the_path() =>
-            {
-                1
-            }
-            Self::Read(_)
-            | Self::Spec { .. }
-            | Self::Scene(_)
-            | Self::Usage(_)
-            | Self::TreeFile(_) => 2,
+            Self::Read(error) if !error.is_of_the_path() => 1,
+            Self::Read(_) | Self::Spec { .. } | Self::Scene(_) | Self::Usage(_) => 2,
             Self::Interrupted { .. } => 130,
             _ => 1,
         }

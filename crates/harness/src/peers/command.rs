@@ -2,16 +2,18 @@
 //! write a tree file.
 
 use super::program::Program;
-use crate::error::CommandFault;
+use super::{BuildFault, Built, Library, Task};
+use bvh_config::fault::{self, Fault};
 use bvh_config::{OutOfRange, above};
 use bvh_core::file::{self, FileError};
-use bvh_core::{Aabb, Bvh, Clip, validate_references};
+use bvh_core::{Bvh, validate_references};
 use bvh_scenes::files::ReadError;
 use bvh_scenes::tree_file::{self, TreeFileError};
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
+use toml::Table;
 
 bvh_config::config! { serde;
     /// A program that builds trees, called as `COMMAND… BOXES TREE` in the harness's working
@@ -22,7 +24,6 @@ bvh_config::config! { serde;
     /// of the scene in a tree file. The program writes the [tree file](bvh_core::file) to the path
     /// `TREE`. The environment variable `BVH_SEED` holds the seed of the run. The harness ignores
     /// the program's output, except the last line on standard error if the program fails.
-    #[serde(tag = "method", rename = "external")]
     pub struct Config {
         /// The program and its first arguments. Everybody who runs the spec runs this program.
         command: Vec<String>;
@@ -33,10 +34,52 @@ bvh_config::config! { serde;
     check Self::check_command;
 }
 
-impl Config {
-    /// The method's name in specs.
-    pub const NAME: &str = "external";
+/// Programs as a library.
+pub struct Programs;
 
+impl Library for Programs {
+    fn name(&self) -> &'static str {
+        "external"
+    }
+
+    fn check(&self, settings: &Table) -> Result<(), Fault> {
+        fault::deserialize::<Config>(settings.clone()).map(|_| ())
+    }
+
+    fn build(&self, settings: &Table, task: &Task) -> Result<Built, BuildFault> {
+        let config: Config = fault::deserialize(settings.clone())?;
+        let built = config.build(task).map(|(tree, seconds)| Built { tree, seconds });
+        built.map_err(|fault| format!("command `{}`: {fault}", config.command.join(" ")).into())
+    }
+}
+
+/// The failure of a program.
+#[derive(Debug, thiserror::Error)]
+enum CommandFault {
+    /// The program does not exist or is not executable.
+    #[error("it cannot be started: {0}")]
+    NotStarted(io::Error),
+    /// The program reported a failure, with the last line on standard error.
+    #[error("{0}: {1}")]
+    Failed(ExitStatus, String),
+    /// The program ended without writing a tree.
+    #[error("it wrote no file at the path that is its last argument")]
+    NoTree,
+    /// The tree is damaged or was built over other boxes.
+    #[error("its tree is invalid: {0}")]
+    InvalidTree(#[from] FileError),
+    /// The program exceeded its time limit.
+    #[error("it did not end within {0} s")]
+    TimedOut(f64),
+    /// The run was interrupted, which kills the program.
+    #[error("it was interrupted")]
+    Interrupted,
+    /// The files for the program could not be written or read.
+    #[error("its input or output files cannot be written or read: {0}")]
+    Exchange(#[from] io::Error),
+}
+
+impl Config {
     fn check_command(&self) -> Result<(), OutOfRange> {
         match self.command.first() {
             Some(program) if !program.is_empty() => Ok(()),
@@ -44,18 +87,13 @@ impl Config {
         }
     }
 
-    /// Runs the program over `boxes`, the boxes of `objects`. Returns its tree and the seconds that
-    /// it needed, including its start and its files.
+    /// Runs the program. Returns its tree and the seconds that it needed, including its start and
+    /// its files.
     ///
-    /// Kills the program once the run is `cancelled`. Whenever the program ends, all processes of
+    /// Kills the program once the task is cancelled. Whenever the program ends, all processes of
     /// its group are killed as well.
-    pub fn build(
-        &self,
-        boxes: &[Aabb],
-        objects: &dyn Clip,
-        seed: u64,
-        cancelled: &dyn Fn() -> bool,
-    ) -> Result<(Bvh, f64), CommandFault> {
+    fn build(&self, task: &Task) -> Result<(Bvh, f64), CommandFault> {
+        let Task { boxes, objects, seed, cancelled } = *task;
         let folder = tempfile::tempdir()?;
         let boxes_path = folder.path().join("boxes");
         let tree_path = folder.path().join("tree.bvh");
@@ -100,7 +138,7 @@ impl Config {
         // No child of the program may write to the tree file while it is read.
         drop(program);
         if !status.success() {
-            return Err(CommandFault::Failed { status, last_line: last_line(&mut errors)? });
+            return Err(CommandFault::Failed(status, last_line(&mut errors)?));
         }
         let tree = file::load(&tree_file::read(&tree_path)?, boxes)?;
         validate_references(&tree, boxes, objects).map_err(FileError::Tree)?;

@@ -1,7 +1,7 @@
 //! Executes an experiment: opens its folder, performs its measurements and makes its reports.
 
 use super::finish::{Summary, conclude};
-use super::job::Job;
+use super::job::{base_costs, selected};
 use super::perform::Watch;
 use super::resolved::{Resolved, load_scenes, to_toml};
 use super::runs::{self, Trees, Work};
@@ -81,7 +81,7 @@ fn run(
         return Ok(Summary { skipped_scenes, ..Summary::finished(folder) });
     }
     // An unknown identifier must not leave a folder.
-    let jobs = Job::selected(experiment, &scenes, ids)?;
+    let jobs = selected(experiment, &scenes, ids)?;
     let parts: Vec<PathBuf> = parts.iter().map(|out| out.join(experiment.folder())).collect();
     // A part that is discarded or finished would lose its runs. Symbolic links and `..` may hide
     // that two paths are the same folder.
@@ -101,6 +101,7 @@ fn run(
     }
     let mut work = Work {
         experiment,
+        bases: base_costs(&experiment.objective, &jobs)?,
         jobs: &jobs,
         store: &store,
         watch: Watch { bar: progress(runs as u64), interrupted },

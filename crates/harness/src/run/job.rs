@@ -8,52 +8,57 @@ use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
 use bvh_core::{Bvh, RayDensity};
 use bvh_scenes::Scene;
-use bvh_search::{Budget, Method};
+use bvh_search::Method;
 use rayon::prelude::*;
-use std::cmp::Reverse;
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 /// One run of an experiment.
 pub(crate) struct Job<'a> {
     /// The position of the run in the order of the spec.
     pub index: usize,
+    /// The identifier, which stays the same when other runs join the spec.
+    pub id: String,
     pub scene: &'a Scene,
-    /// The cost of the scene's greedy Müller–Fellner tree.
-    pub base: f64,
     pub labelled: &'a Labelled,
     pub repetition: u32,
     /// True if this run also makes the measurements that depend only on the scene.
     pub first_of_scene: bool,
 }
 
-impl<'a> Job<'a> {
-    /// Returns the runs of an experiment with these identifiers, all if there are none, scene by
-    /// scene, in the order of the spec.
-    pub fn selected(
-        experiment: &'a Experiment,
-        scenes: &'a [Scene],
-        ids: &[String],
-    ) -> Result<Vec<Self>, Error> {
-        let selected = selected(ids, experiment, scenes)?;
-        let runs: Vec<_> = experiment.runs().collect();
-        let runs_of_scenes: Vec<&[usize]> =
-            selected.chunk_by(|a, b| a / runs.len() == b / runs.len()).collect();
-        // A process that performs one run of a large sweep needs no bases of the other scenes.
-        let jobs_of_scenes = runs_of_scenes
-            .into_par_iter()
-            .map(|indices| {
-                let scene = &scenes[indices[0] / runs.len()];
-                let base = base_cost(scene, &experiment.objective)?;
-                let job = |&index: &usize| {
-                    let (labelled, repetition, first_of_scene) = runs[index % runs.len()];
-                    Self { index, scene, base, labelled, repetition, first_of_scene }
-                };
-                Ok(indices.iter().map(job).collect())
-            })
-            .collect::<Result<Vec<Vec<Self>>, Error>>()?;
-        Ok(jobs_of_scenes.into_iter().flatten().collect())
-    }
+/// Returns the runs of an experiment, scene by scene, in the order of the spec.
+pub(crate) fn jobs<'a>(experiment: &'a Experiment, scenes: &'a [Scene]) -> Vec<Job<'a>> {
+    let runs = scenes.iter().flat_map(|scene| experiment.runs().map(move |run| (scene, run)));
+    let job =
+        |(index, (scene, (labelled, repetition, first_of_scene))): (usize, (&'a Scene, _))| {
+            let labelled: &Labelled = labelled;
+            let id = experiment.run_id(&scene.name, &labelled.label, repetition);
+            Job { index, id, scene, labelled, repetition, first_of_scene }
+        };
+    runs.enumerate().map(job).collect()
+}
 
+/// Returns the runs with these identifiers, in the order of the spec; all runs if there are none.
+///
+/// # Errors
+///
+/// If no run has one of the identifiers.
+pub(crate) fn selected<'a>(
+    experiment: &'a Experiment,
+    scenes: &'a [Scene],
+    ids: &[String],
+) -> Result<Vec<Job<'a>>, Error> {
+    let mut jobs = jobs(experiment, scenes);
+    if let Some(id) = ids.iter().find(|id| jobs.iter().all(|job| job.id != **id)) {
+        let name = &experiment.name;
+        return Err(Error::Usage(format!(
+            "--run {id}: {name} has no such run; accepted: an identifier that `harness jobs` lists"
+        )));
+    }
+    jobs.retain(|job| ids.is_empty() || ids.contains(&job.id));
+    Ok(jobs)
+}
+
+impl Job<'_> {
     /// The seed of the run.
     pub fn seed(&self, experiment: &Experiment) -> u64 {
         let label = self.labelled.options.seed_as.as_ref().unwrap_or(&self.labelled.label);
@@ -91,83 +96,30 @@ pub(crate) fn tracing_error(scene: &Scene) -> impl Fn(String) -> Error + use<> {
     move |message| Error::Tracing { scene: scene.clone(), message }
 }
 
-/// Returns the cost of the scene's greedy Müller–Fellner tree, the base of all ratios.
-fn base_cost(scene: &Scene, objective: &Objective) -> Result<f64, Error> {
-    let tree = muller_fellner::Config::default().build(&scene.boxes);
-    Ok(objective.cost(&tree.map_err(Error::search(&scene.name, "muller_fellner, the base"))?))
-}
-
-/// Returns the indices of the runs with these identifiers, ascending; of all runs if there are none.
-///
-/// # Errors
-///
-/// If no run has one of the identifiers.
-fn selected(
-    ids: &[String],
-    experiment: &Experiment,
-    scenes: &[Scene],
-) -> Result<Vec<usize>, Error> {
-    let listed = listed(experiment, scenes);
-    if ids.is_empty() {
-        return Ok((0..listed.len()).collect());
-    }
-    let index = |id: &String| {
-        let run = listed.iter().find(|run| run.id == *id);
-        run.map(|run| run.index).ok_or_else(|| {
-            let name = &experiment.name;
-            Error::Usage(format!(
-                "--run {id}: {name} has no such run; accepted: an identifier that `harness jobs` lists"
-            ))
-        })
+/// Returns the costs of the greedy Müller–Fellner trees of the jobs' scenes, the bases of all
+/// ratios, by the scene's name.
+pub(crate) fn base_costs(
+    objective: &Objective,
+    jobs: &[Job],
+) -> Result<BTreeMap<String, f64>, Error> {
+    let base = |jobs: &[Job]| {
+        let scene = jobs[0].scene;
+        let tree = muller_fellner::Config::default().build(&scene.boxes);
+        let tree = tree.map_err(Error::search(&scene.name, "muller_fellner, the base"))?;
+        Ok((scene.name.clone(), objective.cost(&tree)))
     };
-    let indices: BTreeSet<usize> = ids.iter().map(index).collect::<Result<_, _>>()?;
-    Ok(indices.into_iter().collect())
+    // A process that performs one run of a large sweep needs no bases of the other scenes.
+    let scenes: Vec<&[Job]> = jobs.chunk_by(|a, b| a.scene.name == b.scene.name).collect();
+    scenes.into_par_iter().map(base).collect()
 }
 
-/// One run in the list of all runs.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ListedRun {
-    /// The identifier, which stays the same when other runs join the spec.
-    pub id: String,
-    /// An estimate of its work, in nodes created or visited.
-    pub work: u64,
-    /// The name of the scene.
-    pub scene: String,
-    /// The label of the method.
-    pub label: String,
-    /// The number of the repetition.
-    pub repetition: u32,
-    index: usize,
-}
-
-/// Returns all runs of an experiment, those with most work first: a long run that begins last would
-/// leave all other workers idle.
-pub fn listed(experiment: &Experiment, scenes: &[Scene]) -> Vec<ListedRun> {
-    let mut runs = Vec::new();
-    for scene in scenes {
-        for (labelled, repetition, _) in experiment.runs() {
-            runs.push(ListedRun {
-                id: experiment.run_id(&scene.name, &labelled.label, repetition),
-                work: estimated_work(
-                    labelled,
-                    experiment.budget_of(labelled),
-                    scene.boxes.len() as u64,
-                ),
-                scene: scene.name.clone(),
-                label: labelled.label.clone(),
-                repetition,
-                index: runs.len(),
-            });
-        }
-    }
-    runs.sort_by_key(|run| Reverse(run.work));
-    runs
-}
-
-/// Estimates the work of a run from the method's parameters and its budget.
-fn estimated_work(labelled: &Labelled, budget: Budget, objects: u64) -> u64 {
+/// Estimates the work of a run, in nodes made or visited, from the method's parameters and its
+/// budget.
+pub(crate) fn estimated_work(experiment: &Experiment, job: &Job) -> u64 {
+    let budget = experiment.budget_of(job.labelled);
+    let objects = job.scene.boxes.len() as u64;
     let tree_work = 2 * objects;
-    let Contestant::Ours(method) = &labelled.method else { return tree_work };
+    let Contestant::Ours(method) = &job.labelled.method else { return tree_work };
     let (trees, work_per_object) = match method {
         Method::Grasp(config) => (config.trials, 0),
         Method::RandomOrders(config) => (config.trials, 0),
@@ -211,31 +163,35 @@ mod tests {
     }
 
     #[test]
-    fn every_run_has_one_identifier_and_those_with_most_work_come_first() {
+    fn every_run_has_an_identifier_that_selects_it() {
         let (experiment, scenes) = experiment();
-        assert_eq!(selected(&[], &experiment, &scenes).unwrap(), Vec::from_iter(0..12));
-        let runs = listed(&experiment, &scenes);
-        let works: Vec<u64> = runs.iter().map(|run| run.work).collect();
-        assert!(works.is_sorted_by(|a, b| a >= b), "{works:?}");
-        assert_eq!(works[0], 9 * 2 * scenes[0].boxes.len().max(750) as u64);
-        assert_eq!(works[11], 2 * scenes[0].boxes.len().min(750) as u64);
-        for run in runs {
-            assert_eq!(selected(&[run.id], &experiment, &scenes).unwrap(), [run.index]);
+        assert_eq!(selected(&experiment, &scenes, &[]).unwrap().len(), 12);
+        for job in jobs(&experiment, &scenes) {
+            let [one] = &selected(&experiment, &scenes, &[job.id]).unwrap()[..] else {
+                panic!("one run")
+            };
+            assert_eq!(one.index, job.index);
         }
     }
 
     #[test]
     fn a_budget_and_another_method_change_the_estimate_but_no_identifier() {
         let (mut experiment, scenes) = experiment();
-        let before = listed(&experiment, &scenes);
+        let listed = |experiment: &Experiment| {
+            let jobs = jobs(experiment, &scenes);
+            jobs.into_iter()
+                .map(|job| (job.id.clone(), estimated_work(experiment, &job)))
+                .collect::<BTreeMap<_, _>>()
+        };
+        let before = listed(&experiment);
+        let greatest = 9 * 2 * scenes[0].boxes.len() as u64;
+        assert_eq!(before.values().max(), Some(&greatest));
         experiment.budget.max_work = Some(1000);
         let mut added = experiment.methods[0].clone();
         added.label = "added".into();
         experiment.methods.insert(0, added);
-        let after = listed(&experiment, &scenes);
-        assert!(after.iter().all(|run| run.work <= 1000));
-        let ids: BTreeSet<String> = after.into_iter().map(|run| run.id).collect();
-        assert_eq!(ids.len(), 18);
-        assert!(before.iter().all(|run| ids.contains(&run.id)));
+        let after = listed(&experiment);
+        assert!(after.len() == 18 && after.values().all(|work| *work <= 1000));
+        assert!(before.keys().all(|id| after.contains_key(id)));
     }
 }

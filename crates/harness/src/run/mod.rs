@@ -3,7 +3,7 @@
 pub mod check;
 pub mod execute;
 pub mod finish;
-pub mod job;
+pub(crate) mod job;
 mod perform;
 pub mod provenance;
 mod ray_cost;

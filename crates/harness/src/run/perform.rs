@@ -1,10 +1,11 @@
 //! Performs one run of an experiment: applies a method to a scene and observes it.
 
 use super::job::Job;
+use super::runs::Work;
 use super::solved::Solved;
 use crate::Error;
 use crate::contestant::{Contestant, Labelled};
-use crate::peers::{self, Built};
+use crate::peers::{self, Built, Task};
 use crate::rows::BoundRow;
 use crate::rows::finished_run::FinishedRun;
 use crate::spec::Experiment;
@@ -28,11 +29,8 @@ fn bound(experiment: &Experiment, scene: &Scene, watch: &Watch) -> Result<Option
 }
 
 /// Performs one run. Returns its rows and its tree, or `None` if it was interrupted.
-pub(crate) fn perform(
-    experiment: &Experiment,
-    job: &Job,
-    watch: &Watch,
-) -> Result<Option<(FinishedRun, Bvh)>, Error> {
+pub(crate) fn perform(work: &Work, job: &Job) -> Result<Option<(FinishedRun, Bvh)>, Error> {
+    let Work { experiment, watch, .. } = work;
     if watch.cancelled() {
         return Ok(None);
     }
@@ -53,7 +51,7 @@ pub(crate) fn perform(
         source,
     })?;
     let solved = Solved { experiment, job, seed, outcome: &outcome, seconds };
-    let run = solved.run_row();
+    let run = solved.run_row(work.bases[&scene.name]);
     let mut finished = FinishedRun::here();
     let bounds = if job.first_of_scene { bound(experiment, scene, watch)? } else { None };
     let (renders, render_times) = match &experiment.render {
@@ -84,23 +82,18 @@ fn solve_or_build(
     stopwatch: &Stopwatch,
 ) -> Result<(Outcome, f64), Error> {
     let Job { scene, labelled, .. } = *job;
-    let (tree, seconds) = match &labelled.method {
+    let peer = match &labelled.method {
         Contestant::Ours(method) => return search(experiment, job, method, seed, stopwatch),
-        Contestant::Peer(peer) => {
-            let Built { tree, seconds } = peer.build(&scene.boxes).map_err(|message| {
-                Error::Library { scene: scene.name.clone(), library: peer.name(), message }
-            })?;
-            (tree, seconds)
-        }
-        Contestant::External(program) => program
-            .build(&scene.boxes, &scene.primitives, seed, &|| stopwatch.watch.cancelled())
-            .map_err(|source| Error::External {
-                scene: scene.name.clone(),
-                method: labelled.label.clone(),
-                command: program.command.join(" "),
-                source,
-            })?,
+        Contestant::Peer(peer) => peer,
     };
+    let cancelled = || stopwatch.watch.cancelled();
+    let task =
+        Task { boxes: &scene.boxes, objects: &scene.primitives, seed, cancelled: &cancelled };
+    let Built { tree, seconds } = peer.build(&task).map_err(|source| Error::Library {
+        scene: scene.name.clone(),
+        method: labelled.label.clone(),
+        source,
+    })?;
     // Third-party methods report no events; their end is the only one.
     stopwatch.note(seconds);
     Ok((single_evaluation(tree, &experiment.objective), seconds))

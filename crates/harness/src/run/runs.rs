@@ -8,7 +8,6 @@ use crate::spec::Experiment;
 use bvh_core::Bvh;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 use std::io::Write;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
@@ -22,6 +21,8 @@ pub(crate) struct Work<'a> {
     pub experiment: &'a Experiment,
     /// The selected runs: all runs, unless several processes share the experiment.
     pub jobs: &'a [Job<'a>],
+    /// The costs of the greedy trees by scene.
+    pub bases: BTreeMap<String, f64>,
     pub store: &'a Store,
     pub watch: Watch<'a>,
     /// True for a line on standard error about every run.
@@ -36,14 +37,11 @@ impl Work<'_> {
     /// Rebuilds the wanted trees whose runs were kept from an interrupted experiment.
     pub fn complete_trees(&mut self, is_wanted: impl Fn(&Job) -> bool) -> Result<(), Error> {
         for (index, job) in self.jobs.iter().enumerate() {
-            if !is_wanted(job) {
-                continue;
-            }
-            if let Entry::Vacant(missing) = self.trees.entry(index) {
+            if is_wanted(job) && !self.trees.contains_key(&index) {
                 // The same seed gives the same tree, so a kept run needs no tree file.
-                let performed = perform(self.experiment, job, &self.watch)?;
-                let (_, tree) = performed.ok_or(all_finished(self.jobs))?;
-                missing.insert(tree);
+                let performed = perform(self, job)?;
+                let (_, tree) = performed.ok_or_else(|| self.interrupted())?;
+                self.trees.insert(index, tree);
             }
         }
         Ok(())
@@ -51,12 +49,8 @@ impl Work<'_> {
 
     /// Returns the error of a measurement that is interrupted after all runs are finished.
     pub fn interrupted(&self) -> Error {
-        all_finished(self.jobs)
+        Error::Interrupted { finished: self.jobs.len(), runs: self.jobs.len() }
     }
-}
-
-fn all_finished(jobs: &[Job]) -> Error {
-    Error::Interrupted { finished: jobs.len(), runs: jobs.len() }
 }
 
 /// Performs the runs that are missing or damaged in the store, and keeps each once it finishes.
@@ -126,7 +120,7 @@ impl Progress {
     fn perform(&self, work: &Work, job: &Job) -> Result<(), Error> {
         let start = Instant::now();
         let experiment = work.experiment;
-        let Some((run, tree)) = perform(experiment, job, &work.watch)? else { return Ok(()) };
+        let Some((run, tree)) = perform(work, job)? else { return Ok(()) };
         work.store.keep(job.index, &run)?;
         if experiment.judges().is_some() || experiment.tracing.is_some() && job.repetition == 0 {
             self.trees.lock().unwrap_or_else(PoisonError::into_inner).insert(job.index, tree);

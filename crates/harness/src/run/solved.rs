@@ -24,8 +24,9 @@ impl Solved<'_> {
         (self.job.scene.name.clone(), self.job.labelled.label.clone(), self.job.repetition)
     }
 
-    pub fn run_row(&self) -> RunRow {
-        let Self { job: &Job { scene, base, .. }, seed, outcome, .. } = *self;
+    /// `base` is the cost of the scene's greedy tree.
+    pub fn run_row(&self, base: f64) -> RunRow {
+        let Self { job: &Job { scene, .. }, seed, outcome, .. } = *self;
         let tree = &outcome.tree;
         let (scene_name, method, repetition) = self.identity();
         let internal_area = cost::internal_area(tree);
@@ -53,30 +54,22 @@ impl Solved<'_> {
 
     /// Returns the first event, every improvement and the last event, if a report reads them.
     pub fn history_rows(&self) -> Vec<HistoryRow> {
-        let mut rows = Vec::new();
-        if !self.experiment.keeps_history() {
-            return rows;
-        }
-        for (_, event) in milestones(&self.outcome.history) {
-            let Event { evaluations, work, incumbent, .. } = *event;
+        let is_kept = self.experiment.keeps_history();
+        let row = |(_, &Event { evaluations, work, incumbent, .. }): (usize, &Event)| {
             let (scene, method, repetition) = self.identity();
-            rows.push(HistoryRow { scene, method, repetition, evaluations, work, incumbent });
-        }
-        rows
+            HistoryRow { scene, method, repetition, evaluations, work, incumbent }
+        };
+        milestones(&self.outcome.history).filter(|_| is_kept).map(row).collect()
     }
 
     /// Returns the costs of all trials, if a report reads them.
     pub fn trial_rows(&self) -> Vec<TrialRow> {
-        let mut rows = Vec::new();
-        if !self.experiment.keeps_trials_of(&self.job.labelled.label) {
-            return rows;
-        }
-        for event in &self.outcome.history {
-            let Event { evaluations, cost, .. } = *event;
+        let is_kept = self.experiment.keeps_trials_of(&self.job.labelled.label);
+        let row = |&Event { evaluations, cost, .. }: &Event| {
             let (scene, method, repetition) = self.identity();
-            rows.push(TrialRow { scene, method, repetition, evaluations, cost });
-        }
-        rows
+            TrialRow { scene, method, repetition, evaluations, cost }
+        };
+        self.outcome.history.iter().filter(|_| is_kept).map(row).collect()
     }
 
     pub fn timing_row(&self) -> TimingRow {
@@ -88,15 +81,12 @@ impl Solved<'_> {
     /// Returns the time of every row of the history, if a report needs it; `event_seconds` are the
     /// times of all events.
     pub fn clock_rows(&self, event_seconds: &[f64]) -> Vec<ClockRow> {
-        let mut rows = Vec::new();
-        if !self.experiment.needs_references() {
-            return rows;
-        }
-        for (event, (index, _)) in milestones(&self.outcome.history).enumerate() {
+        let is_kept = self.experiment.needs_references();
+        let row = |(event, (index, _)): (usize, (usize, &Event))| {
             let (scene, method, repetition) = self.identity();
-            rows.push(ClockRow { scene, method, repetition, event, seconds: event_seconds[index] });
-        }
-        rows
+            ClockRow { scene, method, repetition, event, seconds: event_seconds[index] }
+        };
+        milestones(&self.outcome.history).enumerate().filter(|_| is_kept).map(row).collect()
     }
 
     pub fn ray_rows(&self) -> Vec<RayRow> {

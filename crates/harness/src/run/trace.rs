@@ -22,7 +22,7 @@ pub(crate) fn measure(keys: &Table, work: &mut Work) -> Result<String, Error> {
         }
         let peer = match &job.labelled.method {
             Contestant::Peer(peer) => Some(peer),
-            Contestant::Ours(_) | Contestant::External(_) => None,
+            Contestant::Ours(_) => None,
         };
         runs.push(FirstRun {
             scene: job.scene,

@@ -11,35 +11,17 @@
 //! FORMAT   DECIMALS [below | above | percent]   percent below one, above one, or of a fraction
 //!          text                                 cells as they are; all rows have the same one
 //! ```
-//! A file with `/*/` in its path stands for all such files: results by processor.
 
 #![allow(dead_code)] // numbers and tables use a part each
 
 use super::support::top;
 use harness::report::query::{self, Row, distinct, group, number_in, only_text};
 use harness::report::query_measure::Measure;
-use std::fs;
-use std::path::PathBuf;
-
-/// The paths of a committed CSV; with `/*/` in it, one in every folder in which it is, by name.
-fn paths(file: &str) -> Vec<PathBuf> {
-    let results = top().join("results");
-    let Some((before, after)) = file.split_once("/*/") else { return vec![results.join(file)] };
-    let folders =
-        fs::read_dir(results.join(before)).unwrap_or_else(|error| panic!("{file}: {error}"));
-    let mut paths: Vec<PathBuf> =
-        folders.map(|folder| folder.unwrap().path().join(after)).collect();
-    paths.retain(|path| path.is_file());
-    paths.sort();
-    paths
-}
 
 /// The rows of a committed CSV that meet all conditions; at least one.
-pub fn rows(file: &str, conditions: &str) -> Vec<Row> {
-    let mut rows = Vec::new();
-    for path in paths(file) {
-        rows.extend(query::read(&path).unwrap_or_else(|error| panic!("{file}: {error}")));
-    }
+fn rows(file: &str, conditions: &str) -> Vec<Row> {
+    let rows = query::read(&top().join("results").join(file));
+    let rows = rows.unwrap_or_else(|error| panic!("{file}: {error}"));
     query::select(rows, conditions).unwrap_or_else(|error| panic!("{file}: {error}"))
 }
 
