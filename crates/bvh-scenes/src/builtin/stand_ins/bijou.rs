@@ -6,7 +6,8 @@
 //! 1.7e7, like the original's.
 
 use super::mesh_builder::{
-    MeshBuilder, about_x, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, upright,
+    MeshBuilder, about_x, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, torus,
+    upright,
 };
 use bvh_core::Triangle;
 use glam::{DAffine3, DMat3, DVec3};
@@ -167,20 +168,7 @@ fn small(size: f64) -> DAffine3 {
 
 /// A grain of metal between two stones: a coarse dome of radius 1.
 fn bead() -> MeshBuilder {
-    let mut bead = MeshBuilder::default();
-    bead.revolve(&[(1.0, -0.5), (1.0, 0.3), (0.6, 0.85), (0.0, 1.0)], 6);
-    bead
-}
-
-/// A torus about the z axis.
-fn torus(radius: f64, thickness: f64, segments: usize, sides: usize) -> MeshBuilder {
-    let profile: Vec<_> = (0..=sides)
-        .map(|i| on_circle(thickness, fraction(i, sides), 0.0))
-        .map(|corner| (radius + corner.x, corner.y))
-        .collect();
-    let mut torus = MeshBuilder::default();
-    torus.revolve(&profile, segments);
-    torus
+    MeshBuilder::revolved(&[(1.0, -0.5), (1.0, 0.3), (0.6, 0.85), (0.0, 1.0)], 6)
 }
 
 /// A chain of `links` oval links, alternately flat and on edge, laid in a wave around the ring.

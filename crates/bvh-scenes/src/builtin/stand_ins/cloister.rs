@@ -7,7 +7,8 @@
 //! about 1.8e9, like the original's.
 
 use super::mesh_builder::{
-    MeshBuilder, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, upright,
+    MeshBuilder, about_y, about_z, circle, cos_sin, fraction, half_circle, on_circle, placed,
+    torus, upright,
 };
 use bvh_core::Triangle;
 use glam::{DMat3, DVec3};
@@ -118,10 +119,7 @@ fn arcade_arch() -> MeshBuilder {
     let radius = 0.5 * BAY - 0.42;
     arch.arch(radius, 0.5 * BAY, EAVES - SPRING, 0.5, 14);
     for face in [-0.25, 0.25] {
-        let path: Vec<_> = (0..=14)
-            .map(|k| cos_sin(0.5 * fraction(k, 14)))
-            .map(|(c, s)| DVec3::new(radius * c, face, radius * s))
-            .collect();
+        let path = half_circle(14, |c, s| DVec3::new(radius * c, face, radius * s));
         let profile =
             [(0.0, 0.0), (0.0, 0.05), (-0.07, 0.09), (-0.12, 0.05), (-0.2, 0.07), (-0.24, 0.0)];
         let outwards = profile.map(|(x, y)| (x, if face > 0.0 { -y } else { y }));
@@ -147,22 +145,16 @@ fn vault() -> MeshBuilder {
         vault.place(&web, &upright(0.25 * k as f64, 0.0, 0.0, 0.0));
     }
     for turns in [0.125, 0.375] {
-        let path: Vec<_> = (0..=14)
-            .map(|k| cos_sin(0.5 * fraction(k, 14)))
-            .map(|(c, s)| about_z(turns) * DVec3::new(half * SQRT_2 * c, 0.0, half * s - 0.02))
-            .collect();
+        let path = half_circle(14, |c, s| {
+            about_z(turns) * DVec3::new(half * SQRT_2 * c, 0.0, half * s - 0.02)
+        });
         let rib = [(0.05, -0.07), (0.09, 0.0), (0.05, 0.07), (-0.03, 0.07), (-0.03, -0.07)];
         vault.sweep(&path, about_z(turns) * DVec3::Y, &rib, &|_| 1.0);
     }
-    vault.place(&boss(), &upright(0.05, 0.0, 0.0, half - 0.2));
+    // The keystone where the ribs cross.
+    let boss = [(0.0, 0.0), (0.1, 0.02), (0.18, 0.08), (0.2, 0.16), (0.17, 0.2)];
+    vault.place(&MeshBuilder::revolved(&boss, 10), &upright(0.05, 0.0, 0.0, half - 0.2));
     vault
-}
-
-/// The keystone where the ribs of a vault cross.
-fn boss() -> MeshBuilder {
-    let mut boss = MeshBuilder::default();
-    boss.revolve(&[(0.0, 0.0), (0.1, 0.02), (0.18, 0.08), (0.2, 0.16), (0.17, 0.2)], 10);
-    boss
 }
 
 /// A walk of `bays` bays along x, centred, its arcade in the plane y = 0 and its back wall at y =
@@ -204,12 +196,7 @@ fn walk(parts: &Parts, bays: usize) -> MeshBuilder {
         (door + 1.0, outer, 0.0, 6.9),
         (door - 1.0, door + 1.0, 4.2, 6.9),
     ] {
-        walk.quad(
-            DVec3::new(from, back, low),
-            DVec3::new(to, back, low),
-            DVec3::new(to, back, high),
-            DVec3::new(from, back, high),
-        );
+        walk.wall(from, to, back, low, high);
     }
     let mut doorway = MeshBuilder::default();
     doorway.arch(0.8, 1.0, 1.7, 0.4, 18);
@@ -352,39 +339,25 @@ fn well() -> MeshBuilder {
             &(upright(fraction(k, 12), 0.0, 0.0, 0.0) * upright(0.25, 0.88, 0.0, 0.88)),
         );
     }
-    let yoke: Vec<_> = (0..=20)
-        .map(|k| cos_sin(0.5 * fraction(k, 20)))
-        .map(|(c, s)| DVec3::new(0.83 * c, 0.0, 1.36 + 1.9 * libm::sqrt(s)))
-        .collect();
+    let yoke = half_circle(20, |c, s| DVec3::new(0.83 * c, 0.0, 1.36 + 1.9 * libm::sqrt(s)));
     well.sweep(&yoke, DVec3::Y, &circle(0.035, 7), &|_| 1.0);
-    let mut link = MeshBuilder::default();
-    let ring: Vec<_> =
-        (0..=6).map(|i| on_circle(0.012, fraction(i, 6), 0.0)).map(|p| (0.03 + p.x, p.y)).collect();
-    link.revolve(&ring, 9);
+    let link = torus(0.03, 0.012, 9, 6);
     for k in 0..18 {
         let turned = about_z(if k % 2 == 0 { 0.02 } else { 0.27 }) * about_y(0.25);
         well.place(&link, &placed(turned, DVec3::new(0.0, 0.0, 3.2 - 0.05 * k as f64)));
     }
-    well.place(&bucket(), &upright(0.06, 0.0, 0.0, 1.95));
+    // A wooden bucket, hoops included.
+    let bucket = [
+        (0.0, 0.0),
+        (0.16, 0.0),
+        (0.165, 0.08),
+        (0.175, 0.08),
+        (0.175, 0.12),
+        (0.19, 0.36),
+        (0.175, 0.36),
+        (0.15, 0.03),
+        (0.0, 0.03),
+    ];
+    well.place(&MeshBuilder::revolved(&bucket, 14), &upright(0.06, 0.0, 0.0, 1.95));
     well
-}
-
-/// A wooden bucket, hoops included.
-fn bucket() -> MeshBuilder {
-    let mut bucket = MeshBuilder::default();
-    bucket.revolve(
-        &[
-            (0.0, 0.0),
-            (0.16, 0.0),
-            (0.165, 0.08),
-            (0.175, 0.08),
-            (0.175, 0.12),
-            (0.19, 0.36),
-            (0.175, 0.36),
-            (0.15, 0.03),
-            (0.0, 0.03),
-        ],
-        14,
-    );
-    bucket
 }

@@ -6,7 +6,7 @@
 //! that the greedy MF tree costs about 4.8e5, like the original's.
 
 use super::mesh_builder::{
-    MeshBuilder, about_z, circle, cos_sin, fraction, on_circle, placed, upright,
+    MeshBuilder, about_z, circle, cos_sin, fraction, half_circle, on_circle, placed, upright,
 };
 use bvh_core::Triangle;
 use glam::{DMat3, DVec3};
@@ -133,35 +133,24 @@ fn flight(steps: usize, width: f64, climbs_beneath: bool) -> MeshBuilder {
     let run = steps as f64;
     let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z * RISE);
     let depth = 2.5;
+    // Across the flight, between two points in its side.
+    let across = |flight: &mut MeshBuilder, [x0, z0]: [f64; 2], [x1, z1]: [f64; 2]| {
+        flight.quad(at(x0, 0.0, z0), at(x0, width, z0), at(x1, width, z1), at(x1, 0.0, z1));
+    };
     for k in 0..steps {
         let x = k as f64;
-        let y0 = 0.0;
-        let y1 = width;
-        flight.quad(at(x, y0, x), at(x, y1, x), at(x, y1, x + 1.0), at(x, y0, x + 1.0));
-        flight.quad(
-            at(x, y0, x + 1.0),
-            at(x, y1, x + 1.0),
-            at(x + 1.0, y1, x + 1.0),
-            at(x + 1.0, y0, x + 1.0),
-        );
+        let next = x + 1.0;
+        across(&mut flight, [x, x], [x, next]);
+        across(&mut flight, [x, next], [next, next]);
         if climbs_beneath {
-            let z = x - depth;
-            flight.quad(at(x, y0, z), at(x, y1, z), at(x + 1.0, y1, z), at(x + 1.0, y0, z));
-            flight.quad(
-                at(x + 1.0, y0, z),
-                at(x + 1.0, y1, z),
-                at(x + 1.0, y1, z + 1.0),
-                at(x + 1.0, y0, z + 1.0),
-            );
+            across(&mut flight, [x, x - depth], [next, x - depth]);
+            across(&mut flight, [next, x - depth], [next, next - depth]);
         }
-        for y in [y0, y1] {
-            flight.triangle(at(x, y, x), at(x + 1.0, y, x + 1.0), at(x, y, x + 1.0));
+        for y in [0.0, width] {
+            flight.triangle(at(x, y, x), at(next, y, next), at(x, y, next));
             if climbs_beneath {
-                flight.triangle(
-                    at(x, y, x - depth),
-                    at(x + 1.0, y, x - depth),
-                    at(x + 1.0, y, x + 1.0 - depth),
-                );
+                let low = at(x, y, x - depth);
+                flight.triangle(low, at(next, y, x - depth), at(next, y, next - depth));
             }
         }
     }
@@ -169,12 +158,7 @@ fn flight(steps: usize, width: f64, climbs_beneath: bool) -> MeshBuilder {
         flight.quad(at(0.0, y, 0.0), at(run, y, run), at(run, y, run - depth), at(0.0, y, -depth));
     }
     if !climbs_beneath {
-        flight.quad(
-            at(0.0, 0.0, -depth),
-            at(0.0, width, -depth),
-            at(run, width, run - depth),
-            at(run, 0.0, run - depth),
-        );
+        across(&mut flight, [0.0, -depth], [run, run - depth]);
     }
     for y in [0.15, width - 0.15] {
         let feet: Vec<_> = (0..steps).map(|k| at(k as f64 + 0.5, y, k as f64 + 1.0)).collect();
@@ -199,8 +183,7 @@ fn landing(mesh: &mut MeshBuilder, corner: DVec3, length: f64, width: f64) {
 fn balustrade(mesh: &mut MeshBuilder, feet: &[DVec3]) {
     let up = DVec3::Z * RAIL;
     for &foot in feet {
-        let mut baluster = MeshBuilder::default();
-        baluster.revolve(&[(0.08, 0.0), (0.08, RAIL)], 4);
+        let baluster = MeshBuilder::revolved(&[(0.08, 0.0), (0.08, RAIL)], 4);
         mesh.place(&baluster, &upright(0.0, foot.x, foot.y, foot.z));
     }
     let (Some(&first), Some(&last)) = (feet.first(), feet.last()) else {
@@ -210,8 +193,7 @@ fn balustrade(mesh: &mut MeshBuilder, feet: &[DVec3]) {
         [(0.16, -0.08), (0.16, 0.06), (0.07, 0.14), (-0.07, 0.14), (-0.16, 0.06), (-0.16, -0.08)];
     mesh.sweep(&[first + up, last + up], DVec3::Z, &rail, &|_| 1.0);
     for (end, turns) in [(first, 0.03), (last, 0.07)] {
-        let mut newel = MeshBuilder::default();
-        newel.revolve(
+        let newel = MeshBuilder::revolved(
             &[(0.2, -0.4), (0.2, 2.2), (0.13, 2.4), (0.13, 2.8), (0.24, 3.0), (0.0, 3.3)],
             5,
         );
@@ -225,10 +207,7 @@ fn gate(radius: f64, half_width: f64, pier: f64, segments: usize) -> MeshBuilder
     let mut gate = MeshBuilder::default();
     let mut arch = MeshBuilder::default();
     arch.arch(radius, half_width, radius + 0.8, 1.0, segments);
-    let path: Vec<_> = (0..=segments)
-        .map(|k| cos_sin(0.5 * fraction(k, segments)))
-        .map(|(c, s)| DVec3::new(radius * c, -0.5, radius * s))
-        .collect();
+    let path = half_circle(segments, |c, s| DVec3::new(radius * c, -0.5, radius * s));
     arch.sweep(&path, DVec3::Y, &[(0.0, 0.0), (0.0, -0.12), (-0.12, -0.2), (-0.24, 0.0)], &|_| 1.0);
     gate.place(&arch, &placed(DMat3::IDENTITY, DVec3::Z * pier));
     for (low, high) in [(-half_width, -radius), (radius, half_width)] {
@@ -276,8 +255,7 @@ fn spiral(steps: usize) -> MeshBuilder {
         })
         .collect();
     for (k, &top) in rail.iter().enumerate().take(steps) {
-        let mut rod = MeshBuilder::default();
-        rod.revolve(&[(0.06, -RAIL), (0.06, 0.0)], 5);
+        let rod = MeshBuilder::revolved(&[(0.06, -RAIL), (0.06, 0.0)], 5);
         spiral.place(&rod, &placed(about_z(k as f64 * per_step), top));
     }
     spiral.sweep(&rail, DVec3::Z, &circle(0.14, 7), &|_| 1.0);

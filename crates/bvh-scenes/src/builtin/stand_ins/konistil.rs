@@ -163,8 +163,10 @@ fn viaduct(mesh: &mut MeshBuilder) {
     for y in [-3.6, 3.2] {
         bay.cuboid(DVec3::new(-12.0, y, -1.0), DVec3::new(12.0, y + 0.4, 0.9));
     }
-    let mut pier = MeshBuilder::default();
-    pier.revolve(&[(5.6, -75.0), (5.2, -60.0), (4.2, -14.5), (4.6, -14.2), (4.6, -13.5)], 4);
+    let pier = MeshBuilder::revolved(
+        &[(5.6, -75.0), (5.2, -60.0), (4.2, -14.5), (4.6, -14.2), (4.6, -13.5)],
+        4,
+    );
     for k in 0..spans {
         let place = placed(aligned(430.0) * about_z(0.231), beside(430.0, 0.0, 118.0))
             * upright(0.0, span * (k as f64 - 13.5), 0.0, 0.0);
@@ -197,8 +199,8 @@ fn station(mesh: &mut MeshBuilder) {
             &|_| 1.0,
         );
         for y in [-half, half] {
-            let mut post = MeshBuilder::default();
-            post.revolve(&[(0.45, 0.0), (0.25, 0.6), (0.2, 6.4), (0.5, 7.0)], 8);
+            let post =
+                MeshBuilder::revolved(&[(0.45, 0.0), (0.25, 0.6), (0.2, 6.4), (0.5, 7.0)], 8);
             station.place(&post, &upright(0.02, x, y, 0.0));
         }
     }
@@ -216,8 +218,10 @@ fn station(mesh: &mut MeshBuilder) {
     }
     station.place(&house(98.0, 14.0, 9.0, 5.0), &upright(0.0, 0.0, 31.0, 0.0));
     station.cuboid(DVec3::new(50.0, 24.0, 0.0), DVec3::new(58.0, 32.0, 27.0));
-    let mut cap = MeshBuilder::default();
-    cap.revolve(&[(6.4, 27.0), (5.0, 31.0), (1.2, 34.0), (0.9, 38.0), (0.0, 41.0)], 8);
+    let cap = MeshBuilder::revolved(
+        &[(6.4, 27.0), (5.0, 31.0), (1.2, 34.0), (0.9, 38.0), (0.0, 41.0)],
+        8,
+    );
     station.place(&cap, &upright(1.0 / 16.0, 54.0, 28.0, 0.0));
     mesh.place(&station, &placed(aligned(1500.0), beside(1500.0, 0.0, TRACK)));
 }
@@ -230,12 +234,7 @@ fn house(length: f64, width: f64, wall: f64, gable: f64) -> MeshBuilder {
     let y = 0.5 * width;
     let at = |i: f64, j: f64, z: f64| DVec3::new(i, j, z);
     for side in [-1.0, 1.0] {
-        house.quad(
-            at(-x, side * y, -4.0),
-            at(x, side * y, -4.0),
-            at(x, side * y, wall),
-            at(-x, side * y, wall),
-        );
+        house.wall(-x, x, side * y, -4.0, wall);
         let end = side * x;
         house.polygon(&[
             at(end, -y, -4.0),
@@ -255,13 +254,7 @@ fn house(length: f64, width: f64, wall: f64, gable: f64) -> MeshBuilder {
         let windows = (length / 4.5) as usize;
         for k in 0..windows {
             let middle = length * (fraction(2 * k + 1, 2 * windows) - 0.5);
-            let face = side * (y + 0.05);
-            house.quad(
-                at(middle - 0.6, face, 1.2),
-                at(middle + 0.6, face, 1.2),
-                at(middle + 0.6, face, 2.9),
-                at(middle - 0.6, face, 2.9),
-            );
+            house.wall(middle - 0.6, middle + 0.6, side * (y + 0.05), 1.2, 2.9);
         }
     }
     house
@@ -301,12 +294,10 @@ fn town(mesh: &mut MeshBuilder) {
 /// A church with nave, round apse and a tower with an octagonal spire.
 fn church() -> MeshBuilder {
     let mut church = house(34.0, 14.0, 12.0, 8.0);
-    let mut apse = MeshBuilder::default();
-    apse.revolve(&[(5.5, -4.0), (5.5, 9.0), (5.9, 9.3), (0.0, 14.0)], 16);
+    let apse = MeshBuilder::revolved(&[(5.5, -4.0), (5.5, 9.0), (5.9, 9.3), (0.0, 14.0)], 16);
     church.place(&apse, &upright(0.0, 17.0, 0.0, 0.0));
     church.cuboid(DVec3::new(-25.0, -4.0, -4.0), DVec3::new(-17.0, 4.0, 30.0));
-    let mut spire = MeshBuilder::default();
-    spire.revolve(&[(5.2, 29.5), (3.2, 34.0), (0.15, 62.0), (0.0, 64.0)], 8);
+    let spire = MeshBuilder::revolved(&[(5.2, 29.5), (3.2, 34.0), (0.15, 62.0), (0.0, 64.0)], 8);
     church.place(&spire, &upright(1.0 / 16.0, -21.0, 0.0, 0.0));
     church
 }

@@ -25,6 +25,13 @@ impl MeshBuilder {
         self.triangle(a, c, d);
     }
 
+    /// Adds a rectangle in the plane of this `y`, between two x and two z.
+    pub fn wall(&mut self, from: f64, to: f64, y: f64, low: f64, high: f64) {
+        let corners = [(from, low), (to, low), (to, high), (from, high)];
+        let [a, b, c, d] = corners.map(|(x, z)| DVec3::new(x, y, z));
+        self.quad(a, b, c, d);
+    }
+
     /// Adds a convex polygon as a fan around its first corner; fewer than three corners add
     /// nothing.
     pub fn polygon(&mut self, corners: &[DVec3]) {
@@ -50,6 +57,13 @@ impl MeshBuilder {
             let (radius, z) = profile[j];
             on_circle(radius, fraction(i, segments), z)
         });
+    }
+
+    /// Returns a surface of revolution, as [`revolve`](Self::revolve) adds it.
+    pub fn revolved(profile: &[(f64, f64)], segments: usize) -> Self {
+        let mut mesh = Self::default();
+        mesh.revolve(profile, segments);
+        mesh
     }
 
     /// Sweeps a closed polygon along a path and closes both ends. The profile's first coordinate
@@ -178,9 +192,22 @@ pub fn on_circle(radius: f64, turns: f64, z: f64) -> DVec3 {
     DVec3::new(radius * c, radius * s, z)
 }
 
+/// The points of a half circle from the x axis on in this number of steps, made of their cosine and
+/// sine.
+pub fn half_circle(steps: usize, point: impl Fn(f64, f64) -> DVec3) -> Vec<DVec3> {
+    (0..=steps).map(|k| cos_sin(0.5 * fraction(k, steps))).map(|(c, s)| point(c, s)).collect()
+}
+
 /// A regular polygon of `sides` corners as a profile for [`MeshBuilder::sweep`].
 pub fn circle(radius: f64, sides: usize) -> Vec<(f64, f64)> {
     (0..sides).map(|i| cos_sin(fraction(i, sides))).map(|(c, s)| (radius * c, radius * s)).collect()
+}
+
+/// A torus about the z axis.
+pub fn torus(radius: f64, thickness: f64, segments: usize, sides: usize) -> MeshBuilder {
+    let profile: Vec<_> =
+        circle(thickness, sides).into_iter().map(|(x, z)| (radius + x, z)).collect();
+    MeshBuilder::revolved(&[&profile[..], &profile[..1]].concat(), segments)
 }
 
 /// `i / n`, the parameter of the i-th of n steps.
