@@ -102,35 +102,29 @@ impl<'a> Accelerator<'a> {
     /// Returns the nearest object in the ray's range; of several at the same distance, the object
     /// with the lowest id.
     pub fn nearest_hit(&self, ray: &Ray) -> Option<Hit> {
-        match &self.structure {
-            Structure::Wide(wide) => wide.nearest_hit(ray),
-            _ => self.find(ray, &mut ()),
-        }
+        self.nearest_hit_counted(ray, &mut ())
     }
 
     /// Returns whether any object is in the ray's range. The first hit ends the traversal.
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        match &self.structure {
-            Structure::Wide(wide) => wide.any_hit(ray),
-            _ => self.meets(ray, &mut ()),
-        }
+        self.any_hit_counted(ray, &mut ())
     }
 
     /// Answers as [`nearest_hit`](Self::nearest_hit) does and counts the tests, except in
     /// [`Structure::Wide`].
-    pub fn nearest_hit_counted(&self, ray: &Ray, counts: &mut TestCounts) -> Option<Hit> {
+    pub fn nearest_hit_counted(&self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
         match &self.structure {
             Structure::Wide(wide) => wide.nearest_hit(ray),
-            _ => self.find(ray, counts),
+            _ => self.find(ray, counter),
         }
     }
 
     /// Answers as [`any_hit`](Self::any_hit) does and counts the tests, except in
     /// [`Structure::Wide`].
-    pub fn any_hit_counted(&self, ray: &Ray, counts: &mut TestCounts) -> bool {
+    pub fn any_hit_counted(&self, ray: &Ray, counter: &mut impl Counter) -> bool {
         match &self.structure {
             Structure::Wide(wide) => wide.any_hit(ray),
-            _ => self.meets(ray, counts),
+            _ => self.meets(ray, counter),
         }
     }
 
@@ -148,18 +142,13 @@ impl<'a> Accelerator<'a> {
     /// Returns the nearest object. The wide layouts use portable code.
     #[inline(always)]
     fn find(&self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
-        match (&self.structure, self.objects) {
-            (Structure::Wide(wide) | Structure::WidePortable(wide), _) => {
+        match &self.structure {
+            Structure::Wide(wide) | Structure::WidePortable(wide) => {
                 wide.nearest_hit_counted(ray, counter)
             }
-            (structure, Primitives::Triangles(triangles)) => {
-                let prepared = PreparedRay::new(ray);
-                let test = |id: u32, t_max| triangles[id as usize].intersect(&prepared, t_max);
-                structure.nearest_hit(triangles.len(), ray, test, counter)
-            }
-            (structure, Primitives::Spheres(spheres)) => {
-                let test = |id: u32, t_max| spheres[id as usize].intersect(ray, t_max);
-                structure.nearest_hit(spheres.len(), ray, test, counter)
+            structure => {
+                let test = test(self.objects, ray);
+                structure.nearest_hit(count(self.objects), ray, test, counter)
             }
         }
     }
@@ -181,27 +170,31 @@ impl<'a> Accelerator<'a> {
     /// a hit.
     #[inline(always)]
     fn visit(&self, ray: &Ray, ends_at_hit: bool, counter: &mut impl Counter) -> bool {
+        let test = test(self.objects, ray);
         let mut is_hit = false;
         // To visit all objects, the tests report no hit, so that the traversal continues.
-        match self.objects {
-            Primitives::Triangles(triangles) => {
-                let prepared = PreparedRay::new(ray);
-                let test = |id: u32| {
-                    let hit = triangles[id as usize].intersect(&prepared, ray.t_max());
-                    is_hit |= hit.is_some();
-                    is_hit && ends_at_hit
-                };
-                self.structure.any_hit(triangles.len(), ray, test, counter);
-            }
-            Primitives::Spheres(spheres) => {
-                let test = |id: u32| {
-                    let hit = spheres[id as usize].intersect(ray, ray.t_max());
-                    is_hit |= hit.is_some();
-                    is_hit && ends_at_hit
-                };
-                self.structure.any_hit(spheres.len(), ray, test, counter);
-            }
-        }
+        let visited = |id: u32| {
+            is_hit |= test(id, ray.t_max()).is_some();
+            is_hit && ends_at_hit
+        };
+        self.structure.any_hit(count(self.objects), ray, visited, counter);
         is_hit
+    }
+}
+
+fn count(objects: &Primitives) -> usize {
+    match objects {
+        Primitives::Triangles(triangles) => triangles.len(),
+        Primitives::Spheres(spheres) => spheres.len(),
+    }
+}
+
+/// Returns the test of a ray against the object of an id, up to a distance.
+#[inline(always)]
+fn test(objects: &Primitives, ray: &Ray) -> impl Fn(u32, f32) -> Option<f32> {
+    let prepared = PreparedRay::new(ray);
+    move |id, t_max| match objects {
+        Primitives::Triangles(triangles) => triangles[id as usize].intersect(&prepared, t_max),
+        Primitives::Spheres(spheres) => spheres[id as usize].intersect(ray, t_max),
     }
 }
