@@ -373,10 +373,6 @@ fn whole(owned: OwnedTree) -> BvhTree {
 }
 
 fn found(objects: Objects, options: &Options, seconds: Option<f64>) -> Result<BvhTree, Failure> {
-    let references = options.references;
-    if !(1.0..=16.0).contains(&references) {
-        return Err(Failure::invalid(format!("references is {references}; accepted: 1 to 16")));
-    }
     let deadline = seconds.map(deadline).transpose()?;
     let observer = deadline.as_ref().map_or(&() as &dyn Observer, |deadline| deadline);
     OwnedTree::find(objects, options, observer).map(whole).map_err(Failure::invalid)

@@ -12,9 +12,6 @@ const ALL_BITS: &str = "0 to 18446744073709551615";
 /// The accepted times.
 pub const SECONDS: &str = "0 to 1e19";
 
-/// The accepted average numbers of parts.
-pub const REFERENCES: &str = "1 to 16";
-
 /// Reads the argument `seconds`.
 pub fn seconds(argument: &Bound<PyAny>) -> PyResult<Option<f64>> {
     optional("seconds", argument, SECONDS)
@@ -22,7 +19,7 @@ pub fn seconds(argument: &Bound<PyAny>) -> PyResult<Option<f64>> {
 
 /// Reads the argument `references`.
 pub fn references(argument: &Bound<PyAny>) -> PyResult<f64> {
-    number("references", argument, REFERENCES)
+    number("references", argument, "1 to 16")
 }
 
 /// Reads the argument `seed`.

@@ -4,14 +4,14 @@
 use crate::arrays::{MESH, boxes, invalid, mesh, moved_mesh, segments, shapes, triangles};
 use crate::improver::Improver;
 use crate::pickle::{self, State};
-use crate::scalars::{self, REFERENCES};
+use crate::scalars;
 use crate::search::{self, Limits};
 use bvh_scenes::files::{self, WriteError};
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_search::bvh_core::Segment;
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
 use bvh_search::bvh_core::export::Target;
-use bvh_search::{BakeError, Objects, Options, OwnedTree};
+use bvh_search::{BakeError, Objects, Options, OwnedTree, SearchError};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -324,16 +324,13 @@ fn found(
     rays: &[Segment],
     limits: Limits,
 ) -> PyResult<Tree> {
-    if !(1.0..=16.0).contains(&references) {
-        return Err(invalid(format!("references is {references}; accepted: {REFERENCES}")));
-    }
     let (found, raised) = search::run(py, limits, |budget, observer| {
         let options = Options { references, seed, budget, rays };
         OwnedTree::find(objects, &options, observer)
     })?;
     raised?;
     found.map(Tree::new).map_err(|error| match error {
-        BakeError::Rays(_) => invalid(error),
+        BakeError::Rays(_) | BakeError::Search(SearchError::OutOfRange(_)) => invalid(error),
         BakeError::Search(_) => invalid_argument(name, error),
     })
 }

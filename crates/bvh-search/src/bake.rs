@@ -7,6 +7,7 @@ use crate::{Budget, Kept, Observer, Outcome, Problem, Search, SearchError, Split
 use crate::{best, optimize, ray_density, solve_or_keep};
 use best::Horizon;
 use bvh_build::{BuildError, Builder, muller_fellner};
+use bvh_config::OutOfRange;
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::file::{self, FileError, Origin};
 use bvh_core::{
@@ -41,7 +42,7 @@ pub struct Bake<'a> {
     /// because it saves more of their tests than the sum of visits does, and otherwise the internal
     /// area.
     pub objective: Option<Objective>,
-    /// The largest average number of references to an object, from 1 for whole objects.
+    /// The largest average number of references to an object, from 1 for whole objects to 16.
     pub references: f64,
     /// The division of the objects with spatial splits, if the caller has it.
     pub division: Option<&'a Bvh>,
@@ -133,6 +134,14 @@ impl<'a> Bake<'a> {
         self.objective.unwrap_or(default)
     }
 
+    /// Rejects a number of references that is out of range.
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        match (1.0..=16.0).contains(&self.references) {
+            true => Ok(()),
+            false => Err(OutOfRange::new("references", self.references, "1 to 16")),
+        }
+    }
+
     /// Builds the greedy tree, with which gains are compared. `None` if the observer cancels first.
     pub fn greedy(&self, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
         let config = muller_fellner::Config::default();
@@ -149,6 +158,7 @@ impl<'a> Bake<'a> {
         greedy: Option<Bvh>,
         observer: &dyn Observer,
     ) -> Result<Baked, SearchError> {
+        self.check()?;
         let is_timed = observer.progress().is_some();
         let builds = !is_timed && self.budget != Budget::UNLIMITED && self.start.is_none();
         let greedy = match greedy {

@@ -115,7 +115,8 @@ impl OwnedTree {
         owned.tree = file.tree()?;
         // Half a reference more keeps the product with the number of objects from being rounded
         // down.
-        owned.references = (owned.tree.prim_ids.len() as f64 + 0.5) / owned.boxes.len() as f64;
+        let references = owned.tree.prim_ids.len() as f64 + 0.5;
+        owned.references = (references / owned.boxes.len().max(1) as f64).max(1.0);
         owned.work = file.header().work;
         owned.seed = file.header().seed;
         Ok(owned)

@@ -146,3 +146,17 @@ fn no_bake_of_work_is_behind_reinsertion_within_the_same_work() {
         }
     }
 }
+
+#[test]
+fn references_that_no_bake_may_have_are_rejected_and_a_tree_over_nothing_is_improved() {
+    let boxes = scene();
+    for references in [0.5, 16.5, f64::NAN] {
+        let error = Bake { references, ..Bake::new(&boxes) }.search(None, &()).unwrap_err();
+        let expected = format!("references is {references}; accepted: 1 to 16");
+        assert_eq!(error.to_string(), expected);
+    }
+    let nothing = || Objects::Boxes(Vec::new());
+    let empty = OwnedTree::find(nothing(), &Options::default(), &()).unwrap();
+    let loaded = OwnedTree::load(nothing(), &empty.save().unwrap()).unwrap();
+    assert_eq!(loaded.improvement(Budget::UNLIMITED, &()).unwrap().outcome.cost, 0.0);
+}
