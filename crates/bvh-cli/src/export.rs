@@ -2,12 +2,12 @@
 
 use crate::Error;
 use crate::answer::{Answer, Form, gain, whole};
-use crate::arguments::{output_file, reserve};
+use crate::arguments::output_file;
 use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
-use bvh_core::export::{Better, Layout, Target};
+use bvh_core::export::{Layout, Target};
 use bvh_core::{Bvh, Triangle};
-use bvh_scenes::{Scene, tree_file};
+use bvh_scenes::{Scene, files, tree_file};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
@@ -51,28 +51,27 @@ pub fn export(args: &ExportArgs) -> Result<(), Error> {
     let (tree, _) = tree_file::load(&args.file, &scene)?;
     // Only triangles can be traced there.
     let triangles = scene.triangles().map_err(|fault| Error::Usage(fault.to_string()))?;
-    let (better, compared) = compare(&target, &tree, &scene, triangles);
-    let bytes = target.bytes(&better.tree, &scene.boxes);
-    reserve(&args.out, true, bytes.len())?.write(&[&bytes])?;
-    let nodes = better.tree.nodes.len();
     let mut answer = Answer::new(args.form);
+    let (better, compared) = compare(&target, &tree, &scene, triangles, &mut answer);
+    let bytes = target.bytes(&better, &scene.boxes);
+    files::write(&args.out, &bytes)?;
+    let nodes = better.nodes.len();
     answer.say(&format!("{}: {} nodes of {compared}", args.out.display(), whole(nodes)));
     answer.record("nodes", nodes);
-    answer.record("cost of a ray", target.cost(&better.tree));
-    answer.record("is searched", better.is_searched());
-    answer.record("gain inside", better.gains[0]);
-    answer.record("gain outside", better.gains[1]);
+    answer.record("cost of a ray", target.cost(&better));
     answer.end();
     Ok(())
 }
 
-/// Returns the better of the tree and a greedy one for the tracer, and which one it is and why.
+/// Returns the better of the tree and a greedy one for the tracer, and which one it is and why,
+/// which it also records.
 pub fn compare(
     target: &Target,
     tree: &Bvh,
     scene: &Scene,
     triangles: &[Triangle],
-) -> (Better, String) {
+    answer: &mut Answer,
+) -> (Bvh, String) {
     // The loaded tree is over the same boxes, so that these can be built over, too.
     let greedy = muller_fellner::Config::default().build(&scene.boxes).unwrap_or_default();
     let better = target.fit_better(tree, &greedy, triangles);
@@ -80,10 +79,13 @@ pub fn compare(
         true => "this tree",
         false => "a greedy tree instead, which takes fewer tests",
     };
+    answer.record("is searched", better.is_searched());
+    answer.record("gain inside", better.gains[0]);
+    answer.record("gain outside", better.gains[1]);
     let [inside, outside] = better.gains.map(|times| gain(1.0, times));
     let compared = format!(
         "{which}; tests of rays from inside the scene {inside} a greedy tree's, of rays from \
          outside {outside}"
     );
-    (better, compared)
+    (better.tree, compared)
 }

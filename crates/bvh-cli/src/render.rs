@@ -88,18 +88,17 @@ fn point(text: &str) -> Result<DVec3, String> {
 impl RenderArgs {
     fn options(&self, scene: &Scene) -> Options {
         let (width, height) = self.size;
-        let bounds = Aabb::union_of(&scene.boxes);
-        let automatic = framing::automatic(scene, &bounds, f64::from(width) / f64::from(height));
+        let automatic = framing::automatic(scene, f64::from(width) / f64::from(height));
         // The automatic eye fits the automatic angle; any other pair gets the default angle.
         let view = match (self.from, self.at) {
             (None, None) => automatic,
             (from, at) => View {
                 from: from.unwrap_or(automatic.from),
-                at: at.unwrap_or(bounds.doubled_centroid() / 2.0),
+                at: at.unwrap_or_else(|| Aabb::union_of(&scene.boxes).doubled_centroid() / 2.0),
                 fov: View::FOV,
             },
         };
-        Options { width, height, samples: self.samples, view: Some(view), ..Options::default() }
+        Options { samples: self.samples, ..Options::new(width, height, view) }
     }
 }
 

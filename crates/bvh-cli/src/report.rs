@@ -4,7 +4,7 @@ mod page;
 
 use crate::Error;
 use crate::answer::{Answer, Form, whole};
-use crate::arguments::{Jobs, output_file, output_or_free, reserve};
+use crate::arguments::{Jobs, output_file, output_or_free};
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
@@ -13,7 +13,7 @@ use bvh_core::cost::{self, Objective};
 use bvh_scenes::rays::View;
 use bvh_scenes::render::{Film, Options, framing, heat, image, render};
 use bvh_scenes::trace::Accelerator;
-use bvh_scenes::{Scene, tree_file};
+use bvh_scenes::{Scene, files, tree_file};
 use clap::Args;
 use page::{Page, Row};
 use serde_json::json;
@@ -66,10 +66,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Error> {
     let greedy = muller_fellner::Config::default()
         .build(&scene.boxes)
         .map_err(Error::search(&scene.name, "muller_fellner"))?;
-    let view = {
-        let accelerator = Accelerator::of_tree(&scene.primitives, &tree);
-        framing::of_most_objects(&scene, &accelerator, f64::from(WIDTH) / f64::from(HEIGHT))
-    };
+    let view = framing::automatic(&scene, f64::from(WIDTH) / f64::from(HEIGHT));
     let baked = measure(tree, &scene, &view)?;
     let greedy = measure(greedy, &scene, &view)?;
     let rows = rows(&baked, &greedy);
@@ -102,7 +99,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Error> {
         medians: ranges.map(|range| range.median),
         top,
     };
-    reserve(&out, args.out.is_some(), 0)?.write(&[page.html().as_bytes()])?;
+    files::write(&out, page.html().as_bytes())?;
     answer.end();
     Ok(())
 }
@@ -132,12 +129,10 @@ fn measure(tree: Bvh, scene: &Scene, view: &View) -> Result<Measured, Error> {
         Err(_) => None,
     };
     let options = Options {
-        width: WIDTH,
-        height: HEIGHT,
         samples: 1,
         depth: 0,
-        view: Some(view.clone()),
         ground: false,
+        ..Options::new(WIDTH, HEIGHT, view.clone())
     };
     let accelerator = Accelerator::of_tree(&scene.primitives, &tree);
     let film = render(scene, &accelerator, &options, &|| ());

@@ -9,7 +9,7 @@ mod watch;
 
 use crate::Error;
 use crate::answer::{Answer, Form, gain, short, whole};
-use crate::arguments::{Jobs, input_file, output_file, output_or_free, reserve};
+use crate::arguments::{Jobs, input_file, output_file, output_or_free};
 use crate::explain;
 use crate::export::{compare, tracers};
 use crate::rays::Rays;
@@ -18,7 +18,7 @@ use bvh_core::cost::{Objective, internal_area};
 use bvh_core::export::Target;
 use bvh_scenes::files::Reserved;
 use bvh_scenes::{Scene, did_you_mean};
-use bvh_search::{Method, Outcome, StopReason};
+use bvh_search::{Bake, Method, Outcome, StopReason};
 use clap::Args;
 use decide::{Open, decide};
 use effort::Effort;
@@ -146,13 +146,14 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         args.from.as_ref().map(|path| Start::load(path, &scene, most_references)).transpose()?;
     let plan = args.with_budget(plan, objects, &mut answer);
     // Reserving the file first reports a full disk before the search and not after it.
-    let reserved = reserve(&out, args.out.is_some(), plan::most_bytes(&scene, most_references))?;
+    let reserved = Reserved::new(&out, plan::most_bytes(&scene, most_references))?;
     let (plan, prepared) = args.decided(plan, &scene, interrupted, &mut answer)?;
     let found = plan.search(&scene, start.as_ref(), prepared, interrupted)?;
     save(&found, &out, reserved, interrupted, &mut answer)?;
     // Rays are counted once the tree is safe.
     if let (Some(target), Ok(triangles)) = (&args.tracer, scene.triangles()) {
-        let (_, compared) = compare(target, &found.baked.outcome.tree, &scene, triangles);
+        let (_, compared) =
+            compare(target, &found.baked.outcome.tree, &scene, triangles, &mut answer);
         answer.say(&format!("for {}, export writes {compared}", target.name));
     }
     answer.end();
@@ -359,9 +360,8 @@ impl BakeArgs {
         let divides = matches!(method, Method::Best(_));
         let default = self.tracer.filter(|_| divides).map_or(1.0, |tracer| tracer.references);
         let references = self.references.unwrap_or(default);
-        if !(1.0..=16.0).contains(&references) {
-            return Err(Error::Usage(format!("--references {references}; accepted: 1 to 16")));
-        }
+        let bake = Bake { references, ..Bake::new(&[]) };
+        bake.check().map_err(|error| Error::Usage(format!("--{error}")))?;
         if references > 1.0 && !divides {
             let name = &self.method;
             let message =

@@ -1,6 +1,6 @@
 //! Exporting trees to other tracers from the command line.
 
-use crate::support::bvh;
+use crate::support::{bvh, facts};
 use bvh_build::{Builder, goldsmith_salmon, muller_fellner};
 use bvh_core::cost::Objective;
 use bvh_core::export::{Layout, Target};
@@ -73,7 +73,8 @@ fn a_bake_for_a_tracer_has_the_cost_and_the_references_that_pay_there() {
             assert_eq!(header.objective, Objective::InternalArea);
         }
     }
-    bvh(at, "bake escher:900 --for=obvhs --references=1 --budget=1Mwork --out=x.bvh");
+    let json = facts(at, "bake escher:900 --for=obvhs --references=1 --budget=1Mwork --out=x.bvh");
+    assert!(json["gain inside"].is_f64() && json["is searched"] == true, "{json:?}");
     let (tree, _) = tree_file::load(&at.join("x.bvh"), &scene).unwrap();
     assert_eq!(tree.prim_ids.len(), 900);
 }

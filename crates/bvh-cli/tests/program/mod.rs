@@ -58,12 +58,6 @@ pub fn run_on_a_small_disk(folder: &Path, args: &str, blocks: u32) -> Option<Out
     Some(output.unwrap())
 }
 
-/// Runs the program where it may have so many kilobytes of memory.
-pub fn run_in_little_memory(folder: &Path, args: &str, kilobytes: u32) -> Output {
-    let script = format!("ulimit -v {kilobytes}; exec '{PROGRAM}' {args}");
-    Command::new("sh").args(["-c", &script]).current_dir(folder).output().unwrap()
-}
-
 /// Waits until a file or folder exists.
 pub fn wait_for(path: &Path) {
     let start = Instant::now();

@@ -1,7 +1,6 @@
 //! Draws a picture of a scene from a view. Rows are drawn in parallel, and the picture has the same
 //! bytes for any number of threads.
 
-use super::framing;
 use super::image::Film;
 use super::light::World;
 use crate::Scene;
@@ -21,15 +20,16 @@ pub struct Options {
     pub samples: u32,
     /// The largest number of successive mirror reflections.
     pub depth: u32,
-    /// The view. The default shows the whole scene.
-    pub view: Option<View>,
+    /// The view.
+    pub view: View,
     /// True to draw a ground below a scene that is seen from outside.
     pub ground: bool,
 }
 
-impl Default for Options {
-    fn default() -> Self {
-        Self { width: 960, height: 540, samples: 2, depth: 4, view: None, ground: true }
+impl Options {
+    /// Returns the options of a whole picture from this view, with four rays per pixel.
+    pub fn new(width: u32, height: u32, view: View) -> Self {
+        Self { width, height, samples: 2, depth: 4, view, ground: true }
     }
 }
 
@@ -43,13 +43,8 @@ pub fn render(
     let bounds = Aabb::union_of(&scene.boxes);
     let &Options { width, height, samples, .. } = options;
     let up = scene.up();
-    let aspect = f64::from(width) / f64::from(height);
-    let view = match &options.view {
-        Some(view) => view.clone(),
-        None => framing::automatic(scene, &bounds, aspect),
-    };
-    let camera = Camera::new(&view, up, width, height);
-    let world = World::new(accelerator, &view, up, &bounds, options.ground, options.depth);
+    let camera = Camera::new(&options.view, up, width, height);
+    let world = World::new(accelerator, scene, &bounds, options);
     // Rows are collected in order, so that the picture does not depend on the order of completion.
     let rows: Vec<Film> = (0..height)
         .into_par_iter()
@@ -67,7 +62,13 @@ pub fn render(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::framing::automatic;
     use crate::trace::Structure;
+
+    fn options(scene: &Scene, width: u32, height: u32) -> Options {
+        let view = automatic(scene, f64::from(width) / f64::from(height));
+        Options { samples: 1, ..Options::new(width, height, view) }
+    }
 
     fn picture(scene: &Scene, options: &Options) -> Film {
         let brute = Accelerator::new(&scene.primitives, Structure::Brute);
@@ -78,7 +79,7 @@ mod tests {
     fn any_number_of_threads_and_any_size_give_the_same_pixels() {
         let scene = Scene::load("spheres75").unwrap();
         for (width, height) in [(1, 1), (16, 16), (17, 33), (5, 40)] {
-            let options = Options { width, height, samples: 1, ..Options::default() };
+            let options = options(&scene, width, height);
             let films = [1, 3].map(|threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| picture(&scene, &options))
@@ -91,7 +92,7 @@ mod tests {
     #[test]
     fn rays_follow_as_many_reflections_as_the_options_say() {
         let scene = Scene::load("spheres75").unwrap();
-        let options = Options { width: 32, height: 18, samples: 1, ..Options::default() };
+        let options = options(&scene, 32, 18);
         let rays =
             [0, 1, 2].map(|depth| picture(&scene, &Options { depth, ..options.clone() }).rays);
         assert!(rays.is_sorted_by(|a, b| a < b), "{rays:?}");

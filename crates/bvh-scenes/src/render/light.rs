@@ -1,8 +1,10 @@
 //! Computes the light that reaches a pixel with rays through the pixel, to the lights, and along
 //! mirror reflections.
 
+use super::draw::Options;
 use super::image::{self, Film};
 use super::surface::{Ground, Surface};
+use crate::Scene;
 use crate::rays::{Camera, View};
 use crate::trace::Accelerator;
 use bvh_core::{Aabb, Ray, TestCounts};
@@ -91,12 +93,12 @@ const AMBIENT: f64 = 0.42;
 impl<'a> World<'a> {
     pub fn new(
         accelerator: &'a Accelerator<'a>,
-        view: &View,
-        up: DVec3,
+        scene: &Scene,
         bounds: &Aabb,
-        ground: bool,
-        depth: u32,
+        options: &Options,
     ) -> Self {
+        let &Options { ref view, ground, depth, .. } = options;
+        let up = scene.up();
         // An interior has its own floor.
         let ground = if ground && !view.is_inside(bounds) {
             Ground::below(accelerator.objects(), bounds, up)

@@ -5,7 +5,7 @@ use crate::Error;
 use crate::rows::{RenderRow, RenderTimeRow, RunRow};
 use bvh_config::config;
 use bvh_core::Bvh;
-use bvh_scenes::render::{Film, Options, render};
+use bvh_scenes::render::{Film, Options, framing, render};
 use bvh_scenes::trace::{Accelerator, Structure, kd_tree};
 use bvh_scenes::{Scene, fnv1a};
 use std::borrow::Cow;
@@ -99,7 +99,8 @@ impl Config {
     /// Returns the picture and the seconds of each repetition.
     fn draw(&self, scene: &Scene, accelerator: &Accelerator) -> (Film, Vec<f64>) {
         let Self { width, height, samples, .. } = *self;
-        let options = Options { width, height, samples, ..Options::default() };
+        let view = framing::automatic(scene, f64::from(width) / f64::from(height));
+        let options = Options { samples, ..Options::new(width, height, view) };
         let mut seconds = Vec::new();
         loop {
             let start = Instant::now();
