@@ -4,6 +4,10 @@
 //! logarithmic axis, and the negative indices of rows. Logarithms come from a library whose last
 //! digit is the same on every machine.
 
+use plotters::coord::ranged1d::Ranged;
+use plotters::coord::types::RangedCoordf64;
+use plotters::data::float::pretty_print_float;
+
 use super::model::{Axis, Marks, Panel, Scale, Unit};
 
 /// Values of a larger magnitude count as non-finite, so that no difference overflows.
@@ -165,7 +169,9 @@ impl Ruled {
         let mut ticks = if self.log { self.decades(most) } else { vec![] };
         // One tick tells no distance.
         if ticks.len() < 2 {
-            ticks = round_numbers(low, high, most);
+            let linear = |most| RangedCoordf64::from(low..high).key_points(most);
+            let ample = (most..most + 4).map(linear).find(|ticks| ticks.len() > 1);
+            ticks = ample.unwrap_or_else(|| linear(most));
         }
         let tick = |value| Some((self.coordinate(value)?, self.label(value)));
         self.major = ticks.into_iter().filter_map(tick).collect();
@@ -190,15 +196,11 @@ impl Ruled {
             .unwrap_or_default()
     }
 
-    /// Writes a value with up to nine decimals.
+    /// Writes a value in up to ten digits.
     fn label(&self, value: f64) -> String {
         let number = |value: f64| {
             let is_plain = value == 0.0 || (1e-4..1e6).contains(&value.abs());
-            let text = if is_plain { format!("{value:.9}e0") } else { format!("{value:.9e}") };
-            let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
-            let digits = digits.trim_end_matches('0').trim_end_matches('.');
-            let power = if power == "0" { String::new() } else { format!("e{power}") };
-            format!("{digits}{power}").replace('-', "−")
+            pretty_print_float(value, !is_plain).replace('-', "−")
         };
         match self.unit {
             Unit::Percent => format!("{} %", number(100.0 * value)),
@@ -207,20 +209,6 @@ impl Ruled {
             Unit::Number | Unit::Bare => number(value),
         }
     }
-}
-
-/// Returns the multiples of 1, 2 or 5 times a power of ten from `low` to `high`: at most `most`, or
-/// the fewest if these are more.
-fn round_numbers(low: f64, high: f64, most: usize) -> Vec<f64> {
-    let power = libm::log10(high - low).floor() as i32;
-    let multiples = |step: f64| -> Vec<f64> {
-        let (first, last) = ((low / step - 1e-9).ceil(), (high / step + 1e-9).floor());
-        (0..=(last - first) as i32).map(|index| (first + f64::from(index)) * step).collect()
-    };
-    let steps = (power - 2..=power).flat_map(|power| [1.0, 2.0, 5.0].map(|of| (of, power)));
-    let all = steps.map(|(of, power)| multiples(of * libm::exp10(f64::from(power))));
-    let all: Vec<Vec<f64>> = all.filter(|ticks| ticks.len() > 1).collect();
-    all.iter().find(|ticks| ticks.len() <= most).or(all.last()).cloned().unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -1,14 +1,24 @@
-//! A sheet for drawing in pixels, y downwards, and the SVG document made from it.
+//! A sheet for drawing through plotters in pixels, y downwards, and the SVG document made from it.
+
+use std::fmt::Write as _;
+
+use plotters::coord::Shift;
+use plotters::element::{DashedPathElement, Drawable, PathElement, Polygon};
+use plotters::prelude::{Color, DrawingArea, IntoDrawingArea, RGBColor, SVGBackend};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{FontDesc, FontFamily, FontStyle, FontTransform, TextStyle};
 
 use super::text::{FAMILY, Type};
-use svg::Node as _;
-use svg::node::element::{Path, Rectangle, SVG, Text, Title};
 
-/// A colour as SVG writes it.
-pub(super) type Colour = &'static str;
+pub(super) type Colour = RGBColor;
 
 /// The colour of the background.
-pub(super) const WHITE: Colour = "#FFFFFF";
+pub(super) const WHITE: Colour = RGBColor(0xFF, 0xFF, 0xFF);
+
+/// Steps of plotters' integer coordinates per pixel.
+const STEPS: f64 = 4.0;
+/// plotters' SVG backend divides font sizes by this.
+const FONT_SIZE: f64 = 1.24;
 
 /// A place in pixels.
 pub(super) type Point = (f64, f64);
@@ -36,19 +46,22 @@ pub(super) struct Frame {
 pub(super) type Dash = Option<(f64, f64)>;
 
 /// An SVG document that is being drawn.
-pub(super) struct Sheet(SVG);
+pub(super) struct Sheet<'a>(DrawingArea<SVGBackend<'a>, Shift>);
 
-/// Rounds to tenths of a pixel, which no eye distinguishes.
-fn rounded(pixels: f64) -> f64 {
-    // A sum with 0 is never −0.
-    (10.0 * pixels).round().clamp(-1e8, 1e8) / 10.0 + 0.0
+/// Why nothing that is drawn here fails.
+const IN_MEMORY: &str = "a text in memory takes whatever is drawn";
+
+/// Converts pixels to steps. Casting saturates; the limit leaves room for plotters' own additions.
+fn steps(pixels: f64) -> i32 {
+    (pixels * STEPS).clamp(-1e8, 1e8).round() as i32
 }
 
-/// Returns the path through these points.
-fn path(points: &[Point]) -> String {
-    let places: Vec<String> =
-        points.iter().map(|&(x, y)| format!("{} {}", rounded(x), rounded(y))).collect();
-    format!("M{}", places.join("L"))
+fn place((x, y): Point) -> (i32, i32) {
+    (steps(x), steps(y))
+}
+
+fn places(points: &[Point]) -> Vec<(i32, i32)> {
+    points.iter().copied().map(place).collect()
 }
 
 /// Removes control characters, which XML does not allow even escaped.
@@ -57,32 +70,31 @@ fn printable(text: &str) -> String {
     text.chars().map(|c| if legal(c) { c } else { ' ' }).collect()
 }
 
-impl Sheet {
+impl<'a> Sheet<'a> {
+    fn draw<E>(&mut self, element: &E)
+    where
+        for<'b> &'b E: plotters::element::PointCollection<'b, (i32, i32)>,
+        E: Drawable<SVGBackend<'a>>,
+    {
+        self.0.draw(element).expect(IN_MEMORY);
+    }
+
     /// Draws a line of text.
     pub fn text(&mut self, at: Point, text: &str, style: Type, colour: Colour, align: Align) {
         if text.is_empty() {
             return;
         }
-        let (x, y) = (rounded(at.0), rounded(at.1));
-        let anchor = match align {
-            Align::Left => "start",
-            Align::Center | Align::Up => "middle",
-            Align::Right => "end",
+        let (side, turn) = match align {
+            Align::Left => (HPos::Left, FontTransform::None),
+            Align::Center => (HPos::Center, FontTransform::None),
+            Align::Right => (HPos::Right, FontTransform::None),
+            Align::Up => (HPos::Center, FontTransform::Rotate270),
         };
-        let mut element = Text::new(printable(text))
-            .set("x", x)
-            .set("y", y)
-            .set("dy", "0.35em")
-            .set("font-size", style.size)
-            .set("text-anchor", anchor)
-            .set("fill", colour);
-        if style.bold {
-            element.assign("font-weight", "bold");
-        }
-        if align == Align::Up {
-            element.assign("transform", format!("rotate(-90 {x} {y})"));
-        }
-        self.0.append(element);
+        let weight = if style.bold { FontStyle::Bold } else { FontStyle::Normal };
+        let font = FontDesc::new(FontFamily::Name(FAMILY), style.size * STEPS * FONT_SIZE, weight);
+        let style = TextStyle { color: colour.to_backend_color(), ..TextStyle::from(font) };
+        let style = style.pos(Pos::new(side, VPos::Center)).transform(turn);
+        self.0.draw_text(&printable(text), &style, place(at)).expect(IN_MEMORY);
     }
 
     /// Draws lines of text, the first just below `top`.
@@ -102,8 +114,7 @@ impl Sheet {
 
     /// Fills a polygon.
     pub fn polygon(&mut self, corners: &[Point], colour: Colour, opacity: f64) {
-        let area = Path::new().set("d", path(corners) + "Z").set("fill", colour);
-        self.0.append(if opacity < 1.0 { area.set("opacity", opacity) } else { area });
+        self.draw(&Polygon::new(places(corners), colour.mix(opacity)));
     }
 
     /// Fills a polygon over its edge, of which the outer half is seen.
@@ -123,30 +134,87 @@ impl Sheet {
 
     /// Draws a line through these points.
     pub fn line(&mut self, points: &[Point], colour: Colour, width: f64, dash: Dash) {
-        let mut line = Path::new()
-            .set("d", path(points))
-            .set("fill", "none")
-            .set("stroke", colour)
-            .set("stroke-width", width);
-        if let Some((on, off)) = dash {
-            line.assign("stroke-dasharray", format!("{on} {off}"));
+        let style = colour.stroke_width(steps(width) as u32);
+        let points = places(points);
+        match dash {
+            None => self.draw(&PathElement::new(points, style)),
+            Some((on, off)) => {
+                self.draw(&DashedPathElement::new(points, steps(on), steps(off), style));
+            }
         }
-        self.0.append(line);
     }
 }
 
 /// Makes an SVG document of this size. Screen readers read the title.
-pub(super) fn svg(title: &str, size: (f64, f64), draw: impl FnOnce(&mut Sheet)) -> String {
-    let (width, height) = (size.0.ceil(), size.1.ceil());
-    let ground = Rectangle::new().set("width", width).set("height", height).set("fill", WHITE);
-    let root = SVG::new()
-        .set("width", width)
-        .set("height", height)
-        .set("viewBox", (0.0, 0.0, width, height))
-        .set("role", "img")
-        .set("font-family", FAMILY)
-        .set("stroke-linejoin", "round");
-    let mut sheet = Sheet(root.add(Title::new(printable(title))).add(ground));
-    draw(&mut sheet);
-    format!("{}\n", sheet.0)
+pub(super) fn svg(
+    title: &str,
+    (width, height): (f64, f64),
+    draw: impl FnOnce(&mut Sheet),
+) -> String {
+    let (across, down) = place((width.ceil(), height.ceil()));
+    let mut body = String::new();
+    {
+        let area =
+            SVGBackend::with_string(&mut body, (across as u32, down as u32)).into_drawing_area();
+        let mut sheet = Sheet(area);
+        draw(&mut sheet);
+        sheet.0.present().expect(IN_MEMORY);
+    }
+    let title = printable(title).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" \
+         viewBox=\"0 0 {across} {down}\" role=\"img\" stroke-linejoin=\"round\">\n\
+         <title>{title}</title>\n<rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>\n\
+         {}</svg>\n",
+        width.ceil(),
+        height.ceil(),
+        joined(&body),
+    )
+}
+
+/// Joins successive lines of one style, such as the dashes of a line, into one element. The
+/// document shrinks to a fifth.
+fn joined(svg: &str) -> String {
+    let mut joined = String::with_capacity(svg.len());
+    let mut open: Option<&str> = None;
+    for line in svg.lines() {
+        let path = line.strip_prefix("<polyline ").and_then(|rest| rest.split_once(" points=\""));
+        if open.is_some() && open != path.map(|(style, _)| style) {
+            joined.push_str("\"/>\n");
+            open = None;
+        }
+        match path {
+            Some((style, points)) => {
+                if open.is_none() {
+                    let _ = write!(joined, "<path {style} d=\"");
+                    open = Some(style);
+                }
+                let _ = write!(joined, "M{}", points.trim_end_matches([' ', '"', '/', '>']));
+            }
+            None => {
+                joined.push_str(line);
+                joined.push('\n');
+            }
+        }
+    }
+    joined
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dashes_of_one_style_become_one_path() {
+        let line =
+            |style: &str, points: &str| format!("<polyline {style} points=\"{points} \"/>\n");
+        let svg = format!(
+            "<svg>\n{}{}{}</svg>\n",
+            line("a", "1,2 3,4"),
+            line("a", "5,6 7,8"),
+            line("b", "1,1 2,2")
+        );
+        let paths = "<path a d=\"M1,2 3,4M5,6 7,8\"/>\n<path b d=\"M1,1 2,2\"/>\n";
+        assert_eq!(joined(&svg), format!("<svg>\n{paths}</svg>\n"));
+    }
 }

@@ -1,24 +1,37 @@
 //! Gives every series of a figure its colour, dash and marker.
 
+use plotters::prelude::RGBColor;
+
 use super::canvas::{Colour, Dash, Point, Sheet, WHITE};
 use super::model::{Figure, Hue, Look, Shape};
 
 /// The colour of text and axes.
-pub(super) const INK: Colour = "#222222";
+pub(super) const INK: Colour = RGBColor(0x22, 0x22, 0x22);
 /// The colour of captions and reference lines.
-pub(super) const GREY: Colour = "#555555";
+pub(super) const GREY: Colour = RGBColor(0x55, 0x55, 0x55);
 /// The colour of grid lines at labelled ticks.
-pub(super) const GRID: Colour = "#DDDDDD";
+pub(super) const GRID: Colour = RGBColor(0xDD, 0xDD, 0xDD);
 /// The colour of grid lines between labelled ticks.
-pub(super) const FAINT: Colour = "#F0F0F0";
+pub(super) const FAINT: Colour = RGBColor(0xF0, 0xF0, 0xF0);
 
 /// The opacity of bands.
 pub(super) const BAND: f64 = 0.2;
 
 /// The colours by [`Hue`].
 const PALETTE: [Colour; 13] = [
-    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#882255", "#828282",
-    "#332288", "#999933", "#8C564B", "#117733", INK,
+    RGBColor(0x00, 0x72, 0xB2),
+    RGBColor(0xD5, 0x5E, 0x00),
+    RGBColor(0x00, 0x9E, 0x73),
+    RGBColor(0xCC, 0x79, 0xA7),
+    RGBColor(0xE6, 0x9F, 0x00),
+    RGBColor(0x56, 0xB4, 0xE9),
+    RGBColor(0x88, 0x22, 0x55),
+    RGBColor(0x82, 0x82, 0x82),
+    RGBColor(0x33, 0x22, 0x88),
+    RGBColor(0x99, 0x99, 0x33),
+    RGBColor(0x8C, 0x56, 0x4B),
+    RGBColor(0x11, 0x77, 0x33),
+    INK,
 ];
 
 /// The dashes of series, by [`Shape`], repeating.

@@ -1,9 +1,11 @@
 //! Reads the triangles of a Wavefront OBJ file, or reports the first invalid line.
 //!
-//! This module does not use `tobj` 4.0.5, because that crate reads a polyline `l 1 2 3` as a
-//! triangle, skips the first vertex after a byte order mark, and rejects Latin-1 comments, comments
-//! at the end of a line, continued lines, and files in which only some vertices have a colour; its
-//! errors name no line, and it accepts `nan`.
+//! `tobj` parses the numbers and resolves relative indices. It receives only the `v` and `f`
+//! statements that `Geometry` finds, because `tobj` 4.0.5 reads a polyline `l 1 2 3` as a triangle,
+//! skips the first vertex after a byte order mark, and rejects Latin-1 comments, comments at the end
+//! of a line, continued lines, and files in which only some vertices have a colour. Its errors name
+//! no line, and it accepts `nan`. `Geometry` therefore checks every number before `tobj` receives
+//! it. `tobj` splits every polygon into a fan, so that `Polygons` splits them instead.
 //!
 //! Points, lines, curves, names, groups, materials (whose files are never opened), normals and
 //! texture coordinates are ignored. Lines may end in LF, CRLF or CR, and a backslash at the end
@@ -13,68 +15,101 @@ use super::mesh::{Fault, Mesh, Place, counted, unused};
 use super::polygon::{MOST_CORNERS, Polygons, open};
 use super::text::{self, number, shown};
 use glam::Vec3;
-use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Reads the bytes of an OBJ file; `path` only names it in errors. Any bytes give a mesh or an
 /// error. O(bytes), and more for faces that are not convex.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
-    let at = |(line, message): LineFault| Fault::new(path, Place::Line(line), message);
-    let geometry = Geometry::of(bytes).map_err(at)?;
-    let vertices = geometry.vertices.len();
+    let at = |line: usize, message| Fault::new(path, Place::Line(line), message);
+    let geometry = Geometry::of(bytes).map_err(|(line, message)| at(line, message))?;
+    let options =
+        tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
+    // No statement names a material, so that `tobj` asks for no material file.
+    let no_material = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+    let loaded = tobj::load_obj_buf(&mut &geometry.text[..], &options, no_material);
+    let (models, _) = loaded.map_err(|error| {
+        Fault::new(path, Place::File, format!("{error}; expected a Wavefront OBJ file"))
+    })?;
     let mut polygons = Polygons::default();
-    let mut used = vec![false; vertices];
+    let mut lines = geometry.lines.iter();
     let mut corners = Vec::new();
-    let mut indices = &geometry.indices[..];
-    for &(line, length) in &geometry.faces {
-        let (face, rest) = indices.split_at(length);
-        indices = rest;
-        corners.clear();
-        for &index in open(face) {
-            corners.push(geometry.vertex(index, line).map_err(at)?);
-            used[index] |= length >= 3;
+    let mut used = 0;
+    for tobj::Model { mesh, .. } in models {
+        // `tobj` keeps exactly the vertices that faces use, each once, and names no lengths of
+        // faces if all are triangles.
+        let (positions, _) = mesh.positions.as_chunks::<3>();
+        let mut indices = &mesh.indices[..];
+        let mut arities = mesh.face_arities.iter();
+        while !indices.is_empty() {
+            let (face, rest) = indices.split_at(arities.next().map_or(3, |&arity| arity as usize));
+            corners.clear();
+            corners.extend(open(face).iter().map(|&index| Vec3::from(positions[index as usize])));
+            let line = lines.next().copied().unwrap_or_default();
+            polygons.add(&corners).map_err(|message| at(line, format!("face of {message}")))?;
+            indices = rest;
         }
-        polygons.add(&corners).map_err(|message| at((line, format!("face of {message}"))))?;
+        used += positions.len();
     }
     if polygons.triangles.is_empty() {
-        let found = format!("{vertices} vertices and no face of three or more");
+        let found = format!("{} vertices and no face of three or more", geometry.vertices);
         let message = format!("{found}; expected a Wavefront OBJ file with at least one such face");
         return Err(Fault::new(path, Place::File, message));
     }
-    let unused = unused(used.iter().filter(|used| !**used).count());
-    let remarks = unused.into_iter().chain(polygons.remarks()).chain(geometry.unknown).collect();
+    polygons.short += geometry.short_faces;
+    let unused = unused(geometry.vertices - used);
+    let remarks = unused.into_iter().chain(polygons.remarks()).chain(geometry.unknown);
+    let remarks = remarks.collect();
     Ok(Mesh::new(polygons.triangles, remarks))
 }
 
 /// A line, counted from 1, and what is wrong with it.
 type LineFault = (usize, String);
 
-/// The vertices and faces of a file.
+/// The checked statements of a file.
 #[derive(Default)]
 struct Geometry {
-    vertices: Vec<Vec3>,
-    /// The vertices that no face may use, with the reasons.
-    invalid: BTreeMap<usize, LineFault>,
-    /// The vertices of all faces, counted from 0. A face may name vertices below it.
-    indices: Vec<usize>,
-    /// The line of each face, and its number of vertices.
-    faces: Vec<(usize, usize)>,
+    /// The statements for `tobj`.
+    text: Vec<u8>,
+    /// The line of each face in `text`.
+    lines: Vec<usize>,
+    /// The number of `v` statements.
+    vertices: usize,
+    /// The number of `f` statements with fewer than three vertices, which are skipped.
+    short_faces: usize,
     /// The clause about lines that begin with no keyword.
     unknown: Option<String>,
+    /// The numbers of the vertices that no face may use, counted from 1, with the reasons.
+    invalid: Vec<(usize, LineFault)>,
+    /// The vertices below a face that the face names, counted from 1, and the face's line.
+    ahead: Vec<(usize, usize)>,
 }
 
 impl Geometry {
-    /// Reads the statements of a file, up to the first that is none.
+    /// Checks the statements of a file.
+    ///
+    /// # Errors
+    ///
+    /// The first fault in the order of the file. A fault of a vertex below the face that names it
+    /// is found only at the end of the file, and is reported last.
     fn of(bytes: &[u8]) -> Result<Self, LineFault> {
         let mut geometry = Self::default();
         let mut statements = Statements::new(bytes);
         let mut words = Vec::new();
         while let Some((keyword, line)) = statements.next(&mut words, MOST_CORNERS + 1) {
             match keyword {
-                Keyword::Vertex => geometry.add_vertex(&words, line),
-                Keyword::Face => geometry.add_face(&words, line),
+                Keyword::Vertex => {
+                    geometry.add_vertex(&words, line).map_err(|message| (line, message))?;
+                }
+                Keyword::Face => geometry.add_face(&words, line)?,
             }
-            .map_err(|message| (line, message))?;
+        }
+        for &(vertex, line) in &geometry.ahead {
+            if vertex > geometry.vertices {
+                let most = geometry.vertices;
+                let expected = format!("expected at most {most}, the file's vertex count");
+                return Err((line, format!("face vertex {vertex}; {expected}")));
+            }
+            geometry.usable(vertex)?;
         }
         geometry.unknown = statements.unknown.and_then(|(count, line, word)| {
             let (one, many) =
@@ -85,49 +120,49 @@ impl Geometry {
         Ok(geometry)
     }
 
-    /// Adds a vertex without its colour: its coordinates, divided by its weight if it has one.
+    /// Adds a vertex without its colour: its coordinates, and its weight if it has one.
     fn add_vertex(&mut self, words: &[&[u8]], line: usize) -> Result<(), String> {
+        self.vertices += 1;
         let length = words.len();
         if !matches!(length, 3 | 4 | 6..=8) {
             let expected = "3 (x y z), 4 (x y z and a weight), or 3 or 4 more (a colour)";
             return Err(format!("vertex of length {length}; expected {expected}"));
         }
-        let mut position = Vec3::ZERO;
-        for (axis, word) in words[..3].iter().enumerate() {
+        let words = &words[..if matches!(length, 4 | 8) { 4 } else { 3 }];
+        let mut position = [0.0; 3];
+        for (coordinate, word) in position.iter_mut().zip(words) {
             let message = || {
                 let expected = "expected a finite number up to ±3.4e38";
                 format!("vertex coordinate `{}`; {expected}", shown(word))
             };
-            position[axis] = number(word).ok_or_else(message)?;
+            *coordinate = number(word).ok_or_else(message)?;
             // Some programs write vertices that they do not use in this way.
-            if !position[axis].is_finite() {
-                self.invalid.insert(self.vertices.len(), (line, message()));
-                self.vertices.push(Vec3::NAN);
+            if !coordinate.is_finite() {
+                self.invalid.push((self.vertices, (line, message())));
+                add(b'v', [&b"0"[..]; 3].into_iter(), &mut self.text);
                 return Ok(());
             }
         }
-        if matches!(length, 4 | 8) {
-            // The quotients reject the weight 0; an infinite weight needs its own test, because
-            // x / ∞ is finite.
+        if let [_, _, _, word] = words {
+            // `tobj` divides by the weight. The quotients reject the weight 0; an infinite weight
+            // needs its own test, because x / ∞ is finite.
             let expected = "expected a finite number other than 0 that keeps the divided \
                             coordinates within ±3.4e38";
-            let weight = number(words[3]).filter(|weight| weight.is_finite());
-            position = weight
-                .map(|weight| position / weight)
-                .filter(|position| position.is_finite())
-                .ok_or_else(|| format!("vertex weight `{}`; {expected}", shown(words[3])))?;
+            number(word)
+                .filter(|w| w.is_finite() && position.iter().all(|x| (x / w).is_finite()))
+                .ok_or_else(|| format!("vertex weight `{}`; {expected}", shown(word)))?;
         }
-        self.vertices.push(position);
+        add(b'v', words.iter().copied(), &mut self.text);
         Ok(())
     }
 
-    fn add_face(&mut self, words: &[&[u8]], line: usize) -> Result<(), String> {
+    fn add_face(&mut self, words: &[&[u8]], line: usize) -> Result<(), LineFault> {
         if words.len() > MOST_CORNERS {
-            return Err(format!(
-                "face of more than {MOST_CORNERS} vertices; expected at most as many"
-            ));
+            let message =
+                format!("face of more than {MOST_CORNERS} vertices; expected at most as many");
+            return Err((line, message));
         }
-        let above = self.vertices.len();
+        let vertices = self.vertices;
         for corner in words {
             let index: isize = std::str::from_utf8(vertex_index(corner))
                 .ok()
@@ -136,37 +171,52 @@ impl Geometry {
                 .ok_or_else(|| {
                     let expected = "expected a whole number, from 1 for the first vertex of the \
                                     file or from -1 for the latest one";
-                    format!("face vertex `{}`; {expected}", shown(corner))
+                    (line, format!("face vertex `{}`; {expected}", shown(corner)))
                 })?;
             let vertex = match usize::try_from(index) {
-                Ok(index) => Some(index - 1),
-                Err(_) => above.checked_sub(index.unsigned_abs()),
+                Ok(index) => Some(index),
+                Err(_) => (vertices + 1).checked_sub(index.unsigned_abs()).filter(|&v| v > 0),
             };
-            self.indices.push(vertex.ok_or_else(|| {
-                let expected = format!("expected at least -{above}, the number of vertices above");
-                format!("face vertex {index}; {expected}")
-            })?);
+            match vertex {
+                Some(vertex) if vertex > vertices => self.ahead.push((vertex, line)),
+                Some(vertex) => self.usable(vertex)?,
+                None => {
+                    let expected =
+                        format!("expected at least -{vertices}, the number of vertices above");
+                    return Err((line, format!("face vertex {index}; {expected}")));
+                }
+            }
         }
-        self.faces.push((line, words.len()));
+        if words.len() < 3 {
+            self.short_faces += 1;
+        } else {
+            add(b'f', words.iter().map(vertex_index), &mut self.text);
+            self.lines.push(line);
+        }
         Ok(())
     }
 
-    /// Returns a vertex of the face in this line.
-    fn vertex(&self, index: usize, line: usize) -> Result<Vec3, LineFault> {
-        if let Some(fault) = self.invalid.get(&index) {
-            return Err(fault.clone());
+    /// Rejects a vertex without finite coordinates.
+    fn usable(&self, vertex: usize) -> Result<(), LineFault> {
+        match self.invalid.binary_search_by_key(&vertex, |(invalid, _)| *invalid) {
+            Ok(found) => Err(self.invalid[found].1.clone()),
+            Err(_) => Ok(()),
         }
-        self.vertices.get(index).copied().ok_or_else(|| {
-            let expected =
-                format!("expected at most {}, the file's vertex count", self.vertices.len());
-            (line, format!("face vertex {}; {expected}", index + 1))
-        })
     }
 }
 
 /// Returns the `7` of `7`, `7/1`, `7//3` and `7/1/3`.
 fn vertex_index<'a>(corner: &&'a [u8]) -> &'a [u8] {
     corner.split(|&b| b == b'/').next().unwrap_or_default()
+}
+
+fn add<'a>(keyword: u8, words: impl Iterator<Item = &'a [u8]>, text: &mut Vec<u8>) {
+    text.push(keyword);
+    for word in words {
+        text.push(b' ');
+        text.extend_from_slice(word);
+    }
+    text.push(b'\n');
 }
 
 /// A statement that defines geometry.

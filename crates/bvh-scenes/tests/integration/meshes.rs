@@ -4,6 +4,7 @@ use crate::samples::{
     INDEXED, NODE, buffer, error, gltf_json, read, samples, square, stl_text, with,
 };
 use bvh_scenes::Scene;
+use bvh_scenes::files::ReadError;
 use bvh_scenes::load::mesh::Mesh;
 use bvh_scenes::load::{Format, MeshError, OutsideFiles, load};
 use std::path::Path;
@@ -52,6 +53,15 @@ fn the_path_of_a_mesh_file_names_a_scene_and_a_missing_file_is_reported() {
         let message = Scene::load(missing).unwrap_err().to_string();
         assert!(message.contains(&format!("{missing}: no such file")), "{message}");
     }
+    assert!(matches!(
+        load(folder.path(), OutsideFiles::Rejected),
+        Err(MeshError::Read(ReadError::Folder { .. }))
+    ));
+    #[cfg(unix)]
+    assert!(matches!(
+        load(Path::new("/dev/zero"), OutsideFiles::Rejected),
+        Err(MeshError::Read(ReadError::NotRegular { .. }))
+    ));
     assert!(matches!(read(b" \r\n", "a.ply"), Err(MeshError::Empty(_))));
 }
 

@@ -32,6 +32,11 @@ fn a_triangle_has_its_corners_and_leaves_two_vertices_unused() {
 }
 
 #[test]
+fn a_polygon_is_the_fan_around_its_first_vertex() {
+    assert_eq!(mesh("f 1 2 3 5 4\n"), mesh("f 1 2 3\nf 1 3 5\nf 1 5 4\n"));
+}
+
+#[test]
 fn spellings_of_the_same_triangle_agree() {
     let expected = mesh("f 1 2 3\n");
     for faces in [
@@ -63,18 +68,21 @@ fn spellings_of_the_same_triangle_agree() {
 }
 
 #[test]
-fn groups_faces_above_their_vertices_and_weights_mean_the_same_triangles() {
-    for (text, faces) in [
-        (format!("{POINTS}f 1 2 3 5 4\n"), "f 1 2 3\nf 1 3 5\nf 1 5 4\n"),
-        (
-            format!("{POINTS}o a\nf 5 4 3\ng b\nf 1 2 3\nusemtl c\nf 1 3 4\n"),
-            "f 5 4 3\nf 1 2 3\nf 1 3 4\n",
-        ),
-        (format!("g a\nf 1 2 3\ng b\n{POINTS}"), "f 1 2 3\n"),
-        (POINTS.replace("v 1 1 0", "v -2 -2 0 -2") + "f 1 2 3\n", "f 1 2 3\n"),
-    ] {
-        assert_eq!(read(&text).unwrap(), mesh(faces), "{text}");
-    }
+fn objects_and_groups_are_joined_in_the_order_of_the_file() {
+    let grouped = "o a\nf 5 4 3\ng b\nf 1 2 3\nusemtl c\nf 1 3 4\n";
+    assert_eq!(mesh(grouped), mesh("f 5 4 3\nf 1 2 3\nf 1 3 4\n"));
+}
+
+#[test]
+fn a_face_may_name_vertices_below_it() {
+    let above = read(format!("g a\nf 1 2 3\ng b\n{POINTS}")).unwrap();
+    assert_eq!(above, mesh("f 1 2 3\n"));
+}
+
+#[test]
+fn a_weight_divides_the_coordinates() {
+    let weighted = read("v 2 4 6 2\nv 0 0 0 -1\nv 1 0 0\nf 1 2 3\n").unwrap();
+    assert_eq!(weighted.triangles[0].0[0], Vec3::new(1.0, 2.0, 3.0));
 }
 
 #[test]

@@ -4,5 +4,7 @@ mod fuzz;
 mod laws;
 mod never_worse;
 mod objectives;
+#[cfg(target_arch = "x86_64")]
+mod subnormals;
 mod suite;
 mod tightness;
