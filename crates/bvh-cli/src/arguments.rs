@@ -1,7 +1,7 @@
 //! Arguments of several commands, and the check of paths before any work.
 
 use crate::Error;
-use bvh_scenes::files::folder_of;
+use bvh_scenes::files::{Reserved, WriteError, folder_of};
 use std::path::{Path, PathBuf};
 
 /// The limit on the program's threads.
@@ -66,6 +66,13 @@ pub fn output_or_free(
         )));
     }
     Ok(path)
+}
+
+/// Reserves bytes of the file to write. At a path that is not `given` by the user, a file that
+/// somebody creates meanwhile stays.
+pub fn reserve(path: &Path, given: bool, bytes: usize) -> Result<Reserved, WriteError> {
+    let reserve = if given { Reserved::new } else { Reserved::new_file };
+    reserve(path, bytes)
 }
 
 /// Checks the path of a folder to write into: an existing folder, or one that can be created

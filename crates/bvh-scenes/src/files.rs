@@ -110,6 +110,8 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
 pub struct Reserved {
     path: PathBuf,
     new: NamedTempFile,
+    /// True if a file that somebody else creates meanwhile is not replaced.
+    only_new: bool,
 }
 
 impl Reserved {
@@ -120,20 +122,28 @@ impl Reserved {
         let mut new = create_beside(&path)?;
         reserve(new.as_file_mut(), bytes)
             .map_err(WriteError::of(&path, "reserve the file's space"))?;
-        Ok(Self { path, new })
+        Ok(Self { path, new, only_new: false })
+    }
+
+    /// Reserves like [`new`](Self::new) for a name that nobody gave, at which there is no file. If
+    /// somebody creates one meanwhile, it stays: writing then fails, and the error names the file
+    /// with the bytes.
+    pub fn new_file(path: &Path, bytes: usize) -> Result<Self, WriteError> {
+        let reserved = Self::new(path, bytes)?;
+        Ok(Self { only_new: true, ..reserved })
     }
 
     /// Writes the sections one after the other, syncs the file, and renames it. At any moment the
     /// file at the path is the old one or the complete new one.
     pub fn write(self, sections: &[&[u8]]) -> Result<(), WriteError> {
-        let Self { path, mut new } = self;
+        let Self { path, mut new, only_new } = self;
         // The user may have removed it during hours of search.
         if !new.path().exists() {
             new = create_beside(&path)?;
         }
         overwrite(new.as_file_mut(), sections).map_err(WriteError::of(&path, "write the file"))?;
-        new.persist(&path)
-            .map_err(|unnamed| WriteError::of(&path, "replace the file")(keep(unnamed)))?;
+        let persisted = if only_new { new.persist_noclobber(&path) } else { new.persist(&path) };
+        persisted.map_err(|unnamed| WriteError::of(&path, "replace the file")(keep(unnamed)))?;
         // The new name must outlast a loss of power. Where folders cannot be synced, the old file
         // may come back, complete.
         if let Ok(folder) = File::open(folder_of(&path)) {
@@ -251,12 +261,21 @@ mod tests {
     fn bytes_that_cannot_get_the_name_of_the_file_are_kept_under_another() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.bvh");
+        let kept = |reserved: Reserved| {
+            let error = reserved.write(&[b"the work of hours"]).unwrap_err().to_string();
+            let kept = names(folder.path()).into_iter().find(|name| *name != path).unwrap();
+            assert!(error.contains(&kept.display().to_string()), "{error}");
+            assert_eq!(fs::read(&kept).unwrap(), b"the work of hours");
+            fs::remove_file(kept).unwrap();
+        };
         let reserved = Reserved::new(&path, 1000).unwrap();
         fs::create_dir(&path).unwrap();
-        let error = reserved.write(&[b"the work of hours"]).unwrap_err().to_string();
-        let kept = names(folder.path()).into_iter().find(|name| *name != path).unwrap();
-        assert!(error.contains(&kept.display().to_string()), "{error}");
-        assert_eq!(fs::read(&kept).unwrap(), b"the work of hours");
+        kept(reserved);
+        fs::remove_dir(&path).unwrap();
+        let reserved = Reserved::new_file(&path, 10).unwrap();
+        fs::write(&path, "notes").unwrap();
+        kept(reserved);
+        assert_eq!(fs::read(&path).unwrap(), b"notes");
     }
 
     #[test]

@@ -9,7 +9,7 @@ mod watch;
 
 use crate::Error;
 use crate::answer::{Answer, Form, gain, short, whole};
-use crate::arguments::{Jobs, input_file, output_file, output_or_free};
+use crate::arguments::{Jobs, input_file, output_file, output_or_free, reserve};
 use crate::explain;
 use crate::export::{compare, tracers};
 use crate::rays::Rays;
@@ -146,7 +146,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         args.from.as_ref().map(|path| Start::load(path, &scene, most_references)).transpose()?;
     let plan = args.with_budget(plan, objects, &mut answer);
     // Reserving the file first reports a full disk before the search and not after it.
-    let reserved = Reserved::new(&out, plan::most_bytes(&scene, most_references))?;
+    let reserved = reserve(&out, args.out.is_some(), plan::most_bytes(&scene, most_references))?;
     let (plan, prepared) = args.decided(plan, &scene, interrupted, &mut answer)?;
     let found = plan.search(&scene, start.as_ref(), prepared, interrupted)?;
     save(&found, &out, reserved, interrupted, &mut answer)?;

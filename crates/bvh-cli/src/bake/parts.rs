@@ -6,9 +6,8 @@ use super::plan::{Plan, Prepared, Start, most_bytes};
 use super::{BakeArgs, save};
 use crate::Error;
 use crate::answer::Answer;
-use crate::arguments::output_file;
+use crate::arguments::{output_file, reserve};
 use bvh_core::{Aabb, Bvh, Node, NodeKind};
-use bvh_scenes::files::Reserved;
 use bvh_scenes::tree_file;
 use bvh_scenes::{Scene, fnv1a};
 use bvh_search::{Budget, Problem, best, solve};
@@ -91,7 +90,8 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
         answer.end();
         return Ok(());
     }
-    let reserved = Reserved::new(&out, most_bytes(&scene, plan.references))?;
+    let bytes = most_bytes(&scene, plan.references);
+    let reserved = reserve(&out, args.out.is_some(), bytes)?;
     let start = join(&scene, &parts, &folder)?;
     let plan = Plan { effort: plan.effort.share(1.0 - SHARE_OF_PARTS), ..plan };
     let found = plan.search(&scene, Some(&start), Prepared::default(), interrupted)?;

@@ -1,6 +1,6 @@
 //! Baking from the command line: the trees, the choices, and the files in all circumstances.
 
-use crate::support::{bvh, cost, ended, facts, names, number, run_on_a_small_disk, wrong};
+use crate::support::{begin, bvh, cost, ended, facts, names, number, run_on_a_small_disk, wrong};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::Segment;
 use bvh_core::cost::{internal_area, layout_area};
@@ -9,6 +9,7 @@ use bvh_scenes::{Scene, tree_file};
 use bvh_search::{Budget, Objects, Options, OwnedTree};
 use std::fs;
 use std::path::Path;
+use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 /// A walk through escher's stairs.
@@ -260,6 +261,23 @@ fn a_bake_without_a_name_writes_a_new_file_named_after_the_scene() {
     bvh(folder.path(), bake);
     assert_eq!(names(folder.path()), ["escher-50.bvh"]);
     wrong(folder.path(), bake, &["escher-50.bvh exists", "--out"]);
+}
+
+#[test]
+fn a_file_that_somebody_creates_at_the_name_after_the_scene_stays_and_the_tree_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut bake = begin(at, &["bake", "spheres75", "--budget=1s"]);
+    // The bake has reserved its file once the new one exists.
+    while names(at).is_empty() {
+        sleep(Duration::from_millis(5));
+    }
+    let notes = at.join("spheres75.bvh");
+    fs::write(&notes, "notes").unwrap();
+    assert_eq!(bake.wait().unwrap().code(), Some(1));
+    assert_eq!(fs::read(&notes).unwrap(), b"notes");
+    let kept = names(at).into_iter().find(|name| name != "spheres75.bvh").unwrap();
+    tree_file::load(&at.join(kept), &Scene::load("spheres75").unwrap()).unwrap();
 }
 
 #[test]

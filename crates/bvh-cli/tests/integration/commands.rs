@@ -150,6 +150,25 @@ fn what_is_wrong_is_named_before_the_work_and_changes_no_file() {
     assert!(contents(at) == before, "a file was changed or left behind");
 }
 
+#[cfg(unix)]
+#[test]
+fn pipes_devices_and_folders_are_rejected_as_inputs() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let made = std::process::Command::new("mkfifo").arg("p.bvh").current_dir(at).status();
+    assert!(made.unwrap().success());
+    fs::create_dir(at.join("folder.bvh")).unwrap();
+    for (line, parts) in [
+        ("inspect p.bvh", &["p.bvh", "not a regular file"][..]),
+        ("bake spheres75 --budget=0s --from=p.bvh --out=x.bvh", &["p.bvh"]),
+        ("bake /dev/zero --budget=0s --out=x.bvh", &["/dev/zero"]),
+        ("inspect folder.bvh", &["folder.bvh", "a folder"]),
+        ("render spheres75 --accel=folder.bvh --out=x.png", &["--accel", "folder.bvh"]),
+    ] {
+        wrong(at, line, parts);
+    }
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_output_is_an_error_and_a_closed_pipe_is_none() {
