@@ -20,9 +20,6 @@ bvh_config::config! { serde;
     }
 }
 
-/// The figure's name. It has no CSV file: `numbers.csv` and `timing_numbers.csv` hold its numbers.
-pub const FIGURE: &str = "overview";
-
 /// Medians of one method over repetitions, over all scenes with a reference.
 struct OverScenes {
     scenes: usize,
@@ -88,7 +85,8 @@ impl Config {
         let y = Axis::log("").unit(Unit::Percent);
         let mut output = Output::new("", "Error against run time");
         output.finding = Some(finding);
-        output.add_figure(FIGURE, caption, 1, vec![panel("", x, y, layers)]);
+        // It has no CSV file: `numbers.csv` and `timing_numbers.csv` hold its numbers.
+        output.add_figure("overview", caption, 1, vec![panel("", x, y, layers)]);
         Ok(output)
     }
 
