@@ -13,7 +13,7 @@ OUT = config["out"]
 PARTS = f"{OUT}.parts"
 
 listed = subprocess.run([HARNESS, "jobs", SPEC], check=True, capture_output=True, text=True).stdout
-# The runs with most work come first.
+# The runs on the largest scenes come first.
 IDS = [line.split(" ")[0] for line in listed.splitlines()]
 
 

@@ -41,7 +41,7 @@ def main(spec, out, server=None):
         cluster.start_worker(WorkerConfig())
     client = Client(server) if server else cluster.client()
     listed = subprocess.run([HARNESS, "jobs", spec], check=True, capture_output=True, text=True)
-    # The runs with most work come first.
+    # The runs on the largest scenes come first.
     runs = [line.split(" ")[0] for line in listed.stdout.splitlines()]
     left = runs
     for _ in range(ROUNDS):

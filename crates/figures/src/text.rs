@@ -1,7 +1,5 @@
 //! Measures and wraps text in the embedded fonts, so that no figure depends on the machine's fonts.
 
-use std::collections::HashMap;
-
 use ab_glyph::{Font, FontRef};
 
 /// The font DejaVu Sans, reduced to the characters that figures use.
@@ -37,48 +35,23 @@ pub(super) const BODY: Type = Type { size: 16.0, bold: false };
 
 /// The embedded fonts.
 pub struct Fonts {
-    regular: Face,
-    bold: Face,
-}
-
-/// One of the fonts.
-struct Face {
-    font: FontRef<'static>,
-    /// Advances of its characters in font sizes, cached because the font's own tables are slow.
-    advances: HashMap<char, f64>,
-}
-
-impl Face {
-    fn new(bytes: &'static [u8]) -> Self {
-        let font = FontRef::try_from_slice(bytes).expect("the file is a font");
-        let advances = font
-            .codepoint_ids()
-            .map(|(_, character)| (character, advance(&font, character)))
-            .collect();
-        Self { font, advances }
-    }
-}
-
-/// Returns the advance of a character in font sizes. A missing character has the advance of a box.
-fn advance(font: &FontRef, character: char) -> f64 {
-    f64::from(
-        font.h_advance_unscaled(font.glyph_id(character)) / font.units_per_em().unwrap_or(1.0),
-    )
+    regular: FontRef<'static>,
+    bold: FontRef<'static>,
 }
 
 impl Fonts {
     /// Parses the embedded fonts.
     pub fn new() -> Self {
-        Self { regular: Face::new(REGULAR), bold: Face::new(BOLD) }
+        let [regular, bold] = [REGULAR, BOLD]
+            .map(|bytes| FontRef::try_from_slice(bytes).expect("the file is a font"));
+        Self { regular, bold }
     }
 
-    fn face(&self, style: Type) -> &Face {
-        if style.bold { &self.bold } else { &self.regular }
-    }
-
+    /// Returns the advance of a character in pixels. A missing character has that of a box.
     fn advance(&self, character: char, style: Type) -> f64 {
-        let Face { font, advances } = self.face(style);
-        style.size * advances.get(&character).copied().unwrap_or_else(|| advance(font, character))
+        let font = if style.bold { &self.bold } else { &self.regular };
+        let advance = font.h_advance_unscaled(font.glyph_id(character));
+        style.size * f64::from(advance / font.units_per_em().unwrap_or(1.0))
     }
 
     /// Returns the width of a line of text in pixels, without kerning.
@@ -158,7 +131,7 @@ mod tests {
         let fonts = Fonts::new();
         for character in "aZ09 äéñß αΩπσ ×÷±−≤≥≈∞√∑ ⁰¹²³⁴⁵⁶⁷⁸⁹⁻ ₀₁₉ ←→↑↓ …–—’“” °µ½ ✓✗ ●■▲".chars()
         {
-            assert_ne!(fonts.regular.font.glyph_id(character).0, 0, "no {character}");
+            assert_ne!(fonts.regular.glyph_id(character).0, 0, "no {character}");
         }
     }
 }

@@ -3,14 +3,14 @@
 use super::terminal::print_line;
 use crate::Error;
 use crate::run::execute::reject_indivisible;
-use crate::run::job::{Job, estimated_work, jobs as jobs_of};
+use crate::run::job::{Job, selected};
 use crate::run::resolved::load_scenes;
 use crate::spec::{Experiment, Overrides};
 use std::cmp::Reverse;
 use std::path::PathBuf;
 
-/// List the runs of an experiment, one a line: identifier, estimated work, and description. The
-/// runs with most work come first. `--run` performs one.
+/// List the runs of an experiment, one a line: identifier, number of objects, and description. The
+/// runs on the largest scenes come first. `--run` performs one.
 #[derive(clap::Args, Clone, Debug)]
 pub struct JobsArgs {
     /// The experiment's spec.
@@ -26,15 +26,14 @@ pub fn jobs(args: &JobsArgs) -> Result<(), Error> {
     let experiment = Experiment::read(&args.spec, &args.overrides)?;
     reject_indivisible(&experiment)?;
     let (scenes, _) = load_scenes(&experiment)?;
-    let mut listed: Vec<(u64, Job)> = jobs_of(&experiment, &scenes)
-        .into_iter()
-        .map(|job| (estimated_work(&experiment, &job), job))
-        .collect();
-    // A long run that begins last would leave all other workers idle.
-    listed.sort_by_key(|(work, _)| Reverse(*work));
-    for (work, Job { id, labelled, scene, repetition, .. }) in listed {
-        let (label, scene) = (&labelled.label, &scene.name);
-        print_line(&format!("{id} {work} {label} on {scene}, repetition {repetition}"));
+    let mut jobs = selected(&experiment, &scenes, &[])?;
+    // A long run that begins last would leave all other workers idle. Scenes differ most, and specs
+    // begin with what is quick.
+    jobs.reverse();
+    jobs.sort_by_key(|job| Reverse(job.scene.boxes.len()));
+    for Job { id, labelled, scene, repetition, .. } in jobs {
+        let (label, objects, scene) = (&labelled.label, scene.boxes.len(), &scene.name);
+        print_line(&format!("{id} {objects} {label} on {scene}, repetition {repetition}"));
     }
     Ok(())
 }

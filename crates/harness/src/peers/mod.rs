@@ -127,7 +127,7 @@ pub fn bring(others: Others) {
 }
 
 /// Returns what this program contains for a key of a spec.
-fn others(key: &str) -> Result<&'static Others, Fault> {
+pub(crate) fn others(key: &str) -> Result<&'static Others, Fault> {
     OTHERS.get().ok_or_else(|| {
         Fault::new(key, format!("set, which needs `{PROGRAM}`"), "none without that program")
     })
@@ -136,16 +136,6 @@ fn others(key: &str) -> Result<&'static Others, Fault> {
 /// Returns true if this program contains more than the harness.
 pub(crate) fn has_others() -> bool {
     OTHERS.get().is_some()
-}
-
-/// Returns the measurement of the key `tracing`.
-pub(crate) fn tracing() -> Result<&'static dyn Tracing, Fault> {
-    Ok(others("tracing")?.tracing)
-}
-
-/// Returns the lower bound of the key `lower_bound`.
-pub(crate) fn lower_bound() -> Result<LowerBound, Fault> {
-    Ok(others("lower_bound")?.lower_bound)
 }
 
 /// A library with its settings, as a spec names it.

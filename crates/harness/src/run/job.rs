@@ -2,13 +2,12 @@
 //! share an experiment.
 
 use crate::Error;
-use crate::contestant::{Contestant, Labelled};
+use crate::contestant::Labelled;
 use crate::spec::Experiment;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
 use bvh_core::{Bvh, RayDensity};
 use bvh_scenes::Scene;
-use bvh_search::Method;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -25,19 +24,8 @@ pub(crate) struct Job<'a> {
     pub first_of_scene: bool,
 }
 
-/// Returns the runs of an experiment, scene by scene, in the order of the spec.
-pub(crate) fn jobs<'a>(experiment: &'a Experiment, scenes: &'a [Scene]) -> Vec<Job<'a>> {
-    let runs = scenes.iter().flat_map(|scene| experiment.runs().map(move |run| (scene, run)));
-    let job =
-        |(index, (scene, (labelled, repetition, first_of_scene))): (usize, (&'a Scene, _))| {
-            let labelled: &Labelled = labelled;
-            let id = experiment.run_id(&scene.name, &labelled.label, repetition);
-            Job { index, id, scene, labelled, repetition, first_of_scene }
-        };
-    runs.enumerate().map(job).collect()
-}
-
-/// Returns the runs with these identifiers, in the order of the spec; all runs if there are none.
+/// Returns the runs with these identifiers, scene by scene, in the order of the spec; all runs if
+/// there are none.
 ///
 /// # Errors
 ///
@@ -47,7 +35,13 @@ pub(crate) fn selected<'a>(
     scenes: &'a [Scene],
     ids: &[String],
 ) -> Result<Vec<Job<'a>>, Error> {
-    let mut jobs = jobs(experiment, scenes);
+    let mut jobs = Vec::new();
+    for scene in scenes {
+        for (labelled, repetition, first_of_scene) in experiment.runs() {
+            let id = experiment.run_id(&scene.name, &labelled.label, repetition);
+            jobs.push(Job { index: jobs.len(), id, scene, labelled, repetition, first_of_scene });
+        }
+    }
     if let Some(id) = ids.iter().find(|id| jobs.iter().all(|job| job.id != **id)) {
         let name = &experiment.name;
         return Err(Error::Usage(format!(
@@ -113,39 +107,6 @@ pub(crate) fn base_costs(
     scenes.into_par_iter().map(base).collect()
 }
 
-/// Estimates the work of a run, in nodes made or visited, from the method's parameters and its
-/// budget.
-pub(crate) fn estimated_work(experiment: &Experiment, job: &Job) -> u64 {
-    let budget = experiment.budget_of(job.labelled);
-    let objects = job.scene.boxes.len() as u64;
-    let tree_work = 2 * objects;
-    let Contestant::Ours(method) = &job.labelled.method else { return tree_work };
-    let (trees, work_per_object) = match method {
-        Method::Grasp(config) => (config.trials, 0),
-        Method::RandomOrders(config) => (config.trials, 0),
-        Method::Genetic(config) => {
-            (config.generations.saturating_add(1).saturating_mul(config.population as u64), 0)
-        }
-        Method::Annealing(config) => (0, config.work_per_object),
-        Method::Rebuild(config) => (0, config.work_per_object),
-        Method::RuinRecreate(config) => (0, config.work_per_object),
-        Method::Best(config) => (0, config.work_per_object),
-        Method::MullerFellner(_)
-        | Method::MedianCut(_)
-        | Method::GoldsmithSalmon(_)
-        | Method::Agglomerative(_)
-        | Method::Reinsertion(_)
-        | Method::Rotation(_)
-        | Method::Treelet(_)
-        | Method::Exact(_) => (1, 0),
-    };
-    // An evaluation is a tree of these methods, and a move of all others.
-    let trees = trees.min(budget.max_evaluations.unwrap_or(u64::MAX));
-    let work =
-        trees.saturating_mul(tree_work).saturating_add(work_per_object.saturating_mul(objects));
-    work.min(budget.max_work.unwrap_or(u64::MAX))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -163,35 +124,22 @@ mod tests {
     }
 
     #[test]
-    fn every_run_has_an_identifier_that_selects_it() {
-        let (experiment, scenes) = experiment();
-        assert_eq!(selected(&experiment, &scenes, &[]).unwrap().len(), 12);
-        for job in jobs(&experiment, &scenes) {
-            let [one] = &selected(&experiment, &scenes, &[job.id]).unwrap()[..] else {
-                panic!("one run")
-            };
-            assert_eq!(one.index, job.index);
-        }
-    }
-
-    #[test]
-    fn a_budget_and_another_method_change_the_estimate_but_no_identifier() {
+    fn every_run_has_an_identifier_that_selects_it_also_after_others_have_joined() {
         let (mut experiment, scenes) = experiment();
-        let listed = |experiment: &Experiment| {
-            let jobs = jobs(experiment, &scenes);
-            jobs.into_iter()
-                .map(|job| (job.id.clone(), estimated_work(experiment, &job)))
-                .collect::<BTreeMap<_, _>>()
+        let ids = |experiment: &Experiment| {
+            let jobs = selected(experiment, &scenes, &[]).unwrap();
+            jobs.into_iter().map(|job| job.id).collect::<Vec<_>>()
         };
-        let before = listed(&experiment);
-        let greatest = 9 * 2 * scenes[0].boxes.len() as u64;
-        assert_eq!(before.values().max(), Some(&greatest));
-        experiment.budget.max_work = Some(1000);
+        let before = ids(&experiment);
+        for (index, id) in before.iter().enumerate() {
+            let one = selected(&experiment, &scenes, std::slice::from_ref(id)).unwrap();
+            assert_eq!(one.iter().map(|job| job.index).collect::<Vec<_>>(), [index]);
+        }
         let mut added = experiment.methods[0].clone();
         added.label = "added".into();
         experiment.methods.insert(0, added);
-        let after = listed(&experiment);
-        assert!(after.len() == 18 && after.values().all(|work| *work <= 1000));
-        assert!(before.keys().all(|id| after.contains_key(id)));
+        let after = ids(&experiment);
+        assert_eq!((before.len(), after.len()), (12, 18));
+        assert!(before.iter().all(|id| after.contains(id)));
     }
 }

@@ -22,8 +22,8 @@ use std::time::Instant;
 /// Computes the lower bound of the scene's internal area that the experiment requests, if any.
 fn bound(experiment: &Experiment, scene: &Scene, watch: &Watch) -> Result<Option<BoundRow>, Error> {
     let Some(effort) = experiment.lower_bound else { return Ok(None) };
-    let bound = peers::lower_bound().map_err(|fault| Error::Usage(fault.to_string()))?;
-    let lower_bound = bound(&scene.boxes, effort, watch)
+    let others = peers::others("lower_bound").map_err(|fault| Error::Usage(fault.to_string()))?;
+    let lower_bound = (others.lower_bound)(&scene.boxes, effort, watch)
         .map_err(Error::search(&scene.name, "the lower bound"))?;
     Ok(Some(BoundRow { scene: scene.name.clone(), objects: scene.boxes.len(), lower_bound }))
 }

@@ -12,7 +12,7 @@ use toml::Table;
 
 /// Writes the files of the times, and returns the text for the terminal.
 pub(crate) fn measure(keys: &Table, work: &mut Work) -> Result<String, Error> {
-    let tracing = peers::tracing().map_err(|fault| Error::Usage(fault.to_string()))?;
+    let others = peers::others("tracing").map_err(|fault| Error::Usage(fault.to_string()))?;
     work.complete_trees(|job| job.repetition == 0)?;
     let mut runs = Vec::new();
     for (&index, tree) in &work.trees {
@@ -34,7 +34,7 @@ pub(crate) fn measure(keys: &Table, work: &mut Work) -> Result<String, Error> {
             seed: work.experiment.seed_of(&job.scene.name, "tracing", 0),
         });
     }
-    let traced = tracing.trace(keys, &runs, &|| work.watch.cancelled())?;
+    let traced = others.tracing.trace(keys, &runs, &|| work.watch.cancelled())?;
     let (files, text) = traced.ok_or_else(|| work.interrupted())?;
     for (name, bytes) in files {
         work.store.write(name, &bytes)?;

@@ -22,7 +22,7 @@ impl Experiment {
         self.check_run_count()?;
         self.check_labels()?;
         if self.lower_bound.is_some() {
-            peers::lower_bound()?;
+            peers::others("lower_bound")?;
         }
         for (index, labelled) in self.methods.iter().enumerate() {
             let fault = self.check_method(labelled).err();
@@ -61,7 +61,7 @@ impl Experiment {
     }
 
     /// Checks that there is at least one run, and at most [`MOST_RUNS`].
-    pub(crate) fn check_run_count(&self) -> Result<(), OutOfRange> {
+    fn check_run_count(&self) -> Result<(), OutOfRange> {
         let scenes =
             self.scenes.iter().map(|name| subset::names(name)).fold(0, u64::saturating_add);
         // A range of scenes may have more names than fit in a number of 64 bits.

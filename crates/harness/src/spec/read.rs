@@ -102,7 +102,7 @@ impl Experiment {
             experiment.methods = Method::all().into_iter().map(Labelled::new).collect();
         }
         if let Some(keys) = experiment.tracing.take() {
-            let resolved = peers::tracing()?.resolve(keys);
+            let resolved = peers::others("tracing")?.tracing.resolve(keys);
             experiment.tracing = Some(resolved.map_err(|fault| fault.below("tracing"))?);
         }
         experiment.check_together()?;

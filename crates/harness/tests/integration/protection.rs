@@ -41,15 +41,6 @@ fn refused(folder: &Path, args: &[&str], parts: &[&str]) {
 }
 
 #[test]
-fn a_spec_whose_name_would_lead_elsewhere_is_rejected() {
-    for spec in ["...toml", "..toml", ".lock.toml", ".partial.toml", "quick.toml"] {
-        let folder = folder(spec);
-        refused(folder.path(), &[spec, "--out", "out/below"], &[spec, "do not begin with a dot"]);
-        assert_eq!(names(folder.path()), [spec]);
-    }
-}
-
-#[test]
 fn finished_results_are_replaced_by_force_only() {
     let folder = folder("spec.toml");
     let dir = folder.path();
@@ -132,30 +123,6 @@ fn a_damaged_finished_run_is_named_and_repeated_or_rejected() {
     let resumed = run(dir, &["spec.toml", "--resume", "--out=one"]);
     ended(&resumed, 0, &["done again", damaged]);
     assert!(reproducible(&dir.join("one/spec")) == whole);
-}
-
-#[test]
-fn results_come_from_the_programs_repository_and_not_from_the_current_folders() {
-    let folder = folder("spec.toml");
-    git(folder.path(), &["init"]);
-    git(folder.path(), &["commit", "--allow-empty", "--no-gpg-sign", "--message=x"]);
-    // The repository around the folder has another commit than the program.
-    let head = git(folder.path(), &["rev-parse", "HEAD"]);
-    let Some(elsewhere) = head.filter(|output| output.status.success()) else {
-        return eprintln!("skipped: there is no git");
-    };
-    said(folder.path(), &["spec.toml"]);
-    let provenance =
-        fs::read_to_string(folder.path().join("results/spec/provenance.toml")).unwrap();
-    let provenance: toml::Table = provenance.parse().unwrap();
-    assert_eq!(provenance["revision"].as_str(), Some(env!("HARNESS_REVISION")));
-    assert!(!env!("HARNESS_REVISION").starts_with(text(&elsewhere.stdout).trim()));
-}
-
-/// Runs git with an author and a branch, which a machine's configuration may lack.
-fn git(folder: &Path, args: &[&str]) -> Option<std::process::Output> {
-    let settings = ["-c", "user.name=x", "-c", "user.email=x", "-c", "init.defaultBranch=x"];
-    std::process::Command::new("git").args(settings).args(args).current_dir(folder).output().ok()
 }
 
 #[cfg(unix)]
