@@ -7,7 +7,8 @@ use ::bvh::aabb::{Aabb as TheirAabb, Bounded};
 use ::bvh::bounding_hierarchy::BHShape;
 use ::bvh::bvh::{Bvh as TheirBvh, BvhNode};
 use ::bvh::ray::Ray as TheirRay;
-use bvh_config::fault::{self, Fault};
+use bvh_config::OutOfRange;
+use bvh_config::fault;
 use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle};
 use bvh_scenes::trace::Query;
 use glam::Vec3;
@@ -29,7 +30,7 @@ impl Library for Crate {
         "bvh"
     }
 
-    fn check(&self, settings: &Table) -> Result<(), Fault> {
+    fn check(&self, settings: &Table) -> Result<(), OutOfRange> {
         fault::deserialize::<NoSettings>(settings.clone()).map(|_| ())
     }
 
@@ -44,7 +45,7 @@ impl Racer for Crate {
         &self,
         settings: &Table,
         triangles: &'a [Triangle],
-    ) -> Result<Vec<Contender<'a>>, Fault> {
+    ) -> Result<Vec<Contender<'a>>, OutOfRange> {
         self.check(settings)?;
         Ok(vec![contender(triangles)])
     }

@@ -13,7 +13,7 @@ pub use crate::obvhs::Preset;
 
 use crate::obvhs::Obvhs;
 use crate::tracing::contender::Contender;
-use bvh_config::fault::Fault;
+use bvh_config::OutOfRange;
 use bvh_core::{Aabb, Bvh, Triangle};
 use harness::peers::{Built, Library, Others};
 use toml::Table;
@@ -30,7 +30,7 @@ pub trait Racer: Library {
         &self,
         settings: &Table,
         triangles: &'a [Triangle],
-    ) -> Result<Vec<Contender<'a>>, Fault>;
+    ) -> Result<Vec<Contender<'a>>, OutOfRange>;
 }
 
 /// The libraries that specs may name.

@@ -9,7 +9,8 @@ use ::obvhs::ray::{Ray as TheirRay, RayHit};
 use ::obvhs::rt_triangle::RtTriangle;
 use ::obvhs::triangle::Triangle as TheirTriangle;
 use ::obvhs::{BvhBuildParams, aabb};
-use bvh_config::fault::{self, Fault};
+use bvh_config::OutOfRange;
+use bvh_config::fault;
 use bvh_core::{Aabb, Bvh, FirstCountNode, Hit, Ray, Triangle};
 use bvh_scenes::trace::Query;
 use glam::Vec3A;
@@ -50,7 +51,7 @@ impl Library for Crate {
         "obvhs"
     }
 
-    fn check(&self, settings: &Table) -> Result<(), Fault> {
+    fn check(&self, settings: &Table) -> Result<(), OutOfRange> {
         read(settings).map(|_| ())
     }
 
@@ -64,12 +65,12 @@ impl Racer for Crate {
         &self,
         settings: &Table,
         triangles: &'a [Triangle],
-    ) -> Result<Vec<Contender<'a>>, Fault> {
+    ) -> Result<Vec<Contender<'a>>, OutOfRange> {
         Ok(contenders(&read(settings)?, triangles))
     }
 }
 
-fn read(settings: &Table) -> Result<Obvhs, Fault> {
+fn read(settings: &Table) -> Result<Obvhs, OutOfRange> {
     fault::deserialize(settings.clone())
 }
 

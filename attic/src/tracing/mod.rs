@@ -8,7 +8,8 @@ pub mod speed;
 
 use crate::comparison::{self, Raced};
 use crate::{RACERS, programs};
-use bvh_config::fault::{self, Fault};
+use bvh_config::OutOfRange;
+use bvh_config::fault;
 use contender::Contender;
 use harness::Error;
 use harness::peers::{FirstRun, NamedBytes, OURS, Tracing};
@@ -23,9 +24,9 @@ use toml::Table;
 pub struct Rounds;
 
 impl Tracing for Rounds {
-    fn resolve(&self, keys: Table) -> Result<Table, Fault> {
+    fn resolve(&self, keys: Table) -> Result<Table, OutOfRange> {
         let config: Config = fault::deserialize(keys)?;
-        Table::try_from(config).map_err(|error| Fault::new("tracing", error, "TOML"))
+        Table::try_from(config).map_err(|error| OutOfRange::new("tracing", error, "TOML"))
     }
 
     fn trace(

@@ -3,37 +3,11 @@
 use crate::{Check, OutOfRange};
 use serde::de::DeserializeOwned;
 use serde_path_to_error::{Deserializer, Track};
-use std::fmt;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
-/// A rejected value.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Fault {
-    /// The path of the value, such as `methods[1].noise`; empty for the full text.
-    pub key: String,
-    /// The message after the key.
-    rest: String,
-}
-
-impl Fault {
-    /// Returns the rejection of the value `found` of `key`.
-    pub fn new(
-        key: impl fmt::Display,
-        found: impl fmt::Display,
-        accepted: impl fmt::Display,
-    ) -> Self {
-        OutOfRange::new(key, found, accepted).into()
-    }
-
-    /// Returns the same fault, with a key relative to the table or list that contains this value
-    /// under `key`.
-    pub fn below(self, key: &str) -> Self {
-        let dot = if self.key.is_empty() || self.key.starts_with('[') { "" } else { "." };
-        Self { key: format!("{key}{dot}{}", self.key), ..self }
-    }
-
+impl OutOfRange {
     /// Returns the message with the line of the key in the text. A key of the table `above` takes
     /// precedence over the same key at the top level.
     pub fn in_text(&self, text: &str, above: Option<&str>) -> String {
@@ -49,22 +23,6 @@ impl Fault {
     }
 }
 
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rest =
-            if self.key.is_empty() { self.rest.trim_start_matches([':', ' ']) } else { &self.rest };
-        write!(f, "{}{rest}", self.key)
-    }
-}
-
-impl std::error::Error for Fault {}
-
-impl From<OutOfRange> for Fault {
-    fn from(OutOfRange { key, found, accepted }: OutOfRange) -> Self {
-        Self { key, rest: format!(" is {found}; accepted: {accepted}") }
-    }
-}
-
 /// A deserializer that tracks the path of the current value.
 type Tracked<'a, 'b> = Deserializer<'a, 'b, Value>;
 
@@ -72,13 +30,13 @@ type Tracked<'a, 'b> = Deserializer<'a, 'b, Value>;
 fn tracked<T: Check>(
     table: Table,
     read: impl FnOnce(Tracked) -> Result<T, toml::de::Error>,
-) -> Result<T, Fault> {
+) -> Result<T, OutOfRange> {
     let mut track = Track::new();
     let value = read(Deserializer::new(Value::Table(table), &mut track)).map_err(|error| {
         let path = track.path();
         // An empty path is written as a dot, which is no key.
         let key = if path.iter().len() == 0 { String::new() } else { path.to_string() };
-        Fault { key, rest: format!(": {}", error.message()) }
+        OutOfRange { key, separator: ": ", message: error.message().into() }
     })?;
     value.check()?;
     Ok(value)
@@ -95,7 +53,7 @@ pub fn parse<T: DeserializeOwned + Check>(text: &str) -> Result<T, String> {
 }
 
 /// Deserialises a table.
-pub fn deserialize<T: DeserializeOwned + Check>(table: Table) -> Result<T, Fault> {
+pub fn deserialize<T: DeserializeOwned + Check>(table: Table) -> Result<T, OutOfRange> {
     tracked(table, |deserializer| T::deserialize(deserializer))
 }
 
@@ -106,14 +64,14 @@ pub fn tagged<T: Check>(
     tag: &str,
     read: impl FnOnce(&str, Tracked) -> Result<Option<T>, toml::de::Error>,
     accepted: impl FnOnce() -> String,
-) -> Result<T, Fault> {
+) -> Result<T, OutOfRange> {
     let name = table.remove(tag);
     let found = name.as_ref().map_or("missing".into(), Value::to_string);
     let known = match name {
         Some(Value::String(name)) => tracked(table, |deserializer| read(&name, deserializer))?,
         _ => None,
     };
-    known.ok_or_else(|| Fault::new(tag, found, accepted()))
+    known.ok_or_else(|| OutOfRange::new(tag, found, accepted()))
 }
 
 fn in_table(table: &DeTable, key: &str) -> Option<Range<usize>> {
@@ -149,11 +107,11 @@ mod tests {
         for (key, line) in
             [("a", 1), ("b[1].c", 4), ("d.e f", 7), ("d.none", 6), ("g[1].h", 11), ("b[7]", 2)]
         {
-            let message = Fault::new(key, 1, 2).in_text(text, None);
+            let message = OutOfRange::new(key, 1, 2).in_text(text, None);
             assert_eq!(message, format!("line {line}: {key} is 1; accepted: 2"));
         }
-        assert_eq!(Fault::new("none", 1, 2).in_text(text, None), "none is 1; accepted: 2");
-        let replaced = Fault::new("a", 1, 2).in_text("a = 1\n[q]\na = 1\n", Some("q"));
+        assert_eq!(OutOfRange::new("none", 1, 2).in_text(text, None), "none is 1; accepted: 2");
+        let replaced = OutOfRange::new("a", 1, 2).in_text("a = 1\n[q]\na = 1\n", Some("q"));
         assert_eq!(replaced, "line 3: a is 1; accepted: 2");
     }
 }

@@ -29,28 +29,30 @@ use std::ops::{RangeBounds, RangeFrom, RangeInclusive, RangeToInclusive};
 
 /// A parameter with a rejected value.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{key} is {found}; accepted: {accepted}")]
+#[error("{key}{}{message}", if key.is_empty() { "" } else { separator })]
 pub struct OutOfRange {
-    /// The parameter's name; dots separate the names of nested configurations, as in TOML.
+    /// The parameter's name; dots separate the names of nested configurations, as in TOML. Empty for
+    /// a whole text.
     pub key: String,
-    /// The value found.
-    pub found: String,
-    /// The accepted values, in words.
-    pub accepted: String,
+    /// What stands between the name and the message.
+    separator: &'static str,
+    /// The value found, and the accepted values, in words.
+    message: String,
 }
 
 impl OutOfRange {
     /// Returns the rejection of the value `found` of `key`.
     pub fn new(key: impl Display, found: impl Display, accepted: impl Display) -> Self {
-        Self { key: key.to_string(), found: found.to_string(), accepted: accepted.to_string() }
+        let message = format!("{found}; accepted: {accepted}");
+        Self { key: key.to_string(), separator: " is ", message }
     }
 
-    /// Returns the same rejection, with a key relative to the configuration that contains this one
-    /// under `key`.
+    /// Returns the same rejection, with a key relative to the configuration or list that contains
+    /// this one under `key`.
     #[must_use]
     pub fn below(self, key: impl Display) -> Self {
         // An index follows its list without a dot: `methods[1].noise`.
-        let dot = if self.key.starts_with('[') { "" } else { "." };
+        let dot = if self.key.is_empty() || self.key.starts_with('[') { "" } else { "." };
         Self { key: format!("{key}{dot}{}", self.key), ..self }
     }
 }

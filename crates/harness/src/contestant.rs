@@ -2,7 +2,7 @@
 
 use crate::measure::ray_cost::TrainedOn;
 use crate::peers::Peer;
-use bvh_config::fault::{self, Fault};
+use bvh_config::fault;
 use bvh_config::{Check, Keys, Nested, OutOfRange};
 use bvh_core::cost::Objective;
 use bvh_scenes::rays::RandomRays;
@@ -108,7 +108,7 @@ impl Labelled {
     }
 
     /// Reads an entry, without what depends on the rest of the spec.
-    pub(crate) fn read(mut entry: Table) -> Result<Self, Fault> {
+    pub(crate) fn read(mut entry: Table) -> Result<Self, OutOfRange> {
         // A method rejects unknown keys, so the keys that are not its parameters are removed first.
         let options =
             EntryOptions::KEYS.iter().filter_map(|key| entry.remove_entry(*key)).collect();

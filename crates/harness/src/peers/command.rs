@@ -3,7 +3,7 @@
 
 use super::program::Program;
 use super::{BuildFault, Built, Library, Task};
-use bvh_config::fault::{self, Fault};
+use bvh_config::fault;
 use bvh_config::{OutOfRange, above};
 use bvh_core::file::{self, FileError};
 use bvh_core::{Bvh, validate_references};
@@ -42,7 +42,7 @@ impl Library for Programs {
         "external"
     }
 
-    fn check(&self, settings: &Table) -> Result<(), Fault> {
+    fn check(&self, settings: &Table) -> Result<(), OutOfRange> {
         fault::deserialize::<Config>(settings.clone()).map(|_| ())
     }
 

@@ -9,7 +9,7 @@ mod program;
 
 use crate::Error;
 use bvh_build::BuildError;
-use bvh_config::fault::Fault;
+use bvh_config::OutOfRange;
 use bvh_core::{Aabb, Bvh, Clip};
 use bvh_scenes::Scene;
 use bvh_search::Observer;
@@ -27,7 +27,7 @@ pub trait Library: Sync {
     /// # Errors
     ///
     /// An unknown key, or a value that is not accepted.
-    fn check(&self, settings: &Table) -> Result<(), Fault>;
+    fn check(&self, settings: &Table) -> Result<(), OutOfRange>;
 
     /// Builds the tree over the boxes of objects.
     ///
@@ -68,7 +68,7 @@ pub trait Tracing: Sync {
     /// # Errors
     ///
     /// An unknown key, or a value that is not accepted.
-    fn resolve(&self, keys: Table) -> Result<Table, Fault>;
+    fn resolve(&self, keys: Table) -> Result<Table, OutOfRange>;
 
     /// Traces rays through trees, scene by scene. Returns files with their names, and lines for the
     /// terminal; `None` once `cancelled` returns true.
@@ -127,9 +127,9 @@ pub fn bring(others: Others) {
 }
 
 /// Returns what this program contains for a key of a spec.
-pub(crate) fn others(key: &str) -> Result<&'static Others, Fault> {
+pub(crate) fn others(key: &str) -> Result<&'static Others, OutOfRange> {
     OTHERS.get().ok_or_else(|| {
-        Fault::new(key, format!("set, which needs `{PROGRAM}`"), "none without that program")
+        OutOfRange::new(key, format!("set, which needs `{PROGRAM}`"), "none without that program")
     })
 }
 
@@ -167,7 +167,7 @@ impl Peer {
     }
 
     /// Checks that this program contains the library, and that the library accepts the settings.
-    pub fn check_settings(&self) -> Result<(), Fault> {
+    pub fn check_settings(&self) -> Result<(), OutOfRange> {
         self.library()?.check(&self.settings)
     }
 
@@ -181,14 +181,14 @@ impl Peer {
         &self.settings
     }
 
-    fn library(&self) -> Result<&'static dyn Library, Fault> {
+    fn library(&self) -> Result<&'static dyn Library, OutOfRange> {
         let others = OTHERS.get().map_or(&[][..], |others| others.libraries);
         let programs: &dyn Library = &command::Programs;
         let mut here = [programs].into_iter().chain(others.iter().copied());
         here.find(|library| library.name() == self.name).ok_or_else(|| {
             let found = format!("{:?}, another library, which `{PROGRAM}` contains", self.name);
             let ours = bvh_search::Method::NAMES.join(", ");
-            Fault::new("method", found, format!("without it {ours}, external"))
+            OutOfRange::new("method", found, format!("without it {ours}, external"))
         })
     }
 }

@@ -6,7 +6,6 @@ use super::Experiment;
 use crate::contestant::{Contestant, EntryOptions, Labelled};
 use crate::peers;
 use bvh_config::OutOfRange;
-use bvh_config::fault::Fault;
 use bvh_scenes::subset;
 use bvh_search::{Budget, Method, best};
 use std::collections::HashSet;
@@ -16,7 +15,7 @@ const MOST_RUNS: u64 = 10_000_000;
 
 impl Experiment {
     /// Checks relations between keys.
-    pub(super) fn check_together(&self) -> Result<(), Fault> {
+    pub(super) fn check_together(&self) -> Result<(), OutOfRange> {
         self.check_question()?;
         self.check_scenes()?;
         self.check_run_count()?;
@@ -27,7 +26,7 @@ impl Experiment {
         for (index, labelled) in self.methods.iter().enumerate() {
             let fault = self.check_method(labelled).err();
             if let Some(fault) = fault.or_else(|| self.check_end(labelled).err()) {
-                return Err(fault.below(&format!("methods[{index}]")));
+                return Err(fault.below(format!("methods[{index}]")));
             }
         }
         Ok(())
@@ -79,7 +78,7 @@ impl Experiment {
         Ok(())
     }
 
-    fn check_method(&self, labelled: &Labelled) -> Result<(), Fault> {
+    fn check_method(&self, labelled: &Labelled) -> Result<(), OutOfRange> {
         let Labelled { method, options, .. } = labelled;
         let EntryOptions { budget, keep, judge, for_rays, objective, references, .. } = options;
         let is_ours = matches!(method, Contestant::Ours(_));
@@ -98,30 +97,30 @@ impl Experiment {
         ];
         for (key, is_set, is_accepted, accepted) in restricted_keys {
             if is_set && !is_accepted {
-                return Err(Fault::new(key, format!("set for {}", method.name()), accepted));
+                return Err(OutOfRange::new(key, format!("set for {}", method.name()), accepted));
             }
         }
         if for_rays.is_some() && self.ray_cost.is_none() {
             let accepted = "with the experiment's `ray_cost`";
-            return Err(Fault::new("for_rays", "set without `ray_cost`", accepted));
+            return Err(OutOfRange::new("for_rays", "set without `ray_cost`", accepted));
         }
         self.check_library(method)
     }
 
     /// Checks that the experiment can run a third-party method.
-    fn check_library(&self, method: &Contestant) -> Result<(), Fault> {
+    fn check_library(&self, method: &Contestant) -> Result<(), OutOfRange> {
         let name = method.name();
         if self.suite.is_some() && !matches!(method, Contestant::Ours(_)) {
             // One that crashes must not end the suite; it runs each library in a separate process.
             let accepted = "methods of ours";
-            return Err(Fault::new("method", format!("{name:?}, none of ours"), accepted));
+            return Err(OutOfRange::new("method", format!("{name:?}, none of ours"), accepted));
         }
         let Contestant::Peer(peer) = method else { return Ok(()) };
         peer.check_settings()
     }
 
     /// Rejects a method that would run for hours because the spec sets no limit.
-    fn check_end(&self, labelled: &Labelled) -> Result<(), Fault> {
+    fn check_end(&self, labelled: &Labelled) -> Result<(), OutOfRange> {
         let work = best::Config::default().work_per_object;
         let is_endless = matches!(&labelled.method, Contestant::Ours(Method::Best(config))
             if config.work_per_object == work)
@@ -136,17 +135,17 @@ impl Experiment {
         );
         let accepted = "`budget = { max_work = 300_000_000 }`, some seconds on one thread, here or \
                         for all methods, or another `work_per_object`";
-        Err(Fault::new("budget", found, accepted))
+        Err(OutOfRange::new("budget", found, accepted))
     }
 
     /// Rejects a label of two methods, and a label in a report that no method has.
-    fn check_labels(&self) -> Result<(), Fault> {
+    fn check_labels(&self) -> Result<(), OutOfRange> {
         let mut known = HashSet::new();
         for (index, labelled) in self.methods.iter().enumerate() {
             let label = labelled.label.as_str();
             if !known.insert(label) {
                 let key = format!("methods[{index}].label");
-                return Err(Fault::new(
+                return Err(OutOfRange::new(
                     key,
                     format!("{label:?} for the second time"),
                     "unique labels",
@@ -160,7 +159,7 @@ impl Experiment {
                     let found = format!("{label:?}, no label of a method");
                     let labels = self.methods.iter().map(|labelled| labelled.label.as_str());
                     let accepted = labels.collect::<Vec<_>>().join(", ");
-                    return Err(Fault::new(key, found, accepted));
+                    return Err(OutOfRange::new(key, found, accepted));
                 }
             }
         }

@@ -4,7 +4,8 @@ use super::{Experiment, Labelled};
 use crate::Error;
 use crate::peers;
 use crate::report::Report;
-use bvh_config::fault::{self, Fault};
+use bvh_config::OutOfRange;
+use bvh_config::fault;
 use bvh_scenes::files::read_text;
 use bvh_search::Method;
 use serde::{Deserialize, Deserializer, de};
@@ -62,16 +63,22 @@ impl Experiment {
         Ok(experiment)
     }
 
-    fn from_table(mut table: Table, name: String, overrides: &Overrides) -> Result<Self, Fault> {
+    fn from_table(
+        mut table: Table,
+        name: String,
+        overrides: &Overrides,
+    ) -> Result<Self, OutOfRange> {
         check_numbers(&table, "")?;
         match table.remove("quick") {
             Some(Value::Table(quick)) if overrides.quick => replace(&mut table, quick),
             None if overrides.quick => {
                 let accepted = "with --quick, a table of keys to replace";
-                return Err(Fault::new("quick", "missing", accepted));
+                return Err(OutOfRange::new("quick", "missing", accepted));
             }
             None | Some(Value::Table(_)) => {}
-            Some(found) => return Err(Fault::new("quick", found, "a table of keys to replace")),
+            Some(found) => {
+                return Err(OutOfRange::new("quick", found, "a table of keys to replace"));
+            }
         }
         // Serde loses the path to an error within an internally tagged enum, so entries are read
         // singly.
@@ -82,7 +89,7 @@ impl Experiment {
         })?;
         let mut experiment: Self = fault::deserialize(table)?;
         if !experiment.name.is_empty() {
-            return Err(Fault::new("name", experiment.name, "none, the file's name is used"));
+            return Err(OutOfRange::new("name", experiment.name, "none, the file's name is used"));
         }
         experiment.name = name;
         experiment.quick = overrides.quick;
@@ -149,26 +156,26 @@ fn is_path(scene: &str) -> bool {
 fn list<T>(
     table: &mut Table,
     key: &str,
-    read: impl Fn(Table) -> Result<T, Fault>,
-) -> Result<Vec<T>, Fault> {
+    read: impl Fn(Table) -> Result<T, OutOfRange>,
+) -> Result<Vec<T>, OutOfRange> {
     let entries = match table.remove(key) {
         None => vec![],
         Some(Value::Array(entries)) => entries,
-        Some(found) => return Err(Fault::new(key, found, "a list of tables")),
+        Some(found) => return Err(OutOfRange::new(key, found, "a list of tables")),
     };
     let read_entry = |(index, entry)| {
         let value = match entry {
             Value::Table(entry) => read(entry),
-            found => Err(Fault::new("", found, "a table")),
+            found => Err(OutOfRange::new("", found, "a table")),
         };
-        value.map_err(|fault| fault.below(&format!("{key}[{index}]")))
+        value.map_err(|fault| fault.below(format!("{key}[{index}]")))
     };
     entries.into_iter().enumerate().map(read_entry).collect()
 }
 
 /// Rejects values that no key accepts: infinite numbers, NaN, and dates.
-fn check_numbers(table: &Table, above: &str) -> Result<(), Fault> {
-    fn check(key: &str, value: &Value) -> Result<(), Fault> {
+fn check_numbers(table: &Table, above: &str) -> Result<(), OutOfRange> {
+    fn check(key: &str, value: &Value) -> Result<(), OutOfRange> {
         match value {
             Value::Table(table) => check_numbers(table, &format!("{key}.")),
             Value::Array(list) => list
@@ -177,7 +184,7 @@ fn check_numbers(table: &Table, above: &str) -> Result<(), Fault> {
                 .try_for_each(|(index, value)| check(&format!("{key}[{index}]"), value)),
             Value::Float(number) if number.is_finite() => Ok(()),
             Value::Float(_) | Value::Datetime(_) => {
-                Err(Fault::new(key, value, "under any key finite numbers, and no dates"))
+                Err(OutOfRange::new(key, value, "under any key finite numbers, and no dates"))
             }
             _ => Ok(()),
         }
