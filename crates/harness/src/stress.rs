@@ -13,6 +13,9 @@ use bvh_stress::{CASES, Case, Cell, Class, Effort, KINDS, is_builder, tracing};
 use figures::{Axis, Layer, Marks, Panel, Unit};
 use std::path::Path;
 
+/// The name of the figure of all checks.
+pub const FIGURE: &str = "matrix";
+
 /// Runs the cases (all if none are named) and writes rows.
 pub fn execute(
     effort: &Effort,
@@ -71,7 +74,7 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     });
     let caption = "A square per case and method: builders, searches, traversals, then readers of \
                    files and others. Empty where the case has no check of it.";
-    output.add_figure("matrix", caption, 1, panels(&cells));
+    output.add_figure(FIGURE, caption, 1, panels(&cells));
     Ok(output)
 }
 

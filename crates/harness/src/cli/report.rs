@@ -5,7 +5,7 @@ use crate::Error;
 use crate::page;
 use std::path::PathBuf;
 
-/// Write all results on one page in Markdown, `report.md` in their folder.
+/// Write all results on one HTML page, `report.html` in their folder.
 #[derive(clap::Args, Clone, Debug)]
 pub struct ReportArgs {
     /// Folder with the results of experiments.

@@ -20,6 +20,9 @@ bvh_config::config! { serde;
     }
 }
 
+/// The figure's name. It has no CSV file: `numbers.csv` and `timing_numbers.csv` hold its numbers.
+pub const FIGURE: &str = "overview";
+
 /// Medians of one method over repetitions, over all scenes with a reference.
 struct OverScenes {
     scenes: usize,
@@ -85,8 +88,7 @@ impl Config {
         let y = Axis::log("").unit(Unit::Percent);
         let mut output = Output::new("", "Error against run time");
         output.finding = Some(finding);
-        // It has no CSV file: `numbers.csv` and `timing_numbers.csv` hold its numbers.
-        output.add_figure("overview", caption, 1, vec![panel("", x, y, layers)]);
+        output.add_figure(FIGURE, caption, 1, vec![panel("", x, y, layers)]);
         Ok(output)
     }
 
