@@ -117,7 +117,6 @@ pub(crate) unsafe fn given_mut<'a, T>(name: &str, pointer: *mut T) -> Result<&'a
     unsafe { pointer.as_mut() }.ok_or_else(|| Failure::invalid(format!("{name} is null")))
 }
 
-/// Rejects pointers with the wrong alignment for their type.
 fn check_alignment<T>(name: &str, pointer: *const T) -> Result<(), Failure> {
     if pointer.is_aligned() {
         return Ok(());

@@ -35,7 +35,6 @@ fn last_error() -> String {
     message.to_str().unwrap().to_owned()
 }
 
-/// Builds a tree over triangles.
 fn tree(corners: &[f32]) -> *mut BvhTree {
     // SAFETY: `corners` has nine floats for each of the triangles.
     unsafe { bvh_tree_from_triangles(corners.as_ptr(), corners.len() / 9, 0.02, 1.0) }
@@ -266,7 +265,6 @@ fn an_export_is_the_file_of_every_tracer_and_others_are_named() {
     }
 }
 
-/// Asserts that the last error contains this text.
 #[track_caller]
 fn rejected(part: &str) {
     assert!(last_error().contains(part), "{}", last_error());

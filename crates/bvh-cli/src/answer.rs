@@ -44,6 +44,12 @@ impl Answer {
         }
     }
 
+    /// Explains a choice of the program.
+    pub fn choice(&mut self, reason: String) {
+        self.say(&reason);
+        self.list("choices", reason);
+    }
+
     /// Adds a fact and prints it as a line, `name: value`.
     pub fn fact(&mut self, name: &str, value: impl Into<Value>) {
         let value = value.into();

@@ -193,7 +193,6 @@ fn objective(objective: &Objective) -> String {
     }
 }
 
-/// Adds the facts that follow from the tree alone.
 fn measure(tree: &Bvh, answer: &mut Answer) {
     let area = cost::internal_area(tree);
     answer.fact("inner nodes", tree.inner_count());

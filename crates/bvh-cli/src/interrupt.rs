@@ -11,7 +11,6 @@ pub static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 /// True while the result is not on the disk yet, so that the command must not be ended by force.
 static HELD: AtomicBool = AtomicBool::new(false);
 
-/// The exit code after a signal.
 const CODE: u8 = 130;
 
 /// The time that a command has to end in order. The end by force after that time damages no file

@@ -11,7 +11,6 @@ mod interrupt;
 mod memory;
 mod output;
 mod rays;
-mod recorded;
 mod render;
 mod report;
 mod scene_files;

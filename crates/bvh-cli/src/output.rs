@@ -6,7 +6,6 @@ use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// True after a failed write to standard output.
 static STDOUT_FAILED: AtomicBool = AtomicBool::new(false);
 
 /// Prints text to standard output, and ends the line. A reader that closes the pipe early, like

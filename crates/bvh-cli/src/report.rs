@@ -44,7 +44,6 @@ pub struct ReportArgs {
     pub form: Form,
 }
 
-/// One of the two trees on the page.
 struct Measured {
     tree: Bvh,
     /// The expected tests of a ray in the wide layout, for triangles.
@@ -52,7 +51,6 @@ struct Measured {
     film: Film,
 }
 
-/// The size of the pictures in pixels.
 const WIDTH: u32 = 640;
 const HEIGHT: u32 = 400;
 

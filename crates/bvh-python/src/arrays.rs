@@ -304,7 +304,6 @@ impl<'py> Vectors<'py> {
     }
 }
 
-/// Vectors that threads without Python can read.
 #[derive(Clone, Copy)]
 enum VectorSlice<'a> {
     Single(&'a [[f32; 3]]),

@@ -5,7 +5,6 @@ use pyo3::prelude::*;
 use std::process;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// The message about a second improvement at the same time.
 const IMPROVING: &str =
     "another thread is improving this tree; accepted: `improve` when its call has returned";
 

@@ -6,7 +6,6 @@ use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 
-/// The numbers of 64 bits without a sign.
 const ALL_BITS: &str = "0 to 18446744073709551615";
 
 /// The accepted times.

@@ -24,7 +24,6 @@ pub struct Limits {
     pub progress: Option<Py<PyAny>>,
 }
 
-/// Ends a search at its deadline or after Ctrl-C.
 struct Watch {
     deadline: Option<Deadline>,
     pressed: AtomicBool,

@@ -375,7 +375,6 @@ impl Tracer {
         Ok((restore, (Tree::shared(self.source.clone()), center)))
     }
 
-    /// Restores a pickle.
     #[staticmethod]
     #[pyo3(signature = (tree, center))]
     fn _restore(tree: &Tree, center: Option<&Bound<PyAny>>) -> PyResult<Self> {
@@ -383,7 +382,6 @@ impl Tracer {
     }
 }
 
-/// The arguments that restore a tracer.
 type State = (Tree, Option<[f64; 3]>);
 
 impl Tracer {
@@ -418,7 +416,6 @@ impl Tracer {
     }
 }
 
-/// Reads the argument `by`.
 fn rule(by: &str) -> PyResult<InsideRule> {
     match by {
         "auto" => Ok(InsideRule::Auto),
@@ -428,7 +425,6 @@ fn rule(by: &str) -> PyResult<InsideRule> {
     }
 }
 
-/// Returns the rays of a batch.
 fn batch_of(source: RaySource, batch: usize) -> Result<Batch, (usize, InvalidRay)> {
     let first = batch * BATCH;
     source.batch(first..(first + BATCH).min(source.rays))

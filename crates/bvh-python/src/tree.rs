@@ -297,7 +297,6 @@ impl Tree {
         Ok((restore, pickle::state(py, &self.owned(), faces)?))
     }
 
-    /// Makes the tree of a pickle.
     #[staticmethod]
     fn _restore(shape: &str, objects: &[u8], tree: &[u8], faces: Option<&[u8]>) -> PyResult<Self> {
         let owned = pickle::tree(shape, objects, tree)?;
@@ -335,7 +334,6 @@ fn found(
     })
 }
 
-/// Creates the error of an argument with this name.
 fn invalid_argument(name: &str, error: impl Display) -> PyErr {
     invalid(format!("{name}: {error}"))
 }

@@ -74,7 +74,6 @@ mod tests {
     use bvh_core::{Aabb, Node};
     use std::fs;
 
-    /// A tree file over one box.
     fn tree() -> Vec<u8> {
         let aabb = Aabb::from([[0.0; 3], [1.0; 3]]);
         let tree = Bvh { nodes: vec![Node::leaf(aabb, 0, 1)], prim_ids: vec![0] };

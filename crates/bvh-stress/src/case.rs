@@ -124,9 +124,25 @@ impl Case {
         stiff::by_id(self.id).map_or_else(Vec::new, |triangles| triangles(objects))
     }
 
+    /// Performs all checks of the methods, of the traversals, and of other parts of the program.
+    pub fn cells<'a>(
+        &'a self,
+        methods: &'a [(String, Method)],
+        effort: &'a Effort,
+    ) -> impl Iterator<Item = Cell> + 'a {
+        let of_method =
+            |(label, method): &'a (String, Method)| self.of_method(label, method, effort);
+        let of_traversal = |&(name, way): &'a _| self.of_traversal(name, way, effort.rays);
+        methods
+            .iter()
+            .filter_map(of_method)
+            .chain(tracing::TRAVERSALS.iter().filter_map(of_traversal))
+            .chain(self.checks.iter().filter_map(|check| self.of_part(check)))
+    }
+
     /// Performs all checks of a method; `None` if there are none. The numbers are those of the
     /// largest scene.
-    pub fn of_method(&self, label: &str, method: &Method, effort: &Effort) -> Option<Cell> {
+    fn of_method(&self, label: &str, method: &Method, effort: &Effort) -> Option<Cell> {
         self.cell(label, |cell| {
             let extents = self.sizes.map(|sizes| extents(sizes, method, effort));
             for &(objects, work) in extents.iter().flatten() {
@@ -154,12 +170,7 @@ impl Case {
     }
 
     /// Checks a traversal's answers to the scene's rays; `None` if there is no scene.
-    pub fn of_traversal(
-        &self,
-        name: &str,
-        traversal: tracing::Traversal,
-        rays: usize,
-    ) -> Option<Cell> {
+    fn of_traversal(&self, name: &str, traversal: tracing::Traversal, rays: usize) -> Option<Cell> {
         let triangles = self.triangles(self.sizes?[Size::Few as usize]);
         self.cell(name, |cell| {
             let rays = tracing::rays(&triangles, rays, 1);
@@ -168,14 +179,11 @@ impl Case {
         })
     }
 
-    /// Performs the checks of another part of the program, one of them for each part.
-    pub fn of_parts(&self) -> impl Iterator<Item = Cell> {
-        self.checks.iter().filter_map(|check| match check {
-            Check::Part(name, check) => self.cell(name, |cell| {
-                cell.note = check()?;
-                Ok(true)
-            }),
-            _ => None,
+    fn of_part(&self, check: &Check) -> Option<Cell> {
+        let Check::Part(name, check) = check else { return None };
+        self.cell(name, |cell| {
+            cell.note = check()?;
+            Ok(true)
         })
     }
 

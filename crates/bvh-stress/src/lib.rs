@@ -12,9 +12,8 @@
 //!   except where boxes are smaller than 2⁻²⁰ of their distance from the ray's origin, as in S24.
 //!
 //! [`CASES`] lists the cases, some of which promise more about their own scene. A [`Case`] is
-//! checked by [`Case::of_method`], [`Case::of_traversal`] and [`Case::of_parts`]. The checks
-//! themselves work on any tree: [`examine::check_outcome`] on the outcome of a search,
-//! [`transform`] on scenes, [`kernels`] and [`tracing`] on rays.
+//! checked by [`Case::cells`]. The checks themselves work on any tree: [`examine::check_outcome`] on
+//! the outcome of a search, [`transform`] on scenes, [`kernels`] and [`tracing`] on rays.
 //!
 //! ```
 //! use bvh_search::{Budget, Method, Problem, solve};

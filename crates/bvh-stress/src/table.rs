@@ -21,12 +21,10 @@ pub fn scenes(most: usize) -> impl Iterator<Item = (&'static Case, Vec<Triangle>
     })
 }
 
-/// A case without a scene.
 const fn bare(id: &'static str, name: &'static str, checks: &'static [Check]) -> Case {
     Case { id, name, sizes: None, checks }
 }
 
-/// A case with a scene of these sizes.
 const fn case(
     id: &'static str,
     name: &'static str,

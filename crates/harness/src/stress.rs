@@ -28,19 +28,20 @@ pub fn execute(
         .iter()
         .filter(|case| cases.is_empty() || cases.iter().any(|id| id == case.id))
         .collect();
+    // Specs accept only methods of ours here.
+    let methods: Vec<(String, Method)> = methods
+        .iter()
+        .filter_map(|Labelled { label, method, .. }| match method {
+            Contestant::Ours(method) => Some((label.clone(), method.clone())),
+            _ => None,
+        })
+        .collect();
     let mut cells = Vec::new();
     for (done, case) in cases.iter().enumerate() {
         if interrupted() {
             return Err(Error::Interrupted { finished: done, runs: cases.len() });
         }
-        for Labelled { label, method, .. } in methods {
-            // Specs accept only methods of ours here.
-            let Contestant::Ours(method) = method else { continue };
-            cells.extend(case.of_method(label, method, effort));
-        }
-        let ways = tracing::TRAVERSALS.iter();
-        cells.extend(ways.filter_map(|(name, way)| case.of_traversal(name, *way, effort.rays)));
-        cells.extend(case.of_parts());
+        cells.extend(case.cells(&methods, effort));
     }
     store.write("cells.csv", &to_bytes(&cells, Path::new("cells.csv"))?)
 }

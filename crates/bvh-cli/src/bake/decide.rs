@@ -8,6 +8,7 @@
 use super::plan::{Plan, Prepared};
 use super::watch::Interrupted;
 use crate::Error;
+use crate::answer::Answer;
 use crate::interrupt;
 use crate::output::{self, print_error};
 use crate::rays::Rays;
@@ -69,24 +70,25 @@ pub struct Open {
     pub references: bool,
 }
 
-/// Tries the combinations of the open choices, and chooses one of them. Returns the plan with the
-/// choices that pay, the explanation of each choice in one line, and the parts of the decision that
-/// the bake needs too. Keeps the plan as it is if `interrupted` becomes true.
+/// Tries the combinations of the open choices, and explains each choice in one line. Returns the plan
+/// with the choices that pay, and the parts of the decision that the bake needs too. Keeps the plan
+/// as it is if `interrupted` becomes true.
 pub fn decide(
     open: Open,
     plan: Plan,
     scene: &Scene,
     interrupted: &AtomicBool,
-) -> Result<(Plan, Vec<String>, Prepared), Error> {
+    answer: &mut Answer,
+) -> Result<(Plan, Prepared), Error> {
     let costs = open.costs(&plan);
     let references = open.references(&plan);
     if costs.len() * references.len() == 1 {
-        return Ok((plan, Vec::new(), Prepared::default()));
+        return Ok((plan, Prepared::default()));
     }
     // From here on there is a tree soon, which Ctrl-C must save instead of ending the program.
     interrupt::hold();
     let Some(mut trials) = Trials::begin(&open, &plan, scene, interrupted)? else {
-        return Ok((plan, Vec::new(), Prepared::default()));
+        return Ok((plan, Prepared::default()));
     };
     let mut table = Table { columns: costs.len(), tests: Vec::new() };
     let bar = bar(costs.len() * references.len());
@@ -102,7 +104,7 @@ pub fn decide(
     // An interrupted search says nothing about the choices.
     if interrupted.load(Relaxed) {
         let prepared = Prepared { greedy: Some(trials.greedy), ..Prepared::default() };
-        return Ok((plan, Vec::new(), prepared));
+        return Ok((plan, prepared));
     }
     let (row, column) = table.simplest();
     let (objective, rays) = costs[column].clone();
@@ -112,7 +114,10 @@ pub fn decide(
         density: trials.trained.take_if(|_| plan.rays.is_some()),
         division: trials.division.take_if(|_| plan.references > 1.0),
     };
-    Ok((plan, table.reasons(&open, row, column), prepared))
+    for reason in table.reasons(&open, row, column) {
+        answer.choice(reason);
+    }
+    Ok((plan, prepared))
 }
 
 impl Open {
@@ -173,7 +178,6 @@ impl Table {
     }
 }
 
-/// Explains one choice by the fraction of expected tests that it saves.
 fn reason(name: &str, is_chosen: bool, saved: f64) -> String {
     let verdict = if is_chosen { "yes" } else { "no" };
     let percent = 100.0 * saved.abs();
@@ -193,7 +197,6 @@ fn bar(trials: usize) -> ProgressBar {
     bar
 }
 
-/// Short searches, and the data that they share.
 struct Trials<'a> {
     scene: &'a Scene,
     interrupted: &'a AtomicBool,

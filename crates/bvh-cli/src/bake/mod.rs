@@ -99,7 +99,6 @@ pub struct BakeArgs {
     pub form: Form,
 }
 
-/// The heading in the help of what few need.
 const ADVANCED: &str = "Advanced";
 
 /// The cost that a bake minimises.
@@ -160,7 +159,6 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     Ok(())
 }
 
-/// Writes the best tree, and prints its cost.
 fn save(
     found: &Found,
     out: &Path,
@@ -259,12 +257,10 @@ fn summarise(found: &Found, cost_for_lines: f64, answer: &mut Answer) {
 }
 
 impl BakeArgs {
-    /// Returns the file or folder to write.
     fn out(&self) -> Result<PathBuf, Error> {
         output_or_free("--out", self.out.as_ref(), || self.name_after_scene())
     }
 
-    /// Returns the name that an output has if none is given.
     fn name_after_scene(&self) -> PathBuf {
         let scene = Path::new(&self.scene);
         let stem = scene.file_stem().unwrap_or(scene.as_os_str());
@@ -301,9 +297,7 @@ impl BakeArgs {
         if self.budget.is_some() {
             return plan;
         }
-        let reason = decide::reason_of_work(objects);
-        answer.say(&reason);
-        answer.list("choices", reason);
+        answer.choice(decide::reason_of_work(objects));
         Plan { effort: Effort::Work(decide::work(objects)), ..plan }
     }
 
@@ -328,12 +322,7 @@ impl BakeArgs {
             rays: self.rays.is_none(),
             references: self.references.is_none(),
         };
-        let (plan, reasons, prepared) = decide(open, plan, scene, interrupted)?;
-        for reason in reasons {
-            answer.say(&reason);
-            answer.list("choices", reason);
-        }
-        Ok((plan, prepared))
+        decide(open, plan, scene, interrupted, answer)
     }
 
     /// Returns the named method. If a tree is given, rejects methods that cannot continue from it.

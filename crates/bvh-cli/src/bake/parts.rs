@@ -21,7 +21,6 @@ const SHARE_OF_PARTS: f64 = 0.8;
 /// The largest work on the tree over all parts, in nodes visited per part.
 const WORK_PER_PART: u64 = 10_000;
 
-/// A part of a scene.
 struct Part {
     /// The identifier, which another scene, seed, budget or number of parts changes.
     id: String,
@@ -36,7 +35,6 @@ impl Part {
         Scene::new(&format!("{}, part {}", whole.name, self.id), whole.kind, primitives)
     }
 
-    /// Returns the file of the part's tree.
     fn path(&self, folder: &Path) -> PathBuf {
         folder.join(&self.id).with_extension("bvh")
     }

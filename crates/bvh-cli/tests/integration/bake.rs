@@ -12,7 +12,6 @@ use std::path::Path;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// A walk through escher's stairs.
 const WALK: &str = "count = 5000
 bounces = 2
 lights = [[0.0, 9.0, 0.0]]

@@ -4,10 +4,8 @@ use crate::support::{begin, bvh, cost, names, number, send, words};
 use std::fs;
 use std::path::Path;
 
-/// Bakes escher in four parts.
 const BAKE: &str = "bake escher --budget=30Mwork --parts=4";
 
-/// Returns the identifiers of the parts.
 fn listed(folder: &Path) -> Vec<String> {
     let list = bvh(folder, &format!("{BAKE} --out=x.bvh --list"));
     list.lines().map(|line| words(line)[0].to_owned()).collect()

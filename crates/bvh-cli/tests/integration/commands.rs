@@ -30,7 +30,6 @@ fn every_shell_gets_all_commands() {
     }
 }
 
-/// Returns the file of a tree of one node and its leaves.
 fn wide_file(boxes: &[Aabb]) -> Vec<u8> {
     let count = boxes.len() as u32;
     let root = Node::inner(Aabb::union_of(boxes), 1, count);
@@ -60,7 +59,6 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// Lists the files of a folder with their contents.
 fn contents(at: &Path) -> Vec<(String, Option<Vec<u8>>)> {
     names(at).into_iter().map(|name| (name.clone(), fs::read(at.join(name)).ok())).collect()
 }

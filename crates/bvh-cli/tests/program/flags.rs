@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-/// Runs a command, and returns its exit code and all its output.
 fn outcome(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
     let output = run(folder, args);
     (output.status.code(), text(&[output.stdout, output.stderr].concat()))

@@ -93,7 +93,6 @@ pub fn commands(text: &str, place: &str) -> Vec<Vec<String>> {
     commands
 }
 
-/// Returns whether a word sets a variable of the environment.
 fn is_variable(word: &str) -> bool {
     let Some((name, _)) = word.split_once('=') else { return false };
     name.bytes().all(|byte| byte == b'_' || byte.is_ascii_uppercase())

@@ -138,12 +138,10 @@ fn no_triangle(path: &Path) -> Fault {
     Fault::new(path, Place::File, message)
 }
 
-/// Returns the element of a list that a reference names.
 fn get<'a, T>(list: &'a [T], index: usize, name: &str) -> Result<&'a T, String> {
     list.get(index).ok_or_else(|| format!("no {name}[{index}]; expected one that exists"))
 }
 
-/// A file while its triangles are read.
 struct Loader<'a> {
     path: &'a Path,
     document: &'a Document,

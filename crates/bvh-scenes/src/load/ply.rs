@@ -49,7 +49,6 @@ impl Scalar {
     }
 }
 
-/// What becomes of a property.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Purpose {
     Ignored,
@@ -304,7 +303,6 @@ impl<'a> File<'a> {
         Ok(word)
     }
 
-    /// Returns the next bytes in little-endian order.
     fn bytes<const N: usize>(&mut self) -> Result<[u8; N], String> {
         let (bytes, rest) = self.rest.split_first_chunk::<N>().ok_or(ENDS)?;
         self.rest = rest;
@@ -319,7 +317,6 @@ impl<'a> File<'a> {
 const ENDS: &str = "the file ends here; expected the elements of the header";
 
 impl Element {
-    /// Adds the property of these types, or rejects it.
     fn add(&mut self, types: &[&str], name: &str) -> Result<(), String> {
         if self.properties.iter().any(|property| property.name == name) {
             return Err(format!("property `{name}` repeats a name; expected each once"));

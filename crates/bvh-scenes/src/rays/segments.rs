@@ -202,7 +202,6 @@ pub fn density(rays: &[TracedRay], tree: &Bvh) -> Result<RayDensity, DensityErro
     RayDensity::of_rays(&bounds, &segments, AREA_WEIGHT)
 }
 
-/// Traces rays and keeps them.
 struct Tracing<'a> {
     accelerator: Accelerator<'a>,
     bounds: Aabb,

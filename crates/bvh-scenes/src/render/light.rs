@@ -10,7 +10,6 @@ use crate::trace::Accelerator;
 use bvh_core::{Aabb, Ray, TestCounts};
 use glam::DVec3;
 
-/// A point light.
 #[derive(Clone, Debug)]
 struct Light {
     position: DVec3,

@@ -22,7 +22,6 @@ pub struct Surface {
 /// The colour of all triangles, because loaders read no colours.
 const PLASTER: DVec3 = DVec3::new(0.80, 0.73, 0.64);
 
-/// The colours of spheres, in rotation.
 const COLOURS: [DVec3; 6] = [
     DVec3::new(0.78, 0.16, 0.10),
     DVec3::new(0.90, 0.52, 0.08),

@@ -110,7 +110,6 @@ struct Split {
     above: usize,
 }
 
-/// A cell that is not built yet.
 struct Frame {
     cell: usize,
     bounds: Aabb,

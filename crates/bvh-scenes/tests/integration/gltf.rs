@@ -31,7 +31,6 @@ fn merge(value: &mut Value, patch: &Value) {
     }
 }
 
-/// The types of numbers with their codes.
 const TYPES: [(&str, u32); 5] =
     [("i8", 5120), ("u8", 5121), ("i16", 5122), ("u16", 5123), ("f32", 5126)];
 
@@ -60,7 +59,6 @@ fn accessor(text: &Value) -> Value {
     accessor
 }
 
-/// Returns the file of a case.
 fn file(case: &Value) -> Vec<u8> {
     let list = |name: &str| case[name].as_array().cloned().unwrap_or_default();
     let first = |name: &str| case.get(name).cloned();
@@ -230,7 +228,6 @@ fn a_buffer_outside_the_folder_of_the_scene_is_rejected_unless_it_is_allowed() {
     }
 }
 
-/// Asserts that the folder's scene is rejected, and that it is read with permission.
 fn assert_outside(folder: &Path) {
     let path = folder.join("scene.gltf");
     let message = load(&path, OutsideFiles::Rejected).unwrap_err().to_string();

@@ -7,14 +7,12 @@ use glam::Vec3;
 use proptest::prelude::*;
 use std::path::Path;
 
-/// The corners of a square and a fifth point.
 const POINTS: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 2 0\n";
 
 fn read(text: impl AsRef<[u8]>) -> Result<Mesh, Fault> {
     parse(text.as_ref(), Path::new("scene.obj"))
 }
 
-/// Reads the points followed by `faces`.
 fn mesh(faces: &str) -> Mesh {
     read(format!("{POINTS}{faces}")).unwrap()
 }

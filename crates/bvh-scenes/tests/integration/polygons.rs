@@ -74,7 +74,6 @@ fn polygons_of_many_corners_are_covered_or_rejected_before_they_take_long() {
 
 type Point = [i64; 2];
 
-/// Twice the signed area.
 fn area([a, b, c]: [Point; 3]) -> i64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }

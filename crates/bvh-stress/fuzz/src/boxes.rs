@@ -44,7 +44,6 @@ fn is_invalid(aabb: &Aabb) -> bool {
     !is_finite || aabb.min.cmpgt(aabb.max).any()
 }
 
-/// Checks that all errors name the invalid object.
 fn check_rejected(boxes: &[Aabb], object: usize, seed: u64, budget: Budget) {
     let problem = Problem::new(boxes);
     let mut messages = Vec::new();

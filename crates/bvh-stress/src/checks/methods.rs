@@ -40,7 +40,6 @@ pub fn scaled_scenes(n: usize) -> [Vec<Aabb>; 5] {
     ]
 }
 
-/// Flattens boxes along the axes that are 0 in `axes`.
 fn projected(boxes: &[Aabb], axes: Vec3) -> Vec<Aabb> {
     boxes.iter().map(|aabb| Aabb { min: aabb.min * axes, max: aabb.max * axes }).collect()
 }
@@ -77,7 +76,6 @@ pub fn threads_and_seeds(method: &Method) -> Verdict {
     Ok("4 numbers of threads, 3 seeds".into())
 }
 
-/// An observer that cancels immediately, or at a time.
 struct Deadline(Option<Instant>);
 
 impl Observer for Deadline {

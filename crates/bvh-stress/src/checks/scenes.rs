@@ -19,7 +19,6 @@ fn is_greedy(method: &Method) -> bool {
     matches!(method, Method::MullerFellner(config) if config.heuristic == Default::default())
 }
 
-/// Returns ⌈log₂ n⌉.
 fn levels(objects: usize) -> usize {
     objects.max(1).next_power_of_two().trailing_zeros() as usize
 }

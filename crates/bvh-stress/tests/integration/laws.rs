@@ -35,7 +35,6 @@ fn solved(method: &Method, boxes: &[Aabb]) -> Outcome {
     run(method, boxes, WORK).unwrap_or_else(|broken| panic!("{}: {broken}", method.name()))
 }
 
-/// Returns as many boxes as the method accepts.
 fn accepted<'a>(method: &Method, boxes: &'a [Aabb]) -> &'a [Aabb] {
     if let Method::Exact(_) = method { &boxes[..boxes.len().min(EXACT_OBJECTS - 4)] } else { boxes }
 }
@@ -58,7 +57,6 @@ fn insertion_and_exact() -> Vec<Method> {
     ["goldsmith_salmon", "random_orders", "genetic", "exact"].map(named).into()
 }
 
-/// Turns axis i into axis `to[i]`.
 fn with_axes(boxes: &[Aabb], to: [usize; 3]) -> Vec<Aabb> {
     let mut turned = boxes.to_vec();
     for (aabb, turned) in boxes.iter().zip(&mut turned) {

@@ -158,7 +158,6 @@ fn local_searches_begin_no_more_than_a_little_above_the_greedy_tree() {
     }
 }
 
-/// A clock that expires after a number of queries of any kind.
 struct Questions {
     asked: AtomicU64,
     most: u64,

@@ -14,14 +14,12 @@ use bvh_stress::{
 };
 use glam::Vec3;
 
-/// Nodes per object that a search may make or visit here.
 const WORK: u64 = 150;
 
 fn best() -> Method {
     Method::Best(bvh_search::best::Config::default())
 }
 
-/// Asserts that the reported cost of a tree is its cost.
 fn assert_reported(who: &str, reported: f64, cost: f64) {
     assert!(
         (reported - cost).abs() <= examine::ROUNDING * cost,
@@ -29,7 +27,6 @@ fn assert_reported(who: &str, reported: f64, cost: f64) {
     );
 }
 
-/// Asserts that two layouts give the same answers to rays through the triangles.
 fn assert_same_answers(case: &Case, wide: &WideBvh, plain: &WideBvh, triangles: &[Triangle]) {
     for ray in tracing::rays(triangles, 300, 2) {
         assert_eq!(wide.nearest_hit(&ray), plain.nearest_hit(&ray), "{}: {ray:?}", case.id);

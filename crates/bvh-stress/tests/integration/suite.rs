@@ -11,32 +11,29 @@ use bvh_stress::{
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
-/// Nodes per object that a search may make or visit here.
 const WORK: u64 = 150;
 
-/// The effort for every method in the quick tier.
 const QUICK: Effort =
     Effort { builders: Size::Few, work_per_object: WORK, larger_searches: None, rays: 500 };
 
-/// Panics with all broken promises at once.
 fn assert_kept(broken: Vec<String>) {
     assert!(broken.is_empty(), "\n{}", broken.join("\n"));
-}
-
-/// Returns the broken promise of a cell.
-fn broken(Cell { scene, method, outcome, note, .. }: Cell) -> Option<String> {
-    (outcome == Class::Broken).then(|| format!("{scene}, {method}: {note}"))
 }
 
 #[test]
 fn every_case_from_s01_to_s45_exists_and_is_checked() {
     let expected = (1..=45).map(|number| format!("S{number:02}"));
     assert!(CASES.iter().map(|case| case.id).eq(expected));
+    assert_eq!(CASES.iter().filter(|case| case.sizes.is_some()).count(), STIFF.len());
     let mut with_kind: Vec<&str> = KINDS.iter().flat_map(|(_, ids)| *ids).copied().collect();
     with_kind.sort_unstable();
     assert!(with_kind.into_iter().eq(CASES.iter().map(|case| case.id)), "one kind each");
     for case in &CASES {
         assert!(case.sizes.is_some() || !case.checks.is_empty(), "{} has no check", case.id);
+        if let Some(sizes) = case.sizes {
+            assert_eq!(case.triangles(sizes[0]).len(), sizes[0], "{}", case.id);
+            assert!(sizes.is_sorted(), "{}", case.id);
+        }
         for check in case.checks {
             // A check of a method that does not exist would never be performed.
             if let Check::Method(name, _) = check {
@@ -46,39 +43,28 @@ fn every_case_from_s01_to_s45_exists_and_is_checked() {
     }
 }
 
-#[test]
-fn every_scene_has_the_requested_size() {
-    let mut scenes = 0;
-    for case in &CASES {
-        if let Some(sizes) = case.sizes {
-            assert_eq!(case.triangles(sizes[0]).len(), sizes[0], "{}", case.id);
-            assert!(sizes.is_sorted(), "{}", case.id);
-            scenes += 1;
-        }
-    }
-    assert_eq!(scenes, STIFF.len());
-}
-
-/// Checks every case with each of these methods.
-fn check_methods(methods: &[(String, Method)], effort: Effort) {
-    // Methods run in parallel and cases in order, so that a failure names its case first.
-    let found = methods.par_iter().flat_map_iter(|(label, method)| {
-        CASES.iter().filter_map(move |case| broken(case.of_method(label, method, &effort)?))
-    });
-    assert_kept(found.collect());
+/// Checks every case with these methods, and every traversal and other part.
+fn check_cases(methods: &[(String, Method)], effort: Effort) {
+    let cells = CASES.par_iter().flat_map_iter(|case| case.cells(methods, &effort));
+    let broken = cells.filter(|cell| cell.outcome == Class::Broken);
+    assert_kept(
+        broken
+            .map(|Cell { scene, method, note, .. }| format!("{scene}, {method}: {note}"))
+            .collect(),
+    );
 }
 
 #[test]
-fn every_case_holds_for_every_method() {
-    check_methods(&bvh_stress::methods(), QUICK);
+fn every_case_holds_for_every_method_every_traversal_and_every_other_part() {
+    check_cases(&bvh_stress::methods(), QUICK);
 }
 
 #[test]
 #[ignore = "slow: thousands of objects for builders and searches alike"]
-fn every_case_holds_for_every_method_at_a_larger_size() {
+fn every_case_holds_at_a_larger_size() {
     let larger = Some(LargerScenes { objects: 2000, work_per_object: 60 });
     let effort = Effort { builders: Size::Many, larger_searches: larger, ..QUICK };
-    check_methods(&bvh_stress::methods(), effort);
+    check_cases(&bvh_stress::methods(), effort);
 }
 
 #[test]
@@ -86,18 +72,8 @@ fn every_case_holds_for_every_method_at_a_larger_size() {
 fn every_scene_holds_for_every_builder_at_its_full_size() {
     let builders = Method::all().into_iter().filter(is_builder);
     for builder in builders.map(|method| (method.name().to_owned(), method)) {
-        check_methods(&[builder], Effort { builders: Size::All, ..QUICK });
+        check_cases(&[builder], Effort { builders: Size::All, ..QUICK });
     }
-}
-
-#[test]
-fn every_traversal_answers_as_brute_force_on_every_scene() {
-    let cells = CASES.par_iter().flat_map_iter(|case| {
-        tracing::TRAVERSALS
-            .iter()
-            .filter_map(|&(name, way)| case.of_traversal(name, way, QUICK.rays))
-    });
-    assert_kept(cells.filter_map(broken).collect());
 }
 
 /// The powers of two that scale scenes, each for an equal part of the rays. Most of them keep
@@ -112,7 +88,6 @@ const PIECE: usize = 25_000;
 /// nodes.
 const TESTED: usize = 40;
 
-/// The scene of a case, scaled by two to this power.
 type Scaled = (&'static Case, i32, Vec<Triangle>);
 
 /// Checks at least these numbers of rays in the scene of every case, at every scale at which the
@@ -158,11 +133,6 @@ fn every_kernel_answers_as_brute_force_on_every_scene_at_every_scale() {
 #[ignore = "nightly: minutes, a million rays per scene"]
 fn every_kernel_answers_a_million_rays_of_every_scene_as_brute_force() {
     check_kernels(1_000_000, 100_000);
-}
-
-#[test]
-fn every_other_part_keeps_its_promises() {
-    assert_kept(CASES.iter().flat_map(Case::of_parts).filter_map(broken).collect());
 }
 
 #[test]

@@ -194,7 +194,6 @@ fn on_wave(t: f64) -> DVec3 {
     point.with_z(padding(point.x, point.y) + 0.05)
 }
 
-/// A padded top over a plain box.
 fn cushion(mesh: &mut MeshBuilder) {
     mesh.cuboid(DVec3::new(-CUSHION, -CUSHION, -0.9), DVec3::new(CUSHION, CUSHION, -0.35));
     mesh.grid(20, 20, &|i, j| {

@@ -48,7 +48,6 @@ pub fn triangles() -> Vec<Triangle> {
     cloister.finish(UNIT, DVec3::new(1250.0, -430.0, 75.0))
 }
 
-/// The pieces that are repeated in every bay.
 struct Parts {
     column: MeshBuilder,
     arch: MeshBuilder,

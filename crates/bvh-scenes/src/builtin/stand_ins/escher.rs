@@ -68,7 +68,6 @@ pub fn triangles() -> Vec<Triangle> {
     room.finish(UNIT, DVec3::ZERO)
 }
 
-/// The parameters of one gravity's staircases.
 struct Plan {
     first: usize,
     second: usize,

@@ -15,11 +15,8 @@ use glam::{DMat3, DVec3};
 const UNIT: f64 = 1000.0;
 /// The map grid's coordinates of the valley's corner, world units.
 const ORIGIN: DVec3 = DVec3::new(5.2e5, 3.1e5, 4.0e4);
-/// Size of the terrain in metres.
 const SIZE: (f64, f64) = (2700.0, 2000.0);
-/// Terrain cells along x and y.
 const CELLS: (usize, usize) = (36, 27);
-/// Height of the railway, metres.
 const TRACK: f64 = 78.0;
 
 /// Generates the triangles of the scene. Every call gives the same bytes on every machine.

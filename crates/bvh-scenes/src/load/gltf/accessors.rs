@@ -57,7 +57,6 @@ pub struct Accessors<'a> {
     items: u64,
 }
 
-/// Items one after the other in a view.
 struct Window {
     view: usize,
     offset: usize,

@@ -10,7 +10,6 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 use std::rc::Rc;
 
-/// The bytes of one buffer.
 #[derive(Clone, Debug)]
 enum Bytes<'a> {
     /// The binary chunk of a GLB file.

@@ -134,7 +134,6 @@ impl Loader<'_> {
         Ok(places)
     }
 
-    /// Returns the transforms of the instances of a node's mesh.
     fn instances(&mut self, instances: &Instances) -> Result<Vec<DMat4>, String> {
         let named = |name| instances.attributes.get(name).copied();
         let mut translations = Vec::new();
