@@ -46,7 +46,7 @@ use super::portable::WideRay;
 use super::triangles::TriangleBlock;
 use super::{portable, vector};
 use crate::exact::Line;
-use crate::{Hit, Kernel, Ray, Triangle};
+use crate::{Coherence, Hit, Kernel, Ray, Triangle};
 use alloc::vec::Vec;
 
 impl WideBvh {
@@ -89,7 +89,7 @@ impl WideBvh {
         let mut found = Vec::new();
         for (rays, counts) in rays.chunks(AT_ONCE).zip(counts.chunks_mut(AT_ONCE)) {
             found.clear();
-            self.trace_in_flight(rays, All(&mut found));
+            self.trace(rays, All(&mut found), Coherence::Incoherent);
             append_sorted(&found, hits, counts);
         }
     }

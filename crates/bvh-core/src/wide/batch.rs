@@ -47,24 +47,15 @@ impl WideBvh {
         }
     }
 
-    fn trace(&self, rays: &[Ray], mut find: impl Find, coherence: Coherence) {
-        if coherence == Coherence::Incoherent || self.kernel == Kernel::Portable {
-            return self.trace_in_flight(rays, find);
-        }
-        let task = Packets { wide: self, rays, find: &mut find };
-        // SAFETY: a layout's kernel is available.
-        unsafe { vector::dispatch(self.kernel, task) }
-    }
-
     /// Answers at most [`AT_ONCE`] rays.
-    pub(super) fn trace_in_flight(&self, rays: &[Ray], mut find: impl Find) {
+    pub(super) fn trace(&self, rays: &[Ray], mut find: impl Find, coherence: Coherence) {
         if self.kernel == Kernel::Portable || rays.len() < FEW {
             for (number, ray) in rays.iter().enumerate() {
                 find.alone(self, number, ray);
             }
             return;
         }
-        let task = InFlight { wide: self, rays, find: &mut find };
+        let task = Batch { wide: self, rays, find: &mut find, coherence };
         // SAFETY: a layout's kernel is available.
         unsafe { vector::dispatch(self.kernel, task) }
     }
@@ -79,40 +70,26 @@ const FEW: usize = 8;
 /// The minimum run of rays between packets that is traced in flight rather than ray by ray.
 const MANY: usize = 128;
 
-/// The search for the answers to all rays of a batch, in flight.
-struct InFlight<'a, F> {
-    wide: &'a WideBvh,
-    rays: &'a [Ray],
-    find: &'a mut F,
-}
-
-impl<K: Instructions, F: Find> Task<K> for InFlight<'_, F> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run(self) {
-        let Self { wide, rays, find } = self;
-        // SAFETY: the processor has the instructions of `K`.
-        unsafe { flight::trace::<K, F>(wide, rays, 0..rays.len(), find) };
-    }
-}
-
 /// The search for the answers to all rays of a batch: coherent rays in packets, other rays in
 /// flight.
-struct Packets<'a, F> {
+struct Batch<'a, F> {
     wide: &'a WideBvh,
     rays: &'a [Ray],
     find: &'a mut F,
+    coherence: Coherence,
 }
 
-impl<K: Instructions, F: Find> Task<K> for Packets<'_, F> {
+impl<K: Instructions, F: Find> Task<K> for Batch<'_, F> {
     type Output = ();
 
     #[inline(always)]
     unsafe fn run(self) {
-        let Self { wide, rays, find } = self;
+        let Self { wide, rays, find, coherence } = self;
         // SAFETY: the processor has the instructions of `K`.
         unsafe {
+            if F::ALL || coherence == Coherence::Incoherent {
+                return flight::trace::<K, F>(wide, rays, 0..rays.len(), find);
+            }
             let mut packet = Packet::<K>::new();
             // The rays from `first_of_rest` up to `next` fit no packet, and wait for `rest`.
             let mut first_of_rest = 0;
