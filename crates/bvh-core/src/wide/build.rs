@@ -152,12 +152,7 @@ mod tests {
 
     /// The box of every node, with 0, and of every leaf, with its number of blocks.
     fn boxes(wide: &WideBvh) -> impl Iterator<Item = (Aabb, usize)> {
-        let blocks = |child: Child| match child.is_node() {
-            true => 0,
-            false => {
-                1 + wide.blocks[child.index()..].iter().take_while(|block| !block.is_last()).count()
-            }
-        };
+        let blocks = |child: Child| if child.is_node() { 0 } else { wide.leaf(child).len() };
         let root = wide.root.map(|root| (wide.bounds, blocks(root)));
         root.into_iter().chain(wide.nodes.iter().flat_map(move |node| {
             (0..8).filter_map(move |lane| Some((node.lane_box(lane)?, blocks(node.children[lane]))))

@@ -77,7 +77,8 @@ impl WideBvh {
         Aabb::around(corners)
     }
 
-    fn leaf(&self, leaf: Child) -> &[TriangleBlock] {
+    /// The blocks of a leaf.
+    pub(super) fn leaf(&self, leaf: Child) -> &[TriangleBlock] {
         let blocks = &self.blocks[leaf.index()..];
         let end =
             blocks.iter().position(TriangleBlock::is_last).map_or(blocks.len(), |last| last + 1);

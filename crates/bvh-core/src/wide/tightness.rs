@@ -40,9 +40,7 @@ impl WideBvh {
         open.extend(self.root);
         while let Some(child) = open.pop() {
             if !child.is_node() {
-                let blocks = &self.blocks[child.index()..];
-                let others = blocks.iter().take_while(|block| !block.is_last()).count();
-                counts.objects += Self::OBJECTS_OF_BLOCK * (others as u64 + 1);
+                counts.objects += Self::OBJECTS_OF_BLOCK * self.leaf(child).len() as u64;
                 continue;
             }
             counts.boxes += Self::BOXES_OF_NODE;
