@@ -19,7 +19,7 @@ use super::answer::Find;
 use super::gathered::Gathered;
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{DeepStacks, LINE, SPARE, STACK};
-use super::lanes::Lanes;
+use super::lanes::{Aligned, Lanes};
 use super::layout::{Child, Places, WideBvh, WideNode};
 use super::pairs::Crossings;
 use super::prepared::{Prepared, Ready, Test};
@@ -119,7 +119,7 @@ impl<K: Instructions, F: Find> Task<K> for Flight<'_, K, F> {
         let mut traversals = MaybeUninit::<[Traversal; FLIGHT]>::uninit();
         let traversals = traversals.as_mut_ptr().cast::<Traversal>();
         let need = self.wide.stack_need;
-        let mut stacks = MaybeUninit::<Stacks>::uninit();
+        let mut stacks = MaybeUninit::<Aligned<[Pending; FLIGHT * (STACK + SPARE)]>>::uninit();
         let mut deep = DeepStacks::new(FLIGHT, need);
         let stacks =
             deep.as_mut().map_or(stacks.as_mut_ptr().cast::<Pending>(), |deep| deep.stack(0));
@@ -383,10 +383,6 @@ struct Traversal {
     /// stores of whole registers.
     stack: *mut Pending,
 }
-
-/// The stacks of layouts that are not deep.
-#[repr(C, align(64))]
-struct Stacks([MaybeUninit<Pending>; FLIGHT * (STACK + SPARE)]);
 
 /// # Safety
 ///

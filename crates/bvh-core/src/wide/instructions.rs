@@ -6,7 +6,7 @@
 //! [`Task`] that [`dispatch`](super::vector::dispatch) runs has them, and what a task calls. Functions
 //! whose sections name something else need that, too.
 
-use super::lanes::{Lanes, Mask};
+use super::lanes::{Aligned, Lanes, Mask};
 use super::layout::{Child, WideNode};
 
 /// A child to visit later: its key, or 0, above the bits of the child.
@@ -17,10 +17,7 @@ use super::layout::{Child, WideNode};
 pub(crate) type Pending = u64;
 
 /// The last bits of the keys.
-#[repr(align(32))]
-pub(crate) struct LastBits(pub(crate) [u32; 8]);
-
-pub(crate) static LAST_BITS: LastBits = LastBits([8, 7, 6, 5, 4, 3, 2, 1]);
+static LAST_BITS: Aligned<[u32; 8]> = Aligned([8, 7, 6, 5, 4, 3, 2, 1]);
 
 /// Returns the lane of a key.
 #[inline(always)]

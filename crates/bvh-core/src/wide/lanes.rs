@@ -3,6 +3,10 @@
 
 use core::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Sub};
 
+/// A value that begins with a line of the cache, and is aligned for any register.
+#[repr(align(64))]
+pub(crate) struct Aligned<T>(pub(crate) T);
+
 /// `N` numbers of f32, or of u32 where an operation says so.
 ///
 /// A value exists only where the processor has the instructions: what makes one out of nothing is
@@ -33,9 +37,6 @@ pub(crate) trait Lanes:
     /// # Safety
     /// The processor has the instructions; `from` is aligned to `N` numbers.
     unsafe fn load(from: *const f32) -> Self;
-
-    /// Loads numbers from an address that need not be aligned.
-    unsafe fn load_unaligned(from: *const f32) -> Self;
 
     /// Writes `N` numbers to any place.
     ///
@@ -141,9 +142,6 @@ pub(crate) trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
 
     /// The set of these bits, of which those beyond the lanes are ignored.
     unsafe fn from_bits(bits: u32) -> Self;
-
-    /// The lanes that are not in `other`.
-    fn and_not(self, other: Self) -> Self;
 }
 
 /// One f64 per lane.

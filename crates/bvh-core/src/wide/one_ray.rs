@@ -3,19 +3,13 @@
 use super::box_ray::{BoxRay, BoxTest, FarBoxRay};
 use super::instructions::{Instructions, Pending, Task, last_pending};
 use super::kernel::{DeepStacks, SPARE, STACK};
-use super::lanes::{Lanes, Mask};
+use super::lanes::{Aligned, Lanes, Mask};
 use super::layout::{Child, WideBvh};
 use super::pairs::{Crossings, Pairs, Plane};
 use super::triangles::TriangleBlock;
 use crate::ray::{AXES, largest_axis};
 use crate::{Aabb, Hit, Ray};
 use core::mem::MaybeUninit;
-
-/// Aligns the frame of the function that holds it. Otherwise the compiler keeps vectors of 32 bytes
-/// at odd multiples of 16, depending on where its caller's frame ends, and then every other vector
-/// crosses a line of the cache. That costs a ray which misses everything 5 of 14 ns.
-#[repr(align(64))]
-struct Aligned<T>(T);
 
 /// The search for a ray's nearest hit, or with `ANY` the first one found, among those that `filter`
 /// accepts; without any the object is `u32::MAX`.
@@ -94,6 +88,9 @@ pub(crate) unsafe fn traverse<K: Instructions, const ANY: bool>(
         if !ray.begins_in(&wide.near) || wide.stack_need > STACK {
             return K::call(Rare::<_, ANY> { wide, ray, leaves });
         }
+        // Aligned, so that the whole frame is. Otherwise the compiler keeps vectors of 32 bytes at odd
+        // multiples of 16, depending on where its caller's frame ends, and then every other vector
+        // crosses a line of the cache. That costs a ray which misses everything 5 of 14 ns.
         let mut stack = MaybeUninit::<Aligned<[Pending; STACK + SPARE]>>::uninit();
         let base = stack.as_mut_ptr().cast::<Pending>();
         visit::<K, ANY>(wide, ray.t_max(), &BoxRay::new(ray), leaves, base)
@@ -160,19 +157,12 @@ pub(crate) unsafe fn visit<K: Instructions, const ANY: bool>(
                     child = *node.children.get_unchecked(mask.trailing_zeros() as usize);
                     continue;
                 }
-                if ANY {
-                    let last = mask.ilog2();
-                    child = *node.children.get_unchecked(last as usize);
-                    let mut others = mask ^ 1 << last;
-                    while others != 0 {
-                        let other = *node.children.get_unchecked(others.trailing_zeros() as usize);
-                        top.write(u64::from(other.bits()));
-                        top = top.add(1);
-                        others &= others - 1;
-                    }
-                    continue;
-                }
-                child = K::sort(node, keys, mask, top);
+                child = if ANY {
+                    K::compress(node, mask, top);
+                    *node.children.get_unchecked(mask.ilog2() as usize)
+                } else {
+                    K::sort(node, keys, mask, top)
+                };
                 top = top.add(mask.count_ones() as usize - 1);
             }
             if !child.is_node() {

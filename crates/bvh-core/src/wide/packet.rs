@@ -337,7 +337,7 @@ unsafe fn test<L: Lanes, const ANY: bool>(
             if crossings.possible == 0 {
                 continue;
             }
-            let plane = Plane::of_triangle(&block.doubles(lane, vector.axes));
+            let plane = Plane::of_lanes(&corners);
             let (inside, t) = pairs.decide(&corners, &plane, crossings, nearest.t);
             let inside = inside & t.mask(entered);
             is_hit |= if ANY {

@@ -74,11 +74,10 @@
 //! |s′|, because |h| is at most 3MP. The bound 64εMP / |s′| covers the sum. If both ends of this
 //! interval round to one f32, that f32 is the rounded distance, because rounding is monotone.
 
-use super::lanes::{DoubleLanes, Lanes, Mask};
+use super::lanes::{Aligned, DoubleLanes, Lanes, Mask};
 use crate::exact::ERROR;
 use crate::ray::pow2;
 use crate::{PreparedRay, Ray, Triangle};
-use core::ops::{Mul, Sub};
 
 /// e of f32, in multiples of R.
 const SINGLE_ERROR: f32 = 64.0 * (f32::EPSILON / 2.0);
@@ -372,7 +371,7 @@ impl<L: Lanes> Pairs<L> {
         let origin = self.origin.map(stored);
         let direction = self.direction.map(stored);
         let corners = corners.map(|corner| corner.map(stored));
-        let mut distances = stored(t);
+        let mut distances = Aligned(stored(t));
         let mut hits = is_hit.bits();
         for lane in (0..L::N).filter(|lane| unsure >> lane & 1 != 0) {
             // The distance does not depend on the names of the axes.
@@ -382,19 +381,13 @@ impl<L: Lanes> Pairs<L> {
             // The bounds for one ray and one triangle are narrower.
             if let Some(t) = triangle.intersect(&PreparedRay::new(&ray), f32::MAX) {
                 hits |= 1 << lane;
-                distances[lane] = t;
+                distances.0[lane] = t;
             }
         }
         // SAFETY: there are sixteen numbers.
-        let t = unsafe { L::load_unaligned(distances.as_ptr()) };
+        let t = unsafe { L::load(distances.0.as_ptr()) };
         (t.mask(hits) & self.t_min.le(t) & t.le(t_max), t)
     }
-}
-
-#[inline(always)]
-unsafe fn constants<D: DoubleLanes, const N: usize>(numbers: [f64; N]) -> [D; N] {
-    // SAFETY: the processor has the instructions.
-    numbers.map(|number| unsafe { D::splat(number) })
 }
 
 impl<L: Lanes> Plane<L> {
@@ -422,36 +415,10 @@ impl<L: Lanes> Plane<L> {
         let size = (first.double() + first.double()) * second.double();
         Self { corner: a, normal: normal(&a, &b, &c), size, sides: first + second }
     }
-
-    #[inline(always)]
-    pub(crate) unsafe fn of_triangle([a, b, c]: &[[f64; 3]; 3]) -> Self {
-        let [x, y, z] = normal(a, b, c);
-        let side = |p: &[f64; 3]| {
-            let x = (p[0] - a[0]).abs();
-            let y = (p[1] - a[1]).abs();
-            let z = (p[2] - a[2]).abs();
-            x.max(y).max(z)
-        };
-        let first = side(b);
-        let second = side(c);
-        // SAFETY: the processor has the instructions.
-        unsafe {
-            Self {
-                corner: constants(*a),
-                normal: constants([x, y, z]),
-                size: L::Double::splat(2.0 * first * second),
-                sides: L::splat((first + second) as f32),
-            }
-        }
-    }
 }
 
 #[inline(always)]
-fn normal<D: Copy + Sub<Output = D> + Mul<Output = D>>(
-    a: &[D; 3],
-    b: &[D; 3],
-    c: &[D; 3],
-) -> [D; 3] {
+fn normal<D: DoubleLanes>(a: &[D; 3], b: &[D; 3], c: &[D; 3]) -> [D; 3] {
     let [x, y, z] = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
     let [p, q, r] = [c[0] - a[0], c[1] - a[1], c[2] - a[2]];
     [y * r - z * q, z * p - x * r, x * q - y * p]

@@ -148,7 +148,7 @@ impl Seen {
                     vector.shear(bounds);
                     let pairs = vector.pairs.assume_init_ref();
                     let corners = block.splat_corners::<L>(lane, vector.axes);
-                    let plane = Plane::of_triangle(&block.doubles(lane, vector.axes));
+                    let plane = Plane::of_lanes(&corners);
                     let crossings = pairs.candidates(&corners).crossings;
                     (inside, t) = pairs.decide(&corners, &plane, crossings, vector.nearest.t);
                     inside = inside & t.mask(entered);

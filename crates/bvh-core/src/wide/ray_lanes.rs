@@ -77,8 +77,8 @@ impl<L: Lanes> RayLanes<L> {
         let x = x.abs();
         let y = y.abs();
         let z = z.abs();
-        let third = x.max(y).lt(z);
-        (x.lt(y).and_not(third), third)
+        let most = x.max(y);
+        (x.lt(y) & z.le(most), most.lt(z))
     }
 
     /// Returns a bit per ray that begins outside of a region.

@@ -122,22 +122,6 @@ impl TriangleBlock {
         }
     }
 
-    /// Returns the corners of the triangle in a lane along these axes.
-    ///
-    /// # Safety
-    /// Axes are below 3, and `lane` is one.
-    #[inline(always)]
-    pub(crate) unsafe fn doubles(&self, lane: usize, axes: [usize; 3]) -> [[f64; 3]; 3] {
-        // SAFETY: there are three axes of four lanes for every corner.
-        unsafe {
-            let lanes = self.corners.as_ptr().cast::<f32>().add(lane);
-            let of = |corner: usize, axis: usize| {
-                f64::from(*lanes.add((3 * corner + axes[axis]) * Self::LANES))
-            };
-            three_by_three(of)
-        }
-    }
-
     /// The triangle in a lane, and its id; `None` in an unused lane.
     #[inline(always)]
     pub(crate) fn triangle(&self, lane: usize) -> Option<(u32, Triangle)> {

@@ -87,11 +87,6 @@ impl<const R: usize> Lanes for Singles<R> {
     }
 
     #[inline(always)]
-    unsafe fn load_unaligned(from: *const f32) -> Self {
-        unsafe { Self::load(from) }
-    }
-
-    #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
         unsafe { self.store_quarters(from_fn(|i| to.wrapping_add(4 * i))) }
     }
@@ -182,12 +177,6 @@ impl<const R: usize> Mask for Singles<R> {
     unsafe fn from_bits(bits: u32) -> Self {
         let lanes: [f32; 16] = from_fn(|lane| f32::from_bits(bits & 1 << lane));
         unsafe { Self::splat(0.0).below(Self::load(lanes.as_ptr())) }
-    }
-
-    #[inline(always)]
-    fn and_not(self, other: Self) -> Self {
-        // Lanes of all bits are the only ones that are not below all bits.
-        self & other.below(other.filled_with_bits(u32::MAX))
     }
 }
 

@@ -38,7 +38,7 @@ macro_rules! functions {
 
 /// Loads and stores of a register, and the fill of all its lanes.
 macro_rules! memory {
-    ($splat:ident $load:ident $load_unaligned:ident $store:ident) => {
+    ($splat:ident $load:ident $store:ident) => {
         #[inline(always)]
         unsafe fn splat(x: f32) -> Self {
             unsafe { Self($splat(x)) }
@@ -46,10 +46,6 @@ macro_rules! memory {
         #[inline(always)]
         unsafe fn load(from: *const f32) -> Self {
             unsafe { Self($load(from)) }
-        }
-        #[inline(always)]
-        unsafe fn load_unaligned(from: *const f32) -> Self {
-            unsafe { Self($load_unaligned(from)) }
         }
         #[inline(always)]
         unsafe fn store(self, to: *mut f32) {
@@ -126,7 +122,7 @@ impl Lanes for F32x4 {
     const N: usize = 4;
     type Mask = Self;
     type Double = F64x4;
-    memory!(_mm_set1_ps _mm_load_ps _mm_loadu_ps _mm_storeu_ps);
+    memory!(_mm_set1_ps _mm_load_ps _mm_storeu_ps);
     #[inline(always)]
     unsafe fn load_quarters(from: [*const f32; 4]) -> Self {
         unsafe { Self::load(from[0]) }
@@ -179,7 +175,7 @@ impl Lanes for F32x8 {
     const N: usize = 8;
     type Mask = Self;
     type Double = Two<F64x4>;
-    memory!(_mm256_set1_ps _mm256_load_ps _mm256_loadu_ps _mm256_storeu_ps);
+    memory!(_mm256_set1_ps _mm256_load_ps _mm256_storeu_ps);
     #[inline(always)]
     unsafe fn load_quarters(from: [*const f32; 4]) -> Self {
         unsafe { Self(_mm256_setr_m128(_mm_load_ps(from[0]), _mm_load_ps(from[1]))) }
@@ -232,7 +228,7 @@ impl Lanes for F32x16 {
     const N: usize = 16;
     type Mask = u16;
     type Double = Two<F64x8>;
-    memory!(_mm512_set1_ps _mm512_load_ps _mm512_loadu_ps _mm512_storeu_ps);
+    memory!(_mm512_set1_ps _mm512_load_ps _mm512_storeu_ps);
     #[inline(always)]
     unsafe fn load_quarters(from: [*const f32; 4]) -> Self {
         unsafe {
@@ -407,10 +403,6 @@ impl Mask for F32x4 {
             Self(_mm_castsi128_ps(_mm_cmpeq_epi32(set, lanes)))
         }
     }
-    #[inline(always)]
-    fn and_not(self, other: Self) -> Self {
-        unsafe { Self(_mm_andnot_ps(other.0, self.0)) }
-    }
 }
 
 impl Mask for F32x8 {
@@ -426,10 +418,6 @@ impl Mask for F32x8 {
             Self(_mm256_castsi256_ps(_mm256_cmpeq_epi32(set, lanes)))
         }
     }
-    #[inline(always)]
-    fn and_not(self, other: Self) -> Self {
-        unsafe { Self(_mm256_andnot_ps(other.0, self.0)) }
-    }
 }
 
 impl Mask for u16 {
@@ -440,9 +428,5 @@ impl Mask for u16 {
     #[inline(always)]
     unsafe fn from_bits(bits: u32) -> Self {
         bits as Self
-    }
-    #[inline(always)]
-    fn and_not(self, other: Self) -> Self {
-        self & !other
     }
 }
