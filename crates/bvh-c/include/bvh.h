@@ -202,9 +202,8 @@ BvhTree *bvh_tree_load_triangles(const char *path, const float *corners, size_t 
 // `tree` is a tree; `path` is a string.
 BvhStatus bvh_tree_save(const BvhTree *tree, const char *path);
 
-// Writes the tree to the file `path`, in UTF-8, for the tracer of another library: one of
-// `three-mesh-bvh`, `tinybvh`, `obvhs`, `bvh`, `madmann91-bvh` and `json`. The file is the same as
-// of `bvh export`.
+// Writes the tree to the file `path`, in UTF-8, for the tracer of another library, by its name for
+// `bvh export` (docs/INTEROP.md). The file is the same as of that command.
 //
 // `tree` is a tree; `tracer` and `path` are strings.
 BvhStatus bvh_tree_export(const BvhTree *tree, const char *tracer, const char *path);

@@ -335,9 +335,8 @@ pub unsafe extern "C" fn bvh_tree_save(tree: *const BvhTree, path: *const c_char
     })
 }
 
-/// Writes the tree to the file `path`, in UTF-8, for the tracer of another library: one of
-/// `three-mesh-bvh`, `tinybvh`, `obvhs`, `bvh`, `madmann91-bvh` and `json`. The file is the same as
-/// of `bvh export`.
+/// Writes the tree to the file `path`, in UTF-8, for the tracer of another library, by its name for
+/// `bvh export` (docs/INTEROP.md). The file is the same as of that command.
 ///
 /// `tree` is a tree; `tracer` and `path` are strings.
 #[unsafe(no_mangle)]

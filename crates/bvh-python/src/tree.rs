@@ -178,8 +178,8 @@ impl Tree {
         files::write(&path, &bytes).map_err(write_error)
     }
 
-    /// Returns the file of `bvh export` for the tracer of another library: `three-mesh-bvh`,
-    /// `tinybvh`, `obvhs`, `bvh`, `madmann91-bvh`, or `json` for any other.
+    /// Returns the file of `bvh export` for the tracer of another library, by its name there
+    /// (docs/INTEROP.md).
     ///
     /// >>> import json
     /// >>> json.loads(square.export("json"))["nodes"]

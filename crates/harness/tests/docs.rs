@@ -12,6 +12,7 @@
 mod queries;
 mod support;
 
+use bvh_core::export::Target;
 use queries::table;
 use regex_lite::{Captures, Regex};
 use std::collections::{BTreeMap, BTreeSet};
@@ -185,6 +186,18 @@ fn the_index_of_results_has_every_experiment_with_its_question() {
         let line = format!("| [{name}]({name}) | {question} |");
         assert!(index.contains(&line), "results/README.md lacks: {line}");
     }
+}
+
+#[test]
+fn the_page_of_tracers_has_every_target_and_whether_its_trees_divide_triangles() {
+    let page = fs::read_to_string(top().join("docs/INTEROP.md")).unwrap();
+    let rows = page.lines().skip_while(|line| !line.starts_with("| `--for` |")).skip(2);
+    let rows = rows.map_while(|line| {
+        let columns: Vec<&str> = line.split('|').map(str::trim).collect();
+        Some((*columns.get(1)?, *columns.get(3)? == "yes"))
+    });
+    let targets = Target::ALL.map(|target| (target.name, target.references > 1.0));
+    assert_eq!(rows.collect::<Vec<_>>(), targets);
 }
 
 #[test]

@@ -6,6 +6,7 @@ use crate::collapse::{binary, collapse_at_most};
 use crate::cost::{self, SahConstants};
 use crate::{Aabb, Bvh, Node, file};
 use alloc::{format, string::String, vec, vec::Vec};
+use bytemuck::NoUninit;
 
 /// A tracer that traces rays through a ready tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -135,10 +136,9 @@ impl Target {
     /// # Panics
     /// May panic on a tree that [`validate`](crate::validate()) rejects.
     pub fn fit(&self, tree: &Bvh) -> Bvh {
-        let collapsed = collapse_at_most(tree, &self.constants, self.most_objects);
-        let mut divided = binary(&collapsed).into_owned();
-        divided.halve_leaves(self.most_objects as usize);
-        let mut fitted = limit_depth(divided, self.most_depth);
+        let mut fitted = collapse_at_most(&binary(tree), &self.constants, self.most_objects);
+        fitted.halve_leaves(self.most_objects as usize);
+        limit_depth(&mut fitted, self.most_depth);
         larger_first(&mut fitted);
         compact(&fitted)
     }
@@ -160,30 +160,12 @@ impl Target {
     /// # Panics
     /// May panic on a tree that [`validate`](crate::validate()) rejects, or that is not fitted.
     pub fn bytes(&self, tree: &Bvh, boxes: &[Aabb]) -> Vec<u8> {
-        let nodes: Vec<u8> = match self.layout {
-            Layout::FirstCount => bytemuck::cast_slice(&tree.to_first_count()).to_vec(),
-            Layout::FirstCountAligned => {
-                bytemuck::cast_slice(&tree.to_first_count_aligned()).to_vec()
-            }
-            Layout::ThreeMesh => bytemuck::cast_slice(&tree.to_three_mesh()).to_vec(),
-            Layout::Json => return text(tree).into_bytes(),
-        };
-        let header = [
-            1,
-            (nodes.len() / 32) as u32,
-            tree.prim_ids.len() as u32,
-            file::boxes_checksum(boxes),
-            0,
-            0,
-            0,
-        ];
-        let words = header.iter().map(|word| word.to_le_bytes());
-        let ids = tree.prim_ids.iter().map(|id| id.to_le_bytes());
-        let mut bytes = b"BVHX".to_vec();
-        bytes.extend(words.flatten());
-        bytes.extend(nodes);
-        bytes.extend(ids.flatten());
-        bytes
+        match self.layout {
+            Layout::FirstCount => packed(&tree.to_first_count(), tree, boxes),
+            Layout::FirstCountAligned => packed(&tree.to_first_count_aligned(), tree, boxes),
+            Layout::ThreeMesh => packed(&tree.to_three_mesh(), tree, boxes),
+            Layout::Json => text(tree).into_bytes(),
+        }
     }
 
     /// Returns the cost of a ray in a tree, fitted or not: the surface area heuristic by the
@@ -195,6 +177,17 @@ impl Target {
 
 /// References per object that suffice: searches that may use twice as many hardly do.
 const DIVIDED: f64 = 1.3;
+
+/// Returns the [bytes](Target::bytes) of a tree with these nodes.
+fn packed<N: NoUninit>(nodes: &[N], tree: &Bvh, boxes: &[Aabb]) -> Vec<u8> {
+    let [nodes_len, ids_len] = [nodes.len(), tree.prim_ids.len()].map(|len| len as u32);
+    let header = [1, nodes_len, ids_len, file::boxes_checksum(boxes), 0, 0, 0];
+    let mut bytes = b"BVHX".to_vec();
+    bytes.extend(header.iter().flat_map(|word| word.to_le_bytes()));
+    bytes.extend(bytemuck::cast_slice::<N, u8>(nodes));
+    bytes.extend(tree.prim_ids.iter().flat_map(|id| id.to_le_bytes()));
+    bytes
+}
 
 /// Returns a binary tree as [text](Layout::Json). Numbers have the fewest digits that are read back
 /// as the same numbers.
@@ -225,7 +218,7 @@ fn larger_first(tree: &mut Bvh) {
 
 /// Replaces subtrees that reach below `most` levels by balanced ones over the same leaves, as far
 /// down as possible, where few rays come. Their former nodes stay, unused.
-fn limit_depth(mut tree: Bvh, most: usize) -> Bvh {
+fn limit_depth(tree: &mut Bvh, most: usize) {
     let mut heights = vec![0usize; tree.nodes.len()];
     let mut leaves = vec![1usize; tree.nodes.len()];
     for index in (0..tree.nodes.len()).rev() {
@@ -236,7 +229,7 @@ fn limit_depth(mut tree: Bvh, most: usize) -> Bvh {
         }
     }
     if heights.first().is_none_or(|&height| height <= most) {
-        return tree;
+        return;
     }
     let balanced = |leaves: usize| leaves.next_power_of_two().trailing_zeros() as usize;
     let mut open = vec![(0, 0)];
@@ -248,10 +241,9 @@ fn limit_depth(mut tree: Bvh, most: usize) -> Bvh {
         if children.clone().all(|child| depth + 1 + balanced(leaves[child]) <= most) {
             open.extend(children.map(|child| (child, depth + 1)));
         } else {
-            balance(&mut tree, index);
+            balance(tree, index);
         }
     }
-    tree
 }
 
 /// Makes the subtree a balanced one over its leaves in their order. Its former nodes stay, unused.

@@ -2,8 +2,10 @@
 //! has the documented bytes.
 
 use crate::support::{Random, SHAPES, ball, boxes, chain, grid_box, rays, scaled, soup, tree};
-use bvh_core::export::{CompressedBvh, CompressedNode, FirstCountNode, Target, ThreeMeshNode};
-use bvh_core::{Aabb, Bvh, InvalidBvh, Node, Ray, Triangle, any_hit, nearest_hit, validate};
+use bvh_core::export::{
+    CompressedBvh, CompressedNode, FirstCountNode, Layout, Target, ThreeMeshNode,
+};
+use bvh_core::{Aabb, Bvh, InvalidBvh, Node, Ray, Triangle, any_hit, file, nearest_hit, validate};
 use glam::Vec3;
 use proptest::prelude::*;
 
@@ -236,6 +238,52 @@ fn a_fitted_tree_has_what_the_tracer_accepts_and_traces_the_same_hits() {
                 assert_eq!(nearest_hit(&fitted, &triangles, ray), expected);
             }
         }
+    }
+}
+
+#[test]
+fn a_file_for_a_tracer_has_the_documented_header_nodes_and_ids() {
+    let mut random = Random(5);
+    let boxes = boxes(&soup(90, &mut random));
+    let tree = tree(&boxes, SHAPES[0], &mut random);
+    for target in Target::ALL {
+        let fitted = target.fit(&tree);
+        let bytes = target.bytes(&fitted, &boxes);
+        let (nodes, ids): (Vec<FirstCountNode>, Vec<u32>) = if target.layout == Layout::Json {
+            let text = String::from_utf8(bytes).unwrap().replace(['\n', ']', '}'], "");
+            let (nodes, ids) =
+                text.strip_prefix("{\"nodes\":[").unwrap().split_once(",\"ids\":[").unwrap();
+            let node = |text: &str| {
+                let numbers: Vec<f32> = text
+                    .split(',')
+                    .filter(|word| !word.is_empty())
+                    .map(|word| word.parse().unwrap())
+                    .collect();
+                let [min, max] = [0, 3].map(|at| numbers[at..at + 3].try_into().unwrap());
+                let [first, count] = [6, 7].map(|at| numbers[at] as u32);
+                FirstCountNode { min, first, max, count }
+            };
+            let ids = ids.split(", ").map(|id| id.parse().unwrap()).collect();
+            (nodes.split('[').skip(1).map(node).collect(), ids)
+        } else {
+            let [version, nodes, ids, checksum] = [4, 8, 12, 16].map(|at| word(&bytes, at));
+            assert_eq!((&bytes[..4], version), (&b"BVHX"[..], 1));
+            assert_eq!(checksum, file::boxes_checksum(&boxes));
+            assert_eq!(bytes[20..32], [0; 12]);
+            let (nodes, all_ids) = bytes[32..].split_at(32 * nodes as usize);
+            assert_eq!(all_ids.len(), 4 * ids as usize);
+            let expected = match target.layout {
+                Layout::ThreeMesh => bytemuck::cast_slice(&fitted.to_three_mesh()).to_vec(),
+                Layout::FirstCountAligned => {
+                    bytemuck::cast_slice(&fitted.to_first_count_aligned()).to_vec()
+                }
+                _ => bytemuck::cast_slice(&fitted.to_first_count()).to_vec(),
+            };
+            assert_eq!(nodes, expected, "{target:?}");
+            let ids = all_ids.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
+            (fitted.to_first_count(), ids)
+        };
+        assert_eq!(Bvh::from_first_count(&nodes, &ids).unwrap(), fitted, "{target:?}");
     }
 }
 
