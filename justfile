@@ -19,9 +19,8 @@ verify:
 table4:
     cargo run -p harness -- experiments/table4.toml
 
-# Times of builders against other libraries.
+# `best` after the time of other libraries' builds.
 bench:
-    cargo bench --manifest-path attic/Cargo.toml --bench build
     cargo bench --manifest-path attic/Cargo.toml --bench peers -- escher
 
 docs:
