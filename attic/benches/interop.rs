@@ -4,6 +4,8 @@
 //! `scripts/interop [--time] [SCENE...]` builds the programs that this one calls, and runs it. With
 //! scenes, it only prints their table.
 
+mod tracer_scenes;
+
 use ::bvh::bvh::Bvh as TheirBvh;
 use ::obvhs::bvh2::builder::build_bvh2_from_tris;
 use ::obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris, bvh2_to_cwbvh::bvh2_to_cwbvh};
@@ -13,20 +15,18 @@ use attic::tracing::rays::{coherence, query, rays};
 use attic::{bvh, obvhs};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::export::Target;
-use bvh_core::{
-    Bvh, PreparedRay, Primitives, Ray, TestCounts, Triangle, any_hit_by, nearest_hit_by,
-};
+use bvh_core::{Bvh, PreparedRay, Ray, TestCounts, Triangle, any_hit_by, nearest_hit_by};
 use bvh_scenes::rays::{Kind, Viewpoint};
-use bvh_scenes::{Scene, SceneKind, files, trace::Query};
+use bvh_scenes::{Scene, files, trace::Query};
 use bvh_search::{Bake, Budget};
-use glam::{DVec3, UVec2, Vec3, dvec3};
+// For the library's macro.
+use glam::UVec2;
 use harness::processor::PROCESSOR;
-use harness::statistics::{geometric_mean, quantile};
-use libm::{cos, sin};
+use harness::statistics::{self, geometric_mean, median_interval};
 use std::collections::{BTreeMap, BTreeSet};
-use std::f64::consts::PI;
 use std::path::Path;
 use std::process::Command;
+use tracer_scenes::scenes;
 
 /// What every scene is searched for, in nodes visited.
 const WORK: u64 = 100_000_000;
@@ -35,18 +35,6 @@ const ROUNDS: usize = 15;
 const KINDS: [Kind; 3] = [Kind::Primary, Kind::Incoherent, Kind::Shadow];
 /// The searched trees, and the references per triangle.
 const SEARCHED: [(&str, f64); 2] = [("searched", 1.0), ("divided", 1.3)];
-const OUTSIDE: [[f64; 3]; 2] = [[1.9, 1.3, 2.2], [0.5; 3]];
-/// The scenes, and what is seen in fractions of their boxes, as in experiments/peers.toml.
-const SCENES: [(&str, [[f64; 3]; 2]); 7] = [
-    ("sponza", [[0.15, 0.25, 0.5], [0.9, 0.35, 0.5]]),
-    ("kitchen", [[0.5, 0.6, 0.5], [0.9, 0.4, 0.9]]),
-    ("cloister", [[0.2, 0.3, 0.3], [0.8, 0.4, 0.6]]),
-    ("escher", OUTSIDE),
-    ("spot", OUTSIDE),
-    ("knot", OUTSIDE),
-    ("pebble", OUTSIDE),
-];
-
 /// The scenes of the geometric means.
 const BUILDINGS: &str = "sponza and kitchen";
 
@@ -87,8 +75,6 @@ fn main() {
     let (flags, only): (Vec<_>, Vec<_>) =
         arguments.into_iter().partition(|word| word.starts_with("--"));
     assert!(flags.iter().all(|flag| flag == "--time"), "{flags:?}; accepted: --time");
-    let known = SCENES.map(|(name, _)| name);
-    assert!(only.iter().all(|name| known.contains(&&**name)), "{only:?}; accepted: {known:?}");
     let rounds = if flags.is_empty() { 0 } else { ROUNDS };
     let mut of_buildings = BTreeMap::new();
     println!("{}", PROCESSOR.name());
@@ -98,21 +84,19 @@ fn main() {
     let mut speeds = "tracer,processor,scene,rays,count,rounds,tree,over,over_tree,ratio_median,\
                       ratio_low,ratio_high\n"
         .to_owned();
-    for (name, [eye, target]) in SCENES {
-        if only.is_empty() || only.iter().any(|one| one == name) {
-            let scene = scene(name);
-            let measured = measure(&scene, &Viewpoint { eye, target }, rounds);
-            for (Case { tracer, rays, tree }, [hits, boxes, triangles]) in &measured.tests {
-                let all = scene.boxes.len();
-                tests += &format!(
-                    "{tracer},{name},{all},{rays},{RAYS},{tree},{hits},{boxes},{triangles}\n"
-                );
-            }
-            compare(name, &measured, &mut gains, &mut speeds, &mut of_buildings);
+    for (scene, view) in scenes(&only) {
+        let measured = measure(&scene, &view, rounds);
+        let name = &*scene.name;
+        for (Case { tracer, rays, tree }, [hits, boxes, triangles]) in &measured.tests {
+            let all = scene.boxes.len();
+            tests +=
+                &format!("{tracer},{name},{all},{rays},{RAYS},{tree},{hits},{boxes},{triangles}\n");
         }
+        compare(name, &measured, &mut gains, &mut speeds, &mut of_buildings);
     }
     let processor = PROCESSOR.name();
-    for ((Case { tracer, rays, tree }, over), Ratios { tests, speeds: of_scenes }) in &of_buildings {
+    for ((Case { tracer, rays, tree }, over), Ratios { tests, speeds: of_scenes }) in &of_buildings
+    {
         let line = format!("{BUILDINGS:18} {tracer:16} {rays:10} {tree:8}");
         // Without the trees that a library can trace in one of the scenes only.
         if let [_, _] = tests[..] {
@@ -162,7 +146,7 @@ fn compare(
     let processor = PROCESSOR.name();
     let is_ours = |case: &Case| SEARCHED.iter().any(|(name, _)| case.tree == *name);
     let cases: BTreeSet<&Case> = measured.tests.keys().chain(measured.seconds.keys()).collect();
-    let median = |seconds: &[f64]| quantile(seconds, 0.5).expect("rounds");
+    let median = |seconds: &[f64]| statistics::median(seconds).expect("rounds");
     for case in cases.iter().filter(|case| is_ours(case)) {
         let Case { tracer, rays, tree } = case;
         let cost = |case: &Case| {
@@ -190,10 +174,9 @@ fn compare(
             let timed = own.iter().filter_map(|own| Some((own, measured.seconds.get(own)?)));
             let fastest = timed.min_by(|(_, a), (_, b)| median(a).total_cmp(&median(b)));
             if let (Some((own, theirs)), Some(ours)) = (fastest, measured.seconds.get(case)) {
-                let mut ratios: Vec<f64> = theirs.iter().zip(ours).map(|(a, b)| a / b).collect();
-                ratios.sort_by(f64::total_cmp);
-                // The fourth of fifteen values from either end is an interval of 96 % for the median.
-                let [low, middle, high] = [3, ROUNDS / 2, ROUNDS - 4].map(|place| ratios[place]);
+                let ratios: Vec<f64> = theirs.iter().zip(ours).map(|(a, b)| a / b).collect();
+                let (low, high) = median_interval(&ratios).expect("rounds");
+                let middle = median(&ratios);
                 let own = &own.tree;
                 *speeds += &format!(
                     "{tracer},\"{processor}\",{scene},{rays},{RAYS},{ROUNDS},{tree},{over},{own},\
@@ -212,61 +195,6 @@ fn compare(
             }
         }
     }
-}
-
-fn scene(name: &str) -> Scene {
-    let triangles = match name {
-        "knot" => knot(),
-        "pebble" => pebble(),
-        name => return Scene::load(name).unwrap_or_else(|error| panic!("{error}")),
-    };
-    Scene::new(name, SceneKind::Procedural, Primitives::Triangles(triangles))
-}
-
-/// A tube around a curve that winds three times around a torus while it goes round twice.
-fn knot() -> Vec<Triangle> {
-    let on_curve = |turn: f64| {
-        let radius = 2.0 + cos(1.5 * turn);
-        0.5 * dvec3(radius * cos(turn), radius * sin(turn), sin(1.5 * turn))
-    };
-    surface([1250, 40], |[around, across]| {
-        let (turn, angle) = (4.0 * PI * around, 2.0 * PI * across);
-        let point = on_curve(turn);
-        let ahead = on_curve(turn + 0.01);
-        let side = (ahead - point).cross(ahead + point).normalize();
-        let up = side.cross(ahead - point).normalize();
-        point + 0.35 * (cos(angle) * up + sin(angle) * side)
-    })
-}
-
-/// A smooth closed surface of bumps, over a sphere.
-fn pebble() -> Vec<Triangle> {
-    surface([350, 175], |[around, down]| {
-        let (azimuth, polar) = (2.0 * PI * around, PI * down);
-        let point = dvec3(sin(polar) * cos(azimuth), cos(polar), sin(polar) * sin(azimuth));
-        let DVec3 { x, y, z } = point;
-        let coarse = sin(5.0 * x + 1.0) * sin(6.0 * y);
-        let fine = sin(17.0 * z + 3.0 * x) * sin(13.0 * y + 2.0);
-        (1.0 + 0.12 * coarse + 0.05 * fine) * point
-    })
-}
-
-/// Triangles over a grid of parameters from 0 to 1, without those that have no area.
-fn surface([columns, rows]: [u32; 2], point: impl Fn([f64; 2]) -> DVec3) -> Vec<Triangle> {
-    let corner = |column: u32, row: u32| -> Vec3 {
-        let fraction = |place: u32, of: u32| f64::from(place % of) / f64::from(of);
-        // A row may end at 1, where a sphere has a pole.
-        let down = if row == rows { 1.0 } else { fraction(row, rows) };
-        point([fraction(column, columns), down]).as_vec3()
-    };
-    let mut triangles = Vec::new();
-    for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
-        let [a, b] = [corner(column, row), corner(column + 1, row)];
-        let [c, d] = [corner(column, row + 1), corner(column + 1, row + 1)];
-        triangles.extend([Triangle([a, b, c]), Triangle([b, d, c])]);
-    }
-    triangles.retain(|Triangle([a, b, c])| (b - a).cross(c - a).length_squared() > 1e-16);
-    triangles
 }
 
 /// Measures all tracers. Those in other languages read the scene from a folder.

@@ -226,6 +226,19 @@ mod tests {
     }
 
     #[test]
+    fn the_tree_of_a_layout_has_its_boxes_and_every_triangle() {
+        for (objects, seed) in [(1, 0), (9, 1), (700, 2)] {
+            let (triangles, tree) = scene(objects, seed);
+            let wide = WideBvh::new(&tree, &triangles).unwrap();
+            let tree = wide.to_tree();
+            crate::validate(&tree, &crate::boxes(&triangles)).unwrap();
+            let blocks = |node: &Node| node.prims().len().div_ceil(TriangleBlock::LANES);
+            assert!(boxes(&wide).eq(tree.nodes.iter().map(|node| (node.aabb, blocks(node)))));
+        }
+        assert!(WideBvh::new(&Bvh::default(), &[]).unwrap().to_tree().nodes.is_empty());
+    }
+
+    #[test]
     fn rays_that_ask_for_any_hit_come_to_a_wall_before_what_is_scattered_whether_the_wall_is_divided_or_not()
      {
         let corner = |x: f32, y: f32| [x, y, 0.0];

@@ -2,8 +2,8 @@
 
 use super::kernel::Kernel;
 use super::triangles::TriangleBlock;
-use crate::Aabb;
 use crate::slabs::near_region;
+use crate::{Aabb, Bvh, Node};
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
@@ -166,6 +166,44 @@ impl WideBvh {
             }
         }
         leaves
+    }
+
+    /// Returns the layout as a tree, for the wide nodes of other tracers: up to eight children of a
+    /// node in the order of the lanes, and leaves of the triangles of their blocks. Triangles without
+    /// area are in no leaf, so that a node may have a single child. O(n).
+    pub fn to_tree(&self) -> Bvh {
+        let mut tree = Bvh::default();
+        let mut open = Vec::new();
+        if let Some(root) = self.root {
+            tree.nodes.push(Node::leaf(self.bounds, 0, 0));
+            open.push((0, root));
+        }
+        while let Some((place, child)) = open.pop() {
+            let aabb = tree.nodes[place].aabb;
+            if child.is_node() {
+                let node = &self.nodes[child.index()];
+                let first = tree.nodes.len();
+                for (lane, &child) in node.children.iter().enumerate() {
+                    if let Some(aabb) = node.lane_box(lane) {
+                        open.push((tree.nodes.len(), child));
+                        tree.nodes.push(Node::leaf(aabb, 0, 0));
+                    }
+                }
+                let children = tree.nodes.len() - first;
+                tree.nodes[place] = Node::inner(aabb, first as u32, children as u32);
+            } else {
+                let first = tree.prim_ids.len();
+                for block in &self.blocks[child.index()..] {
+                    tree.prim_ids.extend(block.triangles().map(|(id, _)| id));
+                    if block.is_last() {
+                        break;
+                    }
+                }
+                let objects = tree.prim_ids.len() - first;
+                tree.nodes[place] = Node::leaf(aabb, first as u32, objects as u32);
+            }
+        }
+        tree
     }
 
     /// Returns the layout of nothing within these bounds, for the portable kernel.
