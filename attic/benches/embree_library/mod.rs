@@ -267,7 +267,7 @@ impl<'e> Traced<'e> {
                     unsafe { (free_block as *mut Block).write(Block::new(ids, triangles)) };
                     free_block += size_of::<Block>();
                 }
-                first | LEAF + leaf_blocks(node)
+                first | (LEAF + leaf_blocks(node))
             } else {
                 let mut wide = Node::EMPTY;
                 for (lane, child) in node.children().enumerate() {
