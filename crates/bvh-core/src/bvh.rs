@@ -68,13 +68,6 @@ impl Node {
         }
     }
 
-    /// Moves the start of the node's range, of children or of entries in `prim_ids`, to `first`.
-    /// The length of the range stays the same.
-    #[inline(always)]
-    pub fn set_first(&mut self, first: u32) {
-        self.first = first;
-    }
-
     /// Returns whether the node is a leaf.
     #[inline]
     pub fn is_leaf(&self) -> bool {

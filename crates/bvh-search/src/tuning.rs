@@ -154,8 +154,8 @@ tuned! { "cd attic; cargo bench --bench peers -- SCENE..." {
     COLD_MEMORY: f64 = 2.5, "factor";
     /// Part of the scene on which the sort is timed a second time, in warm memory.
     WARM_SAMPLE: usize = 16, "divisor of the number of objects";
-    /// Time reserved for ordering, evaluating and bounding the tree after reinsertion.
-    FINISH_TIME: f64 = 1.0, "sort times";
+    /// Time reserved for converting and evaluating the tree after reinsertion.
+    FINISH_TIME: f64 = 2.0, "sort times";
     /// The clustering that reinsertion starts from. A better clustering takes the time of more
     /// reinsertions than it saves.
     CLUSTERING: Clustering = Clustering { radius: 5, near_rounds: 1 }, "clusters, rounds";

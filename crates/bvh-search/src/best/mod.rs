@@ -27,13 +27,11 @@ use crate::run::{
 };
 use crate::tree::{Metric, Working, search_by_metric};
 use crate::tuning::{CLUSTERING, CLUSTERING_MUCH_CHEAPER, REINSERTED_BELOW, SECURED_FROM};
-use bvh_build::ploc::{self, MortonOrder};
-use bvh_build::{BuildError, Builder, Watch};
+use bvh_build::{BuildError, Builder, Watch, ploc};
 use bvh_core::Bvh;
 use bvh_core::cost::Objective;
 pub use config::{Config, Horizon};
 use improve::improve;
-use small_budget::SmallBudget;
 
 search_by_metric!(Config);
 
@@ -97,7 +95,7 @@ impl Config {
         run: &mut Run,
     ) -> Found {
         if problem.splits.is_some() || problem.objective == Objective::Layout {
-            let tree = self.initial(None, problem, run)?;
+            let tree = self.initial(problem, run)?;
             let other = division(problem, run.observer())?;
             let best = Incumbent::begin(tree, problem, run);
             return self.improved(best, other, metric, problem, seed, run);
@@ -109,14 +107,12 @@ impl Config {
         // The search for small budgets supports the area only.
         let small = match problem.measure {
             None => small_budget::search(problem, run)?,
-            Some(_) => SmallBudget::Large(None),
+            Some(_) => None,
         };
         let best = match small {
-            SmallBudget::Tree(tree) => return Ok(tree),
-            SmallBudget::LocalOptimum(best) => best,
-            SmallBudget::Large(morton) => {
-                Incumbent::begin(self.initial(morton, problem, run)?, problem, run)
-            }
+            Some((best, false)) => return Ok(best.tree),
+            Some((best, true)) => best,
+            None => Incumbent::begin(self.initial(problem, run)?, problem, run),
         };
         self.improved(best, None, metric, problem, seed, run)
     }
@@ -126,16 +122,11 @@ impl Config {
     /// more thorough clustering is built and kept aside, so no budget ends above it. If the first
     /// clustering is much cheaper, the cheapest of them becomes the initial tree. The work of a
     /// clustering counts only if it is used, like the work of the [`fallback`].
-    fn initial(
-        &self,
-        morton: Option<MortonOrder>,
-        problem: &Problem,
-        run: &mut Run,
-    ) -> Result<Kept, SearchError> {
+    fn initial(&self, problem: &Problem, run: &mut Run) -> Result<Kept, SearchError> {
         let boxes = problem.boxes;
         let build = |watch: &Watch| construction().build_watched(boxes, problem.measure, watch);
-        let morton = morton.map_or_else(|| MortonOrder::new(boxes), Ok)?;
-        let clustered = watched(run.observer(), |watch| morton.build(&CLUSTERING, None, watch))?;
+        let cluster = |watch: &Watch| CLUSTERING.build_watched(boxes, None, watch);
+        let clustered = watched(run.observer(), cluster)?;
         // Only the cheapest tree is kept, because the division of a large scene needs most of the
         // memory of the search.
         run.keep_aside(Kept::new(clustered, problem));

@@ -12,55 +12,46 @@
 use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion::pass;
 use crate::parallel::threads;
-use crate::run::{Kept, Observer, Problem, Run, SearchError, Tally};
-use crate::tree::{Linked, Siblings};
+use crate::run::{Kept, Observer, Problem, Run, SearchError};
+use crate::tree::{Area, Working};
 use crate::tuning::{
     ANNEAL_FROM_TIME, ANNEAL_FROM_WORK, CLUSTERING, COLD_MEMORY, FINISH_TIME, FIRST_PASS, FRONT,
     MOVES_PER_READING, SEVERAL_THREADS, WARM_SAMPLE,
 };
 use bvh_build::Watch;
 use bvh_build::ploc::MortonOrder;
-use bvh_core::Bvh;
 
-/// The result of a small budget.
-#[allow(clippy::large_enum_variant, reason = "one is made per search, and taken apart at once")]
-pub(super) enum SmallBudget<'p> {
-    /// The budget is not small. Holds the objects in Morton order, if a time limit required the
-    /// sort.
-    Large(Option<MortonOrder>),
-    /// The budget is used up.
-    Tree(Bvh),
-    /// Reinsertion reached a local optimum before the end of the budget, so the search can
-    /// continue.
-    LocalOptimum(Incumbent<'p>),
-}
-
-/// Searches within a small budget. Improves a clustering by reinsertion as far as the budget
-/// reaches.
+/// Improves a clustering by reinsertion as far as a small budget reaches. Also returns whether this
+/// ended in a local optimum, so that the rest of the budget remains. `None` if the budget is not
+/// small.
 pub(super) fn search<'p>(
     problem: &Problem<'p>,
     run: &mut Run,
-) -> Result<SmallBudget<'p>, SearchError> {
+) -> Result<Option<(Incumbent<'p>, bool)>, SearchError> {
     let observer = run.observer();
     let n = problem.boxes.len();
     let began = observer.progress();
     let work = run.left().work / n.max(1) as u64;
     // Without a clock the decision depends on the work alone, which keeps the result reproducible.
     if n < 3 || began.is_none() && work >= ANNEAL_FROM_WORK {
-        return Ok(SmallBudget::Large(None));
+        return Ok(None);
     }
     let morton = MortonOrder::new(problem.boxes)?;
-    // Reinsertion must end early enough for the order and the evaluation of the tree.
-    let mut end = None;
+    let mut end = f64::INFINITY;
     if let (Some(began), Some(now)) = (began, observer.progress()) {
         let sort = (now - began).max(SHORTEST_SORT);
         if is_enough_for_annealing(1.0 - began, sort, problem, observer)? {
-            return Ok(SmallBudget::Large(Some(morton)));
+            return Ok(None);
         }
-        end = Some(1.0 - FINISH_TIME * sort);
+        // Reinsertion must end early enough for the conversion and the evaluation of the tree.
+        end = 1.0 - FINISH_TIME * sort;
     }
     let clustered = morton.build(&CLUSTERING, None, &Watch::default())?;
-    Ok(improved(clustered, end, problem, run))
+    let mut best = Incumbent::begin(Kept::new(clustered, problem), problem, run);
+    let mut tree = best.working(Area)?;
+    let is_local_optimum = reinsert_largest(&mut tree, end, run);
+    best.offer(&tree, run);
+    Ok(Some((best, is_local_optimum)))
 }
 
 /// The shortest duration of a sort, as a fraction of all time: a coarse clock may not advance during
@@ -90,38 +81,9 @@ fn is_enough_for_annealing(
     Ok(time >= sorts * warm.max(SHORTEST_SORT))
 }
 
-/// Improves the initial tree by reinsertion until a local optimum, until the work is used up, or
-/// until the observer's progress reaches `end`, if the time is limited.
-fn improved<'p>(
-    tree: Bvh,
-    end: Option<f64>,
-    problem: &Problem<'p>,
-    run: &mut Run,
-) -> SmallBudget<'p> {
-    // A time-limited search does not evaluate the initial tree: reinsertion never makes it worse,
-    // and the evaluation would take the time of many moves.
-    let mut before = None;
-    if end.is_none() {
-        before = Some(Incumbent::begin(Kept::new(tree.clone(), problem), problem, run));
-    } else {
-        run.count(Tally { moves: 1, kept: 0, work: tree.nodes.len() as u64 });
-    }
-    let mut siblings = Siblings::new(tree);
-    let is_local_optimum = reinsert_largest(&mut siblings, end.unwrap_or(f64::INFINITY), run);
-    let tree = siblings.into_tree();
-    let best = match before {
-        Some(mut best) => {
-            best.offer_tree(tree, run);
-            best
-        }
-        None => Incumbent::begin(Kept::new(tree, problem), problem, run),
-    };
-    if is_local_optimum { SmallBudget::LocalOptimum(best) } else { SmallBudget::Tree(best.tree) }
-}
-
 /// Reinserts more and more of the largest nodes, until the observer's progress reaches `end` or the
 /// run stops. Returns whether it reached a local optimum first.
-fn reinsert_largest(tree: &mut Siblings, end: f64, run: &mut Run) -> bool {
+fn reinsert_largest(tree: &mut Working, end: f64, run: &mut Run) -> bool {
     let observer = run.observer();
     let mut part = FIRST_PASS;
     let mut order = Vec::new();
@@ -147,14 +109,14 @@ fn reinsert_largest(tree: &mut Siblings, end: f64, run: &mut Run) -> bool {
 /// Writes the k largest nodes to `order`, the largest first and equal nodes by index, where k is
 /// about the fraction `part` of all nodes. Examines only the first `front` · k nodes.
 /// O(`front` · k + k log k).
-fn select_largest(tree: &Siblings, part: f64, front: usize, order: &mut Vec<u32>) {
-    let nodes = tree.len() - 1;
+fn select_largest(tree: &Working, part: f64, front: usize, order: &mut Vec<u32>) {
+    let nodes = tree.nodes.len() - 1;
     let count = ((part * nodes as f64) as usize).clamp(1, nodes);
     let examined = 1..=count.saturating_mul(front).min(nodes) as u32;
     // Areas are never negative, so their bits have the same order. Inverted bits put the largest
     // first, and the index breaks ties.
     let mut keyed: Vec<(u64, u32)> =
-        examined.map(|index| (!tree.area(index).to_bits(), index)).collect();
+        examined.map(|index| (!tree.nodes[index as usize].area.to_bits(), index)).collect();
     if count < keyed.len() {
         // Selection first makes the sort O(k log k) instead of O(n log n).
         keyed.select_nth_unstable(count);
@@ -170,8 +132,8 @@ mod tests {
     use super::*;
     use crate::best;
     use crate::run::{Budget, solve};
-    use crate::scatter::scatter;
-    use bvh_build::{Builder, ploc};
+    use crate::scatter::{built, scatter};
+    use bvh_build::ploc;
     use bvh_core::{cost, validate};
     use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
@@ -224,11 +186,10 @@ mod tests {
 
     #[test]
     fn the_largest_nodes_are_those_that_a_full_sort_puts_first() {
-        let boxes = scatter(300);
-        let tree = ploc::Config::default().build(&boxes).unwrap();
-        let tree = Siblings::new(tree);
-        let mut all: Vec<u32> = (1..tree.len() as u32).collect();
-        all.sort_by(|&a, &b| tree.area(b).total_cmp(&tree.area(a)));
+        let tree = built(&ploc::Config::default(), &scatter(300));
+        let area = |index: u32| tree.nodes[index as usize].area;
+        let mut all: Vec<u32> = (1..tree.nodes.len() as u32).collect();
+        all.sort_by(|&a, &b| area(b).total_cmp(&area(a)));
         let mut order = Vec::new();
         for part in [0.001, 0.1, 0.5, 1.0] {
             select_largest(&tree, part, usize::MAX, &mut order);

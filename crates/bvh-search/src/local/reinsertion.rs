@@ -19,7 +19,7 @@
 //!
 //! Both sums are the same kind: the cost of a position, which `PositionSearch` finds by branch
 //! and bound over the whole tree while X stays where it is (`position_of_attached`). The move is
-//! made by `Linked::reinsert`.
+//! made by `Working::reinsert`.
 //!
 //! Differs from the papers: the search is exact and sequential, every node is tried, and the method
 //! ends only when a full pass over the tree finds no improvement.
@@ -27,7 +27,7 @@
 use super::TOLERANCE;
 use super::incumbent::Incumbent;
 use crate::run::{Found, Observer, Problem, Quota, Run, Tally, WORK_PER_POLL};
-use crate::tree::{Linked, Metric, PositionSearch, Working, search_by_metric};
+use crate::tree::{ANCHOR, Metric, PositionSearch, Working, search_by_metric};
 use bvh_core::with_vector_instructions;
 
 bvh_config::config! {
@@ -107,13 +107,13 @@ with_vector_instructions! {
     /// after the other. Stops early when the quota is used up or the observer cancels. Returns the
     /// number of nodes tried and moved, and of nodes visited; one search for a position visits the
     /// whole tree at worst.
-    pub(crate) pass = pass_plain<T: Linked>(
-        tree: &mut T, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally
+    pub(crate) pass = pass_plain(
+        tree: &mut Working<impl Metric>, order: &[u32], quota: Quota, observer: &dyn Observer) -> Tally
 }
 
 #[inline(always)]
-fn pass_plain<T: Linked>(
-    tree: &mut T,
+fn pass_plain(
+    tree: &mut Working<impl Metric>,
     order: &[u32],
     quota: Quota,
     observer: &dyn Observer,
@@ -131,7 +131,7 @@ fn pass_plain<T: Linked>(
             }
             work_at_poll = done.work + WORK_PER_POLL;
         }
-        let is_root = tree.parent(node) == T::ABOVE;
+        let is_root = tree.nodes[node as usize].parent == ANCHOR;
         if is_root {
             continue;
         }

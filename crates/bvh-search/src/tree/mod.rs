@@ -1,33 +1,27 @@
 //! Mutable trees, and the search for the best position in them.
 //!
 //! [`Working`] is the working form of all searches: parents, packed boxes, cached areas, and a
-//! journal that undoes a change. Its construction takes longer than a search of a few milliseconds
-//! has. That search changes the flat tree itself ([`Siblings`]). Both implement [`Linked`], the
-//! operations that reinsertion needs.
+//! journal that undoes a change.
 //!
-//! In the working form, node 0 is the *anchor*, whose first child is the root, so the root needs no
+//! Node 0 is the *anchor*, whose first child is the root, so the root needs no
 //! special case. A detached subtree keeps its parent node, and attaching reuses that node, so no
 //! move allocates memory.
 
 mod convert;
 mod layout_cost;
-mod linked;
 mod metric;
 mod order;
 mod position;
 mod shape;
-mod siblings;
 mod subsets;
 
 use bvh_core::PackedAabb;
 use bvh_core::cost::Sum;
-pub(crate) use linked::Linked;
 #[cfg(test)]
 pub(crate) use metric::AreaWithLeaves;
 pub(crate) use metric::{Area, Measured, Metric, search_by_metric};
 pub(crate) use position::{PositionSearch, Scope};
 pub(crate) use shape::Shape;
-pub(crate) use siblings::Siblings;
 pub(crate) use subsets::Subsets;
 
 /// No node.
@@ -259,6 +253,15 @@ impl<M: Metric> Working<M> {
         }
         self.added += added;
         (added, visits)
+    }
+
+    /// Moves the subtree of `node` next to `position`, which is not inside the subtree and neither
+    /// its parent nor its sibling, as one change. Returns the number of nodes visited.
+    #[inline(always)]
+    pub fn reinsert(&mut self, node: u32, position: u32) -> u64 {
+        self.begin();
+        let (_, _, visits) = self.detach(node);
+        visits + self.attach(node, position).1
     }
 
     /// Adds a detached leaf with its parent node, so that it can be attached. The boxes are empty.

@@ -25,8 +25,7 @@
 //! promising node and examines the neighbourhood first (Meister & Bittner 2018), so the bound is
 //! tight from the start.
 
-use super::linked::Linked;
-use super::{ANCHOR, Metric, NONE, Working, contains};
+use super::{ANCHOR, Metric, NONE, Node, Working, contains};
 use bvh_core::PackedAabb;
 
 /// Finds positions. Holds the buffers of a search and counts the nodes that it visits.
@@ -145,33 +144,27 @@ impl PositionSearch {
     /// The boxes of ancestors count *without* the node here, so their current boxes are the unions
     /// with B.
     #[inline(always)]
-    pub fn position_of_attached<T: Linked>(
+    pub fn position_of_attached(
         &mut self,
-        tree: &T,
+        tree: &Working<impl Metric>,
         node: u32,
         tolerance: f64,
     ) -> (Option<Position>, f64) {
-        let aabb = tree.aabb(node);
-        let area = tree.area(node);
-        let parent = tree.parent(node);
+        let node_at = |index: u32| &tree.nodes[index as usize];
+        let Node { aabb, area, parent, .. } = *node_at(node);
         self.path.clear();
-        let sibling = tree.other(parent, node);
-        let mut rest = tree.aabb(sibling);
-        let rest_area = tree.area(sibling);
-        let joint = tree.area(parent);
-        let mut index = tree.parent(parent);
+        let sibling = node_at(parent).other(node);
+        let Node { aabb: mut rest, area: rest_area, .. } = *node_at(sibling);
+        let joint = node_at(parent).area;
+        let mut index = node_at(parent).parent;
         self.path.push(Step { node: sibling, below: NONE, joint, growth: joint - rest_area });
         let mut below = parent;
-        while index != T::ABOVE {
-            let area = tree.area(index);
-            rest.grow(&tree.aabb(tree.other(index, below)));
-            self.path.push(Step {
-                node: index,
-                below,
-                joint: area,
-                growth: area - tree.size(&rest),
-            });
-            (below, index) = (index, tree.parent(index));
+        while index != ANCHOR {
+            let node = node_at(index);
+            rest.grow(&node_at(node.other(below)).aabb);
+            let growth = node.area - tree.metric.of(&rest);
+            self.path.push(Step { node: index, below, joint: node.area, growth });
+            (below, index) = (index, node.parent);
         }
         let mut best = Position { sibling: NONE, cost: f64::INFINITY };
         self.climb(&mut best);
@@ -202,14 +195,14 @@ impl PositionSearch {
 
     /// Examines everything next to and below the path, from its first node up.
     #[inline(always)]
-    fn search(&mut self, tree: &impl Linked, item: Item, best: &mut Position) {
+    fn search(&mut self, tree: &Working<impl Metric>, item: Item, best: &mut Position) {
         for &Step { node: index, below, growth, .. } in &self.path {
             if growth + item.1 >= best.cost {
                 continue;
             }
             let mut next = (index, growth);
             if below != NONE {
-                let other = tree.other(index, below);
+                let other = tree.nodes[index as usize].other(below);
                 self.visits += 1;
                 next = (other, try_position(tree, other, item.0, growth, best));
                 if next.1 + item.1 >= best.cost {
@@ -219,7 +212,8 @@ impl PositionSearch {
             // Descend, the more promising child first: a lower best cost rejects more of the rest.
             loop {
                 let (node, growth) = next;
-                if let Some([left, right]) = tree.children(node) {
+                let [left, right] = tree.nodes[node as usize].children;
+                if left != NONE {
                     self.visits += 2;
                     let mut first = (left, try_position(tree, left, item.0, growth, best));
                     let mut second = (right, try_position(tree, right, item.0, growth, best));
@@ -256,15 +250,16 @@ fn pop(stack: &mut Vec<(u32, f64)>, area: f64, limit: f64) -> Option<(u32, f64)>
 /// infinite for a leaf.
 #[inline(always)]
 fn try_position(
-    tree: &impl Linked,
+    tree: &Working<impl Metric>,
     index: u32,
     aabb: &PackedAabb,
     growth: f64,
     best: &mut Position,
 ) -> f64 {
-    let cost = growth + tree.size(&tree.aabb(index).union(aabb));
+    let node = &tree.nodes[index as usize];
+    let cost = growth + tree.metric.of(&node.aabb.union(aabb));
     if cost < best.cost {
         *best = Position { sibling: index, cost };
     }
-    if tree.children(index).is_none() { f64::INFINITY } else { cost - tree.area(index) }
+    if node.is_leaf() { f64::INFINITY } else { cost - node.area }
 }
