@@ -20,13 +20,12 @@ pub use crate::candidates::Candidates;
 use crate::candidates::Randomised;
 use crate::local::reinsertion;
 use crate::parallel::{KEPT_NODES, map_init};
-use crate::run::{Observer, Problem, Quota, Run, Search, SearchError, stream, watched};
-use crate::tree::{Area, Measured, Metric, Working};
+use crate::run::{Found, Observer, Problem, Quota, Run, SearchError, stream, watched};
+use crate::tree::{Metric, Working, search_by_metric};
 use bvh_build::top_down::Workspace;
-use bvh_build::{BuildError, Presorted, Watch, muller_fellner};
+use bvh_build::{BuildError, Presorted, muller_fellner};
 use bvh_config::Nested;
 use bvh_core::Bvh;
-use bvh_core::cost::Measure;
 use std::sync::{Mutex, PoisonError};
 
 bvh_config::config! {
@@ -68,79 +67,7 @@ impl LocalSearch {
     }
 }
 
-impl Config {
-    /// Makes the construction number `trial` and writes it into `tree`.
-    fn construct(
-        &self,
-        scene: &Presorted,
-        measure: Option<&dyn Measure>,
-        (seed, trial): (u64, u64),
-        workspace: &mut Workspace,
-        tree: &mut Bvh,
-        watch: &Watch,
-    ) -> Result<(), BuildError> {
-        let Self { candidates, noise, .. } = *self;
-        let mut rule = Randomised::new(candidates, noise, stream(seed, trial));
-        self.construction.construct(scene, measure, &mut rule, workspace, tree, watch)
-    }
-
-    /// Improves a tree to a local optimum; leaves it unchanged if the observer cancels first.
-    /// Returns the number of nodes visited.
-    fn improve(
-        &self,
-        tree: &mut Bvh,
-        problem: &Problem,
-        observer: &dyn Observer,
-    ) -> Result<u64, SearchError> {
-        match (self.local_search, problem.measure) {
-            (LocalSearch::None, _) => Ok(0),
-            (LocalSearch::Reinsertion, Some(measure)) => {
-                reinserted(Measured::new(measure), tree, observer)
-            }
-            (LocalSearch::Reinsertion, None) => reinserted(Area, tree, observer),
-        }
-    }
-
-    /// Makes the trial number `trial`: constructs and improves `tree`. Returns `None` if the
-    /// observer cancels before the construction ends, except for the first trial, which fails
-    /// instead, so a trial is either complete or an error.
-    fn attempt(
-        &self,
-        scene: &Presorted,
-        problem: &Problem,
-        (seed, trial): (u64, u64),
-        workspace: &mut Workspace,
-        tree: &mut Bvh,
-        observer: &dyn Observer,
-    ) -> Result<Option<Trial>, SearchError> {
-        if trial > 0 && observer.cancelled() {
-            return Ok(None);
-        }
-        let constructed = watched(observer, |watch| {
-            self.construct(scene, problem.measure, (seed, trial), workspace, tree, watch)
-        });
-        match constructed {
-            Err(BuildError::Cancelled) if trial > 0 => return Ok(None),
-            constructed => constructed?,
-        }
-        let work = self.improve(tree, problem, observer)?;
-        Ok(Some(Trial { cost: problem.cost(tree), work, tree: None }))
-    }
-}
-
-/// Reinserts to a local optimum; the rest as for [`Config::improve`].
-fn reinserted(
-    metric: impl Metric,
-    tree: &mut Bvh,
-    observer: &dyn Observer,
-) -> Result<u64, SearchError> {
-    let mut working = Working::from_bvh(tree, metric.internal(tree), metric)?;
-    let tally = reinsertion::to_local_optimum(&mut working, Quota::ENDLESS, observer);
-    if !observer.cancelled() {
-        *tree = working.to_bvh();
-    }
-    Ok(tally.work)
-}
+search_by_metric!(Config);
 
 /// A constructed and improved tree.
 #[derive(Debug)]
@@ -152,9 +79,15 @@ struct Trial {
     tree: Option<Bvh>,
 }
 
-impl Search for Config {
+impl Config {
     /// Runs trials in parallel. They are independent, because each draws from a separate stream.
-    fn search(&self, problem: &Problem, seed: u64, run: &mut Run) -> Result<Bvh, SearchError> {
+    fn search_by<A: Metric>(
+        &self,
+        metric: A,
+        problem: &Problem,
+        seed: u64,
+        run: &mut Run,
+    ) -> Found {
         let scene = Presorted::new(problem.boxes)?;
         let construction = (2 * scene.len() as u64).saturating_sub(1);
         let observer = run.observer();
@@ -172,18 +105,28 @@ impl Search for Config {
             let limit = run.incumbent();
             let costs = Mutex::default();
             let results = map_init((end - next) as usize, Default::default, |buffers, index| {
-                let (workspace, tree): &mut (Workspace, Bvh) = buffers;
-                let number = (seed, next + index as u64);
-                let mut trial = self.attempt(&scene, problem, number, workspace, tree, observer)?;
-                if let Some(trial) = &mut trial
-                    && trial.cost < limit
-                    && can_win(&costs, index, trial.cost)
-                {
-                    trial.tree = Some(std::mem::take(tree));
+                let number = next + index as u64;
+                if number > 0 && observer.cancelled() {
+                    return Ok(None);
                 }
-                Ok::<_, SearchError>(trial)
+                let rule = &mut Randomised::new(self.candidates, self.noise, stream(seed, number));
+                let (workspace, tree): &mut (Workspace, Bvh) = buffers;
+                let constructed = watched(observer, |watch| {
+                    let Problem { measure, .. } = *problem;
+                    self.construction.construct(&scene, measure, rule, workspace, tree, watch)
+                });
+                match constructed {
+                    // A trial is either complete or, without any other, an error.
+                    Err(BuildError::Cancelled) if number > 0 => return Ok(None),
+                    constructed => constructed?,
+                }
+                let work = self.improve(tree, metric, observer)?;
+                let cost = problem.cost(tree);
+                let is_kept = cost < limit && can_win(&costs, index, cost);
+                Ok(Some(Trial { cost, work, tree: is_kept.then(|| std::mem::take(tree)) }))
             });
             for result in results {
+                let result: Result<_, SearchError> = result;
                 let Some(Trial { cost, work, tree }) = result? else { break };
                 if run.record(cost, construction + work)
                     && let Some(tree) = tree
@@ -199,6 +142,25 @@ impl Search for Config {
             next = end;
         }
         Ok(best)
+    }
+
+    /// Improves a tree to a local optimum; leaves it unchanged if the observer cancels first.
+    /// Returns the number of nodes visited.
+    fn improve(
+        &self,
+        tree: &mut Bvh,
+        metric: impl Metric,
+        observer: &dyn Observer,
+    ) -> Result<u64, SearchError> {
+        if self.local_search.is_none() {
+            return Ok(0);
+        }
+        let mut working = Working::from_bvh(tree, metric.internal(tree), metric)?;
+        let tally = reinsertion::to_local_optimum(&mut working, Quota::ENDLESS, observer);
+        if !observer.cancelled() {
+            *tree = working.to_bvh();
+        }
+        Ok(tally.work)
     }
 }
 

@@ -3,7 +3,7 @@
 //! Searches are generic over the metric, so the area costs no indirection.
 
 pub(crate) use bvh_core::cost::Area;
-use bvh_core::cost::{self, Measure, Sum};
+use bvh_core::cost::{Measure, Sum};
 use bvh_core::{Bvh, PackedAabb};
 
 /// The size of a box: finite, not negative, and no smaller for a box that contains another.
@@ -23,7 +23,10 @@ pub(crate) trait Metric: Copy + Send + Sync {
     fn of(self, aabb: &PackedAabb) -> f64;
     /// The total size of the boxes of all inner nodes, and of the leaves times their
     /// [cost](Self::leaf_cost).
-    fn internal(self, tree: &Bvh) -> f64;
+    fn internal(self, tree: &Bvh) -> f64 {
+        let parts = tree.nodes.iter().filter(|node| !node.is_leaf() || self.leaf_cost() > 0.0);
+        parts.map(|node| self.of(&PackedAabb::from(&node.aabb))).collect::<Sum>().value()
+    }
 }
 
 impl Metric for Area {
@@ -36,10 +39,6 @@ impl Metric for Area {
     #[inline(always)]
     fn of(self, aabb: &PackedAabb) -> f64 {
         aabb.half_area()
-    }
-
-    fn internal(self, tree: &Bvh) -> f64 {
-        cost::internal_area(tree)
     }
 }
 
@@ -62,10 +61,6 @@ impl Metric for AreaWithLeaves {
     #[inline(always)]
     fn of(self, aabb: &PackedAabb) -> f64 {
         aabb.half_area()
-    }
-
-    fn internal(self, tree: &Bvh) -> f64 {
-        of_all_nodes(self, tree)
     }
 }
 
@@ -100,19 +95,6 @@ impl Metric for Measured<'_> {
     fn of(self, aabb: &PackedAabb) -> f64 {
         self.measure.of(aabb)
     }
-
-    fn internal(self, tree: &Bvh) -> f64 {
-        if self.leaf_cost > 0.0 {
-            of_all_nodes(self, tree)
-        } else {
-            cost::internal_measure(tree, self.measure)
-        }
-    }
-}
-
-/// Returns the total size of the boxes of all nodes, leaves included.
-fn of_all_nodes(metric: impl Metric, tree: &Bvh) -> f64 {
-    tree.nodes.iter().map(|node| metric.of(&PackedAabb::from(&node.aabb))).collect::<Sum>().value()
 }
 
 /// Implements [`Search`](crate::Search) by the type's method `search_by`, which is generic over the
