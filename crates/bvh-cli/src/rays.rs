@@ -5,7 +5,6 @@ use crate::arguments::input_file;
 use crate::interrupt::INTERRUPTED;
 use bvh_config::fault;
 use bvh_core::cost::Objective;
-use bvh_core::query::Region;
 use bvh_core::{Aabb, Bvh, Ray, RayDensity, Segment, Slabs};
 use bvh_scenes::Scene;
 use bvh_scenes::files::{read, read_text};
@@ -59,7 +58,7 @@ impl Rays {
         let meets = |&Segment { from, to }: &Segment| {
             let from = Vec3::from(from);
             let ray = Ray::new(from, Vec3::from(to) - from, 0.0, 1.0);
-            from.may_meet(&bounds)
+            bounds.contains(&Aabb { min: from, max: from })
                 || ray.is_ok_and(|ray| Slabs::new(&ray, &bounds).entry(&bounds) <= 1.0)
         };
         // A search rejects a scene without objects, with a better message.

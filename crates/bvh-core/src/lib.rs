@@ -20,7 +20,6 @@ mod mesh;
 mod packed;
 mod polygon;
 mod primitives;
-pub mod query;
 mod ray;
 pub mod ray_density;
 mod slabs;

@@ -9,6 +9,6 @@ pub use bvh_core::glam::{Affine3A, Vec3};
 pub use bvh_core::{
     Aabb, Bvh, Coherence, Hit, InsideRule, Instance, InstanceHit, Instances, Primitive, Ray,
     RayDensity, RefitError, Segment, Solid, Sphere, Triangle, WideBvh, any_hit, boxes, cost, file,
-    nearest_hit, query, validate,
+    nearest_hit, validate,
 };
 pub use std::time::Duration;

@@ -40,11 +40,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{met} of a million rays hit, in {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
 
     let point = Vec3::splat(0.5);
-    let closest = |id: u32| triangles[id as usize].closest_point(point);
-    let distance = |id| Some(closest(id).distance_squared(point.as_dvec3()));
-    let near =
-        query::nearest(&found.tree, point, f64::INFINITY, distance).ok_or("an empty scene")?;
-    println!("closest to {point} is {} of triangle {}", closest(near.object), near.object);
+    let near = wide.closest_point(point).ok_or("an empty scene")?;
+    println!("closest to {point} is {} of triangle {}", near.point, near.object);
 
     let path = std::env::temp_dir().join(format!("stranger.{}.bvh", std::process::id()));
     std::fs::write(

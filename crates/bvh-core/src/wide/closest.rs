@@ -9,7 +9,6 @@ use super::layout::{WideBvh, WideNode};
 use super::one_ray::{Leaves, visit};
 use super::triangles::TriangleBlock;
 use super::{portable, vector};
-use crate::query::Near;
 use crate::ray::pow2;
 use crate::{Aabb, Hit, Kernel};
 use core::mem::MaybeUninit;
@@ -29,42 +28,45 @@ pub struct Closest {
 /// The nearest triangle of a point so far.
 struct Nearest {
     target: DVec3,
-    near: Near,
+    object: u32,
     offset: DVec3,
+    distance_squared: f64,
 }
 
 impl Nearest {
     #[inline(always)]
     fn new(point: Vec3) -> Self {
-        let near = Near { object: u32::MAX, distance_squared: f64::INFINITY };
-        Self { target: point.as_dvec3(), near, offset: DVec3::ZERO }
+        let target = point.as_dvec3();
+        Self { target, object: u32::MAX, offset: DVec3::ZERO, distance_squared: f64::INFINITY }
     }
 
-    /// Takes a triangle if it is nearer; `offset` is the vector to its closest point.
+    /// Takes a triangle if it is nearer, or as near and of a lower id; `offset` is the vector to its
+    /// closest point.
     #[inline(always)]
     fn offer(&mut self, object: u32, offset: DVec3) {
-        let near = Near { object, distance_squared: offset.length_squared() };
-        if near.precedes(&self.near) {
-            self.near = near;
-            self.offset = offset;
+        let distance_squared = offset.length_squared();
+        if distance_squared < self.distance_squared
+            || distance_squared == self.distance_squared && object < self.object
+        {
+            *self = Self { object, offset, distance_squared, ..*self };
         }
     }
 
     /// Returns the greatest [bound](PointLanes) that a box with a nearer triangle may have.
     #[inline(always)]
     fn limit(&self, scale: f32) -> f32 {
-        let scaled = self.near.distance_squared * f64::from(scale) * f64::from(scale);
+        let scaled = self.distance_squared * f64::from(scale) * f64::from(scale);
         (scaled * (1.0 + 1.0 / (1 << 18) as f64)) as f32 + f32::MIN_POSITIVE
     }
 
     #[inline(always)]
     fn closest(&self) -> Option<Closest> {
         // A layout over triangles without area has nodes and no triangles.
-        let is_found = self.near.object != u32::MAX;
+        let is_found = self.object != u32::MAX;
         is_found.then(|| Closest {
-            object: self.near.object,
+            object: self.object,
             point: self.target + self.offset,
-            distance: libm::sqrt(self.near.distance_squared),
+            distance: libm::sqrt(self.distance_squared),
         })
     }
 }
@@ -268,7 +270,7 @@ impl<K: Instructions> Leaves<K> for TargetLanes<K::Block> {
         unsafe {
             let [a, b, c] = block.corners_along::<K::Block>(TriangleBlock::ROWS);
             let offset = offset(self.relative(a), self.relative(b), self.relative(c));
-            let most = offset[0].filled(self.nearest.near.distance_squared);
+            let most = offset[0].filled(self.nearest.distance_squared);
             let mut lanes = K::Block::narrow(dot(offset, offset).le(most)).bits();
             if lanes == 0 {
                 return false;

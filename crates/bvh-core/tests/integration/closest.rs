@@ -4,6 +4,34 @@ use crate::support::layouts::{by_kernel, layout};
 use crate::support::{Random, SHAPES, ball, grid_box, scaled, soup};
 use bvh_core::{Triangle, WideBvh};
 use glam::Vec3;
+use proptest::prelude::*;
+
+proptest! {
+    #[test]
+    fn no_point_of_a_triangle_is_closer_than_the_closest(
+        corners in prop::array::uniform3(prop::array::uniform3(-4i8..4)),
+        point in prop::array::uniform3(-8.0f32..8.0).prop_map(Vec3::from),
+    ) {
+        // Integers, so that many triangles are thin or without area.
+        let triangle = Triangle::from(corners.map(|corner| corner.map(f32::from)));
+        let closest = triangle.closest_point(point);
+        let [a, b, c] = triangle.0.map(Vec3::as_dvec3);
+        let distance = closest.distance(point.as_dvec3());
+        for i in 0..=16 {
+            for j in 0..=16 - i {
+                let [u, v] = [i, j].map(|part| f64::from(part) / 16.0);
+                let other = a * (1.0 - u - v) + b * u + c * v;
+                prop_assert!(distance <= other.distance(point.as_dvec3()) + 1e-9, "{closest} {other}");
+            }
+        }
+        // A point outside of the triangle could be closer, so the point must be in its box.
+        let aabb = triangle.aabb();
+        let slack = glam::DVec3::splat(1e-6);
+        let above = closest.cmpge(aabb.min.as_dvec3() - slack);
+        let below = closest.cmple(aabb.max.as_dvec3() + slack);
+        prop_assert!((above & below).all());
+    }
+}
 
 /// Returns the squared distance of the nearest triangle with an area, and the lowest id of the
 /// triangles at this distance.

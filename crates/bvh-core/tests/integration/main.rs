@@ -7,7 +7,6 @@ mod export;
 mod filters;
 mod instances;
 mod leave;
-mod query;
 mod ray_density;
 mod references;
 mod solid;
