@@ -11,6 +11,7 @@ use bytemuck::Zeroable;
 use libloading::Library;
 use memmap2::{Advice, MmapMut, MmapOptions};
 use std::ffi::{CStr, c_char, c_int, c_uint, c_void};
+use std::mem::ManuallyDrop;
 use std::path::Path;
 use std::ptr::null_mut;
 use std::time::Instant;
@@ -51,6 +52,11 @@ struct One {
 }
 
 const LANES: usize = 8;
+
+/// Which of eight rays are traced, -1 for those: aligned as the library reads it.
+#[derive(Clone, Copy, Zeroable)]
+#[repr(C, align(32))]
+struct Valid([c_int; LANES]);
 
 /// Eight rays and their hits, `RTCRayHit8`.
 #[derive(Clone, Copy, Zeroable)]
@@ -100,7 +106,8 @@ struct Functions {
 pub struct Embree {
     functions: Functions,
     device: Handle,
-    _library: Library,
+    /// Stays loaded, as its device does.
+    _library: ManuallyDrop<Library>,
 }
 
 impl Embree {
@@ -143,7 +150,7 @@ impl Embree {
             (device, (functions.device_property)(device, 0))
         };
         assert_eq!(version, VERSION, "the version of {}; accepted: {VERSION}", file.display());
-        Self { functions, device, _library: library }
+        Self { functions, device, _library: ManuallyDrop::new(library) }
     }
 }
 
@@ -212,7 +219,8 @@ pub enum Calls {
     EightTogether,
 }
 
-/// A scene that Embree traces.
+/// A scene that Embree traces. It is never released, nor are its mesh and the device: Embree would
+/// free a root of ours as its own.
 pub struct Traced<'e> {
     embree: &'e Embree,
     scene: Handle,
@@ -376,7 +384,7 @@ impl<'e> Traced<'e> {
         hits: &mut [Option<Hit>],
     ) -> f64 {
         let mut block = [Eight::zeroed(); IN_CACHE / LANES];
-        let mut valid = [[0; LANES]; IN_CACHE / LANES];
+        let mut valid = [Valid::zeroed(); IN_CACHE / LANES];
         let packets = rays.len().div_ceil(LANES);
         for (index, ray) in rays.iter().enumerate() {
             let (eight, lane) = (&mut block[index / LANES], index % LANES);
@@ -389,7 +397,7 @@ impl<'e> Traced<'e> {
                 (ray.t_min(), ray.t_max(), u32::MAX);
             eight.geometry[lane] = u32::MAX;
             eight.instance.iter_mut().for_each(|instance| instance[lane] = u32::MAX);
-            valid[index / LANES][lane] = -1;
+            valid[index / LANES].0[lane] = -1;
         }
         let flags = if is_together { COHERENT } else { 0 };
         let mut arguments =
@@ -398,8 +406,9 @@ impl<'e> Traced<'e> {
         let call = if query == Query::Any { occluded_eight } else { intersect_eight };
         let start = Instant::now();
         for (eight, valid) in block[..packets].iter_mut().zip(&valid) {
-            // SAFETY: the scene is committed, and the rays of valid lanes are complete.
-            unsafe { call(valid.as_ptr(), self.scene, eight, &mut arguments) };
+            // SAFETY: the scene is committed, the rays of valid lanes are complete, and the types of
+            // both are aligned to 32 bytes.
+            unsafe { call(valid.0.as_ptr(), self.scene, eight, &mut arguments) };
         }
         let seconds = start.elapsed().as_secs_f64();
         for (index, hit) in hits.iter_mut().enumerate() {

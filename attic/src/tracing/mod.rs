@@ -115,7 +115,10 @@ fn racer(name: &str) -> Option<&'static dyn crate::Racer> {
 fn raced<'a>(runs: &[FirstRun], traced: &'a Traced) -> Raced<'a> {
     let TraceRow { scene, method, .. } = &traced.answers;
     let run = runs.iter().find(|run| run.scene.name == *scene && run.label == *method);
-    let library = run.map_or(method.as_str(), |run| run.peer.map_or(OURS, |peer| peer.name()));
+    // Our kernels trace the trees of programs.
+    let library = run.map_or(method.as_str(), |run| {
+        run.peer.map(|peer| peer.name()).filter(|name| racer(name).is_some()).unwrap_or(OURS)
+    });
     let search_seconds = run.map_or(f64::NAN, |run| run.search_seconds);
     Raced { library: library.into(), search_seconds, traced }
 }

@@ -4,7 +4,7 @@ mod page;
 
 use crate::Error;
 use crate::answer::{Answer, Form, whole};
-use crate::arguments::{Jobs, output_file, output_or_free};
+use crate::arguments::{Jobs, output_file, output_or_free, reserve};
 use crate::rays::Rays;
 use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
@@ -13,7 +13,7 @@ use bvh_core::cost::{self, Objective};
 use bvh_scenes::rays::View;
 use bvh_scenes::render::{Film, Options, framing, heat, image, render};
 use bvh_scenes::trace::Accelerator;
-use bvh_scenes::{Scene, files, tree_file};
+use bvh_scenes::{Scene, tree_file};
 use clap::Args;
 use page::{Page, Row};
 use serde_json::json;
@@ -97,7 +97,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Error> {
         medians: ranges.map(|range| range.median),
         top,
     };
-    files::write(&out, page.html().as_bytes())?;
+    reserve(&out, args.out.is_some(), 0)?.write(&[page.html().as_bytes()])?;
     answer.end();
     Ok(())
 }

@@ -134,9 +134,10 @@ impl<'a> Bake<'a> {
         self.objective.unwrap_or(default)
     }
 
-    /// Rejects a number of references that is out of range.
+    /// Rejects a number of references that is out of range. A [start](Self::start) may have more.
     pub fn check(&self) -> Result<(), OutOfRange> {
-        match (1.0..=16.0).contains(&self.references) {
+        let most = if self.start.is_some() { f64::MAX } else { 16.0 };
+        match (1.0..=most).contains(&self.references) {
             true => Ok(()),
             false => Err(OutOfRange::new("references", self.references, "1 to 16")),
         }

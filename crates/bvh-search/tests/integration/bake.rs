@@ -38,6 +38,24 @@ fn a_time_of_zero_still_gives_a_tree() {
     assert!(bake(&[], Duration::ZERO).unwrap().tree.nodes.is_empty());
 }
 
+#[test]
+fn a_tree_of_many_references_per_object_is_loaded_and_improved() {
+    let corners = scene().into_iter().take(20).map(|aabb| {
+        Triangle::from([aabb.min.to_array(), aabb.max.to_array(), aabb.min.to_array()])
+    });
+    let triangles: Vec<Triangle> = corners.collect();
+    let boxes = boxes(&triangles);
+    let shapes = Primitives::Triangles(triangles);
+    let mut tree = muller_fellner::Config::default().build(&boxes.repeat(17)).unwrap();
+    tree.prim_ids.iter_mut().for_each(|id| *id %= 20);
+    let bake = Bake { shapes: Some(&shapes), ..Bake::new(&boxes) };
+    let bytes = bake.write(&tree, 0, |sections, _| sections.concat()).unwrap();
+    let mut owned = OwnedTree::load(Objects::Shapes(shapes), &bytes).unwrap();
+    let before = owned.cost(Objective::InternalArea);
+    improve_owned(&mut owned, Duration::from_millis(20));
+    assert!(owned.cost(Objective::InternalArea) <= before);
+}
+
 fn improve_owned(owned: &mut OwnedTree, time: Duration) {
     let improvement = owned.improvement(Budget::UNLIMITED, &Deadline::after(time)).unwrap();
     owned.apply(improvement);

@@ -111,7 +111,7 @@ impl Condition {
     fn is_met(&self, row: &Row) -> Result<bool, QueryError> {
         let found = cell(row, &self.column)?;
         let number = |text: &str| text.parse::<f64>().ok();
-        let order = number(found).zip(number(&self.texts[0])).map(|(a, b)| a.total_cmp(&b));
+        let order = number(found).zip(number(&self.texts[0])).and_then(|(a, b)| a.partial_cmp(&b));
         Ok(match self.sign {
             "=" => self.texts.contains(found),
             "!=" => !self.texts.contains(found),

@@ -80,8 +80,9 @@ fn run(
     if is_finished(&folder, &resolved, existing, is_part)? {
         return Ok(Summary { skipped_scenes, ..Summary::finished(folder) });
     }
-    // An unknown identifier must not leave a folder.
+    // Neither an unknown identifier nor a base that cannot be built leaves a folder.
     let jobs = selected(experiment, &scenes, ids)?;
+    let bases = base_costs(&experiment.objective, &jobs)?;
     let parts: Vec<PathBuf> = parts.iter().map(|out| out.join(experiment.folder())).collect();
     // A part that is discarded or finished would lose its runs. Symbolic links and `..` may hide
     // that two paths are the same folder.
@@ -101,7 +102,7 @@ fn run(
     }
     let mut work = Work {
         experiment,
-        bases: base_costs(&experiment.objective, &jobs)?,
+        bases,
         jobs: &jobs,
         store: &store,
         watch: Watch { bar: progress(runs as u64), interrupted },
