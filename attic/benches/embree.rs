@@ -10,6 +10,7 @@ mod tracer_scenes;
 use attic::tracing::answers::disagreements;
 use attic::tracing::contender::{Batch, Tracer};
 use attic::tracing::rays::{coherence, is_in_squares, query, rays};
+use attic::tracing::speed::{in_turns, ratio_of_rounds};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
 use bvh_core::{Bvh, Hit, Kernel, WideBvh};
@@ -19,7 +20,7 @@ use bvh_scenes::{Scene, files};
 use bvh_search::{Bake, Budget};
 use embree_library::{Calls, Embree, Traced};
 use harness::processor::PROCESSOR;
-use harness::statistics::{geometric_mean, median, median_interval};
+use harness::statistics::{geometric_mean, median};
 use std::collections::BTreeMap;
 use std::path::Path;
 use tracer_scenes::scenes;
@@ -40,15 +41,19 @@ const MEANS: [(&str, &[&str]); 2] = [
     ("smooth", &["spot", "knot", "pebble"]),
 ];
 
-/// Answers rays, and returns the seconds of each part.
-type Trace<'a> = Box<dyn Fn(&Batch, &mut [Option<Hit>]) -> Vec<f64> + 'a>;
-
 /// A tree in a kernel.
 struct Contender<'a> {
     kernel: &'static str,
     tree: &'static str,
     mode: &'static str,
-    trace: Trace<'a>,
+    tracer: Tracer<'a>,
+}
+
+impl Contender<'_> {
+    /// Answers the rays, and returns the seconds.
+    fn trace(&self, batch: &Batch, hits: &mut [Option<Hit>]) -> f64 {
+        self.tracer.trace(batch, hits).expect("answers").iter().sum()
+    }
 }
 
 /// Ratios of speeds by what is called, the part that they tell, the tree and the rays.
@@ -125,13 +130,12 @@ fn measure(
         let batch =
             Batch { query: query(kind), coherence: coherence(kind), in_squares, rays: &rays };
         let unlike = unlike(&contenders, &batch, &greedy);
-        let seconds = time(&contenders, &batch);
+        let mut hits = vec![None; rays.len()];
+        let trace = |at: usize| contenders[at].trace(&batch, &mut hits);
+        let seconds = in_turns(contenders.len(), ROUNDS, trace);
         let middle = |at: usize| median(&seconds[at]).expect("rounds");
         for (calls, part, one, over) in comparisons(&contenders, middle) {
-            let pairs = seconds[over].iter().zip(&seconds[one]);
-            let of_rounds: Vec<f64> = pairs.map(|(over, one)| over / one).collect();
-            let ratio = median(&of_rounds).expect("rounds");
-            let (low, high) = median_interval(&of_rounds).expect("rounds");
+            let [ratio, low, high] = ratio_of_rounds(&seconds[over], &seconds[one]);
             let Contender { tree, mode, .. } = contenders[one];
             let over = format!("{}: {}", contenders[over].tree, contenders[over].mode);
             let (name, kind, count, unlike) = (&scene.name, kind.name(), rays.len(), unlike[one]);
@@ -165,18 +169,16 @@ fn contenders<'a>(
             ("coherent packets", Calls::EightTogether),
         ] {
             let trace =
-                move |batch: &Batch, hits: &mut [Option<Hit>]| traced.trace(calls, batch, hits);
-            contenders.push(Contender { kernel: "embree", tree, mode, trace: Box::new(trace) });
+                move |batch: &Batch, hits: &mut [Option<Hit>]| Ok(traced.trace(calls, batch, hits));
+            let tracer = Tracer::Other(Box::new(trace));
+            contenders.push(Contender { kernel: "embree", tree, mode, tracer });
         }
     }
     for (tree, wide) in ours {
         let structure = Structure::Wide(wide.clone());
         let single = Tracer::Own(Accelerator::new(&scene.primitives, structure));
         for (mode, tracer) in [("single", single), ("batches", Tracer::Batches(wide.clone()))] {
-            let trace = move |batch: &Batch, hits: &mut [Option<Hit>]| {
-                tracer.trace(batch, hits).expect("answers of ours")
-            };
-            contenders.push(Contender { kernel: "ours", tree, mode, trace: Box::new(trace) });
+            contenders.push(Contender { kernel: "ours", tree, mode, tracer });
         }
     }
     contenders
@@ -187,11 +189,11 @@ fn contenders<'a>(
 /// any tree.
 fn unlike(contenders: &[Contender], batch: &Batch, greedy: &Bvh) -> Vec<u64> {
     let mut expected = vec![None; batch.rays.len()];
-    (contenders[0].trace)(batch, &mut expected);
+    contenders[0].trace(batch, &mut expected);
     let distance = |hit: &Option<Hit>| hit.map(|hit| hit.t);
     let count = |contender: &Contender| {
         let mut hits = vec![None; batch.rays.len()];
-        (contender.trace)(batch, &mut hits);
+        contender.trace(batch, &mut hits);
         let unlike = if contender.kernel == "embree" {
             let pairs = expected.iter().zip(&hits);
             pairs.filter(|(a, b)| distance(a) != distance(b)).count() as u64
@@ -204,20 +206,6 @@ fn unlike(contenders: &[Contender], batch: &Batch, greedy: &Bvh) -> Vec<u64> {
         unlike
     };
     contenders.iter().map(count).collect()
-}
-
-/// Returns the seconds of each contender in each round.
-fn time(contenders: &[Contender], batch: &Batch) -> Vec<Vec<f64>> {
-    let mut hits = vec![None; batch.rays.len()];
-    let mut seconds = vec![Vec::new(); contenders.len()];
-    for round in 0..ROUNDS {
-        for turn in 0..contenders.len() {
-            // Each round begins with another contender.
-            let at = (turn + round) % contenders.len();
-            seconds[at].push((contenders[at].trace)(batch, &mut hits).iter().sum());
-        }
-    }
-    seconds
 }
 
 /// Returns the calls, the part that a ratio tells, and the contender over another: both are the

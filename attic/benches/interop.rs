@@ -12,6 +12,7 @@ use ::obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris, bvh2_to_cwbvh::bvh2_
 use ::obvhs::{BvhBuildParams, traverse};
 use attic::tracing::contender::{Batch, Trace};
 use attic::tracing::rays::{coherence, query, rays};
+use attic::tracing::speed::{in_turns, ratio_of_rounds};
 use attic::{bvh, obvhs};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::export::Target;
@@ -22,7 +23,7 @@ use bvh_search::{Bake, Budget};
 // For the library's macro.
 use glam::UVec2;
 use harness::processor::PROCESSOR;
-use harness::statistics::{self, geometric_mean, median_interval};
+use harness::statistics::{self, geometric_mean};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Command;
@@ -174,9 +175,7 @@ fn compare(
             let timed = own.iter().filter_map(|own| Some((own, measured.seconds.get(own)?)));
             let fastest = timed.min_by(|(_, a), (_, b)| median(a).total_cmp(&median(b)));
             if let (Some((own, theirs)), Some(ours)) = (fastest, measured.seconds.get(case)) {
-                let ratios: Vec<f64> = theirs.iter().zip(ours).map(|(a, b)| a / b).collect();
-                let (low, high) = median_interval(&ratios).expect("rounds");
-                let middle = median(&ratios);
+                let [middle, low, high] = ratio_of_rounds(theirs, ours);
                 let own = &own.tree;
                 *speeds += &format!(
                     "{tracer},\"{processor}\",{scene},{rays},{RAYS},{ROUNDS},{tree},{over},{own},\
@@ -262,13 +261,13 @@ fn measure(scene: &Scene, view: &Viewpoint, rounds: usize) -> Measured {
         let coherence = coherence(*kind);
         let batch = Batch { query: query(*kind), coherence, in_squares: false, rays };
         let mut answers = vec![None; rays.len()];
-        for round in 0..rounds {
-            for turn in 0..contenders.len() {
-                // Each round begins with another contender.
-                let contender = &contenders[(turn + round) % contenders.len()];
-                let seconds = (contender.trace)(&batch, &mut answers).expect("answers");
-                measured.seconds.entry(case(contender)).or_default().push(seconds.iter().sum());
-            }
+        let trace = |at: usize| {
+            let seconds = (contenders[at].trace)(&batch, &mut answers).expect("answers");
+            seconds.iter().sum()
+        };
+        let seconds = in_turns(contenders.len(), rounds, trace);
+        if rounds > 0 {
+            measured.seconds.extend(contenders.iter().map(case).zip(seconds));
         }
     }
     eprintln!("{}", scene.name);

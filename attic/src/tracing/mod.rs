@@ -8,8 +8,7 @@ pub mod speed;
 
 use crate::comparison::{self, Raced};
 use crate::{RACERS, programs};
-use bvh_config::OutOfRange;
-use bvh_config::fault;
+use bvh_config::{OutOfRange, fault};
 use contender::Contender;
 use harness::Error;
 use harness::peers::{FirstRun, NamedBytes, OURS, Tracing};

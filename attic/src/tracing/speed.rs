@@ -11,7 +11,7 @@ use bvh_scenes::Scene;
 use bvh_scenes::rays::{Kind, Viewpoint};
 use bvh_scenes::trace::{Accelerator, Query};
 use harness::rows::{TraceRow, TraceTimeRow};
-use harness::statistics::{median, minimum};
+use harness::statistics::{median, median_interval, minimum};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -60,6 +60,32 @@ pub struct Traced {
     pub version: String,
     /// The seconds of each turn.
     pub turns: Vec<f64>,
+}
+
+/// Returns the seconds of each contender in each round, of which each begins with another contender.
+pub fn in_turns(
+    contenders: usize,
+    rounds: usize,
+    mut trace: impl FnMut(usize) -> f64,
+) -> Vec<Vec<f64>> {
+    let mut seconds = vec![Vec::with_capacity(rounds); contenders];
+    for round in 0..rounds {
+        for turn in 0..contenders {
+            let at = (turn + round) % contenders;
+            seconds[at].push(trace(at));
+        }
+    }
+    seconds
+}
+
+/// Returns the median of the ratios of two contenders' seconds, round by round, and its interval.
+///
+/// # Panics
+/// If there are no rounds.
+pub fn ratio_of_rounds(over: &[f64], one: &[f64]) -> [f64; 3] {
+    let ratios: Vec<f64> = over.iter().zip(one).map(|(over, one)| over / one).collect();
+    let (low, high) = median_interval(&ratios).expect("rounds");
+    [median(&ratios).expect("rounds"), low, high]
 }
 
 /// Traces the same rays through all contenders of a scene, each with its method's label.

@@ -2,8 +2,7 @@
 
 use crate::measure::ray_cost::TrainedOn;
 use crate::peers::Peer;
-use bvh_config::fault;
-use bvh_config::{Check, Keys, Nested, OutOfRange};
+use bvh_config::{Check, Keys, Nested, OutOfRange, fault};
 use bvh_core::cost::Objective;
 use bvh_scenes::rays::RandomRays;
 use bvh_search::{Budget, Method, Shortcut};

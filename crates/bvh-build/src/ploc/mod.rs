@@ -71,11 +71,6 @@ impl MortonOrder {
         Ok(Self { boxes, bounds, order })
     }
 
-    /// Returns the objects in order.
-    pub fn order(&self) -> &[u32] {
-        &self.order
-    }
-
     /// Clusters the sorted objects by the measure, or by half area without one, unless the `watch`
     /// cancels.
     pub fn build(

@@ -27,7 +27,8 @@ use crate::run::{
 };
 use crate::tree::{Metric, Working, search_by_metric};
 use crate::tuning::{CLUSTERING, CLUSTERING_MUCH_CHEAPER, REINSERTED_BELOW, SECURED_FROM};
-use bvh_build::{BuildError, Builder, Watch, ploc};
+use bvh_build::ploc::{self, MortonOrder};
+use bvh_build::{BuildError, Builder, Watch};
 use bvh_core::Bvh;
 use bvh_core::cost::Objective;
 pub use config::{Config, Horizon};
@@ -95,7 +96,7 @@ impl Config {
         run: &mut Run,
     ) -> Found {
         if problem.splits.is_some() || problem.objective == Objective::Layout {
-            let tree = self.initial(problem, run)?;
+            let tree = self.initial(None, problem, run)?;
             let other = division(problem, run.observer())?;
             let best = Incumbent::begin(tree, problem, run);
             return self.improved(best, other, metric, problem, seed, run);
@@ -105,14 +106,15 @@ impl Config {
             return Ok(optimum);
         }
         // The search for small budgets supports the area only.
+        let mut morton = None;
         let small = match problem.measure {
-            None => small_budget::search(problem, run)?,
+            None => small_budget::search(problem, &mut morton, run)?,
             Some(_) => None,
         };
         let best = match small {
             Some((best, false)) => return Ok(best.tree),
             Some((best, true)) => best,
-            None => Incumbent::begin(self.initial(problem, run)?, problem, run),
+            None => Incumbent::begin(self.initial(morton, problem, run)?, problem, run),
         };
         self.improved(best, None, metric, problem, seed, run)
     }
@@ -122,11 +124,16 @@ impl Config {
     /// more thorough clustering is built and kept aside, so no budget ends above it. If the first
     /// clustering is much cheaper, the cheapest of them becomes the initial tree. The work of a
     /// clustering counts only if it is used, like the work of the [`fallback`].
-    fn initial(&self, problem: &Problem, run: &mut Run) -> Result<Kept, SearchError> {
+    fn initial(
+        &self,
+        morton: Option<MortonOrder>,
+        problem: &Problem,
+        run: &mut Run,
+    ) -> Result<Kept, SearchError> {
         let boxes = problem.boxes;
         let build = |watch: &Watch| construction().build_watched(boxes, problem.measure, watch);
-        let cluster = |watch: &Watch| CLUSTERING.build_watched(boxes, None, watch);
-        let clustered = watched(run.observer(), cluster)?;
+        let morton = morton.map_or_else(|| MortonOrder::new(boxes), Ok)?;
+        let clustered = watched(run.observer(), |watch| morton.build(&CLUSTERING, None, watch))?;
         // Only the cheapest tree is kept, because the division of a large scene needs most of the
         // memory of the search.
         run.keep_aside(Kept::new(clustered, problem));

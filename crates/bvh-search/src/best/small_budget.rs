@@ -23,9 +23,10 @@ use bvh_build::ploc::MortonOrder;
 
 /// Improves a clustering by reinsertion as far as a small budget reaches. Also returns whether this
 /// ended in a local optimum, so that the rest of the budget remains. `None` if the budget is not
-/// small.
+/// small; `sorted` then receives the objects in Morton order, if a time limit required the sort.
 pub(super) fn search<'p>(
     problem: &Problem<'p>,
+    sorted: &mut Option<MortonOrder>,
     run: &mut Run,
 ) -> Result<Option<(Incumbent<'p>, bool)>, SearchError> {
     let observer = run.observer();
@@ -41,6 +42,7 @@ pub(super) fn search<'p>(
     if let (Some(began), Some(now)) = (began, observer.progress()) {
         let sort = (now - began).max(SHORTEST_SORT);
         if is_enough_for_annealing(1.0 - began, sort, problem, observer)? {
+            *sorted = Some(morton);
             return Ok(None);
         }
         // Reinsertion must end early enough for the conversion and the evaluation of the tree.

@@ -9,7 +9,7 @@ use bvh_core::cost::Objective;
 use bvh_core::{Bvh, RayDensity};
 use bvh_scenes::Scene;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 /// One run of an experiment.
 pub(crate) struct Job<'a> {
@@ -42,13 +42,15 @@ pub(crate) fn selected<'a>(
             jobs.push(Job { index: jobs.len(), id, scene, labelled, repetition, first_of_scene });
         }
     }
-    if let Some(id) = ids.iter().find(|id| jobs.iter().all(|job| job.id != **id)) {
+    let known: HashSet<&str> = jobs.iter().map(|job| &*job.id).collect();
+    if let Some(id) = ids.iter().find(|id| !known.contains(id.as_str())) {
         let name = &experiment.name;
         return Err(Error::Usage(format!(
             "--run {id}: {name} has no such run; accepted: an identifier that `harness jobs` lists"
         )));
     }
-    jobs.retain(|job| ids.is_empty() || ids.contains(&job.id));
+    let wanted: HashSet<&String> = ids.iter().collect();
+    jobs.retain(|job| ids.is_empty() || wanted.contains(&job.id));
     Ok(jobs)
 }
 

@@ -54,22 +54,30 @@ impl Solved<'_> {
 
     /// Returns the first event, every improvement and the last event, if a report reads them.
     pub fn history_rows(&self) -> Vec<HistoryRow> {
-        let is_kept = self.experiment.keeps_history();
-        let row = |(_, &Event { evaluations, work, incumbent, .. }): (usize, &Event)| {
+        let mut rows = Vec::new();
+        if !self.experiment.keeps_history() {
+            return rows;
+        }
+        for (_, event) in milestones(&self.outcome.history) {
+            let Event { evaluations, work, incumbent, .. } = *event;
             let (scene, method, repetition) = self.identity();
-            HistoryRow { scene, method, repetition, evaluations, work, incumbent }
-        };
-        milestones(&self.outcome.history).filter(|_| is_kept).map(row).collect()
+            rows.push(HistoryRow { scene, method, repetition, evaluations, work, incumbent });
+        }
+        rows
     }
 
     /// Returns the costs of all trials, if a report reads them.
     pub fn trial_rows(&self) -> Vec<TrialRow> {
-        let is_kept = self.experiment.keeps_trials_of(&self.job.labelled.label);
-        let row = |&Event { evaluations, cost, .. }: &Event| {
+        let mut rows = Vec::new();
+        if !self.experiment.keeps_trials_of(&self.job.labelled.label) {
+            return rows;
+        }
+        for event in &self.outcome.history {
+            let Event { evaluations, cost, .. } = *event;
             let (scene, method, repetition) = self.identity();
-            TrialRow { scene, method, repetition, evaluations, cost }
-        };
-        self.outcome.history.iter().filter(|_| is_kept).map(row).collect()
+            rows.push(TrialRow { scene, method, repetition, evaluations, cost });
+        }
+        rows
     }
 
     pub fn timing_row(&self) -> TimingRow {
@@ -81,12 +89,15 @@ impl Solved<'_> {
     /// Returns the time of every row of the history, if a report needs it; `event_seconds` are the
     /// times of all events.
     pub fn clock_rows(&self, event_seconds: &[f64]) -> Vec<ClockRow> {
-        let is_kept = self.experiment.needs_references();
-        let row = |(event, (index, _)): (usize, (usize, &Event))| {
+        let mut rows = Vec::new();
+        if !self.experiment.needs_references() {
+            return rows;
+        }
+        for (event, (index, _)) in milestones(&self.outcome.history).enumerate() {
             let (scene, method, repetition) = self.identity();
-            ClockRow { scene, method, repetition, event, seconds: event_seconds[index] }
-        };
-        milestones(&self.outcome.history).enumerate().filter(|_| is_kept).map(row).collect()
+            rows.push(ClockRow { scene, method, repetition, event, seconds: event_seconds[index] });
+        }
+        rows
     }
 
     pub fn ray_rows(&self) -> Vec<RayRow> {
