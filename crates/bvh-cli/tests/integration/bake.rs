@@ -57,9 +57,9 @@ fn a_bake_for_rays_saves_the_number_of_visits_of_each_node() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("walk.toml"), WALK).unwrap();
-    let scene = Scene::load("escher").unwrap();
+    let scene = Scene::load("escher:2000").unwrap();
     for rays in ["default", "walk.toml"] {
-        let bake = format!("escher --budget=2Mwork --rays={rays}");
+        let bake = format!("escher:2000 --budget=1Mwork --rays={rays}");
         let (said, bytes) = bake_twice(at, &bake);
         for part in ["cost of the wide layout for rays, which was minimised, ", "risk: a tree for"]
         {
@@ -234,11 +234,11 @@ fn a_given_choice_is_kept_and_not_tried() {
     let folder = tempfile::tempdir().unwrap();
     // Spheres have no wide layout, and other methods than `best` offer no choices.
     for (bake, kept) in [
-        ("escher:200 --cost=area", "cost: "),
-        ("escher:200 --rays=default", "rays: "),
-        ("escher:200 --references=1", "references: "),
+        ("escher:60 --cost=area", "cost: "),
+        ("escher:60 --rays=default", "rays: "),
+        ("escher:60 --references=1", "references: "),
         ("spheres75", "references: "),
-        ("escher:200 --method=reinsertion", "references: "),
+        ("escher:60 --method=reinsertion", "references: "),
     ] {
         let said = bvh(folder.path(), &format!("bake {bake} --out=a.bvh"));
         assert!(said.contains("budget: ") && !said.contains(kept), "{bake}: {said}");
