@@ -16,7 +16,7 @@ use bvh_core::cost;
 use bvh_core::file::{self, Origin, TreeFile};
 use bvh_core::{Aabb, Bvh, WideBvh, validate};
 use bvh_scenes::Scene;
-use bvh_scenes::load::{self, OutsideFiles};
+use bvh_scenes::load;
 use bvh_search::best::{self, Horizon};
 use bvh_search::{Budget, Deadline, Kept, Problem, solve_or_keep};
 use harness::processor::PROCESSOR;
@@ -141,7 +141,7 @@ impl Phases {
         for (path, kind) in [(&obj, "OBJ"), (&ply, "PLY")] {
             let megabytes = fs::metadata(path).expect("a file").len() as f64 / 1e6;
             self.phase(&format!("load {kind}"), || {
-                load::load(path, OutsideFiles::Rejected).expect("a mesh")
+                load::load(path).expect("a mesh")
             });
             let row = self.rows.last_mut().expect("a phase");
             row.megabytes_per_s = Some(megabytes / row.seconds);

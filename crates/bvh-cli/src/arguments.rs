@@ -1,7 +1,9 @@
-//! Arguments of several commands, and the check of paths before any work.
+//! Arguments of several commands: scenes, and paths, which are checked before any work.
 
 use crate::Error;
+use crate::output::print_error;
 use bvh_scenes::files::{Reserved, WriteError, folder_of};
+use bvh_scenes::{Scene, SceneError};
 use std::path::{Path, PathBuf};
 
 /// The limit on the program's threads.
@@ -23,6 +25,15 @@ impl Jobs {
             .build_global()
             .map_err(|error| Error::Usage(format!("--jobs {jobs}: {error}")))
     }
+}
+
+/// Loads a scene by name or path, and prints the remark on it, if it has one.
+pub fn load_scene(name: &str) -> Result<Scene, SceneError> {
+    let scene = Scene::load(name)?;
+    if let Some(remark) = &scene.remark {
+        print_error(remark);
+    }
+    Ok(scene)
 }
 
 fn reject(flag: &str, path: &Path, found: &str, accepted: &str) -> Result<(), Error> {

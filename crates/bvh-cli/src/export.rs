@@ -2,8 +2,7 @@
 
 use crate::Error;
 use crate::answer::{Answer, Form, gain, whole};
-use crate::arguments::output_file;
-use crate::scene_files::SceneFiles;
+use crate::arguments::{load_scene, output_file};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::export::{Layout, Target};
 use bvh_core::{Bvh, Triangle};
@@ -28,9 +27,6 @@ pub struct ExportArgs {
     /// The file to write, replaced when it is complete; `.json` for json.
     #[arg(long, value_name = "FILE.bin|.json")]
     pub out: PathBuf,
-    /// Permits files outside the scene's folder.
-    #[command(flatten)]
-    pub files: SceneFiles,
     /// The form of the costs.
     #[command(flatten)]
     pub form: Form,
@@ -47,7 +43,7 @@ pub fn export(args: &ExportArgs) -> Result<(), Error> {
     let target = args.tracer;
     let extension = if target.layout == Layout::Json { "json" } else { "bin" };
     output_file("--out", &args.out, extension)?;
-    let scene = args.files.load(&args.scene)?;
+    let scene = load_scene(&args.scene)?;
     let (tree, _) = tree_file::load(&args.file, &scene)?;
     // Only triangles can be traced there.
     let triangles = scene.triangles().map_err(|fault| Error::Usage(fault.to_string()))?;

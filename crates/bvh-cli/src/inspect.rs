@@ -3,9 +3,8 @@
 
 use crate::Error;
 use crate::answer::{Answer, Form};
-use crate::arguments::output_file;
+use crate::arguments::{load_scene, output_file};
 use crate::rays::Rays;
-use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_core::file::{FileError, Header, TreeFile};
@@ -33,9 +32,6 @@ pub struct InspectArgs {
     /// Write the nodes to a CSV file, one row each, in full precision.
     #[arg(long, value_name = "NODES.csv")]
     pub nodes: Option<PathBuf>,
-    /// Permits files outside the scene's folder.
-    #[command(flatten)]
-    pub files: SceneFiles,
     /// The form of the facts.
     #[command(flatten)]
     pub form: Form,
@@ -48,7 +44,7 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
         output_file("--nodes", nodes, "csv")?;
     }
     let rays = args.rays.as_deref().map(Rays::read).transpose()?;
-    let scene = args.scene.as_deref().map(|name| args.files.load(name)).transpose()?;
+    let scene = args.scene.as_deref().map(load_scene).transpose()?;
     if let (Some(named), Some(rays), Some(scene)) = (&args.rays, &rays, &scene) {
         rays.check(named, scene)?;
     }
@@ -99,9 +95,6 @@ pub struct VerifyArgs {
     pub file: PathBuf,
     /// The tree's scene, by name or path of a mesh file.
     pub scene: String,
-    /// Permits files outside the scene's folder.
-    #[command(flatten)]
-    pub files: SceneFiles,
     /// The form of the facts.
     #[command(flatten)]
     pub form: Form,
@@ -109,7 +102,7 @@ pub struct VerifyArgs {
 
 /// Does the same as [`inspect`], and requires a scene.
 pub fn verify(args: &VerifyArgs) -> Result<(), Error> {
-    let scene = args.files.load(&args.scene)?;
+    let scene = load_scene(&args.scene)?;
     let read = Read::new(&args.file, Some(&scene))?;
     let mut answer = Answer::new(args.form);
     read.describe(Some(&scene), &mut answer);

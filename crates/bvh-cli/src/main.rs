@@ -13,7 +13,6 @@ mod output;
 mod rays;
 mod render;
 mod report;
-mod scene_files;
 mod scenes;
 
 use clap::{CommandFactory, Parser, Subcommand};

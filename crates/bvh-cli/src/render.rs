@@ -2,9 +2,8 @@
 
 use crate::Error;
 use crate::answer::{Answer, Form, short, whole};
-use crate::arguments::{Jobs, input_file, output_file};
+use crate::arguments::{Jobs, input_file, load_scene, output_file};
 use crate::output::bar;
-use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, WideBvh};
 use bvh_scenes::files;
@@ -47,9 +46,6 @@ pub struct RenderArgs {
     /// The middle of the picture. The default is the centre of the scene.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub at: Option<DVec3>,
-    /// Permits files outside the scene's folder.
-    #[command(flatten)]
-    pub files: SceneFiles,
     /// Limits the threads.
     #[command(flatten)]
     pub jobs: Jobs,
@@ -109,7 +105,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Error> {
     }
     output_file("--out", &args.out, "png")?;
     args.jobs.apply()?;
-    let scene = args.files.load(&args.scene)?;
+    let scene = load_scene(&args.scene)?;
     if args.heatmap && args.accel == "wide" {
         return Err(Error::Usage(
             "--heatmap: the wide layout counts no tests; \

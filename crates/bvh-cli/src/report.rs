@@ -4,9 +4,8 @@ mod page;
 
 use crate::Error;
 use crate::answer::{Answer, Form, whole};
-use crate::arguments::{Jobs, output_file, output_or_free, reserve};
+use crate::arguments::{Jobs, load_scene, output_file, output_or_free, reserve};
 use crate::rays::Rays;
-use crate::scene_files::SceneFiles;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective};
@@ -33,9 +32,6 @@ pub struct ReportArgs {
     /// of the tree file with the extension html, which must be free.
     #[arg(long, value_name = "FILE.html")]
     pub out: Option<PathBuf>,
-    /// Permits files outside the scene's folder.
-    #[command(flatten)]
-    pub files: SceneFiles,
     /// Limits the threads.
     #[command(flatten)]
     pub jobs: Jobs,
@@ -59,7 +55,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Error> {
     let out = output_or_free("--out", args.out.as_ref(), || args.file.with_extension("html"))?;
     output_file("--out", &out, "html")?;
     args.jobs.apply()?;
-    let scene = args.files.load(&args.scene)?;
+    let scene = load_scene(&args.scene)?;
     let (tree, header) = tree_file::load(&args.file, &scene)?;
     let greedy = muller_fellner::Config::default()
         .build(&scene.boxes)

@@ -1,7 +1,6 @@
 //! A loaded scene, and the names that select one.
 
 use crate::builtin::{spheres, stand_ins, stiff};
-use crate::load::OutsideFiles;
 use crate::subset::Subset;
 use crate::{fnv1a, load};
 use bvh_core::{Aabb, Primitives, Triangle};
@@ -95,25 +94,17 @@ impl Scene {
     ///
     /// [`SceneError`] reports the fault of the name or of the file, and the accepted names.
     pub fn load(name: &str) -> Result<Self, SceneError> {
-        Self::load_with(name, OutsideFiles::Rejected)
-    }
-
-    /// Loads a scene as [`load`](Self::load) does. `outside` decides whether a glTF file may refer
-    /// to files outside its folder.
-    pub fn load_with(name: &str, outside: OutsideFiles) -> Result<Self, SceneError> {
         match Subset::parse(name) {
             // A generated scene has any number of objects, so its count is not a subset.
             Some((id, Subset::Spaced(objects))) if stiff::by_id(id).is_some() => {
                 Self::generated(id, name, objects)
             }
-            Some((whole, subset)) => {
-                Self::load_whole(whole, outside)?.subset(subset, &name[whole.len()..])
-            }
-            None => Self::load_whole(name, outside),
+            Some((whole, subset)) => Self::load_whole(whole)?.subset(subset, &name[whole.len()..]),
+            None => Self::load_whole(name),
         }
     }
 
-    fn load_whole(name: &str, outside: OutsideFiles) -> Result<Self, SceneError> {
+    fn load_whole(name: &str) -> Result<Self, SceneError> {
         if let Some(stand_in) = stand_ins::STAND_INS.iter().find(|scene| scene.name == name) {
             return Ok(Self::new(
                 name,
@@ -144,7 +135,7 @@ impl Scene {
             let meant = did_you_mean(name, known_names());
             return Err(SceneError::new(name, format!("no such scene{meant}; {}", known_scenes())));
         }
-        let mesh = load::load(&path, outside).map_err(|error| SceneError::new(name, error))?;
+        let mesh = load::load(&path).map_err(|error| SceneError::new(name, error))?;
         let stem = path
             .file_stem()
             .map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());

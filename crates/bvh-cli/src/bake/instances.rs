@@ -11,7 +11,7 @@ use bvh_build::{Builder, median_cut};
 use bvh_core::cost::Objective;
 use bvh_core::{Instance, InvalidInstances, Primitives, Triangle, WideBvh};
 use bvh_scenes::files;
-use bvh_scenes::load::{Format, OutsideFiles, gltf};
+use bvh_scenes::load::{Format, gltf};
 use bvh_scenes::{Scene, SceneError, SceneKind};
 use glam::Affine3A;
 use serde_json::json;
@@ -35,7 +35,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     args.jobs.apply()?;
     let plan = args.plan()?;
     let path = Path::new(&args.scene);
-    let parts = parts(path, args.files.outside())?;
+    let parts = parts(path)?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     if let Some(remark) = &parts.remark {
         print_error(&format!("scene {stem}: {remark}"));
@@ -121,10 +121,10 @@ fn new_folder(path: &Path) -> Result<(), Error> {
     )))
 }
 
-fn parts(path: &Path, outside: OutsideFiles) -> Result<gltf::Parts, Error> {
+fn parts(path: &Path) -> Result<gltf::Parts, Error> {
     let bytes = files::read(path)?;
     let parts = match Format::of(&bytes, path) {
-        Format::Gltf => gltf::parts(&bytes, path, outside).map_err(|fault| fault.to_string()),
+        Format::Gltf => gltf::parts(&bytes, path).map_err(|fault| fault.to_string()),
         format => Err(format!(
             "--instances with a file of the kind {format:?}; \
              accepted: glTF or GLB, whose nodes place meshes"

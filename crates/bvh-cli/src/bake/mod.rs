@@ -9,11 +9,10 @@ mod watch;
 
 use crate::Error;
 use crate::answer::{Answer, Form, gain, short, whole};
-use crate::arguments::{Jobs, input_file, output_file, output_or_free, reserve};
+use crate::arguments::{Jobs, input_file, load_scene, output_file, output_or_free, reserve};
 use crate::explain;
 use crate::export::{compare, tracers};
 use crate::rays::Rays;
-use crate::scene_files::SceneFiles;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::export::Target;
 use bvh_scenes::files::Reserved;
@@ -88,9 +87,6 @@ pub struct BakeArgs {
     /// Limits the threads.
     #[command(flatten)]
     pub jobs: Jobs,
-    /// Permits files outside the scene's folder.
-    #[command(flatten)]
-    pub files: SceneFiles,
     /// First list the steps that the scene does not need and that are skipped, with reasons.
     #[arg(long)]
     pub explain: bool,
@@ -131,7 +127,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     } else {
         plan.references
     };
-    let scene = args.files.load(&args.scene)?;
+    let scene = load_scene(&args.scene)?;
     let objects = scene.boxes.len();
     if let (Some(named), Some(rays)) = (&args.rays, &plan.rays) {
         rays.check(named, &scene)?;

@@ -6,7 +6,7 @@ use super::plan::{Plan, Prepared, Start, most_bytes};
 use super::{BakeArgs, save};
 use crate::Error;
 use crate::answer::Answer;
-use crate::arguments::{output_file, reserve};
+use crate::arguments::{load_scene, output_file, reserve};
 use bvh_core::{Aabb, Bvh, Node, NodeKind};
 use bvh_scenes::tree_file;
 use bvh_scenes::{Scene, fnv1a};
@@ -46,7 +46,7 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
     output_file("--out", &out, "bvh")?;
     let plan = args.plan()?;
     args.jobs.apply()?;
-    let scene = args.files.load(&args.scene)?;
+    let scene = load_scene(&args.scene)?;
     let parts = parts(&plan, &scene, count)?;
     let mut answer = Answer::new(args.form);
     if args.list {

@@ -3,10 +3,7 @@
 // Tests that send signals or make links and pipes are left out on Windows, and their imports stay.
 #![cfg_attr(windows, allow(unused_imports))]
 
-use crate::support::{
-    bvh, facts, names, outside_buffer, outside_scene, program, refused, unsaid, words, wrong,
-    wrong_flags,
-};
+use crate::support::{bvh, facts, names, program, refused, unsaid, words, wrong, wrong_flags};
 use bvh_core::{Aabb, Bvh, Node, file};
 use bvh_scenes::Scene;
 use std::fs;
@@ -213,26 +210,6 @@ fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
         ],
     );
     assert!(flags > 20, "{flags} flags");
-}
-
-#[test]
-fn every_command_reads_buffers_outside_the_folder_of_a_scene_only_with_permission() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = &folder.path().join("inner");
-    fs::create_dir(at).unwrap();
-    fs::write(at.join("scene.gltf"), outside_scene("../outside.bin")).unwrap();
-    fs::write(folder.path().join("outside.bin"), outside_buffer()).unwrap();
-    for line in [
-        "bake scene.gltf --budget=0s --out=x.bvh",
-        "bake scene.gltf --instances --budget=0s --out=x",
-        "inspect x.bvh scene.gltf",
-        "verify x.bvh scene.gltf",
-        "render scene.gltf --size=8x8 --out=x.png",
-        "report x.bvh scene.gltf",
-    ] {
-        wrong(at, line, &["buffers[0]", "outside the scene's folder", "--outside-files"]);
-        bvh(at, &format!("{line} --outside-files"));
-    }
 }
 
 #[test]

@@ -115,23 +115,3 @@ pub fn send(signal: &str, to: &Child) {
     let status = Command::new("kill").args([signal, &to.id().to_string()]).status();
     assert!(status.unwrap().success());
 }
-
-/// Returns a glTF scene of one triangle, whose corners, [`outside_buffer`], are in the file at
-/// `uri`.
-pub fn outside_scene(uri: &str) -> String {
-    format!(
-        r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0]}}], "nodes": [{{"mesh": 0}}],
-        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}}]}}],
-        "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}}],
-        "bufferViews": [{{"buffer": 0, "byteLength": 36}}],
-        "buffers": [{{"uri": "{uri}", "byteLength": 36}}]}}"#
-    )
-}
-
-/// Returns the bytes of a triangle's corners.
-pub fn outside_buffer() -> Vec<u8> {
-    [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
-        .into_iter()
-        .flat_map(f32::to_le_bytes)
-        .collect()
-}

@@ -26,28 +26,11 @@ const MOST_BYTES: u64 = 48 * MOST_TRIANGLES as u64;
 /// The largest number of positions and indices: [`MOST_TRIANGLES`] that share no position.
 const MOST_ITEMS: u64 = 6 * MOST_TRIANGLES as u64;
 
-/// The treatment of buffers outside the file's folder. Reading them lets the author of the file
-/// decide which files of the user are opened.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum OutsideFiles {
-    /// The loader rejects them and names them.
-    #[default]
-    Rejected,
-    /// The loader reads them.
-    Allowed,
-}
-
-impl From<bool> for OutsideFiles {
-    fn from(allowed: bool) -> Self {
-        if allowed { Self::Allowed } else { Self::Rejected }
-    }
-}
-
 /// Reads the bytes of a glTF or GLB file, and the buffers that its meshes refer to from the folder
 /// of `path`.
-pub fn parse(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Mesh, Fault> {
+pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     let (document, chunk) = document(bytes, path)?;
-    let buffers = Buffers::new(path, outside, chunk);
+    let buffers = Buffers::new(path, chunk);
     let mut loader = Loader::new(path, &document, buffers, bytes.len());
     let places = loader.places()?;
     check_size(&document, &places, path)?;
@@ -86,9 +69,9 @@ pub struct Placed {
 
 /// Reads a file as [`parse`] does, but returns every mesh once. Rejects a node that gives its mesh
 /// a shape of its own. Leaves out places in which no triangle has an area.
-pub fn parts(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Parts, Fault> {
+pub fn parts(bytes: &[u8], path: &Path) -> Result<Parts, Fault> {
     let (document, chunk) = document(bytes, path)?;
-    let buffers = Buffers::new(path, outside, chunk);
+    let buffers = Buffers::new(path, chunk);
     let mut loader = Loader::new(path, &document, buffers, bytes.len());
     let mut places = loader.places()?;
     for Placed { node, mesh, .. } in &places {

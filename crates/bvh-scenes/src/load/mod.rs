@@ -9,7 +9,6 @@ mod stl;
 mod text;
 
 use crate::files::{ReadError, read};
-pub use gltf::OutsideFiles;
 use mesh::{Fault, Mesh, Place};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -74,15 +73,15 @@ fn without_mark(bytes: &[u8]) -> &[u8] {
 }
 
 /// Reads the mesh file at `path`. Any bytes give a mesh with at least one triangle or an error.
-/// `outside` decides whether a glTF file may refer to files outside its folder. Takes O(bytes) time,
-/// and a few hundred bytes of memory per triangle besides the file.
-pub fn load(path: &Path, outside: OutsideFiles) -> Result<Mesh, MeshError> {
-    parse(&read(path)?, path, outside)
+/// A glTF file may refer to files in its folder and below. Takes O(bytes) time, and a few hundred
+/// bytes of memory per triangle besides the file.
+pub fn load(path: &Path) -> Result<Mesh, MeshError> {
+    parse(&read(path)?, path)
 }
 
 /// Reads the bytes of a mesh file as [`load`] does. `path` names the file in errors, and a glTF
 /// file's references are relative to its folder.
-pub fn parse(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Mesh, MeshError> {
+pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
     if bytes.trim_ascii().is_empty() {
         return Err(MeshError::Empty(path.to_path_buf()));
     }
@@ -95,6 +94,6 @@ pub fn parse(bytes: &[u8], path: &Path, outside: OutsideFiles) -> Result<Mesh, M
         Format::Obj => obj::parse(bytes, path)?,
         Format::Ply => ply::parse(bytes, path)?,
         Format::Stl => stl::parse(bytes, path)?,
-        Format::Gltf => gltf::parse(bytes, path, outside)?,
+        Format::Gltf => gltf::parse(bytes, path)?,
     })
 }

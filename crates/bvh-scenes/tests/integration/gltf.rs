@@ -4,8 +4,8 @@ use crate::glb::glb;
 use crate::samples::{INDEXED, NODE, buffer, error, gltf_json, read, square};
 use bvh_core::Triangle;
 use bvh_scenes::load::gltf::{self, Parts};
+use bvh_scenes::load::load;
 use bvh_scenes::load::mesh::Mesh;
-use bvh_scenes::load::{OutsideFiles, load};
 use glam::Vec3;
 use serde_json::{Value, json};
 use std::fs;
@@ -130,7 +130,7 @@ fn everything_that_moves_hides_or_repeats_a_vertex_is_read_or_named() {
             let bytes = file(&case);
             let name = case["name"].as_str().unwrap();
             let [fault, fault_of_parts] = ["fault", "fault of parts"].map(|key| case[key].as_str());
-            let parts = gltf::parts(&bytes, path, OutsideFiles::Rejected);
+            let parts = gltf::parts(&bytes, path);
             if let Some(words) = fault {
                 let message = error(&bytes, "a.glb");
                 assert!(message.contains(words), "{name}: {message}");
@@ -197,7 +197,7 @@ fn extras_of_any_kind_are_ignored_in_any_place() {
 }
 
 #[test]
-fn a_buffer_outside_the_folder_of_the_scene_is_rejected_unless_it_is_allowed() {
+fn a_buffer_outside_the_folder_of_the_scene_is_rejected() {
     let outside = tempfile::tempdir().unwrap();
     let file = outside.path().join("outside.bin");
     fs::write(&file, buffer()).unwrap();
@@ -216,9 +216,7 @@ fn a_buffer_outside_the_folder_of_the_scene_is_rejected_unless_it_is_allowed() {
     }
     // The message must not reveal whether the file exists.
     let scene_folder = folder("../no_such_file");
-    let message = load(&scene_folder.path().join("scene.gltf"), OutsideFiles::Rejected)
-        .unwrap_err()
-        .to_string();
+    let message = load(&scene_folder.path().join("scene.gltf")).unwrap_err().to_string();
     assert!(message.contains("`../no_such_file` is outside"), "{message}");
     #[cfg(unix)]
     {
@@ -230,11 +228,10 @@ fn a_buffer_outside_the_folder_of_the_scene_is_rejected_unless_it_is_allowed() {
 
 fn assert_outside(folder: &Path) {
     let path = folder.join("scene.gltf");
-    let message = load(&path, OutsideFiles::Rejected).unwrap_err().to_string();
-    for part in ["buffers[0]", "outside the scene's folder", "--outside-files"] {
+    let message = load(&path).unwrap_err().to_string();
+    for part in ["buffers[0]", "outside the scene's folder; accepted: a file in this folder"] {
         assert!(message.contains(part), "{part}: {message}");
     }
-    assert_eq!(load(&path, OutsideFiles::Allowed).unwrap(), mesh());
 }
 
 #[test]
@@ -244,7 +241,7 @@ fn files_in_the_folder_of_the_scene_and_below_are_read() {
         fs::create_dir(folder.path().join("a")).unwrap();
         let file = folder.path().join(name.replace("%20", " "));
         fs::write(file, buffer()).unwrap();
-        let read = load(&folder.path().join("scene.gltf"), OutsideFiles::Rejected);
+        let read = load(&folder.path().join("scene.gltf"));
         assert_eq!(read.unwrap(), mesh(), "{name}");
     }
 }

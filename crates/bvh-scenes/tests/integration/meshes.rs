@@ -6,7 +6,7 @@ use crate::samples::{
 use bvh_scenes::Scene;
 use bvh_scenes::files::ReadError;
 use bvh_scenes::load::mesh::Mesh;
-use bvh_scenes::load::{Format, MeshError, OutsideFiles, load};
+use bvh_scenes::load::{Format, MeshError, load};
 use std::path::Path;
 
 #[test]
@@ -53,13 +53,10 @@ fn the_path_of_a_mesh_file_names_a_scene_and_a_missing_file_is_reported() {
         let message = Scene::load(missing).unwrap_err().to_string();
         assert!(message.contains(&format!("{missing}: no such file")), "{message}");
     }
-    assert!(matches!(
-        load(folder.path(), OutsideFiles::Rejected),
-        Err(MeshError::Read(ReadError::Folder { .. }))
-    ));
+    assert!(matches!(load(folder.path()), Err(MeshError::Read(ReadError::Folder { .. }))));
     #[cfg(unix)]
     assert!(matches!(
-        load(Path::new("/dev/zero"), OutsideFiles::Rejected),
+        load(Path::new("/dev/zero")),
         Err(MeshError::Read(ReadError::NotRegular { .. }))
     ));
     assert!(matches!(read(b" \r\n", "a.ply"), Err(MeshError::Empty(_))));
@@ -70,15 +67,15 @@ fn buffers_are_files_in_the_folder_of_the_file_that_names_them() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.gltf");
     std::fs::write(&path, gltf_json("my%20buffer.bin", NODE, INDEXED)).unwrap();
-    let missing = load(&path, OutsideFiles::Rejected).unwrap_err().to_string();
+    let missing = load(&path).unwrap_err().to_string();
     assert!(
         missing.contains("buffers[0]") && missing.contains("my buffer.bin: no such file"),
         "{missing}"
     );
     std::fs::write(folder.path().join("my buffer.bin"), buffer()).unwrap();
-    assert_eq!(load(&path, OutsideFiles::Rejected).unwrap().triangles, square());
+    assert_eq!(load(&path).unwrap().triangles, square());
     std::fs::write(folder.path().join("my buffer.bin"), &buffer()[..50]).unwrap();
-    let short = load(&path, OutsideFiles::Rejected).unwrap_err().to_string();
+    let short = load(&path).unwrap_err().to_string();
     assert!(short.contains("buffers[0]: 50 bytes; expected 60"), "{short}");
     let remote = error(gltf_json("http://example.org/a.bin", NODE, INDEXED), "a.gltf");
     assert!(remote.contains("a file in this folder"), "{remote}");

@@ -3,7 +3,7 @@
 use base64::Engine as _;
 use bvh_core::Triangle;
 use bvh_scenes::load::mesh::Mesh;
-use bvh_scenes::load::{Format, MeshError, OutsideFiles, parse};
+use bvh_scenes::load::{Format, MeshError, parse};
 use std::path::Path;
 
 pub const CORNERS: [[f32; 3]; 4] =
@@ -129,9 +129,9 @@ pub fn samples() -> [(&'static str, Format, Vec<u8>); 8] {
     ]
 }
 
-/// Reads a file that may not refer to files outside its folder.
+/// Reads the bytes of a file with this name.
 pub fn read(bytes: impl AsRef<[u8]>, name: &str) -> Result<Mesh, MeshError> {
-    parse(bytes.as_ref(), Path::new(name), OutsideFiles::Rejected)
+    parse(bytes.as_ref(), Path::new(name))
 }
 
 pub fn error(bytes: impl AsRef<[u8]>, name: &str) -> String {

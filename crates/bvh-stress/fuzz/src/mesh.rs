@@ -1,6 +1,6 @@
 //! Mesh files of arbitrary bytes, in every format.
 
-use bvh_scenes::load::{OutsideFiles, gltf, parse};
+use bvh_scenes::load::{gltf, parse};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use std::path::Path;
 /// read again, and that the parts of a glTF file are its triangles.
 pub fn mesh(bytes: &[u8]) {
     let path = Path::new("scene.obj");
-    let mesh = match parse(bytes, path, OutsideFiles::Rejected) {
+    let mesh = match parse(bytes, path) {
         Ok(mesh) => mesh,
         Err(error) => {
             let message = error.to_string();
@@ -19,7 +19,7 @@ pub fn mesh(bytes: &[u8]) {
         }
     };
     assert!(!mesh.triangles.is_empty());
-    if let Ok(parts) = gltf::parts(bytes, path, OutsideFiles::Rejected) {
+    if let Ok(parts) = gltf::parts(bytes, path) {
         let triangles = parts.places.iter().map(|place| parts.meshes[&place.mesh].len());
         assert!(triangles.sum::<usize>() <= mesh.triangles.len());
     }
@@ -35,6 +35,6 @@ pub fn mesh(bytes: &[u8]) {
         }
         text += "f -3 -2 -1\n";
     }
-    let again = parse(text.as_bytes(), path, OutsideFiles::Rejected).unwrap();
+    let again = parse(text.as_bytes(), path).unwrap();
     assert_eq!(again.triangles, mesh.triangles);
 }

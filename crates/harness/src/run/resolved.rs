@@ -3,7 +3,6 @@
 use crate::Error;
 use crate::spec::Experiment;
 use bvh_scenes::files::read_text;
-use bvh_scenes::load::OutsideFiles;
 use bvh_scenes::{Scene, subset};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -73,12 +72,10 @@ pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>),
         return Ok(Default::default());
     }
     let names = experiment.scenes.iter().flat_map(|name| subset::expand(name));
-    let outside = OutsideFiles::from(experiment.outside_files);
-    let mut scenes =
-        names.map(|name| Scene::load_with(&name, outside)).collect::<Result<Vec<_>, _>>()?;
+    let mut scenes = names.map(|name| Scene::load(&name)).collect::<Result<Vec<_>, _>>()?;
     let mut skipped_scenes = Vec::new();
     for name in &experiment.optional_scenes {
-        match Scene::load_with(name, outside) {
+        match Scene::load(name) {
             Ok(scene) => scenes.push(scene),
             // An optional scene that cannot be loaded is one that nobody has fetched.
             Err(_) => skipped_scenes.push(name.clone()),

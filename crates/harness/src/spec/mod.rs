@@ -43,10 +43,6 @@ config! {
         scenes: Vec<String>;
         /// Scenes that are skipped, with a note, if they have not been fetched.
         optional_scenes: Vec<String>;
-        /// Whether glTF files may name buffers outside their own folders. The author of such a file
-        /// then chooses which files are read.
-        #[serde(skip_serializing_if = "std::ops::Not::not")]
-        outside_files: bool;
         /// The seed from which, with the experiment, the scene, the method and the repetition,
         /// every run's seed is derived.
         seed: u64 = 1, in 0..=i64::MAX as u64;

@@ -19,10 +19,6 @@ pub struct Overrides {
     /// repeated.
     #[arg(long = "scene", value_name = "NAME|PATH")]
     pub scenes: Vec<String>,
-    /// Let a glTF file name buffers outside its own folder. Its author then chooses which files are
-    /// read.
-    #[arg(long)]
-    pub outside_files: bool,
     /// Seed instead of the spec's.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
@@ -97,8 +93,6 @@ impl Experiment {
         if let Some(seed) = overrides.seed {
             experiment.seed = seed;
         }
-        // The command line can only allow more than the spec, never less.
-        experiment.outside_files |= overrides.outside_files;
         if !overrides.scenes.is_empty() {
             experiment.scenes.clone_from(&overrides.scenes);
             experiment.optional_scenes.clear();

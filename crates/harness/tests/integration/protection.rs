@@ -5,8 +5,7 @@
 #![cfg_attr(windows, allow(unused_imports))]
 
 use crate::support::{
-    ended, folder_with, names, of_part, outside_buffer, outside_scene, part, program, reproducible,
-    run, said, text,
+    ended, folder_with, names, of_part, part, program, reproducible, run, said, text,
 };
 use std::fs;
 use std::path::Path;
@@ -165,19 +164,4 @@ fn arguments_need_not_be_utf_8() {
     let provenance =
         fs::read_to_string(folder.path().join(out).join("spec/provenance.toml")).unwrap();
     assert!(provenance.contains("harness spec.toml --out out"), "{provenance}");
-}
-
-#[test]
-fn only_a_spec_that_allows_it_reads_a_buffer_outside_the_folder_of_a_scene() {
-    let folder = tempfile::tempdir().unwrap();
-    let dir = &folder.path().join("inner");
-    fs::create_dir(dir).unwrap();
-    fs::write(dir.join("scene.gltf"), outside_scene("../outside.bin")).unwrap();
-    fs::write(folder.path().join("outside.bin"), outside_buffer()).unwrap();
-    let spec = "question = 'q'\nscenes = ['scene.gltf']\nmethods = [{ method = 'median_cut' }]\n";
-    fs::write(dir.join("spec.toml"), spec).unwrap();
-    refused(dir, &["spec.toml"], &["buffers[0]", "outside the scene's folder", "--outside-files"]);
-    said(dir, &["spec.toml", "--outside-files"]);
-    fs::write(dir.join("told.toml"), format!("outside_files = true\n{spec}")).unwrap();
-    said(dir, &["told.toml"]);
 }

@@ -1,7 +1,7 @@
 //! The buffers of a glTF file. A buffer is read when a mesh first needs it, and a file once.
 
+use super::MOST_BYTES;
 use super::document::{Buffer, Document};
-use super::{MOST_BYTES, OutsideFiles};
 use crate::files::{read, regular};
 use data_url::DataUrl;
 use std::collections::BTreeMap;
@@ -21,7 +21,6 @@ enum Bytes<'a> {
 /// The buffers of one glTF file.
 pub struct Buffers<'a> {
     path: &'a Path,
-    outside: OutsideFiles,
     /// The binary chunk of a GLB file.
     chunk: Option<&'a [u8]>,
     /// The buffers that a mesh has needed, by their number.
@@ -34,8 +33,8 @@ pub struct Buffers<'a> {
 
 impl<'a> Buffers<'a> {
     /// Prepares the buffers of the file at `path` without reading any.
-    pub fn new(path: &'a Path, outside: OutsideFiles, chunk: Option<&'a [u8]>) -> Self {
-        Self { path, outside, chunk, needed: BTreeMap::new(), files: BTreeMap::new(), total: 0 }
+    pub fn new(path: &'a Path, chunk: Option<&'a [u8]>) -> Self {
+        Self { path, chunk, needed: BTreeMap::new(), files: BTreeMap::new(), total: 0 }
     }
 
     /// Reads a buffer if no mesh has needed it before. The error describes its fault.
@@ -105,10 +104,11 @@ impl<'a> Buffers<'a> {
     }
 
     /// Returns the path of a file by its name in a URI. Rejects a file outside the folder of the
-    /// glTF file, also one behind a symbolic link, unless such files are allowed.
+    /// glTF file, also one behind a symbolic link, because otherwise the author of a file decides
+    /// which files of the user are opened.
     fn allowed(&self, name: &Path) -> Result<PathBuf, String> {
         let path = self.path.with_file_name(name);
-        if self.outside == OutsideFiles::Rejected && leaves(name) {
+        if leaves(name) {
             return Err(outside_message(name));
         }
         // A missing file has no canonical path; the reader then reports that the file is missing.
@@ -117,7 +117,7 @@ impl<'a> Buffers<'a> {
         let folder = Path::new(".").join(self.path.parent().unwrap_or(Path::new("")));
         // Canonical paths follow symbolic links, which the name alone does not reveal.
         let is_below = fs::canonicalize(folder).is_ok_and(|folder| path.starts_with(folder));
-        if self.outside == OutsideFiles::Rejected && !is_below {
+        if !is_below {
             return Err(outside_message(name));
         }
         Ok(path)
@@ -138,7 +138,7 @@ impl<'a> Buffers<'a> {
 
 fn outside_message(name: &Path) -> String {
     format!(
-        "`{}` is outside the scene's folder; accepted: a file in it, or any with --outside-files",
+        "`{}` is outside the scene's folder; accepted: a file in this folder or below",
         name.display()
     )
 }
@@ -167,7 +167,7 @@ mod tests {
         fs::create_dir(folder.path().join("a")).unwrap();
         fs::write(folder.path().join("b.bin"), [7; 60]).unwrap();
         let path = folder.path().join("scene.gltf");
-        let mut buffers = Buffers::new(&path, OutsideFiles::Rejected, None);
+        let mut buffers = Buffers::new(&path, None);
         for name in ["b.bin", "./b.bin", "a/../b.bin", "%62.bin"] {
             assert_eq!(*buffers.of_uri(name).unwrap(), [7; 60], "{name}");
         }
