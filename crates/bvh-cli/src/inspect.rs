@@ -7,13 +7,12 @@ use crate::arguments::{load_scene, output_file};
 use crate::rays::Rays;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
-use bvh_core::file::{FileError, Header, TreeFile};
-use bvh_core::{Bvh, NodeKind, validate_references};
-use bvh_scenes::tree_file::{self, TreeFileError};
-use bvh_scenes::{Scene, files};
+use bvh_core::file::Header;
+use bvh_core::{Bvh, NodeKind};
+use bvh_scenes::{files, tree_file};
 use clap::Args;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Report the origin of a tree file, and the costs, depth, arity and validity of its tree.
 #[derive(Args, Clone, Debug)]
@@ -48,18 +47,37 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     if let (Some(named), Some(rays), Some(scene)) = (&args.rays, &rays, &scene) {
         rays.check(named, scene)?;
     }
-    let read = Read::new(&args.file, scene.as_ref())?;
+    let (tree, header) = tree_file::load(&args.file, scene.as_ref())?;
     let tests = match (rays, &scene) {
-        (Some(rays), Some(scene)) => Some(rays.expected_tests(&read.tree, scene)?),
+        (Some(rays), Some(scene)) => Some(rays.expected_tests(&tree, scene)?),
         _ => None,
     };
     let mut answer = Answer::new(args.form);
-    read.describe(scene.as_ref(), &mut answer);
+    match &scene {
+        Some(scene) => {
+            answer.fact("valid", "yes, over this scene's objects");
+            answer.fact("scene", scene.name.as_str());
+        }
+        // Without a scene there are no boxes to check against, which the fact must not hide.
+        None => answer.fact("valid", "as a tree; name a scene to check its objects too"),
+    }
+    answer.fact("version", Header::VERSION);
+    answer.fact("bytes", files::regular(&args.file)?);
+    describe(&header, &mut answer);
+    measure(&tree, &mut answer);
+    // The build cannot fail, because a valid tree over these boxes proves that they are finite.
+    if let Some(scene) = &scene
+        && let Ok(greedy) = muller_fellner::Config::default().build(&scene.boxes)
+        && cost::internal_area(&greedy) > 0.0
+    {
+        let ratio = cost::internal_area(&tree) / cost::internal_area(&greedy);
+        answer.fact("internal area over Müller–Fellner's", ratio);
+    }
     if let Some(tests) = tests {
         answer.fact("expected tests of a ray", tests);
     }
     if let Some(path) = &args.nodes {
-        files::write(path, &nodes_table(&read.tree).map_err(Error::csv(path))?)?;
+        files::write(path, &nodes_table(&tree).map_err(Error::csv(path))?)?;
     }
     answer.end();
     Ok(())
@@ -102,75 +120,22 @@ pub struct VerifyArgs {
 
 /// Does the same as [`inspect`], and requires a scene.
 pub fn verify(args: &VerifyArgs) -> Result<(), Error> {
-    let scene = load_scene(&args.scene)?;
-    let read = Read::new(&args.file, Some(&scene))?;
-    let mut answer = Answer::new(args.form);
-    read.describe(Some(&scene), &mut answer);
-    answer.end();
-    Ok(())
+    let VerifyArgs { file, scene, form } = args.clone();
+    inspect(&InspectArgs { file, scene: Some(scene), rays: None, nodes: None, form })
 }
 
-/// A tree file whose tree is valid, over the objects of the scene if there is one.
-struct Read {
-    bytes: Vec<u8>,
-    header: Header,
-    tree: Bvh,
-}
-
-impl Read {
-    fn new(path: &Path, scene: Option<&Scene>) -> Result<Self, Error> {
-        let bytes = tree_file::read(path)?;
-        let checked = || {
-            let file = TreeFile::open(&bytes)?;
-            let header = file.header().clone();
-            let tree = file.tree()?;
-            if let Some(scene) = scene {
-                file.for_boxes(&scene.boxes)?;
-                validate_references(&tree, &scene.boxes, &scene.primitives)?;
-            }
-            Ok::<_, FileError>((header, tree))
-        };
-        let (header, tree) = checked().map_err(TreeFileError::of(path))?;
-        Ok(Self { header, tree, bytes })
-    }
-
-    /// Lists the facts, which begin with the validity.
-    fn describe(&self, scene: Option<&Scene>, answer: &mut Answer) {
-        let Self { bytes, header, tree } = self;
-        match scene {
-            Some(scene) => {
-                answer.fact("valid", "yes, over this scene's objects");
-                answer.fact("scene", scene.name.as_str());
-            }
-            // Without a scene there are no boxes to check against, which the fact must not hide.
-            None => answer.fact("valid", "as a tree; name a scene to check its objects too"),
-        }
-        // The version follows the magic number.
-        let version = bytes[Header::MAGIC.len()..].first_chunk();
-        answer.fact("version", version.map_or(0, |bytes| u32::from_le_bytes(*bytes)));
-        answer.fact("bytes", bytes.len());
-        answer.fact("method", header.method.as_str());
-        // Digits in groups would be no seed on the command line.
-        answer.say(&format!("seed: {}", header.seed));
-        answer.record("seed", header.seed);
-        answer.fact("work", header.work);
-        answer.fact("objective", objective(&header.objective));
-        answer.fact("cost when saved", header.cost);
-        answer.fact("checksum of the scene", format!("{:08x}", header.scene));
-        answer.fact("objects", header.objects);
-        answer.fact("references", header.references);
-        answer.fact("nodes", header.nodes);
-        measure(tree, answer);
-        let Some(scene) = scene else { return };
-        // The build cannot fail, because a valid tree over these boxes proves that they are finite.
-        if let Ok(greedy) = muller_fellner::Config::default().build(&scene.boxes) {
-            let base = cost::internal_area(&greedy);
-            if base > 0.0 {
-                answer
-                    .fact("internal area over Müller–Fellner's", cost::internal_area(tree) / base);
-            }
-        }
-    }
+fn describe(header: &Header, answer: &mut Answer) {
+    answer.fact("method", header.method.as_str());
+    // Digits in groups would be no seed on the command line.
+    answer.say(&format!("seed: {}", header.seed));
+    answer.record("seed", header.seed);
+    answer.fact("work", header.work);
+    answer.fact("objective", objective(&header.objective));
+    answer.fact("cost when saved", header.cost);
+    answer.fact("checksum of the scene", format!("{:08x}", header.scene));
+    answer.fact("objects", header.objects);
+    answer.fact("references", header.references);
+    answer.fact("nodes", header.nodes);
 }
 
 fn objective(objective: &Objective) -> String {

@@ -49,20 +49,29 @@ pub fn read(path: &Path) -> Result<Vec<u8>, TreeFileError> {
     Ok(bytes)
 }
 
-/// Reads the tree over a scene's objects from the file at `path`, and the file's header.
+/// Reads the tree over a scene's objects from the file at `path`, and the file's header. Without a
+/// scene, checks the tree alone.
 ///
 /// # Errors
 ///
 /// [`TreeFileError`] if the file is damaged or was saved for another scene, or if its tree is not
 /// [valid](validate_references) over these objects.
-pub fn load(path: &Path, scene: &Scene) -> Result<(Bvh, Header), TreeFileError> {
+pub fn load<'a>(
+    path: &Path,
+    scene: impl Into<Option<&'a Scene>>,
+) -> Result<(Bvh, Header), TreeFileError> {
     let bytes = read(path)?;
+    let scene = scene.into();
     let checked = || {
-        let file = TreeFile::open(&bytes)?.for_boxes(&scene.boxes)?;
+        let file = TreeFile::open(&bytes)?;
+        let header = file.header().clone();
         let tree = file.tree()?;
-        // The checksums prove only that the file is intact: a forged tree can have right ones.
-        validate_references(&tree, &scene.boxes, &scene.primitives)?;
-        Ok((tree, file.header().clone()))
+        if let Some(scene) = scene {
+            file.for_boxes(&scene.boxes)?;
+            // The checksums prove only that the file is intact: a forged tree can have right ones.
+            validate_references(&tree, &scene.boxes, &scene.primitives)?;
+        }
+        Ok((tree, header))
     };
     checked().map_err(TreeFileError::of(path))
 }

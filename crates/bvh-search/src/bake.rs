@@ -13,6 +13,10 @@ use bvh_core::file::{self, FileError, Origin};
 use bvh_core::{
     Aabb, Bvh, DensityError, Primitives, RayDensity, Segment, validate, validate_references,
 };
+use core::sync::atomic::AtomicBool;
+
+/// The largest average number of references to an object.
+const MOST_REFERENCES: f64 = 16.0;
 
 /// A search for the best tree of a scene.
 ///
@@ -102,15 +106,6 @@ impl Observer for Unheard<'_> {
     }
 }
 
-/// Ends a search before its first step.
-struct Over;
-
-impl Observer for Over {
-    fn cancelled(&self) -> bool {
-        true
-    }
-}
-
 impl<'a> Bake<'a> {
     /// Returns a search with the defaults: whole objects, random lines, seed 1, no limit.
     pub fn new(boxes: &'a [Aabb]) -> Self {
@@ -134,12 +129,11 @@ impl<'a> Bake<'a> {
         self.objective.unwrap_or(default)
     }
 
-    /// Rejects a number of references that is out of range. A [start](Self::start) may have more.
-    pub fn check(&self) -> Result<(), OutOfRange> {
-        let most = if self.start.is_some() { f64::MAX } else { 16.0 };
-        match (1.0..=most).contains(&self.references) {
+    /// Rejects a number of [references](Self::references) that is out of range.
+    pub fn check_references(references: f64) -> Result<(), OutOfRange> {
+        match (1.0..=MOST_REFERENCES).contains(&references) {
             true => Ok(()),
-            false => Err(OutOfRange::new("references", self.references, "1 to 16")),
+            false => Err(OutOfRange::new("references", references, "1 to 16")),
         }
     }
 
@@ -159,7 +153,10 @@ impl<'a> Bake<'a> {
         greedy: Option<Bvh>,
         observer: &dyn Observer,
     ) -> Result<Baked, SearchError> {
-        self.check()?;
+        // A start may have more references.
+        if self.start.is_none() || self.references.is_nan() || self.references <= MOST_REFERENCES {
+            Self::check_references(self.references)?;
+        }
         let is_timed = observer.progress().is_some();
         let builds = !is_timed && self.budget != Budget::UNLIMITED && self.start.is_none();
         let greedy = match greedy {
@@ -167,7 +164,8 @@ impl<'a> Bake<'a> {
             greedy => greedy,
         };
         // Without work there is nothing to search for, and the first tree is the answer.
-        let observer = if self.budget.max_work == Some(0) { &Over } else { observer };
+        let is_over = AtomicBool::new(true);
+        let observer = if self.budget.max_work == Some(0) { &is_over } else { observer };
         let mut splits = self.splits();
         // A division may take all the time of a search that has no tree yet. Such a search divides
         // later itself.

@@ -1,8 +1,8 @@
 //! `bvh bake --instances`: writes a tree for every mesh of a glTF file, and one tree over the
 //! instances that its nodes place, into a folder.
 
-use super::BakeArgs;
 use super::plan::{Found, Plan, Prepared};
+use super::{BakeArgs, decide};
 use crate::Error;
 use crate::answer::{Answer, gain, short, whole};
 use crate::arguments::output_folder;
@@ -33,7 +33,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let out = args.out()?;
     new_folder(&out)?;
     args.jobs.apply()?;
-    let plan = args.plan()?;
+    let mut plan = args.plan()?;
     let path = Path::new(&args.scene);
     let parts = parts(path)?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -56,7 +56,9 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
 
     let objects: usize = scenes.iter().chain([&top]).map(|scene| scene.boxes.len()).sum();
     let mut answer = Answer::new(args.form);
-    let plan = args.with_budget(plan, objects, &mut answer);
+    if args.budget.is_none() {
+        plan.effort = decide::work(objects, &mut answer);
+    }
     // The top tree's objects are boxes, which cannot be divided, and no wide layout is made of it.
     let plan_of_top = Plan { references: 1.0, objective: Objective::InternalArea, ..plan.clone() };
     let names = parts.meshes.keys().map(|mesh| format!("mesh_{mesh}.bvh")).chain([TOP.into()]);

@@ -15,13 +15,13 @@ use crate::export::{compare, tracers};
 use crate::rays::Rays;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::export::Target;
+use bvh_scenes::did_you_mean;
 use bvh_scenes::files::Reserved;
-use bvh_scenes::{Scene, did_you_mean};
 use bvh_search::{Bake, Method, Outcome, StopReason};
 use clap::Args;
-use decide::{Open, decide};
+use decide::decide;
 use effort::Effort;
-use plan::{Found, Plan, Prepared, Start};
+use plan::{Found, Plan, Start};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -119,16 +119,9 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let mut answer = Answer::new(args.form);
     let out = args.out()?;
     output_file("--out", &out, "bvh")?;
-    let plan = args.plan()?;
+    let mut plan = args.plan()?;
     args.jobs.apply()?;
-    // A decision may add references later.
-    let most_references = if args.budget.is_none() {
-        decide::REFERENCES.max(plan.references)
-    } else {
-        plan.references
-    };
     let scene = load_scene(&args.scene)?;
-    let objects = scene.boxes.len();
     if let (Some(named), Some(rays)) = (&args.rays, &plan.rays) {
         rays.check(named, &scene)?;
     }
@@ -137,12 +130,17 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         answer.say(&text);
         answer.record("explanation", text);
     }
+    let mut most_references = plan.references;
+    if args.budget.is_none() {
+        plan.effort = decide::work(scene.boxes.len(), &mut answer);
+        // The decision may add references.
+        most_references = most_references.max(decide::REFERENCES);
+    }
     let start =
         args.from.as_ref().map(|path| Start::load(path, &scene, most_references)).transpose()?;
-    let plan = args.with_budget(plan, objects, &mut answer);
     // Reserving the file first reports a full disk before the search and not after it.
     let reserved = reserve(&out, args.out.is_some(), plan::most_bytes(&scene, most_references))?;
-    let (plan, prepared) = args.decided(plan, &scene, interrupted, &mut answer)?;
+    let (plan, prepared) = decide(args, plan, &scene, interrupted, &mut answer)?;
     let found = plan.search(&scene, start.as_ref(), prepared, interrupted)?;
     save(&found, &out, reserved, interrupted, &mut answer)?;
     // Rays are counted once the tree is safe.
@@ -179,7 +177,7 @@ fn save(
 
 /// Describes the result of a search, whose tree has this cost for random lines.
 fn summarise(found: &Found, cost_for_lines: f64, answer: &mut Answer) {
-    let Found { plan, scene, baked, greedy, seconds, .. } = found;
+    let Found { plan, scene, baked, seconds, .. } = found;
     let Outcome { tree, cost, evaluations: moves, work, stop, .. } = &baked.outcome;
     let objects = scene.boxes.len();
     let references = tree.prim_ids.len();
@@ -197,12 +195,12 @@ fn summarise(found: &Found, cost_for_lines: f64, answer: &mut Answer) {
     answer.record("method", method);
     answer.record("seed", plan.seed);
     let area = internal_area(tree);
-    if let Some(greedy) = greedy {
+    if let Some([base, _]) = found.costs_of_greedy {
         answer.say(&format!(
             "total area of inner nodes {} that of a greedy SAH sweep's tree",
-            gain(area, greedy.area)
+            gain(area, base)
         ));
-        answer.record("total area of inner nodes in the greedy tree", greedy.area);
+        answer.record("total area of inner nodes in the greedy tree", base);
     }
     answer.record("total area of inner nodes", area);
     // The gain in area is no measure of a search for another cost.
@@ -212,11 +210,11 @@ fn summarise(found: &Found, cost_for_lines: f64, answer: &mut Answer) {
         answer.record("cost in the greedy tree", base);
     }
     answer.record("cost", *cost);
-    if let Some(greedy) = greedy.as_ref().filter(|_| found.is_for_rays()) {
+    if let (Some([_, base]), Some(_)) = (found.costs_of_greedy, &found.density) {
         answer.say(&format!(
             "risk: a tree for rays may be worse for others; for random lines it is {} the greedy \
              tree's",
-            gain(cost_for_lines, greedy.cost_for_lines)
+            gain(cost_for_lines, base)
         ));
     }
     if let Some(before) = baked.start {
@@ -254,20 +252,17 @@ fn summarise(found: &Found, cost_for_lines: f64, answer: &mut Answer) {
 
 impl BakeArgs {
     fn out(&self) -> Result<PathBuf, Error> {
-        output_or_free("--out", self.out.as_ref(), || self.name_after_scene())
-    }
-
-    fn name_after_scene(&self) -> PathBuf {
-        let scene = Path::new(&self.scene);
-        let stem = scene.file_stem().unwrap_or(scene.as_os_str());
-        // The colon of `escher:1000` is no part of a file's name everywhere.
-        let stem = stem.to_string_lossy().replace(':', "-");
-        let extension = if self.instances { "" } else { ".bvh" };
-        PathBuf::from(stem + extension)
+        output_or_free("--out", self.out.as_ref(), || {
+            let scene = Path::new(&self.scene);
+            let stem = scene.file_stem().unwrap_or(scene.as_os_str());
+            // The colon of `escher:1000` is no part of a file's name everywhere.
+            let stem = stem.to_string_lossy().replace(':', "-");
+            PathBuf::from(stem + if self.instances { "" } else { ".bvh" })
+        })
     }
 
     /// Returns the search that the arguments specify. Without `--budget` it has no work yet, which
-    /// [`Self::with_budget`] adds.
+    /// [`decide::work`] chooses.
     fn plan(&self) -> Result<Plan, Error> {
         let rays = self.rays.as_deref().map(Rays::read).transpose()?;
         let method = self.method()?;
@@ -286,39 +281,6 @@ impl BakeArgs {
             references,
             rays,
         })
-    }
-
-    /// Adds the work for this many objects to a plan without a budget, and prints the reason.
-    fn with_budget(&self, plan: Plan, objects: usize, answer: &mut Answer) -> Plan {
-        if self.budget.is_some() {
-            return plan;
-        }
-        answer.choice(decide::reason_of_work(objects));
-        Plan { effort: Effort::Work(decide::work(objects)), ..plan }
-    }
-
-    /// Makes the choices that the arguments leave open if there is no budget, and prints the
-    /// reasons. Also returns the results of the decision that the bake needs.
-    fn decided(
-        &self,
-        plan: Plan,
-        scene: &Scene,
-        interrupted: &AtomicBool,
-        answer: &mut Answer,
-    ) -> Result<(Plan, Prepared), Error> {
-        // Only `best` offers the choices, and only triangles have a wide layout. A search from an
-        // earlier tree minimises the cost that is given.
-        let has_choices = matches!(plan.method, Method::Best(_)) && scene.triangles().is_ok();
-        let is_given = self.budget.is_some() || self.from.is_some() || self.tracer.is_some();
-        if is_given || !has_choices {
-            return Ok((plan, Prepared::default()));
-        }
-        let open = Open {
-            cost: self.cost.is_none() && self.rays.is_none(),
-            rays: self.rays.is_none(),
-            references: self.references.is_none(),
-        };
-        decide(open, plan, scene, interrupted, answer)
     }
 
     /// Returns the named method. If a tree is given, rejects methods that cannot continue from it.
@@ -345,8 +307,7 @@ impl BakeArgs {
         let divides = matches!(method, Method::Best(_));
         let default = self.tracer.filter(|_| divides).map_or(1.0, |tracer| tracer.references);
         let references = self.references.unwrap_or(default);
-        let bake = Bake { references, ..Bake::new(&[]) };
-        bake.check().map_err(|error| Error::Usage(format!("--{error}")))?;
+        Bake::check_references(references).map_err(|error| Error::Usage(format!("--{error}")))?;
         if references > 1.0 && !divides {
             let name = &self.method;
             let message =

@@ -1,7 +1,7 @@
 //! A search without its command line, its result, and the tree file.
 
 use super::effort::Effort;
-use super::watch::{Interrupted, Watch};
+use super::watch::Watch;
 use crate::Error;
 use crate::interrupt;
 use crate::rays::Rays;
@@ -18,13 +18,9 @@ use std::sync::atomic::AtomicBool;
 /// A search for the best tree of any scene.
 #[derive(Clone)]
 pub struct Plan {
-    /// The method, with its parameters.
     pub method: Method,
-    /// The budget of the search.
     pub effort: Effort,
-    /// The seed of the random numbers.
     pub seed: u64,
-    /// The cost that the search minimises.
     pub objective: Objective,
     /// The largest number of references per object; 1 for whole objects.
     pub references: f64,
@@ -40,9 +36,8 @@ pub fn most_bytes(scene: &Scene, references: f64) -> usize {
     Header::BYTES + (references * scene.boxes.len() as f64) as usize * reference
 }
 
-/// The tree of an earlier bake, from which a search continues.
+/// The tree of an earlier bake of the scene, from which a search continues.
 pub struct Start {
-    /// The tree, over the same scene.
     pub tree: Bvh,
     /// The work of the earlier bake, in nodes built or visited.
     pub work: u64,
@@ -82,7 +77,6 @@ fn check_start(tree: &Bvh, objects: usize, most: f64) -> Result<(), String> {
 /// The results of a decision that the search needs too, and would otherwise make again.
 #[derive(Default)]
 pub struct Prepared {
-    /// The greedy tree.
     pub greedy: Option<Bvh>,
     /// The density of the plan's rays.
     pub density: Option<RayDensity>,
@@ -120,54 +114,40 @@ impl Plan {
         // From here on there is a tree soon, which Ctrl-C must save instead of ending the program.
         interrupt::hold();
         let failed = |error| Error::search(&scene.name, self.method.name())(error);
-        let greedy = match prepared.greedy {
-            None => self.bake(scene, None).greedy(&Interrupted(interrupted)).map_err(failed)?,
-            greedy => greedy,
-        };
-        let deadline = self.effort.deadline();
-        let density = match (prepared.density, &self.rays, &greedy) {
-            (None, Some(rays), Some(tree)) => rays.density(scene, tree, self.seed, interrupted)?,
-            (density, ..) => density,
-        };
-        let costs_of_greedy = greedy.as_ref().map(|tree| Greedy {
-            area: internal_area(tree),
-            cost_for_lines: self.objective.cost(tree),
-        });
+        let Prepared { mut greedy, mut density, division } = prepared;
+        if greedy.is_none() {
+            greedy = self.bake(scene, None).greedy(interrupted).map_err(failed)?;
+        }
+        let watch = Watch::new(self.effort, interrupted);
+        if let (None, Some(rays), Some(tree)) = (&density, &self.rays, &greedy) {
+            density = rays.density(scene, tree, self.seed, interrupted)?;
+        }
+        let costs_of_greedy =
+            greedy.as_ref().map(|tree| [internal_area(tree), self.objective.cost(tree)]);
         let bake = Bake {
-            division: prepared.division.as_ref(),
+            division: division.as_ref(),
             start: start.map(|start| &start.tree),
             ..self.bake(scene, density.as_ref())
         };
-        let watch = Watch::new(self.effort, deadline, interrupted);
         let baked = bake.search(greedy, &watch);
         watch.bar.finish_and_clear();
         let baked = baked.map_err(failed)?;
-        let seconds = deadline.elapsed().as_secs_f64();
+        let seconds = watch.deadline.elapsed().as_secs_f64();
         // The work of all bakes that led to this tree, one after the other.
         let work = start.map_or(0, |start| start.work).saturating_add(baked.outcome.work);
-        Ok(Found { plan: self, scene, density, baked, greedy: costs_of_greedy, work, seconds })
+        Ok(Found { plan: self, scene, density, baked, costs_of_greedy, work, seconds })
     }
-}
-
-/// The costs of the greedy tree for random lines.
-pub struct Greedy {
-    /// The total area of inner nodes, which the documentation compares.
-    pub area: f64,
-    /// The cost by the plan's objective.
-    pub cost_for_lines: f64,
 }
 
 /// The result of a search, with what its file and its summary need.
 pub struct Found<'a> {
-    /// The search.
     pub plan: &'a Plan,
-    /// The scene.
     pub scene: &'a Scene,
-    density: Option<RayDensity>,
-    /// The tree, and the course of the search.
+    pub density: Option<RayDensity>,
     pub baked: Baked,
-    /// The costs of the greedy tree.
-    pub greedy: Option<Greedy>,
+    /// The total area of inner nodes of the greedy tree, which the documentation compares, and its
+    /// cost for random lines by the plan's objective.
+    pub costs_of_greedy: Option<[f64; 2]>,
     work: u64,
     /// The time since the greedy tree was built.
     pub seconds: f64,
@@ -184,14 +164,9 @@ impl Found<'_> {
         saved.map_err(TreeFileError::of(path))?
     }
 
-    /// Returns whether the tree is for other rays than random lines.
-    pub fn is_for_rays(&self) -> bool {
-        self.density.is_some()
-    }
-
     /// Names the cost that the search minimised, unless it is the total area of inner nodes.
     pub fn unit(&self) -> Option<&'static str> {
-        match (self.plan.objective, self.is_for_rays()) {
+        match (self.plan.objective, self.density.is_some()) {
             (Objective::Layout, true) => Some("cost of the wide layout for rays"),
             (Objective::Layout, false) => Some("cost of the wide layout"),
             (_, true) => Some("visits of rays"),

@@ -7,20 +7,11 @@ use indicatif::ProgressBar;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
 
-/// Cancels a search once the flag is set.
-pub struct Interrupted<'a>(pub &'a AtomicBool);
-
-impl Observer for Interrupted<'_> {
-    fn cancelled(&self) -> bool {
-        self.0.load(Relaxed)
-    }
-}
-
 /// Ends a bake when its time is over or when it is interrupted, and shows its progress.
 pub struct Watch<'a> {
     /// The progress bar, which is hidden unless standard error is a terminal.
     pub bar: ProgressBar,
-    deadline: Deadline,
+    pub deadline: Deadline,
     effort: Effort,
     last: Mutex<Option<Event>>,
     /// The work so far. Events are rare while the search is hot, so that their work would be out of
@@ -32,12 +23,12 @@ pub struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    pub fn new(effort: Effort, deadline: Deadline, interrupted: &'a AtomicBool) -> Self {
-        // The bar counts thousandths of the budget.
-        let bar = bar(1000, "{bar:10} {wide_msg}");
+    /// Begins to measure the time.
+    pub fn new(effort: Effort, interrupted: &'a AtomicBool) -> Self {
         Self {
-            bar,
-            deadline,
+            // The bar counts thousandths of the budget.
+            bar: bar(1000, "{bar:10} {wide_msg}"),
+            deadline: effort.deadline(),
             effort,
             last: Mutex::default(),
             work: AtomicU64::default(),

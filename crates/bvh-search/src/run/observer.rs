@@ -1,6 +1,7 @@
 //! [`Observer`]: the caller's way to follow a search and to stop it.
 
 use bvh_build::Watch;
+use core::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// One point of a search's history: a trial, a generation, or an improvement.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,6 +41,13 @@ pub trait Observer: Sync {
 }
 
 impl Observer for () {}
+
+/// A flag cancels a search once it is true.
+impl Observer for AtomicBool {
+    fn cancelled(&self) -> bool {
+        self.load(Relaxed)
+    }
+}
 
 /// Calls `construct` with a watch that the observer can cancel.
 pub(crate) fn watched<T>(observer: &dyn Observer, construct: impl FnOnce(&Watch) -> T) -> T {
