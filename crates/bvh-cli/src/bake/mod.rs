@@ -10,7 +10,7 @@ mod watch;
 use crate::Error;
 use crate::answer::{Answer, Form, gain, short, whole};
 use crate::arguments::{Jobs, input_file, load_scene, output_file, output_or_free, reserve};
-use crate::explain;
+use crate::explain::explain;
 use crate::export::{compare, tracers};
 use crate::rays::Rays;
 use bvh_core::cost::{Objective, internal_area};
@@ -19,6 +19,7 @@ use bvh_scenes::did_you_mean;
 use bvh_scenes::files::Reserved;
 use bvh_search::{Bake, Method, Outcome, StopReason};
 use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use decide::decide;
 use effort::Effort;
 use plan::{Found, Plan, Start};
@@ -55,8 +56,8 @@ pub struct BakeArgs {
     /// The cost to minimise: `area`, the internal area, which suits every tracer; or `layout`, the
     /// tests of nodes and of blocks of triangles in this project's wide layout. With --budget, the
     /// default is `layout` with --rays, and `area` otherwise.
-    #[arg(long, value_name = "area|layout", value_enum)]
-    pub cost: Option<BakeCost>,
+    #[arg(long, value_name = "area|layout", value_parser = costs())]
+    pub cost: Option<Objective>,
     /// Divide objects among leaves where it pays, up to N references per object, 1 to 16. The cost
     /// then includes the leaves. With --budget, the default is 1.
     #[arg(long, value_name = "N")]
@@ -97,13 +98,11 @@ pub struct BakeArgs {
 
 const ADVANCED: &str = "Advanced";
 
-/// The cost that a bake minimises.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum BakeCost {
-    /// The internal area.
-    Area,
-    /// The cost of the wide layout.
-    Layout,
+fn costs() -> impl TypedValueParser<Value = Objective> {
+    PossibleValuesParser::new(["area", "layout"]).map(|cost| match cost.as_str() {
+        "layout" => Objective::Layout,
+        _ => Objective::InternalArea,
+    })
 }
 
 /// The method that can continue from a given tree.
@@ -126,9 +125,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         rays.check(named, &scene)?;
     }
     if args.explain {
-        let text = explain::scene(&scene).map_err(Error::search(&scene.name, "--explain"))?;
-        answer.say(&text);
-        answer.record("explanation", text);
+        explain(&scene, &mut answer).map_err(Error::search(&scene.name, "--explain"))?;
     }
     let mut most_references = plan.references;
     if args.budget.is_none() {
@@ -268,16 +265,12 @@ impl BakeArgs {
         let method = self.method()?;
         let references = self.most_references(&method)?;
         // The cost of the layout saves more tests of rays than area does: `results/ray_objective`.
-        let default_cost = if rays.is_some() { BakeCost::Layout } else { BakeCost::Area };
-        let objective = match self.cost.unwrap_or(default_cost) {
-            BakeCost::Area => Objective::InternalArea,
-            BakeCost::Layout => Objective::Layout,
-        };
+        let default = if rays.is_some() { Objective::Layout } else { Objective::InternalArea };
         Ok(Plan {
             method,
             effort: self.budget.unwrap_or(Effort::Work(0)),
             seed: self.seed,
-            objective,
+            objective: self.cost.unwrap_or(default),
             references,
             rays,
         })

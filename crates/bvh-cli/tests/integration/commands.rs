@@ -27,6 +27,18 @@ fn every_shell_gets_all_commands() {
     }
 }
 
+#[test]
+fn the_steps_that_a_scene_does_not_need_are_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    for (scene, parts) in [
+        ("escher:12", ["12 triangles", "skipped: ", "a traversal for triangles exists"]),
+        ("S34:50", ["50 triangles", "skipped: ", "45 objects with the same box as the object"]),
+    ] {
+        let said = bvh(folder.path(), &format!("bake {scene} --explain --budget=0s --out=x.bvh"));
+        assert!(parts.iter().all(|part| said.contains(part)), "{scene}: {said}");
+    }
+}
+
 fn wide_file(boxes: &[Aabb]) -> Vec<u8> {
     let count = boxes.len() as u32;
     let root = Node::inner(Aabb::union_of(boxes), 1, count);
