@@ -11,37 +11,40 @@ use bvh_core::Triangle;
 use glam::Vec3;
 use std::path::Path;
 
-/// The types of numbers, each with its two names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Scalar {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    F32,
-    F64,
+enum Kind {
+    Signed,
+    Unsigned,
+    Float,
+}
+
+/// A type of numbers.
+#[derive(Clone, Copy, Debug)]
+struct Scalar {
+    kind: Kind,
+    /// The number of bytes.
+    size: usize,
 }
 
 impl Scalar {
     fn named(word: &str) -> Result<Self, String> {
-        Ok(match word {
-            "char" | "int8" => Self::I8,
-            "uchar" | "uint8" => Self::U8,
-            "short" | "int16" => Self::I16,
-            "ushort" | "uint16" => Self::U16,
-            "int" | "int32" => Self::I32,
-            "uint" | "uint32" => Self::U32,
-            "float" | "float32" => Self::F32,
-            "double" | "float64" => Self::F64,
+        let (kind, size) = match word {
+            "char" | "int8" => (Kind::Signed, 1),
+            "uchar" | "uint8" => (Kind::Unsigned, 1),
+            "short" | "int16" => (Kind::Signed, 2),
+            "ushort" | "uint16" => (Kind::Unsigned, 2),
+            "int" | "int32" => (Kind::Signed, 4),
+            "uint" | "uint32" => (Kind::Unsigned, 4),
+            "float" | "float32" => (Kind::Float, 4),
+            "double" | "float64" => (Kind::Float, 8),
             _ => return Err(format!("type `{word}`; expected a type such as uchar, int or float")),
-        })
+        };
+        Ok(Self { kind, size })
     }
 
     fn integer(word: &str, what: &str) -> Result<Self, String> {
         match Self::named(word)? {
-            Self::F32 | Self::F64 => {
+            Self { kind: Kind::Float, .. } => {
                 Err(format!("{what} of type {word}; expected an integer type"))
             }
             integer => Ok(integer),
@@ -253,26 +256,23 @@ impl<'a> File<'a> {
     }
 
     fn skip(&mut self, scalar: Scalar) -> Result<(), String> {
-        match (self.encoding, scalar) {
-            (Encoding::Text, _) => self.word().map(drop),
-            (_, Scalar::I8 | Scalar::U8) => self.bytes::<1>().map(drop),
-            (_, Scalar::I16 | Scalar::U16) => self.bytes::<2>().map(drop),
-            (_, Scalar::I32 | Scalar::U32 | Scalar::F32) => self.bytes::<4>().map(drop),
-            (_, Scalar::F64) => self.bytes::<8>().map(drop),
+        match self.encoding {
+            Encoding::Text => self.word().map(drop),
+            _ => self.bytes(scalar).map(drop),
         }
     }
 
     fn float(&mut self, scalar: Scalar) -> Result<f32, String> {
-        match (self.encoding, scalar) {
-            (Encoding::Text, Scalar::F32 | Scalar::F64) => {
-                let word = self.word()?;
-                text::number(word)
-                    .ok_or_else(|| format!("`{}`; expected a number", text::shown(word)))
-            }
-            (_, Scalar::F32) => Ok(f32::from_le_bytes(self.bytes()?)),
-            (_, Scalar::F64) => Ok(f64::from_le_bytes(self.bytes()?) as f32),
-            _ => Ok(self.integer(scalar)? as f32),
+        if scalar.kind != Kind::Float {
+            return Ok(self.integer(scalar)? as f32);
         }
+        if self.encoding == Encoding::Text {
+            let word = self.word()?;
+            return text::number(word)
+                .ok_or_else(|| format!("`{}`; expected a number", text::shown(word)));
+        }
+        let bits = self.bytes(scalar)?;
+        Ok(if scalar.size == 4 { f32::from_bits(bits as u32) } else { f64::from_bits(bits) as f32 })
     }
 
     fn integer(&mut self, scalar: Scalar) -> Result<i64, String> {
@@ -282,15 +282,10 @@ impl<'a> File<'a> {
             return number
                 .ok_or_else(|| format!("`{}`; expected a whole number", text::shown(word)));
         }
-        Ok(match scalar {
-            Scalar::I8 => i8::from_le_bytes(self.bytes()?).into(),
-            Scalar::U8 => u8::from_le_bytes(self.bytes()?).into(),
-            Scalar::I16 => i16::from_le_bytes(self.bytes()?).into(),
-            Scalar::U16 => u16::from_le_bytes(self.bytes()?).into(),
-            Scalar::I32 => i32::from_le_bytes(self.bytes()?).into(),
-            Scalar::U32 => u32::from_le_bytes(self.bytes()?).into(),
-            Scalar::F32 | Scalar::F64 => unreachable!("the header was checked for integer types"),
-        })
+        let bits = self.bytes(scalar)? as i64;
+        let unused = 64 - 8 * scalar.size;
+        // The sign is in the highest bit of the number.
+        Ok(if scalar.kind == Kind::Signed { bits << unused >> unused } else { bits })
     }
 
     fn word(&mut self) -> Result<&'a [u8], String> {
@@ -303,14 +298,15 @@ impl<'a> File<'a> {
         Ok(word)
     }
 
-    fn bytes<const N: usize>(&mut self) -> Result<[u8; N], String> {
-        let (bytes, rest) = self.rest.split_first_chunk::<N>().ok_or(ENDS)?;
+    /// Returns the bytes of a number, the lowest first, as the lowest bits.
+    fn bytes(&mut self, scalar: Scalar) -> Result<u64, String> {
+        let (bytes, rest) = self.rest.split_at_checked(scalar.size).ok_or(ENDS)?;
         self.rest = rest;
-        let mut bytes = *bytes;
-        if self.encoding == Encoding::BigEndian {
-            bytes.reverse();
-        }
-        Ok(bytes)
+        let add = |bits: u64, byte: &u8| bits << 8 | u64::from(*byte);
+        Ok(match self.encoding {
+            Encoding::BigEndian => bytes.iter().fold(0, add),
+            _ => bytes.iter().rev().fold(0, add),
+        })
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! This module does not use `stl_io` 0.11, because `stl_io` stops after the first of several
 //! solids, mistakes `solid` without a name for a binary file, names no line, and knows neither of
-//! the ways in which programs write comments, colours, `end loop`, counts and attributes.
+//! the ways in which programs write comments, colours, `end loop` and counts.
 
 use super::mesh::{Fault, Mesh, Place, counted};
 use super::{text, without_mark};
@@ -13,8 +13,8 @@ use std::path::Path;
 /// The number of bytes before the triangles of a binary file: a comment of 80 bytes, and the number
 /// of triangles.
 const HEADER: usize = 84;
-/// The number of bytes of a triangle: a normal, three corners, and the length of the attribute
-/// after it, which most programs use for a colour instead.
+/// The number of bytes of a triangle: a normal, three corners, and two bytes that programs use for
+/// a colour.
 const FACET: usize = 50;
 
 fn promised(bytes: &[u8]) -> Option<usize> {
@@ -69,19 +69,16 @@ fn parse_binary(bytes: &[u8], path: &Path) -> Result<(Vec<Triangle>, Option<Stri
     })?;
     let body = &bytes[HEADER..];
     let (room, after) = (body.len() / FACET, body.len() % FACET);
-    let has_attributes = body.len() != promised * FACET && are_attributes(body, promised);
     // Programs that write while they compute do not always return to the header.
     let is_unwritten = matches!(promised, 0 | 0xffff_ffff) && after == 0;
-    if !has_attributes && !is_unwritten && (room < promised || room > promised && after == 0) {
+    if !is_unwritten && (room < promised || room > promised && after == 0) {
         let message = format!("room for {room} facets; expected the {promised} of the header");
         return Err(Fault::new(path, Place::File, message));
     }
     let facets = if is_unwritten { room } else { promised };
+    let (body, rest) = body.split_at(facets * FACET);
     let mut triangles = Vec::with_capacity(facets);
-    let mut rest = body;
-    for number in 0..facets {
-        let (facet, after) = rest.split_at(FACET);
-        rest = if has_attributes { &after[attribute(facet)..] } else { after };
+    for (number, facet) in body.as_chunks::<FACET>().0.iter().enumerate() {
         // The normal in the first 12 bytes is ignored: many programs write zeros there.
         let (words, _) = facet[12..48].as_chunks();
         let corners: [f32; 9] = std::array::from_fn(|i| f32::from_le_bytes(words[i]));
@@ -100,21 +97,6 @@ fn parse_binary(bytes: &[u8], path: &Path) -> Result<(Vec<Triangle>, Option<Stri
     let unwritten = (is_unwritten && facets > 0)
         .then(|| format!("the header counts {promised} facets and the file has {facets}"));
     Ok((triangles, unwritten.or(ignored)))
-}
-
-/// Returns the number of bytes that a facet says follow it.
-fn attribute(facet: &[u8]) -> usize {
-    usize::from(u16::from_le_bytes([facet[48], facet[49]]))
-}
-
-/// Returns whether the facets, each with as many bytes after it as it says, end where the file does.
-fn are_attributes(body: &[u8], facets: usize) -> bool {
-    // Ends at the first facet without room: forged headers count billions.
-    let rest = (0..facets).try_fold(body, |rest, _| {
-        let (facet, after) = rest.split_at_checked(FACET)?;
-        after.get(attribute(facet)..)
-    });
-    rest.is_some_and(<[u8]>::is_empty)
 }
 
 /// Words that begin a part of a text file. Any other words after `facet`, `normal` and `color` are

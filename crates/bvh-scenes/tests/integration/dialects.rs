@@ -185,12 +185,6 @@ fn binary_stl_files_as_programs_write_them() {
     assert_read(
         "a.stl",
         vec![
-            ("attributes", [header, one, b"\x03\0abc", two, b"\0\0"].concat(), ""),
-            (
-                "long attributes",
-                [header, one, b"\x08\0abcdefgh", two, b"\x08\0abcdefgh"].concat(),
-                "",
-            ),
             ("colours", [header, one, b"\x1f\x80", two, b"\x00\x7c"].concat(), ""),
             (
                 "zeros at the end",

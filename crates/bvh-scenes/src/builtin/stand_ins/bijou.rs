@@ -10,7 +10,7 @@ use super::mesh_builder::{
     upright,
 };
 use bvh_core::Triangle;
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec3, dvec3};
 
 /// World units per inner radius of the shank.
 const UNIT: f64 = 118.0;
@@ -22,7 +22,7 @@ const CUSHION: f64 = 2.6;
 pub fn triangles() -> Vec<Triangle> {
     let mut scene = MeshBuilder::default();
     let lean = about_z(0.09) * about_x(0.045) * about_y(-0.03);
-    scene.place(&ring(), &placed(lean, DVec3::new(0.0, 0.0, 1.12)));
+    scene.place(&ring(), &placed(lean, dvec3(0.0, 0.0, 1.12)));
     scene.place(&chain(44), &DAffine3::IDENTITY);
     cushion(&mut scene);
     for (x, y, size, turns) in
@@ -30,10 +30,7 @@ pub fn triangles() -> Vec<Triangle> {
     {
         // Loose stones rest on their pavilion: girdle and culet touch the cushion.
         let tilted = about_z(turns * 5.0) * about_y(0.39) * about_z(turns);
-        scene.place(
-            &brilliant(),
-            &placed(tilted * size, DVec3::new(x, y, padding(x, y) + 0.66 * size)),
-        );
+        scene.place(&brilliant(), &placed(tilted * size, dvec3(x, y, padding(x, y) + 0.66 * size)));
     }
     scene.finish(UNIT, DVec3::ZERO)
 }
@@ -48,7 +45,7 @@ fn brilliant() -> MeshBuilder {
     let pavilion = |k: usize| on_circle(0.3, eighth(k) + 1.0 / 16.0, -0.66);
     let upper = 0.02;
     let lower = -0.02;
-    let culet = DVec3::new(0.0, 0.0, -0.88);
+    let culet = dvec3(0.0, 0.0, -0.88);
     let corners: Vec<_> = (0..8).map(table).collect();
     stone.polygon(&corners);
     for k in 0..8 {
@@ -90,7 +87,7 @@ fn ring() -> MeshBuilder {
         ];
         let path: Vec<_> = bent.map(|(r, z)| on_circle(r, fraction(k, 6) + 0.02, z)).into();
         let side = on_circle(1.0, fraction(k, 6) + 0.27, 0.0);
-        ring.sweep(&path, side, &circle(0.045, 9), &|i| 1.0 - 0.06 * i as f64);
+        ring.taper(&path, side, &circle(0.045, 9), &|i| 1.0 - 0.06 * i as f64);
     }
 
     // Halo stones in a circle, then pavé rows over both shoulders, beads between neighbours.
@@ -125,7 +122,7 @@ fn on_halo(turns: f64, z: f64) -> DAffine3 {
 
 fn seat(away: f64, across: f64) -> DAffine3 {
     placed(about_y(away), DVec3::ZERO)
-        * placed(DMat3::IDENTITY, DVec3::new(0.0, across, surface(away, across)))
+        * placed(DMat3::IDENTITY, dvec3(0.0, across, surface(away, across)))
 }
 
 /// Half the width of the shank, `away` turns from the head.
@@ -158,7 +155,7 @@ fn shank(mesh: &mut MeshBuilder) {
             }
             _ => (width, 1.0),
         };
-        about_y(away) * DVec3::new(0.0, across, radius)
+        about_y(away) * dvec3(0.0, across, radius)
     });
 }
 
@@ -183,7 +180,7 @@ fn chain(links: usize) -> MeshBuilder {
         let across = DVec3::Z.cross(along).normalize();
         let heading = DMat3::from_cols(along, across, along.cross(across));
         let roll = if k % 2 == 0 { 0.02 } else { 0.23 };
-        let stretch = DMat3::from_diagonal(DVec3::new(1.7, 1.0, 1.0));
+        let stretch = DMat3::from_diagonal(dvec3(1.7, 1.0, 1.0));
         chain.place(&link, &placed(heading * about_x(roll) * stretch, here));
     }
     chain
@@ -195,11 +192,11 @@ fn on_wave(t: f64) -> DVec3 {
 }
 
 fn cushion(mesh: &mut MeshBuilder) {
-    mesh.cuboid(DVec3::new(-CUSHION, -CUSHION, -0.9), DVec3::new(CUSHION, CUSHION, -0.35));
+    mesh.cuboid(dvec3(-CUSHION, -CUSHION, -0.9), dvec3(CUSHION, CUSHION, -0.35));
     mesh.grid(20, 20, &|i, j| {
         let x = CUSHION * (2.0 * fraction(i, 20) - 1.0);
         let y = CUSHION * (2.0 * fraction(j, 20) - 1.0);
-        DVec3::new(x, y, padding(x, y))
+        dvec3(x, y, padding(x, y))
     });
 }
 

@@ -11,7 +11,7 @@ use super::mesh_builder::{
     torus, upright,
 };
 use bvh_core::Triangle;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, dvec3};
 use std::f64::consts::SQRT_2;
 
 /// World units per metre.
@@ -31,7 +31,7 @@ pub fn triangles() -> Vec<Triangle> {
     // The court's sides in bays: the long walks run along x, the short ones along y.
     let long = 9;
     let short = 7;
-    let half = DVec3::new(long as f64, short as f64, 0.0) * (0.5 * BAY);
+    let half = dvec3(long as f64, short as f64, 0.0) * (0.5 * BAY);
     let parts = Parts::new();
     for (turns, bays, offset) in
         [(0.0, long, half.y), (0.25, short, half.x), (0.5, long, half.y), (0.75, short, half.x)]
@@ -45,7 +45,7 @@ pub fn triangles() -> Vec<Triangle> {
     }
     court(&mut cloister, half);
     cloister.place(&well(), &upright(0.037, 2.1, -1.4, 0.0));
-    cloister.finish(UNIT, DVec3::new(1250.0, -430.0, 75.0))
+    cloister.finish(UNIT, dvec3(1250.0, -430.0, 75.0))
 }
 
 struct Parts {
@@ -62,7 +62,7 @@ impl Parts {
         tile.grid(3, 1, &|i, j| {
             let (c, s) = cos_sin(0.5 * fraction(i, 3));
             let width = 0.15 - 0.02 * j as f64;
-            DVec3::new(width * c, j as f64 * 1.06, width * s)
+            dvec3(width * c, j as f64 * 1.06, width * s)
         });
         Self { column: column(), arch: arcade_arch(), vault: vault(), tile }
     }
@@ -96,7 +96,7 @@ fn column() -> MeshBuilder {
             let u = fraction(i, 2) - 0.5;
             let v = fraction(j, 4);
             let width = 0.085 * (1.0 - v * v * v) + 0.012;
-            DVec3::new(
+            dvec3(
                 0.108 + 0.085 * v * v * v + 0.01 * (1.0 - 4.0 * u * u),
                 u * width,
                 low + tall * (v - 0.35 * v * v * v),
@@ -109,7 +109,7 @@ fn column() -> MeshBuilder {
 
 /// Adds a square plate of this half width around the z axis.
 fn square(mesh: &mut MeshBuilder, half: f64, low: f64, high: f64) {
-    mesh.cuboid(DVec3::new(-half, -half, low), DVec3::new(half, half, high));
+    mesh.cuboid(dvec3(-half, -half, low), dvec3(half, half, high));
 }
 
 /// The arch over one bay with its moulding on both faces; springs at z = 0, centred on x = 0.
@@ -118,11 +118,11 @@ fn arcade_arch() -> MeshBuilder {
     let radius = 0.5 * BAY - 0.42;
     arch.arch(radius, 0.5 * BAY, EAVES - SPRING, 0.5, 14);
     for face in [-0.25, 0.25] {
-        let path = half_circle(14, |c, s| DVec3::new(radius * c, face, radius * s));
+        let path = half_circle(14, |c, s| dvec3(radius * c, face, radius * s));
         let profile =
             [(0.0, 0.0), (0.0, 0.05), (-0.07, 0.09), (-0.12, 0.05), (-0.2, 0.07), (-0.24, 0.0)];
         let outwards = profile.map(|(x, y)| (x, if face > 0.0 { -y } else { y }));
-        arch.sweep(&path, DVec3::Y, &outwards, &|_| 1.0);
+        arch.sweep(&path, DVec3::Y, &outwards);
     }
     arch
 }
@@ -139,16 +139,15 @@ fn vault() -> MeshBuilder {
             let (c, s) = cos_sin(0.25 * fraction(j, 6));
             let reach = half * c;
             let y = (2.0 * fraction(i, 6) - 1.0) * reach;
-            DVec3::new(reach, y, half * s)
+            dvec3(reach, y, half * s)
         });
         vault.place(&web, &upright(0.25 * k as f64, 0.0, 0.0, 0.0));
     }
     for turns in [0.125, 0.375] {
-        let path = half_circle(14, |c, s| {
-            about_z(turns) * DVec3::new(half * SQRT_2 * c, 0.0, half * s - 0.02)
-        });
+        let path =
+            half_circle(14, |c, s| about_z(turns) * dvec3(half * SQRT_2 * c, 0.0, half * s - 0.02));
         let rib = [(0.05, -0.07), (0.09, 0.0), (0.05, 0.07), (-0.03, 0.07), (-0.03, -0.07)];
-        vault.sweep(&path, about_z(turns) * DVec3::Y, &rib, &|_| 1.0);
+        vault.sweep(&path, about_z(turns) * DVec3::Y, &rib);
     }
     // The keystone where the ribs cross.
     let boss = [(0.0, 0.0), (0.1, 0.02), (0.18, 0.08), (0.2, 0.16), (0.17, 0.2)];
@@ -163,12 +162,11 @@ fn walk(parts: &Parts, bays: usize) -> MeshBuilder {
     let start = -0.5 * BAY * bays as f64;
     let end = -start;
     let back = -BAY - 0.25;
-    walk.cuboid(DVec3::new(start, -0.3, 0.0), DVec3::new(end, 0.3, PARAPET));
+    walk.cuboid(dvec3(start, -0.3, 0.0), dvec3(end, 0.3, PARAPET));
     walk.sweep(
-        &[DVec3::new(start, 0.0, PARAPET), DVec3::new(end, 0.0, PARAPET)],
+        &[dvec3(start, 0.0, PARAPET), dvec3(end, 0.0, PARAPET)],
         DVec3::Z,
         &[(0.36, 0.0), (0.36, 0.06), (0.31, 0.1), (-0.31, 0.1), (-0.36, 0.06), (-0.36, 0.0)],
-        &|_| 1.0,
     );
     for bay in 0..=bays {
         let x = start + BAY * bay as f64;
@@ -186,7 +184,7 @@ fn walk(parts: &Parts, bays: usize) -> MeshBuilder {
     }
     let outer = end - back;
     let bed = [(start, 0.0), (end, 0.0), (outer, back), (-outer, back)];
-    let [a, b, c, d] = bed.map(|(x, y)| DVec3::new(x, y, -0.02));
+    let [a, b, c, d] = bed.map(|(x, y)| dvec3(x, y, -0.02));
     walk.quad(a, b, c, d);
     // The back wall has three polygons around a doorway, whose arch closes it above.
     let door = start + BAY * (0.5 + (bays / 2) as f64);
@@ -200,13 +198,13 @@ fn walk(parts: &Parts, bays: usize) -> MeshBuilder {
     let mut doorway = MeshBuilder::default();
     doorway.arch(0.8, 1.0, 1.7, 0.4, 18);
     for x in [-1.0, 0.8] {
-        doorway.cuboid(DVec3::new(x, -0.2, -2.5), DVec3::new(x + 0.2, 0.2, 0.0));
+        doorway.cuboid(dvec3(x, -0.2, -2.5), dvec3(x + 0.2, 0.2, 0.0));
     }
     // The door leaf is ajar.
     let mut leaf = MeshBuilder::default();
-    leaf.cuboid(DVec3::ZERO, DVec3::new(1.5, 0.06, 2.4));
+    leaf.cuboid(DVec3::ZERO, dvec3(1.5, 0.06, 2.4));
     for z in [0.4, 1.2, 2.0] {
-        leaf.cuboid(DVec3::new(0.0, -0.02, z), DVec3::new(1.1, 0.08, z + 0.06));
+        leaf.cuboid(dvec3(0.0, -0.02, z), dvec3(1.1, 0.08, z + 0.06));
     }
     doorway.place(&leaf, &upright(0.079, -0.78, 0.1, -2.5));
     walk.place(&doorway, &upright(0.0, door, back, 2.5));
@@ -216,7 +214,7 @@ fn walk(parts: &Parts, bays: usize) -> MeshBuilder {
 
 /// A slender stepped pier against the arcade's court side.
 fn buttress(mesh: &mut MeshBuilder, x: f64) {
-    let at = |dx: f64, y: f64, z: f64| DVec3::new(x + dx, y, z);
+    let at = |dx: f64, y: f64, z: f64| dvec3(x + dx, y, z);
     for (depth, low, high) in [(0.52, 3.1, 3.9), (0.42, 3.9, 4.9)] {
         mesh.cuboid(at(-0.14, 0.25, low), at(0.14, depth, high));
     }
@@ -227,7 +225,7 @@ fn buttress(mesh: &mut MeshBuilder, x: f64) {
 /// changes from bay to bay.
 fn paving(mesh: &mut MeshBuilder, x: f64, bay: usize) {
     let tiles = 3 + bay % 3;
-    let middle = DVec3::new(x + 0.5 * BAY, -0.5 * BAY - 0.1, 0.0);
+    let middle = dvec3(x + 0.5 * BAY, -0.5 * BAY - 0.1, 0.0);
     let half = 0.5 * BAY - 0.3;
     for k in 0..4 {
         let corner =
@@ -245,15 +243,15 @@ fn paving(mesh: &mut MeshBuilder, x: f64, bay: usize) {
     mesh.grid(tiles, tiles, &|i, j| {
         let u = fraction(i, tiles) - 0.5;
         let v = fraction(j, tiles) - 0.5;
-        middle + DVec3::new((u - v) * half, (u + v) * half, 0.0)
+        middle + dvec3((u - v) * half, (u + v) * half, 0.0)
     });
 }
 
 /// The lean-to roof over a walk, `half` its arcade's half length: rafters below, boarding in five
 /// panels, rows of barrel tiles above; mitred at both corners.
 fn roof(mesh: &mut MeshBuilder, parts: &Parts, half: f64) {
-    let eaves = DVec3::new(0.0, 0.7, EAVES);
-    let ridge = DVec3::new(0.0, -BAY - 0.25, EAVES + 1.5);
+    let eaves = dvec3(0.0, 0.7, EAVES);
+    let ridge = dvec3(0.0, -BAY - 0.25, EAVES + 1.5);
     let slope = (ridge - eaves).length();
     let up = (ridge - eaves) / slope;
     let normal = up.cross(DVec3::X);
@@ -268,7 +266,7 @@ fn roof(mesh: &mut MeshBuilder, parts: &Parts, half: f64) {
     let beam = [(0.05, -0.12), (0.05, -0.02), (-0.05, -0.02), (-0.05, -0.12)];
     for k in 0..rafters {
         let foot = eaves + along(low * (2.0 * fraction(2 * k + 1, 2 * rafters) - 1.0));
-        mesh.sweep(&[foot, foot + up * (slope - 0.1)], normal, &beam, &|_| 1.0);
+        mesh.sweep(&[foot, foot + up * (slope - 0.1)], normal, &beam);
     }
     let rows = 6;
     let columns = (2.0 * high / 0.5) as usize;
@@ -290,8 +288,8 @@ fn roof(mesh: &mut MeshBuilder, parts: &Parts, half: f64) {
 
 /// The garden: paths that cross obliquely over one lawn, and hedges of plain boxes.
 fn court(mesh: &mut MeshBuilder, half: DVec3) {
-    let inner = half - DVec3::new(0.25, 0.25, 0.0);
-    let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+    let inner = half - dvec3(0.25, 0.25, 0.0);
+    let at = |x: f64, y: f64, z: f64| dvec3(x, y, z);
     mesh.grid(3, 2, &|i, j| {
         at(inner.x * (2.0 * fraction(i, 3) - 1.0), inner.y * (j as f64 - 1.0), -0.1)
     });
@@ -338,12 +336,12 @@ fn well() -> MeshBuilder {
             &(upright(fraction(k, 12), 0.0, 0.0, 0.0) * upright(0.25, 0.88, 0.0, 0.88)),
         );
     }
-    let yoke = half_circle(20, |c, s| DVec3::new(0.83 * c, 0.0, 1.36 + 1.9 * libm::sqrt(s)));
-    well.sweep(&yoke, DVec3::Y, &circle(0.035, 7), &|_| 1.0);
+    let yoke = half_circle(20, |c, s| dvec3(0.83 * c, 0.0, 1.36 + 1.9 * libm::sqrt(s)));
+    well.sweep(&yoke, DVec3::Y, &circle(0.035, 7));
     let link = torus(0.03, 0.012, 9, 6);
     for k in 0..18 {
         let turned = about_z(if k % 2 == 0 { 0.02 } else { 0.27 }) * about_y(0.25);
-        well.place(&link, &placed(turned, DVec3::new(0.0, 0.0, 3.2 - 0.05 * k as f64)));
+        well.place(&link, &placed(turned, dvec3(0.0, 0.0, 3.2 - 0.05 * k as f64)));
     }
     // A wooden bucket, hoops included.
     let bucket = [

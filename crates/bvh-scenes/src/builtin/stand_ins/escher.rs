@@ -9,7 +9,7 @@ use super::mesh_builder::{
     MeshBuilder, about_z, circle, cos_sin, fraction, half_circle, on_circle, placed, upright,
 };
 use bvh_core::Triangle;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, dvec3};
 
 /// World units per tread depth.
 const UNIT: f64 = 2.17;
@@ -30,36 +30,9 @@ pub fn triangles() -> Vec<Triangle> {
         DMat3::from_cols(DVec3::Z, DVec3::X, DVec3::Y),
     ];
     let plans = [
-        Plan {
-            first: 13,
-            second: 9,
-            width: 3.6,
-            x: 3.0,
-            y: 4.5,
-            oblique: 0.038,
-            bays: 3,
-            climbs_beneath: true,
-        },
-        Plan {
-            first: 10,
-            second: 11,
-            width: 3.0,
-            x: 7.0,
-            y: 9.0,
-            oblique: -0.061,
-            bays: 2,
-            climbs_beneath: false,
-        },
-        Plan {
-            first: 15,
-            second: 7,
-            width: 2.6,
-            x: 2.0,
-            y: 14.0,
-            oblique: 0.094,
-            bays: 4,
-            climbs_beneath: true,
-        },
+        Plan { steps: [13, 9], width: 3.6, at: [3.0, 4.5], turn: 0.038, bays: 3, beneath: true },
+        Plan { steps: [10, 11], width: 3.0, at: [7.0, 9.0], turn: -0.061, bays: 2, beneath: false },
+        Plan { steps: [15, 7], width: 2.6, at: [2.0, 14.0], turn: 0.094, bays: 4, beneath: true },
     ];
     for (gravity, plan) in gravities.into_iter().zip(&plans) {
         room.place(&storey(plan), &placed(gravity, DVec3::ZERO));
@@ -69,68 +42,58 @@ pub fn triangles() -> Vec<Triangle> {
 }
 
 struct Plan {
-    first: usize,
-    second: usize,
+    /// The steps of the first and the second flight.
+    steps: [usize; 2],
     width: f64,
-    x: f64,
-    y: f64,
-    oblique: f64,
+    at: [f64; 2],
+    /// The bearing of the oblique flight, in turns.
+    turn: f64,
     bays: usize,
-    climbs_beneath: bool,
+    /// Whether the undersides of flights are stairs too.
+    beneath: bool,
 }
 
 /// One gravity's floor, flights, landings and arcade; up is z.
 fn storey(plan: &Plan) -> MeshBuilder {
     let mut storey = MeshBuilder::default();
-    storey.grid(3, 2, &|i, j| DVec3::new(fraction(i, 3), fraction(j, 2), 0.0) * ROOM);
+    storey.grid(3, 2, &|i, j| dvec3(fraction(i, 3), fraction(j, 2), 0.0) * ROOM);
 
     // The first flight leads along x to a landing, the second along y to a gallery, and the third
     // down at an oblique angle.
-    let width = plan.width;
-    let deep = plan.width + 1.0;
-    let low = plan.first as f64 * RISE;
-    let high = (plan.first + plan.second) as f64 * RISE;
-    let turn = plan.x + plan.first as f64;
-    storey
-        .place(&flight(plan.first, width, plan.climbs_beneath), &upright(0.0, plan.x, plan.y, 0.0));
-    landing(&mut storey, DVec3::new(turn, plan.y, low), deep, width);
-    storey.place(
-        &flight(plan.second, width, false),
-        &upright(0.25, turn + deep, plan.y + width, low),
-    );
-    let gallery = plan.y + width + plan.second as f64;
-    landing(&mut storey, DVec3::new(turn, gallery, high), deep, deep);
-    let bearing = 0.5 + plan.oblique;
+    let &Plan { steps: [first, second], width, at: [x, y], turn, bays, beneath } = plan;
+    let deep = width + 1.0;
+    let low = first as f64 * RISE;
+    let high = (first + second) as f64 * RISE;
+    let corner = x + first as f64;
+    storey.place(&flight(first, width, beneath), &upright(0.0, x, y, 0.0));
+    landing(&mut storey, dvec3(corner, y, low), deep, width);
+    storey.place(&flight(second, width, false), &upright(0.25, corner + deep, y + width, low));
+    let gallery = y + width + second as f64;
+    landing(&mut storey, dvec3(corner, gallery, high), deep, deep);
     let down = high - 8.0 * RISE;
-    let (c, s) = cos_sin(bearing);
+    let (c, s) = cos_sin(0.5 + turn);
     // The descending flight is an ascending flight that begins at its foot.
-    let foot = DVec3::new(turn + 8.0 * c, gallery + 8.0 * s + width, down);
-    storey.place(
-        &flight(8, width, plan.climbs_beneath),
-        &upright(plan.oblique, foot.x, foot.y - width, foot.z),
-    );
-    landing(&mut storey, foot + DVec3::new(-3.0, -width, 0.0), 3.0, width);
+    let foot = dvec3(corner + 8.0 * c, gallery + 8.0 * s + width, down);
+    storey.place(&flight(8, width, beneath), &upright(turn, foot.x, foot.y - width, foot.z));
+    landing(&mut storey, foot + dvec3(-3.0, -width, 0.0), 3.0, width);
 
     // The arcade that carries the gallery, a doorway in the back wall, and a free-standing oblique
     // gate.
-    for bay in 0..plan.bays {
-        let x = turn + deep - 2.2 - 4.4 * bay as f64;
+    for bay in 0..bays {
+        let x = corner + deep - 2.2 - 4.4 * bay as f64;
         storey.place(&gate(1.7, 2.2, high - 3.3, 9), &upright(0.0, x, gallery + deep, 0.0));
     }
-    storey.place(&gate(1.9, 4.0, 4.2, 14), &upright(0.25, ROOM - 0.5, plan.y + 11.0, 0.0));
-    storey.place(
-        &gate(1.4, 2.0, 3.1, 10),
-        &upright(2.6 * plan.oblique, plan.x + 6.0, plan.y + 9.0, 0.0),
-    );
+    storey.place(&gate(1.9, 4.0, 4.2, 14), &upright(0.25, ROOM - 0.5, y + 11.0, 0.0));
+    storey.place(&gate(1.4, 2.0, 3.1, 10), &upright(2.6 * turn, x + 6.0, y + 9.0, 0.0));
     storey
 }
 
 /// A flight of `steps` along x with balustrades on both sides; its underside is a slope or, upside
 /// down, stairs too.
-fn flight(steps: usize, width: f64, climbs_beneath: bool) -> MeshBuilder {
+fn flight(steps: usize, width: f64, beneath: bool) -> MeshBuilder {
     let mut flight = MeshBuilder::default();
     let run = steps as f64;
-    let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z * RISE);
+    let at = |x: f64, y: f64, z: f64| dvec3(x, y, z * RISE);
     let depth = 2.5;
     // Across the flight, between two points in its side.
     let across = |flight: &mut MeshBuilder, [x0, z0]: [f64; 2], [x1, z1]: [f64; 2]| {
@@ -141,13 +104,13 @@ fn flight(steps: usize, width: f64, climbs_beneath: bool) -> MeshBuilder {
         let next = x + 1.0;
         across(&mut flight, [x, x], [x, next]);
         across(&mut flight, [x, next], [next, next]);
-        if climbs_beneath {
+        if beneath {
             across(&mut flight, [x, x - depth], [next, x - depth]);
             across(&mut flight, [next, x - depth], [next, next - depth]);
         }
         for y in [0.0, width] {
             flight.triangle(at(x, y, x), at(next, y, next), at(x, y, next));
-            if climbs_beneath {
+            if beneath {
                 let low = at(x, y, x - depth);
                 flight.triangle(low, at(next, y, x - depth), at(next, y, next - depth));
             }
@@ -156,7 +119,7 @@ fn flight(steps: usize, width: f64, climbs_beneath: bool) -> MeshBuilder {
     for y in [0.0, width] {
         flight.quad(at(0.0, y, 0.0), at(run, y, run), at(run, y, run - depth), at(0.0, y, -depth));
     }
-    if !climbs_beneath {
+    if !beneath {
         across(&mut flight, [0.0, -depth], [run, run - depth]);
     }
     for y in [0.15, width - 0.15] {
@@ -169,10 +132,10 @@ fn flight(steps: usize, width: f64, climbs_beneath: bool) -> MeshBuilder {
 /// A slab with its near corner at `corner`, its top at that height, and a balustrade along its far
 /// side.
 fn landing(mesh: &mut MeshBuilder, corner: DVec3, length: f64, width: f64) {
-    mesh.cuboid(corner - DVec3::Z * 0.8, corner + DVec3::new(length, width, 0.0));
+    mesh.cuboid(corner - DVec3::Z * 0.8, corner + dvec3(length, width, 0.0));
     let posts = (length / 0.9) as usize;
     let feet: Vec<_> = (0..=posts)
-        .map(|k| corner + DVec3::new(0.2 + fraction(k, posts) * (length - 0.4), 0.2, 0.0))
+        .map(|k| corner + dvec3(0.2 + fraction(k, posts) * (length - 0.4), 0.2, 0.0))
         .collect();
     balustrade(mesh, &feet);
 }
@@ -190,7 +153,7 @@ fn balustrade(mesh: &mut MeshBuilder, feet: &[DVec3]) {
     };
     let rail =
         [(0.16, -0.08), (0.16, 0.06), (0.07, 0.14), (-0.07, 0.14), (-0.16, 0.06), (-0.16, -0.08)];
-    mesh.sweep(&[first + up, last + up], DVec3::Z, &rail, &|_| 1.0);
+    mesh.sweep(&[first + up, last + up], DVec3::Z, &rail);
     for (end, turns) in [(first, 0.03), (last, 0.07)] {
         let newel = MeshBuilder::revolved(
             &[(0.2, -0.4), (0.2, 2.2), (0.13, 2.4), (0.13, 2.8), (0.24, 3.0), (0.0, 3.3)],
@@ -206,12 +169,12 @@ fn gate(radius: f64, half_width: f64, pier: f64, segments: usize) -> MeshBuilder
     let mut gate = MeshBuilder::default();
     let mut arch = MeshBuilder::default();
     arch.arch(radius, half_width, radius + 0.8, 1.0, segments);
-    let path = half_circle(segments, |c, s| DVec3::new(radius * c, -0.5, radius * s));
-    arch.sweep(&path, DVec3::Y, &[(0.0, 0.0), (0.0, -0.12), (-0.12, -0.2), (-0.24, 0.0)], &|_| 1.0);
+    let path = half_circle(segments, |c, s| dvec3(radius * c, -0.5, radius * s));
+    arch.sweep(&path, DVec3::Y, &[(0.0, 0.0), (0.0, -0.12), (-0.12, -0.2), (-0.24, 0.0)]);
     gate.place(&arch, &placed(DMat3::IDENTITY, DVec3::Z * pier));
     for (low, high) in [(-half_width, -radius), (radius, half_width)] {
-        gate.cuboid(DVec3::new(low, -0.5, 0.0), DVec3::new(high, 0.5, pier - 0.2));
-        gate.cuboid(DVec3::new(low - 0.1, -0.6, pier - 0.2), DVec3::new(high + 0.1, 0.6, pier));
+        gate.cuboid(dvec3(low, -0.5, 0.0), dvec3(high, 0.5, pier - 0.2));
+        gate.cuboid(dvec3(low - 0.1, -0.6, pier - 0.2), dvec3(high + 0.1, 0.6, pier));
     }
     gate
 }
@@ -257,6 +220,6 @@ fn spiral(steps: usize) -> MeshBuilder {
         let rod = MeshBuilder::revolved(&[(0.06, -RAIL), (0.06, 0.0)], 5);
         spiral.place(&rod, &placed(about_z(k as f64 * per_step), top));
     }
-    spiral.sweep(&rail, DVec3::Z, &circle(0.14, 7), &|_| 1.0);
+    spiral.sweep(&rail, DVec3::Z, &circle(0.14, 7));
     spiral
 }

@@ -9,12 +9,12 @@ use super::mesh_builder::{
     MeshBuilder, about_z, circle, cos_sin, fraction, jitter, placed, upright,
 };
 use bvh_core::Triangle;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, dvec3};
 
 /// World units per metre.
 const UNIT: f64 = 1000.0;
 /// The map grid's coordinates of the valley's corner, world units.
-const ORIGIN: DVec3 = DVec3::new(5.2e5, 3.1e5, 4.0e4);
+const ORIGIN: DVec3 = dvec3(5.2e5, 3.1e5, 4.0e4);
 const SIZE: (f64, f64) = (2700.0, 2000.0);
 const CELLS: (usize, usize) = (36, 27);
 const TRACK: f64 = 78.0;
@@ -74,12 +74,12 @@ fn course(x: f64) -> f64 {
 /// A point on the railway, `aside` metres to its left.
 fn beside(x: f64, aside: f64, z: f64) -> DVec3 {
     let along = heading(x);
-    DVec3::new(x - along.y * aside, course(x) + along.x * aside, z)
+    dvec3(x - along.y * aside, course(x) + along.x * aside, z)
 }
 
 /// Unit direction of the railway at x.
 fn heading(x: f64) -> DVec3 {
-    DVec3::new(20.0, course(x + 10.0) - course(x - 10.0), 0.0).normalize()
+    dvec3(20.0, course(x + 10.0) - course(x - 10.0), 0.0).normalize()
 }
 
 /// Rotation that carries the x axis to the railway's direction at x.
@@ -92,15 +92,15 @@ fn aligned(x: f64) -> DMat3 {
 fn terrain(mesh: &mut MeshBuilder) {
     for j in 0..CELLS.1 {
         for i in 0..CELLS.0 {
-            let size = DVec3::new(SIZE.0 / CELLS.0 as f64, SIZE.1 / CELLS.1 as f64, 0.0);
-            let corner = DVec3::new(i as f64, j as f64, 0.0) * size;
+            let size = dvec3(SIZE.0 / CELLS.0 as f64, SIZE.1 / CELLS.1 as f64, 0.0);
+            let corner = dvec3(i as f64, j as f64, 0.0) * size;
             let aside = corner.y - course(corner.x);
             let near = (corner.x - 1500.0).abs() < 620.0 && (-150.0..460.0).contains(&aside);
             let parts = if near { 4 } else { 1 };
             mesh.grid(parts, parts, &|a, b| {
                 let x = corner.x + size.x * fraction(a, parts);
                 let y = corner.y + size.y * fraction(b, parts);
-                DVec3::new(x, y, ground(x, y))
+                dvec3(x, y, ground(x, y))
             });
         }
     }
@@ -115,10 +115,10 @@ fn railway(mesh: &mut MeshBuilder) {
     let rail = [(0.035, 0.0), (0.035, 0.16), (-0.035, 0.16), (-0.035, 0.0)];
     for aside in [-2.8, -1.3, 1.3, 2.8] {
         let path: Vec<_> = (0..=steps).map(|k| beside(at(k), aside, TRACK)).collect();
-        mesh.sweep(&path, DVec3::Z, &rail, &|_| 1.0);
+        mesh.sweep(&path, DVec3::Z, &rail);
     }
     let mut sleeper = MeshBuilder::default();
-    sleeper.cuboid(DVec3::new(-0.13, -1.3, -0.2), DVec3::new(0.13, 1.3, 0.0));
+    sleeper.cuboid(dvec3(-0.13, -1.3, -0.2), dvec3(0.13, 1.3, 0.0));
     for k in 0..110 {
         let x = 1428.0 + 1.3 * k as f64;
         mesh.place(
@@ -132,7 +132,7 @@ fn railway(mesh: &mut MeshBuilder) {
         let next = SIZE.0 * fraction(k + 1, spans);
         for side in [-1.0, 1.0] {
             let foot = beside(x, 4.6 * side, TRACK - 0.6);
-            mesh.cuboid(foot - DVec3::new(0.15, 0.15, 0.0), foot + DVec3::new(0.15, 0.15, 8.0));
+            mesh.cuboid(foot - dvec3(0.15, 0.15, 0.0), foot + dvec3(0.15, 0.15, 8.0));
             mesh.bar(
                 beside(x, 4.6 * side, TRACK + 6.4),
                 beside(x, 2.05 * side, TRACK + 6.0),
@@ -158,7 +158,7 @@ fn viaduct(mesh: &mut MeshBuilder) {
     arch.arch(9.5, 12.0, 12.5, 7.0, 14);
     bay.place(&arch, &upright(0.0, 0.0, 0.0, -13.5));
     for y in [-3.6, 3.2] {
-        bay.cuboid(DVec3::new(-12.0, y, -1.0), DVec3::new(12.0, y + 0.4, 0.9));
+        bay.cuboid(dvec3(-12.0, y, -1.0), dvec3(12.0, y + 0.4, 0.9));
     }
     let pier = MeshBuilder::revolved(
         &[(5.6, -75.0), (5.2, -60.0), (4.2, -14.5), (4.6, -14.2), (4.6, -13.5)],
@@ -181,7 +181,7 @@ fn station(mesh: &mut MeshBuilder) {
     let ribs = 15;
     let vault = |t: f64, x: f64, reach: f64| {
         let (c, s) = cos_sin(0.5 * t);
-        DVec3::new(x, -reach * c, 7.0 + 0.62 * reach * s)
+        dvec3(x, -reach * c, 7.0 + 0.62 * reach * s)
     };
     station.grid(24, ribs - 1, &|i, j| {
         vault(fraction(i, 24), length * (fraction(j, ribs - 1) - 0.5), half)
@@ -189,12 +189,7 @@ fn station(mesh: &mut MeshBuilder) {
     for j in 0..ribs {
         let x = length * (fraction(j, ribs - 1) - 0.5);
         let path: Vec<_> = (0..=18).map(|i| vault(fraction(i, 18), x, half - 0.3)).collect();
-        station.sweep(
-            &path,
-            DVec3::X,
-            &[(-0.2, -0.12), (0.2, -0.12), (0.2, 0.12), (-0.2, 0.12)],
-            &|_| 1.0,
-        );
+        station.sweep(&path, DVec3::X, &[(-0.2, -0.12), (0.2, -0.12), (0.2, 0.12), (-0.2, 0.12)]);
         for y in [-half, half] {
             let post =
                 MeshBuilder::revolved(&[(0.45, 0.0), (0.25, 0.6), (0.2, 6.4), (0.5, 7.0)], 8);
@@ -202,19 +197,19 @@ fn station(mesh: &mut MeshBuilder) {
         }
     }
     for (low, high) in [(-12.0, -4.2), (4.2, 17.0)] {
-        station.cuboid(DVec3::new(-0.7 * length, low, -0.6), DVec3::new(0.7 * length, high, 0.75));
+        station.cuboid(dvec3(-0.7 * length, low, -0.6), dvec3(0.7 * length, high, 0.75));
     }
     let mut bay = MeshBuilder::default();
     bay.arch(2.6, 3.5, 4.2, 0.8, 12);
     for k in 0..14 {
         station.place(&bay, &upright(0.0, 7.0 * (k as f64 - 6.5), 23.0, 4.0));
         station.cuboid(
-            DVec3::new(7.0 * (k as f64 - 7.0) - 0.9, 22.6, 0.0),
-            DVec3::new(7.0 * (k as f64 - 7.0) + 0.9, 23.4, 4.0),
+            dvec3(7.0 * (k as f64 - 7.0) - 0.9, 22.6, 0.0),
+            dvec3(7.0 * (k as f64 - 7.0) + 0.9, 23.4, 4.0),
         );
     }
     station.place(&house(98.0, 14.0, 9.0, 5.0), &upright(0.0, 0.0, 31.0, 0.0));
-    station.cuboid(DVec3::new(50.0, 24.0, 0.0), DVec3::new(58.0, 32.0, 27.0));
+    station.cuboid(dvec3(50.0, 24.0, 0.0), dvec3(58.0, 32.0, 27.0));
     let cap = MeshBuilder::revolved(
         &[(6.4, 27.0), (5.0, 31.0), (1.2, 34.0), (0.9, 38.0), (0.0, 41.0)],
         8,
@@ -229,7 +224,7 @@ fn house(length: f64, width: f64, wall: f64, gable: f64) -> MeshBuilder {
     let mut house = MeshBuilder::default();
     let x = 0.5 * length;
     let y = 0.5 * width;
-    let at = |i: f64, j: f64, z: f64| DVec3::new(i, j, z);
+    let at = |i: f64, j: f64, z: f64| dvec3(i, j, z);
     for side in [-1.0, 1.0] {
         house.wall(-x, x, side * y, -4.0, wall);
         let end = side * x;
@@ -293,7 +288,7 @@ fn church() -> MeshBuilder {
     let mut church = house(34.0, 14.0, 12.0, 8.0);
     let apse = MeshBuilder::revolved(&[(5.5, -4.0), (5.5, 9.0), (5.9, 9.3), (0.0, 14.0)], 16);
     church.place(&apse, &upright(0.0, 17.0, 0.0, 0.0));
-    church.cuboid(DVec3::new(-25.0, -4.0, -4.0), DVec3::new(-17.0, 4.0, 30.0));
+    church.cuboid(dvec3(-25.0, -4.0, -4.0), dvec3(-17.0, 4.0, 30.0));
     let spire = MeshBuilder::revolved(&[(5.2, 29.5), (3.2, 34.0), (0.15, 62.0), (0.0, 64.0)], 8);
     church.place(&spire, &upright(1.0 / 16.0, -21.0, 0.0, 0.0));
     church
@@ -305,7 +300,7 @@ fn power_line(mesh: &mut MeshBuilder) {
     let foot = |k: usize| {
         let x = 70.0 + 255.0 * k as f64;
         let y = 220.0 + 26.0 * k as f64;
-        DVec3::new(x, y, ground(x, y))
+        dvec3(x, y, ground(x, y))
     };
     let mast = mast();
     // The arms point across the line.
@@ -317,12 +312,12 @@ fn power_line(mesh: &mut MeshBuilder) {
             continue;
         }
         for (aside, height) in [(-8.0, 30.0), (8.0, 30.0), (-6.0, 38.0), (6.0, 38.0), (0.0, 46.0)] {
-            let end = |k: usize| foot(k) + across * DVec3::new(aside, 0.0, height);
+            let end = |k: usize| foot(k) + across * dvec3(aside, 0.0, height);
             let path: Vec<_> = (0..=8)
                 .map(|i| fraction(i, 8))
                 .map(|t| end(k).lerp(end(k + 1), t) - DVec3::Z * (36.0 * t * (1.0 - t)))
                 .collect();
-            mesh.sweep(&path, DVec3::Z, &circle(0.03, 3), &|_| 1.0);
+            mesh.sweep(&path, DVec3::Z, &circle(0.03, 3));
         }
     }
 }
@@ -334,7 +329,7 @@ fn mast() -> MeshBuilder {
     let corner = |k: usize, storey: usize| {
         let t = fraction(storey, storeys);
         let (c, s) = cos_sin(fraction(2 * k + 1, 8));
-        DVec3::new(c, s, 0.0) * (4.2 * (1.0 - t) + 0.7) + DVec3::Z * (46.0 * t)
+        dvec3(c, s, 0.0) * (4.2 * (1.0 - t) + 0.7) + DVec3::Z * (46.0 * t)
     };
     for k in 0..4 {
         mast.bar(corner(k, 0), corner(k, storeys), 0.11, 4);
@@ -346,12 +341,7 @@ fn mast() -> MeshBuilder {
     for (reach, height) in [(8.0, 30.0), (6.0, 38.0)] {
         for y in [-0.6, 0.6] {
             for side in [-1.0, 1.0] {
-                mast.bar(
-                    DVec3::new(0.0, y, height + 2.0),
-                    DVec3::new(side * reach, 0.0, height),
-                    0.06,
-                    4,
-                );
+                mast.bar(dvec3(0.0, y, height + 2.0), dvec3(side * reach, 0.0, height), 0.06, 4);
             }
         }
     }

@@ -5,7 +5,7 @@
 //! machine gets the same bytes.
 
 use bvh_core::Triangle;
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec3, dvec3};
 
 /// Triangles under construction, in the order in which they were added.
 #[derive(Default)]
@@ -28,7 +28,7 @@ impl MeshBuilder {
     /// Adds a rectangle in the plane of this `y`, between two x and two z.
     pub fn wall(&mut self, from: f64, to: f64, y: f64, low: f64, high: f64) {
         let corners = [(from, low), (to, low), (to, high), (from, high)];
-        let [a, b, c, d] = corners.map(|(x, z)| DVec3::new(x, y, z));
+        let [a, b, c, d] = corners.map(|(x, z)| dvec3(x, y, z));
         self.quad(a, b, c, d);
     }
 
@@ -68,8 +68,14 @@ impl MeshBuilder {
 
     /// Sweeps a closed polygon along a path and closes both ends. The profile's first coordinate
     /// points along `side` × path, its second completes the frame; `side` must not be parallel to
-    /// the path. The profile is multiplied by `scale(k)` at path point `k`.
-    pub fn sweep(
+    /// the path.
+    pub fn sweep(&mut self, path: &[DVec3], side: DVec3, profile: &[(f64, f64)]) {
+        self.taper(path, side, profile, &|_| 1.0);
+    }
+
+    /// Sweeps as [`sweep`](Self::sweep) does. The profile is multiplied by `scale(k)` at path point
+    /// `k`.
+    pub fn taper(
         &mut self,
         path: &[DVec3],
         side: DVec3,
@@ -94,7 +100,7 @@ impl MeshBuilder {
 
     /// Adds a straight round bar of `sides` sides between two points that differ in x or y.
     pub fn bar(&mut self, from: DVec3, to: DVec3, radius: f64, sides: usize) {
-        self.sweep(&[from, to], DVec3::Z, &circle(radius, sides), &|_| 1.0);
+        self.sweep(&[from, to], DVec3::Z, &circle(radius, sides));
     }
 
     /// Adds the 12 triangles of a box parallel to the axes.
@@ -129,20 +135,16 @@ impl MeshBuilder {
     ) {
         let front = |i: usize, y: f64| {
             let (c, s) = cos_sin(fraction(i, segments) * 0.5);
-            DVec3::new(radius * c, y, radius * s)
+            dvec3(radius * c, y, radius * s)
         };
         for y in [-0.5 * thickness, 0.5 * thickness] {
             self.grid(segments, 1, &|i, j| {
                 let arc = front(i, y);
-                if j == 0 { arc } else { DVec3::new(arc.x, y, top) }
+                if j == 0 { arc } else { dvec3(arc.x, y, top) }
             });
             for (inner, outer) in [(radius, half_width), (-half_width, -radius)] {
                 self.grid(1, 1, &|i, j| {
-                    DVec3::new(
-                        if i == 0 { inner } else { outer },
-                        y,
-                        if j == 0 { 0.0 } else { top },
-                    )
+                    dvec3(if i == 0 { inner } else { outer }, y, if j == 0 { 0.0 } else { top })
                 });
             }
         }
@@ -189,7 +191,7 @@ pub fn cos_sin(turns: f64) -> (f64, f64) {
 /// axis.
 pub fn on_circle(radius: f64, turns: f64, z: f64) -> DVec3 {
     let (c, s) = cos_sin(turns);
-    DVec3::new(radius * c, radius * s, z)
+    dvec3(radius * c, radius * s, z)
 }
 
 /// The points of a half circle from the x axis on in this number of steps, made of their cosine and
@@ -218,19 +220,19 @@ pub fn fraction(i: usize, n: usize) -> f64 {
 /// Rotation about the x axis by an angle in turns.
 pub fn about_x(turns: f64) -> DMat3 {
     let (c, s) = cos_sin(turns);
-    DMat3::from_cols(DVec3::X, DVec3::new(0.0, c, s), DVec3::new(0.0, -s, c))
+    DMat3::from_cols(DVec3::X, dvec3(0.0, c, s), dvec3(0.0, -s, c))
 }
 
 /// Rotation about the y axis by an angle in turns.
 pub fn about_y(turns: f64) -> DMat3 {
     let (c, s) = cos_sin(turns);
-    DMat3::from_cols(DVec3::new(c, 0.0, -s), DVec3::Y, DVec3::new(s, 0.0, c))
+    DMat3::from_cols(dvec3(c, 0.0, -s), DVec3::Y, dvec3(s, 0.0, c))
 }
 
 /// Rotation about the z axis by an angle in turns.
 pub fn about_z(turns: f64) -> DMat3 {
     let (c, s) = cos_sin(turns);
-    DMat3::from_cols(DVec3::new(c, s, 0.0), DVec3::new(-s, c, 0.0), DVec3::Z)
+    DMat3::from_cols(dvec3(c, s, 0.0), dvec3(-s, c, 0.0), DVec3::Z)
 }
 
 /// The placement that turns a part by `rotation` and carries its origin to `origin`.
@@ -240,7 +242,7 @@ pub fn placed(rotation: DMat3, origin: DVec3) -> DAffine3 {
 
 /// The placement that turns a part by `turns` about the z axis and carries its origin to (x, y, z).
 pub fn upright(turns: f64, x: f64, y: f64, z: f64) -> DAffine3 {
-    placed(about_z(turns), DVec3::new(x, y, z))
+    placed(about_z(turns), dvec3(x, y, z))
 }
 
 /// A number in [-1, 1) that depends on its two arguments only: the finalizer of MurmurHash3 over

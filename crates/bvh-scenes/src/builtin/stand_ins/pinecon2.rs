@@ -9,7 +9,7 @@ use super::mesh_builder::{
     MeshBuilder, about_x, about_y, about_z, circle, cos_sin, fraction, jitter, placed,
 };
 use bvh_core::Triangle;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, dvec3};
 
 /// World units per cone height.
 const UNIT: f64 = 104.0;
@@ -24,11 +24,9 @@ pub fn triangles() -> Vec<Triangle> {
     let core = [0.0, 0.0, 0.25, 0.5, 0.75, 1.0].map(|t| (0.6 * belly(t), 0.97 * t));
     let closed: Vec<_> = [(0.0, -0.04)].into_iter().chain(core).chain([(0.0, 1.0)]).collect();
     cone.revolve(&closed, 14);
-    let stem: Vec<DVec3> = (0..=6)
-        .map(|k| fraction(k, 6))
-        .map(|t| DVec3::new(0.07 * t * t, 0.02 * t, -0.25 * t))
-        .collect();
-    cone.sweep(&stem, DVec3::Y, &circle(0.035, 8), &|k| 1.0 - 0.07 * k as f64);
+    let stem: Vec<DVec3> =
+        (0..=6).map(|k| fraction(k, 6)).map(|t| dvec3(0.07 * t * t, 0.02 * t, -0.25 * t)).collect();
+    cone.taper(&stem, DVec3::Y, &circle(0.035, 8), &|k| 1.0 - 0.07 * k as f64);
 
     for i in 0..SCALES {
         // Scales are denser towards the tip, where they are smaller.
@@ -37,7 +35,7 @@ pub fn triangles() -> Vec<Triangle> {
         let opening = 0.13 - 0.09 * t + 0.012 * jitter(2, i);
         let azimuth = i as f64 * GOLDEN + 0.004 * jitter(3, i);
         let rotation = about_z(azimuth) * about_y(opening) * about_x(0.01 * jitter(4, i));
-        let root = about_z(azimuth) * DVec3::new(0.5 * belly(t), 0.0, 0.98 * t - 0.05);
+        let root = about_z(azimuth) * dvec3(0.5 * belly(t), 0.0, 0.98 * t - 0.05);
         cone.place(&scale(i), &placed(rotation * DMat3::from_diagonal(DVec3::splat(size)), root));
     }
     cone.finish(UNIT, DVec3::ZERO)
@@ -82,5 +80,5 @@ fn face(u: f64, v: f64, lift: f64) -> DVec3 {
     let across = 2.0 * u - 1.0;
     let width = 0.16 + 0.36 * cos_sin(0.25 * (1.0 - v) * (1.0 - v) * 1.6).0 - 0.22 * v * v * v;
     let bend = 0.22 * v * v - 0.12 * across * across + 0.05 * cos_sin(0.5 * v).1;
-    DVec3::new(bend + lift, across * width, v - 0.12 * v * across * across)
+    dvec3(bend + lift, across * width, v - 0.12 * v * across * across)
 }
