@@ -10,7 +10,8 @@ mod buffers;
 mod document;
 mod nodes;
 
-use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Place, counted};
+use super::MeshError;
+use super::mesh::{Fault, MOST_TRIANGLES, Mesh, counted};
 use accessors::{Accessors, F32, I8, I16, U8, U16, U32};
 use buffers::Buffers;
 use bvh_core::Triangle;
@@ -29,16 +30,16 @@ const MOST_ITEMS: u64 = 6 * MOST_TRIANGLES as u64;
 /// Reads the bytes of a glTF or GLB file, and the buffers that its meshes refer to from the folder
 /// of `path`.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
-    let (document, chunk) = document(bytes, path)?;
+    let (document, chunk) = document(bytes)?;
     let buffers = Buffers::new(path, chunk);
-    let mut loader = Loader::new(path, &document, buffers, bytes.len());
+    let mut loader = Loader::new(&document, buffers, bytes.len());
     let places = loader.places()?;
-    check_size(&document, &places, path)?;
+    check_size(&document, &places)?;
     for place in &places {
         loader.add_mesh(place, &place.transform)?;
     }
     match loader.triangles.is_empty() {
-        true => Err(no_triangle(path)),
+        true => Err(no_triangle()),
         false => Ok(Mesh::new(std::mem::take(&mut loader.triangles), loader.remarks())),
     }
 }
@@ -69,10 +70,14 @@ pub struct Placed {
 
 /// Reads a file as [`parse`] does, but returns every mesh once. Rejects a node that gives its mesh
 /// a shape of its own. Leaves out places in which no triangle has an area.
-pub fn parts(bytes: &[u8], path: &Path) -> Result<Parts, Fault> {
-    let (document, chunk) = document(bytes, path)?;
+pub fn parts(bytes: &[u8], path: &Path) -> Result<Parts, MeshError> {
+    read_parts(bytes, path).map_err(MeshError::of(path))
+}
+
+fn read_parts(bytes: &[u8], path: &Path) -> Result<Parts, Fault> {
+    let (document, chunk) = document(bytes)?;
     let buffers = Buffers::new(path, chunk);
-    let mut loader = Loader::new(path, &document, buffers, bytes.len());
+    let mut loader = Loader::new(&document, buffers, bytes.len());
     let mut places = loader.places()?;
     for Placed { node, mesh, .. } in &places {
         let own = &document.nodes[*node];
@@ -80,7 +85,7 @@ pub fn parts(bytes: &[u8], path: &Path) -> Result<Parts, Fault> {
         if own.skin.is_some() || bends {
             let cause = if bends { "weights" } else { "a skin" };
             let message = format!("{cause}; expected none, so that every instance has one shape");
-            return Err(loader.fault(format!("nodes[{node}]"), message));
+            return Err(Fault::of(&format!("nodes[{node}]"), message));
         }
     }
     let all = places.len();
@@ -93,7 +98,7 @@ pub fn parts(bytes: &[u8], path: &Path) -> Result<Parts, Fault> {
     let mut placed = BTreeSet::new();
     let mut first_places = places.clone();
     first_places.retain(|place| placed.insert(place.mesh));
-    check_size(&document, &first_places, path)?;
+    check_size(&document, &first_places)?;
     let mut meshes = BTreeMap::new();
     for place in &first_places {
         loader.add_mesh(place, &DMat4::IDENTITY)?;
@@ -103,7 +108,7 @@ pub fn parts(bytes: &[u8], path: &Path) -> Result<Parts, Fault> {
     meshes.retain(|_, triangles| !triangles.is_empty());
     places.retain(|place| meshes.contains_key(&place.mesh));
     if places.is_empty() {
-        return Err(no_triangle(path));
+        return Err(no_triangle());
     }
     let remarks: Vec<String> = loader.remarks().into_iter().chain(flat).collect();
     let remark = (!remarks.is_empty()).then(|| remarks.join("; "));
@@ -116,9 +121,9 @@ fn has_area(transform: &DMat4) -> bool {
     [x.cross(y), y.cross(z), z.cross(x)].iter().any(|normal| *normal != DVec3::ZERO)
 }
 
-fn no_triangle(path: &Path) -> Fault {
+fn no_triangle() -> Fault {
     let message = "no triangle in its scene; expected a glTF file with at least one";
-    Fault::new(path, Place::File, message)
+    Fault::of_file(message)
 }
 
 fn get<'a, T>(list: &'a [T], index: usize, name: &str) -> Result<&'a T, String> {
@@ -126,7 +131,6 @@ fn get<'a, T>(list: &'a [T], index: usize, name: &str) -> Result<&'a T, String> 
 }
 
 struct Loader<'a> {
-    path: &'a Path,
     document: &'a Document,
     accessors: Accessors<'a>,
     nodes: Nodes,
@@ -151,19 +155,14 @@ const INCOMPLETE: [&str; 2] =
 const POSITIONS: [u32; 5] = [F32, I8, U8, I16, U16];
 
 impl<'a> Loader<'a> {
-    fn new(path: &'a Path, document: &'a Document, buffers: Buffers<'a>, length: usize) -> Self {
+    fn new(document: &'a Document, buffers: Buffers<'a>, length: usize) -> Self {
         Self {
-            path,
             document,
             accessors: Accessors::new(document, buffers, length),
             nodes: Nodes::default(),
             triangles: Vec::new(),
             left_out: BTreeMap::new(),
         }
-    }
-
-    fn fault(&self, place: String, message: impl std::fmt::Display) -> Fault {
-        Fault::new(self.path, Place::Element(place), message)
     }
 
     fn leave_out(&mut self, part: [&'static str; 2]) {
@@ -190,14 +189,14 @@ impl<'a> Loader<'a> {
         let Placed { node, mesh, .. } = *place;
         let joints = match self.document.nodes[node].skin {
             Some(skin) => Some(self.joints(skin).map_err(|message| {
-                self.fault(format!("skins[{skin}] at nodes[{node}]"), message)
+                Fault::of(&format!("skins[{skin}] at nodes[{node}]"), message)
             })?),
             None => None,
         };
         for (number, primitive) in self.document.meshes[mesh].primitives.iter().enumerate() {
             self.add(place, primitive, transform, joints.as_deref()).map_err(|message| {
                 let place = format!("meshes[{mesh}].primitives[{number}] at nodes[{node}]");
-                self.fault(place, message)
+                Fault::of(&place, message)
             })?;
         }
         Ok(())
@@ -367,18 +366,15 @@ fn same_length(found: usize, expected: usize, name: &str) -> Result<(), String> 
 /// Rejects places that have more triangles together than a scene may have, before any of them takes
 /// memory: a file of a few kilobytes can place one mesh any number of times. The meshes of all
 /// places must exist.
-fn check_size(document: &Document, places: &[Placed], path: &Path) -> Result<(), Fault> {
+fn check_size(document: &Document, places: &[Placed]) -> Result<(), Fault> {
     let mut total = 0;
     for place in places {
         for primitive in &document.meshes[place.mesh].primitives {
             total += promised(document, primitive);
         }
         if total > MOST_TRIANGLES {
-            return Err(Fault::new(
-                path,
-                Place::Element(format!("nodes[{}]", place.node)),
-                format!("more than {MOST_TRIANGLES} triangles in all; expected no more"),
-            ));
+            let message = format!("more than {MOST_TRIANGLES} triangles in all; expected no more");
+            return Err(Fault::of(&format!("nodes[{}]", place.node), message));
         }
     }
     Ok(())

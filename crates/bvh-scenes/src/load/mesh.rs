@@ -2,7 +2,6 @@
 
 use bvh_core::Triangle;
 use std::fmt;
-use std::path::{Path, PathBuf};
 
 /// The largest number of triangles that one file may contain. Together with boxes and a tree they
 /// need ten gigabytes. The limit matters because a small file can name one mesh many times.
@@ -48,39 +47,31 @@ pub(super) fn unused(vertices: usize) -> Option<String> {
     counted(vertices, "vertex is used by no face", "vertices are used by no face")
 }
 
-/// The place of a fault in a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// The whole file.
-    File,
-    /// A line, counted from 1. A continued statement has the number of its first line.
-    Line(usize),
-    /// A part of the file, with the name or number that its format gives it.
-    Element(String),
-}
-
-/// The reason why a file was rejected, in the words of its format.
+/// The reason why a file was rejected, in the words of its format: the place in the file, what was
+/// found there, and what would be accepted. Its text follows the path of the file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}{place}: {message}", .path.display())]
+#[error("{place}: {message}")]
 pub struct Fault {
-    /// The file's path as the caller gave it.
-    pub path: PathBuf,
-    /// The place in the file.
-    pub place: Place,
-    /// The contents that were found, and the contents that would be accepted.
-    pub message: String,
+    place: String,
+    message: String,
 }
 
 impl Fault {
-    /// Creates a fault of the file at `path`.
-    pub fn new(path: &Path, place: Place, message: impl fmt::Display) -> Self {
+    /// Creates a fault of the whole file.
+    pub fn of_file(message: impl fmt::Display) -> Self {
         // A message must fit a terminal, whatever names and numbers the file contains.
-        let place = match place {
-            Place::Element(name) => Place::Element(shortened(&name, 80)),
-            Place::File | Place::Line(_) => place,
-        };
-        let message = shortened(&message.to_string(), 300);
-        Self { path: path.to_path_buf(), place, message }
+        Self { place: String::new(), message: shortened(&message.to_string(), 300) }
+    }
+
+    /// Creates a fault of a line, counted from 1. A continued statement has the number of its first
+    /// line.
+    pub fn in_line(line: usize, message: impl fmt::Display) -> Self {
+        Self { place: format!(":{line}"), ..Self::of_file(message) }
+    }
+
+    /// Creates a fault of a part of the file, with the name or number that its format gives it.
+    pub fn of(part: &str, message: impl fmt::Display) -> Self {
+        Self { place: format!(": {}", shortened(part, 80)), ..Self::of_file(message) }
     }
 }
 
@@ -94,14 +85,4 @@ pub(super) fn shortened(text: &str, most: usize) -> String {
     }
     let beginning: String = line.chars().take(most - 1).collect();
     format!("{beginning}…")
-}
-
-impl fmt::Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Self::File => Ok(()),
-            Self::Line(line) => write!(f, ":{line}"),
-            Self::Element(name) => write!(f, ": {name}"),
-        }
-    }
 }

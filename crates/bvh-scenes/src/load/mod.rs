@@ -2,14 +2,14 @@
 
 pub mod gltf;
 pub mod mesh;
-pub mod obj;
+mod obj;
 mod ply;
 mod polygon;
 mod stl;
 mod text;
 
 use crate::files::{ReadError, read};
-use mesh::{Fault, Mesh, Place};
+use mesh::{Fault, Mesh};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -23,8 +23,20 @@ pub enum MeshError {
     #[error("{} is empty; expected an OBJ, PLY, STL or glTF file", .0.display())]
     Empty(PathBuf),
     /// The file is invalid.
-    #[error(transparent)]
-    Fault(#[from] Fault),
+    #[error("{}{fault}", .path.display())]
+    Fault {
+        /// The file's path as the caller gave it.
+        path: PathBuf,
+        /// The place and the reason.
+        fault: Fault,
+    },
+}
+
+impl MeshError {
+    /// Returns a function for `map_err` that names the file.
+    fn of(path: &Path) -> impl FnOnce(Fault) -> Self {
+        move |fault| Self::Fault { path: path.to_path_buf(), fault }
+    }
 }
 
 /// The formats of meshes.
@@ -88,12 +100,13 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
     let is_utf_16 = bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff");
     if is_utf_16 && !stl::is_binary(bytes) {
         let message = "the text is UTF-16; expected UTF-8 or ASCII";
-        return Err(Fault::new(path, Place::File, message).into());
+        return Err(MeshError::of(path)(Fault::of_file(message)));
     }
-    Ok(match Format::of(bytes, path) {
-        Format::Obj => obj::parse(bytes, path)?,
-        Format::Ply => ply::parse(bytes, path)?,
-        Format::Stl => stl::parse(bytes, path)?,
-        Format::Gltf => gltf::parse(bytes, path)?,
-    })
+    let parsed = match Format::of(bytes, path) {
+        Format::Obj => obj::parse(bytes),
+        Format::Ply => ply::parse(bytes),
+        Format::Stl => stl::parse(bytes),
+        Format::Gltf => gltf::parse(bytes, path),
+    };
+    parsed.map_err(MeshError::of(path))
 }

@@ -11,25 +11,23 @@
 //! texture coordinates are ignored. Lines may end in LF, CRLF or CR, and a backslash at the end
 //! continues a statement on the next line.
 
-use super::mesh::{Fault, Mesh, Place, counted, unused};
+use super::mesh::{Fault, Mesh, counted, unused};
 use super::polygon::{MOST_CORNERS, Polygons, open};
 use super::text::{self, number, shown};
 use glam::Vec3;
 use std::path::Path;
 
-/// Reads the bytes of an OBJ file; `path` only names it in errors. Any bytes give a mesh or an
-/// error. O(bytes), and more for faces that are not convex.
-pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
-    let at = |line: usize, message| Fault::new(path, Place::Line(line), message);
-    let geometry = Geometry::of(bytes).map_err(|(line, message)| at(line, message))?;
+/// Reads the bytes of an OBJ file. Any bytes give a mesh or an error. O(bytes), and more for faces
+/// that are not convex.
+pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
+    let geometry = Geometry::of(bytes)?;
     let options =
         tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     // No statement names a material, so that `tobj` asks for no material file.
     let no_material = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
     let loaded = tobj::load_obj_buf(&mut &geometry.text[..], &options, no_material);
-    let (models, _) = loaded.map_err(|error| {
-        Fault::new(path, Place::File, format!("{error}; expected a Wavefront OBJ file"))
-    })?;
+    let (models, _) = loaded
+        .map_err(|error| Fault::of_file(format!("{error}; expected a Wavefront OBJ file")))?;
     let mut polygons = Polygons::default();
     let mut lines = geometry.lines.iter();
     let mut corners = Vec::new();
@@ -45,7 +43,9 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
             corners.clear();
             corners.extend(open(face).iter().map(|&index| Vec3::from(positions[index as usize])));
             let line = lines.next().copied().unwrap_or_default();
-            polygons.add(&corners).map_err(|message| at(line, format!("face of {message}")))?;
+            polygons
+                .add(&corners)
+                .map_err(|message| Fault::in_line(line, format!("face of {message}")))?;
             indices = rest;
         }
         used += positions.len();
@@ -53,7 +53,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     if polygons.triangles.is_empty() {
         let found = format!("{} vertices and no face of three or more", geometry.vertices);
         let message = format!("{found}; expected a Wavefront OBJ file with at least one such face");
-        return Err(Fault::new(path, Place::File, message));
+        return Err(Fault::of_file(message));
     }
     polygons.short += geometry.short_faces;
     let unused = unused(geometry.vertices - used);
@@ -61,9 +61,6 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     let remarks = remarks.collect();
     Ok(Mesh::new(polygons.triangles, remarks))
 }
-
-/// A line, counted from 1, and what is wrong with it.
-type LineFault = (usize, String);
 
 /// The checked statements of a file.
 #[derive(Default)]
@@ -79,7 +76,7 @@ struct Geometry {
     /// The clause about lines that begin with no keyword.
     unknown: Option<String>,
     /// The numbers of the vertices that no face may use, counted from 1, with the reasons.
-    invalid: Vec<(usize, LineFault)>,
+    invalid: Vec<(usize, Fault)>,
     /// The vertices below a face that the face names, counted from 1, and the face's line.
     ahead: Vec<(usize, usize)>,
 }
@@ -91,15 +88,13 @@ impl Geometry {
     ///
     /// The first fault in the order of the file. A fault of a vertex below the face that names it
     /// is found only at the end of the file, and is reported last.
-    fn of(bytes: &[u8]) -> Result<Self, LineFault> {
+    fn of(bytes: &[u8]) -> Result<Self, Fault> {
         let mut geometry = Self::default();
         let mut statements = Statements::new(bytes);
         let mut words = Vec::new();
         while let Some((keyword, line)) = statements.next(&mut words, MOST_CORNERS + 1) {
             match keyword {
-                Keyword::Vertex => {
-                    geometry.add_vertex(&words, line).map_err(|message| (line, message))?;
-                }
+                Keyword::Vertex => geometry.add_vertex(&words, line)?,
                 Keyword::Face => geometry.add_face(&words, line)?,
             }
         }
@@ -107,7 +102,7 @@ impl Geometry {
             if vertex > geometry.vertices {
                 let most = geometry.vertices;
                 let expected = format!("expected at most {most}, the file's vertex count");
-                return Err((line, format!("face vertex {vertex}; {expected}")));
+                return Err(Fault::in_line(line, format!("face vertex {vertex}; {expected}")));
             }
             geometry.usable(vertex)?;
         }
@@ -121,24 +116,25 @@ impl Geometry {
     }
 
     /// Adds a vertex without its colour: its coordinates, and its weight if it has one.
-    fn add_vertex(&mut self, words: &[&[u8]], line: usize) -> Result<(), String> {
+    fn add_vertex(&mut self, words: &[&[u8]], line: usize) -> Result<(), Fault> {
         self.vertices += 1;
         let length = words.len();
         if !matches!(length, 3 | 4 | 6..=8) {
             let expected = "3 (x y z), 4 (x y z and a weight), or 3 or 4 more (a colour)";
-            return Err(format!("vertex of length {length}; expected {expected}"));
+            let message = format!("vertex of length {length}; expected {expected}");
+            return Err(Fault::in_line(line, message));
         }
         let words = &words[..if matches!(length, 4 | 8) { 4 } else { 3 }];
         let mut position = [0.0; 3];
         for (coordinate, word) in position.iter_mut().zip(words) {
             let message = || {
                 let expected = "expected a finite number up to ±3.4e38";
-                format!("vertex coordinate `{}`; {expected}", shown(word))
+                Fault::in_line(line, format!("vertex coordinate `{}`; {expected}", shown(word)))
             };
             *coordinate = number(word).ok_or_else(message)?;
             // Some programs write vertices that they do not use in this way.
             if !coordinate.is_finite() {
-                self.invalid.push((self.vertices, (line, message())));
+                self.invalid.push((self.vertices, message()));
                 add(b'v', [&b"0"[..]; 3].into_iter(), &mut self.text);
                 return Ok(());
             }
@@ -150,17 +146,19 @@ impl Geometry {
                             coordinates within ±3.4e38";
             number(word)
                 .filter(|w| w.is_finite() && position.iter().all(|x| (x / w).is_finite()))
-                .ok_or_else(|| format!("vertex weight `{}`; {expected}", shown(word)))?;
+                .ok_or_else(|| {
+                    Fault::in_line(line, format!("vertex weight `{}`; {expected}", shown(word)))
+                })?;
         }
         add(b'v', words.iter().copied(), &mut self.text);
         Ok(())
     }
 
-    fn add_face(&mut self, words: &[&[u8]], line: usize) -> Result<(), LineFault> {
+    fn add_face(&mut self, words: &[&[u8]], line: usize) -> Result<(), Fault> {
         if words.len() > MOST_CORNERS {
             let message =
                 format!("face of more than {MOST_CORNERS} vertices; expected at most as many");
-            return Err((line, message));
+            return Err(Fault::in_line(line, message));
         }
         let vertices = self.vertices;
         for corner in words {
@@ -171,7 +169,7 @@ impl Geometry {
                 .ok_or_else(|| {
                     let expected = "expected a whole number, from 1 for the first vertex of the \
                                     file or from -1 for the latest one";
-                    (line, format!("face vertex `{}`; {expected}", shown(corner)))
+                    Fault::in_line(line, format!("face vertex `{}`; {expected}", shown(corner)))
                 })?;
             let vertex = match usize::try_from(index) {
                 Ok(index) => Some(index),
@@ -183,7 +181,7 @@ impl Geometry {
                 None => {
                     let expected =
                         format!("expected at least -{vertices}, the number of vertices above");
-                    return Err((line, format!("face vertex {index}; {expected}")));
+                    return Err(Fault::in_line(line, format!("face vertex {index}; {expected}")));
                 }
             }
         }
@@ -197,7 +195,7 @@ impl Geometry {
     }
 
     /// Rejects a vertex without finite coordinates.
-    fn usable(&self, vertex: usize) -> Result<(), LineFault> {
+    fn usable(&self, vertex: usize) -> Result<(), Fault> {
         match self.invalid.binary_search_by_key(&vertex, |(invalid, _)| *invalid) {
             Ok(found) => Err(self.invalid[found].1.clone()),
             Err(_) => Ok(()),

@@ -4,12 +4,11 @@
 //! Latin-1, lines that end in CR, elements without properties, and `-nan(ind)`; it reads an element
 //! that is declared twice at wrong places; and its errors speak of its grammar.
 
-use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Place, counted, unused};
+use super::mesh::{Fault, MOST_TRIANGLES, Mesh, counted, unused};
 use super::polygon::{Polygons, open};
 use super::{text, without_mark};
 use bvh_core::Triangle;
 use glam::Vec3;
-use std::path::Path;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
@@ -96,13 +95,11 @@ impl Lists {
     }
 }
 
-/// Reads the bytes of a PLY file; `path` only names it in errors. O(bytes), and more for polygons
-/// that are not convex.
-pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
+/// Reads the bytes of a PLY file. O(bytes), and more for polygons that are not convex.
+pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
     let mut file =
         File { rest: without_mark(bytes), line: 0, words: &[], encoding: Encoding::Text };
-    let elements =
-        file.header().map_err(|message| Fault::new(path, Place::Line(file.line), message))?;
+    let elements = file.header().map_err(|message| Fault::in_line(file.line, message))?;
     let mut vertices = Vec::new();
     let (mut faces, mut strips, mut others) = Default::default();
     for Element { name, count, properties } in &elements {
@@ -117,10 +114,8 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
             file.element(properties, &mut point, &mut lists.indices).map_err(|message| {
                 let name = format!("{name} {number}, counted from 0");
                 match file.encoding {
-                    Encoding::Text => {
-                        Fault::new(path, Place::Line(file.line), format!("{name}: {message}"))
-                    }
-                    _ => Fault::new(path, Place::Element(name), message),
+                    Encoding::Text => Fault::in_line(file.line, format!("{name}: {message}")),
+                    _ => Fault::of(&name, message),
                 }
             })?;
             lists.ends.push(lists.indices.len());
@@ -134,7 +129,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
         "byte after the last element was ignored",
         "bytes after the last element were ignored",
     );
-    mesh(&vertices, &faces, &strips, after, path)
+    mesh(&vertices, &faces, &strips, after)
 }
 
 /// The part of a file that is not read yet.
@@ -362,7 +357,6 @@ fn mesh(
     faces: &Lists,
     strips: &Lists,
     after: Option<String>,
-    path: &Path,
 ) -> Result<Mesh, Fault> {
     // Unused vertices are reported, because they often show that an export went wrong.
     let mut used = vec![false; vertices.len()];
@@ -378,7 +372,7 @@ fn mesh(
         }
     };
     let fault = |element: &str, number: usize, message: String| {
-        Fault::new(path, Place::Element(format!("{element} {number}, counted from 0")), message)
+        Fault::of(&format!("{element} {number}, counted from 0"), message)
     };
     let mut polygons = Polygons::default();
     let mut corners = Vec::new();
@@ -409,7 +403,7 @@ fn mesh(
     if triangles.is_empty() || triangles.len() > MOST_TRIANGLES {
         let found = format!("{} vertices and {} triangles", vertices.len(), triangles.len());
         let message = format!("{found}; expected 1 to {MOST_TRIANGLES} triangles");
-        return Err(Fault::new(path, Place::File, message));
+        return Err(Fault::of_file(message));
     }
     Ok(Mesh::new(triangles, remarks))
 }

@@ -4,11 +4,10 @@
 //! solids, mistakes `solid` without a name for a binary file, names no line, and knows neither of
 //! the ways in which programs write comments, colours, `end loop` and counts.
 
-use super::mesh::{Fault, Mesh, Place, counted};
+use super::mesh::{Fault, Mesh, counted};
 use super::{text, without_mark};
 use bvh_core::Triangle;
 use glam::Vec3;
-use std::path::Path;
 
 /// The number of bytes before the triangles of a binary file: a comment of 80 bytes, and the number
 /// of triangles.
@@ -44,28 +43,27 @@ fn is_comment(line: &[u8]) -> bool {
     matches!(line.trim_ascii_start(), [] | [b';' | b'#', ..])
 }
 
-/// Reads the bytes of an STL file; `path` only names it in errors. O(bytes).
-pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
+/// Reads the bytes of an STL file. O(bytes).
+pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
     let text = without_mark(bytes);
     let is_text = !is_binary(bytes) && is_text(text);
     let (triangles, remarks) = match is_text {
-        true => (parse_text(text, path)?, None),
-        false => parse_binary(bytes, path)?,
+        true => (parse_text(text)?, None),
+        false => parse_binary(bytes)?,
     };
     if triangles.is_empty() {
-        let message = "no facet; expected an STL file with at least one";
-        return Err(Fault::new(path, Place::File, message));
+        return Err(Fault::of_file("no facet; expected an STL file with at least one"));
     }
     Ok(Mesh::new(triangles, remarks.into_iter().collect()))
 }
 
 /// Reads the triangles of a binary file, and returns a remark if the header does not give their
 /// number or bytes follow them.
-fn parse_binary(bytes: &[u8], path: &Path) -> Result<(Vec<Triangle>, Option<String>), Fault> {
+fn parse_binary(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> {
     let promised = promised(bytes).ok_or_else(|| {
         let message =
             format!("{} bytes; expected the {HEADER} of a binary STL file's header", bytes.len());
-        Fault::new(path, Place::File, message)
+        Fault::of_file(message)
     })?;
     let body = &bytes[HEADER..];
     let (room, after) = (body.len() / FACET, body.len() % FACET);
@@ -73,7 +71,7 @@ fn parse_binary(bytes: &[u8], path: &Path) -> Result<(Vec<Triangle>, Option<Stri
     let is_unwritten = matches!(promised, 0 | 0xffff_ffff) && after == 0;
     if !is_unwritten && (room < promised || room > promised && after == 0) {
         let message = format!("room for {room} facets; expected the {promised} of the header");
-        return Err(Fault::new(path, Place::File, message));
+        return Err(Fault::of_file(message));
     }
     let facets = if is_unwritten { room } else { promised };
     let (body, rest) = body.split_at(facets * FACET);
@@ -83,9 +81,8 @@ fn parse_binary(bytes: &[u8], path: &Path) -> Result<(Vec<Triangle>, Option<Stri
         let (words, _) = facet[12..48].as_chunks();
         let corners: [f32; 9] = std::array::from_fn(|i| f32::from_le_bytes(words[i]));
         if let Some(found) = corners.iter().find(|x| !x.is_finite()) {
-            let place = Place::Element(format!("facet {number}, counted from 0"));
             let message = format!("coordinate {found}; expected a finite number");
-            return Err(Fault::new(path, place, message));
+            return Err(Fault::of(&format!("facet {number}, counted from 0"), message));
         }
         triangles.push(Triangle::from(corners));
     }
@@ -105,7 +102,7 @@ const KEYWORDS: [&str; 9] =
     ["color", "end", "endfacet", "endloop", "endsolid", "facet", "outer", "solid", "vertex"];
 
 /// Reads the corners of every loop, three at a time. Normals, colours and names are ignored.
-fn parse_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
+fn parse_text(bytes: &[u8]) -> Result<Vec<Triangle>, Fault> {
     let mut triangles = Vec::new();
     let mut corners: Vec<Vec3> = Vec::new();
     let mut rest = bytes;
@@ -116,7 +113,7 @@ fn parse_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
         if is_comment(text) {
             continue;
         }
-        let fault = |message| Fault::new(path, Place::Line(line), message);
+        let fault = |message: String| Fault::in_line(line, message);
         let text = String::from_utf8_lossy(text).to_ascii_lowercase();
         // A line may have several keywords, because STL knows only words.
         let mut words = text.split_whitespace().peekable();
@@ -166,7 +163,7 @@ fn parse_text(bytes: &[u8], path: &Path) -> Result<Vec<Triangle>, Fault> {
     }
     if inside || !corners.is_empty() {
         let message = "the file ends in a facet; expected `endfacet`";
-        return Err(Fault::new(path, Place::Line(line), message));
+        return Err(Fault::in_line(line, message));
     }
     Ok(triangles)
 }

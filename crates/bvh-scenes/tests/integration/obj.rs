@@ -1,15 +1,15 @@
 //! Valid and invalid OBJ files: the triangles of the valid ones, and the lines that errors name.
 
 use bvh_core::Triangle;
-use bvh_scenes::load::mesh::{Fault, Mesh};
-use bvh_scenes::load::obj::parse;
+use bvh_scenes::load::mesh::Mesh;
+use bvh_scenes::load::{MeshError, parse};
 use glam::Vec3;
 use proptest::prelude::*;
 use std::path::Path;
 
 const POINTS: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 2 0\n";
 
-fn read(text: impl AsRef<[u8]>) -> Result<Mesh, Fault> {
+fn read(text: impl AsRef<[u8]>) -> Result<Mesh, MeshError> {
     parse(text.as_ref(), Path::new("scene.obj"))
 }
 

@@ -4,13 +4,12 @@
 //! 1.4, because that crate takes references modulo 2³², knows neither instances nor visibility, and
 //! speaks of its own types where a file is wrong. The readers in `gltf` panic on forged files.
 
-use super::super::mesh::{Fault, Place};
+use super::super::mesh::Fault;
 use super::super::without_mark;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::path::Path;
 
 /// Extensions that a file may require, because the loader reads them.
 const READ: [&str; 3] = ["EXT_mesh_gpu_instancing", "KHR_mesh_quantization", "KHR_node_visibility"];
@@ -188,18 +187,17 @@ pub struct Buffer {
 }
 
 /// Reads a file's JSON, and returns the bytes of the binary chunk of a GLB file with it.
-pub fn document<'a>(bytes: &'a [u8], path: &Path) -> Result<(Document, Option<&'a [u8]>), Fault> {
+pub fn document(bytes: &[u8]) -> Result<(Document, Option<&[u8]>), Fault> {
     let (json, chunk) = match bytes.starts_with(b"glTF") {
         true => chunks(bytes).ok_or_else(|| {
-            let message = "no chunk of JSON in version 2; expected a GLB file, and whole";
-            Fault::new(path, Place::File, message)
+            Fault::of_file("no chunk of JSON in version 2; expected a GLB file, and whole")
         })?,
         false => (without_mark(bytes), None),
     };
     // Some programs pad the chunk with zeros instead of blanks.
     let zeros = json.iter().rev().take_while(|&&byte| byte == 0).count();
     let document: Document = serde_json::from_slice(&json[..json.len() - zeros])
-        .map_err(|error| Fault::new(path, Place::File, format!("{error} of the JSON")))?;
+        .map_err(|error| Fault::of_file(format!("{error} of the JSON")))?;
     // A file of a later minor version is read unless it says that it needs this version.
     let version = |value: &Value| value.as_str().map_or_else(|| value.to_string(), Into::into);
     let asset = &document.asset;
@@ -209,14 +207,13 @@ pub fn document<'a>(bytes: &'a [u8], path: &Path) -> Result<(Document, Option<&'
     };
     if !is_known {
         let message = format!("version `{found}`; expected 2.0");
-        return Err(Fault::new(path, Place::Element("asset".into()), message));
+        return Err(Fault::of("asset", message));
     }
     if let Some(unknown) = document.extensions_required.iter().find(|name| !is_covered(name)) {
-        let place = Place::Element("extensionsRequired".into());
         let message = format!(
             "`{unknown}`; expected none that changes triangles (compressed meshes cannot be read)"
         );
-        return Err(Fault::new(path, place, message));
+        return Err(Fault::of("extensionsRequired", message));
     }
     Ok((document, chunk))
 }

@@ -2,7 +2,7 @@
 
 use super::accessors::{F32, I8, I16};
 use super::document::{Document, Instances, Node};
-use super::{Fault, HIDDEN, Loader, MOST_TRIANGLES, Place, Placed, get};
+use super::{Fault, HIDDEN, Loader, MOST_TRIANGLES, Placed, get};
 use glam::{DMat4, DQuat, DVec3};
 
 /// The nodes of a file.
@@ -85,11 +85,8 @@ impl Loader<'_> {
     pub fn places(&mut self) -> Result<Vec<Placed>, Fault> {
         let document = self.document;
         self.nodes = Nodes::new(document)
-            .map_err(|(node, message)| self.fault(format!("nodes[{node}]"), message))?;
-        let path = self.path;
-        let fault =
-            |place: String, message: String| Fault::new(path, Place::Element(place), message);
-        let in_scene = |message| fault("scene".into(), message);
+            .map_err(|(node, message)| Fault::of(&format!("nodes[{node}]"), message))?;
+        let in_scene = |message: String| Fault::of("scene", message);
         let roots = match (document.scene, &document.scenes[..]) {
             (Some(scene), scenes) => &get(scenes, scene, "scenes").map_err(in_scene)?.nodes,
             (None, [first, ..]) => &first.nodes,
@@ -101,7 +98,7 @@ impl Loader<'_> {
         let mut open: Vec<usize> = roots.iter().rev().copied().collect();
         while let Some(number) = open.pop() {
             let node = get(&document.nodes, number, "nodes").map_err(in_scene)?;
-            let in_node = |message| fault(format!("nodes[{number}]"), message);
+            let in_node = |message: String| Fault::of(&format!("nodes[{number}]"), message);
             if std::mem::replace(&mut reached[number], true) {
                 return Err(in_node("in its scene twice; expected each node once".to_owned()));
             }
