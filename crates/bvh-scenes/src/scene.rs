@@ -279,20 +279,5 @@ mod tests {
             );
         }
         assert!(!Scene::load("sofa").unwrap_err().to_string().contains("did you mean"));
-        let message = Scene::load("none/file.glb").unwrap_err().to_string();
-        assert_eq!(message, "scene none/file.glb: no such file");
-    }
-
-    #[test]
-    fn a_file_is_named_by_its_stem_and_a_remark_lists_its_other_contents() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("one.obj");
-        std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2\n").unwrap();
-        let scene = Scene::load(path.to_str().unwrap()).unwrap();
-        assert_eq!(
-            (scene.name.as_str(), scene.kind, scene.boxes.len()),
-            ("one", SceneKind::File, 1)
-        );
-        assert!(scene.remark.unwrap().contains("1 face"));
     }
 }

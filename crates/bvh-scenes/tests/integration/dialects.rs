@@ -54,6 +54,7 @@ const STL: &str = r"
 endloop ⇒ end loop & endfacet ⇒ end facet |
 endsolid ⇒ end solid |
 endloop ⇒ END LOOP |
+\r\n\x20\x20 ⇒ \x20 |
 normal 0 0 1 ⇒ normal NaN -nan(ind) 1.#QNAN |
 normal 0 0 1 ⇒ normal 0,0 0,0 1,0 |
  normal 0 0 1 ⇒ |
@@ -128,6 +129,7 @@ fn files_as_programs_write_them_are_read_and_faults_are_named_with_their_places(
     assert_square("more lines", &more, "a.ply", "5 bytes after the last element were ignored");
     assert_square("a long name", &with(&stl_text(), "a square", &"n".repeat(5000)), "a.stl", "");
     assert_square("capitals", &samples()[0].2.to_ascii_uppercase(), "a.obj", "");
+    assert_square("capitals", &stl_text().to_ascii_uppercase(), "a.stl", "");
     let face = format!("element {} 9000", "face".repeat(1000));
     let long = with(&ply_text(), "element face 1", &face);
     assert_refused(long, "a.ply", &["a.ply:16: facefaceface", "…"]);

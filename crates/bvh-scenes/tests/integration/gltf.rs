@@ -240,10 +240,19 @@ fn files_in_the_folder_of_the_scene_and_below_are_read() {
         let folder = folder(name);
         fs::create_dir(folder.path().join("a")).unwrap();
         let file = folder.path().join(name.replace("%20", " "));
-        fs::write(file, buffer()).unwrap();
-        let read = load(&folder.path().join("scene.gltf"));
-        assert_eq!(read.unwrap(), mesh(), "{name}");
+        fs::write(&file, buffer()).unwrap();
+        let read = || load(&folder.path().join("scene.gltf"));
+        assert_eq!(read().unwrap(), mesh(), "{name}");
+        fs::write(&file, &buffer()[..50]).unwrap();
+        let short = read().unwrap_err().to_string();
+        assert!(short.contains("buffers[0]: 50 bytes; expected 60"), "{short}");
+        fs::remove_file(file).unwrap();
+        let missing = read().unwrap_err().to_string();
+        let words = ["buffers[0]", "bin: no such file"];
+        assert!(words.iter().all(|words| missing.contains(words)), "{missing}");
     }
+    let remote = error(gltf_json("http://example.org/a.bin", NODE, INDEXED), "a.gltf");
+    assert!(remote.contains("a file in this folder"), "{remote}");
 }
 
 #[test]

@@ -61,7 +61,6 @@ fn polygons_of_many_corners_are_covered_or_rejected_before_they_take_long() {
     let corners: Vec<[f32; 3]> = (0..1 << 13).map(comb).collect();
     assert_eq!(mesh(&corners).triangles.len(), corners.len() - 2);
     let corners: Vec<[f32; 3]> = (0..1 << 12).map(zigzag).collect();
-    assert!(mesh(&corners).remark().unwrap().contains("crosses itself"));
     let mut text = String::from("# a zigzag\n");
     for [x, y, z] in &corners {
         writeln!(text, "v {x} {y} {z}").unwrap();

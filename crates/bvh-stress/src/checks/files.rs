@@ -4,8 +4,8 @@ use crate::{Verdict, tracing};
 use anyhow::{bail, ensure};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, PreparedRay, Primitives, Triangle, file};
-use bvh_scenes::load::mesh::{Fault, Mesh};
-use bvh_scenes::{builtin::stiff, load::obj};
+use bvh_scenes::builtin::stiff;
+use bvh_scenes::load::{self, MeshError, mesh::Mesh};
 use std::path::Path;
 
 /// S17: degenerate triangles are never hit, and the reader counts them.
@@ -37,8 +37,8 @@ fn to_obj(triangles: &[Triangle]) -> String {
     text
 }
 
-fn read(text: &str) -> Result<Mesh, Fault> {
-    obj::parse(text.as_bytes(), Path::new("scene.obj"))
+fn read(text: &str) -> Result<Mesh, MeshError> {
+    load::parse(text.as_bytes(), Path::new("scene.obj"))
 }
 
 /// Returns the message that rejects the text, which must name this line.
