@@ -5,7 +5,6 @@ use bvh_scenes::SceneError;
 use bvh_scenes::files::{ReadError, WriteError};
 use bvh_scenes::tree_file::TreeFileError;
 use bvh_search::SearchError;
-use std::io;
 use std::path::{Path, PathBuf};
 
 /// A failure, with its file or object.
@@ -24,10 +23,7 @@ pub enum Error {
     /// An input cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// A file or folder cannot be read or written.
-    #[error("{}: cannot {action}: {source}", .path.display())]
-    Io { path: PathBuf, action: &'static str, source: io::Error },
-    /// A file cannot be written.
+    /// A file or folder cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
     /// A search failed.
@@ -52,19 +48,13 @@ impl Error {
             Self::Read(error) | Self::TreeFile(TreeFileError::Read(error)) => read_code(error),
             Self::TreeFile(_) => 2,
             Self::Interrupted(_) => 130,
-            Self::Io { .. } | Self::Write(_) | Self::Search { .. } | Self::Tracing { .. } => 1,
+            Self::Write(_) | Self::Search { .. } | Self::Tracing { .. } => 1,
         }
-    }
-
-    /// Returns a function for `map_err` on file operations that names the path and the operation.
-    pub fn io(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
-        move |source| Self::Io { path: path.to_owned(), action, source }
     }
 
     /// Returns a function for `map_err` on tables that names the file.
     pub fn csv(path: &Path) -> impl FnOnce(csv::Error) -> Self {
-        let path = path.to_owned();
-        move |error| Self::Io { path, action: "write the table", source: error.into() }
+        move |error| WriteError::of(path, "write the table")(error.into()).into()
     }
 
     /// Returns a function for `map_err` on builders and searches that names the scene and the

@@ -27,7 +27,6 @@ pub struct ExportArgs {
     /// The file to write, replaced when it is complete; `.json` for json.
     #[arg(long, value_name = "FILE.bin|.json")]
     pub out: PathBuf,
-    /// The form of the costs.
     #[command(flatten)]
     pub form: Form,
 }

@@ -31,7 +31,6 @@ pub struct InspectArgs {
     /// Write the nodes to a CSV file, one row each, in full precision.
     #[arg(long, value_name = "NODES.csv")]
     pub nodes: Option<PathBuf>,
-    /// The form of the facts.
     #[command(flatten)]
     pub form: Form,
 }
@@ -113,7 +112,6 @@ pub struct VerifyArgs {
     pub file: PathBuf,
     /// The tree's scene, by name or path of a mesh file.
     pub scene: String,
-    /// The form of the facts.
     #[command(flatten)]
     pub form: Form,
 }

@@ -6,14 +6,13 @@ use crate::arguments::{Jobs, input_file, load_scene, output_file};
 use crate::output::bar;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, WideBvh};
-use bvh_scenes::files;
+use bvh_scenes::files::{self, WriteError};
 use bvh_scenes::rays::View;
 use bvh_scenes::render::{Film, Options, framing, heat, image, render as draw};
 use bvh_scenes::trace::{Accelerator, Structure, kd_tree};
 use bvh_scenes::{Scene, tree_file};
 use glam::DVec3;
 use std::borrow::Cow;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -46,10 +45,8 @@ pub struct RenderArgs {
     /// The middle of the picture. The default is the centre of the scene.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub at: Option<DVec3>,
-    /// Limits the threads.
     #[command(flatten)]
     pub jobs: Jobs,
-    /// The form of the times and counts.
     #[command(flatten)]
     pub form: Form,
 }
@@ -176,18 +173,17 @@ fn structure(name: &str, scene: &Scene) -> Result<Structure<'static>, Error> {
 }
 
 fn write(args: &RenderArgs, film: &Film, rays_per_pixel: u32) -> Result<(), Error> {
-    let range = heat::range(film, rays_per_pixel);
+    let range = heat::range(film.tests.clone(), rays_per_pixel);
     let heat = args.heatmap.then(|| heat::colours(film, range.top * f64::from(rays_per_pixel)));
     let bytes = image::png(film.width, heat.as_ref().unwrap_or(&film.pixels))
-        .map_err(io::Error::other)
-        .map_err(Error::io(&args.out, "encode the picture"))?;
+        .map_err(WriteError::of(&args.out, "encode the picture"))?;
     Ok(files::write(&args.out, &bytes)?)
 }
 
 fn per_ray(film: &Film, rays_per_pixel: u32, answer: &mut Answer) {
     let boxes = film.counts.boxes as f64 / film.rays as f64;
     let objects = film.counts.objects as f64 / film.rays as f64;
-    let heat::Range { min, median, top, max } = heat::range(film, rays_per_pixel);
+    let heat::Range { min, median, top, max } = heat::range(film.tests.clone(), rays_per_pixel);
     let [boxes_text, objects_text, min_text, median_text, top_text, max_text] =
         [boxes, objects, min, median, top, max].map(short);
     answer.say(&format!(

@@ -9,6 +9,7 @@ use crate::rays::Rays;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective};
+use bvh_scenes::files::WriteError;
 use bvh_scenes::rays::View;
 use bvh_scenes::render::{Film, Options, framing, heat, image, render};
 use bvh_scenes::trace::Accelerator;
@@ -16,8 +17,7 @@ use bvh_scenes::{Scene, tree_file};
 use clap::Args;
 use page::{Page, Row};
 use serde_json::json;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Write a page about a tree file: its costs and the tests of rays as heat, each compared with the
 /// greedy tree of the same scene.
@@ -32,10 +32,8 @@ pub struct ReportArgs {
     /// of the tree file with the extension html, which must be free.
     #[arg(long, value_name = "FILE.html")]
     pub out: Option<PathBuf>,
-    /// Limits the threads.
     #[command(flatten)]
     pub jobs: Jobs,
-    /// The form of the facts.
     #[command(flatten)]
     pub form: Form,
 }
@@ -74,6 +72,9 @@ pub fn report(args: &ReportArgs) -> Result<(), Error> {
     let ranges = [&baked, &greedy].map(Measured::range);
     // The same colour must mean the same number of tests in both.
     let top = ranges[0].top.max(ranges[1].top);
+    let png = |pixels: &[[u8; 3]]| {
+        image::png(WIDTH, pixels).map_err(WriteError::of(&out, "encode the picture"))
+    };
     let page = Page {
         title: &title,
         origin: format!(
@@ -85,11 +86,8 @@ pub fn report(args: &ReportArgs) -> Result<(), Error> {
             whole(header.work)
         ),
         rows,
-        scene: png(&out, &baked.film.pixels)?,
-        heat: [
-            png(&out, &heat::colours(&baked.film, top))?,
-            png(&out, &heat::colours(&greedy.film, top))?,
-        ],
+        scene: png(&baked.film.pixels)?,
+        heat: [png(&heat::colours(&baked.film, top))?, png(&heat::colours(&greedy.film, top))?],
         medians: ranges.map(|range| range.median),
         top,
     };
@@ -113,7 +111,7 @@ impl Measured {
     /// other rays have one test, which would hide the median of a small scene.
     fn range(&self) -> heat::Range {
         let tests = self.film.tests.iter().copied().filter(|&tests| tests > 1).collect();
-        heat::range(&Film { tests, ..Film::default() }, 1)
+        heat::range(tests, 1)
     }
 }
 
@@ -156,12 +154,6 @@ fn rows(baked: &Measured, greedy: &Measured) -> Vec<Row> {
             Some(Row { name, baked: baked?, greedy: greedy?, is_cost })
         })
         .collect()
-}
-
-fn png(out: &Path, pixels: &[[u8; 3]]) -> Result<Vec<u8>, Error> {
-    image::png(WIDTH, pixels)
-        .map_err(io::Error::other)
-        .map_err(Error::io(out, "encode the picture"))
 }
 
 #[cfg(test)]

@@ -14,7 +14,6 @@ pub struct ScenesArgs {
     /// Print this scene's triangles as an OBJ file instead.
     #[arg(value_name = "SCENE", conflicts_with = "json")]
     pub scene: Option<String>,
-    /// The form of the table.
     #[command(flatten)]
     pub form: Form,
 }

@@ -92,7 +92,8 @@ pub struct WriteError {
 }
 
 impl WriteError {
-    fn of(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
+    /// Returns a function for `map_err` that names the file and the operation.
+    pub fn of(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
         move |source| Self { path: path.to_owned(), action, source }
     }
 }

@@ -20,24 +20,15 @@ pub enum Subset {
 impl Subset {
     /// Splits `name` into the scene's name and the subset, if it ends in a subset.
     pub fn parse(name: &str) -> Option<(&str, Self)> {
+        let (before, last) = name.rsplit_once(':')?;
         // The longer form comes first, because its last word is a number as well.
-        Self::parse_seeded(name).or_else(|| {
-            let (whole, count) = name.rsplit_once(':')?;
-            Some((whole, Self::Spaced(count.parse().ok()?)))
-        })
-    }
-
-    fn parse_seeded(name: &str) -> Option<(&str, Self)> {
-        let (before_seed, seed) = name.rsplit_once(':')?;
-        let (before_count, count) = before_seed.rsplit_once(':')?;
-        let (whole, kind) = before_count.rsplit_once(':')?;
-        let count = count.parse().ok()?;
-        let seed = seed.parse().ok()?;
-        match kind {
-            "random" => Some((whole, Self::Random(count, seed))),
-            "cluster" => Some((whole, Self::Cluster(count, seed))),
-            _ => None,
+        if let Some((before, count)) = before.rsplit_once(':')
+            && let Some((whole, kind @ ("random" | "cluster"))) = before.rsplit_once(':')
+        {
+            let make = if kind == "random" { Self::Random } else { Self::Cluster };
+            return Some((whole, make(count.parse().ok()?, last.parse().ok()?)));
         }
+        Some((before, Self::Spaced(last.parse().ok()?)))
     }
 
     /// Returns the number of objects.

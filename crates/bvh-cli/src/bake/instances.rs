@@ -49,7 +49,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let instances = instances(&parts);
     let top = top(&stem, &scenes, &instances, &parts)?;
     // Everything that can be invalid has been checked, so that a fault leaves no folder behind.
-    fs::create_dir_all(&out).map_err(Error::io(&out, "create the folder"))?;
+    fs::create_dir_all(&out).map_err(files::WriteError::of(&out, "create the folder"))?;
     let path = out.join(INSTANCES);
     let table = table(&instances, &parts).map_err(Error::csv(&path))?;
     files::write(&path, &table)?;

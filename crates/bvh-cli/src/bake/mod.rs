@@ -85,13 +85,11 @@ pub struct BakeArgs {
     /// With --parts, bake only the part with this identifier.
     #[arg(long, value_name = "ID", requires = "parts", help_heading = ADVANCED)]
     pub part: Option<String>,
-    /// Limits the threads.
     #[command(flatten)]
     pub jobs: Jobs,
     /// First list the steps that the scene does not need and that are skipped, with reasons.
     #[arg(long)]
     pub explain: bool,
-    /// The form of the results.
     #[command(flatten)]
     pub form: Form,
 }

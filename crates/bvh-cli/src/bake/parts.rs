@@ -8,6 +8,7 @@ use crate::Error;
 use crate::answer::Answer;
 use crate::arguments::{load_scene, output_file, reserve};
 use bvh_core::{Aabb, Bvh, Node, NodeKind};
+use bvh_scenes::files::WriteError;
 use bvh_scenes::tree_file;
 use bvh_scenes::{Scene, fnv1a};
 use bvh_search::{Budget, Problem, best, solve};
@@ -67,7 +68,7 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
         let accepted = "an identifier that --list prints for the same scene, budget and seed";
         return Err(Error::Usage(format!("--part {id}: no such part; accepted: {accepted}")));
     }
-    fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;
+    fs::create_dir_all(&folder).map_err(WriteError::of(&folder, "create the folder"))?;
     for part in chosen {
         let path = part.path(&folder);
         if path.exists() {

@@ -5,7 +5,6 @@ use crate::output::{bar, print_error};
 use bvh_search::{Deadline, Event, Observer};
 use indicatif::ProgressBar;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
-use std::sync::{Mutex, PoisonError};
 
 /// Ends a bake when its time is over or when it is interrupted, and shows its progress.
 pub struct Watch<'a> {
@@ -13,7 +12,8 @@ pub struct Watch<'a> {
     pub bar: ProgressBar,
     pub deadline: Deadline,
     effort: Effort,
-    last: Mutex<Option<Event>>,
+    /// The lowest cost so far, as the bits of a number.
+    incumbent: AtomicU64,
     /// The work so far. Events are rare while the search is hot, so that their work would be out of
     /// date.
     work: AtomicU64,
@@ -30,7 +30,7 @@ impl<'a> Watch<'a> {
             bar: bar(1000, "{bar:10} {wide_msg}"),
             deadline: effort.deadline(),
             effort,
-            last: Mutex::default(),
+            incumbent: AtomicU64::new(f64::INFINITY.to_bits()),
             work: AtomicU64::default(),
             shown: AtomicU64::default(),
             interrupted,
@@ -55,14 +55,16 @@ impl<'a> Watch<'a> {
         if claim.is_err() {
             return;
         }
-        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        let Some(event) = *last else { return };
+        let incumbent = f64::from_bits(self.incumbent.load(Relaxed));
+        if incumbent == f64::INFINITY {
+            return;
+        }
         let seconds = elapsed.as_secs_f64().max(1e-9);
         let done = match self.effort {
             Effort::Time(_) => self.deadline.fraction(),
             Effort::Work(work) => self.work.load(Relaxed) as f64 / work.max(1) as f64,
         };
-        let mut message = format!("cost {:.6e}", event.incumbent);
+        let mut message = format!("cost {:.6e}", incumbent);
         // The rate of the first moments predicts nothing.
         if done >= 0.01 {
             message += &format!(", {:.0} s left", (seconds / done - seconds).max(0.0));
@@ -78,7 +80,7 @@ impl<'a> Watch<'a> {
 
 impl Observer for Watch<'_> {
     fn event(&self, event: &Event) {
-        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(*event);
+        self.incumbent.store(event.incumbent.to_bits(), Relaxed);
     }
 
     fn counted(&self, _evaluations: u64, work: u64) {

@@ -44,27 +44,12 @@ pub fn tests_per_ray(wide: &WideBvh, kind: Kind, rays: &[Ray]) -> [f64; 2] {
     ]
 }
 
-/// Sums over some rays. They are integers, so that the order of addition does not matter.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    rays: u64,
-    hits: u64,
-    boxes: u64,
-    boxes_squared: u128,
-    objects: u64,
-    objects_squared: u128,
-}
+/// The sums of rays, hits, tests of boxes and their squares, tests of objects and their squares. They
+/// are integers, so that the order of addition does not matter.
+type Sums = [u128; 6];
 
-impl Sums {
-    fn add(mut self, other: Self) -> Self {
-        self.rays += other.rays;
-        self.hits += other.hits;
-        self.boxes += other.boxes;
-        self.boxes_squared += other.boxes_squared;
-        self.objects += other.objects;
-        self.objects_squared += other.objects_squared;
-        self
-    }
+fn added(a: Sums, b: Sums) -> Sums {
+    std::array::from_fn(|i| a[i] + b[i])
 }
 
 /// The mean of a number over random rays, with its standard error.
@@ -77,7 +62,7 @@ pub struct Mean {
 }
 
 impl Mean {
-    fn of_sums(count: u64, sum: u64, squares: u128) -> Self {
+    fn of_sums(count: u128, sum: u128, squares: u128) -> Self {
         let n = count as f64;
         let sum = sum as f64;
         let variance = ((squares as f64 - sum * sum / n) / (n - 1.0).max(1.0)).max(0.0);
@@ -122,12 +107,13 @@ pub fn empirical_cost(
     let sums = (0..config.count.div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| measure_chunk(config, &accelerator, &root, seed, chunk))
-        .reduce(Sums::default, Sums::add);
+        .reduce(Sums::default, added);
+    let [rays, hits, boxes, boxes_squared, objects, objects_squared] = sums;
     EmpiricalCost {
-        rays: sums.rays,
-        hit_fraction: sums.hits as f64 / sums.rays as f64,
-        boxes: Mean::of_sums(sums.rays, sums.boxes, sums.boxes_squared),
-        objects: Mean::of_sums(sums.rays, sums.objects, sums.objects_squared),
+        rays: rays as u64,
+        hit_fraction: hits as f64 / rays as f64,
+        boxes: Mean::of_sums(rays, boxes, boxes_squared),
+        objects: Mean::of_sums(rays, objects, objects_squared),
     }
 }
 
@@ -147,14 +133,8 @@ fn measure_chunk(
         // A box of one point has no rays; each counts as a ray without tests or hits.
         let hit = random_ray(config.family, root, &mut rng)
             .is_some_and(|ray| accelerator.count(config.query, &ray, &mut counts));
-        sums = sums.add(Sums {
-            rays: 1,
-            hits: u64::from(hit),
-            boxes: counts.boxes,
-            boxes_squared: u128::from(counts.boxes).pow(2),
-            objects: counts.objects,
-            objects_squared: u128::from(counts.objects).pow(2),
-        });
+        let [boxes, objects] = [counts.boxes, counts.objects].map(u128::from);
+        sums = added(sums, [1, hit.into(), boxes, boxes * boxes, objects, objects * objects]);
     }
     sums
 }

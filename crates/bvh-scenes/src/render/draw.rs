@@ -76,20 +76,6 @@ mod tests {
     }
 
     #[test]
-    fn any_number_of_threads_and_any_size_give_the_same_pixels() {
-        let scene = Scene::load("spheres75").unwrap();
-        for (width, height) in [(1, 1), (16, 16), (17, 33), (5, 40)] {
-            let options = options(&scene, width, height);
-            let films = [1, 3].map(|threads| {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                pool.install(|| picture(&scene, &options))
-            });
-            assert_eq!(films[0].pixels.len(), (width * height) as usize);
-            assert_eq!(films[0], films[1]);
-        }
-    }
-
-    #[test]
     fn rays_follow_as_many_reflections_as_the_options_say() {
         let scene = Scene::load("spheres75").unwrap();
         let options = options(&scene, 32, 18);

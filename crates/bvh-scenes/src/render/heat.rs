@@ -39,15 +39,13 @@ pub struct Range {
     pub max: f64,
 }
 
-/// Returns the distribution of tests over the pixels of a film with this many rays through each
-/// pixel.
-pub fn range(film: &Film, rays_per_pixel: u32) -> Range {
-    let mut sorted = film.tests.clone();
-    sorted.sort_unstable();
+/// Returns the distribution of the tests of pixels with this many rays through each.
+pub fn range(mut tests: Vec<u64>, rays_per_pixel: u32) -> Range {
+    tests.sort_unstable();
     // A film without pixels has zeros.
-    let last = sorted.len().saturating_sub(1);
+    let last = tests.len().saturating_sub(1);
     let [min, median, top, max] = [0, last / 2, last - last / 200, last].map(|index| {
-        let tests = sorted.get(index).copied().unwrap_or(0);
+        let tests = tests.get(index).copied().unwrap_or(0);
         tests as f64 / f64::from(rays_per_pixel)
     });
     Range { min, median, top, max }
@@ -76,16 +74,12 @@ fn colour(value: f64) -> [u8; 3] {
 mod tests {
     use super::*;
 
-    fn film(width: u32, tests: Vec<u64>) -> Film {
-        Film { width, tests, ..Film::default() }
-    }
-
     #[test]
     fn a_few_extreme_pixels_change_only_the_maximum() {
         let mut tests: Vec<u64> = (0..1000).collect();
         tests[500] = 1_000_000;
         // 499 is now the five hundredth of a thousand values.
-        let range = range(&film(10, tests), 4);
+        let range = range(tests, 4);
         assert_eq!((range.min, range.median, range.max), (0.0, 499.0 / 4.0, 250_000.0));
         assert!(range.top > 240.0 && range.top < 250.0, "{range:?}");
     }
@@ -101,13 +95,13 @@ mod tests {
 
     #[test]
     fn the_same_number_of_tests_has_one_colour_under_one_scale() {
-        let (few, many) = (film(64, vec![5; 64]), film(64, vec![10; 64]));
-        assert_eq!([colours(&few, 10.0)[0], colours(&many, 10.0)[0]], [colour(0.5), colour(1.0)]);
+        let film = Film { tests: vec![5, 10], ..Film::default() };
+        assert_eq!(colours(&film, 10.0), [colour(0.5), colour(1.0)]);
     }
 
     #[test]
     fn a_picture_without_tests_has_a_heat_map_too() {
-        let film = film(40, vec![0; 40]);
-        assert_eq!(colours(&film, range(&film, 1).top), [INFERNO[0]; 40]);
+        let film = Film { tests: vec![0; 40], ..Film::default() };
+        assert_eq!(colours(&film, range(film.tests.clone(), 1).top), [INFERNO[0]; 40]);
     }
 }

@@ -2,6 +2,7 @@
 
 use bvh_core::TestCounts;
 use glam::DVec3;
+use std::io;
 
 /// A picture, or a row that one thread has drawn, with its numbers of rays and tests. Rows run
 /// from the top, and pixels from the left.
@@ -62,7 +63,7 @@ pub fn encode(light: DVec3) -> [u8; 3] {
 }
 
 /// Encodes pixels, row by row from the top, as a PNG file with the highest compression.
-pub fn png(width: u32, pixels: &[[u8; 3]]) -> Result<Vec<u8>, png::EncodingError> {
+pub fn png(width: u32, pixels: &[[u8; 3]]) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, pixels.len() as u32 / width);
     encoder.set_color(png::ColorType::Rgb);
@@ -90,7 +91,7 @@ mod tests {
     fn decoded_pixels_equal_the_encoded_ones() {
         let pixels = [[1, 2, 3], [255, 0, 128], [9, 9, 9], [0, 0, 0], [7, 70, 250], [4, 5, 6]];
         let bytes = png(3, &pixels).unwrap();
-        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+        let mut reader = png::Decoder::new(io::Cursor::new(bytes)).read_info().unwrap();
         let mut read = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut read).unwrap();
         assert_eq!((info.width, info.height, info.color_type), (3, 2, png::ColorType::Rgb));

@@ -1,7 +1,7 @@
 //! The numbers of a glTF file: accessors, their views and the items that differ from them.
 
 use super::buffers::Buffers;
-use super::document::{Accessor, Document};
+use super::document::{Accessor, Document, Sparse, SparseIndices, SparseValues};
 use super::{MOST_ITEMS, get};
 
 /// The types of numbers.
@@ -12,25 +12,24 @@ pub const U16: u32 = 5123;
 pub const U32: u32 = 5125;
 pub const F32: u32 = 5126;
 
+/// The names and the numbers of bytes of the types.
+const TYPES: [(u32, &str, usize); 6] = [
+    (I8, "byte", 1),
+    (U8, "unsigned byte", 1),
+    (I16, "short", 2),
+    (U16, "unsigned short", 2),
+    (U32, "unsigned int", 4),
+    (F32, "float", 4),
+];
+
 fn name(component: u32) -> String {
-    match component {
-        I8 => "byte",
-        U8 => "unsigned byte",
-        I16 => "short",
-        U16 => "unsigned short",
-        U32 => "unsigned int",
-        F32 => "float",
-        _ => return format!("component type {component}"),
-    }
-    .into()
+    let known = TYPES.iter().find(|(number, ..)| *number == component);
+    known.map_or_else(|| format!("component type {component}"), |(_, name, _)| (*name).into())
 }
 
+/// Returns the number of bytes of a known type.
 fn size(component: u32) -> usize {
-    match component {
-        I8 | U8 => 1,
-        I16 | U16 => 2,
-        _ => 4,
-    }
+    TYPES.iter().find(|(number, ..)| *number == component).map_or(4, |(.., size)| *size)
 }
 
 /// Returns the number in the first bytes. A normalised integer is a fraction of the largest one.
@@ -55,14 +54,6 @@ pub struct Accessors<'a> {
     length: usize,
     /// Items read so far.
     items: u64,
-}
-
-struct Window {
-    view: usize,
-    offset: usize,
-    count: usize,
-    component: u32,
-    normalized: bool,
 }
 
 impl<'a> Accessors<'a> {
@@ -113,10 +104,7 @@ impl<'a> Accessors<'a> {
         }
         let mut items = match accessor.buffer_view {
             _ if count == 0 => Vec::new(),
-            Some(view) => {
-                let offset = accessor.byte_offset;
-                self.window(&Window { view, offset, count, component, normalized })?
-            }
+            Some(view) => self.window(view, accessor.byte_offset, count, component, normalized)?,
             // Zeros need no bytes, so that a forged file could ask for any number of them. The
             // displacements of a mesh are no more than its positions, which were read before.
             None if count as u64 > self.length as u64 + self.buffers.total => {
@@ -125,20 +113,16 @@ impl<'a> Accessors<'a> {
             None => vec![[0.0; N]; count],
         };
         let Some(sparse) = &accessor.sparse else { return Ok(items) };
-        let indices: Vec<[f64; 1]> = self.window(&Window {
-            view: sparse.indices.buffer_view,
-            offset: sparse.indices.byte_offset,
-            count: sparse.count,
-            component: sparse.indices.component_type,
-            normalized: false,
-        })?;
-        let values = self.window(&Window {
-            view: sparse.values.buffer_view,
-            offset: sparse.values.byte_offset,
-            count: sparse.count,
-            component,
-            normalized,
-        })?;
+        let Sparse { count: changes, indices, values } = sparse;
+        let SparseIndices { buffer_view, byte_offset, component_type } = *indices;
+        if ![U8, U16, U32].contains(&component_type) {
+            let found = name(component_type);
+            return Err(format!("sparse indices of {found}; expected an unsigned type"));
+        }
+        let indices: Vec<[f64; 1]> =
+            self.window(buffer_view, byte_offset, *changes, component_type, false)?;
+        let SparseValues { buffer_view, byte_offset } = *values;
+        let values = self.window(buffer_view, byte_offset, *changes, component, normalized)?;
         if !indices.is_sorted_by(|a, b| a < b) {
             return Err("sparse indices out of order; expected each larger than the last".into());
         }
@@ -150,16 +134,21 @@ impl<'a> Accessors<'a> {
         Ok(items)
     }
 
-    fn window<const N: usize>(&mut self, window: &Window) -> Result<Vec<[f64; N]>, String> {
-        let &Window { view, offset, count, component, normalized } = window;
-        let number = view;
+    /// Reads `count` items from a byte of the view with this number.
+    fn window<const N: usize>(
+        &mut self,
+        number: usize,
+        offset: usize,
+        count: usize,
+        component: u32,
+        normalized: bool,
+    ) -> Result<Vec<[f64; N]>, String> {
         let view = get(&self.document.buffer_views, number, "bufferViews")?;
-        self.buffers.need(self.document, view.buffer)?;
+        let buffer = self.buffers.bytes(self.document, view.buffer)?;
         let size = size(component);
         let stride = view.byte_stride.unwrap_or(size * N);
         // Every number comes from the file, so each step checks for overflow and for the end.
         let bytes = || {
-            let buffer = self.buffers.bytes(view.buffer)?;
             let bytes = buffer.get(view.byte_offset..)?.get(..view.byte_length)?;
             // The last item needs no padding after it.
             let length = stride.checked_mul(count.checked_sub(1)?)?.checked_add(size * N)?;

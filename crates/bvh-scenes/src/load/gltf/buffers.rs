@@ -1,7 +1,7 @@
 //! The buffers of a glTF file. A buffer is read when a mesh first needs it, and a file once.
 
-use super::MOST_BYTES;
 use super::document::{Buffer, Document};
+use super::{MOST_BYTES, get};
 use crate::files::{read, regular};
 use data_url::DataUrl;
 use std::collections::BTreeMap;
@@ -37,24 +37,15 @@ impl<'a> Buffers<'a> {
         Self { path, chunk, needed: BTreeMap::new(), files: BTreeMap::new(), total: 0 }
     }
 
-    /// Reads a buffer if no mesh has needed it before. The error describes its fault.
-    pub fn need(&mut self, document: &Document, number: usize) -> Result<(), String> {
-        if self.needed.contains_key(&number) {
-            return Ok(());
+    /// Returns the bytes of a buffer, which is read if no mesh has needed it before.
+    pub fn bytes(&mut self, document: &Document, number: usize) -> Result<&[u8], String> {
+        if !self.needed.contains_key(&number) {
+            let buffer = get(&document.buffers, number, "buffers")?;
+            let read = self.read(number, buffer);
+            let bytes = read.map_err(|message| format!("buffers[{number}]: {message}"))?;
+            self.needed.insert(number, bytes);
         }
-        let buffer = document
-            .buffers
-            .get(number)
-            .ok_or_else(|| format!("no buffers[{number}]; expected one that exists"))?;
-        let bytes =
-            self.read(number, buffer).map_err(|message| format!("buffers[{number}]: {message}"))?;
-        self.needed.insert(number, bytes);
-        Ok(())
-    }
-
-    /// Returns the bytes of a buffer that was [needed](Self::need).
-    pub fn bytes(&self, number: usize) -> Option<&[u8]> {
-        Some(match self.needed.get(&number)? {
+        Ok(match &self.needed[&number] {
             Bytes::Chunk(bytes) => bytes,
             Bytes::Read(bytes) => bytes,
         })
