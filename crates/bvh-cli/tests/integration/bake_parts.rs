@@ -17,7 +17,7 @@ fn joined_parts_cost_at_most_a_percent_more_than_a_whole_bake_of_the_same_work()
     let at = folder.path();
     bvh(at, &format!("{BAKE} --out=parts.bvh"));
     bvh(at, "bake escher --budget=30Mwork --out=whole.bvh");
-    bvh(at, "inspect parts.bvh escher");
+    bvh(at, "verify parts.bvh escher");
     let [parts, whole] = ["parts.bvh", "whole.bvh"].map(|file| cost(at, file));
     assert!(parts <= 1.01 * whole, "{parts} is more than 1 % above {whole}");
 }
@@ -26,9 +26,9 @@ fn joined_parts_cost_at_most_a_percent_more_than_a_whole_bake_of_the_same_work()
 fn joined_parts_may_have_divided_objects() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    bvh(at, &format!("{BAKE} --out=parts.bvh --references=1.2"));
+    bvh(at, "bake escher:900 --budget=1Mwork --parts=4 --out=parts.bvh --references=1.2");
     let [references, objects] =
-        ["references", "objects"].map(|name| number(at, "inspect parts.bvh escher", name));
+        ["references", "objects"].map(|name| number(at, "verify parts.bvh escher:900", name));
     assert!(references > objects && references <= 1.2 * objects, "{references} of {objects}");
 }
 

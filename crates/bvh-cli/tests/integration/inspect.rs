@@ -118,8 +118,8 @@ fn an_inspection_with_rays_measures_their_expected_tests() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let [searched, greedy] = ["best", "muller_fellner"].map(|method| {
-        bvh(at, &format!("bake escher --budget=2Mwork --out=a.bvh --method={method}"));
-        number(at, "inspect a.bvh escher --rays=default", "expected tests of a ray")
+        bvh(at, &format!("bake escher:500 --budget=2Mwork --out=a.bvh --method={method}"));
+        number(at, "inspect a.bvh escher:500 --rays=default", "expected tests of a ray")
     });
     assert!(0.0 < searched && searched < greedy, "{searched}");
 }

@@ -36,7 +36,7 @@ fn the_eye_may_be_anywhere_and_the_scene_a_single_point() {
 fn a_report_compares_a_tree_with_the_greedy_tree_on_one_page_and_replaces_no_file_unasked() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    for (scene, has_layout) in [("escher", true), ("spheres75", false)] {
+    for (scene, has_layout) in [("escher:500", true), ("spheres75", false)] {
         bvh(at, &format!("bake {scene} --budget=1Mwork --out=a.bvh"));
         let title = bvh(at, &format!("report a.bvh {scene} --out=a.html"));
         let title = title.trim_end().strip_prefix("a.html: ").unwrap();
