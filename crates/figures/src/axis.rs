@@ -8,7 +8,7 @@ use plotters::coord::ranged1d::Ranged;
 use plotters::coord::types::RangedCoordf64;
 use plotters::data::float::pretty_print_float;
 
-use super::model::{Axis, Marks, Panel, Scale, Unit};
+use super::model::{Axis, Layer, Marks, Panel, Scale, Unit};
 
 /// Values of a larger magnitude count as non-finite, so that no difference overflows.
 const LARGEST: f64 = 1e300;
@@ -30,48 +30,28 @@ pub(super) struct Ruled {
 
 /// Returns both axes of a panel, without ticks, and true if any series has data to show.
 pub(super) fn axes(panel: &Panel) -> (Ruled, Ruled, bool) {
+    let marks = || panel.layers.iter().map(|layer| &layer.marks);
     // Only the scale decides whether a value has a coordinate, so axes without ranges suffice here.
-    let any = (Ruled::new(&panel.x, &[], 0.0), Ruled::new(&panel.y, &[], 0.0));
-    let mut xs = Vec::new();
-    let mut ys = Vec::new();
-    let mut add = |x: f64, heights: &[f64]| {
-        for &y in heights
-            .iter()
-            .filter(|&&y| any.0.coordinate(x).is_some() && any.1.coordinate(y).is_some())
-        {
-            xs.push(x);
-            ys.push(y);
-        }
-    };
-    let mut other_xs = Vec::new();
-    let mut other_ys = Vec::new();
-    let mut marked = false;
-    for layer in &panel.layers {
-        marked |= layer.is_marked();
-        match &layer.marks {
-            Marks::Line(points) | Marks::Steps(points) | Marks::Points(points) => {
-                points.iter().for_each(|&(x, y)| add(x, &[y]));
-            }
-            Marks::Band(points) => {
-                points.iter().for_each(|&(x, low, high)| add(x, &[low, high]));
-            }
+    let [x, y] = [&panel.x, &panel.y].map(|axis| Ruled::new(axis, &[], 0.0));
+    let is_shown = |at: &(f64, f64)| x.coordinate(at.0).is_some() && y.coordinate(at.1).is_some();
+    let (mut xs, mut ys): (Vec<f64>, Vec<f64>) =
+        marks().flat_map(Marks::data).filter(is_shown).unzip();
+    let data = xs.len();
+    for marks in marks() {
+        match marks {
             Marks::Spans(spans) => {
-                spans.iter().flatten().for_each(|&(x, y)| {
-                    other_xs.push(x);
-                    other_ys.push(y);
-                });
+                xs.extend(spans.iter().flatten().map(|end| end.0));
+                ys.extend(spans.iter().flatten().map(|end| end.1));
             }
-            Marks::HLine(y) => other_ys.push(*y),
-            Marks::VLine(x) => other_xs.push(*x),
-            Marks::Text(_) => {}
+            Marks::HLine(at) => ys.push(*at),
+            Marks::VLine(at) => xs.push(*at),
+            _ => {}
         }
     }
-    let has_data = !xs.is_empty();
     // Lines may run from edge to edge; markers and upright reference lines need room at the ends.
-    let margin = if marked || !other_xs.is_empty() { 0.04 } else { 0.0 };
-    xs.extend(other_xs);
-    ys.extend(other_ys);
-    (Ruled::new(&panel.x, &xs, margin), Ruled::new(&panel.y, &ys, 0.05), has_data)
+    let has_margin = xs.len() > data || panel.layers.iter().any(Layer::is_marked);
+    let margin = if has_margin { 0.04 } else { 0.0 };
+    (Ruled::new(&panel.x, &xs, margin), Ruled::new(&panel.y, &ys, 0.05), data > 0)
 }
 
 /// Gives the axes of all panels, which have the same scales, the ranges that show the data of all of
@@ -213,7 +193,6 @@ impl Ruled {
 
 #[cfg(test)]
 mod tests {
-    use super::super::model::Layer;
     use super::*;
 
     fn labels(axis: &Axis, values: &[f64], most: usize) -> Vec<String> {

@@ -126,20 +126,6 @@ mod tests {
     }
 
     #[test]
-    fn the_same_figure_gives_the_same_bytes() {
-        let points: Vec<(f64, f64)> =
-            (0..50).map(|i| (f64::from(i), f64::from(i * i % 17))).collect();
-        let panel = Panel {
-            title: "t".to_owned(),
-            x: Axis::linear("x"),
-            y: Axis::log("y"),
-            layers: all_layers(&points),
-        };
-        let figure = Figure { columns: 2, panels: vec![panel; 3], ..Figure::default() };
-        assert_eq!(svg(&figure), svg(&figure.clone()));
-    }
-
-    #[test]
     fn a_million_points_are_drawn_as_few() {
         let wave = (0..1_000_000).map(|i| (f64::from(i) * 1e-4, f64::from(i % 97)));
         let layers = vec![Layer::new("", Marks::Line(wave.collect()))];

@@ -181,6 +181,19 @@ pub enum Marks {
     Text((f64, f64)),
 }
 
+impl Marks {
+    /// The points of a series with data; none for spans, reference lines and names.
+    pub(super) fn data(&self) -> Vec<(f64, f64)> {
+        match self {
+            Self::Line(points) | Self::Steps(points) | Self::Points(points) => points.clone(),
+            Self::Band(points) => {
+                points.iter().flat_map(|&(x, low, high)| [(x, low), (x, high)]).collect()
+            }
+            _ => vec![],
+        }
+    }
+}
+
 impl Layer {
     /// Makes a layer of these marks.
     pub fn new(name: impl Into<String>, marks: Marks) -> Self {

@@ -7,7 +7,7 @@
 use super::data::distinct;
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
-use crate::rows::{RunRow, RunTestRow, VisitRow};
+use crate::rows::{RunRow, VisitRow};
 use crate::statistics::{pearson, pearson_interval, spearman};
 use bvh_config::above;
 
@@ -59,53 +59,86 @@ const OF_PAPER: (&str, &str) = ("inside", "any");
 /// The cost that the paper compares with tests, as in `runs.csv`.
 const OF_AREA: &str = "goldsmith_salmon";
 
-/// A tree, and the tests per ray of one kind in it.
-type Tree<'a> = (&'a RunRow, f64);
+/// A tree by its run, and the tests per ray of one kind in it.
+struct Tree<'a> {
+    run: &'a RunRow,
+    /// Family and query of random rays, or kind of rays and camera.
+    kind: (&'a str, &'a str),
+    tests: f64,
+}
 
-/// A cost: name in the table, and function of the tree of a run.
-type Cost<'a> = (String, Box<dyn Fn(&RunRow) -> Option<f64> + 'a>);
-
-/// Returns the costs by area, and one cost by the density of each kind of rays.
-fn costs(rows: &Rows) -> Vec<Cost<'_>> {
-    let of_area: [Cost; 3] = [
-        (OF_AREA.into(), Box::new(|run| Some(run.goldsmith_salmon))),
-        ("cost_over_root_area".into(), Box::new(|run| Some(run.cost_over_root_area))),
-        ("sah".into(), Box::new(|run| Some(run.sah))),
-    ];
-    let of_rays = |rays| -> Cost {
-        let own = move |run: &RunRow, row: &VisitRow| {
-            (&row.scene, &row.method, row.repetition) == (&run.scene, &run.method, run.repetition)
-                && row.rays == rays
-        };
-        let of = move |run: &RunRow| {
-            Some(rows.visits.iter().find(|row| own(run, row))?.goldsmith_salmon)
-        };
-        (format!("goldsmith_salmon_{rays}"), Box::new(of))
+/// All trees through which rays were sent. Random rays traverse the binary tree, all other rays the
+/// wide layout.
+fn trees(rows: &Rows) -> Vec<Tree<'_>> {
+    let tree = |scene: &str, method: &str, repetition: u32, kind, tests| {
+        let run = rows.runs_of(scene, method).find(|run| run.repetition == repetition)?;
+        Some(Tree { run, kind, tests })
     };
-    let rays = distinct(rows.visits.iter().map(|row| row.rays.as_str()));
-    of_area.into_iter().chain(rays.into_iter().map(of_rays)).collect()
+    let random = rows.rays.iter().filter_map(|row| {
+        let kind = (row.family.as_str(), row.query.as_str());
+        tree(&row.scene, &row.method, row.repetition, kind, row.boxes_per_ray)
+    });
+    let of_layouts = rows.run_tests.iter().filter_map(|row| {
+        let kind = (row.judged_on.as_str(), row.camera.as_str());
+        tree(&row.scene, &row.method, row.repetition, kind, row.tests)
+    });
+    random.chain(of_layouts).collect()
+}
+
+/// The names of the costs by area, and of one cost by the density of each kind of rays.
+fn costs(rows: &Rows) -> Vec<String> {
+    let rays = distinct(rows.visits.iter().map(|row| &row.rays));
+    let of_rays = rays.into_iter().map(|rays| format!("{OF_AREA}_{rays}"));
+    let of_area = [OF_AREA, "cost_over_root_area", "sah"].map(str::to_owned);
+    of_area.into_iter().chain(of_rays).collect()
+}
+
+/// The cost of this name of a run's tree.
+fn cost_of(rows: &Rows, cost: &str, run: &RunRow) -> Option<f64> {
+    match cost {
+        OF_AREA => Some(run.goldsmith_salmon),
+        "cost_over_root_area" => Some(run.cost_over_root_area),
+        "sah" => Some(run.sah),
+        of_rays => {
+            let rays = of_rays.strip_prefix(OF_AREA)?.strip_prefix('_')?;
+            let tree = (&run.scene, &run.method, run.repetition, rays);
+            let of_tree =
+                |row: &&VisitRow| (&row.scene, &row.method, row.repetition, &*row.rays) == tree;
+            Some(rows.visits.iter().find(of_tree)?.goldsmith_salmon)
+        }
+    }
 }
 
 pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     let mut correlations = Vec::new();
     let mut panels = Vec::new();
     let costs = costs(rows);
-    let of_layouts =
-        distinct(rows.run_tests.iter().map(|row| (row.judged_on.as_str(), row.camera.as_str())));
-    let random = rows.ray_kinds().len();
+    let trees = trees(rows);
+    let random = distinct(rows.rays.iter().map(|row| (&row.family, &row.query))).len();
     for scene in rows.scenes() {
-        for (number, kind) in rows.ray_kinds().into_iter().chain(of_layouts.clone()).enumerate() {
+        for (number, kind) in distinct(trees.iter().map(|tree| tree.kind)).into_iter().enumerate() {
             let start = correlations.len();
-            let mut drawn = Vec::new();
+            let mut points = Vec::new();
             for method in &config.methods {
-                let trees = trees(rows, scene, method, kind);
-                correlations
-                    .extend(costs.iter().map(|cost| correlate(scene, method, kind, cost, &trees)));
-                drawn.push((method.as_str(), trees));
+                let is_own = |tree: &&Tree| {
+                    (tree.run.scene.as_str(), &tree.run.method, tree.kind) == (scene, method, kind)
+                };
+                let own: Vec<&Tree> = trees.iter().filter(is_own).collect();
+                for cost in &costs {
+                    let pair = |tree: &&Tree| Some((cost_of(rows, cost, tree.run)?, tree.tests));
+                    let pairs: Vec<_> = own.iter().filter_map(pair).collect();
+                    correlations.push(correlate(scene, method, kind, cost, &pairs));
+                }
+                let at = |tree: &&Tree| (tree.run.goldsmith_salmon, tree.tests);
+                points.push(Layer::new(method, Marks::Points(own.iter().map(at).collect())));
             }
             // Only random rays are drawn; kinds of rays through layouts would make too many panels.
             if number < random {
-                panels.push(draw(&rows.shown(scene), kind, &drawn, correlations[start].spearman));
+                let rank = correlations[start].spearman;
+                let rank = rank.map_or_else(String::new, |rank| format!(", ρ = {rank:.3}"));
+                let title = format!("{}: {}, {}{rank}", rows.shown(scene), kind.0, kind.1);
+                let x = Axis::linear("Goldsmith–Salmon cost");
+                panels.push(panel(title, x, Axis::linear("box tests per ray"), points));
             }
         }
     }
@@ -165,40 +198,17 @@ impl Config {
     }
 }
 
-/// Returns the method's trees through which rays of the kind were sent. Random rays traverse the
-/// binary tree, all other rays the wide layout.
-fn trees<'a>(rows: &'a Rows, scene: &str, method: &str, kind: (&str, &str)) -> Vec<Tree<'a>> {
-    let random = rows
-        .rays_of(scene, method, kind)
-        .into_iter()
-        .map(|row| (row.repetition, row.boxes_per_ray));
-    let own = |row: &&RunTestRow| {
-        row.scene == scene
-            && row.method == method
-            && (row.judged_on.as_str(), row.camera.as_str()) == kind
-    };
-    let of_layouts = rows.run_tests.iter().filter(own).map(|row| (row.repetition, row.tests));
-    let run = |repetition| rows.runs_of(scene, method).find(|run| run.repetition == repetition);
-    random
-        .chain(of_layouts)
-        .filter_map(|(repetition, tests)| Some((run(repetition)?, tests)))
-        .collect()
-}
-
 fn correlate<'a>(
     scene: &'a str,
     method: &'a str,
     (family, query): (&'a str, &'a str),
-    (cost, of): &'a Cost,
-    trees: &[Tree],
+    cost: &'a str,
+    pairs: &[(f64, f64)],
 ) -> Correlation<'a> {
-    let pair = |(run, tests): &Tree| Some((of(run)?, *tests));
-    let pairs: Vec<(f64, f64)> = trees.iter().filter_map(pair).collect();
-    let pearson = pearson(&pairs);
-    let (pearson_low, pearson_high) =
-        pearson.and_then(|pearson| pearson_interval(pearson, pairs.len())).unzip();
-    let trees = pairs.len();
-    let spearman = spearman(&pairs);
+    let (pearson, trees) = (pearson(pairs), pairs.len());
+    let interval = pearson.and_then(|pearson| pearson_interval(pearson, trees));
+    let (pearson_low, pearson_high) = interval.unzip();
+    let spearman = spearman(pairs);
     Correlation {
         scene,
         method,
@@ -211,22 +221,6 @@ fn correlate<'a>(
         pearson_high,
         spearman,
     }
-}
-
-fn draw(
-    scene: &str,
-    (family, query): (&str, &str),
-    methods: &[(&str, Vec<Tree>)],
-    rank: Option<f64>,
-) -> Panel {
-    let points = |(method, trees): &(&str, Vec<Tree>)| {
-        let points = trees.iter().map(|(run, tests)| (run.goldsmith_salmon, *tests));
-        Layer::new(*method, Marks::Points(points.collect()))
-    };
-    let rank = rank.map_or_else(String::new, |rank| format!(", ρ = {rank:.3}"));
-    let x = Axis::linear("Goldsmith–Salmon cost");
-    let y = Axis::linear("box tests per ray");
-    panel(format!("{scene}: {family}, {query}{rank}"), x, y, methods.iter().map(points).collect())
 }
 
 #[cfg(test)]

@@ -143,22 +143,6 @@ impl Rows {
             |trials: Vec<&TrialRow>| trials.iter().map(|row| ratio(row.cost, base)).collect();
         self.trials_of(scene, method).into_iter().map(over_base).collect()
     }
-
-    /// Returns the kinds of random rays: family and query.
-    pub fn ray_kinds(&self) -> Vec<(&str, &str)> {
-        distinct(self.rays.iter().map(|row| (row.family.as_str(), row.query.as_str())))
-    }
-
-    /// Returns the measurements with random rays of one kind in the trees of one method on one
-    /// scene.
-    pub fn rays_of(&self, scene: &str, method: &str, kind: (&str, &str)) -> Vec<&RayRow> {
-        let own = |row: &&RayRow| {
-            row.scene == scene
-                && row.method == method
-                && (row.family.as_str(), row.query.as_str()) == kind
-        };
-        self.rays.iter().filter(own).collect()
-    }
 }
 
 /// Makes the row of an ordinary run on the scene `s`.

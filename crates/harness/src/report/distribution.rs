@@ -60,13 +60,10 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
         for method in &config.methods {
             let costs = sorted(&rows.trial_costs(scene, method));
             summaries.push(summarise(scene, method, &costs, base_cost));
-            let fraction = |rank: u32| f64::from(rank) / costs.len() as f64;
-            let steps = costs
-                .iter()
-                .zip(1..)
-                .map(|(&cost, rank)| (cost / base_cost, fraction(rank)))
-                .collect();
-            layers.push(Layer::new(method, Marks::Steps(steps)));
+            let count = costs.len() as f64;
+            let step = |(cost, rank): (&f64, u32)| (cost / base_cost, f64::from(rank) / count);
+            layers
+                .push(Layer::new(method, Marks::Steps(costs.iter().zip(1..).map(step).collect())));
         }
         layers.push(Layer::new("greedy", Marks::VLine(1.0)));
         let y = Axis::linear("trials at most as costly").range(0.0, 1.0).unit(Unit::Percent);
@@ -90,15 +87,12 @@ impl Config {
     /// the paper: one statement, one row.
     fn majority(&self, rows: &Rows, method: &str) -> Option<PaperRow> {
         let within = self.paper_majority_within?;
-        let fraction = |scene: &str| {
+        let mut scenes = rows.scenes();
+        scenes.retain(|scene| rows.kind(scene) == SceneKind::StandIn.to_string());
+        let (low, high) = range(scenes.into_iter().map(|scene| {
             let limit = (1.0 + within) * rows.base_cost(scene);
             fraction_below(&rows.trial_costs(scene, method), limit)
-        };
-        let stand_ins = rows
-            .scenes()
-            .into_iter()
-            .filter(|scene| rows.kind(scene) == SceneKind::StandIn.to_string());
-        let (low, high) = range(stand_ins.map(fraction))?;
+        }))?;
         let quantity = format!("{method}, fraction of trials within {} % of base", 100.0 * within);
         let row = PaperRow::new(&self.source, "all stand-ins", quantity, &self.reason);
         let verdict = if low > 0.5 { Verdict::Agrees } else { Verdict::Differs };

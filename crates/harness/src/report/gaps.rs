@@ -65,53 +65,53 @@ impl Config {
         let mut summaries = Vec::new();
         for method in &self.methods {
             let mut gaps_by_part: BTreeMap<(&'static str, usize), Vec<f64>> = BTreeMap::new();
-            let own = rows.runs.iter().filter(|run| run.method == *method);
-            for run in own {
+            for run in rows.runs.iter().filter(|run| run.method == *method) {
                 let Some(&optimum) = optima.get(run.scene.as_str()) else { continue };
                 // An optimum of 0 has no relative gap, so the cost itself is the gap.
                 let gap = if optimum > 0.0 { run.cost / optimum - 1.0 } else { run.cost };
                 gaps_by_part.entry((part(&run.scene), run.objects)).or_default().push(gap);
             }
-            for ((part, objects), gaps) in gaps_by_part {
-                summaries.push(Gaps {
+            summaries.extend(gaps_by_part.into_iter().map(|((part, objects), gaps)| {
+                let at = |q| quantile(&gaps, q).unwrap_or(f64::NAN);
+                Gaps {
                     method,
                     part,
                     objects,
                     runs: gaps.len(),
                     solved_fraction: solved(&gaps),
-                    median_gap: at(&gaps, 0.5),
-                    quantile_90_gap: at(&gaps, 0.9),
-                    maximum_gap: at(&gaps, 1.0),
-                });
-            }
+                    median_gap: at(0.5),
+                    quantile_90_gap: at(0.9),
+                    maximum_gap: at(1.0),
+                }
+            }));
         }
         summaries
     }
 
     /// Draws the fraction solved and the worst gap against size, for every kind of part.
     fn draw(&self, summaries: &[Gaps]) -> Vec<Panel> {
-        let parts: BTreeSet<&str> = summaries.iter().map(|summary| summary.part).collect();
         let draw = |part: &str, title: &str, y: Axis, value: fn(&Gaps) -> f64| {
+            let is_own = |gaps: &&Gaps, method: &str| gaps.part == part && gaps.method == method;
             let line = |method: &String| {
-                let own = summaries
-                    .iter()
-                    .filter(|summary| summary.part == part && summary.method == method);
-                let points: Vec<_> =
-                    own.map(|summary| (summary.objects as f64, value(summary))).collect();
+                let own = summaries.iter().filter(|gaps| is_own(gaps, method));
+                let points: Vec<_> = own.map(|gaps| (gaps.objects as f64, value(gaps))).collect();
                 let marks = [Marks::Line(points.clone()), Marks::Points(points)];
                 marks.map(|marks| Layer::new(method, marks))
             };
             let lines = self.methods.iter().flat_map(line).collect();
+            let y = y.unit(Unit::Percent);
             panel(format!("{part}, {title}"), Axis::linear("objects"), y, lines)
         };
         let both = |part| {
-            let fraction = Axis::linear("runs").range(0.0, 1.02).unit(Unit::Percent);
-            let gap = Axis::linear("greatest gap").unit(Unit::Percent);
+            let fraction = Axis::linear("runs").range(0.0, 1.02);
             [
-                draw(part, "solved", fraction, |summary| summary.solved_fraction),
-                draw(part, "greatest gap", gap, |summary| summary.maximum_gap.max(0.0)),
+                draw(part, "solved", fraction, |gaps| gaps.solved_fraction),
+                draw(part, "greatest gap", Axis::linear("greatest gap"), |gaps| {
+                    gaps.maximum_gap.max(0.0)
+                }),
             ]
         };
+        let parts: BTreeSet<&str> = summaries.iter().map(|gaps| gaps.part).collect();
         parts.into_iter().flat_map(both).collect()
     }
 }
@@ -123,10 +123,6 @@ fn part(scene: &str) -> &'static str {
         Some((_, Subset::Cluster(..))) => "cluster",
         Some((_, Subset::Spaced(_))) | None => "whole",
     }
-}
-
-fn at(values: &[f64], q: f64) -> f64 {
-    quantile(values, q).unwrap_or(f64::NAN)
 }
 
 /// Returns the fraction of gaps that are only rounding.

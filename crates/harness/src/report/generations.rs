@@ -51,15 +51,6 @@ pub(super) struct Generation<'a> {
     random_picking_cost: Option<f64>,
 }
 
-/// The generations of all runs on a scene, and the costs of random orders.
-struct Runs<'a> {
-    scene: &'a str,
-    runs: Vec<Progress>,
-    /// Index of the run with the median final cost, the lower of two.
-    middle: usize,
-    random: Vec<f64>,
-}
-
 /// A run, generation by generation: trees evaluated so far, and the lowest cost so far.
 type Progress = Vec<(u64, f64)>;
 
@@ -75,12 +66,32 @@ impl Config {
         let mut generations = Vec::new();
         let mut panels = Vec::new();
         for scene in rows.scenes() {
-            let Some(runs) = self.runs(rows, scene) else { continue };
-            let own = runs.generations();
-            panels.push(draw(&rows.shown(scene), runs.runs.len(), &own, rows.base_cost(scene)));
-            generations.extend(own);
+            let trials = rows.trials_of(scene, &self.method);
+            let mut runs: Vec<Progress> = trials.iter().map(|run| progress(run)).collect();
+            runs.sort_by(|a, b| end(a).total_cmp(&end(b)));
+            // Of an even number of runs there is no median run, so the lower one stands for it.
+            let Some(middle) = runs.get(runs.len().saturating_sub(1) / 2) else { continue };
+            let random = rows.trial_costs(scene, &self.baseline);
+            let at = |(generation, &(evaluations, incumbent)): (usize, &(u64, f64))| {
+                // A run that has ended keeps its best tree.
+                let costs = runs.iter().map(|run| run.get(generation).map_or(end(run), |at| at.1));
+                let (lowest_cost, highest_cost) = range(costs).unwrap_or((f64::NAN, f64::NAN));
+                Generation {
+                    scene,
+                    generation,
+                    median_run_cost: incumbent,
+                    lowest_cost,
+                    highest_cost,
+                    random_picking_cost: expected_best_of(&random, evaluations as usize),
+                }
+            };
+            let own: Vec<Generation> = middle.iter().enumerate().map(at).collect();
             let base = rows.base_cost(scene);
-            output.paper.extend(self.compare(&rows.shown(scene), &runs, base));
+            panels.push(draw(&rows.shown(scene), runs.len(), &own, base));
+            generations.extend(own);
+            let ends: Vec<f64> = runs.iter().map(end).collect();
+            let average = mean(random.iter().copied());
+            output.paper.extend(self.compare(scene, rows, &ends, average));
         }
         let caption = format!(
             "{}. Goldsmith–Salmon cost of the best tree so far: the run whose final cost is the \
@@ -104,46 +115,37 @@ impl Config {
         }
     }
 
-    fn runs<'a>(&self, rows: &'a Rows, scene: &'a str) -> Option<Runs<'a>> {
-        let runs: Vec<Progress> =
-            rows.trials_of(scene, &self.method).iter().map(|run| progress(run)).collect();
-        let last = |run: usize| runs[run].last().map_or(f64::INFINITY, |end| end.1);
-        let mut order: Vec<usize> = (0..runs.len()).collect();
-        order.sort_by(|&a, &b| last(a).total_cmp(&last(b)));
-        // Of an even number of runs there is no median run, so the lower one stands for it.
-        let middle = *order.get(order.len().checked_sub(1)? / 2)?;
-        Some(Runs { scene, runs, middle, random: rows.trial_costs(scene, &self.baseline) })
-    }
-
-    /// Compares our final costs with the paper's spread and gain, if the spec has them.
-    fn compare(&self, shown: &str, runs: &Runs, base: f64) -> Vec<PaperRow> {
-        let ends: Vec<f64> = runs.runs.iter().filter_map(|run| Some(run.last()?.1)).collect();
-        let ends = range(ends.iter().copied()).zip(median(&ends));
-        let Some(((lowest, highest), middle)) = ends else { return vec![] };
-        let average = mean(runs.random.iter().copied());
+    /// Compares the final costs of all runs, in ascending order, with the paper's spread and gain,
+    /// if the spec has them.
+    fn compare(&self, scene: &str, rows: &Rows, ends: &[f64], average: f64) -> Vec<PaperRow> {
+        let Some((middle, (low, high))) = median(ends).zip(range(ends.iter().copied())) else {
+            return vec![];
+        };
+        let shown = &rows.shown(scene);
         let row = |quantity: &str| PaperRow::new(&self.source, shown, quantity, &self.reason);
-        let spread = self.paper_final.get(runs.scene).map(|&[low, high]| {
-            let [theirs, ours] =
-                [(low, high), (lowest, highest)].map(|(l, h)| 2.0 * (h - l) / (h + l));
-            let verdict =
-                if (ours / theirs - 1.0).abs() <= 0.5 { Verdict::Agrees } else { Verdict::Differs };
+        let spread = self.paper_final.get(scene).map(|&[paper_low, paper_high]| {
+            let spread = |low: f64, high: f64| 2.0 * (high - low) / (high + low);
+            let (paper, ours) = (spread(paper_low, paper_high), spread(low, high));
+            let is_like = (ours / paper - 1.0).abs() <= 0.5;
+            let verdict = if is_like { Verdict::Agrees } else { Verdict::Differs };
             let rule = "between half and one and a half times the paper's";
             row("spread of final costs over runs: (highest − lowest) / middle").compare(
-                format!("{theirs:.3}"),
+                format!("{paper:.3}"),
                 format!("{ours:.3}"),
                 verdict,
                 rule,
             )
         });
+        let ours = middle / average;
         let says = self.paper_says.as_ref().map(|says| {
-            let ours = format!("{:.3}", middle / average);
-            row(GAIN).compare(says, ours, Verdict::NoVerdict, "the paper gives no number")
+            let rule = "the paper gives no number";
+            row(GAIN).compare(says, format!("{ours:.3}"), Verdict::NoVerdict, rule)
         });
-        let interval = (lowest / average, highest / average);
-        let gain = self.paper_gain.map(|paper| {
-            row(GAIN).compare_ratios(paper, middle / average, Some(interval), GAIN_TOLERANCE)
-        });
-        let ours = middle / base;
+        let interval = Some((low / average, high / average));
+        let gain = self
+            .paper_gain
+            .map(|paper| row(GAIN).compare_ratios(paper, ours, interval, GAIN_TOLERANCE));
+        let ours = middle / rows.base_cost(scene);
         let over_base = PaperRow {
             ours: format!("{ours:.3}"),
             ours_over_base: Some(ours),
@@ -153,16 +155,19 @@ impl Config {
     }
 }
 
-/// Returns the incumbents of a run, generation by generation.
 fn progress(run: &[&TrialRow]) -> Progress {
     let mut incumbent = f64::INFINITY;
-    let mut generations = Vec::new();
-    for row in run {
-        // Rows hold the best of each generation, which need not be the best so far.
+    // Rows hold the best of each generation, which need not be the best so far.
+    let at = |row: &&TrialRow| {
         incumbent = incumbent.min(row.cost);
-        generations.push((row.evaluations, incumbent));
-    }
-    generations
+        (row.evaluations, incumbent)
+    };
+    run.iter().map(at).collect()
+}
+
+/// The final cost of a run.
+fn end(run: &Progress) -> f64 {
+    run.last().map_or(f64::INFINITY, |end| end.1)
 }
 
 /// Draws one scene beside the cost of its greedy tree. The paper's costs are of other scenes and in
@@ -188,24 +193,4 @@ fn draw(shown: &str, runs: usize, generations: &[Generation], base: f64) -> Pane
         layers.extend(end);
     }
     panel(shown, Axis::linear("generation"), Axis::linear("cost / greedy"), layers)
-}
-
-impl<'a> Runs<'a> {
-    fn generations(&self) -> Vec<Generation<'a>> {
-        let generation = |(generation, &(evaluations, incumbent)): (usize, &(u64, f64))| {
-            // A run that has ended keeps its best tree.
-            let costs =
-                self.runs.iter().filter_map(|run| Some(run.get(generation).or(run.last())?.1));
-            let (lowest_cost, highest_cost) = range(costs).unwrap_or((f64::NAN, f64::NAN));
-            Generation {
-                scene: self.scene,
-                generation,
-                median_run_cost: incumbent,
-                lowest_cost,
-                highest_cost,
-                random_picking_cost: expected_best_of(&self.random, evaluations as usize),
-            }
-        };
-        self.runs[self.middle].iter().enumerate().map(generation).collect()
-    }
 }

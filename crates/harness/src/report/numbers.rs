@@ -3,7 +3,6 @@
 
 use super::data::{Series, ratio};
 use super::prelude::*;
-use crate::rows::ReferenceRow;
 use crate::statistics::{order_quantile, quartiles};
 
 bvh_config::config! { serde;
@@ -70,11 +69,29 @@ impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let mut numbers = Vec::new();
         let mut timing = Vec::new();
+        let mut reached = Vec::new();
         for scene in rows.scenes() {
             // Without a reference there are no gaps to report.
             let Some(reference) = rows.reference(scene) else { continue };
             for method in &self.methods {
-                numbers.push(of_costs(rows, scene, method, reference));
+                let costs: Vec<f64> = rows.runs_of(scene, method).map(|run| run.cost).collect();
+                let of_costs = quartiles(&costs);
+                let [gap_quartile_1, gap_median, gap_quartile_3] =
+                    of_costs.map(|cost| ratio(cost, reference.cost) - 1.0);
+                let over_reference = |bound| ratio(bound, reference.cost);
+                numbers.push(Numbers {
+                    scene,
+                    method,
+                    runs: costs.len(),
+                    cost_over_base_median: ratio(of_costs[1], rows.base_cost(scene)),
+                    reference: if reference.is_optimum() { "exact optimum" } else { "best known" },
+                    reference_cost: reference.cost,
+                    gap_quartile_1,
+                    gap_median,
+                    gap_quartile_3,
+                    lower_bound: reference.lower_bound,
+                    lower_bound_over_reference: reference.lower_bound.map(over_reference),
+                });
                 let [seconds_quartile_1, seconds_median, seconds_quartile_3] =
                     quartiles(&rows.seconds_of(scene, method));
                 timing.push(Timing {
@@ -84,6 +101,18 @@ impl Config {
                     seconds_median,
                     seconds_quartile_3,
                 });
+            }
+            let series = |method: &String| rows.series(scene, method);
+            let runs_of_methods: Vec<Vec<Series>> = self.methods.iter().map(series).collect();
+            for percent in &self.targets {
+                let cost = reference.cost * (1.0 + percent / 100.0);
+                let target = match percent {
+                    0.0 => "best known".to_owned(),
+                    percent => format!("best known +{percent} %"),
+                };
+                for (method, runs) in self.methods.iter().zip(&runs_of_methods) {
+                    reached.push(Reached::new(scene, target.clone(), method, runs, cost));
+                }
             }
         }
         let mut output = Output::new("", &self.title);
@@ -96,59 +125,12 @@ impl Config {
         let columns = "scene method seconds_quartile_1 seconds_median seconds_quartile_3";
         output.show("Seconds of the runs:", &timing, columns)?;
         if !self.targets.is_empty() {
-            let reached = self.reached(rows);
             output.add_csv("timing_to_target", &reached)?;
             let columns = "scene target method runs solved median quantile_90";
             let explanation = "Seconds until the target is reached, over all runs:";
             output.show(explanation, &reached, columns)?;
         }
         Ok(output)
-    }
-
-    /// Returns the seconds until all methods reach all targets.
-    fn reached<'a>(&'a self, rows: &'a Rows) -> Vec<Reached<'a>> {
-        let mut reached = Vec::new();
-        for scene in rows.scenes() {
-            let runs_of_methods: Vec<Vec<Series>> =
-                self.methods.iter().map(|method| rows.series(scene, method)).collect();
-            let Some(reference) = rows.reference(scene) else { continue };
-            for percent in &self.targets {
-                let cost = reference.cost * (1.0 + percent / 100.0);
-                let target = match percent {
-                    0.0 => "best known".to_owned(),
-                    percent => format!("best known +{percent} %"),
-                };
-                for (method, runs) in self.methods.iter().zip(&runs_of_methods) {
-                    reached.push(Reached::new(scene, target.clone(), method, runs, cost));
-                }
-            }
-        }
-        reached
-    }
-}
-
-/// Returns the costs of a method's runs on a scene.
-fn of_costs<'a>(
-    rows: &Rows,
-    scene: &'a str,
-    method: &'a str,
-    reference: &ReferenceRow,
-) -> Numbers<'a> {
-    let costs: Vec<f64> = rows.runs_of(scene, method).map(|run| run.cost).collect();
-    let quartiles = quartiles(&costs);
-    let gaps = quartiles.map(|cost| ratio(cost, reference.cost) - 1.0);
-    Numbers {
-        scene,
-        method,
-        runs: costs.len(),
-        cost_over_base_median: ratio(quartiles[1], rows.base_cost(scene)),
-        reference: if reference.is_optimum() { "exact optimum" } else { "best known" },
-        reference_cost: reference.cost,
-        gap_quartile_1: gaps[0],
-        gap_median: gaps[1],
-        gap_quartile_3: gaps[2],
-        lower_bound: reference.lower_bound,
-        lower_bound_over_reference: reference.lower_bound.map(|bound| ratio(bound, reference.cost)),
     }
 }
 

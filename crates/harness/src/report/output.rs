@@ -1,18 +1,17 @@
 //! The output of a report: CSV files, figures, comparisons with the paper, and text for the
 //! terminal.
 
-use super::data::Rows;
+use super::data::{Rows, distinct};
 use super::looks::look;
 use super::paper::PaperRow;
 use super::query::{QueryError, Row};
 use super::query_measure::filled;
 use crate::Error;
-use crate::rows::csv_file::{parse, read, to_bytes};
+use crate::rows::csv_file::{bytes_of, parse, read, to_bytes};
 use crate::rows::store::Store;
 use comfy_table::{Table, presets};
 use figures::{Axis, Figure, Layer, Marks, Panel};
 use serde::Serialize;
-use std::io;
 use std::path::Path;
 
 /// The output of a report.
@@ -143,19 +142,15 @@ impl Output {
     }
 }
 
-/// Returns the bytes of a CSV file with these columns of some rows.
-pub fn table_bytes(columns: &[String], rows: &[Row]) -> Result<Vec<u8>, Error> {
+/// Returns the bytes of a CSV file with these rows, which have the same columns.
+pub fn table_bytes(rows: &[Row]) -> Result<Vec<u8>, Error> {
     let path = Path::new("table");
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(columns).map_err(Error::csv(path))?;
-    for row in rows {
-        let cells = columns.iter().map(|column| row.get(column).map_or("", String::as_str));
+    let header = rows.first().map(|row| row.keys().collect::<Vec<_>>());
+    for cells in header.into_iter().chain(rows.iter().map(|row| row.values().collect())) {
         writer.write_record(cells).map_err(Error::csv(path))?;
     }
-    writer.into_inner().map_err(|error| {
-        let source = io::Error::other(error.to_string());
-        Error::Io { path: path.to_owned(), action: "write", source }
-    })
+    bytes_of(writer, path)
 }
 
 /// Rounds a number to four digits. Other texts and whole numbers stay unchanged.
@@ -173,30 +168,36 @@ fn four_digits(text: &str) -> String {
     }
 }
 
-/// A value in the row of this number, with the ends of its interval, if it has one.
-pub type Dot = (usize, f64, Option<(f64, f64)>);
+/// A value in a named row.
+pub struct Dot {
+    /// Name of the row.
+    pub row: String,
+    /// Name of the series.
+    pub series: String,
+    /// The value.
+    pub value: f64,
+    /// The ends of its interval, if it has one.
+    pub ends: Option<(f64, f64)>,
+}
 
-/// Makes a panel of values in named rows. The series of a row are below each other.
-pub fn dots(
-    title: impl Into<String>,
-    x: Axis,
-    names: Vec<String>,
-    series: Vec<(String, Vec<Dot>)>,
-) -> Panel {
+/// Makes a panel of values in these rows. The series of a row are below each other.
+pub fn dots(title: impl Into<String>, x: Axis, rows: Vec<String>, dots: &[Dot]) -> Panel {
+    let series = distinct(dots.iter().map(|dot| dot.series.as_str()));
     let count = series.len() as f64;
     let mut layers = Vec::new();
-    for ((name, dots), number) in series.into_iter().zip(0..) {
-        let height = |row: usize| row as f64 + 0.8 * ((f64::from(number) + 0.5) / count - 0.5);
-        let points = dots.iter().map(|&(row, value, _)| (value, height(row))).collect();
-        let spans = dots.iter().filter_map(|&(row, _, ends)| {
-            let (low, high) = ends?;
-            Some([(low, height(row)), (high, height(row))])
-        });
-        layers.push(Layer::new(&name, Marks::Spans(spans.collect())));
+    for (name, number) in series.into_iter().zip(0..) {
+        let mut points = Vec::new();
+        let mut spans = Vec::new();
+        for Dot { row, value, ends, .. } in dots.iter().filter(|dot| dot.series == name) {
+            let Some(row) = rows.iter().position(|name| name == row) else { continue };
+            let height = row as f64 + 0.8 * ((f64::from(number) + 0.5) / count - 0.5);
+            points.push((*value, height));
+            spans.extend(ends.map(|(low, high)| [(low, height), (high, height)]));
+        }
+        layers.push(Layer::new(name, Marks::Spans(spans)));
         layers.push(Layer::new(name, Marks::Points(points)));
     }
-    let y = Axis::rows(names, (10.0 * count + 6.0).max(24.0));
-    panel(title, x, y, layers)
+    panel(title, x, Axis::rows(rows, (10.0 * count + 6.0).max(24.0)), layers)
 }
 
 /// Makes a panel.

@@ -11,13 +11,11 @@
 //! VALUE        COLUMN, COLUMN / COLUMN * 1e-6, …      computed row by row, from left to right
 //! ```
 
-use crate::Error;
+use indexmap::IndexMap;
 use std::cmp::Ordering;
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
-/// A row by column names.
-pub type Row = BTreeMap<String, String>;
+/// A row: the texts of its cells by the names of their columns, in the order of the file.
+pub type Row = IndexMap<String, String>;
 
 /// Reasons why a query has no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -42,11 +40,6 @@ pub enum QueryError {
 
 /// Replaces commas within texts while conditions are split at commas.
 const COMMA: &str = "\u{0}";
-
-/// Reads the rows of a CSV file.
-pub fn read(path: &Path) -> Result<Vec<Row>, Error> {
-    crate::rows::read(path)
-}
 
 /// Returns the text of a cell.
 pub fn cell<'r>(row: &'r Row, column: &str) -> Result<&'r String, QueryError> {
@@ -137,12 +130,6 @@ impl Conditions {
         Ok(Self(conditions))
     }
 
-    /// Returns the condition that a column has a text.
-    pub fn equal(column: &str, text: &str) -> Self {
-        let texts = vec![text.to_owned()];
-        Self(vec![Condition { column: column.into(), sign: "=", texts }])
-    }
-
     /// Returns the columns of the conditions.
     pub fn columns(&self) -> impl Iterator<Item = &str> {
         self.0.iter().map(|condition| condition.column.as_str())
@@ -156,12 +143,7 @@ impl Conditions {
 
     /// Returns true if the row meets all conditions.
     pub fn are_met(&self, row: &Row) -> Result<bool, QueryError> {
-        for condition in &self.0 {
-            if !condition.is_met(row)? {
-                return Ok(false);
-            }
-        }
-        Ok(true)
+        self.0.iter().try_fold(true, |all, condition| Ok(condition.is_met(row)? && all))
     }
 }
 
@@ -221,19 +203,4 @@ pub fn group<'r>(rows: &'r [Row], columns: &[&str], values: &[String]) -> Vec<&'
         columns.iter().zip(values).all(|(column, value)| row.get(*column) == Some(value))
     };
     rows.iter().filter(is_own).collect()
-}
-
-/// Returns the one text of a column; `None` if all cells are empty.
-pub fn only_text(rows: &[&Row], column: &str) -> Result<Option<String>, QueryError> {
-    let mut texts = BTreeSet::new();
-    for row in rows {
-        texts.insert(cell(row, column)?.as_str());
-    }
-    // Empty cells mean that the value does not exist, which contradicts no other value.
-    texts.remove("");
-    if texts.len() > 1 {
-        let values = texts.into_iter().collect::<Vec<_>>().join(", ");
-        return Err(QueryError::Several { column: column.into(), values });
-    }
-    Ok(texts.first().map(|text| (*text).to_owned()))
 }

@@ -1,8 +1,8 @@
 //! A column of the table that a query gives: an aggregate of each group of rows, or its quotient
 //! with a base.
 
-use super::query::{self, Conditions, QueryError, Row};
-use super::query_measure::Measure;
+use super::query::{Conditions, QueryError, Row};
+use super::query_measure::{Aggregate, Measure};
 use crate::statistics::{median_interval, range};
 use bvh_config::{Nested, above};
 use serde::{Deserialize, Serialize};
@@ -14,8 +14,7 @@ bvh_config::config! { serde;
         name: String;
         /// The quantity in words, for axes and sentences; by default the name with blanks.
         label: String;
-        /// The aggregate, such as `median cost`, or `text` and a column in which all rows of a
-        /// group agree.
+        /// The aggregate, such as `median cost`.
         value: String;
         /// Which quotient with the base the column is, if any. Quotients of medians have further
         /// columns: the ends of an interval, which is between the extremes of all pairs of runs or,
@@ -77,53 +76,36 @@ pub(super) struct Group<'r> {
 type Compared = (Option<f64>, Option<(f64, f64)>);
 
 impl Column {
-    /// Computes the value of a group of one row, for its errors alone.
-    pub(super) fn try_on(&self, row: &Row) -> Result<(), QueryError> {
-        match self.value.strip_prefix("text ") {
-            Some(column) => query::only_text(&[row], column).map(|_| ()),
-            None => Measure::parse(&self.value)?.of_rows(&[row]).map(|_| ()),
-        }
-    }
-
     pub(super) fn label(&self) -> String {
         if self.label.is_empty() { self.name.replace('_', " ") } else { self.label.clone() }
     }
 
-    pub(super) fn has_interval(&self) -> bool {
-        self.ratio.is_some() && self.value.starts_with("median ")
-    }
-
-    pub(super) fn has_verdict(&self) -> bool {
-        self.has_interval() && !self.paired_by.is_empty()
-    }
-
-    /// Adds the cells of this column to the row of a group.
+    /// Adds the cells of this column, and of those that belong to it, to the row of a group.
     pub(super) fn fill(&self, group: &Group, row: &mut Row) -> Result<(), QueryError> {
-        if let Some(column) = self.value.strip_prefix("text ") {
-            let text = query::only_text(&group.rows, column)?;
-            row.insert(self.name.clone(), text.unwrap_or_default());
-            return Ok(());
-        }
         let measure = Measure::parse(&self.value)?;
         let (value, interval) = match self.ratio {
             None => (measure.of_rows(&group.rows)?, None),
             Some(ratio) => self.quotient(group, &measure, ratio)?,
         };
-        row.insert(self.name.clone(), text_of(value));
-        if self.has_interval() {
+        let mut cells = vec![("", text_of(value))];
+        if self.ratio.is_some() && measure.how == Aggregate::Median {
             let (low, high) = interval.unzip();
-            row.insert(format!("{}_low", self.name), text_of(low));
-            row.insert(format!("{}_high", self.name), text_of(high));
-        }
-        if self.has_verdict() {
-            row.insert(format!("{}_verdict", self.name), verdict(interval).into());
-        }
-        for of_paper in &self.paper {
-            let paper = row.entry(format!("paper_{}", self.name)).or_default();
-            let is_own = Conditions::parse(&of_paper.row)?.are_met(&group.key)?;
-            if is_own {
-                *paper = text_of(Some(of_paper.value / of_paper.over));
+            cells.extend([("_low", text_of(low)), ("_high", text_of(high))]);
+            if !self.paired_by.is_empty() {
+                cells.push(("_verdict", verdict(interval).into()));
             }
+        }
+        for (end, text) in cells {
+            put(row, format!("{}{end}", self.name), text)?;
+        }
+        if !self.paper.is_empty() {
+            let mut paper = None;
+            for OfPaper { row, value, over } in &self.paper {
+                if Conditions::parse(row)?.are_met(&group.key)? {
+                    paper = Some(value / over);
+                }
+            }
+            put(row, format!("paper_{}", self.name), text_of(paper))?;
         }
         Ok(())
     }
@@ -167,6 +149,14 @@ impl Column {
         // Fewer than six pairs enclose the median with a lower probability.
         let interval = median_interval(&quotients).filter(|_| quotients.len() >= 6);
         Ok((value, interval))
+    }
+}
+
+fn put(row: &mut Row, name: String, text: String) -> Result<(), QueryError> {
+    let accepted = "a name of a column that no other has";
+    match row.insert(name.clone(), text) {
+        Some(_) => Err(QueryError::Malformed { part: "name", found: name, accepted }),
+        None => Ok(()),
     }
 }
 

@@ -107,22 +107,15 @@ impl Drawing {
     }
 
     fn rows(&self, rows: &Rows, title: String, table: &[&Row]) -> Panel {
-        let names = distinct(table.iter().map(|row| text_in(row, &self.y)));
-        let series = |series: String| {
-            let own = table.iter().filter(|row| self.series_of(row) == series);
-            let dot = |row: &&Row| {
-                let number = |end: &str| number_in(row, &format!("{}{end}", self.x));
-                let at = names.iter().position(|name| *name == text_in(row, &self.y))?;
-                Some((at, number("")?, number("_low").zip(number("_high"))))
-            };
-            let dots = own.filter_map(dot).collect();
-            (series, dots)
+        let name = |row: &Row| self.shown(rows, &self.y, &text_in(row, &self.y));
+        let dot = |row: &&Row| {
+            let number = |end: &str| number_in(row, &format!("{}{end}", self.x));
+            let ends = number("_low").zip(number("_high"));
+            Some(Dot { row: name(row), series: self.series_of(row), value: number("")?, ends })
         };
-        let all = distinct(table.iter().map(|row| self.series_of(row)));
-        let all = all.into_iter().map(series).collect();
-        let shown = |name: &String| self.shown(rows, &self.y, name);
-        let x = axis(&self.x_label, self.log_x);
-        let mut panel = dots(title, x, names.iter().map(shown).collect(), all);
+        let all: Vec<Dot> = table.iter().filter_map(dot).collect();
+        let names = distinct(table.iter().map(|row| name(row)));
+        let mut panel = dots(title, axis(&self.x_label, self.log_x), names, &all);
         panel.layers.extend(self.line_at.map(|at| Layer::new("", Marks::VLine(at))));
         panel
     }

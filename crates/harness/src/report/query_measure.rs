@@ -239,7 +239,7 @@ mod tests {
     fn errors_name_what_was_found_and_what_is_accepted() {
         for (conditions, measure, parts) in [
             ("scene", "only cost", &["\"scene\" is no condition", "COLUMN=TEXT"][..]),
-            ("colour=red", "only cost", &["no column \"colour\"", "cost, method, rays, scene"]),
+            ("colour=red", "only cost", &["no column \"colour\"", "scene, method, cost, rays"]),
             ("scene=c", "only cost", &["no row meets \"scene=c\""]),
             ("*", "mean cost", &["\"mean cost\" is no measure", "median"]),
             ("*", "only cost", &["cost has several values, from 2 to 5"]),

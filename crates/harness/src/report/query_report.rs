@@ -11,7 +11,6 @@ use super::query_figure::Drawing;
 use super::query_measure::filled;
 use crate::rows;
 use bvh_config::{Nested, OutOfRange};
-use std::collections::HashSet;
 
 bvh_config::config! { serde;
     /// A table of some rows of a CSV file, and a figure of it.
@@ -56,7 +55,7 @@ bvh_config::config! { serde;
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let read = |file: &str| query::read(&rows.folder.join(file));
+        let read = |file: &str| rows::read(&rows.folder.join(file));
         let mut selected = read(&self.rows)?;
         if !self.join.is_empty() {
             selected = query::join(&selected, &read(&self.join)?);
@@ -67,8 +66,8 @@ impl Config {
         let selected = query::select(selected, &self.select).map_err(named)?;
         let table = self.table(&selected).map_err(named)?;
         let mut output = Output::new(&self.source, &self.title);
-        let columns = self.header();
-        let bytes = table_bytes(&columns, &table)?;
+        let columns: Vec<&String> = table.first().map_or(vec![], |row| row.keys().collect());
+        let bytes = table_bytes(&table)?;
         output.show_csv(&format!("{}:", self.title), &bytes, &columns)?;
         output.csv.push((self.file.clone(), bytes));
         output.paper = self.compare(rows, &table).map_err(named)?;
@@ -80,58 +79,32 @@ impl Config {
         Ok(output)
     }
 
-    /// Returns the names of the table's columns.
-    pub fn header(&self) -> Vec<String> {
-        let mut names = self.by.clone();
-        if !self.pairs.is_empty() {
-            names.push("against".into());
-        }
-        for column in &self.columns {
-            let name = &column.name;
-            names.push(name.clone());
-            if column.has_interval() {
-                names.extend([format!("{name}_low"), format!("{name}_high")]);
-            }
-            if column.has_verdict() {
-                names.push(format!("{name}_verdict"));
-            }
-            if !column.paper.is_empty() {
-                names.push(format!("paper_{name}"));
-            }
-        }
-        names
-    }
-
     fn table(&self, rows: &[Row]) -> Result<Vec<Row>, QueryError> {
-        let mut table = Vec::new();
-        for group in self.groups(rows)? {
+        let row = |group: Group| {
             let mut row = group.key.clone();
-            for column in &self.columns {
-                column.fill(&group, &mut row)?;
-            }
-            table.push(row);
-        }
-        Ok(table)
+            self.columns.iter().try_for_each(|column| column.fill(&group, &mut row)).map(|()| row)
+        };
+        self.groups(rows)?.into_iter().map(row).collect()
     }
 
     fn groups<'r>(&self, rows: &'r [Row]) -> Result<Vec<Group<'r>>, QueryError> {
         let by: Vec<&str> = self.by.iter().map(String::as_str).collect();
         let base = Conditions::parse(&self.base)?;
-        let mut is_base = rows.iter().map(|row| base.are_met(row));
-        if !self.base.is_empty() && !is_base.any(|met| met.unwrap_or(true)) {
+        let mut bases = Vec::new();
+        for row in rows.iter().filter(|_| !self.base.is_empty()) {
+            bases.extend(base.are_met(row)?.then_some(row));
+        }
+        if bases.is_empty() && !self.base.is_empty() {
             return Err(QueryError::NoRow(self.base.clone()));
         }
+        let named: Vec<&str> = base.columns().collect();
         let mut groups = Vec::new();
         for values in query::distinct(rows, &by)? {
-            let mut key = Row::new();
-            for (column, value) in by.iter().zip(&values) {
-                key.insert((*column).to_owned(), value.clone());
-            }
+            let names = by.iter().map(|column| (*column).to_owned());
+            let key: Row = names.zip(values.iter().cloned()).collect();
             let rows_of_group = query::group(rows, &by, &values);
             if self.pairs.is_empty() {
-                let named: Vec<&str> = base.columns().collect();
-                // Without a base there is nothing to divide by, and no rows to look for.
-                let base = if named.is_empty() { vec![] } else { find(rows, &key, &named, &base)? };
+                let base = bases.iter().copied().filter(|row| agree(row, &key, &named)).collect();
                 groups.push(Group { key, rows: rows_of_group, base });
                 continue;
             }
@@ -139,10 +112,11 @@ impl Config {
                 if key.get("method") != Some(second) {
                     continue;
                 }
-                let is_first = Conditions::equal("method", first);
-                let base = find(rows, &key, &["method"], &is_first)?;
-                let mut key = key.clone();
-                key.insert("against".into(), first.clone());
+                let is_base =
+                    |row: &&Row| row.get("method") == Some(first) && agree(row, &key, &["method"]);
+                let base = rows.iter().filter(is_base).collect();
+                let against = ("against".to_owned(), first.clone());
+                let key = key.clone().into_iter().chain([against]).collect();
                 groups.push(Group { key, rows: rows_of_group.clone(), base });
             }
         }
@@ -159,132 +133,104 @@ impl Config {
         for column in &self.columns {
             for of_paper in &column.paper {
                 let conditions = Conditions::parse(&of_paper.row)?;
+                let paper = of_paper.value / of_paper.over;
                 for row in table {
-                    let Some(ours) = number_in(row, &column.name) else { continue };
+                    let number = |end: &str| number_in(row, &format!("{}{end}", column.name));
+                    let Some(ours) = number("") else { continue };
                     if !conditions.are_met(row)? {
                         continue;
                     }
-                    let scene =
-                        row.get("scene").map_or_else(String::new, |scene| rows.shown(scene));
-                    let subject = self.subject(row, &self.by);
-                    let quantity = format!("{}, {subject}", column.label());
-                    let low = number_in(row, &format!("{}_low", column.name));
-                    let high = number_in(row, &format!("{}_high", column.name));
-                    let paper = of_paper.value / of_paper.over;
-                    compared.push(
-                        PaperRow::new(&self.source, scene, quantity, &self.reason).compare_ratios(
-                            paper,
-                            ours,
-                            low.zip(high),
-                            self.tolerance,
-                        ),
-                    );
+                    let scene = row.get("scene").map_or(String::new(), |scene| rows.shown(scene));
+                    let quantity = format!("{}, {}", column.label(), self.subject(row));
+                    let interval = number("_low").zip(number("_high"));
+                    let row = PaperRow::new(&self.source, scene, quantity, &self.reason);
+                    compared.push(row.compare_ratios(paper, ours, interval, self.tolerance));
                 }
             }
         }
         Ok(compared)
     }
 
-    /// Names a row of the table by these columns, without its scene, and the base that it is compared
-    /// with.
-    fn subject(&self, row: &Row, by: &[String]) -> String {
-        let names = by.iter().filter(|column| *column != "scene");
-        let own: Vec<&str> = names.map(|column| row[column].as_str()).collect();
-        let own = own.join(", ");
-        match (row.get("against"), Conditions::parse(&self.base)) {
-            (Some(against), _) => format!("{own} over {against}"),
-            (None, Ok(base)) if !self.base.is_empty() => {
-                format!("{own} over {}", base.texts().join(", "))
-            }
-            _ => own,
+    /// Names a row of the table without its scene, and the base that it is compared with.
+    fn subject(&self, row: &Row) -> String {
+        let names = self.by.iter().filter(|column| *column != "scene");
+        let own = names.map(|column| row[column].as_str()).collect::<Vec<_>>().join(", ");
+        let base =
+            Conditions::parse(&self.base).map_or(String::new(), |base| base.texts().join(", "));
+        match row.get("against").unwrap_or(&base).as_str() {
+            "" => own,
+            base => format!("{own} over {base}"),
         }
     }
 }
 
 impl Config {
     /// Rejects parts of the query that cannot be read, and files and columns that no run writes.
-    pub(super) fn check_queries(&self) -> Result<(), OutOfRange> {
+    fn check_queries(&self) -> Result<(), OutOfRange> {
         check_file("", &self.file)?;
-        let mut names = HashSet::new();
-        if let Some(twice) = self.header().into_iter().find(|name| !names.insert(name.clone())) {
-            let found = format!("the name {twice:?} twice");
-            let accepted = "different names, and not those of `by`";
-            return Err(OutOfRange::new("columns", found, accepted));
-        }
-        // A row that any number would fit into.
         let mut row = Row::new();
         for (key, name) in [("rows", &self.rows), ("join", &self.join)] {
-            if key == "join" && name.is_empty() {
-                continue;
-            }
-            let (_, columns) = rows::files().find(|(file, _)| file == name).ok_or_else(|| {
-                let names: Vec<&str> = rows::files().map(|(file, _)| *file).collect();
-                OutOfRange::new(key, format!("{name:?}"), names.join(", "))
-            })?;
-            row.extend(columns.iter().map(|&column| (column.into(), "1".into())));
-        }
-        for (key, result) in self.attempts(&row) {
-            match result {
-                Err(QueryError::Malformed { found, accepted, .. }) => {
-                    return Err(OutOfRange::new(key, format!("{found:?}"), accepted));
-                }
-                Err(QueryError::Column { column, accepted }) => {
-                    let accepted = format!("the columns {accepted}");
-                    return Err(OutOfRange::new(key, format!("{column:?}"), accepted));
-                }
-                _ => {}
+            if key == "rows" || !name.is_empty() {
+                row.extend(ones(name).ok_or_else(|| {
+                    let names: Vec<&str> = rows::files().map(|(file, _)| *file).collect();
+                    OutOfRange::new(key, format!("{name:?}"), names.join(", "))
+                })?);
             }
         }
-        Ok(())
-    }
-
-    /// Applies every part of the query to a row, and returns the result of each with its key.
-    fn attempts(&self, row: &Row) -> Vec<(String, Result<(), QueryError>)> {
-        let has = |column: &str| query::cell(row, column).map(|_| ());
-        let has_all = |conditions: &str| Conditions::parse(conditions)?.columns().try_for_each(has);
-        let mut attempts =
-            vec![("select".into(), has_all(&self.select)), ("base".into(), has_all(&self.base))];
+        let has = |column: &String| query::cell(&row, column).map(drop);
+        for (key, conditions) in [("select", &self.select), ("base", &self.base)] {
+            accept(key, Conditions::parse(conditions).and_then(|all| all.are_met(&row)))?;
+        }
         for (index, column) in self.by.iter().enumerate() {
-            attempts.push((format!("by[{index}]"), has(column)));
+            accept(&format!("by[{index}]"), has(column))?;
         }
+        let against = self.pairs.first().map(|_| "against".to_owned());
+        let key: Row =
+            self.by.iter().cloned().chain(against).map(|column| (column, "1".into())).collect();
+        let mut made = key.clone();
+        // Compared with itself, a row has a value in every column.
+        let group = Group { key, rows: vec![&row], base: vec![&row] };
         for (index, column) in self.columns.iter().enumerate() {
-            let partners = column.paired_by.iter().try_for_each(|column| has(column));
-            attempts.push((format!("columns[{index}].value"), column.try_on(row)));
-            attempts.push((format!("columns[{index}].paired_by"), partners));
+            let at = |key: &str| format!("columns[{index}].{key}");
+            accept(&at("paired_by"), column.paired_by.iter().try_for_each(has))?;
+            for (index, of_paper) in column.paper.iter().enumerate() {
+                let row = Conditions::parse(&of_paper.row).and_then(|all| all.are_met(&group.key));
+                accept(&at(&format!("paper[{index}].row")), row)?;
+            }
+            let filled = column.fill(&group, &mut made);
+            let is_name = matches!(filled, Err(QueryError::Malformed { part: "name", .. }));
+            accept(&at(if is_name { "name" } else { "value" }), filled)?;
         }
-        let ones = |columns: &mut dyn Iterator<Item = String>| {
-            Ok(vec![columns.map(|column| (column, "1".into())).collect()])
-        };
-        let read = |name: &str| match rows::files().find(|(file, _)| *file == name) {
-            Some((_, columns)) => ones(&mut columns.iter().map(|column| (*column).to_owned())),
-            None => ones(&mut self.header().into_iter()),
-        };
-        for part in self.finding.split_inclusive('}') {
-            attempts.push(("finding".into(), filled(part, &read).map(|_| ())));
-        }
-        attempts
+        let read = |file: &str| Ok(vec![ones(file).unwrap_or_else(|| made.clone())]);
+        let mut parts = self.finding.split_inclusive('}');
+        parts.try_for_each(|part| accept("finding", filled(part, &read)))
     }
 }
 
-/// Returns the rows that agree with the key in all columns but the `free` ones, and that meet the
-/// conditions.
-fn find<'r>(
-    rows: &'r [Row],
-    key: &Row,
-    free: &[&str],
-    conditions: &Conditions,
-) -> Result<Vec<&'r Row>, QueryError> {
-    let mut found = Vec::new();
-    for row in rows {
-        let agrees = key
-            .iter()
-            .filter(|(column, _)| !free.contains(&column.as_str()))
-            .all(|(column, text)| row.get(column) == Some(text));
-        if agrees && conditions.are_met(row)? {
-            found.push(row);
+/// A row of a file that runs write, which any number would fit into.
+fn ones(file: &str) -> Option<Row> {
+    let (_, columns) = rows::files().find(|(name, _)| *name == file)?;
+    Some(columns.iter().map(|&column| (column.into(), "1".into())).collect())
+}
+
+/// Rejects a part of a query that cannot be read, or has an unknown column, whatever the rows.
+fn accept<T>(key: &str, result: Result<T, QueryError>) -> Result<(), OutOfRange> {
+    match result {
+        Err(QueryError::Malformed { found, accepted, .. }) => {
+            Err(OutOfRange::new(key, format!("{found:?}"), accepted))
         }
+        Err(QueryError::Column { column, accepted }) => {
+            let accepted = format!("the columns {accepted}");
+            Err(OutOfRange::new(key, format!("{column:?}"), accepted))
+        }
+        _ => Ok(()),
     }
-    Ok(found)
+}
+
+/// Whether a row has the texts of the key in all columns but the `free` ones.
+fn agree(row: &Row, key: &Row, free: &[&str]) -> bool {
+    let mut bound = key.iter().filter(|(column, _)| !free.contains(&column.as_str()));
+    bound.all(|(column, text)| row.get(column) == Some(text))
 }
 
 #[cfg(test)]
@@ -394,9 +340,9 @@ mod tests {
             ("file = 'runs'", "file"),
             (
                 "columns = [{ name = 'c', value = 'max cost' }, { name = 'c', value = 'min cost' }]",
-                "columns",
+                "columns[1].name",
             ),
-            ("columns = [{ name = 'scene', value = 'max cost' }]", "columns"),
+            ("columns = [{ name = 'scene', value = 'max cost' }]", "columns[0].name"),
             // The columns of an unknown file are unknown, too.
             ("join = 'costs.csv'\nbase = 'threads=1'", "join"),
             ("select = 'method=a, seconds=1'", "select"),

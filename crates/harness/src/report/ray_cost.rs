@@ -105,26 +105,20 @@ impl Config {
 
     /// A row per tree, with the intervals that scenes have and means have not.
     fn draw(&self, title: String, scene: &str, table: &[Compared]) -> Panel {
-        let own: Vec<&Compared> =
-            table.iter().filter(|row| row.scene == scene && row.tree != self.base).collect();
-        let trees = distinct(own.iter().map(|row| (row.tree, row.trained_on)));
-        let series = |kind: (&str, &str)| {
-            let of_kind = own.iter().filter(|row| (row.judged_on, row.camera) == kind);
-            let dot = |row: &&Compared| {
-                let at = trees.iter().position(|tree| *tree == (row.tree, row.trained_on))?;
-                Some((at, row.tests_over_base, row.over_base_low.zip(row.over_base_high)))
-            };
-            let name = match kind {
-                (rays, "none") => rays.to_owned(),
-                (rays, camera) => format!("{rays}, {camera} path"),
-            };
-            (name, of_kind.filter_map(dot).collect())
+        let is_own = |row: &&Compared| row.scene == scene && row.tree != self.base;
+        let dot = |row: &Compared| Dot {
+            row: self.tree_name(row.tree, row.trained_on),
+            series: match row.camera {
+                "none" => row.judged_on.to_owned(),
+                camera => format!("{}, {camera} path", row.judged_on),
+            },
+            value: row.tests_over_base,
+            ends: row.over_base_low.zip(row.over_base_high),
         };
-        let kinds = distinct(own.iter().map(|row| (row.judged_on, row.camera)));
-        let names =
-            trees.iter().map(|(tree, trained_on)| self.tree_name(tree, trained_on)).collect();
+        let all: Vec<Dot> = table.iter().filter(is_own).map(dot).collect();
+        let trees = distinct(all.iter().map(|dot| dot.row.clone()));
         let x = Axis::linear(format!("tests per ray, over those of {}", self.base));
-        let mut panel = dots(title, x, names, kinds.into_iter().map(series).collect());
+        let mut panel = dots(title, x, trees, &all);
         panel.layers.push(Layer::new(&self.base, Marks::VLine(1.0)));
         panel
     }

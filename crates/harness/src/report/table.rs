@@ -6,7 +6,6 @@ use super::prelude::*;
 use crate::statistics::best_of::predicted_best;
 use crate::statistics::{expected_best_of, median, minimum, range};
 use bvh_config::{Accepts, Nested, above};
-use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 bvh_config::config! { serde;
@@ -52,12 +51,6 @@ impl Labels for Column {
     }
 }
 
-impl Column {
-    fn shown(&self) -> &str {
-        if self.label.is_empty() { &self.name } else { &self.label }
-    }
-}
-
 /// One cell, as written to `table.csv`.
 #[derive(Serialize)]
 pub(super) struct Cell<'a> {
@@ -79,21 +72,43 @@ pub(super) struct Cell<'a> {
     high_over_base: Option<f64>,
     /// The paper's ratio, where it has one.
     paper_over_base: Option<f64>,
+    #[serde(skip)]
+    reason: &'a str,
+}
+
+/// The ends of an interval, if there is one.
+type Interval = Option<(f64, f64)>;
+
+impl Cell<'_> {
+    fn interval(&self) -> Interval {
+        self.low_over_base.zip(self.high_over_base)
+    }
+
+    /// The factor between our ratio and the paper's, as a logarithm.
+    fn distance(&self) -> f64 {
+        self.paper_over_base.map_or(f64::INFINITY, |paper| (self.cost_over_base / paper).ln().abs())
+    }
 }
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let scenes = rows.scenes();
-        let row = |&scene: &_| {
-            self.columns.iter().filter_map(move |column| self.cell(rows, scene, column))
-        };
-        let cells: Vec<Cell> = scenes.iter().flat_map(row).collect();
+        let mut cells = Vec::new();
+        for scene in rows.scenes() {
+            cells.extend(self.columns.iter().filter_map(|column| self.cell(rows, scene, column)));
+        }
         let mut output = Output::new(&self.source, &self.title);
         output.add_csv("table", &cells)?;
         output.say(&self.finding, rows)?;
-        let caption = format!("{}. {}", output.heading, self.caption(&cells));
+        let caption = format!("{}. {}", output.heading, caption(&cells));
         output.add_figure("table", caption, 1, vec![self.draw(rows, &cells)]);
-        output.paper = self.compare_all(rows, &cells);
+        output.paper = if self.are_readings() {
+            let scenes = rows.scenes().into_iter();
+            scenes.filter_map(|scene| self.compare_readings(rows, scene, &cells)).collect()
+        } else {
+            let others = self.columns.iter().skip(1);
+            let cells = others.flat_map(|column| of_column(&cells, column));
+            cells.filter_map(|cell| self.compare(rows, cell)).collect()
+        };
         let columns = "scene scene_kind column cost_over_base low_over_base high_over_base \
                        paper_over_base";
         output.show("Cost over base (and the paper's, on its own scenes):", &cells, columns)?;
@@ -102,27 +117,27 @@ impl Config {
 
     /// Returns the labels of the methods whose trials some column reads.
     pub(super) fn trial_methods(&self) -> Vec<&str> {
-        self.columns
-            .iter()
-            .filter(|column| column.best_of.is_some())
-            .map(|column| column.method.as_str())
-            .collect()
+        let with_trials = self.columns.iter().filter(|column| column.best_of.is_some());
+        with_trials.map(|column| column.method.as_str()).collect()
     }
 
     fn cell<'a>(&'a self, rows: &'a Rows, scene: &'a str, column: &'a Column) -> Option<Cell<'a>> {
         let trials = rows.trials_over_base(scene, &column.method);
         let pool = trials.concat();
-        let results: Vec<f64> = match column.best_of {
+        let (results, interval) = match column.best_of {
             Some(m) => {
-                trials.iter().filter_map(|trials| minimum(trials.iter().copied().take(m))).collect()
+                let best = |trials: &Vec<f64>| minimum(trials.iter().copied().take(m));
+                let results: Vec<f64> = trials.iter().filter_map(best).collect();
+                (results, predicted_best(&pool, m))
             }
-            None => rows.final_ratios(scene, &column.method),
-        };
-        let interval = match column.best_of {
-            Some(m) => predicted_best(&pool, m),
-            None => range(results.iter().copied()).filter(|(low, high)| low < high),
+            None => {
+                let results = rows.final_ratios(scene, &column.method);
+                let interval = range(results.iter().copied()).filter(|(low, high)| low < high);
+                (results, interval)
+            }
         };
         let (low_over_base, high_over_base) = interval.unzip();
+        let paper = column.paper.get(scene).zip(self.columns.first()?.paper.get(scene));
         Some(Cell {
             scene,
             scene_kind: rows.kind(scene),
@@ -133,152 +148,107 @@ impl Config {
             expected_over_base: column.best_of.and_then(|m| expected_best_of(&pool, m)),
             low_over_base,
             high_over_base,
-            paper_over_base: self.paper_ratio(column, scene),
+            paper_over_base: paper.map(|(cost, base)| cost / base),
+            reason: &column.reason,
         })
     }
 
-    /// Explains the marks that the figure shows.
-    fn caption(&self, cells: &[Cell]) -> String {
-        let mut caption =
-            String::from("Total area of inner nodes over that of the greedy Müller–Fellner tree.");
-        if cells.iter().any(|cell| cell.best_of.is_some()) {
-            caption += " Lines: at least nine of ten repetitions of as many fresh trials end between them.";
-        }
-        if cells.iter().any(|cell| cell.paper_over_base.is_some()) {
-            caption += " Ours on stand-in scenes, the paper's on the originals: compare ratios within a column, not dot by dot.";
-        }
-        caption
-    }
-
-    fn paper_ratio(&self, column: &Column, scene: &str) -> Option<f64> {
-        Some(column.paper.get(scene)? / self.columns.first()?.paper.get(scene)?)
-    }
-
     fn draw(&self, rows: &Rows, cells: &[Cell]) -> Panel {
-        let scenes = rows.scenes();
-        let series = |name: String, column: &Column, dot: fn(&Cell) -> Option<(f64, Interval)>| {
-            let dot = |cell: &Cell| {
-                let (value, ends) = dot(cell)?;
-                Some((scenes.iter().position(|scene| *scene == cell.scene)?, value, ends))
-            };
-            (name, of_column(cells, column).filter_map(dot).collect::<Vec<_>>())
-        };
         // Columns that are readings of one column of the paper share its dots.
         let readings = self.are_readings();
         let mut all = Vec::new();
-        for (index, column) in self.columns.iter().skip(1).enumerate() {
-            let name = column.shown();
-            let of_paper = !column.paper.is_empty();
-            if of_paper && (index == 0 || !readings) {
-                let name = if readings { "paper".into() } else { format!("paper, {name}") };
-                all.push(series(name, column, |cell| Some((cell.paper_over_base?, None))));
+        for (index, column) in self.columns.iter().enumerate().skip(1) {
+            let mut add = |series: &str, dot: fn(&Cell) -> Option<(f64, Interval)>| {
+                all.extend(of_column(cells, column).filter_map(|cell| {
+                    let (value, ends) = dot(cell)?;
+                    Some(Dot { row: rows.shown(cell.scene), series: series.into(), value, ends })
+                }));
+            };
+            let name = if column.label.is_empty() { &column.name } else { &column.label };
+            let ours = |cell: &Cell| Some((cell.cost_over_base, cell.interval()));
+            if column.paper.is_empty() {
+                add(name, ours);
+                continue;
             }
-            let name = if of_paper { format!("{name}, ours") } else { name.to_owned() };
-            all.push(series(name, column, |cell| {
-                Some((cell.cost_over_base, cell.low_over_base.zip(cell.high_over_base)))
-            }));
+            if index == 1 || !readings {
+                let of = if readings { "paper" } else { &format!("paper, {name}") };
+                add(of, |cell| Some((cell.paper_over_base?, None)));
+            }
+            add(&format!("{name}, ours"), ours);
         }
         // Readings of a heuristic that peel off one object at a time cost hundreds of times as much.
         let most = cells.iter().map(|cell| cell.cost_over_base).fold(1.0, f64::max);
         let label = "cost / greedy";
         let x = if most > 3.0 { Axis::log(label) } else { Axis::linear(label) };
-        let mut panel = dots("", x, rows.all_shown(), all);
+        let mut panel = dots("", x, rows.all_shown(), &all);
         // Ratios are to the greedy tree, whose line separates savings from losses.
         panel.layers.push(Layer::new("greedy", Marks::VLine(1.0)));
         panel
     }
-}
 
-/// The ends of an interval, if there is one.
-type Interval = Option<(f64, f64)>;
-
-/// Returns the cells of a column.
-fn of_column<'c, 'a>(cells: &'c [Cell<'a>], column: &Column) -> impl Iterator<Item = &'c Cell<'a>> {
-    cells.iter().filter(|cell| cell.column == column.name)
-}
-
-impl Config {
     /// Compares a number of the paper with ours.
-    fn compare(&self, rows: &Rows, column: &Column, cell: &Cell) -> Option<PaperRow> {
-        let paper = cell.paper_over_base?;
-        let ours = cell.cost_over_base;
-        let quantity = format!("{}, cost over base", column.name);
-        let row = PaperRow::new(&self.source, rows.shown(cell.scene), quantity, &column.reason);
-        let interval = cell.low_over_base.zip(cell.high_over_base);
-        Some(row.compare_ratios(paper, ours, interval, self.tolerance))
+    fn compare(&self, rows: &Rows, cell: &Cell) -> Option<PaperRow> {
+        let quantity = format!("{}, cost over base", cell.column);
+        let row = PaperRow::new(&self.source, rows.shown(cell.scene), quantity, cell.reason);
+        let (paper, ours) = (cell.paper_over_base?, cell.cost_over_base);
+        Some(row.compare_ratios(paper, ours, cell.interval(), self.tolerance))
     }
 
     /// Compares a number of the paper with the closest of the columns that read it in different
     /// ways.
     fn compare_readings(&self, rows: &Rows, scene: &str, cells: &[Cell]) -> Option<PaperRow> {
-        let distance = |cell: &&Cell| {
-            cell.paper_over_base.map(|paper| (cell.cost_over_base / paper).ln().abs())
-        };
-        let base = &self.columns.first()?.name;
-        let read = cells.iter().filter(|cell| {
-            cell.scene == scene && cell.column != base && cell.paper_over_base.is_some()
-        });
-        let closest =
-            read.min_by(|a, b| distance(a).partial_cmp(&distance(b)).unwrap_or(Ordering::Equal))?;
-        let paper = closest.paper_over_base?;
+        let of_scene = self.columns.iter().skip(1).flat_map(|column| of_column(cells, column));
+        let of_scene = of_scene.filter(|cell| cell.scene == scene);
+        let closest = of_scene.min_by(|a, b| a.distance().total_cmp(&b.distance()))?;
+        let (paper, ours) = (closest.paper_over_base?, closest.cost_over_base);
+        let percent = 100.0 * self.tolerance;
         // The paper prints no formula, so the closest reading is the most favourable to it.
-        let close = is_close(closest, self.tolerance);
-        let column = self.columns.iter().find(|column| column.name == closest.column)?;
-        let row = PaperRow::new(
-            &self.source,
-            rows.shown(scene),
-            "cost over base, the closest reading",
-            &column.reason,
-        );
+        let is_close = (ours / paper - 1.0).abs() <= self.tolerance;
+        let quantity = "cost over base, the closest reading";
+        let row = PaperRow::new(&self.source, rows.shown(scene), quantity, closest.reason);
         let row = row.compare(
             format!("{paper:.4}"),
-            format!("{:.4}, by {}", closest.cost_over_base, closest.column),
-            if close { Verdict::Inconclusive } else { Verdict::Differs },
+            format!("{ours:.4}, by {}", closest.column),
+            if is_close { Verdict::Inconclusive } else { Verdict::Differs },
             format!(
-                "differs if no reading is within {} % of the paper's; the paper prints no formula, so that a reading which is within cannot \
-                 be distinguished from the paper's",
-                100.0 * self.tolerance
+                "differs if no reading is within {percent} % of the paper's; the paper prints no \
+                 formula, so that a reading which is within cannot be distinguished from the paper's"
             ),
         );
-        Some(PaperRow {
-            paper_over_base: Some(paper),
-            ours_over_base: Some(closest.cost_over_base),
-            ..row
-        })
+        Some(PaperRow { paper_over_base: Some(paper), ours_over_base: Some(ours), ..row })
     }
 
     /// Returns true if all columns except the base are readings of one column of the paper.
     fn are_readings(&self) -> bool {
-        let mut others = self.columns.iter().skip(1);
-        match others.next() {
-            Some(first) => {
-                !first.paper.is_empty()
-                    && others.len() > 0
-                    && others.all(|column| column.paper == first.paper)
+        match &self.columns[..] {
+            [_, first, others @ ..] if !others.is_empty() && !first.paper.is_empty() => {
+                others.iter().all(|column| column.paper == first.paper)
             }
-            None => false,
+            _ => false,
         }
-    }
-
-    /// Returns the rows of `paper.csv`, one for each number of the paper.
-    fn compare_all(&self, rows: &Rows, cells: &[Cell]) -> Vec<PaperRow> {
-        if self.are_readings() {
-            let scenes = rows.scenes().into_iter();
-            return scenes.filter_map(|scene| self.compare_readings(rows, scene, cells)).collect();
-        }
-        let mut compared = Vec::new();
-        for column in self.columns.iter().skip(1) {
-            compared.extend(
-                of_column(cells, column).filter_map(|cell| self.compare(rows, column, cell)),
-            );
-        }
-        compared
     }
 }
 
-/// Returns true if the ratio is within the tolerance of the paper's.
-fn is_close(cell: &Cell, tolerance: f64) -> bool {
-    cell.paper_over_base.is_some_and(|paper| (cell.cost_over_base / paper - 1.0).abs() <= tolerance)
+/// Explains the marks that the figure shows.
+fn caption(cells: &[Cell]) -> String {
+    let mut caption =
+        String::from("Total area of inner nodes over that of the greedy Müller–Fellner tree.");
+    if cells.iter().any(|cell| cell.best_of.is_some()) {
+        caption +=
+            " Lines: at least nine of ten repetitions of as many fresh trials end between them.";
+    }
+    if cells.iter().any(|cell| cell.paper_over_base.is_some()) {
+        caption += " Ours on stand-in scenes, the paper's on the originals: compare ratios within a column, not dot by dot.";
+    }
+    caption
+}
+
+/// Returns the cells of a column.
+fn of_column<'c, 'a>(
+    cells: &'c [Cell<'a>],
+    column: &'c Column,
+) -> impl Iterator<Item = &'c Cell<'a>> {
+    cells.iter().filter(|cell| cell.column == column.name)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
-use crate::statistics::{expected_best_of, mean_interval, minimum, range};
+use crate::statistics::{expected_best_of, mean_interval, minimum};
 
 bvh_config::config! { serde;
     /// Cost against number of trials.
@@ -42,19 +42,6 @@ pub(super) struct Point<'a> {
     expected_high: Option<f64>,
 }
 
-impl Point<'_> {
-    /// Returns the interval of the expected best; one value if there is only one repetition.
-    fn interval(&self) -> (f64, f64) {
-        let end = |end: Option<f64>| end.unwrap_or(self.expected_over_base);
-        (end(self.expected_low), end(self.expected_high))
-    }
-
-    /// Returns true if the whole interval of the expected best is below the other's.
-    fn is_below(&self, other: &Self) -> bool {
-        self.interval().1 < other.interval().0
-    }
-}
-
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let mut output = Output::new(&self.source, &self.title);
@@ -63,37 +50,30 @@ impl Config {
         for scene in rows.scenes() {
             let curves: Vec<Vec<Point>> =
                 self.methods.iter().map(|method| self.curve(rows, scene, method)).collect();
-            let mut single = Vec::new();
-            let mut expected = Vec::new();
-            let mut bands = Vec::new();
+            let mut single = vec![Layer::new("greedy", Marks::HLine(1.0))];
+            let mut expected = single.clone();
             for (name, curve) in self.methods.iter().zip(&curves) {
-                let x = |point: &Point| point.trials as f64;
-                let steps =
-                    curve.iter().map(|point| (x(point), point.single_run_over_base)).collect();
-                single.push(Layer::new(name, Marks::Steps(steps)));
-                let line = curve.iter().map(|point| (x(point), point.expected_over_base)).collect();
-                expected.push(Layer::new(name, Marks::Line(line)));
-                let band =
-                    curve.iter().map(|point| (x(point), point.interval().0, point.interval().1));
-                bands.push(Layer::new(name, Marks::Band(band.collect())));
+                let line = |cost: fn(&Point) -> f64| {
+                    curve.iter().map(|point| (point.trials as f64, cost(point))).collect()
+                };
+                let steps = Marks::Steps(line(|point| point.single_run_over_base));
+                single.push(Layer::new(name, steps));
+                let line = Marks::Line(line(|point| point.expected_over_base));
+                expected.push(Layer::new(name, line));
+                // One repetition has no interval.
+                let ends = |point: &Point| {
+                    Some((point.trials as f64, point.expected_low?, point.expected_high?))
+                };
+                expected
+                    .push(Layer::new(name, Marks::Band(curve.iter().filter_map(ends).collect())));
             }
-            // One repetition has no interval, and its bands would cover the lines.
-            if curves.iter().flatten().any(|point| point.expected_low.is_some()) {
-                expected.extend(bands);
-            }
-            // One range for both panels, so that they can be compared.
-            let shown = curves.iter().flatten().flat_map(|point| {
-                [point.single_run_over_base, point.interval().0, point.interval().1, 1.0]
+            let mut both = [("one run", single), ("expected", expected)].map(|(what, layers)| {
+                let (x, y) = (Axis::log("number of trials"), Axis::linear("best cost / greedy"));
+                panel(format!("{}, {what}", rows.shown(scene)), x, y, layers)
             });
-            let (low, high) = range(shown).unwrap_or((0.0, 1.0));
-            let (low, high) = (low - 0.03 * (high - low), high + 0.03 * (high - low));
-            for (what, mut layers) in [("one run", single), ("expected", expected)] {
-                layers.push(Layer::new("greedy", Marks::HLine(1.0)));
-                let x = Axis::log("number of trials");
-                let y = Axis::linear("best cost / greedy").range(low, high);
-                panels.push(panel(format!("{}, {what}", rows.shown(scene)), x, y, layers));
-            }
-            self.compare(&rows.shown(scene), &curves, &mut output);
+            figures::share_axes(&mut both);
+            panels.extend(both);
+            output.paper.extend(self.compare(&rows.shown(scene), &curves));
             points.extend(curves.into_iter().flatten());
         }
         let caption = "Lowest cost among so many trials. Left, one run, as in the paper; right, \
@@ -139,34 +119,32 @@ impl Config {
     fn best<'p, 'a>(&self, curves: &'p [Vec<Point<'a>>]) -> Vec<&'p Point<'a>> {
         let mut ranking: Vec<&Point> = curves.iter().filter_map(|curve| curve.last()).collect();
         ranking.sort_by(|a, b| a.expected_over_base.total_cmp(&b.expected_over_base));
-        let Some(least) = ranking.first().copied() else { return ranking };
-        ranking.retain(|point| !least.is_below(point));
+        let end = |end: Option<f64>, point: &Point| end.unwrap_or(point.expected_over_base);
+        let high = ranking.first().map(|least| end(least.expected_high, least));
+        ranking.retain(|point| high.is_none_or(|high| high >= end(point.expected_low, point)));
         ranking
     }
 
     /// Compares the best methods with the paper's. Where there are several, it is inconclusive
     /// which is best.
-    fn compare(&self, scene: &str, curves: &[Vec<Point>], output: &mut Output) {
+    fn compare(&self, scene: &str, curves: &[Vec<Point>]) -> Option<PaperRow> {
         let best = self.best(curves);
-        let Some(least) = best.first() else { return };
-        let Some(paper) = &self.paper_best else { return };
-        // With several best methods, the intervals do not show which is best.
+        let (least, paper) = (best.first()?, self.paper_best.as_ref()?);
         let verdict = match (best.iter().any(|point| point.method == paper), best.len()) {
             (true, 1) => Verdict::Agrees,
             (true, _) => Verdict::Inconclusive,
             (false, _) => Verdict::Differs,
         };
         let quantity = format!("best of the compared, by the expected best of {}", self.best_of);
-        let row = PaperRow::new(&self.source, scene, quantity, &self.reason);
         let rule = "its 95 % interval lies below those of all others; it differs if that of another lies below its own";
         let names: Vec<&str> = best.iter().map(|point| point.method).collect();
-        let row = row.compare(paper, names.join(" or "), verdict, rule);
-        output.paper.push(PaperRow {
+        let row = PaperRow::new(&self.source, scene, quantity, &self.reason);
+        Some(PaperRow {
             ours_over_base: Some(least.expected_over_base),
             ours_low: least.expected_low,
             ours_high: least.expected_high,
-            ..row
-        });
+            ..row.compare(paper, names.join(" or "), verdict, rule)
+        })
     }
 }
 

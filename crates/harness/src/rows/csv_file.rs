@@ -33,6 +33,11 @@ pub fn to_bytes<R: Serialize>(rows: &[R], path: &Path) -> Result<Vec<u8>, Error>
     for row in rows {
         writer.serialize(row).map_err(Error::csv(path))?;
     }
+    bytes_of(writer, path)
+}
+
+/// Returns what has been written for the file `path`.
+pub fn bytes_of(writer: csv::Writer<Vec<u8>>, path: &Path) -> Result<Vec<u8>, Error> {
     writer.into_inner().map_err(|error| Error::Io {
         path: path.to_owned(),
         action: "write",

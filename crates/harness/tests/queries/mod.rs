@@ -3,24 +3,23 @@
 //!
 //! ```text
 //! FILE | CONDITIONS | MEASURE [| below, above or percent]   one value
-//! FILE | CONDITIONS | ROWS × COLUMNS | SHOWN | FORMAT       a table
+//! FILE | CONDITIONS | ROWS × COLUMNS | SHOWN | DECIMALS     a table
 //!
 //! MEASURE  over CONDITIONS by COLUMNS           of one value: each row's number over the least
 //!                                               number of other rows that agree in the columns
 //! SHOWN    MEASURE [LOW, HIGH] (COLUMN)         an interval and a further column, both optional
-//! FORMAT   DECIMALS [below | above | percent]   percent below one, above one, or of a fraction
-//!          text                                 cells as they are; all rows have the same one
 //! ```
 
 #![allow(dead_code)] // numbers and tables use a part each
 
 use super::support::top;
-use harness::report::query::{self, Row, distinct, group, number_in, only_text};
+use harness::report::query::{self, Row, distinct, group, number_in};
 use harness::report::query_measure::Measure;
+use std::collections::BTreeSet;
 
 /// The rows of a committed CSV that meet all conditions; at least one.
 fn rows(file: &str, conditions: &str) -> Vec<Row> {
-    let rows = query::read(&top().join("results").join(file));
+    let rows = harness::rows::read(&top().join("results").join(file));
     let rows = rows.unwrap_or_else(|error| panic!("{file}: {error}"));
     query::select(rows, conditions).unwrap_or_else(|error| panic!("{file}: {error}"))
 }
@@ -51,10 +50,11 @@ pub fn value(query: &str) -> f64 {
 /// The table of a query of five parts.
 pub fn table(query: &str) -> String {
     let parts: Vec<&str> = query.split(" | ").collect();
-    let [file, conditions, axes, measure, format] = parts[..] else {
-        panic!("{query}: expected FILE | CONDITIONS | ROWS × COLUMNS | SHOWN | FORMAT")
+    let [file, conditions, axes, measure, decimals] = parts[..] else {
+        panic!("{query}: expected FILE | CONDITIONS | ROWS × COLUMNS | SHOWN | DECIMALS")
     };
-    format!("\n{}\n", pivot(&rows(file, conditions), axes, measure, format))
+    let decimals = decimals.parse().unwrap();
+    format!("\n{}\n", pivot(&rows(file, conditions), axes, measure, decimals))
 }
 
 /// Divides the number of each row by the least one among other rows of the file, `CONDITIONS by
@@ -83,14 +83,6 @@ fn divide_by_least(rows: &mut [Row], column: &str, others: &[Row], columns: &[&s
     }
 }
 
-/// Writes a number in a format.
-fn write(value: f64, format: &str) -> String {
-    let (digits, unit) = format.split_once(' ').unwrap_or((format, ""));
-    let digits: usize = digits.parse().unwrap_or_else(|_| panic!("{format:?} is no format"));
-    let value = in_unit(value, unit).unwrap_or_else(|| panic!("{format:?} is no format"));
-    format!("{value:.digits$}")
-}
-
 /// Percentages are differences from 1, which no column holds.
 fn in_unit(value: f64, unit: &str) -> Option<f64> {
     match unit {
@@ -102,37 +94,34 @@ fn in_unit(value: f64, unit: &str) -> Option<f64> {
     }
 }
 
-/// Returns the further column of a measure: a number in the format, a text as it is.
-fn further(rows: &[&Row], column: &str, format: &str) -> Option<String> {
-    let mut texts = rows.iter().filter_map(|row| row.get(column));
-    let is_number = format != "text" && texts.any(|text| text.parse::<f64>().is_ok());
-    one(rows, &format!("only {column}"), if is_number { format } else { "text" })
-}
-
-/// Returns one value of `AGGREGATE COLUMN` in the format.
-fn one(rows: &[&Row], measure: &str, format: &str) -> Option<String> {
-    if format == "text" {
-        return only_text(rows, measure.strip_prefix("only ").unwrap_or(measure)).unwrap();
+/// Returns one value of `AGGREGATE COLUMN`: a number with so many decimals, or the text in which all
+/// rows agree.
+fn one(rows: &[&Row], measure: &str, decimals: usize) -> Option<String> {
+    if let Some(value) = Measure::parse(measure).unwrap().of_rows(rows).unwrap() {
+        return Some(format!("{value:.decimals$}"));
     }
-    Measure::parse(measure).unwrap().of_rows(rows).unwrap().map(|value| write(value, format))
+    let column = measure.strip_prefix("only ")?;
+    let texts: BTreeSet<&String> = rows.iter().filter_map(|row| row.get(column)).collect();
+    let mut texts = texts.into_iter().filter(|text| !text.is_empty());
+    let text = texts.next().cloned();
+    assert_eq!(texts.next(), None, "{column} has several values");
+    text
 }
 
 /// Returns the text of a whole measure over some rows; empty if they have no value.
-fn show(rows: &[&Row], measure: &str, format: &str) -> String {
+fn show(rows: &[&Row], measure: &str, decimals: usize) -> String {
     let (measure, beside) = measure.split_once(" (").unwrap_or((measure, ""));
     let (measure, ends) = measure.split_once(" [").unwrap_or((measure, ""));
-    let mut text = one(rows, measure, format).unwrap_or_default();
+    let mut text = one(rows, measure, decimals).unwrap_or_default();
     if let Some((low, high)) = ends.trim_end_matches(']').split_once(", ") {
-        let low = one(rows, &format!("min {low}"), format);
-        let high = one(rows, &format!("max {high}"), format);
+        let low = one(rows, &format!("min {low}"), decimals);
+        let high = one(rows, &format!("max {high}"), decimals);
         if let Some((low, high)) = low.zip(high) {
             text += &format!(" [{low}, {high}]");
         }
     }
-    let beside = beside.trim_end_matches(')');
-    if let Some(beside) = Some(beside)
-        .filter(|column| !column.is_empty())
-        .and_then(|column| further(rows, column, format))
+    if let Some(column) = beside.strip_suffix(')')
+        && let Some(beside) = one(rows, &format!("only {column}"), decimals)
     {
         text += &format!(" ({beside})");
     }
@@ -140,7 +129,7 @@ fn show(rows: &[&Row], measure: &str, format: &str) -> String {
 }
 
 /// Returns a Markdown table of `ROWS × COLUMNS`; ROWS may be several columns, with ` + ` between.
-fn pivot(rows: &[Row], axes: &str, measure: &str, format: &str) -> String {
+fn pivot(rows: &[Row], axes: &str, measure: &str, decimals: usize) -> String {
     let (down, across) =
         axes.split_once(" × ").unwrap_or_else(|| panic!("{axes}: expected ROWS × COLUMNS"));
     let down: Vec<&str> = down.split(" + ").collect();
@@ -160,7 +149,7 @@ fn pivot(rows: &[Row], axes: &str, measure: &str, format: &str) -> String {
         }
         for column in &columns {
             let here = group(&of_line, &[across], std::slice::from_ref(column));
-            cells.push(escape(&show(&here, measure, format)));
+            cells.push(escape(&show(&here, measure, decimals)));
         }
         lines.push(format!("| {} |", cells.join(" | ")));
     }
@@ -200,16 +189,16 @@ fn heading(column: &str, name: &str) -> String {
 }
 
 #[test]
-fn values_are_written_in_their_format_and_a_table_has_empty_cells_where_no_row_is() {
+fn values_are_rounded_and_a_table_has_empty_cells_where_no_row_is() {
     let text = "scene,method,cost,rays\na,\"x, y\",2,4\na,z,3,4\nb,z,5,\n";
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let rows: Vec<Row> = reader.deserialize().map(Result::unwrap).collect();
     let all: Vec<&Row> = rows.iter().collect();
-    let shown = |measure: &str, format: &str| show(&all, measure, format);
-    assert_eq!(shown("median cost", "1"), "3.0");
-    assert_eq!(shown("max cost [cost, cost]", "0"), "5 [2, 5]");
-    assert_eq!(shown("min cost / rays (rays)", "0 percent"), "50 (400)");
-    let table = pivot(&rows, "scene × method", "only cost", "0");
+    let shown = |measure: &str, decimals| show(&all, measure, decimals);
+    assert_eq!(shown("median cost", 1), "3.0");
+    assert_eq!(shown("max cost [cost, cost]", 0), "5 [2, 5]");
+    assert_eq!(shown("min cost / rays (rays)", 1), "0.5 (4.0)");
+    let table = pivot(&rows, "scene × method", "only cost", 0);
     assert_eq!(table, "| scene | x, y | z |\n|---|---|---|\n| a | 2 | 3 |\n| b |  | 5 |");
 }
 

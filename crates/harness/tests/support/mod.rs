@@ -7,7 +7,7 @@ mod program;
 use bvh_core::Bvh;
 use bvh_core::file::{self, Origin};
 use bvh_scenes::Scene;
-use harness::report::query::{self, Row};
+use harness::report::query::Row;
 pub use program::*;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -111,7 +111,7 @@ pub fn reproducible(folder: &Path) -> Vec<(String, Vec<u8>)> {
 
 /// The rows of a CSV file by column names.
 pub fn rows(path: &Path) -> Vec<Row> {
-    query::read(path).unwrap()
+    harness::rows::read(path).unwrap()
 }
 
 /// Saves a tree over the scene's objects in a file.
