@@ -5,7 +5,7 @@ use super::legend::Legend;
 use super::model::Figure;
 use super::panel::Plot;
 use super::style::{GREY, INK, Strokes};
-use super::text::{BODY, Fonts, TITLE};
+use super::text::{self, BODY, TITLE};
 
 /// Width of every figure in pixels.
 const WIDTH: f64 = 680.0;
@@ -20,15 +20,14 @@ const GUTTER: (f64, f64) = (16.0, 16.0);
 ///
 /// Skips points that an axis cannot show: see [`Marks`](super::Marks).
 pub fn svg(figure: &Figure) -> String {
-    let fonts = Fonts::new();
     let strokes = Strokes::new(figure);
     let room = WIDTH - 2.0 * BORDER;
-    let title = fonts.wrap(&figure.title, room, TITLE);
-    let caption = fonts.wrap(&figure.caption, room, BODY);
+    let title = text::wrap(&figure.title, room, TITLE);
+    let caption = text::wrap(&figure.caption, room, BODY);
     let below_title = BORDER + TITLE.line() * title.len() as f64;
     let below_caption = below_title + BODY.line() * caption.len() as f64 + 8.0;
-    let legend = Legend::new(figure, &strokes, room, &fonts);
-    let (panels, height) = arrange(figure, below_caption + legend.height(), &fonts);
+    let legend = Legend::new(figure, &strokes, room);
+    let (panels, height) = arrange(figure, below_caption + legend.height());
     canvas::svg(&figure.title, (WIDTH, height), |sheet| {
         sheet.lines((BORDER, BORDER), &title, TITLE, INK, Align::Left);
         sheet.lines((BORDER, below_title), &caption, BODY, GREY, Align::Left);
@@ -38,11 +37,11 @@ pub fn svg(figure: &Figure) -> String {
 }
 
 /// Finds places for the plots of all panels, below `top`. Returns them and the figure's height.
-fn arrange<'a>(figure: &'a Figure, top: f64, fonts: &Fonts) -> (Vec<(Plot<'a>, Frame)>, f64) {
+fn arrange<'a>(figure: &'a Figure, top: f64) -> (Vec<(Plot<'a>, Frame)>, f64) {
     let most = figure.columns.clamp(1, HEIGHTS.len()).min(figure.panels.len().max(1));
     // Labels next to the plots determine the width left for them, and with it the lines below.
     let side_by_side = |columns: usize| {
-        let plot = |panel| Plot::new(panel, HEIGHTS[columns - 1], fonts);
+        let plot = |panel| Plot::new(panel, HEIGHTS[columns - 1]);
         let plots: Vec<Plot> = figure.panels.iter().map(plot).collect();
         let beside = plots.iter().map(|plot| plot.left).fold(0.0, f64::max);
         let column_width = (WIDTH - 2.0 * BORDER) / columns as f64;
@@ -54,8 +53,8 @@ fn arrange<'a>(figure: &'a Figure, top: f64, fonts: &Fonts) -> (Vec<(Plot<'a>, F
         .filter(|(_, _, beside, width)| room(*beside, *width) >= 0.5 * width)
         .unwrap_or_else(|| side_by_side(1));
     let room = room(beside, column_width);
-    let width = plots.iter().map(|plot| plot.width_beside_texts(room, fonts)).fold(room, f64::min);
-    plots.iter_mut().for_each(|plot| plot.fit_width(width, fonts));
+    let width = plots.iter().map(|plot| plot.width_beside_texts(room)).fold(room, f64::min);
+    plots.iter_mut().for_each(|plot| plot.fit_width(width));
     for upper in 0..plots.len().saturating_sub(columns) {
         let (above, below) = plots.split_at_mut(upper + 1);
         above[upper].share_x_label(&below[columns - 1]);

@@ -3,7 +3,7 @@
 use super::canvas::{Align, Frame, Point, Sheet};
 use super::model::{Figure, Layer, Marks};
 use super::style::{BAND, INK, REFERENCE_LINE, Stroke, Strokes};
-use super::text::{BODY, Fonts};
+use super::text::{self, BODY};
 
 /// Width of a sample.
 const SAMPLE: f64 = 30.0;
@@ -31,7 +31,7 @@ pub(super) struct Legend {
 }
 
 impl Legend {
-    pub fn new(figure: &Figure, strokes: &Strokes, width: f64, fonts: &Fonts) -> Self {
+    pub fn new(figure: &Figure, strokes: &Strokes, width: f64) -> Self {
         let layers = || figure.panels.iter().flat_map(|panel| &panel.layers);
         let entry = |(name, stroke): &(String, Stroke)| {
             let has = |kind: fn(&Layer) -> bool| {
@@ -53,15 +53,15 @@ impl Legend {
                 entries.push(Entry { name, stroke, line: true, marker: false, area: false });
             }
         }
-        Self::arrange(entries, width, fonts)
+        Self::arrange(entries, width)
     }
 
-    fn arrange(mut entries: Vec<Entry>, width: f64, fonts: &Fonts) -> Self {
+    fn arrange(mut entries: Vec<Entry>, width: f64) -> Self {
         let before = SAMPLE + GAPS.0;
         let room = width - before;
-        entries.iter_mut().for_each(|entry| entry.name = fonts.shorten(&entry.name, room, BODY));
+        entries.iter_mut().for_each(|entry| entry.name = text::shorten(&entry.name, room, BODY));
         let column_width =
-            before + fonts.widest(entries.iter().map(|entry| &entry.name), BODY) + GAPS.1;
+            before + text::widest(entries.iter().map(|entry| &entry.name), BODY) + GAPS.1;
         let most = (((width + GAPS.1) / column_width).floor() as usize).max(1);
         // As even rows as possible: 4 + 4 rather than 7 + 1.
         let columns = entries.len().div_ceil(entries.len().div_ceil(most).max(1)).max(1);

@@ -5,7 +5,7 @@ use super::canvas::{Align, Frame, Sheet, WHITE};
 use super::layers::Layers;
 use super::model::{Marks, Panel, Scale, Unit};
 use super::style::{FAINT, GREY, GRID, INK, Strokes};
-use super::text::{BODY, Fonts, HEADING};
+use super::text::{self, BODY, HEADING};
 
 /// Length of ticks; their labels are twice as far from the axis.
 const TICK: f64 = 4.0;
@@ -40,18 +40,18 @@ pub(super) struct Plot<'a> {
 impl<'a> Plot<'a> {
     /// Finds the ranges of both axes and the ticks of a y axis of this height, unless rows have
     /// another.
-    pub fn new(panel: &'a Panel, height: f64, fonts: &Fonts) -> Self {
+    pub fn new(panel: &'a Panel, height: f64) -> Self {
         let (x, mut y, has_data) = axes(panel);
         y.rule((height / 34.0) as usize);
-        let y_label = fonts.wrap(&panel.y.label, height, BODY);
+        let y_label = text::wrap(&panel.y.label, height, BODY);
         let (names, height) = match &panel.y.scale {
             Scale::Rows(names, row) => (
-                names.iter().map(|name| fonts.shorten(name, NAMES, BODY)).collect(),
+                names.iter().map(|name| text::shorten(name, NAMES, BODY)).collect(),
                 row * names.len() as f64,
             ),
             _ => (Vec::new(), height),
         };
-        let widest = fonts.widest(y.major.iter().map(|tick| &tick.1).chain(&names), BODY);
+        let widest = text::widest(y.major.iter().map(|tick| &tick.1).chain(&names), BODY);
         let left = (2.0 * TICK + widest + LABEL + BODY.line() * y_label.len() as f64).ceil();
         Self {
             panel,
@@ -81,31 +81,31 @@ impl<'a> Plot<'a> {
     }
 
     /// Returns the greatest width of the plot with which its texts are not wider than this.
-    pub fn width_beside_texts(&self, width: f64, fonts: &Fonts) -> f64 {
-        let fits = |(x, _, name): (f64, f64, &str)| (width - BESIDE - fonts.width(name, BODY)) / x;
+    pub fn width_beside_texts(&self, width: f64) -> f64 {
+        let fits = |(x, _, name): (f64, f64, &str)| (width - BESIDE - text::width(name, BODY)) / x;
         self.anchors().map(fits).fold(width, f64::min).max(0.4 * width)
     }
 
     /// Finds the ticks of an x axis of this width, breaks the texts above and below into lines,
     /// and finds places for the texts in the plot.
-    pub fn fit_width(&mut self, width: f64, fonts: &Fonts) {
+    pub fn fit_width(&mut self, width: f64) {
         let apart = if self.panel.x.scale == Scale::Log { 55.0 } else { 40.0 };
         // Fewer ticks, not some without a label, keep the distances between them regular.
         for most in (2..=((width / apart) as usize).max(2)).rev() {
             self.x.rule(most);
-            if !self.labels_touch(width, fonts) {
+            if !self.labels_touch(width) {
                 break;
             }
         }
-        self.title = fonts.wrap(&self.panel.title, width, HEADING);
+        self.title = text::wrap(&self.panel.title, width, HEADING);
         self.above = HEADING.line() * self.title.len() as f64 + 5.0;
-        self.x_label = fonts.wrap(&self.panel.x.label, width, BODY);
+        self.x_label = text::wrap(&self.panel.x.label, width, BODY);
         let ticks = if self.panel.x.unit == Unit::Bare { 0.0 } else { 2.0 * TICK + BODY.line() };
         self.below = (ticks + LABEL + BODY.line() * self.x_label.len() as f64).ceil();
         let mut texts: Vec<_> = self
             .anchors()
             .map(|(x, y, name)| {
-                (x * width + BESIDE, y * self.height, fonts.width(name, BODY), name)
+                (x * width + BESIDE, y * self.height, text::width(name, BODY), name)
             })
             .collect();
         texts.sort_by(|one, other| one.1.total_cmp(&other.1));
@@ -123,9 +123,9 @@ impl<'a> Plot<'a> {
     }
 
     /// Returns true if two neighbouring labels of the x axis leave no gap between them.
-    fn labels_touch(&self, width: f64, fonts: &Fonts) -> bool {
+    fn labels_touch(&self, width: f64) -> bool {
         let ends = self.x.major.iter().map(|(at, label)| {
-            let (middle, half) = (self.x.fraction(*at) * width, fonts.width(label, BODY) / 2.0);
+            let (middle, half) = (self.x.fraction(*at) * width, text::width(label, BODY) / 2.0);
             (middle - half, middle + half)
         });
         let ends: Vec<(f64, f64)> = ends.collect();
@@ -201,19 +201,15 @@ mod tests {
 
     #[test]
     fn labels_below_a_plot_of_any_width_are_as_far_apart_as_each_other_and_touch_nowhere() {
-        let fonts = Fonts::new();
         let ends = [(1.0, 1.065), (0.0, 256_000.0), (-0.04, 0.01)];
         for (low, high) in ends {
             let panel = Panel { x: Axis::linear("").range(low, high), ..Panel::default() };
             for width in (160..600).step_by(10) {
-                let mut plot = Plot::new(&panel, 100.0, &fonts);
-                plot.fit_width(f64::from(width), &fonts);
+                let mut plot = Plot::new(&panel, 100.0);
+                plot.fit_width(f64::from(width));
                 let ticks: Vec<f64> = plot.x.major.iter().map(|tick| tick.0).collect();
                 let gaps: Vec<f64> = ticks.windows(2).map(|pair| pair[1] - pair[0]).collect();
-                assert!(
-                    ticks.len() > 1 && !plot.labels_touch(f64::from(width), &fonts),
-                    "{ticks:?}"
-                );
+                assert!(ticks.len() > 1 && !plot.labels_touch(f64::from(width)), "{ticks:?}");
                 assert!(gaps.iter().all(|gap| (gap / gaps[0] - 1.0).abs() < 1e-6), "{ticks:?}");
             }
         }
