@@ -5,15 +5,9 @@ use super::data::{Series, ratio};
 use super::prelude::*;
 use crate::statistics::quartiles;
 
-bvh_config::config! { serde;
+report! {
     /// Error against run time.
     pub struct Config {
-        /// Section or topic of the report.
-        source: String;
-        /// Heading.
-        title: String;
-        /// What the rows say, the title of the figure, as in a report of the kind `query`.
-        finding: String;
         /// Name of the files; several such reports of one experiment need different ones.
         file: String = "anytime".into();
         /// Labels of the methods. One event per run, as a builder has, is shown as a point.
@@ -45,7 +39,7 @@ const PER_DECADE: f64 = 20.0;
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let mut output = Output::new(&self.source, &self.title);
+        let mut output = Output::default();
         let caption = "Median and quartiles over repetitions. Points are builders. A curve falls \
                        through the floor where it is the best known.";
         let mut points = Vec::new();
@@ -65,9 +59,7 @@ impl Config {
             panels.push(panel(rows.shown(scene), x, y, layers));
         }
         let file = format!("timing_{}", self.file);
-        let caption = format!("{}. {caption}", output.heading);
         output.add_csv(&file, &corners(&points))?;
-        output.say(&self.finding, rows)?;
         output.add_figure(file, caption, 2, panels);
         Ok(output)
     }

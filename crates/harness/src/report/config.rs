@@ -3,6 +3,37 @@
 use crate::rows;
 use bvh_config::{Accepts, OutOfRange};
 
+/// Declares the configuration of a kind of reports: its own keys after those that all kinds have.
+macro_rules! report {
+    ($(#[$doc:meta])* pub struct Config { $($keys:tt)* } $($check:tt)*) => {
+        bvh_config::config! { serde;
+            $(#[$doc])*
+            pub struct Config {
+                /// Place in the paper, such as `Figure 2`, or topic.
+                source: String;
+                /// The report in words.
+                title: String;
+                /// What the rows say, the title of figures. `{CONDITIONS | MEASURE}` in it is a
+                /// number of the table, `{FILE | CONDITIONS | MEASURE}` of another file of the
+                /// experiment.
+                finding: String;
+                /// Reason for differences from the paper.
+                reason: String;
+                $($keys)*
+            }
+            $($check)*
+        }
+
+        impl Config {
+            pub(super) fn headed(&self, output: Output, rows: &Rows) -> Result<Output, Error> {
+                let Self { source, title, finding, reason, .. } = self;
+                output.headed(source, title, finding, reason, rows)
+            }
+        }
+    };
+}
+pub(crate) use report;
+
 /// Accepts lists that are not empty.
 #[derive(Clone, Copy, Debug)]
 pub struct OneOrMore;

@@ -11,15 +11,9 @@ use crate::rows::{RunRow, VisitRow};
 use crate::statistics::{pearson, pearson_interval, spearman};
 use bvh_config::above;
 
-bvh_config::config! { serde;
+report! {
     /// Costs against tests per ray.
     pub struct Config {
-        /// Section or topic of the report.
-        source: String;
-        /// Heading.
-        title: String;
-        /// What the rows say, the title of the figure, as in a report of the kind `query`.
-        finding: String;
         /// Labels of the methods, the paper's own case first. Trees of each method are compared
         /// with each other only.
         methods: Vec<String>, in OneOrMore;
@@ -28,8 +22,6 @@ bvh_config::config! { serde;
         paper_says: Option<String>;
         /// Least value of Pearson's correlation for which these words hold.
         paper_from: f64 = 0.9, in above(0.0);
-        /// Reason for differences from the paper.
-        reason: String;
     }
 }
 
@@ -142,9 +134,8 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
             }
         }
     }
-    let mut output = Output::new(&config.source, &config.title);
+    let mut output = Output::default();
     output.add_csv("correlation", &correlations)?;
-    output.say(&config.finding, rows)?;
     let caption = format!(
         "One point per tree, the same rays for all trees of a scene. ρ is Spearman's rank correlation over the trees of ‘{}’.",
         config.case()
@@ -185,8 +176,7 @@ impl Config {
                 Verdict::Inconclusive
             };
             let quantity = "Pearson's correlation of cost and tests per ray over insertion orders";
-            let compared =
-                PaperRow::new(&self.source, rows.shown(row.scene), quantity, &self.reason);
+            let compared = PaperRow::new(rows.shown(row.scene), quantity);
             let rule = format!(
                 "its 95 % interval lies from {} on; it differs if the interval lies below",
                 self.paper_from

@@ -6,22 +6,14 @@ use crate::statistics::{mean, quantile, range, sorted};
 use bvh_config::above;
 use bvh_scenes::SceneKind;
 
-bvh_config::config! { serde;
+report! {
     /// The distribution of costs over trials.
     pub struct Config {
-        /// The section or topic that it belongs to.
-        source: String;
-        /// Heading.
-        title: String;
-        /// What the rows say, the title of the figure, as in a report of the kind `query`.
-        finding: String;
         /// Labels of the methods.
         methods: Vec<String>, in OneOrMore;
         /// Within which fraction of the greedy tree's cost the paper finds the majority of trials.
         #[serde(skip_serializing_if = "Option::is_none")]
         paper_majority_within: Option<f64>, in above(0.0);
-        /// Why ours differs, where it does.
-        reason: String;
     }
 }
 
@@ -51,7 +43,7 @@ pub(super) struct Summary<'a> {
 }
 
 pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
-    let mut output = Output::new(&config.source, &config.title);
+    let mut output = Output::default();
     let mut summaries = Vec::new();
     let mut panels = Vec::new();
     for scene in rows.scenes() {
@@ -74,9 +66,7 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
         output.paper.extend(config.majority(rows, method));
     }
     output.add_csv("distribution", &summaries)?;
-    output.say(&config.finding, rows)?;
-    let caption = format!("{}. Every trial of every repetition.", output.heading);
-    output.add_figure("distribution", caption, 2, panels);
+    output.add_figure("distribution", "Every trial of every repetition.", 2, panels);
     let columns = "scene method lowest_cost median_cost highest_cost relative_deviation base_cost";
     output.show("Costs of all trials:", &summaries, columns)?;
     Ok(output)
@@ -94,7 +84,7 @@ impl Config {
             fraction_below(&rows.trial_costs(scene, method), limit)
         }))?;
         let quantity = format!("{method}, fraction of trials within {} % of base", 100.0 * within);
-        let row = PaperRow::new(&self.source, "all stand-ins", quantity, &self.reason);
+        let row = PaperRow::new("all stand-ins", quantity);
         let verdict = if low > 0.5 { Verdict::Agrees } else { Verdict::Differs };
         let ours = format!("{:.0} to {:.0} %", 100.0 * low, 100.0 * high);
         let row = row.compare("the majority", ours, verdict, "above one half on every scene");

@@ -5,13 +5,9 @@ use crate::statistics::quantile;
 use bvh_scenes::subset::Subset;
 use std::collections::{BTreeMap, BTreeSet};
 
-bvh_config::config! { serde;
+report! {
     /// Gaps to the exact optimum.
     pub struct Config {
-        /// Heading.
-        title: String;
-        /// What the rows say, the title of the figure, as in a report of the kind `query`.
-        finding: String;
         /// Labels of the methods to compare. Their trees must be binary with one object per leaf.
         methods: Vec<String>, in OneOrMore;
         /// Label of the method that finds the optimum.
@@ -44,10 +40,9 @@ pub(super) struct Gaps<'a> {
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let summaries = self.summaries(rows);
-        let mut output = Output::new("", &self.title);
+        let mut output = Output::default();
         output.add_csv("gaps", &summaries)?;
         let optima = rows.runs.iter().filter(|run| run.method == self.optimum).count();
-        output.say(&self.finding, rows)?;
         let caption = format!(
             "{optima} small scenes. Left, the fraction of runs that end at the optimum; right, the \
              worst gap of any."

@@ -8,15 +8,9 @@ use crate::statistics::{expected_best_of, mean, median, range};
 use bvh_config::{OutOfRange, above};
 use std::collections::BTreeMap;
 
-bvh_config::config! { serde;
+report! {
     /// Cost against generation.
     pub struct Config {
-        /// Place in the paper, such as `Figure 2`.
-        source: String;
-        /// Heading.
-        title: String;
-        /// What the rows say, the title of the figure, as in a report of the kind `query`.
-        finding: String;
         /// Label of the genetic algorithm.
         method: String;
         /// Label of the random picking of orders that it is compared with.
@@ -29,8 +23,6 @@ bvh_config::config! { serde;
         /// The paper's words on the gain, where it gives no number.
         #[serde(skip_serializing_if = "Option::is_none")]
         paper_says: Option<String>;
-        /// Reason for differences from the paper.
-        reason: String;
     }
     check Self::check_order;
 }
@@ -62,7 +54,7 @@ const GAIN_TOLERANCE: f64 = 0.05;
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let mut output = Output::new(&self.source, &self.title);
+        let mut output = Output::default();
         let mut generations = Vec::new();
         let mut panels = Vec::new();
         for scene in rows.scenes() {
@@ -93,14 +85,10 @@ impl Config {
             let average = mean(random.iter().copied());
             output.paper.extend(self.compare(scene, rows, &ends, average));
         }
-        let caption = format!(
-            "{}. Goldsmith–Salmon cost of the best tree so far: the run whose final cost is the \
+        let caption = "Goldsmith–Salmon cost of the best tree so far: the run whose final cost is the \
              median and, of several runs, the range. Random picking: the exact expectation for as \
-             many orders, as far as so many were drawn.",
-            output.heading
-        );
+             many orders, as far as so many were drawn.";
         output.add_csv("generations", &generations)?;
-        output.say(&self.finding, rows)?;
         output.add_figure("generations", caption, 1, panels);
         Ok(output)
     }
@@ -122,7 +110,7 @@ impl Config {
             return vec![];
         };
         let shown = &rows.shown(scene);
-        let row = |quantity: &str| PaperRow::new(&self.source, shown, quantity, &self.reason);
+        let row = |quantity: &str| PaperRow::new(shown, quantity);
         let spread = self.paper_final.get(scene).map(|&[paper_low, paper_high]| {
             let spread = |low: f64, high: f64| 2.0 * (high - low) / (high + low);
             let (paper, ours) = (spread(paper_low, paper_high), spread(low, high));

@@ -79,7 +79,7 @@ macro_rules! reports {
 
             fn write(&self, rows: &Rows) -> Result<Output, Error> {
                 match self {
-                    $(Self::$kind(config) => $write(config, rows),)*
+                    $(Self::$kind(config) => config.headed($write(config, rows)?, rows),)*
                 }
             }
         }

@@ -5,11 +5,9 @@ use super::data::{Series, ratio};
 use super::prelude::*;
 use crate::statistics::{order_quantile, quartiles};
 
-bvh_config::config! { serde;
+report! {
     /// Numbers of every method on every scene.
     pub struct Config {
-        /// Heading.
-        title: String;
         /// Labels of the methods.
         methods: Vec<String>, in OneOrMore;
         /// Distances above the best known cost or exact optimum in per cent, for a table of the
@@ -115,7 +113,7 @@ impl Config {
                 }
             }
         }
-        let mut output = Output::new("", &self.title);
+        let mut output = Output::default();
         output.add_csv("numbers", &numbers)?;
         output.add_csv("timing_numbers", &timing)?;
         let explanation = "Gaps are to the best known cost; the lower bound is relative to that:";

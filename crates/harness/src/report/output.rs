@@ -39,6 +39,33 @@ impl Output {
         Self { heading, ..Self::default() }
     }
 
+    /// Adds the heading, and what the rows say. Figures whose title is that have the heading in
+    /// their captions.
+    pub fn headed(
+        mut self,
+        source: &str,
+        title: &str,
+        finding: &str,
+        reason: &str,
+        rows: &Rows,
+    ) -> Result<Self, Error> {
+        self.heading = Self::new(source, title).heading;
+        self.say(finding, rows)?;
+        for (_, figure) in &mut self.figures {
+            figure.title.clone_from(self.finding.as_ref().unwrap_or(&self.heading));
+            if self.finding.is_some() {
+                figure.caption = format!("{}. {}", self.heading, figure.caption);
+            }
+        }
+        for row in &mut self.paper {
+            row.source = source.into();
+            if row.reason.is_empty() {
+                row.reason = reason.into();
+            }
+        }
+        Ok(self)
+    }
+
     /// Writes the figures into the store's folder, as SVG.
     pub fn draw(&self, store: &Store) -> Result<(), Error> {
         for (name, figure) in &self.figures {
@@ -59,11 +86,14 @@ impl Output {
         Ok(())
     }
 
-    /// Sets what the rows say, the title of figures: a text in which numbers of the CSV file that
-    /// was added last and of other files are [filled in](filled). Nothing if the text is empty, or
-    /// if there is no such row, as in a quick variant with other scenes.
-    pub fn say(&mut self, finding: &str, rows: &Rows) -> Result<(), Error> {
-        let own = self.csv.last().map_or(&[][..], |(_, bytes)| bytes);
+    /// Sets what the rows say: a text in which numbers of the first CSV file and of other files are
+    /// [filled in](filled). Nothing if the text is empty, or if there is no such row, as in a quick
+    /// variant with other scenes.
+    fn say(&mut self, finding: &str, rows: &Rows) -> Result<(), Error> {
+        if finding.is_empty() {
+            return Ok(());
+        }
+        let own = self.csv.first().map_or(&[][..], |(_, bytes)| bytes);
         let read = |file: &str| match file {
             "" => parse(own, Path::new("the table")),
             file => read(&rows.folder.join(file)),
@@ -71,7 +101,7 @@ impl Output {
         let read = |file: &str| read(file).map_err(|error| QueryError::File(error.to_string()));
         self.finding = match filled(finding, &read) {
             Err(QueryError::NoRow(_)) => None,
-            Ok(said) => Some(said).filter(|said| !said.is_empty()),
+            Ok(said) => Some(said),
             Err(error) => {
                 let message = format!("finding: {error}");
                 return Err(Error::Query { path: rows.folder.clone(), message });
@@ -88,7 +118,7 @@ impl Output {
         columns: usize,
         panels: Vec<Panel>,
     ) {
-        let title = self.finding.as_ref().unwrap_or(&self.heading).clone();
+        let title = self.finding.clone().unwrap_or_default();
         let series = panels.iter().flat_map(|panel| &panel.layers).filter_map(Layer::series);
         let looks = series.filter_map(|name| Some((name.to_owned(), look(name)?))).collect();
         self.figures

@@ -7,7 +7,7 @@ use super::prelude::*;
 use crate::statistics::{median, range};
 use bvh_config::Nested;
 
-bvh_config::config! { serde;
+report! {
     /// Error against run time of all scenes in one panel, `overview.svg`.
     pub struct Config {
         /// Methods that take their own time, by the name of their point.
@@ -86,7 +86,7 @@ impl Config {
         );
         let x = Axis::log("time on one thread").unit(Unit::Seconds);
         let y = Axis::log("").unit(Unit::Percent);
-        let mut output = Output::new("", "Error against run time");
+        let mut output = Output::default();
         output.finding = Some(finding);
         output.add_figure(FIGURE, caption, 1, vec![panel("", x, y, layers)]);
         Ok(output)

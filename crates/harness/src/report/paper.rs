@@ -34,15 +34,10 @@ pub struct PaperRow {
 }
 
 impl PaperRow {
-    /// Makes a row without numbers about the section `source` of the paper.
-    pub fn new(
-        source: &str,
-        scene: impl Into<String>,
-        quantity: impl Into<String>,
-        reason: &str,
-    ) -> Self {
+    /// Makes a row without numbers.
+    pub fn new(scene: impl Into<String>, quantity: impl Into<String>) -> Self {
         Self {
-            source: source.into(),
+            source: String::new(),
             scene: scene.into(),
             quantity: quantity.into(),
             paper: String::new(),
@@ -53,8 +48,14 @@ impl PaperRow {
             ours_high: None,
             verdict: Verdict::NotInPaper,
             rule: String::new(),
-            reason: reason.into(),
+            reason: String::new(),
         }
+    }
+
+    /// Adds a reason other than that of the whole report.
+    #[must_use]
+    pub fn because(self, reason: &str) -> Self {
+        Self { reason: reason.into(), ..self }
     }
 
     /// Adds both sides as they are shown, the verdict on them, and its rule.
@@ -163,7 +164,7 @@ mod tests {
     use super::*;
 
     fn verdict(paper: f64, ours: f64, interval: Option<(f64, f64)>) -> Verdict {
-        PaperRow::new("", "", "", "").compare_ratios(paper, ours, interval, 0.02).verdict
+        PaperRow::new("", "").compare_ratios(paper, ours, interval, 0.02).verdict
     }
 
     #[test]

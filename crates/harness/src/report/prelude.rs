@@ -1,6 +1,6 @@
 //! Items that every kind of report uses: an experiment's rows in, tables and figures out.
 
-pub(crate) use super::config::OneOrMore;
+pub(crate) use super::config::{OneOrMore, report};
 pub(crate) use super::data::Rows;
 pub(crate) use super::output::{Dot, Output, dots, panel};
 pub(crate) use crate::Error;

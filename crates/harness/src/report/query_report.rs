@@ -12,13 +12,9 @@ use super::query_measure::filled;
 use crate::rows;
 use bvh_config::{Nested, OutOfRange};
 
-bvh_config::config! { serde;
+report! {
     /// A table of some rows of a CSV file, and a figure of it.
     pub struct Config {
-        /// Section of the paper, or topic.
-        source: String;
-        /// Heading.
-        title: String;
         /// Name of the CSV file that is made, without its extension: letters, digits, `-` and `_`.
         /// A file with seconds needs a name that begins with `timing`.
         file: String;
@@ -41,11 +37,6 @@ bvh_config::config! { serde;
         columns: Vec<Column>, in Nested;
         /// Ratios within this relative distance of the paper's agree with it.
         tolerance: f64 = 0.05, in 0.0..=1.0;
-        /// Reason for differences from the paper.
-        reason: String;
-        /// What the table says, the title of the figure. `{CONDITIONS | MEASURE}` in it is a number
-        /// of the table, `{FILE | CONDITIONS | MEASURE}` of another file of the experiment.
-        finding: String;
         /// A figure of the table.
         #[serde(skip_serializing_if = "Option::is_none")]
         figure: Option<Drawing>, in Nested;
@@ -65,13 +56,12 @@ impl Config {
             |error: QueryError| Error::Query { path: path.clone(), message: error.to_string() };
         let selected = query::select(selected, &self.select).map_err(named)?;
         let table = self.table(&selected).map_err(named)?;
-        let mut output = Output::new(&self.source, &self.title);
+        let mut output = Output::default();
         let columns: Vec<&String> = table.first().map_or(vec![], |row| row.keys().collect());
         let bytes = table_bytes(&table)?;
-        output.show_csv(&format!("{}:", self.title), &bytes, &columns)?;
+        output.show_csv(&format!("By {}:", self.by.join(", ")), &bytes, &columns)?;
         output.csv.push((self.file.clone(), bytes));
         output.paper = self.compare(rows, &table).map_err(named)?;
-        output.say(&self.finding, rows)?;
         if let Some(figure) = &self.figure {
             let panels = figure.panels(rows, &table);
             output.add_figure(&self.file, &figure.caption, figure.per_row, panels);
@@ -143,7 +133,7 @@ impl Config {
                     let scene = row.get("scene").map_or(String::new(), |scene| rows.shown(scene));
                     let quantity = format!("{}, {}", column.label(), self.subject(row));
                     let interval = number("_low").zip(number("_high"));
-                    let row = PaperRow::new(&self.source, scene, quantity, &self.reason);
+                    let row = PaperRow::new(scene, quantity);
                     compared.push(row.compare_ratios(paper, ours, interval, self.tolerance));
                 }
             }

@@ -7,15 +7,9 @@ use crate::rows::TestRow;
 use crate::statistics::{geometric_mean, student};
 use std::collections::BTreeMap;
 
-bvh_config::config! { serde;
+report! {
     /// A comparison of trees by the tests of rays that they were not trained on.
     pub struct Config {
-        /// The section or topic that it belongs to.
-        source: String;
-        /// Heading.
-        title: String;
-        /// What the rows say, the title of the figure, as in a report of the kind `query`.
-        finding: String;
         /// Label of the method that the others are compared with.
         base: String;
         /// Pairs of labels: whether trees of the second take more tests than those of the first.
@@ -76,14 +70,10 @@ impl Config {
             rows.tests.iter().filter_map(|row| compared(rows, row, &self.base)).collect();
         let means = means(&table);
         table.extend(means);
-        let mut output = Output::new(&self.source, &self.title);
+        let mut output = Output::default();
         output.add_csv("ray_cost", &table)?;
-        output.say(&self.finding, rows)?;
-        let caption = format!(
-            "{}. Tests of nodes and blocks of triangles in the wide layout, of rays that no tree was \
-             trained on; lines are 95 % intervals, which means have not.",
-            output.heading
-        );
+        let caption = "Tests of nodes and blocks of triangles in the wide layout, of rays that no tree was \
+             trained on; lines are 95 % intervals, which means have not.";
         // The mean of all scenes says the most, so it comes first.
         let scenes = rows.scenes().into_iter().map(|scene| (rows.shown(scene), scene));
         let panels = [(ALL.to_owned(), ALL)].into_iter().chain(scenes);

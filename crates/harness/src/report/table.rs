@@ -8,15 +8,9 @@ use crate::statistics::{expected_best_of, median, minimum, range};
 use bvh_config::{Accepts, Nested, above};
 use std::collections::BTreeMap;
 
-bvh_config::config! { serde;
+report! {
     /// A table of cost ratios.
     pub struct Config {
-        /// Place in the paper, such as `Table 4`.
-        source: String;
-        /// Heading.
-        title: String;
-        /// What the rows say, the title of the figure, as in a report of the kind `query`.
-        finding: String;
         /// Ratios within this relative distance of the paper's agree with it.
         tolerance: f64 = 0.02, in 0.0..=1.0;
         /// The columns; the paper's ratios are to its values in the first.
@@ -96,11 +90,9 @@ impl Config {
         for scene in rows.scenes() {
             cells.extend(self.columns.iter().filter_map(|column| self.cell(rows, scene, column)));
         }
-        let mut output = Output::new(&self.source, &self.title);
+        let mut output = Output::default();
         output.add_csv("table", &cells)?;
-        output.say(&self.finding, rows)?;
-        let caption = format!("{}. {}", output.heading, caption(&cells));
-        output.add_figure("table", caption, 1, vec![self.draw(rows, &cells)]);
+        output.add_figure("table", caption(&cells), 1, vec![self.draw(rows, &cells)]);
         output.paper = if self.are_readings() {
             let scenes = rows.scenes().into_iter();
             scenes.filter_map(|scene| self.compare_readings(rows, scene, &cells)).collect()
@@ -189,7 +181,7 @@ impl Config {
     /// Compares a number of the paper with ours.
     fn compare(&self, rows: &Rows, cell: &Cell) -> Option<PaperRow> {
         let quantity = format!("{}, cost over base", cell.column);
-        let row = PaperRow::new(&self.source, rows.shown(cell.scene), quantity, cell.reason);
+        let row = PaperRow::new(rows.shown(cell.scene), quantity).because(cell.reason);
         let (paper, ours) = (cell.paper_over_base?, cell.cost_over_base);
         Some(row.compare_ratios(paper, ours, cell.interval(), self.tolerance))
     }
@@ -205,7 +197,7 @@ impl Config {
         // The paper prints no formula, so the closest reading is the most favourable to it.
         let is_close = (ours / paper - 1.0).abs() <= self.tolerance;
         let quantity = "cost over base, the closest reading";
-        let row = PaperRow::new(&self.source, rows.shown(scene), quantity, closest.reason);
+        let row = PaperRow::new(rows.shown(scene), quantity).because(closest.reason);
         let row = row.compare(
             format!("{paper:.4}"),
             format!("{ours:.4}, by {}", closest.column),

@@ -4,15 +4,9 @@ use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
 use crate::statistics::{expected_best_of, mean_interval, minimum};
 
-bvh_config::config! { serde;
+report! {
     /// Cost against number of trials.
     pub struct Config {
-        /// Place in the paper, such as `Figure 1`.
-        source: String;
-        /// Heading.
-        title: String;
-        /// What the rows say, the title of the figure, as in a report of the kind `query`.
-        finding: String;
         /// Labels of the methods to compare.
         methods: Vec<String>, in OneOrMore;
         /// Number of trials whose best is compared, and at which figures end. Use fewer than are
@@ -21,8 +15,6 @@ bvh_config::config! { serde;
         /// The method that the paper found best.
         #[serde(skip_serializing_if = "Option::is_none")]
         paper_best: Option<String>;
-        /// Reason for differences from the paper.
-        reason: String;
     }
 }
 
@@ -44,7 +36,7 @@ pub(super) struct Point<'a> {
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let mut output = Output::new(&self.source, &self.title);
+        let mut output = Output::default();
         let mut points = Vec::new();
         let mut panels = Vec::new();
         for scene in rows.scenes() {
@@ -79,8 +71,6 @@ impl Config {
         let caption = "Lowest cost among so many trials. Left, one run, as in the paper; right, \
                        what is expected, with the 95 % interval of the mean over repetitions.";
         output.add_csv("trials", &points)?;
-        output.say(&self.finding, rows)?;
-        let caption = format!("{}. {caption}", output.heading);
         output.add_figure("trials", caption, 2, panels);
         let last: Vec<&Point> =
             points.iter().filter(|point| point.trials == self.best_of).collect();
@@ -138,7 +128,7 @@ impl Config {
         let quantity = format!("best of the compared, by the expected best of {}", self.best_of);
         let rule = "its 95 % interval lies below those of all others; it differs if that of another lies below its own";
         let names: Vec<&str> = best.iter().map(|point| point.method).collect();
-        let row = PaperRow::new(&self.source, scene, quantity, &self.reason);
+        let row = PaperRow::new(scene, quantity);
         Some(PaperRow {
             ours_over_base: Some(least.expected_over_base),
             ours_low: least.expected_low,
