@@ -19,7 +19,7 @@ mod text;
 
 pub use axis::share_axes;
 pub use figure::svg;
-pub use model::{Axis, Figure, Hue, Layer, Look, Marks, Panel, Scale, Shape, Unit};
+pub use model::{Axis, Figure, Hue, Layer, Marks, Panel, Scale, Unit};
 
 #[cfg(test)]
 mod tests {

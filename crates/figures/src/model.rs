@@ -14,18 +14,9 @@ pub struct Figure {
     pub columns: usize,
     /// The panels, row by row.
     pub panels: Vec<Panel>,
-    /// Looks of some series, so that a method looks the same in every figure. Other series take
-    /// free colours in order of appearance.
-    pub looks: Vec<(String, Look)>,
-}
-
-/// The look of a series.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Look {
-    /// Its colour.
-    pub hue: Hue,
-    /// Its marker, which also chooses the dash of its lines.
-    pub shape: Shape,
+    /// Colours of some series, so that a method has the same in every figure. Other series take
+    /// free ones in order of appearance.
+    pub hues: Vec<(String, Hue)>,
 }
 
 /// The colours of Okabe and Ito without yellow, which is invisible on white; then darker ones of
@@ -46,21 +37,6 @@ pub enum Hue {
     Brown,
     Forest,
     Ink,
-}
-
-/// A marker. Lines of discs, diamonds and stars are solid; others have dashes.
-#[allow(missing_docs, reason = "the names of shapes")]
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shape {
-    Disc,
-    Square,
-    Triangle,
-    Diamond,
-    Inverted,
-    Cross,
-    Star,
-    /// A disc with a white centre.
-    Ring,
 }
 
 /// One pair of axes with layers. Bands are drawn first, then reference lines, spans, lines, points

@@ -3,7 +3,7 @@
 use plotters::prelude::RGBColor;
 
 use super::canvas::{Colour, Dash, Point, Sheet, WHITE};
-use super::model::{Figure, Hue, Look, Shape};
+use super::model::{Figure, Hue};
 
 /// The colour of text and axes.
 pub(super) const INK: Colour = RGBColor(0x22, 0x22, 0x22);
@@ -34,14 +34,14 @@ const PALETTE: [Colour; 13] = [
     INK,
 ];
 
-/// The dashes of series, by [`Shape`], repeating.
+/// The dashes of series, repeating.
 const DASHES: [Dash; 3] = [None, Some((9.0, 3.0)), Some((3.0, 2.5))];
 
 /// A star: number of points, inner radius relative to the outer radius, and direction of the first
 /// point in turns, clockwise from the right. A regular polygon is a star without notches.
 pub(super) type Star = (u32, f64, f64);
-/// The markers by [`Shape`].
-const MARKERS: [Star; 8] = [
+/// The markers of series, repeating.
+const MARKERS: [Star; 7] = [
     (6, 1.0, 0.0),
     (4, 0.71, 0.125),
     (3, 0.5, 0.75),
@@ -49,7 +49,6 @@ const MARKERS: [Star; 8] = [
     (3, 0.5, 0.25),
     (4, 0.42, 0.0),
     (5, 0.45, 0.75),
-    (6, 1.0, 0.0),
 ];
 
 /// The colour, dash and marker of one series.
@@ -57,28 +56,23 @@ const MARKERS: [Star; 8] = [
 pub(super) struct Stroke {
     pub colour: Colour,
     pub dash: Dash,
-    /// True for markers with a white centre.
-    pub hollow: bool,
     pub marker: Star,
 }
 
 impl Stroke {
-    fn of(Look { hue, shape }: Look) -> Self {
+    /// The stroke of the series of this number in its figure. Successive ones can be told apart in
+    /// grey.
+    fn of(hue: Hue, number: usize) -> Self {
         Self {
             colour: PALETTE[hue as usize],
-            dash: DASHES[shape as usize % DASHES.len()],
-            hollow: shape == Shape::Ring,
-            marker: MARKERS[shape as usize],
+            dash: DASHES[number % DASHES.len()],
+            marker: MARKERS[number % MARKERS.len()],
         }
     }
 
     /// Draws the marker with a white edge, which separates it from its neighbours.
     pub fn mark(&self, sheet: &mut Sheet, at: Point, radius: f64, edge: f64) {
-        let (fill, line, width) = match self.hollow {
-            true => (WHITE, self.colour, 0.7 * radius),
-            false => (self.colour, WHITE, 2.0 * edge),
-        };
-        sheet.marker(&self.outline(at, radius), fill, line, width);
+        sheet.marker(&self.outline(at, radius), self.colour, WHITE, 2.0 * edge);
     }
 
     /// Returns the marker around a point as a polygon with about the area of a disc of this
@@ -98,19 +92,14 @@ impl Stroke {
 
 /// The stroke of reference lines.
 pub(super) const REFERENCE_LINE: Stroke =
-    Stroke { colour: GREY, dash: Some((5.0, 4.0)), hollow: false, marker: MARKERS[0] };
+    Stroke { colour: GREY, dash: Some((5.0, 4.0)), marker: MARKERS[0] };
 /// The stroke of series without a name.
-const UNNAMED: Stroke = Stroke { colour: GREY, dash: None, hollow: false, marker: MARKERS[0] };
+const UNNAMED: Stroke = Stroke { colour: GREY, dash: None, marker: MARKERS[0] };
 
-/// The colours of series without a given look, in order, those that methods have most often last;
-/// their markers repeat.
+/// The colours of series without a given one, in order, those that methods have most often last.
 const FREE: [Hue; 12] = {
     use Hue::{Amber, Blue, Brown, Forest, Green, Grey, Indigo, Olive, Orange, Pink, Sky, Wine};
     [Wine, Amber, Sky, Pink, Olive, Forest, Brown, Grey, Indigo, Green, Orange, Blue]
-};
-const SHAPES: [Shape; 7] = {
-    use Shape::{Cross, Diamond, Disc, Inverted, Square, Star, Triangle};
-    [Disc, Square, Triangle, Diamond, Inverted, Cross, Star]
 };
 
 /// The strokes of all series of a figure, in order of their first appearance.
@@ -125,22 +114,14 @@ impl Strokes {
                 names.push(name);
             }
         }
-        let given = |name: &str| {
-            figure.looks.iter().find(|(known, _)| known == name).map(|&(_, look)| look)
-        };
-        // Series without a look of their own get colours that no other has, while they last.
-        let free = FREE.iter().zip(SHAPES.iter().cycle()).map(|(&hue, &shape)| Look { hue, shape });
-        let is_free = |look: &Look| {
-            names.iter().filter_map(|name| given(name)).all(|own| own.hue != look.hue)
-        };
-        let mut free = free.clone().filter(is_free).chain(free.cycle());
-        let mut looks: Vec<Look> = Vec::new();
-        for name in &names {
-            let own = given(name).filter(|look| !looks.contains(look));
-            looks.extend(own.or_else(|| free.next()));
-        }
-        let stroke = |(name, look): (&str, Look)| (name.to_owned(), Stroke::of(look));
-        Self(names.iter().copied().zip(looks).map(stroke).collect())
+        let given = |name: &&str| figure.hues.iter().find(|(known, _)| known == name);
+        let is_free = |hue: &Hue| !names.iter().filter_map(given).any(|(_, own)| own == hue);
+        // Series without a colour of their own get some that no other has, while they last.
+        let mut free = FREE.into_iter().filter(is_free).chain(FREE.into_iter().cycle());
+        let mut hue = |name| given(name).map(|given| given.1).or_else(|| free.next());
+        let hues: Vec<Hue> = names.iter().filter_map(&mut hue).collect();
+        let strokes = (0..).zip(hues).map(|(number, hue)| Stroke::of(hue, number));
+        Self(names.iter().map(|name| (*name).to_owned()).zip(strokes).collect())
     }
 
     /// Returns the stroke of the named series; solid grey for a series without a name.
@@ -154,11 +135,11 @@ mod tests {
     use super::super::model::{Layer, Marks, Panel};
     use super::*;
 
-    fn strokes(names: &[String], looks: Vec<(String, Look)>) -> Vec<(String, Stroke)> {
+    fn strokes(names: &[String], hues: Vec<(String, Hue)>) -> Vec<(String, Stroke)> {
         let line = |name: &String| Layer::new(name, Marks::Line(Vec::new()));
         let layers = names.iter().chain(names.iter().rev()).map(line).collect();
         let panel = Panel { layers, ..Panel::default() };
-        Strokes::new(&Figure { panels: vec![panel], looks, ..Figure::default() }).0
+        Strokes::new(&Figure { panels: vec![panel], hues, ..Figure::default() }).0
     }
 
     #[test]
@@ -174,12 +155,10 @@ mod tests {
     }
 
     #[test]
-    fn looks_given_in_advance_are_kept_and_their_colours_not_given_again() {
-        let given = Look { hue: Hue::Wine, shape: Shape::Star };
-        let series = strokes(&["MF", "GRASP"].map(str::to_owned), vec![("GRASP".into(), given)]);
-        assert_eq!(
-            (series[0].1, series[1].1),
-            (Stroke::of(Look { hue: Hue::Amber, shape: Shape::Square }), Stroke::of(given))
-        );
+    fn a_colour_given_in_advance_is_given_to_no_other() {
+        let names = ["MF", "GRASP"].map(str::to_owned);
+        let series = strokes(&names, vec![("GRASP".into(), Hue::Wine)]);
+        let expected = [Stroke::of(Hue::Amber, 0), Stroke::of(Hue::Wine, 1)];
+        assert_eq!([series[0].1, series[1].1], expected);
     }
 }

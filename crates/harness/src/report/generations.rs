@@ -168,17 +168,17 @@ fn draw(shown: &str, runs: usize, generations: &[Generation], base: f64) -> Pane
         generations.iter().map(|g| (at(g), over(g.lowest_cost), over(g.highest_cost))).collect();
     let random: Vec<_> =
         generations.iter().filter_map(|g| Some((at(g), over(g.random_picking_cost?)))).collect();
-    // One run has no range, so it is drawn as one line.
     let name = if runs > 1 { "median run" } else { "one run" };
     let mut layers = Vec::new();
-    if runs > 1 {
-        layers.push(Layer::new("range over runs", Marks::Band(range)));
-    }
     let greedy = generations.iter().map(|g| (at(g), 1.0)).collect();
     for (name, line) in [(name, median), ("random picking", random), ("greedy", greedy)] {
         let end = line.last().map(|end| Layer::new(name, Marks::Text(*end)));
         layers.push(Layer::new(name, Marks::Line(line)));
         layers.extend(end);
+    }
+    // One run has no range, so it is drawn as one line.
+    if runs > 1 {
+        layers.push(Layer::new("range over runs", Marks::Band(range)));
     }
     panel(shown, Axis::linear("generation"), Axis::linear("cost / greedy"), layers)
 }

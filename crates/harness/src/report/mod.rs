@@ -3,13 +3,13 @@
 //! A kind of report is one file and one line in [`Report`]. Reports read CSV files only.
 
 pub mod anytime;
+mod colours;
 pub mod config;
 mod correlation;
 pub mod data;
 pub mod distribution;
 pub mod gaps;
 pub mod generations;
-mod looks;
 pub mod numbers;
 pub mod output;
 pub mod overview;

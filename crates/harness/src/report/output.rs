@@ -1,8 +1,8 @@
 //! The output of a report: CSV files, figures, comparisons with the paper, and text for the
 //! terminal.
 
+use super::colours::hue;
 use super::data::{Rows, distinct};
-use super::looks::look;
 use super::paper::PaperRow;
 use super::query::{QueryError, Row};
 use super::query_measure::filled;
@@ -120,9 +120,9 @@ impl Output {
     ) {
         let title = self.finding.clone().unwrap_or_default();
         let series = panels.iter().flat_map(|panel| &panel.layers).filter_map(Layer::series);
-        let looks = series.filter_map(|name| Some((name.to_owned(), look(name)?))).collect();
+        let hues = series.filter_map(|name| Some((name.to_owned(), hue(name)?))).collect();
         self.figures
-            .push((name.into(), Figure { title, caption: caption.into(), columns, panels, looks }));
+            .push((name.into(), Figure { title, caption: caption.into(), columns, panels, hues }));
     }
 
     /// Adds a table of some columns of a CSV file's rows, numbers with four digits. `columns` are

@@ -1,7 +1,6 @@
 //! The page of all results: the paper's numbers come first, and whatever the page leads to is there.
 
-use crate::support::{TABLE, folder_with, refused, said, top};
-use harness::run::finish::remade;
+use crate::support::{TABLE, folder_with, refused, said};
 use std::fs;
 
 /// The texts between `before` and `after` in the page.
@@ -35,18 +34,4 @@ fn the_page_of_all_results_begins_with_the_paper_and_leads_to_files_that_are_the
         assert!(page.contains(&format!("{file}\"")), "{file}: {links:?}");
     }
     refused(folder.path(), &["report", "--results", "."], 2, &["no finished experiment"]);
-}
-
-#[test]
-fn series_of_one_figure_have_looks_of_their_own() {
-    let folders = fs::read_dir(top().join("results")).unwrap().map(|folder| folder.unwrap().path());
-    for folder in folders.filter(|folder| folder.join("resolved.toml").is_file()) {
-        for (name, figure) in remade(&folder).unwrap().into_iter().flat_map(|made| made.figures) {
-            for (index, (series, look)) in figure.looks.iter().enumerate() {
-                let same = |(other, its): &&(String, _)| other != series && its == look;
-                let other = figure.looks[..index].iter().find(same);
-                assert_eq!(other, None, "{series} in {name} of {}", folder.display());
-            }
-        }
-    }
 }
