@@ -79,11 +79,6 @@ impl Rows {
         if kind == SceneKind::File.to_string() { scene.into() } else { format!("{scene} ({kind})") }
     }
 
-    /// Returns the names of all scenes for tables and figures.
-    pub fn all_shown(&self) -> Vec<String> {
-        self.scenes().into_iter().map(|scene| self.shown(scene)).collect()
-    }
-
     /// Returns the cost of the scene's greedy tree.
     pub fn base_cost(&self, scene: &str) -> f64 {
         self.runs.iter().find(|run| run.scene == scene).map_or(f64::NAN, |run| run.base_cost)

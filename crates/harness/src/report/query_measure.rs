@@ -74,17 +74,21 @@ impl<'t> Measure<'t> {
 
     /// Returns one number of the rows; `None` if no row has one.
     pub fn of_rows(&self, rows: &[&Row]) -> Result<Option<f64>, QueryError> {
+        let mut numbers = Vec::new();
+        for row in rows {
+            let of_row = self.values.iter().map(|value| number(row, value));
+            numbers.push(of_row.collect::<Result<Option<Vec<f64>>, _>>()?);
+        }
+        let numbers = numbers.into_iter().flatten();
         if self.how == Aggregate::Count {
             return Ok(Some(rows.len() as f64));
         }
         if self.how.is_of_pairs() {
-            return self.correlation(rows);
+            let pairs: Vec<_> = numbers.map(|numbers| (numbers[0], numbers[1])).collect();
+            let is_pearson = self.how == Aggregate::Pearson;
+            return Ok(if is_pearson { pearson(&pairs) } else { spearman(&pairs) });
         }
-        let mut values = Vec::new();
-        for row in rows {
-            values.extend(self.of_row(row)?);
-        }
-        self.of_values(&values)
+        self.of_values(&numbers.flatten().collect::<Vec<_>>())
     }
 
     /// Returns one number of some values; `None` if there are none.
@@ -103,25 +107,9 @@ impl<'t> Measure<'t> {
             Aggregate::Geomean => Some(geometric_mean(values)),
             Aggregate::Count | Aggregate::Pearson | Aggregate::Spearman => {
                 let accepted = "an aggregate of one value of every row";
-                return Err(QueryError::Malformed {
-                    part: "ratio",
-                    found: self.text.into(),
-                    accepted,
-                });
+                let found = self.text.into();
+                return Err(QueryError::Malformed { part: "ratio", found, accepted });
             }
-        })
-    }
-
-    fn correlation(&self, rows: &[&Row]) -> Result<Option<f64>, QueryError> {
-        let mut pairs = Vec::new();
-        for row in rows {
-            let first = number(row, self.values[0])?;
-            let second = number(row, self.values[1])?;
-            pairs.extend(first.zip(second));
-        }
-        Ok(match self.how {
-            Aggregate::Pearson => pearson(&pairs),
-            _ => spearman(&pairs),
         })
     }
 }
@@ -133,20 +121,17 @@ pub fn filled(
     text: &str,
     read: &dyn Fn(&str) -> Result<Vec<Row>, QueryError>,
 ) -> Result<String, QueryError> {
-    let mut filled = String::new();
-    let mut rest = text;
-    while let Some((before, after)) = rest.split_once('{') {
-        let (query, after) = after.split_once('}').unwrap_or((after, ""));
+    let mut parts = text.split('{');
+    let mut filled = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (query, after) = part.split_once('}').unwrap_or((part, ""));
         let (file, conditions, measure) = match query.split(" | ").collect::<Vec<_>>()[..] {
             [conditions, measure] => ("", conditions, measure),
             [file, conditions, measure] => (file, conditions, measure),
             _ => {
                 let accepted = "{CONDITIONS | MEASURE}, {FILE | CONDITIONS | MEASURE}";
-                return Err(QueryError::Malformed {
-                    part: "number",
-                    found: query.into(),
-                    accepted,
-                });
+                let found = query.into();
+                return Err(QueryError::Malformed { part: "number", found, accepted });
             }
         };
         let rows = read(file)?;
@@ -159,11 +144,10 @@ pub fn filled(
         // No zero has a sign.
         let number = if number.abs() < 0.05 { 0.0 } else { number };
         let is_whole = number.fract() == 0.0 || number.abs() >= 9.95;
-        filled += before;
         filled += &format!("{number:.0$}", usize::from(!is_whole)).replace('-', "−");
-        rest = after;
+        filled += after;
     }
-    Ok(filled + rest)
+    Ok(filled)
 }
 
 /// Returns a value of a row, computed from left to right; `None` where a cell holds no number.

@@ -170,9 +170,10 @@ impl Config {
         }
         // Readings of a heuristic that peel off one object at a time cost hundreds of times as much.
         let most = cells.iter().map(|cell| cell.cost_over_base).fold(1.0, f64::max);
+        let scenes = rows.scenes().into_iter().map(|scene| rows.shown(scene)).collect();
         let label = "cost / greedy";
         let x = if most > 3.0 { Axis::log(label) } else { Axis::linear(label) };
-        let mut panel = dots("", x, rows.all_shown(), &all);
+        let mut panel = dots("", x, scenes, &all);
         // Ratios are to the greedy tree, whose line separates savings from losses.
         panel.layers.push(Layer::new("greedy", Marks::VLine(1.0)));
         panel
