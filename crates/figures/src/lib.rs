@@ -1,7 +1,7 @@
 //! The chart engine: data series in, SVG out. It knows no BVH, no files and no clock.
 //!
 //! A [`Figure`] holds the data in data units. [`svg`] lays it out with the text widths
-//! of embedded fonts. The same picture gives the same bytes on every machine.
+//! of DejaVu Sans. The same picture gives the same bytes on every machine.
 //!
 //! Figures are 680 pixels wide with text of 16 pixels and more, so that it can still be read where a
 //! phone shows them 390 pixels wide. Series differ in colour and in dash or marker, so that they

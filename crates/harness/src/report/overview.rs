@@ -86,8 +86,7 @@ impl Config {
         );
         let x = Axis::log("time on one thread").unit(Unit::Seconds);
         let y = Axis::log("").unit(Unit::Percent);
-        let mut output = Output::default();
-        output.finding = Some(finding);
+        let mut output = Output { finding: Some(finding), ..Output::default() };
         output.add_figure(FIGURE, caption, 1, vec![panel("", x, y, layers)]);
         Ok(output)
     }

@@ -247,7 +247,8 @@ mod tests {
         let common = "file = 'x'\nrows = 'costs.csv'\nby = ['scene', 'method']\n";
         let config: Config = toml::from_str(&format!("{common}{config}")).unwrap();
         let rows = Rows { folder: folder.path().to_owned(), ..Rows::default() };
-        config.write(&rows).map_err(|error| error.to_string())
+        let headed = config.write(&rows).and_then(|output| config.headed(output, &rows));
+        headed.map_err(|error| error.to_string())
     }
 
     fn csv(output: &Output) -> &str {
