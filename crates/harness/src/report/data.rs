@@ -11,31 +11,23 @@ use std::path::{Path, PathBuf};
 /// The incumbents of a run: seconds since its start, and cost.
 pub type Series = Vec<(f64, f64)>;
 
-/// An experiment's rows.
+/// The rows of an experiment's files; none of a file that no run wrote.
 #[derive(Clone, Debug, Default)]
+#[allow(missing_docs, reason = "rows of these kinds")]
 pub struct Rows {
     /// The experiment's folder, for reports that read further files.
     pub folder: PathBuf,
-    /// The rows of `runs.csv`.
     pub runs: Vec<RunRow>,
-    /// The rows of `history.csv`; none if no report reads them.
     pub history: Vec<HistoryRow>,
-    /// The rows of `trial_costs.csv`; none if no report reads them.
     pub trials: Vec<TrialRow>,
-    /// The rows of `timing.csv`.
     pub timing: Vec<TimingRow>,
-    /// The rows of `rays.csv`; none if the spec requests no rays.
     pub rays: Vec<RayRow>,
-    /// The rows of `timing_history.csv`: one for every row of `history`, in the same order, or none
-    /// if no report needs them.
+    /// One row for every row of `history`, in the same order, or none.
     pub clock: Vec<ClockRow>,
-    /// The rows of `references.csv` by the experiment's objective; none if no report needs them.
+    /// Those by the experiment's objective.
     pub references: Vec<ReferenceRow>,
-    /// The rows of `tests.csv`; none if no rays judge the trees.
     pub tests: Vec<TestRow>,
-    /// The rows of `run_tests.csv`; none if trees were not tested one by one.
     pub run_tests: Vec<RunTestRow>,
-    /// The rows of `visits.csv`; none if trees were not tested one by one.
     pub visits: Vec<VisitRow>,
 }
 
