@@ -4,7 +4,7 @@
 use super::{Cell, Corner};
 use alloc::vec;
 use alloc::vec::Vec;
-use glam::DVec3;
+use glam::{DVec3, Vec4};
 
 /// The number of cells of the grid along each axis.
 pub(super) const CELLS: usize = 32;
@@ -109,17 +109,18 @@ impl Crossings {
     }
 
     fn cell(&self, cell: [usize; 3]) -> Cell {
-        let mut rows = [0.0; 16];
+        let mut rows = [Vec4::ZERO; 4];
         for axis in 0..3 {
             let lower = face(axis, cell[axis], cell);
             let upper = face(axis, cell[axis] + 1, cell);
             let [upward, downward] = &self.faces[axis];
             // The counts at the low end of the cell, and their differences across it.
-            rows[axis] = (upward[lower] as f32 + downward[lower] as f32) * super::FRACTIONS as f32;
-            rows[4 + axis] = upward[upper] as f32 - upward[lower] as f32;
-            rows[8 + axis] = downward[upper] as f32 - downward[lower] as f32;
+            rows[0][axis] =
+                (upward[lower] as f32 + downward[lower] as f32) * super::FRACTIONS as f32;
+            rows[1][axis] = upward[upper] as f32 - upward[lower] as f32;
+            rows[2][axis] = downward[upper] as f32 - downward[lower] as f32;
         }
-        rows[12] = self.starts[index(cell)] as f32;
+        rows[3][0] = self.starts[index(cell)] as f32;
         Cell(rows)
     }
 }
@@ -182,12 +183,12 @@ struct Sums {
 impl Sums {
     /// Returns the signed counts of a box's corner at the eight grid points of a cell.
     fn around(&self, cell: [usize; 3], corner: usize) -> Corner {
-        let mut values = [0.0; 8];
-        for (i, value) in values.iter_mut().enumerate() {
-            let point = [cell[0] + (i & 1), cell[1] + (i >> 1 & 1), cell[2] + (i >> 2)];
-            *value = self.signed_count(corner, point);
-        }
-        Corner(values)
+        let [x, y, z] = cell;
+        let plane = |z: usize| {
+            let points = [[x, y, z], [x + 1, y, z], [x, y + 1, z], [x + 1, y + 1, z]];
+            Vec4::from(points.map(|point| self.signed_count(corner, point)))
+        };
+        Corner([plane(z), plane(z + 1)])
     }
 
     /// Returns the term of a box's corner in the number of entries if the corner is at a grid

@@ -38,22 +38,18 @@
 
 mod crossings;
 mod segment;
-#[cfg(all(feature = "std", target_arch = "x86_64"))]
-mod x86;
 
 use crate::cost::Measure;
 use crate::{Aabb, Bvh, Node, PackedAabb};
 use alloc::vec::Vec;
 use crossings::{CELLS, Crossings, index};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, DVec4, Vec4};
 pub use segment::{DensityError, Segment};
 
-/// The binary logarithm of [`FRACTIONS`].
-const FRACTION_BITS: u32 = 9;
-/// The number of fractions of a cell. Box corners are rounded to fractions.
-const FRACTIONS: u32 = 1 << FRACTION_BITS;
+/// The number of fractions of a cell, a power of two. Box corners are rounded to fractions.
+const FRACTIONS: f64 = 512.0;
 /// The value of one entry in the integer arithmetic: a product of fractions along all three axes.
-const FRACTIONS_OF_ENTRY: f64 = (1u64 << (3 * FRACTION_BITS)) as f64;
+const FRACTIONS_OF_ENTRY: f64 = FRACTIONS * FRACTIONS * FRACTIONS;
 /// The length by which [`RayDensity::of_rays`] extends segments at both ends, in cells along their
 /// main axis.
 ///
@@ -68,10 +64,10 @@ const LENGTHENED: f64 = 0.25;
 /// Takes about 11 MB for any number of segments. A clone copies this memory.
 #[derive(Clone, Debug)]
 pub struct RayDensity {
-    /// The lower corner of the grid, in world units.
-    low: DVec3,
-    /// Fractions of cells per world unit.
-    scale: DVec3,
+    /// The lower corner of the grid, in world units, and 0.
+    low: DVec4,
+    /// Fractions of cells per world unit, and 0.
+    scale: DVec4,
     /// The signed counts at a cell's eight grid points: `[cell][corner of the box]`.
     corners: Vec<Corner>,
     /// The counts for boxes within a cell: `[cell]`.
@@ -123,10 +119,11 @@ impl Grid {
     }
 }
 
-/// The signed counts at the eight grid points of a cell, in half a cache line.
+/// The signed counts at the eight grid points of a cell, in half a cache line: the lower and the
+/// upper four along z.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
-struct Corner([f32; 8]);
+struct Corner([Vec4; 2]);
 
 /// The counts for boxes within one cell, in one cache line: four rows of one number per axis and a
 /// zero.
@@ -137,13 +134,13 @@ struct Corner([f32; 8]);
 /// it adds the segments that start in the box.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-struct Cell([f32; 16]);
+struct Cell([Vec4; 4]);
 
-/// The corners of a box in fractions of cells.
+/// The corners of a box in fractions of cells: integers from 0 to the end of the grid.
 #[derive(Debug)]
 struct Rounded {
-    low: [u32; 3],
-    high: [u32; 3],
+    low: DVec4,
+    high: DVec4,
 }
 
 impl RayDensity {
@@ -209,8 +206,8 @@ impl RayDensity {
         }
         let entries_of_root = FRACTIONS_OF_ENTRY * f64::from(crossings.segments);
         Ok(Self {
-            low: grid.low,
-            scale: grid.cells_per_unit * f64::from(FRACTIONS),
+            low: grid.low.extend(0.0),
+            scale: (grid.cells_per_unit * FRACTIONS).extend(0.0),
             corners: crossings.corner_tables(),
             cells: crossings.cell_table(),
             segments: crossings.segments,
@@ -260,71 +257,62 @@ impl RayDensity {
 
     /// Returns the entries times 512³, an integer.
     fn fractional_entries(&self, bounds: &Aabb) -> f64 {
-        if bounds.min.cmpgt(bounds.max).any() {
-            return 0.0;
-        }
-        #[cfg(all(feature = "std", target_arch = "x86_64"))]
-        if x86::is_available() {
-            // SAFETY: `x86::fractional_entries` needs AVX2 and FMA, and the processor has both by
-            // the test above.
-            return unsafe { x86::fractional_entries(self, &PackedAabb::from(bounds)) };
-        }
-        self.portable_entries(bounds)
-    }
-
-    /// Returns the same as [`Self::fractional_entries`] on any processor, for a box that is not
-    /// empty.
-    fn portable_entries(&self, bounds: &Aabb) -> f64 {
-        let rounded = self.round(bounds);
-        // A box within one cell needs one look-up instead of eight.
-        let cell = rounded.low.map(cell_of);
-        if (0..3).all(|axis| rounded.high[axis] <= (cell[axis] as u32 + 1) << FRACTION_BITS) {
-            within(&self.cells[index(cell)], &rounded, cell)
-        } else {
-            self.across(&rounded)
-        }
+        let is_empty = bounds.min.cmpgt(bounds.max).any();
+        if is_empty { 0.0 } else { fractional_entries(self, &PackedAabb::from(bounds)) }
     }
 
     /// Returns the corners in fractions of cells, rounded outward and clamped to the grid.
-    #[inline]
-    fn round(&self, bounds: &Aabb) -> Rounded {
-        // Coordinates are not negative, so a cast rounds down.
-        let low = self.in_fractions(bounds.min).to_array().map(|x| x as u32);
-        let high = self.in_fractions(bounds.max).to_array().map(round_up);
-        Rounded { low, high }
+    #[inline(always)]
+    fn round(&self, bounds: &PackedAabb) -> Rounded {
+        let [negated_min, max] = bounds.planes().map(|plane| Vec4::from(plane).as_dvec4());
+        let end = DVec4::splat(CELLS as f64 * FRACTIONS);
+        let clamped = |point: DVec4| ((point - self.low) * self.scale).max(DVec4::ZERO).min(end);
+        Rounded { low: clamped(-negated_min).floor(), high: clamped(max).ceil() }
     }
 
-    /// Returns a point in fractions of cells, clamped to the grid.
-    #[inline]
-    fn in_fractions(&self, point: Vec3) -> DVec3 {
-        let end = DVec3::splat(f64::from((CELLS as u32) << FRACTION_BITS));
-        let fractions = (point.as_dvec3() - self.low) * self.scale;
-        fractions.clamp(DVec3::ZERO, end)
-    }
-
-    fn across(&self, rounded: &Rounded) -> f64 {
-        let ends = [&rounded.low, &rounded.high];
-        let mut sum = 0.0;
+    /// Returns the sum of the terms of a box's eight corners.
+    #[inline(always)]
+    fn across(&self, Rounded { low, high }: &Rounded) -> f64 {
+        let cells = [cell_of(*low), cell_of(*high)];
+        let places = [*low - cells[0] * FRACTIONS, *high - cells[1] * FRACTIONS];
+        let cells = cells.map(indices);
+        // The weights of the grid points around the low and around the high corner: along x and y,
+        // of the four of a plane; along z, of the two planes.
+        let weights = |axis: usize| places.map(|place| [FRACTIONS - place[axis], place[axis]]);
+        let along_x = weights(0).map(|[a, b]| DVec4::new(a, b, a, b));
+        let along_y = weights(1).map(|[a, b]| DVec4::new(a, a, b, b));
+        let along_z = weights(2);
+        let mut sum = DVec4::ZERO;
         for corner in 0..8 {
-            let place = [0, 1, 2].map(|axis| ends[corner >> axis & 1][axis]);
-            let cell = place.map(cell_of);
-            let values = &self.corners[8 * index(cell) + corner].0;
-            let part = [0, 1, 2].map(|axis| place[axis] - ((cell[axis] as u32) << FRACTION_BITS));
-            // The weights of the lower and of the upper grid point along each axis.
-            let [x, y, z] = part.map(|part| [f64::from(FRACTIONS - part), f64::from(part)]);
-            let xy = [x[0] * y[0], x[1] * y[0], x[0] * y[1], x[1] * y[1]];
-            let plane =
-                |k: usize| (0..4).map(|i| xy[i] * f64::from(values[4 * k + i])).sum::<f64>();
-            sum += z[0] * plane(0) + z[1] * plane(1);
+            let [i, j, k] = [0, 1, 2].map(|axis| corner >> axis & 1);
+            let cell = [cells[i][0], cells[j][1], cells[k][2]];
+            let [lower, upper] =
+                self.corners[8 * index(cell) + corner].0.map(|four| four.as_dvec4());
+            let [below, above] = along_z[k];
+            sum += (lower * below + upper * above) * (along_x[i] * along_y[j]);
         }
-        sum
+        sum.element_sum()
     }
 }
 
-#[inline]
-fn round_up(value: f64) -> u32 {
-    let down = value as u32;
-    down + u32::from(f64::from(down) < value)
+#[cfg(feature = "std")]
+crate::with_vector_instructions! {
+    fractional_entries = entries_plain(density: &RayDensity, bounds: &PackedAabb) -> f64
+}
+#[cfg(not(feature = "std"))]
+use entries_plain as fractional_entries;
+
+/// Returns the entries times 512³ of a box that is not empty.
+#[inline(always)]
+fn entries_plain(density: &RayDensity, bounds: &PackedAabb) -> f64 {
+    let rounded = density.round(bounds);
+    // A box within one cell needs one look-up instead of eight.
+    let cell = cell_of(rounded.low);
+    if (rounded.high - cell * FRACTIONS).cmple(DVec4::splat(FRACTIONS)).all() {
+        within(&density.cells[index(indices(cell))], &rounded, cell)
+    } else {
+        density.across(&rounded)
+    }
 }
 
 impl Measure for RayDensity {
@@ -332,40 +320,68 @@ impl Measure for RayDensity {
     // the trait object would compile it, with its own options.
     #[inline(never)]
     fn of(&self, aabb: &PackedAabb) -> f64 {
-        #[cfg(all(feature = "std", target_arch = "x86_64"))]
-        if x86::is_available() {
-            // SAFETY: `x86::fractional_entries` needs AVX2 and FMA, and the processor has both by
-            // the test above.
-            let entries = unsafe { x86::fractional_entries(self, aabb) };
-            return self.entry_weight * entries + self.area_weight * aabb.half_area();
-        }
-        self.measure(&Aabb::from(aabb))
+        let entries = fractional_entries(self, aabb);
+        self.entry_weight * entries + self.area_weight * aabb.half_area()
     }
 }
 
-/// Returns the cell of a corner along an axis; the last cell for the upper end of the grid.
-#[inline]
-fn cell_of(corner: u32) -> usize {
-    ((corner >> FRACTION_BITS) as usize).min(CELLS - 1)
+/// Returns the cells of a corner along all axes; the last cell for the upper end of the grid.
+#[inline(always)]
+fn cell_of(corner: DVec4) -> DVec4 {
+    (corner * (1.0 / FRACTIONS)).floor().min(DVec4::splat((CELLS - 1) as f64))
+}
+
+#[inline(always)]
+fn indices(cell: DVec4) -> [usize; 3] {
+    [cell.x, cell.y, cell.z].map(|index| index as u32 as usize)
 }
 
 /// Returns the fractional entries of a box within one cell. They are the sum of two parts: the flux
 /// through each face of the cell, interpolated to the position of the box's face, times the share
 /// of the box's face in it; and the starts in the cell, times the share of the box in the cell.
-#[inline]
-fn within(cell_table: &Cell, rounded: &Rounded, cell: [usize; 3]) -> f64 {
-    let mut size = [0.0; 3];
-    let mut flux = [0.0; 3];
-    for axis in 0..3 {
-        let begin = (cell[axis] as u32) << FRACTION_BITS;
-        let low = f64::from(rounded.low[axis] - begin);
-        let high = f64::from(rounded.high[axis] - begin);
-        let row = |k: usize| f64::from(cell_table.0[4 * k + axis]);
-        size[axis] = high - low;
-        flux[axis] = row(0) + row(1) * low + row(2) * high + row(3) * size[axis];
-    }
-    flux[0] * (size[1] * size[2]) + flux[1] * (size[0] * size[2]) + flux[2] * (size[0] * size[1])
+#[inline(always)]
+fn within(table: &Cell, rounded: &Rounded, cell: DVec4) -> f64 {
+    let low = rounded.low - cell * FRACTIONS;
+    let high = rounded.high - cell * FRACTIONS;
+    let size = high - low;
+    let others = DVec4::new(size.y * size.z, size.z * size.x, size.x * size.y, 0.0);
+    let [constant, by_low, by_high, by_size] = table.0.map(|row| row.as_dvec4());
+    let flux = constant + by_low * low + by_high * high + by_size * size;
+    (flux * others).element_sum()
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn points() -> impl Strategy<Value = Vec<[f32; 3]>> {
+        prop::collection::vec(prop::array::uniform3(0.0..CELLS as f32), 400)
+    }
+
+    proptest! {
+        #[test]
+        fn the_shortcut_within_a_cell_and_the_sum_over_corners_give_the_same_bits(
+            points in points(),
+            boxes in prop::collection::vec(prop::array::uniform9(0..512u16), 400),
+        ) {
+            let (pairs, _) = points.as_chunks();
+            let segments: Vec<_> = pairs.iter().map(|&[from, to]| Segment { from, to }).collect();
+            // The cells have a side of 1.
+            let bounds = Aabb::from([[0.0; 3], [CELLS as f32; 3]]);
+            let density = RayDensity::new(&bounds, &segments, 0.0).unwrap();
+            for numbers in boxes {
+                let [i, j, k, a, b, c, d, e, f] = numbers.map(f64::from);
+                let cell = (DVec4::new(i, j, k, 0.0) % CELLS as f64).floor();
+                let corner = |x, y, z| cell * FRACTIONS + DVec4::new(x, y, z, 0.0);
+                let [first, second] = [corner(a, b, c), corner(d, e, f) + DVec4::new(1.0, 1.0, 1.0, 0.0)];
+                let rounded = Rounded { low: first.min(second), high: first.max(second) };
+                // A lower corner at the upper end of its cell belongs to the next cell.
+                if cell_of(rounded.low) == cell {
+                    let short = within(&density.cells[index(indices(cell))], &rounded, cell);
+                    prop_assert_eq!(short.to_bits(), density.across(&rounded).to_bits(), "{:?}", rounded);
+                }
+            }
+        }
+    }
+}
