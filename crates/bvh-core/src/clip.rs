@@ -19,7 +19,6 @@
 //! region is.
 
 use crate::aabb::round_down;
-use crate::polygon::{Plane, Polygon};
 use crate::{Aabb, Primitives, Triangle};
 use core::fmt::Debug;
 use glam::{DVec3, Vec3};
@@ -98,10 +97,10 @@ fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
     for axis in 0..3 {
         // Planes that miss the triangle cut nothing off.
         if full.min[axis] < region.min[axis] {
-            cut(&mut polygon, Plane { axis, position: low[axis], side: 1.0 });
+            polygon.cut(axis, low[axis], 1.0);
         }
         if full.max[axis] > region.max[axis] {
-            cut(&mut polygon, Plane { axis, position: high[axis], side: -1.0 });
+            polygon.cut(axis, high[axis], -1.0);
         }
     }
     let kept = polygon.corners();
@@ -117,13 +116,65 @@ fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
     part.intersection(&common)
 }
 
-/// Cuts a polygon, and puts the new corners exactly on the plane.
-#[inline]
-fn cut(polygon: &mut Polygon, plane: Plane) {
-    polygon.cut(plane, |mut corner| {
-        corner[plane.axis] = plane.position;
-        corner
-    });
+/// A convex planar polygon: a triangle cut by up to six planes, of which each adds at most one corner
+/// (Sutherland & Hodgman 1974).
+#[derive(Clone, Copy)]
+struct Polygon {
+    corners: [DVec3; 9],
+    len: usize,
+}
+
+impl Polygon {
+    #[inline]
+    fn new([a, b, c]: [DVec3; 3]) -> Self {
+        let mut corners = [DVec3::ZERO; 9];
+        corners[..3].copy_from_slice(&[a, b, c]);
+        Self { corners, len: 3 }
+    }
+
+    #[inline]
+    fn corners(&self) -> &[DVec3] {
+        &self.corners[..self.len]
+    }
+
+    /// Keeps the part above a plane across an axis if `side` is 1, the part below it if `side` is
+    /// −1. New corners are exactly on the plane.
+    ///
+    /// Rounding can make a polygon slightly concave, and a plane could then add more corners than
+    /// there is room for. The polygon stays uncut in that case: too large by rounding errors, but
+    /// never too small.
+    #[inline]
+    fn cut(&mut self, axis: usize, position: f64, side: f64) {
+        let whole = *self;
+        let mut kept = 0;
+        let mut add = |corner: DVec3| {
+            if let Some(place) = self.corners.get_mut(kept) {
+                *place = corner;
+            }
+            kept += 1;
+        };
+        let height = |point: DVec3| side * (point[axis] - position);
+        for (index, &from) in whole.corners().iter().enumerate() {
+            let next = if index + 1 == whole.len { 0 } else { index + 1 };
+            let to = whole.corners[next];
+            let before = height(from);
+            let after = height(to);
+            if before >= 0.0 {
+                add(from);
+            }
+            // A corner in the plane is kept above, and would be its own crossing.
+            if (before < 0.0) != (after < 0.0) && before != 0.0 && after != 0.0 {
+                let mut crossing = from + (to - from) * (before / (before - after));
+                crossing[axis] = position;
+                add(crossing);
+            }
+        }
+        if kept <= self.corners.len() {
+            self.len = kept;
+        } else {
+            *self = whole;
+        }
+    }
 }
 
 #[cfg(test)]
@@ -207,5 +258,45 @@ mod tests {
         // This region overlaps the triangle's box, but not the triangle.
         let missed = Aabb::from([[0.0, 3.0, 0.0], [1.0, 4.0, 1.0]]);
         assert_eq!(triangles.as_slice().clip(0, &missed), Aabb::EMPTY);
+    }
+
+    #[test]
+    fn a_cut_without_room_for_its_corners_drops_none() {
+        // Rounding never makes a polygon as concave as this zigzag, which crosses the plane at
+        // every edge but one.
+        let mut zigzag = Polygon { corners: [DVec3::ZERO; 9], len: 9 };
+        for (index, corner) in zigzag.corners.iter_mut().enumerate() {
+            let height = if index % 2 == 0 { 1.0 } else { -1.0 };
+            *corner = DVec3::new(index as f64, height, 0.0);
+        }
+        let mut polygon = zigzag;
+        polygon.cut(1, 0.0, 1.0);
+        assert_eq!(polygon.corners(), zigzag.corners());
+    }
+
+    #[test]
+    fn a_cut_that_fills_the_room_is_made() {
+        let octagon = [[3, 0], [2, 2], [0, 3], [-2, 2], [-3, 0], [-2, -2], [0, -3], [2, -2]]
+            .map(|[x, y]| DVec3::new(f64::from(x), f64::from(y), 0.0));
+        let mut polygon = Polygon { corners: [DVec3::ZERO; 9], len: 8 };
+        polygon.corners[..8].copy_from_slice(&octagon);
+        polygon.cut(0, 2.5, -1.0);
+        assert_eq!(polygon.corners().len(), 9);
+        assert!(polygon.corners().iter().all(|corner| corner.x <= 2.5));
+    }
+
+    #[test]
+    fn a_corner_in_the_plane_is_kept_once() {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        for (position, side, expected) in [
+            (0.0, 1.0, &corners[..]),
+            (0.0, -1.0, &[DVec3::ZERO, DVec3::Y]),
+            (1.0, 1.0, &[DVec3::X]),
+            (0.25, 1.0, &[DVec3::new(0.25, 0.0, 0.0), DVec3::X, DVec3::new(0.25, 0.75, 0.0)]),
+        ] {
+            let mut polygon = Polygon::new(corners);
+            polygon.cut(0, position, side);
+            assert_eq!(polygon.corners(), expected);
+        }
     }
 }

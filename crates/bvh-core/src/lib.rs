@@ -18,7 +18,6 @@ mod layout_cost;
 mod leave;
 mod mesh;
 mod packed;
-mod polygon;
 mod primitives;
 mod ray;
 pub mod ray_density;
