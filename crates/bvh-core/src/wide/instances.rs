@@ -73,17 +73,12 @@ impl Instance {
     /// builder. They do not depend on the trees of the parts.
     pub fn boxes(instances: &[Self], parts: &[WideBvh]) -> Result<Vec<Aabb>, InvalidInstances> {
         (instances.iter().enumerate())
-            .map(|(index, instance)| Ok(instance.check(index, parts)?.1))
+            .map(|(index, instance)| Ok(instance.place(index, parts)?.aabb))
             .collect()
     }
 
-    /// Checks the instance, and returns its inverse transform and its box. `instance` is its index,
-    /// for errors.
-    fn check(
-        &self,
-        instance: usize,
-        parts: &[WideBvh],
-    ) -> Result<(DAffine3, Aabb), InvalidInstances> {
+    /// Checks the instance and prepares it for rays. `instance` is its index, for errors.
+    fn place(&self, instance: usize, parts: &[WideBvh]) -> Result<Placed, InvalidInstances> {
         let Some(part) = parts.get(self.part as usize) else {
             return Err(InvalidInstances::Part { instance, part: self.part, parts: parts.len() });
         };
@@ -91,32 +86,13 @@ impl Instance {
             return Err(InvalidInstances::Empty(instance));
         }
         let transform = self.transform.as_daffine3();
-        let inverse = transform.inverse();
-        let bounds = transformed(&transform, &part.bounds);
-        if !inverse.is_finite() || transform.matrix3.determinant() == 0.0 || bounds.check().is_err()
+        let to_local = transform.inverse();
+        let aabb = transformed(&transform, &part.bounds);
+        if !to_local.is_finite() || transform.matrix3.determinant() == 0.0 || aabb.check().is_err()
         {
             return Err(InvalidInstances::Transform(instance));
         }
-        Ok((inverse, bounds))
-    }
-
-    /// Checks the instance and prepares it for rays. `outlines` are the outlines of the parts.
-    fn place(
-        &self,
-        instance: usize,
-        parts: &[WideBvh],
-        outlines: &[Vec<Aabb>],
-    ) -> Result<Placed, InvalidInstances> {
-        let (to_local, bounds) = self.check(instance, parts)?;
-        let transform = self.transform.as_daffine3();
-        // A turned box has a box of up to five times its volume; the boxes of many small ones fit
-        // better.
-        let mut outline = Aabb::EMPTY;
-        for aabb in &outlines[self.part as usize] {
-            outline = outline.union(&transformed(&transform, aabb));
-        }
-        let aabb = Aabb { min: outline.min.max(bounds.min), max: outline.max.min(bounds.max) };
-        Ok(Placed { part: self.part, to_local, aabb, bounds })
+        Ok(Placed { part: self.part, to_local, aabb })
     }
 }
 
@@ -151,9 +127,8 @@ struct Placed {
     part: u32,
     /// The transform from the scene's coordinates to the part's.
     to_local: DAffine3,
-    /// A box in which all hits of the instance are, and the box that trees over instances have.
+    /// The box that trees over instances have, in which all hits of the instance are.
     aabb: Aabb,
-    bounds: Aabb,
 }
 
 impl Placed {
@@ -195,18 +170,17 @@ pub struct Instances {
 impl Instances {
     /// Makes a scene of `instances` of `parts`, with a tree over the [boxes of the
     /// instances](Instance::boxes). If instances move, they need a refitted or new tree, but no new
-    /// parts. O(parts + instances), where an instance has at most 64 boxes to be transformed.
+    /// parts. O(instances).
     pub fn new(
         parts: Vec<WideBvh>,
         instances: Vec<Instance>,
         top: Bvh,
     ) -> Result<Self, InvalidInstances> {
-        let outlines: Vec<Vec<Aabb>> = parts.iter().map(WideBvh::outline).collect();
         let placed: Vec<Placed> = (instances.iter().enumerate())
-            .map(|(index, instance)| instance.place(index, &parts, &outlines))
+            .map(|(index, instance)| instance.place(index, &parts))
             .collect::<Result<_, _>>()?;
-        let bounds: Vec<Aabb> = placed.iter().map(|placed| placed.bounds).collect();
-        validate(&top, &bounds)?;
+        let boxes: Vec<Aabb> = placed.iter().map(|placed| placed.aabb).collect();
+        validate(&top, &boxes)?;
         Ok(Self { parts, placed, top })
     }
 

@@ -4,7 +4,6 @@ use super::kernel::Kernel;
 use super::triangles::TriangleBlock;
 use crate::slabs::near_region;
 use crate::{Aabb, Bvh, Node};
-use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 
@@ -138,34 +137,10 @@ pub struct WideBvh {
     pub(crate) stack_need: usize,
 }
 
-/// The maximum number of boxes in an outline. Boxes of instances are computed from all of them.
-const OUTLINE: usize = 64;
-
 impl WideBvh {
     #[inline(always)]
     pub(crate) fn places(&self) -> Places {
         Places { nodes: self.nodes.as_ptr().cast(), blocks: self.blocks.as_ptr().cast() }
-    }
-
-    /// Returns boxes around all triangles, fewer than [`OUTLINE`] and eight: the subtrees of the
-    /// layout from the root down.
-    pub(crate) fn outline(&self) -> Vec<Aabb> {
-        let Some(root) = self.root else { return Vec::new() };
-        let mut leaves = Vec::new();
-        let mut open = VecDeque::from([(self.bounds, root)]);
-        while let Some((aabb, child)) = open.pop_front() {
-            if !child.is_node() || leaves.len() + open.len() >= OUTLINE {
-                leaves.push(aabb);
-                continue;
-            }
-            let node = &self.nodes[child.index()];
-            for lane in 0..WideNode::LANES {
-                if let Some(aabb) = node.lane_box(lane) {
-                    open.push_back((aabb, node.children[lane]));
-                }
-            }
-        }
-        leaves
     }
 
     /// Returns the layout as a tree, for the wide nodes of other tracers: up to eight children of a
@@ -193,12 +168,8 @@ impl WideBvh {
                 tree.nodes[place] = Node::inner(aabb, first as u32, children as u32);
             } else {
                 let first = tree.prim_ids.len();
-                for block in &self.blocks[child.index()..] {
-                    tree.prim_ids.extend(block.triangles().map(|(id, _)| id));
-                    if block.is_last() {
-                        break;
-                    }
-                }
+                let triangles = self.leaf(child).iter().flat_map(TriangleBlock::triangles);
+                tree.prim_ids.extend(triangles.map(|(id, _)| id));
                 let objects = tree.prim_ids.len() - first;
                 tree.nodes[place] = Node::leaf(aabb, first as u32, objects as u32);
             }
