@@ -35,12 +35,7 @@ pub enum Objective {
 impl Objective {
     /// Returns the cost of `tree` under this objective. O(nodes).
     pub fn cost(&self, tree: &Bvh) -> f64 {
-        match self {
-            Self::InternalArea => internal_area(tree),
-            Self::GoldsmithSalmon => goldsmith_salmon(tree),
-            Self::Sah(constants) => sah(tree, constants),
-            Self::Layout => layout_area(tree),
-        }
+        self.cost_by(tree, &Area)
     }
 
     /// Returns the cost of `tree` under this objective with a measure of boxes instead of their

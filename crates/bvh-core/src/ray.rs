@@ -234,6 +234,8 @@ mod tests {
     fn a_range_begins_and_ends_at_positive_zeros() {
         let ray = Ray::new(Vec3::ZERO, Vec3::X, -0.0, -0.0).unwrap();
         assert_eq!([ray.t_min(), ray.t_max()].map(f32::to_bits), [0, 0]);
+        let below_zero = Ray::assume_valid(Vec3::ONE, Vec3::X, -1e30, f32::INFINITY);
+        assert_eq!(below_zero, Ray::half_line(Vec3::ONE, Vec3::X).unwrap());
     }
 
     #[test]

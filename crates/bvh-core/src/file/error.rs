@@ -14,21 +14,12 @@ pub enum FileError {
     /// The file is shorter than a header.
     #[error("the file ends within its header")]
     Header,
-    /// The file has an earlier version of the format, of which none was released.
+    /// The file has another version of the format. None before this one was released.
     #[error(
-        "the tree was written by version {found} of the format; this program reads version {}: bake it again",
+        "the tree was written by version {found} of the format; this program reads version {}: bake it again, or update the program",
         VERSION
     )]
-    OldVersion {
-        /// The version found.
-        found: u32,
-    },
-    /// The file has a later version of the format.
-    #[error(
-        "the tree was written by version {found} of the format; this program reads version {}: update the program",
-        VERSION
-    )]
-    NewVersion {
+    Version {
         /// The version found.
         found: u32,
     },

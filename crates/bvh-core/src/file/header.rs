@@ -8,7 +8,6 @@ use alloc::borrow::ToOwned;
 use alloc::string::String;
 use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
-use core::cmp::Ordering;
 
 /// The header of a tree file. [The format](super) documents the position of each field.
 #[derive(Clone, Debug, PartialEq)]
@@ -133,7 +132,9 @@ impl Header {
         if stored.endianness == Self::ENDIANNESS.swap_bytes() {
             return Err(FileError::Endianness);
         }
-        check_version(stored.version)?;
+        if stored.version != VERSION {
+            return Err(FileError::Version { found: stored.version });
+        }
         if stored.endianness != Self::ENDIANNESS {
             return Err(FileError::Field("endianness mark"));
         }
@@ -199,14 +200,6 @@ struct Stored {
     flags: u32,
     reserved: [u32; 2],
     checksum: u32,
-}
-
-fn check_version(found: u32) -> Result<(), FileError> {
-    match found.cmp(&VERSION) {
-        Ordering::Less => Err(FileError::OldVersion { found }),
-        Ordering::Equal => Ok(()),
-        Ordering::Greater => Err(FileError::NewVersion { found }),
-    }
 }
 
 /// Returns the objective with this number. Constants must be 0 unless the objective uses them.

@@ -61,7 +61,7 @@
 //! the checks of the tree's structure do. `scripts/read_tree.py` and `scripts/read_tree.cpp` of the
 //! repository read this format.
 //!
-//! Versions 1 to 3 were never released. This crate rejects them with [`FileError::OldVersion`].
+//! Versions 1 to 3 were never released. This crate rejects them with [`FileError::Version`].
 //!
 //! # Loading without copying
 //!

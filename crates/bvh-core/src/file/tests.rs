@@ -3,7 +3,6 @@
 use super::*;
 use crate::cost::SahConstants;
 use crate::{Clip, Ray, nearest_hit_by, validate_references};
-use alloc::string::ToString;
 use alloc::vec;
 
 const ORIGIN: Origin = Origin {
@@ -260,13 +259,9 @@ fn each_foreign_file_version_byte_order_and_scene_has_its_error() {
     let changed =
         |offset, field: &[u8]| TreeFile::open(&with_field(&bytes, offset, field)).unwrap_err();
     assert_eq!(changed(0, b"v 0 0 0\n"), FileError::Magic);
-    let old = changed(8, &3u32.to_le_bytes());
-    assert_eq!(old, FileError::OldVersion { found: 3 });
-    assert!(
-        old.to_string().contains("version 3") && old.to_string().contains("bake it again"),
-        "{old}"
-    );
-    assert_eq!(changed(8, &5u32.to_le_bytes()), FileError::NewVersion { found: 5 });
+    for found in [3, 5] {
+        assert_eq!(changed(8, &u32::to_le_bytes(found)), FileError::Version { found });
+    }
     assert_eq!(changed(8, &[0, 0, 0, 2, 1, 2, 3, 4]), FileError::Endianness);
     assert_eq!(changed(32, &u64::MAX.to_le_bytes()), FileError::Field("objects"));
     let short = FileError::Length { found: bytes.len() as u64, expected: 192 + 3 * 32 + 5 * 4 };

@@ -391,22 +391,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn no_box_that_is_not_finite_or_is_inverted_passes() {
-        let tree = chain(5);
-        for index in 0..tree.nodes.len() {
-            for axis in 0..3 {
-                for wrong in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-                    for (min, max) in [(wrong, 1.0), (0.0, wrong), (1.5, 1.0), (0.0, -0.5)] {
-                        let mut damaged = tree.clone();
-                        damaged.nodes[index].aabb.min[axis] = min;
-                        damaged.nodes[index].aabb.max[axis] = max;
-                        let fault = validate(&damaged, &[UNIT; 5]);
-                        assert!(matches!(fault, Err(InvalidBvh::Box { .. })), "{fault:?}");
-                    }
-                }
-            }
-        }
-    }
 }

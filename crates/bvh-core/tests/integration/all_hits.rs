@@ -189,19 +189,7 @@ fn is_crossed(ray: &Ray, triangle: &Triangle) -> bool {
 
 #[test]
 fn crossings_are_those_of_a_moved_origin_in_exact_arithmetic() {
-    let mut random = Random(6);
-    for (name, triangles, inside) in closed_meshes() {
-        for ray in rays_through(&triangles, inside, 40, &mut random) {
-            for _ in 0..12 {
-                let triangle = random.of(&triangles);
-                let is_met = triangle.intersect(&PreparedRay::new(&ray), f32::MAX).is_some();
-                let expected = is_crossed(&ray, &triangle) && is_met;
-                let found = triangle.crossing(&ray).is_some();
-                assert_eq!(found, expected, "{name}: {ray:?} {triangle:?}");
-            }
-        }
-    }
-    let crossed = compare_with_exact_arithmetic(20);
+    let crossed = compare_with_exact_arithmetic(24);
     assert!(crossed > 400, "{crossed}");
 }
 

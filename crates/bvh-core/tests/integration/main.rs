@@ -4,7 +4,6 @@ mod all_hits;
 mod closest;
 mod exact;
 mod export;
-mod filters;
 mod instances;
 mod leave;
 mod ray_density;

@@ -5,7 +5,7 @@ use crate::support::layouts::{bundles, by_kernel, layouts};
 use crate::support::{
     Random, SHAPES, ball, bits, boxes, brute_force, chain, grid_box, rays, scaled, soup, tree,
 };
-use bvh_core::{Coherence, Hit, Kernel, Ray, RefitError, Triangle, WideBvh};
+use bvh_core::{Coherence, Hit, Kernel, PreparedRay, Ray, RefitError, Triangle, WideBvh};
 use glam::Vec3;
 
 /// Checks all rays by all layouts, one by one and in a batch. Returns the number of rays that hit.
@@ -43,12 +43,13 @@ fn every_kernel_answers_as_brute_force_at_every_scale() {
     for (name, scene) in
         [("soup", soup(150, &mut random)), ("grid", grid_box(4)), ("ball", ball(2))]
     {
-        for exponent in [-120, -60, -20, 0, 20, 60, 71, 120] {
+        // Down to the least denormal number.
+        for exponent in [-149, -140, -127, -120, -110, -91, -88, -60, -20, 0, 20, 60, 71, 120] {
             let triangles = scaled(&scene, libm::exp2f(exponent as f32));
             let layouts = layouts(&triangles, &mut random);
             let name = format!("{name} * 2^{exponent}");
-            hits += check(&name, &triangles, &layouts, &rays(&triangles, 1500, &mut random));
-            hits += check(&name, &triangles, &layouts, &bundles(&triangles, 100, &mut random));
+            hits += check(&name, &triangles, &layouts, &rays(&triangles, 1000, &mut random));
+            hits += check(&name, &triangles, &layouts, &bundles(&triangles, 60, &mut random));
         }
     }
     assert!(hits > 10_000, "the rays should hit something: {hits}");
@@ -100,14 +101,22 @@ fn packets_from_one_origin_answer_as_brute_force() {
 }
 
 #[test]
-fn ranges_that_end_at_a_hit_or_next_to_it_are_answered_alike() {
+fn ranges_that_end_at_a_hit_or_next_to_it_are_answered_alike_from_near_and_from_afar() {
     let mut random = Random(12);
     let mut hits = 0;
     for scale in [1.0, 1e-20, 1e11, 1e14, 1e-38] {
-        let triangles = scaled(&soup(80, &mut random), scale);
+        let triangles = scaled(&[soup(80, &mut random), grid_box(2)].concat(), scale);
         let layouts = layouts(&triangles, &mut random);
+        let mut whole = rays(&triangles, 200, &mut random);
+        for distance in [10.0, 1e3, 1e5, 1e7] {
+            for _ in 0..40 {
+                let origin = random.point() * distance * scale;
+                let towards = (random.of(&triangles).0[0] - origin) / scale;
+                whole.extend(Ray::half_line(origin, towards * random.of(&[1.0, 0.01, 37.0])));
+            }
+        }
         let mut ends = Vec::new();
-        for ray in rays(&triangles, 300, &mut random) {
+        for ray in whole {
             let Some(Hit { t, .. }) = brute_force(&triangles, &ray) else { continue };
             let ranges = [
                 (0.0, t),
@@ -123,7 +132,7 @@ fn ranges_that_end_at_a_hit_or_next_to_it_are_answered_alike() {
         }
         hits += check(&format!("soup * {scale}"), &triangles, &layouts, &ends);
     }
-    assert!(hits > 500, "the rays should hit something: {hits}");
+    assert!(hits > 1000, "the rays should hit something: {hits}");
 }
 
 #[test]
@@ -226,48 +235,6 @@ fn a_range_that_ends_at_either_zero_has_the_same_bits_from_every_kernel() {
 }
 
 #[test]
-fn batches_miss_a_scene_in_which_no_triangle_has_an_area() {
-    let line = Triangle::from([[-1.0; 3], [0.0; 3], [1.0; 3]]);
-    let ray = Ray::half_line([0.0, 0.0, 5.0], [0.01, 0.01, -1.0]).unwrap();
-    for (kernel, wide) in layouts(&[line, line], &mut Random(7)) {
-        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
-            let mut hits = vec![Hit { t: 1.0, object: 0 }; 100];
-            let mut any = vec![true; 100];
-            wide.nearest_hits(&[ray; 100], &mut hits, coherence);
-            wide.any_hits(&[ray; 100], &mut any, coherence);
-            let is_miss = hits.iter().all(Hit::is_miss) && !any.contains(&true);
-            assert!(is_miss, "{kernel:?}, {coherence:?}");
-        }
-    }
-}
-
-#[test]
-fn ranges_that_begin_below_zero_are_answered_as_from_zero() {
-    let mut random = Random(6);
-    let triangles = soup(200, &mut random);
-    let below_zero: Vec<Ray> = (rays(&triangles, 500, &mut random).iter())
-        .map(|ray| Ray::assume_valid(ray.origin(), ray.direction(), -1e30, f32::INFINITY))
-        .collect();
-    for ray in &below_zero {
-        assert_eq!(*ray, Ray::half_line(ray.origin(), ray.direction()).unwrap());
-    }
-    let layouts = layouts(&triangles, &mut random);
-    assert!(check("below zero", &triangles, &layouts, &below_zero) > 100);
-}
-
-#[test]
-fn coordinates_down_to_denormal_ones_are_answered_alike() {
-    let mut random = Random(3);
-    for exponent in [-149, -140, -127, -110, -91, -88] {
-        let triangles = scaled(&soup(40, &mut random), libm::exp2f(exponent as f32 + 7.0) / 128.0);
-        let layouts = layouts(&triangles, &mut random);
-        let name = format!("soup * 2^{exponent}");
-        check(&name, &triangles, &layouts, &rays(&triangles, 600, &mut random));
-        check(&name, &triangles, &layouts, &bundles(&triangles, 40, &mut random));
-    }
-}
-
-#[test]
 fn a_refitted_layout_answers_as_brute_force_at_the_new_places() {
     let mut random = Random(6);
     let triangles = soup(150, &mut random);
@@ -357,33 +324,10 @@ fn triangles_without_area_are_left_out_and_never_hit() {
     let mut triangles: Vec<Triangle> =
         corners.iter().flat_map(|&p| corners.iter().map(move |&q| flat(p, q))).collect();
     let empty = layouts(&triangles, &mut random);
-    assert!(empty.iter().all(|(_, wide)| {
-        wide.nearest_hit(&Ray::half_line(-Vec3::ONE, Vec3::ONE).unwrap()).is_none()
-    }));
+    assert_eq!(check("empty", &triangles, &empty, &rays(&triangles, 500, &mut random)), 0);
     triangles.push(Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]));
     let layouts = layouts(&triangles, &mut random);
     assert!(check("flat", &triangles, &layouts, &rays(&triangles, 500, &mut random)) > 0);
-}
-
-#[test]
-fn a_range_of_one_distance_has_the_hit_at_that_distance_from_near_and_from_afar() {
-    let mut random = Random(22);
-    let triangles = [soup(100, &mut random), grid_box(3)].concat();
-    let layouts = layouts(&triangles, &mut random);
-    let mut rays = Vec::new();
-    for distance in [0.5, 10.0, 1e3, 1e5, 1e7] {
-        for _ in 0..200 {
-            let origin = random.point() * distance;
-            let towards = random.of(&triangles).0[0].as_dvec3() - origin.as_dvec3();
-            let towards = towards.as_vec3() * random.of(&[1.0, 0.01, 37.0]);
-            let Ok(ray) = Ray::half_line(origin, towards) else { continue };
-            if let Some(hit) = brute_force(&triangles, &ray) {
-                rays.push(Ray::new(origin, towards, hit.t, hit.t).unwrap());
-            }
-        }
-    }
-    assert_eq!(check("one distance", &triangles, &layouts, &rays), rays.len());
-    assert!(rays.len() > 300, "{}", rays.len());
 }
 
 #[test]
@@ -457,4 +401,37 @@ fn every_kernel_traces_trees_of_any_depth() {
             assert_eq!(hits, singly, "{name}, {kernel:?}");
         }
     }
+}
+
+#[test]
+fn a_filter_passes_over_hits_and_sees_all_of_them_if_it_accepts_none() {
+    let mut random = Random(9);
+    let triangles = soup(150, &mut random);
+    let layouts = layouts(&triangles, &mut random);
+    let mut found = 0;
+    let mut several = 0;
+    for ray in rays(&triangles, 2000, &mut random) {
+        let prepared = PreparedRay::new(&ray);
+        let hit = |(object, triangle): (u32, &Triangle)| {
+            Some(Hit { t: triangle.intersect(&prepared, ray.t_max())?, object })
+        };
+        let all: Vec<Hit> = (0..).zip(&triangles).filter_map(hit).collect();
+        let kept = all.iter().copied().filter(|hit| hit.object % 3 > 0);
+        let nearest = kept.reduce(|a, b| if b.precedes(&a) { b } else { a });
+        for (_, layout) in &layouts {
+            assert_eq!(layout.nearest_hit_where(&ray, |hit| hit.object % 3 > 0), nearest);
+            assert_eq!(layout.any_hit_where(&ray, |hit| hit.object % 3 > 0), nearest.is_some());
+            let mut seen = Vec::new();
+            let sees = |hit| {
+                seen.push(hit);
+                false
+            };
+            assert_eq!(layout.nearest_hit_where(&ray, sees), None);
+            seen.sort_by_key(|hit| hit.object);
+            assert_eq!(seen, all);
+        }
+        found += usize::from(nearest.is_some());
+        several += usize::from(all.len() > 1);
+    }
+    assert!(found > 300 && several > 100, "{found} {several}");
 }
