@@ -3,13 +3,12 @@
 
 use ::obvhs::bvh2::builder::build_bvh2;
 use ::obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
-use ::obvhs::cwbvh::{CwBvh, node::CwBvhNode};
 use ::obvhs::ray::RayHit;
 use ::obvhs::{BvhBuildParams, aabb};
 use attic::obvhs::{to_our_tree, to_their_ray, to_theirs};
 use attic::tracing::rays::rays;
-use bvh_core::export::{CompressedBvh, CompressedNode, Target};
-use bvh_core::{Aabb, Bvh, PreparedRay, Ray, Triangle, nearest_hit, validate};
+use bvh_core::export::Target;
+use bvh_core::{Aabb, PreparedRay, Ray, Triangle, nearest_hit, validate};
 use bvh_scenes::Scene;
 use bvh_scenes::rays::{Kind, Viewpoint};
 use bvh_search::{Bake, Budget};
@@ -28,24 +27,6 @@ fn triangles(n: u32) -> Vec<Triangle> {
         ]));
     }
     triangles
-}
-
-/// Converts a tree to compressed nodes of `obvhs`, which have the planes in another order.
-fn to_their_compressed(tree: &Bvh, boxes: &[Aabb]) -> CwBvh {
-    let CompressedBvh { nodes, prim_ids } = CompressedBvh::new(tree, boxes).unwrap();
-    let nodes = nodes.iter().map(to_their_compressed_node).collect();
-    CwBvh { nodes, primitive_indices: prim_ids, ..Default::default() }
-}
-
-fn to_their_compressed_node(node: &CompressedNode) -> CwBvhNode {
-    let ours = bytemuck::bytes_of(node);
-    let mut theirs = ours.to_vec();
-    for plane in 0..6 {
-        let from = 32 + 8 * plane;
-        let to = 32 + 8 * (2 * (plane % 3) + plane / 3);
-        theirs[to..to + 8].copy_from_slice(&ours[from..from + 8]);
-    }
-    bytemuck::pod_read_unaligned(&theirs)
 }
 
 #[test]
@@ -67,8 +48,6 @@ fn a_tree_of_obvhs_survives_a_round_trip_and_traces_the_same_hits() {
             let returned = to_theirs(&tree);
             returned.validate(&their_boxes, false, true);
             assert_eq!(to_our_tree(&returned), tree);
-            let compressed = to_their_compressed(&tree, &boxes);
-            compressed.validate(&their_boxes, false);
             for i in 0..200u8 {
                 let origin = [-3.0, f32::from(i % 14), f32::from(i / 14)];
                 let direction = [1.0, 0.05, f32::from(i) * 0.01 - 1.0];
@@ -80,11 +59,6 @@ fn a_tree_of_obvhs_survives_a_round_trip_and_traces_the_same_hits() {
                     distance(&triangles, &ray, returned.primitive_indices[position])
                 });
                 assert_eq!(found.then_some(hit.t), expected, "{n} triangles, ray {i}");
-                let mut hit = RayHit::none();
-                let found = compressed.ray_traverse(their_ray, &mut hit, |_, position| {
-                    distance(&triangles, &ray, compressed.primitive_indices[position])
-                });
-                assert_eq!(found.then_some(hit.t), expected, "compressed, {n} triangles, ray {i}");
             }
         }
     }

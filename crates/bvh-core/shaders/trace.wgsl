@@ -1,9 +1,11 @@
-// What the traversals of all layouts share: rays, hits, triangles, and one invocation per ray. A layout's file comes behind it, and
-// has `nearest`. Distances are those of f32 arithmetic on a GPU, not bit by bit those of the crate.
+// Rays through nodes of 32 bytes, as `Bvh::to_first_count` makes them, in trees of depth 64 at most, one invocation per ray.
+// Distances are those of f32 arithmetic on a GPU, not bit by bit those of the crate.
 
+struct Node { low: vec3f, first: u32, high: vec3f, count: u32 }
 struct Ray { origin: vec3f, t_min: f32, direction: vec3f, t_max: f32 }
 struct Hit { t: f32, object: u32 }
 
+@group(0) @binding(0) var<storage, read> nodes: array<Node>;
 @group(0) @binding(1) var<storage, read> prim_ids: array<u32>;
 // Nine numbers per triangle, by its id.
 @group(0) @binding(2) var<storage, read> corners: array<f32>;
@@ -60,6 +62,48 @@ fn nearer(hit: Hit, first: u32, count: u32, ray: Ray) -> Hit {
         }
     }
     return best;
+}
+
+// Visits the nearer child first.
+fn nearest(ray: Ray, none: Hit) -> Hit {
+    let inverse = reciprocal(ray.direction);
+    var hit = none;
+    var stack: array<u32, 64>;
+    var open = 0;
+    var at = 0u;
+    loop {
+        let node = nodes[at];
+        if node.count > 0u {
+            hit = nearer(hit, node.first, node.count, ray);
+        } else {
+            var near = node.first;
+            var far = node.first + 1u;
+            var enter = entry(nodes[near].low, nodes[near].high, ray, inverse, hit.t);
+            var enter_far = entry(nodes[far].low, nodes[far].high, ray, inverse, hit.t);
+            if enter_far < enter {
+                let swap = vec2u(far, near);
+                near = swap.x;
+                far = swap.y;
+                let times = vec2f(enter_far, enter);
+                enter = times.x;
+                enter_far = times.y;
+            }
+            if enter < FAR {
+                if enter_far < FAR {
+                    stack[open] = far;
+                    open++;
+                }
+                at = near;
+                continue;
+            }
+        }
+        if open == 0 {
+            return hit;
+        }
+        open--;
+        at = stack[open];
+    }
+    return hit;
 }
 
 @compute @workgroup_size(64)

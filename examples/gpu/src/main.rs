@@ -1,9 +1,9 @@
-//! Traces exported nodes with the compute shaders of `bvh-core`, and compares every hit with the
+//! Traces exported nodes with the compute shader of `bvh-core`, and compares every hit with the
 //! processor's hit. Needs a Vulkan device; a software device, such as Mesa's lavapipe, will do.
 //!
 //! `cargo run --release --manifest-path examples/gpu/Cargo.toml`
 
-use bvh_search::bvh_core::export::{CompressedBvh, shaders};
+use bvh_search::bvh_core::export::SHADER;
 use bvh_search::prelude::*;
 use std::error::Error;
 use wgpu::{BindGroupEntry, BufferUsages, PollType, ShaderSource};
@@ -47,14 +47,13 @@ fn create_buffer(device: &wgpu::Device, size: usize, usage: BufferUsages) -> wgp
     })
 }
 
-/// Returns the hits of `count` rays by a shader, as distances and objects.
+/// Returns the hits of `count` rays by the shader, as distances and objects.
 fn trace(
     (device, queue): &(wgpu::Device, wgpu::Queue),
-    shader: &str,
     data: [&[u8]; 4],
     count: usize,
 ) -> Result<Vec<(f32, u32)>, Box<dyn Error>> {
-    let source = ShaderSource::Wgsl(shader.into());
+    let source = ShaderSource::Wgsl(SHADER.into());
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
     let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: None,
@@ -122,35 +121,29 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 
     let nodes = tree.to_first_count();
-    let compressed = CompressedBvh::new(&tree, &boxes)?;
-    let binary: (&[u8], &[u32]) = (bytemuck::cast_slice(&nodes), &tree.prim_ids);
-    let wide: (&[u8], &[u32]) = (bytemuck::cast_slice(&compressed.nodes), &compressed.prim_ids);
-    for (name, shader, (nodes, ids)) in
-        [("binary", shaders::BINARY, binary), ("compressed", shaders::COMPRESSED, wide)]
-    {
-        let data = [
-            nodes,
-            bytemuck::cast_slice(ids),
-            bytemuck::cast_slice(&corners),
-            bytemuck::cast_slice(&ray_data),
-        ];
-        let found = trace(&device, shader, data, rays.len())?;
-        let mut differences = 0;
-        for ((t, object), expected) in found.iter().zip(&expected) {
-            // Only distances are compared, because a ray through an edge may hit either triangle.
-            let agrees = match expected {
-                Some(hit) => (t - hit.t).abs() <= 1e-5 * hit.t,
-                None => *object == u32::MAX,
-            };
-            differences += usize::from(!agrees);
-        }
-        let hits = expected.iter().flatten().count();
-        println!(
-            "{name}: {} bytes, {hits} of {} rays hit, {differences} answers differ",
-            nodes.len(),
-            rays.len()
-        );
-        assert!(hits > rays.len() / 4 && differences < 10, "the picture differs");
+    let nodes: &[u8] = bytemuck::cast_slice(&nodes);
+    let data = [
+        nodes,
+        bytemuck::cast_slice(&tree.prim_ids),
+        bytemuck::cast_slice(&corners),
+        bytemuck::cast_slice(&ray_data),
+    ];
+    let found = trace(&device, data, rays.len())?;
+    let mut differences = 0;
+    for ((t, object), expected) in found.iter().zip(&expected) {
+        // Only distances are compared, because a ray through an edge may hit either triangle.
+        let agrees = match expected {
+            Some(hit) => (t - hit.t).abs() <= 1e-5 * hit.t,
+            None => *object == u32::MAX,
+        };
+        differences += usize::from(!agrees);
     }
+    let hits = expected.iter().flatten().count();
+    println!(
+        "{} bytes, {hits} of {} rays hit, {differences} answers differ",
+        nodes.len(),
+        rays.len()
+    );
+    assert!(hits > rays.len() / 4 && differences < 10, "the picture differs");
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Conversion from and to the arrays of other libraries: binary nodes with the fields `first` and
 //! `count`.
 
-use super::unpack::{Part, unpack};
+use super::unpack::{Below, unpack};
 use crate::collapse::binary;
 use crate::{Aabb, Bvh, InvalidBvh, NodeKind};
 use alloc::vec::Vec;
@@ -60,34 +60,14 @@ impl Bvh {
         nodes: &[FirstCountNode],
         prim_ids: &[u32],
     ) -> Result<Self, InvalidBvh> {
-        let root = nodes.first().map(FirstCountNode::aabb);
-        unpack(nodes.len(), prim_ids, root, |index, parts| {
-            let node = &nodes[index];
-            let first = node.first;
-            if node.count > 0 {
-                parts.push((node.aabb(), Part::Leaf { first, count: node.count }));
-                return Ok(());
-            }
-            let left = first as usize;
-            let Some([left_node, right_node]) = nodes.get(left..).and_then(<[_]>::first_chunk)
-            else {
-                return Err(InvalidBvh::BadChildren {
-                    node: index,
-                    first,
-                    count: 2,
-                    nodes: nodes.len(),
-                });
+        unpack(nodes.len(), prim_ids, |index| {
+            let FirstCountNode { min, first, max, count } = nodes[index];
+            let below = match count {
+                0 => Below::Children([first as usize, (first as usize).saturating_add(1)]),
+                _ => Below::Objects { first, count },
             };
-            parts.push((left_node.aabb(), Part::Node(left)));
-            parts.push((right_node.aabb(), Part::Node(left + 1)));
-            Ok(())
+            (Aabb::from([min, max]), below)
         })
-    }
-}
-
-impl FirstCountNode {
-    fn aabb(&self) -> Aabb {
-        Aabb::from([self.min, self.max])
     }
 }
 

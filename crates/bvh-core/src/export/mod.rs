@@ -5,7 +5,6 @@
 //! |---|---|---|---|---|
 //! | [binary](FirstCountNode) | 32 per node | [`to_first_count`](crate::Bvh::to_first_count) | [`from_first_count`](crate::Bvh::from_first_count) | `obvhs`, `tinybvh`, most GPU tracers |
 //! | [three-mesh-bvh's](ThreeMeshNode) | 32 per node | [`to_three_mesh`](crate::Bvh::to_three_mesh) | [`from_three_mesh`](crate::Bvh::from_three_mesh) | `three-mesh-bvh`, `three-gpu-pathtracer` |
-//! | [compressed, eight-wide](CompressedNode) | 80 per node | [`CompressedBvh::new`] | [`CompressedBvh::decode`] | `obvhs`, `tinybvh`, after Ylitie et al. 2017 |
 //!
 //! A cheap tree by area is not yet a fast one there: [`Target::fit`] gives it the leaves, the depth
 //! and the order that a library is fastest with, and [`Target::fit_better`] counts whether rays take
@@ -16,32 +15,20 @@
 //! back traces the same hits as the original tree, bit by bit, because no box is smaller than in
 //! the original tree.
 //!
-//! [`shaders`] trace rays through two of them on a GPU; `examples/gpu` of the repository runs both.
+//! [`SHADER`] traces rays through binary nodes on a GPU; `examples/gpu` of the repository runs it.
 
 mod better;
-mod compressed;
 mod first_count;
 mod target;
 mod three_mesh;
 mod unpack;
 
-/// Complete compute shaders. Each one reads buffers of nodes, object ids, corners and rays, and
-/// writes a buffer of hits; its declarations define the bindings.
-pub mod shaders {
-    /// Traces [`FirstCountNode`](super::FirstCountNode)s. Written in WGSL.
-    pub const BINARY: &str = concat!(
-        include_str!("../../shaders/trace.wgsl"),
-        include_str!("../../shaders/binary.wgsl")
-    );
-    /// Traces [`CompressedNode`](super::CompressedNode)s. Written in WGSL.
-    pub const COMPRESSED: &str = concat!(
-        include_str!("../../shaders/trace.wgsl"),
-        include_str!("../../shaders/compressed.wgsl")
-    );
-}
+/// A complete compute shader in WGSL that traces rays through [`FirstCountNode`]s. It reads buffers
+/// of nodes, object ids, corners and rays, and writes a buffer of hits; its declarations define the
+/// bindings.
+pub const SHADER: &str = include_str!("../../shaders/trace.wgsl");
 
 pub use better::Better;
-pub use compressed::{CompressedBvh, CompressedNode};
 pub use first_count::FirstCountNode;
 pub use target::{Layout, Target, UnknownTarget};
 pub use three_mesh::ThreeMeshNode;

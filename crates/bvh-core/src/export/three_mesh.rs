@@ -1,7 +1,7 @@
 //! Conversion from and to the nodes of the JavaScript library `three-mesh-bvh`, whose trees
 //! `three-gpu-pathtracer` traces too.
 
-use super::unpack::{Part, unpack};
+use super::unpack::{Below, unpack};
 use crate::collapse::binary;
 use crate::{Aabb, Bvh, InvalidBvh, Node};
 use alloc::{vec, vec::Vec};
@@ -77,25 +77,13 @@ impl Bvh {
     ///
     /// The boxes are the library's; [`refit`](Bvh::refit) makes them tight.
     pub fn from_three_mesh(nodes: &[ThreeMeshNode], prim_ids: &[u32]) -> Result<Self, InvalidBvh> {
-        let aabb = |node: &ThreeMeshNode| Aabb::from([node.min, node.max]);
-        unpack(nodes.len(), prim_ids, nodes.first().map(aabb), |index, parts| {
-            let node = &nodes[index];
-            if node.axis_or_count >= LEAF {
-                let count = node.axis_or_count - LEAF;
-                parts.push((aabb(node), Part::Leaf { first: node.below, count }));
-                return Ok(());
-            }
-            for child in [index.checked_add(1), index.checked_add(node.below as usize)] {
-                let child = child.filter(|&child| child > index && child < nodes.len());
-                let child = child.ok_or(InvalidBvh::BadChildren {
-                    node: index,
-                    first: node.below,
-                    count: 2,
-                    nodes: nodes.len(),
-                })?;
-                parts.push((aabb(&nodes[child]), Part::Node(child)));
-            }
-            Ok(())
+        unpack(nodes.len(), prim_ids, |index| {
+            let ThreeMeshNode { min, max, below, axis_or_count } = nodes[index];
+            let below = match axis_or_count.checked_sub(LEAF) {
+                Some(count) => Below::Objects { first: below, count },
+                None => Below::Children([index + 1, index.saturating_add(below as usize)]),
+            };
+            (Aabb::from([min, max]), below)
         })
     }
 }

@@ -1,6 +1,6 @@
 //! The wide layout of least expected cost of a given tree.
 
-use super::decide::{BLOCK_COST, Costs, Decision, areas, children, decide};
+use super::decide::{Costs, Decision, areas, children, decide};
 use super::layout::{Child, WideBvh, WideNode};
 use super::triangles::TriangleBlock;
 use crate::collapse::{binary, binary_visited, collect};
@@ -72,9 +72,7 @@ pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) 
     };
     let tree = &*tree;
     let split = tree.prim_ids.len() > triangles.len();
-    let blocks =
-        |objects: u32| Some(BLOCK_COST * objects.div_ceil(TriangleBlock::LANES as u32) as f32);
-    let (decisions, costs) = decide(tree, &visits, blocks);
+    let (decisions, costs) = decide(tree, &visits);
     let promise = promise(tree, triangles, &visits, &costs);
     drop(visits);
     drop(costs);
@@ -160,22 +158,15 @@ mod tests {
     }
 
     #[test]
-    fn no_choice_of_nodes_costs_less_than_the_wide_layout() {
-        for seed in 0..6 {
-            let (triangles, tree) = scene(11, seed);
-            let wide = WideBvh::new(&tree, &triangles).unwrap();
-            check_optimal(&tree, &wide, Aabb::half_area);
-        }
-    }
-
-    #[test]
-    fn no_choice_of_nodes_costs_less_for_the_visits_of_rays() {
+    fn no_choice_of_nodes_costs_less_than_the_layout_for_random_lines_or_for_the_visits_of_rays() {
         let along_x = |aabb: &Aabb| {
             let extent = aabb.extent();
             extent.y * extent.z + 0.02 * extent.x * (extent.y + extent.z)
         };
         for seed in 0..6 {
             let (triangles, tree) = scene(11, seed);
+            let wide = WideBvh::new(&tree, &triangles).unwrap();
+            check_optimal(&tree, &wide, Aabb::half_area);
             let visits: Vec<f32> =
                 tree.nodes.iter().map(|node| along_x(&node.aabb) as f32).collect();
             let wide = WideBvh::for_rays(&tree, &triangles, &visits).unwrap();
@@ -281,7 +272,7 @@ mod tests {
         let promised = |ids: [u32; 2]| {
             let tree = Bvh { nodes: vec![root, leaves[0], leaves[1]], prim_ids: ids.to_vec() };
             let visits = areas(&tree);
-            let (_, costs) = decide(&tree, &visits, |_| Some(BLOCK_COST));
+            let (_, costs) = decide(&tree, &visits);
             promise(&tree, &triangles, &visits, &costs)[1]
         };
         assert_eq!(promised([0, 0]), promised([0, 1]));

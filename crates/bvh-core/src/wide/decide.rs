@@ -35,22 +35,19 @@ impl Decision {
 /// the 8 slots of a wide node.
 pub(crate) type Costs = [f32; 8];
 
-/// Decides for every node of `tree`, each of which has two children or none. `leaf_cost` is the
-/// expected time of testing a leaf of so many objects, if there may be one. O(n).
+/// Decides for every node of `tree`, each of which has two children or none. O(n).
 // Costs take most of the memory. They are separate, so that the layout is made after they are
 // dropped.
-pub(crate) fn decide(
-    tree: &Bvh,
-    visits: &[f32],
-    leaf_cost: impl Fn(u32) -> Option<f32>,
-) -> (Vec<Decision>, Vec<Costs>) {
+pub(super) fn decide(tree: &Bvh, visits: &[f32]) -> (Vec<Decision>, Vec<Costs>) {
     let one_child = Decision { slots: [0; 7], is_leaf: true, objects: 0 };
     let mut decisions = vec![one_child; tree.nodes.len()];
     let mut costs = vec![[0.0; 8]; tree.nodes.len()];
     for (index, node) in tree.nodes.iter().enumerate().rev() {
         let visits = visits[index];
-        let leaf_cost =
-            |objects: u32| leaf_cost(objects).map_or(f32::INFINITY, |cost| visits * cost);
+        let leaf_cost = |objects: u32| {
+            let blocks = objects.div_ceil(TriangleBlock::LANES as u32);
+            visits * (BLOCK_COST * blocks as f32)
+        };
         match (node.kind(), &decisions[node.children()], &costs[node.children()]) {
             (NodeKind::Inner { .. }, [a, b], [costs_of_a, costs_of_b]) => {
                 let objects = a.objects + b.objects;

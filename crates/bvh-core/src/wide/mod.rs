@@ -42,7 +42,7 @@ mod vector;
 
 pub use batch::Coherence;
 pub use closest::Closest;
-pub(crate) use decide::{BLOCK_COST, NODE_COST, areas, children, decide};
+pub(crate) use decide::{BLOCK_COST, NODE_COST};
 pub use instances::{Instance, InstanceHit, Instances, InvalidInstances};
 pub use kernel::Kernel;
 pub use layout::WideBvh;

@@ -2,27 +2,24 @@
 //! has the documented bytes.
 
 use crate::support::{Random, SHAPES, ball, boxes, chain, grid_box, rays, scaled, soup, tree};
-use bvh_core::export::{
-    CompressedBvh, CompressedNode, FirstCountNode, Layout, Target, ThreeMeshNode,
-};
-use bvh_core::{Aabb, Bvh, InvalidBvh, Node, Ray, Triangle, any_hit, file, nearest_hit, validate};
+use bvh_core::export::{FirstCountNode, Layout, Target, ThreeMeshNode};
+use bvh_core::{Aabb, Bvh, InvalidBvh, Node, Triangle, any_hit, file, nearest_hit, validate};
 use glam::Vec3;
 use proptest::prelude::*;
 
-fn returned(tree: &Bvh, boxes: &[Aabb]) -> [(&'static str, Bvh); 4] {
+fn returned(tree: &Bvh) -> [(&'static str, Bvh); 3] {
     let ids = &tree.prim_ids;
     [
         ("binary", Bvh::from_first_count(&tree.to_first_count(), ids).unwrap()),
         ("aligned", Bvh::from_first_count(&tree.to_first_count_aligned(), ids).unwrap()),
         ("three-mesh-bvh", Bvh::from_three_mesh(&tree.to_three_mesh(), ids).unwrap()),
-        ("compressed", CompressedBvh::new(tree, boxes).unwrap().decode().unwrap()),
     ]
 }
 
 fn check(name: &str, tree: &Bvh, triangles: &[Triangle], random: &mut Random) -> usize {
     let boxes = boxes(triangles);
     let rays = rays(triangles, 600, random);
-    for (layout, mut returned) in returned(tree, &boxes) {
+    for (layout, returned) in returned(tree) {
         for ray in &rays {
             let expected = nearest_hit(tree, triangles, ray);
             assert_eq!(
@@ -38,12 +35,7 @@ fn check(name: &str, tree: &Bvh, triangles: &[Triangle], random: &mut Random) ->
         for (node, tight_node) in returned.nodes.iter().zip(&tight.nodes) {
             assert!(node.aabb.contains(&tight_node.aabb), "{name}, {layout}");
         }
-        // Compression merges nodes and rounds boxes; the other layouts keep everything.
-        if layout != "compressed" {
-            returned.refit(&boxes);
-            assert_eq!(returned, tight);
-            assert_eq!(returned.prim_ids.len(), tree.prim_ids.len());
-        }
+        assert_eq!(returned.prim_ids.len(), tree.prim_ids.len());
     }
     rays.iter().filter(|ray| any_hit(tree, triangles, ray)).count()
 }
@@ -81,33 +73,6 @@ fn every_layout_traces_the_hits_of_the_tree_at_every_scale() {
 }
 
 #[test]
-fn a_corner_that_is_next_to_a_plane_of_the_grid_stays_in_its_box() {
-    // Relative to the node's lower corner −1, the corner −2⁻⁶⁰ is in no f64.
-    let least = -libm::exp2f(-60.0);
-    // Nor is the corner 2⁻⁶⁰ relative to −255, which is 255 steps of the grid below 0.
-    let wide = Triangle::from([[-255.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-least, 0.0, 0.0]]);
-    let boxed = Aabb::union_of(&boxes(&[wide]));
-    let tree = Bvh { nodes: vec![Node::leaf(boxed, 0, 1)], prim_ids: vec![0] };
-    let returned = CompressedBvh::new(&tree, &[boxed]).unwrap().decode().unwrap();
-    assert!(returned.nodes[0].aabb.contains(&boxed));
-    let left = Triangle::from([[-1.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [-0.5, 0.0, 0.0]]);
-    let right = Triangle::from([[least, -1.0, 0.0], [least, 1.0, 0.0], [1.0, 0.0, 0.0]]);
-    for sign in [1.0, -1.0] {
-        let triangles = [left, left, left, right, right, right]
-            .map(|triangle| Triangle(triangle.0.map(|corner| corner * sign)));
-        let boxes = boxes(&triangles);
-        let [a, b] = [boxes[0], boxes[3]];
-        let nodes = vec![Node::inner(a.union(&b), 1, 2), Node::leaf(a, 0, 3), Node::leaf(b, 3, 3)];
-        let tree = Bvh { nodes, prim_ids: (0..6).collect() };
-        let returned = CompressedBvh::new(&tree, &boxes).unwrap().decode().unwrap();
-        let ray = Ray::half_line([sign * least / 2.0, 0.0, -1.0], [0.0, 0.0, 1.0]).unwrap();
-        let expected = nearest_hit(&tree, &triangles, &ray);
-        assert!(expected.is_some());
-        assert_eq!(nearest_hit(&returned, &triangles, &ray), expected);
-    }
-}
-
-#[test]
 fn small_trees_deep_trees_and_trees_of_points_have_layouts() {
     let mut random = Random(2);
     let points = vec![Triangle([Vec3::new(1.0, 2.0, 3.0); 3]); 30];
@@ -124,18 +89,14 @@ fn small_trees_deep_trees_and_trees_of_points_have_layouts() {
         check("one leaf", &one_leaf, &triangles, &mut random);
         check("chain", &chain(&boxes), &triangles, &mut random);
     }
-    for (layout, returned) in returned(&Bvh::default(), &[]) {
+    for (layout, returned) in returned(&Bvh::default()) {
         assert_eq!(returned, Bvh::default(), "{layout}");
     }
 }
 
 #[test]
 fn the_bytes_are_the_documented_ones() {
-    let sizes =
-        [size_of::<FirstCountNode>(), size_of::<ThreeMeshNode>(), size_of::<CompressedNode>()];
-    assert_eq!(sizes, [32, 32, 80]);
-    // Two cubes of side 1 at x = 0 and x = 509: the grid's step is 2 along x, and 1/128 along y and
-    // z.
+    assert_eq!([size_of::<FirstCountNode>(), size_of::<ThreeMeshNode>()], [32; 2]);
     let cube = |x: f32| Aabb::from([[x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]]);
     let boxes = [cube(0.0), cube(509.0)];
     let nodes = vec![
@@ -153,21 +114,6 @@ fn the_bytes_are_the_documented_ones() {
     assert_eq!([32 + 24, 64 + 24].map(|offset| word(bytes, offset)), [1, 0]);
     assert_eq!(bytes[32 + 28..64], [1, 0, 0xff, 0xff]);
     assert!(float(bytes, 64) < 509.0 && float(bytes, 64 + 12) > 510.0);
-
-    let compressed = CompressedBvh::new(&refitted, &boxes).unwrap();
-    let bytes: &[u8] = bytemuck::cast_slice(&compressed.nodes);
-    // Both objects are in one leaf, and the leaf is in one slot.
-    assert_eq!(bytes.len(), 80);
-    assert_eq!([0, 4, 8].map(|offset| float(bytes, offset)), [0.0; 3]);
-    assert_eq!(bytes[12..16], [128, 120, 120, 0]);
-    assert_eq!([word(bytes, 16), word(bytes, 20)], [1, 0]);
-    let slot = (0..8).find(|slot| bytes[24 + slot] != 0).unwrap();
-    assert_eq!(bytes[24 + slot], 0b011_00000);
-    assert_eq!(
-        [32, 40, 48, 56, 64, 72].map(|offset| bytes[offset + slot]),
-        [0, 0, 0, 255, 128, 128]
-    );
-    assert_eq!(compressed.prim_ids, [1, 0]);
 }
 
 #[test]
@@ -287,25 +233,6 @@ fn a_file_for_a_tracer_has_the_documented_header_nodes_and_ids() {
     }
 }
 
-#[test]
-fn children_are_in_the_slots_of_their_corners() {
-    let mut boxes = Vec::new();
-    for slot in 0..8u8 {
-        let low = [2, 1, 0].map(|bit| f32::from(slot >> bit & 1) * 10.0);
-        boxes.push(Aabb::from([low, low.map(|x| x + 1.0)]));
-    }
-    let mut random = Random(3);
-    for _ in 0..10 {
-        let compressed = CompressedBvh::new(&tree(&boxes, SHAPES[2], &mut random), &boxes).unwrap();
-        let bytes: &[u8] = bytemuck::cast_slice(&compressed.nodes);
-        assert_eq!(bytes.len(), 80);
-        for slot in 0..8 {
-            assert_eq!(compressed.prim_ids[slot], slot as u32);
-            assert_eq!(bytes[24 + slot], 1 << 5 | slot as u8);
-        }
-    }
-}
-
 proptest! {
     #[test]
     fn bytes_that_are_no_tree_are_rejected_or_give_a_tree_that_can_be_traversed(
@@ -315,11 +242,9 @@ proptest! {
         fn nodes<T: bytemuck::Pod>(bytes: &[u8]) -> Vec<T> {
             bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect()
         }
-        let compressed = CompressedBvh { nodes: nodes(&bytes), prim_ids: ids.clone() };
-        let trees: [Result<Bvh, InvalidBvh>; 3] = [
+        let trees: [Result<Bvh, InvalidBvh>; 2] = [
             Bvh::from_first_count(&nodes(&bytes), &ids),
             Bvh::from_three_mesh(&nodes(&bytes), &ids),
-            compressed.decode(),
         ];
         for tree in trees.into_iter().flatten() {
             prop_assert!(tree.prim_ids.len() <= ids.len());
