@@ -175,46 +175,78 @@ fn split_mix(state: u64) -> u64 {
 mod tests {
     use super::*;
     use crate::run::stream;
-    use crate::scatter::built;
+    use crate::scatter::{built, scatter};
     use bvh_build::muller_fellner;
     use bvh_core::{Aabb, validate};
     use rand::RngExt;
+    use std::collections::BTreeMap;
+
+    /// Returns the objects below every node, as bits, and the area of all inner nodes of the
+    /// cheapest tree of which every division is in one of the trees.
+    fn brute_force(trees: &[&Working], boxes: &[Aabb]) -> f64 {
+        let mut divisions: BTreeMap<u32, Vec<[u32; 2]>> = BTreeMap::new();
+        for tree in trees {
+            let mut below = vec![0_u32; tree.nodes.len()];
+            for &node in tree.preorder().iter().rev() {
+                let [left, right] = tree.nodes[node as usize].children;
+                below[node as usize] = if tree.nodes[node as usize].is_leaf() {
+                    1 << right
+                } else {
+                    let parts = [below[left as usize], below[right as usize]];
+                    divisions.entry(parts[0] | parts[1]).or_default().push(parts);
+                    parts[0] | parts[1]
+                };
+            }
+        }
+        // A part of a set is a smaller number than the set.
+        let mut least = BTreeMap::new();
+        for (&set, divisions) in &divisions {
+            let of = |part: &u32| least.get(part).copied().unwrap_or(0.0);
+            let parts = divisions.iter().map(|[a, b]| of(a) + of(b)).fold(f64::INFINITY, f64::min);
+            let inside = boxes.iter().zip(0..).filter(|(_, object)| set >> object & 1 == 1);
+            let area = Aabb::union_of(inside.map(|(aabb, _)| aabb)).half_area();
+            least.insert(set, area + parts);
+        }
+        least.into_values().next_back().unwrap()
+    }
 
     #[test]
-    fn the_recombined_tree_has_the_best_part_of_every_parent() {
-        let boxes: Vec<Aabb> = (0..200u16)
-            .map(|i| {
-                let low = [f32::from(i) * 1.7 % 9.0, f32::from(i) * 2.3 % 7.0, f32::from(i / 3)];
-                Aabb::from((low, low.map(|c| c + 1.0)))
-            })
-            .collect();
-        let good = built(&muller_fellner::Config::default(), &boxes);
-        let [left, right] = good.nodes[good.root().unwrap() as usize].children;
-        // Two parents, each degraded on one side of the root.
-        let spoilt = |side: u32| {
-            let mut tree = good.clone();
-            let mut rng = stream(u64::from(side), 0);
-            tree.begin();
-            for _ in 0..20 {
-                let mut node = side;
-                while !tree.nodes[node as usize].is_leaf() {
-                    node = tree.nodes[node as usize].children[usize::from(rng.random::<bool>())];
-                }
-                if node != side && tree.nodes[node as usize].parent != side {
-                    tree.detach(node);
-                    let place = tree.nodes[side as usize].children[0];
-                    tree.attach(node, place);
-                }
-            }
-            tree
-        };
-        let a = spoilt(left);
-        let b = spoilt(right);
-        let found = recombine(&[&a, &b]);
-        validate(&found.to_bvh(), &boxes).unwrap();
-        assert!(a.area() > good.area() && b.area() > good.area());
-        assert!(found.area() <= good.area() * (1.0 + 1e-12), "{} {}", found.area(), good.area());
-        assert_eq!(recombine(&[&good]).to_bvh(), good.to_bvh());
+    fn no_combination_of_divisions_of_the_trees_is_cheaper_than_the_recombined_tree() {
+        let boxes = &scatter(24);
+        let start = built(&muller_fellner::Config::default(), boxes);
+        let mut better = 0;
+        for seed in 0..40 {
+            let rng = &mut stream(seed, 0);
+            // Trees with most divisions in common.
+            let trees: Vec<Working> = (0..4)
+                .map(|_| {
+                    let mut tree = start.clone();
+                    for _ in 0..6 {
+                        tree.begin();
+                        let root = tree.root().unwrap();
+                        let node = rng.random_range(1..tree.nodes.len() as u32);
+                        if node != root {
+                            let (_, sibling, _) = tree.detach(node);
+                            let above = tree.nodes[sibling as usize].parent;
+                            tree.attach(node, if above == ANCHOR { sibling } else { above });
+                        }
+                    }
+                    tree
+                })
+                .collect();
+            let trees: Vec<&Working> = trees.iter().collect();
+            let found = recombine(&trees);
+            validate(&found.to_bvh(), boxes).unwrap();
+            let least = brute_force(&trees, boxes);
+            assert!(
+                (found.area() - least).abs() <= 1e-12 * least,
+                "{seed}: {} {least}",
+                found.area()
+            );
+            better += usize::from(trees.iter().all(|tree| found.area() < 0.999 * tree.area()));
+        }
+        assert!(better > 20, "{better}");
+        assert_eq!(recombine(&[&start]).to_bvh(), start.to_bvh());
         assert_eq!(recombine(&[&built(&muller_fellner::Config::default(), &[])]).objects(), 0);
     }
 }
