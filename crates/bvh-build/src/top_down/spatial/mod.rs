@@ -251,6 +251,36 @@ mod tests {
         assert!((100..1400).contains(&kept), "{kept}");
     }
 
+    /// Returns how many splits from the root down separate one object from all others.
+    fn separated(tree: &Bvh) -> usize {
+        let mut node = &tree.nodes[0];
+        let mut count = 0;
+        loop {
+            let inner: Vec<&Node> =
+                tree.nodes[node.children()].iter().filter(|child| !child.is_leaf()).collect();
+            let [next] = inner.as_slice() else { return count };
+            node = next;
+            count += 1;
+        }
+    }
+
+    #[test]
+    fn objects_as_large_as_the_scene_are_halved_after_eight_splits_that_separate_one() {
+        let corner = |x, y, z, size| Vec3::new(x, y, z) * size;
+        let triangles: Vec<Triangle> = (31_000..32_000u16)
+            .map(f32::from)
+            .map(|size| {
+                Triangle([Vec3::ZERO, corner(1.0, 1.0, 0.0, size), corner(1.0, 0.0, 1.0, size)])
+            })
+            .collect();
+        let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+        let whole = build(1000, &boxes, &triangles.as_slice(), &Watch::default()).unwrap();
+        assert_eq!(separated(&whole), 8);
+        let heuristic = muller_fellner::Heuristic::AreaTimesPower(POWER);
+        let config = muller_fellner::Config { heuristic, ..Default::default() };
+        assert_eq!(separated(&config.build(&boxes).unwrap()), 8);
+    }
+
     #[test]
     fn scenes_of_points_of_one_object_and_of_none_are_built_and_bad_boxes_are_rejected() {
         for triangles in
