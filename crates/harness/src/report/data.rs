@@ -6,6 +6,8 @@ use crate::rows::{
     TrialRow, VisitRow,
 };
 use bvh_scenes::SceneKind;
+use indexmap::IndexMap;
+use std::hash::Hash;
 use std::path::{Path, PathBuf};
 
 /// The incumbents of a run: seconds since its start, and cost.
@@ -144,6 +146,18 @@ pub(super) fn run(method: &str, repetition: u32, evaluations: u64, work: u64) ->
 /// Returns a ratio of costs; 1 when the denominator is 0, as in `runs.csv`.
 pub fn ratio(cost: f64, base: f64) -> f64 {
     if base > 0.0 { cost / base } else { 1.0 }
+}
+
+/// Returns the items by their keys, in the order of the first item of each.
+pub(crate) fn grouped<K: Hash + Eq, T>(
+    items: impl IntoIterator<Item = T>,
+    key: impl Fn(&T) -> K,
+) -> IndexMap<K, Vec<T>> {
+    let mut groups: IndexMap<K, Vec<T>> = IndexMap::new();
+    for item in items {
+        groups.entry(key(&item)).or_default().push(item);
+    }
+    groups
 }
 
 /// Returns the distinct items in the order of their first occurrence.

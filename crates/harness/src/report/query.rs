@@ -86,16 +86,10 @@ impl Condition {
         if self.texts != ["max"] || self.sign != "=" {
             return Ok(());
         }
-        let mut greatest: Option<(f64, &String)> = None;
-        for row in rows {
-            let text = cell(row, &self.column)?;
-            if let Ok(number) = text.parse::<f64>()
-                && greatest.is_none_or(|(most, _)| number > most)
-            {
-                greatest = Some((number, text));
-            }
-        }
-        if let Some((_, text)) = greatest {
+        let texts = rows.iter().map(|row| cell(row, &self.column));
+        let texts = texts.collect::<Result<Vec<&String>, _>>()?.into_iter();
+        let numbers = texts.filter_map(|text| Some((text.parse::<f64>().ok()?, text)));
+        if let Some((_, text)) = numbers.max_by(|one, other| one.0.total_cmp(&other.0)) {
             self.texts = vec![text.clone()];
         }
         Ok(())
@@ -169,38 +163,27 @@ pub fn select(rows: Vec<Row>, conditions: &str) -> Result<Vec<Row>, QueryError> 
 pub fn join(rows: &[Row], others: &[Row]) -> Vec<Row> {
     let mut joined = Vec::new();
     for row in rows {
-        for other in others {
-            let agrees =
-                other.iter().all(|(column, text)| row.get(column).is_none_or(|own| own == text));
-            if agrees {
-                let mut both = row.clone();
-                both.extend(other.clone());
-                joined.push(both);
-            }
+        let agrees = |other: &&Row| {
+            other.iter().all(|(column, text)| row.get(column).is_none_or(|own| own == text))
+        };
+        for other in others.iter().filter(agrees) {
+            let mut both = row.clone();
+            both.extend(other.clone());
+            joined.push(both);
         }
     }
     joined
 }
 
-/// Returns the different values of some columns, in their order in the file.
-pub fn distinct(rows: &[Row], columns: &[&str]) -> Result<Vec<Vec<String>>, QueryError> {
-    let mut found: Vec<Vec<String>> = Vec::new();
+/// Returns the rows by their values in some columns, in the order of the file.
+pub fn grouped<'r>(
+    rows: impl IntoIterator<Item = &'r Row>,
+    columns: &[&str],
+) -> Result<IndexMap<Vec<String>, Vec<&'r Row>>, QueryError> {
+    let mut groups: IndexMap<_, Vec<&Row>> = IndexMap::new();
     for row in rows {
-        let mut cells = Vec::new();
-        for column in columns {
-            cells.push(cell(row, column)?.clone());
-        }
-        if !found.contains(&cells) {
-            found.push(cells);
-        }
+        let values = columns.iter().map(|column| cell(row, column).cloned());
+        groups.entry(values.collect::<Result<_, _>>()?).or_default().push(row);
     }
-    Ok(found)
-}
-
-/// Returns the rows whose cells in these columns have these values.
-pub fn group<'r>(rows: &'r [Row], columns: &[&str], values: &[String]) -> Vec<&'r Row> {
-    let is_own = |row: &&Row| {
-        columns.iter().zip(values).all(|(column, value)| row.get(*column) == Some(value))
-    };
-    rows.iter().filter(is_own).collect()
+    Ok(groups)
 }

@@ -1,7 +1,7 @@
 //! The figure of a table that a query gives.
 
 use super::config::Series;
-use super::data::distinct;
+use super::data::{distinct, grouped};
 use super::prelude::*;
 use super::query::{Row, number_in};
 use bvh_config::Nested;
@@ -65,14 +65,9 @@ pub enum Shape {
 impl Drawing {
     /// Returns one panel for all rows that agree in the columns `panels`.
     pub(super) fn panels(&self, rows: &Rows, table: &[Row]) -> Vec<Panel> {
-        let mut panels = Vec::new();
-        let table = self.sound(table);
-        let titles: Vec<String> = table.iter().map(|row| self.title(rows, row)).collect();
-        for title in distinct(titles.iter()) {
-            let own = table.iter().zip(&titles).filter(|(_, of_row)| *of_row == title);
-            let rows_of_panel: Vec<&Row> = own.map(|(row, _)| *row).collect();
-            panels.push(self.panel(rows, title.clone(), &rows_of_panel));
-        }
+        let by_title = grouped(self.sound(table), |row| self.title(rows, row)).into_iter();
+        let mut panels: Vec<Panel> =
+            by_title.map(|(title, table)| self.panel(rows, title, &table)).collect();
         if self.same_axes {
             figures::share_axes(&mut panels);
         }
@@ -80,12 +75,8 @@ impl Drawing {
     }
 
     fn title(&self, rows: &Rows, row: &Row) -> String {
-        let mut names = Vec::new();
-        for column in &self.panels {
-            let name = text_in(row, column);
-            names.push(self.shown(rows, column, &name));
-        }
-        names.join(": ")
+        let name = |column: &String| self.shown(rows, column, &text_in(row, column));
+        self.panels.iter().map(name).collect::<Vec<_>>().join(": ")
     }
 
     fn panel(&self, rows: &Rows, title: String, table: &[&Row]) -> Panel {
@@ -93,10 +84,8 @@ impl Drawing {
             return self.rows(rows, title, table);
         }
         let mut layers = Vec::new();
-        for series in distinct(table.iter().map(|row| self.series_of(row))) {
-            let rows_of_series: Vec<&Row> =
-                table.iter().filter(|row| self.series_of(row) == series).copied().collect();
-            let points = self.points(&rows_of_series);
+        for (series, table) in grouped(table.iter().copied(), |row| self.series_of(row)) {
+            let points = self.points(&table);
             layers.push(Layer::new(&series, Marks::Line(points.clone())));
             layers.push(Layer::new(series, Marks::Points(points)));
         }

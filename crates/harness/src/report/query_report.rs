@@ -89,10 +89,9 @@ impl Config {
         }
         let named: Vec<&str> = base.columns().collect();
         let mut groups = Vec::new();
-        for values in query::distinct(rows, &by)? {
+        for (values, rows_of_group) in query::grouped(rows, &by)? {
             let names = by.iter().map(|column| (*column).to_owned());
-            let key: Row = names.zip(values.iter().cloned()).collect();
-            let rows_of_group = query::group(rows, &by, &values);
+            let key: Row = names.zip(values).collect();
             if self.pairs.is_empty() {
                 let base = bases.iter().copied().filter(|row| agree(row, &key, &named)).collect();
                 groups.push(Group { key, rows: rows_of_group, base });

@@ -1,7 +1,7 @@
 //! Tests of rays in trees that are trained on rays, relative to a tree that is searched for by
 //! area.
 
-use super::data::distinct;
+use super::data::{distinct, grouped};
 use super::prelude::*;
 use crate::rows::TestRow;
 use crate::statistics::{geometric_mean, student};
@@ -175,9 +175,8 @@ fn paired<'a>(rows: &'a Rows, [first, second]: &'a [String; 2]) -> Vec<Paired<'a
 
 /// Returns the geometric means over scenes of rows that agree in all other columns.
 fn means<'a>(table: &[Compared<'a>]) -> Vec<Compared<'a>> {
-    let key = |row: &Compared<'a>| (row.tree, row.trained_on, row.judged_on, row.camera);
-    let mean = |group| {
-        let own: Vec<&Compared> = table.iter().filter(|row| key(row) == group).collect();
+    let key = |row: &&Compared<'a>| (row.tree, row.trained_on, row.judged_on, row.camera);
+    let mean = |own: Vec<&Compared<'a>>| {
         let ratios: Vec<f64> = own.iter().map(|row| row.tests_over_base).collect();
         Compared {
             scene: ALL,
@@ -188,5 +187,5 @@ fn means<'a>(table: &[Compared<'a>]) -> Vec<Compared<'a>> {
             ..*own[0]
         }
     };
-    distinct(table.iter().map(key)).into_iter().map(mean).collect()
+    grouped(table, key).into_values().map(mean).collect()
 }

@@ -13,7 +13,7 @@
 #![allow(dead_code)] // numbers and tables use a part each
 
 use super::support::top;
-use harness::report::query::{self, Row, distinct, group, number_in};
+use harness::report::query::{self, Row, grouped, number_in};
 use harness::report::query_measure::Measure;
 use std::collections::BTreeSet;
 
@@ -70,13 +70,11 @@ fn divide(rows: &mut [Row], measure: &str, file: &str, others: &str) {
 }
 
 fn divide_by_least(rows: &mut [Row], column: &str, others: &[Row], columns: &[&str]) {
+    let others = grouped(others, columns).unwrap();
     for row in rows {
         let names: Vec<String> = columns.iter().map(|name| row[*name].clone()).collect();
-        let least = group(others, columns, &names)
-            .into_iter()
-            .filter_map(|other| number_in(other, column))
-            .reduce(f64::min)
-            .unwrap_or_else(|| panic!("no number of {column} to divide by for {names:?}"));
+        let numbers = others[&names].iter().filter_map(|other| number_in(other, column));
+        let least = numbers.reduce(f64::min).expect("a number to divide by");
         if let Some(value) = number_in(row, column) {
             row.insert(column.into(), (value / least).to_string());
         }
@@ -133,40 +131,29 @@ fn pivot(rows: &[Row], axes: &str, measure: &str, decimals: usize) -> String {
     let (down, across) =
         axes.split_once(" × ").unwrap_or_else(|| panic!("{axes}: expected ROWS × COLUMNS"));
     let down: Vec<&str> = down.split(" + ").collect();
-    let columns = distinct(rows, &[across]).unwrap().concat();
+    let columns = grouped(rows, &[across]).unwrap().into_keys().collect::<Vec<_>>().concat();
     let mut header: Vec<String> =
         down.iter().map(|column| escape(&column.replace('_', " "))).collect();
     header.extend(columns.iter().map(|column| escape(column)));
     let mut lines = vec![format!("| {} |", header.join(" | "))];
     lines.push(format!("|{}", "---|".repeat(header.len())));
-    for names in together(distinct(rows, &down).unwrap()) {
-        let of_line: Vec<Row> = group(rows, &down, &names).into_iter().cloned().collect();
+    // Names that begin alike follow each other.
+    let by_first = grouped(rows, &down[..1]).unwrap().into_values();
+    for (names, of_line) in by_first.flat_map(|rows| grouped(rows, &down).unwrap()) {
         let mut cells: Vec<String> =
             down.iter().zip(&names).map(|(column, name)| escape(&heading(column, name))).collect();
         // Readers must see which scenes are stand-ins wherever a table names them.
         if down == ["scene"] {
             cells[0] += &kind_note(&of_line);
         }
+        let of_cells = grouped(of_line, &[across]).unwrap();
         for column in &columns {
-            let here = group(&of_line, &[across], std::slice::from_ref(column));
-            cells.push(escape(&show(&here, measure, decimals)));
+            let here = of_cells.get(std::slice::from_ref(column)).map_or(&[][..], Vec::as_slice);
+            cells.push(escape(&show(here, measure, decimals)));
         }
         lines.push(format!("| {} |", cells.join(" | ")));
     }
     lines.join("\n")
-}
-
-/// Sorts names so that those that begin alike follow each other.
-fn together(names: Vec<Vec<String>>) -> Vec<Vec<String>> {
-    let mut groups: Vec<Vec<Vec<String>>> = Vec::new();
-    for name in names {
-        let found = groups.iter_mut().find(|group| group[0][0] == name[0]);
-        match found {
-            Some(group) => group.push(name),
-            None => groups.push(vec![name]),
-        }
-    }
-    groups.concat()
 }
 
 fn escape(text: &str) -> String {
@@ -174,7 +161,7 @@ fn escape(text: &str) -> String {
 }
 
 /// Returns the scene's kind in parentheses, unless it is a file.
-fn kind_note(rows: &[Row]) -> String {
+fn kind_note(rows: &[&Row]) -> String {
     let kind = rows.iter().find_map(|row| row.get("scene_kind"));
     kind.filter(|kind| *kind != "file").map_or_else(String::new, |kind| format!(" ({kind})"))
 }
