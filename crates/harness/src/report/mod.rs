@@ -132,9 +132,6 @@ impl Report {
     }
 }
 
-/// The file with the printed text of the reports. Its name marks it as a file with seconds.
-pub const TEXT_FILE: &str = "timing_report.txt";
-
 /// Makes all reports from the CSV files in a folder; the comparison with the paper is last. Writes
 /// nothing.
 pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> {
@@ -171,27 +168,23 @@ fn check_names(outputs: &[Output], folder: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// Writes the output of reports into the store's folder. Returns the text for the terminal, which
-/// [`TEXT_FILE`] keeps. Writes figures only if `drawn` is true.
+/// Writes the output of reports into the store's folder; figures, as SVG, only if `drawn` is true.
+/// Returns the text for the terminal.
 pub fn write_all(outputs: &[Output], store: &Store, drawn: bool) -> Result<String, Error> {
     for output in outputs {
         for (name, bytes) in &output.csv {
             store.write(&format!("{name}.csv"), bytes)?;
         }
-        if drawn {
-            output.draw(store)?;
+        for (name, figure) in output.figures.iter().filter(|_| drawn) {
+            store.write(&format!("{name}.svg"), figures::svg(figure).as_bytes())?;
         }
     }
-    let text: String = outputs.iter().map(Output::text).collect();
-    if !text.is_empty() {
-        store.write(TEXT_FILE, text.as_bytes())?;
-    }
-    Ok(text)
+    Ok(outputs.iter().map(Output::text).collect())
 }
 
 /// Returns the table of final costs, for experiments without reports.
 fn final_costs(rows: &Rows) -> Result<Output, Error> {
-    #[derive(serde::Serialize)]
+    #[derive(Serialize)]
     struct Row<'a> {
         scene: String,
         method: &'a str,
@@ -200,23 +193,20 @@ fn final_costs(rows: &Rows) -> Result<Output, Error> {
         median_over_base: Option<f64>,
         median_seconds: Option<f64>,
     }
-    let row = |(scene, method)| {
-        let ratios = rows.final_ratios(scene, method);
-        Row {
-            scene: rows.shown(scene),
-            method,
-            runs: ratios.len(),
-            least_over_base: minimum(ratios.iter().copied()),
-            median_over_base: median(&ratios),
-            median_seconds: median(&rows.seconds_of(scene, method)),
+    let mut table = Vec::new();
+    for scene in rows.scenes() {
+        for method in rows.methods() {
+            let ratios = rows.final_ratios(scene, method);
+            table.push(Row {
+                scene: rows.shown(scene),
+                method,
+                runs: ratios.len(),
+                least_over_base: minimum(ratios.iter().copied()),
+                median_over_base: median(&ratios),
+                median_seconds: median(&rows.seconds_of(scene, method)),
+            });
         }
-    };
-    let methods = rows.methods();
-    let pairs = rows
-        .scenes()
-        .into_iter()
-        .flat_map(|scene| methods.iter().map(move |method| (scene, *method)));
-    let table: Vec<Row> = pairs.map(row).collect();
+    }
     let mut output = Output::new("", "Final costs");
     let columns = "scene method runs least_over_base median_over_base median_seconds";
     output.show("Cost over that of the greedy tree:", &table, columns)?;
@@ -227,12 +217,8 @@ fn final_costs(rows: &Rows) -> Result<Output, Error> {
 fn beside_paper(rows: &[PaperRow]) -> Result<Output, Error> {
     let mut output = Output::new("", "Ng & Trifonov 2003 beside our results");
     output.add_csv("paper", rows)?;
-    let columns = "scene quantity paper ours ours_low ours_high verdict";
-    output.show(
-        "What the paper says beside ours, which lies between low and high:",
-        rows,
-        columns,
-    )?;
+    let explanation = "What the paper says beside ours, which lies between low and high:";
+    output.show(explanation, rows, "scene quantity paper ours ours_low ours_high verdict")?;
     output.paper = rows.to_vec();
     Ok(output)
 }

@@ -8,7 +8,6 @@ use super::query::{QueryError, Row};
 use super::query_measure::filled;
 use crate::Error;
 use crate::rows::csv_file::{bytes_of, parse, read, to_bytes};
-use crate::rows::store::Store;
 use comfy_table::{Table, presets};
 use figures::{Axis, Figure, Layer, Marks, Panel};
 use serde::Serialize;
@@ -64,14 +63,6 @@ impl Output {
             }
         }
         Ok(self)
-    }
-
-    /// Writes the figures into the store's folder, as SVG.
-    pub fn draw(&self, store: &Store) -> Result<(), Error> {
-        for (name, figure) in &self.figures {
-            store.write(&format!("{name}.svg"), figures::svg(figure).as_bytes())?;
-        }
-        Ok(())
     }
 
     /// Adds the CSV file `name`, without its extension.
