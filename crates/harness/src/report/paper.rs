@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// One row of `paper.csv`: a statement of the paper and our result. Absolute costs are not
 /// compared, because the scenes are not the paper's.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PaperRow {
     /// The place in the paper.
     pub source: String,
@@ -36,20 +36,7 @@ pub struct PaperRow {
 impl PaperRow {
     /// Makes a row without numbers.
     pub fn new(scene: impl Into<String>, quantity: impl Into<String>) -> Self {
-        Self {
-            source: String::new(),
-            scene: scene.into(),
-            quantity: quantity.into(),
-            paper: String::new(),
-            ours: String::new(),
-            paper_over_base: None,
-            ours_over_base: None,
-            ours_low: None,
-            ours_high: None,
-            verdict: Verdict::NotInPaper,
-            rule: String::new(),
-            reason: String::new(),
-        }
+        Self { scene: scene.into(), quantity: quantity.into(), ..Self::default() }
     }
 
     /// Adds a reason other than that of the whole report.
@@ -104,7 +91,7 @@ impl PaperRow {
 }
 
 /// The relation of our number to the paper's.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Verdict {
     /// The rule holds.
     #[serde(rename = "agrees")]
@@ -131,6 +118,7 @@ pub enum Verdict {
     #[serde(rename = "no verdict")]
     NoVerdict,
     /// The paper has no such statement.
+    #[default]
     #[serde(rename = "not in the paper")]
     NotInPaper,
 }
