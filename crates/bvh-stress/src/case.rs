@@ -125,66 +125,92 @@ impl Case {
     }
 
     /// Performs all checks of the methods, of the traversals, and of other parts of the program.
-    pub fn cells<'a>(
-        &'a self,
-        methods: &'a [(String, Method)],
-        effort: &'a Effort,
-    ) -> impl Iterator<Item = Cell> + 'a {
-        let of_method =
-            |(label, method): &'a (String, Method)| self.of_method(label, method, effort);
-        let of_traversal = |&(name, way): &'a _| self.of_traversal(name, way, effort.rays);
-        methods
-            .iter()
-            .filter_map(of_method)
-            .chain(tracing::TRAVERSALS.iter().filter_map(of_traversal))
-            .chain(self.checks.iter().filter_map(|check| self.of_part(check)))
+    pub fn cells(&self, methods: &[(String, Method)], effort: &Effort) -> Vec<Cell> {
+        let mut cells = Vec::new();
+        for (label, method) in methods {
+            cells.extend(self.cell(label, |cell| self.check_method(method, effort, cell)));
+        }
+        if let Some(sizes) = self.sizes {
+            let triangles = self.triangles(sizes[Size::Few as usize]);
+            let rays = tracing::rays(&triangles, effort.rays, 1);
+            let objects = Primitives::Triangles(triangles);
+            for (name, traversal) in tracing::TRAVERSALS {
+                cells.extend(self.cell(name, |cell| {
+                    cell.note = tracing::check(*traversal, &objects, &rays)?;
+                    Ok(true)
+                }));
+            }
+        }
+        for check in self.checks {
+            if let Check::Part(name, check) = check {
+                cells.extend(self.cell(name, |cell| {
+                    cell.note = check()?;
+                    Ok(true)
+                }));
+            }
+        }
+        cells
     }
 
-    /// Performs all checks of a method; `None` if there are none. The numbers are those of the
-    /// largest scene.
-    fn of_method(&self, label: &str, method: &Method, effort: &Effort) -> Option<Cell> {
-        self.cell(label, |cell| {
-            let extents = self.sizes.map(|sizes| extents(sizes, method, effort));
-            for &(objects, work) in extents.iter().flatten() {
-                examine(self, method, objects, work, cell)?;
+    /// Performs all checks of a method. The numbers are those of the largest scene. Returns false
+    /// if there is nothing to check.
+    fn check_method(&self, method: &Method, effort: &Effort, cell: &mut Cell) -> Result<bool> {
+        let mut is_checked = self.sizes.is_some();
+        if let Some(sizes) = self.sizes {
+            for (objects, work) in extents(sizes, method, effort) {
+                self.examine(method, objects, work, cell)?;
             }
-            let mut is_checked = extents.is_some();
-            for check in self.checks {
-                match check {
-                    Check::Refused(boxes) => {
-                        cell.outcome = Class::Refused;
-                        // The exact method rejects larger scenes for their size first.
-                        let objects =
-                            if let Method::Exact(_) = method { EXACT_OBJECTS } else { 100 };
-                        cell.note = examine::refuses(method, &boxes(objects), Self::BAD)?;
-                    }
-                    Check::Method(name, check) if ["", method.name()].contains(name) => {
-                        cell.note = format!("{} {}", cell.note, check(method)?).trim().to_owned();
-                    }
-                    _ => continue,
+        }
+        for check in self.checks {
+            match check {
+                Check::Refused(boxes) => {
+                    cell.outcome = Class::Refused;
+                    // The exact method rejects larger scenes for their size first.
+                    let objects = if let Method::Exact(_) = method { EXACT_OBJECTS } else { 100 };
+                    cell.note = examine::refuses(method, &boxes(objects), Self::BAD)?;
                 }
-                is_checked = true;
+                Check::Method(name, check) if ["", method.name()].contains(name) => {
+                    cell.note = format!("{} {}", cell.note, check(method)?).trim().to_owned();
+                }
+                _ => continue,
             }
-            Ok(is_checked)
-        })
+            is_checked = true;
+        }
+        Ok(is_checked)
     }
 
-    /// Checks a traversal's answers to the scene's rays; `None` if there is no scene.
-    fn of_traversal(&self, name: &str, traversal: tracing::Traversal, rays: usize) -> Option<Cell> {
-        let triangles = self.triangles(self.sizes?[Size::Few as usize]);
-        self.cell(name, |cell| {
-            let rays = tracing::rays(&triangles, rays, 1);
-            cell.note = tracing::check(traversal, &Primitives::Triangles(triangles), &rays)?;
-            Ok(true)
-        })
-    }
-
-    fn of_part(&self, check: &Check) -> Option<Cell> {
-        let Check::Part(name, check) = check else { return None };
-        self.cell(name, |cell| {
-            cell.note = check()?;
-            Ok(true)
-        })
+    /// Checks P1, P2 and P4 to P7 for a method on the scene with this number of objects, and what
+    /// the case promises beyond them. Writes the findings to `cell`.
+    fn examine(&self, method: &Method, objects: usize, work: u64, cell: &mut Cell) -> Result<()> {
+        let boxes = stiff::boxes(&self.triangles(objects));
+        let outcome = examine::run(method, &boxes, work)?;
+        cell.objects = boxes.len();
+        cell.depth = Some(outcome.tree.depth());
+        cell.cost = Some(outcome.cost);
+        cell.relative_error = Some(examine::check_outcome(&boxes, &outcome)?);
+        // Repetitions take several times as long, so large scenes are built once.
+        if boxes.len() <= REPEATED {
+            for threads in [1, 3] {
+                let other = examine::on_threads(threads, || examine::run(method, &boxes, work))??;
+                let same = (&other.tree, &other.history) == (&outcome.tree, &outcome.history);
+                ensure!(same, "P4: another outcome on {threads} threads");
+            }
+            let range = scale_range(&boxes);
+            let low = *range.start().max(&-120);
+            let high = *range.end().min(&120);
+            // The ends of the range are where exponents overflow; two scales in between cover the
+            // rest.
+            for k in [low, low / 7, high / 7, high] {
+                examine::check_scale(method, &boxes, work, &outcome, k)?;
+            }
+        }
+        cell.note.clear();
+        for check in self.checks {
+            if let Check::Outcome(check) = check {
+                cell.note = check(method, &boxes, &outcome)?;
+            }
+        }
+        Ok(())
     }
 
     /// Fills a cell by checks, or with the promise that they find broken. A panic breaks one.
@@ -223,44 +249,4 @@ fn extents(sizes: [usize; 3], method: &Method, effort: &Effort) -> Vec<(usize, u
             .map(|larger| (larger.objects.min(sizes[Size::Many as usize]), larger.work_per_object)),
     };
     [few].into_iter().chain(further.filter(|further| further.0 > few.0)).collect()
-}
-
-/// Checks P1, P2 and P4 to P7 for a method on the scene of a case with this number of objects, and
-/// what the case promises beyond them. Writes the findings to `cell`.
-fn examine(
-    case: &Case,
-    method: &Method,
-    objects: usize,
-    work_per_object: u64,
-    cell: &mut Cell,
-) -> Result<()> {
-    let boxes = stiff::boxes(&case.triangles(objects));
-    let outcome = examine::run(method, &boxes, work_per_object)?;
-    cell.objects = boxes.len();
-    cell.depth = Some(outcome.tree.depth());
-    cell.cost = Some(outcome.cost);
-    cell.relative_error = Some(examine::check_outcome(&boxes, &outcome)?);
-    // Repetitions take several times as long, so large scenes are built once.
-    if boxes.len() <= REPEATED {
-        for threads in [1, 3] {
-            let other =
-                examine::on_threads(threads, || examine::run(method, &boxes, work_per_object))??;
-            let same = (&other.tree, &other.history) == (&outcome.tree, &outcome.history);
-            ensure!(same, "P4: another outcome on {threads} threads");
-        }
-        let range = scale_range(&boxes);
-        let low = *range.start().max(&-120);
-        let high = *range.end().min(&120);
-        // The ends of the range are where exponents overflow; two scales in between cover the rest.
-        for k in [low, low / 7, high / 7, high] {
-            examine::check_scale(method, &boxes, work_per_object, &outcome, k)?;
-        }
-    }
-    cell.note.clear();
-    for check in case.checks {
-        if let Check::Outcome(check) = check {
-            cell.note = check(method, &boxes, &outcome)?;
-        }
-    }
-    Ok(())
 }

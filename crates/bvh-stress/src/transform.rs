@@ -64,27 +64,3 @@ pub fn same_topology(a: &Bvh, b: &Bvh) -> bool {
     let b_kinds = b.nodes.iter().map(|node| node.kind());
     a.prim_ids == b.prim_ids && a_kinds.eq(b_kinds)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use bvh_scenes::builtin::stiff;
-
-    #[test]
-    fn scaling_within_the_range_is_exact_and_beyond_it_is_not() {
-        let boxes = stiff::boxes(&stiff::uniform(50));
-        let range = scale_range(&boxes);
-        assert!(*range.start() <= -120 && *range.end() >= 120);
-        for k in [*range.start(), *range.end()] {
-            assert_eq!(scaled(&scaled(&boxes, k), -k), boxes);
-        }
-        assert_ne!(scaled(&scaled(&boxes, range.end() + 1), -range.end() - 1), boxes);
-    }
-
-    #[test]
-    fn two_reflections_change_nothing_and_one_does() {
-        let boxes = stiff::boxes(&stiff::symmetric(50));
-        assert_eq!(mirrored(&mirrored(&boxes, 1), 1), boxes);
-        assert_ne!(mirrored(&boxes, 1), boxes);
-    }
-}

@@ -22,65 +22,42 @@ fn files(folder: &Path) -> Vec<Vec<u8>> {
     paths.into_iter().filter(|path| path.is_file()).map(|path| fs::read(path).unwrap()).collect()
 }
 
-/// Makes one to eight changes: bits, bytes, special words, numbers, and pieces that are cut,
-/// repeated, or copied from another input.
+/// Replaces one to eight pieces by nothing, bytes, special words, numbers, or pieces of another
+/// input.
 fn mutated(inputs: &[Vec<u8>], rng: &mut Stream) -> Vec<u8> {
-    const WORDS: [u32; 10] = [
-        0,
-        1,
-        1 << 31,
-        u32::MAX,
-        0x7f80_0000,
-        0xff80_0000,
-        0x7fc0_0000,
-        0x7f7f_ffff,
-        0xff7f_ffff,
-        0x3f80_0000,
-    ];
+    const WORDS: [f32; 8] =
+        [0.0, -0.0, 1.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, f32::MAX, f32::MIN];
+    const NUMBERS: [&str; 5] = ["-1", "0", "nan", "1e39", "18446744073709551616"];
     // Kept inputs are nearly valid, so that mutations pass the first checks and reach the deeper
     // ones.
     let mut bytes = inputs.choose(rng).cloned().unwrap_or_default();
     for _ in 0..rng.random_range(1..=8) {
-        let start = rng.random_range(0..=bytes.len());
-        let end = rng.random_range(start..=bytes.len().min(start + 40));
-        match rng.random_range(0..8) {
-            0 => bytes.insert(start, rng.random()),
-            1 => drop(bytes.drain(start..end)),
-            2 => {
-                let piece = bytes[start..end].to_vec();
-                let to = rng.random_range(0..=bytes.len());
-                bytes.splice(to..to, piece);
-            }
-            3 => {
-                let other = inputs.choose(rng).cloned().unwrap_or_default();
-                let from = rng.random_range(0..=other.len());
-                let piece = &other[from..other.len().min(from + 40)];
-                bytes.splice(start..end, piece.iter().copied());
-            }
-            4 => {
-                let word = WORDS.choose(rng).unwrap().to_le_bytes();
-                for (old, new) in bytes[start..].iter_mut().zip(word) {
-                    *old = new;
-                }
-            }
+        let mut start = rng.random_range(0..=bytes.len());
+        let piece = match rng.random_range(0..7) {
+            0 => Vec::new(),
+            1 => rng.random::<u32>().to_le_bytes()[..rng.random_range(1..=4)].to_vec(),
+            2 => WORDS.choose(rng).unwrap().to_le_bytes().to_vec(),
+            3 => rng.random_range(-1..=1i32).to_le_bytes().to_vec(),
+            4 => bytes
+                .get(start)
+                .map(|byte| byte ^ 1 << rng.random_range(0..8))
+                .into_iter()
+                .collect(),
             5 => {
-                let numbers = ["-1", "0", "nan", "1e39", "18446744073709551616"];
-                let number = numbers.choose(rng).unwrap();
-                if let Some(digit) = bytes[start..].iter().position(u8::is_ascii_digit) {
-                    bytes.splice(start + digit..=start + digit, number.bytes());
-                }
-            }
-            6 => {
-                if let Some(byte) = bytes.get_mut(start) {
-                    *byte ^= 1 << rng.random_range(0..8);
-                }
+                let digit = bytes[start..].iter().position(u8::is_ascii_digit);
+                start += digit.unwrap_or(0);
+                NUMBERS.choose(rng).unwrap().as_bytes().to_vec()
             }
             _ => {
-                for byte in bytes[start..].iter_mut().take(4) {
-                    *byte = rng.random();
-                }
+                let other = inputs.choose(rng).unwrap();
+                let from = rng.random_range(0..=other.len());
+                other[from..].iter().take(rng.random_range(0..=40)).copied().collect()
             }
-        }
+        };
+        // What has fixed places stays there only if as many bytes go as come.
+        let gone = if rng.random() { piece.len() } else { rng.random_range(0..=40) };
+        let end = bytes.len().min(start + gone);
+        bytes.splice(start..end, piece);
     }
     bytes
 }

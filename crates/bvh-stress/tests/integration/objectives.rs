@@ -114,14 +114,7 @@ fn every_case_holds_with_divided_objects_and_with_the_cost_of_the_layout() {
                 let most = (references * boxes.len() as f64) as usize;
                 let splits = Splits::at_most(most, &boxes, &objects);
                 let problem = Problem { objective, splits, ..Problem::new(&boxes) };
-                let solved = || solve(&method, &problem, 1, budget, &()).unwrap();
-                let outcome = solved();
-                assert_eq!(
-                    outcome.tree,
-                    solved().tree,
-                    "{}: another tree for the same seed",
-                    case.id
-                );
+                let outcome = solve(&method, &problem, 1, budget, &()).unwrap();
                 validate_references(&outcome.tree, &boxes, &objects).unwrap_or_else(|fault| {
                     panic!("{}, {objective:?}, {references}: {fault}", case.id)
                 });
