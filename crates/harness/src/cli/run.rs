@@ -47,9 +47,6 @@ pub struct RunArgs {
     /// Print only errors and, under --check, differences.
     #[arg(long)]
     pub quiet: bool,
-    /// Print a line about every run on standard error: method, scene, repetition, seed, seconds.
-    #[arg(long, conflicts_with = "quiet")]
-    pub verbose: bool,
 }
 
 /// Runs all experiments and prints their tables.
@@ -76,8 +73,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         (_, true) => Existing::Replace,
         _ => Existing::Keep,
     };
-    let runs = args.runs.clone();
-    let extent = Extent { existing, runs, verbose: args.verbose, ..Extent::default() };
+    let extent = Extent { existing, runs: args.runs.clone(), ..Extent::default() };
     let mut differences = 0;
     for experiment in &experiments {
         if args.check {
@@ -121,8 +117,7 @@ fn compare(
     let committed = args.out.join(experiment.folder());
     // Gaps are measured from the references of the committed run, not from later finds.
     reference::adopt(&committed, temporary.path())?;
-    let extent = Extent { verbose: args.verbose, ..Extent::default() };
-    let summary = execute(experiment, temporary.path(), &extent, interrupted)?;
+    let summary = execute(experiment, temporary.path(), &Extent::default(), interrupted)?;
     let found = check::compare(&fresh, &committed, &summary.skipped_scenes)?;
     let name = &experiment.name;
     for scene in &summary.skipped_scenes {

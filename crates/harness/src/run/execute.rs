@@ -26,8 +26,6 @@ pub struct Extent {
     pub runs: Vec<String>,
     /// The `--out` of harnesses that have performed parts of the experiment, whose runs are taken.
     pub parts: Vec<PathBuf>,
-    /// True for a line on standard error about every run.
-    pub verbose: bool,
 }
 
 /// Runs `experiment` into `out/NAME/`. Once `interrupted` is true, unfinished runs are abandoned
@@ -72,7 +70,7 @@ fn run(
     extent: &Extent,
     interrupted: &AtomicBool,
 ) -> Result<Summary, Error> {
-    let Extent { existing, runs: ref ids, ref parts, verbose } = *extent;
+    let Extent { existing, runs: ref ids, ref parts } = *extent;
     let is_part = !ids.is_empty();
     let (scenes, skipped_scenes) = load_scenes(experiment)?;
     let resolved = Resolved::new(experiment, &scenes);
@@ -106,7 +104,6 @@ fn run(
         jobs: &jobs,
         store: &store,
         watch: Watch { bar: progress(runs as u64), interrupted },
-        verbose,
         trees: Trees::new(),
         remarks,
     };

@@ -10,5 +10,4 @@ mod ray_cost;
 pub mod reference;
 pub mod resolved;
 mod runs;
-mod solved;
 mod trace;

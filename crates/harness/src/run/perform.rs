@@ -2,17 +2,17 @@
 
 use super::job::Job;
 use super::runs::Work;
-use super::solved::Solved;
 use crate::Error;
-use crate::contestant::{Contestant, Labelled};
-use crate::peers::{self, Built, Task};
-use crate::rows::BoundRow;
+use crate::contestant::Contestant;
+use crate::peers::{self, Built, Peer, Task};
 use crate::rows::finished_run::FinishedRun;
+use crate::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, TrialRow};
 use crate::spec::Experiment;
-use bvh_core::cost::{Measure, Objective};
+use bvh_core::cost::{self, Measure, SahConstants};
 use bvh_core::{Bvh, validate_references};
 use bvh_scenes::Scene;
-use bvh_scenes::rays::{RandomRays, empirical_cost};
+use bvh_scenes::rays::{Family, RandomRays, empirical_cost};
+use bvh_scenes::trace::Query;
 use bvh_search::{Event, Judge, Method, Observer, Outcome, Problem, Splits, StopReason, solve};
 use indicatif::ProgressBar;
 use std::sync::Mutex;
@@ -34,58 +34,162 @@ pub(crate) fn perform(work: &Work, job: &Job) -> Result<Option<(FinishedRun, Bvh
     if watch.cancelled() {
         return Ok(None);
     }
-    let Job { scene, labelled, .. } = *job;
+    let Job { scene, labelled, repetition, first_of_scene, .. } = *job;
     let seed = job.seed(experiment);
     let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
-    let result = solve_or_build(experiment, job, seed, &stopwatch);
+    let result = match &labelled.method {
+        Contestant::Ours(method) => search(experiment, job, method, seed, &stopwatch),
+        Contestant::Peer(peer) => build(experiment, job, peer, seed, &stopwatch),
+    };
     // Cancelling kills the external program, which is not an error.
     if watch.cancelled() {
         return Ok(None);
     }
     let (outcome, seconds) = result?;
+    let tree = &outcome.tree;
     // A method's defect must not become a published number.
-    let valid = validate_references(&outcome.tree, &scene.boxes, &scene.primitives);
+    let valid = validate_references(tree, &scene.boxes, &scene.primitives);
     valid.map_err(|source| Error::InvalidTree {
         scene: scene.name.clone(),
         method: labelled.label.clone(),
         source,
     })?;
-    let solved = Solved { experiment, job, seed, outcome: &outcome, seconds };
-    let run = solved.run_row(work.bases[&scene.name]);
-    let mut finished = FinishedRun::here();
-    let bounds = if job.first_of_scene { bound(experiment, scene, watch)? } else { None };
+    let run = run_row(job, seed, &outcome, work.bases[&scene.name]);
+    let identity = || (scene.name.clone(), labelled.label.clone(), repetition);
+    let mut history = Vec::new();
+    let mut clock = Vec::new();
+    let event_seconds = stopwatch.seconds();
+    for (index, event) in milestones(&outcome.history) {
+        let Event { evaluations, work, incumbent, .. } = *event;
+        let (scene, method, repetition) = identity();
+        if experiment.needs_references() {
+            let (scene, method, _) = identity();
+            let seconds = event_seconds[index];
+            clock.push(ClockRow { scene, method, repetition, event: clock.len(), seconds });
+        }
+        if experiment.keeps_history() {
+            history.push(HistoryRow { scene, method, repetition, evaluations, work, incumbent });
+        }
+    }
+    let mut trials = Vec::new();
+    if experiment.keeps_trials_of(&labelled.label) {
+        for event in &outcome.history {
+            let Event { evaluations, cost, .. } = *event;
+            let (scene, method, repetition) = identity();
+            trials.push(TrialRow { scene, method, repetition, evaluations, cost });
+        }
+    }
+    let threads = rayon::current_num_threads();
+    let (scene_name, method, _) = identity();
+    let timing = TimingRow { scene: scene_name, method, seed, repetition, threads, seconds };
+    let rays: Vec<RayRow> =
+        experiment.rays.iter().map(|rays| ray_row(experiment, job, seed, tree, rays)).collect();
+    let bounds = if first_of_scene { bound(experiment, scene, watch)? } else { None };
     let (renders, render_times) = match &experiment.render {
-        Some(config) => config.measure(scene, &outcome.tree, &run, seconds, job.first_of_scene)?,
+        Some(config) => config.measure(scene, tree, &run, seconds, first_of_scene)?,
         None => Default::default(),
     };
     // An interrupted bound is not a result.
     if watch.cancelled() {
         return Ok(None);
     }
+    let mut finished = FinishedRun::here();
     finished.add(&[run])?;
-    finished.add(&solved.history_rows())?;
-    finished.add(&solved.trial_rows())?;
-    finished.add(&[solved.timing_row()])?;
-    finished.add(&solved.ray_rows())?;
-    finished.add(&solved.clock_rows(&stopwatch.seconds()))?;
+    finished.add(&history)?;
+    finished.add(&trials)?;
+    finished.add(&[timing])?;
+    finished.add(&rays)?;
+    finished.add(&clock)?;
     finished.add(bounds.as_slice())?;
     finished.add(&renders)?;
     finished.add(&render_times)?;
     Ok(Some((finished, outcome.tree)))
 }
 
-/// Returns the tree of a job's method and the seconds that the method needed.
-fn solve_or_build(
+/// Returns the events that `history.csv` keeps, each with its index: the first, every improvement,
+/// and the last.
+fn milestones(history: &[Event]) -> impl Iterator<Item = (usize, &Event)> {
+    history.iter().enumerate().filter(|&(index, event)| {
+        let is_end = index == 0 || index + 1 == history.len();
+        is_end || event.incumbent < history[index - 1].incumbent
+    })
+}
+
+/// `base_cost` is the cost of the scene's greedy tree.
+fn run_row(job: &Job, seed: u64, outcome: &Outcome, base_cost: f64) -> RunRow {
+    let Job { scene, labelled, repetition, .. } = *job;
+    let Outcome { ref tree, cost, evaluations, work, stop, .. } = *outcome;
+    let internal_area = cost::internal_area(tree);
+    RunRow {
+        scene: scene.name.clone(),
+        scene_kind: scene.kind.to_string(),
+        method: labelled.label.clone(),
+        seed,
+        repetition,
+        objects: scene.boxes.len(),
+        evaluations,
+        work,
+        stop,
+        cost,
+        base_cost,
+        cost_over_base: if base_cost > 0.0 { cost / base_cost } else { 1.0 },
+        cost_over_root_area: cost::over_root_area(tree, internal_area),
+        internal_area,
+        goldsmith_salmon: cost::goldsmith_salmon(tree),
+        sah: cost::sah(tree, &SahConstants::default()),
+        nodes: tree.nodes.len(),
+        depth: tree.depth(),
+    }
+}
+
+fn ray_row(
     experiment: &Experiment,
     job: &Job,
+    seed: u64,
+    tree: &Bvh,
+    config: &RandomRays,
+) -> RayRow {
+    let Job { scene, labelled, repetition, .. } = *job;
+    let (family, stream) = match config.family {
+        Family::Inside => ("inside", "rays Inside"),
+        Family::Lines => ("lines", "rays Lines"),
+    };
+    let query = match config.query {
+        Query::Any => "any",
+        Query::Nearest => "nearest",
+        Query::All => "all",
+    };
+    // Every method gets the same rays, so that methods differ only in their trees.
+    let ray_seed = experiment.seed_of(&scene.name, stream, 0);
+    let cost = empirical_cost(config, &scene.primitives, tree, ray_seed);
+    let [boxes_low, boxes_high] = cost.boxes.interval();
+    RayRow {
+        scene: scene.name.clone(),
+        method: labelled.label.clone(),
+        seed,
+        repetition,
+        family: family.into(),
+        query: query.into(),
+        rays: cost.rays,
+        hit_fraction: cost.hit_fraction,
+        boxes_per_ray: cost.boxes.mean,
+        boxes_standard_error: cost.boxes.standard_error,
+        boxes_low,
+        boxes_high,
+        objects_per_ray: cost.objects.mean,
+        objects_standard_error: cost.objects.standard_error,
+    }
+}
+
+/// Builds the tree of another library or program, as the outcome of a search of one evaluation.
+fn build(
+    experiment: &Experiment,
+    job: &Job,
+    peer: &Peer,
     seed: u64,
     stopwatch: &Stopwatch,
 ) -> Result<(Outcome, f64), Error> {
     let Job { scene, labelled, .. } = *job;
-    let peer = match &labelled.method {
-        Contestant::Ours(method) => return search(experiment, job, method, seed, stopwatch),
-        Contestant::Peer(peer) => peer,
-    };
     let cancelled = || stopwatch.watch.cancelled();
     let task =
         Task { boxes: &scene.boxes, objects: &scene.primitives, seed, cancelled: &cancelled };
@@ -94,9 +198,13 @@ fn solve_or_build(
         method: labelled.label.clone(),
         source,
     })?;
-    // Third-party methods report no events; their end is the only one.
+    // It reports no events; its end is the only one.
     stopwatch.note(seconds);
-    Ok((single_evaluation(tree, &experiment.objective), seconds))
+    let cost = experiment.objective.cost(&tree);
+    let work = tree.nodes.len() as u64;
+    let history = vec![Event { evaluations: 1, work, cost, incumbent: cost }];
+    let stop = StopReason::Completed;
+    Ok((Outcome { tree, cost, evaluations: 1, work, stop, proof: None, history }, seconds))
 }
 
 /// Applies one of our methods with all options of its entry.
@@ -113,9 +221,10 @@ fn search(
     let ray_seed = experiment.seed_of(&scene.name, "rays of the judge", job.repetition);
     let judge = options.judge.as_ref().map(|rays| RayJudge { rays, scene, seed: ray_seed });
     let density = job.density(experiment)?;
+    let most = options.references.map(|most| (most * scene.boxes.len() as f64) as usize);
     let problem = Problem {
         objective: options.objective.unwrap_or(experiment.objective),
-        splits: splits(labelled, scene),
+        splits: most.and_then(|most| Splits::at_most(most, &scene.boxes, &scene.primitives)),
         measure: density.as_ref().map(|density| density as &dyn Measure),
         judge: judge.as_ref().map(|judge| judge as &dyn Judge),
         disabled: &options.keep,
@@ -153,21 +262,6 @@ impl Judge for RayJudge<'_> {
     fn judge(&self, tree: &Bvh) -> f64 {
         empirical_cost(self.rays, &self.scene.primitives, tree, self.seed).boxes.mean
     }
-}
-
-/// Returns how the method may divide the scene's objects, if it may.
-fn splits<'a>(labelled: &Labelled, scene: &'a Scene) -> Option<Splits<'a>> {
-    let references = labelled.options.references? * scene.boxes.len() as f64;
-    Splits::at_most(references as usize, &scene.boxes, &scene.primitives)
-}
-
-/// Describes a third-party tree as the outcome of a search of one evaluation.
-fn single_evaluation(tree: Bvh, objective: &Objective) -> Outcome {
-    let cost = objective.cost(&tree);
-    let work = tree.nodes.len() as u64;
-    let history = vec![Event { evaluations: 1, work, cost, incumbent: cost }];
-    let stop = StopReason::Completed;
-    Outcome { tree, cost, evaluations: 1, work, stop, proof: None, history }
 }
 
 /// Observes all runs: moves the bar and forwards an interruption.
@@ -212,5 +306,25 @@ impl Observer for Stopwatch<'_> {
 
     fn cancelled(&self) -> bool {
         self.watch.cancelled()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_history_keeps_the_first_event_every_improvement_and_the_last() {
+        let incumbents = [9.0, 9.0, 7.0, 7.0, 6.0, 6.0, 6.0];
+        let history = incumbents.map(|incumbent| Event {
+            evaluations: 1,
+            work: 1,
+            cost: incumbent,
+            incumbent,
+        });
+        let kept: Vec<usize> = milestones(&history).map(|(index, _)| index).collect();
+        assert_eq!(kept, [0, 2, 4, 6]);
+        assert_eq!(milestones(&history[..1]).count(), 1);
+        assert_eq!(milestones(&[]).count(), 0);
     }
 }

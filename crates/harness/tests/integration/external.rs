@@ -48,6 +48,23 @@ fn the_tree_of_a_program_is_costed_by_us_and_every_run_has_its_seed_and_the_boxe
 }
 
 #[test]
+fn runs_whose_times_are_the_result_alternate_between_methods_one_at_a_time() {
+    let folder = folder("echo $1 >> order; cp good.bvh \"$3\"", "");
+    let method = |name| {
+        let command = format!("command = ['sh', 'peer.sh', '{name}']");
+        format!("{{ label = '{name}', method = 'external', {command} }}")
+    };
+    let [a, b] = ["a", "b"].map(method);
+    let spec = format!(
+        "question = 'Which is faster?'\nscenes = ['spheres75']\nrepetitions = 3\n\
+         sequential = true\nmethods = [{a}, {b}]\n"
+    );
+    fs::write(folder.path().join("spec.toml"), spec).unwrap();
+    said(folder.path(), &["spec.toml"]);
+    assert_eq!(fs::read_to_string(folder.path().join("order")).unwrap(), "a\nb\n".repeat(3));
+}
+
+#[test]
 fn errors_of_programs_name_the_method_and_the_command() {
     for (script, more, parts) in [
         ("echo first >&2; echo 'no license' >&2; exit 3", "", &["exit status: 3: no license"][..]),
