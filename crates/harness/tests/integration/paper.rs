@@ -16,39 +16,26 @@ fn compared_folders() -> Vec<PathBuf> {
 }
 
 #[test]
-fn every_difference_from_the_paper_has_a_reason() {
+fn a_number_of_the_paper_has_one_row_and_every_difference_a_reason() {
     let mut compared = 0;
     for folder in compared_folders() {
-        let path = folder.join("paper.csv");
-        // Rows without a value of the paper only add to the others.
-        for row in read::<PaperRow>(&path).unwrap().iter().filter(|row| !row.paper.is_empty()) {
-            let needs_none = matches!(row.verdict, Verdict::Agrees | Verdict::Inconclusive);
-            let explained = !row.rule.is_empty() && (needs_none || !row.reason.is_empty());
-            assert!(explained, "{}: {row:?}", path.display());
-            compared += 1;
+        let mut seen = BTreeSet::new();
+        for row in &read::<PaperRow>(&folder.join("paper.csv")).unwrap() {
+            let place = format!("{}: {row:?}", folder.display());
+            let first = seen.insert(format!("{}, {}, {}", row.source, row.scene, row.quantity));
+            assert!(first, "twice: {place}");
+            // The base over itself is 1 whatever is built.
+            assert_ne!(row.paper_over_base, Some(1.0), "{place}");
+            // Rows without a value of the paper only add to the others.
+            assert_eq!(row.paper.is_empty(), row.verdict == Verdict::NotInPaper, "{place}");
+            if !row.paper.is_empty() {
+                let needs_none = matches!(row.verdict, Verdict::Agrees | Verdict::Inconclusive);
+                assert!(!row.rule.is_empty() && (needs_none || !row.reason.is_empty()), "{place}");
+                compared += 1;
+            }
         }
     }
     assert!(compared > 30, "{compared} rows");
-}
-
-#[test]
-fn a_number_of_the_paper_has_one_row_and_a_verdict_needs_something_of_the_papers() {
-    for folder in compared_folders() {
-        let rows: Vec<PaperRow> = read(&folder.join("paper.csv")).unwrap();
-        let mut seen = BTreeSet::new();
-        for row in &rows {
-            let first = seen.insert((&row.source, &row.scene, &row.quantity));
-            assert!(first, "{}: twice: {row:?}", folder.display());
-            assert_eq!(
-                row.paper.is_empty(),
-                row.verdict == Verdict::NotInPaper,
-                "{}: {row:?}",
-                folder.display()
-            );
-            // The base over itself is 1 whatever is built.
-            assert_ne!(row.paper_over_base, Some(1.0), "{}: {row:?}", folder.display());
-        }
-    }
 }
 
 #[test]
@@ -56,11 +43,9 @@ fn the_committed_verdicts_are_those_that_the_rules_give_on_the_committed_rows() 
     for folder in compared_folders() {
         let made = remade(&folder).unwrap();
         let mut written = made.iter().flat_map(|output| &output.csv);
-        let (_, bytes) = written
-            .find(|(name, _)| name == "paper")
-            .unwrap_or_else(|| panic!("{}: no comparison", folder.display()));
-        let committed = fs::read(folder.join("paper.csv")).unwrap();
-        assert!(*bytes == committed, "{}: renew it with --redraw", folder.display());
+        let paper = written.find(|(name, _)| name == "paper").map(|(_, bytes)| bytes.clone());
+        let committed = fs::read(folder.join("paper.csv")).ok();
+        assert!(paper == committed, "{}: renew it with --redraw", folder.display());
     }
     assert!(compared_folders().len() > 9);
 }
