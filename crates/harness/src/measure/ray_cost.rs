@@ -76,23 +76,6 @@ pub struct Cameras {
     pub lights: Vec<[f64; 3]>,
 }
 
-/// A choice among the paths of the cameras.
-type Path = fn(&Cameras) -> &[Viewpoint];
-
-impl Cameras {
-    fn recorded(&self) -> &[Viewpoint] {
-        &self.same
-    }
-
-    fn next_frame(&self) -> &[Viewpoint] {
-        if self.next.is_empty() { &self.same } else { &self.next }
-    }
-
-    fn elsewhere(&self) -> &[Viewpoint] {
-        &self.other
-    }
-}
-
 impl Default for Cameras {
     /// Two arcs around the scene, and a light above it.
     fn default() -> Self {
@@ -127,31 +110,8 @@ impl Config {
         Ok(())
     }
 
-    /// Returns a renderer's rays from one of the paths through a scene.
-    fn rendered(
-        &self,
-        scene: &Scene,
-        tree: &Bvh,
-        path: Path,
-        count: u32,
-        seed: u64,
-    ) -> Vec<TracedRay> {
-        let cameras = self.cameras.get(&scene.name).cloned().unwrap_or_default();
-        // Viewpoints are fractions of the root's box, which an empty tree lacks.
-        let Some(root) = tree.root_aabb() else { return Vec::new() };
-        let poses = path(&cameras).iter().map(|view| Pose {
-            eye: in_box(&root, view.eye).to_array(),
-            target: in_box(&root, view.target).to_array(),
-        });
-        let lights = cameras.lights.iter();
-        let rays = RenderedRays {
-            cameras: poses.collect(),
-            lights: lights.map(|&light| in_box(&root, light).to_array()).collect(),
-            count,
-            seed,
-            ..Default::default()
-        };
-        of_renderer(&rays, scene, tree, &|| false)
+    fn cameras_of(&self, scene: &Scene) -> Cameras {
+        self.cameras.get(&scene.name).cloned().unwrap_or_default()
     }
 
     /// Returns the density of the rays that a tree is trained on; `seed` draws the rays.
@@ -167,7 +127,8 @@ impl Config {
         let rays = match trained {
             TrainedOn::Default => of_anything(self.trained, scene, &tree, seed, &|| false),
             TrainedOn::Camera | TrainedOn::Recorded => {
-                self.rendered(scene, &tree, Cameras::recorded, self.trained, seed)
+                let Cameras { same, lights, .. } = self.cameras_of(scene);
+                rendered(&same, &lights, scene, &tree, self.trained, seed)
             }
             TrainedOn::Inside => of_inside(self.trained, scene, &tree, seed),
         };
@@ -181,20 +142,45 @@ impl Config {
     }
 }
 
+/// Returns a renderer's rays from a path through a scene.
+fn rendered(
+    path: &[Viewpoint],
+    lights: &[[f64; 3]],
+    scene: &Scene,
+    tree: &Bvh,
+    count: u32,
+    seed: u64,
+) -> Vec<TracedRay> {
+    // Viewpoints are fractions of the root's box, which an empty tree lacks.
+    let Some(root) = tree.root_aabb() else { return Vec::new() };
+    let place = |place| in_box(&root, place).to_array();
+    let poses = path.iter().map(|view| Pose { eye: place(view.eye), target: place(view.target) });
+    let rays = RenderedRays {
+        cameras: poses.collect(),
+        lights: lights.iter().copied().map(place).collect(),
+        count,
+        seed,
+        ..Default::default()
+    };
+    of_renderer(&rays, scene, tree, &|| false)
+}
+
 /// Rays that judge trees.
 pub struct TestRays {
     /// The kind of the rays.
     pub kind: Kind,
     /// The path of cameras that they come from: `same` as in the training, `other`, or `none`.
     pub camera: &'static str,
-    rays: Vec<Ray>,
+    /// The rays.
+    pub rays: Vec<Ray>,
 }
 
 /// Returns all rays that judge the trees of a scene. `tree` is any of these trees.
 pub fn test_rays(config: &Config, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<TestRays> {
     let mut test_rays = Vec::new();
-    for (camera, path) in [("same", Cameras::next_frame as Path), ("other", Cameras::elsewhere)] {
-        let traced = config.rendered(scene, tree, path, config.count, seed);
+    let Cameras { same, next, other, lights } = config.cameras_of(scene);
+    for (camera, path) in [("same", if next.is_empty() { same } else { next }), ("other", other)] {
+        let traced = rendered(&path, &lights, scene, tree, config.count, seed);
         for kind in [Kind::Primary, Kind::Bounce, Kind::Shadow] {
             let rays_of_kind =
                 traced.iter().filter(|traced| traced.kind == kind).map(|traced| traced.ray);
@@ -213,11 +199,6 @@ pub fn test_rays(config: &Config, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<T
 }
 
 impl TestRays {
-    /// Number of rays.
-    pub fn count(&self) -> u64 {
-        self.rays.len() as u64
-    }
-
     /// Returns the tests of nodes and of blocks of triangles per ray in a layout. They do not
     /// depend on the machine.
     pub fn tests(&self, wide: &WideBvh) -> [f64; 2] {

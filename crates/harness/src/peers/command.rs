@@ -5,13 +5,12 @@ use super::program::Program;
 use super::{BuildFault, Built, Library, Task};
 use bvh_config::fault;
 use bvh_config::{OutOfRange, above};
-use bvh_core::file::{self, FileError};
-use bvh_core::{Bvh, validate_references};
+use bvh_core::{file, validate_references};
 use bvh_scenes::files::ReadError;
 use bvh_scenes::tree_file::{self, TreeFileError};
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
-use std::process::{Command, ExitStatus, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use toml::Table;
 
@@ -48,35 +47,14 @@ impl Library for Programs {
 
     fn build(&self, settings: &Table, task: &Task) -> Result<Built, BuildFault> {
         let config: Config = fault::deserialize(settings.clone())?;
-        let built = config.build(task).map(|(tree, seconds)| Built { tree, seconds });
-        built.map_err(|fault| format!("command `{}`: {fault}", config.command.join(" ")).into())
+        let command = config.command.join(" ");
+        config.build(task).map_err(|fault| format!("command `{command}`: {fault}").into())
     }
 }
 
-/// The failure of a program.
-#[derive(Debug, thiserror::Error)]
-enum CommandFault {
-    /// The program does not exist or is not executable.
-    #[error("it cannot be started: {0}")]
-    NotStarted(io::Error),
-    /// The program reported a failure, with the last line on standard error.
-    #[error("{0}: {1}")]
-    Failed(ExitStatus, String),
-    /// The program ended without writing a tree.
-    #[error("it wrote no file at the path that is its last argument")]
-    NoTree,
-    /// The tree is damaged or was built over other boxes.
-    #[error("its tree is invalid: {0}")]
-    InvalidTree(#[from] FileError),
-    /// The program exceeded its time limit.
-    #[error("it did not end within {0} s")]
-    TimedOut(f64),
-    /// The run was interrupted, which kills the program.
-    #[error("it was interrupted")]
-    Interrupted,
-    /// The files for the program could not be written or read.
-    #[error("its input or output files cannot be written or read: {0}")]
-    Exchange(#[from] io::Error),
+/// A failure of the files that a program and the harness exchange.
+fn exchange(error: io::Error) -> String {
+    format!("its input or output files cannot be written or read: {error}")
 }
 
 impl Config {
@@ -87,18 +65,17 @@ impl Config {
         }
     }
 
-    /// Runs the program. Returns its tree and the seconds that it needed, including its start and
-    /// its files.
+    /// Runs the program. The seconds include its start and its files.
     ///
     /// Kills the program once the task is cancelled. Whenever the program ends, all processes of
     /// its group are killed as well.
-    fn build(&self, task: &Task) -> Result<(Bvh, f64), CommandFault> {
+    fn build(&self, task: &Task) -> Result<Built, String> {
         let Task { boxes, objects, seed, cancelled } = *task;
-        let folder = tempfile::tempdir()?;
+        let folder = tempfile::tempdir().map_err(exchange)?;
         let boxes_path = folder.path().join("boxes");
         let tree_path = folder.path().join("tree.bvh");
         // Without a name, so that the program cannot replace it.
-        let mut errors = tempfile::tempfile()?;
+        let mut errors = tempfile::tempfile().map_err(exchange)?;
         let box_bytes: Vec<u8> = boxes
             .iter()
             .flat_map(|aabb| [aabb.min.to_array(), aabb.max.to_array()])
@@ -106,18 +83,20 @@ impl Config {
             // The checksum of a scene knows no −0.
             .flat_map(|x| (x + 0.0).to_le_bytes())
             .collect();
-        fs::write(&boxes_path, box_bytes)?;
+        fs::write(&boxes_path, box_bytes).map_err(exchange)?;
         let mut command = Command::new(&self.command[0]);
         command
             .args(&self.command[1..])
             .args([&boxes_path, &tree_path])
             .env("BVH_SEED", seed.to_string());
         // Standard error goes to a file: a full pipe that nobody reads would stop the program.
-        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(errors.try_clone()?);
+        let stderr = errors.try_clone().map_err(exchange)?;
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr);
         let start = Instant::now();
-        let mut program = Program::start(&mut command).map_err(CommandFault::NotStarted)?;
+        let mut program = Program::start(&mut command)
+            .map_err(|error| format!("it cannot be started: {error}"))?;
         let status = loop {
-            if let Some(status) = program.status()? {
+            if let Some(status) = program.status().map_err(exchange)? {
                 break status;
             }
             // The limit comes before the interruption, so that a slow program is named as such.
@@ -125,10 +104,10 @@ impl Config {
             if let Some(limit) = self.timeout_seconds
                 && elapsed.as_secs_f64() > limit
             {
-                return Err(CommandFault::TimedOut(limit));
+                return Err(format!("it did not end within {limit} s"));
             }
             if cancelled() {
-                return Err(CommandFault::Interrupted);
+                return Err("it was interrupted".into());
             }
             // A fiftieth of the elapsed time bounds the error of the measured seconds.
             let pause = elapsed / 50;
@@ -138,22 +117,24 @@ impl Config {
         // No child of the program may write to the tree file while it is read.
         drop(program);
         if !status.success() {
-            return Err(CommandFault::Failed(status, last_line(&mut errors)?));
+            return Err(format!("{status}: {}", last_line(&mut errors).map_err(exchange)?));
         }
-        let tree = file::load(&tree_file::read(&tree_path)?, boxes)?;
-        validate_references(&tree, boxes, objects).map_err(FileError::Tree)?;
-        Ok((tree, seconds))
+        let bytes = tree_file::read(&tree_path).map_err(|error| match error {
+            TreeFileError::Read(ReadError::Failed { source, .. }) => exchange(source),
+            TreeFileError::Read(_) => {
+                "it wrote no file at the path that is its last argument".into()
+            }
+            TreeFileError::Invalid { source, .. } => invalid(&source),
+        })?;
+        let tree = file::load(&bytes, boxes).map_err(|error| invalid(&error))?;
+        validate_references(&tree, boxes, objects).map_err(|error| invalid(&error))?;
+        Ok(Built { tree, seconds })
     }
 }
 
-impl From<TreeFileError> for CommandFault {
-    fn from(error: TreeFileError) -> Self {
-        match error {
-            TreeFileError::Read(ReadError::Failed { source, .. }) => Self::Exchange(source),
-            TreeFileError::Read(_) => Self::NoTree,
-            TreeFileError::Invalid { source, .. } => Self::InvalidTree(source),
-        }
-    }
+/// A tree that is damaged or was built over other boxes.
+fn invalid(error: &dyn std::error::Error) -> String {
+    format!("its tree is invalid: {error}")
 }
 
 /// Returns the last line of a text file that is not blank.

@@ -37,9 +37,14 @@ pub(crate) fn selected<'a>(
 ) -> Result<Vec<Job<'a>>, Error> {
     let mut jobs = Vec::new();
     for scene in scenes {
-        for (labelled, repetition, first_of_scene) in experiment.runs() {
-            let id = experiment.run_id(&scene.name, &labelled.label, repetition);
-            jobs.push(Job { index: jobs.len(), id, scene, labelled, repetition, first_of_scene });
+        let first = jobs.len();
+        for labelled in &experiment.methods {
+            for repetition in 0..experiment.repetitions {
+                let index = jobs.len();
+                let id = experiment.run_id(&scene.name, &labelled.label, repetition);
+                let first_of_scene = index == first;
+                jobs.push(Job { index, id, scene, labelled, repetition, first_of_scene });
+            }
         }
     }
     let known: HashSet<&str> = jobs.iter().map(|job| &*job.id).collect();
@@ -70,13 +75,9 @@ impl Job<'_> {
         };
         let seed =
             experiment.seed_of(&self.scene.name, "rays that trees are trained on", self.repetition);
-        let density = config.density(trained, self.scene, seed).map_err(self.tracing_error())?;
+        let density =
+            config.density(trained, self.scene, seed).map_err(tracing_error(self.scene))?;
         Ok(Some(density))
-    }
-
-    /// For `map_err` where rays cannot be traced: names the scene.
-    pub fn tracing_error(&self) -> impl Fn(String) -> Error + use<> {
-        tracing_error(self.scene)
     }
 
     /// Returns how often the run's training rays enter each node of `tree`, which decides its
@@ -86,7 +87,7 @@ impl Job<'_> {
     }
 }
 
-/// For `map_err` where rays cannot be traced through a scene.
+/// For `map_err` where rays cannot be traced: names the scene.
 pub(crate) fn tracing_error(scene: &Scene) -> impl Fn(String) -> Error + use<> {
     let scene = scene.name.clone();
     move |message| Error::Tracing { scene: scene.clone(), message }
@@ -114,20 +115,13 @@ mod tests {
     use super::*;
     use crate::spec::Overrides;
 
-    fn experiment() -> (Experiment, Vec<Scene>) {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("spec.toml");
-        let text = "question = 'Q'\nscenes = ['escher', 'spheres750']\nrepetitions = 3\n\
-                    methods = [{ method = 'muller_fellner' }, { method = 'grasp', trials = 9 }]\n";
-        std::fs::write(&path, text).unwrap();
-        let experiment = Experiment::read(&path, &Overrides::default()).unwrap();
-        let scenes = ["escher", "spheres750"].map(|name| Scene::load(name).unwrap());
-        (experiment, scenes.into())
-    }
-
     #[test]
     fn every_run_has_an_identifier_that_selects_it_also_after_others_have_joined() {
-        let (mut experiment, scenes) = experiment();
+        let text = "question = 'Q'\nscenes = ['escher', 'spheres750']\nrepetitions = 3\n\
+                    methods = [{ method = 'muller_fellner' }, { method = 'grasp', trials = 9 }]\n";
+        let spec = Experiment::parse("spec.toml".as_ref(), text, &Overrides::default());
+        let mut experiment = spec.unwrap();
+        let scenes = ["escher", "spheres750"].map(|name| Scene::load(name).unwrap());
         let ids = |experiment: &Experiment| {
             let jobs = selected(experiment, &scenes, &[]).unwrap();
             jobs.into_iter().map(|job| job.id).collect::<Vec<_>>()

@@ -4,7 +4,6 @@ use super::job::{Job, tracing_error};
 use super::runs::Work;
 use crate::Error;
 use crate::measure::ray_cost::{Config, TestRays, TrainedOn, test_rays};
-use crate::rows::store::Store;
 use crate::rows::{LayoutRow, RunTestRow, TestRow, VisitRow};
 use crate::spec::Experiment;
 use crate::statistics::mean;
@@ -16,94 +15,66 @@ use rayon::prelude::*;
 /// The name that results give to all trees trained on rays, whatever the label of their method.
 const RAYS: &str = "rays";
 
-/// Judges the trees of all runs.
+/// A run and its tree.
+type Run<'a> = (&'a Job<'a>, &'a Bvh);
+
+/// Counts the tests of the same rays in the trees of all runs on a scene. Each tree is laid out for
+/// the rays that it was trained on.
 pub(crate) fn measure(config: &Config, work: &mut Work) -> Result<(), Error> {
     work.complete_trees(|_| true)?;
     let runs: Vec<Run> =
         work.trees.iter().map(|(&index, tree)| (&work.jobs[index], tree)).collect();
-    let mut rows = Rows::default();
-    for scene_runs in runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
-        rows.judge_scene(config, work, scene_runs)?;
-    }
-    rows.write(work.store)
-}
-
-/// A run and its tree.
-type Run<'a> = (&'a Job<'a>, &'a Bvh);
-
-/// The rows of a judgement; the vectors of files that are not requested stay empty.
-#[derive(Default)]
-struct Rows {
-    tests: Vec<TestRow>,
-    layouts: Vec<LayoutRow>,
-    visits: Vec<VisitRow>,
-    run_tests: Vec<RunTestRow>,
-}
-
-impl Rows {
-    fn write(&self, store: &Store) -> Result<(), Error> {
-        store.write_rows(&self.tests)?;
-        store.write_rows(&self.layouts)?;
-        if !self.visits.is_empty() {
-            store.write_rows(&self.visits)?;
-            store.write_rows(&self.run_tests)?;
-        }
-        Ok(())
-    }
-
-    /// Counts the tests of the same rays in the trees of all runs on a scene. Each tree is laid out
-    /// for the rays that it was trained on.
-    fn judge_scene(&mut self, config: &Config, work: &Work, runs: &[Run]) -> Result<(), Error> {
-        let experiment = work.experiment;
-        let repetitions = experiment.repetitions as usize;
-        let (first_job, first_tree) = runs[0];
-        let scene = first_job.scene;
-        let layouts = runs
-            .par_iter()
-            .map(|(job, tree)| layout(experiment, job, tree))
-            .collect::<Result<Vec<WideBvh>, Error>>()?;
+    let experiment = work.experiment;
+    let repetitions = experiment.repetitions as usize;
+    let (mut tests, mut sizes, mut visits) = (Vec::new(), Vec::new(), Vec::new());
+    let mut run_tests = Vec::new();
+    for runs in runs.chunk_by(|a, b| a.0.scene.name == b.0.scene.name) {
+        let scene = runs[0].0.scene;
+        let layouts = runs.par_iter().map(|(job, tree)| layout(experiment, job, tree));
+        let layouts = layouts.collect::<Result<Vec<WideBvh>, Error>>()?;
         // Runs are ordered by method, then by repetition.
-        let layouts_of_methods = layouts.chunks(repetitions);
-        self.layouts.extend(
-            runs.chunks(repetitions)
-                .zip(layouts_of_methods)
-                .map(|(runs, layouts)| layout_row(runs, layouts)),
-        );
+        let methods = || runs.chunks(repetitions);
+        let of_methods = methods().zip(layouts.chunks(repetitions));
+        sizes.extend(of_methods.map(|(runs, layouts)| layout_row(runs, layouts)));
         for &trained_on in &config.costs {
-            self.visits.extend(visit_rows(experiment, config, trained_on, runs)?);
+            // These rays serve no other purpose.
+            let seed = experiment.seed_of(&scene.name, "rays that costs are of", 0);
+            let density = config.density(trained_on, scene, seed).map_err(tracing_error(scene))?;
+            visits.extend(runs.iter().map(|(job, tree)| VisitRow {
+                scene: scene.name.clone(),
+                method: job.labelled.label.clone(),
+                repetition: job.repetition,
+                rays: TrainedOn::name(Some(trained_on)).into(),
+                goldsmith_salmon: Objective::GoldsmithSalmon.cost_by(tree, &density),
+            }));
         }
         let seed = experiment.seed_of(&scene.name, "rays that judge trees", 0);
-        for rays in test_rays(config, scene, first_tree, seed) {
+        for rays in test_rays(config, scene, runs[0].1, seed) {
             if work.watch.cancelled() {
                 return Err(work.interrupted());
             }
-            let tests: Vec<[f64; 2]> = layouts.par_iter().map(|wide| rays.tests(wide)).collect();
+            let of_runs: Vec<[f64; 2]> = layouts.par_iter().map(|wide| rays.tests(wide)).collect();
             if !config.costs.is_empty() {
-                self.run_tests.extend(
-                    runs.iter()
-                        .zip(&tests)
-                        .map(|((job, _), tests)| run_test_row(job, &rays, *tests)),
-                );
+                run_tests.extend(runs.iter().zip(&of_runs).map(|((job, _), tests)| RunTestRow {
+                    scene: scene.name.clone(),
+                    method: job.labelled.label.clone(),
+                    repetition: job.repetition,
+                    judged_on: rays.kind.name().into(),
+                    camera: rays.camera.into(),
+                    tests: tests[0] + tests[1],
+                }));
             }
-            self.tests.extend(
-                runs.chunks(repetitions)
-                    .zip(tests.chunks(repetitions))
-                    .map(|(runs, tests)| test_row(runs[0].0, &rays, tests)),
-            );
+            let of_methods = methods().zip(of_runs.chunks(repetitions));
+            tests.extend(of_methods.map(|(runs, tests)| test_row(runs[0].0, &rays, tests)));
         }
-        Ok(())
     }
-}
-
-fn run_test_row(job: &Job, rays: &TestRays, [node_tests, block_tests]: [f64; 2]) -> RunTestRow {
-    RunTestRow {
-        scene: job.scene.name.clone(),
-        method: job.labelled.label.clone(),
-        repetition: job.repetition,
-        judged_on: rays.kind.name().into(),
-        camera: rays.camera.into(),
-        tests: node_tests + block_tests,
+    work.store.write_rows(&tests)?;
+    work.store.write_rows(&sizes)?;
+    if !config.costs.is_empty() {
+        work.store.write_rows(&visits)?;
+        work.store.write_rows(&run_tests)?;
     }
+    Ok(())
 }
 
 /// Averages the tests of a method over its repetitions.
@@ -124,52 +95,26 @@ fn test_row(job: &Job, rays: &TestRays, tests: &[[f64; 2]]) -> TestRow {
         block_tests: mean(tests.iter().map(|tests| tests[1])),
         repetitions: tests.len(),
         tests_standard_error: standard_error(tests),
-        rays: rays.count(),
+        rays: rays.rays.len() as u64,
     }
-}
-
-/// Costs a scene's trees by the density of rays that serve no other purpose.
-fn visit_rows(
-    experiment: &Experiment,
-    config: &Config,
-    trained_on: TrainedOn,
-    runs: &[Run],
-) -> Result<Vec<VisitRow>, Error> {
-    let scene = runs[0].0.scene;
-    let seed = experiment.seed_of(&scene.name, "rays that costs are of", 0);
-    let density = config.density(trained_on, scene, seed).map_err(tracing_error(scene))?;
-    let rows = runs.iter().map(|(job, tree)| VisitRow {
-        scene: scene.name.clone(),
-        method: job.labelled.label.clone(),
-        repetition: job.repetition,
-        rays: TrainedOn::name(Some(trained_on)).into(),
-        goldsmith_salmon: Objective::GoldsmithSalmon.cost_by(tree, &density),
-    });
-    Ok(rows.collect())
 }
 
 /// Lays out a run's tree for the rays that it was trained on, otherwise for random lines.
 fn layout(experiment: &Experiment, job: &Job, tree: &Bvh) -> Result<WideBvh, Error> {
     let triangles =
-        job.scene.triangles().map_err(|error| job.tracing_error()(error.to_string()))?;
+        job.scene.triangles().map_err(|error| tracing_error(job.scene)(error.to_string()))?;
     let layout = match job.visits(experiment, tree)? {
         Some(visits) => WideBvh::for_rays(tree, triangles, &visits),
         None => WideBvh::new(tree, triangles),
     };
-    layout.map_err(|error| job.tracing_error()(error.to_string()))
-}
-
-/// Returns the surface area heuristic of a tree with both constants 1, after the best collapse of
-/// leaves.
-fn collapsed_sah(tree: &Bvh) -> f64 {
-    let constants = SahConstants::default();
-    cost::sah(&collapse_leaves(tree, &constants), &constants)
+    layout.map_err(|error| tracing_error(job.scene)(error.to_string()))
 }
 
 /// Averages the sizes and costs of a method's trees and layouts over repetitions.
 fn layout_row(runs: &[Run], layouts: &[WideBvh]) -> LayoutRow {
     let job = runs[0].0;
     let objects = job.scene.boxes.len() as f64;
+    let constants = SahConstants::default();
     let trees = runs.iter().map(|(_, tree)| *tree);
     let bytes: usize = layouts.iter().map(WideBvh::bytes).sum();
     let references_per_object = trees.clone().map(|tree| tree.prim_ids.len() as f64 / objects);
@@ -181,7 +126,9 @@ fn layout_row(runs: &[Run], layouts: &[WideBvh]) -> LayoutRow {
         repetitions: runs.len(),
         references_per_object: mean(references_per_object),
         bytes_per_object: bytes as f64 / (objects * layouts.len() as f64),
-        collapsed_sah: mean(trees.map(collapsed_sah)),
+        collapsed_sah: mean(
+            trees.map(|tree| cost::sah(&collapse_leaves(tree, &constants), &constants)),
+        ),
         layout_over_root: mean(layout_over_root),
     }
 }

@@ -26,11 +26,6 @@ pub(crate) struct LoadedScene {
     pub checksum: String,
 }
 
-/// Returns a scene's checksum in the form of [`LoadedScene::checksum`].
-pub(crate) fn checksum(scene: &Scene) -> String {
-    format!("{:016x}", scene.checksum())
-}
-
 impl Resolved {
     /// Combines an experiment with the scenes that were loaded for it.
     pub fn new(experiment: &Experiment, scenes: &[Scene]) -> Self {
@@ -38,7 +33,7 @@ impl Resolved {
             name: scene.name.clone(),
             kind: scene.kind.to_string(),
             objects: scene.boxes.len(),
-            checksum: checksum(scene),
+            checksum: format!("{:016x}", scene.checksum()),
         });
         Self { experiment: experiment.clone(), scenes: loaded.collect() }
     }
@@ -61,7 +56,7 @@ impl Resolved {
 
     /// The number of runs over all scenes.
     pub fn run_count(&self) -> usize {
-        self.experiment.runs().count() * self.scenes.len()
+        self.scenes.len() * self.experiment.methods.len() * self.experiment.repetitions as usize
     }
 }
 

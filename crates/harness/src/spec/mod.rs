@@ -95,14 +95,6 @@ impl Experiment {
         }
     }
 
-    /// Returns the runs on one scene in order: method, repetition, and whether it is the first run.
-    pub fn runs(&self) -> impl Iterator<Item = (&Labelled, u32, bool)> {
-        self.methods.iter().enumerate().flat_map(|(index, labelled)| {
-            (0..self.repetitions)
-                .map(move |repetition| (labelled, repetition, index == 0 && repetition == 0))
-        })
-    }
-
     /// The rays that judge the experiment's trees, if any do.
     pub fn judges(&self) -> Option<&ray_cost::Config> {
         self.ray_cost.as_ref().filter(|config| config.count > 0)
