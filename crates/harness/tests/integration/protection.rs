@@ -5,7 +5,7 @@
 #![cfg_attr(windows, allow(unused_imports))]
 
 use crate::support::{
-    ended, folder_with, names, of_part, part, program, reproducible, run, said, text,
+    ended, folder_with, names, of_part, part, program, reproducible, run, said, text, top,
 };
 use std::fs;
 use std::path::Path;
@@ -15,18 +15,6 @@ question = 'What stays?'
 scenes = ['spheres75']
 repetitions = 3
 methods = [{ method = 'muller_fellner' }, { method = 'grasp', trials = 3 }]
-";
-
-/// A measurement over the suite, of one case and one method.
-const SUITE: &str = "
-question = 'q'
-scenes = ['S01']
-methods = [{ method = 'median_cut' }]
-[suite]
-builders = 'few'
-work_per_object = 1
-larger_searches = { objects = 0, work_per_object = 1 }
-rays = 1
 ";
 
 /// Creates a folder with a spec of this name.
@@ -80,9 +68,10 @@ fn resuming_what_is_finished_does_nothing() {
         (vec![".lock".into(), "best_known.csv".into(), "spec".into()], first)
     );
     // The suite of cases is no exception.
-    fs::write(dir.join("suite.toml"), SUITE).unwrap();
-    said(dir, &["suite.toml"]);
-    assert!(said(dir, &["suite.toml", "--resume"]).contains("nothing was done"));
+    let suite = top().canonicalize().unwrap().join("experiments/stability.toml");
+    let suite = [suite.to_str().unwrap(), "--quick", "--scene=S01"];
+    said(dir, &suite);
+    assert!(said(dir, &[&suite[..], &["--resume"]].concat()).contains("nothing was done"));
 }
 
 /// Returns the names of the runs that the results of an interrupted experiment keep.

@@ -17,7 +17,7 @@ const PROGRAM: &str = env!("CARGO_BIN_EXE_harness");
 /// A spec whose report is a table of the paper.
 pub const TABLE: &str = "
 question = 'Do results survive?'
-scenes = ['escher', 'pinecon2']
+scenes = ['escher:300', 'pinecon2:300']
 repetitions = 3
 methods = [
     { label = 'greedy', method = 'muller_fellner' },
@@ -32,15 +32,15 @@ title = 'a table'
 [[reports.columns]]
 name = 'base'
 method = 'greedy'
-paper = { escher = 1.0, pinecon2 = 1.0 }
+paper = { 'escher:300' = 1.0, 'pinecon2:300' = 1.0 }
 [[reports.columns]]
 name = 'best of 5'
 method = 'noise'
 best_of = 5
-paper = { escher = 1.0, pinecon2 = 0.9 }
+paper = { 'escher:300' = 1.0, 'pinecon2:300' = 0.9 }
 
 [quick]
-scenes = ['escher']
+scenes = ['escher:300']
 repetitions = 1
 ";
 
