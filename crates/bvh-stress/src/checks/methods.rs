@@ -9,11 +9,11 @@ use bvh_core::{Aabb, cost};
 use bvh_scenes::builtin::stiff;
 use bvh_search::grasp::{self, Candidates};
 use bvh_search::{
-    Budget, Event, Method, Observer, Outcome, Problem, Search, StopReason, annealing, exact,
+    Budget, Deadline, Method, Observer, Outcome, Problem, Search, StopReason, annealing, exact,
     genetic, solve,
 };
 use glam::Vec3;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 fn boxes(n: usize) -> Vec<Aabb> {
     stiff::boxes(&stiff::uniform(n))
@@ -25,7 +25,7 @@ fn solved(search: &dyn Search, boxes: &[Aabb], seed: u64, budget: Budget) -> Res
 
 /// Returns five scenes for P5: uniform, flat, a line, many ties, and very different sizes.
 /// Coordinates are between 2^-5 and 2^5.
-pub fn scaled_scenes(n: usize) -> [Vec<Aabb>; 5] {
+fn scaled_scenes(n: usize) -> [Vec<Aabb>; 5] {
     let uniform = boxes(n);
     let mut sized = uniform.clone();
     for (index, aabb) in sized.iter_mut().enumerate() {
@@ -76,28 +76,19 @@ pub fn threads_and_seeds(method: &Method) -> Verdict {
     Ok("4 numbers of threads, 3 seeds".into())
 }
 
-struct Deadline(Option<Instant>);
-
-impl Observer for Deadline {
-    fn event(&self, _: &Event) {}
-
-    fn cancelled(&self) -> bool {
-        self.0.is_none_or(|end| Instant::now() >= end)
-    }
-}
-
 /// S39: a method returns its best tree so far with a budget of 0, and if it is cancelled
 /// immediately or after a millisecond.
 pub fn budgets_end(method: &Method) -> Verdict {
     let boxes = boxes(if let Method::Exact(_) = method { 10 } else { 200 });
     let nothing = Budget { max_evaluations: Some(0), max_work: Some(0) };
     let one = Budget { max_evaluations: Some(1), max_work: None };
-    let soon = Deadline(Some(Instant::now() + Duration::from_millis(1)));
+    let now = Deadline::after(Duration::ZERO);
+    let soon = Deadline::after(Duration::from_millis(1));
     let free = Budget::UNLIMITED;
     let watchers: [(Budget, &dyn Observer, Option<StopReason>); 4] = [
         (nothing, &(), None),
         (one, &(), None),
-        (free, &Deadline(None), Some(StopReason::Cancelled)),
+        (free, &now, Some(StopReason::Cancelled)),
         (free, &soon, None),
     ];
     for (budget, observer, reason) in watchers {

@@ -106,7 +106,7 @@ fn box_of([a, b]: [[f32; 3]; 2]) -> Aabb {
 
 /// Boxes of any finite bits, with zeros and repetitions. Exponents come from a range, as narrow as
 /// one exponent or as wide as all.
-fn any_boxes() -> impl Strategy<Value = Vec<Aabb>> {
+pub fn any_boxes() -> impl Strategy<Value = Vec<Aabb>> {
     (0u32..=254, 0u32..=254).prop_flat_map(|(low, width)| {
         let coordinate =
             (any::<u32>(), low..=(low + width).min(254)).prop_map(move |(bits, exponent)| {

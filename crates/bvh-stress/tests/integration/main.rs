@@ -1,5 +1,6 @@
 //! All methods, traversals and readers on stiff and extreme input, in one program.
 
+mod any_bits;
 mod fuzz;
 mod laws;
 mod never_worse;

@@ -61,7 +61,7 @@ fn every_case_holds_with_the_visits_of_rays_instead_of_area() {
     for (case, triangles) in scenes(2000) {
         let boxes = stiff::boxes(&triangles);
         let bounds = Aabb::union_of(&boxes);
-        let segments: Vec<Segment> = tracing::rays(&triangles, 3000, 1)
+        let segments: Vec<Segment> = tracing::rays(&triangles, 1000, 1)
             .iter()
             .map(|ray| Segment {
                 from: ray.origin().to_array(),

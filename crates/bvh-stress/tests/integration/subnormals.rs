@@ -44,23 +44,13 @@ fn flags(wide: &WideBvh, rays: &[Ray]) -> Vec<(&'static str, Option<&'static str
         raised_by(|| hit_count += rays.iter().filter_map(|ray| wide.nearest_hit(ray)).count());
     let single_any = raised_by(|| hit_count += rays.iter().filter(|ray| wide.any_hit(ray)).count());
     assert!(hit_count > 0, "rays that meet nothing try no triangle");
-    vec![
-        ("nearest_hit", single_nearest),
-        ("any_hit", single_any),
-        (
-            "coherent nearest_hits",
-            raised_by(|| wide.nearest_hits(rays, &mut hits, Coherence::Coherent)),
-        ),
-        (
-            "incoherent nearest_hits",
-            raised_by(|| wide.nearest_hits(rays, &mut hits, Coherence::Incoherent)),
-        ),
-        ("coherent any_hits", raised_by(|| wide.any_hits(rays, &mut shadows, Coherence::Coherent))),
-        (
-            "incoherent any_hits",
-            raised_by(|| wide.any_hits(rays, &mut shadows, Coherence::Incoherent)),
-        ),
-    ]
+    let mut flags = vec![("nearest_hit", single_nearest), ("any_hit", single_any)];
+    for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+        let nearest = raised_by(|| wide.nearest_hits(rays, &mut hits, coherence));
+        let any = raised_by(|| wide.any_hits(rays, &mut shadows, coherence));
+        flags.extend([("nearest_hits", nearest), ("any_hits", any)]);
+    }
+    flags
 }
 
 /// Returns the rays of cameras outside and inside of a scene, sorted by their kind.

@@ -5,8 +5,7 @@ use bvh_scenes::builtin::stiff::{self, STIFF};
 use bvh_scenes::trace::{Accelerator, Structure};
 use bvh_search::Method;
 use bvh_stress::{
-    CASES, Case, Cell, Check, Class, Effort, KINDS, LargerScenes, Size, is_builder, kernels,
-    scenes, tracing,
+    CASES, Case, Cell, Check, Class, Effort, KINDS, LargerScenes, Size, kernels, scenes, tracing,
 };
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -65,15 +64,6 @@ fn every_case_holds_at_a_larger_size() {
     let larger = Some(LargerScenes { objects: 2000, work_per_object: 60 });
     let effort = Effort { builders: Size::Many, larger_searches: larger, ..QUICK };
     check_cases(&bvh_stress::methods(), effort);
-}
-
-#[test]
-#[ignore = "by hand: minutes and gigabytes, S36 has ten million triangles"]
-fn every_scene_holds_for_every_builder_at_its_full_size() {
-    let builders = Method::all().into_iter().filter(is_builder);
-    for builder in builders.map(|method| (method.name().to_owned(), method)) {
-        check_cases(&[builder], Effort { builders: Size::All, ..QUICK });
-    }
 }
 
 /// The powers of two that scale scenes, each for an equal part of the rays. Most of them keep

@@ -4,14 +4,14 @@
 
 use bvh_build::{Builder, goldsmith_salmon, muller_fellner};
 use bvh_core::{
-    Aabb, Bvh, Hit, Kernel, NodeKind, NodeTest, PreparedRay, Ray, TestCounts, Triangle, WideBvh,
-    nearest_hit_by,
+    Aabb, Bvh, Kernel, NodeTest, PreparedRay, Ray, TestCounts, Triangle, WideBvh, nearest_hit_by,
 };
 use bvh_search::Stream;
 use bvh_stress::{scenes, tracing};
 use glam::Vec3;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
+use std::iter;
 
 /// A scene, and rays that meet it or pass by closely.
 struct Scene {
@@ -95,112 +95,59 @@ fn stretched() -> Vec<Scene> {
     scenes
 }
 
-/// Returns the distances at which a ray enters and leaves a box, in f64. The first exceeds the
-/// second if it misses the box.
-fn interval(ray: &Ray, aabb: &Aabb) -> [f64; 2] {
+/// Returns the distance at which a ray enters a box, in f64; infinite if it misses the box by more
+/// than the rounding of f64.
+fn entry(ray: &Ray, aabb: &Aabb) -> f32 {
     let origin = ray.origin().as_dvec3();
     let direction = ray.direction().as_dvec3();
-    let low = aabb.min.as_dvec3() - origin;
-    let high = aabb.max.as_dvec3() - origin;
-    let mut interval = [f64::from(ray.t_min()), f64::INFINITY];
+    let [low, high] = [aabb.min, aabb.max].map(|corner| corner.as_dvec3() - origin);
+    let [mut entry, mut exit] = [f64::from(ray.t_min()), f64::INFINITY];
     for axis in 0..3 {
-        if direction[axis] == 0.0 {
-            if low[axis] > 0.0 || high[axis] < 0.0 {
-                return [f64::INFINITY, 0.0];
-            }
-            continue;
+        if direction[axis] != 0.0 {
+            let [a, b] = [low, high].map(|side| side[axis] / direction[axis]);
+            entry = entry.max(a.min(b));
+            exit = exit.min(a.max(b));
+        } else if low[axis] > 0.0 || high[axis] < 0.0 {
+            return f32::INFINITY;
         }
-        let [a, b] = [low, high].map(|side| side[axis] / direction[axis]);
-        interval = [interval[0].max(a.min(b)), interval[1].min(a.max(b))];
     }
-    interval
-}
-
-/// Returns the distance at which a ray enters a box; infinite if it misses the box by more than
-/// the rounding of f64.
-fn entry(ray: &Ray, aabb: &Aabb) -> f32 {
-    let [entry, exit] = interval(ray, aabb);
     if entry <= exit * (1.0 + 1e-14) { entry as f32 } else { f32::INFINITY }
 }
 
-/// Counts the tests of the traversal of a tree with boxes that are tested in f64.
-fn real_counts(tree: &Bvh, triangles: &[Triangle], ray: &Ray) -> TestCounts {
-    let prepared = PreparedRay::new(ray);
+/// Counts the tests of a ray that ends at its hit in a tree with boxes that are tested in f64.
+fn real_counts(tree: &Bvh, is_entered: impl Fn(&Aabb) -> bool) -> TestCounts {
     let mut counts = TestCounts { boxes: 1, objects: 0 };
-    let mut nearest = Hit { t: ray.t_max(), object: u32::MAX };
-    let entry = |node: usize| entry(ray, &tree.nodes[node].aabb);
-    let mut stack = vec![(entry(0), 0)];
-    while let Some((distance, node)) = stack.pop() {
-        if distance > nearest.t || distance == f32::INFINITY {
-            continue;
-        }
-        match tree.nodes[node].kind() {
-            NodeKind::Leaf { .. } => {
-                for &object in &tree.prim_ids[tree.nodes[node].prims()] {
-                    counts.objects += 1;
-                    if let Some(t) = triangles[object as usize].intersect(&prepared, nearest.t) {
-                        let hit = Hit { t, object };
-                        if hit.precedes(&nearest) {
-                            nearest = hit;
-                        }
-                    }
-                }
-            }
-            NodeKind::Inner { .. } => {
-                let mut children: Vec<(f32, usize)> =
-                    tree.nodes[node].children().map(|child| (entry(child), child)).collect();
-                counts.boxes += children.len() as u64;
-                children.sort_by(|a, b| b.0.total_cmp(&a.0));
-                stack.extend(children);
-            }
+    let mut stack = vec![0];
+    while let Some(at) = stack.pop() {
+        let node = &tree.nodes[at];
+        if is_entered(&node.aabb) {
+            counts.objects += node.prims().len() as u64;
+            counts.boxes += node.children().len() as u64;
+            stack.extend(node.children());
         }
     }
     counts
 }
 
-/// The tests of all rays of a scene, in real arithmetic and ours.
-#[derive(Default)]
-struct Sums {
-    way: String,
-    real: u64,
-    ours: u64,
-}
-
-impl Sums {
-    fn new(way: String) -> Self {
-        Self { way, ..Self::default() }
-    }
-
-    fn add(&mut self, real: TestCounts, ours: TestCounts) {
-        self.real += real.boxes + real.objects;
-        self.ours += ours.boxes + ours.objects;
-    }
-}
-
 /// Counts the tests of all rays by the traversal of a tree, and of its wide layout by every kernel.
-fn sums(name: &str, tree: &Bvh, triangles: &[Triangle], rays: &[Ray]) -> Vec<Sums> {
+/// Returns the tests in real arithmetic and ours for each way.
+fn sums(name: &str, tree: &Bvh, triangles: &[Triangle], rays: &[Ray]) -> Vec<(String, [u64; 2])> {
     let wide = WideBvh::new(tree, triangles).unwrap();
-    let mut plain = Sums::new(format!("{name}, tree"));
-    let mut portable = Sums::new(format!("{name}, portable kernel"));
-    let ways = [
-        ("a ray by itself", NodeTest::Alone),
-        ("rays in flight", NodeTest::InFlight),
-        ("a packet", NodeTest::Packet),
-    ];
+    let mut sums =
+        ["tree", "portable kernel"].map(|way| (format!("{name}, {way}"), [0; 2])).to_vec();
+    let tests = [NodeTest::Alone, NodeTest::InFlight, NodeTest::Packet];
+    let ways = ["a ray by itself", "rays in flight", "a packet"];
     let mut vectors = Vec::new();
     for kernel in Kernel::ALL.into_iter().filter(|&kernel| kernel != Kernel::Portable) {
         // The processor may lack the kernel's instructions.
         let Some(wide) = wide.clone().with_kernel(kernel) else { continue };
-        vectors.extend(ways.map(|(way, test)| {
-            (Sums::new(format!("{name}, {kernel:?}, {way}")), wide.clone(), test)
-        }));
+        vectors.extend(tests.map(|test| (wide.clone(), test)));
+        sums.extend(ways.map(|way| (format!("{name}, {kernel:?}, {way}"), [0; 2])));
     }
     for ray in rays {
         let prepared = PreparedRay::new(ray);
         let test = |id: u32, t_max| triangles[id as usize].intersect(&prepared, t_max);
-        let mut counts = TestCounts::default();
-        let hit = nearest_hit_by(tree, ray, test, &mut counts);
-        plain.add(real_counts(tree, triangles, ray), counts);
+        let hit = nearest_hit_by(tree, ray, test, &mut ());
         // A ray that ends at its hit enters the same nodes in any order.
         let t_max = hit.map_or(ray.t_max(), |hit| hit.t);
         let ray = Ray::new(ray.origin(), ray.direction(), ray.t_min(), t_max).unwrap();
@@ -208,15 +155,18 @@ fn sums(name: &str, tree: &Bvh, triangles: &[Triangle], rays: &[Ray]) -> Vec<Sum
             let entry = entry(&ray, aabb);
             entry <= ray.t_max() && entry < f32::INFINITY
         };
+        let mut ours = vec![TestCounts::default(); 2];
+        assert_eq!(nearest_hit_by(tree, &ray, test, &mut ours[0]), hit, "{name}: {ray:?}");
+        assert_eq!(wide.nearest_hit_counted(&ray, &mut ours[1]), hit, "{name}: {ray:?}");
+        ours.extend(vectors.iter().map(|(wide, test)| wide.tests_without_hits(&ray, *test)));
         let real = wide.tests_without_hits(&ray, NodeTest::Given(&is_entered));
-        let mut counts = TestCounts::default();
-        assert_eq!(wide.nearest_hit_counted(&ray, &mut counts), hit, "{name}: {ray:?}");
-        portable.add(real, counts);
-        for (sums, wide, test) in &mut vectors {
-            sums.add(real, wide.tests_without_hits(&ray, *test));
+        let real = iter::once(real_counts(tree, is_entered)).chain(iter::repeat(real));
+        for ((_, sum), (real, ours)) in sums.iter_mut().zip(real.zip(ours)) {
+            sum[0] += real.boxes + real.objects;
+            sum[1] += ours.boxes + ours.objects;
         }
     }
-    [plain, portable].into_iter().chain(vectors.into_iter().map(|(sums, ..)| sums)).collect()
+    sums
 }
 
 /// Returns the greatest ratio of our tests to those in real arithmetic.
@@ -242,9 +192,8 @@ fn tests_per_ray_are_at_most_twice_those_in_real_arithmetic() {
         let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
         for (builder, arity) in builders.into_iter().zip(["binary", "n-ary"]) {
             let tree = builder.build(&boxes).unwrap();
-            for Sums { way, real, ours } in
-                sums(&format!("{name}, {arity}"), &tree, &triangles, &rays)
-            {
+            let name_of_tree = format!("{name}, {arity}");
+            for (way, [real, ours]) in sums(&name_of_tree, &tree, &triangles, &rays) {
                 if ours > limit(&name) * real {
                     broken.push(format!("{way}: {ours} tests, in real arithmetic {real}"));
                 }

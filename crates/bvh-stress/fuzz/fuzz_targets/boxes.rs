@@ -1,3 +1,0 @@
-//! `cargo fuzz run boxes`: see the function of that name.
-#![no_main]
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| targets::boxes(bytes));
