@@ -11,6 +11,7 @@ use crate::rows::{read, to_bytes};
 use bvh_search::Method;
 use bvh_stress::{CASES, Case, Cell, Class, Effort, KINDS, is_builder, tracing};
 use figures::{Axis, Layer, Marks, Panel, Unit};
+use rayon::prelude::*;
 use std::path::Path;
 
 /// The name of the figure of all checks.
@@ -22,7 +23,7 @@ pub fn execute(
     cases: &[String],
     methods: &[Labelled],
     store: &Store,
-    interrupted: &dyn Fn() -> bool,
+    interrupted: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), Error> {
     let cases: Vec<&Case> = CASES
         .iter()
@@ -36,13 +37,12 @@ pub fn execute(
             _ => None,
         })
         .collect();
-    let mut cells = Vec::new();
-    for (done, case) in cases.iter().enumerate() {
-        if interrupted() {
-            return Err(Error::Interrupted { finished: done, runs: cases.len() });
-        }
-        cells.extend(case.cells(&methods, effort));
-    }
+    let runs = cases.len();
+    let cells = cases.par_iter().map(|case| match interrupted() {
+        true => Err(Error::Interrupted { finished: 0, runs }),
+        false => Ok(case.cells(&methods, effort)),
+    });
+    let cells = cells.collect::<Result<Vec<_>, Error>>()?.concat();
     store.write("cells.csv", &to_bytes(&cells, Path::new("cells.csv"))?)
 }
 

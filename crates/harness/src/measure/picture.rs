@@ -34,12 +34,12 @@ pub fn unpruned(method: &str) -> String {
 
 /// A picture is drawn again until this many seconds have passed.
 const REPEAT_WITHIN: f64 = 2.0;
-/// The maximum number of times that a picture is drawn.
-const MOST_REPEATS: usize = 25;
+/// The maximum number of times that a picture is drawn for its seconds.
+pub const MOST_REPEATS: usize = 25;
 
 impl Config {
-    /// Draws the scene on one thread with the tree of `run`, which was built in `build_seconds`. If
-    /// `first`, draws it by brute force and with a KD-tree before.
+    /// Draws the scene on one thread with the tree of `run`, which was built in `build_seconds`, up
+    /// to `most` times. If `first`, draws it by brute force and with a KD-tree before.
     pub fn measure(
         &self,
         scene: &Scene,
@@ -47,6 +47,7 @@ impl Config {
         run: &RunRow,
         build_seconds: f64,
         first: bool,
+        most: usize,
     ) -> Result<(Vec<RenderRow>, Vec<RenderTimeRow>), Error> {
         let mut structures = Vec::new();
         if first {
@@ -71,7 +72,7 @@ impl Config {
         let mut times = Vec::new();
         for (method, structure, repetition, build_seconds) in structures {
             let accelerator = Accelerator::new(&scene.primitives, structure);
-            let (film, seconds) = pool.install(|| self.draw(scene, &accelerator));
+            let (film, seconds) = pool.install(|| self.draw(scene, &accelerator, most));
             let rays = film.rays as f64;
             rows.push(RenderRow {
                 scene: scene.name.clone(),
@@ -97,7 +98,7 @@ impl Config {
     }
 
     /// Returns the picture and the seconds of each repetition.
-    fn draw(&self, scene: &Scene, accelerator: &Accelerator) -> (Film, Vec<f64>) {
+    fn draw(&self, scene: &Scene, accelerator: &Accelerator, most: usize) -> (Film, Vec<f64>) {
         let Self { width, height, samples, .. } = *self;
         let view = framing::automatic(scene, f64::from(width) / f64::from(height));
         let options = Options { samples, ..Options::new(width, height, view) };
@@ -106,9 +107,7 @@ impl Config {
             let start = Instant::now();
             let film = render(scene, accelerator, &options, &|| ());
             seconds.push(start.elapsed().as_secs_f64());
-            let done =
-                seconds.iter().sum::<f64>() >= REPEAT_WITHIN || seconds.len() == MOST_REPEATS;
-            if done {
+            if seconds.iter().sum::<f64>() >= REPEAT_WITHIN || seconds.len() == most {
                 return (film, seconds);
             }
         }

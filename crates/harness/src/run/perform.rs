@@ -4,6 +4,7 @@ use super::job::Job;
 use super::runs::Work;
 use crate::Error;
 use crate::contestant::Contestant;
+use crate::measure::picture;
 use crate::peers::{self, Built, Peer, Task};
 use crate::rows::finished_run::FinishedRun;
 use crate::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, TrialRow};
@@ -86,7 +87,11 @@ pub(crate) fn perform(work: &Work, job: &Job) -> Result<Option<(FinishedRun, Bvh
         experiment.rays.iter().map(|rays| ray_row(experiment, job, seed, tree, rays)).collect();
     let bounds = if first_of_scene { bound(experiment, scene, watch)? } else { None };
     let (renders, render_times) = match &experiment.render {
-        Some(config) => config.measure(scene, tree, &run, seconds, first_of_scene)?,
+        // Nobody reads the seconds of quick variants.
+        Some(config) => {
+            let most = if experiment.quick { 1 } else { picture::MOST_REPEATS };
+            config.measure(scene, tree, &run, seconds, first_of_scene, most)?
+        }
         None => Default::default(),
     };
     // An interrupted bound is not a result.
