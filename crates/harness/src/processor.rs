@@ -34,15 +34,13 @@ impl Processor {
     /// The name for folders, for example `amd-epyc-25-17`: lower-case letters and digits, with
     /// single hyphens between words.
     pub fn folder(&self) -> String {
-        let numbers = self.model.iter().flatten();
-        let words: Vec<String> =
-            std::iter::once(&self.name).chain(numbers).map(|word| word.to_lowercase()).collect();
-        let name = words.join(" ");
-        let parts: Vec<&str> = name
-            .split(|letter: char| !letter.is_ascii_alphanumeric())
-            .filter(|part| !part.is_empty())
+        let words: Vec<&str> = [&self.name]
+            .into_iter()
+            .chain(self.model.iter().flatten())
+            .flat_map(|words| words.split(|letter: char| !letter.is_ascii_alphanumeric()))
+            .filter(|word| !word.is_empty())
             .collect();
-        parts.join("-")
+        words.join("-").to_lowercase()
     }
 }
 

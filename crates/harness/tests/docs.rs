@@ -1,5 +1,5 @@
 //! Every number in the README and in `docs/` that can come from a committed CSV does. Tables have
-//! their query in a comment; the test `numbers` is for running prose. `UPDATE_DOCS=1 cargo test -p harness --test docs` writes the tables.
+//! their query in a comment; the module `numbers` is for running prose. `UPDATE_DOCS=1 cargo test -p harness --test docs` writes the tables.
 //!
 //! ```text
 //! <!-- pivot QUERY -->
@@ -9,6 +9,7 @@
 //! The queries are described in `queries/mod.rs`. Here is also what holds of all pages: widths,
 //! links, lengths of sentences, and of the README.
 
+mod numbers;
 mod queries;
 mod support;
 

@@ -14,7 +14,7 @@ use bvh_stress::{
 };
 use glam::Vec3;
 
-const WORK: u64 = 150;
+const WORK: u64 = 60;
 
 fn best() -> Method {
     Method::Best(bvh_search::best::Config::default())

@@ -10,10 +10,10 @@ use bvh_stress::{
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
-const WORK: u64 = 150;
+const WORK: u64 = 60;
 
 const QUICK: Effort =
-    Effort { builders: Size::Few, work_per_object: WORK, larger_searches: None, rays: 500 };
+    Effort { builders: Size::Few, work_per_object: WORK, larger_searches: None, rays: 200 };
 
 fn assert_kept(broken: Vec<String>) {
     assert!(broken.is_empty(), "\n{}", broken.join("\n"));

@@ -37,6 +37,7 @@ impl Provenance {
     /// Collects the provenance of results that are completed now, whose runs these processors
     /// performed.
     pub fn gather(processors: BTreeSet<String>) -> Self {
+        let on = |is_on| if is_on { "on" } else { "off" };
         // The program's path would reveal folders of the machine.
         let mut command = "harness".to_owned();
         for argument in std::env::args_os().skip(1) {
@@ -59,8 +60,4 @@ impl Provenance {
             date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
         }
     }
-}
-
-fn on(set: bool) -> &'static str {
-    if set { "on" } else { "off" }
 }

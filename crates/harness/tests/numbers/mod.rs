@@ -8,14 +8,11 @@
 //! Any correct rounding at the digits shown is accepted, and the words are free. A word that judges
 //! has the id of a fact of `docs/facts.toml` behind it, `<!-- ?table3 -->`.
 
-mod queries;
-mod support;
-
-use queries::value;
+use crate::queries::value;
+use crate::support::{pages, top};
 use regex_lite::Regex;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use support::{pages, top};
 
 /// Returns the numbers that a text shows with a comment behind them, each with its id.
 fn bound_numbers(text: &str) -> Result<Vec<(String, String)>, String> {
