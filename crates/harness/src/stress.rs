@@ -73,8 +73,8 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
         0 => format!("{all}: none fails"),
         broken => format!("{broken} of {all} fail"),
     });
-    let caption = "A square per case and method: builders, searches, traversals, then readers of \
-                   files and others. Empty where the case has no check of it.";
+    let caption = "A mark per case and method: builders, searches, traversals, then readers of files \
+                   and others. Empty where the case has no check of it.";
     output.add_figure(FIGURE, caption, 1, panels(&cells));
     Ok(output)
 }
