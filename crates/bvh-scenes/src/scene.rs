@@ -106,18 +106,12 @@ impl Scene {
 
     fn load_whole(name: &str) -> Result<Self, SceneError> {
         if let Some(stand_in) = stand_ins::STAND_INS.iter().find(|scene| scene.name == name) {
-            return Ok(Self::new(
-                name,
-                SceneKind::StandIn,
-                Primitives::Triangles((stand_in.triangles)()),
-            ));
+            let triangles = Primitives::Triangles((stand_in.triangles)());
+            return Ok(Self::new(name, SceneKind::StandIn, triangles));
         }
         if let Some(&(_, count)) = SPHERES.iter().find(|(spheres, _)| *spheres == name) {
-            return Ok(Self::new(
-                name,
-                SceneKind::Procedural,
-                Primitives::Spheres(spheres::spheres(count)),
-            ));
+            let spheres = Primitives::Spheres(spheres::spheres(count));
+            return Ok(Self::new(name, SceneKind::Procedural, spheres));
         }
         let path = match FETCHED.iter().find(|(fetched, _)| *fetched == name) {
             Some((_, package)) => fetched_path(name).ok_or_else(|| {
@@ -136,15 +130,11 @@ impl Scene {
             return Err(SceneError::new(name, format!("no such scene{meant}; {}", known_scenes())));
         }
         let mesh = load::load(&path).map_err(|error| SceneError::new(name, error))?;
-        let stem = path
-            .file_stem()
-            .map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());
+        let stem = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy();
         // The remark names the scene, because an experiment loads many.
         let remark = mesh.remark().map(|remark| format!("scene {stem}: {remark}"));
-        Ok(Self {
-            remark,
-            ..Self::new(&stem, SceneKind::File, Primitives::Triangles(mesh.triangles))
-        })
+        let triangles = Primitives::Triangles(mesh.triangles);
+        Ok(Self { remark, ..Self::new(&stem, SceneKind::File, triangles) })
     }
 
     /// Generates a scene of `objects` objects, or of nearly as many where the generator cannot make

@@ -125,14 +125,14 @@ fn new_folder(path: &Path) -> Result<(), Error> {
 
 fn parts(path: &Path) -> Result<gltf::Parts, Error> {
     let bytes = files::read(path)?;
-    let parts = match Format::of(&bytes, path) {
-        Format::Gltf => gltf::parts(&bytes, path).map_err(|fault| fault.to_string()),
-        format => Err(format!(
-            "--instances with a file of the kind {format:?}; \
-             accepted: glTF or GLB, whose nodes place meshes"
-        )),
-    };
-    Ok(parts.map_err(|message| SceneError::new(&path.display().to_string(), message))?)
+    let name = path.display().to_string();
+    let format = Format::of(&bytes, path);
+    if format != Format::Gltf {
+        let message =
+            format!("--instances with a file of the kind {format:?}; accepted: glTF or GLB");
+        return Err(SceneError::new(&name, message).into());
+    }
+    Ok(gltf::parts(&bytes, path).map_err(|error| SceneError::new(&name, error))?)
 }
 
 /// Returns the instances. A part is the rank of its mesh among the meshes that are baked.

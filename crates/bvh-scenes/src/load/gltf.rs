@@ -90,11 +90,7 @@ fn read_parts(bytes: &[u8], path: &Path) -> Result<Parts, Fault> {
     }
     let all = places.len();
     places.retain(|place| has_area(&place.transform));
-    let flat = counted(
-        all - places.len(),
-        "instance without area was left out",
-        "instances without area were left out",
-    );
+    let flat = counted("instances without area left out", all - places.len());
     let mut placed = BTreeSet::new();
     let mut first_places = places.clone();
     first_places.retain(|place| placed.insert(place.mesh));
@@ -135,21 +131,14 @@ struct Loader<'a> {
     accessors: Accessors<'a>,
     nodes: Nodes,
     triangles: Vec<Triangle>,
-    /// The numbers of nodes and of primitives that are not read, by the clause about one and about
-    /// many of them.
-    left_out: BTreeMap<[&'static str; 2], usize>,
+    /// The numbers of nodes and of primitives that are not read, by kind.
+    left_out: BTreeMap<&'static str, usize>,
 }
 
-const HIDDEN: [&str; 2] = [
-    "invisible node was left out with its children",
-    "invisible nodes were left out with their children",
-];
-const LINES: [&str; 2] =
-    ["primitive of points or lines was left out", "primitives of points or lines were left out"];
-const WITHOUT_POSITIONS: [&str; 2] =
-    ["primitive without positions was left out", "primitives without positions were left out"];
-const INCOMPLETE: [&str; 2] =
-    ["primitive ends in an incomplete triangle", "primitives end in incomplete triangles"];
+const HIDDEN: &str = "invisible nodes left out with their children";
+const LINES: &str = "primitives of points or lines left out";
+const WITHOUT_POSITIONS: &str = "primitives without positions left out";
+const INCOMPLETE: &str = "primitives that end in an incomplete triangle";
 
 /// Positions are floats, or integers by `KHR_mesh_quantization`.
 const POSITIONS: [u32; 5] = [F32, I8, U8, I16, U16];
@@ -165,7 +154,7 @@ impl<'a> Loader<'a> {
         }
     }
 
-    fn leave_out(&mut self, part: [&'static str; 2]) {
+    fn leave_out(&mut self, part: &'static str) {
         *self.left_out.entry(part).or_default() += 1;
     }
 
@@ -178,10 +167,8 @@ impl<'a> Loader<'a> {
         let scenes = document.scenes.len();
         let scene = document.scene.unwrap_or(0);
         let other_scenes = (scenes > 1).then(|| format!("scenes[{scene}] of {scenes} was read"));
-        let animations = document.animations.len();
-        let animations = counted(animations, "animation was ignored", "animations were ignored");
-        let left_out = self.left_out.iter();
-        let left_out = left_out.filter_map(|([one, many], &count)| counted(count, one, many));
+        let animations = counted("animations ignored", document.animations.len());
+        let left_out = self.left_out.iter().filter_map(|(things, &count)| counted(things, count));
         extensions.chain(other_scenes).chain(animations).chain(left_out).collect()
     }
 

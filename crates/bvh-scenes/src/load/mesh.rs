@@ -23,7 +23,7 @@ impl Mesh {
     /// repeated corners), which stay in the mesh, to the given remarks.
     pub fn new(triangles: Vec<Triangle>, mut remarks: Vec<String>) -> Self {
         let degenerate = triangles.iter().filter(|triangle| triangle.is_degenerate()).count();
-        remarks.extend(counted(degenerate, "triangle has no area", "triangles have no area"));
+        remarks.extend(counted("triangles without area", degenerate));
         Self { triangles, remarks }
     }
 
@@ -34,18 +34,14 @@ impl Mesh {
 }
 
 /// Returns a clause about `count` things, and nothing if there are none.
-pub(super) fn counted(count: usize, one: &str, many: &str) -> Option<String> {
-    match count {
-        0 => None,
-        1 => Some(format!("1 {one}")),
-        _ => Some(format!("{count} {many}")),
-    }
+pub(super) fn counted(things: &str, count: usize) -> Option<String> {
+    (count > 0).then(|| format!("{things}: {count}"))
 }
 
-/// Returns the clause about vertices that no face uses. Often they show that an export went wrong.
-pub(super) fn unused(vertices: usize) -> Option<String> {
-    counted(vertices, "vertex is used by no face", "vertices are used by no face")
-}
+/// Vertices that often show that an export went wrong.
+pub(super) const UNUSED: &str = "vertices that no face uses";
+/// Bytes after the last triangle.
+pub(super) const AFTER_END: &str = "bytes ignored at the end";
 
 /// The reason why a file was rejected, in the words of its format: the place in the file, what was
 /// found there, and what would be accepted. Its text follows the path of the file.

@@ -11,7 +11,7 @@
 //! texture coordinates are ignored. Lines may end in LF, CRLF or CR, and a backslash at the end
 //! continues a statement on the next line.
 
-use super::mesh::{Fault, Mesh, counted, unused};
+use super::mesh::{Fault, Mesh, UNUSED, counted};
 use super::polygon::{MOST_CORNERS, Polygons, open};
 use super::text::{self, number, shown};
 use glam::Vec3;
@@ -56,7 +56,7 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
         return Err(Fault::of_file(message));
     }
     polygons.short += geometry.short_faces;
-    let unused = unused(geometry.vertices - used);
+    let unused = counted(UNUSED, geometry.vertices - used);
     let remarks = unused.into_iter().chain(polygons.remarks()).chain(geometry.unknown);
     let remarks = remarks.collect();
     Ok(Mesh::new(polygons.triangles, remarks))
@@ -94,8 +94,8 @@ impl Geometry {
         let mut words = Vec::new();
         while let Some((keyword, line)) = statements.next(&mut words, MOST_CORNERS + 1) {
             match keyword {
-                Keyword::Vertex => geometry.add_vertex(&words, line)?,
-                Keyword::Face => geometry.add_face(&words, line)?,
+                b'v' => geometry.add_vertex(&words, line)?,
+                _ => geometry.add_face(&words, line)?,
             }
         }
         for &(vertex, line) in &geometry.ahead {
@@ -107,10 +107,8 @@ impl Geometry {
             geometry.usable(vertex)?;
         }
         geometry.unknown = statements.unknown.and_then(|(count, line, word)| {
-            let (one, many) =
-                ("line with an unknown keyword was", "lines with unknown keywords were");
-            let lines = counted(count, one, many)?;
-            Some(format!("{lines} ignored (`{}` in line {line})", shown(word)))
+            let lines = counted("lines with unknown keywords ignored", count)?;
+            Some(format!("{lines} (`{}` in line {line})", shown(word)))
         });
         Ok(geometry)
     }
@@ -217,15 +215,6 @@ fn add<'a>(keyword: u8, words: impl Iterator<Item = &'a [u8]>, text: &mut Vec<u8
     text.push(b'\n');
 }
 
-/// A statement that defines geometry.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Keyword {
-    /// `v`, or a capital one.
-    Vertex,
-    /// `f`, a capital one, or the obsolete `fo`.
-    Face,
-}
-
 /// Keywords of the format that are ignored (Wavefront, "Object Files", version 3.0).
 const IGNORED: &str = "vt vn vp p l curv curv2 surf parm trim hole scrv sp end con cstype deg bmat \
     step g o s mg bevel c_interp d_interp lod maplib usemap usemtl mtllib shadow_obj trace_obj \
@@ -254,16 +243,16 @@ impl<'a> Statements<'a> {
         Self { rest, lines: 0, ignoring: false, unknown: None }
     }
 
-    /// Returns the next `v` or `f` statement and the number of its first line. Replaces the
-    /// contents of `words` by the words after the keyword, at most `most` of them.
-    fn next(&mut self, words: &mut Vec<&'a [u8]>, most: usize) -> Option<(Keyword, usize)> {
+    /// Returns the keyword `v` or `f` of the next such statement, and the number of its first line.
+    /// Capitals and the obsolete `fo` count as well. Replaces the contents of `words` by the words after the keyword, at most `most` of them.
+    fn next(&mut self, words: &mut Vec<&'a [u8]>, most: usize) -> Option<(u8, usize)> {
         loop {
             let (code, mut continued) = self.line()?;
             let number = self.lines;
             let mut on_line = text::words(code);
             let keyword = match on_line.next() {
-                Some(b"v" | b"V") => Keyword::Vertex,
-                Some(b"f" | b"F" | b"fo") => Keyword::Face,
+                Some(b"v" | b"V") => b'v',
+                Some(b"f" | b"F" | b"fo") => b'f',
                 word => {
                     // A line that ends in a backslash by accident, such as a path, must not swallow
                     // a vertex. The line after it is therefore ignored only if it is no `v` or `f`
@@ -317,7 +306,7 @@ mod tests {
             let found = Statements::new(text.as_bytes()).next(&mut words, 4);
             assert_eq!(
                 (found, words),
-                (Some((Keyword::Face, 1)), vec![b"1", b"2", b"3", &b"4"[..]]),
+                (Some((b'f', 1)), vec![b"1", b"2", b"3", &b"4"[..]]),
                 "{text}"
             );
         }

@@ -4,7 +4,7 @@
 //! Latin-1, lines that end in CR, elements without properties, and `-nan(ind)`; it reads an element
 //! that is declared twice at wrong places; and its errors speak of its grammar.
 
-use super::mesh::{Fault, MOST_TRIANGLES, Mesh, counted, unused};
+use super::mesh::{AFTER_END, Fault, MOST_TRIANGLES, Mesh, UNUSED, counted};
 use super::polygon::{Polygons, open};
 use super::{text, without_mark};
 use bvh_core::Triangle;
@@ -124,11 +124,7 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
             }
         }
     }
-    let after = counted(
-        file.rest.trim_ascii().len(),
-        "byte after the last element was ignored",
-        "bytes after the last element were ignored",
-    );
+    let after = counted(AFTER_END, file.rest.trim_ascii().len());
     mesh(&vertices, &faces, &strips, after)
 }
 
@@ -397,7 +393,7 @@ fn mesh(
             polygons.triangles.extend(triangles);
         }
     }
-    let remarks = unused(used.iter().filter(|used| !**used).count());
+    let remarks = counted(UNUSED, used.iter().filter(|used| !**used).count());
     let remarks = remarks.into_iter().chain(polygons.remarks()).chain(after).collect();
     let triangles = polygons.triangles;
     if triangles.is_empty() || triangles.len() > MOST_TRIANGLES {

@@ -57,17 +57,9 @@ impl Polygons {
 
     /// Returns the clauses about polygons that do not become triangles as one expects.
     pub fn remarks(&self) -> impl Iterator<Item = String> {
-        let short = counted(
-            self.short,
-            "face has fewer than three vertices and was skipped",
-            "faces have fewer than three vertices and were skipped",
-        );
-        let crossing = counted(
-            self.crossing,
-            "face crosses itself and became the fan around its first vertex",
-            "faces cross themselves and became the fans around their first vertices",
-        );
-        short.into_iter().chain(crossing)
+        let short = counted("faces of fewer than three vertices skipped", self.short);
+        let fans = "faces that cross themselves, read as the fans around their first vertices";
+        short.into_iter().chain(counted(fans, self.crossing))
     }
 
     fn split(&mut self, corners: &[Vec3]) -> Result<(), String> {

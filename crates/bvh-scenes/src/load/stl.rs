@@ -4,7 +4,7 @@
 //! solids, mistakes `solid` without a name for a binary file, names no line, and knows neither of
 //! the ways in which programs write comments, colours, `end loop` and counts.
 
-use super::mesh::{Fault, Mesh, counted};
+use super::mesh::{AFTER_END, Fault, Mesh, counted};
 use super::{text, without_mark};
 use bvh_core::Triangle;
 use glam::Vec3;
@@ -86,11 +86,7 @@ fn parse_binary(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> 
         }
         triangles.push(Triangle::from(corners));
     }
-    let ignored = counted(
-        rest.len(),
-        "byte after the last facet was ignored",
-        "bytes after the last facet were ignored",
-    );
+    let ignored = counted(AFTER_END, rest.len());
     let unwritten = (is_unwritten && facets > 0)
         .then(|| format!("the header counts {promised} facets and the file has {facets}"));
     Ok((triangles, unwritten.or(ignored)))

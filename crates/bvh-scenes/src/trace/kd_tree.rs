@@ -171,22 +171,14 @@ impl Config {
             let mut upper = frame.bounds;
             upper.min[axis] = position;
             let all = split.below + split.above;
-            stack.push(Frame {
-                cell: below + 1,
-                bounds: upper,
-                events: events_on(Side::Above, &frame.events, &sides),
-                count: split.above,
-                depth: frame.depth + 1,
-                budget: share(frame.budget, split.above, all),
-            });
-            stack.push(Frame {
-                cell: below,
-                bounds: lower,
-                events: events_on(Side::Below, &frame.events, &sides),
-                count: split.below,
-                depth: frame.depth + 1,
-                budget: share(frame.budget, split.below, all),
-            });
+            for (side, cell, bounds, count) in [
+                (Side::Above, below + 1, upper, split.above),
+                (Side::Below, below, lower, split.below),
+            ] {
+                let events = events_on(side, &frame.events, &sides);
+                let budget = share(frame.budget, count, all);
+                stack.push(Frame { cell, bounds, events, count, depth: frame.depth + 1, budget });
+            }
         }
         Ok(tree)
     }

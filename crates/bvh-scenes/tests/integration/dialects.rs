@@ -18,11 +18,11 @@ ply\n → ply\ncomment caf\xe9\n |
 comment a square → obj_info num_cols 5 |
  255 ⇒ \x09 255  |
 255 ⇒ nan |
-4\nprop → 5\nprop & 4 0 1 2 → -nan(ind) nan 1.#QNAN 0\n4 0 1 2 | 1 vertex is used by no face
+4\nprop → 5\nprop & 4 0 1 2 → -nan(ind) nan 1.#QNAN 0\n4 0 1 2 | vertices that no face uses: 1
 end_header → element cell 4000000000\nend_header |
 element v → element camera 2\nproperty list uchar float m\nelement v & 0 0 0 → 2 nan 5\n0\n0 0 0 |
 4 0 1 2 3 → 5 0 1 2 3 0 |
-face 1 → face 2 & 4 0 1 → 2 0 1\n4 0 1 | 1 face has fewer than three vertices and was skipped
+face 1 → face 2 & 4 0 1 → 2 0 1\n4 0 1 | faces of fewer than three vertices skipped: 1
 element face → element tristrips & 4 0 1 2 3 → 8 0 1 2 -1 0 2 3 -1 |
 1 1 0.5 → 1 nan 0.5 ! face 0 | vertex 2 at [1, NaN, 0.5]
 1 1 0.5 → 1 1e99 0.5 ! face 0 | vertex 2 at [1, inf, 0.5]
@@ -73,7 +73,7 @@ endfacet\r\nendsolid\r\nsolid\r → vertecks\r ! a.stl:8: | `vertecks`
 const OBJ: &str = r"
 f 1 → fo 1 |
 \nv 1 1 0.5 ⇒ \nv 1 1 0.5 1 0.5 nan 0 1 |
-f 1 → v nan 1.#QNAN -nan(ind)\nf 1 | 1 vertex is used by no face
+f 1 → v nan 1.#QNAN -nan(ind)\nf 1 | vertices that no face uses: 1
 f 1 2 3 4 → f 1 2 3 4 1 |
 ";
 
@@ -126,7 +126,7 @@ fn files_as_programs_write_them_are_read_and_faults_are_named_with_their_places(
         }
     }
     let more = [&ply_text()[..], b"1 2 3\n"].concat();
-    assert_square("more lines", &more, "a.ply", "5 bytes after the last element were ignored");
+    assert_square("more lines", &more, "a.ply", "bytes ignored at the end: 5");
     assert_square("a long name", &with(&stl_text(), "a square", &"n".repeat(5000)), "a.stl", "");
     assert_square("capitals", &samples()[0].2.to_ascii_uppercase(), "a.obj", "");
     assert_square("capitals", &stl_text().to_ascii_uppercase(), "a.stl", "");
@@ -156,7 +156,7 @@ fn binary_ply_files_as_programs_write_them() {
             vec![
                 ("CRLF", crlf, ""),
                 ("CR", cr.clone(), ""),
-                ("more bytes", zeros, "3 bytes after the last element were ignored"),
+                ("more bytes", zeros, "bytes ignored at the end: 3"),
             ],
         );
         // The first number of the body may look like the end of a line, after any end of the header.
@@ -188,16 +188,8 @@ fn binary_stl_files_as_programs_write_them() {
         "a.stl",
         vec![
             ("colours", [header, one, b"\x1f\x80", two, b"\x00\x7c"].concat(), ""),
-            (
-                "zeros at the end",
-                [&stl[..], &[0; 2]].concat(),
-                "2 bytes after the last facet were ignored",
-            ),
-            (
-                "facets and more",
-                [&stl[..], &[0; 57]].concat(),
-                "57 bytes after the last facet were ignored",
-            ),
+            ("zeros at the end", [&stl[..], &[0; 2]].concat(), "bytes ignored at the end: 2"),
+            ("facets and more", [&stl[..], &[0; 57]].concat(), "bytes ignored at the end: 57"),
             ("a count of 0", counted(0), "the header counts 0 facets and the file has 2"),
             (
                 "a count of -1",

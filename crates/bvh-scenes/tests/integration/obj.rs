@@ -26,7 +26,7 @@ fn error(statements: &str) -> String {
 fn a_triangle_has_its_corners_and_leaves_two_vertices_unused() {
     let read = mesh("f 1 2 3\n");
     assert_eq!(read.triangles, [Triangle([Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y])]);
-    assert_eq!(read.remarks, ["2 vertices are used by no face"]);
+    assert_eq!(read.remarks, ["vertices that no face uses: 2"]);
 }
 
 #[test]
@@ -83,10 +83,10 @@ fn lines_with_unknown_keywords_are_counted_and_one_sentence_lists_all_oddities()
     let read = mesh("w 7 7 7\nf 1 2 3\ncurv 0 1 \\\n1 2\nfx 1 2 4\nf 1 2 2\nf 1 2\nf\nf 1\n");
     let remark = read.remark().unwrap();
     for part in [
-        "2 vertices are used by no face",
-        "3 faces have fewer",
-        "1 triangle has no area",
-        "2 lines with unknown keywords were ignored (`w` in line 6)",
+        "vertices that no face uses: 2",
+        "faces of fewer than three vertices skipped: 3",
+        "triangles without area: 1",
+        "lines with unknown keywords ignored: 2 (`w` in line 6)",
     ] {
         assert!(remark.contains(part), "{part}: {remark}");
     }
@@ -107,7 +107,7 @@ fn triangles_without_area_are_counted_and_kept_at_every_scale() {
         let points = format!("v 0 0 0\nv {scale} 0 0\nv -{scale} 0 0\nv 0 {scale} 0\n");
         let read = read(format!("{points}f 1 1 1\nf 1 2 2\nf 1 2 3\nf 1 2 4\n")).unwrap();
         assert_eq!(read.triangles.len(), 4);
-        assert_eq!(read.remarks, ["3 triangles have no area"], "scale {scale}");
+        assert_eq!(read.remarks, ["triangles without area: 3"], "scale {scale}");
     }
 }
 
@@ -172,6 +172,6 @@ proptest! {
         let read = read(text).unwrap();
         let expected: Vec<_> = corners.iter().map(|&t| Triangle::from(t)).collect();
         prop_assert_eq!(&read.triangles, &expected);
-        prop_assert!(!read.remark().is_some_and(|remark| remark.contains("used by no face")));
+        prop_assert!(!read.remark().is_some_and(|remark| remark.contains("no face uses")));
     }
 }

@@ -289,20 +289,19 @@ fn roof(mesh: &mut MeshBuilder, parts: &Parts, half: f64) {
 /// The garden: paths that cross obliquely over one lawn, and hedges of plain boxes.
 fn court(mesh: &mut MeshBuilder, half: DVec3) {
     let inner = half - dvec3(0.25, 0.25, 0.0);
-    let at = |x: f64, y: f64, z: f64| dvec3(x, y, z);
     mesh.grid(3, 2, &|i, j| {
-        at(inner.x * (2.0 * fraction(i, 3) - 1.0), inner.y * (j as f64 - 1.0), -0.1)
+        dvec3(inner.x * (2.0 * fraction(i, 3) - 1.0), inner.y * (j as f64 - 1.0), -0.1)
     });
     for (turns, length) in [(0.037, 14.0), (0.287, 11.0)] {
         let mut path = MeshBuilder::default();
         let stones = 18;
         path.grid(stones, 2, &|i, j| {
-            at((2.0 * fraction(i, stones) - 1.0) * length, 0.7 * (j as f64 - 1.0), -0.06)
+            dvec3((2.0 * fraction(i, stones) - 1.0) * length, 0.7 * (j as f64 - 1.0), -0.06)
         });
         mesh.place(&path, &upright(turns, 2.1, -1.4, 0.0));
         for (x, y) in [(3.0, 1.0), (3.0, -1.6), (-9.0, 1.0), (-9.0, -1.6)] {
             let mut hedge = MeshBuilder::default();
-            hedge.cuboid(at(x, y, -0.1), at(x + 6.0, y + 0.6, 0.55));
+            hedge.cuboid(dvec3(x, y, -0.1), dvec3(x + 6.0, y + 0.6, 0.55));
             mesh.place(&hedge, &upright(turns, 2.1, -1.4, 0.0));
         }
     }

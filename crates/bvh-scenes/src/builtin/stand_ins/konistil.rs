@@ -224,24 +224,23 @@ fn house(length: f64, width: f64, wall: f64, gable: f64) -> MeshBuilder {
     let mut house = MeshBuilder::default();
     let x = 0.5 * length;
     let y = 0.5 * width;
-    let at = |i: f64, j: f64, z: f64| dvec3(i, j, z);
     for side in [-1.0, 1.0] {
         house.wall(-x, x, side * y, -4.0, wall);
         let end = side * x;
         house.polygon(&[
-            at(end, -y, -4.0),
-            at(end, y, -4.0),
-            at(end, y, wall),
-            at(end, 0.0, wall + gable),
-            at(end, -y, wall),
+            dvec3(end, -y, -4.0),
+            dvec3(end, y, -4.0),
+            dvec3(end, y, wall),
+            dvec3(end, 0.0, wall + gable),
+            dvec3(end, -y, wall),
         ]);
         // The roof overhangs the walls on all sides.
         let eaves = wall - 0.7 * gable / y;
         house.quad(
-            at(-x - 0.5, side * (y + 0.7), eaves),
-            at(x + 0.5, side * (y + 0.7), eaves),
-            at(x + 0.5, 0.0, wall + gable),
-            at(-x - 0.5, 0.0, wall + gable),
+            dvec3(-x - 0.5, side * (y + 0.7), eaves),
+            dvec3(x + 0.5, side * (y + 0.7), eaves),
+            dvec3(x + 0.5, 0.0, wall + gable),
+            dvec3(-x - 0.5, 0.0, wall + gable),
         );
         let windows = (length / 4.5) as usize;
         for k in 0..windows {
@@ -249,8 +248,10 @@ fn house(length: f64, width: f64, wall: f64, gable: f64) -> MeshBuilder {
             house.wall(middle - 0.6, middle + 0.6, side * (y + 0.05), 1.2, 2.9);
         }
     }
-    house
-        .cuboid(at(0.22 * x, 0.3 * y, wall), at(0.22 * x + 0.9, 0.3 * y + 0.9, wall + gable + 0.8));
+    house.cuboid(
+        dvec3(0.22 * x, 0.3 * y, wall),
+        dvec3(0.22 * x + 0.9, 0.3 * y + 0.9, wall + gable + 0.8),
+    );
     house
 }
 
