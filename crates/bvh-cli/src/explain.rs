@@ -16,6 +16,9 @@ pub fn explain(scene: &Scene, answer: &mut Answer) -> Result<(), BuildError> {
     let size = Aabb::union_of(boxes).extent().as_vec3();
     let mut text =
         format!("{} ({}): {} {kind} within {size}\n", scene.name, scene.kind, boxes.len());
+    if let Some(remark) = &scene.remark {
+        text += &format!("  {remark}\n");
+    }
     for (_, why) in shortcuts::of(boxes)? {
         text += &format!("  skipped: {why}\n");
     }

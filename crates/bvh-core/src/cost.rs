@@ -33,7 +33,7 @@ pub enum Objective {
 }
 
 impl Objective {
-    /// Returns the cost of `tree` under this objective. O(nodes).
+    /// Returns the cost of a valid tree under this objective. O(nodes).
     pub fn cost(&self, tree: &Bvh) -> f64 {
         self.cost_by(tree, &Area)
     }

@@ -154,7 +154,7 @@ impl<'a> Bake<'a> {
         observer: &dyn Observer,
     ) -> Result<Baked, SearchError> {
         // A start may have more references.
-        if self.start.is_none() || self.references.is_nan() || self.references <= MOST_REFERENCES {
+        if self.start.is_none() || !(MOST_REFERENCES..=f64::MAX).contains(&self.references) {
             Self::check_references(self.references)?;
         }
         let is_timed = observer.progress().is_some();

@@ -125,14 +125,14 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     if args.explain {
         explain(&scene, &mut answer).map_err(Error::search(&scene.name, "--explain"))?;
     }
-    let mut most_references = plan.references;
-    if args.budget.is_none() {
-        plan.effort = decide::work(scene.boxes.len(), &mut answer);
-        // The decision may add references.
-        most_references = most_references.max(decide::REFERENCES);
-    }
+    // Without a budget the decision may add references.
+    let least = if args.budget.is_none() { decide::REFERENCES } else { 1.0 };
+    let most_references = plan.references.max(least);
     let start =
         args.from.as_ref().map(|path| Start::load(path, &scene, most_references)).transpose()?;
+    if args.budget.is_none() {
+        plan.effort = decide::work(scene.boxes.len(), &mut answer);
+    }
     // Reserving the file first reports a full disk before the search and not after it.
     let reserved = reserve(&out, args.out.is_some(), plan::most_bytes(&scene, most_references))?;
     let (plan, prepared) = decide(args, plan, &scene, interrupted, &mut answer)?;

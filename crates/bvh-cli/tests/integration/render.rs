@@ -26,6 +26,7 @@ fn the_eye_may_be_anywhere_and_the_scene_a_single_point() {
     for scene in ["point.obj", "flat.obj"] {
         for eye in ["", "--from=-1,2,3 --at=-1,2,3", "--from=1,2,3"] {
             bvh(at, &format!("render {scene} --out=p.png --size=20x10 --heatmap {eye}"));
+            bvh(at, &format!("render {scene} --out=p.png --size=1x1 {eye}"));
         }
         bvh(at, &format!("bake {scene} --out={scene}.bvh --budget=0s"));
         bvh(at, &format!("report {scene}.bvh {scene}"));

@@ -42,12 +42,8 @@ pub(super) fn unpack(
         tree.nodes[to] = match below {
             Below::Children([low, high]) => {
                 if low.max(high) >= nodes {
-                    return Err(InvalidBvh::BadChildren {
-                        node,
-                        first: low as u32,
-                        count: 2,
-                        nodes,
-                    });
+                    let first = if low >= nodes { low } else { high } as u32;
+                    return Err(InvalidBvh::BadChildren { node, first, count: 2, nodes });
                 }
                 let first = tree.nodes.len();
                 tree.nodes.extend([unread; 2]);

@@ -16,12 +16,12 @@ type Slots = u8;
 
 /// How a subtree becomes children of a wide node.
 #[derive(Clone, Copy)]
-pub(crate) struct Decision {
+pub(super) struct Decision {
     /// For at most 2 to 7 slots, and last for the 8 of a wide node.
     slots: [Slots; 7],
     /// Whether, as one child, it is a leaf.
-    pub(crate) is_leaf: bool,
-    pub(crate) objects: u32,
+    pub(super) is_leaf: bool,
+    pub(super) objects: u32,
 }
 
 impl Decision {
@@ -33,7 +33,7 @@ impl Decision {
 
 /// The least expected time of a subtree in at most 1 to 7 slots, times the root's area; last, in
 /// the 8 slots of a wide node.
-pub(crate) type Costs = [f32; 8];
+pub(super) type Costs = [f32; 8];
 
 /// Decides for every node of `tree`, each of which has two children or none. O(n).
 // Costs take most of the memory. They are separate, so that the layout is made after they are
@@ -101,7 +101,7 @@ fn share(a: &Costs, b: &Costs) -> (Costs, [Slots; 8]) {
 
 /// The roots of the subtrees that become the children of the wide node of `subtree`, which is no
 /// leaf, and how many there are.
-pub(crate) fn children(tree: &Bvh, decisions: &[Decision], subtree: usize) -> ([usize; 8], usize) {
+pub(super) fn children(tree: &Bvh, decisions: &[Decision], subtree: usize) -> ([usize; 8], usize) {
     // At most 8 slots are shared out: no more than 8 parts wait at any time.
     let mut parts = [(subtree, decisions[subtree].slots(8)); 8];
     let mut count = 1;
@@ -125,7 +125,7 @@ pub(crate) fn children(tree: &Bvh, decisions: &[Decision], subtree: usize) -> ([
 }
 
 /// The part of the lines through the root's box that meet each node's.
-pub(crate) fn areas(tree: &Bvh) -> Vec<f32> {
+pub(super) fn areas(tree: &Bvh) -> Vec<f32> {
     let root_area = tree.nodes[0].aabb.half_area();
     let scale = if root_area > 0.0 { 1.0 / root_area } else { 0.0 };
     tree.nodes.iter().map(|node| (node.aabb.half_area() * scale) as f32).collect()

@@ -75,6 +75,15 @@ fn parse_binary(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> 
     }
     let facets = if is_unwritten { room } else { promised };
     let (body, rest) = body.split_at(facets * FACET);
+    // Of a file whose facets are followed by so many bytes as their last two bytes say, the second
+    // facet would be read from a wrong place.
+    let has_attributes = |facet: &[u8; FACET]| facet[48..] != [0; 2];
+    if !rest.is_empty() && body.as_chunks().0.iter().any(has_attributes) {
+        let found = rest.len();
+        return Err(Fault::of_file(format!(
+            "facets with attributes and {found} bytes after the last; expected {FACET} bytes per facet"
+        )));
+    }
     let mut triangles = Vec::with_capacity(facets);
     for (number, facet) in body.as_chunks::<FACET>().0.iter().enumerate() {
         // The normal in the first 12 bytes is ignored: many programs write zeros there.
