@@ -44,7 +44,12 @@ pub fn merge(args: &MergeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         return Err(Error::Usage(message.into()));
     }
     for (name, parts) in parts {
-        let Resolved { experiment, .. } = read_toml(&spec_of_part(&parts[0].join(name)))?;
+        let spec = spec_of_part(&parts[0].join(name));
+        let Resolved { experiment, .. } = read_toml(&spec)?;
+        // Somebody may have edited it.
+        experiment
+            .check_run_count()
+            .map_err(|fault| Error::Usage(format!("{}: {fault}", spec.display())))?;
         // What an earlier merge has taken is kept.
         let existing = if args.force { Existing::Replace } else { Existing::Resume };
         let extent = Extent { existing, parts, ..Extent::default() };

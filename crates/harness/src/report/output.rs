@@ -52,7 +52,7 @@ impl Output {
         self.say(finding, rows)?;
         for (_, figure) in &mut self.figures {
             figure.title.clone_from(self.finding.as_ref().unwrap_or(&self.heading));
-            if self.finding.is_some() {
+            if self.finding.is_some() && !self.heading.is_empty() {
                 figure.caption = format!("{}. {}", self.heading, figure.caption);
             }
         }
@@ -163,7 +163,8 @@ impl Output {
     }
 }
 
-/// Returns the bytes of a CSV file with these rows, which have the same columns.
+/// Returns the bytes of a CSV file with these rows, which have the same columns. Without rows there
+/// is no header either.
 pub fn table_bytes(rows: &[Row]) -> Result<Vec<u8>, Error> {
     let path = Path::new("table");
     let mut writer = csv::Writer::from_writer(Vec::new());

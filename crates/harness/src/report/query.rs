@@ -89,6 +89,7 @@ impl Condition {
         let texts = rows.iter().map(|row| cell(row, &self.column));
         let texts = texts.collect::<Result<Vec<&String>, _>>()?.into_iter();
         let numbers = texts.filter_map(|text| Some((text.parse::<f64>().ok()?, text)));
+        let numbers = numbers.filter(|(number, _)| !number.is_nan());
         if let Some((_, text)) = numbers.max_by(|one, other| one.0.total_cmp(&other.0)) {
             self.texts = vec![text.clone()];
         }

@@ -74,15 +74,15 @@ impl<'t> Measure<'t> {
 
     /// Returns one number of the rows; `None` if no row has one.
     pub fn of_rows(&self, rows: &[&Row]) -> Result<Option<f64>, QueryError> {
+        if self.how == Aggregate::Count {
+            return Ok(Some(rows.len() as f64));
+        }
         let mut numbers = Vec::new();
         for row in rows {
             let of_row = self.values.iter().map(|value| number(row, value));
             numbers.push(of_row.collect::<Result<Option<Vec<f64>>, _>>()?);
         }
         let numbers = numbers.into_iter().flatten();
-        if self.how == Aggregate::Count {
-            return Ok(Some(rows.len() as f64));
-        }
         if self.how.is_of_pairs() {
             let pairs: Vec<_> = numbers.map(|numbers| (numbers[0], numbers[1])).collect();
             let is_pearson = self.how == Aggregate::Pearson;

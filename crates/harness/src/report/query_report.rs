@@ -171,7 +171,11 @@ impl Config {
             accept(key, Conditions::parse(conditions).and_then(|all| all.are_met(&row)))?;
         }
         for (index, column) in self.by.iter().enumerate() {
-            accept(&format!("by[{index}]"), has(column))?;
+            let at = format!("by[{index}]");
+            accept(&at, has(column))?;
+            if self.by[..index].contains(column) {
+                return Err(OutOfRange::new(at, format!("{column:?} twice"), "each column once"));
+            }
         }
         let against = self.pairs.first().map(|_| "against".to_owned());
         let key: Row =

@@ -56,11 +56,16 @@ fn compare_specs(
     committed: &Path,
     skipped_scenes: &[String],
 ) -> Result<Vec<String>, Error> {
-    let [now, then] = [read_spec(fresh, skipped_scenes)?, read_spec(committed, skipped_scenes)?];
-    let [now, then] = [&now, &then].map(|text| text.lines().collect::<BTreeSet<_>>());
+    let [fresh, committed] =
+        [read_spec(fresh, skipped_scenes)?, read_spec(committed, skipped_scenes)?];
+    let [now, then] = [&fresh, &committed].map(|text| text.lines().collect::<BTreeSet<_>>());
     let added = now.difference(&then).map(|line| format!("not committed: {line}"));
     let removed = then.difference(&now).map(|line| format!("only committed: {line}"));
-    Ok(shortened("resolved.toml", added.chain(removed).collect()))
+    let mut differences: Vec<String> = added.chain(removed).collect();
+    if differences.is_empty() && fresh != committed {
+        differences.push("the same lines in another order or number".into());
+    }
+    Ok(shortened("resolved.toml", differences))
 }
 
 /// Returns the text of a resolved spec without the skipped scenes.
@@ -193,5 +198,12 @@ mod tests {
             found,
             ["resolved.toml: not committed: seed = 1", "resolved.toml: only committed: seed = 2"]
         );
+        // Values exchanged between two tables are the same lines.
+        for (folder, names) in folders.iter().zip([["x", "z"], ["z", "x"]]) {
+            let scenes = names.map(|name| format!("[[scenes]]\nname = '{name}'\n")).concat();
+            fs::write(folder.path().join("resolved.toml"), scenes).unwrap();
+        }
+        let found = compare(folders[0].path(), folders[1].path(), &[]).unwrap();
+        assert_eq!(found, ["resolved.toml: the same lines in another order or number"]);
     }
 }

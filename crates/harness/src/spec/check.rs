@@ -60,7 +60,7 @@ impl Experiment {
     }
 
     /// Checks that there is at least one run, and at most [`MOST_RUNS`].
-    fn check_run_count(&self) -> Result<(), OutOfRange> {
+    pub(crate) fn check_run_count(&self) -> Result<(), OutOfRange> {
         let scenes =
             self.scenes.iter().map(|name| subset::names(name)).fold(0, u64::saturating_add);
         // A range of scenes may have more names than fit in a number of 64 bits.

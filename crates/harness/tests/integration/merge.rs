@@ -41,6 +41,11 @@ fn runs_performed_apart_are_joined_to_the_bytes_of_one_process_and_missing_ones_
     let figures =
         ["whole", "joined"].map(|out| fs::read(dir.join(out).join("spec/table.svg")).unwrap());
     assert!(figures[0] == figures[1]);
+    let resolved = dir.join(part).join("spec/.partial/resolved.toml");
+    let edited = fs::read_to_string(&resolved).unwrap();
+    let repetitions = edited.lines().find(|line| line.starts_with("repetitions = ")).unwrap();
+    fs::write(&resolved, edited.replace(repetitions, "repetitions = 4294967295")).unwrap();
+    refused(dir, &["merge", part, "--out=huge"], 2, &["spec/.partial/resolved.toml: ", "runs"]);
 }
 
 #[test]
