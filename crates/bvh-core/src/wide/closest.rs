@@ -3,7 +3,7 @@
 use super::answer::NEAREST_HIT;
 use super::box_ray::BoxTest;
 use super::instructions::{Instructions, Pending, Task};
-use super::kernel::{DeepStacks, SPARE, STACK};
+use super::kernel::{SPARE, STACK, deep_stacks};
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use super::layout::{WideBvh, WideNode};
 use super::one_ray::{Leaves, visit};
@@ -166,8 +166,9 @@ impl<K: Instructions> Task<K> for ClosestPoints<'_> {
     unsafe fn run(self) {
         let Self { wide, points, closest } = self;
         let mut stack = [const { MaybeUninit::<Pending>::uninit() }; STACK + SPARE];
-        let mut deep = DeepStacks::new(1, wide.stack_need);
-        let stack = deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.stack(0));
+        let mut deep = deep_stacks::<Pending>(1, wide.stack_need);
+        let stack =
+            deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
         for (&point, closest) in points.iter().zip(closest) {
             if !point.is_finite() {
                 *closest = None;

@@ -18,7 +18,7 @@
 use super::answer::Find;
 use super::gathered::Gathered;
 use super::instructions::{Instructions, Pending, Task};
-use super::kernel::{DeepStacks, LINE, SPARE, STACK};
+use super::kernel::{LINE, SPARE, STACK, deep_stacks};
 use super::lanes::{Aligned, Lanes};
 use super::layout::{Child, Places, WideBvh, WideNode};
 use super::pairs::Crossings;
@@ -120,9 +120,9 @@ impl<K: Instructions, F: Find> Task<K> for Flight<'_, K, F> {
         let traversals = traversals.as_mut_ptr().cast::<Traversal>();
         let need = self.wide.stack_need;
         let mut stacks = MaybeUninit::<Aligned<[Pending; FLIGHT * (STACK + SPARE)]>>::uninit();
-        let mut deep = DeepStacks::new(FLIGHT, need);
-        let stacks =
-            deep.as_mut().map_or(stacks.as_mut_ptr().cast::<Pending>(), |deep| deep.stack(0));
+        let mut deep = deep_stacks::<Pending>(FLIGHT, need);
+        let stacks: *mut Pending =
+            deep.as_mut().map_or(stacks.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
         // SAFETY: the processor has the instructions; there is room for so many, since stacks that
         // are not deep fit in the frame.
         unsafe {

@@ -2,7 +2,7 @@
 
 use super::box_ray::{BoxRay, BoxTest, FarBoxRay};
 use super::instructions::{Instructions, Pending, Task, last_pending};
-use super::kernel::{DeepStacks, SPARE, STACK};
+use super::kernel::{SPARE, STACK, deep_stacks};
 use super::lanes::{Aligned, Lanes, Mask};
 use super::layout::{Child, WideBvh};
 use super::pairs::{Crossings, Pairs, Plane};
@@ -111,8 +111,8 @@ impl<K: Instructions, L: Leaves<K>, const ANY: bool> Task<K> for Rare<'_, L, ANY
     unsafe fn run(self) -> Hit {
         let Self { wide, ray, leaves } = self;
         let mut stack = MaybeUninit::<Aligned<[Pending; STACK + SPARE]>>::uninit();
-        let mut deep = DeepStacks::new(1, wide.stack_need);
-        let base = deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.stack(0));
+        let mut deep = deep_stacks::<Pending>(1, wide.stack_need);
+        let base = deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
         // SAFETY: the stack has room for `stack_need` children; the rest is as in `traverse`.
         unsafe {
             if ray.begins_in(&wide.near) {

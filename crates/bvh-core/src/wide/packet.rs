@@ -8,7 +8,7 @@
 
 use super::answer::{ANY_HIT, Find, NEAREST_HIT};
 use super::instructions::{Instructions, Task, lane_of, last_key};
-use super::kernel::{DeepStacks, SPARE, STACK};
+use super::kernel::{SPARE, STACK, deep_stacks};
 use super::lanes::{Lanes, Mask};
 use super::layout::{Child, WideBvh, WideNode};
 use super::packet_vector::Vector;
@@ -122,12 +122,14 @@ impl<K: Instructions> Packet<K> {
             let mut end = last_key(farthest);
             let mut keys = MaybeUninit::<[u32; STACK + SPARE]>::uninit();
             let mut parents = MaybeUninit::<[Parent; STACK + SPARE]>::uninit();
-            let mut deep_keys = DeepStacks::new(1, wide.stack_need);
-            let mut deep_parents = DeepStacks::new(1, wide.stack_need);
-            let keys: *mut u32 =
-                deep_keys.as_mut().map_or(keys.as_mut_ptr().cast(), |deep| deep.stack(0));
-            let parents: *mut Parent =
-                deep_parents.as_mut().map_or(parents.as_mut_ptr().cast(), |deep| deep.stack(0));
+            let mut deep_keys = deep_stacks::<u32>(1, wide.stack_need);
+            let mut deep_parents = deep_stacks::<Parent>(1, wide.stack_need);
+            let keys: *mut u32 = deep_keys
+                .as_mut()
+                .map_or(keys.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
+            let parents: *mut Parent = deep_parents
+                .as_mut()
+                .map_or(parents.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
             let mut top = 0;
             let mut child = root;
             // The first vector that enters the child, its rays that do, and the planes of the

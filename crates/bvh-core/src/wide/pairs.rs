@@ -95,7 +95,7 @@ pub(crate) struct Pairs<L> {
     /// e, the bound of the error of a coordinate sheared in f32; what underflow adds to the error
     /// of an edge value, infinite where products may overflow; and the bound of the error of a
     /// distance times the depth in f32, without the tilt's.
-    errors: [L; 3],
+    pub(super) errors: [L; 3],
     pub(crate) t_min: L,
 }
 
@@ -141,19 +141,7 @@ impl<L: Lanes> Pairs<L> {
         reach: L,
         t_min: L,
     ) -> Self {
-        Self::with(origin, direction, slope, reach, Self::errors_of(reach, direction[2]), t_min)
-    }
-
-    /// Returns the same with the errors that [`errors_of`](Self::errors_of) returned.
-    #[inline(always)]
-    pub(crate) fn with(
-        origin: [L; 3],
-        direction: [L; 3],
-        slope: [L; 2],
-        reach: L,
-        errors: [L; 3],
-        t_min: L,
-    ) -> Self {
+        let errors = Self::errors_of(reach, direction[2]);
         Self { origin, direction, slope, reach, errors, t_min }
     }
 

@@ -196,14 +196,14 @@ impl Test<'_> {
             let origin = row(3);
             let last = row(4);
             let errors = row(7);
-            Pairs::with(
-                [origin.spread::<0>(), origin.spread::<1>(), origin.spread::<2>()],
-                [row(0).spread::<3>(), row(2).spread::<3>(), last.spread::<2>()],
-                [origin.spread::<3>(), last.spread::<0>()],
-                last.spread::<1>(),
-                [errors.spread::<1>(), errors.spread::<2>(), errors.spread::<3>()],
-                last.spread::<3>(),
-            )
+            Pairs {
+                origin: [origin.spread::<0>(), origin.spread::<1>(), origin.spread::<2>()],
+                direction: [row(0).spread::<3>(), row(2).spread::<3>(), last.spread::<2>()],
+                slope: [origin.spread::<3>(), last.spread::<0>()],
+                reach: last.spread::<1>(),
+                errors: [errors.spread::<1>(), errors.spread::<2>(), errors.spread::<3>()],
+                t_min: last.spread::<3>(),
+            }
         }
     }
 
