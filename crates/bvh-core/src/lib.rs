@@ -24,7 +24,6 @@ pub mod ray_density;
 mod slabs;
 mod solid;
 mod sphere;
-mod stack;
 mod traverse;
 mod triangle;
 mod validate;

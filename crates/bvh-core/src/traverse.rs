@@ -31,10 +31,10 @@
 //! # Ok::<(), bvh_core::InvalidRay>(())
 //! ```
 
-use crate::stack::Stack;
 use crate::{BvhView, Hit, Node, NodeKind, Primitive, Ray, Slabs};
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
+use smallvec::SmallVec;
 
 /// A counter of the tests of a traversal. `()` counts nothing and costs nothing.
 pub trait Counter {
@@ -215,6 +215,9 @@ struct Pending {
     kind: NodeKind,
 }
 
+/// Only very deep trees need memory from the heap.
+type Stack = SmallVec<[Pending; 64]>;
+
 /// Calls `leaf` with the objects of every leaf that the ray may hit, the nearest leaf first, until
 /// `leaf` breaks. `leaf` may lower the distance beyond which boxes are skipped.
 #[inline(always)]
@@ -232,9 +235,7 @@ fn walk<C: Counter>(
         return;
     }
     let mut kind = root.kind();
-    // Its bits are all zero, which is the fastest filler.
-    let filler = Pending { entry: 0.0, kind: NodeKind::Inner { first: 0, count: 0 } };
-    let mut stack = Stack::<Pending, 48>::new(filler);
+    let mut stack = Stack::new();
     loop {
         match kind {
             NodeKind::Leaf { .. } => {
@@ -247,30 +248,15 @@ fn walk<C: Counter>(
                 let pair = &tree.nodes[first as usize..first as usize + 2];
                 let a = slabs.entry(&pair[0].aabb);
                 let b = slabs.entry(&pair[1].aabb);
+                let mut visit = |near, far, entries| {
+                    descend(tree, near, far, entries, &mut t_max, &mut stack, &mut leaf, counter)
+                };
                 // This branch is often mispredicted, but it pays: the processor continues with the
                 // child that it expects to be nearer while the distances are still being computed.
                 let next = if b < a {
-                    descend(
-                        tree,
-                        &pair[1],
-                        &pair[0],
-                        [b, a],
-                        &mut t_max,
-                        &mut stack,
-                        &mut leaf,
-                        counter,
-                    )
+                    visit(&pair[1], &pair[0], [b, a])
                 } else {
-                    descend(
-                        tree,
-                        &pair[0],
-                        &pair[1],
-                        [a, b],
-                        &mut t_max,
-                        &mut stack,
-                        &mut leaf,
-                        counter,
-                    )
+                    visit(&pair[0], &pair[1], [a, b])
                 };
                 match next {
                     ControlFlow::Continue(Some(next)) => {
@@ -302,13 +288,13 @@ fn walk<C: Counter>(
 /// done. Returns `None` if the ray enters neither.
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "the state of a walk, in registers")]
-fn descend<C: Counter, const N: usize>(
+fn descend<C: Counter>(
     tree: BvhView,
     near: &Node,
     far: &Node,
     [near_entry, far_entry]: [f32; 2],
     t_max: &mut f32,
-    stack: &mut Stack<Pending, N>,
+    stack: &mut Stack,
     leaf: &mut impl FnMut(&[u32], &mut f32, &mut C) -> ControlFlow<()>,
     counter: &mut C,
 ) -> ControlFlow<(), Option<NodeKind>> {
@@ -321,7 +307,7 @@ fn descend<C: Counter, const N: usize>(
         return ControlFlow::Continue((far_entry <= *t_max).then(|| far.kind()));
     }
     if far_entry <= *t_max {
-        stack.push_if(true, Pending { entry: far_entry, kind: far.kind() });
+        stack.push(Pending { entry: far_entry, kind: far.kind() });
     }
     ControlFlow::Continue(Some(near.kind()))
 }
@@ -338,12 +324,7 @@ fn objects(tree: BvhView<'_>, leaf: NodeKind) -> &[u32] {
 
 /// Pushes the children that the ray enters, in such an order that the nearest one is popped first.
 /// Among children at the same distance, the lower index is popped first.
-fn push_sorted<const N: usize>(
-    children: &[Node],
-    slabs: &Slabs,
-    t_max: f32,
-    stack: &mut Stack<Pending, N>,
-) {
+fn push_sorted(children: &[Node], slabs: &Slabs, t_max: f32, stack: &mut Stack) {
     // Only nodes with more than 16 children need memory from the heap.
     let mut few = [(0.0, 0); 16];
     let mut many = Vec::new();
@@ -366,6 +347,6 @@ fn push_sorted<const N: usize>(
         by_distance.then(b.1.cmp(&a.1))
     });
     for &(entry, index) in &entered[..count] {
-        stack.push_if(true, Pending { entry, kind: children[index].kind() });
+        stack.push(Pending { entry, kind: children[index].kind() });
     }
 }

@@ -3,8 +3,8 @@
 
 use super::layout::{Child, WideBvh, WideNode};
 use super::triangles::TriangleBlock;
-use crate::stack::Stack;
 use crate::{Aabb, Counter, Hit, PreparedRay, Ray, Slabs};
+use smallvec::SmallVec;
 
 /// A child that the ray enters at `entry`, to be visited later.
 #[derive(Clone, Copy)]
@@ -119,15 +119,15 @@ pub(crate) fn traverse<const ANY: bool>(
 ) -> Hit {
     let mut nearest = Hit { t: t_max, object: u32::MAX };
     let Some(mut child) = wide.root else { return nearest };
-    let mut stack = Stack::<Pending, 32>::new(Pending { entry: 0.0, child: Child::node(0) });
+    let mut stack = SmallVec::<[Pending; 32]>::new();
+    let mut entered = [Pending { entry: 0.0, child: Child::node(0) }; 8];
     loop {
         if child.is_node() {
             counter.boxes(WideNode::LANES);
             let node = &wide.nodes[child.index()];
-            let others = stack.room();
-            if let Some(last) = enter::<ANY>(node, intervals(node), nearest.t, others) {
-                child = others[last].child;
-                stack.grow(last);
+            if let Some(last) = enter::<ANY>(node, intervals(node), nearest.t, &mut entered) {
+                child = entered[last].child;
+                stack.extend_from_slice(&entered[..last]);
                 continue;
             }
         } else {
