@@ -16,34 +16,16 @@ fn triangles() -> Vec<Triangle> {
     triangles
 }
 
-/// A custom builder. Like most builders it makes plain nodes: two children at `first`, or `count`
-/// objects from `first` on.
-fn halves(boxes: &[Aabb]) -> Vec<FirstCountNode> {
-    let mut nodes =
-        vec![FirstCountNode { first: 0, count: boxes.len() as u32, ..Default::default() }];
-    let mut index = 0;
-    while index < nodes.len() {
-        let FirstCountNode { first, count, .. } = nodes[index];
-        let mut around = Aabb::EMPTY;
-        for aabb in &boxes[first as usize..][..count as usize] {
-            around = around.union(aabb);
-        }
-        nodes[index].min = around.min.to_array();
-        nodes[index].max = around.max.to_array();
-        if count > 2 {
-            let half = count / 2;
-            nodes[index].first = nodes.len() as u32;
-            nodes[index].count = 0;
-            nodes.push(FirstCountNode { first, count: half, ..Default::default() });
-            nodes.push(FirstCountNode {
-                first: first + half,
-                count: count - half,
-                ..Default::default()
-            });
-        }
-        index += 1;
-    }
-    nodes
+/// The nodes of another builder: two children at `first`, or `count` objects from `first` on.
+fn halves(boxes: &[Aabb]) -> [FirstCountNode; 3] {
+    let half = boxes.len() as u32 / 2;
+    let (low, high) = boxes.split_at(half as usize);
+    [(boxes, 1, 0), (low, 0, half), (high, half, high.len() as u32)].map(
+        |(objects, first, count)| {
+            let Aabb { min, max } = Aabb::union_of(objects);
+            FirstCountNode { min: min.to_array(), first, max: max.to_array(), count }
+        },
+    )
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

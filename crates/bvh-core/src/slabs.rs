@@ -400,53 +400,49 @@ mod tests {
         }
     }
 
+    /// Rays in many directions, along axes, too, from inside, beside and far away.
+    fn rays() -> impl Iterator<Item = Ray> {
+        let directions =
+            [Vec3::new(0.3, -0.1, 0.7), Vec3::new(-1e-40, 0.0, 1.0), Vec3::new(-0.0, 1.0, 0.0)];
+        let origins = [
+            Vec3::ZERO,
+            Vec3::splat(0.2),
+            Vec3::new(0.1, -0.2, 0.3),
+            Vec3::new(0.4, -0.2, 0.9),
+            Vec3::new(0.25, -0.2, -9.0),
+            Vec3::splat(-3e38),
+        ];
+        directions.into_iter().flat_map(move |direction| {
+            origins.map(|origin| Ray::half_line(origin, direction).unwrap())
+        })
+    }
+
     #[test]
     fn boxes_on_one_side_of_a_plane_are_met_on_that_side() {
         let b = Aabb::from(([0.1, -0.2, 0.3], [0.4, -0.2, 0.9]));
-        for direction in
-            [Vec3::new(0.3, -0.1, 0.7), Vec3::new(-1e-40, 0.0, 1.0), Vec3::new(-0.0, 1.0, 0.0)]
-        {
-            for origin in
-                [Vec3::ZERO, b.min, b.max, Vec3::new(0.25, -0.2, -9.0), Vec3::splat(-3e38)]
-            {
-                let ray = Ray::half_line(origin, direction).unwrap();
-                let slabs = Slabs::new(&ray, &b);
-                let (entry, exit) = slabs.interval(&b);
-                for axis in 0..3 {
-                    let mut near = b.min[axis];
-                    let mut far = b.max[axis];
-                    if ray.inverse_direction()[axis] < 0.0 {
-                        (near, far) = (far, near);
-                    }
-                    assert!(slabs.crossing(axis, near).0 <= entry, "{ray:?}");
-                    assert!(slabs.crossing(axis, far).1 >= exit, "{ray:?}");
-                    assert!(
-                        slabs.crossing(axis, near).0
-                            <= slabs.crossing(axis, near).1.max(ray.t_min()),
-                        "{ray:?}"
-                    );
-                }
+        for ray in rays() {
+            let slabs = Slabs::new(&ray, &b);
+            let (entry, exit) = slabs.interval(&b);
+            for axis in 0..3 {
+                let is_backwards = ray.inverse_direction()[axis] < 0.0;
+                let (first, last) = if is_backwards { (b.max, b.min) } else { (b.min, b.max) };
+                let near = slabs.crossing(axis, first[axis]);
+                assert!(near.0 <= entry && near.0 <= near.1.max(ray.t_min()), "{ray:?}");
+                assert!(slabs.crossing(axis, last[axis]).1 >= exit, "{ray:?}");
             }
         }
     }
 
     #[test]
     fn intervals_of_boxes_inside_others_are_inside_theirs() {
-        let inner = Aabb::from(([0.1, 0.2, 0.3], [0.4, 0.2, 0.9]));
-        let outer = Aabb::from(([0.1, -3.0, 0.3], [0.5, 0.2, 1e6]));
-        for direction in
-            [Vec3::new(0.3, 0.1, 0.7), Vec3::new(-1e-40, 0.0, 1.0), Vec3::new(-0.0, 1.0, 0.0)]
-        {
-            for origin in
-                [Vec3::ZERO, Vec3::splat(0.2), Vec3::new(0.25, 0.2, -9.0), Vec3::splat(-3e38)]
-            {
-                let ray = Ray::half_line(origin, direction).unwrap();
-                let alone = Slabs::new(&ray, &inner).interval(&inner);
-                let scene = Slabs::new(&ray, &outer).interval(&inner);
-                let around = Slabs::new(&ray, &outer).interval(&outer);
-                assert!(alone.0 >= scene.0 && alone.1 <= scene.1, "{ray:?}");
-                assert!(scene.0 >= around.0 && scene.1 <= around.1, "{ray:?}");
-            }
+        let inner = Aabb::from(([0.1, -0.2, 0.3], [0.4, -0.2, 0.9]));
+        let outer = Aabb::from(([0.1, -3.0, 0.3], [0.5, -0.2, 1e6]));
+        for ray in rays() {
+            let alone = Slabs::new(&ray, &inner).interval(&inner);
+            let scene = Slabs::new(&ray, &outer).interval(&inner);
+            let around = Slabs::new(&ray, &outer).interval(&outer);
+            assert!(alone.0 >= scene.0 && alone.1 <= scene.1, "{ray:?}");
+            assert!(scene.0 >= around.0 && scene.1 <= around.1, "{ray:?}");
         }
     }
 }

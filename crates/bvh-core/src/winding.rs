@@ -27,7 +27,7 @@
 //! van Oosterom & Strackee 1983, 'The solid angle of a plane triangle'. Differs from the first
 //! paper: errors are bounded, and no parameter trades them for time.
 
-use crate::{BvhView, Triangle};
+use crate::{Aabb, BvhView, Triangle};
 use alloc::collections::{BinaryHeap, VecDeque};
 use alloc::vec::Vec;
 use core::f64::consts::PI;
@@ -48,8 +48,7 @@ struct Patch {
     moment: DMat3,
     /// ∫ |h|² dA.
     spread: f64,
-    lower: Vec3,
-    upper: Vec3,
+    aabb: Aabb,
     first: u32,
     count: u32,
     /// Whether the range above is of triangles, or of patches.
@@ -66,8 +65,7 @@ impl Patch {
             normal: DVec3::ZERO,
             moment: DMat3::ZERO,
             spread: 0.0,
-            lower: Vec3::INFINITY,
-            upper: Vec3::NEG_INFINITY,
+            aabb: Aabb::EMPTY,
             first: range.start as u32,
             count: range.len() as u32,
             is_leaf,
@@ -85,17 +83,9 @@ impl Patch {
         let normal = (b - a).cross(c - a) / 2.0;
         let area = normal.length();
         let squares: f64 = [a, b, c].iter().map(|p| p.distance_squared(center)).sum();
-        let [lower, upper] = [Vec3::min, Vec3::max].map(|f| triangle.0.into_iter().reduce(f));
         let spread = area * squares / 12.0;
-        Self {
-            center,
-            area,
-            normal,
-            spread,
-            lower: lower.unwrap_or_default(),
-            upper: upper.unwrap_or_default(),
-            ..Self::new(0..0, true)
-        }
+        let aabb = triangle.aabb();
+        Self { center, area, normal, spread, aabb, ..Self::new(0..0, true) }
     }
 
     /// Writes the terms of all parts together.
@@ -103,10 +93,9 @@ impl Patch {
         for part in parts.clone() {
             self.area += part.area;
             self.center += part.area * part.center;
-            self.lower = self.lower.min(part.lower);
-            self.upper = self.upper.max(part.upper);
+            self.aabb = self.aabb.union(&part.aabb);
         }
-        let [lower, upper] = [self.lower.as_dvec3(), self.upper.as_dvec3()];
+        let [lower, upper] = [self.aabb.min.as_dvec3(), self.aabb.max.as_dvec3()];
         self.center = if self.area > 0.0 { self.center / self.area } else { (lower + upper) / 2.0 };
         for part in parts {
             let h = part.center - self.center;
@@ -317,7 +306,7 @@ mod tests {
             prop_assert!(merged.center.abs_diff_eq(whole.center, 1e-9));
             prop_assert!(merged.moment.abs_diff_eq(whole.moment, 1e-9));
             prop_assert!(merged.normal.abs_diff_eq(whole.normal, 1e-9));
-            prop_assert_eq!(merged.radius, (merged.center - whole.lower.as_dvec3()).max(whole.upper.as_dvec3() - merged.center).length());
+            prop_assert_eq!(merged.radius, (merged.center - whole.aabb.min.as_dvec3()).max(whole.aabb.max.as_dvec3() - merged.center).length());
         }
     }
 }

@@ -11,7 +11,6 @@ use bvh_core::{
     cost::{SahConstants, layout_area, layout_cost},
     nearest_hit_by, validate, validate_references,
 };
-use glam::Vec3;
 use std::thread;
 
 /// Divides leaves of `tree` at random planes, and divides parts again. Returns the tree, and the
@@ -139,31 +138,6 @@ fn every_traversal_of_divided_triangles_answers_as_brute_force_at_every_scale() 
         }
     }
     assert!(hits > 10_000 && divisions > 1000, "{hits} {divisions}");
-}
-
-#[test]
-fn no_ray_passes_between_two_parts_of_a_closed_surface() {
-    let mut random = Random(5);
-    for triangles in [ball(2), grid_box(2)] {
-        let undivided = tree(&boxes(&triangles), SHAPES[0], &mut random);
-        let (split, planes) = divided(&undivided, &triangles, &mut random);
-        let wide = WideBvh::new(&split, &triangles).unwrap();
-        let corners = triangles.iter().flat_map(|triangle| triangle.0);
-        let middle = corners.sum::<Vec3>() / (3 * triangles.len()) as f32;
-        for _ in 0..20_000 {
-            // From inside, through a point on a plane or near one, or in the plane itself.
-            let (object, axis, plane) = random.of(&planes);
-            let Triangle([a, b, c]) = triangles[object as usize];
-            let mut target = a + (b - a) * random.unit() * 0.5 + (c - a) * random.unit() * 0.5;
-            target[axis] = plane;
-            let mut from = middle + random.point() * 0.1;
-            if random.below(2) == 0 && (plane - middle[axis]).abs() < 0.1 {
-                from[axis] = plane;
-            }
-            let Ok(ray) = Ray::half_line(from, target - from) else { continue };
-            assert!(wide.nearest_hit(&ray).is_some() && wide.any_hit(&ray), "{ray:?}");
-        }
-    }
 }
 
 #[test]
