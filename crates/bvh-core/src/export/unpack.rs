@@ -42,7 +42,9 @@ pub(super) fn unpack(
         tree.nodes[to] = match below {
             Below::Children([low, high]) => {
                 if low.max(high) >= nodes {
-                    let first = if low >= nodes { low } else { high } as u32;
+                    // Of a pair, the first one is named.
+                    let is_first = low >= nodes || high == low + 1;
+                    let first = if is_first { low } else { high } as u32;
                     return Err(InvalidBvh::BadChildren { node, first, count: 2, nodes });
                 }
                 let first = tree.nodes.len();

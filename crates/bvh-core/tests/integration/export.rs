@@ -134,6 +134,11 @@ fn pairs_begin_at_even_indices_if_aligned_and_invalid_indices_are_rejected() {
         assert_eq!(rejection(0, first, 0), bad_children);
     }
     assert!(matches!(rejection(0, 0, 0), InvalidBvh::Parents { parents: 2, .. }));
+    // The far child's index is what a node of three-mesh-bvh has.
+    let mut nodes = tree.to_three_mesh();
+    nodes[0].below = 999;
+    let bad_children = InvalidBvh::BadChildren { node: 0, first: 999, count: 2, nodes: 7 };
+    assert_eq!(Bvh::from_three_mesh(&nodes, &tree.prim_ids), Err(bad_children));
     for (first, count) in [(4, 1), (1, u32::MAX)] {
         let bad_leaf = InvalidBvh::BadLeaf { node: 1, first, count, objects: 4 };
         assert_eq!(rejection(1, first, count), bad_leaf);
