@@ -75,10 +75,7 @@ fn parse_binary(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> 
     }
     let facets = if is_unwritten { room } else { promised };
     let (body, rest) = body.split_at(facets * FACET);
-    // Of a file whose facets are followed by so many bytes as their last two bytes say, the second
-    // facet would be read from a wrong place.
-    let has_attributes = |facet: &[u8; FACET]| facet[48..] != [0; 2];
-    if !rest.is_empty() && body.as_chunks().0.iter().any(has_attributes) {
+    if !rest.is_empty() && have_attributes(&bytes[HEADER..], facets) {
         let found = rest.len();
         return Err(Fault::of_file(format!(
             "facets with attributes and {found} bytes after the last; expected {FACET} bytes per facet"
@@ -99,6 +96,16 @@ fn parse_binary(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> 
     let unwritten = (is_unwritten && facets > 0)
         .then(|| format!("the header counts {promised} facets and the file has {facets}"));
     Ok((triangles, unwritten.or(ignored)))
+}
+
+/// Returns whether the facets, each with as many bytes after it as its last two bytes say, end where
+/// the file does.
+fn have_attributes(body: &[u8], facets: usize) -> bool {
+    let rest = (0..facets).try_fold(body, |rest, _| {
+        let (facet, after) = rest.split_at_checked(FACET)?;
+        after.get(usize::from(u16::from_le_bytes([facet[48], facet[49]]))..)
+    });
+    rest.is_some_and(<[u8]>::is_empty)
 }
 
 /// Words that begin a part of a text file. Any other words after `facet`, `normal` and `color` are

@@ -203,8 +203,12 @@ fn binary_stl_files_as_programs_write_them() {
     {
         assert!(error(counted(count), "a.stl").contains(room));
     }
-    let attributes = [header, one, b"\x03\0abc", two, b"\0\0"].concat();
-    assert!(error(attributes, "a.stl").contains("facets with attributes and 3 bytes after"));
+    for attributes in [
+        [header, one, b"\x03\0abc", two, b"\0\0"].concat(),
+        [header, one, b"\x08\0abcdefgh", two, b"\x08\0abcdefgh"].concat(),
+    ] {
+        assert!(error(attributes, "a.stl").contains("facets with attributes"));
+    }
     for empty in [&counted(0)[..84], &[&counted(0)[..], &[0; 2]].concat()] {
         assert!(error(empty, "a.stl").contains("no facet"));
     }
