@@ -80,7 +80,7 @@ const VALIDATION: f64 = 1.0;
 /// by a bound of the error before they cut, and the corners are moved outwards after the cuts. The
 /// result is rounded outwards to f32 and never leaves the region. The bound is relative to the
 /// triangle's largest coordinate: 2⁻⁴⁶ of it, 64 rounding errors, while each of the six cuts makes
-/// 4.
+/// at most 5.
 fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
     let full = triangle.aabb();
     let common = full.intersection(region);

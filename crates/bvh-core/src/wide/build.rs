@@ -145,8 +145,8 @@ fn lay_out_nodes(
 mod tests {
     use super::super::decide::{BLOCK_COST, NODE_COST};
     use super::*;
-    use crate::Node;
     use crate::collapse::tests::{exhaustive, objects, scene};
+    use crate::{Node, Ray};
 
     /// The box of every node, with 0, and of every leaf, with its number of blocks.
     fn boxes(wide: &WideBvh) -> impl Iterator<Item = (Aabb, usize)> {
@@ -171,6 +171,18 @@ mod tests {
                 tree.nodes.iter().map(|node| along_x(&node.aabb) as f32).collect();
             let wide = WideBvh::for_rays(&tree, &triangles, &visits).unwrap();
             check_optimal(&tree, &wide, along_x);
+        }
+    }
+
+    #[test]
+    fn visits_whose_sums_are_infinite_or_no_numbers_give_a_layout() {
+        let (triangles, tree) = scene(40, 1);
+        let expected = WideBvh::new(&tree, &triangles).unwrap();
+        for visits in [3e38, f32::INFINITY, f32::NAN] {
+            let visits = vec![visits; tree.nodes.len()];
+            let wide = WideBvh::for_rays(&tree, &triangles, &visits).unwrap();
+            let ray = Ray::half_line([0.5, 0.5, 9.0], [0.0, 0.0, -1.0]).unwrap();
+            assert_eq!(wide.nearest_hit(&ray), expected.nearest_hit(&ray));
         }
     }
 

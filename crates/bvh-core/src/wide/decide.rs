@@ -84,9 +84,10 @@ fn share(a: &Costs, b: &Costs) -> (Costs, [Slots; 8]) {
     let mut costs = [0.0; 8];
     let mut shares = [0; 8];
     for slots in 2..=8 {
-        let mut least = f32::INFINITY;
-        let mut share = 0;
-        for first in 1..slots {
+        // Costs may be infinite, if the visits are: some division is needed all the same.
+        let mut least = a[0] + b[slots - 2];
+        let mut share = 1 | (slots - 1) << 4;
+        for first in 2..slots {
             let cost = a[first - 1] + b[slots - first - 1];
             if cost < least {
                 least = cost;

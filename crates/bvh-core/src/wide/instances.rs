@@ -3,8 +3,8 @@
 //! An instance is tested against the ray that `transform⁻¹` moves into the part's coordinates. The
 //! moved ray is computed in f64 and rounded to f32 once. The length of its direction changes with
 //! the transform, so a distance means the same for every instance. A distance that the part's layout
-//! returns for the moved ray is moved into the interval of the instance's box in the scene, and a
-//! ray that misses that box has no hit. The answer is, bit by bit, the least of these distances, for
+//! returns for the moved ray is at least that of the ray's entry into the instance's box in the scene,
+//! and a ray that misses that box has no hit. The answer is, bit by bit, the least of these distances, for
 //! any tree over the instances.
 //!
 //! Compared with the same scene whose triangles are all written out, distances differ by the
@@ -32,7 +32,7 @@
 use super::layout::WideBvh;
 use crate::{Aabb, Bvh, Hit, InvalidBvh, Ray, Slabs, any_hit_by, nearest_hit_by, validate};
 use alloc::vec::Vec;
-use glam::{Affine3A, DAffine3};
+use glam::{Affine3A, DAffine3, DMat3, DVec3, Vec3Swizzles};
 
 /// A transformed copy of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,12 +88,20 @@ impl Instance {
         let transform = self.transform.as_daffine3();
         let to_local = transform.inverse();
         let aabb = transformed(&transform, &part.bounds);
-        if !to_local.is_finite() || transform.matrix3.determinant() == 0.0 || aabb.check().is_err()
-        {
+        let is_singular = is_singular(&transform.matrix3);
+        if !to_local.is_finite() || is_singular || aabb.check().is_err() {
             return Err(InvalidInstances::Transform(instance));
         }
         Ok(Placed { part: self.part, to_local, aabb })
     }
+}
+
+/// Returns whether the determinant is zero, or is smaller than its rounding.
+fn is_singular(matrix: &DMat3) -> bool {
+    let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(DVec3::abs);
+    // The sum of the sizes of its six products.
+    let size = x.dot(y.yzx() * z.zxy() + y.zxy() * z.yzx());
+    matrix.determinant().abs() <= size * (4.0 * f64::EPSILON)
 }
 
 /// Returns a box around a transformed box in which a ray moved by the inverse transform has its
@@ -213,14 +221,14 @@ impl Instances {
         ray: &Ray,
         mut find: impl FnMut(&WideBvh, u32, &Ray) -> Option<Hit>,
     ) -> Option<InstanceHit> {
-        let slabs = Slabs::new(ray, &self.top.root_aabb()?);
+        let slabs = Slabs::new(ray, &Aabb::EMPTY);
         let mut nearest: Option<(Hit, u32)> = None;
         let test = |instance: u32, t_max: f32| {
             let placed = &self.placed[instance as usize];
             let local_ray = placed.local(ray, t_max)?;
             let found = find(self.part_of(instance), instance, &local_ray)?;
             // A hit in front of the instance's box would depend on the tree: a tree that visits the
-            // box later would skip it.
+            // box later would skip it. So would an entry by the slabs of the tree's root.
             let t = found.t.max(slabs.entry(&placed.aabb));
             let hit = Hit { t, object: instance };
             if t <= t_max && nearest.is_none_or(|(nearest, _)| hit.precedes(&nearest)) {
@@ -249,8 +257,7 @@ impl Instances {
     /// part.
     #[inline(always)]
     fn any(&self, ray: &Ray, mut hits: impl FnMut(&WideBvh, u32, &Ray) -> bool) -> bool {
-        let Some(bounds) = self.top.root_aabb() else { return false };
-        let slabs = Slabs::new(ray, &bounds);
+        let slabs = Slabs::new(ray, &Aabb::EMPTY);
         let test = |instance: u32| {
             let placed = &self.placed[instance as usize];
             // The nearest hit is never in front of the instance's box. If the ray ends before the

@@ -4,8 +4,8 @@
 use crate::support::layouts::bundles;
 use crate::support::{self, Random, SHAPES, ball, boxes, chain, grid_box, soup, tree};
 use bvh_core::{
-    Aabb, Bvh, Instance, InstanceHit, Instances, InvalidInstances, Kernel, Ray, Triangle, WideBvh,
-    nearest_hit,
+    Aabb, Bvh, Instance, InstanceHit, Instances, InvalidInstances, Kernel, Node, Ray, Triangle,
+    WideBvh, nearest_hit,
 };
 use glam::{Affine3A, Mat3A, Quat, Vec3, Vec3A};
 
@@ -258,4 +258,35 @@ fn an_invalid_scene_is_rejected_by_its_instance() {
     let empty = Instances::new(parts, vec![], Bvh::default()).unwrap();
     let ray = Ray::half_line([0.0; 3], [1.0; 3]).unwrap();
     assert!(empty.nearest_hit(&ray).is_none() && !empty.any_hit(&ray));
+}
+
+fn one_triangle() -> WideBvh {
+    let triangles = [Triangle::from([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]])];
+    let top = Bvh { nodes: vec![Node::leaf(boxes(&triangles)[0], 0, 1)], prim_ids: vec![0] };
+    WideBvh::new(&top, &triangles).unwrap()
+}
+
+#[test]
+fn a_tree_with_a_padded_root_gives_the_same_distances() {
+    let transform = Affine3A::from_translation(Vec3::Z * 0.1);
+    let instances = vec![Instance { part: 0, transform }];
+    let tight = Instance::boxes(&instances, &[one_triangle()]).unwrap()[0];
+    // The ray is far from the tight root, and near the padded one.
+    let ray = Ray::half_line([0.0, 0.0, -1000.0], [0.0, 0.0, 5.0]).unwrap();
+    let [one, other] = [tight, Aabb::from([[-10.0; 3], [10.0; 3]])].map(|root| {
+        let top = Bvh { nodes: vec![Node::leaf(root, 0, 1)], prim_ids: vec![0] };
+        Instances::new(vec![one_triangle()], instances.clone(), top).unwrap().nearest_hit(&ray)
+    });
+    assert!(one.is_some() && one == other, "{one:?} {other:?}");
+}
+
+#[test]
+fn a_transform_whose_determinant_is_all_rounding_is_rejected() {
+    // The first column is the sum of the others.
+    let a = 8_388_611.0;
+    let columns = [[a, 1037.0, a], [a, 1.0, 0.0], [0.0, 1036.0, a]].map(Vec3A::from_array);
+    let matrix = Mat3A::from_cols(columns[0], columns[1], columns[2]);
+    let transform = Affine3A { matrix3: matrix, translation: Vec3A::ZERO };
+    let found = Instance::boxes(&[Instance { part: 0, transform }], &[one_triangle()]);
+    assert_eq!(found, Err(InvalidInstances::Transform(0)));
 }
