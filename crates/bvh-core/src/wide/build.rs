@@ -268,7 +268,7 @@ mod tests {
             let wide = WideBvh::new(&tree, &triangles).unwrap();
             let lanes = (0..8).filter_map(|lane| wide.nodes[0].lane_box(lane)).collect::<Vec<_>>();
             assert_eq!(lanes[0], scattered, "the last of {}", lanes.len());
-            let ray = crate::Ray::half_line([0.1, 0.1, -1.0], [0.0, 0.0, 1.0]).unwrap();
+            let ray = Ray::half_line([0.1, 0.1, -1.0], [0.0, 0.0, 1.0]).unwrap();
             let mut counts = crate::TestCounts::default();
             assert!(wide.any_hit_counted(&ray, &mut counts));
             assert_eq!(counts.objects, WideBvh::OBJECTS_OF_BLOCK);
