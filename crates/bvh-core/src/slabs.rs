@@ -272,7 +272,9 @@ pub fn clip_to_box(ray: &Ray, bounds: &Aabb, t: f32, t_max: f32) -> Option<f32> 
     let last = (exit * NEAR_DOUBLE) as f32;
     // Adding 0 turns −0 into +0.
     let moved = larger(smaller(t, last), first) + 0.0;
-    (entry <= exit && ray.t_min() <= exit as f32 && moved <= t_max).then_some(moved)
+    // A box so little behind the ray that the distance rounds to zero is missed, as by traversals.
+    let is_met = entry <= exit && exit >= 0.0 && ray.t_min() <= exit as f32;
+    (is_met && moved <= t_max).then_some(moved)
 }
 
 #[cfg(test)]
@@ -283,6 +285,16 @@ mod tests {
     fn meets(ray: &Ray, b: &Aabb) -> bool {
         let (entry, exit) = Slabs::new(ray, b).interval(b);
         entry <= exit && entry <= ray.t_max()
+    }
+
+    #[test]
+    fn a_box_behind_the_ray_is_missed_although_its_distance_rounds_to_zero() {
+        // Far away, where slabs are exact, too.
+        for end in [1.0, 1e38] {
+            let b = Aabb::from(([0.0, -1.0, -1.0], [0.0, 1.0, end]));
+            let ray = Ray::half_line([f32::from_bits(1), 0.0, 0.0], [200.0, 0.0, 0.0]).unwrap();
+            assert_eq!(clip_to_box(&ray, &b, 0.0, 1.0), None);
+        }
     }
 
     #[test]

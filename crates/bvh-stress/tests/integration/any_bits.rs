@@ -71,6 +71,8 @@ fn is_binary(tree: &Bvh) -> bool {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(3000))]
+
     #[test]
     fn any_ray_is_answered_by_every_traversal_as_by_brute_force(
         (triangles, maybe_rays) in triangles_and_rays(),
