@@ -173,6 +173,8 @@ pub struct Instances {
     parts: Vec<WideBvh>,
     placed: Vec<Placed>,
     top: Bvh,
+    /// The box of all instances; the root of the tree may be larger.
+    bounds: Aabb,
 }
 
 impl Instances {
@@ -189,7 +191,8 @@ impl Instances {
             .collect::<Result<_, _>>()?;
         let boxes: Vec<Aabb> = placed.iter().map(|placed| placed.aabb).collect();
         validate(&top, &boxes)?;
-        Ok(Self { parts, placed, top })
+        let bounds = Aabb::union_of(&boxes);
+        Ok(Self { parts, placed, top, bounds })
     }
 
     fn part_of(&self, instance: u32) -> &WideBvh {
@@ -221,14 +224,15 @@ impl Instances {
         ray: &Ray,
         mut find: impl FnMut(&WideBvh, u32, &Ray) -> Option<Hit>,
     ) -> Option<InstanceHit> {
-        let slabs = Slabs::new(ray, &Aabb::EMPTY);
+        let slabs = Slabs::new(ray, &self.bounds);
         let mut nearest: Option<(Hit, u32)> = None;
         let test = |instance: u32, t_max: f32| {
             let placed = &self.placed[instance as usize];
             let local_ray = placed.local(ray, t_max)?;
             let found = find(self.part_of(instance), instance, &local_ray)?;
             // A hit in front of the instance's box would depend on the tree: a tree that visits the
-            // box later would skip it. So would an entry by the slabs of the tree's root.
+            // box later would skip it. So would an entry by the slabs of a root that is larger than
+            // the instances.
             let t = found.t.max(slabs.entry(&placed.aabb));
             let hit = Hit { t, object: instance };
             if t <= t_max && nearest.is_none_or(|(nearest, _)| hit.precedes(&nearest)) {
@@ -257,7 +261,7 @@ impl Instances {
     /// part.
     #[inline(always)]
     fn any(&self, ray: &Ray, mut hits: impl FnMut(&WideBvh, u32, &Ray) -> bool) -> bool {
-        let slabs = Slabs::new(ray, &Aabb::EMPTY);
+        let slabs = Slabs::new(ray, &self.bounds);
         let test = |instance: u32| {
             let placed = &self.placed[instance as usize];
             // The nearest hit is never in front of the instance's box. If the ray ends before the
