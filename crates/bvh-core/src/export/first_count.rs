@@ -63,7 +63,10 @@ impl Bvh {
         unpack(nodes.len(), prim_ids, |index| {
             let FirstCountNode { min, first, max, count } = nodes[index];
             let below = match count {
-                0 => Below::Children([first as usize, (first as usize).saturating_add(1)]),
+                0 => {
+                    let low = first as usize;
+                    Below::Children { named: first, at: [low, low.saturating_add(1)] }
+                }
                 _ => Below::Objects { first, count },
             };
             (Aabb::from([min, max]), below)

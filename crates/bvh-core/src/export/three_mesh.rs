@@ -81,7 +81,10 @@ impl Bvh {
             let ThreeMeshNode { min, max, below, axis_or_count } = nodes[index];
             let below = match axis_or_count.checked_sub(LEAF) {
                 Some(count) => Below::Objects { first: below, count },
-                None => Below::Children([index + 1, index.saturating_add(below as usize)]),
+                None => {
+                    let at = [index + 1, index.saturating_add(below as usize)];
+                    Below::Children { named: below, at }
+                }
             };
             (Aabb::from([min, max]), below)
         })

@@ -6,8 +6,8 @@ use alloc::vec::Vec;
 
 /// What is below a node of a layout.
 pub(super) enum Below {
-    /// Two nodes, by their indices in the layout.
-    Children([usize; 2]),
+    /// Two nodes, by their indices in the layout, and the number by which the node names them.
+    Children { named: u32, at: [usize; 2] },
     /// A range of the object ids.
     Objects { first: u32, count: u32 },
 }
@@ -40,11 +40,8 @@ pub(super) fn unpack(
         }
         let (aabb, below) = read(node);
         tree.nodes[to] = match below {
-            Below::Children([low, high]) => {
+            Below::Children { named: first, at: [low, high] } => {
                 if low.max(high) >= nodes {
-                    // Of a pair, the first one is named.
-                    let is_first = low >= nodes || high == low + 1;
-                    let first = if is_first { low } else { high } as u32;
                     return Err(InvalidBvh::BadChildren { node, first, count: 2, nodes });
                 }
                 let first = tree.nodes.len();
