@@ -107,8 +107,9 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     let costs = costs(rows);
     let trees = trees(rows);
     let random = distinct(rows.rays.iter().map(|row| (&row.family, &row.query))).len();
+    let kinds = distinct(trees.iter().map(|tree| tree.kind));
     for scene in rows.scenes() {
-        for (number, kind) in distinct(trees.iter().map(|tree| tree.kind)).into_iter().enumerate() {
+        for (number, &kind) in kinds.iter().enumerate() {
             let start = correlations.len();
             let mut points = Vec::new();
             for method in &config.methods {

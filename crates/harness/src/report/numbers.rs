@@ -100,9 +100,11 @@ impl Config {
                     seconds_quartile_3,
                 });
             }
-            let methods = self.methods.iter().filter(|_| !self.targets.is_empty());
+            if self.targets.is_empty() {
+                continue;
+            }
             let series = |method: &String| rows.series(scene, method);
-            let runs_of_methods: Vec<Vec<Series>> = methods.map(series).collect();
+            let runs_of_methods: Vec<Vec<Series>> = self.methods.iter().map(series).collect();
             for percent in &self.targets {
                 let cost = reference.cost * (1.0 + percent / 100.0);
                 let target = match percent {

@@ -6,7 +6,7 @@ use super::output::table_bytes;
 use super::paper::PaperRow;
 use super::prelude::*;
 use super::query::{self, Conditions, QueryError, Row, number_in};
-use super::query_column::{Column, Group};
+use super::query_column::{Column, Group, put};
 use super::query_figure::Drawing;
 use super::query_measure::filled;
 use crate::rows;
@@ -170,19 +170,16 @@ impl Config {
         for (key, conditions) in [("select", &self.select), ("base", &self.base)] {
             accept(key, Conditions::parse(conditions).and_then(|all| all.are_met(&row)))?;
         }
+        let mut made = Row::new();
         for (index, column) in self.by.iter().enumerate() {
-            let at = format!("by[{index}]");
-            accept(&at, has(column))?;
-            if self.by[..index].contains(column) {
-                return Err(OutOfRange::new(at, format!("{column:?} twice"), "each column once"));
-            }
+            let put = has(column).and_then(|()| put(&mut made, column.clone(), "1".into()));
+            accept(&format!("by[{index}]"), put)?;
         }
-        let against = self.pairs.first().map(|_| "against".to_owned());
-        let key: Row =
-            self.by.iter().cloned().chain(against).map(|column| (column, "1".into())).collect();
-        let mut made = key.clone();
+        if !self.pairs.is_empty() {
+            accept("pairs", put(&mut made, "against".into(), "1".into()))?;
+        }
         // Compared with itself, a row has a value in every column.
-        let group = Group { key, rows: vec![&row], base: vec![&row] };
+        let group = Group { key: made.clone(), rows: vec![&row], base: vec![&row] };
         for (index, column) in self.columns.iter().enumerate() {
             let at = |key: &str| format!("columns[{index}].{key}");
             accept(&at("paired_by"), column.paired_by.iter().try_for_each(has))?;
