@@ -1,37 +1,13 @@
 //! Draws a picture of a scene from a view. Rows are drawn in parallel, and the picture has the same
 //! bytes for any number of threads.
 
-use super::image::Film;
+use super::image::{Film, Options};
 use super::light::World;
 use crate::Scene;
-use crate::rays::{Camera, View};
+use crate::rays::Camera;
 use crate::trace::Accelerator;
 use bvh_core::Aabb;
 use rayon::prelude::*;
-
-/// The contents and the resolution of a picture.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// The number of pixels per row.
-    pub width: u32,
-    /// The number of rows.
-    pub height: u32,
-    /// The square root of the number of rays per pixel, which form a grid; 1 or more.
-    pub samples: u32,
-    /// The largest number of successive mirror reflections.
-    pub depth: u32,
-    /// The view.
-    pub view: View,
-    /// True to draw a ground below a scene that is seen from outside.
-    pub ground: bool,
-}
-
-impl Options {
-    /// Returns the options of a whole picture from this view, with four rays per pixel.
-    pub fn new(width: u32, height: u32, view: View) -> Self {
-        Self { width, height, samples: 2, depth: 4, view, ground: true }
-    }
-}
 
 /// Draws the scene on all threads of the current rayon pool. Calls `row_done` after every row.
 pub fn render(

@@ -1,8 +1,33 @@
 //! Pictures in memory: assembled from rows, exposed, and as the bytes of a PNG file.
 
+use crate::rays::View;
 use bvh_core::TestCounts;
 use glam::DVec3;
 use std::io;
+
+/// The contents and the resolution of a picture.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The number of pixels per row.
+    pub width: u32,
+    /// The number of rows.
+    pub height: u32,
+    /// The square root of the number of rays per pixel, which form a grid; 1 or more.
+    pub samples: u32,
+    /// The largest number of successive mirror reflections.
+    pub depth: u32,
+    /// The view.
+    pub view: View,
+    /// True to draw a ground below a scene that is seen from outside.
+    pub ground: bool,
+}
+
+impl Options {
+    /// Returns the options of a whole picture from this view, with four rays per pixel.
+    pub fn new(width: u32, height: u32, view: View) -> Self {
+        Self { width, height, samples: 2, depth: 4, view, ground: true }
+    }
+}
 
 /// A picture, or a row that one thread has drawn, with its numbers of rays and tests. Rows run
 /// from the top, and pixels from the left.

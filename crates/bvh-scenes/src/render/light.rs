@@ -1,8 +1,7 @@
 //! Computes the light that reaches a pixel with rays through the pixel, to the lights, and along
 //! mirror reflections.
 
-use super::draw::Options;
-use super::image::{self, Film};
+use super::image::{self, Film, Options};
 use super::surface::{Ground, Surface};
 use crate::Scene;
 use crate::rays::{Camera, View};

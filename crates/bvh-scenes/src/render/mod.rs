@@ -18,5 +18,5 @@ pub mod image;
 mod light;
 mod surface;
 
-pub use draw::{Options, render};
-pub use image::Film;
+pub use draw::render;
+pub use image::{Film, Options};

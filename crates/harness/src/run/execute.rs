@@ -3,8 +3,9 @@
 use super::finish::{Summary, conclude};
 use super::job::{base_costs, selected};
 use super::perform::Watch;
+use super::perform::{Trees, Work};
 use super::resolved::{Resolved, load_scenes, to_toml};
-use super::runs::{self, Trees, Work};
+use super::runs;
 use super::{ray_cost, trace};
 use crate::Error;
 use crate::rows::store::{Existing, Store, is_unfinished};

@@ -1,12 +1,12 @@
 //! Performs one run of an experiment: applies a method to a scene and observes it.
 
 use super::job::Job;
-use super::runs::Work;
 use crate::Error;
 use crate::contestant::Contestant;
 use crate::measure::picture;
 use crate::peers::{self, Built, Peer, Task};
 use crate::rows::finished_run::FinishedRun;
+use crate::rows::store::Store;
 use crate::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, TrialRow};
 use crate::spec::Experiment;
 use bvh_core::cost::{self, Measure, SahConstants};
@@ -16,9 +16,48 @@ use bvh_scenes::rays::{Family, RandomRays, empirical_cost};
 use bvh_scenes::trace::Query;
 use bvh_search::{Event, Judge, Method, Observer, Outcome, Problem, Splits, StopReason, solve};
 use indicatif::ProgressBar;
+use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Instant;
+
+/// The trees of runs by the index of the run.
+pub(crate) type Trees = BTreeMap<usize, Bvh>;
+
+/// A running experiment, with everything that its measurements share.
+pub(crate) struct Work<'a> {
+    pub experiment: &'a Experiment,
+    /// The selected runs: all runs, unless several processes share the experiment.
+    pub jobs: &'a [Job<'a>],
+    /// The costs of the greedy trees by scene.
+    pub bases: BTreeMap<String, f64>,
+    pub store: &'a Store,
+    pub watch: Watch<'a>,
+    /// The trees of performed runs that later measurements need.
+    pub trees: Trees,
+    /// Peculiarities of scene files and damaged runs, one line each.
+    pub remarks: Vec<String>,
+}
+
+impl Work<'_> {
+    /// Rebuilds the wanted trees whose runs were kept from an interrupted experiment.
+    pub fn complete_trees(&mut self, is_wanted: impl Fn(&Job) -> bool) -> Result<(), Error> {
+        for (index, job) in self.jobs.iter().enumerate() {
+            if is_wanted(job) && !self.trees.contains_key(&index) {
+                // The same seed gives the same tree, so a kept run needs no tree file.
+                let performed = perform(self, job)?;
+                let (_, tree) = performed.ok_or_else(|| self.interrupted())?;
+                self.trees.insert(index, tree);
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the error of a measurement that is interrupted after all runs are finished.
+    pub fn interrupted(&self) -> Error {
+        Error::Interrupted { finished: self.jobs.len(), runs: self.jobs.len() }
+    }
+}
 
 /// Computes the lower bound of the scene's internal area that the experiment requests, if any.
 fn bound(experiment: &Experiment, scene: &Scene, watch: &Watch) -> Result<Option<BoundRow>, Error> {

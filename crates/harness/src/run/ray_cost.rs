@@ -1,7 +1,7 @@
 //! Judges the trees of all runs by rays that they were not trained on.
 
 use super::job::{Job, tracing_error};
-use super::runs::Work;
+use super::perform::Work;
 use crate::Error;
 use crate::measure::ray_cost::{Config, TestRays, TrainedOn, test_rays};
 use crate::rows::{LayoutRow, RunTestRow, TestRow, VisitRow};

@@ -1,53 +1,11 @@
 //! The runs of all methods on all scenes: in parallel or one by one.
 
 use super::job::Job;
-use super::perform::{Watch, perform};
+use super::perform::{Trees, Work, perform};
 use crate::Error;
-use crate::rows::store::Store;
-use crate::spec::Experiment;
-use bvh_core::Bvh;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
-
-/// The trees of runs by the index of the run.
-pub(crate) type Trees = BTreeMap<usize, Bvh>;
-
-/// A running experiment, with everything that its measurements share.
-pub(crate) struct Work<'a> {
-    pub experiment: &'a Experiment,
-    /// The selected runs: all runs, unless several processes share the experiment.
-    pub jobs: &'a [Job<'a>],
-    /// The costs of the greedy trees by scene.
-    pub bases: BTreeMap<String, f64>,
-    pub store: &'a Store,
-    pub watch: Watch<'a>,
-    /// The trees of performed runs that later measurements need.
-    pub trees: Trees,
-    /// Peculiarities of scene files and damaged runs, one line each.
-    pub remarks: Vec<String>,
-}
-
-impl Work<'_> {
-    /// Rebuilds the wanted trees whose runs were kept from an interrupted experiment.
-    pub fn complete_trees(&mut self, is_wanted: impl Fn(&Job) -> bool) -> Result<(), Error> {
-        for (index, job) in self.jobs.iter().enumerate() {
-            if is_wanted(job) && !self.trees.contains_key(&index) {
-                // The same seed gives the same tree, so a kept run needs no tree file.
-                let performed = perform(self, job)?;
-                let (_, tree) = performed.ok_or_else(|| self.interrupted())?;
-                self.trees.insert(index, tree);
-            }
-        }
-        Ok(())
-    }
-
-    /// Returns the error of a measurement that is interrupted after all runs are finished.
-    pub fn interrupted(&self) -> Error {
-        Error::Interrupted { finished: self.jobs.len(), runs: self.jobs.len() }
-    }
-}
 
 /// Performs the runs that are missing or damaged in the store, and keeps each once it finishes.
 pub(crate) fn measure(work: &mut Work) -> Result<(), Error> {

@@ -1,7 +1,7 @@
 //! Rays through the trees of first runs, timed by the program in `attic/`.
 
 use super::job::Job;
-use super::runs::Work;
+use super::perform::Work;
 use crate::Error;
 use crate::contestant::Contestant;
 use crate::peers::{self, FirstRun};
