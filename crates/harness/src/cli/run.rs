@@ -27,7 +27,7 @@ pub struct RunArgs {
     /// Limits the threads.
     #[command(flatten)]
     pub jobs: Jobs,
-    /// Compare with the committed results instead of writing any; exit code 1 on a difference.
+    /// Only compare with the committed results; exit code 1 on a difference.
     #[arg(long, conflicts_with = "resume")]
     pub check: bool,
     /// Make the tables and figures again from existing rows, with the current best known costs; run
@@ -76,8 +76,9 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let extent = Extent { existing, runs: args.runs.clone(), ..Extent::default() };
     let mut differences = 0;
     for experiment in &experiments {
-        if args.check {
-            differences += compare(args, experiment, interrupted)?;
+        let is_new = args.redraw || args.resume || args.force || !args.runs.is_empty();
+        if args.check || !is_new && finish::has_results_of(experiment, &args.out)? {
+            differences += repeat(args, experiment, interrupted)?;
             continue;
         }
         let summary = if args.redraw {
@@ -104,24 +105,36 @@ pub(super) fn print_summary(experiment: &Experiment, summary: &Summary) {
 
 /// Runs into a temporary folder and prints how the rows differ from the committed ones.
 ///
-/// Returns the number of differences.
-fn compare(
+/// Returns the number of differences. Only `--check` removes rows that differ or are not complete.
+fn repeat(
     args: &RunArgs,
     experiment: &Experiment,
     interrupted: &AtomicBool,
 ) -> Result<usize, Error> {
-    // A check must not touch the committed results, not even for a moment.
+    // A repetition must not touch the committed results, not even for a moment.
     let temporary =
         tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
     let fresh = temporary.path().join(experiment.folder());
     let committed = args.out.join(experiment.folder());
     // Gaps are measured from the references of the committed run, not from later finds.
     reference::adopt(&committed, temporary.path())?;
-    let summary = execute(experiment, temporary.path(), &Extent::default(), interrupted)?;
-    let found = check::compare(&fresh, &committed, &summary.skipped_scenes)?;
+    let repetition = execute(experiment, temporary.path(), &Extent::default(), interrupted);
     let name = &experiment.name;
-    for scene in &summary.skipped_scenes {
-        print_line(&format!("{name}: scene {scene} is not fetched; its rows are not compared"));
+    let found = match &repetition {
+        Ok(summary) => check::compare(&fresh, &committed, &summary.skipped_scenes)?,
+        Err(_) => Vec::new(),
+    };
+    if !args.check && (repetition.is_err() || !found.is_empty()) {
+        let fresh = temporary.keep();
+        print_error(&format!("{name}: the repetition is kept in {}", fresh.display()));
+    }
+    let summary = repetition?;
+    if args.check {
+        for scene in &summary.skipped_scenes {
+            print_line(&format!("{name}: scene {scene} is not fetched; its rows are not compared"));
+        }
+    } else if !args.quiet {
+        print_summary(experiment, &Summary { folder: committed, ..summary });
     }
     for difference in &found {
         print_line(&format!("{name}: {difference}"));

@@ -154,7 +154,7 @@ fn is_finished(
     let is_same = toml::from_str(&text).is_ok_and(|found| resolved.repeats(&found));
     let found = match (is_same, existing == Existing::Resume && !is_part) {
         (true, true) => return Ok(true),
-        (true, false) => "finished results; --check compares a repetition with them",
+        (true, false) => "finished results",
         (false, _) => "the results of another spec, scene or seed",
     };
     let folder = folder.display();

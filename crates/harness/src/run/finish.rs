@@ -88,6 +88,21 @@ pub fn remade(folder: &Path) -> Result<Vec<Output>, Error> {
     outputs(&resolved.experiment, folder)
 }
 
+/// Returns true if `out` has finished results of the same runs, perhaps with other reports.
+///
+/// # Errors
+///
+/// If the spec that the results record cannot be read.
+pub fn has_results_of(experiment: &Experiment, out: &Path) -> Result<bool, Error> {
+    let folder = out.join(experiment.folder());
+    let recorded = folder.join("resolved.toml");
+    if store::is_unfinished(&folder) || !recorded.is_file() {
+        return Ok(false);
+    }
+    let recorded: Option<Resolved> = toml::from_str(&read_text(&recorded)?).ok();
+    Ok(recorded.is_some_and(|recorded| recorded.has_runs_of(experiment)))
+}
+
 /// Makes the reports of finished runs again, with the current best known costs.
 ///
 /// Runs nothing and loads no scene. The rows in `out/NAME/` must come from the same spec, which may

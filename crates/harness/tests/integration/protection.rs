@@ -35,7 +35,19 @@ fn finished_results_are_replaced_by_force_only() {
     let results = dir.join("results/spec");
     let first = reproducible(&results);
     let first_timing = fs::read(results.join("timing.csv")).unwrap();
-    refused(dir, &["spec.toml"], &["results/spec has finished results", "--check", "--force"]);
+    // A repetition prints its tables and compares them, and writes nothing.
+    let repetition = said(dir, &["spec.toml"]);
+    assert!(repetition.contains("What stays?") && repetition.contains("spec: as committed"));
+    // Rows that differ are kept elsewhere.
+    let rows = fs::read(results.join("runs.csv")).unwrap();
+    fs::write(results.join("runs.csv"), rows.repeat(2)).unwrap();
+    let differing = run(dir, &["spec.toml"]);
+    ended(&differing, 1, &["the repetition is kept in"]);
+    let message = text(&differing.stderr);
+    let kept = message.split_once("kept in ").unwrap().1.lines().next().unwrap();
+    assert_eq!(fs::read(Path::new(kept).join("spec/runs.csv")).unwrap(), rows);
+    fs::remove_dir_all(kept).unwrap();
+    fs::write(results.join("runs.csv"), rows).unwrap();
     let part = of_part(dir, "spec.toml", 0, 1000);
     for other in ["--scene=spheres750", "--seed=2", part[0].as_str()] {
         refused(dir, &["spec.toml", other], &["results/spec", "--force", "--out"]);
