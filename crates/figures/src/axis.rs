@@ -184,8 +184,6 @@ impl Ruled {
         };
         match self.unit {
             Unit::Percent => format!("{} %", number(100.0 * value)),
-            Unit::Seconds if value < 0.099 => format!("{} ms", number(1000.0 * value)),
-            Unit::Seconds => format!("{} s", number(value)),
             Unit::Number | Unit::Bare => number(value),
         }
     }
@@ -210,31 +208,11 @@ mod tests {
             (Axis::log(""), [0.01, 100.0], 5, "0.01 0.1 1 10 100"),
             (Axis::log(""), [1.5, 60.0], 6, "2 5 10 20 50"),
             (Axis::log(""), [1.01, 1.04], 6, "1.01 1.02 1.03 1.04"),
-            (Axis::log("").unit(Unit::Seconds), [0.01, 10.0], 4, "10 ms 0.1 s 1 s 10 s"),
-            (Axis::log("").unit(Unit::Seconds), [0.0057, 8.4], 4, "10 ms 0.1 s 1 s"),
-            (Axis::log("").unit(Unit::Seconds), [0.0057, 14.0], 3, "10 ms 1 s"),
+            (Axis::log(""), [0.0057, 8.4], 4, "0.01 0.1 1"),
+            (Axis::log(""), [0.0057, 14.0], 3, "0.01 1"),
             (Axis::linear(""), [33.0, 47.0], 2, "35 40 45"),
         ] {
             assert_eq!(labels(&axis, &ends, most).join(" "), ticks, "{axis:?}");
-        }
-    }
-
-    #[test]
-    fn one_value_or_none_still_gives_an_axis() {
-        for axis in [
-            Axis::linear(""),
-            Axis::log(""),
-            Axis::log("").range(2.0, 1.0),
-            Axis::linear("").range(9.0, f64::NAN),
-        ] {
-            for values in
-                [vec![], vec![7.0], vec![1e-320], vec![0.0], vec![1e300, -1e300, f64::NAN]]
-            {
-                let ruled = Ruled::new(&axis, &values, 0.05);
-                assert!(ruled.low < ruled.high, "{values:?} gave {ruled:?}");
-                let ticks = labels(&axis, &values, 8);
-                assert!(ticks.len() <= 9, "{values:?} gave {ticks:?}");
-            }
         }
     }
 

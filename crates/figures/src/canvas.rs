@@ -124,14 +124,6 @@ impl<'a> Sheet<'a> {
         self.polygon(corners, fill, 1.0);
     }
 
-    /// Fills a rectangle.
-    pub fn rectangle(&mut self, frame: Frame, colour: Colour, opacity: f64) {
-        let Frame { left, top, width, height } = frame;
-        let (right, bottom) = (left + width, top + height);
-        let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
-        self.polygon(&corners, colour, opacity);
-    }
-
     /// Draws a line through these points.
     pub fn line(&mut self, points: &[Point], colour: Colour, width: f64, dash: Dash) {
         let style = colour.stroke_width(steps(width) as u32);

@@ -52,8 +52,7 @@ fn arrange<'a>(figure: &'a Figure, top: f64) -> (Vec<(Plot<'a>, Frame)>, f64) {
     let (columns, mut plots, beside, column_width) = Some(side_by_side(most))
         .filter(|(_, _, beside, width)| room(*beside, *width) >= 0.5 * width)
         .unwrap_or_else(|| side_by_side(1));
-    let room = room(beside, column_width);
-    let width = plots.iter().map(|plot| plot.width_beside_texts(room)).fold(room, f64::min);
+    let width = room(beside, column_width);
     plots.iter_mut().for_each(|plot| plot.fit_width(width));
     for upper in 0..plots.len().saturating_sub(columns) {
         let (above, below) = plots.split_at_mut(upper + 1);

@@ -1,7 +1,5 @@
 //! Draws the marks of a panel's layers.
 
-use std::collections::BTreeSet;
-
 use super::axis::Ruled;
 use super::canvas::{Frame, Point, Sheet};
 use super::model::{Layer, Marks};
@@ -82,43 +80,31 @@ impl Layers<'_> {
         }
     }
 
-    /// Draws the unbroken parts of a line or staircase. Points outside the panel move to its edge.
+    /// Draws the unbroken parts of a line. Points outside the panel move to its edge.
     fn line(&self, sheet: &mut Sheet, layer: &Layer) {
-        let (Marks::Line(points) | Marks::Steps(points)) = &layer.marks else { return };
-        let stairs = matches!(layer.marks, Marks::Steps(_));
+        let Marks::Line(points) = &layer.marks else { return };
         let stroke = self.strokes.of(&layer.name);
-        let shown = |axis: &Ruled, value| {
-            axis.nearest(value).filter(|_| stairs || axis.coordinate(value).is_some())
-        };
-        let at = |point: &Point| Some((shown(self.x, point.0)?, shown(self.y, point.1)?));
+        let at = |point: &Point| Some((self.x.nearest(point.0)?, self.y.nearest(point.1)?));
         for path in runs(points.iter().map(at)) {
-            let path = self.thinned(&stepped(path, stairs));
-            let path: Vec<Point> = path.iter().map(|at| self.place(at)).collect();
+            let path: Vec<Point> = self.thinned(&path).iter().map(|at| self.place(at)).collect();
             sheet.line(&path, stroke.colour, LINE, stroke.dash);
         }
     }
 
-    /// Draws points, smaller if there are many, and one marker for points that look the same.
+    /// Draws points, smaller if there are many.
     fn points(&self, sheet: &mut Sheet) {
-        let mut all: Vec<(&str, Point)> = Vec::new();
-        for layer in self.layers {
-            let Marks::Points(points) = &layer.marks else { continue };
-            let shown = |point: &Point| Some((self.x.shown(point.0)?, self.y.shown(point.1)?));
-            let placed = points.iter().filter_map(shown).map(|at| self.place(&at));
-            all.extend(placed.map(|at| (layer.name.as_str(), at)));
-        }
-        // Many large points would hide each other.
-        let (radius, edge, grain) = match all.len() {
-            0..300 => (5.0, 1.0, 0.25),
-            300..3000 => (2.5, 0.3, 0.5),
-            _ => (1.5, 0.0, 1.0),
+        let points = |layer: &Layer| match &layer.marks {
+            Marks::Points(points) => points.clone(),
+            _ => vec![],
         };
-        // A hundred thousand points would make an SVG of megabytes that looks the same.
-        let cell = |length: f64| (length / grain).round() as i32;
-        let mut seen: BTreeSet<(&str, i32, i32)> = BTreeSet::new();
-        all.retain(|&(name, (x, y))| seen.insert((name, cell(x), cell(y))));
-        for (name, at) in all {
-            self.strokes.of(name).mark(sheet, at, radius, edge);
+        let count: usize = self.layers.iter().map(|layer| points(layer).len()).sum();
+        // Many large points would hide each other.
+        let (radius, edge) = if count < 300 { (5.0, 1.0) } else { (2.5, 0.3) };
+        let shown = |at: Point| Some((self.x.shown(at.0)?, self.y.shown(at.1)?));
+        for layer in self.layers {
+            for at in points(layer).into_iter().filter_map(shown) {
+                self.strokes.of(&layer.name).mark(sheet, self.place(&at), radius, edge);
+            }
         }
     }
 
@@ -152,13 +138,4 @@ fn runs<T: Copy>(placed: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
     let placed: Vec<Option<T>> = placed.collect();
     let parts = placed.split(Option::is_none).map(|part| part.iter().copied().flatten().collect());
     parts.filter(|part: &Vec<T>| !part.is_empty()).collect()
-}
-
-/// Returns the path, or the staircase that holds each y until the next x.
-fn stepped(path: Vec<Point>, stairs: bool) -> Vec<Point> {
-    if !stairs {
-        return path;
-    }
-    let corners = path.windows(2).flat_map(|ends| [ends[0], (ends[1].0, ends[0].1)]);
-    corners.chain(path.last().copied()).collect()
 }

@@ -1,7 +1,7 @@
 //! The legend of a figure: its series and reference lines, shared by all panels.
 
-use super::canvas::{Align, Frame, Point, Sheet};
-use super::model::{Figure, Layer, Marks};
+use super::canvas::{Align, Point, Sheet};
+use super::model::{Figure, Layer};
 use super::style::{BAND, INK, REFERENCE_LINE, Stroke, Strokes};
 use super::text::{self, BODY};
 
@@ -39,12 +39,9 @@ impl Legend {
             };
             let line = has(Layer::is_line);
             let marker = has(Layer::is_marked);
-            let entry =
-                Entry { name: name.clone(), stroke: *stroke, line, marker, area: !line && !marker };
-            // A name in a panel needs no second one here.
-            (!has(|layer| matches!(layer.marks, Marks::Text(_)))).then_some(entry)
+            Entry { name: name.clone(), stroke: *stroke, line, marker, area: !line && !marker }
         };
-        let mut entries: Vec<Entry> = strokes.0.iter().filter_map(entry).collect();
+        let mut entries: Vec<Entry> = strokes.0.iter().map(entry).collect();
         for layer in layers() {
             let is_new = entries.iter().all(|entry| entry.name != layer.name);
             if layer.series().is_none() && !layer.name.trim().is_empty() && is_new {
@@ -82,9 +79,9 @@ impl Legend {
             let middle = corner.1 + ROW * ((index / self.columns) as f64 + 0.5);
             let Entry { stroke, .. } = entry;
             if entry.area {
-                let frame =
-                    Frame { left: left + 8.0, top: middle - 6.0, width: 14.0, height: 12.0 };
-                sheet.rectangle(frame, stroke.colour, BAND);
+                let corners = [(8.0, -6.0), (22.0, -6.0), (22.0, 6.0), (8.0, 6.0)];
+                let corners = corners.map(|(x, y)| (left + x, middle + y));
+                sheet.polygon(&corners, stroke.colour, BAND);
             }
             if entry.line {
                 let ends = [(left, middle), (left + SAMPLE, middle)];

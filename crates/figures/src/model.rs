@@ -39,8 +39,8 @@ pub enum Hue {
     Ink,
 }
 
-/// One pair of axes with layers. Bands are drawn first, then reference lines, spans, lines, points
-/// and texts; within a kind, the first layer is at the bottom.
+/// One pair of axes with layers. Bands are drawn first, then reference lines, spans, lines and
+/// points; within a kind, the first layer is at the bottom.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Panel {
     /// The title, printed bold above the panel; may be empty.
@@ -88,8 +88,6 @@ pub enum Unit {
     Number,
     /// Fractions in per cent.
     Percent,
-    /// Seconds, below a tenth in milliseconds.
-    Seconds,
     /// Not at all: there are no ticks.
     Bare,
 }
@@ -132,20 +130,16 @@ pub struct Layer {
     pub marks: Marks,
 }
 
-/// The marks of a layer in data units. Points that an axis cannot show, because they are not finite
-/// or not positive on a logarithmic axis, are skipped and interrupt a line.
+/// The marks of a layer in data units. Points that are not finite are skipped and interrupt a line.
+/// On a logarithmic axis, lines and bands run along the floor at values of 0 and below, and points
+/// there are skipped.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Marks {
     /// Straight lines through the points `(x, y)` in drawing order.
     Line(Vec<(f64, f64)>),
-    /// A staircase through `(x, y)`, x ascending: y holds until the next x, and the last point ends
-    /// the last step. On a logarithmic axis it falls to the floor at the first y that is 0 or
-    /// below.
-    Steps(Vec<(f64, f64)>),
     /// Markers at `(x, y)`.
     Points(Vec<(f64, f64)>),
-    /// A translucent area between two lines: `(x, lower, upper)`, x ascending. A lower value of 0
-    /// or below reaches the floor of a logarithmic axis.
+    /// A translucent area between two lines: `(x, lower, upper)`, x ascending.
     Band(Vec<(f64, f64, f64)>),
     /// Straight thin lines from point to point, such as the range of a value.
     Spans(Vec<[(f64, f64); 2]>),
@@ -153,15 +147,13 @@ pub enum Marks {
     HLine(f64),
     /// A vertical reference line at this place.
     VLine(f64),
-    /// A name in the colour of the series, to the right of this point; replaces the legend's entry.
-    Text((f64, f64)),
 }
 
 impl Marks {
-    /// The points of a series with data; none for spans, reference lines and names.
+    /// The points of a series with data; none for spans and reference lines.
     pub(super) fn data(&self) -> Vec<(f64, f64)> {
         match self {
-            Self::Line(points) | Self::Steps(points) | Self::Points(points) => points.clone(),
+            Self::Line(points) | Self::Points(points) => points.clone(),
             Self::Band(points) => {
                 points.iter().flat_map(|&(x, low, high)| [(x, low), (x, high)]).collect()
             }
@@ -182,9 +174,9 @@ impl Layer {
         (!is_reference).then_some(&self.name)
     }
 
-    /// Returns true for lines and staircases.
+    /// Returns true for lines.
     pub(super) fn is_line(&self) -> bool {
-        matches!(self.marks, Marks::Line(_) | Marks::Steps(_))
+        matches!(self.marks, Marks::Line(_))
     }
 
     /// Returns true for layers with markers at their points.

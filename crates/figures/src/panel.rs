@@ -1,9 +1,9 @@
 //! Draws one panel: axes, ticks, names and, by [`Layers`], the marks.
 
 use super::axis::{Ruled, axes};
-use super::canvas::{Align, Frame, Sheet, WHITE};
+use super::canvas::{Align, Frame, Sheet};
 use super::layers::Layers;
-use super::model::{Marks, Panel, Scale, Unit};
+use super::model::{Panel, Scale, Unit};
 use super::style::{FAINT, GREY, GRID, INK, Strokes};
 use super::text::{self, BODY, HEADING};
 
@@ -13,8 +13,6 @@ const TICK: f64 = 4.0;
 const LABEL: f64 = 5.0;
 /// The greatest width of the names of rows; longer ones are shortened.
 const NAMES: f64 = 310.0;
-/// Distance from a point to its text.
-const BESIDE: f64 = 9.0;
 
 /// A panel with the space it needs around its plot.
 pub(super) struct Plot<'a> {
@@ -24,8 +22,6 @@ pub(super) struct Plot<'a> {
     has_data: bool,
     /// The names of rows.
     names: Vec<String>,
-    /// Texts to the right of points: left end and middle in pixels of the plot, width and series.
-    texts: Vec<(f64, f64, f64, &'a str)>,
     title: Vec<String>,
     x_label: Vec<String>,
     y_label: Vec<String>,
@@ -59,7 +55,6 @@ impl<'a> Plot<'a> {
             y,
             has_data,
             names,
-            texts: Vec::new(),
             title: Vec::new(),
             x_label: Vec::new(),
             y_label,
@@ -70,24 +65,7 @@ impl<'a> Plot<'a> {
         }
     }
 
-    /// Returns the places of texts, as fractions of the plot from its upper left corner, and their
-    /// series.
-    fn anchors(&self) -> impl Iterator<Item = (f64, f64, &'a str)> {
-        self.panel.layers.iter().filter_map(|layer| {
-            let Marks::Text((x, y)) = layer.marks else { return None };
-            let x = self.x.fraction(self.x.nearest(x)?);
-            Some((x, 1.0 - self.y.fraction(self.y.nearest(y)?), layer.name.as_str()))
-        })
-    }
-
-    /// Returns the greatest width of the plot with which its texts are not wider than this.
-    pub fn width_beside_texts(&self, width: f64) -> f64 {
-        let fits = |(x, _, name): (f64, f64, &str)| (width - BESIDE - text::width(name, BODY)) / x;
-        self.anchors().map(fits).fold(width, f64::min).max(0.4 * width)
-    }
-
-    /// Finds the ticks of an x axis of this width, breaks the texts above and below into lines,
-    /// and finds places for the texts in the plot.
+    /// Finds the ticks of an x axis of this width, and breaks the texts above and below into lines.
     pub fn fit_width(&mut self, width: f64) {
         let apart = if self.panel.x.scale == Scale::Log { 55.0 } else { 40.0 };
         // Fewer ticks, not some without a label, keep the distances between them regular.
@@ -102,24 +80,6 @@ impl<'a> Plot<'a> {
         self.x_label = text::wrap(&self.panel.x.label, width, BODY);
         let ticks = if self.panel.x.unit == Unit::Bare { 0.0 } else { 2.0 * TICK + BODY.line() };
         self.below = (ticks + LABEL + BODY.line() * self.x_label.len() as f64).ceil();
-        let mut texts: Vec<_> = self
-            .anchors()
-            .map(|(x, y, name)| {
-                (x * width + BESIDE, y * self.height, text::width(name, BODY), name)
-            })
-            .collect();
-        texts.sort_by(|one, other| one.1.total_cmp(&other.1));
-        // A text moves below those above that it would cover.
-        for text in texts {
-            let mut text = text;
-            for above in &self.texts {
-                let is_beside = above.0 + above.2 < text.0 || text.0 + text.2 < above.0;
-                if !is_beside && text.1 < above.1 + BODY.line() {
-                    text.1 = above.1 + BODY.line();
-                }
-            }
-            self.texts.push(text);
-        }
     }
 
     /// Returns true if two neighbouring labels of the x axis leave no gap between them.
@@ -174,12 +134,6 @@ impl<'a> Plot<'a> {
         for (row, name) in (0..).zip(&self.names) {
             let place = (left - 2.0 * TICK, down(-f64::from(row)));
             sheet.text(place, name, BODY, INK, Align::Right);
-        }
-        for &(x, y, width, name) in &self.texts {
-            let height = BODY.size;
-            let ground = Frame { left: left + x, top: top + y - height / 2.0, width, height };
-            sheet.rectangle(ground, WHITE, 0.7);
-            sheet.text((left + x, top + y), name, BODY, strokes.of(name).colour, Align::Left);
         }
         if !self.has_data {
             sheet.text((centre, middle), "no data", BODY, GREY, Align::Center);

@@ -3,7 +3,7 @@
 use plotters::prelude::RGBColor;
 
 use super::canvas::{Colour, Dash, Point, Sheet, WHITE};
-use super::model::{Figure, Hue, Layer, Marks};
+use super::model::{Figure, Hue};
 
 /// The colour of text and axes.
 pub(super) const INK: Colour = RGBColor(0x22, 0x22, 0x22);
@@ -107,11 +107,8 @@ pub(super) struct Strokes(pub Vec<(String, Stroke)>);
 
 impl Strokes {
     pub fn new(figure: &Figure) -> Self {
-        let layers = || figure.panels.iter().flat_map(|panel| &panel.layers);
-        let is_text = |layer: &&Layer| matches!(layer.marks, Marks::Text(_));
+        let layers = figure.panels.iter().flat_map(|panel| &panel.layers);
         let mut names: Vec<&str> = Vec::new();
-        // Words without marks take no mark from a series.
-        let layers = layers().filter(|layer| !is_text(layer)).chain(layers().filter(is_text));
         for name in layers.filter_map(|layer| layer.series()).filter(|name| !name.is_empty()) {
             if !names.contains(&name) {
                 names.push(name);
@@ -135,7 +132,7 @@ impl Strokes {
 
 #[cfg(test)]
 mod tests {
-    use super::super::model::Panel;
+    use super::super::model::{Layer, Marks, Panel};
     use super::*;
 
     fn strokes(names: &[String], hues: Vec<(String, Hue)>) -> Vec<(String, Stroke)> {
@@ -155,17 +152,6 @@ mod tests {
                 assert!(one.colour != other.colour, "series {i} looks like another");
             }
         }
-    }
-
-    #[test]
-    fn words_take_no_mark_from_a_series() {
-        let layers = vec![
-            Layer::new("heading", Marks::Text((0.0, 0.0))),
-            Layer::new("series", Marks::Points(vec![(0.0, 0.0)])),
-        ];
-        let panel = Panel { layers, ..Panel::default() };
-        let strokes = Strokes::new(&Figure { panels: vec![panel], ..Figure::default() });
-        assert_eq!(strokes.of("series").marker, MARKERS[0]);
     }
 
     #[test]

@@ -4,7 +4,6 @@
 use crate::Error;
 use crate::files;
 use crate::report::output::Output;
-use crate::report::overview;
 use crate::report::paper::{PaperRow, Verdict};
 use crate::run::finish::outputs;
 use crate::run::provenance::Provenance;
@@ -46,13 +45,6 @@ impl Section {
             tables: ending(".csv"),
             provenance: read_toml(&folder.join("provenance.toml"))?,
         })
-    }
-
-    /// Returns the first thing that the experiment's rows say.
-    fn finding(&self) -> Option<String> {
-        let said = self.outputs.iter().find_map(|output| output.finding.as_ref())?;
-        // No line ends between a number and its sign.
-        Some(said.replace(" %", "\u{a0}%"))
     }
 
     /// Returns the comparisons with the paper's numbers and words.
@@ -108,7 +100,6 @@ fn page(sections: &[Section]) -> Markup {
                         @for section in sections {
                             li {
                                 a href={ "#" (in_url(&section.name)) } { (section.question) }
-                                @if let Some(finding) = section.finding() { " " (finding) "." }
                             }
                         }
                     }
@@ -123,7 +114,7 @@ fn page(sections: &[Section]) -> Markup {
 /// The two pictures that say the most, wherever they are: error against run time, and all checks of
 /// extreme scenes.
 fn pictures(sections: &[Section]) -> Markup {
-    let files = [overview::FIGURE, stress::FIGURE].map(|name| format!("{name}.svg"));
+    let files = ["timing_overview", stress::FIGURE].map(|name| format!("{name}.svg"));
     let figures = sections.iter().flat_map(|section| &section.figures);
     html! {
         @for (name, path) in figures.filter(|(name, _)| files.contains(name)) {
@@ -163,7 +154,6 @@ fn experiment(section: &Section) -> Markup {
     html! {
         section id=(in_url(&section.name)) {
             h2 { (section.question) }
-            @if let Some(finding) = section.finding() { p { (finding) "." } }
             @for (name, path) in &section.figures {
                 figure { img.sheet src=(path) alt=(name) loading="lazy"; }
             }

@@ -2,6 +2,7 @@
 
 use super::config::check_file;
 use super::data::{Series, ratio};
+use super::drawing::{Drawing, Shape};
 use super::prelude::*;
 use crate::statistics::quartiles;
 
@@ -39,28 +40,34 @@ const PER_DECADE: f64 = 20.0;
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let mut output = Output::default();
-        let caption = "Median and quartiles over repetitions. Points are builders. A curve falls \
-                       through the floor where it is the best known.";
         let mut points = Vec::new();
-        let mut panels = Vec::new();
         for scene in rows.scenes() {
             // A scene without a reference has no gaps.
             let Some(reference) = rows.reference(scene) else { continue };
-            let mut layers = Vec::new();
             for method in &self.methods {
-                let runs = rows.series(scene, method);
-                let curve = curve(scene, method, &runs, reference.cost);
-                layers.extend(draw(method, &curve));
-                points.extend(curve);
+                points.extend(curve(scene, method, &rows.series(scene, method), reference.cost));
             }
-            let x = Axis::log("time").unit(Unit::Seconds);
-            let y = Axis::log("above the best known").unit(Unit::Percent);
-            panels.push(panel(rows.shown(scene), x, y, layers));
         }
+        let figure = Drawing {
+            marks: Shape::Steps,
+            panels: vec!["scene".into()],
+            x: "seconds".into(),
+            y: "gap_median".into(),
+            ends: Some(["gap_quartile_1", "gap_quartile_3"].map(str::to_owned)),
+            series: vec!["method".into()],
+            x_label: "seconds".into(),
+            y_label: "above the best known".into(),
+            log_x: true,
+            log_y: true,
+            percent_y: true,
+            ..Drawing::default()
+        };
+        let caption = "Median and quartiles over repetitions. Points are builders. A curve falls \
+                       to the floor where it is the best known.";
+        let mut output = Output::default();
         let file = format!("timing_{}", self.file);
         output.add_csv(&file, &corners(&points))?;
-        output.add_figure(file, caption, 2, panels);
+        output.add_figure(file, caption, 2, figure.panels(rows, &output.table()?));
         Ok(output)
     }
 }
@@ -109,22 +116,6 @@ fn corners<'a>(points: &[Point<'a>]) -> Vec<Point<'a>> {
         }
     }
     kept
-}
-
-/// A staircase with its band, or a marker for a single point.
-fn draw(method: &str, points: &[Point]) -> Vec<Layer> {
-    let medians: Vec<(f64, f64)> =
-        points.iter().map(|point| (point.seconds, point.gap_median)).collect();
-    // A builder has one event, and a staircase of one corner would be invisible.
-    if points.len() == 1 {
-        return vec![Layer::new(method, Marks::Points(medians))];
-    }
-    // Both quartiles hold until the next corner.
-    let ends = |point: Point| (point.seconds, point.gap_quartile_1, point.gap_quartile_3);
-    let corners =
-        points.windows(2).flat_map(|ends| [ends[0], Point { seconds: ends[1].seconds, ..ends[0] }]);
-    let band = corners.chain(points.last().copied()).map(ends).collect();
-    vec![Layer::new(method, Marks::Band(band)), Layer::new(method, Marks::Steps(medians))]
 }
 
 #[cfg(test)]

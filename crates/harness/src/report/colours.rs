@@ -5,11 +5,11 @@ use figures::Hue::{self, *};
 
 /// Beginnings of names of series by their colour; the longest that fits decides.
 const COLOURS: [(Hue, &[&str]); 13] = [
-    (Ink, &["Build", "Müller–Fellner", "Other", "Search", "Trace", "exact SAH sweep", "greedy"]),
+    (Ink, &["Müller–Fellner", "exact SAH sweep", "greedy"]),
     (Olive, &["Goldsmith–Salmon", "best, never exact", "rebuild"]),
     (Green, &["GRASP", "best of 10", "k = 2", "noise", "valid tree"]),
     (Forest, &["GRASP, noise", "best of 100", "median cut", "treelets"]),
-    (Blue, &["a minute", "best", "refused"]),
+    (Blue, &["best", "refused"]),
     (Wine, &["annealing"]),
     (Sky, &["best by rays", "rotations"]),
     (Pink, &["best of each axis", "ruin and recreate"]),

@@ -13,21 +13,23 @@ macro_rules! report {
                 source: String;
                 /// The report in words.
                 title: String;
-                /// What the rows say, the title of figures. `{CONDITIONS | MEASURE}` in it is a
-                /// number of the table, `{FILE | CONDITIONS | MEASURE}` of another file of the
-                /// experiment.
-                finding: String;
                 /// Reason for differences from the paper.
                 reason: String;
                 $($keys)*
+                /// A figure of the report's first table.
+                #[serde(skip_serializing_if = "Option::is_none")]
+                figure: Option<$crate::report::drawing::Drawing>, in bvh_config::Nested;
             }
             $($check)*
         }
 
         impl Config {
-            pub(super) fn headed(&self, output: Output, rows: &Rows) -> Result<Output, Error> {
-                let Self { source, title, finding, reason, .. } = self;
-                output.headed(source, title, finding, reason, rows)
+            pub(super) fn finish(&self, mut output: Output, rows: &Rows) -> Result<Output, Error> {
+                let Self { source, title, reason, figure, .. } = self;
+                if let Some(figure) = figure {
+                    figure.draw(rows, &mut output)?;
+                }
+                Ok(output.headed(source, title, reason))
             }
         }
     };
@@ -81,12 +83,6 @@ bvh_config::config! { serde;
     }
 }
 
-impl Labels for Series {
-    fn labels(&self, key: &str) -> Vec<(String, &str)> {
-        self.methods.labels(&format!("{key}.methods"))
-    }
-}
-
 /// Rejects names of CSV files that could lead to another folder or replace rows of the runs.
 /// `before` stands before the name.
 pub fn check_file(before: &str, name: &str) -> Result<(), OutOfRange> {
@@ -96,7 +92,7 @@ pub fn check_file(before: &str, name: &str) -> Result<(), OutOfRange> {
         return Err(OutOfRange::new("file", format!("{name:?}"), "letters, digits, - and _"));
     }
     let csv = format!("{before}{name}.csv");
-    if rows::files().any(|(file, _)| *file == csv) {
+    if rows::FILES.contains(&csv.as_str()) {
         let accepted = format!("a name other than that of {csv}, which runs write");
         return Err(OutOfRange::new("file", format!("{name:?}"), accepted));
     }

@@ -103,15 +103,11 @@ fn cost_of(rows: &Rows, cost: &str, run: &RunRow) -> Option<f64> {
 
 pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     let mut correlations = Vec::new();
-    let mut panels = Vec::new();
     let costs = costs(rows);
     let trees = trees(rows);
-    let random = distinct(rows.rays.iter().map(|row| (&row.family, &row.query))).len();
     let kinds = distinct(trees.iter().map(|tree| tree.kind));
     for scene in rows.scenes() {
-        for (number, &kind) in kinds.iter().enumerate() {
-            let start = correlations.len();
-            let mut points = Vec::new();
+        for &kind in &kinds {
             for method in &config.methods {
                 let is_own = |tree: &&Tree| {
                     (tree.run.scene.as_str(), &tree.run.method, tree.kind) == (scene, method, kind)
@@ -122,26 +118,11 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
                     let pairs: Vec<_> = own.iter().filter_map(pair).collect();
                     correlations.push(correlate(scene, method, kind, cost, &pairs));
                 }
-                let at = |tree: &&Tree| (tree.run.goldsmith_salmon, tree.tests);
-                points.push(Layer::new(method, Marks::Points(own.iter().map(at).collect())));
-            }
-            // Only random rays are drawn; kinds of rays through layouts would make too many panels.
-            if number < random {
-                let rank = correlations[start].spearman;
-                let rank = rank.map_or_else(String::new, |rank| format!(", ρ = {rank:.3}"));
-                let title = format!("{}: {}, {}{rank}", rows.shown(scene), kind.0, kind.1);
-                let x = Axis::linear("Goldsmith–Salmon cost");
-                panels.push(panel(title, x, Axis::linear("box tests per ray"), points));
             }
         }
     }
     let mut output = Output::default();
     output.add_csv("correlation", &correlations)?;
-    let caption = format!(
-        "One point per tree, the same rays for all trees of a scene. ρ is Spearman's rank correlation over the trees of ‘{}’.",
-        config.case()
-    );
-    output.add_figure("correlation", caption, random, panels);
     output.paper = config.compare(rows, &correlations);
     let columns = "scene method trees cost family query pearson spearman";
     output.show(
@@ -153,17 +134,14 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
 }
 
 impl Config {
-    /// The label of the paper's own case.
-    fn case(&self) -> &str {
-        self.methods.first().map_or("", String::as_str)
-    }
-
     /// Compares the paper's words with the correlation of its cost and its rays over the trees of
     /// its case, scene by scene.
     fn compare(&self, rows: &Rows, correlations: &[Correlation]) -> Vec<PaperRow> {
         let Some(says) = &self.paper_says else { return Vec::new() };
         let is_of_paper = |row: &&Correlation| {
-            row.method == self.case() && row.cost == OF_AREA && (row.family, row.query) == OF_PAPER
+            row.method == self.methods[0]
+                && row.cost == OF_AREA
+                && (row.family, row.query) == OF_PAPER
         };
         let compare = |row: &Correlation| {
             let pearson = row.pearson?;
@@ -218,7 +196,6 @@ fn correlate<'a>(
 mod tests {
     use super::*;
     use crate::report::data::run;
-    use crate::report::query::Row;
     use crate::rows::RayRow;
 
     /// Rows of two methods, whose costs predict nothing within either, though the second is dearer
@@ -231,18 +208,13 @@ mod tests {
             {
                 let goldsmith_salmon = level + cost;
                 rows.runs.push(RunRow { goldsmith_salmon, ..run(method, repetition, 1, 0) });
-                let scene = "s".to_owned();
-                let method = method.to_owned();
-                let family = OF_PAPER.0.to_owned();
-                let query = OF_PAPER.1.to_owned();
-                let boxes_per_ray = level + tests;
                 rows.rays.push(RayRow {
-                    scene,
-                    method,
+                    scene: "s".into(),
+                    method: method.into(),
                     repetition,
-                    family,
-                    query,
-                    boxes_per_ray,
+                    family: OF_PAPER.0.into(),
+                    query: OF_PAPER.1.into(),
+                    boxes_per_ray: level + tests,
                     ..RayRow::default()
                 });
             }
@@ -263,8 +235,7 @@ mod tests {
     #[test]
     fn trees_of_different_methods_are_never_ranked_together() {
         let output = output();
-        let mut reader = csv::Reader::from_reader(&output.csv[0].1[..]);
-        let rows: Vec<Row> = reader.deserialize().map(Result::unwrap).collect();
+        let rows = output.table().unwrap();
         let own = rows.iter().filter(|row| row["cost"] == OF_AREA);
         let own: Vec<(&str, f64)> =
             own.map(|row| (row["method"].as_str(), row["spearman"].parse().unwrap())).collect();

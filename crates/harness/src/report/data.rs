@@ -1,6 +1,8 @@
 //! Reads the rows of an experiment's CSV files and selects from them for reports.
 
+use super::query;
 use crate::Error;
+use crate::rows::csv_file::parse;
 use crate::rows::{
     self, ClockRow, HistoryRow, RayRow, ReferenceRow, Row, RunRow, RunTestRow, TestRow, TimingRow,
     TrialRow, VisitRow,
@@ -19,6 +21,8 @@ pub type Series = Vec<(f64, f64)>;
 pub struct Rows {
     /// The experiment's folder, for reports that read further files.
     pub folder: PathBuf,
+    /// The CSV files of earlier reports: names without extension, and bytes.
+    pub made: Vec<(String, Vec<u8>)>,
     pub runs: Vec<RunRow>,
     pub history: Vec<HistoryRow>,
     pub trials: Vec<TrialRow>,
@@ -38,6 +42,7 @@ impl Rows {
     pub fn read(folder: &Path) -> Result<Self, Error> {
         Ok(Self {
             folder: folder.to_owned(),
+            made: vec![],
             runs: rows::read(&folder.join(RunRow::FILE))?,
             history: rows::read_if_any(folder)?,
             trials: rows::read_if_any(folder)?,
@@ -49,6 +54,21 @@ impl Rows {
             run_tests: rows::read_if_any(folder)?,
             visits: rows::read_if_any(folder)?,
         })
+    }
+
+    /// Reads a CSV file of the experiment's runs or of an earlier report.
+    pub fn read_file(&self, file: &str) -> Result<Vec<query::Row>, Error> {
+        let path = self.folder.join(file);
+        let is_of_file = |(name, _): &&(String, _)| file.strip_suffix(".csv") == Some(name);
+        if let Some((_, bytes)) = self.made.iter().find(is_of_file) {
+            return parse(bytes, &path);
+        }
+        // What else lies in the folder is of an earlier experiment.
+        if !rows::FILES.contains(&file) || !path.is_file() {
+            let message = "neither a run nor a report before this one writes this file".into();
+            return Err(Error::Query { path, message });
+        }
+        rows::read(&path)
     }
 
     /// Returns the scenes in the order of the rows.
@@ -69,8 +89,9 @@ impl Rows {
     /// Returns the scene's name for tables and figures: its kind follows unless it is a file.
     pub fn shown(&self, scene: &str) -> String {
         let kind = self.kind(scene);
-        // Everything that is not a file is marked, so that no stand-in passes for an original.
-        if kind == SceneKind::File.to_string() { scene.into() } else { format!("{scene} ({kind})") }
+        // Every scene that is no file is marked, so that no stand-in passes for an original.
+        let is_plain = kind.is_empty() || kind == SceneKind::File.to_string();
+        if is_plain { scene.into() } else { format!("{scene} ({kind})") }
     }
 
     /// Returns the cost of the scene's greedy tree.

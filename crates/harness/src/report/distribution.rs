@@ -1,5 +1,6 @@
 //! Distributions of the costs of independent trials.
 
+use super::drawing::{Point, Shape, curve};
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
 use crate::statistics::{mean, quantile, range, sorted};
@@ -53,9 +54,12 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
             let costs = sorted(&rows.trial_costs(scene, method));
             summaries.push(summarise(scene, method, &costs, base_cost));
             let count = costs.len() as f64;
-            let step = |(cost, rank): (&f64, u32)| (cost / base_cost, f64::from(rank) / count);
-            layers
-                .push(Layer::new(method, Marks::Steps(costs.iter().zip(1..).map(step).collect())));
+            let step = |(cost, rank): (&f64, u32)| {
+                let (x, y) = (cost / base_cost, f64::from(rank) / count);
+                Point { x, y, ends: None }
+            };
+            let steps: Vec<Point> = costs.iter().zip(1..).map(step).collect();
+            layers.extend(curve(method, &steps, Shape::Steps));
         }
         layers.push(Layer::new("greedy", Marks::VLine(1.0)));
         let y = Axis::linear("trials at most as costly").range(0.0, 1.0).unit(Unit::Percent);

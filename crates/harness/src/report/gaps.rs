@@ -3,7 +3,7 @@
 use super::prelude::*;
 use crate::statistics::quantile;
 use bvh_scenes::subset::Subset;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 report! {
     /// Gaps to the exact optimum.
@@ -42,12 +42,6 @@ impl Config {
         let summaries = self.summaries(rows);
         let mut output = Output::default();
         output.add_csv("gaps", &summaries)?;
-        let optima = rows.runs.iter().filter(|run| run.method == self.optimum).count();
-        let caption = format!(
-            "{optima} small scenes. Left, the fraction of runs that end at the optimum; right, the \
-             worst gap of any."
-        );
-        output.add_figure("gaps", caption, 2, self.draw(&summaries));
         let columns = "method part objects runs solved_fraction median_gap maximum_gap";
         output.show("Gaps to the exact optimum:", &summaries, columns)?;
         Ok(output)
@@ -81,33 +75,6 @@ impl Config {
             }));
         }
         summaries
-    }
-
-    /// Draws the fraction solved and the worst gap against size, for every kind of part.
-    fn draw(&self, summaries: &[Gaps]) -> Vec<Panel> {
-        let draw = |part: &str, title: &str, y: Axis, value: fn(&Gaps) -> f64| {
-            let is_own = |gaps: &&Gaps, method: &str| gaps.part == part && gaps.method == method;
-            let line = |method: &String| {
-                let own = summaries.iter().filter(|gaps| is_own(gaps, method));
-                let points: Vec<_> = own.map(|gaps| (gaps.objects as f64, value(gaps))).collect();
-                let marks = [Marks::Line(points.clone()), Marks::Points(points)];
-                marks.map(|marks| Layer::new(method, marks))
-            };
-            let lines = self.methods.iter().flat_map(line).collect();
-            let y = y.unit(Unit::Percent);
-            panel(format!("{part}, {title}"), Axis::linear("objects"), y, lines)
-        };
-        let both = |part| {
-            let fraction = Axis::linear("runs").range(0.0, 1.02);
-            [
-                draw(part, "solved", fraction, |gaps| gaps.solved_fraction),
-                draw(part, "greatest gap", Axis::linear("greatest gap"), |gaps| {
-                    gaps.maximum_gap.max(0.0)
-                }),
-            ]
-        };
-        let parts: BTreeSet<&str> = summaries.iter().map(|gaps| gaps.part).collect();
-        parts.into_iter().flat_map(both).collect()
     }
 }
 

@@ -8,16 +8,15 @@ pub mod config;
 mod correlation;
 pub mod data;
 pub mod distribution;
+pub mod drawing;
 pub mod gaps;
 pub mod generations;
 pub mod numbers;
 pub mod output;
-pub mod overview;
 pub mod paper;
 mod prelude;
 pub mod query;
 mod query_column;
-mod query_figure;
 pub mod query_measure;
 pub mod query_report;
 mod ray_cost;
@@ -26,12 +25,13 @@ pub mod trials;
 
 use crate::Error;
 use crate::rows::store::Store;
-use crate::statistics::{median, minimum};
+use crate::rows::{Row as _, RunRow, TimingRow};
 use bvh_config::{Check, OutOfRange};
 use config::Labels as _;
 use data::Rows;
 use output::Output;
 use paper::PaperRow;
+use query_column::Column;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::HashSet;
 use std::path::Path;
@@ -79,7 +79,7 @@ macro_rules! reports {
 
             fn write(&self, rows: &Rows) -> Result<Output, Error> {
                 match self {
-                    $(Self::$kind(config) => config.headed($write(config, rows)?, rows),)*
+                    $(Self::$kind(config) => config.finish($write(config, rows)?, rows),)*
                 }
             }
         }
@@ -99,15 +99,13 @@ reports! {
     "correlation" => Correlation(correlation::Config: methods) by correlation::write;
     /// Error against run time.
     "anytime" => Anytime(anytime::Config: methods) by anytime::Config::write;
-    /// Error against run time of all scenes in one panel.
-    "overview" => Overview(overview::Config: points, line) by overview::Config::write;
     /// Gaps to the exact optimum of small scenes.
     "gaps" => Gaps(gaps::Config: methods, optimum) by gaps::Config::write;
     /// Medians, quartiles, and seconds until targets are reached.
     "numbers" => Numbers(numbers::Config: methods) by numbers::Config::write;
     /// Tests of rays in trees that are trained on rays.
     "ray_cost" => RayCost(ray_cost::Config: base, pairs) by ray_cost::Config::write;
-    /// Rows of one CSV file, selected, grouped, aggregated and drawn.
+    /// Rows of a CSV file of a run or of an earlier report, selected, grouped, aggregated and drawn.
     "query" => Query(query_report::Config: pairs) by query_report::Config::write;
 }
 
@@ -128,16 +126,20 @@ impl Report {
 
     /// Returns true if the report measures gaps, for which it needs the times of events.
     pub fn needs_references(&self) -> bool {
-        matches!(self, Self::Anytime(_) | Self::Numbers(_) | Self::Overview(_))
+        matches!(self, Self::Anytime(_) | Self::Numbers(_))
     }
 }
 
 /// Makes all reports from the CSV files in a folder; the comparison with the paper is last. Writes
 /// nothing.
 pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> {
-    let rows = Rows::read(folder)?;
-    let mut outputs =
-        reports.iter().map(|report| report.write(&rows)).collect::<Result<Vec<_>, _>>()?;
+    let mut rows = Rows::read(folder)?;
+    let mut outputs = Vec::new();
+    for report in reports {
+        let output = report.write(&rows)?;
+        rows.made.extend(output.csv.clone());
+        outputs.push(output);
+    }
     // A spec without reports is a first try, whose author wants to see the costs.
     if reports.is_empty() {
         outputs.push(final_costs(&rows)?);
@@ -184,33 +186,26 @@ pub fn write_all(outputs: &[Output], store: &Store, drawn: bool) -> Result<Strin
 
 /// Returns the table of final costs, for experiments without reports.
 fn final_costs(rows: &Rows) -> Result<Output, Error> {
-    #[derive(Serialize)]
-    struct Row<'a> {
-        scene: String,
-        method: &'a str,
-        runs: usize,
-        least_over_base: Option<f64>,
-        median_over_base: Option<f64>,
-        median_seconds: Option<f64>,
-    }
-    let mut table = Vec::new();
-    for scene in rows.scenes() {
-        for method in rows.methods() {
-            let ratios = rows.final_ratios(scene, method);
-            table.push(Row {
-                scene: rows.shown(scene),
-                method,
-                runs: ratios.len(),
-                least_over_base: minimum(ratios.iter().copied()),
-                median_over_base: median(&ratios),
-                median_seconds: median(&rows.seconds_of(scene, method)),
-            });
-        }
-    }
-    let mut output = Output::new("", "Final costs");
-    let columns = "scene method runs least_over_base median_over_base median_seconds";
-    output.show("Cost over that of the greedy tree:", &table, columns)?;
-    Ok(output)
+    let columns = [
+        ("runs", "count cost"),
+        ("least_over_base", "min cost_over_base"),
+        ("median_over_base", "median cost_over_base"),
+        ("median_seconds", "median seconds"),
+    ];
+    let column = |(name, value): (&str, &str)| Column {
+        name: name.into(),
+        value: value.into(),
+        ..Column::default()
+    };
+    let costs = query_report::Config {
+        rows: RunRow::FILE.into(),
+        join: TimingRow::FILE.into(),
+        by: ["scene", "scene_kind", "method"].map(str::to_owned).into(),
+        columns: columns.map(column).into(),
+        ..query_report::Config::default()
+    };
+    let tables = costs.write(rows)?.tables;
+    Ok(Output { tables, ..Output::new("", "Final costs over those of the greedy tree") })
 }
 
 /// Collects the comparisons with the paper of all reports.

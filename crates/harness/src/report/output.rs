@@ -2,24 +2,20 @@
 //! terminal.
 
 use super::colours::hue;
-use super::data::{Rows, distinct};
 use super::paper::PaperRow;
-use super::query::{QueryError, Row};
-use super::query_measure::filled;
+use super::query::Row;
 use crate::Error;
-use crate::rows::csv_file::{bytes_of, parse, read, to_bytes};
+use crate::rows::csv_file::{bytes_of, parse, to_bytes};
 use comfy_table::{Table, presets};
-use figures::{Axis, Figure, Layer, Marks, Panel};
+use figures::{Axis, Figure, Layer, Panel};
 use serde::Serialize;
 use std::path::Path;
 
 /// The output of a report.
 #[derive(Clone, Debug, Default)]
 pub struct Output {
-    /// Source and title of the report; the first line of its text.
+    /// Source and title of the report: the first line of its text, and the title of its figures.
     pub heading: String,
-    /// What the rows say, computed from them: the title of figures, which otherwise is the heading.
-    pub finding: Option<String>,
     /// CSV files: name without extension, and bytes. Names that begin with `timing` hold seconds.
     pub csv: Vec<(String, Vec<u8>)>,
     /// Figures: name without extension, and what they show.
@@ -38,23 +34,12 @@ impl Output {
         Self { heading, ..Self::default() }
     }
 
-    /// Adds the heading, and what the rows say. Figures whose title is that have the heading in
-    /// their captions.
-    pub fn headed(
-        mut self,
-        source: &str,
-        title: &str,
-        finding: &str,
-        reason: &str,
-        rows: &Rows,
-    ) -> Result<Self, Error> {
+    /// Adds the heading, and the source and the reason to comparisons with the paper.
+    #[must_use]
+    pub fn headed(mut self, source: &str, title: &str, reason: &str) -> Self {
         self.heading = Self::new(source, title).heading;
-        self.say(finding, rows)?;
         for (_, figure) in &mut self.figures {
-            figure.title.clone_from(self.finding.as_ref().unwrap_or(&self.heading));
-            if self.finding.is_some() && !self.heading.is_empty() {
-                figure.caption = format!("{}. {}", self.heading, figure.caption);
-            }
+            figure.title.clone_from(&self.heading);
         }
         for row in &mut self.paper {
             row.source = source.into();
@@ -62,7 +47,7 @@ impl Output {
                 row.reason = reason.into();
             }
         }
-        Ok(self)
+        self
     }
 
     /// Adds the CSV file `name`, without its extension.
@@ -77,28 +62,10 @@ impl Output {
         Ok(())
     }
 
-    /// Sets what the rows say: a text in which numbers of the first CSV file and of other files are
-    /// [filled in](filled). Nothing if the text is empty, or if there is no such row, as in a quick
-    /// variant with other scenes.
-    fn say(&mut self, finding: &str, rows: &Rows) -> Result<(), Error> {
-        if finding.is_empty() {
-            return Ok(());
-        }
-        let own = self.csv.first().map_or(&[][..], |(_, bytes)| bytes);
-        let read = |file: &str| match file {
-            "" => parse(own, Path::new("the table")),
-            file => read(&rows.folder.join(file)),
-        };
-        let read = |file: &str| read(file).map_err(|error| QueryError::File(error.to_string()));
-        self.finding = match filled(finding, &read) {
-            Err(QueryError::NoRow(_)) => None,
-            Ok(said) => Some(said),
-            Err(error) => {
-                let message = format!("finding: {error}");
-                return Err(Error::Query { path: rows.folder.clone(), message });
-            }
-        };
-        Ok(())
+    /// Returns the rows of the first CSV file.
+    pub fn table(&self) -> Result<Vec<Row>, Error> {
+        let bytes = self.csv.first().map_or(&[][..], |(_, bytes)| bytes);
+        parse(bytes, Path::new("table"))
     }
 
     /// Adds a figure of these panels.
@@ -109,7 +76,7 @@ impl Output {
         columns: usize,
         panels: Vec<Panel>,
     ) {
-        let title = self.finding.clone().unwrap_or_default();
+        let title = self.heading.clone();
         let series = panels.iter().flat_map(|panel| &panel.layers).filter_map(Layer::series);
         let hues = series.filter_map(|name| Some((name.to_owned(), hue(name)?))).collect();
         self.figures
@@ -190,38 +157,6 @@ fn four_digits(text: &str) -> String {
     }
 }
 
-/// A value in a named row.
-pub struct Dot {
-    /// Name of the row.
-    pub row: String,
-    /// Name of the series.
-    pub series: String,
-    /// The value.
-    pub value: f64,
-    /// The ends of its interval, if it has one.
-    pub ends: Option<(f64, f64)>,
-}
-
-/// Makes a panel of values in these rows. The series of a row are below each other.
-pub fn dots(title: impl Into<String>, x: Axis, rows: Vec<String>, dots: &[Dot]) -> Panel {
-    let series = distinct(dots.iter().map(|dot| dot.series.as_str()));
-    let count = series.len() as f64;
-    let mut layers = Vec::new();
-    for (name, number) in series.into_iter().zip(0..) {
-        let mut points = Vec::new();
-        let mut spans = Vec::new();
-        for Dot { row, value, ends, .. } in dots.iter().filter(|dot| dot.series == name) {
-            let Some(row) = rows.iter().position(|name| name == row) else { continue };
-            let height = row as f64 + 0.8 * ((f64::from(number) + 0.5) / count - 0.5);
-            points.push((*value, height));
-            spans.extend(ends.map(|(low, high)| [(low, height), (high, height)]));
-        }
-        layers.push(Layer::new(name, Marks::Spans(spans)));
-        layers.push(Layer::new(name, Marks::Points(points)));
-    }
-    panel(title, x, Axis::rows(rows, (10.0 * count + 6.0).max(24.0)), layers)
-}
-
 /// Makes a panel.
 pub fn panel(title: impl Into<String>, x: Axis, y: Axis, layers: Vec<Layer>) -> Panel {
     Panel { title: title.into(), x, y, layers }
@@ -239,25 +174,5 @@ mod tests {
             shown,
             ["1.235", "0.01235", "12346", "1.500e-9", "0", "123456", "best", "-1.000"]
         );
-    }
-
-    #[test]
-    fn a_table_has_the_columns_asked_for_under_their_names() {
-        #[derive(Serialize)]
-        struct Row {
-            scene: &'static str,
-            hidden: u32,
-            gap: f64,
-        }
-        let mut output = Output::new("", "title");
-        output
-            .show("Gaps:", &[Row { scene: "escher", hidden: 77, gap: 0.5 }], "gap scene")
-            .unwrap();
-        let text = output.text();
-        assert!(
-            ["title\n\nGaps:\n", "gap", "0.5000", "escher"].iter().all(|part| text.contains(part)),
-            "{text}"
-        );
-        assert!(!text.contains("77") && !text.contains("hidden"), "{text}");
     }
 }

@@ -2,7 +2,7 @@
 
 pub(crate) use super::config::{OneOrMore, report};
 pub(crate) use super::data::Rows;
-pub(crate) use super::output::{Dot, Output, dots, panel};
+pub(crate) use super::output::{Output, panel};
 pub(crate) use crate::Error;
 pub(crate) use figures::{Axis, Layer, Marks, Panel, Unit};
 pub(crate) use serde::Serialize;

@@ -30,9 +30,6 @@ pub enum QueryError {
     /// Rows that were to agree.
     #[error("{column} has several values, {values}; accepted: one")]
     Several { column: String, values: String },
-    /// A file that cannot be read.
-    #[error("{0}")]
-    File(String),
     /// Conditions that no row meets.
     #[error("no row meets {0:?}")]
     NoRow(String),

@@ -1,6 +1,6 @@
 //! The measures of the query language: an aggregate of a value that is computed row by row.
 
-use super::query::{QueryError, Row, cell, select};
+use super::query::{QueryError, Row, cell};
 use crate::statistics::{geometric_mean, median, pearson, range, spearman};
 use serde::Deserialize;
 use serde::de::IntoDeserializer;
@@ -114,42 +114,6 @@ impl<'t> Measure<'t> {
     }
 }
 
-/// Replaces every `{CONDITIONS | MEASURE}` of a text by a number of the rows that `read` returns for
-/// the empty name, and `{FILE | CONDITIONS | MEASURE}` by one of a file: whole, or from 10 on rounded
-/// to whole ones, or with one decimal.
-pub fn filled(
-    text: &str,
-    read: &dyn Fn(&str) -> Result<Vec<Row>, QueryError>,
-) -> Result<String, QueryError> {
-    let mut parts = text.split('{');
-    let mut filled = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        let (query, after) = part.split_once('}').unwrap_or((part, ""));
-        let (file, conditions, measure) = match query.split(" | ").collect::<Vec<_>>()[..] {
-            [conditions, measure] => ("", conditions, measure),
-            [file, conditions, measure] => (file, conditions, measure),
-            _ => {
-                let accepted = "{CONDITIONS | MEASURE}, {FILE | CONDITIONS | MEASURE}";
-                let found = query.into();
-                return Err(QueryError::Malformed { part: "number", found, accepted });
-            }
-        };
-        let rows = read(file)?;
-        let measure = Measure::parse(measure)?;
-        // A wrong column is an error even where no row meets the conditions.
-        measure.of_rows(&rows.iter().take(1).collect::<Vec<_>>())?;
-        let chosen = select(rows, conditions)?;
-        let number = measure.of_rows(&chosen.iter().collect::<Vec<_>>())?;
-        let number = number.ok_or_else(|| QueryError::NoRow(query.into()))?;
-        // No zero has a sign.
-        let number = if number.abs() < 0.05 { 0.0 } else { number };
-        let is_whole = number.fract() == 0.0 || number.abs() >= 9.95;
-        filled += &format!("{number:.0$}", usize::from(!is_whole)).replace('-', "−");
-        filled += after;
-    }
-    Ok(filled)
-}
-
 /// Returns a value of a row, computed from left to right; `None` where a cell holds no number.
 fn number(row: &Row, value: &str) -> Result<Option<f64>, QueryError> {
     let mut words = value.split(' ');
@@ -181,6 +145,7 @@ fn operand(row: &Row, word: &str) -> Result<Option<f64>, QueryError> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::query::select;
     use super::*;
 
     fn rows() -> Vec<Row> {
@@ -203,20 +168,6 @@ mod tests {
         assert_eq!(value("cost>2, cost<5", "only cost"), Ok(Some(3.0)));
         assert_eq!(value("scene=a", "min cost / rays"), Ok(Some(0.5)));
         assert_eq!(value("scene=b", "only rays"), Ok(None));
-    }
-
-    #[test]
-    fn numbers_in_a_sentence_are_those_of_the_rows() {
-        let text = "{scene=a | count cost} trees, {scene=a | min cost / rays * 100 + -0.4} to {* | max cost / 2}";
-        let filled = |text| {
-            filled(text, &|file| match file {
-                "" => Ok(rows()),
-                file => select(rows(), &format!("method={file}")),
-            })
-        };
-        assert_eq!(filled(text).unwrap(), "2 trees, 50 to 2.5");
-        assert_eq!(filled("{z | scene=a | only cost * -1}").unwrap(), "−3");
-        assert!(filled("{scene=c | max cost}").is_err());
     }
 
     #[test]

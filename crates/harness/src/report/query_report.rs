@@ -6,19 +6,18 @@ use super::output::table_bytes;
 use super::paper::PaperRow;
 use super::prelude::*;
 use super::query::{self, Conditions, QueryError, Row, number_in};
-use super::query_column::{Column, Group, put};
-use super::query_figure::Drawing;
-use super::query_measure::filled;
-use crate::rows;
+use super::query_column::{Column, Group};
+use super::query_measure::Measure;
 use bvh_config::{Nested, OutOfRange};
 
 report! {
-    /// A table of some rows of a CSV file, and a figure of it.
+    /// A table of some rows of a CSV file.
     pub struct Config {
         /// Name of the CSV file that is made, without its extension: letters, digits, `-` and `_`.
         /// A file with seconds needs a name that begins with `timing`.
         file: String;
-        /// The CSV file whose rows are read.
+        /// The CSV file whose rows are read: of the experiment's runs, or of a report before this
+        /// one.
         rows: String;
         /// Another CSV file. Each row is joined with all its rows that agree in the columns of
         /// both.
@@ -37,19 +36,15 @@ report! {
         columns: Vec<Column>, in Nested;
         /// Ratios within this relative distance of the paper's agree with it.
         tolerance: f64 = 0.05, in 0.0..=1.0;
-        /// A figure of the table.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        figure: Option<Drawing>, in Nested;
     }
     check Self::check_queries;
 }
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let read = |file: &str| rows::read(&rows.folder.join(file));
-        let mut selected = read(&self.rows)?;
+        let mut selected = rows.read_file(&self.rows)?;
         if !self.join.is_empty() {
-            selected = query::join(&selected, &read(&self.join)?);
+            selected = query::join(&selected, &rows.read_file(&self.join)?);
         }
         let path = rows.folder.join(&self.rows);
         let named =
@@ -62,10 +57,6 @@ impl Config {
         output.show_csv(&format!("By {}:", self.by.join(", ")), &bytes, &columns)?;
         output.csv.push((self.file.clone(), bytes));
         output.paper = self.compare(rows, &table).map_err(named)?;
-        if let Some(figure) = &self.figure {
-            let panels = figure.panels(rows, &table);
-            output.add_figure(&self.file, &figure.caption, figure.per_row, panels);
-        }
         Ok(output)
     }
 
@@ -154,64 +145,23 @@ impl Config {
 }
 
 impl Config {
-    /// Rejects parts of the query that cannot be read, and files and columns that no run writes.
+    /// Rejects a file that would replace rows of runs, and conditions and values that cannot be
+    /// read. Columns are known only when the rows are.
     fn check_queries(&self) -> Result<(), OutOfRange> {
         check_file("", &self.file)?;
-        let mut row = Row::new();
-        for (key, name) in [("rows", &self.rows), ("join", &self.join)] {
-            if key == "rows" || !name.is_empty() {
-                row.extend(ones(name).ok_or_else(|| {
-                    let names: Vec<&str> = rows::files().map(|(file, _)| *file).collect();
-                    OutOfRange::new(key, format!("{name:?}"), names.join(", "))
-                })?);
-            }
-        }
-        let has = |column: &String| query::cell(&row, column).map(drop);
-        for (key, conditions) in [("select", &self.select), ("base", &self.base)] {
-            accept(key, Conditions::parse(conditions).and_then(|all| all.are_met(&row)))?;
-        }
-        let mut made = Row::new();
-        for (index, column) in self.by.iter().enumerate() {
-            let put = has(column).and_then(|()| put(&mut made, column.clone(), "1".into()));
-            accept(&format!("by[{index}]"), put)?;
-        }
-        if !self.pairs.is_empty() {
-            accept("pairs", put(&mut made, "against".into(), "1".into()))?;
-        }
-        // Compared with itself, a row has a value in every column.
-        let group = Group { key: made.clone(), rows: vec![&row], base: vec![&row] };
+        accept("select", Conditions::parse(&self.select))?;
+        accept("base", Conditions::parse(&self.base))?;
         for (index, column) in self.columns.iter().enumerate() {
-            let at = |key: &str| format!("columns[{index}].{key}");
-            accept(&at("paired_by"), column.paired_by.iter().try_for_each(has))?;
-            for (index, of_paper) in column.paper.iter().enumerate() {
-                let row = Conditions::parse(&of_paper.row).and_then(|all| all.are_met(&group.key));
-                accept(&at(&format!("paper[{index}].row")), row)?;
-            }
-            let filled = column.fill(&group, &mut made);
-            let is_name = matches!(filled, Err(QueryError::Malformed { part: "name", .. }));
-            accept(&at(if is_name { "name" } else { "value" }), filled)?;
+            accept(&format!("columns[{index}].value"), Measure::parse(&column.value))?;
         }
-        let read = |file: &str| Ok(vec![ones(file).unwrap_or_else(|| made.clone())]);
-        let mut parts = self.finding.split_inclusive('}');
-        parts.try_for_each(|part| accept("finding", filled(part, &read)))
+        Ok(())
     }
 }
 
-/// A row of a file that runs write, which any number would fit into.
-fn ones(file: &str) -> Option<Row> {
-    let (_, columns) = rows::files().find(|(name, _)| *name == file)?;
-    Some(columns.iter().map(|&column| (column.into(), "1".into())).collect())
-}
-
-/// Rejects a part of a query that cannot be read, or has an unknown column, whatever the rows.
 fn accept<T>(key: &str, result: Result<T, QueryError>) -> Result<(), OutOfRange> {
     match result {
         Err(QueryError::Malformed { found, accepted, .. }) => {
             Err(OutOfRange::new(key, format!("{found:?}"), accepted))
-        }
-        Err(QueryError::Column { column, accepted }) => {
-            let accepted = format!("the columns {accepted}");
-            Err(OutOfRange::new(key, format!("{column:?}"), accepted))
         }
         _ => Ok(()),
     }
@@ -228,12 +178,10 @@ mod tests {
     use super::*;
     use bvh_config::Check;
     use figures::Scale;
-    use std::fs;
 
-    /// Makes the report of a spec's table over two files, in which `b` costs less than `a` and less
+    /// Makes the report of a spec's table over two earlier ones, in which `b` costs less than `a` and less
     /// so with every repetition.
     fn made(config: &str) -> Result<Output, String> {
-        let folder = tempfile::tempdir().unwrap();
         let mut costs = String::from("scene,method,repetition,cost\n");
         let mut seconds = String::from("scene,method,repetition,seconds\n");
         for repetition in 0..6 {
@@ -242,13 +190,13 @@ mod tests {
                 seconds += &format!("s,{method},{repetition},{}\n", 2.0 * cost);
             }
         }
-        fs::write(folder.path().join("costs.csv"), costs).unwrap();
-        fs::write(folder.path().join("timing.csv"), seconds).unwrap();
         let common = "file = 'x'\nrows = 'costs.csv'\nby = ['scene', 'method']\n";
         let config: Config = toml::from_str(&format!("{common}{config}")).unwrap();
-        let rows = Rows { folder: folder.path().to_owned(), ..Rows::default() };
-        let headed = config.write(&rows).and_then(|output| config.headed(output, &rows));
-        headed.map_err(|error| error.to_string())
+        let made = [("costs", costs), ("timing", seconds)];
+        let made = made.map(|(name, text)| (name.to_owned(), text.into_bytes())).into();
+        let rows = Rows { made, ..Rows::default() };
+        let output = config.write(&rows).and_then(|output| config.finish(output, &rows));
+        output.map_err(|error| error.to_string())
     }
 
     fn csv(output: &Output) -> &str {
@@ -267,21 +215,15 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_has_the_names_of_people_and_leaves_out_what_its_control_shows_to_be_biased() {
-        let drawn = |control: &str| {
-            let output = made(&format!(
-                "pairs = [['b', 'a'], ['a', 'a']]\nfinding = 'Of {{* | count r}}'\n\
-                 columns = [{{ name = 'r', value = 'median cost', ratio = 'base_over', paired_by = ['repetition'] }}]\n\
-                 figure = {{ x = 'r', y = 'scene', series = ['against'], control = '{control}', names = {{ s = 'a hill' }} }}"
-            ));
-            let (_, figure) = output.unwrap().figures.remove(0);
-            assert_eq!(figure.title, "Of 2");
-            let panels = figure.panels.into_iter();
-            panels.map(|panel| (panel.y.scale, panel.layers.len())).collect::<Vec<_>>()
-        };
-        let names = || Scale::Rows(vec!["a hill".into()], 26.0);
-        assert_eq!(drawn("a"), [(names(), 4)]);
-        assert_eq!(drawn("b"), []);
+    fn a_figure_has_the_names_of_people() {
+        let output = made(
+            "columns = [{ name = 'r', value = 'median cost' }]\n\
+             figure = { x = 'r', y = 'scene', series = ['method'], names = { s = 'a hill' } }",
+        );
+        let (_, figure) = output.unwrap().figures.remove(0);
+        let panels = figure.panels.into_iter();
+        let panels: Vec<_> = panels.map(|panel| (panel.y.scale, panel.layers.len())).collect();
+        assert_eq!(panels, [(Scale::Rows(vec!["a hill".into()], 26.0), 4)]);
     }
 
     #[test]
@@ -313,37 +255,35 @@ mod tests {
     }
 
     #[test]
-    fn files_and_columns_that_runs_do_not_write_are_rejected_by_key() {
-        let fault = |change: &str| {
-            let mut config: toml::Table =
-                "source = 's'\ntitle = 't'\nfile = 'x'\nrows = 'runs.csv'\n\
-                by = ['scene']\ncolumns = [{ name = 'c', value = 'max cost / work' }]"
-                    .parse()
-                    .unwrap();
-            config.extend(change.parse::<toml::Table>().unwrap());
-            let config: Config = config.try_into().unwrap();
-            config.check().err().map(|fault| fault.key)
-        };
-        assert_eq!(fault(""), None);
+    fn files_of_runs_and_queries_that_cannot_be_read_are_rejected_by_key() {
         for (change, key) in [
-            ("rows = '../runs.csv'", "rows"),
             // Runs would be lost.
             ("file = 'runs'", "file"),
-            (
-                "columns = [{ name = 'c', value = 'max cost' }, { name = 'c', value = 'min cost' }]",
-                "columns[1].name",
-            ),
-            ("columns = [{ name = 'scene', value = 'max cost' }]", "columns[0].name"),
-            // The columns of an unknown file are unknown, too.
-            ("join = 'costs.csv'\nbase = 'threads=1'", "join"),
-            ("select = 'method=a, seconds=1'", "select"),
-            ("by = ['scene', 'rays']", "by[1]"),
-            ("columns = [{ name = 'c', value = 'max cost - work' }]", "columns[0].value"),
-            ("finding = 'Of {scene=a | max c} to {scene=b | max cost}'", "finding"),
-            ("finding = 'Of {max c}'", "finding"),
+            ("select = 'method'", "select"),
+            ("base = 'work<much'", "base"),
+            ("columns = [{ name = 'c', value = 'mean cost' }]", "columns[0].value"),
         ] {
-            assert_eq!(fault(change).as_deref(), Some(key), "{change}");
+            let mut config: toml::Table =
+                "file = 'x'\nrows = 'runs.csv'\nby = ['scene']".parse().unwrap();
+            config.extend(change.parse::<toml::Table>().unwrap());
+            let config: Config = config.try_into().unwrap();
+            assert_eq!(config.check().unwrap_err().key, key, "{change}");
         }
-        assert_eq!(fault("join = 'timing.csv'\nbase = 'threads=1'"), None);
+    }
+
+    #[test]
+    fn files_and_columns_that_nothing_writes_are_named_when_they_are_read() {
+        for (change, message) in [
+            ("join = 'missing.csv'", "missing.csv"),
+            ("columns = [{ name = 'c', value = 'max work' }]", "no column \"work\""),
+            (
+                "columns = [{ name = 'c', value = 'max cost - cost' }]",
+                "\"cost - cost\" is no value",
+            ),
+            ("columns = [{ name = 'scene', value = 'max cost' }]", "\"scene\" is no name"),
+        ] {
+            let error = made(change).unwrap_err();
+            assert!(error.contains(message), "{error}");
+        }
     }
 }

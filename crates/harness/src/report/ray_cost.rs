@@ -1,11 +1,10 @@
 //! Tests of rays in trees that are trained on rays, relative to a tree that is searched for by
 //! area.
 
-use super::data::{distinct, grouped};
+use super::data::grouped;
 use super::prelude::*;
 use crate::rows::TestRow;
 use crate::statistics::{geometric_mean, student};
-use std::collections::BTreeMap;
 
 report! {
     /// A comparison of trees by the tests of rays that they were not trained on.
@@ -16,8 +15,6 @@ report! {
         /// Default none.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         pairs: Vec<[String; 2]>;
-        /// Names of trees in figures, by their labels with what they were trained on.
-        names: BTreeMap<String, String>;
     }
 }
 
@@ -72,15 +69,6 @@ impl Config {
         table.extend(means);
         let mut output = Output::default();
         output.add_csv("ray_cost", &table)?;
-        let caption = "Tests of nodes and blocks of triangles in the wide layout, of rays that no tree was \
-             trained on; lines are 95 % intervals, which means have not.";
-        // The mean of all scenes says the most, so it comes first.
-        let scenes = rows.scenes().into_iter().map(|scene| (rows.shown(scene), scene));
-        let panels = [(ALL.to_owned(), ALL)].into_iter().chain(scenes);
-        let mut panels: Vec<Panel> =
-            panels.map(|(title, scene)| self.draw(title, scene, &table)).collect();
-        figures::share_axes(&mut panels[1..]);
-        output.add_figure("ray_cost", caption, 1, panels);
         let columns =
             "scene tree trained_on judged_on camera over_base_low tests_over_base over_base_high";
         output.show(&format!("Tests per ray over those of {}:", self.base), &table, columns)?;
@@ -91,33 +79,6 @@ impl Config {
             output.show("Tests per ray over those of another method:", &paired, columns)?;
         }
         Ok(output)
-    }
-
-    /// A row per tree, with the intervals that scenes have and means have not.
-    fn draw(&self, title: String, scene: &str, table: &[Compared]) -> Panel {
-        let is_own = |row: &&Compared| row.scene == scene && row.tree != self.base;
-        let dot = |row: &Compared| Dot {
-            row: self.tree_name(row.tree, row.trained_on),
-            series: match row.camera {
-                "none" => row.judged_on.to_owned(),
-                camera => format!("{}, {camera} path", row.judged_on),
-            },
-            value: row.tests_over_base,
-            ends: row.over_base_low.zip(row.over_base_high),
-        };
-        let all: Vec<Dot> = table.iter().filter(is_own).map(dot).collect();
-        let trees = distinct(all.iter().map(|dot| dot.row.clone()));
-        let x = Axis::linear(format!("tests per ray, over those of {}", self.base));
-        let mut panel = dots(title, x, trees, &all);
-        panel.layers.push(Layer::new(&self.base, Marks::VLine(1.0)));
-        panel
-    }
-
-    /// Names a tree with what it was trained on, unless its label says so.
-    fn tree_name(&self, tree: &str, trained_on: &str) -> String {
-        let is_said = trained_on == "none" || tree.contains(trained_on);
-        let name = if is_said { tree.into() } else { format!("{tree}, {trained_on}") };
-        self.names.get(&name).cloned().unwrap_or(name)
     }
 }
 

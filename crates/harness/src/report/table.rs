@@ -24,8 +24,6 @@ bvh_config::config! { serde;
     pub struct Column {
         /// Heading.
         name: String;
-        /// Name in figures, if the heading is none for people.
-        label: String;
         /// Label of the method.
         method: String;
         /// Number of first trials whose best counts; without it, the run's result counts. Median
@@ -70,11 +68,8 @@ pub(super) struct Cell<'a> {
     reason: &'a str,
 }
 
-/// The ends of an interval, if there is one.
-type Interval = Option<(f64, f64)>;
-
 impl Cell<'_> {
-    fn interval(&self) -> Interval {
+    fn interval(&self) -> Option<(f64, f64)> {
         self.low_over_base.zip(self.high_over_base)
     }
 
@@ -92,7 +87,6 @@ impl Config {
         }
         let mut output = Output::default();
         output.add_csv("table", &cells)?;
-        output.add_figure("table", caption(&cells), 1, vec![self.draw(rows, &cells)]);
         output.paper = if self.are_readings() {
             let scenes = rows.scenes().into_iter();
             scenes.filter_map(|scene| self.compare_readings(rows, scene, &cells)).collect()
@@ -145,40 +139,6 @@ impl Config {
         })
     }
 
-    fn draw(&self, rows: &Rows, cells: &[Cell]) -> Panel {
-        // Columns that are readings of one column of the paper share its dots.
-        let readings = self.are_readings();
-        let mut all = Vec::new();
-        for (index, column) in self.columns.iter().enumerate().skip(1) {
-            let mut add = |series: &str, dot: fn(&Cell) -> Option<(f64, Interval)>| {
-                all.extend(of_column(cells, column).filter_map(|cell| {
-                    let (value, ends) = dot(cell)?;
-                    Some(Dot { row: rows.shown(cell.scene), series: series.into(), value, ends })
-                }));
-            };
-            let name = if column.label.is_empty() { &column.name } else { &column.label };
-            let ours = |cell: &Cell| Some((cell.cost_over_base, cell.interval()));
-            if column.paper.is_empty() {
-                add(name, ours);
-                continue;
-            }
-            if index == 1 || !readings {
-                let of = if readings { "paper" } else { &format!("paper, {name}") };
-                add(of, |cell| Some((cell.paper_over_base?, None)));
-            }
-            add(&format!("{name}, ours"), ours);
-        }
-        // Readings of a heuristic that peel off one object at a time cost hundreds of times as much.
-        let most = cells.iter().map(|cell| cell.cost_over_base).fold(1.0, f64::max);
-        let scenes = rows.scenes().into_iter().map(|scene| rows.shown(scene)).collect();
-        let label = "cost / greedy";
-        let x = if most > 3.0 { Axis::log(label) } else { Axis::linear(label) };
-        let mut panel = dots("", x, scenes, &all);
-        // Ratios are to the greedy tree, whose line separates savings from losses.
-        panel.layers.push(Layer::new("greedy", Marks::VLine(1.0)));
-        panel
-    }
-
     /// Compares a number of the paper with ours.
     fn compare(&self, rows: &Rows, cell: &Cell) -> Option<PaperRow> {
         let quantity = format!("{}, cost over base", cell.column);
@@ -222,79 +182,10 @@ impl Config {
     }
 }
 
-/// Explains the marks that the figure shows.
-fn caption(cells: &[Cell]) -> String {
-    let mut caption =
-        String::from("Total area of inner nodes over that of the greedy Müller–Fellner tree.");
-    if cells.iter().any(|cell| cell.best_of.is_some()) {
-        caption +=
-            " Lines: at least nine of ten repetitions of as many fresh trials end between them.";
-    }
-    if cells.iter().any(|cell| cell.paper_over_base.is_some()) {
-        caption += " Ours on stand-in scenes, the paper's on the originals: compare ratios within a column, not dot by dot.";
-    }
-    caption
-}
-
 /// Returns the cells of a column.
 fn of_column<'c, 'a>(
     cells: &'c [Cell<'a>],
     column: &'c Column,
 ) -> impl Iterator<Item = &'c Cell<'a>> {
     cells.iter().filter(|cell| cell.column == column.name)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::report::data::run;
-    use crate::rows::RunRow;
-
-    /// Rows of methods by their costs over base.
-    fn rows(methods: &[(&str, f64)]) -> Rows {
-        let mut rows = Rows::default();
-        for &(method, cost) in methods {
-            rows.runs.push(RunRow { cost, base_cost: 1.0, ..run(method, 0, 1, 0) });
-        }
-        rows
-    }
-
-    fn column(name: &str, paper: f64) -> Column {
-        let paper = BTreeMap::from([("s".to_owned(), paper)]);
-        Column {
-            name: name.into(),
-            method: name.into(),
-            paper,
-            reason: "why".into(),
-            ..Column::default()
-        }
-    }
-
-    fn written(columns: Vec<Column>, costs: &[(&str, f64)]) -> Output {
-        let config = Config { columns, tolerance: 0.1, ..Config::default() };
-        config.write(&rows(costs)).unwrap()
-    }
-
-    #[test]
-    fn several_readings_of_one_number_of_the_paper_are_one_row_by_the_closest() {
-        let readings = || vec![column("base", 1.0), column("sum", 2.0), column("difference", 2.0)];
-        let near = written(readings(), &[("base", 1.0), ("sum", 500.0), ("difference", 1.9)]);
-        let [row] = &near.paper[..] else { panic!("one number, one row: {:?}", near.paper) };
-        // A reading that comes close may still not be the paper's.
-        assert_eq!(
-            (row.ours.as_str(), row.verdict),
-            ("1.9000, by difference", Verdict::Inconclusive)
-        );
-        let far = written(readings(), &[("base", 1.0), ("sum", 500.0), ("difference", 3.0)]);
-        assert_eq!(far.paper[0].verdict, Verdict::Differs);
-    }
-
-    #[test]
-    fn columns_of_their_own_have_a_row_each() {
-        let columns =
-            vec![column("base", 1.0), column("best of 10", 1.1), column("best of 100", 1.2)];
-        let output = written(columns, &[("base", 1.0), ("best of 10", 1.15), ("best of 100", 0.9)]);
-        let verdicts: Vec<Verdict> = output.paper.iter().map(|row| row.verdict).collect();
-        assert_eq!(verdicts, [Verdict::Agrees, Verdict::DiffersLower]);
-    }
 }

@@ -1,7 +1,9 @@
 //! Figure 1 of the paper: cost against number of trials, for one run and as an exact expectation.
 
+use super::drawing::{Drawing, Shape};
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
+use super::query::Row;
 use crate::statistics::{expected_best_of, mean_interval, minimum};
 
 report! {
@@ -38,40 +40,16 @@ impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let mut output = Output::default();
         let mut points = Vec::new();
-        let mut panels = Vec::new();
         for scene in rows.scenes() {
             let curves: Vec<Vec<Point>> =
                 self.methods.iter().map(|method| self.curve(rows, scene, method)).collect();
-            let mut single = vec![Layer::new("greedy", Marks::HLine(1.0))];
-            let mut expected = single.clone();
-            for (name, curve) in self.methods.iter().zip(&curves) {
-                let line = |cost: fn(&Point) -> f64| {
-                    curve.iter().map(|point| (point.trials as f64, cost(point))).collect()
-                };
-                let steps = Marks::Steps(line(|point| point.single_run_over_base));
-                single.push(Layer::new(name, steps));
-                let line = Marks::Line(line(|point| point.expected_over_base));
-                expected.push(Layer::new(name, line));
-                // One repetition has no interval.
-                let ends = |point: &Point| {
-                    Some((point.trials as f64, point.expected_low?, point.expected_high?))
-                };
-                expected
-                    .push(Layer::new(name, Marks::Band(curve.iter().filter_map(ends).collect())));
-            }
-            let mut both = [("one run", single), ("expected", expected)].map(|(what, layers)| {
-                let (x, y) = (Axis::log("number of trials"), Axis::linear("best cost / greedy"));
-                panel(format!("{}, {what}", rows.shown(scene)), x, y, layers)
-            });
-            figures::share_axes(&mut both);
-            panels.extend(both);
             output.paper.extend(self.compare(&rows.shown(scene), &curves));
             points.extend(curves.into_iter().flatten());
         }
+        output.add_csv("trials", &points)?;
         let caption = "Lowest cost among so many trials. Left, one run, as in the paper; right, \
                        what is expected, with the 95 % interval of the mean over repetitions.";
-        output.add_csv("trials", &points)?;
-        output.add_figure("trials", caption, 2, panels);
+        output.add_figure("trials", caption, 2, draw(rows, &output.table()?));
         let last: Vec<&Point> =
             points.iter().filter(|point| point.trials == self.best_of).collect();
         let columns = "scene method expected_over_base expected_low expected_high";
@@ -136,6 +114,35 @@ impl Config {
             ..row.compare(paper, names.join(" or "), verdict, rule)
         })
     }
+}
+
+/// Draws one run and the expectation of each scene side by side.
+fn draw(rows: &Rows, table: &[Row]) -> Vec<Panel> {
+    let panels = |y: &str, y_label: &str| {
+        let ends = ["expected_low", "expected_high"].map(str::to_owned);
+        let drawing = Drawing {
+            marks: Shape::Steps,
+            panels: vec!["scene".into()],
+            x: "trials".into(),
+            y: y.into(),
+            ends: (y == "expected_over_base").then_some(ends),
+            series: vec!["method".into()],
+            x_label: "number of trials".into(),
+            y_label: y_label.into(),
+            log_x: true,
+            line_at: Some(1.0),
+            ..Drawing::default()
+        };
+        drawing.panels(rows, table)
+    };
+    let single = panels("single_run_over_base", "best of one run / greedy");
+    let expected = panels("expected_over_base", "expected best / greedy");
+    let both = |both: (Panel, Panel)| {
+        let mut both = <[Panel; 2]>::from(both);
+        figures::share_axes(&mut both);
+        both
+    };
+    single.into_iter().zip(expected).flat_map(both).collect()
 }
 
 #[cfg(test)]

@@ -38,15 +38,9 @@ macro_rules! rows {
         }
         )*
 
-        /// The files of these rows, with their columns.
-        const COLUMNS: &[(&str, &[&str])] =
-            &[$(($file, &[$(stringify!($column)),*])),*];
+        /// The files that runs write.
+        pub const FILES: &[&str] = &[$($file),*];
     };
-}
-
-/// Returns the files that runs write, each with its columns.
-pub fn files() -> impl Iterator<Item = &'static (&'static str, &'static [&'static str])> {
-    COLUMNS.iter()
 }
 
 rows! {

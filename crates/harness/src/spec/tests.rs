@@ -49,11 +49,6 @@ const WRONG_LINES: &[(&str, &[&str])] = &[
         "[[reports]]\nkind = 'anytime'\nmethods = ['grasp']\nfile = '../../x'",
         &["reports[0].file is \"../../x\"", "letters, digits"],
     ),
-    (
-        "[[reports]]\nkind = 'generations'\nmethod = 'grasp'\nbaseline = 'grasp'\n\
-         paper_final = { e = [3, 2] }",
-        &["paper_final.e is [3.0, 2.0]", "the lower number first"],
-    ),
 ];
 
 /// The methods of a spec, and the parts of the error.

@@ -29,6 +29,10 @@ methods = [
 kind = 'table'
 source = 'Test'
 title = 'a table'
+[reports.figure]
+x = 'cost_over_base'
+y = 'scene'
+series = ['column']
 [[reports.columns]]
 name = 'base'
 method = 'greedy'

@@ -1,0 +1,245 @@
+//! Figures of tables: named rows with a dot per value, or lines through values.
+
+use super::config::Series;
+use super::data::{distinct, grouped};
+use super::prelude::*;
+use super::query::{Conditions, QueryError, Row, number_in};
+use bvh_config::Nested;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+bvh_config::config! { serde;
+    /// A figure of the table.
+    pub struct Drawing {
+        /// Explains the figure.
+        caption: String;
+        /// Conditions on the rows that are drawn.
+        #[serde(skip_serializing_if = "String::is_empty")]
+        select: String;
+        /// The shape of the marks.
+        marks: Shape;
+        /// Columns whose values are the panels; by default there is one panel.
+        panels: Vec<String>;
+        /// Panels per row.
+        per_row: usize = 2, in 1..=2;
+        /// The column along the horizontal axis; values for rows.
+        x: String;
+        /// The column along the vertical axis; for rows one or more columns of names, with `, `
+        /// between them.
+        y: String;
+        /// The columns of the ends of the intervals that values have; by default that of the
+        /// values with `_low` and `_high`, if the table has those.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        ends: Option<[String; 2]>;
+        /// For rows: a column of further values, such as the paper's, which have a dot beside.
+        #[serde(skip_serializing_if = "String::is_empty")]
+        beside: String;
+        /// True for the same ranges in all panels.
+        same_axes: bool;
+        /// Columns whose values are the series.
+        series: Vec<String>;
+        /// Series of several methods each, by name.
+        lines: Vec<Series>, in Nested;
+        /// Label of the horizontal axis.
+        x_label: String;
+        /// Label of the vertical axis.
+        y_label: String;
+        /// True for a logarithmic horizontal axis.
+        log_x: bool;
+        /// True for a logarithmic vertical axis.
+        log_y: bool;
+        /// True for fractions along the vertical axis, which are written in per cent.
+        percent_y: bool;
+        /// Names in words for scenes, rows and series, by what they are called in the table.
+        names: BTreeMap<String, String>;
+        /// The value of a line across all rows, such as 1 for ratios, or at this height.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        line_at: Option<f64>, in 0.0..=1e300;
+    }
+}
+
+/// The shape of marks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shape {
+    /// Named rows with a dot per value.
+    #[default]
+    Rows,
+    /// Points with a line through them.
+    Lines,
+    /// Staircases: each value holds until the next.
+    Steps,
+}
+
+/// A value and its interval.
+#[derive(Clone, Copy)]
+pub(super) struct Point {
+    pub x: f64,
+    pub y: f64,
+    pub ends: Option<(f64, f64)>,
+}
+
+impl Drawing {
+    /// Adds the figure of a report's first table.
+    pub(super) fn draw(&self, rows: &Rows, output: &mut Output) -> Result<(), Error> {
+        let table = output.table()?;
+        let table = self.selected(&table).map_err(|error| Error::Query {
+            path: rows.folder.clone(),
+            message: format!("figure: {error}"),
+        })?;
+        let name = output.csv[0].0.clone();
+        output.add_figure(name, &self.caption, self.per_row, self.panels(rows, &table));
+        Ok(())
+    }
+
+    fn selected(&self, table: &[Row]) -> Result<Vec<Row>, QueryError> {
+        let conditions = Conditions::parse(&self.select)?;
+        let mut selected = Vec::new();
+        for row in table {
+            selected.extend(conditions.are_met(row)?.then(|| row.clone()));
+        }
+        Ok(selected)
+    }
+
+    /// Returns one panel for all rows that agree in the columns `panels`.
+    pub(super) fn panels(&self, rows: &Rows, table: &[Row]) -> Vec<Panel> {
+        let by_title = grouped(table, |row| self.title(rows, row)).into_iter();
+        let mut panels: Vec<Panel> =
+            by_title.map(|(title, table)| self.panel(rows, title, &table)).collect();
+        if self.same_axes {
+            figures::share_axes(&mut panels);
+        }
+        panels
+    }
+
+    fn title(&self, rows: &Rows, row: &Row) -> String {
+        let name =
+            |column: &String| self.shown(rows, column, row.get(column).map_or("", |text| text));
+        self.panels.iter().map(name).collect::<Vec<_>>().join(": ")
+    }
+
+    fn panel(&self, rows: &Rows, title: String, table: &[&Row]) -> Panel {
+        if self.marks == Shape::Rows {
+            return self.rows(rows, title, table);
+        }
+        let mut layers = Vec::new();
+        for (series, table) in grouped(table.iter().copied(), |row| self.series_of(row)) {
+            layers.extend(curve(&series, &self.points(&table), self.marks));
+        }
+        layers.extend(self.line_at.map(|at| Layer::new("", Marks::HLine(at))));
+        let unit = if self.percent_y { Unit::Percent } else { Unit::Number };
+        let (x, y) = (axis(&self.x_label, self.log_x), axis(&self.y_label, self.log_y));
+        panel(title, x, y.unit(unit), layers)
+    }
+
+    /// Draws a row per name, in which the series are below each other.
+    fn rows(&self, rows: &Rows, title: String, table: &[&Row]) -> Panel {
+        let columns: Vec<String> = self.y.split(", ").map(str::to_owned).collect();
+        let name = |row: &Row| self.shown(rows, &self.y, &texts_in(row, &columns));
+        let names = distinct(table.iter().map(|row| name(row)));
+        let by_series = grouped(table.iter().copied(), |row| self.series_of(row));
+        let count = by_series.len() as f64;
+        let mut layers = Vec::new();
+        let mut beside = Vec::new();
+        for (number, (series, table)) in (0..).zip(by_series) {
+            let mut points = Vec::new();
+            let mut spans = Vec::new();
+            for row in table {
+                let Some(value) = number_in(row, &self.x) else { continue };
+                let place = names.iter().position(|known| *known == name(row)).unwrap_or_default();
+                let height = place as f64 + 0.8 * ((f64::from(number) + 0.5) / count - 0.5);
+                points.push((value, height));
+                let ends = self.ends_in(row, &self.x);
+                spans.extend(ends.map(|(low, high)| [(low, height), (high, height)]));
+                beside.extend(number_in(row, &self.beside).map(|value| (value, height)));
+            }
+            layers.push(Layer::new(&series, Marks::Spans(spans)));
+            layers.push(Layer::new(series, Marks::Points(points)));
+        }
+        if !beside.is_empty() {
+            layers.push(Layer::new("paper", Marks::Points(beside)));
+        }
+        layers.extend(self.line_at.map(|at| Layer::new("", Marks::VLine(at))));
+        let y = Axis::rows(names, (10.0 * count + 6.0).max(24.0));
+        panel(title, axis(&self.x_label, self.log_x), y, layers)
+    }
+
+    /// Returns the series of a row: the line that its method belongs to, or the values of its
+    /// columns.
+    fn series_of(&self, row: &Row) -> String {
+        let method = row.get("method");
+        let line = self
+            .lines
+            .iter()
+            .find(|line| method.is_some_and(|method| line.methods.contains(method)));
+        if let Some(line) = line {
+            return line.name.clone();
+        }
+        let name = texts_in(row, &self.series);
+        self.names.get(&name).cloned().unwrap_or(name)
+    }
+
+    /// Returns the name in words of a text in a column.
+    fn shown(&self, rows: &Rows, column: &str, text: &str) -> String {
+        let own = self.names.get(text).cloned();
+        own.unwrap_or_else(|| if column == "scene" { rows.shown(text) } else { text.into() })
+    }
+
+    /// Returns the points of some rows, by x.
+    fn points(&self, table: &[&Row]) -> Vec<Point> {
+        let point = |row: &&Row| {
+            let (x, y) = (number_in(row, &self.x)?, number_in(row, &self.y)?);
+            Some(Point { x, y, ends: self.ends_in(row, &self.y) })
+        };
+        let mut points: Vec<Point> = table.iter().filter_map(point).collect();
+        points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+        points
+    }
+
+    /// Returns the ends of the interval of the value in a column.
+    fn ends_in(&self, row: &Row, column: &str) -> Option<(f64, f64)> {
+        let end = |end: &str| number_in(row, &format!("{column}{end}"));
+        match &self.ends {
+            Some([low, high]) => number_in(row, low).zip(number_in(row, high)),
+            None => end("_low").zip(end("_high")),
+        }
+    }
+}
+
+/// Draws a line through points, x ascending, on the band between the ends of their intervals. A
+/// single point has a mark and a line from end to end.
+pub(super) fn curve(series: &str, points: &[Point], shape: Shape) -> Vec<Layer> {
+    let path = match shape {
+        Shape::Steps => stairs(points),
+        _ => points.to_vec(),
+    };
+    let places = |points: &[Point]| points.iter().map(|at| (at.x, at.y)).collect();
+    let range = match path[..] {
+        [Point { x, ends: Some((low, high)), .. }] => Marks::Spans(vec![[(x, low), (x, high)]]),
+        _ => {
+            let ends = |at: &Point| at.ends.map(|(low, high)| (at.x, low, high));
+            Marks::Band(path.iter().filter_map(ends).collect())
+        }
+    };
+    let mut marks = vec![range, Marks::Line(places(&path))];
+    if shape == Shape::Lines || points.len() == 1 {
+        marks.push(Marks::Points(places(points)));
+    }
+    marks.into_iter().map(|marks| Layer::new(series, marks)).collect()
+}
+
+/// Returns the staircase that holds each value until the next x.
+fn stairs(points: &[Point]) -> Vec<Point> {
+    let corners = points.windows(2).flat_map(|ends| [ends[0], Point { x: ends[1].x, ..ends[0] }]);
+    corners.chain(points.last().copied()).collect()
+}
+
+/// Returns the texts of some columns, without those that say that something is missing.
+fn texts_in(row: &Row, columns: &[String]) -> String {
+    let texts = columns.iter().filter_map(|column| row.get(column));
+    texts.filter(|text| *text != "none").cloned().collect::<Vec<_>>().join(", ")
+}
+
+fn axis(label: &str, is_log: bool) -> Axis {
+    if is_log { Axis::log(label) } else { Axis::linear(label) }
+}
