@@ -2,11 +2,11 @@
 //! [`harness::report::query`].
 //!
 //! ```text
-//! FILE | CONDITIONS | MEASURE [| below, above or percent]   one value
+//! FILE | CONDITIONS | MEASURE                               one value
 //! FILE | CONDITIONS | ROWS × COLUMNS | SHOWN | DECIMALS     a table
 //!
-//! MEASURE  over CONDITIONS by COLUMNS           of one value: each row's number over the least
-//!                                               number of other rows that agree in the columns
+//! MEASURE  over CONDITIONS by COLUMNS           of one value: each row's first number over the
+//!                                               least of other rows that agree in the columns
 //! SHOWN    MEASURE [LOW, HIGH] (COLUMN)         an interval and a further column, both optional
 //! ```
 
@@ -24,13 +24,11 @@ fn rows(file: &str, conditions: &str) -> Vec<Row> {
     query::select(rows, conditions).unwrap_or_else(|error| panic!("{file}: {error}"))
 }
 
-/// The value of a query of three parts, or of four with a unit.
+/// The value of a query of three parts.
 pub fn value(query: &str) -> f64 {
     let parts: Vec<&str> = query.split(" | ").collect();
-    let (file, conditions, measure, unit) = match parts[..] {
-        [file, conditions, measure] => (file, conditions, measure, ""),
-        [file, conditions, measure, unit] => (file, conditions, measure, unit),
-        _ => panic!("{query}: expected FILE | CONDITIONS | MEASURE [| below, above or percent]"),
+    let [file, conditions, measure] = parts[..] else {
+        panic!("{query}: expected FILE | CONDITIONS | MEASURE")
     };
     let mut rows = rows(file, conditions);
     let measure = match measure.split_once(" over ") {
@@ -43,8 +41,7 @@ pub fn value(query: &str) -> f64 {
     let rows: Vec<&Row> = rows.iter().collect();
     let value = Measure::parse(measure).and_then(|measure| measure.of_rows(&rows));
     let value = value.unwrap_or_else(|error| panic!("{query}: {error}"));
-    in_unit(value.unwrap_or_else(|| panic!("{query}: no value")), unit)
-        .unwrap_or_else(|| panic!("{query}: {unit:?} is no unit; accepted: below, above, percent"))
+    value.unwrap_or_else(|| panic!("{query}: no value"))
 }
 
 /// The table of a query of five parts.
@@ -64,8 +61,8 @@ fn divide(rows: &mut [Row], measure: &str, file: &str, others: &str) {
         .rsplit_once(" by ")
         .unwrap_or_else(|| panic!("over {others}: expected over CONDITIONS by COLUMNS"));
     let columns: Vec<&str> = columns.split(" + ").collect();
-    let (_, column) =
-        measure.split_once(' ').unwrap_or_else(|| panic!("{measure}: expected AGGREGATE COLUMN"));
+    let column =
+        measure.split(' ').nth(1).unwrap_or_else(|| panic!("{measure}: expected AGGREGATE COLUMN"));
     divide_by_least(rows, column, &self::rows(file, conditions), &columns);
 }
 
@@ -78,17 +75,6 @@ fn divide_by_least(rows: &mut [Row], column: &str, others: &[Row], columns: &[&s
         if let Some(value) = number_in(row, column) {
             row.insert(column.into(), (value / least).to_string());
         }
-    }
-}
-
-/// Percentages are differences from 1, which no column holds.
-fn in_unit(value: f64, unit: &str) -> Option<f64> {
-    match unit {
-        "" => Some(value),
-        "below" => Some(100.0 * (1.0 - value)),
-        "above" => Some(100.0 * (value - 1.0)),
-        "percent" => Some(100.0 * value),
-        _ => None,
     }
 }
 
