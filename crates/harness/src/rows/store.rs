@@ -11,7 +11,7 @@ use super::lock::lock_folder;
 use super::{Row, to_bytes};
 use crate::Error;
 use crate::files;
-use bvh_scenes::files::{ReadError, read_text};
+use bvh_scenes::files::read_text;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -61,7 +61,8 @@ impl Store {
         let spec = store.partial.join(SPEC);
         let found = match existing {
             Existing::Replace => None,
-            Existing::Keep | Existing::Resume => read_text_if_any(&spec)?,
+            _ if !spec.try_exists().map_err(Error::io(&spec, "read the file"))? => None,
+            Existing::Keep | Existing::Resume => Some(read_text(&spec)?),
         };
         match (existing, found) {
             (Existing::Resume, Some(found)) if found == resolved => return Ok(store),
@@ -209,15 +210,6 @@ impl Store {
     }
 }
 
-/// Returns the text of a file; `None` if there is no such file.
-fn read_text_if_any(path: &Path) -> Result<Option<String>, Error> {
-    match read_text(path) {
-        Ok(text) => Ok(Some(text)),
-        Err(ReadError::NotFound { .. }) => Ok(None),
-        Err(error) => Err(error.into()),
-    }
-}
-
 /// The file of a part in this folder with the resolved spec of its runs.
 pub fn spec_of_part(folder: &Path) -> PathBuf {
     folder.join(".partial").join(SPEC)
@@ -236,6 +228,7 @@ pub fn is_unfinished(folder: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bvh_scenes::files::ReadError;
 
     // The tests `faults` and `protection` run the program on folders that are in use, unfinished or
     // blocked.

@@ -121,7 +121,7 @@ mod tests {
         }
     }
 
-    const POOLS: usize = 1500;
+    const POOLS: usize = 1000;
 
     /// Returns the fractions of fresh best-of-`m` values below and above the intervals that pools
     /// of `n` predict.
@@ -144,7 +144,7 @@ mod tests {
         // Four standard deviations of a fraction of 5 % among this number of pools.
         let most = TAIL + 4.0 * (TAIL * (1.0 - TAIL) / POOLS as f64).sqrt();
         let light: [Draw; 4] = [normal, uniform, exponential_to_the_left, log_normal];
-        for (n, m) in [(400, 10), (400, 100), (500, 100), (100, 100), (40, 10)] {
+        for (n, m) in [(400, 10), (400, 100), (100, 100), (40, 10)] {
             for (kind, draw) in light.into_iter().enumerate() {
                 let (below, above) = missed(draw, n, m);
                 assert!(
@@ -153,7 +153,7 @@ mod tests {
                 );
             }
         }
-        for (n, m) in [(400, 10), (400, 100), (500, 100)] {
+        for (n, m) in [(400, 10), (400, 100)] {
             let (below, above) = missed(seldom_lower, n, m);
             assert!(
                 below <= most && above <= most,
