@@ -25,6 +25,4 @@ pub mod trace;
 pub mod tree_file;
 
 pub use fnv::fnv1a;
-pub use scene::{
-    FETCHED, NoTriangles, SPHERES, Scene, SceneError, SceneKind, did_you_mean, fetched_path,
-};
+pub use scene::{FETCHED, NoTriangles, SPHERES, Scene, SceneError, SceneKind, fetched_path};

@@ -63,15 +63,3 @@ fn a_greedy_tree_is_exported_where_its_rays_take_fewer_tests() {
     let kept = Target::OBVHS.bytes(&Target::OBVHS.fit(&greedy), &scene.boxes);
     assert_eq!(fs::read(at.join("y.bin")).unwrap(), kept);
 }
-
-#[test]
-fn a_printed_scene_is_read_back_with_the_same_triangles() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let path = at.join("printed.obj");
-    for name in ["escher:900", "cloister"] {
-        fs::write(&path, bvh(at, &format!("scenes {name}"))).unwrap();
-        let [scene, read] = [name, path.to_str().unwrap()].map(|name| Scene::load(name).unwrap());
-        assert_eq!(scene.triangles().unwrap(), read.triangles().unwrap(), "{name}");
-    }
-}

@@ -6,8 +6,7 @@
 //! 1.7e7, like the original's.
 
 use super::mesh_builder::{
-    MeshBuilder, about_x, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, torus,
-    upright,
+    MeshBuilder, about_x, about_y, about_z, circle, cos_sin, fraction, on_circle, placed, upright,
 };
 use bvh_core::Triangle;
 use glam::{DAffine3, DMat3, DVec3, dvec3};
@@ -22,22 +21,21 @@ const CUSHION: f64 = 2.6;
 pub fn triangles() -> Vec<Triangle> {
     let mut scene = MeshBuilder::default();
     let lean = about_z(0.09) * about_x(0.045) * about_y(-0.03);
-    scene.place(&ring(), &placed(lean, dvec3(0.0, 0.0, 1.12)));
-    scene.place(&chain(44), &DAffine3::IDENTITY);
+    scene.part(&placed(lean, dvec3(0.0, 0.0, 1.12)), ring);
+    chain(&mut scene, 44);
     cushion(&mut scene);
     for (x, y, size, turns) in
         [(2.1, -1.6, 0.22, 0.02), (0.4, -0.9, 0.17, 0.11), (-0.7, 1.0, 0.26, 0.07)]
     {
         // Loose stones rest on their pavilion: girdle and culet touch the cushion.
         let tilted = about_z(turns * 5.0) * about_y(0.39) * about_z(turns);
-        scene.place(&brilliant(), &placed(tilted * size, dvec3(x, y, padding(x, y) + 0.66 * size)));
+        scene.part(&placed(tilted * size, dvec3(x, y, padding(x, y) + 0.66 * size)), brilliant);
     }
     scene.finish(UNIT, DVec3::ZERO)
 }
 
 /// A brilliant of girdle radius 1, its girdle plane at z = 0, its table up: 110 triangles.
-fn brilliant() -> MeshBuilder {
-    let mut stone = MeshBuilder::default();
+fn brilliant(stone: &mut MeshBuilder) {
     let eighth = |k: usize| fraction(k, 8);
     let table = |k: usize| on_circle(0.56, eighth(k), 0.33);
     let star = |k: usize| on_circle(0.78, eighth(k) + 1.0 / 16.0, 0.2);
@@ -58,45 +56,37 @@ fn brilliant() -> MeshBuilder {
         }
         stone.quad(girdle(2 * k, lower), pavilion(k + 7), culet, pavilion(k));
     }
-    stone
 }
 
 /// The ring, its finger hole along y, the main stone above on the z axis; inner radius 1.
-fn ring() -> MeshBuilder {
-    let mut ring = MeshBuilder::default();
-    shank(&mut ring);
-    let stone = brilliant();
+fn ring(ring: &mut MeshBuilder) {
+    shank(ring);
+    let stone = MeshBuilder::of(brilliant);
     let head = 1.62;
-    ring.place(&stone, &placed(about_z(0.013) * 0.52, DVec3::Z * head));
+    ring.copy(&placed(about_z(0.013) * 0.52, DVec3::Z * head), &stone);
 
     // The setting has two gallery rails, a halo plate, and six prongs bent over the girdle.
     for (radius, z, thickness) in [(0.3, 1.22, 0.035), (0.46, 1.47, 0.04)] {
-        ring.place(&torus(radius, thickness, 40, 7), &upright(0.0, 0.0, 0.0, z));
+        ring.part(&upright(0.0, 0.0, 0.0, z), |rail| rail.torus(radius, thickness, 40, 7));
     }
-    let halo: Vec<_> = [(0.56, 1.5), (0.56, 1.54), (0.74, 1.54), (0.74, 1.48), (0.56, 1.5)].into();
+    let halo = [(0.56, 1.5), (0.56, 1.54), (0.74, 1.54), (0.74, 1.48), (0.56, 1.5)];
     ring.revolve(&halo, 56);
     for k in 0..6 {
-        let bent = [
-            (0.2, 1.05),
-            (0.34, 1.25),
-            (0.48, 1.48),
-            (0.545, 1.62),
-            (0.54, 1.68),
-            (0.5, 1.71),
-            (0.43, 1.73),
-        ];
-        let path: Vec<_> = bent.map(|(r, z)| on_circle(r, fraction(k, 6) + 0.02, z)).into();
+        let stem = [(0.2, 1.05), (0.34, 1.25), (0.48, 1.48), (0.545, 1.62)];
+        let claw = [(0.54, 1.68), (0.5, 1.71), (0.43, 1.73)];
+        let prong = stem.into_iter().chain(claw);
+        let path: Vec<_> = prong.map(|(r, z)| on_circle(r, fraction(k, 6) + 0.02, z)).collect();
         let side = on_circle(1.0, fraction(k, 6) + 0.27, 0.0);
         ring.taper(&path, side, &circle(0.045, 9), &|i| 1.0 - 0.06 * i as f64);
     }
 
     // Halo stones in a circle, then pavé rows over both shoulders, beads between neighbours.
-    let bead = bead();
+    let bead = MeshBuilder::of(bead);
     for k in 0..24 {
-        ring.place(&stone, &(on_halo(fraction(k, 24), 1.58) * small(0.076)));
+        ring.copy(&(on_halo(fraction(k, 24), 1.58) * small(0.076)), &stone);
         for (shift, radial) in [(0.5, 0.075), (0.5, -0.075)] {
             let between = on_halo((k as f64 + shift) / 24.0, 1.55);
-            ring.place(&bead, &(between * upright(0.0, radial, 0.0, 0.0) * small(0.024)));
+            ring.copy(&(between * upright(0.0, radial, 0.0, 0.0) * small(0.024)), &bead);
         }
     }
     for row in [-1.0, 0.0, 1.0] {
@@ -107,13 +97,12 @@ fn ring() -> MeshBuilder {
             let away = half * (0.082 + 0.0105 * i as f64 + 0.002 * row);
             let size = 0.042 - 0.0009 * i as f64;
             let lean = placed(about_x(-0.035 * row), DVec3::ZERO);
-            ring.place(&stone, &(seat(away, 0.105 * row) * lean * small(size)));
+            ring.copy(&(seat(away, 0.105 * row) * lean * small(size)), &stone);
             for (along, across) in [(-0.0053, 0.052), (0.0053, -0.052)] {
-                ring.place(&bead, &(seat(away + along, 0.105 * row + across) * small(0.016)));
+                ring.copy(&(seat(away + along, 0.105 * row + across) * small(0.016)), &bead);
             }
         }
     }
-    ring
 }
 
 fn on_halo(turns: f64, z: f64) -> DAffine3 {
@@ -164,14 +153,13 @@ fn small(size: f64) -> DAffine3 {
 }
 
 /// A grain of metal between two stones: a coarse dome of radius 1.
-fn bead() -> MeshBuilder {
-    MeshBuilder::revolved(&[(1.0, -0.5), (1.0, 0.3), (0.6, 0.85), (0.0, 1.0)], 6)
+fn bead(bead: &mut MeshBuilder) {
+    bead.revolve(&[(1.0, -0.5), (1.0, 0.3), (0.6, 0.85), (0.0, 1.0)], 6);
 }
 
 /// A chain of `links` oval links, alternately flat and on edge, laid in a wave around the ring.
-fn chain(links: usize) -> MeshBuilder {
-    let mut chain = MeshBuilder::default();
-    let link = torus(0.06, 0.016, 12, 6);
+fn chain(mesh: &mut MeshBuilder, links: usize) {
+    let link = MeshBuilder::of(|link| link.torus(0.06, 0.016, 12, 6));
     for k in 0..links {
         let before = on_wave(fraction(k, links));
         let here = on_wave(fraction(2 * k + 1, 2 * links));
@@ -181,9 +169,8 @@ fn chain(links: usize) -> MeshBuilder {
         let heading = DMat3::from_cols(along, across, along.cross(across));
         let roll = if k % 2 == 0 { 0.02 } else { 0.23 };
         let stretch = DMat3::from_diagonal(dvec3(1.7, 1.0, 1.0));
-        chain.place(&link, &placed(heading * about_x(roll) * stretch, here));
+        mesh.copy(&placed(heading * about_x(roll) * stretch, here), &link);
     }
-    chain
 }
 
 fn on_wave(t: f64) -> DVec3 {

@@ -8,7 +8,7 @@
 
 use super::mesh_builder::{
     MeshBuilder, about_y, about_z, circle, cos_sin, fraction, half_circle, on_circle, placed,
-    torus, upright,
+    upright,
 };
 use bvh_core::Triangle;
 use glam::{DMat3, DVec3, dvec3};
@@ -38,13 +38,11 @@ pub fn triangles() -> Vec<Triangle> {
     {
         // Each walk is built along +x with the court on its +y side, its corner vault at its far
         // end.
-        cloister.place(
-            &walk(&parts, bays),
-            &(upright(turns, 0.0, 0.0, 0.0) * upright(0.0, 0.0, -offset, 0.0)),
-        );
+        let place = upright(turns, 0.0, 0.0, 0.0) * upright(0.0, 0.0, -offset, 0.0);
+        cloister.part(&place, |mesh| walk(mesh, &parts, bays));
     }
     court(&mut cloister, half);
-    cloister.place(&well(), &upright(0.037, 2.1, -1.4, 0.0));
+    cloister.part(&upright(0.037, 2.1, -1.4, 0.0), well);
     cloister.finish(UNIT, dvec3(1250.0, -430.0, 75.0))
 }
 
@@ -57,54 +55,48 @@ struct Parts {
 
 impl Parts {
     fn new() -> Self {
-        let mut tile = MeshBuilder::default();
-        // A barrel tile of length 1 down the slope, slightly conical.
-        tile.grid(3, 1, &|i, j| {
-            let (c, s) = cos_sin(0.5 * fraction(i, 3));
-            let width = 0.15 - 0.02 * j as f64;
-            dvec3(width * c, j as f64 * 1.06, width * s)
-        });
-        Self { column: column(), arch: arcade_arch(), vault: vault(), tile }
+        Self {
+            column: MeshBuilder::of(column),
+            arch: MeshBuilder::of(arcade_arch),
+            vault: MeshBuilder::of(vault),
+            tile: MeshBuilder::of(tile),
+        }
     }
 }
 
+/// A barrel tile of length 1 down the slope, slightly conical.
+fn tile(tile: &mut MeshBuilder) {
+    tile.grid(3, 1, &|i, j| {
+        let (c, s) = cos_sin(0.5 * fraction(i, 3));
+        let width = 0.15 - 0.02 * j as f64;
+        dvec3(width * c, j as f64 * 1.06, width * s)
+    });
+}
+
 /// One column on z = 0, 2.3 m high.
-fn column() -> MeshBuilder {
-    let mut column = MeshBuilder::default();
-    square(&mut column, 0.17, 0.0, 0.12);
+fn column(column: &mut MeshBuilder) {
+    square(column, 0.17, 0.0, 0.12);
     // Attic base: torus, scotia, torus; then one long quad per side of the shaft, a necking, and
     // the bell.
-    let base = [
-        (0.17, 0.12),
-        (0.175, 0.15),
-        (0.165, 0.18),
-        (0.135, 0.2),
-        (0.13, 0.22),
-        (0.145, 0.25),
-        (0.12, 0.28),
-    ];
+    let torus = [(0.17, 0.12), (0.175, 0.15), (0.165, 0.18), (0.135, 0.2)];
+    let scotia = [(0.13, 0.22), (0.145, 0.25), (0.12, 0.28)];
     let bell = [(0.1, 1.8), (0.115, 1.83), (0.1, 1.86), (0.105, 2.0), (0.13, 2.1), (0.18, 2.18)];
-    let profile: Vec<_> = base.into_iter().chain(bell).collect();
-    column.revolve(&profile, 12);
-    square(&mut column, 0.19, 2.18, 2.24);
-    square(&mut column, 0.22, 2.24, 2.3);
+    column.revolve(&[&torus[..], &scotia, &bell].concat(), 12);
+    square(column, 0.19, 2.18, 2.24);
+    square(column, 0.22, 2.24, 2.3);
     for k in 0..8 {
         // Leaves in two rows, curling outwards at the tip.
         let (low, tall) = if k % 2 == 0 { (1.87, 0.22) } else { (1.93, 0.24) };
-        let mut leaf = MeshBuilder::default();
-        leaf.grid(2, 4, &|i, j| {
+        let leaf = |i: usize, j: usize| {
             let u = fraction(i, 2) - 0.5;
             let v = fraction(j, 4);
             let width = 0.085 * (1.0 - v * v * v) + 0.012;
-            dvec3(
-                0.108 + 0.085 * v * v * v + 0.01 * (1.0 - 4.0 * u * u),
-                u * width,
-                low + tall * (v - 0.35 * v * v * v),
-            )
-        });
-        column.place(&leaf, &upright(fraction(k, 8) + 0.021, 0.0, 0.0, 0.0));
+            let out = 0.108 + 0.085 * v * v * v + 0.01 * (1.0 - 4.0 * u * u);
+            dvec3(out, u * width, low + tall * (v - 0.35 * v * v * v))
+        };
+        let around = upright(fraction(k, 8) + 0.021, 0.0, 0.0, 0.0);
+        column.part(&around, |mesh| mesh.grid(2, 4, &leaf));
     }
-    column
 }
 
 /// Adds a square plate of this half width around the z axis.
@@ -113,8 +105,7 @@ fn square(mesh: &mut MeshBuilder, half: f64, low: f64, high: f64) {
 }
 
 /// The arch over one bay with its moulding on both faces; springs at z = 0, centred on x = 0.
-fn arcade_arch() -> MeshBuilder {
-    let mut arch = MeshBuilder::default();
+fn arcade_arch(arch: &mut MeshBuilder) {
     let radius = 0.5 * BAY - 0.42;
     arch.arch(radius, 0.5 * BAY, EAVES - SPRING, 0.5, 14);
     for face in [-0.25, 0.25] {
@@ -124,24 +115,20 @@ fn arcade_arch() -> MeshBuilder {
         let outwards = profile.map(|(x, y)| (x, if face > 0.0 { -y } else { y }));
         arch.sweep(&path, DVec3::Y, &outwards);
     }
-    arch
 }
 
 /// A groin vault over one square bay, centred on the z axis, springing at z = 0: the lower envelope
 /// of two barrels is left open, so four webs meet in the groins; diagonal ribs run below these.
-fn vault() -> MeshBuilder {
-    let mut vault = MeshBuilder::default();
+fn vault(vault: &mut MeshBuilder) {
     let half = 0.5 * BAY;
     for k in 0..4 {
         // One web: from the groin (|y| = x) to the wall arch at x = half, courses parallel to y.
-        let mut web = MeshBuilder::default();
-        web.grid(6, 6, &|i, j| {
+        let web = |i: usize, j: usize| {
             let (c, s) = cos_sin(0.25 * fraction(j, 6));
             let reach = half * c;
-            let y = (2.0 * fraction(i, 6) - 1.0) * reach;
-            dvec3(reach, y, half * s)
-        });
-        vault.place(&web, &upright(0.25 * k as f64, 0.0, 0.0, 0.0));
+            dvec3(reach, (2.0 * fraction(i, 6) - 1.0) * reach, half * s)
+        };
+        vault.part(&upright(0.25 * k as f64, 0.0, 0.0, 0.0), |mesh| mesh.grid(6, 6, &web));
     }
     for turns in [0.125, 0.375] {
         let path =
@@ -151,14 +138,12 @@ fn vault() -> MeshBuilder {
     }
     // The keystone where the ribs cross.
     let boss = [(0.0, 0.0), (0.1, 0.02), (0.18, 0.08), (0.2, 0.16), (0.17, 0.2)];
-    vault.place(&MeshBuilder::revolved(&boss, 10), &upright(0.05, 0.0, 0.0, half - 0.2));
-    vault
+    vault.part(&upright(0.05, 0.0, 0.0, half - 0.2), |mesh| mesh.revolve(&boss, 10));
 }
 
 /// A walk of `bays` bays along x, centred, its arcade in the plane y = 0 and its back wall at y =
 /// −`BAY`.
-fn walk(parts: &Parts, bays: usize) -> MeshBuilder {
-    let mut walk = MeshBuilder::default();
+fn walk(walk: &mut MeshBuilder, parts: &Parts, bays: usize) {
     let start = -0.5 * BAY * bays as f64;
     let end = -start;
     let back = -BAY - 0.25;
@@ -172,15 +157,15 @@ fn walk(parts: &Parts, bays: usize) -> MeshBuilder {
         let x = start + BAY * bay as f64;
         // Bays continue into the corner, which has a shared vault and no arch.
         let middle = x + 0.5 * BAY;
-        walk.place(&parts.vault, &upright(0.0, middle, -0.5 * BAY - 0.1, SPRING));
+        walk.copy(&upright(0.0, middle, -0.5 * BAY - 0.1, SPRING), &parts.vault);
         if bay < bays {
             for (turns, y) in [(0.003 * bay as f64, -0.18), (0.002 * bay as f64 - 0.01, 0.18)] {
-                walk.place(&parts.column, &upright(turns, x, y, PARAPET));
+                walk.copy(&upright(turns, x, y, PARAPET), &parts.column);
             }
-            walk.place(&parts.arch, &upright(0.0, middle, 0.0, SPRING));
-            buttress(&mut walk, x);
+            walk.copy(&upright(0.0, middle, 0.0, SPRING), &parts.arch);
+            buttress(walk, x);
         }
-        paving(&mut walk, x, bay);
+        paving(walk, x, bay);
     }
     let outer = end - back;
     let bed = [(start, 0.0), (end, 0.0), (outer, back), (-outer, back)];
@@ -195,21 +180,20 @@ fn walk(parts: &Parts, bays: usize) -> MeshBuilder {
     ] {
         walk.wall(from, to, back, low, high);
     }
-    let mut doorway = MeshBuilder::default();
-    doorway.arch(0.8, 1.0, 1.7, 0.4, 18);
-    for x in [-1.0, 0.8] {
-        doorway.cuboid(dvec3(x, -0.2, -2.5), dvec3(x + 0.2, 0.2, 0.0));
-    }
-    // The door leaf is ajar.
-    let mut leaf = MeshBuilder::default();
-    leaf.cuboid(DVec3::ZERO, dvec3(1.5, 0.06, 2.4));
-    for z in [0.4, 1.2, 2.0] {
-        leaf.cuboid(dvec3(0.0, -0.02, z), dvec3(1.1, 0.08, z + 0.06));
-    }
-    doorway.place(&leaf, &upright(0.079, -0.78, 0.1, -2.5));
-    walk.place(&doorway, &upright(0.0, door, back, 2.5));
-    roof(&mut walk, parts, end);
-    walk
+    walk.part(&upright(0.0, door, back, 2.5), |doorway| {
+        doorway.arch(0.8, 1.0, 1.7, 0.4, 18);
+        for x in [-1.0, 0.8] {
+            doorway.cuboid(dvec3(x, -0.2, -2.5), dvec3(x + 0.2, 0.2, 0.0));
+        }
+        // The door leaf is ajar.
+        doorway.part(&upright(0.079, -0.78, 0.1, -2.5), |leaf| {
+            leaf.cuboid(DVec3::ZERO, dvec3(1.5, 0.06, 2.4));
+            for z in [0.4, 1.2, 2.0] {
+                leaf.cuboid(dvec3(0.0, -0.02, z), dvec3(1.1, 0.08, z + 0.06));
+            }
+        });
+    });
+    roof(walk, parts, end);
 }
 
 /// A slender stepped pier against the arcade's court side.
@@ -277,10 +261,8 @@ fn roof(mesh: &mut MeshBuilder, parts: &Parts, half: f64) {
         for j in 0..rows {
             let limit = low + (high - low) * fraction(2 * j + 1, 2 * rows);
             if x.abs() < limit {
-                mesh.place(
-                    &parts.tile,
-                    &placed(frame, eaves + along(x) + up * (length * j as f64) + normal * 0.02),
-                );
+                let foot = eaves + along(x) + up * (length * j as f64) + normal * 0.02;
+                mesh.copy(&placed(frame, foot), &parts.tile);
             }
         }
     }
@@ -293,67 +275,43 @@ fn court(mesh: &mut MeshBuilder, half: DVec3) {
         dvec3(inner.x * (2.0 * fraction(i, 3) - 1.0), inner.y * (j as f64 - 1.0), -0.1)
     });
     for (turns, length) in [(0.037, 14.0), (0.287, 11.0)] {
-        let mut path = MeshBuilder::default();
-        let stones = 18;
-        path.grid(stones, 2, &|i, j| {
-            dvec3((2.0 * fraction(i, stones) - 1.0) * length, 0.7 * (j as f64 - 1.0), -0.06)
+        mesh.part(&upright(turns, 2.1, -1.4, 0.0), |garden| {
+            let stones = 18;
+            garden.grid(stones, 2, &|i, j| {
+                dvec3((2.0 * fraction(i, stones) - 1.0) * length, 0.7 * (j as f64 - 1.0), -0.06)
+            });
+            for (x, y) in [(3.0, 1.0), (3.0, -1.6), (-9.0, 1.0), (-9.0, -1.6)] {
+                garden.cuboid(dvec3(x, y, -0.1), dvec3(x + 6.0, y + 0.6, 0.55));
+            }
         });
-        mesh.place(&path, &upright(turns, 2.1, -1.4, 0.0));
-        for (x, y) in [(3.0, 1.0), (3.0, -1.6), (-9.0, 1.0), (-9.0, -1.6)] {
-            let mut hedge = MeshBuilder::default();
-            hedge.cuboid(dvec3(x, y, -0.1), dvec3(x + 6.0, y + 0.6, 0.55));
-            mesh.place(&hedge, &upright(turns, 2.1, -1.4, 0.0));
-        }
     }
 }
 
 /// The well: three octagonal steps, a carved round kerb, an iron yoke with chain and bucket.
-fn well() -> MeshBuilder {
-    let mut well = MeshBuilder::default();
+fn well(well: &mut MeshBuilder) {
     well.revolve(
         &[(2.0, -0.1), (2.0, 0.1), (1.65, 0.1), (1.65, 0.3), (1.3, 0.3), (1.3, 0.5), (0.7, 0.5)],
         8,
     );
-    let kerb = [
-        (0.95, 0.5),
-        (0.98, 0.6),
-        (0.88, 0.68),
-        (0.84, 1.1),
-        (0.92, 1.2),
-        (0.98, 1.28),
-        (0.95, 1.36),
-        (0.7, 1.36),
-        (0.7, -2.5),
-    ];
-    well.revolve(&kerb, 36);
+    let kerb = [(0.95, 0.5), (0.98, 0.6), (0.88, 0.68), (0.84, 1.1), (0.92, 1.2), (0.98, 1.28)];
+    let shaft = [(0.95, 1.36), (0.7, 1.36), (0.7, -2.5)];
+    well.revolve(&[&kerb[..], &shaft].concat(), 36);
     for k in 0..12 {
         // Blind arches around the kerb.
-        let mut niche = MeshBuilder::default();
-        niche.arch(0.13, 0.2, 0.19, 0.05, 8);
-        well.place(
-            &niche,
-            &(upright(fraction(k, 12), 0.0, 0.0, 0.0) * upright(0.25, 0.88, 0.0, 0.88)),
-        );
+        let niche = upright(fraction(k, 12), 0.0, 0.0, 0.0) * upright(0.25, 0.88, 0.0, 0.88);
+        well.part(&niche, |mesh| mesh.arch(0.13, 0.2, 0.19, 0.05, 8));
     }
     let yoke = half_circle(20, |c, s| dvec3(0.83 * c, 0.0, 1.36 + 1.9 * libm::sqrt(s)));
     well.sweep(&yoke, DVec3::Y, &circle(0.035, 7));
-    let link = torus(0.03, 0.012, 9, 6);
+    let link = MeshBuilder::of(|link| link.torus(0.03, 0.012, 9, 6));
     for k in 0..18 {
         let turned = about_z(if k % 2 == 0 { 0.02 } else { 0.27 }) * about_y(0.25);
-        well.place(&link, &placed(turned, dvec3(0.0, 0.0, 3.2 - 0.05 * k as f64)));
+        well.copy(&placed(turned, dvec3(0.0, 0.0, 3.2 - 0.05 * k as f64)), &link);
     }
-    // A wooden bucket, hoops included.
-    let bucket = [
-        (0.0, 0.0),
-        (0.16, 0.0),
-        (0.165, 0.08),
-        (0.175, 0.08),
-        (0.175, 0.12),
-        (0.19, 0.36),
-        (0.175, 0.36),
-        (0.15, 0.03),
-        (0.0, 0.03),
-    ];
-    well.place(&MeshBuilder::revolved(&bucket, 14), &upright(0.06, 0.0, 0.0, 1.95));
-    well
+    // A wooden bucket, hoops included: its outside, then its inside.
+    let outside =
+        [(0.0, 0.0), (0.16, 0.0), (0.165, 0.08), (0.175, 0.08), (0.175, 0.12), (0.19, 0.36)];
+    let inside = [(0.175, 0.36), (0.15, 0.03), (0.0, 0.03)];
+    let bucket = [&outside[..], &inside].concat();
+    well.part(&upright(0.06, 0.0, 0.0, 1.95), |mesh| mesh.revolve(&bucket, 14));
 }

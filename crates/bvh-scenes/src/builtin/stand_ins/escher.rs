@@ -35,9 +35,9 @@ pub fn triangles() -> Vec<Triangle> {
         Plan { steps: [15, 7], width: 2.6, at: [2.0, 14.0], turn: 0.094, bays: 4, beneath: true },
     ];
     for (gravity, plan) in gravities.into_iter().zip(&plans) {
-        room.place(&storey(plan), &placed(gravity, DVec3::ZERO));
+        room.part(&placed(gravity, DVec3::ZERO), |mesh| storey(mesh, plan));
     }
-    room.place(&spiral(22), &upright(0.11, 26.0, 25.5, 0.0));
+    room.part(&upright(0.11, 26.0, 25.5, 0.0), |mesh| spiral(mesh, 22));
     room.finish(UNIT, DVec3::ZERO)
 }
 
@@ -54,8 +54,7 @@ struct Plan {
 }
 
 /// One gravity's floor, flights, landings and arcade; up is z.
-fn storey(plan: &Plan) -> MeshBuilder {
-    let mut storey = MeshBuilder::default();
+fn storey(storey: &mut MeshBuilder, plan: &Plan) {
     storey.grid(3, 2, &|i, j| dvec3(fraction(i, 3), fraction(j, 2), 0.0) * ROOM);
 
     // The first flight leads along x to a landing, the second along y to a gallery, and the third
@@ -65,33 +64,35 @@ fn storey(plan: &Plan) -> MeshBuilder {
     let low = first as f64 * RISE;
     let high = (first + second) as f64 * RISE;
     let corner = x + first as f64;
-    storey.place(&flight(first, width, beneath), &upright(0.0, x, y, 0.0));
-    landing(&mut storey, dvec3(corner, y, low), deep, width);
-    storey.place(&flight(second, width, false), &upright(0.25, corner + deep, y + width, low));
+    storey.part(&upright(0.0, x, y, 0.0), |mesh| flight(mesh, first, width, beneath));
+    landing(storey, dvec3(corner, y, low), deep, width);
+    let second_foot = upright(0.25, corner + deep, y + width, low);
+    storey.part(&second_foot, |mesh| flight(mesh, second, width, false));
     let gallery = y + width + second as f64;
-    landing(&mut storey, dvec3(corner, gallery, high), deep, deep);
+    landing(storey, dvec3(corner, gallery, high), deep, deep);
     let down = high - 8.0 * RISE;
     let (c, s) = cos_sin(0.5 + turn);
     // The descending flight is an ascending flight that begins at its foot.
     let foot = dvec3(corner + 8.0 * c, gallery + 8.0 * s + width, down);
-    storey.place(&flight(8, width, beneath), &upright(turn, foot.x, foot.y - width, foot.z));
-    landing(&mut storey, foot + dvec3(-3.0, -width, 0.0), 3.0, width);
+    let third_foot = upright(turn, foot.x, foot.y - width, foot.z);
+    storey.part(&third_foot, |mesh| flight(mesh, 8, width, beneath));
+    landing(storey, foot + dvec3(-3.0, -width, 0.0), 3.0, width);
 
     // The arcade that carries the gallery, a doorway in the back wall, and a free-standing oblique
     // gate.
     for bay in 0..bays {
         let x = corner + deep - 2.2 - 4.4 * bay as f64;
-        storey.place(&gate(1.7, 2.2, high - 3.3, 9), &upright(0.0, x, gallery + deep, 0.0));
+        let place = upright(0.0, x, gallery + deep, 0.0);
+        storey.part(&place, |mesh| gate(mesh, 1.7, 2.2, high - 3.3, 9));
     }
-    storey.place(&gate(1.9, 4.0, 4.2, 14), &upright(0.25, ROOM - 0.5, y + 11.0, 0.0));
-    storey.place(&gate(1.4, 2.0, 3.1, 10), &upright(2.6 * turn, x + 6.0, y + 9.0, 0.0));
-    storey
+    storey.part(&upright(0.25, ROOM - 0.5, y + 11.0, 0.0), |mesh| gate(mesh, 1.9, 4.0, 4.2, 14));
+    let oblique = upright(2.6 * turn, x + 6.0, y + 9.0, 0.0);
+    storey.part(&oblique, |mesh| gate(mesh, 1.4, 2.0, 3.1, 10));
 }
 
 /// A flight of `steps` along x with balustrades on both sides; its underside is a slope or, upside
 /// down, stairs too.
-fn flight(steps: usize, width: f64, beneath: bool) -> MeshBuilder {
-    let mut flight = MeshBuilder::default();
+fn flight(flight: &mut MeshBuilder, steps: usize, width: f64, beneath: bool) {
     let run = steps as f64;
     let at = |x: f64, y: f64, z: f64| dvec3(x, y, z * RISE);
     let depth = 2.5;
@@ -102,11 +103,11 @@ fn flight(steps: usize, width: f64, beneath: bool) -> MeshBuilder {
     for k in 0..steps {
         let x = k as f64;
         let next = x + 1.0;
-        across(&mut flight, [x, x], [x, next]);
-        across(&mut flight, [x, next], [next, next]);
+        across(flight, [x, x], [x, next]);
+        across(flight, [x, next], [next, next]);
         if beneath {
-            across(&mut flight, [x, x - depth], [next, x - depth]);
-            across(&mut flight, [next, x - depth], [next, next - depth]);
+            across(flight, [x, x - depth], [next, x - depth]);
+            across(flight, [next, x - depth], [next, next - depth]);
         }
         for y in [0.0, width] {
             flight.triangle(at(x, y, x), at(next, y, next), at(x, y, next));
@@ -120,13 +121,12 @@ fn flight(steps: usize, width: f64, beneath: bool) -> MeshBuilder {
         flight.quad(at(0.0, y, 0.0), at(run, y, run), at(run, y, run - depth), at(0.0, y, -depth));
     }
     if !beneath {
-        across(&mut flight, [0.0, -depth], [run, run - depth]);
+        across(flight, [0.0, -depth], [run, run - depth]);
     }
     for y in [0.15, width - 0.15] {
         let feet: Vec<_> = (0..steps).map(|k| at(k as f64 + 0.5, y, k as f64 + 1.0)).collect();
-        balustrade(&mut flight, &feet);
+        balustrade(flight, &feet);
     }
-    flight
 }
 
 /// A slab with its near corner at `corner`, its top at that height, and a balustrade along its far
@@ -145,8 +145,9 @@ fn landing(mesh: &mut MeshBuilder, corner: DVec3, length: f64, width: f64) {
 fn balustrade(mesh: &mut MeshBuilder, feet: &[DVec3]) {
     let up = DVec3::Z * RAIL;
     for &foot in feet {
-        let baluster = MeshBuilder::revolved(&[(0.08, 0.0), (0.08, RAIL)], 4);
-        mesh.place(&baluster, &upright(0.0, foot.x, foot.y, foot.z));
+        mesh.part(&upright(0.0, foot.x, foot.y, foot.z), |baluster| {
+            baluster.revolve(&[(0.08, 0.0), (0.08, RAIL)], 4);
+        });
     }
     let (Some(&first), Some(&last)) = (feet.first(), feet.last()) else {
         return;
@@ -154,49 +155,35 @@ fn balustrade(mesh: &mut MeshBuilder, feet: &[DVec3]) {
     let rail =
         [(0.16, -0.08), (0.16, 0.06), (0.07, 0.14), (-0.07, 0.14), (-0.16, 0.06), (-0.16, -0.08)];
     mesh.sweep(&[first + up, last + up], DVec3::Z, &rail);
+    let newel = [(0.2, -0.4), (0.2, 2.2), (0.13, 2.4), (0.13, 2.8), (0.24, 3.0), (0.0, 3.3)];
     for (end, turns) in [(first, 0.03), (last, 0.07)] {
-        let newel = MeshBuilder::revolved(
-            &[(0.2, -0.4), (0.2, 2.2), (0.13, 2.4), (0.13, 2.8), (0.24, 3.0), (0.0, 3.3)],
-            5,
-        );
-        mesh.place(&newel, &upright(turns, end.x, end.y, end.z));
+        mesh.part(&upright(turns, end.x, end.y, end.z), |mesh| mesh.revolve(&newel, 5));
     }
 }
 
 /// An arch on two square piers of height `pier`, with a moulding around it; stands on z = 0, passes
 /// along y.
-fn gate(radius: f64, half_width: f64, pier: f64, segments: usize) -> MeshBuilder {
-    let mut gate = MeshBuilder::default();
-    let mut arch = MeshBuilder::default();
-    arch.arch(radius, half_width, radius + 0.8, 1.0, segments);
-    let path = half_circle(segments, |c, s| dvec3(radius * c, -0.5, radius * s));
-    arch.sweep(&path, DVec3::Y, &[(0.0, 0.0), (0.0, -0.12), (-0.12, -0.2), (-0.24, 0.0)]);
-    gate.place(&arch, &placed(DMat3::IDENTITY, DVec3::Z * pier));
+fn gate(gate: &mut MeshBuilder, radius: f64, half_width: f64, pier: f64, segments: usize) {
+    gate.part(&placed(DMat3::IDENTITY, DVec3::Z * pier), |arch| {
+        arch.arch(radius, half_width, radius + 0.8, 1.0, segments);
+        let path = half_circle(segments, |c, s| dvec3(radius * c, -0.5, radius * s));
+        arch.sweep(&path, DVec3::Y, &[(0.0, 0.0), (0.0, -0.12), (-0.12, -0.2), (-0.24, 0.0)]);
+    });
     for (low, high) in [(-half_width, -radius), (radius, half_width)] {
         gate.cuboid(dvec3(low, -0.5, 0.0), dvec3(high, 0.5, pier - 0.2));
         gate.cuboid(dvec3(low - 0.1, -0.6, pier - 0.2), dvec3(high + 0.1, 0.6, pier));
     }
-    gate
 }
 
 /// A spiral stair of `steps` wedges about a column, with a winding handrail.
-fn spiral(steps: usize) -> MeshBuilder {
-    let mut spiral = MeshBuilder::default();
+fn spiral(spiral: &mut MeshBuilder, steps: usize) {
     let per_step = 0.062;
     let rise = 0.9;
     let radius = 3.4;
     let height = steps as f64 * rise;
-    spiral.revolve(
-        &[
-            (0.7, 0.0),
-            (0.7, 0.3),
-            (0.45, 0.6),
-            (0.45, height),
-            (0.6, height + 0.3),
-            (0.0, height + 1.2),
-        ],
-        12,
-    );
+    let foot = [(0.7, 0.0), (0.7, 0.3), (0.45, 0.6)];
+    let head = [(0.45, height), (0.6, height + 0.3), (0.0, height + 1.2)];
+    spiral.revolve(&[foot, head].concat(), 12);
     for k in 0..steps {
         let z = (k + 1) as f64 * rise;
         let mut wedge = |drop: f64| {
@@ -217,9 +204,9 @@ fn spiral(steps: usize) -> MeshBuilder {
         })
         .collect();
     for (k, &top) in rail.iter().enumerate().take(steps) {
-        let rod = MeshBuilder::revolved(&[(0.06, -RAIL), (0.06, 0.0)], 5);
-        spiral.place(&rod, &placed(about_z(k as f64 * per_step), top));
+        spiral.part(&placed(about_z(k as f64 * per_step), top), |rod| {
+            rod.revolve(&[(0.06, -RAIL), (0.06, 0.0)], 5);
+        });
     }
     spiral.sweep(&rail, DVec3::Z, &circle(0.14, 7));
-    spiral
 }

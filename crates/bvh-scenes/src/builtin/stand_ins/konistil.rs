@@ -25,7 +25,7 @@ pub fn triangles() -> Vec<Triangle> {
     terrain(&mut valley);
     railway(&mut valley);
     viaduct(&mut valley);
-    station(&mut valley);
+    valley.part(&placed(aligned(1500.0), beside(1500.0, 0.0, TRACK)), station);
     town(&mut valley);
     power_line(&mut valley);
     forest(&mut valley);
@@ -117,14 +117,12 @@ fn railway(mesh: &mut MeshBuilder) {
         let path: Vec<_> = (0..=steps).map(|k| beside(at(k), aside, TRACK)).collect();
         mesh.sweep(&path, DVec3::Z, &rail);
     }
-    let mut sleeper = MeshBuilder::default();
-    sleeper.cuboid(dvec3(-0.13, -1.3, -0.2), dvec3(0.13, 1.3, 0.0));
     for k in 0..110 {
         let x = 1428.0 + 1.3 * k as f64;
-        mesh.place(
-            &sleeper,
-            &placed(aligned(x), beside(x, if k % 2 == 0 { 2.05 } else { -2.05 }, TRACK)),
-        );
+        let track = if k % 2 == 0 { 2.05 } else { -2.05 };
+        mesh.part(&placed(aligned(x), beside(x, track, TRACK)), |sleeper| {
+            sleeper.cuboid(dvec3(-0.13, -1.3, -0.2), dvec3(0.13, 1.3, 0.0));
+        });
     }
     let spans = 48;
     for k in 0..spans {
@@ -133,18 +131,9 @@ fn railway(mesh: &mut MeshBuilder) {
         for side in [-1.0, 1.0] {
             let foot = beside(x, 4.6 * side, TRACK - 0.6);
             mesh.cuboid(foot - dvec3(0.15, 0.15, 0.0), foot + dvec3(0.15, 0.15, 8.0));
-            mesh.bar(
-                beside(x, 4.6 * side, TRACK + 6.4),
-                beside(x, 2.05 * side, TRACK + 6.0),
-                0.04,
-                4,
-            );
-            mesh.bar(
-                beside(x, 2.05 * side, TRACK + 5.9),
-                beside(next, 2.05 * side, TRACK + 5.9),
-                0.012,
-                3,
-            );
+            let at = |x: f64, aside: f64, height: f64| beside(x, aside * side, TRACK + height);
+            mesh.bar(at(x, 4.6, 6.4), at(x, 2.05, 6.0), 0.04, 4);
+            mesh.bar(at(x, 2.05, 5.9), at(next, 2.05, 5.9), 0.012, 3);
         }
     }
 }
@@ -153,29 +142,23 @@ fn railway(mesh: &mut MeshBuilder) {
 fn viaduct(mesh: &mut MeshBuilder) {
     let spans = 28;
     let span = 24.0;
-    let mut bay = MeshBuilder::default();
-    let mut arch = MeshBuilder::default();
-    arch.arch(9.5, 12.0, 12.5, 7.0, 14);
-    bay.place(&arch, &upright(0.0, 0.0, 0.0, -13.5));
-    for y in [-3.6, 3.2] {
-        bay.cuboid(dvec3(-12.0, y, -1.0), dvec3(12.0, y + 0.4, 0.9));
-    }
-    let pier = MeshBuilder::revolved(
-        &[(5.6, -75.0), (5.2, -60.0), (4.2, -14.5), (4.6, -14.2), (4.6, -13.5)],
-        4,
-    );
+    let pier = [(5.6, -75.0), (5.2, -60.0), (4.2, -14.5), (4.6, -14.2), (4.6, -13.5)];
     for k in 0..spans {
         let place = placed(aligned(430.0) * about_z(0.231), beside(430.0, 0.0, 118.0))
             * upright(0.0, span * (k as f64 - 13.5), 0.0, 0.0);
-        mesh.place(&bay, &place);
-        mesh.place(&pier, &(place * upright(0.125, 12.0, 0.0, 0.0)));
+        mesh.part(&place, |bay| {
+            bay.part(&upright(0.0, 0.0, 0.0, -13.5), |arch| arch.arch(9.5, 12.0, 12.5, 7.0, 14));
+            for y in [-3.6, 3.2] {
+                bay.cuboid(dvec3(-12.0, y, -1.0), dvec3(12.0, y + 0.4, 0.9));
+            }
+        });
+        mesh.part(&(place * upright(0.125, 12.0, 0.0, 0.0)), |mesh| mesh.revolve(&pier, 4));
     }
 }
 
 /// The station: a glazed barrel roof on ribs, platforms, a hall with a row of arches, a clock
 /// tower.
-fn station(mesh: &mut MeshBuilder) {
-    let mut station = MeshBuilder::default();
+fn station(station: &mut MeshBuilder) {
     let length = 140.0;
     let half = 19.0;
     let ribs = 15;
@@ -191,57 +174,41 @@ fn station(mesh: &mut MeshBuilder) {
         let path: Vec<_> = (0..=18).map(|i| vault(fraction(i, 18), x, half - 0.3)).collect();
         station.sweep(&path, DVec3::X, &[(-0.2, -0.12), (0.2, -0.12), (0.2, 0.12), (-0.2, 0.12)]);
         for y in [-half, half] {
-            let post =
-                MeshBuilder::revolved(&[(0.45, 0.0), (0.25, 0.6), (0.2, 6.4), (0.5, 7.0)], 8);
-            station.place(&post, &upright(0.02, x, y, 0.0));
+            station.part(&upright(0.02, x, y, 0.0), |post| {
+                post.revolve(&[(0.45, 0.0), (0.25, 0.6), (0.2, 6.4), (0.5, 7.0)], 8);
+            });
         }
     }
     for (low, high) in [(-12.0, -4.2), (4.2, 17.0)] {
         station.cuboid(dvec3(-0.7 * length, low, -0.6), dvec3(0.7 * length, high, 0.75));
     }
-    let mut bay = MeshBuilder::default();
-    bay.arch(2.6, 3.5, 4.2, 0.8, 12);
     for k in 0..14 {
-        station.place(&bay, &upright(0.0, 7.0 * (k as f64 - 6.5), 23.0, 4.0));
-        station.cuboid(
-            dvec3(7.0 * (k as f64 - 7.0) - 0.9, 22.6, 0.0),
-            dvec3(7.0 * (k as f64 - 7.0) + 0.9, 23.4, 4.0),
-        );
+        let bay = upright(0.0, 7.0 * (k as f64 - 6.5), 23.0, 4.0);
+        station.part(&bay, |mesh| mesh.arch(2.6, 3.5, 4.2, 0.8, 12));
+        let pier = 7.0 * (k as f64 - 7.0);
+        station.cuboid(dvec3(pier - 0.9, 22.6, 0.0), dvec3(pier + 0.9, 23.4, 4.0));
     }
-    station.place(&house(98.0, 14.0, 9.0, 5.0), &upright(0.0, 0.0, 31.0, 0.0));
+    station.part(&upright(0.0, 0.0, 31.0, 0.0), |hall| house(hall, 98.0, 14.0, 9.0, 5.0));
     station.cuboid(dvec3(50.0, 24.0, 0.0), dvec3(58.0, 32.0, 27.0));
-    let cap = MeshBuilder::revolved(
-        &[(6.4, 27.0), (5.0, 31.0), (1.2, 34.0), (0.9, 38.0), (0.0, 41.0)],
-        8,
-    );
-    station.place(&cap, &upright(1.0 / 16.0, 54.0, 28.0, 0.0));
-    mesh.place(&station, &placed(aligned(1500.0), beside(1500.0, 0.0, TRACK)));
+    station.part(&upright(1.0 / 16.0, 54.0, 28.0, 0.0), |cap| {
+        cap.revolve(&[(6.4, 27.0), (5.0, 31.0), (1.2, 34.0), (0.9, 38.0), (0.0, 41.0)], 8);
+    });
 }
 
 /// A gabled house, `length` along x, with eaves, windows, a door and a chimney; stands on z = 0,
 /// sunk a little.
-fn house(length: f64, width: f64, wall: f64, gable: f64) -> MeshBuilder {
-    let mut house = MeshBuilder::default();
+fn house(house: &mut MeshBuilder, length: f64, width: f64, wall: f64, gable: f64) {
     let x = 0.5 * length;
     let y = 0.5 * width;
     for side in [-1.0, 1.0] {
         house.wall(-x, x, side * y, -4.0, wall);
-        let end = side * x;
-        house.polygon(&[
-            dvec3(end, -y, -4.0),
-            dvec3(end, y, -4.0),
-            dvec3(end, y, wall),
-            dvec3(end, 0.0, wall + gable),
-            dvec3(end, -y, wall),
-        ]);
+        let end = |y: f64, z: f64| dvec3(side * x, y, z);
+        let ridge = wall + gable;
+        house.polygon(&[end(-y, -4.0), end(y, -4.0), end(y, wall), end(0.0, ridge), end(-y, wall)]);
         // The roof overhangs the walls on all sides.
-        let eaves = wall - 0.7 * gable / y;
-        house.quad(
-            dvec3(-x - 0.5, side * (y + 0.7), eaves),
-            dvec3(x + 0.5, side * (y + 0.7), eaves),
-            dvec3(x + 0.5, 0.0, wall + gable),
-            dvec3(-x - 0.5, 0.0, wall + gable),
-        );
+        let low = |x: f64| dvec3(x, side * (y + 0.7), wall - 0.7 * gable / y);
+        let high = |x: f64| dvec3(x, 0.0, ridge);
+        house.quad(low(-x - 0.5), low(x + 0.5), high(x + 0.5), high(-x - 0.5));
         let windows = (length / 4.5) as usize;
         for k in 0..windows {
             let middle = length * (fraction(2 * k + 1, 2 * windows) - 0.5);
@@ -252,7 +219,6 @@ fn house(length: f64, width: f64, wall: f64, gable: f64) -> MeshBuilder {
         dvec3(0.22 * x, 0.3 * y, wall),
         dvec3(0.22 * x + 0.9, 0.3 * y + 0.9, wall + gable + 0.8),
     );
-    house
 }
 
 /// Streets of houses, each turned its own way, around a church on the rise behind the station.
@@ -267,32 +233,29 @@ fn town(mesh: &mut MeshBuilder) {
             if yard.length() < 52.0 {
                 continue; // the churchyard
             }
-            let size = (
-                11.0 + 3.0 * jitter(22, index),
-                8.5 + 1.5 * jitter(23, index),
-                6.0 + 2.0 * jitter(24, index),
-            );
+            let length = 11.0 + 3.0 * jitter(22, index);
+            let width = 8.5 + 1.5 * jitter(23, index);
+            let wall = 6.0 + 2.0 * jitter(24, index);
             let turn = about_z(0.018 * jitter(25, index) + if index % 5 == 0 { 0.25 } else { 0.0 });
-            let part = house(size.0, size.1, size.2, 0.42 * size.1);
-            mesh.place(&part, &placed(aligned(x) * turn, spot + DVec3::Z * ground(spot.x, spot.y)));
+            let place = placed(aligned(x) * turn, spot + DVec3::Z * ground(spot.x, spot.y));
+            mesh.part(&place, |mesh| house(mesh, length, width, wall, 0.42 * width));
         }
     }
     let spot = beside(1560.0, 225.0, 0.0);
-    mesh.place(
-        &church(),
-        &placed(aligned(1560.0) * about_z(0.043), spot + DVec3::Z * ground(spot.x, spot.y)),
-    );
+    let rise = DVec3::Z * ground(spot.x, spot.y);
+    mesh.part(&placed(aligned(1560.0) * about_z(0.043), spot + rise), church);
 }
 
 /// A church with nave, round apse and a tower with an octagonal spire.
-fn church() -> MeshBuilder {
-    let mut church = house(34.0, 14.0, 12.0, 8.0);
-    let apse = MeshBuilder::revolved(&[(5.5, -4.0), (5.5, 9.0), (5.9, 9.3), (0.0, 14.0)], 16);
-    church.place(&apse, &upright(0.0, 17.0, 0.0, 0.0));
+fn church(church: &mut MeshBuilder) {
+    house(church, 34.0, 14.0, 12.0, 8.0);
+    church.part(&upright(0.0, 17.0, 0.0, 0.0), |apse| {
+        apse.revolve(&[(5.5, -4.0), (5.5, 9.0), (5.9, 9.3), (0.0, 14.0)], 16);
+    });
     church.cuboid(dvec3(-25.0, -4.0, -4.0), dvec3(-17.0, 4.0, 30.0));
-    let spire = MeshBuilder::revolved(&[(5.2, 29.5), (3.2, 34.0), (0.15, 62.0), (0.0, 64.0)], 8);
-    church.place(&spire, &upright(1.0 / 16.0, -21.0, 0.0, 0.0));
-    church
+    church.part(&upright(1.0 / 16.0, -21.0, 0.0, 0.0), |spire| {
+        spire.revolve(&[(5.2, 29.5), (3.2, 34.0), (0.15, 62.0), (0.0, 64.0)], 8);
+    });
 }
 
 /// A power line on lattice masts over the hills, its wires sagging between them.
@@ -303,12 +266,11 @@ fn power_line(mesh: &mut MeshBuilder) {
         let y = 220.0 + 26.0 * k as f64;
         dvec3(x, y, ground(x, y))
     };
-    let mast = mast();
     // The arms point across the line.
     let along = (foot(1) - foot(0)).with_z(0.0).normalize();
     let across = DMat3::from_cols(DVec3::Z.cross(along), -along, DVec3::Z);
     for k in 0..masts {
-        mesh.place(&mast, &placed(across, foot(k)));
+        mesh.part(&placed(across, foot(k)), mast);
         if k + 1 == masts {
             continue;
         }
@@ -324,8 +286,7 @@ fn power_line(mesh: &mut MeshBuilder) {
 }
 
 /// A lattice mast of thin bars: four legs, cross braces in every storey, two arms.
-fn mast() -> MeshBuilder {
-    let mut mast = MeshBuilder::default();
+fn mast(mast: &mut MeshBuilder) {
     let storeys = 5;
     let corner = |k: usize, storey: usize| {
         let t = fraction(storey, storeys);
@@ -346,7 +307,6 @@ fn mast() -> MeshBuilder {
             }
         }
     }
-    mast
 }
 
 /// Firs on the slopes: a pyramid on a thin trunk.
@@ -364,10 +324,10 @@ fn forest(mesh: &mut MeshBuilder) {
         if (-120.0..420.0).contains(&aside) {
             continue;
         }
-        let mut fir = MeshBuilder::default();
         let height = 17.0 + 6.0 * jitter(30, k);
-        fir.revolve(&[(0.3, -1.0), (0.3, 3.0)], 3);
-        fir.revolve(&[(0.24 * height, 2.5), (0.0, height)], 6);
-        mesh.place(&fir, &upright(jitter(31, k), x, y, ground(x, y)));
+        mesh.part(&upright(jitter(31, k), x, y, ground(x, y)), |fir| {
+            fir.revolve(&[(0.3, -1.0), (0.3, 3.0)], 3);
+            fir.revolve(&[(0.24 * height, 2.5), (0.0, height)], 6);
+        });
     }
 }

@@ -5,7 +5,7 @@
 //! machine gets the same bytes.
 
 use bvh_core::Triangle;
-use glam::{DAffine3, DMat3, DVec3, dvec3};
+use glam::{BVec3, DAffine3, DMat3, DVec3, dvec3};
 
 /// Triangles under construction, in the order in which they were added.
 #[derive(Default)]
@@ -14,6 +14,13 @@ pub struct MeshBuilder {
 }
 
 impl MeshBuilder {
+    /// Returns what `draw` adds.
+    pub fn of(draw: impl FnOnce(&mut Self)) -> Self {
+        let mut mesh = Self::default();
+        draw(&mut mesh);
+        mesh
+    }
+
     /// Adds one triangle.
     pub fn triangle(&mut self, a: DVec3, b: DVec3, c: DVec3) {
         self.triangles.push([a, b, c]);
@@ -59,11 +66,12 @@ impl MeshBuilder {
         });
     }
 
-    /// Returns a surface of revolution, as [`revolve`](Self::revolve) adds it.
-    pub fn revolved(profile: &[(f64, f64)], segments: usize) -> Self {
-        let mut mesh = Self::default();
-        mesh.revolve(profile, segments);
-        mesh
+    /// Adds a torus about the z axis.
+    pub fn torus(&mut self, radius: f64, thickness: f64, segments: usize, sides: usize) {
+        let profile = (0..=sides).map(|i| cos_sin(fraction(i % sides, sides)));
+        let profile: Vec<_> =
+            profile.map(|(c, s)| (radius + thickness * c, thickness * s)).collect();
+        self.revolve(&profile, segments);
     }
 
     /// Sweeps a closed polygon along a path and closes both ends. The profile's first coordinate
@@ -109,15 +117,8 @@ impl MeshBuilder {
         let sides =
             [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         for side in sides {
-            let [a, b, c, d] = side.map(|number| {
-                DVec3::from(
-                    [0, 1, 2].map(
-                        |axis| {
-                            if number >> axis & 1 == 0 { min[axis] } else { max[axis] }
-                        },
-                    ),
-                )
-            });
+            let corner = |bits: u8| BVec3::new(bits & 1 > 0, bits & 2 > 0, bits & 4 > 0);
+            let [a, b, c, d] = side.map(|bits| DVec3::select(corner(bits), max, min));
             self.quad(a, b, c, d);
         }
     }
@@ -151,12 +152,18 @@ impl MeshBuilder {
         self.grid(segments, 1, &|i, j| front(i, if j == 0 { -0.5 } else { 0.5 } * thickness));
     }
 
-    /// Adds a copy of `part`, moved by `placement`.
-    pub fn place(&mut self, part: &MeshBuilder, placement: &DAffine3) {
-        for corners in &part.triangles {
-            let moved = corners.map(|corner| placement.transform_point3(corner));
-            self.triangles.push(moved);
+    /// Moves what `draw` adds by `placement`: a part is drawn in its own coordinates.
+    pub fn part(&mut self, placement: &DAffine3, draw: impl FnOnce(&mut Self)) {
+        let before = self.triangles.len();
+        draw(self);
+        for corner in self.triangles[before..].as_flattened_mut() {
+            *corner = placement.transform_point3(*corner);
         }
+    }
+
+    /// Adds a moved copy of a part of which there are many.
+    pub fn copy(&mut self, placement: &DAffine3, part: &Self) {
+        self.part(placement, |mesh| mesh.triangles.extend(&part.triangles));
     }
 
     /// Multiplies by `unit`, adds `origin`, rounds to f32, and drops triangles without area, which
@@ -203,13 +210,6 @@ pub fn half_circle(steps: usize, point: impl Fn(f64, f64) -> DVec3) -> Vec<DVec3
 /// A regular polygon of `sides` corners as a profile for [`MeshBuilder::sweep`].
 pub fn circle(radius: f64, sides: usize) -> Vec<(f64, f64)> {
     (0..sides).map(|i| cos_sin(fraction(i, sides))).map(|(c, s)| (radius * c, radius * s)).collect()
-}
-
-/// A torus about the z axis.
-pub fn torus(radius: f64, thickness: f64, segments: usize, sides: usize) -> MeshBuilder {
-    let profile: Vec<_> =
-        circle(thickness, sides).into_iter().map(|(x, z)| (radius + x, z)).collect();
-    MeshBuilder::revolved(&[&profile[..], &profile[..1]].concat(), segments)
 }
 
 /// `i / n`, the parameter of the i-th of n steps.

@@ -36,7 +36,9 @@ pub fn triangles() -> Vec<Triangle> {
         let azimuth = i as f64 * GOLDEN + 0.004 * jitter(3, i);
         let rotation = about_z(azimuth) * about_y(opening) * about_x(0.01 * jitter(4, i));
         let root = about_z(azimuth) * dvec3(0.5 * belly(t), 0.0, 0.98 * t - 0.05);
-        cone.place(&scale(i), &placed(rotation * DMat3::from_diagonal(DVec3::splat(size)), root));
+        cone.part(&placed(rotation * DMat3::from_diagonal(DVec3::splat(size)), root), |mesh| {
+            scale(mesh, i);
+        });
     }
     cone.finish(UNIT, DVec3::ZERO)
 }
@@ -47,10 +49,9 @@ fn belly(t: f64) -> f64 {
 }
 
 /// One scale of length 1 along z, its outer face towards +x, with its sub-scales.
-fn scale(index: usize) -> MeshBuilder {
-    let mut scale = MeshBuilder::default();
-    blade(&mut scale, 5, 3, 0.0);
-    blade(&mut scale, 2, 2, -0.06);
+fn scale(mesh: &mut MeshBuilder, index: usize) {
+    blade(mesh, 5, 3, 0.0);
+    blade(mesh, 2, 2, -0.06);
     for k in 0..SUB_SCALES {
         // The same spiral once more, on the upper half of the blade's face.
         let radius = 0.34 * libm::sqrt(fraction(2 * k + 1, 2 * SUB_SCALES));
@@ -58,15 +59,14 @@ fn scale(index: usize) -> MeshBuilder {
         let u = radius * c;
         let v = 0.62 + radius * s;
         let tilt = about_y(0.1 + 0.02 * jitter(6, index * SUB_SCALES + k)) * about_x(-0.12 * u);
-        let mut sub = MeshBuilder::default();
-        blade(&mut sub, 2, 1, 0.0);
-        let tip = face(0.5, 1.0, 0.0);
-        sub.polygon(&[tip, face(0.3, 0.7, 0.0), face(0.5, 0.85, 0.3), face(0.7, 0.7, 0.0)]);
-        sub.triangle(tip, face(0.7, 0.7, 0.0), face(0.3, 0.7, 0.0));
         let size = DMat3::from_diagonal(DVec3::splat(0.3 - 0.2 * radius));
-        scale.place(&sub, &placed(tilt * size, face(0.5 + u, v, 0.0)));
+        mesh.part(&placed(tilt * size, face(0.5 + u, v, 0.0)), |sub| {
+            blade(sub, 2, 1, 0.0);
+            let tip = face(0.5, 1.0, 0.0);
+            sub.polygon(&[tip, face(0.3, 0.7, 0.0), face(0.5, 0.85, 0.3), face(0.7, 0.7, 0.0)]);
+            sub.triangle(tip, face(0.7, 0.7, 0.0), face(0.3, 0.7, 0.0));
+        });
     }
-    scale
 }
 
 /// Adds a blade's face, `lift` above the middle surface.
