@@ -6,7 +6,7 @@ use bvh_build::{Builder, goldsmith_salmon, median_cut, muller_fellner};
 use bvh_core::{
     Aabb, Bvh, Hit, Kernel, Primitives, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants,
 };
-use bvh_scenes::trace::{Accelerator, Structure, kd_tree};
+use bvh_scenes::trace::{Accelerator, KdTree, Structure};
 use bvh_search::Stream;
 use glam::Vec3;
 use rand::seq::IndexedRandom;
@@ -26,7 +26,7 @@ pub const TRAVERSALS: &[(&str, Traversal)] = &[
     ("wide, SIMD", |objects| over_wide_layouts(objects, Structure::Wide)),
     ("wide, portable", |objects| over_wide_layouts(objects, Structure::WidePortable)),
     ("KD-tree", |objects| {
-        let cells = kd_tree::Config::default().build(&objects.boxes())?;
+        let cells = KdTree::build(&objects.boxes())?;
         Ok(vec![Accelerator::new(objects, Structure::KdTree(cells))])
     }),
 ];

@@ -41,39 +41,6 @@ pub enum Structure<'a> {
     WidePortable(WideBvh),
 }
 
-impl Structure<'_> {
-    #[inline(always)]
-    fn nearest_hit(
-        &self,
-        objects: usize,
-        ray: &Ray,
-        test: impl FnMut(u32, f32) -> Option<f32>,
-        counter: &mut impl Counter,
-    ) -> Option<Hit> {
-        match self {
-            Self::Tree(tree) => nearest_hit_by(&**tree, ray, test, counter),
-            Self::Unpruned(tree) => unpruned::nearest_hit(tree, ray, test, counter),
-            Self::KdTree(tree) => tree.nearest_hit(ray, test, counter),
-            _ => nearest_hit_of_all(objects as u32, ray, test, counter),
-        }
-    }
-
-    #[inline(always)]
-    fn any_hit(
-        &self,
-        objects: usize,
-        ray: &Ray,
-        test: impl FnMut(u32) -> bool,
-        counter: &mut impl Counter,
-    ) -> bool {
-        match self {
-            Self::Tree(tree) | Self::Unpruned(tree) => any_hit_by(&**tree, ray, test, counter),
-            Self::KdTree(tree) => tree.any_hit(ray, test, counter),
-            _ => any_hit_of_all(objects as u32, test, counter),
-        }
-    }
-}
-
 /// Objects with a structure over them. Every structure gives the same answers, bit for bit, except
 /// [`Structure::Unpruned`].
 #[derive(Clone, Debug)]
@@ -142,14 +109,15 @@ impl<'a> Accelerator<'a> {
     /// Returns the nearest object. The wide layouts use portable code.
     #[inline(always)]
     fn find(&self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
+        let test = || test(self.objects, ray);
         match &self.structure {
             Structure::Wide(wide) | Structure::WidePortable(wide) => {
                 wide.nearest_hit_counted(ray, counter)
             }
-            structure => {
-                let test = test(self.objects, ray);
-                structure.nearest_hit(count(self.objects), ray, test, counter)
-            }
+            Structure::Tree(tree) => nearest_hit_by(&**tree, ray, test(), counter),
+            Structure::Unpruned(tree) => unpruned::nearest_hit(tree, ray, test(), counter),
+            Structure::KdTree(tree) => tree.nearest_hit(ray, test(), counter),
+            Structure::Brute => nearest_hit_of_all(count(self.objects), ray, test(), counter),
         }
     }
 
@@ -177,15 +145,21 @@ impl<'a> Accelerator<'a> {
             is_hit |= test(id, ray.t_max()).is_some();
             is_hit && ends_at_hit
         };
-        self.structure.any_hit(count(self.objects), ray, visited, counter);
+        let _ = match &self.structure {
+            Structure::Tree(tree) | Structure::Unpruned(tree) => {
+                any_hit_by(&**tree, ray, visited, counter)
+            }
+            Structure::KdTree(tree) => tree.any_hit(ray, visited, counter),
+            _ => any_hit_of_all(count(self.objects), visited, counter),
+        };
         is_hit
     }
 }
 
-fn count(objects: &Primitives) -> usize {
+fn count(objects: &Primitives) -> u32 {
     match objects {
-        Primitives::Triangles(triangles) => triangles.len(),
-        Primitives::Spheres(spheres) => spheres.len(),
+        Primitives::Triangles(triangles) => triangles.len() as u32,
+        Primitives::Spheres(spheres) => spheres.len() as u32,
     }
 }
 

@@ -17,22 +17,17 @@
 //! the hit are skipped.
 
 use bvh_build::{BuildError, check_scene};
-use bvh_config::{Check, above};
 use bvh_core::{Aabb, Counter, Hit, Ray, Slabs};
 use std::ops::ControlFlow;
 
-bvh_config::config! {
-    /// The constants of the surface area heuristic, in any unit of time. The defaults are the
-    /// paper's.
-    pub struct Config {
-        /// The time to step through a cell.
-        traversal: f64 = 15.0, in above(0.0);
-        /// The time to test an object.
-        intersection: f64 = 20.0, in 0.0..;
-        /// The factor on the cost of a split that cuts off empty space.
-        empty_factor: f64 = 0.8, in 0.0..=1.0;
-    }
-}
+/// The paper's constants of the surface area heuristic, in units of time: to step through a cell,
+/// and to test an object.
+const TRAVERSAL: f64 = 15.0;
+const INTERSECTION: f64 = 20.0;
+/// The paper's factor on the cost of a split that cuts off empty space.
+const EMPTY_FACTOR: f64 = 0.8;
+/// The limit on references per object. Wald & Havran report 2 to 6 for meshes.
+const MAX_REFERENCES: usize = 16;
 
 /// A tree of cells that fill the root's box without overlap. Every leaf that an object's box
 /// overlaps names the object.
@@ -57,7 +52,7 @@ enum Cell {
 }
 
 impl KdTree {
-    /// The limit on the depth in [`Config::build`] for 2^31 objects, more than a scene can have.
+    /// The limit on the depth in [`build`](Self::build) for 2^31 objects, more than a scene can have.
     const MAX_DEPTH: usize = 49;
 
     /// Returns the number of cells, inner cells included.
@@ -120,33 +115,29 @@ struct Frame {
     budget: usize,
 }
 
-impl Config {
-    /// The limit on references per object. Wald & Havran report 2 to 6 for meshes.
-    const MAX_REFERENCES: usize = 16;
-
+impl KdTree {
     /// Builds a tree over `boxes`; `boxes[i]` bounds object `i`. No boxes give the tree without
     /// cells. O(n log n).
     ///
     /// The tree is at most 8 + 1.3 log₂ n deep and has at most 16 references per object.
-    pub fn build(&self, boxes: &[Aabb]) -> Result<KdTree, BuildError> {
+    pub fn build(boxes: &[Aabb]) -> Result<Self, BuildError> {
         check_scene(boxes)?;
-        self.check()?;
         let n = boxes.len();
         let bounds = Aabb::union_of(boxes);
-        let mut tree = KdTree { bounds, cells: vec![], objects: vec![], depth: 0 };
+        let mut tree = Self { bounds, cells: vec![], objects: vec![], depth: 0 };
         if n == 0 {
             return Ok(tree);
         }
-        let max_depth = ((8.0 + 1.3 * libm::log2(n as f64)) as usize).min(KdTree::MAX_DEPTH);
+        let max_depth = ((8.0 + 1.3 * libm::log2(n as f64)) as usize).min(Self::MAX_DEPTH);
         let mut sides = vec![Side::Both; n];
         let placeholder = Cell::Leaf { first: 0, count: 0 };
         tree.cells.push(placeholder);
-        let budget = n.saturating_mul(Self::MAX_REFERENCES).min(u32::MAX as usize);
+        let budget = n.saturating_mul(MAX_REFERENCES).min(u32::MAX as usize);
         let events = [0, 1, 2].map(|axis| events(boxes, axis));
         let mut stack = vec![Frame { cell: 0, bounds, events, count: n, depth: 0, budget }];
         while let Some(frame) = stack.pop() {
             tree.depth = tree.depth.max(frame.depth);
-            let split = if frame.depth < max_depth { self.best_split(&frame) } else { None };
+            let split = if frame.depth < max_depth { frame.best_split() } else { None };
             let Some(split) = split else {
                 let first = tree.objects.len();
                 // Every object has exactly one event that is not an end.
@@ -182,17 +173,19 @@ impl Config {
         }
         Ok(tree)
     }
+}
 
+impl Frame {
     /// Returns the cheapest split within the budget, or `None` if a leaf is cheaper. Ties go to the
     /// lower axis and position.
-    fn best_split(&self, frame: &Frame) -> Option<Split> {
+    fn best_split(&self) -> Option<Split> {
         let mut best: Option<Split> = None;
-        let mut limit = self.intersection * frame.count as f64;
-        let area = frame.bounds.half_area();
-        let extent = frame.bounds.extent();
+        let mut limit = INTERSECTION * self.count as f64;
+        let area = self.bounds.half_area();
+        let extent = self.bounds.extent();
         for axis in 0..3 {
-            let low = frame.bounds.min[axis];
-            let high = frame.bounds.max[axis];
+            let low = self.bounds.min[axis];
+            let high = self.bounds.max[axis];
             let u = extent[(axis + 1) % 3];
             let v = extent[(axis + 2) % 3];
             // The probability that a line through the cell meets the part of this length, or the
@@ -201,8 +194,8 @@ impl Config {
                 if area > 0.0 { (u * v + length * (u + v)) / area } else { length / extent[axis] }
             };
             let mut below = 0;
-            let mut above = frame.count;
-            for group in frame.events[axis].chunk_by(|a, b| a.position == b.position) {
+            let mut above = self.count;
+            for group in self.events[axis].chunk_by(|a, b| a.position == b.position) {
                 let position = group[0].position;
                 let ends = group.partition_point(|event| event.kind == Kind::End);
                 let planar = group.partition_point(|event| event.kind <= Kind::Planar) - ends;
@@ -216,9 +209,9 @@ impl Config {
                         let below = below + if planar_below { planar } else { 0 };
                         let above = above + if planar_below { 0 } else { planar };
                         let tests = chance_below * below as f64 + chance_above * above as f64;
-                        let factor = if below == 0 || above == 0 { self.empty_factor } else { 1.0 };
-                        let cost = factor * (self.traversal + self.intersection * tests);
-                        if cost < limit && below + above <= frame.budget {
+                        let factor = if below == 0 || above == 0 { EMPTY_FACTOR } else { 1.0 };
+                        let cost = factor * (TRAVERSAL + INTERSECTION * tests);
+                        if cost < limit && below + above <= self.budget {
                             limit = cost;
                             best = Some(Split { axis, position, planar_below, below, above });
                         }
@@ -438,7 +431,7 @@ mod tests {
                 100,
             ),
         ) {
-            let tree = Config::default().build(&boxes).unwrap();
+            let tree = KdTree::build(&boxes).unwrap();
             prop_assert!(tree.references() >= boxes.len() && tree.references() <= 16 * boxes.len());
             prop_assert!(tree.depth() as f64 <= 8.0 + 1.3 * libm::log2(boxes.len().max(1) as f64));
             for (origin, towards) in rays {
@@ -461,7 +454,7 @@ mod tests {
             .map(|i| Vec3::X * i as f32 * 2.0)
             .map(|min| Aabb { min, max: min + 1.0 })
             .collect();
-        let tree = Config::default().build(&boxes).unwrap();
+        let tree = KdTree::build(&boxes).unwrap();
         assert_eq!(tree.references(), boxes.len());
         let mut counts = TestCounts::default();
         let ray = Ray::half_line(Vec3::new(60.5, 0.5, -5.0), Vec3::Z).unwrap();

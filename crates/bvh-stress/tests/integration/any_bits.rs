@@ -8,7 +8,7 @@ use bvh_core::{
     Aabb, Bvh, Primitives, Ray, Sphere, Triangle, any_hit_by, clip_to_box, collapse_leaves, file,
     nearest_hit_by, nearest_hit_of_all, validate,
 };
-use bvh_scenes::trace::kd_tree;
+use bvh_scenes::trace::KdTree;
 use bvh_search::{Budget, Problem, best, lower_bound, optimize};
 use bvh_stress::examine::ROUNDING;
 use bvh_stress::tracing::{TRAVERSALS, bits, check};
@@ -61,7 +61,7 @@ fn check_trees(boxes: &[Aabb], ray: &Ray, test: impl Fn(u32, f32) -> Option<f32>
         assert_eq!(bits(nearest_hit_by(&tree, ray, &test, &mut ())), bits(expected), "{ray:?}");
         assert_eq!(any_hit_by(&tree, ray, any, &mut ()), expected.is_some(), "{ray:?}");
     }
-    let cells = kd_tree::Config::default().build(boxes).unwrap();
+    let cells = KdTree::build(boxes).unwrap();
     assert_eq!(bits(cells.nearest_hit(ray, &test, &mut ())), bits(expected), "KD-tree: {ray:?}");
     assert_eq!(cells.any_hit(ray, any, &mut ()), expected.is_some(), "KD-tree: {ray:?}");
 }
@@ -140,7 +140,7 @@ proptest! {
             prop_assert_eq!(validate(&better.tree, &boxes), Ok(()));
             prop_assert!(better.cost <= before * (1.0 + ROUNDING));
         }
-        let cells = kd_tree::Config::default().build(&boxes).unwrap();
+        let cells = KdTree::build(&boxes).unwrap();
         prop_assert!(cells.references() >= cells.cells().min(1));
     }
 }

@@ -6,7 +6,7 @@ use crate::rows::{RenderRow, RenderTimeRow, RunRow};
 use bvh_config::config;
 use bvh_core::Bvh;
 use bvh_scenes::render::{Film, Options, framing, render};
-use bvh_scenes::trace::{Accelerator, Structure, kd_tree};
+use bvh_scenes::trace::{Accelerator, KdTree, Structure};
 use bvh_scenes::{Scene, fnv1a};
 use std::borrow::Cow;
 use std::time::Instant;
@@ -53,7 +53,7 @@ impl Config {
         if first {
             structures.push(("brute force".to_owned(), Structure::Brute, 0, 0.0));
             let start = Instant::now();
-            let cells = kd_tree::Config::default().build(&scene.boxes);
+            let cells = KdTree::build(&scene.boxes);
             let cells = cells.map_err(Error::search(&scene.name, "KD-tree"))?;
             let seconds = start.elapsed().as_secs_f64();
             structures.push(("KD-tree".to_owned(), Structure::KdTree(cells), 0, seconds));
