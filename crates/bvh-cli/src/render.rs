@@ -1,15 +1,15 @@
 //! `bvh render`: draws a scene into a PNG file, and prints times and counts.
 
 use crate::Error;
-use crate::answer::{Answer, Form, short, whole};
+use crate::answer::{Answer, Form, whole};
 use crate::arguments::{Jobs, input_file, load_scene, output_file};
 use crate::output::bar;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, WideBvh};
 use bvh_scenes::files::{self, WriteError};
 use bvh_scenes::rays::View;
-use bvh_scenes::render::{Film, Options, framing, heat, image, render as draw};
-use bvh_scenes::trace::{Accelerator, Structure, kd_tree};
+use bvh_scenes::render::{Options, framing, heat, image, render as draw};
+use bvh_scenes::trace::{Accelerator, KdTree, Structure};
 use bvh_scenes::{Scene, tree_file};
 use glam::DVec3;
 use std::borrow::Cow;
@@ -119,8 +119,11 @@ pub fn render(args: &RenderArgs) -> Result<(), Error> {
     let film = draw(&scene, &accelerator, &options, &|| bar.inc(1));
     bar.finish_and_clear();
     let rendered = start.elapsed().as_secs_f64() - built;
-    let rays_per_pixel = options.samples * options.samples;
-    write(args, &film, rays_per_pixel)?;
+    let heat::Range { median, top } = heat::range(film.tests.clone());
+    let heat = args.heatmap.then(|| heat::colours(&film, top));
+    let bytes = image::png(film.width, heat.as_ref().unwrap_or(&film.pixels))
+        .map_err(WriteError::of(&args.out, "encode the picture"))?;
+    files::write(&args.out, &bytes)?;
     let mut answer = Answer::new(args.form);
     let objects = scene.boxes.len();
     answer.say(&format!(
@@ -134,7 +137,11 @@ pub fn render(args: &RenderArgs) -> Result<(), Error> {
     answer.record("seconds to build", built);
     answer.record("seconds to render", rendered);
     if args.accel != "wide" {
-        per_ray(&film, rays_per_pixel, &mut answer);
+        let rays_per_pixel = f64::from(options.samples * options.samples);
+        answer.fact("boxes per ray", film.counts.boxes as f64 / film.rays as f64);
+        answer.fact("objects per ray", film.counts.objects as f64 / film.rays as f64);
+        answer.fact("median tests per ray of a pixel", median / rays_per_pixel);
+        answer.fact("tests per ray of the last colour of --heatmap", top / rays_per_pixel);
     }
     answer.say(&format!("picture: {}", args.out.display()));
     answer.end();
@@ -151,7 +158,7 @@ fn structure(name: &str, scene: &Scene) -> Result<Structure<'static>, Error> {
     Ok(match name {
         "brute" => Structure::Brute,
         "kdtree" => {
-            let tree = kd_tree::Config::default().build(&scene.boxes);
+            let tree = KdTree::build(&scene.boxes);
             Structure::KdTree(tree.map_err(Error::search(&scene.name, name))?)
         }
         "bvh" => Structure::Tree(Cow::Owned(greedy()?)),
@@ -170,35 +177,4 @@ fn structure(name: &str, scene: &Scene) -> Result<Structure<'static>, Error> {
             return Err(Error::Usage(format!("--accel is {name:?}; accepted: {accepted}")));
         }
     })
-}
-
-fn write(args: &RenderArgs, film: &Film, rays_per_pixel: u32) -> Result<(), Error> {
-    let range = heat::range(film.tests.clone(), rays_per_pixel);
-    let heat = args.heatmap.then(|| heat::colours(film, range.top * f64::from(rays_per_pixel)));
-    let bytes = image::png(film.width, heat.as_ref().unwrap_or(&film.pixels))
-        .map_err(WriteError::of(&args.out, "encode the picture"))?;
-    Ok(files::write(&args.out, &bytes)?)
-}
-
-fn per_ray(film: &Film, rays_per_pixel: u32, answer: &mut Answer) {
-    let boxes = film.counts.boxes as f64 / film.rays as f64;
-    let objects = film.counts.objects as f64 / film.rays as f64;
-    let heat::Range { min, median, top, max } = heat::range(film.tests.clone(), rays_per_pixel);
-    let [boxes_text, objects_text, min_text, median_text, top_text, max_text] =
-        [boxes, objects, min, median, top, max].map(short);
-    answer.say(&format!(
-        "per ray: {boxes_text} boxes, {objects_text} objects; \
-         per pixel: {min_text} to {max_text} tests, median {median_text}; \
-         the colours of --heatmap end at {top_text}"
-    ));
-    for (name, value) in [
-        ("boxes per ray", boxes),
-        ("objects per ray", objects),
-        ("least tests of a pixel", min),
-        ("median tests of a pixel", median),
-        ("tests of the last colour", top),
-        ("most tests of a pixel", max),
-    ] {
-        answer.record(name, value);
-    }
 }

@@ -4,12 +4,12 @@ mod page;
 
 use crate::Error;
 use crate::answer::{Answer, Form, whole};
-use crate::arguments::{Jobs, load_scene, output_file, output_or_free, reserve};
+use crate::arguments::{Jobs, load_scene, output_file, output_or_free};
 use crate::rays::Rays;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective};
-use bvh_scenes::files::WriteError;
+use bvh_scenes::files::{Reserved, WriteError};
 use bvh_scenes::rays::View;
 use bvh_scenes::render::{Film, Options, framing, heat, image, render};
 use bvh_scenes::trace::Accelerator;
@@ -50,7 +50,7 @@ const HEIGHT: u32 = 400;
 
 /// Measures the tree in a file and the greedy tree, draws both, and writes the page.
 pub fn report(args: &ReportArgs) -> Result<(), Error> {
-    let out = output_or_free("--out", args.out.as_ref(), || args.file.with_extension("html"))?;
+    let out = output_or_free(args.out.as_ref(), || args.file.with_extension("html"))?;
     output_file("--out", &out, "html")?;
     args.jobs.apply()?;
     let scene = load_scene(&args.scene)?;
@@ -91,7 +91,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Error> {
         medians: ranges.map(|range| range.median),
         top,
     };
-    reserve(&out, args.out.is_some(), 0)?.write(&[page.html().as_bytes()])?;
+    Reserved::new(&out, 0, args.out.is_none())?.write(&[page.html().as_bytes()])?;
     answer.end();
     Ok(())
 }
@@ -111,7 +111,7 @@ impl Measured {
     /// other rays have one test, which would hide the median of a small scene.
     fn range(&self) -> heat::Range {
         let tests = self.film.tests.iter().copied().filter(|&tests| tests > 1).collect();
-        heat::range(tests, 1)
+        heat::range(tests)
     }
 }
 

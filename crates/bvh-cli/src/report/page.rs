@@ -47,7 +47,7 @@ impl Page<'_> {
         }
         let top = number(self.top);
         let colours: Vec<String> =
-            heat::INFERNO.iter().map(|[r, g, b]| format!("rgb({r} {g} {b})")).collect();
+            heat::scale(17).iter().map(|[r, g, b]| format!("rgb({r} {g} {b})")).collect();
         let colours = colours.join(", ");
         let version = env!("CARGO_PKG_VERSION");
         format!(
