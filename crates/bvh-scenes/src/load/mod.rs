@@ -19,9 +19,6 @@ pub enum MeshError {
     /// The file does not exist or cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// The file has no bytes, or only blanks.
-    #[error("{} is empty; expected an OBJ, PLY, STL or glTF file", .0.display())]
-    Empty(PathBuf),
     /// The file is invalid.
     #[error("{}{fault}", .path.display())]
     Fault {
@@ -94,15 +91,14 @@ pub fn load(path: &Path) -> Result<Mesh, MeshError> {
 /// Reads the bytes of a mesh file as [`load`] does. `path` names the file in errors, and a glTF
 /// file's references are relative to its folder.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
-    if bytes.trim_ascii().is_empty() {
-        return Err(MeshError::Empty(path.to_path_buf()));
-    }
     let is_utf_16 = bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff");
-    if is_utf_16 && !stl::is_binary(bytes) {
-        let message = "the text is UTF-16; expected UTF-8 or ASCII";
-        return Err(MeshError::of(path)(Fault::of_file(message)));
-    }
     let parsed = match Format::of(bytes, path) {
+        _ if bytes.trim_ascii().is_empty() => {
+            Err(Fault::of_file("empty; expected an OBJ, PLY, STL or glTF file"))
+        }
+        _ if is_utf_16 && !stl::is_binary(bytes) => {
+            Err(Fault::of_file("the text is UTF-16; expected UTF-8 or ASCII"))
+        }
         Format::Obj => obj::parse(bytes),
         Format::Ply => ply::parse(bytes),
         Format::Stl => stl::parse(bytes),

@@ -1,4 +1,4 @@
-//! Triangles from PLY files, text or binary: the faces and triangle strips over the vertices.
+//! Triangles from PLY files, text or binary: the faces over the vertices.
 //!
 //! This module does not use `ply-rs-bw` 4.0.1, because that crate rejects blank lines, comments in
 //! Latin-1, lines that end in CR, elements without properties, and `-nan(ind)`; it reads an element
@@ -7,7 +7,6 @@
 use super::mesh::{AFTER_END, Fault, MOST_TRIANGLES, Mesh, UNUSED, counted};
 use super::polygon::{Polygons, open};
 use super::{text, without_mark};
-use bvh_core::Triangle;
 use glam::Vec3;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,51 +80,35 @@ enum Encoding {
     BigEndian,
 }
 
-/// Lists of indices of vertices, one after the other.
-#[derive(Default)]
-struct Lists {
-    indices: Vec<i64>,
-    ends: Vec<usize>,
-}
-
-impl Lists {
-    fn iter(&self) -> impl Iterator<Item = &[i64]> {
-        let starts = [0].iter().chain(&self.ends);
-        starts.zip(&self.ends).map(|(&start, &end)| &self.indices[start..end])
-    }
-}
-
 /// Reads the bytes of a PLY file. O(bytes), and more for polygons that are not convex.
 pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
     let mut file =
         File { rest: without_mark(bytes), line: 0, words: &[], encoding: Encoding::Text };
     let elements = file.header().map_err(|message| Fault::in_line(file.line, message))?;
     let mut vertices = Vec::new();
-    let (mut faces, mut strips, mut others) = Default::default();
+    // The indices of all faces, one face after the other, and the ends of the faces.
+    let (mut indices, mut ends) = (Vec::new(), Vec::new());
     for Element { name, count, properties } in &elements {
-        let lists: &mut Lists = match name.as_str() {
-            "face" => &mut faces,
-            "tristrips" => &mut strips,
-            _ => &mut others,
-        };
         // An element without properties has no bytes, whatever its count.
         for number in 0..if properties.is_empty() { 0 } else { *count } {
             let mut point = [f32::NAN; 3];
-            file.element(properties, &mut point, &mut lists.indices).map_err(|message| {
+            file.element(properties, &mut point, &mut indices).map_err(|message| {
                 let name = format!("{name} {number}, counted from 0");
                 match file.encoding {
                     Encoding::Text => Fault::in_line(file.line, format!("{name}: {message}")),
                     _ => Fault::of(&name, message),
                 }
             })?;
-            lists.ends.push(lists.indices.len());
-            if name == "vertex" {
-                vertices.push(Vec3::from(point));
+            match name.as_str() {
+                "vertex" => vertices.push(Vec3::from(point)),
+                "face" => ends.push(indices.len()),
+                _ => {}
             }
         }
     }
     let after = counted(AFTER_END, file.rest.trim_ascii().len());
-    mesh(&vertices, &faces, &strips, after)
+    let starts = [0].iter().chain(&ends);
+    mesh(&vertices, starts.zip(&ends).map(|(&start, &end)| &indices[start..end]), after)
 }
 
 /// The part of a file that is not read yet.
@@ -311,9 +294,7 @@ impl Element {
         let axis = ["x", "y", "z"].iter().position(|axis| *axis == name);
         let purpose = match (self.name.as_str(), axis) {
             ("vertex", Some(axis)) => Purpose::Axis(axis),
-            ("face" | "tristrips", _) if matches!(name, "vertex_indices" | "vertex_index") => {
-                Purpose::Indices
-            }
+            ("face", _) if matches!(name, "vertex_indices" | "vertex_index") => Purpose::Indices,
             _ => Purpose::Ignored,
         };
         let (length, scalar) = match (types, purpose) {
@@ -337,7 +318,8 @@ impl Element {
     fn check(&self) -> Result<(), String> {
         let (needed, names) = match self.name.as_str() {
             "vertex" => (3, "x, y and z"),
-            "face" | "tristrips" => (1, "vertex_indices"),
+            "face" => (1, "vertex_indices"),
+            "tristrips" => return Err("element tristrips; expected faces instead".into()),
             _ => (0, ""),
         };
         let has = self.properties.iter().filter(|property| property.purpose != Purpose::Ignored);
@@ -348,10 +330,9 @@ impl Element {
     }
 }
 
-fn mesh(
+fn mesh<'a>(
     vertices: &[Vec3],
-    faces: &Lists,
-    strips: &Lists,
+    faces: impl Iterator<Item = &'a [i64]>,
     after: Option<String>,
 ) -> Result<Mesh, Fault> {
     // Unused vertices are reported, because they often show that an export went wrong.
@@ -367,31 +348,17 @@ fn mesh(
             point => Err(format!("vertex {index} at {point}; expected finite x, y and z")),
         }
     };
-    let fault = |element: &str, number: usize, message: String| {
-        Fault::of(&format!("{element} {number}, counted from 0"), message)
-    };
     let mut polygons = Polygons::default();
     let mut corners = Vec::new();
-    for (number, face) in faces.iter().enumerate() {
+    for (number, face) in faces.enumerate() {
         corners.clear();
-        for &index in open(face) {
-            corners.push(point(index).map_err(|message| fault("face", number, message))?);
-        }
-        polygons.add(&corners).map_err(|message| fault("face", number, message))?;
-    }
-    for (number, strip) in strips.iter().enumerate() {
-        // The index -1 ends a strip and begins another one.
-        for run in strip.split(|&index| index == -1) {
-            corners.clear();
-            for &index in run {
-                corners.push(point(index).map_err(|message| fault("tristrips", number, message))?);
+        let mut add = || {
+            for &index in open(face) {
+                corners.push(point(index)?);
             }
-            let triangles = corners.windows(3).enumerate().map(|(i, corners)| {
-                // Every second triangle is turned, so that all have one orientation.
-                Triangle([corners[0], corners[1 + i % 2], corners[2 - i % 2]])
-            });
-            polygons.triangles.extend(triangles);
-        }
+            polygons.add(&corners)
+        };
+        add().map_err(|message| Fault::of(&format!("face {number}, counted from 0"), message))?;
     }
     let remarks = counted(UNUSED, used.iter().filter(|used| !**used).count());
     let remarks = remarks.into_iter().chain(polygons.remarks()).chain(after).collect();

@@ -2,7 +2,6 @@
 
 use crate::samples::{error, read, samples, square, stl_text, with};
 use bvh_scenes::Scene;
-use bvh_scenes::files::ReadError;
 use bvh_scenes::load::mesh::Mesh;
 use bvh_scenes::load::{Format, MeshError, load};
 use std::path::Path;
@@ -55,11 +54,6 @@ fn the_path_of_a_mesh_file_names_a_scene_and_a_missing_file_is_reported() {
         let message = Scene::load(missing).unwrap_err().to_string();
         assert!(message.contains(&format!("{missing}: no such file")), "{message}");
     }
-    assert!(matches!(load(folder.path()), Err(MeshError::Read(ReadError::Folder { .. }))));
-    #[cfg(unix)]
-    assert!(matches!(
-        load(Path::new("/dev/zero")),
-        Err(MeshError::Read(ReadError::NotRegular { .. }))
-    ));
-    assert!(matches!(read(b" \r\n", "a.ply"), Err(MeshError::Empty(_))));
+    assert!(matches!(load(folder.path()), Err(MeshError::Read(_))));
+    assert!(error(b" \r\n", "a.ply").starts_with("a.ply: empty; expected an OBJ, PLY"));
 }

@@ -58,18 +58,14 @@ fn spellings_of_the_same_triangle_agree() {
     let colours =
         text.replacen("0 0 0", "0 0 0 1 0.5 nan", 1).replacen("1 0 0", "1 0 0 1 1 1 1", 1);
     assert_eq!(read(colours).unwrap(), expected);
+    // A face may name vertices below it.
+    assert_eq!(read(format!("g a\nf 1 2 3\ng b\n{POINTS}")).unwrap(), expected);
 }
 
 #[test]
 fn objects_and_groups_are_joined_in_the_order_of_the_file() {
     let grouped = "o a\nf 5 4 3\ng b\nf 1 2 3\nusemtl c\nf 1 3 4\n";
     assert_eq!(mesh(grouped), mesh("f 5 4 3\nf 1 2 3\nf 1 3 4\n"));
-}
-
-#[test]
-fn a_face_may_name_vertices_below_it() {
-    let above = read(format!("g a\nf 1 2 3\ng b\n{POINTS}")).unwrap();
-    assert_eq!(above, mesh("f 1 2 3\n"));
 }
 
 #[test]

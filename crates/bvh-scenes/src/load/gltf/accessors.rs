@@ -1,7 +1,7 @@
-//! The numbers of a glTF file: accessors, their views and the items that differ from them.
+//! The numbers of a glTF file: accessors and their views.
 
 use super::buffers::Buffers;
-use super::document::{Accessor, Document, Sparse, SparseIndices, SparseValues};
+use super::document::{Accessor, Document};
 use super::{MOST_ITEMS, get};
 
 /// The types of numbers.
@@ -50,16 +50,13 @@ fn decode(bytes: &[u8], component: u32, normalized: bool) -> f64 {
 pub struct Accessors<'a> {
     document: &'a Document,
     buffers: Buffers<'a>,
-    /// The number of bytes of the file itself.
-    length: usize,
     /// Items read so far.
     items: u64,
 }
 
 impl<'a> Accessors<'a> {
-    /// Prepares the accessors of a file of this many bytes.
-    pub fn new(document: &'a Document, buffers: Buffers<'a>, length: usize) -> Self {
-        Self { document, buffers, length, items: 0 }
+    pub fn new(document: &'a Document, buffers: Buffers<'a>) -> Self {
+        Self { document, buffers, items: 0 }
     }
 
     /// Reads an accessor whose items have `N` numbers of one of the types `wanted`.
@@ -79,12 +76,7 @@ impl<'a> Accessors<'a> {
         wanted: &[u32],
     ) -> Result<Vec<[f64; N]>, String> {
         let Accessor { count, component_type: component, normalized, .. } = *accessor;
-        let type_ = match N {
-            1 => "SCALAR",
-            3 => "VEC3",
-            4 => "VEC4",
-            _ => "MAT4",
-        };
+        let type_ = if N == 1 { "SCALAR" } else { "VEC3" };
         if accessor.type_ != type_ || !wanted.contains(&component) {
             let wanted: Vec<String> = wanted.iter().map(|&component| name(component)).collect();
             return Err(format!(
@@ -102,47 +94,13 @@ impl<'a> Accessors<'a> {
                 self.items
             ));
         }
-        let mut items = match accessor.buffer_view {
-            _ if count == 0 => Vec::new(),
-            Some(view) => self.window(view, accessor.byte_offset, count, component, normalized)?,
-            // Zeros need no bytes, so that a forged file could ask for any number of them. The
-            // displacements of a mesh are no more than its positions, which were read before.
-            None if count as u64 > self.length as u64 + self.buffers.total => {
-                return Err(format!("{count} zeros without a buffer view; expected fewer"));
-            }
-            None => vec![[0.0; N]; count],
-        };
-        let Some(sparse) = &accessor.sparse else { return Ok(items) };
-        let Sparse { count: changes, indices, values } = sparse;
-        let SparseIndices { buffer_view, byte_offset, component_type } = *indices;
-        if ![U8, U16, U32].contains(&component_type) {
-            let found = name(component_type);
-            return Err(format!("sparse indices of {found}; expected an unsigned type"));
+        if count == 0 {
+            return Ok(Vec::new());
         }
-        let indices: Vec<[f64; 1]> =
-            self.window(buffer_view, byte_offset, *changes, component_type, false)?;
-        let SparseValues { buffer_view, byte_offset } = *values;
-        let values = self.window(buffer_view, byte_offset, *changes, component, normalized)?;
-        if !indices.is_sorted_by(|a, b| a < b) {
-            return Err("sparse indices out of order; expected each larger than the last".into());
-        }
-        for ([index], value) in indices.into_iter().zip(values) {
-            *items
-                .get_mut(index as usize)
-                .ok_or_else(|| format!("sparse index {index}; expected below {count}"))? = value;
-        }
-        Ok(items)
-    }
-
-    /// Reads `count` items from a byte of the view with this number.
-    fn window<const N: usize>(
-        &mut self,
-        number: usize,
-        offset: usize,
-        count: usize,
-        component: u32,
-        normalized: bool,
-    ) -> Result<Vec<[f64; N]>, String> {
+        let number = accessor.buffer_view.filter(|_| accessor.sparse.is_none()).ok_or(
+            "items that are not all in a buffer view; expected them there (sparse accessors and \
+             compressed meshes cannot be read)",
+        )?;
         let view = get(&self.document.buffer_views, number, "bufferViews")?;
         let buffer = self.buffers.bytes(self.document, view.buffer)?;
         let size = size(component);
@@ -151,8 +109,8 @@ impl<'a> Accessors<'a> {
         let bytes = || {
             let bytes = buffer.get(view.byte_offset..)?.get(..view.byte_length)?;
             // The last item needs no padding after it.
-            let length = stride.checked_mul(count.checked_sub(1)?)?.checked_add(size * N)?;
-            bytes.get(offset..)?.get(..length).filter(|_| stride >= size * N)
+            let length = stride.checked_mul(count - 1)?.checked_add(size * N)?;
+            bytes.get(accessor.byte_offset..)?.get(..length).filter(|_| stride >= size * N)
         };
         let bytes = bytes().ok_or_else(|| {
             format!("bufferViews[{number}] has no room for {count} items; expected it")

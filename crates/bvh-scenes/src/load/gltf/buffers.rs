@@ -1,22 +1,13 @@
-//! The buffers of a glTF file. A buffer is read when a mesh first needs it, and a file once.
+//! The buffers of a glTF file. A buffer is read when a mesh first needs it.
 
 use super::document::{Buffer, Document};
 use super::{MOST_BYTES, get};
 use crate::files::{read, regular};
 use data_url::DataUrl;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
-use std::rc::Rc;
-
-#[derive(Clone, Debug)]
-enum Bytes<'a> {
-    /// The binary chunk of a GLB file.
-    Chunk(&'a [u8]),
-    /// The contents of a file, which several buffers may name, or of a data URI.
-    Read(Rc<Vec<u8>>),
-}
 
 /// The buffers of one glTF file.
 pub struct Buffers<'a> {
@@ -24,17 +15,15 @@ pub struct Buffers<'a> {
     /// The binary chunk of a GLB file.
     chunk: Option<&'a [u8]>,
     /// The buffers that a mesh has needed, by their number.
-    needed: BTreeMap<usize, Bytes<'a>>,
-    /// The files that buffers have named, by their canonical path.
-    files: BTreeMap<PathBuf, Rc<Vec<u8>>>,
+    needed: BTreeMap<usize, Cow<'a, [u8]>>,
     /// Bytes read so far.
-    pub total: u64,
+    total: u64,
 }
 
 impl<'a> Buffers<'a> {
     /// Prepares the buffers of the file at `path` without reading any.
     pub fn new(path: &'a Path, chunk: Option<&'a [u8]>) -> Self {
-        Self { path, chunk, needed: BTreeMap::new(), files: BTreeMap::new(), total: 0 }
+        Self { path, chunk, needed: BTreeMap::new(), total: 0 }
     }
 
     /// Returns the bytes of a buffer, which is read if no mesh has needed it before.
@@ -45,53 +34,39 @@ impl<'a> Buffers<'a> {
             let bytes = read.map_err(|message| format!("buffers[{number}]: {message}"))?;
             self.needed.insert(number, bytes);
         }
-        Ok(match &self.needed[&number] {
-            Bytes::Chunk(bytes) => bytes,
-            Bytes::Read(bytes) => bytes,
-        })
+        Ok(&self.needed[&number])
     }
 
-    fn read(&mut self, number: usize, buffer: &Buffer) -> Result<Bytes<'a>, String> {
-        let (bytes, length) = match (&buffer.uri, self.chunk) {
-            (Some(uri), _) => {
-                let bytes = self.of_uri(uri)?;
-                let length = bytes.len();
-                (Bytes::Read(bytes), length)
-            }
-            (None, Some(chunk)) if number == 0 => (Bytes::Chunk(chunk), chunk.len()),
-            (None, Some(_)) => {
-                return Err("no URI; expected one, since buffers[0] alone has the chunk".into());
-            }
-            (None, None) => {
-                return Err("no URI; expected one, or a GLB file with a binary chunk".into());
+    fn read(&mut self, number: usize, buffer: &Buffer) -> Result<Cow<'a, [u8]>, String> {
+        let bytes: Cow<[u8]> = match (&buffer.uri, self.chunk) {
+            (Some(uri), _) => self.of_uri(uri)?.into(),
+            (None, Some(chunk)) if number == 0 => chunk.into(),
+            (None, _) => {
+                return Err("no URI; expected one, or the binary chunk of a GLB file, which is \
+                            buffers[0]"
+                    .into());
             }
         };
-        match buffer.byte_length > length {
-            true => Err(format!("{length} bytes; expected {}", buffer.byte_length)),
+        match buffer.byte_length > bytes.len() {
+            true => Err(format!("{} bytes; expected {}", bytes.len(), buffer.byte_length)),
             false => Ok(bytes),
         }
     }
 
-    fn of_uri(&mut self, uri: &str) -> Result<Rc<Vec<u8>>, String> {
+    fn of_uri(&mut self, uri: &str) -> Result<Vec<u8>, String> {
         if let Ok(data) = DataUrl::process(uri) {
             let (bytes, _) = data.decode_to_vec().map_err(|_| "a data URI of invalid base64")?;
             self.count(bytes.len() as u64)?;
-            return Ok(Rc::new(bytes));
+            return Ok(bytes);
         }
         if uri.contains("://") {
             return Err(format!("`{uri}`; expected a file in this folder, or a data URI"));
         }
         let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
         let path = self.allowed(Path::new(&*name))?;
-        if let Entry::Occupied(file) = self.files.entry(path.clone()) {
-            return Ok(file.get().clone());
-        }
         // A file that is too long is rejected before it takes memory.
-        let length = regular(&path).map_err(|error| error.to_string())?;
-        self.count(length)?;
-        let bytes = Rc::new(read(&path).map_err(|error| error.to_string())?);
-        self.files.insert(path, bytes.clone());
-        Ok(bytes)
+        self.count(regular(&path).map_err(|error| error.to_string())?)?;
+        read(&path).map_err(|error| error.to_string())
     }
 
     /// Returns the path of a file by its name in a URI. Rejects a file outside the folder of the
@@ -151,19 +126,6 @@ fn leaves(name: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_file_that_several_buffers_name_is_read_once() {
-        let folder = tempfile::tempdir().unwrap();
-        fs::create_dir(folder.path().join("a")).unwrap();
-        fs::write(folder.path().join("b.bin"), [7; 60]).unwrap();
-        let path = folder.path().join("scene.gltf");
-        let mut buffers = Buffers::new(&path, None);
-        for name in ["b.bin", "./b.bin", "a/../b.bin", "%62.bin"] {
-            assert_eq!(*buffers.of_uri(name).unwrap(), [7; 60], "{name}");
-        }
-        assert_eq!((buffers.files.len(), buffers.total), (1, 60));
-    }
 
     #[test]
     fn paths_that_lead_out_of_their_folder_are_recognised() {
