@@ -45,7 +45,10 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Scene(_) | Self::Usage(_) | Self::Rays { .. } => 2,
-            Self::Read(error) | Self::TreeFile(TreeFileError::Read(error)) => read_code(error),
+            // A wrong path is a fault of the command line, a failing disk is not.
+            Self::Read(error) | Self::TreeFile(TreeFileError::Read(error)) => {
+                if error.is_of_the_path() { 2 } else { 1 }
+            }
             Self::TreeFile(_) => 2,
             Self::Interrupted(_) => 130,
             Self::Write(_) | Self::Search { .. } | Self::Tracing { .. } => 1,
@@ -64,9 +67,4 @@ impl Error {
         let method = method.to_owned();
         move |source| Self::Search { scene, method, source: Box::new(source.into()) }
     }
-}
-
-fn read_code(error: &ReadError) -> u8 {
-    // A wrong path is a fault of the command line, a failing disk is not.
-    if error.is_of_the_path() { 2 } else { 1 }
 }

@@ -4,7 +4,6 @@ mod answer;
 mod arguments;
 mod bake;
 mod error;
-mod explain;
 mod export;
 mod inspect;
 mod interrupt;
@@ -19,7 +18,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use error::Error;
 use interrupt::INTERRUPTED;
-use output::{answered, print_bytes, print_error, succeeded};
+use output::{answered, print_bytes, print_error};
 use std::process::ExitCode;
 
 #[global_allocator]
@@ -57,7 +56,7 @@ fn main() -> ExitCode {
     // Signals are heard before any work begins.
     interrupt::listen();
     match run(cli.command) {
-        Ok(()) => succeeded(),
+        Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             print_error(&format!("error: {error}"));
             ExitCode::from(error.exit_code())

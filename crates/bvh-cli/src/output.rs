@@ -1,15 +1,12 @@
-//! Writes to the terminal, and records failures.
+//! Writes to the terminal.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::borrow::Cow;
 use std::io::{ErrorKind, Write};
-use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::process::{ExitCode, exit};
 
-static STDOUT_FAILED: AtomicBool = AtomicBool::new(false);
-
-/// Prints text to standard output, and ends the line. A reader that closes the pipe early, like
-/// `head`, causes no error, because the results are in files.
+/// Prints text to standard output, and ends the line. Ends the program if that fails, unless the
+/// reader has closed the pipe early, like `head`: results are in files.
 pub fn print_line(text: &str) {
     print_bytes(format!("{}\n", plain(text.trim_end())).as_bytes());
 }
@@ -18,8 +15,11 @@ pub fn print_line(text: &str) {
 pub fn print_bytes(bytes: &[u8]) {
     let mut out = std::io::stdout();
     let written = out.write_all(bytes).and_then(|()| out.flush());
-    if written.is_err_and(|error| error.kind() != ErrorKind::BrokenPipe) {
-        STDOUT_FAILED.store(true, Relaxed);
+    if let Err(error) = written
+        && error.kind() != ErrorKind::BrokenPipe
+    {
+        print_error(&format!("error: the output could not be written to standard output: {error}"));
+        exit(1);
     }
 }
 
@@ -35,16 +35,6 @@ pub fn bar(length: u64, template: &str) -> ProgressBar {
     ProgressBar::new(length).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
-/// Returns the exit code of a command that has succeeded. If output was lost, prints a message and
-/// returns a failure.
-pub fn succeeded() -> ExitCode {
-    if STDOUT_FAILED.load(Relaxed) {
-        print_error("error: some of the output could not be written to standard output");
-        return ExitCode::FAILURE;
-    }
-    ExitCode::SUCCESS
-}
-
 /// Prints the parser's answer to the arguments: help, version, or their fault. Returns the exit
 /// code.
 pub fn answered(answer: &clap::Error) -> ExitCode {
@@ -56,7 +46,7 @@ pub fn answered(answer: &clap::Error) -> ExitCode {
         return ExitCode::from(USAGE);
     }
     print_bytes(text.as_bytes());
-    succeeded()
+    ExitCode::SUCCESS
 }
 
 /// Escapes control characters except ends of lines. Names of files and keys of specs come from the

@@ -3,54 +3,48 @@
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
-use std::str::Utf8Error;
 use tempfile::NamedTempFile;
 
-/// The reason why a file cannot be read.
+/// A failure to read a file.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each message describes its fields")]
-pub enum ReadError {
-    /// The path does not exist.
-    #[error("{}: no such file", .path.display())]
-    NotFound { path: PathBuf },
-    /// The path is a folder.
-    #[error("{}: a folder; accepted: a file", .path.display())]
-    Folder { path: PathBuf },
-    /// The path is a device, pipe or socket, which might never end.
-    #[error("{}: not a regular file; accepted: a file", .path.display())]
-    NotRegular { path: PathBuf },
-    /// The text is not UTF-8.
-    #[error("{}: {source}; accepted: UTF-8", .path.display())]
-    NotUtf8 { path: PathBuf, source: Utf8Error },
-    /// The file exists, but the system cannot read it.
-    #[error("{} could not be read: {source}", .path.display())]
-    Failed { path: PathBuf, source: io::Error },
+#[error("{}: {source}", .path.display())]
+pub struct ReadError {
+    /// The file.
+    pub path: PathBuf,
+    /// The fault of the path or of its text, or the system's error.
+    pub source: io::Error,
 }
 
 impl ReadError {
-    /// Returns the kind of error that the operating system would report. Bindings choose their
-    /// exception by it.
-    pub fn kind(&self) -> io::ErrorKind {
-        match self {
-            Self::NotFound { .. } => io::ErrorKind::NotFound,
-            Self::Folder { .. } => io::ErrorKind::IsADirectory,
-            Self::NotRegular { .. } => io::ErrorKind::InvalidInput,
-            Self::NotUtf8 { .. } => io::ErrorKind::InvalidData,
-            Self::Failed { source, .. } => source.kind(),
+    fn new(path: &Path, kind: io::ErrorKind, message: String) -> Self {
+        Self { path: path.to_owned(), source: io::Error::new(kind, message) }
+    }
+
+    /// Returns a function for `map_err` on errors of the system that names the file.
+    pub fn of(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        move |error| match error.kind() {
+            kind @ io::ErrorKind::NotFound => Self::new(path, kind, "no such file".into()),
+            kind => Self::new(path, kind, format!("could not be read: {error}")),
         }
     }
 
-    /// Returns whether the path is at fault and not the system.
+    /// Returns the kind of the error. Bindings choose their exception by it.
+    pub fn kind(&self) -> io::ErrorKind {
+        self.source.kind()
+    }
+
+    /// Returns whether the path or the text is at fault and not the system.
     pub fn is_of_the_path(&self) -> bool {
-        !matches!(self, Self::Failed { .. })
+        use io::ErrorKind::{InvalidData, InvalidInput, IsADirectory, NotFound};
+        matches!(self.kind(), NotFound | IsADirectory | InvalidInput | InvalidData)
     }
 }
 
 /// Returns the text of the regular file at `path`.
 pub fn read_text(path: &Path) -> Result<String, ReadError> {
-    String::from_utf8(read(path)?).map_err(|error| ReadError::NotUtf8 {
-        path: path.to_path_buf(),
-        source: error.utf8_error(),
+    String::from_utf8(read(path)?).map_err(|error| {
+        let message = format!("{}; accepted: UTF-8", error.utf8_error());
+        ReadError::new(path, io::ErrorKind::InvalidData, message)
     })
 }
 
@@ -58,25 +52,18 @@ pub fn read_text(path: &Path) -> Result<String, ReadError> {
 /// could block the program and a device might never end.
 pub fn read(path: &Path) -> Result<Vec<u8>, ReadError> {
     regular(path)?;
-    fs::read(path).map_err(|source| failed(path, source))
+    fs::read(path).map_err(ReadError::of(path))
 }
 
 /// Returns the number of bytes of the regular file at `path`.
 pub fn regular(path: &Path) -> Result<u64, ReadError> {
-    let file = fs::metadata(path).map_err(|source| failed(path, source))?;
-    match file.is_file() {
-        true => Ok(file.len()),
-        false if file.is_dir() => Err(ReadError::Folder { path: path.to_path_buf() }),
-        false => Err(ReadError::NotRegular { path: path.to_path_buf() }),
-    }
-}
-
-fn failed(path: &Path, source: io::Error) -> ReadError {
-    let path = path.to_path_buf();
-    match source.kind() {
-        io::ErrorKind::NotFound => ReadError::NotFound { path },
-        _ => ReadError::Failed { path, source },
-    }
+    let file = fs::metadata(path).map_err(ReadError::of(path))?;
+    let (kind, found) = match file.is_file() {
+        true => return Ok(file.len()),
+        false if file.is_dir() => (io::ErrorKind::IsADirectory, "a folder"),
+        false => (io::ErrorKind::InvalidInput, "not a regular file"),
+    };
+    Err(ReadError::new(path, kind, format!("{found}; accepted: a file")))
 }
 
 /// A failure to write a file.
@@ -101,7 +88,7 @@ impl WriteError {
 /// Replaces the contents of the file at `path` by `bytes`. At any moment the file is the old one or
 /// the complete new one.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    Reserved::new(path, 0)?.write(&[bytes])
+    Reserved::new(path, 0, false)?.write(&[bytes])
 }
 
 /// A file whose space on the disk is reserved before its contents exist. A search of hours thus
@@ -116,22 +103,16 @@ pub struct Reserved {
 }
 
 impl Reserved {
-    /// Reserves `bytes` bytes in a file with a temporary name next to `path`.
-    pub fn new(path: &Path, bytes: usize) -> Result<Self, WriteError> {
+    /// Reserves `bytes` bytes in a file with a temporary name next to `path`. At the path that
+    /// nobody gave there is no file yet: if somebody creates one meanwhile, `only_new` makes it
+    /// stay, writing fails, and the error names the file with the bytes.
+    pub fn new(path: &Path, bytes: usize, only_new: bool) -> Result<Self, WriteError> {
         // Renaming onto a symbolic link would replace the link instead of the file.
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let mut new = create_beside(&path)?;
         reserve(new.as_file_mut(), bytes)
             .map_err(WriteError::of(&path, "reserve the file's space"))?;
-        Ok(Self { path, new, only_new: false })
-    }
-
-    /// Reserves like [`new`](Self::new) for a name that nobody gave, at which there is no file. If
-    /// somebody creates one meanwhile, it stays: writing then fails, and the error names the file
-    /// with the bytes.
-    pub fn new_file(path: &Path, bytes: usize) -> Result<Self, WriteError> {
-        let reserved = Self::new(path, bytes)?;
-        Ok(Self { only_new: true, ..reserved })
+        Ok(Self { path, new, only_new })
     }
 
     /// Writes the sections one after the other, syncs the file, and renames it. At any moment the
@@ -231,10 +212,11 @@ mod tests {
     #[test]
     fn folders_devices_and_missing_files_are_rejected_unread() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(matches!(read(folder.path()), Err(ReadError::Folder { .. })));
-        assert!(matches!(read(&folder.path().join("x")), Err(ReadError::NotFound { .. })));
+        let kind = |path: &Path| read(path).unwrap_err().kind();
+        assert_eq!(kind(folder.path()), io::ErrorKind::IsADirectory);
+        assert_eq!(kind(&folder.path().join("x")), io::ErrorKind::NotFound);
         #[cfg(unix)]
-        assert!(matches!(read(Path::new("/dev/zero")), Err(ReadError::NotRegular { .. })));
+        assert_eq!(kind(Path::new("/dev/zero")), io::ErrorKind::InvalidInput);
     }
 
     #[test]
@@ -243,11 +225,11 @@ mod tests {
         let path = folder.path().join("x.bvh");
         fs::write(&path, "old").unwrap();
         for is_removed in [false, true] {
-            let reserved = Reserved::new(&path, 1000).unwrap();
+            let reserved = Reserved::new(&path, 1000, false).unwrap();
             assert_eq!(fs::metadata(reserved.new.path()).unwrap().len(), 1000);
             drop(reserved);
             assert_eq!((fs::read(&path).unwrap(), names(folder.path()).len()), (b"old".into(), 1));
-            let reserved = Reserved::new(&path, 1000).unwrap();
+            let reserved = Reserved::new(&path, 1000, false).unwrap();
             if is_removed {
                 fs::remove_file(reserved.new.path()).unwrap();
             }
@@ -269,11 +251,11 @@ mod tests {
             assert_eq!(fs::read(&kept).unwrap(), b"the work of hours");
             fs::remove_file(kept).unwrap();
         };
-        let reserved = Reserved::new(&path, 1000).unwrap();
+        let reserved = Reserved::new(&path, 1000, false).unwrap();
         fs::create_dir(&path).unwrap();
         kept(reserved);
         fs::remove_dir(&path).unwrap();
-        let reserved = Reserved::new_file(&path, 10).unwrap();
+        let reserved = Reserved::new(&path, 10, true).unwrap();
         fs::write(&path, "notes").unwrap();
         kept(reserved);
         assert_eq!(fs::read(&path).unwrap(), b"notes");
@@ -297,7 +279,7 @@ mod tests {
     fn only_regular_files_are_replaced() {
         let folder = tempfile::tempdir().unwrap();
         for wrong in [folder.path(), &folder.path().join("no/x.bvh"), Path::new("/dev/null")] {
-            assert!(Reserved::new(wrong, 1).is_err(), "{}", wrong.display());
+            assert!(Reserved::new(wrong, 1, false).is_err(), "{}", wrong.display());
         }
     }
 

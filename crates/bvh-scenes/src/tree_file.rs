@@ -35,17 +35,17 @@ impl TreeFileError {
 /// file's length, rejects the file before it reads the rest.
 pub fn read(path: &Path) -> Result<Vec<u8>, TreeFileError> {
     let length = regular(path)?;
-    let failed = |source| ReadError::Failed { path: path.to_owned(), source };
-    let mut file = File::open(path).map_err(failed)?;
+    let mut file = File::open(path).map_err(ReadError::of(path))?;
     let mut bytes = Vec::new();
-    file.by_ref().take(Header::BYTES as u64).read_to_end(&mut bytes).map_err(failed)?;
+    let header = file.by_ref().take(Header::BYTES as u64).read_to_end(&mut bytes);
+    header.map_err(ReadError::of(path))?;
     Header::of_file(&bytes, length).map_err(TreeFileError::of(path))?;
     let after_header = length.saturating_sub(bytes.len() as u64);
     // An intact file may still be larger than the memory, which is an error and no abort.
     bytes
         .try_reserve_exact(after_header as usize)
-        .map_err(|_| failed(io::ErrorKind::OutOfMemory.into()))?;
-    file.take(after_header).read_to_end(&mut bytes).map_err(failed)?;
+        .map_err(|_| ReadError::of(path)(io::ErrorKind::OutOfMemory.into()))?;
+    file.take(after_header).read_to_end(&mut bytes).map_err(ReadError::of(path))?;
     Ok(bytes)
 }
 

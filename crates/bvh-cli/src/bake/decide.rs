@@ -9,13 +9,11 @@ use super::plan::{Plan, Prepared};
 use super::{BakeArgs, Effort};
 use crate::Error;
 use crate::answer::Answer;
-use crate::interrupt;
-use crate::output::{self, print_error};
+use crate::output::bar;
 use crate::rays::Rays;
 use bvh_core::cost::Objective;
 use bvh_scenes::Scene;
 use bvh_search::{Bake, Budget, Method};
-use indicatif::ProgressBar;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// The work per object of a bake that chooses its own budget. On the 7 scenes of
@@ -89,8 +87,6 @@ pub fn decide(
     if trials == 1 {
         return Ok((plan, prepared));
     }
-    // From here on there is a tree soon, which Ctrl-C must save instead of ending the program.
-    interrupt::hold();
     let failed = |error| Error::search(&scene.name, plan.method.name())(error);
     let most = Bake { references: references[references.len() - 1], ..plan.bake(scene, None) };
     prepared.greedy = most.greedy(interrupted).map_err(failed)?;
@@ -105,7 +101,8 @@ pub fn decide(
     // The expected tests of the judging rays, by references and then by costs.
     let mut tests = Vec::new();
     let mut plans = Vec::new();
-    let bar = bar(trials);
+    let bar = bar(trials as u64, "{bar:10} trying the choices, {pos} of {len}");
+    bar.tick();
     for &references in &references {
         for (objective, rays) in &costs {
             // A trial of no work takes seconds in large scenes.
@@ -155,16 +152,4 @@ pub fn decide(
     prepared.density.take_if(|_| plan.rays.is_none());
     prepared.division.take_if(|_| plan.references == 1.0);
     Ok((plan, prepared))
-}
-
-/// Returns a bar over the trials, or without a terminal prints that they begin.
-fn bar(trials: usize) -> ProgressBar {
-    let bar = output::bar(trials as u64, "{bar:10} {msg}, {pos} of {len}");
-    bar.set_message("trying the choices");
-    if bar.is_hidden() {
-        print_error(&format!("trying {trials} combinations of the choices"));
-    } else {
-        bar.tick();
-    }
-    bar
 }

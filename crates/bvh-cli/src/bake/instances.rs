@@ -5,7 +5,6 @@ use super::plan::{Found, Plan, Prepared};
 use super::{BakeArgs, decide};
 use crate::Error;
 use crate::answer::{Answer, gain, short, whole};
-use crate::arguments::output_folder;
 use crate::output::print_error;
 use bvh_build::{Builder, median_cut};
 use bvh_core::cost::Objective;
@@ -37,8 +36,8 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let path = Path::new(&args.scene);
     let parts = parts(path)?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    if let Some(remark) = &parts.remark {
-        print_error(&format!("scene {stem}: {remark}"));
+    if !parts.remarks.is_empty() {
+        print_error(&format!("scene {stem}: {}", parts.remarks.join("; ")));
     }
     let mut scenes = Vec::new();
     for (mesh, triangles) in &parts.meshes {
@@ -91,7 +90,7 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
 
 /// Writes the tree over a part of a scene.
 pub(super) fn save_part(found: &Found, path: &Path, answer: &mut Answer) -> Result<(), Error> {
-    found.save(path, files::Reserved::new(path, 0)?)?;
+    found.save(path, files::Reserved::new(path, 0, false)?)?;
     let cost = found.baked.outcome.cost;
     let Some(base) = found.baked.greedy else { return Ok(()) };
     let objects = found.scene.boxes.len();
@@ -110,17 +109,18 @@ pub(super) fn save_part(found: &Found, path: &Path, answer: &mut Answer) -> Resu
     Ok(())
 }
 
-/// Rejects a folder with files, which would be replaced by the new files or mixed with them.
+/// Rejects a folder with files, which would be replaced by the new files or mixed with them, and a
+/// path at which no folder can be created.
 fn new_folder(path: &Path) -> Result<(), Error> {
-    output_folder("--out", path)?;
+    // The nearest existing ancestor decides whether the rest of the path can be created.
+    let above = path.ancestors().find(|above| above.exists());
+    let is_new = above.is_none_or(Path::is_dir) && !path.as_os_str().is_empty();
     let is_empty = fs::read_dir(path).map_or(true, |mut entries| entries.next().is_none());
-    if is_empty {
+    if is_new && is_empty {
         return Ok(());
     }
-    Err(Error::Usage(format!(
-        "--out: {}: a folder with files; accepted: a new or empty one",
-        path.display()
-    )))
+    let accepted = "accepted: the path of a new or empty folder";
+    Err(Error::Usage(format!("--out: {}; {accepted}", path.display())))
 }
 
 fn parts(path: &Path) -> Result<gltf::Parts, Error> {
@@ -147,14 +147,6 @@ fn instances(parts: &gltf::Parts) -> Vec<Instance> {
     instances
 }
 
-/// Lays out a part, whose box is the same in any tree; the fastest builder will do.
-fn lay_out(scene: &Scene) -> Result<WideBvh, String> {
-    let triangles = scene.triangles().map_err(|error| error.to_string())?;
-    let tree =
-        median_cut::Config::default().build(&scene.boxes).map_err(|error| error.to_string())?;
-    WideBvh::new(&tree, triangles).map_err(|error| error.to_string())
-}
-
 /// Returns a scene of the boxes of all instances.
 fn top(
     stem: &str,
@@ -162,20 +154,26 @@ fn top(
     instances: &[Instance],
     parts: &gltf::Parts,
 ) -> Result<Scene, Error> {
+    let mut layouts = Vec::new();
+    for (scene, triangles) in scenes.iter().zip(parts.meshes.values()) {
+        // A part has the same box in any tree, so that the fastest builder will do.
+        let tree = median_cut::Config::default().build(&scene.boxes);
+        let tree = tree.map_err(Error::search(&scene.name, "median_cut"))?;
+        let layout = WideBvh::new(&tree, triangles);
+        layouts.push(layout.map_err(Error::search(&scene.name, "median_cut"))?);
+    }
     let name = format!("{stem}, instances");
-    let layouts = scenes.iter().map(lay_out).collect::<Result<Vec<_>, String>>();
-    let boxes = layouts.and_then(|layouts| {
-        Instance::boxes(instances, &layouts).map_err(|invalid| match invalid {
+    let boxes = Instance::boxes(instances, &layouts).map_err(|invalid| {
+        let message = match invalid {
             InvalidInstances::Transform(index) => {
-                let node = parts.places[index].node;
-                let mesh = parts.places[index].mesh;
+                let gltf::Placed { node, mesh, .. } = parts.places[index];
                 let found = "its transform has no inverse, or its box is not finite";
                 format!("nodes[{node}] places meshes[{mesh}]: {found}; expected an invertible one")
             }
             other => other.to_string(),
-        })
-    });
-    let boxes = boxes.map_err(|message| SceneError::new(&name, message))?;
+        };
+        SceneError::new(&name, message)
+    })?;
     // A scene needs objects, and the search reads only their boxes.
     let triangles = boxes.iter().map(|aabb| Triangle([aabb.min, aabb.max, aabb.min])).collect();
     Ok(Scene::new(&name, SceneKind::File, Primitives::Triangles(triangles)))

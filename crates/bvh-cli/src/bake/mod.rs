@@ -9,15 +9,17 @@ mod watch;
 
 use crate::Error;
 use crate::answer::{Answer, Form, gain, short, whole};
-use crate::arguments::{Jobs, input_file, load_scene, output_file, output_or_free, reserve};
-use crate::explain::explain;
+use crate::arguments::{Jobs, input_file, load_scene, output_file, output_or_free};
 use crate::export::{compare, tracers};
+use crate::interrupt;
 use crate::rays::Rays;
+use bvh_build::BuildError;
+use bvh_core::Aabb;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::export::Target;
-use bvh_scenes::did_you_mean;
+use bvh_scenes::Scene;
 use bvh_scenes::files::Reserved;
-use bvh_search::{Bake, Method, Outcome, StopReason};
+use bvh_search::{Bake, Method, Outcome, StopReason, shortcuts};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use decide::decide;
@@ -68,8 +70,8 @@ pub struct BakeArgs {
     #[arg(conflicts_with_all = ["rays", "instances", "parts"])]
     pub tracer: Option<Target>,
     /// The method, with its default parameters.
-    #[arg(long, value_name = "NAME", default_value = BEST)]
-    pub method: String,
+    #[arg(long, value_name = "NAME", default_value = BEST, value_parser = methods())]
+    pub method: Method,
     /// Continue from the tree of an earlier bake of the same scene; the result is never worse.
     #[arg(long, value_name = "FILE.bvh")]
     pub from: Option<PathBuf>,
@@ -103,8 +105,15 @@ fn costs() -> impl TypedValueParser<Value = Objective> {
     })
 }
 
-/// The method that can continue from a given tree.
+/// The method that can continue from a given tree and divide objects.
 const BEST: &str = "best";
+
+fn methods() -> impl TypedValueParser<Value = Method> {
+    PossibleValuesParser::new(Method::NAMES).try_map(|name| {
+        let named = Method::all().into_iter().find(|method| method.name() == name);
+        named.ok_or("expected one of the methods")
+    })
+}
 
 /// Searches until the budget is spent or `interrupted` becomes true, writes the best tree, and
 /// prints its cost. An interrupted bake writes the file as well, and returns [`Error::Interrupted`].
@@ -130,11 +139,14 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let most_references = plan.references.max(least);
     let start =
         args.from.as_ref().map(|path| Start::load(path, &scene, most_references)).transpose()?;
+    // From here on there is a tree soon, which Ctrl-C must save instead of ending the program.
+    interrupt::hold();
     if args.budget.is_none() {
         plan.effort = decide::work(scene.boxes.len(), &mut answer);
     }
     // Reserving the file first reports a full disk before the search and not after it.
-    let reserved = reserve(&out, args.out.is_some(), plan::most_bytes(&scene, most_references))?;
+    let bytes = plan::most_bytes(&scene, most_references);
+    let reserved = Reserved::new(&out, bytes, args.out.is_none())?;
     let (plan, prepared) = decide(args, plan, &scene, interrupted, &mut answer)?;
     let found = plan.search(&scene, start.as_ref(), prepared, interrupted)?;
     save(&found, &out, reserved, interrupted, &mut answer)?;
@@ -145,6 +157,18 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         answer.say(&format!("for {}, export writes {compared}", target.name));
     }
     answer.end();
+    Ok(())
+}
+
+/// Lists the steps that the scene does not need and that are skipped, one line each.
+fn explain(scene: &Scene, answer: &mut Answer) -> Result<(), BuildError> {
+    let size = Aabb::union_of(&scene.boxes).extent().as_vec3();
+    let mut text = format!("{}: {} objects within {size}\n", scene.name, scene.boxes.len());
+    for (_, why) in shortcuts::of(&scene.boxes)? {
+        text += &format!("  skipped: {why}\n");
+    }
+    answer.say(&text);
+    answer.record("explanation", text);
     Ok(())
 }
 
@@ -247,7 +271,7 @@ fn summarise(found: &Found, cost_for_lines: f64, answer: &mut Answer) {
 
 impl BakeArgs {
     fn out(&self) -> Result<PathBuf, Error> {
-        output_or_free("--out", self.out.as_ref(), || {
+        output_or_free(self.out.as_ref(), || {
             let scene = Path::new(&self.scene);
             let stem = scene.file_stem().unwrap_or(scene.as_os_str());
             // The colon of `escher:1000` is no part of a file's name everywhere.
@@ -257,54 +281,32 @@ impl BakeArgs {
     }
 
     /// Returns the search that the arguments specify. Without `--budget` it has no work yet, which
-    /// [`decide::work`] chooses.
+    /// [`decide::work`] chooses. Rejects methods that would ignore other arguments.
     fn plan(&self) -> Result<Plan, Error> {
         let rays = self.rays.as_deref().map(Rays::read).transpose()?;
-        let method = self.method()?;
-        let references = self.most_references(&method)?;
+        let is_best = matches!(self.method, Method::Best(_));
+        let default = self.tracer.filter(|_| is_best).map_or(1.0, |tracer| tracer.references);
+        let references = self.references.unwrap_or(default);
+        Bake::check_references(references).map_err(|error| Error::Usage(format!("--{error}")))?;
+        let name = self.method.name();
+        let ignored = match (&self.from, references > 1.0) {
+            _ if is_best => None,
+            (Some(_), _) => Some(format!("--method {name} cannot continue --from a tree")),
+            (None, true) => Some(format!("--references {references} with --method {name}")),
+            (None, false) => None,
+        };
+        if let Some(ignored) = ignored {
+            return Err(Error::Usage(format!("{ignored}; accepted: {BEST}")));
+        }
         // The cost of the layout saves more tests of rays than area does: `results/ray_objective`.
         let default = if rays.is_some() { Objective::Layout } else { Objective::InternalArea };
         Ok(Plan {
-            method,
+            method: self.method.clone(),
             effort: self.budget.unwrap_or(Effort::Work(0)),
             seed: self.seed,
             objective: self.cost.unwrap_or(default),
             references,
             rays,
         })
-    }
-
-    /// Returns the named method. If a tree is given, rejects methods that cannot continue from it.
-    fn method(&self) -> Result<Method, Error> {
-        let name = &self.method;
-        let Some(method) = Method::all().into_iter().find(|method| method.name() == name) else {
-            let accepted = Method::NAMES.join(", ");
-            let meant = did_you_mean(name, Method::NAMES.iter().copied());
-            return Err(Error::Usage(format!(
-                "--method {name}: no such method{meant}; accepted: {accepted}"
-            )));
-        };
-        if self.from.is_some() && name != BEST {
-            return Err(Error::Usage(format!(
-                "--method {name} cannot continue --from a tree; accepted: {BEST}"
-            )));
-        }
-        Ok(method)
-    }
-
-    /// Returns the references per object. Rejects numbers that are out of range, and methods that
-    /// would ignore them.
-    fn most_references(&self, method: &Method) -> Result<f64, Error> {
-        let divides = matches!(method, Method::Best(_));
-        let default = self.tracer.filter(|_| divides).map_or(1.0, |tracer| tracer.references);
-        let references = self.references.unwrap_or(default);
-        Bake::check_references(references).map_err(|error| Error::Usage(format!("--{error}")))?;
-        if references > 1.0 && !divides {
-            let name = &self.method;
-            let message =
-                format!("--references {references} with --method {name}; accepted: {BEST}");
-            return Err(Error::Usage(message));
-        }
-        Ok(references)
     }
 }

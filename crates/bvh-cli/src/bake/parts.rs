@@ -6,9 +6,9 @@ use super::plan::{Plan, Prepared, Start, most_bytes};
 use super::{BakeArgs, save};
 use crate::Error;
 use crate::answer::Answer;
-use crate::arguments::{load_scene, output_file, reserve};
+use crate::arguments::{load_scene, output_file};
 use bvh_core::{Aabb, Bvh, Node, NodeKind};
-use bvh_scenes::files::WriteError;
+use bvh_scenes::files::{Reserved, WriteError};
 use bvh_scenes::tree_file;
 use bvh_scenes::{Scene, fnv1a};
 use bvh_search::{Budget, Problem, best, solve};
@@ -90,7 +90,7 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
         return Ok(());
     }
     let bytes = most_bytes(&scene, plan.references);
-    let reserved = reserve(&out, args.out.is_some(), bytes)?;
+    let reserved = Reserved::new(&out, bytes, args.out.is_none())?;
     let start = join(&scene, &parts, &folder)?;
     let plan = Plan { effort: plan.effort.share(1.0 - SHARE_OF_PARTS), ..plan };
     let found = plan.search(&scene, Some(&start), Prepared::default(), interrupted)?;

@@ -44,33 +44,27 @@ pub struct Start {
 }
 
 impl Start {
-    /// Reads the tree of `--from` over the scene. Rejects a tree that the bake could not improve.
+    /// Reads the tree of `--from` over the scene. Rejects a tree that has more references than the
+    /// bake may keep, or nodes that no search moves.
     pub fn load(from: &Path, scene: &Scene, most_references: f64) -> Result<Self, Error> {
         let (tree, header) = tree_file::load(from, scene)?;
-        check_start(&tree, scene.boxes.len(), most_references)
-            .map_err(|message| Error::Usage(format!("--from {}: {message}", from.display())))?;
-        Ok(Self { tree, work: header.work })
-    }
-}
-
-/// Rejects a start that has more references than the bake may keep, or nodes that no search moves.
-fn check_start(tree: &Bvh, objects: usize, most: f64) -> Result<(), String> {
-    let references = tree.prim_ids.len();
-    if references > objects && references > (most * objects as f64) as usize {
-        // Rounded up, so that the message's number suffices.
-        let least = (100 * references).div_ceil(objects) as f64 / 100.0;
-        return Err(format!(
-            "the tree has {references} references to {objects} objects; accepted: --references \
-             {least:.2} or more"
-        ));
-    }
-    let is_wide = |node: &Node| !node.is_leaf() && node.children().len() != 2;
-    match tree.nodes.iter().position(is_wide) {
-        Some(wide) => Err(format!(
-            "inner node {wide} has {} children; accepted: a tree of nodes with two",
-            tree.nodes[wide].children().len()
-        )),
-        None => Ok(()),
+        let objects = scene.boxes.len();
+        let references = tree.prim_ids.len();
+        let is_wide = |node: &Node| !node.is_leaf() && node.children().len() != 2;
+        let fault = if references > objects.max((most_references * objects as f64) as usize) {
+            // Rounded up, so that the message's number suffices.
+            let least = (100 * references).div_ceil(objects) as f64 / 100.0;
+            format!(
+                "the tree has {references} references to {objects} objects; accepted: \
+                 --references {least:.2} or more"
+            )
+        } else if let Some(wide) = tree.nodes.iter().position(is_wide) {
+            let children = tree.nodes[wide].children().len();
+            format!("inner node {wide} has {children} children; accepted: a tree of nodes with two")
+        } else {
+            return Ok(Self { tree, work: header.work });
+        };
+        Err(Error::Usage(format!("--from {}: {fault}", from.display())))
     }
 }
 

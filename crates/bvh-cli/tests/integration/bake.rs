@@ -57,9 +57,9 @@ fn a_bake_for_rays_saves_the_number_of_visits_of_each_node() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("walk.toml"), WALK).unwrap();
-    let scene = Scene::load("escher:2000").unwrap();
+    let scene = Scene::load("escher:500").unwrap();
     for rays in ["default", "walk.toml"] {
-        let bake = format!("escher:2000 --budget=1Mwork --rays={rays}");
+        let bake = format!("escher:500 --budget=1Mwork --rays={rays}");
         let (said, bytes) = bake_twice(at, &bake);
         for part in ["cost of the wide layout for rays, which was minimised, ", "risk: a tree for"]
         {
@@ -75,7 +75,7 @@ fn a_bake_for_rays_saves_the_number_of_visits_of_each_node() {
         assert_eq!(file.header().cost.to_bits(), layout_area(&tree).to_bits());
     }
     let said =
-        bvh(at, "bake escher:2000 --budget=1Mwork --rays=walk.toml --cost=area --out=area.bvh");
+        bvh(at, "bake escher:500 --budget=1Mwork --rays=walk.toml --cost=area --out=area.bvh");
     assert!(said.contains("visits of rays, which was minimised, "), "{said}");
     let [layout, area] = ["x.bvh", "area.bvh"].map(|file| fs::read(at.join(file)).unwrap());
     assert!(layout != area);

@@ -2,20 +2,12 @@
 
 use crate::support::{begin, bvh, cost, names, number, send, words};
 use std::fs;
-use std::path::Path;
-
-const BAKE: &str = "bake escher --budget=30Mwork --parts=4";
-
-fn listed(folder: &Path) -> Vec<String> {
-    let list = bvh(folder, &format!("{BAKE} --out=x.bvh --list"));
-    list.lines().map(|line| words(line)[0].to_owned()).collect()
-}
 
 #[test]
 fn joined_parts_cost_at_most_a_percent_more_than_a_whole_bake_of_the_same_work() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    bvh(at, &format!("{BAKE} --out=parts.bvh"));
+    bvh(at, "bake escher --budget=30Mwork --parts=4 --out=parts.bvh");
     bvh(at, "bake escher --budget=30Mwork --out=whole.bvh");
     bvh(at, "verify parts.bvh escher");
     let [parts, whole] = ["parts.bvh", "whole.bvh"].map(|file| cost(at, file));
@@ -36,10 +28,12 @@ fn joined_parts_may_have_divided_objects() {
 fn parts_baked_apart_give_the_same_file_although_one_process_is_killed() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    bvh(at, &format!("{BAKE} --out=one.bvh"));
-    let ids = listed(at);
+    let bake = "bake escher:2000 --budget=6Mwork --parts=4";
+    bvh(at, &format!("{bake} --out=one.bvh"));
+    let several = format!("{bake} --out=several.bvh");
+    let list = bvh(at, &format!("{several} --list"));
+    let ids: Vec<&str> = list.lines().map(|line| words(line)[0]).collect();
     assert_eq!(ids.len(), 4);
-    let several = format!("{BAKE} --out=several.bvh");
     let killed = begin(at, &words(&format!("{several} --part={}", ids[2])));
     while !at.join("several.parts").exists() {
         std::thread::sleep(std::time::Duration::from_millis(1));

@@ -6,7 +6,6 @@ use super::{BuildFault, Built, Library, Task};
 use bvh_config::fault;
 use bvh_config::{OutOfRange, above};
 use bvh_core::{file, validate_references};
-use bvh_scenes::files::ReadError;
 use bvh_scenes::tree_file::{self, TreeFileError};
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
@@ -120,10 +119,10 @@ impl Config {
             return Err(format!("{status}: {}", last_line(&mut errors).map_err(exchange)?));
         }
         let bytes = tree_file::read(&tree_path).map_err(|error| match error {
-            TreeFileError::Read(ReadError::Failed { source, .. }) => exchange(source),
-            TreeFileError::Read(_) => {
+            TreeFileError::Read(error) if error.is_of_the_path() => {
                 "it wrote no file at the path that is its last argument".into()
             }
+            TreeFileError::Read(error) => exchange(error.source),
             TreeFileError::Invalid { source, .. } => invalid(&source),
         })?;
         let tree = file::load(&bytes, boxes).map_err(|error| invalid(&error))?;

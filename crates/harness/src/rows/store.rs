@@ -228,7 +228,7 @@ pub fn is_unfinished(folder: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bvh_scenes::files::ReadError;
+    use std::io::ErrorKind;
 
     // The tests `faults` and `protection` run the program on folders that are in use, unfinished or
     // blocked.
@@ -291,7 +291,8 @@ mod tests {
         fs::write(&spec, [0xff]).unwrap();
         for existing in [Existing::Keep, Existing::Resume] {
             let error = Store::open(&folder, "", existing).unwrap_err();
-            assert!(matches!(error, Error::Read(ReadError::NotUtf8 { path, .. }) if path == spec));
+            let Error::Read(error) = error else { panic!("{error}") };
+            assert_eq!((error.kind(), error.path), (ErrorKind::InvalidData, spec.clone()));
         }
         assert!(folder.join(".partial/000000.run").is_file());
         Store::open(&folder, "", Existing::Replace).unwrap();
