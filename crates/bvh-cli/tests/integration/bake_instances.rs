@@ -2,7 +2,9 @@
 //! flat scene.
 
 use crate::support::{bvh, glb, names, wrong};
-use bvh_core::{Instance, Instances, PreparedRay, Ray, Triangle, WideBvh, boxes, file};
+use bvh_core::{
+    Hit, Instance, Instances, PreparedRay, Ray, Triangle, WideBvh, boxes, file, nearest_hit_of_all,
+};
 use bvh_scenes::Scene;
 use glam::{Affine3A, Vec3};
 use std::fs;
@@ -87,14 +89,12 @@ fn a_scene_of_instances_is_baked_mesh_by_mesh_and_answers_like_the_flat_scene() 
         let away = Vec3::new(number(2 * i), number(2 * i + 1), 128.0);
         let ray = Ray::half_line((middle + away).to_array(), (-away / 128.0).to_array()).unwrap();
         let prepared = PreparedRay::new(&ray);
-        let all = flat
-            .iter()
-            .enumerate()
-            .filter_map(|(id, triangle)| Some((triangle.intersect(&prepared, ray.t_max())?, id)));
-        // Several triangles may have the same distance; the one with the lowest id is the answer.
-        let expected = all.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let found = scene.nearest_hit(&ray);
-        let found = found.map(|hit| (hit.t, first[hit.instance as usize] + hit.triangle as usize));
+        let test = |id: u32, t_max| flat[id as usize].intersect(&prepared, t_max);
+        let expected = nearest_hit_of_all(flat.len() as u32, &ray, test, &mut ());
+        let found = scene.nearest_hit(&ray).map(|hit| {
+            let object = first[hit.instance as usize] as u32 + hit.triangle;
+            Hit { t: hit.t, object }
+        });
         assert_eq!(found, expected, "ray {i}");
         hits += u32::from(found.is_some());
     }

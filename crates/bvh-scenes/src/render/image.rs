@@ -51,14 +51,9 @@ impl Film {
     pub fn append(&mut self, mut below: Self) {
         self.pixels.append(&mut below.pixels);
         self.tests.append(&mut below.tests);
-        self.count(below.counts, below.rays);
-    }
-
-    /// Adds to the tests and rays of the whole picture.
-    pub fn count(&mut self, tests: TestCounts, rays: u64) {
-        self.counts.boxes += tests.boxes;
-        self.counts.objects += tests.objects;
-        self.rays += rays;
+        self.counts.boxes += below.counts.boxes;
+        self.counts.objects += below.counts.objects;
+        self.rays += below.rays;
     }
 }
 

@@ -6,7 +6,7 @@ use super::surface::{Ground, Surface};
 use crate::Scene;
 use crate::rays::{Camera, View};
 use crate::trace::Accelerator;
-use bvh_core::{Aabb, Ray, TestCounts};
+use bvh_core::{Aabb, Ray};
 use glam::DVec3;
 
 #[derive(Clone, Debug)]
@@ -74,13 +74,6 @@ pub struct World<'a> {
     depth: u32,
 }
 
-/// The number of rays of a pixel, and the number of their tests.
-#[derive(Default)]
-struct Tally {
-    counts: TestCounts,
-    rays: u64,
-}
-
 const HORIZON: DVec3 = DVec3::new(0.58, 0.66, 0.76);
 const ZENITH: DVec3 = DVec3::new(0.11, 0.24, 0.50);
 /// Ambient light from below, which the surroundings reflect.
@@ -111,27 +104,26 @@ impl<'a> World<'a> {
         let mut row = Film { width, ..Film::default() };
         for x in 0..width {
             let mut sum = DVec3::ZERO;
-            let mut tally = Tally::default();
+            let before = row.counts.boxes + row.counts.objects;
             for v in 0..samples {
                 for u in 0..samples {
                     let right = f64::from(x) + (f64::from(u) + 0.5) / f64::from(samples);
                     let down = f64::from(y) + (f64::from(v) + 0.5) / f64::from(samples);
                     let direction = camera.direction(right, down);
-                    let light = self.radiance(camera.origin, direction, &mut tally);
+                    let light = self.radiance(camera.origin, direction, &mut row);
                     // Exposure before the average keeps the edges of highlights smooth.
                     sum += image::expose(light);
                 }
             }
             row.pixels.push(image::encode(sum / f64::from(samples * samples)));
-            row.tests.push(tally.counts.boxes + tally.counts.objects);
-            row.count(tally.counts, tally.rays);
+            row.tests.push(row.counts.boxes + row.counts.objects - before);
         }
         row
     }
 
     /// Returns the light from `direction`. A loop follows reflections, because each surface has
     /// only one.
-    fn radiance(&self, mut origin: DVec3, mut direction: DVec3, tally: &mut Tally) -> DVec3 {
+    fn radiance(&self, mut origin: DVec3, mut direction: DVec3, tally: &mut Film) -> DVec3 {
         let mut light = DVec3::ZERO;
         let mut weight = 1.0;
         for _ in 0..=self.depth {
@@ -159,7 +151,7 @@ impl<'a> World<'a> {
         light + weight * self.sky(direction)
     }
 
-    fn meet(&self, origin: DVec3, direction: DVec3, tally: &mut Tally) -> Option<Surface> {
+    fn meet(&self, origin: DVec3, direction: DVec3, tally: &mut Film) -> Option<Surface> {
         tally.rays += 1;
         let hit = Ray::half_line(origin.as_vec3(), direction.as_vec3())
             .ok()
@@ -188,7 +180,7 @@ impl<'a> World<'a> {
         start: DVec3,
         reflected: DVec3,
         mirror: f64,
-        tally: &mut Tally,
+        tally: &mut Film,
     ) -> DVec3 {
         let height = 0.5 + 0.5 * surface.normal.dot(self.up);
         let mut diffuse = (BELOW + (ZENITH * 0.5 + HORIZON * 0.5 - BELOW) * height) * AMBIENT;
@@ -217,7 +209,7 @@ impl<'a> World<'a> {
         surface.colour * diffuse * (1.0 - mirror) + highlight
     }
 
-    fn is_shadowed(&self, start: DVec3, towards: DVec3, distance: f64, tally: &mut Tally) -> bool {
+    fn is_shadowed(&self, start: DVec3, towards: DVec3, distance: f64, tally: &mut Film) -> bool {
         tally.rays += 1;
         let ray = Ray::new(start.as_vec3(), towards.as_vec3(), 0.0, distance as f32);
         ray.is_ok_and(|ray| self.accelerator.any_hit_counted(&ray, &mut tally.counts))

@@ -29,25 +29,25 @@ fn merge(value: &mut Value, patch: &Value) {
     }
 }
 
-const TYPES: [(&str, u32); 5] =
-    [("i8", 5120), ("u8", 5121), ("i16", 5122), ("u16", 5123), ("f32", 5126)];
+/// The types of numbers: the name here, the number in the format, and the bytes of a word.
+const TYPES: [(&str, u32, fn(&str) -> Vec<u8>); 5] = [
+    ("i8", 5120, |word| word.parse::<i8>().unwrap().to_le_bytes().into()),
+    ("u8", 5121, |word| word.parse::<u8>().unwrap().to_le_bytes().into()),
+    ("i16", 5122, |word| word.parse::<i16>().unwrap().to_le_bytes().into()),
+    ("u16", 5123, |word| word.parse::<u16>().unwrap().to_le_bytes().into()),
+    ("f32", 5126, |word| word.parse::<f32>().unwrap().to_le_bytes().into()),
+];
 
 fn view(text: &str) -> Vec<u8> {
     let mut words = text.split(' ');
     let kind = words.next().unwrap();
-    let bytes = |word: &str| match kind {
-        "i8" => word.parse::<i8>().unwrap().to_le_bytes().to_vec(),
-        "u8" => word.parse::<u8>().unwrap().to_le_bytes().to_vec(),
-        "i16" => word.parse::<i16>().unwrap().to_le_bytes().to_vec(),
-        "u16" => word.parse::<u16>().unwrap().to_le_bytes().to_vec(),
-        _ => word.parse::<f32>().unwrap().to_le_bytes().to_vec(),
-    };
+    let bytes = TYPES.iter().find(|(name, ..)| *name == kind).unwrap().2;
     words.flat_map(bytes).collect()
 }
 
 fn accessor(text: &Value) -> Value {
     let words: Vec<&str> = text.as_str().unwrap().split(' ').collect();
-    let component = TYPES.iter().find(|(name, _)| *name == words[1]).unwrap().1;
+    let component = TYPES.iter().find(|(name, ..)| *name == words[1]).unwrap().1;
     let count: usize = words[2].parse().unwrap();
     let mut accessor = json!({ "componentType": component, "count": count, "type": words[3] });
     accessor["normalized"] = (words.len() > 4).into();
