@@ -35,7 +35,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    Bake(bake::BakeArgs),
+    Bake(Box<bake::BakeArgs>),
     Inspect(inspect::InspectArgs),
     Verify(inspect::VerifyArgs),
     Export(export::ExportArgs),

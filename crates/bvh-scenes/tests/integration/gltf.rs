@@ -29,8 +29,11 @@ fn merge(value: &mut Value, patch: &Value) {
     }
 }
 
-/// The types of numbers: the name here, the number in the format, and the bytes of a word.
-const TYPES: [(&str, u32, fn(&str) -> Vec<u8>); 5] = [
+/// Returns the bytes of a number.
+type Bytes = fn(&str) -> Vec<u8>;
+
+/// The types of numbers: the name here and the number in the format.
+const TYPES: [(&str, u32, Bytes); 5] = [
     ("i8", 5120, |word| word.parse::<i8>().unwrap().to_le_bytes().into()),
     ("u8", 5121, |word| word.parse::<u8>().unwrap().to_le_bytes().into()),
     ("i16", 5122, |word| word.parse::<i16>().unwrap().to_le_bytes().into()),
