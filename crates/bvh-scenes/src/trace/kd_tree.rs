@@ -55,11 +55,6 @@ impl KdTree {
     /// The limit on the depth in [`build`](Self::build) for 2^31 objects, more than a scene can have.
     const MAX_DEPTH: usize = 49;
 
-    /// Returns the number of cells, inner cells included.
-    pub fn cells(&self) -> usize {
-        self.cells.len()
-    }
-
     /// Returns the number of references from leaves to objects: at least the number of objects.
     pub fn references(&self) -> usize {
         self.objects.len()

@@ -81,7 +81,6 @@ const GLTF: &str = r#"
 "count": 6 → "count": 7 ! meshes[0].primitives[0]: accessors[1]: bufferViews[1] | 7 items
 "byteOffset": 48 → "byteOffset": 46 ! index | below 4
 "version": "2.0" → "version": "1.0" ! a.gltf: asset: version `1.0`; expected 2.0
-"2.0" → "2.1", "minVersion": "2.1" ! a.gltf: asset: version `2.1`; expected 2.0
 "indices": 1 → "indices": 1, "mode": 99 ! meshes[0].primitives[0]: mode 99; expected 0 to 6
 5126 → 5125 ! accessors[0]: VEC3 of unsigned int; expected VEC3 of float or byte
 "byteLength": 60 → "byteLength": 61 ! buffers[0]: 60 bytes; expected 61

@@ -37,10 +37,9 @@ pub struct Document {
 }
 
 #[derive(Debug, Default, Deserialize)]
-#[serde(default, rename_all = "camelCase")]
+#[serde(default)]
 struct Asset {
     version: Value,
-    min_version: Option<Value>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -126,16 +125,10 @@ pub fn document(bytes: &[u8]) -> Result<(Document, Option<&[u8]>), Fault> {
     let zeros = json.iter().rev().take_while(|&&byte| byte == 0).count();
     let document: Document = serde_json::from_slice(&json[..json.len() - zeros])
         .map_err(|error| Fault::of_file(format!("{error} of the JSON")))?;
-    // A file of a later minor version is read unless it says that it needs this version.
-    let version = |value: &Value| value.as_str().map_or_else(|| value.to_string(), Into::into);
-    let asset = &document.asset;
-    let (found, is_known) = match &asset.min_version {
-        Some(least) => (version(least), version(least) == "2.0"),
-        None => (version(&asset.version), version(&asset.version).starts_with("2.")),
-    };
-    if !is_known {
-        let message = format!("version `{found}`; expected 2.0");
-        return Err(Fault::of("asset", message));
+    let version = &document.asset.version;
+    let version = version.as_str().map_or_else(|| version.to_string(), Into::into);
+    if !version.starts_with("2.") {
+        return Err(Fault::of("asset", format!("version `{version}`; expected 2.0")));
     }
     if let Some(unknown) = document.extensions_required.iter().find(|name| !is_covered(name)) {
         let message = format!(
