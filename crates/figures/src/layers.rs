@@ -44,13 +44,9 @@ impl Layers<'_> {
             Some((x.nearest(at)?, y.nearest(low)?, y.nearest(high)?))
         };
         for run in runs(points.iter().map(at)) {
-            let side = |height: fn(&(f64, f64, f64)) -> f64| {
-                let side: Vec<Point> = run.iter().map(|point| (point.0, height(point))).collect();
-                self.thinned(&side)
-            };
-            let upper = side(|point| point.2).into_iter().rev();
-            let outline = side(|point| point.1).into_iter().chain(upper);
-            let outline: Vec<Point> = outline.map(|at| self.place(&at)).collect();
+            let lower = run.iter().map(|&(at, low, _)| (at, low));
+            let upper = run.iter().rev().map(|&(at, _, high)| (at, high));
+            let outline: Vec<Point> = lower.chain(upper).map(|at| self.place(&at)).collect();
             sheet.polygon(&outline, self.strokes.of(&layer.name).colour, BAND);
         }
     }
@@ -86,7 +82,7 @@ impl Layers<'_> {
         let stroke = self.strokes.of(&layer.name);
         let at = |point: &Point| Some((self.x.nearest(point.0)?, self.y.nearest(point.1)?));
         for path in runs(points.iter().map(at)) {
-            let path: Vec<Point> = self.thinned(&path).iter().map(|at| self.place(at)).collect();
+            let path: Vec<Point> = path.iter().map(|at| self.place(at)).collect();
             sheet.line(&path, stroke.colour, LINE, stroke.dash);
         }
     }
@@ -106,30 +102,6 @@ impl Layers<'_> {
                 self.strokes.of(&layer.name).mark(sheet, self.place(&at), radius, edge);
             }
         }
-    }
-
-    /// Thins a path without a visible change: of successive points within half a pixel of x, keeps
-    /// the first, lowest, highest and last; of a level line, keeps the ends.
-    fn thinned(&self, path: &[Point]) -> Vec<Point> {
-        let column = |point: &Point| (self.x.fraction(point.0) * self.frame.width * 2.0).floor();
-        let mut kept: Vec<Point> = Vec::new();
-        for points in path.chunk_by(|one, next| column(one) == column(next)) {
-            let by_height = |one: &&Point, other: &&Point| one.1.total_cmp(&other.1);
-            let low = points.iter().min_by(by_height);
-            let high = points.iter().max_by(by_height);
-            for &point in [points.first(), low, high, points.last()].into_iter().flatten() {
-                if let [.., before, middle] = kept[..]
-                    && [before.1, middle.1] == [point.1; 2]
-                    && (before.0 <= middle.0) == (middle.0 <= point.0)
-                {
-                    kept.pop();
-                }
-                if kept.last() != Some(&point) {
-                    kept.push(point);
-                }
-            }
-        }
-        kept
     }
 }
 

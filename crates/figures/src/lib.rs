@@ -123,15 +123,6 @@ mod tests {
     }
 
     #[test]
-    fn a_million_points_are_drawn_as_few() {
-        let wave = (0..1_000_000).map(|i| (f64::from(i) * 1e-4, f64::from(i % 97)));
-        let layers = vec![Layer::new("", Marks::Line(wave.collect()))];
-        let panel = Panel { layers, ..Panel::default() };
-        let picture = svg(&Figure { panels: vec![panel], ..Figure::default() });
-        assert!(picture.len() < 100_000, "{} bytes", picture.len());
-    }
-
-    #[test]
     fn names_cannot_break_the_svg() {
         let figure = Figure {
             title: "a < b & \u{0}c".to_owned(),
