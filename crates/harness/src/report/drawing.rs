@@ -24,11 +24,11 @@ bvh_config::config! { serde;
         per_row: usize = 2, in 1..=2;
         /// The column along the horizontal axis; values for rows.
         x: String;
-        /// The column along the vertical axis; for rows one or more columns of names, with `, `
-        /// between them.
+        /// The column along the vertical axis, or several with `, ` between them: of names for
+        /// rows, and with a panel each for lines.
         y: String;
-        /// The columns of the ends of the intervals that values have; by default that of the
-        /// values with `_low` and `_high`, if the table has those.
+        /// The columns of the ends of the intervals that values have, those of the last column
+        /// `y`; by default that of the values with `_low` and `_high`, if the table has those.
         #[serde(skip_serializing_if = "Option::is_none")]
         ends: Option<[String; 2]>;
         /// For rows: a column of further values, such as the paper's, which have a dot beside.
@@ -103,9 +103,14 @@ impl Drawing {
 
     /// Returns one panel for all rows that agree in the columns `panels`.
     pub(super) fn panels(&self, rows: &Rows, table: &[Row]) -> Vec<Panel> {
-        let by_title = grouped(table, |row| self.title(rows, row)).into_iter();
-        let mut panels: Vec<Panel> =
-            by_title.map(|(title, table)| self.panel(rows, title, &table)).collect();
+        let mut panels = Vec::new();
+        for (title, table) in grouped(table, |row| self.title(rows, row)) {
+            if self.marks == Shape::Rows {
+                panels.push(self.rows(rows, title, &table));
+            } else {
+                panels.extend(self.y.split(", ").map(|y| self.lines(&title, y, &table)));
+            }
+        }
         if self.same_axes {
             figures::share_axes(&mut panels);
         }
@@ -118,17 +123,16 @@ impl Drawing {
         self.panels.iter().map(name).collect::<Vec<_>>().join(": ")
     }
 
-    fn panel(&self, rows: &Rows, title: String, table: &[&Row]) -> Panel {
-        if self.marks == Shape::Rows {
-            return self.rows(rows, title, table);
-        }
+    /// Draws a line per series through the values in the column `y`.
+    fn lines(&self, title: &str, y: &str, table: &[&Row]) -> Panel {
         let mut layers = Vec::new();
         for (series, table) in grouped(table.iter().copied(), |row| self.series_of(row)) {
-            layers.extend(curve(&series, &self.points(&table), self.marks));
+            layers.extend(curve(&series, &self.points(y, &table), self.marks));
         }
         layers.extend(self.line_at.map(|at| Layer::new("", Marks::HLine(at))));
         let unit = if self.percent_y { Unit::Percent } else { Unit::Number };
-        let (x, y) = (axis(&self.x_label, self.log_x), axis(&self.y_label, self.log_y));
+        let label = self.names.get(y).unwrap_or(&self.y_label);
+        let (x, y) = (axis(&self.x_label, self.log_x), axis(label, self.log_y));
         panel(title, x, y.unit(unit), layers)
     }
 
@@ -186,10 +190,10 @@ impl Drawing {
     }
 
     /// Returns the points of some rows, by x.
-    fn points(&self, table: &[&Row]) -> Vec<Point> {
+    fn points(&self, column: &str, table: &[&Row]) -> Vec<Point> {
         let point = |row: &&Row| {
-            let (x, y) = (number_in(row, &self.x)?, number_in(row, &self.y)?);
-            Some(Point { x, y, ends: self.ends_in(row, &self.y) })
+            let (x, y) = (number_in(row, &self.x)?, number_in(row, column)?);
+            Some(Point { x, y, ends: self.ends_in(row, column) })
         };
         let mut points: Vec<Point> = table.iter().filter_map(point).collect();
         points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
@@ -200,6 +204,7 @@ impl Drawing {
     fn ends_in(&self, row: &Row, column: &str) -> Option<(f64, f64)> {
         let end = |end: &str| number_in(row, &format!("{column}{end}"));
         match &self.ends {
+            Some(_) if self.marks != Shape::Rows && !self.y.ends_with(column) => None,
             Some([low, high]) => number_in(row, low).zip(number_in(row, high)),
             None => end("_low").zip(end("_high")),
         }

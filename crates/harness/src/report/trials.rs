@@ -1,9 +1,7 @@
 //! Figure 1 of the paper: cost against number of trials, for one run and as an exact expectation.
 
-use super::drawing::{Drawing, Shape};
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
-use super::query::Row;
 use crate::statistics::{expected_best_of, mean_interval, minimum};
 
 report! {
@@ -47,9 +45,6 @@ impl Config {
             points.extend(curves.into_iter().flatten());
         }
         output.add_csv("trials", &points)?;
-        let caption = "Lowest cost among so many trials. Left, one run, as in the paper; right, \
-                       what is expected, with the 95 % interval of the mean over repetitions.";
-        output.add_figure("trials", caption, 2, draw(rows, &output.table()?));
         let last: Vec<&Point> =
             points.iter().filter(|point| point.trials == self.best_of).collect();
         let columns = "scene method expected_over_base expected_low expected_high";
@@ -114,35 +109,6 @@ impl Config {
             ..row.compare(paper, names.join(" or "), verdict, rule)
         })
     }
-}
-
-/// Draws one run and the expectation of each scene side by side.
-fn draw(rows: &Rows, table: &[Row]) -> Vec<Panel> {
-    let panels = |y: &str, y_label: &str| {
-        let ends = ["expected_low", "expected_high"].map(str::to_owned);
-        let drawing = Drawing {
-            marks: Shape::Steps,
-            panels: vec!["scene".into()],
-            x: "trials".into(),
-            y: y.into(),
-            ends: (y == "expected_over_base").then_some(ends),
-            series: vec!["method".into()],
-            x_label: "number of trials".into(),
-            y_label: y_label.into(),
-            log_x: true,
-            line_at: Some(1.0),
-            ..Drawing::default()
-        };
-        drawing.panels(rows, table)
-    };
-    let single = panels("single_run_over_base", "best of one run / greedy");
-    let expected = panels("expected_over_base", "expected best / greedy");
-    let both = |both: (Panel, Panel)| {
-        let mut both = <[Panel; 2]>::from(both);
-        figures::share_axes(&mut both);
-        both
-    };
-    single.into_iter().zip(expected).flat_map(both).collect()
 }
 
 #[cfg(test)]
