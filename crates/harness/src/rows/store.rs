@@ -61,7 +61,8 @@ impl Store {
         let spec = store.partial.join(SPEC);
         let found = match existing {
             Existing::Replace => None,
-            _ if !spec.try_exists().map_err(Error::io(&spec, "read the file"))? => None,
+            // Where that cannot be told, reading says why.
+            _ if !spec.try_exists().unwrap_or(true) => None,
             Existing::Keep | Existing::Resume => Some(read_text(&spec)?),
         };
         match (existing, found) {
