@@ -3,7 +3,7 @@
 use super::config::Series;
 use super::data::{distinct, grouped};
 use super::prelude::*;
-use super::query::{Conditions, QueryError, Row, number_in};
+use super::query::{Conditions, QueryError, Row, cell, number_in};
 use bvh_config::Nested;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -93,6 +93,13 @@ impl Drawing {
     }
 
     fn selected(&self, table: &[Row]) -> Result<Vec<Row>, QueryError> {
+        let of_lists = self.panels.iter().chain(&self.series).chain(self.ends.iter().flatten());
+        let columns = self.y.split(", ").chain([self.x.as_str(), &self.beside]);
+        let columns = columns.chain(of_lists.map(String::as_str));
+        if let Some(row) = table.first() {
+            let mut named = columns.filter(|name| !name.is_empty());
+            named.try_for_each(|name| cell(row, name).map(drop))?;
+        }
         let conditions = Conditions::parse(&self.select)?;
         let mut selected = Vec::new();
         for row in table {

@@ -281,6 +281,7 @@ mod tests {
                 "\"cost - cost\" is no value",
             ),
             ("columns = [{ name = 'scene', value = 'max cost' }]", "\"scene\" is no name"),
+            ("figure = { x = 'cost', y = 'scene' }", "figure: there is no column \"cost\""),
         ] {
             let error = made(change).unwrap_err();
             assert!(error.contains(message), "{error}");
