@@ -135,7 +135,7 @@ fn mistakes_are_named_before_any_work() {
         (&["key.toml"], &["key.toml", "repetition", "repetitions"]),
         (&["scene.toml"], &["sofa", "accepted: bijou, cloister, escher, konistil"]),
         (&["spec.toml", "--scene", "nan.obj"], &["nan.obj:2", "nan"]),
-        (&["spec.toml", "--scene", "empty.obj"], &["empty.obj is empty"]),
+        (&["spec.toml", "--scene", "empty.obj"], &["empty.obj: empty"]),
         (&["spec.toml", "--scene", "none.obj"], &["none.obj", "no such file"]),
         (&["spec.toml", "--jobs", "0"], &["--jobs", "1..=1024"]),
         (&["spec.toml", "--sed", "1"], &["--sed", "--seed"]),
