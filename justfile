@@ -19,9 +19,5 @@ verify:
 table4:
     cargo run -p harness -- experiments/table4.toml
 
-# `best` after the time of other libraries' builds.
-bench:
-    cargo bench --manifest-path attic/Cargo.toml --bench peers -- escher
-
 docs:
     cargo doc --workspace --no-deps --open
