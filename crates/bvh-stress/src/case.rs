@@ -136,7 +136,8 @@ impl Case {
             let objects = Primitives::Triangles(triangles);
             for (name, traversal) in tracing::TRAVERSALS {
                 cells.extend(self.cell(name, |cell| {
-                    cell.note = tracing::check(*traversal, &objects, &rays)?;
+                    let hits = tracing::check(*traversal, &objects, &rays)?;
+                    cell.note = format!("{hits} of {} rays hit", rays.len());
                     Ok(true)
                 }));
             }

@@ -13,25 +13,13 @@
 //!
 //! [`CASES`] lists the cases, some of which promise more about their own scene. A [`Case`] is
 //! checked by [`Case::cells`]. The checks themselves work on any tree: [`examine::check_outcome`] on
-//! the outcome of a search, [`transform`] on scenes, [`kernels`] and [`tracing`] on rays.
-//!
-//! ```
-//! use bvh_search::{Budget, Method, Problem, solve};
-//! use bvh_stress::{by_id, examine::check_outcome};
-//!
-//! let case = by_id("S04").unwrap();
-//! let boxes = bvh_scenes::builtin::stiff::boxes(&case.triangles(100));
-//! for method in Method::all().iter().filter(|method| bvh_stress::is_builder(method)) {
-//!     let outcome = solve(method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap();
-//!     check_outcome(&boxes, &outcome).unwrap();
-//! }
-//! ```
+//! the outcome of a search, [`transform`] on scenes, [`tracing`] on rays.
 
 mod case;
 mod checks;
 pub mod exact;
 pub mod examine;
-pub mod kernels;
+pub mod hard_rays;
 mod methods;
 mod table;
 pub mod tracing;

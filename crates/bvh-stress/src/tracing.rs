@@ -1,10 +1,10 @@
 //! Compares every traversal with testing every triangle, and makes difficult rays.
 
-use crate::Verdict;
 use anyhow::{Result, bail, ensure};
 use bvh_build::{Builder, goldsmith_salmon, median_cut, muller_fellner};
 use bvh_core::{
-    Aabb, Bvh, Hit, Kernel, Primitives, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants,
+    Aabb, Bvh, Coherence, Hit, Kernel, Primitives, Ray, Triangle, WideBvh, collapse_leaves,
+    cost::SahConstants,
 };
 use bvh_scenes::trace::{Accelerator, KdTree, Structure};
 use bvh_search::Stream;
@@ -13,21 +13,28 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use std::borrow::Cow;
 
-/// Prepares objects for rays in one or several ways, or returns the reason why it cannot.
-pub type Traversal = fn(&Primitives) -> Result<Vec<Accelerator<'_>>>;
+/// Answers rays: the nearest hit of each, and whether there is any.
+pub type Answers<'a> = Box<dyn Fn(&[Ray]) -> Vec<(Option<Hit>, bool)> + 'a>;
 
-/// Every traversal by name. Adding a traversal takes one line.
+/// Prepares objects for rays in several ways, each with its name, or returns the reason why it
+/// cannot.
+pub type Traversal = fn(&Primitives) -> Result<Vec<(String, Answers<'_>)>>;
+
+/// Every traversal by name.
 pub const TRAVERSALS: &[(&str, Traversal)] = &[
     ("binary tree", over_binary_trees),
     ("n-ary tree", |objects| {
         let tree = build(objects, &goldsmith_salmon::Config::default())?;
-        Ok(vec![Accelerator::new(objects, Structure::Tree(Cow::Owned(tree)))])
+        Ok(vec![singly("whole", objects, Structure::Tree(Cow::Owned(tree)))])
     }),
-    ("wide, SIMD", |objects| over_wide_layouts(objects, Structure::Wide)),
-    ("wide, portable", |objects| over_wide_layouts(objects, Structure::WidePortable)),
+    ("wide, SIMD", by_every_kernel),
+    ("wide, portable", |objects| {
+        let portable = |wide| singly("portable", objects, Structure::WidePortable(wide));
+        Ok(wide_layouts(objects)?.map(portable).into())
+    }),
     ("KD-tree", |objects| {
         let cells = KdTree::build(&objects.boxes())?;
-        Ok(vec![Accelerator::new(objects, Structure::KdTree(cells))])
+        Ok(vec![singly("cells", objects, Structure::KdTree(cells))])
     }),
 ];
 
@@ -37,43 +44,59 @@ fn build(objects: &Primitives, builder: &dyn Builder) -> Result<Bvh> {
 
 /// Prepares trees with one object per leaf, with leaves merged by the surface area heuristic, and
 /// with a tenth of all objects in every leaf.
-fn over_binary_trees(objects: &Primitives) -> Result<Vec<Accelerator<'_>>> {
+fn over_binary_trees(objects: &Primitives) -> Result<Vec<(String, Answers<'_>)>> {
     let greedy = build(objects, &muller_fellner::Config::default())?;
     let merged = collapse_leaves(&greedy, &SahConstants::default());
     let tenths = median_cut::Config { leaf_fraction: 0.1, ..Default::default() };
-    let trees = [greedy, merged, build(objects, &tenths)?];
-    Ok(trees.map(|tree| Accelerator::new(objects, Structure::Tree(Cow::Owned(tree)))).into())
+    let trees =
+        [greedy, merged, build(objects, &tenths)?].into_iter().zip(["one", "merged", "tenths"]);
+    Ok(trees.map(|(tree, name)| singly(name, objects, Structure::Tree(Cow::Owned(tree)))).collect())
 }
 
-fn over_wide_layouts(
-    objects: &Primitives,
-    structure: fn(WideBvh) -> Structure<'static>,
-) -> Result<Vec<Accelerator<'_>>> {
+/// Lays out a binary tree and a tree with many children per node.
+fn wide_layouts(objects: &Primitives) -> Result<[WideBvh; 2]> {
     let Primitives::Triangles(triangles) = objects else {
         bail!("only triangles have a wide layout");
     };
-    let layouts = wide_layouts(triangles)?.into_iter();
-    Ok(layouts.map(|(_, wide)| Accelerator::new(objects, structure(wide))).collect())
+    let binary = build(objects, &muller_fellner::Config::default())?;
+    let wide = build(objects, &goldsmith_salmon::Config::default())?;
+    Ok([WideBvh::new(&binary, triangles)?, WideBvh::new(&wide, triangles)?])
 }
 
-/// Lays out a binary tree and a tree with many children per node for every kernel of this
-/// processor.
-pub fn wide_layouts(triangles: &[Triangle]) -> Result<Vec<(Kernel, WideBvh)>> {
-    let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
-    let builders: [&dyn Builder; 2] =
-        [&muller_fellner::Config::default(), &goldsmith_salmon::Config::default()];
-    let mut layouts = Vec::new();
-    for builder in builders {
-        let tree = builder.build(&boxes)?;
-        let wide = WideBvh::new(&tree, triangles)?;
+/// Answers rays by every kernel of this processor, ray by ray and together, with both hints.
+pub fn by_every_kernel(objects: &Primitives) -> Result<Vec<(String, Answers<'_>)>> {
+    let mut answers = Vec::new();
+    for wide in wide_layouts(objects)? {
         for kernel in Kernel::ALL {
             // The processor may lack the kernel's instructions.
-            if let Some(wide) = wide.clone().with_kernel(kernel) {
-                layouts.push((kernel, wide));
+            let Some(wide) = wide.clone().with_kernel(kernel) else { continue };
+            for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+                let wide = wide.clone();
+                let answer: Answers = Box::new(move |rays| together(&wide, rays, coherence));
+                answers.push((format!("{kernel:?}, {coherence:?}"), answer));
             }
+            answers.push(singly(&format!("{kernel:?}"), objects, Structure::Wide(wide)));
         }
     }
-    Ok(layouts)
+    Ok(answers)
+}
+
+fn singly<'a>(
+    name: &str,
+    objects: &'a Primitives,
+    structure: Structure<'a>,
+) -> (String, Answers<'a>) {
+    let accelerator = Accelerator::new(objects, structure);
+    let answer = move |ray: &Ray| (accelerator.nearest_hit(ray), accelerator.any_hit(ray));
+    (name.to_owned(), Box::new(move |rays| rays.iter().map(&answer).collect()))
+}
+
+fn together(wide: &WideBvh, rays: &[Ray], coherence: Coherence) -> Vec<(Option<Hit>, bool)> {
+    let mut nearest = vec![Hit::MISS; rays.len()];
+    let mut any = vec![false; rays.len()];
+    wide.nearest_hits(rays, &mut nearest, coherence);
+    wide.any_hits(rays, &mut any, coherence);
+    nearest.into_iter().map(|hit| (!hit.is_miss()).then_some(hit)).zip(any).collect()
 }
 
 /// Returns the bits of an answer, for exact comparison.
@@ -81,27 +104,21 @@ pub fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {
     hit.map(|hit| (hit.t.to_bits(), hit.object))
 }
 
-/// Checks both kinds of answers to a ray, bit by bit, against that of testing every object.
-pub fn compare(ray: &Ray, nearest: Option<Hit>, any: bool, expected: Option<Hit>) -> Result<()> {
-    let same = bits(nearest) == bits(expected) && any == expected.is_some();
-    ensure!(same, "P3: {ray:?} gives {nearest:?} and {any}, testing every object {expected:?}");
-    Ok(())
-}
-
-/// Checks P3: for all rays the traversal gives the answers of testing every object, bit by bit. The
-/// note reports the number of hits.
-pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Verdict {
-    let accelerators = traversal(objects)?;
-    let brute_force = Accelerator::new(objects, Structure::Brute);
-    let mut hits = 0;
-    for ray in rays {
-        let expected = brute_force.nearest_hit(ray);
-        hits += usize::from(expected.is_some());
-        for accelerator in &accelerators {
-            compare(ray, accelerator.nearest_hit(ray), accelerator.any_hit(ray), expected)?;
+/// Checks P3: for all rays the traversal gives the answers of testing every object, bit by bit.
+/// Returns the number of rays that hit.
+pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Result<usize> {
+    let (_, brute_force) = singly("", objects, Structure::Brute);
+    let expected = brute_force(rays);
+    for (way, answers) in traversal(objects)? {
+        let answers = answers(rays);
+        for ((ray, (nearest, any)), (hit, is_hit)) in rays.iter().zip(answers).zip(&expected) {
+            ensure!(
+                bits(nearest) == bits(*hit) && any == *is_hit,
+                "P3: {way}: {ray:?} gives {nearest:?} and {any}, testing every object {hit:?}"
+            );
         }
     }
-    Ok(format!("{hits} of {} rays hit", rays.len()))
+    Ok(expected.iter().filter(|(hit, _)| hit.is_some()).count())
 }
 
 /// Returns rays for a scene of any scale: random ones; towards corners, edges and centres; along

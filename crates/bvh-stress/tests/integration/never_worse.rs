@@ -8,7 +8,7 @@
 use bvh_build::{Builder, muller_fellner, ploc};
 use bvh_core::{Aabb, Triangle, cost, validate};
 use bvh_scenes::Scene;
-use bvh_scenes::builtin::stiff;
+use bvh_scenes::builtin::stiff::{self, STIFF};
 use bvh_search::{Budget, Kept, Method, Observer, Outcome, Problem, best, solve, solve_or_keep};
 use bvh_stress::EXACT_OBJECTS;
 use bvh_stress::examine::ROUNDING;
@@ -24,21 +24,16 @@ fn soup(n: usize) -> Vec<Aabb> {
 
 /// Returns all scenes with several hundred objects, and a few that are stiff only at larger sizes.
 fn scenes() -> Vec<(String, Vec<Aabb>)> {
-    let built_in =
-        ["bijou", "cloister", "escher", "konistil", "pinecon2", "spheres7500"].map(|name| {
-            let name = format!("{name}:300");
-            let boxes = Scene::load(&name).unwrap().boxes;
-            (name, boxes)
-        });
-    let stiff = stiff::STIFF
-        .iter()
-        .map(|(id, triangles)| ((*id).to_owned(), stiff::boxes(&triangles(300))));
-    let soups = [300, 3000].map(|n| (format!("soup of {n}"), soup(n)));
-    let larger = ["S06:2000", "S17:2000", "S30:2000"].map(|name| {
-        let boxes = Scene::load(name).unwrap().boxes;
-        (name.to_owned(), boxes)
+    let built_in = ["bijou", "cloister", "escher", "konistil", "pinecon2", "spheres7500"];
+    let larger = ["S06:2000", "S17:2000", "S30:2000"].map(str::to_owned);
+    let named = built_in.map(|name| format!("{name}:300")).into_iter().chain(larger);
+    let loaded = named.map(|name| {
+        let boxes = Scene::load(&name).unwrap().boxes;
+        (name, boxes)
     });
-    built_in.into_iter().chain(stiff).chain(soups).chain(larger).collect()
+    let stiff = STIFF.iter().map(|(id, make)| ((*id).to_owned(), stiff::boxes(&make(300))));
+    let soups = [300, 3000].map(|n| (format!("soup of {n}"), soup(n)));
+    loaded.chain(stiff).chain(soups).collect()
 }
 
 /// Work per object: near the border between small and large budgets, and beyond.
@@ -95,10 +90,9 @@ fn no_method_ends_above_a_tree_that_it_has_evaluated_or_that_its_caller_has() {
 
 #[test]
 fn no_budget_of_the_best_ends_above_the_builders_that_it_pays_for() {
-    let fastest = ploc::Config { radius: 5, near_rounds: 1 };
     let method = Method::Best(best::Config::default());
     for (name, boxes) in scenes() {
-        let of_fastest = cost::internal_area(&fastest.build(&boxes).unwrap());
+        let of_fastest = cost::internal_area(&FASTEST.build(&boxes).unwrap());
         let of_cheapest = cheapest_build(&boxes);
         for work in WORK {
             let limit = if work < PAYS_FOR_EVERY_BUILDER { of_fastest } else { of_cheapest };
@@ -114,15 +108,13 @@ fn no_budget_of_the_best_ends_above_the_builders_that_it_pays_for() {
 
 /// Returns the least cost of the builders that a user would try instead of a search.
 fn cheapest_build(boxes: &[Aabb]) -> f64 {
-    let greedy = muller_fellner::Config::default().build(boxes);
-    let agglomerative = ploc::Config::default().build(boxes);
-    let fastest = ploc::Config { radius: 5, near_rounds: 1 }.build(boxes);
-    let trees = [greedy, agglomerative, fastest];
-    trees
-        .iter()
-        .map(|tree| cost::internal_area(tree.as_ref().unwrap()))
-        .fold(f64::INFINITY, f64::min)
+    let builders: [&dyn Builder; 3] =
+        [&muller_fellner::Config::default(), &ploc::Config::default(), &FASTEST];
+    let costs = builders.map(|builder| cost::internal_area(&builder.build(boxes).unwrap()));
+    costs.into_iter().fold(f64::INFINITY, f64::min)
 }
+
+const FASTEST: ploc::Config = ploc::Config { radius: 5, near_rounds: 1 };
 
 #[test]
 fn more_work_on_objects_as_large_as_the_scene_gives_no_worse_tree() {

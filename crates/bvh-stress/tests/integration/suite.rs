@@ -5,15 +5,14 @@ use bvh_scenes::builtin::stiff::{self, STIFF};
 use bvh_scenes::trace::{Accelerator, Structure};
 use bvh_search::Method;
 use bvh_stress::{
-    CASES, Case, Cell, Check, Class, Effort, KINDS, LargerScenes, Size, kernels, scenes, tracing,
+    CASES, Case, Cell, Check, Class, Effort, KINDS, Size, hard_rays, scenes, tracing,
 };
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
-const WORK: u64 = 60;
-
+/// As in the quick variant of `experiments/stability.toml`.
 const QUICK: Effort =
-    Effort { builders: Size::Few, work_per_object: WORK, larger_searches: None, rays: 200 };
+    Effort { builders: Size::Few, work_per_object: 60, larger_searches: None, rays: 200 };
 
 fn assert_kept(broken: Vec<String>) {
     assert!(broken.is_empty(), "\n{}", broken.join("\n"));
@@ -42,28 +41,16 @@ fn every_case_from_s01_to_s45_exists_and_is_checked() {
     }
 }
 
-/// Checks every case with these methods, and every traversal and other part.
-fn check_cases(methods: &[(String, Method)], effort: Effort) {
-    let cells = CASES.par_iter().flat_map_iter(|case| case.cells(methods, &effort));
+#[test]
+fn every_case_holds_for_every_method_every_traversal_and_every_other_part() {
+    let methods = bvh_stress::methods();
+    let cells = CASES.par_iter().flat_map_iter(|case| case.cells(&methods, &QUICK));
     let broken = cells.filter(|cell| cell.outcome == Class::Broken);
     assert_kept(
         broken
             .map(|Cell { scene, method, note, .. }| format!("{scene}, {method}: {note}"))
             .collect(),
     );
-}
-
-#[test]
-fn every_case_holds_for_every_method_every_traversal_and_every_other_part() {
-    check_cases(&bvh_stress::methods(), QUICK);
-}
-
-#[test]
-#[ignore = "slow: thousands of objects for builders and searches alike"]
-fn every_case_holds_at_a_larger_size() {
-    let larger = Some(LargerScenes { objects: 2000, work_per_object: 60 });
-    let effort = Effort { builders: Size::Many, larger_searches: larger, ..QUICK };
-    check_cases(&bvh_stress::methods(), effort);
 }
 
 /// The powers of two that scale scenes, each for an equal part of the rays. Most of them keep
@@ -85,8 +72,9 @@ type Scaled = (&'static Case, i32, Vec<Triangle>);
 fn check_kernels(random: usize, adversarial: usize) {
     let mut jobs = Vec::new();
     for (case, triangles) in scenes(TESTED) {
-        let scaled =
-            SCALES.into_iter().filter_map(|by| Some((case, by, kernels::scaled(&triangles, by)?)));
+        let scaled = SCALES
+            .into_iter()
+            .filter_map(|by| Some((case, by, hard_rays::scaled(&triangles, by)?)));
         let scaled: Vec<Scaled> = scaled.collect();
         // Every scale gets the same number of pieces, and each piece fits in memory.
         let pieces = random.div_ceil(PIECE * scaled.len()) * scaled.len();
@@ -98,12 +86,13 @@ fn check_kernels(random: usize, adversarial: usize) {
         .map(|(seed, (pieces, (case, scale, triangles)))| {
             let random = random.div_ceil(pieces);
             let adversarial = adversarial.div_ceil(pieces);
-            let mut rays = kernels::random(&triangles, random, seed as u64);
-            rays.extend(kernels::adversarial(&triangles, adversarial, seed as u64));
+            let mut rays = hard_rays::random(&triangles, random, seed as u64);
+            rays.extend(hard_rays::adversarial(&triangles, adversarial, seed as u64));
             let name = format!("{} ({}) * 2^{scale}, seed {seed}", case.id, case.name);
             // A scene that allows fewer rays would be tested less than the others without notice.
             assert_eq!(rays.len(), random + adversarial, "{name}");
-            kernels::check(&triangles, &rays).map_err(|broken| format!("{name}, {broken:#}"))
+            tracing::check(tracing::by_every_kernel, &Primitives::Triangles(triangles), &rays)
+                .map_err(|broken| format!("{name}, {broken:#}"))
         })
         .collect();
     let hits: usize = checked.iter().flatten().sum();

@@ -1,57 +1,12 @@
-//! Compares every kernel of the wide layout, ray by ray and in batches with both hints, with
-//! testing every triangle; and makes rays where rounding decides.
+//! Rays where rounding decides, alone and in bundles.
 
-use crate::tracing::{self, compare, wide_layouts};
-use anyhow::{Context, Result};
-use bvh_core::{Coherence, Hit, Primitives, Ray, Triangle};
+use crate::tracing;
+use bvh_core::{Primitives, Ray, Triangle};
 use bvh_scenes::trace::{Accelerator, Structure};
 use bvh_search::Stream;
 use glam::Vec3;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
-
-/// The lengths of consecutive batches: one ray, fewer and more rays than a kernel processes at
-/// once, and far more.
-const LENGTHS: [usize; 12] = [1, 3, 16, 15, 17, 33, 7, 23, 25, 65, 257, 1023];
-
-/// Checks P3, bit by bit, for the layouts of two trees and every kernel of this processor. Returns
-/// the number of rays that hit. That a triangle is hit at its real distance, rounded once, is tested
-/// in `bvh-core`.
-pub fn check(triangles: &[Triangle], rays: &[Ray]) -> Result<usize> {
-    let objects = Primitives::Triangles(triangles.to_vec());
-    let brute_force = Accelerator::new(&objects, Structure::Brute);
-    let expected: Vec<_> = rays.iter().map(|ray| brute_force.nearest_hit(ray)).collect();
-    for (kernel, wide) in wide_layouts(triangles)? {
-        let nearest: Vec<_> = rays.iter().map(|ray| wide.nearest_hit(ray)).collect();
-        let any: Vec<_> = rays.iter().map(|ray| wide.any_hit(ray)).collect();
-        let compared = |way: &str, nearest: &[Option<Hit>], any: &[bool]| {
-            let mut answers = nearest.iter().zip(any).zip(rays.iter().zip(&expected));
-            answers
-                .try_for_each(|((nearest, any), (ray, hit))| compare(ray, *nearest, *any, *hit))
-                .with_context(|| format!("{kernel:?}, {way}"))
-        };
-        compared("ray by ray", &nearest, &any)?;
-        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
-            let mut nearest = vec![Hit::MISS; rays.len()];
-            let mut any = vec![false; rays.len()];
-            let mut done = 0;
-            // Lengths around multiples of the vector width reach every remainder loop.
-            for length in LENGTHS.into_iter().cycle() {
-                let batch = done..rays.len().min(done + length);
-                wide.nearest_hits(&rays[batch.clone()], &mut nearest[batch.clone()], coherence);
-                wide.any_hits(&rays[batch.clone()], &mut any[batch.clone()], coherence);
-                done = batch.end;
-                if done == rays.len() {
-                    break;
-                }
-            }
-            let nearest: Vec<_> =
-                nearest.iter().map(|hit| (!hit.is_miss()).then_some(*hit)).collect();
-            compared(&format!("{coherence:?}"), &nearest, &any)?;
-        }
-    }
-    Ok(expected.iter().flatten().count())
-}
 
 /// Returns rays of [`tracing::rays`], half of them single, half in bundles.
 pub fn random(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
