@@ -4,14 +4,13 @@ use super::finish::{Summary, conclude};
 use super::job::{base_costs, selected};
 use super::perform::Watch;
 use super::perform::{Trees, Work};
-use super::resolved::{Resolved, load_scenes, to_toml};
+use super::resolved::{Resolved, finished, load_scenes, to_toml};
 use super::runs;
 use super::{ray_cost, trace};
 use crate::Error;
-use crate::rows::store::{Existing, Store, is_unfinished};
+use crate::rows::store::{Existing, Store};
 use crate::spec::Experiment;
 use crate::stress;
-use bvh_scenes::files::read_text;
 use bvh_search::Observer;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
@@ -146,12 +145,9 @@ fn is_finished(
     existing: Existing,
     is_part: bool,
 ) -> Result<bool, Error> {
-    let recorded = folder.join("resolved.toml");
-    if existing == Existing::Replace || is_unfinished(folder) || !recorded.is_file() {
-        return Ok(false);
-    }
-    let text = read_text(&recorded)?;
-    let is_same = toml::from_str(&text).is_ok_and(|found| resolved.repeats(&found));
+    let recorded = if existing == Existing::Replace { None } else { finished(folder)? };
+    let Some(recorded) = recorded else { return Ok(false) };
+    let is_same = recorded.is_some_and(|recorded| resolved.repeats(&recorded));
     let found = match (is_same, existing == Existing::Resume && !is_part) {
         (true, true) => return Ok(true),
         (true, false) => "finished results",

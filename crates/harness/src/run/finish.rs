@@ -7,7 +7,7 @@ use crate::report::output::Output;
 use crate::rows::store::{self, Existing, Store};
 use crate::run::provenance::Provenance;
 use crate::run::reference;
-use crate::run::resolved::{Resolved, read_toml, to_toml};
+use crate::run::resolved::{Resolved, finished, read_toml, to_toml};
 use crate::spec::Experiment;
 use crate::stress;
 use bvh_scenes::files::read_text;
@@ -89,17 +89,8 @@ pub fn remade(folder: &Path) -> Result<Vec<Output>, Error> {
 }
 
 /// Returns true if `out` has finished results of the same runs, perhaps with other reports.
-///
-/// # Errors
-///
-/// If the spec that the results record cannot be read.
 pub fn has_results_of(experiment: &Experiment, out: &Path) -> Result<bool, Error> {
-    let folder = out.join(experiment.folder());
-    let recorded = folder.join("resolved.toml");
-    if store::is_unfinished(&folder) || !recorded.is_file() {
-        return Ok(false);
-    }
-    let recorded: Option<Resolved> = toml::from_str(&read_text(&recorded)?).ok();
+    let recorded = finished(&out.join(experiment.folder()))?.flatten();
     Ok(recorded.is_some_and(|recorded| recorded.has_runs_of(experiment)))
 }
 

@@ -1,6 +1,7 @@
 //! The resolved spec of an experiment: every default spelled out, and the scenes it runs on.
 
 use crate::Error;
+use crate::rows::store::is_unfinished;
 use crate::spec::Experiment;
 use bvh_scenes::files::read_text;
 use bvh_scenes::{Scene, subset};
@@ -58,6 +59,16 @@ impl Resolved {
     pub fn run_count(&self) -> usize {
         self.scenes.len() * self.experiment.methods.len() * self.experiment.repetitions as usize
     }
+}
+
+/// Returns the resolved spec of the finished results in a folder, if it has any: `Some(None)` if the
+/// spec is one that this program cannot read.
+pub(crate) fn finished(folder: &Path) -> Result<Option<Option<Resolved>>, Error> {
+    let recorded = folder.join("resolved.toml");
+    if is_unfinished(folder) || !recorded.is_file() {
+        return Ok(None);
+    }
+    Ok(Some(toml::from_str(&read_text(&recorded)?).ok()))
 }
 
 /// Loads an experiment's scenes. Returns them and the names of optional scenes that are missing.
