@@ -16,42 +16,41 @@ use std::path::Path;
 use std::sync::LazyLock;
 use toml::{Table, Value};
 
-/// A step from a table to a value in it.
-#[derive(Clone, Debug)]
-enum Step {
-    Key(String),
-    Index(usize),
-}
+/// The way from a spec to a value in it: keys and indices.
+type Steps = Vec<String>;
 
-fn follow<'a>(value: &'a mut Value, step: &Step) -> &'a mut Value {
-    match step {
-        Step::Key(key) => &mut value[key.as_str()],
-        Step::Index(index) => &mut value[*index],
+fn follow<'a>(value: &'a mut Value, step: &str) -> &'a mut Value {
+    match value {
+        Value::Array(values) => &mut values[step.parse::<usize>().unwrap()],
+        table => &mut table[step],
     }
 }
 
 /// Collects the paths of all tables in a value.
-fn tables(value: &Value, path: &[Step], found: &mut Vec<Vec<Step>>) {
-    match value {
+fn tables(value: &Value, path: &[String], found: &mut Vec<Steps>) {
+    let inside: Vec<(String, &Value)> = match value {
         Value::Table(table) => {
             found.push(path.to_vec());
-            for (key, value) in table {
-                tables(value, &[path, &[Step::Key(key.clone())]].concat(), found);
-            }
+            table.iter().map(|(key, value)| (key.clone(), value)).collect()
         }
-        Value::Array(array) => {
-            for (index, value) in array.iter().enumerate() {
-                tables(value, &[path, &[Step::Index(index)]].concat(), found);
-            }
+        Value::Array(values) => {
+            (0..).zip(values).map(|(i, value): (usize, _)| (i.to_string(), value)).collect()
         }
-        _ => {}
+        _ => return,
+    };
+    for (step, value) in inside {
+        tables(value, &[path, &[step]].concat(), found);
     }
 }
 
 /// Returns a spec with the value under a key of the table at `path`.
-fn with(spec: &Value, path: &[Step], key: &str, value: Value) -> Value {
+fn with(spec: &Value, path: &[String], key: &str, value: Value) -> Value {
     let mut spec = spec.clone();
-    path.iter().fold(&mut spec, follow).as_table_mut().unwrap().insert(key.into(), value);
+    path.iter()
+        .fold(&mut spec, |value, step| follow(value, step))
+        .as_table_mut()
+        .unwrap()
+        .insert(key.into(), value);
     spec
 }
 
@@ -70,17 +69,15 @@ fn accepted(message: &str) -> Vec<String> {
 
 /// Returns the place of a table. It names elements of arrays by their method or kind instead of
 /// their index, so that each method and kind is tested once.
-fn place(spec: &Value, path: &[Step]) -> String {
+fn place(spec: &Value, path: &[String]) -> String {
     let mut value = spec.clone();
     let mut place = String::new();
     for step in path {
+        let is_index = value.is_array();
         value = follow(&mut value, step).clone();
-        let tag =
-            ["kind", "method"].iter().find_map(|tag| value.get(tag)?.as_str()).unwrap_or_default();
-        match step {
-            Step::Key(key) => place += &format!(".{key}"),
-            Step::Index(_) => place += &format!("[{tag}]"),
-        }
+        let tag = ["kind", "method"].iter().find_map(|tag| value.get(tag)?.as_str());
+        place +=
+            &if is_index { format!("[{}]", tag.unwrap_or_default()) } else { format!(".{step}") };
     }
     place
 }
@@ -107,6 +104,8 @@ fn specs() -> Vec<Value> {
         let experiment: Experiment = Value::Table(spec).try_into().unwrap();
         specs.push(Value::try_from(&experiment).unwrap());
     }
+    // A key is tried in the shortest experiment that has it.
+    specs.sort_by_key(|spec: &Value| spec.to_string().len());
     let methods: Vec<Table> =
         Method::all().iter().map(|method| Table::try_from(method).unwrap()).collect();
     let question = Value::from("Which keys does every method have?");
@@ -158,7 +157,12 @@ fn a_wrong_value_under_any_key_of_a_spec_is_rejected_by_name() {
                 continue;
             }
             let mut table = spec.clone();
-            let table = path.iter().fold(&mut table, follow).as_table().unwrap().clone();
+            let table = path
+                .iter()
+                .fold(&mut table, |value, step| follow(value, step))
+                .as_table()
+                .unwrap()
+                .clone();
             // An unknown key makes the parser list the keys that it accepts. Where it does not, the
             // keys are names, and other specs may have others.
             let unknown = read(&with(&spec, &path, "unheard_of", 1.into()));
@@ -177,11 +181,9 @@ fn a_wrong_value_under_any_key_of_a_spec_is_rejected_by_name() {
                         // The message names the key or one within it. A label is only wrong because
                         // a report names another one. For a table, the key above may be named.
                         let other = key == "label" && message.contains("names method");
-                        let above =
-                            path.iter().rev().filter(|_| value.is_table()).any(|step| match step {
-                                Step::Key(above) => message.contains(above),
-                                Step::Index(_) => false,
-                            });
+                        let keys_above = path.iter().filter(|step| step.parse::<usize>().is_err());
+                        let above = value.is_table()
+                            && keys_above.into_iter().any(|above| message.contains(above));
                         let named = message.starts_with("folder/some.toml: ")
                             && (message.contains(&key) || above || other)
                             && ["accepted", "expected", "missing", "wanted", " to "]
