@@ -15,7 +15,6 @@ mod expansion;
 pub mod export;
 pub mod file;
 mod layout_cost;
-mod leave;
 mod mesh;
 mod packed;
 mod primitives;

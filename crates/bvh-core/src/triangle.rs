@@ -95,16 +95,12 @@ impl Triangle {
     /// Returns the unit vector perpendicular to the triangle, on the side from which its corners
     /// run counterclockwise, computed in f64; `None` for a degenerate triangle.
     pub fn normal(&self) -> Option<Vec3> {
-        self.scale_and_normal().1.map(|normal| normal.as_vec3())
-    }
-
-    /// Returns the length of the longest side along an axis, and the [normal](Self::normal).
-    pub(crate) fn scale_and_normal(&self) -> (f64, Option<DVec3>) {
         let [a, b, c] = self.0.map(Vec3::as_dvec3);
         // Scaled edges have lengths of about one, so their product neither overflows nor
         // underflows.
         let scale = (b - a).abs().max((c - a).abs()).max_element();
-        (scale, ((b - a) / scale).cross((c - a) / scale).try_normalize())
+        let normal = ((b - a) / scale).cross((c - a) / scale).try_normalize();
+        normal.map(|normal| normal.as_vec3())
     }
 
     /// Returns whether the corners coincide or are collinear, in real arithmetic. Such a triangle is
@@ -138,7 +134,7 @@ impl Triangle {
         let t = match prepared.line.filter(&self.0) {
             Verdict::Miss => return None,
             Verdict::Hit(t) => t,
-            Verdict::Unsure => prepared.line.distance(&prepared.ray, &self.0)?,
+            Verdict::Unsure => prepared.line.distance(&prepared.ray, &self.0, false)?,
         };
         (prepared.ray.t_min() <= t && t <= t_max).then_some(t)
     }
@@ -201,12 +197,6 @@ fn greater(a: DVec3, b: DVec3) -> DVec3 {
 mod tests {
     use super::*;
 
-    const CORNER: Triangle = Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]);
-
-    fn hit(triangle: Triangle, origin: Vec3, direction: Vec3) -> Option<f32> {
-        triangle.intersect(&PreparedRay::new(&Ray::half_line(origin, direction).unwrap()), f32::MAX)
-    }
-
     #[test]
     fn the_weights_of_the_corners_are_those_of_the_point_that_is_hit() {
         let triangle = Triangle([
@@ -223,7 +213,8 @@ mod tests {
                 assert_eq!(triangle.barycentrics(&ray), Some(expected));
             }
         }
-        assert_eq!(CORNER.barycentrics(&Ray::half_line(Vec3::ONE, Vec3::X).unwrap()), None);
+        let in_plane = Ray::half_line(triangle.0[0], triangle.0[1] - triangle.0[0]).unwrap();
+        assert_eq!(triangle.barycentrics(&in_plane), None);
     }
 
     #[test]
@@ -241,28 +232,5 @@ mod tests {
         }
         assert_eq!(Triangle([Vec3::ONE; 3]).normal(), None);
         assert_eq!(Triangle([Vec3::ZERO, Vec3::ONE, 2.0 * Vec3::ONE]).normal(), None);
-    }
-
-    #[test]
-    fn triangles_without_area_are_never_hit() {
-        // Multiples of one eighth keep the products below exact, so the corners are truly
-        // collinear.
-        let a = Vec3::new(0.125, 0.75, 0.375);
-        let b = Vec3::new(0.875, -0.5, 2.0);
-        for corners in
-            [[a; 3], [a, a, b], [a, b, a], [b, a, a], [a, (a + b) / 2.0, b], [a, 3.0 * a, 7.0 * a]]
-        {
-            let triangle = Triangle(corners);
-            assert!(triangle.is_degenerate());
-            for target in corners {
-                for direction in [Vec3::X, Vec3::new(0.3, 0.5, -0.7), b - a, -a] {
-                    assert_eq!(
-                        hit(triangle, target - direction / 3.0, direction),
-                        None,
-                        "{triangle:?}"
-                    );
-                }
-            }
-        }
     }
 }

@@ -83,7 +83,7 @@ mod volumes;
 use crate::Ray;
 use crate::ray::{AXES, largest_axis};
 use glam::Vec3;
-use volumes::{Volumes, crossing};
+use volumes::Volumes;
 
 /// The answer of a layer with rounding errors about a line and a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -208,10 +208,11 @@ impl Line {
     }
 
     /// Returns the rounded distance at which the ray's line crosses the triangle at or in front of
-    /// the origin, by exact arithmetic where f64 does not suffice. Does not allocate.
+    /// the origin, by exact arithmetic where f64 does not suffice. If the origin `is_moved`, by the
+    /// rule of [`Triangle::crossing`](crate::Triangle::crossing). Does not allocate.
     #[cold]
     #[inline(never)]
-    pub(crate) fn distance(&self, ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
+    pub(crate) fn distance(&self, ray: &Ray, triangle: &[Vec3; 3], is_moved: bool) -> Option<f32> {
         let volumes = Volumes::new(ray, triangle)?;
         let corners = self.relative(triangle);
         let (edges, error) = self.edges(&corners);
@@ -231,8 +232,11 @@ impl Line {
             if *side == 0 {
                 *side = volumes.side(edge);
             }
+            if *side == 0 && is_moved {
+                *side = volumes.moved_side(edge);
+            }
         }
-        if sides.contains(&-1) && sides.contains(&1) {
+        if sides.contains(&-1) && sides.contains(&1) || is_moved && sides.contains(&0) {
             return None;
         }
         match verdict {
@@ -249,7 +253,7 @@ impl Line {
         match self.filter(triangle) {
             Verdict::Miss => None,
             Verdict::Hit(t) => Some(t),
-            Verdict::Unsure => crossing(ray, triangle),
+            Verdict::Unsure => self.distance(ray, triangle, true),
         }
     }
 }

@@ -4,17 +4,6 @@ use crate::Ray;
 use crate::expansion::Expansion;
 use glam::Vec3;
 
-/// Returns the rounded distance of [`Line::crossing`](super::Line::crossing) by exact arithmetic.
-/// Does not allocate.
-#[cold]
-#[inline(never)]
-pub(super) fn crossing(ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
-    let volumes = Volumes::new(ray, triangle)?;
-    let [u, v, w] = volumes.sides();
-    let is_crossed = u != 0 && u == v && v == w;
-    is_crossed.then(|| volumes.rounded_distance()).flatten()
-}
-
 /// An exact difference of two points.
 type Vector = [Expansion<2>; 3];
 
@@ -61,6 +50,7 @@ impl<'a> Volumes<'a> {
         Some(Self { direction, triangle, corners })
     }
 
+    /// Returns the side of an edge on which the ray is: −1, 0 or 1.
     pub(super) fn side(&self, edge: usize) -> i32 {
         let [first, second] = EDGES[edge];
         let mut volume: Expansion<96> = Expansion::zero();
@@ -72,29 +62,22 @@ impl<'a> Volumes<'a> {
         volume.sign()
     }
 
-    /// Returns the sides of the edges on which the ray is, never 0 for an edge that is not parallel
-    /// to it: the signs of `u`, `v` and `w` after the origin has moved by (ε, ε², ε³) with an
-    /// infinitely small ε > 0.
-    fn sides(&self) -> [i32; 3] {
-        [0, 1, 2].map(|number| {
-            let side = self.side(number);
-            if side != 0 {
-                return side;
-            }
-            let [first, second] = EDGES[number];
-            let edge = difference(self.triangle[second], self.triangle[first]);
-            let direction = self.direction.to_array().map(f64::from);
-            [(1, 2), (2, 0), (0, 1)]
-                .into_iter()
-                .map(|(i, j)| {
-                    let mut component: Expansion<8> = Expansion::zero();
-                    component.add_scaled(&edge[j], direction[i]);
-                    component.add_scaled(&edge[i], -direction[j]);
-                    component.sign()
-                })
-                .find(|&sign| sign != 0)
-                .unwrap_or(0)
-        })
+    /// Returns the side of an edge on which the ray is after its origin has moved by (ε, ε², ε³) with
+    /// an infinitely small ε > 0, if it was on none: 0 only for an edge that is parallel to it.
+    pub(super) fn moved_side(&self, edge: usize) -> i32 {
+        let [first, second] = EDGES[edge];
+        let edge = difference(self.triangle[second], self.triangle[first]);
+        let direction = self.direction.to_array().map(f64::from);
+        [(1, 2), (2, 0), (0, 1)]
+            .into_iter()
+            .map(|(i, j)| {
+                let mut component: Expansion<8> = Expansion::zero();
+                component.add_scaled(&edge[j], direction[i]);
+                component.add_scaled(&edge[i], -direction[j]);
+                component.sign()
+            })
+            .find(|&sign| sign != 0)
+            .unwrap_or(0)
     }
 
     /// Returns the distance of the triangle's plane, rounded once; `None` as [`round_quotient`].

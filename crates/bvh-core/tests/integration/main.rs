@@ -5,7 +5,6 @@ mod closest;
 mod exact;
 mod export;
 mod instances;
-mod leave;
 mod ray_density;
 mod references;
 mod solid;
