@@ -75,7 +75,7 @@ pub use error::FileError;
 pub use header::Header;
 
 use crate::cost::{CallBoth, Objective, call_in_turn};
-use crate::validate::{Leaves, check_structure, for_each};
+use crate::validate::{Leaves, check_structure};
 use crate::{Aabb, Bvh, BvhView, InvalidBvh, Node, validate};
 use alloc::borrow::Cow;
 use alloc::vec::Vec;
@@ -176,16 +176,12 @@ fn check_visits(nodes: &[Node], visits: &[f32]) -> Result<(), FileError> {
     if !visits.is_empty() {
         check_range(visits, 0, 1.0)?;
     }
-    for_each(
-        nodes,
-        |node| !node.is_leaf(),
-        |parent, node| {
-            for child in node.children() {
-                check_range(visits, child, visits[parent])?;
-            }
-            Ok(())
-        },
-    )
+    for (parent, node) in nodes.iter().enumerate() {
+        for child in node.children() {
+            check_range(visits, child, visits[parent])?;
+        }
+    }
+    Ok(())
 }
 
 fn check_range(visits: &[f32], node: usize, most: f32) -> Result<(), FileError> {
@@ -196,13 +192,6 @@ fn check_range(visits: &[f32], node: usize, most: f32) -> Result<(), FileError> 
 /// Returns a copy of the tree over `boxes` that is in `bytes`. O(bytes).
 pub fn load(bytes: &[u8], boxes: &[Aabb]) -> Result<Bvh, FileError> {
     TreeFile::open(bytes)?.for_boxes(boxes)?.tree()
-}
-
-/// Copies bytes, which may have any address, to values.
-fn copied<T: Pod>(bytes: &[u8]) -> Vec<T> {
-    let mut values = alloc::vec![T::zeroed(); bytes.len() / size_of::<T>()];
-    bytemuck::cast_slice_mut(&mut values).copy_from_slice(bytes);
-    values
 }
 
 /// Returns the checksum that identifies a scene in a tree file: the CRC-32 of min x, y, z, max x,
@@ -293,7 +282,9 @@ impl<'a> TreeFile<'a> {
     /// and checks that its boxes are finite. It does not check whether boxes contain their
     /// children; the checksum or [`validate`](validate()) does. O(nodes + objects).
     pub fn tree(&self) -> Result<Bvh, FileError> {
-        let tree = Bvh { nodes: copied(self.nodes), prim_ids: copied(self.prim_ids) };
+        // The bytes may have any address.
+        let nodes = bytemuck::pod_collect_to_vec(self.nodes);
+        let tree = Bvh { nodes, prim_ids: bytemuck::pod_collect_to_vec(self.prim_ids) };
         self.check((&tree).into())?;
         Ok(tree)
     }
@@ -311,7 +302,7 @@ impl<'a> TreeFile<'a> {
         if !self.header.has_visits {
             return Ok(None);
         }
-        let visits = copied(self.visits);
+        let visits = bytemuck::pod_collect_to_vec(self.visits);
         check_visits(&self.tree()?.nodes, &visits)?;
         Ok(Some(visits))
     }
