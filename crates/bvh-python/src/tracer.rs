@@ -209,7 +209,7 @@ impl Tracer {
         let source = arrays.source(self.place)?;
         let counts = detached(py, || {
             answers(source.rays, 0, |batch, counts| {
-                self.wide.count_hits(&batch_of(source, batch)?.rays, counts);
+                self.wide.all_hits_of(&batch_of(source, batch)?.rays, &mut Vec::new(), counts);
                 Ok(())
             })
         })?

@@ -42,11 +42,10 @@ use super::lanes::{Lanes, Mask};
 use super::layout::{WideBvh, WideNode};
 use super::one_ray::{LeafRay, Leaves, traverse};
 use super::pairs::Plane;
-use super::portable::WideRay;
 use super::triangles::TriangleBlock;
 use super::{portable, vector};
 use crate::exact::Line;
-use crate::{Coherence, Hit, Kernel, Ray, Triangle};
+use crate::{Coherence, Hit, Kernel, Ray, Slabs, Triangle};
 use alloc::vec::Vec;
 
 impl WideBvh {
@@ -94,19 +93,6 @@ impl WideBvh {
         }
     }
 
-    /// Writes the number of [all hits](Self::all_hits) of every ray.
-    ///
-    /// # Panics
-    /// Panics if `rays` and `counts` are not equally many.
-    pub fn count_hits(&self, rays: &[Ray], counts: &mut [u32]) {
-        assert_eq!(rays.len(), counts.len(), "a count for every ray");
-        let mut hits = Vec::new();
-        for (rays, counts) in rays.chunks(AT_ONCE).zip(counts.chunks_mut(AT_ONCE)) {
-            hits.clear();
-            self.all_hits_of(rays, &mut hits, counts);
-        }
-    }
-
     /// Appends the hits of one ray, in no order; the hits of a divided triangle once for each of its
     /// leaves.
     fn append_hits(&self, ray: &Ray, hits: &mut Vec<Hit>) {
@@ -115,8 +101,8 @@ impl WideBvh {
             return unsafe { vector::dispatch(self.kernel, OneRay { wide: self, ray, hits }) };
         }
         let line = Line::new(ray);
-        let wide_ray = WideRay::new(ray, &self.bounds);
-        let intervals = |node: &WideNode| wide_ray.intervals(node);
+        let slabs = Slabs::new(ray, &self.bounds);
+        let intervals = |node: &WideNode| portable::intervals(&slabs, node);
         portable::traverse::<ANY_HIT>(self, ray.t_max(), intervals, &mut (), |block, _| {
             for (object, triangle) in block.triangles() {
                 hits.extend(hit_of(ray, &line, object, &triangle));

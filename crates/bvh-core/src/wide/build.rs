@@ -274,31 +274,4 @@ mod tests {
             assert_eq!(counts.objects, WideBvh::OBJECTS_OF_BLOCK);
         }
     }
-
-    #[test]
-    fn what_a_leaf_promises_to_stop_is_all_of_its_triangles_whoever_else_names_them() {
-        let (triangles, _) = scene(2, 1);
-        let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
-        let leaves = [Node::leaf(boxes[0], 0, 1), Node::leaf(boxes[1], 1, 1)];
-        let root = Node::inner(boxes[0].union(&boxes[1]), 1, 2);
-        let promised = |ids: [u32; 2]| {
-            let tree = Bvh { nodes: vec![root, leaves[0], leaves[1]], prim_ids: ids.to_vec() };
-            let visits = areas(&tree);
-            let (_, costs) = decide(&tree, &visits);
-            promise(&tree, &triangles, &visits, &costs)[1]
-        };
-        assert_eq!(promised([0, 0]), promised([0, 1]));
-    }
-
-    #[test]
-    fn trees_of_one_leaf_and_of_none_have_layouts() {
-        let (triangles, _) = scene(9, 1);
-        let mut tree =
-            Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, 9)], prim_ids: (0..9).rev().collect() };
-        tree.refit(&triangles.iter().map(Triangle::aabb).collect::<Vec<_>>());
-        let wide = WideBvh::new(&tree, &triangles).unwrap();
-        assert_eq!((wide.nodes.len(), wide.blocks.len()), (0, 3));
-        assert_eq!(WideBvh::new(&Bvh::default(), &[]).unwrap().bytes(), 0);
-        assert!(WideBvh::new(&tree, &triangles[1..]).is_err());
-    }
 }

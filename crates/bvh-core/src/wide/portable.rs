@@ -3,7 +3,7 @@
 
 use super::layout::{Child, WideBvh, WideNode};
 use super::triangles::TriangleBlock;
-use crate::{Aabb, Counter, Hit, PreparedRay, Ray, Slabs};
+use crate::{Counter, Hit, PreparedRay, Ray, Slabs};
 use smallvec::SmallVec;
 
 /// A child that the ray enters at `entry`, to be visited later.
@@ -13,63 +13,33 @@ struct Pending {
     child: Child,
 }
 
-/// A ray prepared for wide nodes, with the numbers of [`Slabs`].
-pub(super) struct WideRay {
-    /// Which planes of a node the ray meets first, by axis, and which last.
-    near: [usize; 3],
-    far: [usize; 3],
-    near_origin: [f32; 3],
-    far_origin: [f32; 3],
-    near_factor: [f32; 3],
-    far_factor: [f32; 3],
-    t_min: f32,
-    /// The ray itself, where f32 is too coarse.
-    far_away: Option<Slabs>,
-}
-
-impl WideRay {
-    #[inline(always)]
-    pub(super) fn new(ray: &Ray, bounds: &Aabb) -> Self {
-        let slabs = Slabs::new(ray, bounds);
-        let [lower, upper] = slabs.origins();
-        let [near_factor, far_factor] = slabs.factors();
-        let (mut near, mut far) = ([0, 1, 2], [3, 4, 5]);
-        let (mut near_origin, mut far_origin) = (lower, upper);
-        for axis in (0..3).filter(|&axis| near_factor[axis] < 0.0) {
-            (near[axis], far[axis]) = (far[axis], near[axis]);
-            (near_origin[axis], far_origin[axis]) = (far_origin[axis], near_origin[axis]);
+/// Returns the distances at which the ray enters and leaves the boxes of a node. The first exceeds
+/// the second for a box that it misses.
+#[inline(always)]
+pub(super) fn intervals(slabs: &Slabs, node: &WideNode) -> ([f32; 8], [f32; 8]) {
+    let mut entry = [slabs.ray.t_min(); 8];
+    let mut exit = [f32::INFINITY; 8];
+    if slabs.is_far {
+        for lane in 0..8 {
+            let miss = (f32::INFINITY, f32::NEG_INFINITY);
+            (entry[lane], exit[lane]) =
+                node.lane_box(lane).map_or(miss, |aabb| slabs.interval(&aabb));
         }
-        let far_away = ray.is_far_from(bounds).then_some(slabs);
-        let t_min = ray.t_min();
-        Self { near, far, near_origin, far_origin, near_factor, far_factor, t_min, far_away }
+        return (entry, exit);
     }
-
-    /// Returns the distances at which the ray enters and leaves the boxes of a node. The first
-    /// exceeds the second for a box that it misses.
-    #[inline(always)]
-    pub(super) fn intervals(&self, node: &WideNode) -> ([f32; 8], [f32; 8]) {
-        let mut entry = [self.t_min; 8];
-        let mut exit = [f32::INFINITY; 8];
-        if let Some(slabs) = &self.far_away {
-            for lane in 0..8 {
-                let miss = (f32::INFINITY, f32::NEG_INFINITY);
-                (entry[lane], exit[lane]) =
-                    node.lane_box(lane).map_or(miss, |aabb| slabs.interval(&aabb));
-            }
-            return (entry, exit);
+    for axis in 0..3 {
+        let lower = (&node.planes[axis], slabs.lower[axis]);
+        let upper = (&node.planes[axis + 3], slabs.upper[axis]);
+        let is_backwards = slabs.near[axis] < 0.0;
+        let (near, far) = if is_backwards { (upper, lower) } else { (lower, upper) };
+        for lane in 0..8 {
+            let t = (near.0[lane] - near.1) * slabs.near[axis];
+            entry[lane] = if t > entry[lane] { t } else { entry[lane] };
+            let t = (far.0[lane] - far.1) * slabs.far[axis];
+            exit[lane] = if t < exit[lane] { t } else { exit[lane] };
         }
-        for axis in 0..3 {
-            let near = &node.planes[self.near[axis]];
-            let far = &node.planes[self.far[axis]];
-            for lane in 0..8 {
-                let t = (near[lane] - self.near_origin[axis]) * self.near_factor[axis];
-                entry[lane] = if t > entry[lane] { t } else { entry[lane] };
-                let t = (far[lane] - self.far_origin[axis]) * self.far_factor[axis];
-                exit[lane] = if t < exit[lane] { t } else { exit[lane] };
-            }
-        }
-        (entry, exit)
     }
+    (entry, exit)
 }
 
 /// Returns the nearest hit, or with `ANY` the first one found, among those that `accept` accepts.
@@ -99,8 +69,8 @@ pub(crate) fn walk<const ANY: bool>(
         }
         is_nearer
     };
-    let wide_ray = WideRay::new(ray, &wide.bounds);
-    let intervals = |node: &WideNode| wide_ray.intervals(node);
+    let slabs = Slabs::new(ray, &wide.bounds);
+    let intervals = |node: &WideNode| intervals(&slabs, node);
     let nearest = traverse::<ANY>(wide, ray.t_max(), intervals, counter, visit);
     (!nearest.is_miss()).then_some(nearest)
 }

@@ -1,8 +1,8 @@
 //! All hits of a ray: each crossing of a surface once, and a parity that is right on closed meshes
 //! for rays through edges and corners.
 
-use crate::support::layouts::{by_kernel, layout};
-use crate::support::{Random, SHAPES, ball, grid_box, rays, scaled, soup};
+use crate::support::layouts::layout;
+use crate::support::{Random, ball, grid_box, scaled};
 use bvh_core::{Hit, PreparedRay, Ray, Triangle};
 use glam::{Quat, Vec3};
 use num_bigint::{BigInt, Sign};
@@ -30,7 +30,7 @@ fn torus(rings: usize, sides: usize) -> Vec<Triangle> {
 
 /// Returns a tetrahedron. One of its edges is divided on one side only, and a triangle without area
 /// closes the gap.
-fn junction() -> Vec<Triangle> {
+pub fn junction() -> Vec<Triangle> {
     let [a, b, c, d] =
         [Vec3::ZERO, Vec3::new(2.0, 4.0, 6.0), 3.0 * Vec3::X, Vec3::new(0.3, 2.0, 0.1)];
     let middle = (a + b) / 2.0;
@@ -67,7 +67,8 @@ pub fn closed_meshes() -> Vec<(&'static str, Vec<Triangle>, Vec3)> {
     ]
 }
 
-fn all_of(triangles: &[Triangle], ray: &Ray) -> Vec<Hit> {
+/// Returns all hits, the nearest first, by testing every triangle.
+pub fn all_of(triangles: &[Triangle], ray: &Ray) -> Vec<Hit> {
     let mut hits: Vec<Hit> = (0..)
         .zip(triangles)
         .filter_map(|(object, triangle)| Some(Hit { t: triangle.crossing(ray)?, object }))
@@ -76,34 +77,8 @@ fn all_of(triangles: &[Triangle], ray: &Ray) -> Vec<Hit> {
     hits
 }
 
-#[test]
-fn every_kernel_finds_each_crossing_once_at_every_scale() {
-    let mut random = Random(3);
-    let mut found = 0;
-    for exponent in [-100, -30, 0, 30, 100] {
-        for scene in [soup(120, &mut random), ball(2), grid_box(3), junction()] {
-            let triangles = scaled(&scene, libm::exp2f(exponent as f32));
-            let rays = rays(&triangles, 1000, &mut random);
-            let expected: Vec<Vec<Hit>> = rays.iter().map(|ray| all_of(&triangles, ray)).collect();
-            for shape in 0..SHAPES.len() {
-                for (kernel, wide) in by_kernel(&layout(&triangles, shape)) {
-                    let mut hits = Vec::new();
-                    let mut counts = vec![0; rays.len()];
-                    wide.all_hits_of(&rays, &mut hits, &mut counts);
-                    assert_eq!(hits, expected.concat(), "{kernel:?}, 2^{exponent}");
-                    for (ray, expected) in rays.iter().zip(&expected) {
-                        assert_eq!(&wide.all_hits(ray), expected, "{kernel:?}, {ray:?}");
-                    }
-                    wide.count_hits(&rays, &mut counts);
-                    let lengths: Vec<u32> = expected.iter().map(|hits| hits.len() as u32).collect();
-                    assert_eq!(counts, lengths);
-                }
-            }
-            found += expected.iter().flatten().count();
-        }
-    }
-    assert!(found > 10_000, "{found}");
-}
+/// A point outside of all closed meshes.
+const OUTSIDE: Vec3 = Vec3::new(7.0, -5.5, 6.25);
 
 /// Returns rays from `origin` through corners, edges and centres of the triangles.
 fn rays_through(
@@ -135,11 +110,10 @@ fn a_half_line_crosses_a_closed_mesh_an_odd_number_of_times_from_inside_only() {
     let mut random = Random(4);
     for (name, triangles, inside) in closed_meshes() {
         let wide = layout(&triangles, 0);
-        let outside = Vec3::new(7.0, -5.5, 6.25);
-        for (origin, parity) in [(inside, 1), (outside, 0)] {
+        for (origin, parity) in [(inside, 1), (OUTSIDE, 0)] {
             let rays = rays_through(&triangles, origin, 10_000, &mut random);
             let mut counts = vec![0; rays.len()];
-            wide.count_hits(&rays, &mut counts);
+            wide.all_hits_of(&rays, &mut Vec::new(), &mut counts);
             for (ray, count) in rays.iter().zip(counts) {
                 let expected = if ray.origin() == origin { parity } else { 0 };
                 // Rays along short edges may begin anywhere.
@@ -206,8 +180,7 @@ fn compare_with_exact_arithmetic(count: usize) -> usize {
     let mut crossed = 0;
     for (name, triangles, inside) in closed_meshes() {
         let wide = layout(&triangles, 0);
-        let outside = Vec3::new(7.0, -5.5, 6.25);
-        for (origin, parity) in [(inside, 1), (outside, 0)] {
+        for origin in [inside, OUTSIDE] {
             for ray in rays_through(&triangles, origin, count, &mut random) {
                 let hits = wide.all_hits(&ray);
                 for (object, triangle) in (0..).zip(&triangles) {
@@ -218,9 +191,6 @@ fn compare_with_exact_arithmetic(count: usize) -> usize {
                     if met.is_some() {
                         assert_eq!(hit.is_some(), is_crossed(&ray, triangle), "{}", case());
                     }
-                }
-                if ray.origin() == origin {
-                    assert_eq!(hits.len() % 2, parity, "{name}: {ray:?}");
                 }
                 crossed += hits.len();
             }

@@ -1,76 +1,11 @@
-//! Every traversal gives the answer of testing every object, bit by bit.
+//! Traversals of the deepest trees, of what is next to edges, and their counts.
 
-use crate::support::{
-    Random, SHAPES, ball, bits, boxes, brute_force, chain, grid_box, rays, scaled, soup, tree,
-};
+use crate::support::{Random, SHAPES, boxes, chain, tree};
 use bvh_core::{
-    Aabb, Bvh, Hit, PreparedRay, Ray, Sphere, TestCounts, Triangle, WideBvh, any_hit, any_hit_by,
-    clip_to_box, collapse_leaves, cost::SahConstants, nearest_hit, nearest_hit_by,
-    nearest_hit_of_all, validate,
+    Aabb, Bvh, PreparedRay, Ray, TestCounts, Triangle, WideBvh, any_hit_by, clip_to_box,
+    nearest_hit, nearest_hit_by,
 };
 use glam::Vec3;
-
-fn check(name: &str, tree: &Bvh, triangles: &[Triangle], ray: &Ray, expected: Option<Hit>) {
-    let hit = nearest_hit(tree, triangles, ray);
-    assert_eq!(bits(hit), bits(expected), "{name}: {ray:?}");
-    assert_eq!(any_hit(tree, triangles, ray), expected.is_some(), "{name}: {ray:?}");
-}
-
-#[test]
-fn every_tree_answers_as_brute_force_at_every_scale() {
-    let mut random = Random(1);
-    let scenes = [("soup", soup(150, &mut random)), ("grid", grid_box(4)), ("ball", ball(2))];
-    let mut hits = 0;
-    for (name, scene) in scenes {
-        for exponent in [-60, 0, 60] {
-            let triangles = scaled(&scene, libm::exp2f(exponent as f32));
-            let boxes = boxes(&triangles);
-            let mut trees = SHAPES.map(|shape| tree(&boxes, shape, &mut random)).to_vec();
-            trees.push(chain(&boxes));
-            for index in 0..trees.len() {
-                trees.push(collapse_leaves(&trees[index], &SahConstants::default()));
-            }
-            for tree in &trees {
-                validate(tree, &boxes).unwrap();
-            }
-            for ray in rays(&triangles, 3000, &mut random) {
-                let expected = brute_force(&triangles, &ray);
-                hits += usize::from(expected.is_some());
-                for (index, tree) in trees.iter().enumerate() {
-                    let case = format!("{name} * 2^{exponent}, tree {index}");
-                    check(&case, tree, &triangles, &ray, expected);
-                }
-            }
-        }
-    }
-    assert!(hits > 5000, "the rays should hit something: {hits}");
-}
-
-#[test]
-fn spheres_and_boxes_are_traced_by_the_same_functions() {
-    let mut random = Random(2);
-    let mut spheres = Vec::new();
-    for _ in 0..75 {
-        spheres.push(Sphere { center: random.point(), radius: 0.01 + 0.2 * random.unit() });
-    }
-    let boxes: Vec<Aabb> = spheres.iter().map(Sphere::aabb).collect();
-    let trees = SHAPES.map(|shape| tree(&boxes, shape, &mut random));
-    for _ in 0..5000 {
-        let origin = random.point() * random.of(&[1.0, 100.0]);
-        let target = random.point();
-        let ray = Ray::half_line(origin, target - origin).unwrap();
-        let sphere = |id: u32, t_max| spheres[id as usize].intersect(&ray, t_max);
-        // A box is hit where its interval begins.
-        let solid_box = |id: u32, t_max| clip_to_box(&ray, &boxes[id as usize], ray.t_min(), t_max);
-        let objects = spheres.len() as u32;
-        let nearest_sphere = nearest_hit_of_all(objects, &ray, sphere, &mut ());
-        let nearest_box = nearest_hit_of_all(objects, &ray, solid_box, &mut ());
-        for tree in &trees {
-            assert_eq!(nearest_hit(tree, &spheres, &ray), nearest_sphere, "{ray:?}");
-            assert_eq!(nearest_hit_by(tree, &ray, solid_box, &mut ()), nearest_box, "{ray:?}");
-        }
-    }
-}
 
 #[test]
 fn a_chain_of_twenty_thousand_is_traced_from_both_ends() {
@@ -93,31 +28,6 @@ fn a_chain_of_twenty_thousand_is_traced_from_both_ends() {
             counts,
             TestCounts { boxes: tree.nodes.len() as u64, objects: tree.prim_ids.len() as u64 }
         );
-    }
-}
-
-#[test]
-fn no_ray_leaves_a_closed_mesh_through_an_edge_or_a_vertex() {
-    let mut random = Random(3);
-    for (name, triangles) in [("ball", ball(3)), ("box", grid_box(7)), ("plain box", grid_box(1))] {
-        let tree = tree(&boxes(&triangles), SHAPES[0], &mut random);
-        for _ in 0..40_000 {
-            let Triangle([a, b, _]) = random.of(&triangles);
-            let target = a + (b - a) * random.of(&[0.0, 0.5, 1.0, 1.0 / 3.0]);
-            let origin = random.point() * 0.5;
-            // Close to a long edge the rounding of its ends is large compared with the distance to
-            // the edge.
-            let close = target * (1.0 - random.of(&[1e-2, 1e-4, 1e-6]))
-                + random.point() * target.abs() * 1e-7;
-            for origin in [origin, Vec3::ZERO, close] {
-                let direction = (target - origin) * random.of(&[1.0, 1e5]);
-                let ray = Ray::half_line(origin, direction).unwrap();
-                let prepared = PreparedRay::new(&ray);
-                let test =
-                    |id: u32| triangles[id as usize].intersect(&prepared, ray.t_max()).is_some();
-                assert!(any_hit_by(&tree, &ray, test, &mut ()), "{name} leaks {ray:?}");
-            }
-        }
     }
 }
 

@@ -1,7 +1,8 @@
 //! Layouts of several trees by every kernel, and rays that packets are made for.
 
-use super::{Random, SHAPES, boxes, tree};
-use bvh_core::{Kernel, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants};
+use super::{Random, SHAPES, boxes, chain, tree};
+use crate::references::divided;
+use bvh_core::{Bvh, Kernel, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants};
 use glam::Vec3;
 
 /// Returns a layout of the triangles by a tree of one of the shapes.
@@ -16,12 +17,32 @@ pub fn by_kernel(wide: &WideBvh) -> Vec<(Kernel, WideBvh)> {
     Kernel::ALL.into_iter().filter_map(of).collect()
 }
 
-/// Returns the layouts of several trees over the triangles, for every kernel.
-pub fn layouts(triangles: &[Triangle], random: &mut Random) -> Vec<(Kernel, WideBvh)> {
-    let boxes = boxes(triangles);
-    let mut trees: Vec<_> = SHAPES.iter().map(|&shape| tree(&boxes, shape, random)).collect();
-    trees.push(collapse_leaves(&trees[0], &SahConstants::default()));
-    trees.iter().flat_map(|tree| by_kernel(&WideBvh::new(tree, triangles).unwrap())).collect()
+/// The seed of the planes that divide the triangles of a tree of the first shape.
+pub const DIVISION: u64 = 9;
+
+/// A tree, and its layout for every kernel.
+pub struct Traced {
+    pub tree: Bvh,
+    pub layouts: Vec<(Kernel, WideBvh)>,
+}
+
+impl Traced {
+    pub fn new(tree: Bvh, triangles: &[Triangle]) -> Self {
+        Self { layouts: by_kernel(&WideBvh::new(&tree, triangles).unwrap()), tree }
+    }
+
+    /// Makes trees of all shapes, the deepest one, trees of larger leaves, and trees of divided
+    /// triangles.
+    pub fn all(triangles: &[Triangle], random: &mut Random) -> Vec<Self> {
+        let boxes = boxes(triangles);
+        let mut trees: Vec<Bvh> = SHAPES.iter().map(|&shape| tree(&boxes, shape, random)).collect();
+        let (parts, _) = divided(&trees[0], triangles, &mut Random(DIVISION));
+        for tree in [trees[0].clone(), parts.clone()] {
+            trees.push(collapse_leaves(&tree, &SahConstants::default()));
+        }
+        trees.extend([parts, chain(&boxes)]);
+        trees.into_iter().map(|tree| Self::new(tree, triangles)).collect()
+    }
 }
 
 /// Returns groups of sixteen rays that begin close to each other and run nearly in the same
