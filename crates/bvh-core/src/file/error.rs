@@ -23,9 +23,6 @@ pub enum FileError {
         /// The version found.
         found: u32,
     },
-    /// The file was written with the most significant byte first.
-    #[error("the file is big-endian; the format is little-endian")]
-    Endianness,
     /// A field of the header has a value that no tree can have.
     #[error("the header's {0} is out of range; the file is damaged")]
     Field(&'static str),

@@ -122,16 +122,13 @@ impl Header {
     /// Reads all fields except the checksum.
     ///
     /// If there are several faults, reports the most informative one: first a wrong magic number,
-    /// then the byte order, then the version, then any other field.
+    /// then the version, then any other field.
     pub(super) fn decode(bytes: &[u8]) -> Result<Self, FileError> {
         if !bytes.starts_with(&Self::MAGIC) {
             return Err(FileError::Magic);
         }
         let bytes = bytes.get(..Self::BYTES).ok_or(FileError::Header)?;
         let stored: Stored = bytemuck::pod_read_unaligned(bytes);
-        if stored.endianness == Self::ENDIANNESS.swap_bytes() {
-            return Err(FileError::Endianness);
-        }
         if stored.version != VERSION {
             return Err(FileError::Version { found: stored.version });
         }

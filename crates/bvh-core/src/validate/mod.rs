@@ -3,7 +3,7 @@
 
 mod covering;
 
-use crate::{Aabb, Bvh, BvhView, Clip, InvalidBoxReason, MAX_OBJECTS, Node, NodeKind};
+use crate::{Aabb, Bvh, BvhView, Clip, InvalidBoxReason, MAX_OBJECTS, NodeKind};
 use alloc::vec::Vec;
 
 /// The reason why a tree is rejected. Nodes and objects are identified by index.
@@ -55,14 +55,14 @@ pub enum InvalidBvh {
 pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
     check_structure(tree.into(), boxes.len(), Leaves::One)?;
     check_nesting(tree)?;
-    for_each(&tree.nodes, Node::is_leaf, |index, leaf| {
-        for &object in &tree.prim_ids[leaf.prims()] {
-            if !leaf.aabb.contains(&boxes[object as usize]) {
+    for (index, node) in tree.nodes.iter().enumerate() {
+        for &object in &tree.prim_ids[node.prims()] {
+            if !node.aabb.contains(&boxes[object as usize]) {
                 return Err(InvalidBvh::ObjectOutside { node: index, object: object as usize });
             }
         }
-        Ok(())
-    })
+    }
+    Ok(())
 }
 
 /// Checks a tree in which an object may be in several leaves. The boxes of these leaves together
@@ -108,35 +108,11 @@ pub fn validate_references(
 }
 
 fn check_nesting(tree: &Bvh) -> Result<(), InvalidBvh> {
-    let is_inner = |node: &Node| !node.is_leaf();
-    for_each(&tree.nodes, is_inner, |index, node| {
+    for (index, node) in tree.nodes.iter().enumerate() {
         for child in node.children() {
             if !node.aabb.contains(&tree.nodes[child].aabb) {
                 return Err(InvalidBvh::ChildOutside { node: index, child });
             }
-        }
-        Ok(())
-    })
-}
-
-/// Passes every node of one kind to `check`, with its index in `nodes`.
-pub(crate) fn for_each<E>(
-    nodes: &[Node],
-    is_chosen: impl Fn(&Node) -> bool,
-    mut check: impl FnMut(usize, &Node) -> Result<(), E>,
-) -> Result<(), E> {
-    const AT_ONCE: usize = 64;
-    let mut chosen = [0; AT_ONCE];
-    for (chunk, nodes) in nodes.chunks(AT_ONCE).enumerate() {
-        // The processor cannot predict the kind of a node, and a wrong prediction ends the loads
-        // that it has begun ahead. The nodes are therefore chosen without a branch.
-        let mut count = 0;
-        for (place, node) in nodes.iter().enumerate() {
-            chosen[count] = place;
-            count += usize::from(is_chosen(node));
-        }
-        for &place in &chosen[..count] {
-            check(chunk * AT_ONCE + place, &nodes[place])?;
         }
     }
     Ok(())
@@ -266,6 +242,7 @@ impl Marks {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Node;
     use alloc::vec;
 
     fn cube(x: f32) -> Aabb {
