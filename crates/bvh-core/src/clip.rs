@@ -22,6 +22,7 @@ use crate::aabb::round_down;
 use crate::{Aabb, Primitives, Triangle};
 use core::fmt::Debug;
 use glam::{DVec3, Vec3};
+use smallvec::SmallVec;
 
 /// Objects whose parts have boxes.
 pub trait Clip: Debug + Sync {
@@ -93,88 +94,50 @@ fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
     let error = DVec3::splat(f64::from(largest) * (slack * (64.0 * f64::EPSILON)));
     let low = region.min.as_dvec3() - error;
     let high = region.max.as_dvec3() + error;
-    let mut polygon = Polygon::new(triangle.0.map(Vec3::as_dvec3));
+    let mut kept = Polygon::from_slice(&triangle.0.map(Vec3::as_dvec3));
     for axis in 0..3 {
         // Planes that miss the triangle cut nothing off.
         if full.min[axis] < region.min[axis] {
-            polygon.cut(axis, low[axis], 1.0);
+            kept = cut(&kept, axis, low[axis], 1.0);
         }
         if full.max[axis] > region.max[axis] {
-            polygon.cut(axis, high[axis], -1.0);
+            kept = cut(&kept, axis, high[axis], -1.0);
         }
     }
-    let kept = polygon.corners();
     if kept.is_empty() {
         return Aabb::EMPTY;
     }
     let min = kept.iter().fold(DVec3::INFINITY, |min, corner| min.min(*corner)) - error;
     let max = kept.iter().fold(DVec3::NEG_INFINITY, |max, corner| max.max(*corner)) + error;
-    let part = Aabb {
-        min: Vec3::from_array(min.to_array().map(round_down)),
-        max: -Vec3::from_array((-max).to_array().map(round_down)),
-    };
-    part.intersection(&common)
+    Aabb { min: round_down(min), max: -round_down(-max) }.intersection(&common)
 }
 
-/// A convex planar polygon: a triangle cut by up to six planes, of which each adds at most one corner
-/// (Sutherland & Hodgman 1974).
-#[derive(Clone, Copy)]
-struct Polygon {
-    corners: [DVec3; 9],
-    len: usize,
-}
+/// The corners of a convex planar polygon: a triangle cut by up to six planes, of which each adds at
+/// most one corner, but for a polygon that rounding has made slightly concave.
+type Polygon = SmallVec<[DVec3; 9]>;
 
-impl Polygon {
-    #[inline]
-    fn new([a, b, c]: [DVec3; 3]) -> Self {
-        let mut corners = [DVec3::ZERO; 9];
-        corners[..3].copy_from_slice(&[a, b, c]);
-        Self { corners, len: 3 }
-    }
-
-    #[inline]
-    fn corners(&self) -> &[DVec3] {
-        &self.corners[..self.len]
-    }
-
-    /// Keeps the part above a plane across an axis if `side` is 1, the part below it if `side` is
-    /// −1. New corners are exactly on the plane.
-    ///
-    /// Rounding can make a polygon slightly concave, and a plane could then add more corners than
-    /// there is room for. The polygon stays uncut in that case: too large by rounding errors, but
-    /// never too small.
-    #[inline]
-    fn cut(&mut self, axis: usize, position: f64, side: f64) {
-        let whole = *self;
-        let mut kept = 0;
-        let mut add = |corner: DVec3| {
-            if let Some(place) = self.corners.get_mut(kept) {
-                *place = corner;
-            }
-            kept += 1;
-        };
-        let height = |point: DVec3| side * (point[axis] - position);
-        for (index, &from) in whole.corners().iter().enumerate() {
-            let next = if index + 1 == whole.len { 0 } else { index + 1 };
-            let to = whole.corners[next];
-            let before = height(from);
-            let after = height(to);
-            if before >= 0.0 {
-                add(from);
-            }
-            // A corner in the plane is kept above, and would be its own crossing.
-            if (before < 0.0) != (after < 0.0) && before != 0.0 && after != 0.0 {
-                let mut crossing = from + (to - from) * (before / (before - after));
-                crossing[axis] = position;
-                add(crossing);
-            }
+/// Returns the part of a polygon above a plane across an axis if `side` is 1, the part below it if
+/// `side` is −1. New corners are exactly on the plane.
+#[inline]
+fn cut(polygon: &Polygon, axis: usize, position: f64, side: f64) -> Polygon {
+    let mut kept = Polygon::new();
+    let height = |point: DVec3| side * (point[axis] - position);
+    for (index, &from) in polygon.iter().enumerate() {
+        let next = if index + 1 == polygon.len() { 0 } else { index + 1 };
+        let to = polygon[next];
+        let before = height(from);
+        let after = height(to);
+        if before >= 0.0 {
+            kept.push(from);
         }
-        if kept <= self.corners.len() {
-            self.len = kept;
-        } else {
-            *self = whole;
+        // A corner in the plane is kept above, and would be its own crossing.
+        if (before < 0.0) != (after < 0.0) && before != 0.0 && after != 0.0 {
+            let mut crossing = from + (to - from) * (before / (before - after));
+            crossing[axis] = position;
+            kept.push(crossing);
         }
     }
+    kept
 }
 
 #[cfg(test)]
@@ -261,31 +224,6 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_without_room_for_its_corners_drops_none() {
-        // Rounding never makes a polygon as concave as this zigzag, which crosses the plane at
-        // every edge but one.
-        let mut zigzag = Polygon { corners: [DVec3::ZERO; 9], len: 9 };
-        for (index, corner) in zigzag.corners.iter_mut().enumerate() {
-            let height = if index % 2 == 0 { 1.0 } else { -1.0 };
-            *corner = DVec3::new(index as f64, height, 0.0);
-        }
-        let mut polygon = zigzag;
-        polygon.cut(1, 0.0, 1.0);
-        assert_eq!(polygon.corners(), zigzag.corners());
-    }
-
-    #[test]
-    fn a_cut_that_fills_the_room_is_made() {
-        let octagon = [[3, 0], [2, 2], [0, 3], [-2, 2], [-3, 0], [-2, -2], [0, -3], [2, -2]]
-            .map(|[x, y]| DVec3::new(f64::from(x), f64::from(y), 0.0));
-        let mut polygon = Polygon { corners: [DVec3::ZERO; 9], len: 8 };
-        polygon.corners[..8].copy_from_slice(&octagon);
-        polygon.cut(0, 2.5, -1.0);
-        assert_eq!(polygon.corners().len(), 9);
-        assert!(polygon.corners().iter().all(|corner| corner.x <= 2.5));
-    }
-
-    #[test]
     fn a_corner_in_the_plane_is_kept_once() {
         let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
         for (position, side, expected) in [
@@ -294,9 +232,7 @@ mod tests {
             (1.0, 1.0, &[DVec3::X]),
             (0.25, 1.0, &[DVec3::new(0.25, 0.0, 0.0), DVec3::X, DVec3::new(0.25, 0.75, 0.0)]),
         ] {
-            let mut polygon = Polygon::new(corners);
-            polygon.cut(0, position, side);
-            assert_eq!(polygon.corners(), expected);
+            assert_eq!(cut(&Polygon::from_slice(&corners), 0, position, side).as_slice(), expected);
         }
     }
 }

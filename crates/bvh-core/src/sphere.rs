@@ -25,9 +25,9 @@ impl Sphere {
     pub fn aabb(&self) -> Aabb {
         let center = self.center.as_dvec3();
         let radius = f64::from(self.radius);
+        let lower = |corner: DVec3| round_down(corner).max(Vec3::MIN);
         // Negated, so that the upper corner is rounded outwards by rounding downwards too.
-        let negated_max = lower_corner(-center - radius);
-        Aabb { min: lower_corner(center - radius), max: -negated_max }
+        Aabb { min: lower(center - radius), max: -lower(-center - radius) }
     }
 
     /// Returns the nearest distance at which the ray hits the surface, in the ray's range and at
@@ -63,11 +63,6 @@ impl Sphere {
         let nearest = if first >= f64::from(ray.t_min()) { first } else { second };
         clip_to_box(ray, &self.aabb(), nearest as f32, t_max)
     }
-}
-
-/// Rounds each coordinate downwards to a finite f32.
-fn lower_corner(corner: DVec3) -> Vec3 {
-    Vec3::from(corner.to_array().map(|x| round_down(x).max(f32::MIN)))
 }
 
 #[cfg(test)]
