@@ -101,9 +101,8 @@ pub(crate) fn array<T>(action: impl FnOnce() -> Result<*const T, Failure>) -> *c
 /// `pointer` is null or not aligned, or points to a `T` that nobody changes while the result is in
 /// use.
 pub(crate) unsafe fn given<'a, T>(name: &str, pointer: *const T) -> Result<&'a T, Failure> {
-    check_alignment(name, pointer)?;
-    // SAFETY: an aligned pointer that is not null points to a `T` that nobody changes meanwhile.
-    unsafe { pointer.as_ref() }.ok_or_else(|| Failure::invalid(format!("{name} is null")))
+    // SAFETY: `pointer` points to a `T` that nobody changes meanwhile.
+    unsafe { slice(name, pointer, 1) }.map(|one| &one[0])
 }
 
 /// Converts a pointer into a mutable reference, and rejects null and wrong alignment.
@@ -112,25 +111,19 @@ pub(crate) unsafe fn given<'a, T>(name: &str, pointer: *const T) -> Result<&'a T
 /// `pointer` is null or not aligned, or points to a `T` that nobody else uses while the result is
 /// in use.
 pub(crate) unsafe fn given_mut<'a, T>(name: &str, pointer: *mut T) -> Result<&'a mut T, Failure> {
-    check_alignment(name, pointer)?;
-    // SAFETY: an aligned pointer that is not null points to a `T` that nobody else uses meanwhile.
-    unsafe { pointer.as_mut() }.ok_or_else(|| Failure::invalid(format!("{name} is null")))
-}
-
-fn check_alignment<T>(name: &str, pointer: *const T) -> Result<(), Failure> {
-    if pointer.is_aligned() {
-        return Ok(());
-    }
-    let multiple = align_of::<T>();
-    Err(Failure::invalid(format!("{name} is not aligned to a multiple of {multiple}")))
+    // SAFETY: `pointer` points to a `T` that nobody else uses meanwhile.
+    unsafe { slice_mut(name, pointer, 1) }.map(|one| &mut one[0])
 }
 
 /// Rejects arrays that cannot exist: null, not aligned, or larger than the address space.
 fn check<T>(name: &str, first: *const T, count: usize) -> Result<(), Failure> {
     if first.is_null() {
-        return Err(Failure::invalid(format!("{name} is null; accepted: {count} elements")));
+        return Err(Failure::invalid(format!("{name} is null")));
     }
-    check_alignment(name, first)?;
+    if !first.is_aligned() {
+        let multiple = align_of::<T>();
+        return Err(Failure::invalid(format!("{name} is not aligned to a multiple of {multiple}")));
+    }
     if count > isize::MAX as usize / size_of::<T>() {
         return Err(Failure::invalid(format!("{name} has {count} elements, more than memory has")));
     }
@@ -169,7 +162,7 @@ pub(crate) unsafe fn slice_mut<'a, T>(
     }
     check(name, first, count)?;
     // SAFETY: `first` is aligned and points to `count` elements that nobody else uses meanwhile,
-    // and their size fits into `isize`. The elements are plain numbers, so that any bytes are
-    // valid.
+    // and their size fits into `isize`. The elements are the library's own, or plain numbers, of
+    // which any bytes are valid.
     Ok(unsafe { std::slice::from_raw_parts_mut(first, count) })
 }

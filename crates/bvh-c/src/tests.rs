@@ -15,6 +15,15 @@ fn corners(count: usize) -> Vec<f32> {
     (0..count).map(|i| i as f32).flat_map(|x| [x, 0.0, x, x + 1.5, 0.0, x, x, 1.5, x]).collect()
 }
 
+/// Returns rays that run upwards from a line below the staircase, and beyond its end.
+fn rays(slope: f32) -> Vec<BvhRay> {
+    let origin = |i: u16| [f32::from(i) * 0.03, 0.2, -1.0];
+    let direction = [slope, 0.0, 1.0];
+    (0..1500)
+        .map(|i| BvhRay { origin: origin(i), t_min: 0.0, direction, t_max: f32::INFINITY })
+        .collect()
+}
+
 /// A search without objects, and every choice at its default.
 const NO_BAKE: BvhBake = BvhBake {
     boxes: null(),
@@ -45,14 +54,7 @@ fn trees_and_hits_equal_the_results_of_the_rust_crates() {
     let corners = corners(40);
     let triangles: Vec<Triangle> = bytes_as_triangles(&corners);
     let tree = tree(&corners);
-    let rays: Vec<BvhRay> = (0..1500)
-        .map(|i| BvhRay {
-            origin: [i as f32 * 0.03, 0.2, -1.0],
-            t_min: 0.0,
-            direction: [0.0, 0.0, 1.0],
-            t_max: f32::INFINITY,
-        })
-        .collect();
+    let rays = rays(0.0);
     let mut count = 0;
     let mut ids = 0;
     let mut cost = 0.0;
@@ -101,14 +103,7 @@ fn surfaces_all_hits_closest_points_and_insides_equal_the_results_of_the_rust_cr
     let triangles = bytes_as_triangles(&corners);
     let segments: Vec<f32> =
         (0..60).flat_map(|i| [i as f32 * 0.5, 0.2, -1.0, i as f32 * 0.5, 0.2, 30.0]).collect();
-    let rays: Vec<BvhRay> = (0..1500)
-        .map(|i| BvhRay {
-            origin: [i as f32 * 0.03, 0.2, -1.0],
-            t_min: 0.0,
-            direction: [0.1, 0.0, 1.0],
-            t_max: f32::INFINITY,
-        })
-        .collect();
+    let rays = rays(0.1);
     let none = BvhSurfaceHit { t: 0.0, object: 0, u: 0.0, v: 0.0, normal: [0.0; 3] };
     let mut surfaces = vec![none; rays.len()];
     let mut hits = vec![BvhHit { t: 0.0, object: 0 }; 9000];

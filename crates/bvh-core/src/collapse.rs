@@ -121,11 +121,7 @@ pub(crate) fn binary_visited<'t>(tree: &'t Bvh, visits: &mut Vec<f32>) -> Cow<'t
                 continue;
             }
             [node] => (node.aabb, node.children()),
-            several => {
-                let aabb =
-                    several.iter().fold(Aabb::EMPTY, |around, node| around.union(&node.aabb));
-                (aabb, siblings)
-            }
+            several => (Aabb::union_of(several.iter().map(|node| &node.aabb)), siblings),
         };
         let first = split.nodes.len();
         let middle = below.start + below.len() / 2;

@@ -45,12 +45,16 @@ impl Objective {
         match self {
             Self::InternalArea => internal_measure(tree, measure),
             Self::GoldsmithSalmon => {
-                // Leaves have no children, so their measure need not be computed.
-                let size = |node: &Node| if node.is_leaf() { 0.0 } else { size_by(measure, node) };
-                over(root, by_children(tree, size))
+                let term = |node: &Node| match node.children().len() {
+                    // A leaf, whose measure need not be computed.
+                    0 => 0.0,
+                    children => size_by(measure, node) * children as f64,
+                };
+                over(root, sum_over(tree, term))
             }
             Self::Sah(constants) => {
-                over(root, by_tests(tree, constants, |node| size_by(measure, node)))
+                let term = |node: &Node| size_by(measure, node) * constants.cost_of(node);
+                over(root, sum_over(tree, term))
             }
             Self::Layout => layout_cost(tree, Some(measure), &call_in_turn),
         }
@@ -99,7 +103,7 @@ fn size_by(measure: &dyn Measure, node: &Node) -> f64 {
 /// The surface area heuristic with equal constants reduces to this sum if every leaf has one
 /// reference. Searches of trees with [split references](crate::Clip) minimise it.
 pub fn total_area(tree: &Bvh) -> f64 {
-    sum_over(tree, |node| node.aabb.half_area())
+    total_measure(tree, &Area)
 }
 
 /// The constants of the surface area heuristic, in any common unit of time. Every tree of finite
@@ -203,11 +207,7 @@ fn inner_half_area(node: &Node) -> f64 {
 ///
 /// Source: Goldsmith & Salmon 1987; Ng & Trifonov 2003, section 1.
 pub fn goldsmith_salmon(tree: &Bvh) -> f64 {
-    over_root_area(tree, by_children(tree, |node| node.aabb.half_area()))
-}
-
-fn by_children(tree: &Bvh, size: impl Fn(&Node) -> f64) -> f64 {
-    sum_over(tree, |node| size(node) * node.children().len() as f64)
+    Objective::GoldsmithSalmon.cost(tree)
 }
 
 /// Returns the surface area heuristic:
@@ -218,12 +218,7 @@ fn by_children(tree: &Bvh, size: impl Fn(&Node) -> f64) -> f64 {
 ///
 /// Source: MacDonald & Booth 1990.
 pub fn sah(tree: &Bvh, constants: &SahConstants) -> f64 {
-    over_root_area(tree, by_tests(tree, constants, |node| node.aabb.half_area()))
-}
-
-/// Returns Σ size(node) · cost of visiting the node or of testing its objects.
-fn by_tests(tree: &Bvh, constants: &SahConstants, size: impl Fn(&Node) -> f64) -> f64 {
-    sum_over(tree, |node| size(node) * constants.cost_of(node))
+    Objective::Sah(*constants).cost(tree)
 }
 
 #[inline]
@@ -340,13 +335,11 @@ mod tests {
             prim_ids: vec![0, 1],
         };
         let single = Bvh { nodes: vec![Node::leaf(point, 0, 1)], prim_ids: vec![0] };
+        let sah = Objective::Sah(SahConstants::default());
         for tree in [Bvh::default(), single, flat] {
-            for objective in [
-                Objective::InternalArea,
-                Objective::GoldsmithSalmon,
-                Objective::Sah(SahConstants::default()),
-                Objective::Layout,
-            ] {
+            for objective in
+                [Objective::InternalArea, Objective::GoldsmithSalmon, sah, Objective::Layout]
+            {
                 assert_eq!(objective.cost(&tree), 0.0, "{objective:?} of {tree:?}");
             }
         }

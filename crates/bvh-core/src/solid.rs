@@ -10,7 +10,7 @@
 
 use crate::exact::normal_sign;
 use crate::winding::{Open, Winding};
-use crate::{BvhView, Hit, Ray, Triangle, WideBvh};
+use crate::{Aabb, BvhView, Hit, Ray, Triangle, WideBvh};
 use alloc::vec::Vec;
 use core::cmp::Ordering;
 use glam::Vec3;
@@ -171,23 +171,19 @@ fn by_crossings(
     inside: &mut [bool],
     is_inside: impl Fn(&[Hit]) -> bool,
 ) {
-    let is_within = |point: Vec3| {
-        // A point outside the box is outside the mesh. NaN fails every comparison.
-        (wide.bounds.min.cmple(point) & point.cmple(wide.bounds.max)).all()
+    // A point outside the box is outside the mesh: its range is empty. NaN fails every comparison.
+    let half_line = |&point: &Vec3| match wide.bounds.contains(&Aabb { min: point, max: point }) {
+        true => Ray::assume_valid(point, Vec3::X, 0.0, f32::MAX),
+        false => Ray::assume_valid(Vec3::ZERO, Vec3::X, 1.0, 0.0),
     };
-    let rays: Vec<Ray> = (points.iter())
-        .filter(|&&point| is_within(point))
-        .map(|&point| Ray::assume_valid(point, Vec3::X, 0.0, f32::MAX))
-        .collect();
+    let rays: Vec<Ray> = points.iter().map(half_line).collect();
     let mut hits = Vec::new();
     let mut counts = alloc::vec![0; rays.len()];
     wide.all_hits_of(&rays, &mut hits, &mut counts);
     let mut hits = &hits[..];
-    let mut counts = counts.into_iter();
-    for (&point, inside) in points.iter().zip(inside) {
-        let count = if is_within(point) { counts.next().unwrap_or(0) } else { 0 };
-        let own;
-        (own, hits) = hits.split_at(count as usize);
-        *inside = is_inside(own);
+    for (inside, count) in inside.iter_mut().zip(counts) {
+        let hits_of_point;
+        (hits_of_point, hits) = hits.split_at(count as usize);
+        *inside = is_inside(hits_of_point);
     }
 }

@@ -59,15 +59,15 @@ impl Target {
             // Visited by the nearer child first.
             Layout::FirstCount | Layout::FirstCountAligned | Layout::Json => Vec::new(),
         };
-        let mut open = Vec::new();
-        let mut cost = |ray: Ray| {
+        let cost = |ray: Ray| {
             let mut counts = TestCounts::default();
+            let prepared = PreparedRay::new(&ray);
             if nodes.is_empty() {
-                let prepared = PreparedRay::new(&ray);
                 let test = |id, t_max| triangles[id as usize].intersect(&prepared, t_max);
                 nearest_hit_by(tree, &ray, test, &mut counts);
             } else {
-                first_hit(&nodes, &tree.prim_ids, triangles, &ray, &mut open, &mut counts);
+                let (nodes, ids, counts) = (&nodes[..], &tree.prim_ids[..], &mut counts);
+                ThreeMeshRay { nodes, ids, triangles, ray: &ray, prepared, counts }.first_hit(0);
             }
             // A visit of an inner node tests the boxes of two children.
             0.5 * self.constants.traversal * counts.boxes as f64
@@ -108,32 +108,56 @@ fn rays(bounds: &Aabb, index: u32) -> Option<[Ray; 2]> {
     Some([ray(point, direction)?, ray(eye, point - eye)?])
 }
 
-/// What is left to do for a node of [`first_hit`].
-#[derive(Clone, Copy)]
-enum Step {
-    Enter(usize),
-    /// The second child, if the distance found in the first one does not exclude it.
-    Second(usize),
-    /// The nearer of the second child's hit and this distance.
-    Nearer(f32),
+/// A ray in the traversal of `three-mesh-bvh`: no hit shortens the ray, and a node's second child is
+/// left out only if the hit in the first one lies before its box along the node's axis.
+struct ThreeMeshRay<'a> {
+    nodes: &'a [ThreeMeshNode],
+    ids: &'a [u32],
+    triangles: &'a [Triangle],
+    ray: &'a Ray,
+    prepared: PreparedRay,
+    counts: &'a mut TestCounts,
 }
 
-/// Returns the distance of the first hit, infinite without one, and counts the tests of the
-/// traversal of `three-mesh-bvh`: no hit shortens the ray, and a node's second child is left out
-/// only if the hit in the first one lies before its box along the node's axis.
-fn first_hit(
-    nodes: &[ThreeMeshNode],
-    ids: &[u32],
-    triangles: &[Triangle],
-    ray: &Ray,
-    open: &mut Vec<Step>,
-    counts: &mut TestCounts,
-) -> f32 {
-    let [origin, direction] = [ray.origin().as_dvec3(), ray.direction().as_dvec3()];
-    let inverse = direction.recip();
-    let mut boxes = 0;
-    let mut is_hit = |node: &ThreeMeshNode| {
-        boxes += 1;
+impl ThreeMeshRay<'_> {
+    /// Returns the distance of the first hit below a node, infinite without one. Recursive, as the
+    /// library's is: fitted trees have at most its depth.
+    fn first_hit(&mut self, index: usize) -> f32 {
+        let ThreeMeshNode { below, axis_or_count, .. } = self.nodes[index];
+        if let Some(count) = axis_or_count.checked_sub(LEAF) {
+            self.counts.objects += u64::from(count);
+            return self.ids[below as usize..][..count as usize]
+                .iter()
+                .filter_map(|&id| {
+                    self.triangles[id as usize].intersect(&self.prepared, self.ray.t_max())
+                })
+                .fold(f32::INFINITY, f32::min);
+        }
+        let axis = axis_or_count as usize;
+        let [low, high] = [index + 1, index + below as usize];
+        let [origin, direction] =
+            [self.ray.origin(), self.ray.direction()].map(|vector| f64::from(vector[axis]));
+        let (first, second) = if direction >= 0.0 { (low, high) } else { (high, low) };
+        let found = if self.meets(first) { self.first_hit(first) } else { f32::INFINITY };
+        let point = origin + f64::from(found) * direction;
+        let is_before = if second > first {
+            point <= f64::from(self.nodes[second].min[axis])
+        } else {
+            point >= f64::from(self.nodes[second].max[axis])
+        };
+        if !(found < f32::INFINITY && is_before) && self.meets(second) {
+            return found.min(self.first_hit(second));
+        }
+        found
+    }
+
+    /// Returns whether the ray meets a node's box, and counts the test.
+    fn meets(&mut self, index: usize) -> bool {
+        self.counts.boxes += 1;
+        let node = &self.nodes[index];
+        let [origin, direction] =
+            [self.ray.origin(), self.ray.direction()].map(|vector| vector.as_dvec3());
+        let inverse = direction.recip();
         let (mut low, mut high) = (0.0, f64::INFINITY);
         for axis in 0..3 {
             let [a, b] = [node.min, node.max]
@@ -143,52 +167,7 @@ fn first_hit(
             high = f64::min(high, a.max(b));
         }
         low <= high
-    };
-    let children = |index: usize| {
-        let node = &nodes[index];
-        let axis = node.axis_or_count as usize;
-        let [low, high] = [index + 1, index + node.below as usize];
-        if direction[axis] >= 0.0 { (axis, low, high) } else { (axis, high, low) }
-    };
-    let prepared = PreparedRay::new(ray);
-    let mut found = f32::INFINITY;
-    open.push(Step::Enter(0));
-    while let Some(step) = open.pop() {
-        match step {
-            Step::Enter(index) if nodes[index].axis_or_count >= LEAF => {
-                let first = nodes[index].below as usize;
-                let leaf = &ids[first..][..(nodes[index].axis_or_count - LEAF) as usize];
-                counts.objects += leaf.len() as u64;
-                found = leaf
-                    .iter()
-                    .filter_map(|&id| triangles[id as usize].intersect(&prepared, ray.t_max()))
-                    .fold(f32::INFINITY, f32::min);
-            }
-            Step::Enter(index) => {
-                let (_, first, _) = children(index);
-                found = f32::INFINITY;
-                open.push(Step::Second(index));
-                if is_hit(&nodes[first]) {
-                    open.push(Step::Enter(first));
-                }
-            }
-            Step::Second(index) => {
-                let (axis, first, second) = children(index);
-                let point = origin[axis] + f64::from(found) * direction[axis];
-                let is_before = if second > first {
-                    point <= f64::from(nodes[second].min[axis])
-                } else {
-                    point >= f64::from(nodes[second].max[axis])
-                };
-                if !(found < f32::INFINITY && is_before) && is_hit(&nodes[second]) {
-                    open.extend([Step::Nearer(found), Step::Enter(second)]);
-                }
-            }
-            Step::Nearer(other) => found = found.min(other),
-        }
     }
-    counts.boxes += boxes;
-    found
 }
 
 #[cfg(test)]
@@ -207,8 +186,15 @@ mod tests {
         let mut hits = 0;
         for ray in (0..2000).flat_map(|index| rays(&bounds, index).unwrap()) {
             let mut counts = TestCounts::default();
-            let ids = &fitted.prim_ids;
-            let found = first_hit(&nodes, ids, &triangles, &ray, &mut Vec::new(), &mut counts);
+            let found = ThreeMeshRay {
+                nodes: &nodes,
+                ids: &fitted.prim_ids,
+                triangles: &triangles,
+                ray: &ray,
+                prepared: PreparedRay::new(&ray),
+                counts: &mut counts,
+            }
+            .first_hit(0);
             let expected = nearest_hit(&tree, &triangles, &ray);
             assert_eq!(found, expected.map_or(f32::INFINITY, |hit| hit.t));
             hits += usize::from(expected.is_some());

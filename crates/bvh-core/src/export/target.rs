@@ -75,11 +75,9 @@ impl Target {
     /// The binary layout `BVH` of `tinybvh`, by the costs that the library builds with.
     pub const TINYBVH: Self = Self {
         name: "tinybvh",
-        constants: constants(1.0, 1.0),
-        most_objects: 1 << 20,
-        most_depth: 63,
         references: DIVIDED,
         layout: Layout::FirstCountAligned,
+        ..Self::PLAIN
     };
 
     /// The layout `Bvh2` of `obvhs`, by the costs that the library collapses leaves with.
@@ -95,22 +93,20 @@ impl Target {
     /// The Rust crate `bvh`, whose leaves have one shape, and whose iterator has a stack of 32.
     pub const BVH: Self = Self {
         name: "bvh",
-        constants: constants(1.0, 1.0),
         most_objects: 1,
         most_depth: 31,
-        references: 1.0,
         layout: Layout::FirstCount,
+        ..Self::PLAIN
     };
 
     /// Version 2 of `madmann91/bvh` in C++, which stores the size of a leaf in four bits, and whose
     /// examples have a stack of 64.
     pub const MADMANN91_BVH: Self = Self {
         name: "madmann91-bvh",
-        constants: constants(1.0, 1.0),
         most_objects: 15,
-        most_depth: 63,
         references: DIVIDED,
         layout: Layout::FirstCount,
+        ..Self::PLAIN
     };
 
     /// Nodes as text, for any program with a stack of 64.
@@ -263,8 +259,7 @@ fn balance(tree: &mut Bvh, root: usize) {
             tree.nodes[index] = leaves[range.start];
             continue;
         }
-        let aabb =
-            leaves[range.clone()].iter().fold(Aabb::EMPTY, |around, leaf| around.union(&leaf.aabb));
+        let aabb = Aabb::union_of(leaves[range.clone()].iter().map(|leaf| &leaf.aabb));
         let first = tree.nodes.len();
         tree.nodes[index] = Node::inner(aabb, first as u32, 2);
         tree.nodes.extend([leaves[range.start]; 2]);

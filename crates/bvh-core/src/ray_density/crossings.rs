@@ -221,33 +221,24 @@ fn face(axis: usize, plane: usize, cell: [usize; 3]) -> usize {
 
 /// Returns the sums of all cells below each grid point: `[z][y][x]`.
 fn summed_starts(starts: &[u32]) -> Vec<i64> {
-    let mut sums = vec![0i64; POINTS * POINTS * POINTS];
-    let point = |x: usize, y: usize, z: usize| (z * POINTS + y) * POINTS + x;
-    for z in 1..POINTS {
-        for y in 1..POINTS {
-            let mut row = 0;
-            for x in 1..POINTS {
-                row += i64::from(starts[index([x - 1, y - 1, z - 1])]);
-                // The rectangle below both neighbours is in both of their sums.
-                sums[point(x, y, z)] = row + sums[point(x, y - 1, z)] + sums[point(x, y, z - 1)]
-                    - sums[point(x, y - 1, z - 1)];
-            }
-        }
+    let mut sums = vec![0; POINTS * POINTS];
+    sums.extend(summed_faces(starts));
+    for i in POINTS * POINTS..sums.len() {
+        sums[i] += sums[i - POINTS * POINTS];
     }
     sums
 }
 
 /// Returns, in each plane, the sums of all faces below each grid point: `[plane][v][u]`.
 fn summed_faces(faces: &[u32]) -> Vec<i64> {
-    let mut sums = vec![0i64; POINTS * POINTS * POINTS];
-    for plane in 0..POINTS {
+    let mut sums = vec![0i64; faces.len() / (CELLS * CELLS) * POINTS * POINTS];
+    for (row, faces) in faces.chunks(CELLS).enumerate() {
+        let (plane, v) = (row / CELLS, row % CELLS + 1);
         let point = |u: usize, v: usize| (plane * POINTS + v) * POINTS + u;
-        for v in 1..POINTS {
-            let mut row = 0;
-            for u in 1..POINTS {
-                row += i64::from(faces[(plane * CELLS + v - 1) * CELLS + u - 1]);
-                sums[point(u, v)] = row + sums[point(u, v - 1)];
-            }
+        let mut sum = 0;
+        for (u, &face) in (1..).zip(faces) {
+            sum += i64::from(face);
+            sums[point(u, v)] = sum + sums[point(u, v - 1)];
         }
     }
     sums
