@@ -63,6 +63,7 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     answer.fact("version", Header::VERSION);
     answer.fact("bytes", files::regular(&args.file)?);
     describe(&header, &mut answer);
+    answer.fact("cost", header.objective.cost(&tree));
     measure(&tree, &mut answer);
     // The build cannot fail, because a valid tree over these boxes proves that they are finite.
     if let Some(scene) = &scene

@@ -8,6 +8,7 @@ mod export;
 mod inspect;
 mod interrupt;
 mod memory;
+mod npy;
 mod output;
 mod rays;
 mod render;

@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::arguments::input_file;
 use crate::interrupt::INTERRUPTED;
+use crate::npy::read_npy;
 use bvh_config::fault;
 use bvh_core::cost::Objective;
 use bvh_core::{Aabb, Bvh, Ray, RayDensity, Segment, Slabs};
@@ -47,10 +48,12 @@ impl Rays {
         let invalid = |message| Error::Rays { file: path.to_owned(), message };
         match extension {
             Some("toml") => fault::parse(&read_text(path)?).map(Self::Rendered).map_err(invalid),
-            Some(format @ ("csv" | "bin")) => {
+            Some(format @ ("csv" | "npy" | "bin")) => {
                 recorded(format, &read(path)?).map(Self::Recorded).map_err(invalid)
             }
-            _ => Err(invalid("--rays accepts files that end with .toml, .csv or .bin".into())),
+            _ => {
+                Err(invalid("--rays accepts files that end with .toml, .csv, .npy or .bin".into()))
+            }
         }
     }
 
@@ -124,10 +127,15 @@ impl Rays {
     }
 }
 
-/// Reads segments, in the scene's coordinates, from a file in the format `csv`; in any other format
-/// the file is little-endian `f32`. Messages count lines from 1, as editors do, and segments from 0, as arrays do.
+/// Reads segments, in the scene's coordinates, from a file in the format `csv` or `npy`; in any
+/// other format the file is little-endian `f32`. Messages count lines from 1, as editors do, and
+/// segments from 0, as arrays do.
 fn recorded(format: &str, bytes: &[u8]) -> Result<Vec<Segment>, String> {
-    let numbers = if format == "csv" { read_csv(bytes)? } else { read_floats(bytes)? };
+    let numbers = match format {
+        "csv" => read_csv(bytes)?,
+        "npy" => read_npy(bytes)?,
+        _ => read_floats(bytes)?,
+    };
     let (segments, rest) = numbers.as_chunks::<6>();
     if !rest.is_empty() {
         let count = numbers.len();

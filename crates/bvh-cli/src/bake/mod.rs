@@ -53,7 +53,7 @@ pub struct BakeArgs {
     /// Minimise the cost of rays instead of area: `default` for rays that need no camera, a TOML
     /// file that describes the rays of a renderer, or a file of recorded segments: six numbers
     /// each, from the origin to the hit, as lines of CSV or as little-endian `f32`.
-    #[arg(long, value_name = "default|FILE.toml|.csv|.bin")]
+    #[arg(long, value_name = "default|FILE.toml|.csv|.npy|.bin")]
     pub rays: Option<String>,
     /// The cost to minimise: `area`, the internal area, which suits every tracer; or `layout`, the
     /// tests of nodes and of blocks of triangles in this project's wide layout. With --budget, the
@@ -248,7 +248,7 @@ fn summarise(found: &Found, cost_for_lines: f64, answer: &mut Answer) {
             plan.references
         ));
     } else if plan.references > 1.0 {
-        answer.say("no object is divided, because that does not pay here");
+        answer.say("no object is divided, because no division paid within the budget");
     }
     // A method that plans its time completes its plan just before the time is over, and then could
     // have used more.

@@ -118,7 +118,7 @@ bake spheres75 LONG --references=nan ! --references is NaN; accepted: 1 to 16
 bake spheres75 LONG --rays=wrong.toml ! wrong.toml | line 2 | bouncy | bounces
 bake spheres75 LONG --rays=none.toml ! none.toml | cameras is empty | eye
 bake spheres75 LONG --rays=gone.toml ! --rays | gone.toml | no such file
-bake spheres75 LONG --rays=mesh.obj ! mesh.obj: --rays accepts | .csv or .bin
+bake spheres75 LONG --rays=mesh.obj ! mesh.obj: --rays accepts | .npy or .bin
 bake escher VAST --parts=4 --part=0123 ! --part 0123 | no such part | --list
 bake escher VAST --parts=4 --rays=default ! --parts | --rays | cannot be used with
 bake spheres75 VAST --parts=76 ! --parts 76 | 75 objects | 2 to 75
