@@ -11,7 +11,7 @@ use bvh_config::{OutOfRange, fault};
 use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle};
 use bvh_scenes::trace::Query;
 use glam::Vec3;
-use harness::peers::{Built, Library};
+use harness::peers::{BuildFault, Built, Library, Task};
 use nalgebra::{Point3, Vector3};
 use std::time::Instant;
 use toml::Table;
@@ -33,9 +33,9 @@ impl Library for Crate {
         fault::deserialize::<NoSettings>(settings.clone()).map(|_| ())
     }
 
-    fn build(&self, settings: &Table, boxes: &[Aabb]) -> Result<Built, OutOfRange> {
+    fn build(&self, settings: &Table, task: &Task) -> Result<Built, BuildFault> {
         self.check(settings)?;
-        Ok(build(boxes))
+        Ok(build(task.boxes))
     }
 }
 

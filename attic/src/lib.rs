@@ -55,6 +55,11 @@ pub fn build_by_obvhs(preset: Preset, boxes: &[Aabb]) -> Built {
     obvhs::build(&Obvhs { preset, reinsertion: None }, boxes)
 }
 
+/// Builds with the crate `bvh`.
+pub fn build_by_bvh(boxes: &[Aabb]) -> Built {
+    bvh::build(boxes)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -65,6 +70,7 @@ mod tests {
     use bvh_scenes::Scene;
     use bvh_scenes::rays::Kind;
     use bvh_scenes::trace::{Accelerator, Query};
+    use harness::peers::Task;
 
     fn all() -> Vec<(&'static dyn Racer, Table)> {
         let settings = ["", "preset = 'fastest'", "preset = 'medium'", "preset = 'very_slow'"];
@@ -95,7 +101,13 @@ mod tests {
     fn trees_of_other_libraries_are_valid_and_have_one_object_per_leaf() {
         let scene = Scene::load("escher:500").unwrap();
         for (library, settings) in all() {
-            let built = library.build(&settings, &scene.boxes).unwrap();
+            let task = Task {
+                boxes: &scene.boxes,
+                objects: &scene.primitives,
+                seed: 1,
+                cancelled: &|| false,
+            };
+            let built = library.build(&settings, &task).unwrap();
             validate(&built.tree, &scene.boxes).unwrap();
             assert_eq!(built.tree.nodes.len(), 2 * 500 - 1, "{} {settings}", library.name());
         }
@@ -104,7 +116,7 @@ mod tests {
     #[test]
     fn other_libraries_find_nearly_all_hits_and_nothing_else() {
         let scene = Scene::load("escher:2000").unwrap();
-        let tree = bvh::build(&scene.boxes).tree;
+        let tree = build_by_bvh(&scene.boxes).tree;
         let rays = rays(Kind::Incoherent, 4000, &scene, &tree, &Default::default(), 1);
         let batch = Batch {
             query: Query::Nearest,

@@ -13,7 +13,7 @@ use bvh_config::{OutOfRange, fault};
 use bvh_core::{Aabb, Bvh, FirstCountNode, Hit, Ray, Triangle};
 use bvh_scenes::trace::Query;
 use glam::Vec3A;
-use harness::peers::{Built, Library};
+use harness::peers::{BuildFault, Built, Library, Task};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use toml::Table;
@@ -54,8 +54,8 @@ impl Library for Crate {
         read(settings).map(|_| ())
     }
 
-    fn build(&self, settings: &Table, boxes: &[Aabb]) -> Result<Built, OutOfRange> {
-        Ok(build(&read(settings)?, boxes))
+    fn build(&self, settings: &Table, task: &Task) -> Result<Built, BuildFault> {
+        Ok(build(&read(settings)?, task.boxes))
     }
 }
 

@@ -21,7 +21,7 @@ pub struct Labelled {
     pub options: EntryOptions,
 }
 
-/// A method of ours, or another library.
+/// A method of ours, or another library or program.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 #[allow(missing_docs, reason = "the line above names the variants in order")]
@@ -125,7 +125,7 @@ impl Labelled {
 
 fn accepted_methods() -> String {
     let ours = Method::NAMES.join(", ");
-    format!("{ours}, or the libraries {}", Peer::NAMES.join(", "))
+    format!("{ours}, or the libraries and programs {}", Peer::NAMES.join(", "))
 }
 
 impl<'de> Deserialize<'de> for Labelled {

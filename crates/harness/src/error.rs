@@ -40,6 +40,9 @@ pub enum Error {
     /// A run failed.
     #[error("scene {scene}, method {method}: {source}")]
     Search { scene: String, method: String, source: Box<SearchError> },
+    /// Another library or a program built no tree.
+    #[error("scene {scene}, method {method}, {source}")]
+    Library { scene: String, method: String, source: Box<dyn std::error::Error + Send + Sync> },
     /// Rays cannot be traced through this scene.
     #[error("scene {scene}, tracing: {message}")]
     Tracing { scene: String, message: String },

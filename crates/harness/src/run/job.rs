@@ -59,13 +59,6 @@ pub(crate) fn selected<'a>(
     Ok(jobs)
 }
 
-/// Orders the runs of a scene so that methods alternate. A disturbance of the machine then affects
-/// all of them, and not all repetitions of one.
-pub(crate) fn alternate(experiment: &Experiment, jobs: &mut [&Job]) {
-    let runs_of_scene = experiment.methods.len() * experiment.repetitions as usize;
-    jobs.sort_by_key(|job| (job.index / runs_of_scene, job.repetition));
-}
-
 impl Job<'_> {
     /// The seed of the run.
     pub fn seed(&self, experiment: &Experiment) -> u64 {
@@ -122,31 +115,13 @@ mod tests {
     use super::*;
     use crate::spec::Overrides;
 
-    fn two_methods_on_two_scenes() -> (Experiment, [Scene; 2]) {
+    #[test]
+    fn every_run_has_an_identifier_that_selects_it_also_after_others_have_joined() {
         let text = "question = 'Q'\nscenes = ['escher', 'spheres750']\nrepetitions = 3\n\
                     methods = [{ method = 'muller_fellner' }, { method = 'grasp', trials = 9 }]\n";
         let spec = Experiment::parse("spec.toml".as_ref(), text, &Overrides::default());
-        (spec.unwrap(), ["escher", "spheres750"].map(|name| Scene::load(name).unwrap()))
-    }
-
-    #[test]
-    fn runs_whose_times_are_the_result_alternate_between_methods_scene_by_scene() {
-        let (experiment, scenes) = two_methods_on_two_scenes();
-        let jobs = selected(&experiment, &scenes, &[]).unwrap();
-        let mut turns: Vec<&Job> = jobs.iter().collect();
-        alternate(&experiment, &mut turns);
-        let turns =
-            turns.iter().map(|job| (&*job.scene.name, &*job.labelled.label, job.repetition));
-        let methods = ["muller_fellner", "grasp"];
-        let expected = ["escher", "spheres750"].into_iter().flat_map(|scene| {
-            (0..3).flat_map(move |repetition| methods.map(|method| (scene, method, repetition)))
-        });
-        assert!(turns.eq(expected));
-    }
-
-    #[test]
-    fn every_run_has_an_identifier_that_selects_it_also_after_others_have_joined() {
-        let (mut experiment, scenes) = two_methods_on_two_scenes();
+        let mut experiment = spec.unwrap();
+        let scenes = ["escher", "spheres750"].map(|name| Scene::load(name).unwrap());
         let ids = |experiment: &Experiment| {
             let jobs = selected(experiment, &scenes, &[]).unwrap();
             jobs.into_iter().map(|job| job.id).collect::<Vec<_>>()

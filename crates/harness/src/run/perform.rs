@@ -4,7 +4,7 @@ use super::job::Job;
 use crate::Error;
 use crate::contestant::Contestant;
 use crate::measure::picture;
-use crate::peers::{self, Built, Peer};
+use crate::peers::{self, Built, Peer, Task};
 use crate::rows::finished_run::FinishedRun;
 use crate::rows::store::Store;
 use crate::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, TrialRow};
@@ -79,8 +79,9 @@ pub(crate) fn perform(work: &Work, job: &Job) -> Result<Option<(FinishedRun, Bvh
     let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
     let result = match &labelled.method {
         Contestant::Ours(method) => search(experiment, job, method, seed, &stopwatch),
-        Contestant::Peer(peer) => build(experiment, job, peer, &stopwatch),
+        Contestant::Peer(peer) => build(experiment, job, peer, seed, &stopwatch),
     };
+    // Cancelling kills the external program, which is not an error.
     if watch.cancelled() {
         return Ok(None);
     }
@@ -224,15 +225,23 @@ fn ray_row(
     }
 }
 
-/// Builds the tree of another library, as the outcome of a search of one evaluation.
+/// Builds the tree of another library or program, as the outcome of a search of one evaluation.
 fn build(
     experiment: &Experiment,
     job: &Job,
     peer: &Peer,
+    seed: u64,
     stopwatch: &Stopwatch,
 ) -> Result<(Outcome, f64), Error> {
-    let Built { tree, seconds } =
-        peer.build(&job.scene.boxes).map_err(|fault| Error::Usage(fault.to_string()))?;
+    let Job { scene, labelled, .. } = *job;
+    let cancelled = || stopwatch.watch.cancelled();
+    let task =
+        Task { boxes: &scene.boxes, objects: &scene.primitives, seed, cancelled: &cancelled };
+    let Built { tree, seconds } = peer.build(&task).map_err(|source| Error::Library {
+        scene: scene.name.clone(),
+        method: labelled.label.clone(),
+        source,
+    })?;
     // It reports no events; its end is the only one.
     stopwatch.note(seconds);
     let cost = experiment.objective.cost(&tree);

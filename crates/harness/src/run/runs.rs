@@ -1,6 +1,6 @@
 //! The runs of all methods on all scenes: in parallel or one by one.
 
-use super::job::{Job, alternate};
+use super::job::Job;
 use super::perform::{Trees, Work, perform};
 use crate::Error;
 use rayon::prelude::*;
@@ -55,8 +55,12 @@ fn missing_runs<'a>(work: &mut Work<'a>) -> Vec<&'a Job<'a>> {
         }
         missing.push(job);
     }
-    if work.experiment.sequential {
-        alternate(work.experiment, &mut missing);
+    let experiment = work.experiment;
+    if experiment.sequential {
+        // Methods alternate, so that a disturbance of the machine does not affect all repetitions
+        // of one method.
+        let runs_of_scene = experiment.methods.len() * experiment.repetitions as usize;
+        missing.sort_by_key(|job| (job.index / runs_of_scene, job.repetition));
     }
     missing
 }

@@ -4,6 +4,8 @@ mod archive;
 mod circles;
 mod command_line;
 mod examples;
+#[cfg(unix)]
+mod external;
 mod faults;
 mod merge;
 mod page;

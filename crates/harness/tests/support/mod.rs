@@ -4,6 +4,9 @@
 #[path = "../../../bvh-cli/tests/program/mod.rs"]
 mod program;
 
+use bvh_core::Bvh;
+use bvh_core::file::{self, Origin};
+use bvh_scenes::Scene;
 use harness::report::query::Row;
 pub use program::*;
 use std::fs;
@@ -113,4 +116,10 @@ pub fn reproducible(folder: &Path) -> Vec<(String, Vec<u8>)> {
 /// The rows of a CSV file by column names.
 pub fn rows(path: &Path) -> Vec<Row> {
     harness::rows::read(path).unwrap()
+}
+
+/// Saves a tree over the scene's objects in a file.
+pub fn save(tree: &Bvh, scene: &Scene, path: &Path) {
+    let origin = Origin { method: "test", ..Origin::default() };
+    fs::write(path, file::save(tree, &scene.boxes, &origin).unwrap()).unwrap();
 }

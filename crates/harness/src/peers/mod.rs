@@ -1,12 +1,16 @@
-//! Other libraries as methods of experiments: our costs of their trees.
+//! Third-party libraries and programs as methods of experiments: our costs of their trees.
 //!
-//! The harness contains none. The program in `attic/` does: it brings each as a [`Library`], a
-//! [lower bound](LowerBound) and the [times of rays](Tracing), and is the same program otherwise.
+//! The harness contains no library. The program in `attic/` does: it brings each as a [`Library`],
+//! a [lower bound](LowerBound) and the [times of rays](Tracing), and is the same program otherwise.
+//! A program of your own needs no code here: see [`command`].
+
+pub mod command;
+mod program;
 
 use crate::Error;
 use bvh_build::BuildError;
 use bvh_config::OutOfRange;
-use bvh_core::{Aabb, Bvh};
+use bvh_core::{Aabb, Bvh, Clip};
 use bvh_scenes::Scene;
 use bvh_search::Observer;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -29,9 +33,24 @@ pub trait Library: Sync {
     ///
     /// # Errors
     ///
-    /// As [`Self::check`].
-    fn build(&self, settings: &Table, boxes: &[Aabb]) -> Result<Built, OutOfRange>;
+    /// As [`Self::check`], and those of a program.
+    fn build(&self, settings: &Table, task: &Task) -> Result<Built, BuildFault>;
 }
+
+/// What a library builds a tree over.
+pub struct Task<'a> {
+    /// The boxes of the objects.
+    pub boxes: &'a [Aabb],
+    /// The objects, which may be divided.
+    pub objects: &'a dyn Clip,
+    /// The seed of the run.
+    pub seed: u64,
+    /// Returns true once nobody waits for the tree.
+    pub cancelled: &'a dyn Fn() -> bool,
+}
+
+/// The failure of a library or program.
+pub type BuildFault = Box<dyn std::error::Error + Send + Sync>;
 
 /// A library's tree.
 #[derive(Clone, Debug)]
@@ -130,8 +149,8 @@ pub struct Peer {
 }
 
 impl Peer {
-    /// The names of all libraries.
-    pub const NAMES: &[&str] = &["bvh", "obvhs"];
+    /// The names of all libraries; the last is a [program](command).
+    pub const NAMES: &[&str] = &["bvh", "obvhs", "external"];
 
     /// Reads the settings of the library called `name`; `None` if no library has this name.
     pub fn read<'de, D: Deserializer<'de>>(
@@ -153,8 +172,8 @@ impl Peer {
     }
 
     /// Builds the tree over the boxes of objects.
-    pub fn build(&self, boxes: &[Aabb]) -> Result<Built, OutOfRange> {
-        self.library()?.build(&self.settings, boxes)
+    pub fn build(&self, task: &Task) -> Result<Built, BuildFault> {
+        self.library()?.build(&self.settings, task)
     }
 
     /// The settings of the library.
@@ -163,11 +182,13 @@ impl Peer {
     }
 
     fn library(&self) -> Result<&'static dyn Library, OutOfRange> {
-        let mut here = OTHERS.get().into_iter().flat_map(|others| others.libraries).copied();
+        let others = OTHERS.get().map_or(&[][..], |others| others.libraries);
+        let programs: &dyn Library = &command::Programs;
+        let mut here = [programs].into_iter().chain(others.iter().copied());
         here.find(|library| library.name() == self.name).ok_or_else(|| {
             let found = format!("{:?}, another library, which `{PROGRAM}` contains", self.name);
             let ours = bvh_search::Method::NAMES.join(", ");
-            OutOfRange::new("method", found, format!("without it {ours}"))
+            OutOfRange::new("method", found, format!("without it {ours}, external"))
         })
     }
 }
