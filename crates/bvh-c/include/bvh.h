@@ -223,19 +223,19 @@ BvhTracer *bvh_tracer_new(const BvhTree *tree);
 // close to each other and have similar directions, and to 0 otherwise. It changes the speed and no
 // answer.
 //
-// `tracer` is a tracer; `rays` and `hits` point to `count` elements each.
+// `tracer` is a tracer; `rays` and `hits` point to `count` elements each, and do not overlap.
 BvhStatus bvh_tracer_nearest_hits(const BvhTracer *tracer, const BvhRay *rays, size_t count, int32_t coherent, BvhHit *hits);
 
 // Writes to `hits` whether each of `count` rays hits any triangle: 1 or 0. `coherent` has the
 // meaning that it has in `bvh_tracer_nearest_hits`.
 //
-// `tracer` is a tracer; `rays` and `hits` point to `count` elements each.
+// `tracer` is a tracer; `rays` and `hits` point to `count` elements each, and do not overlap.
 BvhStatus bvh_tracer_any_hits(const BvhTracer *tracer, const BvhRay *rays, size_t count, int32_t coherent, uint8_t *hits);
 
 // Writes the nearest hits of `count` rays with the surfaces there to `hits`. `coherent` has the
 // meaning that it has in `bvh_tracer_nearest_hits`.
 //
-// `tracer` is a tracer; `rays` and `hits` point to `count` elements each.
+// `tracer` is a tracer; `rays` and `hits` point to `count` elements each, and do not overlap.
 BvhStatus bvh_tracer_surface_hits(const BvhTracer *tracer, const BvhRay *rays, size_t count, int32_t coherent, BvhSurfaceHit *hits);
 
 // Writes all hits of `count` rays to `hits`, ray after ray and the nearest first, the number of

@@ -98,7 +98,7 @@ pub unsafe extern "C" fn bvh_tracer_new(tree: *const BvhTree) -> *mut BvhTracer 
 /// close to each other and have similar directions, and to 0 otherwise. It changes the speed and no
 /// answer.
 ///
-/// `tracer` is a tracer; `rays` and `hits` point to `count` elements each.
+/// `tracer` is a tracer; `rays` and `hits` point to `count` elements each, and do not overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvh_tracer_nearest_hits(
     tracer: *const BvhTracer,
@@ -128,7 +128,7 @@ pub unsafe extern "C" fn bvh_tracer_nearest_hits(
 /// Writes to `hits` whether each of `count` rays hits any triangle: 1 or 0. `coherent` has the
 /// meaning that it has in `bvh_tracer_nearest_hits`.
 ///
-/// `tracer` is a tracer; `rays` and `hits` point to `count` elements each.
+/// `tracer` is a tracer; `rays` and `hits` point to `count` elements each, and do not overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvh_tracer_any_hits(
     tracer: *const BvhTracer,
@@ -158,7 +158,7 @@ pub unsafe extern "C" fn bvh_tracer_any_hits(
 /// Writes the nearest hits of `count` rays with the surfaces there to `hits`. `coherent` has the
 /// meaning that it has in `bvh_tracer_nearest_hits`.
 ///
-/// `tracer` is a tracer; `rays` and `hits` point to `count` elements each.
+/// `tracer` is a tracer; `rays` and `hits` point to `count` elements each, and do not overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bvh_tracer_surface_hits(
     tracer: *const BvhTracer,

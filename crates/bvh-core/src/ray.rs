@@ -86,6 +86,12 @@ impl Ray {
         let inverse = (1.0 / direction.extend(1.0)).max(Vec4::MIN).min(Vec4::MAX);
         let sizes = inverse.abs();
         let least = sizes.x.min(sizes.y).min(sizes.z);
+        // The products of infinity and zero are no numbers, which would enter unused lanes of nodes
+        // and never end. An empty range enters nothing.
+        let is_finite = (origin.extend(0.0).abs().cmple(Vec4::MAX)
+            & direction.extend(0.0).abs().cmple(Vec4::MAX))
+        .all();
+        let t_max = if is_finite { t_max } else { -1.0 };
         // Adding 0 turns −0 into +0, so no kernel returns a distance of −0.
         // A range that began below 0 would have entries below 0, and kernels sort entries by
         // their bits.

@@ -100,7 +100,9 @@ pub fn validate_references(
         let (object, _) = parts_of_object[0];
         leaves.clear();
         leaves.extend(parts_of_object.iter().map(|&(_, leaf)| tree.nodes[leaf as usize].aabb));
-        if !covering::is_covered(objects, object, &boxes[object as usize], &leaves) {
+        let aabb = &boxes[object as usize];
+        // Parts of a triangle that is not finite would be empty, and covered by anything.
+        if aabb.check().is_err() || !covering::is_covered(objects, object, aabb, &leaves) {
             return Err(InvalidBvh::Uncovered { object: object as usize });
         }
     }

@@ -8,7 +8,8 @@ use crate::support::{
     Random, SHAPES, ball, bits, boxes, brute_force, chain, grid_box, rays, scaled, soup, tree,
 };
 use bvh_core::{
-    Coherence, Hit, PreparedRay, Ray, RefitError, Triangle, WideBvh, any_hit, nearest_hit,
+    Aabb, Bvh, Coherence, Hit, Node, PreparedRay, Ray, RefitError, Triangle, WideBvh, any_hit,
+    nearest_hit,
 };
 use glam::Vec3;
 
@@ -420,4 +421,41 @@ fn a_filter_passes_over_hits_and_sees_all_of_them_if_it_accepts_none() {
         several += usize::from(all.len() > 1);
     }
     assert!(found > 300 && several > 100, "{found} {several}");
+}
+
+#[test]
+fn rays_that_are_not_finite_end_and_meet_only_triangles_that_exist() {
+    // Five children leave three lanes of the node unused.
+    let triangles: Vec<Triangle> = (0..5u8)
+        .map(|i| f32::from(i) * 100.0)
+        .map(|x| Triangle::from([[x, 0.0, 0.0], [x + 1.0, 0.0, 1.0], [x, 1.0, 0.0]]))
+        .collect();
+    let boxes = boxes(&triangles);
+    let root = Node::inner(Aabb::union_of(&boxes), 1, 5);
+    let leaves = (0..).zip(&boxes).map(|(i, &aabb)| Node::leaf(aabb, i, 1));
+    let tree =
+        Bvh { nodes: [root].into_iter().chain(leaves).collect(), prim_ids: (0..5).collect() };
+    let traced = Traced::new(tree, &triangles);
+    let (nan, inf) = (f32::NAN, f32::INFINITY);
+    for (origin, direction) in [
+        ([nan; 3], [0.0, 0.0, 1.0]),
+        ([1e30, 0.0, 0.0], [nan; 3]),
+        ([1e30, 0.0, 0.0], [inf; 3]),
+        ([nan, 0.0, 0.0], [0.0, inf, inf]),
+        ([0.1; 3], [inf; 3]),
+        ([0.1; 3], [-inf, 1.0, 0.0]),
+        ([inf, 0.0, -inf], [0.0, 1.0, 0.0]),
+    ] {
+        let ray = Ray::assume_valid(origin, direction, 0.0, 1.0);
+        for (_, wide) in &traced.layouts {
+            wide.nearest_hit(&ray);
+            wide.any_hit(&ray);
+            wide.all_hits(&ray);
+            for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+                let mut hits = [Hit::MISS; 40];
+                wide.nearest_hits(&[ray; 40], &mut hits, coherence);
+                assert!(hits.iter().all(|hit| hit.is_miss() || hit.object < 5));
+            }
+        }
+    }
 }
