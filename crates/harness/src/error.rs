@@ -57,18 +57,33 @@ pub enum Error {
     /// `--check` found numbers that differ from the committed ones.
     #[error(
         "{differences} difference(s) from the committed results; \
-         if they are intended, run again without --check"
+         if they are intended, --force replaces these"
     )]
     Differs { differences: usize },
     /// A file of a finished run that no longer matches its checksum.
     #[error("{} is damaged", .0.display())]
     Damaged(PathBuf),
     /// Ctrl-C.
-    #[error("interrupted; {finished} of {runs} runs are kept, `--resume` does the rest")]
+    #[error("interrupted; {}", kept(*finished, *runs))]
     Interrupted { finished: usize, runs: usize },
 }
 
+fn kept(finished: usize, runs: usize) -> String {
+    match finished {
+        0 => "no run is kept".into(),
+        _ => format!("{finished} of {runs} runs are kept, `--resume` does the rest"),
+    }
+}
+
 impl Error {
+    /// Says after an interruption that no run is kept, because their folder is temporary.
+    pub(crate) fn without_kept_runs(self) -> Self {
+        match self {
+            Self::Interrupted { runs, .. } => Self::Interrupted { finished: 0, runs },
+            error => error,
+        }
+    }
+
     /// Returns 2 for mistakes in a spec or a command line, 130 after Ctrl-C, otherwise 1.
     pub fn exit_code(&self) -> u8 {
         match self {

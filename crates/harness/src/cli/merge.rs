@@ -1,9 +1,10 @@
 //! `harness merge`: joins the parts of experiments that ran with `--run`.
 
-use super::run::print_summary;
+use super::run::{print_summary, repeat};
 use super::terminal::{Jobs, input_folder, output_folder, print_error};
 use crate::rows::store::{Existing, spec_of_part};
 use crate::run::execute::{Extent, execute};
+use crate::run::finish;
 use crate::run::resolved::{Resolved, read_toml};
 use crate::{Error, files};
 use std::collections::BTreeMap;
@@ -43,6 +44,7 @@ pub fn merge(args: &MergeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         let message = "DIR: no part of an experiment; accepted: --out of runs with --run";
         return Err(Error::Usage(message.into()));
     }
+    let mut differences = 0;
     for (name, parts) in parts {
         let spec = spec_of_part(&parts[0].join(name));
         let Resolved { experiment, .. } = read_toml(&spec)?;
@@ -53,11 +55,15 @@ pub fn merge(args: &MergeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         // What an earlier merge has taken is kept.
         let existing = if args.force { Existing::Replace } else { Existing::Resume };
         let extent = Extent { existing, parts, ..Extent::default() };
+        if !args.force && finish::has_results_of(&experiment, &args.out)? {
+            differences += repeat(&experiment, &args.out, &extent, interrupted, false)?;
+            continue;
+        }
         let summary = execute(&experiment, &args.out, &extent, interrupted)?;
         summary.remarks.iter().for_each(|remark| print_error(remark));
         print_summary(&experiment, &summary);
     }
-    Ok(())
+    if differences > 0 { Err(Error::Differs { differences }) } else { Ok(()) }
 }
 
 /// Returns the folders of the experiments, full and quick, of which `out` has a part.

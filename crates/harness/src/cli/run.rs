@@ -9,7 +9,8 @@ use crate::run::finish::Summary;
 use crate::run::{check, finish, reference};
 use crate::spec::{Experiment, Overrides};
 use std::collections::HashSet;
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 /// Run experiments.
@@ -76,9 +77,14 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let extent = Extent { existing, runs: args.runs.clone(), ..Extent::default() };
     let mut differences = 0;
     for experiment in &experiments {
-        let is_new = args.redraw || args.resume || args.force || !args.runs.is_empty();
-        if args.check || !is_new && finish::has_results_of(experiment, &args.out)? {
-            differences += repeat(args, experiment, interrupted)?;
+        if args.check {
+            differences += check(args, experiment, interrupted)?;
+            continue;
+        }
+        let is_new = args.redraw || args.force || !args.runs.is_empty();
+        let is_over = args.resume && !repeated(experiment, &args.out).is_dir();
+        if !is_new && !is_over && finish::has_results_of(experiment, &args.out)? {
+            differences += repeat(experiment, &args.out, &extent, interrupted, args.quiet)?;
             continue;
         }
         let summary = if args.redraw {
@@ -103,44 +109,87 @@ pub(super) fn print_summary(experiment: &Experiment, summary: &Summary) {
     print_line(&format!("\n{text}Results: {}", folder.display()));
 }
 
-/// Runs into a temporary folder and prints how the rows differ from the committed ones.
-///
-/// Returns the number of differences. Only `--check` removes rows that differ or are not complete.
-fn repeat(
+/// Runs into a temporary folder and prints how the rows differ from the committed ones. Returns the
+/// number of differences.
+fn check(
     args: &RunArgs,
     experiment: &Experiment,
     interrupted: &AtomicBool,
 ) -> Result<usize, Error> {
-    // A repetition must not touch the committed results, not even for a moment.
+    // A check must not touch the committed results, not even for a moment.
     let temporary =
         tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
-    let fresh = temporary.path().join(experiment.folder());
-    let committed = args.out.join(experiment.folder());
-    // Gaps are measured from the references of the committed run, not from later finds.
-    reference::adopt(&committed, temporary.path())?;
-    let repetition = execute(experiment, temporary.path(), &Extent::default(), interrupted);
-    let name = &experiment.name;
-    let found = match &repetition {
-        Ok(summary) => check::compare(&fresh, &committed, &summary.skipped_scenes)?,
-        Err(_) => Vec::new(),
+    let extent = Extent::default();
+    let (summary, found) = compare(experiment, &args.out, temporary.path(), &extent, interrupted)
+        .map_err(Error::without_kept_runs)?;
+    for scene in &summary.skipped_scenes {
+        let name = &experiment.name;
+        print_line(&format!("{name}: scene {scene} is not fetched; its rows are not compared"));
+    }
+    print_differences(experiment, &found);
+    Ok(found.len())
+}
+
+/// Returns the folder in `out` for a repetition of finished results.
+fn repeated(experiment: &Experiment, out: &Path) -> PathBuf {
+    out.join(format!("repeated-{}", experiment.folder().display()).replace(['/', '\\'], "-"))
+}
+
+/// Runs again what has finished results in `out`, prints the tables and how the rows differ from
+/// those, and replaces nothing. Returns the number of differences; with any, or after an
+/// interruption, the repetition stays beside the results.
+pub(super) fn repeat(
+    experiment: &Experiment,
+    out: &Path,
+    extent: &Extent,
+    interrupted: &AtomicBool,
+    quiet: bool,
+) -> Result<usize, Error> {
+    let repeated = repeated(experiment, out);
+    // Only --resume continues an earlier repetition.
+    let existing = match extent.existing {
+        Existing::Resume => Existing::Resume,
+        _ => Existing::Replace,
     };
-    if !args.check && (repetition.is_err() || !found.is_empty()) {
-        let fresh = temporary.keep();
-        print_error(&format!("{name}: the repetition is kept in {}", fresh.display()));
+    let extent = Extent { existing, ..extent.clone() };
+    fs::create_dir_all(&repeated).map_err(Error::io(&repeated, "create the folder"))?;
+    let (summary, found) = compare(experiment, out, &repeated, &extent, interrupted)?;
+    summary.remarks.iter().for_each(|remark| print_error(remark));
+    if !quiet {
+        print_summary(experiment, &Summary { folder: out.join(experiment.folder()), ..summary });
     }
-    let summary = repetition?;
-    if args.check {
-        for scene in &summary.skipped_scenes {
-            print_line(&format!("{name}: scene {scene} is not fetched; its rows are not compared"));
-        }
-    } else if !args.quiet {
-        print_summary(experiment, &Summary { folder: committed, ..summary });
+    print_differences(experiment, &found);
+    if found.is_empty() {
+        fs::remove_dir_all(&repeated).map_err(Error::io(&repeated, "remove the folder"))?;
+    } else {
+        print_error(&format!("the repetition is kept in {}", repeated.display()));
     }
-    for difference in &found {
+    Ok(found.len())
+}
+
+/// Runs into `fresh` what has results in `out`. Returns how its rows differ from those.
+fn compare(
+    experiment: &Experiment,
+    out: &Path,
+    fresh: &Path,
+    extent: &Extent,
+    interrupted: &AtomicBool,
+) -> Result<(Summary, Vec<String>), Error> {
+    let committed = out.join(experiment.folder());
+    // Gaps are measured from the references of the committed run, not from later finds.
+    reference::adopt(&committed, fresh)?;
+    let summary = execute(experiment, fresh, extent, interrupted)?;
+    let fresh = fresh.join(experiment.folder());
+    let found = check::compare(&fresh, &committed, &summary.skipped_scenes)?;
+    Ok((summary, found))
+}
+
+fn print_differences(experiment: &Experiment, found: &[String]) {
+    let name = &experiment.name;
+    for difference in found {
         print_line(&format!("{name}: {difference}"));
     }
     if found.is_empty() {
         print_line(&format!("{name}: as committed"));
     }
-    Ok(found.len())
 }
