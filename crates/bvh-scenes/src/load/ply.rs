@@ -319,7 +319,9 @@ impl Element {
         let (needed, names) = match self.name.as_str() {
             "vertex" => (3, "x, y and z"),
             "face" => (1, "vertex_indices"),
-            "tristrips" => return Err("element tristrips; expected faces instead".into()),
+            "tristrips" if self.count > 0 => {
+                return Err("element tristrips; expected faces instead".into());
+            }
             _ => (0, ""),
         };
         let has = self.properties.iter().filter(|property| property.purpose != Purpose::Ignored);

@@ -19,6 +19,7 @@ comment a square → obj_info num_cols 5 |
 255 ⇒ nan |
 4\nprop → 5\nprop & 4 0 1 2 → -nan(ind) nan 1.#QNAN 0\n4 0 1 2 | vertices that no face uses: 1
 end_header → element cell 4000000000\nend_header |
+end_header → element tristrips 0\nproperty list int int vertex_indices\nend_header |
 element v → element camera 2\nproperty list uchar float m\nelement v & 0 0 0 → 2 nan 5\n0\n0 0 0 |
 4 0 1 2 3 → 5 0 1 2 3 0 |
 face 1 → face 2 & 4 0 1 → 2 0 1\n4 0 1 | faces of fewer than three vertices skipped: 1
