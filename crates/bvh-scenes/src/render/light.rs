@@ -123,11 +123,11 @@ impl<'a> World<'a> {
 
     /// Returns the light from `direction`. A loop follows reflections, because each surface has
     /// only one.
-    fn radiance(&self, mut origin: DVec3, mut direction: DVec3, tally: &mut Film) -> DVec3 {
+    fn radiance(&self, mut origin: DVec3, mut direction: DVec3, film: &mut Film) -> DVec3 {
         let mut light = DVec3::ZERO;
         let mut weight = 1.0;
         for _ in 0..=self.depth {
-            let Some(surface) = self.meet(origin, direction, tally) else { break };
+            let Some(surface) = self.meet(origin, direction, film) else { break };
             let facing = -surface.normal.dot(direction);
             // Schlick 1994, 'An inexpensive BRDF model for physically-based rendering'.
             let grazing = 1.0 - facing.clamp(0.0, 1.0);
@@ -139,7 +139,7 @@ impl<'a> World<'a> {
             };
             let reflected = direction + surface.normal * (2.0 * facing);
             let start = self.lifted(&surface, origin);
-            let direct = self.direct(&surface, start, reflected, mirror, tally);
+            let direct = self.direct(&surface, start, reflected, mirror, film);
             light += weight * (direct * (1.0 - surface.haze) + HORIZON * surface.haze);
             weight *= mirror * (1.0 - surface.haze);
             // A smaller weight changes no byte of a pixel.
@@ -151,11 +151,11 @@ impl<'a> World<'a> {
         light + weight * self.sky(direction)
     }
 
-    fn meet(&self, origin: DVec3, direction: DVec3, tally: &mut Film) -> Option<Surface> {
-        tally.rays += 1;
+    fn meet(&self, origin: DVec3, direction: DVec3, film: &mut Film) -> Option<Surface> {
+        film.rays += 1;
         let hit = Ray::half_line(origin.as_vec3(), direction.as_vec3())
             .ok()
-            .and_then(|ray| self.accelerator.nearest_hit_counted(&ray, &mut tally.counts));
+            .and_then(|ray| self.accelerator.nearest_hit_counted(&ray, &mut film.counts));
         if let Some(ground) = &self.ground
             && let Some(distance) = ground.meet(origin, direction)
             && hit.is_none_or(|hit| f64::from(hit.t) > distance)
@@ -180,7 +180,7 @@ impl<'a> World<'a> {
         start: DVec3,
         reflected: DVec3,
         mirror: f64,
-        tally: &mut Film,
+        film: &mut Film,
     ) -> DVec3 {
         let height = 0.5 + 0.5 * surface.normal.dot(self.up);
         let mut diffuse = (BELOW + (ZENITH * 0.5 + HORIZON * 0.5 - BELOW) * height) * AMBIENT;
@@ -191,7 +191,7 @@ impl<'a> World<'a> {
             let towards = to_light / distance;
             let cosine = surface.normal.dot(towards);
             // The cosine is NaN if the light is exactly at this point.
-            if cosine.is_nan() || cosine <= 0.0 || self.is_shadowed(start, towards, distance, tally)
+            if cosine.is_nan() || cosine <= 0.0 || self.is_shadowed(start, towards, distance, film)
             {
                 continue;
             }
@@ -209,10 +209,10 @@ impl<'a> World<'a> {
         surface.colour * diffuse * (1.0 - mirror) + highlight
     }
 
-    fn is_shadowed(&self, start: DVec3, towards: DVec3, distance: f64, tally: &mut Film) -> bool {
-        tally.rays += 1;
+    fn is_shadowed(&self, start: DVec3, towards: DVec3, distance: f64, film: &mut Film) -> bool {
+        film.rays += 1;
         let ray = Ray::new(start.as_vec3(), towards.as_vec3(), 0.0, distance as f32);
-        ray.is_ok_and(|ray| self.accelerator.any_hit_counted(&ray, &mut tally.counts))
+        ray.is_ok_and(|ray| self.accelerator.any_hit_counted(&ray, &mut film.counts))
     }
 
     fn sky(&self, direction: DVec3) -> DVec3 {
