@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 /// True after the first signal.
 pub static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// True while the command saves its result at the end.
+/// True from the moment from which the command soon has a result to save.
 static HELD: AtomicBool = AtomicBool::new(false);
 
 const CODE: i32 = 130;
@@ -26,7 +26,8 @@ pub fn listen() {
     }
 }
 
-/// Lets the command end in order after a signal, because it saves its result at the end.
+/// Lets the command end in order after a signal, because from here on there is a tree soon, which
+/// the command must save.
 pub fn hold() {
     HELD.store(true, Relaxed);
 }

@@ -2,7 +2,6 @@
 
 use crate::Error;
 use crate::arguments::input_file;
-use crate::interrupt::INTERRUPTED;
 use crate::npy::read_npy;
 use bvh_config::fault;
 use bvh_core::cost::Objective;
@@ -119,11 +118,11 @@ impl Rays {
     /// Returns the expected number of tests of a ray that enters the scene, in the wide layout of a
     /// tree. No bake trains on the same default rays.
     pub fn expected_tests(&self, tree: &Bvh, scene: &Scene) -> Result<f64, Error> {
-        let density = self.density(scene, tree, Self::JUDGING, &INTERRUPTED)?;
-        let density = density.ok_or_else(|| Error::Interrupted("nothing was written".into()))?;
+        let density = self.density(scene, tree, Self::JUDGING, &AtomicBool::new(false))?;
+        let (Some(density), Some(root)) = (density, tree.root_aabb()) else { return Ok(0.0) };
         let tests = Objective::Layout.cost_by(tree, &density);
-        let root = tree.root_aabb().map_or(0.0, |root| density.measure(&root));
-        Ok(if root > 0.0 { tests / root } else { 0.0 })
+        let entering = density.measure(&root);
+        Ok(if entering > 0.0 { tests / entering } else { 0.0 })
     }
 }
 

@@ -139,7 +139,6 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let most_references = plan.references.max(least);
     let start =
         args.from.as_ref().map(|path| Start::load(path, &scene, most_references)).transpose()?;
-    // From here on there is a tree soon, which Ctrl-C must save instead of ending the program.
     interrupt::hold();
     if args.budget.is_none() {
         plan.effort = decide::work(scene.boxes.len(), &mut answer);

@@ -105,7 +105,6 @@ impl Plan {
         prepared: Prepared,
         interrupted: &AtomicBool,
     ) -> Result<Found<'a>, Error> {
-        // From here on there is a tree soon, which Ctrl-C must save instead of ending the program.
         interrupt::hold();
         let failed = |error| Error::search(&scene.name, self.method.name())(error);
         let Prepared { mut greedy, mut density, division } = prepared;
