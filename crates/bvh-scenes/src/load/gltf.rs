@@ -54,11 +54,13 @@ pub struct Placed {
 /// Reads the bytes of a glTF or GLB file, and the buffers that its meshes refer to from the folder
 /// of `path`. Returns the meshes at their places.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
-    let Parts { meshes, places, remarks } = read(bytes, path)?;
+    let Parts { mut meshes, places, remarks } = read(bytes, path)?;
     // A file of a few kilobytes can place one mesh any number of times.
     let total = places.iter().map(|place| meshes[&place.mesh].len()).sum();
     check_total(total).map_err(Fault::of_file)?;
     let mut triangles = Vec::with_capacity(total);
+    let last_nodes: BTreeMap<usize, usize> =
+        places.iter().map(|place| (place.mesh, place.node)).collect();
     for Placed { node, mesh, transform } in places {
         for triangle in &meshes[&mesh] {
             let moved =
@@ -69,6 +71,10 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
                 return Err(Fault::of(&format!("nodes[{node}]"), message));
             }
             triangles.push(Triangle(moved));
+        }
+        // Otherwise a file of meshes with one place each would take twice its memory.
+        if last_nodes[&mesh] == node {
+            meshes.remove(&mesh);
         }
     }
     Ok(Mesh::new(triangles, remarks))
@@ -108,12 +114,12 @@ fn read(bytes: &[u8], path: &Path) -> Result<Parts, Fault> {
     // A mesh of points or lines gives no triangles, and a tree needs at least one object.
     meshes.retain(|_, triangles| !triangles.is_empty());
     places.retain(|place| meshes.contains_key(&place.mesh));
-    if places.is_empty() {
-        let message = "no triangle in its scene; expected a glTF file with at least one";
-        return Err(Fault::of_file(message));
-    }
     let left_out = loader.left_out.iter().filter_map(|(things, &count)| counted(things, count));
-    let remarks = remarks(&document).into_iter().chain(left_out).collect();
+    let remarks: Vec<String> = remarks(&document).into_iter().chain(left_out).collect();
+    if places.is_empty() {
+        let found = [&["no triangle in its scene".into()], &remarks[..]].concat().join("; ");
+        return Err(Fault::of_file(format!("{found}; expected a glTF file with at least one")));
+    }
     Ok(Parts { meshes, places, remarks })
 }
 

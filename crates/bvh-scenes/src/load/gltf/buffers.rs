@@ -1,4 +1,4 @@
-//! The buffers of a glTF file. A buffer is read when a mesh first needs it.
+//! The buffers of a glTF file. A buffer is read when a mesh first needs it, and a file once.
 
 use super::document::{Buffer, Document};
 use super::{MOST_BYTES, get};
@@ -8,6 +8,10 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
+use std::rc::Rc;
+
+/// The binary chunk of a GLB file, or what was read. Several buffers may name the same file.
+type Bytes<'a> = Rc<Cow<'a, [u8]>>;
 
 /// The buffers of one glTF file.
 pub struct Buffers<'a> {
@@ -15,7 +19,9 @@ pub struct Buffers<'a> {
     /// The binary chunk of a GLB file.
     chunk: Option<&'a [u8]>,
     /// The buffers that a mesh has needed, by their number.
-    needed: BTreeMap<usize, Cow<'a, [u8]>>,
+    needed: BTreeMap<usize, Bytes<'a>>,
+    /// The files that buffers have named, by their canonical path.
+    files: BTreeMap<PathBuf, Bytes<'a>>,
     /// Bytes read so far.
     total: u64,
 }
@@ -23,7 +29,7 @@ pub struct Buffers<'a> {
 impl<'a> Buffers<'a> {
     /// Prepares the buffers of the file at `path` without reading any.
     pub fn new(path: &'a Path, chunk: Option<&'a [u8]>) -> Self {
-        Self { path, chunk, needed: BTreeMap::new(), total: 0 }
+        Self { path, chunk, needed: BTreeMap::new(), files: BTreeMap::new(), total: 0 }
     }
 
     /// Returns the bytes of a buffer, which is read if no mesh has needed it before.
@@ -37,10 +43,10 @@ impl<'a> Buffers<'a> {
         Ok(&self.needed[&number])
     }
 
-    fn read(&mut self, number: usize, buffer: &Buffer) -> Result<Cow<'a, [u8]>, String> {
-        let bytes: Cow<[u8]> = match (&buffer.uri, self.chunk) {
-            (Some(uri), _) => self.of_uri(uri)?.into(),
-            (None, Some(chunk)) if number == 0 => chunk.into(),
+    fn read(&mut self, number: usize, buffer: &Buffer) -> Result<Bytes<'a>, String> {
+        let bytes = match (&buffer.uri, self.chunk) {
+            (Some(uri), _) => self.of_uri(uri)?,
+            (None, Some(chunk)) if number == 0 => Rc::new(chunk.into()),
             (None, _) => {
                 return Err("no URI; expected one, or the binary chunk of a GLB file, which is \
                             buffers[0]"
@@ -53,20 +59,25 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    fn of_uri(&mut self, uri: &str) -> Result<Vec<u8>, String> {
+    fn of_uri(&mut self, uri: &str) -> Result<Bytes<'a>, String> {
         if let Ok(data) = DataUrl::process(uri) {
             let (bytes, _) = data.decode_to_vec().map_err(|_| "a data URI of invalid base64")?;
             self.count(bytes.len() as u64)?;
-            return Ok(bytes);
+            return Ok(Rc::new(bytes.into()));
         }
         if uri.contains("://") {
             return Err(format!("`{uri}`; expected a file in this folder, or a data URI"));
         }
         let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
         let path = self.allowed(Path::new(&*name))?;
+        if let Some(bytes) = self.files.get(&path) {
+            return Ok(bytes.clone());
+        }
         // A file that is too long is rejected before it takes memory.
         self.count(regular(&path).map_err(|error| error.to_string())?)?;
-        read(&path).map_err(|error| error.to_string())
+        let bytes = Rc::new(read(&path).map_err(|error| error.to_string())?.into());
+        self.files.insert(path, Rc::clone(&bytes));
+        Ok(bytes)
     }
 
     /// Returns the path of a file by its name in a URI. Rejects a file outside the folder of the
@@ -126,6 +137,19 @@ fn leaves(name: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_that_several_buffers_name_is_read_once() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("a")).unwrap();
+        fs::write(folder.path().join("b.bin"), [7; 60]).unwrap();
+        let path = folder.path().join("scene.gltf");
+        let mut buffers = Buffers::new(&path, None);
+        for name in ["b.bin", "./b.bin", "a/../b.bin", "%62.bin"] {
+            assert_eq!(buffers.of_uri(name).unwrap()[..], [7; 60], "{name}");
+        }
+        assert_eq!((buffers.files.len(), buffers.total), (1, 60));
+    }
 
     #[test]
     fn paths_that_lead_out_of_their_folder_are_recognised() {
