@@ -14,10 +14,6 @@ use glam::Vec3;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// The number of rays of each family that a small scene needs at least, and per object.
-const LEAST_RAYS: u32 = 10_000;
-const RAYS_PER_OBJECT: u32 = 100;
-
 /// The rays that train a tree.
 #[derive(Clone)]
 pub enum Rays {
@@ -94,10 +90,7 @@ impl Rays {
         let is_over = || interrupted.load(Relaxed);
         let density = match self {
             Self::Default => {
-                // More would change the density in a small scene by less than a seed does.
-                let objects = scene.boxes.len() as u32;
-                let count = RAYS_PER_OBJECT.saturating_mul(objects).clamp(LEAST_RAYS, TRAINED);
-                let rays = of_anything(count, scene, tree, seed, &is_over);
+                let rays = of_anything(TRAINED, scene, tree, seed, &is_over);
                 density(&rays, tree).map(Some)
             }
             Self::Rendered(config) => {
