@@ -9,7 +9,7 @@ use super::plan::{Plan, Prepared};
 use super::{BakeArgs, Effort};
 use crate::Error;
 use crate::answer::Answer;
-use crate::output::bar;
+use crate::output::{bar, print_error};
 use crate::rays::Rays;
 use bvh_core::cost::Objective;
 use bvh_scenes::Scene;
@@ -103,6 +103,9 @@ pub fn decide(
     let mut plans = Vec::new();
     let bar = bar(trials as u64, "{bar:10} trying the choices, {pos} of {len}");
     bar.tick();
+    if bar.is_hidden() {
+        print_error(&format!("trying {trials} combinations of the choices"));
+    }
     for &references in &references {
         for (objective, rays) in &costs {
             // A trial of no work takes seconds in large scenes.
