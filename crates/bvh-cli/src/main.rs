@@ -19,7 +19,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use error::Error;
 use interrupt::INTERRUPTED;
-use output::{answered, print_bytes, print_error};
+use output::{answered, print_bytes, print_error, succeeded};
 use std::process::ExitCode;
 
 #[global_allocator]
@@ -57,7 +57,7 @@ fn main() -> ExitCode {
     // Signals are heard before any work begins.
     interrupt::listen();
     match run(cli.command) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => succeeded(),
         Err(error) => {
             print_error(&format!("error: {error}"));
             ExitCode::from(error.exit_code())

@@ -3,10 +3,15 @@
 use indicatif::{ProgressBar, ProgressStyle};
 use std::borrow::Cow;
 use std::io::{ErrorKind, Write};
-use std::process::{ExitCode, exit};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// Prints text to standard output, and ends the line. Ends the program if that fails, unless the
-/// reader has closed the pipe early, like `head`: results are in files.
+/// True if standard output has lost something.
+static LOST: AtomicBool = AtomicBool::new(false);
+
+/// Prints text to standard output, and ends the line. If that fails, the command goes on, because
+/// its results are in files, and [`succeeded`] tells it at the end. A reader that closes the pipe
+/// early, like `head`, causes no failure.
 pub fn print_line(text: &str) {
     print_bytes(format!("{}\n", plain(text.trim_end())).as_bytes());
 }
@@ -17,10 +22,15 @@ pub fn print_bytes(bytes: &[u8]) {
     let written = out.write_all(bytes).and_then(|()| out.flush());
     if let Err(error) = written
         && error.kind() != ErrorKind::BrokenPipe
+        && !LOST.swap(true, Relaxed)
     {
         print_error(&format!("error: the output could not be written to standard output: {error}"));
-        exit(1);
     }
+}
+
+/// Returns the exit code of a command that has succeeded, a failure if its output was lost.
+pub fn succeeded() -> ExitCode {
+    if LOST.load(Relaxed) { ExitCode::FAILURE } else { ExitCode::SUCCESS }
 }
 
 /// Prints a line to standard error.
@@ -46,7 +56,7 @@ pub fn answered(answer: &clap::Error) -> ExitCode {
         return ExitCode::from(USAGE);
     }
     print_bytes(text.as_bytes());
-    ExitCode::SUCCESS
+    succeeded()
 }
 
 /// Escapes control characters except ends of lines. Names of files and keys of specs come from the

@@ -113,14 +113,14 @@ pub(super) fn save_part(found: &Found, path: &Path, answer: &mut Answer) -> Resu
 /// path at which no folder can be created.
 fn new_folder(path: &Path) -> Result<(), Error> {
     // The nearest existing ancestor decides whether the rest of the path can be created.
-    let above = path.ancestors().find(|above| above.exists());
-    let is_new = above.is_none_or(Path::is_dir) && !path.as_os_str().is_empty();
+    let above = path.ancestors().find(|above| above.exists()).filter(|above| !above.is_dir());
     let is_empty = fs::read_dir(path).map_or(true, |mut entries| entries.next().is_none());
-    if is_new && is_empty {
-        return Ok(());
-    }
-    let accepted = "accepted: the path of a new or empty folder";
-    Err(Error::Usage(format!("--out: {}; {accepted}", path.display())))
+    let found = match above {
+        Some(above) => format!("{} is no folder", above.display()),
+        None if !is_empty => format!("{} contains files", path.display()),
+        None => return Ok(()),
+    };
+    Err(Error::Usage(format!("--out: {found}; accepted: the path of a new or empty folder")))
 }
 
 fn parts(path: &Path) -> Result<gltf::Parts, Error> {

@@ -3,7 +3,9 @@
 // Tests that send signals or make links and pipes are left out on Windows, and their imports stay.
 #![cfg_attr(windows, allow(unused_imports))]
 
-use crate::support::{bvh, facts, names, program, refused, unsaid, words, wrong, wrong_flags};
+use crate::support::{
+    bvh, facts, names, program, refused, said, unsaid, words, wrong, wrong_flags,
+};
 use bvh_core::{Aabb, Bvh, Node, file};
 use bvh_scenes::Scene;
 use std::fs;
@@ -88,8 +90,8 @@ report good.bvh spheres7500 --out=no/x.html ! no is no folder
 report good.bvh spheres75 --out=good.bvh ! --out: good.bvh | .html
 report good.bvh escher --out=x.html ! good.bvh | scene
 export good.bvh spheres75 --for=obvhs --out=x.bvh ! --out | .bin
-bake forest.glb --instances --budget=1h --out=full ! full | new or empty
-bake forest.glb --instances --budget=1h --out=file/x ! file/x | new or empty
+bake forest.glb --instances --budget=1h --out=full ! full contains files | new or empty
+bake forest.glb --instances --budget=1h --out=file/x ! file is no folder | new or empty
 
 bake sofa LONG ! scene sofa: no such scene; accepted: bijou
 bake esher LONG ! no such scene; did you mean escher?
@@ -174,6 +176,7 @@ fn a_full_output_is_an_error_and_a_closed_pipe_is_none() {
     let at = folder.path();
     for line in ["scenes", "--help", "--version", "-h", "bake --help", "help inspect"] {
         unsaid(at, &words(line));
+        said(at, &words(line));
         let mut child = program(at, &words(line)).stdout(Stdio::piped()).spawn().unwrap();
         drop(child.stdout.take());
         assert!(child.wait().unwrap().success(), "{line}");
