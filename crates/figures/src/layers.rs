@@ -89,17 +89,17 @@ impl Layers<'_> {
 
     /// Draws points, smaller if there are many.
     fn points(&self, sheet: &mut Sheet) {
-        let points = |layer: &Layer| match &layer.marks {
-            Marks::Points(points) => points.clone(),
-            _ => vec![],
-        };
-        let count: usize = self.layers.iter().map(|layer| points(layer).len()).sum();
+        let with_points = self.layers.iter().filter_map(|layer| match &layer.marks {
+            Marks::Points(points) => Some((&layer.name, points)),
+            _ => None,
+        });
+        let count: usize = with_points.clone().map(|(_, points)| points.len()).sum();
         // Many large points would hide each other.
         let (radius, edge) = if count < 300 { (5.0, 1.0) } else { (2.5, 0.3) };
-        let shown = |at: Point| Some((self.x.shown(at.0)?, self.y.shown(at.1)?));
-        for layer in self.layers {
-            for at in points(layer).into_iter().filter_map(shown) {
-                self.strokes.of(&layer.name).mark(sheet, self.place(&at), radius, edge);
+        let shown = |at: &Point| Some((self.x.shown(at.0)?, self.y.shown(at.1)?));
+        for (name, points) in with_points {
+            for at in points.iter().filter_map(shown) {
+                self.strokes.of(name).mark(sheet, self.place(&at), radius, edge);
             }
         }
     }
