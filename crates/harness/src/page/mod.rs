@@ -16,6 +16,9 @@ use std::path::{Path, PathBuf};
 
 const STYLE: &str = include_str!("style.css");
 
+/// The figure of error against run time, which `experiments/anytime.toml` makes.
+const OVERVIEW: &str = "timing_overview";
+
 /// One experiment's folder, as read.
 struct Section {
     name: String,
@@ -114,7 +117,7 @@ fn page(sections: &[Section]) -> Markup {
 /// The two pictures that say the most, wherever they are: error against run time, and all checks of
 /// extreme scenes.
 fn pictures(sections: &[Section]) -> Markup {
-    let files = ["timing_overview", stress::FIGURE].map(|name| format!("{name}.svg"));
+    let files = [OVERVIEW, stress::FIGURE].map(|name| format!("{name}.svg"));
     let figures = sections.iter().flat_map(|section| &section.figures);
     html! {
         @for (name, path) in figures.filter(|(name, _)| files.contains(name)) {
@@ -202,4 +205,22 @@ fn in_url(name: &str) -> String {
     // These are the unreserved characters of URLs (RFC 3986); all others are encoded.
     const PLAIN: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
     utf8_percent_encode(name, PLAIN).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::Report;
+    use crate::spec::{Experiment, Overrides};
+
+    #[test]
+    fn the_experiment_about_run_times_draws_the_first_picture() {
+        let spec = concat!(env!("CARGO_MANIFEST_DIR"), "/../../experiments/anytime.toml");
+        let spec = Experiment::read(Path::new(spec), &Overrides::default()).unwrap();
+        let draws = |report: &Report| match report {
+            Report::Query(config) => config.file == OVERVIEW && config.figure.is_some(),
+            _ => false,
+        };
+        assert!(spec.reports.iter().any(draws));
+    }
 }

@@ -189,3 +189,39 @@ fn of_column<'c, 'a>(
 ) -> impl Iterator<Item = &'c Cell<'a>> {
     cells.iter().filter(|cell| cell.column == column.name)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::data::run;
+    use crate::rows::RunRow;
+
+    /// Compares columns, each with the paper's cost and ours on one scene, with the paper.
+    fn compared(columns: &[(&str, f64, f64)]) -> Vec<(String, Verdict)> {
+        let mut rows = Rows::default();
+        let mut config = Config { tolerance: 0.1, ..Config::default() };
+        for &(name, paper, cost) in columns {
+            rows.runs.push(RunRow { cost, base_cost: 1.0, ..run(name, 0, 1, 0) });
+            let paper = BTreeMap::from([("s".into(), paper)]);
+            let (name, method) = (name.into(), name.into());
+            config.columns.push(Column { name, method, paper, ..Column::default() });
+        }
+        let paper = config.write(&rows).unwrap().paper.into_iter();
+        paper.map(|row| (row.ours, row.verdict)).collect()
+    }
+
+    #[test]
+    fn several_readings_of_a_number_of_the_paper_are_one_row_by_the_closest() {
+        let readings = |ours| compared(&[("base", 1.0, 1.0), ("a", 2.0, 500.0), ("b", 2.0, ours)]);
+        // A reading that comes close may still not be the paper's.
+        assert_eq!(readings(1.9), [("1.9000, by b".into(), Verdict::Inconclusive)]);
+        assert_eq!(readings(3.0), [("3.0000, by b".into(), Verdict::Differs)]);
+    }
+
+    #[test]
+    fn columns_of_their_own_have_a_row_each() {
+        let rows = compared(&[("base", 1.0, 1.0), ("10", 1.1, 1.15), ("100", 1.2, 0.9)]);
+        let verdicts: Vec<Verdict> = rows.into_iter().map(|(_, verdict)| verdict).collect();
+        assert_eq!(verdicts, [Verdict::Agrees, Verdict::DiffersLower]);
+    }
+}
