@@ -1,5 +1,6 @@
 //! Keys that several kinds of reports share, and checks of their lists.
 
+use super::query::QueryError;
 use crate::rows;
 use bvh_config::{Accepts, OutOfRange};
 
@@ -92,11 +93,21 @@ pub fn check_file(before: &str, name: &str) -> Result<(), OutOfRange> {
         return Err(OutOfRange::new("file", format!("{name:?}"), "letters, digits, - and _"));
     }
     let csv = format!("{before}{name}.csv");
-    if rows::FILES.contains(&csv.as_str()) {
-        let accepted = format!("a name other than that of {csv}, which runs write");
+    if rows::FILES.contains(&csv.as_str()) || csv == "paper.csv" {
+        let accepted = format!("a name other than that of {csv}, which every experiment writes");
         return Err(OutOfRange::new("file", format!("{name:?}"), accepted));
     }
     Ok(())
+}
+
+/// Rejects the text under `key` if it cannot be read as a part of a query.
+pub(super) fn accept<T>(key: &str, result: Result<T, QueryError>) -> Result<(), OutOfRange> {
+    match result {
+        Err(QueryError::Malformed { found, accepted, .. }) => {
+            Err(OutOfRange::new(key, format!("{found:?}"), accepted))
+        }
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]
@@ -110,6 +121,7 @@ mod tests {
             ("timing_", "builds", true),
             ("timing_", "runs", true),
             ("", "runs", false),
+            ("", "paper", false),
             ("", "timing_history", false),
             ("timing_", "history", false),
             ("", "", false),

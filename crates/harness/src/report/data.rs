@@ -65,7 +65,14 @@ impl Rows {
         }
         // What else lies in the folder is of an earlier experiment.
         if !rows::FILES.contains(&file) || !path.is_file() {
-            let message = "neither a run nor a report before this one writes this file".into();
+            let of_runs = rows::FILES.iter().filter(|file| self.folder.join(file).is_file());
+            let made = self.made.iter().map(|(name, _)| format!("{name}.csv"));
+            let accepted: Vec<String> =
+                of_runs.map(|file| (*file).to_owned()).chain(made).collect();
+            let message = format!(
+                "neither these runs nor a report before this one write this file; accepted: {}",
+                accepted.join(", ")
+            );
             return Err(Error::Query { path, message });
         }
         rows::read(&path)

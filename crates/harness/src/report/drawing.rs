@@ -1,10 +1,10 @@
 //! Figures of tables: named rows with a dot per value, or lines through values.
 
-use super::config::Series;
+use super::config::{Series, accept};
 use super::data::{distinct, grouped};
 use super::prelude::*;
-use super::query::{Conditions, QueryError, Row, cell, number_in};
-use bvh_config::Nested;
+use super::query::{self, Conditions, QueryError, Row, cell, number_in};
+use bvh_config::{Nested, OutOfRange};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -16,6 +16,9 @@ bvh_config::config! { serde;
         /// Conditions on the rows that are drawn.
         #[serde(skip_serializing_if = "String::is_empty")]
         select: String;
+        /// Conditions on the rows that are drawn before the others.
+        #[serde(skip_serializing_if = "String::is_empty")]
+        first: String;
         /// The shape of the marks.
         marks: Shape;
         /// Columns whose values are the panels; by default there is one panel.
@@ -50,12 +53,17 @@ bvh_config::config! { serde;
         log_y: bool;
         /// True for fractions along the vertical axis, which are written in per cent.
         percent_y: bool;
-        /// Names in words for scenes, rows and series, by what they are called in the table.
+        /// Ends of the vertical axis for lines, by the column `y`; by default around the values.
+        #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+        ranges: BTreeMap<String, [f64; 2]>, in 0.0..=1e300;
+        /// Names in words for scenes, rows and series, by what they are called in the table; for
+        /// lines also labels of the vertical axis by the column `y`, in place of `y_label`.
         names: BTreeMap<String, String>;
         /// The value of a line across all rows, such as 1 for ratios, or at this height.
         #[serde(skip_serializing_if = "Option::is_none")]
         line_at: Option<f64>, in 0.0..=1e300;
     }
+    check Self::check_conditions;
 }
 
 /// The shape of marks.
@@ -65,6 +73,8 @@ pub enum Shape {
     /// Named rows with a dot per value.
     #[default]
     Rows,
+    /// Points alone.
+    Points,
     /// Points with a line through them.
     Lines,
     /// Staircases: each value holds until the next.
@@ -80,19 +90,25 @@ pub(super) struct Point {
 }
 
 impl Drawing {
-    /// Adds the figure of a report's first table.
+    fn check_conditions(&self) -> Result<(), OutOfRange> {
+        accept("select", Conditions::parse(&self.select))?;
+        accept("first", Conditions::parse(&self.first))
+    }
+
+    /// Adds the figure of a report's first table, in place of the report's own of this name.
     pub(super) fn draw(&self, rows: &Rows, output: &mut Output) -> Result<(), Error> {
         let table = output.table()?;
-        let table = self.selected(&table).map_err(|error| Error::Query {
+        let table = self.selected(table).map_err(|error| Error::Query {
             path: rows.folder.clone(),
             message: format!("figure: {error}"),
         })?;
         let name = output.csv[0].0.clone();
+        output.figures.retain(|(own, _)| *own != name);
         output.add_figure(name, &self.caption, self.per_row, self.panels(rows, &table));
         Ok(())
     }
 
-    fn selected(&self, table: &[Row]) -> Result<Vec<Row>, QueryError> {
+    fn selected(&self, table: Vec<Row>) -> Result<Vec<Row>, QueryError> {
         let of_lists = self.panels.iter().chain(&self.series).chain(self.ends.iter().flatten());
         let columns = self.y.split(", ").chain([self.x.as_str(), &self.beside]);
         let columns = columns.chain(of_lists.map(String::as_str));
@@ -100,12 +116,17 @@ impl Drawing {
             let mut named = columns.filter(|name| !name.is_empty());
             named.try_for_each(|name| cell(row, name).map(drop))?;
         }
-        let conditions = Conditions::parse(&self.select)?;
-        let mut selected = Vec::new();
-        for row in table {
-            selected.extend(conditions.are_met(row)?.then(|| row.clone()));
+        let selected = match query::select(table, &self.select) {
+            // A figure may be of rows that these runs lack, such as those of quick variants.
+            Err(QueryError::NoRow(_)) => vec![],
+            selected => selected?,
+        };
+        let first = Conditions::parse(&self.first)?;
+        let (mut before, mut after) = (vec![], vec![]);
+        for row in selected {
+            if first.are_met(&row)? { before.push(row) } else { after.push(row) }
         }
-        Ok(selected)
+        Ok([before, after].concat())
     }
 
     /// Returns one panel for all rows that agree in the columns `panels`.
@@ -139,8 +160,9 @@ impl Drawing {
         layers.extend(self.line_at.map(|at| Layer::new("", Marks::HLine(at))));
         let unit = if self.percent_y { Unit::Percent } else { Unit::Number };
         let label = self.names.get(y).unwrap_or(&self.y_label);
-        let (x, y) = (axis(&self.x_label, self.log_x), axis(label, self.log_y));
-        panel(title, x, y.unit(unit), layers)
+        let range = self.ranges.get(y).map(|&[low, high]| (low, high));
+        let y = Axis { unit, range, ..axis(label, self.log_y) };
+        panel(title, axis(&self.x_label, self.log_x), y, layers)
     }
 
     /// Draws a row per name, in which the series are below each other.
@@ -210,8 +232,9 @@ impl Drawing {
     /// Returns the ends of the interval of the value in a column.
     fn ends_in(&self, row: &Row, column: &str) -> Option<(f64, f64)> {
         let end = |end: &str| number_in(row, &format!("{column}{end}"));
+        let is_last = self.y.split(", ").last() == Some(column);
         match &self.ends {
-            Some(_) if self.marks != Shape::Rows && !self.y.ends_with(column) => None,
+            Some(_) if self.marks != Shape::Rows && !is_last => None,
             Some([low, high]) => number_in(row, low).zip(number_in(row, high)),
             None => end("_low").zip(end("_high")),
         }
@@ -219,22 +242,23 @@ impl Drawing {
 }
 
 /// Draws a line through points, x ascending, on the band between the ends of their intervals. A
-/// single point has a mark and a line from end to end.
+/// single point, and every one of points alone, has a mark and a line from end to end.
 pub(super) fn curve(series: &str, points: &[Point], shape: Shape) -> Vec<Layer> {
     let path = match shape {
         Shape::Steps => stairs(points),
         _ => points.to_vec(),
     };
     let places = |points: &[Point]| points.iter().map(|at| (at.x, at.y)).collect();
-    let range = match path[..] {
-        [Point { x, ends: Some((low, high)), .. }] => Marks::Spans(vec![[(x, low), (x, high)]]),
-        _ => {
-            let ends = |at: &Point| at.ends.map(|(low, high)| (at.x, low, high));
-            Marks::Band(path.iter().filter_map(ends).collect())
-        }
-    };
-    let mut marks = vec![range, Marks::Line(places(&path))];
-    if shape == Shape::Lines || points.len() == 1 {
+    let ends = path.iter().filter_map(|at| at.ends.map(|(low, high)| (at.x, low, high)));
+    let mut marks = vec![if shape == Shape::Points || points.len() == 1 {
+        Marks::Spans(ends.map(|(x, low, high)| [(x, low), (x, high)]).collect())
+    } else {
+        Marks::Band(ends.collect())
+    }];
+    if shape != Shape::Points {
+        marks.push(Marks::Line(places(&path)));
+    }
+    if shape != Shape::Steps || points.len() == 1 {
         marks.push(Marks::Points(places(points)));
     }
     marks.into_iter().map(|marks| Layer::new(series, marks)).collect()
@@ -254,4 +278,99 @@ fn texts_in(row: &Row, columns: &[String]) -> String {
 
 fn axis(label: &str, is_log: bool) -> Axis {
     if is_log { Axis::log(label) } else { Axis::linear(label) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rows::csv_file::parse;
+    use std::path::Path;
+
+    const TABLE: &str = "scene,method,cost,cost_low,cost_high,base_cost,least,paper,seconds
+a,x,2,1,3,4,0.5,2.5,1
+a,y,4,,,4,,,2
+b,x,8,7,9,16,6,,1
+";
+
+    /// Returns the panels of a figure of the table.
+    fn panels(config: &str) -> Vec<Panel> {
+        let config: Drawing = toml::from_str(config).unwrap();
+        let table = config.selected(parse(TABLE.as_bytes(), Path::new("table")).unwrap());
+        config.panels(&Rows::default(), &table.unwrap())
+    }
+
+    /// Returns the title, the label and the marks of each panel, without layers that have none.
+    fn drawn(config: &str) -> Vec<String> {
+        let layer = |layer: &Layer| format!("; {} {:?}", layer.name, layer.marks);
+        let in_words = |panel: Panel| {
+            let layers = panel.layers.iter().map(layer).filter(|text| !text.ends_with("([])"));
+            format!("{} {}{}", panel.title, panel.y.label, layers.collect::<String>())
+        };
+        panels(config).into_iter().map(in_words).collect()
+    }
+
+    #[test]
+    fn a_figure_has_the_panels_series_and_intervals_that_its_keys_say() {
+        for (config, expected) in [
+            (
+                "x = 'cost'\ny = 'scene'\nseries = ['method']\nselect = 'scene=a'\nbeside = 'paper'",
+                &[" ; x Spans([[(1.0, -0.2), (3.0, -0.2)]]); x Points([(2.0, -0.2)]); \
+                   y Points([(4.0, 0.2)]); paper Points([(2.5, -0.2)])"][..],
+            ),
+            (
+                "x = 'cost'\ny = 'scene, method'\nselect = 'scene=b'\nends = ['least', 'cost']\nline_at = 1.0",
+                &[" ;  Spans([[(6.0, 0.0), (8.0, 0.0)]]);  Points([(8.0, 0.0)]);  VLine(1.0)"],
+            ),
+            (
+                "marks = 'lines'\nx = 'seconds'\ny = 'cost'\nselect = 'scene=a'\ny_label = 'c'",
+                &[" c;  Band([(1.0, 1.0, 3.0)]);  Line([(1.0, 2.0), (2.0, 4.0)]);  \
+                   Points([(1.0, 2.0), (2.0, 4.0)])"],
+            ),
+            (
+                "marks = 'steps'\nx = 'seconds'\ny = 'cost'\nselect = 'scene=a'\nends = ['paper', 'paper']",
+                &[" ;  Band([(1.0, 2.5, 2.5), (2.0, 2.5, 2.5)]);  \
+                   Line([(1.0, 2.0), (2.0, 2.0), (2.0, 4.0)])"],
+            ),
+            (
+                "marks = 'points'\nx = 'seconds'\ny = 'cost'\nselect = 'method=x'",
+                &[" ;  Spans([[(1.0, 1.0), (1.0, 3.0)], [(1.0, 7.0), (1.0, 9.0)]]);  \
+                   Points([(1.0, 2.0), (1.0, 8.0)])"],
+            ),
+            // Ends belong to the last column, also where its name ends in that of another.
+            (
+                "marks = 'points'\nx = 'seconds'\ny = 'cost, base_cost'\nends = ['least', 'cost']\n\
+                 select = 'scene=b'\ny_label = 'c'\nnames = { base_cost = 'greedy' }",
+                &[
+                    " c;  Points([(1.0, 8.0)])",
+                    " greedy;  Spans([[(1.0, 6.0), (1.0, 8.0)]]);  Points([(1.0, 16.0)])",
+                ],
+            ),
+            (
+                "marks = 'points'\nx = 'seconds'\ny = 'base_cost'\npanels = ['scene']\nfirst = 'scene=b'",
+                &["b ;  Points([(1.0, 16.0)])", "a ;  Points([(1.0, 4.0), (2.0, 4.0)])"],
+            ),
+            (
+                "marks = 'points'\nx = 'cost'\ny = 'base_cost'\nselect = 'seconds=max'",
+                &[" ;  Points([(4.0, 4.0)])"],
+            ),
+            ("marks = 'points'\nx = 'cost'\ny = 'base_cost'\nselect = 'scene=c'", &[]),
+        ] {
+            assert_eq!(drawn(config), expected, "{config}");
+        }
+    }
+
+    #[test]
+    fn panels_have_the_same_axes_if_asked_and_the_range_that_a_column_has() {
+        let common = "marks = 'points'\nx = 'seconds'\npanels = ['scene']\n";
+        let axes = |config: &str| -> Vec<_> {
+            let panels = panels(&format!("{common}{config}")).into_iter();
+            panels.map(|panel| (panel.x.range, panel.y.range)).collect()
+        };
+        let shared = axes("y = 'cost'\nsame_axes = true");
+        let (low, high) = shared[0].1.unwrap();
+        assert!(shared.len() == 2 && shared[0] == shared[1] && low < 2.0 && high > 8.0);
+        let ranges = axes("y = 'cost, paper'\nranges = { paper = [0.0, 1.0] }");
+        let paper = (None, Some((0.0, 1.0)));
+        assert_eq!(ranges, [(None, None), paper, (None, None), paper]);
+    }
 }

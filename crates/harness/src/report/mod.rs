@@ -33,7 +33,6 @@ use output::Output;
 use paper::PaperRow;
 use query_column::Column;
 use serde::{Deserialize, Deserializer, Serialize};
-use std::collections::HashSet;
 use std::path::Path;
 
 /// Declares the kinds of reports: name in specs (in snake case), configuration and its keys that
@@ -124,6 +123,30 @@ impl Report {
         }
     }
 
+    /// Returns the CSV files that the report may make; those of its figures have their names.
+    pub fn files(&self) -> Vec<String> {
+        let names = match self {
+            Self::Table(_) => vec!["table"],
+            Self::Trials(_) => vec!["trials"],
+            Self::Generations(_) => vec!["generations"],
+            Self::Distribution(_) => vec!["distribution"],
+            Self::Correlation(_) => vec!["correlation"],
+            Self::Anytime(config) => return vec![format!("timing_{}.csv", config.file)],
+            Self::Gaps(_) => vec!["gaps"],
+            Self::Numbers(_) => vec!["numbers", "timing_numbers", "timing_to_target"],
+            Self::RayCost(_) => vec!["ray_cost", "ray_cost_pairs"],
+            Self::Query(config) => vec![config.file.as_str()],
+        };
+        names.into_iter().map(|name| format!("{name}.csv")).collect()
+    }
+
+    /// Returns the CSV files that the report reads by name, each with its key.
+    pub fn reads(&self) -> Vec<(&str, &str)> {
+        let Self::Query(config) = self else { return vec![] };
+        let files = [("rows", config.rows.as_str()), ("join", &config.join)];
+        files.into_iter().filter(|(key, file)| *key == "rows" || !file.is_empty()).collect()
+    }
+
     /// Returns true if the report measures gaps, for which it needs the times of events.
     pub fn needs_references(&self) -> bool {
         matches!(self, Self::Anytime(_) | Self::Numbers(_))
@@ -137,6 +160,10 @@ pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> 
     let mut outputs = Vec::new();
     for report in reports {
         let output = report.write(&rows)?;
+        let known = report.files();
+        let figures = output.figures.iter().map(|(name, _)| name);
+        let mut made = output.csv.iter().map(|(name, _)| name).chain(figures);
+        debug_assert!(made.all(|name| known.contains(&format!("{name}.csv"))), "{known:?}");
         rows.made.extend(output.csv.clone());
         outputs.push(output);
     }
@@ -149,25 +176,7 @@ pub fn outputs(reports: &[Report], folder: &Path) -> Result<Vec<Output>, Error> 
     if !paper.is_empty() {
         outputs.push(beside_paper(&paper)?);
     }
-    check_names(&outputs, folder)?;
     Ok(outputs)
-}
-
-/// Rejects reports of which one would overwrite what another made.
-fn check_names(outputs: &[Output], folder: &Path) -> Result<(), Error> {
-    let mut names = HashSet::new();
-    for output in outputs {
-        let tables = output.csv.iter().map(|(name, _)| format!("{name}.csv"));
-        let figures = output.figures.iter().map(|(name, _)| format!("{name}.svg"));
-        for name in tables.chain(figures) {
-            let path = folder.join(&name);
-            if !names.insert(name) {
-                let message = "two reports make this file; expected another `file` in one of them";
-                return Err(Error::Query { path, message: message.into() });
-            }
-        }
-    }
-    Ok(())
 }
 
 /// Writes the output of reports into the store's folder; figures, as SVG, only if `drawn` is true.
@@ -216,4 +225,24 @@ fn beside_paper(rows: &[PaperRow]) -> Result<Output, Error> {
     output.show(explanation, rows, "scene quantity paper ours ours_low ours_high verdict")?;
     output.paper = rows.to_vec();
     Ok(output)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_figure_of_a_spec_replaces_the_one_of_its_kind() {
+        for (kind, keys) in [
+            ("distribution", "methods = ['a']"),
+            ("generations", "method = 'a'\nbaseline = 'b'"),
+            ("anytime", "methods = ['a']"),
+        ] {
+            let text = format!("kind = '{kind}'\n{keys}\nfigure = {{ caption = 'mine' }}");
+            let report: Report = toml::from_str(&text).unwrap();
+            let figures = report.write(&Rows::default()).unwrap().figures;
+            let captions: Vec<&str> = figures.iter().map(|(_, figure)| &*figure.caption).collect();
+            assert_eq!(captions, ["mine"], "{kind}");
+        }
+    }
 }

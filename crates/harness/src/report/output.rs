@@ -3,7 +3,7 @@
 
 use super::colours::hue;
 use super::paper::PaperRow;
-use super::query::Row;
+use super::query::{Row, cell};
 use crate::Error;
 use crate::rows::csv_file::{bytes_of, parse, to_bytes};
 use comfy_table::{Table, presets};
@@ -104,19 +104,16 @@ impl Output {
         columns: &[impl AsRef<str>],
     ) -> Result<(), Error> {
         let path = Path::new("table");
-        let mut reader = csv::Reader::from_reader(bytes);
-        let header = reader.headers().map_err(Error::csv(path))?.clone();
-        // Columns are found by name, so that tables do not depend on their order in the file.
         let columns: Vec<&str> = columns.iter().map(AsRef::as_ref).collect();
-        let shown: Vec<usize> = columns
-            .iter()
-            .filter_map(|column| header.iter().position(|name| name == *column))
-            .collect();
         let mut table = Table::new();
-        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(columns);
-        for record in reader.records() {
-            let record = record.map_err(Error::csv(path))?;
-            table.add_row(shown.iter().map(|&at| four_digits(&record[at])));
+        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(&columns);
+        for row in parse::<Row>(bytes, path)? {
+            let cells =
+                columns.iter().map(|column| cell(&row, column).map(|text| four_digits(text)));
+            let cells: Vec<String> = cells
+                .collect::<Result<_, _>>()
+                .map_err(|error| Error::Query { path: path.into(), message: error.to_string() })?;
+            table.add_row(cells);
         }
         self.tables.push((explanation.into(), table));
         Ok(())
@@ -165,6 +162,15 @@ pub fn panel(title: impl Into<String>, x: Axis, y: Axis, layers: Vec<Layer>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_table_shows_columns_by_name_and_rejects_those_that_its_rows_lack() {
+        let mut output = Output::default();
+        output.show_csv("All:", b"scene,cost\ns,1.23456\n", &["cost", "scene"]).unwrap();
+        assert!(output.text().contains("│ 1.235 ┆ s     │"), "{}", output.text());
+        let error = output.show_csv("All:", b"scene\ns\n", &["cost"]).unwrap_err().to_string();
+        assert!(error.contains("no column \"cost\"; accepted: scene"), "{error}");
+    }
 
     #[test]
     fn numbers_are_shown_with_four_digits_and_whole_ones_whole() {

@@ -158,19 +158,21 @@ pub fn select(rows: Vec<Row>, conditions: &str) -> Result<Vec<Row>, QueryError> 
 }
 
 /// Returns each row with the columns of every other row that agrees with it in all common columns.
-pub fn join(rows: &[Row], others: &[Row]) -> Vec<Row> {
+/// The rows of either list have the same columns.
+pub fn join(rows: &[Row], others: &[Row]) -> Result<Vec<Row>, QueryError> {
+    let Some((row, other)) = rows.first().zip(others.first()) else { return Ok(vec![]) };
+    let common = other.keys().filter(|column| row.contains_key(*column));
+    let common: Vec<&str> = common.map(String::as_str).collect();
+    let others = grouped(others, &common)?;
     let mut joined = Vec::new();
     for row in rows {
-        let agrees = |other: &&Row| {
-            other.iter().all(|(column, text)| row.get(column).is_none_or(|own| own == text))
-        };
-        for other in others.iter().filter(agrees) {
-            let mut both = row.clone();
-            both.extend(other.clone());
-            joined.push(both);
+        let values = common.iter().map(|column| cell(row, column).cloned());
+        let agreeing = others.get(&values.collect::<Result<Vec<_>, _>>()?);
+        for other in agreeing.into_iter().flatten() {
+            joined.push(row.clone().into_iter().chain((*other).clone()).collect());
         }
     }
-    joined
+    Ok(joined)
 }
 
 /// Returns the rows by their values in some columns, in the order of the file.
@@ -184,4 +186,44 @@ pub fn grouped<'r>(
         groups.entry(values.collect::<Result<_, _>>()?).or_default().push(row);
     }
     Ok(groups)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rows::csv_file::parse;
+    use std::path::Path;
+
+    #[test]
+    fn a_row_is_joined_with_all_that_agree_in_every_common_column() {
+        let rows = |text: &str| parse::<Row>(text.as_bytes(), Path::new("rows")).unwrap();
+        let texts = |rows: Vec<Row>| {
+            let texts = rows.iter().map(|row| row.values().cloned().collect::<Vec<_>>().join(" "));
+            texts.collect::<Vec<_>>()
+        };
+        let runs = rows("scene,method,cost\nb,x,1\na,x,2\nb,y,3\nc,x,4\n");
+        for (others, expected) in [
+            (
+                "method,rays,scene\nx,7,a\nx,8,b\nx,9,b\nz,6,b\n",
+                &["b x 1 8", "b x 1 9", "a x 2 7"][..],
+            ),
+            ("scene\nb\n", &["b x 1", "b y 3"]),
+            (
+                "light\non\noff\n",
+                &[
+                    "b x 1 on",
+                    "b x 1 off",
+                    "a x 2 on",
+                    "a x 2 off",
+                    "b y 3 on",
+                    "b y 3 off",
+                    "c x 4 on",
+                    "c x 4 off",
+                ],
+            ),
+            ("scene\n", &[]),
+        ] {
+            assert_eq!(texts(join(&runs, &rows(others)).unwrap()), expected, "{others}");
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! A table of some rows of a CSV file, by the language of [`query`]: selected,
 //! grouped, aggregated, compared with a base, and drawn.
 
-use super::config::check_file;
+use super::config::{accept, check_file};
 use super::output::table_bytes;
 use super::paper::PaperRow;
 use super::prelude::*;
@@ -42,13 +42,13 @@ report! {
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let mut selected = rows.read_file(&self.rows)?;
-        if !self.join.is_empty() {
-            selected = query::join(&selected, &rows.read_file(&self.join)?);
-        }
         let path = rows.folder.join(&self.rows);
         let named =
             |error: QueryError| Error::Query { path: path.clone(), message: error.to_string() };
+        let mut selected = rows.read_file(&self.rows)?;
+        if !self.join.is_empty() {
+            selected = query::join(&selected, &rows.read_file(&self.join)?).map_err(named)?;
+        }
         let selected = query::select(selected, &self.select).map_err(named)?;
         let table = self.table(&selected).map_err(named)?;
         let mut output = Output::default();
@@ -153,17 +153,12 @@ impl Config {
         accept("base", Conditions::parse(&self.base))?;
         for (index, column) in self.columns.iter().enumerate() {
             accept(&format!("columns[{index}].value"), Measure::parse(&column.value))?;
+            for (at, of_paper) in column.paper.iter().enumerate() {
+                let key = format!("columns[{index}].paper[{at}].row");
+                accept(&key, Conditions::parse(&of_paper.row))?;
+            }
         }
         Ok(())
-    }
-}
-
-fn accept<T>(key: &str, result: Result<T, QueryError>) -> Result<(), OutOfRange> {
-    match result {
-        Err(QueryError::Malformed { found, accepted, .. }) => {
-            Err(OutOfRange::new(key, format!("{found:?}"), accepted))
-        }
-        _ => Ok(()),
     }
 }
 
@@ -179,8 +174,8 @@ mod tests {
     use bvh_config::Check;
     use figures::Scale;
 
-    /// Makes the report of a spec's table over two earlier ones, in which `b` costs less than `a` and less
-    /// so with every repetition.
+    /// Makes the report of a spec's table over two earlier ones, in which `b` costs less than `a`
+    /// and less so with every repetition.
     fn made(config: &str) -> Result<Output, String> {
         let mut costs = String::from("scene,method,repetition,cost\n");
         let mut seconds = String::from("scene,method,repetition,seconds\n");
@@ -262,6 +257,12 @@ mod tests {
             ("select = 'method'", "select"),
             ("base = 'work<much'", "base"),
             ("columns = [{ name = 'c', value = 'mean cost' }]", "columns[0].value"),
+            (
+                "columns = [{ value = 'max cost', paper = [{ row = 'escher' }] }]",
+                "columns[0].paper[0].row",
+            ),
+            ("figure = { select = 'scene' }", "figure.select"),
+            ("figure = { first = 'cost>much' }", "figure.first"),
         ] {
             let mut config: toml::Table =
                 "file = 'x'\nrows = 'runs.csv'\nby = ['scene']".parse().unwrap();

@@ -5,6 +5,7 @@
 use super::Experiment;
 use crate::contestant::{Contestant, EntryOptions, Labelled};
 use crate::peers;
+use crate::rows;
 use bvh_config::OutOfRange;
 use bvh_scenes::subset;
 use bvh_search::{Budget, Method, best};
@@ -20,6 +21,7 @@ impl Experiment {
         self.check_scenes()?;
         self.check_run_count()?;
         self.check_labels()?;
+        self.check_files()?;
         if self.lower_bound.is_some() {
             peers::others("lower_bound")?;
         }
@@ -136,6 +138,31 @@ impl Experiment {
         let accepted = "`budget = { max_work = 300_000_000 }`, some seconds on one thread, here or \
                         for all methods, or another `work_per_object`";
         Err(OutOfRange::new("budget", found, accepted))
+    }
+
+    /// Rejects a file that no run and no earlier report writes, and one that two reports make.
+    fn check_files(&self) -> Result<(), OutOfRange> {
+        let mut known: Vec<String> = rows::FILES.iter().map(|file| (*file).to_owned()).collect();
+        for (index, report) in self.reports.iter().enumerate() {
+            let rejected = |key: &str, found: String, accepted: String| {
+                Err(OutOfRange::new(format!("reports[{index}].{key}"), found, accepted))
+            };
+            for (key, file) in report.reads() {
+                if !known.iter().any(|known| known == file) {
+                    let found =
+                        format!("{file:?}, which no run and no report before this one writes");
+                    return rejected(key, found, known.join(", "));
+                }
+            }
+            for file in report.files() {
+                if known.contains(&file) {
+                    let accepted = "one report that makes it, or another `file` in one of them";
+                    return rejected("kind", format!("a second {file}"), accepted.into());
+                }
+                known.push(file);
+            }
+        }
+        Ok(())
     }
 
     /// Rejects a label of two methods, and a label in a report that no method has.

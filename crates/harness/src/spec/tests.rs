@@ -49,6 +49,22 @@ const WRONG_LINES: &[(&str, &[&str])] = &[
         "[[reports]]\nkind = 'anytime'\nmethods = ['grasp']\nfile = '../../x'",
         &["reports[0].file is \"../../x\"", "letters, digits"],
     ),
+    // Found before hours of runs, not after them.
+    (
+        "[[reports]]\nkind = 'query'\nfile = 'x'\nby = ['scene']\nrows = 'table.csv'\n\
+         [[reports]]\nkind = 'table'\ncolumns = [{ method = 'grasp' }]",
+        &["reports[0].rows is \"table.csv\"", "no report before", "runs.csv, "],
+    ),
+    (
+        "[[reports]]\nkind = 'gaps'\nmethods = ['grasp']\noptimum = 'grasp'\n\
+         [[reports]]\nkind = 'query'\nfile = 'x'\nby = ['scene']\nrows = 'gaps.csv'\njoin = 'gap.csv'",
+        &["reports[1].join is \"gap.csv\"", ", gaps.csv"],
+    ),
+    (
+        "[[reports]]\nkind = 'trials'\nmethods = ['grasp']\n\
+         [[reports]]\nkind = 'trials'\nmethods = ['grasp']",
+        &["reports[1].kind is a second trials.csv", "one report that makes it"],
+    ),
 ];
 
 /// The methods of a spec, and the parts of the error.
