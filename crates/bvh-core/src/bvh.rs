@@ -100,7 +100,8 @@ impl Node {
 /// Node 0 is the root. The children of a node are adjacent and come after their parent. An inner
 /// node has two *or more* children, because Goldsmith–Salmon trees need wide nodes. Leaves refer to
 /// ranges of `prim_ids`, a permutation of the objects. A tree over no objects has no nodes.
-/// [`validate`](crate::validate()) checks all of this.
+/// [`validate`](crate::validate()) checks all of this. A function on a tree that it rejects may panic,
+/// not return or take all memory, unless the function says that it checks the tree.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Bvh {
     /// The nodes; one entry per node, the root first.
