@@ -76,28 +76,44 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     };
     let extent = Extent { existing, runs: args.runs.clone(), ..Extent::default() };
     let mut differences = 0;
-    for experiment in &experiments {
-        if args.check {
-            differences += check(args, experiment, interrupted)?;
-            continue;
-        }
-        let is_new = args.redraw || args.force || !args.runs.is_empty();
-        let is_over = args.resume && !repeated(experiment, &args.out).is_dir();
-        if !is_new && !is_over && finish::has_results_of(experiment, &args.out)? {
-            differences += repeat(experiment, &args.out, &extent, interrupted, args.quiet)?;
-            continue;
-        }
-        let summary = if args.redraw {
-            finish::redraw(experiment, &args.out)?
-        } else {
-            execute(experiment, &args.out, &extent, interrupted)?
-        };
-        summary.remarks.iter().for_each(|remark| print_error(remark));
-        if !args.quiet {
-            print_summary(experiment, &summary);
-        }
+    for (path, experiment) in args.specs.iter().zip(&experiments) {
+        differences += perform(args, experiment, &extent, interrupted).map_err(|error| {
+            let named = |fault| Error::Usage(format!("{}: scenes: {fault}", path.display()));
+            match error {
+                Error::Scene(fault) if args.overrides.scenes.is_empty() => named(fault),
+                error => error,
+            }
+        })?;
     }
     if differences > 0 { Err(Error::Differs { differences }) } else { Ok(()) }
+}
+
+/// Runs one experiment, or does with it what the flags say. Returns the number of differences from
+/// earlier results.
+fn perform(
+    args: &RunArgs,
+    experiment: &Experiment,
+    extent: &Extent,
+    interrupted: &AtomicBool,
+) -> Result<usize, Error> {
+    if args.check {
+        return check(args, experiment, interrupted);
+    }
+    let is_new = args.redraw || args.force || !args.runs.is_empty();
+    let is_over = args.resume && !repeated(experiment, &args.out).is_dir();
+    if !is_new && !is_over && finish::has_results_of(experiment, &args.out)? {
+        return repeat(experiment, &args.out, extent, interrupted, args.quiet);
+    }
+    let summary = if args.redraw {
+        finish::redraw(experiment, &args.out)?
+    } else {
+        execute(experiment, &args.out, extent, interrupted)?
+    };
+    summary.remarks.iter().for_each(|remark| print_error(remark));
+    if !args.quiet {
+        print_summary(experiment, &summary);
+    }
+    Ok(0)
 }
 
 pub(super) fn print_summary(experiment: &Experiment, summary: &Summary) {

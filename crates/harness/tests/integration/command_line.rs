@@ -133,7 +133,10 @@ fn mistakes_are_named_before_any_work() {
     for (args, parts) in [
         (&["missing.toml"][..], &["missing.toml"][..]),
         (&["key.toml"], &["key.toml", "repetition", "repetitions"]),
-        (&["scene.toml"], &["sofa", "accepted: bijou, cloister, escher, konistil"]),
+        (
+            &["scene.toml"],
+            &["scene.toml: scenes: ", "sofa", "accepted: bijou, cloister, escher, konistil"],
+        ),
         (&["spec.toml", "--scene", "nan.obj"], &["nan.obj:2", "nan"]),
         (&["spec.toml", "--scene", "empty.obj"], &["empty.obj: empty"]),
         (&["spec.toml", "--scene", "none.obj"], &["none.obj", "no such file"]),
