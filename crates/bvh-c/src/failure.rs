@@ -101,7 +101,7 @@ pub(crate) fn array<T>(action: impl FnOnce() -> Result<*const T, Failure>) -> *c
 /// `pointer` is null or not aligned, or points to a `T` that nobody changes while the result is in
 /// use.
 pub(crate) unsafe fn given<'a, T>(name: &str, pointer: *const T) -> Result<&'a T, Failure> {
-    // SAFETY: `pointer` points to a `T` that nobody changes meanwhile.
+    // SAFETY: what the caller promises for one element.
     unsafe { slice(name, pointer, 1) }.map(|one| &one[0])
 }
 
@@ -111,7 +111,7 @@ pub(crate) unsafe fn given<'a, T>(name: &str, pointer: *const T) -> Result<&'a T
 /// `pointer` is null or not aligned, or points to a `T` that nobody else uses while the result is
 /// in use.
 pub(crate) unsafe fn given_mut<'a, T>(name: &str, pointer: *mut T) -> Result<&'a mut T, Failure> {
-    // SAFETY: `pointer` points to a `T` that nobody else uses meanwhile.
+    // SAFETY: what the caller promises for one element.
     unsafe { slice_mut(name, pointer, 1) }.map(|one| &mut one[0])
 }
 
@@ -133,7 +133,8 @@ fn check<T>(name: &str, first: *const T, count: usize) -> Result<(), Failure> {
 /// Returns the array with this first element and length. An empty array may be null.
 ///
 /// # Safety
-/// `first` points to `count` elements that nobody changes while the result is in use.
+/// `first` is null or not aligned, or points to `count` elements that nobody changes while the result
+/// is in use.
 pub(crate) unsafe fn slice<'a, T>(
     name: &str,
     first: *const T,
@@ -151,7 +152,8 @@ pub(crate) unsafe fn slice<'a, T>(
 /// Returns the array for results with this first element and length. An empty array may be null.
 ///
 /// # Safety
-/// `first` points to `count` elements that nobody else uses while the result is in use.
+/// `first` is null or not aligned, or points to `count` elements that nobody else uses while the
+/// result is in use.
 pub(crate) unsafe fn slice_mut<'a, T>(
     name: &str,
     first: *mut T,

@@ -67,7 +67,7 @@ impl Ray {
         if !(is_finite & Self::DIRECTION_RANGE.contains(&longest) & is_range) {
             return Err(Self::why_not(origin, direction, t_min, t_max));
         }
-        Ok(Self::assume_valid(origin, direction, t_min, t_max))
+        Ok(Self::made(origin, direction, t_min, t_max))
     }
 
     /// Makes a ray like [`new`](Self::new), without the checks, for callers who know that they
@@ -83,15 +83,19 @@ impl Ray {
     ) -> Self {
         let origin = origin.into();
         let direction = direction.into();
-        let inverse = (1.0 / direction.extend(1.0)).max(Vec4::MIN).min(Vec4::MAX);
-        let sizes = inverse.abs();
-        let least = sizes.x.min(sizes.y).min(sizes.z);
         // The products of infinity and zero are no numbers, which would enter unused lanes of nodes
         // and never end. An empty range enters nothing.
         let is_finite = (origin.extend(0.0).abs().cmple(Vec4::MAX)
             & direction.extend(0.0).abs().cmple(Vec4::MAX))
         .all();
-        let t_max = if is_finite { t_max } else { -1.0 };
+        Self::made(origin, direction, t_min, if is_finite { t_max } else { -1.0 })
+    }
+
+    #[inline]
+    fn made(origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Self {
+        let inverse = (1.0 / direction.extend(1.0)).max(Vec4::MIN).min(Vec4::MAX);
+        let sizes = inverse.abs();
+        let least = sizes.x.min(sizes.y).min(sizes.z);
         // Adding 0 turns −0 into +0, so no kernel returns a distance of −0.
         // A range that began below 0 would have entries below 0, and kernels sort entries by
         // their bits.

@@ -174,7 +174,8 @@ fn by_crossings(
     // A point outside the box is outside the mesh: its range is empty. NaN fails every comparison.
     let half_line = |&point: &Vec3| match wide.bounds.contains(&Aabb { min: point, max: point }) {
         true => Ray::assume_valid(point, Vec3::X, 0.0, f32::MAX),
-        false => Ray::assume_valid(Vec3::ZERO, Vec3::X, 1.0, 0.0),
+        // From the box, because a ray from afar would be traced alone and in f64.
+        false => Ray::assume_valid(wide.bounds.min, Vec3::X, 1.0, 0.0),
     };
     let rays: Vec<Ray> = points.iter().map(half_line).collect();
     let mut hits = Vec::new();

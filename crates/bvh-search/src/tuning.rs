@@ -142,7 +142,7 @@ tuned! { "cd attic; cargo bench --bench search -- --seconds 0.1,1,10,60 SCENE...
 // `best` within milliseconds. With 35 instead of 45 sort times, annealing gains one percent on some
 // scenes and loses ten on others: its top-down initial build takes 14 to 20 sort times, 27 where
 // objects are sorted quickly, and half as much again on a busy machine.
-tuned! { "cargo run --release --manifest-path attic/Cargo.toml -- experiments/peers.toml" {
+tuned! { "cd attic; cargo bench --bench search -- --seconds 0.005,0.02,0.1 SCENE..." {
     /// Minimum work with which annealing ends lower than clustering and reinsertion.
     ANNEAL_FROM_WORK: u64 = 20, "work per object";
     /// Minimum time in which annealing ends lower, with one thread.

@@ -91,11 +91,16 @@ fn a_tree_with_divided_objects_comes_back_and_is_rejected_if_a_part_is_missing()
     assert_eq!(TreeFile::open(&bytes).unwrap().header().references, 15);
     let wrong_count = FileError::Tree(InvalidBvh::ObjectCount { named: 15, objects: 11 });
     assert_eq!(save(&tree, &boxes, &origin), Err(wrong_count), "objects that may not be divided");
-    let leaf = tree.nodes.iter().position(Node::is_leaf).unwrap();
-    let mut smaller = tree;
+    let is_divided = |id: u32| tree.prim_ids.iter().filter(|&&other| other == id).count() > 1;
+    let leaf = tree.nodes.iter().position(|node| {
+        node.is_leaf() && tree.prim_ids[node.prims()].iter().all(|&id| is_divided(id))
+    });
+    let leaf = leaf.unwrap();
+    let mut smaller = tree.clone();
     smaller.nodes[leaf].aabb.max.y -= 0.25;
     let fault = save_parts(&smaller, &boxes, &origin);
-    assert!(matches!(fault, Err(FileError::Tree(_))), "node {leaf} does not cover its object");
+    let object = tree.prim_ids[tree.nodes[leaf].prims()][0] as usize;
+    assert_eq!(fault, Err(FileError::Tree(InvalidBvh::Uncovered { object })));
 }
 
 /// Copies bytes to an address that is aligned like a mapped file.

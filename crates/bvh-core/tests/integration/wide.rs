@@ -59,7 +59,7 @@ fn check(name: &str, triangles: &[Triangle], traced: &[Traced], rays: &[Ray]) ->
 #[test]
 fn every_traversal_answers_as_brute_force_at_every_scale() {
     let mut random = Random(1);
-    let mut hits = 0;
+    let (mut hits, mut divisions) = (0, 0);
     for (name, scene) in [
         ("soup", soup(150, &mut random)),
         ("grid", grid_box(4)),
@@ -71,6 +71,7 @@ fn every_traversal_answers_as_brute_force_at_every_scale() {
             let triangles = scaled(&scene, libm::exp2f(exponent as f32));
             let traced = Traced::all(&triangles, &mut random);
             let (_, planes) = divided(&traced[0].tree, &triangles, &mut Random(DIVISION));
+            divisions += planes.len();
             let mut rays = rays(&triangles, 300, &mut random);
             rays.extend(bundles(&triangles, 20, &mut random));
             rays.extend(rays_on_planes(&triangles, &planes, 100, &mut random));
@@ -78,6 +79,7 @@ fn every_traversal_answers_as_brute_force_at_every_scale() {
         }
     }
     assert!(hits > 10_000, "the rays should hit something: {hits}");
+    assert!(divisions > 1000, "triangles should be divided: {divisions}");
 }
 
 /// Rays from one origin through the neighbourhoods of corners, edges and centres, exactly and
@@ -451,9 +453,11 @@ fn rays_that_are_not_finite_end_and_meet_only_triangles_that_exist() {
             wide.nearest_hit(&ray);
             wide.any_hit(&ray);
             wide.all_hits(&ray);
+            wide.all_hits_of(&[ray; 40], &mut Vec::new(), &mut [0; 40]);
             for coherence in [Coherence::Coherent, Coherence::Incoherent] {
                 let mut hits = [Hit::MISS; 40];
                 wide.nearest_hits(&[ray; 40], &mut hits, coherence);
+                wide.any_hits(&[ray; 40], &mut [false; 40], coherence);
                 assert!(hits.iter().all(|hit| hit.is_miss() || hit.object < 5));
             }
         }
