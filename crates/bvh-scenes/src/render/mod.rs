@@ -6,10 +6,9 @@
 //! grid of rays instead of an adaptive one, no light is refracted, the ambient light is a
 //! hemisphere, and a scene that is seen from outside has a ground.
 //!
-//! Data flows one way: [`View`](crate::rays::View) → [`Camera`](crate::rays::Camera) → rays →
-//! [`Accelerator`](crate::trace::Accelerator) → `Surface` → light → [`Film`]. All computations
-//! except ray tests use f64, and `libm` where the platform's functions may differ. The same scene
-//! therefore gives the same bytes on every machine.
+//! Data flows one way: [`View`](crate::rays::View) → [`Camera`] → rays → [`Accelerator`] →
+//! `Surface` → light → [`Film`]. All computations except ray tests use f64, and `libm` where the
+//! platform's functions may differ. The same scene therefore gives the same bytes on every machine.
 
 pub mod framing;
 pub mod heat;
