@@ -4,8 +4,8 @@ use glam::{Vec3, Vec4};
 
 /// The points `origin + t · direction` with `t_min <= t <= t_max`.
 ///
-/// Every value of this type is finite and has a direction. [`Ray::new`] rejects anything else, so
-/// no later test meets a NaN. A range with `t_min > t_max` is empty and hits nothing; a range with
+/// Every value of this type is finite and has a direction, unless [`Ray::assume_valid`] made it.
+/// [`Ray::new`] rejects anything else, so no later test meets a NaN. A range with `t_min > t_max` is empty and hits nothing; a range with
 /// `t_min == t_max` is one point. Zero components of the direction may have either sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(16))]

@@ -54,10 +54,10 @@ pub enum Error {
         "scene {scene}, method {method} returned an invalid tree: {source}; please report this"
     )]
     InvalidTree { scene: String, method: String, source: bvh_core::InvalidBvh },
-    /// `--check` found numbers that differ from the committed ones.
+    /// A repetition has numbers that differ from the committed ones.
     #[error(
         "{differences} difference(s) from the committed results; \
-         if they are intended, --force replaces these"
+         if they are intended, --force replaces the results"
     )]
     Differs { differences: usize },
     /// A file of a finished run that no longer matches its checksum.

@@ -3,13 +3,14 @@
 
 use super::terminal::{Jobs, output_folder, print_error, print_line};
 use crate::Error;
-use crate::rows::store::Existing;
+use crate::rows::store::{Existing, is_unfinished};
 use crate::run::execute::{Extent, execute};
 use crate::run::finish::Summary;
 use crate::run::{check, finish, reference};
 use crate::spec::{Experiment, Overrides};
 use std::collections::HashSet;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -35,7 +36,8 @@ pub struct RunArgs {
     /// nothing.
     #[arg(long, conflicts_with_all = ["check", "resume", "runs"])]
     pub redraw: bool,
-    /// Keep the finished runs of an interrupted experiment and perform the missing ones.
+    /// Keep the finished runs of an interrupted experiment, or of its interrupted repetition, and
+    /// perform the missing ones.
     #[arg(long)]
     pub resume: bool,
     /// Replace existing results.
@@ -45,7 +47,7 @@ pub struct RunArgs {
     /// merge`; may be repeated. Every process needs a different --out.
     #[arg(long = "run", value_name = "ID", conflicts_with = "check")]
     pub runs: Vec<String>,
-    /// Print only errors and, under --check, differences.
+    /// Print only errors and differences.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -100,7 +102,7 @@ fn perform(
         return check(args, experiment, interrupted);
     }
     let is_new = args.redraw || args.force || !args.runs.is_empty();
-    let is_over = args.resume && !repeated(experiment, &args.out).is_dir();
+    let is_over = args.resume && !is_interrupted(experiment, &args.out);
     if !is_new && !is_over && finish::has_results_of(experiment, &args.out)? {
         return repeat(experiment, &args.out, extent, interrupted, args.quiet);
     }
@@ -117,12 +119,15 @@ fn perform(
 }
 
 pub(super) fn print_summary(experiment: &Experiment, summary: &Summary) {
-    let Summary { text, skipped_scenes, folder, .. } = summary;
+    print_tables(experiment, summary, "Results:", &summary.folder);
+}
+
+fn print_tables(experiment: &Experiment, summary: &Summary, label: &str, folder: &Path) {
     print_line(&experiment.question);
-    for name in skipped_scenes {
+    for name in &summary.skipped_scenes {
         print_line(&format!("(without {name}: scripts/fetch-scenes brings it)"));
     }
-    print_line(&format!("\n{text}Results: {}", folder.display()));
+    print_line(&format!("\n{}{label} {}", summary.text, folder.display()));
 }
 
 /// Runs into a temporary folder and prints how the rows differ from the committed ones. Returns the
@@ -146,9 +151,14 @@ fn check(
     Ok(found.len())
 }
 
-/// Returns the folder in `out` for a repetition of finished results.
+/// Returns the folder in `out` for a repetition of finished results. No experiment has its name.
 fn repeated(experiment: &Experiment, out: &Path) -> PathBuf {
-    out.join(format!("repeated-{}", experiment.folder().display()).replace(['/', '\\'], "-"))
+    out.join(".repeated").join(experiment.folder())
+}
+
+/// Returns true if a repetition of finished results in `out` was interrupted.
+fn is_interrupted(experiment: &Experiment, out: &Path) -> bool {
+    is_unfinished(&repeated(experiment, out).join(experiment.folder()))
 }
 
 /// Runs again what has finished results in `out`, prints the tables and how the rows differ from
@@ -162,21 +172,47 @@ pub(super) fn repeat(
     quiet: bool,
 ) -> Result<usize, Error> {
     let repeated = repeated(experiment, out);
-    // Only --resume continues an earlier repetition.
-    let existing = match extent.existing {
-        Existing::Resume => Existing::Resume,
-        _ => Existing::Replace,
+    let remove = || match fs::remove_dir_all(&repeated) {
+        Err(error) if error.kind() != ErrorKind::NotFound => {
+            Err(Error::io(&repeated, "remove the folder")(error))
+        }
+        _ => {
+            // The folders above are empty, or another experiment's.
+            let _ = repeated
+                .ancestors()
+                .skip(1)
+                .take_while(|&above| above != out)
+                .try_for_each(fs::remove_dir);
+            Ok(())
+        }
     };
-    let extent = Extent { existing, ..extent.clone() };
+    match (is_interrupted(experiment, out), extent.existing) {
+        (true, Existing::Resume) => {}
+        (true, _) => {
+            let repeated = repeated.display();
+            return Err(Error::Usage(format!(
+                "{repeated} has an interrupted repetition; --resume does the rest, removing the \
+                 folder discards it"
+            )));
+        }
+        // An earlier one that differed.
+        (false, _) => remove()?,
+    }
+    let extent = Extent { existing: Existing::Resume, ..extent.clone() };
     fs::create_dir_all(&repeated).map_err(Error::io(&repeated, "create the folder"))?;
-    let (summary, found) = compare(experiment, out, &repeated, &extent, interrupted)?;
+    let compared = compare(experiment, out, &repeated, &extent, interrupted);
+    if compared.is_err() && !is_interrupted(experiment, out) {
+        remove()?;
+    }
+    let (summary, found) = compared?;
     summary.remarks.iter().for_each(|remark| print_error(remark));
     if !quiet {
-        print_summary(experiment, &Summary { folder: out.join(experiment.folder()), ..summary });
+        let folder = out.join(experiment.folder());
+        print_tables(experiment, &summary, "Compared with", &folder);
     }
     print_differences(experiment, &found);
     if found.is_empty() {
-        fs::remove_dir_all(&repeated).map_err(Error::io(&repeated, "remove the folder"))?;
+        remove()?;
     } else {
         print_error(&format!("the repetition is kept in {}", repeated.display()));
     }

@@ -91,6 +91,12 @@ pub(super) struct Point {
 
 impl Drawing {
     fn check_conditions(&self) -> Result<(), OutOfRange> {
+        for (y, [low, high]) in &self.ranges {
+            if low >= high || !self.y.split(", ").any(|column| column == y) {
+                let found = format!("{y} = [{low}, {high}]");
+                return Err(OutOfRange::new("ranges", found, "a column of y, and a rising range"));
+            }
+        }
         accept("select", Conditions::parse(&self.select))?;
         accept("first", Conditions::parse(&self.first))
     }

@@ -43,17 +43,18 @@ fn finished_results_are_replaced_by_force_only() {
     fs::write(results.join("runs.csv"), rows.repeat(2)).unwrap();
     let differing = run(dir, &["spec.toml"]);
     ended(&differing, 1, &["the repetition is kept in"]);
-    let repeated = dir.join("results/repeated-spec");
+    let repeated = dir.join("results/.repeated/spec");
     assert!(fs::read(repeated.join("spec/runs.csv")).unwrap() == rows);
     fs::write(results.join("runs.csv"), rows).unwrap();
     // An interrupted repetition is resumed, and parts are compared as it is.
     let part = of_part(dir, "spec.toml", 0, 1000);
     fs::remove_dir_all(&repeated).unwrap();
-    said(dir, &["spec.toml", &part[0], "--out=results/repeated-spec"]);
+    said(dir, &["spec.toml", &part[0], "--out=results/.repeated/spec"]);
+    refused(dir, &["spec.toml"], &["results/.repeated/spec", "--resume does the rest"]);
     assert!(said(dir, &["spec.toml", "--resume"]).contains("spec: as committed"));
     said(dir, &["spec.toml", &part[0], "--out=one"]);
     assert!(said(dir, &["merge", "one", "--out=results"]).contains("spec: as committed"));
-    assert!(!repeated.exists());
+    assert!(!dir.join("results/.repeated").exists());
     for other in ["--scene=spheres750", "--seed=2", part[0].as_str()] {
         refused(dir, &["spec.toml", other], &["results/spec", "--force", "--out"]);
     }
