@@ -84,6 +84,11 @@ impl Error {
         }
     }
 
+    /// Returns an error if there are differences from earlier results.
+    pub(crate) fn differs(differences: usize) -> Result<(), Self> {
+        if differences > 0 { Err(Self::Differs { differences }) } else { Ok(()) }
+    }
+
     /// Returns 2 for mistakes in a spec or a command line, 130 after Ctrl-C, otherwise 1.
     pub fn exit_code(&self) -> u8 {
         match self {

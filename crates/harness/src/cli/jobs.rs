@@ -25,7 +25,8 @@ pub struct JobsArgs {
 pub fn jobs(args: &JobsArgs) -> Result<(), Error> {
     let experiment = Experiment::read(&args.spec, &args.overrides)?;
     reject_indivisible(&experiment)?;
-    let (scenes, _) = load_scenes(&experiment)?;
+    let (scenes, _) =
+        load_scenes(&experiment).map_err(|error| args.overrides.named(&args.spec, error))?;
     let mut jobs = selected(&experiment, &scenes, &[])?;
     // A long run that begins last would leave all other workers idle. Scenes differ most, and specs
     // begin with what is quick.

@@ -1,11 +1,12 @@
 //! `harness merge`: joins the parts of experiments that ran with `--run`.
 
-use super::run::{print_summary, repeat};
-use super::terminal::{Jobs, input_folder, output_folder, print_error};
+use super::run::{print_outcome, repeat};
+use super::terminal::{Jobs, input_folder, output_folder};
 use crate::rows::store::{Existing, spec_of_part};
 use crate::run::execute::{Extent, execute};
 use crate::run::finish;
 use crate::run::resolved::{Resolved, read_toml};
+use crate::spec::Overrides;
 use crate::{Error, files};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -55,15 +56,16 @@ pub fn merge(args: &MergeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         // What an earlier merge has taken is kept.
         let existing = if args.force { Existing::Replace } else { Existing::Resume };
         let extent = Extent { existing, parts, ..Extent::default() };
+        let named = |error| Overrides::default().named(&spec, error);
         if !args.force && finish::has_results_of(&experiment, &args.out)? {
-            differences += repeat(&experiment, &args.out, &extent, interrupted, false)?;
+            differences +=
+                repeat(&experiment, &args.out, &extent, interrupted, false).map_err(named)?;
             continue;
         }
-        let summary = execute(&experiment, &args.out, &extent, interrupted)?;
-        summary.remarks.iter().for_each(|remark| print_error(remark));
-        print_summary(&experiment, &summary);
+        let summary = execute(&experiment, &args.out, &extent, interrupted).map_err(named)?;
+        print_outcome(&experiment, &summary, "Results:", &summary.folder, false);
     }
-    if differences > 0 { Err(Error::Differs { differences }) } else { Ok(()) }
+    Error::differs(differences)
 }
 
 /// Returns the folders of the experiments, full and quick, of which `out` has a part.

@@ -10,7 +10,6 @@ use crate::run::{check, finish, reference};
 use crate::spec::{Experiment, Overrides};
 use std::collections::HashSet;
 use std::fs;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -79,15 +78,10 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let extent = Extent { existing, runs: args.runs.clone(), ..Extent::default() };
     let mut differences = 0;
     for (path, experiment) in args.specs.iter().zip(&experiments) {
-        differences += perform(args, experiment, &extent, interrupted).map_err(|error| {
-            let named = |fault| Error::Usage(format!("{}: scenes: {fault}", path.display()));
-            match error {
-                Error::Scene(fault) if args.overrides.scenes.is_empty() => named(fault),
-                error => error,
-            }
-        })?;
+        differences += perform(args, experiment, &extent, interrupted)
+            .map_err(|error| args.overrides.named(path, error))?;
     }
-    if differences > 0 { Err(Error::Differs { differences }) } else { Ok(()) }
+    Error::differs(differences)
 }
 
 /// Runs one experiment, or does with it what the flags say. Returns the number of differences from
@@ -111,18 +105,22 @@ fn perform(
     } else {
         execute(experiment, &args.out, extent, interrupted)?
     };
-    summary.remarks.iter().for_each(|remark| print_error(remark));
-    if !args.quiet {
-        print_summary(experiment, &summary);
-    }
+    print_outcome(experiment, &summary, "Results:", &summary.folder, args.quiet);
     Ok(0)
 }
 
-pub(super) fn print_summary(experiment: &Experiment, summary: &Summary) {
-    print_tables(experiment, summary, "Results:", &summary.folder);
-}
-
-fn print_tables(experiment: &Experiment, summary: &Summary, label: &str, folder: &Path) {
+/// Prints the remarks and, unless `quiet`, the tables and a folder with its label.
+pub(super) fn print_outcome(
+    experiment: &Experiment,
+    summary: &Summary,
+    label: &str,
+    folder: &Path,
+    quiet: bool,
+) {
+    summary.remarks.iter().for_each(|remark| print_error(remark));
+    if quiet {
+        return;
+    }
     print_line(&experiment.question);
     for name in &summary.skipped_scenes {
         print_line(&format!("(without {name}: scripts/fetch-scenes brings it)"));
@@ -156,6 +154,17 @@ fn repeated(experiment: &Experiment, out: &Path) -> PathBuf {
     out.join(".repeated").join(experiment.folder())
 }
 
+/// Removes a repetition, and the folders above it that are then empty.
+fn discard(repeated: &Path, out: &Path) -> Result<(), Error> {
+    if repeated.is_dir() {
+        fs::remove_dir_all(repeated).map_err(Error::io(repeated, "remove the folder"))?;
+    }
+    // The folders of another repetition are not empty, and stay.
+    let mut above = repeated.ancestors().skip(1).take_while(|&above| above != out);
+    let _ = above.try_for_each(fs::remove_dir);
+    Ok(())
+}
+
 /// Returns true if a repetition of finished results in `out` was interrupted.
 fn is_interrupted(experiment: &Experiment, out: &Path) -> bool {
     is_unfinished(&repeated(experiment, out).join(experiment.folder()))
@@ -172,20 +181,6 @@ pub(super) fn repeat(
     quiet: bool,
 ) -> Result<usize, Error> {
     let repeated = repeated(experiment, out);
-    let remove = || match fs::remove_dir_all(&repeated) {
-        Err(error) if error.kind() != ErrorKind::NotFound => {
-            Err(Error::io(&repeated, "remove the folder")(error))
-        }
-        _ => {
-            // The folders above are empty, or another experiment's.
-            let _ = repeated
-                .ancestors()
-                .skip(1)
-                .take_while(|&above| above != out)
-                .try_for_each(fs::remove_dir);
-            Ok(())
-        }
-    };
     match (is_interrupted(experiment, out), extent.existing) {
         (true, Existing::Resume) => {}
         (true, _) => {
@@ -196,23 +191,20 @@ pub(super) fn repeat(
             )));
         }
         // An earlier one that differed.
-        (false, _) => remove()?,
+        (false, _) => discard(&repeated, out)?,
     }
     let extent = Extent { existing: Existing::Resume, ..extent.clone() };
     fs::create_dir_all(&repeated).map_err(Error::io(&repeated, "create the folder"))?;
     let compared = compare(experiment, out, &repeated, &extent, interrupted);
     if compared.is_err() && !is_interrupted(experiment, out) {
-        remove()?;
+        discard(&repeated, out)?;
     }
     let (summary, found) = compared?;
-    summary.remarks.iter().for_each(|remark| print_error(remark));
-    if !quiet {
-        let folder = out.join(experiment.folder());
-        print_tables(experiment, &summary, "Compared with", &folder);
-    }
+    let folder = out.join(experiment.folder());
+    print_outcome(experiment, &summary, "Compared with", &folder, quiet);
     print_differences(experiment, &found);
     if found.is_empty() {
-        remove()?;
+        discard(&repeated, out)?;
     } else {
         print_error(&format!("the repetition is kept in {}", repeated.display()));
     }

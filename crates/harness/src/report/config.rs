@@ -84,6 +84,12 @@ bvh_config::config! { serde;
     }
 }
 
+impl Labels for Series {
+    fn labels(&self, key: &str) -> Vec<(String, &str)> {
+        self.methods.labels(&format!("{key}.methods"))
+    }
+}
+
 /// Rejects names of CSV files that could lead to another folder or replace rows of the runs.
 /// `before` stands before the name.
 pub fn check_file(before: &str, name: &str) -> Result<(), OutOfRange> {

@@ -83,11 +83,6 @@ impl Rows {
         distinct(self.runs.iter().map(|run| run.scene.as_str()))
     }
 
-    /// Returns the labels of the methods in the order of the rows.
-    pub fn methods(&self) -> Vec<&str> {
-        distinct(self.runs.iter().map(|run| run.method.as_str()))
-    }
-
     /// Returns the scene's kind, as in `runs.csv`.
     pub fn kind(&self, scene: &str) -> &str {
         self.runs.iter().find(|run| run.scene == scene).map_or("", |run| run.scene_kind.as_str())

@@ -127,12 +127,9 @@ impl Drawing {
             Err(QueryError::NoRow(_)) => vec![],
             selected => selected?,
         };
-        let first = Conditions::parse(&self.first)?;
-        let (mut before, mut after) = (vec![], vec![]);
-        for row in selected {
-            if first.are_met(&row)? { before.push(row) } else { after.push(row) }
-        }
-        Ok([before, after].concat())
+        let (mut table, others) = query::split(selected, &self.first)?;
+        table.extend(others);
+        Ok(table)
     }
 
     /// Returns one panel for all rows that agree in the columns `panels`.
@@ -353,6 +350,10 @@ b,x,8,7,9,16,6,,1
             ),
             (
                 "marks = 'points'\nx = 'seconds'\ny = 'base_cost'\npanels = ['scene']\nfirst = 'scene=b'",
+                &["b ;  Points([(1.0, 16.0)])", "a ;  Points([(1.0, 4.0), (2.0, 4.0)])"],
+            ),
+            (
+                "marks = 'points'\nx = 'seconds'\ny = 'base_cost'\npanels = ['scene']\nfirst = 'cost=max'",
                 &["b ;  Points([(1.0, 16.0)])", "a ;  Points([(1.0, 4.0), (2.0, 4.0)])"],
             ),
             (

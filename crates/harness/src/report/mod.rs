@@ -56,6 +56,12 @@ macro_rules! reports {
         }
 
         impl Report {
+            fn name(&self) -> &'static str {
+                match self {
+                    $(Self::$kind(_) => $name,)*
+                }
+            }
+
             /// The names of all kinds.
             pub const NAMES: &[&str] = &[$($name),*];
 
@@ -72,7 +78,11 @@ macro_rules! reports {
             /// The labels of the methods that the report names, each with its key.
             pub fn labels(&self) -> Vec<(String, &str)> {
                 match self {
-                    $(Self::$kind(config) => [$(config.$label.labels(stringify!($label))),*].concat(),)*
+                    $(Self::$kind(config) => {
+                        let lines = config.figure.as_ref().map(|figure| figure.lines.labels("figure.lines"));
+                        let own = [$(config.$label.labels(stringify!($label))),*].concat();
+                        own.into_iter().chain(lines.into_iter().flatten()).collect()
+                    })*
                 }
             }
 
@@ -123,19 +133,20 @@ impl Report {
         }
     }
 
-    /// Returns the CSV files that the report may make; those of its figures have their names.
+    /// Returns the CSV files that the report makes; those of its figures have their names.
     pub fn files(&self) -> Vec<String> {
         let names = match self {
-            Self::Table(_) => vec!["table"],
-            Self::Trials(_) => vec!["trials"],
-            Self::Generations(_) => vec!["generations"],
-            Self::Distribution(_) => vec!["distribution"],
-            Self::Correlation(_) => vec!["correlation"],
             Self::Anytime(config) => return vec![format!("timing_{}.csv", config.file)],
-            Self::Gaps(_) => vec!["gaps"],
+            Self::Numbers(config) if config.targets.is_empty() => {
+                vec!["numbers", "timing_numbers"]
+            }
             Self::Numbers(_) => vec!["numbers", "timing_numbers", "timing_to_target"],
-            Self::RayCost(_) => vec!["ray_cost", "ray_cost_pairs"],
+            Self::RayCost(config) if !config.pairs.is_empty() => {
+                vec!["ray_cost", "ray_cost_pairs"]
+            }
             Self::Query(config) => vec![config.file.as_str()],
+            // The others make one file, of their name.
+            report => vec![report.name()],
         };
         names.into_iter().map(|name| format!("{name}.csv")).collect()
     }

@@ -139,18 +139,22 @@ impl Conditions {
     }
 }
 
-/// Returns the rows that meet all conditions; at least one.
-pub fn select(rows: Vec<Row>, conditions: &str) -> Result<Vec<Row>, QueryError> {
+/// Returns the rows that meet all conditions, and the others.
+pub fn split(rows: Vec<Row>, conditions: &str) -> Result<(Vec<Row>, Vec<Row>), QueryError> {
     let mut parsed = Conditions::parse(conditions)?;
     for condition in &mut parsed.0 {
         condition.resolve(&rows)?;
     }
-    let mut selected = Vec::new();
+    let (mut met, mut others) = (Vec::new(), Vec::new());
     for row in rows {
-        if parsed.are_met(&row)? {
-            selected.push(row);
-        }
+        if parsed.are_met(&row)? { met.push(row) } else { others.push(row) }
     }
+    Ok((met, others))
+}
+
+/// Returns the rows that meet all conditions; at least one.
+pub fn select(rows: Vec<Row>, conditions: &str) -> Result<Vec<Row>, QueryError> {
+    let (selected, _) = split(rows, conditions)?;
     if selected.is_empty() {
         return Err(QueryError::NoRow(conditions.into()));
     }

@@ -152,7 +152,7 @@ impl Column {
     }
 }
 
-pub(super) fn put(row: &mut Row, name: String, text: String) -> Result<(), QueryError> {
+fn put(row: &mut Row, name: String, text: String) -> Result<(), QueryError> {
     let accepted = "a name of a column that no other has";
     match row.insert(name.clone(), text) {
         Some(_) => Err(QueryError::Malformed { part: "name", found: name, accepted }),

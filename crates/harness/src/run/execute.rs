@@ -2,8 +2,7 @@
 
 use super::finish::{Summary, conclude};
 use super::job::{base_costs, selected};
-use super::perform::Watch;
-use super::perform::{Trees, Work};
+use super::perform::{Trees, Watch, Work};
 use super::resolved::{Resolved, finished, load_scenes, to_toml};
 use super::runs;
 use super::{ray_cost, trace};
@@ -146,8 +145,8 @@ fn is_finished(
     is_part: bool,
 ) -> Result<bool, Error> {
     let recorded = if existing == Existing::Replace { None } else { finished(folder)? };
-    let Some(recorded) = recorded else { return Ok(false) };
-    let is_same = recorded.is_some_and(|recorded| resolved.repeats(&recorded));
+    let Some(text) = recorded else { return Ok(false) };
+    let is_same = toml::from_str(&text).is_ok_and(|found| resolved.repeats(&found));
     let found = match (is_same, existing == Existing::Resume && !is_part) {
         (true, true) => return Ok(true),
         (true, false) => "finished results",

@@ -90,7 +90,8 @@ pub fn remade(folder: &Path) -> Result<Vec<Output>, Error> {
 
 /// Returns true if `out` has finished results of the same runs, perhaps with other reports.
 pub fn has_results_of(experiment: &Experiment, out: &Path) -> Result<bool, Error> {
-    let recorded = finished(&out.join(experiment.folder()))?.flatten();
+    let text = finished(&out.join(experiment.folder()))?;
+    let recorded: Option<Resolved> = text.and_then(|text| toml::from_str(&text).ok());
     Ok(recorded.is_some_and(|recorded| recorded.has_runs_of(experiment)))
 }
 

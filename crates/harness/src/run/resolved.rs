@@ -61,14 +61,13 @@ impl Resolved {
     }
 }
 
-/// Returns the resolved spec of the finished results in a folder, if it has any: `Some(None)` if the
-/// spec is one that this program cannot read.
-pub(crate) fn finished(folder: &Path) -> Result<Option<Option<Resolved>>, Error> {
+/// Returns the text of the resolved spec of the finished results in a folder, if it has any.
+pub(crate) fn finished(folder: &Path) -> Result<Option<String>, Error> {
     let recorded = folder.join("resolved.toml");
     if is_unfinished(folder) || !recorded.is_file() {
         return Ok(None);
     }
-    Ok(Some(toml::from_str(&read_text(&recorded)?).ok()))
+    Ok(Some(read_text(&recorded)?))
 }
 
 /// Loads an experiment's scenes. Returns them and the names of optional scenes that are missing.

@@ -27,6 +27,18 @@ pub struct Overrides {
     pub quick: bool,
 }
 
+impl Overrides {
+    /// Names the spec in a fault of its scenes, unless the command line names the scenes.
+    pub fn named(&self, spec: &Path, error: Error) -> Error {
+        match error {
+            Error::Scene(fault) if self.scenes.is_empty() => {
+                Error::Spec { file: spec.to_owned(), message: format!("scenes: {fault}") }
+            }
+            error => error,
+        }
+    }
+}
+
 impl Experiment {
     /// Reads and checks the spec at `path`. Does not load its scenes.
     pub fn read(path: &Path, overrides: &Overrides) -> Result<Self, Error> {

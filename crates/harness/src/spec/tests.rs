@@ -106,6 +106,12 @@ const WRONG_PARTS: &[(&str, &str, &[&str])] = &[
         "}]\n[[reports]]\nkind = 'numbers'\nmethods = ['grasp', 'a']",
         &["line 6: reports[0].methods[1] is \"a\"", "accepted: grasp"],
     ),
+    (
+        "}]",
+        "}]\n[[reports]]\nkind = 'numbers'\nmethods = ['grasp']\nfigure = { x = 'runs', y = 'cost_median', \
+         lines = [{ name = 'all', methods = ['graps'] }] }",
+        &["reports[0].figure.lines[0].methods[0] is \"graps\"", "accepted: grasp"],
+    ),
 ];
 
 #[test]
