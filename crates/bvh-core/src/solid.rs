@@ -172,10 +172,9 @@ fn by_crossings(
     is_inside: impl Fn(&[Hit]) -> bool,
 ) {
     // A point outside the box is outside the mesh: its range is empty. NaN fails every comparison.
-    let half_line = |&point: &Vec3| match wide.bounds.contains(&Aabb { min: point, max: point }) {
-        true => Ray::assume_valid(point, Vec3::X, 0.0, f32::MAX),
-        // From the box, because a ray from afar would be traced alone and in f64.
-        false => Ray::assume_valid(wide.bounds.min, Vec3::X, 1.0, 0.0),
+    let half_line = |&point: &Vec3| {
+        let is_within = wide.bounds.contains(&Aabb { min: point, max: point });
+        Ray::assume_valid(point, Vec3::X, 0.0, if is_within { f32::MAX } else { -1.0 })
     };
     let rays: Vec<Ray> = points.iter().map(half_line).collect();
     let mut hits = Vec::new();

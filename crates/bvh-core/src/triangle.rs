@@ -1,6 +1,6 @@
 //! Triangles, and a watertight ray test: no ray passes through the edge between two triangles.
 
-use crate::exact::{Line, Verdict, is_degenerate};
+use crate::exact::{Line, is_degenerate};
 use crate::{Aabb, Ray};
 use bytemuck::{Pod, Zeroable};
 use glam::{Affine3A, DVec3, Vec3};
@@ -131,11 +131,7 @@ impl Triangle {
     /// assert_eq!(triangle.intersect(&PreparedRay::new(&ray), 9.0), Some(1.0 / 3.0));
     /// ```
     pub fn intersect(&self, prepared: &PreparedRay, t_max: f32) -> Option<f32> {
-        let t = match prepared.line.filter(&self.0) {
-            Verdict::Miss => return None,
-            Verdict::Hit(t) => t,
-            Verdict::Unsure => prepared.line.distance(&prepared.ray, &self.0, false)?,
-        };
+        let t = prepared.line.crossing(&prepared.ray, &self.0, false)?;
         (prepared.ray.t_min() <= t && t <= t_max).then_some(t)
     }
 
@@ -155,7 +151,7 @@ impl Triangle {
     /// assert_eq!(Triangle::from([a, c, d]).crossing(&diagonal), None);
     /// ```
     pub fn crossing(&self, ray: &Ray) -> Option<f32> {
-        let t = Line::new(ray).crossing(ray, &self.0)?;
+        let t = Line::new(ray).crossing(ray, &self.0, true)?;
         (ray.t_min() <= t && t <= ray.t_max()).then_some(t)
     }
 }

@@ -70,7 +70,7 @@ impl Builder for Config {
                 return Err(BuildError::Cancelled);
             }
             let ids = &mut prim_ids[start..start + len];
-            let aabb = ids.iter().fold(Aabb::EMPTY, |b, &id| b.union(&boxes[id as usize]));
+            let aabb = Aabb::union_of(ids.iter().map(|&id| &boxes[id as usize]));
             if len <= max_leaf {
                 // The selection leaves no defined order within a side, and a leaf's order must be
                 // reproducible.

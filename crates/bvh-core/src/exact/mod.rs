@@ -212,7 +212,7 @@ impl Line {
     /// rule of [`Triangle::crossing`](crate::Triangle::crossing). Does not allocate.
     #[cold]
     #[inline(never)]
-    pub(crate) fn distance(&self, ray: &Ray, triangle: &[Vec3; 3], is_moved: bool) -> Option<f32> {
+    fn distance(&self, ray: &Ray, triangle: &[Vec3; 3], is_moved: bool) -> Option<f32> {
         let volumes = Volumes::new(ray, triangle)?;
         let corners = self.relative(triangle);
         let (edges, error) = self.edges(&corners);
@@ -246,14 +246,15 @@ impl Line {
     }
 
     /// Returns the rounded distance at which the ray crosses the triangle at or in front of the
-    /// origin, by the rule of [`Triangle::crossing`](crate::Triangle::crossing). `self` is the line
-    /// of `ray`.
+    /// origin, by the rule of [`Triangle::crossing`](crate::Triangle::crossing) if the origin is
+    /// moved, otherwise by that of [`Triangle::intersect`](crate::Triangle::intersect). `self` is
+    /// the line of `ray`.
     #[inline(always)]
-    pub(crate) fn crossing(&self, ray: &Ray, triangle: &[Vec3; 3]) -> Option<f32> {
+    pub(crate) fn crossing(&self, ray: &Ray, triangle: &[Vec3; 3], is_moved: bool) -> Option<f32> {
         match self.filter(triangle) {
             Verdict::Miss => None,
             Verdict::Hit(t) => Some(t),
-            Verdict::Unsure => self.distance(ray, triangle, true),
+            Verdict::Unsure => self.distance(ray, triangle, is_moved),
         }
     }
 }

@@ -61,13 +61,13 @@ impl Target {
         };
         let cost = |ray: Ray| {
             let mut counts = TestCounts::default();
-            let prepared = PreparedRay::new(&ray);
             if nodes.is_empty() {
+                let prepared = PreparedRay::new(&ray);
                 let test = |id, t_max| triangles[id as usize].intersect(&prepared, t_max);
                 nearest_hit_by(tree, &ray, test, &mut counts);
             } else {
-                let (nodes, ids, counts) = (&nodes[..], &tree.prim_ids[..], &mut counts);
-                ThreeMeshRay { nodes, ids, triangles, ray: &ray, prepared, counts }.first_hit(0);
+                ThreeMeshRay::new(&nodes, &tree.prim_ids, triangles, &ray, &mut counts)
+                    .first_hit(0);
             }
             // A visit of an inner node tests the boxes of two children.
             0.5 * self.constants.traversal * counts.boxes as f64
@@ -114,12 +114,28 @@ struct ThreeMeshRay<'a> {
     nodes: &'a [ThreeMeshNode],
     ids: &'a [u32],
     triangles: &'a [Triangle],
-    ray: &'a Ray,
     prepared: PreparedRay,
+    t_max: f32,
+    origin: DVec3,
+    direction: DVec3,
+    inverse: DVec3,
     counts: &'a mut TestCounts,
 }
 
-impl ThreeMeshRay<'_> {
+impl<'a> ThreeMeshRay<'a> {
+    fn new(
+        nodes: &'a [ThreeMeshNode],
+        ids: &'a [u32],
+        triangles: &'a [Triangle],
+        ray: &Ray,
+        counts: &'a mut TestCounts,
+    ) -> Self {
+        let [origin, direction] = [ray.origin(), ray.direction()].map(|vector| vector.as_dvec3());
+        let (prepared, inverse) = (PreparedRay::new(ray), direction.recip());
+        let t_max = ray.t_max();
+        Self { nodes, ids, triangles, prepared, t_max, origin, direction, inverse, counts }
+    }
+
     /// Returns the distance of the first hit below a node, infinite without one. Recursive, as the
     /// library's is: fitted trees have at most its depth.
     fn first_hit(&mut self, index: usize) -> f32 {
@@ -128,15 +144,12 @@ impl ThreeMeshRay<'_> {
             self.counts.objects += u64::from(count);
             return self.ids[below as usize..][..count as usize]
                 .iter()
-                .filter_map(|&id| {
-                    self.triangles[id as usize].intersect(&self.prepared, self.ray.t_max())
-                })
+                .filter_map(|&id| self.triangles[id as usize].intersect(&self.prepared, self.t_max))
                 .fold(f32::INFINITY, f32::min);
         }
         let axis = axis_or_count as usize;
         let [low, high] = [index + 1, index + below as usize];
-        let [origin, direction] =
-            [self.ray.origin(), self.ray.direction()].map(|vector| f64::from(vector[axis]));
+        let [origin, direction] = [self.origin[axis], self.direction[axis]];
         let (first, second) = if direction >= 0.0 { (low, high) } else { (high, low) };
         let found = if self.meets(first) { self.first_hit(first) } else { f32::INFINITY };
         let point = origin + f64::from(found) * direction;
@@ -155,13 +168,10 @@ impl ThreeMeshRay<'_> {
     fn meets(&mut self, index: usize) -> bool {
         self.counts.boxes += 1;
         let node = &self.nodes[index];
-        let [origin, direction] =
-            [self.ray.origin(), self.ray.direction()].map(|vector| vector.as_dvec3());
-        let inverse = direction.recip();
         let (mut low, mut high) = (0.0, f64::INFINITY);
         for axis in 0..3 {
             let [a, b] = [node.min, node.max]
-                .map(|corner| (f64::from(corner[axis]) - origin[axis]) * inverse[axis]);
+                .map(|corner| (f64::from(corner[axis]) - self.origin[axis]) * self.inverse[axis]);
             // `max` and `min` leave out NaN, of a ray in the plane of a face.
             low = f64::max(low, a.min(b));
             high = f64::min(high, a.max(b));
@@ -186,15 +196,8 @@ mod tests {
         let mut hits = 0;
         for ray in (0..2000).flat_map(|index| rays(&bounds, index).unwrap()) {
             let mut counts = TestCounts::default();
-            let found = ThreeMeshRay {
-                nodes: &nodes,
-                ids: &fitted.prim_ids,
-                triangles: &triangles,
-                ray: &ray,
-                prepared: PreparedRay::new(&ray),
-                counts: &mut counts,
-            }
-            .first_hit(0);
+            let found = ThreeMeshRay::new(&nodes, &fitted.prim_ids, &triangles, &ray, &mut counts)
+                .first_hit(0);
             let expected = nearest_hit(&tree, &triangles, &ray);
             assert_eq!(found, expected.map_or(f32::INFINITY, |hit| hit.t));
             hits += usize::from(expected.is_some());

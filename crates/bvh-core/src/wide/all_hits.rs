@@ -146,7 +146,7 @@ fn append_sorted(found: &[Found], hits: &mut Vec<Hit>, counts: &mut [u32]) {
 
 #[inline(always)]
 fn hit_of(ray: &Ray, line: &Line, object: u32, triangle: &Triangle) -> Option<Hit> {
-    let t = line.crossing(ray, &triangle.0)?;
+    let t = line.crossing(ray, &triangle.0, true)?;
     (ray.t_min() <= t && t <= ray.t_max()).then_some(Hit { t, object })
 }
 

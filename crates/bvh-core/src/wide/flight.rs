@@ -188,8 +188,10 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
                     if number >= self.from {
                         continue;
                     }
-                    if ready.far >> lane & 1 != 0 {
-                        self.find.alone(wide, number, &rays[number]);
+                    let ray = &rays[number];
+                    // An empty range is a miss, from afar too.
+                    if ready.far >> lane & 1 != 0 && ray.t_min() <= ray.t_max() {
+                        self.find.alone(wide, number, ray);
                     } else {
                         self.find.write(number, f32::INFINITY, u32::MAX);
                     }

@@ -2,8 +2,8 @@
 //! give the answers of testing every triangle, bit by bit.
 
 use crate::all_hits::{all_of, junction};
-use crate::references::{divided, rays_on_planes};
-use crate::support::layouts::{DIVISION, Traced, bundles};
+use crate::references::rays_on_planes;
+use crate::support::layouts::{Traced, bundles};
 use crate::support::{
     Random, SHAPES, ball, bits, boxes, brute_force, chain, grid_box, rays, scaled, soup, tree,
 };
@@ -69,8 +69,7 @@ fn every_traversal_answers_as_brute_force_at_every_scale() {
         // Down to the least denormal number.
         for exponent in [-149, -140, -127, -120, -110, -91, -88, -60, -20, 0, 20, 60, 71, 120] {
             let triangles = scaled(&scene, libm::exp2f(exponent as f32));
-            let traced = Traced::all(&triangles, &mut random);
-            let (_, planes) = divided(&traced[0].tree, &triangles, &mut Random(DIVISION));
+            let (traced, planes) = Traced::all_and_planes(&triangles, &mut random);
             divisions += planes.len();
             let mut rays = rays(&triangles, 300, &mut random);
             rays.extend(bundles(&triangles, 20, &mut random));

@@ -151,8 +151,9 @@ impl<'p> Incumbent<'p> {
 /// Returns the total that the working form of a tree of this cost calls the area.
 fn area(problem: &Problem, tree: &Bvh, cost: f64) -> f64 {
     match *problem {
-        Problem { splits: Some(_), measure, .. } => measure
-            .map_or_else(|| cost::total_area(tree), |measure| cost::total_measure(tree, measure)),
+        Problem { splits: Some(_), measure, .. } => {
+            cost::total_measure(tree, measure.unwrap_or(&cost::Area))
+        }
         Problem { objective: Objective::InternalArea, .. } => cost,
         Problem { measure: Some(measure), .. } => cost::internal_measure(tree, measure),
         _ => cost::internal_area(tree),

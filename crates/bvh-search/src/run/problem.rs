@@ -87,10 +87,8 @@ impl<'a> Problem<'a> {
             _ if self.objective == Objective::Layout => {
                 cost::layout_cost(tree, self.measure, &parallel::call_both)
             }
-            (None, Some(_), Some(measure)) => cost::total_measure(tree, measure),
-            (None, Some(_), None) => cost::total_area(tree),
-            (None, _, Some(measure)) => self.objective.cost_by(tree, measure),
-            (None, _, None) => self.objective.cost(tree),
+            (None, Some(_), measure) => cost::total_measure(tree, measure.unwrap_or(&cost::Area)),
+            (None, None, measure) => self.objective.cost_by(tree, measure.unwrap_or(&cost::Area)),
         }
     }
 

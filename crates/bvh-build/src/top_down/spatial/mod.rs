@@ -183,7 +183,7 @@ impl<'a> Build<'a> {
 }
 
 fn union(references: &[Reference]) -> Aabb {
-    references.iter().fold(Aabb::EMPTY, |aabb, reference| aabb.union(&reference.aabb))
+    Aabb::union_of(references.iter().map(|reference| &reference.aabb))
 }
 
 #[cfg(test)]

@@ -17,9 +17,6 @@ pub fn by_kernel(wide: &WideBvh) -> Vec<(Kernel, WideBvh)> {
     Kernel::ALL.into_iter().filter_map(of).collect()
 }
 
-/// The seed of the planes that divide the triangles of a tree of the first shape.
-pub const DIVISION: u64 = 9;
-
 /// A tree, and its layout for every kernel.
 pub struct Traced {
     pub tree: Bvh,
@@ -34,14 +31,22 @@ impl Traced {
     /// Makes trees of all shapes, the deepest one, trees of larger leaves, and trees of divided
     /// triangles.
     pub fn all(triangles: &[Triangle], random: &mut Random) -> Vec<Self> {
+        Self::all_and_planes(triangles, random).0
+    }
+
+    /// Returns the same, and the planes that divide triangles.
+    pub fn all_and_planes(
+        triangles: &[Triangle],
+        random: &mut Random,
+    ) -> (Vec<Self>, Vec<(u32, usize, f32)>) {
         let boxes = boxes(triangles);
         let mut trees: Vec<Bvh> = SHAPES.iter().map(|&shape| tree(&boxes, shape, random)).collect();
-        let (parts, _) = divided(&trees[0], triangles, &mut Random(DIVISION));
-        for tree in [trees[0].clone(), parts.clone()] {
-            trees.push(collapse_leaves(&tree, &SahConstants::default()));
-        }
+        let (parts, planes) = divided(&trees[0], triangles, &mut Random(9));
+        let merged =
+            [&trees[0], &parts].map(|tree| collapse_leaves(tree, &SahConstants::default()));
+        trees.extend(merged);
         trees.extend([parts, chain(&boxes)]);
-        trees.into_iter().map(|tree| Self::new(tree, triangles)).collect()
+        (trees.into_iter().map(|tree| Self::new(tree, triangles)).collect(), planes)
     }
 }
 
