@@ -25,23 +25,29 @@ fn rays(slope: f32) -> Vec<BvhRay> {
 }
 
 /// A search without objects, and every choice at its default.
-const NO_BAKE: BvhBake = BvhBake {
-    boxes: null(),
-    corners: null(),
-    count: 0,
-    rays: null(),
-    ray_count: 0,
-    references: 0.0,
-    seconds: 0.0,
-    work: 0,
-    seed: 0,
-};
+// SAFETY: null pointers and zeros are valid values of the fields.
+const NO_BAKE: BvhBake = unsafe { std::mem::zeroed() };
 
 fn last_error() -> String {
     // SAFETY: the message ends with a zero, and no call of this thread fails before the copy is
     // made.
     let message = unsafe { CStr::from_ptr(bvh_last_error()) };
     message.to_str().unwrap().to_owned()
+}
+
+#[track_caller]
+fn ok(status: BvhStatus) {
+    assert_eq!(status, BvhStatus::Ok, "{}", last_error());
+}
+
+#[track_caller]
+fn rejected(has_failed: bool, part: &str) {
+    assert!(has_failed && last_error().contains(part), "{part}: {}", last_error());
+}
+
+#[track_caller]
+fn invalid(status: BvhStatus, part: &str) {
+    rejected(status == BvhStatus::Invalid, part);
 }
 
 fn tree(corners: &[f32]) -> *mut BvhTree {
@@ -66,24 +72,18 @@ fn trees_and_hits_equal_the_results_of_the_rust_crates() {
         let nodes = std::slice::from_raw_parts(bvh_tree_nodes(tree, &mut count), count).to_vec();
         let ids = std::slice::from_raw_parts(bvh_tree_object_ids(tree, &mut ids), ids);
         assert_eq!((nodes.len(), ids.len(), nodes[0].first, nodes[0].min), (80, 40, 2, [0.0; 3]));
-        assert_eq!(bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut cost), BvhStatus::Ok);
+        ok(bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut cost));
         assert_eq!(cost, cost::internal_area((*tree).owned.tree()));
         let before = cost;
-        assert_eq!(bvh_tree_improve(tree, 0.02), BvhStatus::Ok);
-        assert_eq!(bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut cost), BvhStatus::Ok);
+        ok(bvh_tree_improve(tree, 0.02));
+        ok(bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut cost));
         assert!(cost <= before);
         let tracer = bvh_tracer_new(tree);
         for coherent in [0, 1] {
             let count = rays.len();
             let rays = rays.as_ptr();
-            assert_eq!(
-                bvh_tracer_nearest_hits(tracer, rays, count, coherent, hits.as_mut_ptr()),
-                BvhStatus::Ok
-            );
-            assert_eq!(
-                bvh_tracer_any_hits(tracer, rays, count, coherent, any.as_mut_ptr()),
-                BvhStatus::Ok
-            );
+            ok(bvh_tracer_nearest_hits(tracer, rays, count, coherent, hits.as_mut_ptr()));
+            ok(bvh_tracer_any_hits(tracer, rays, count, coherent, any.as_mut_ptr()));
             for (index, (hit, any)) in hits.iter().zip(&any).enumerate() {
                 let ray = Ray::half_line((*rays.add(index)).origin, [0.0, 0.0, 1.0]).unwrap();
                 let expected = nearest_hit((*tree).owned.tree(), &triangles, &ray);
@@ -126,17 +126,12 @@ fn surfaces_all_hits_closest_points_and_insides_equal_the_results_of_the_rust_cr
         });
         let tracer = bvh_tracer_new(tree);
         let count = rays.len();
-        let status =
-            bvh_tracer_surface_hits(tracer, rays.as_ptr(), count, 0, surfaces.as_mut_ptr());
-        assert_eq!(status, BvhStatus::Ok);
-        let status =
-            bvh_tracer_closest_points(tracer, points.as_ptr(), count, closest.as_mut_ptr());
-        assert_eq!(status, BvhStatus::Ok);
-        let status = bvh_tracer_contains(tracer, points.as_ptr(), count, inside.as_mut_ptr());
-        assert_eq!(status, BvhStatus::Ok);
+        ok(bvh_tracer_surface_hits(tracer, rays.as_ptr(), count, 0, surfaces.as_mut_ptr()));
+        ok(bvh_tracer_closest_points(tracer, points.as_ptr(), count, closest.as_mut_ptr()));
+        ok(bvh_tracer_contains(tracer, points.as_ptr(), count, inside.as_mut_ptr()));
         // Without room for all hits, their number is written nevertheless.
         for capacity in [10, 9000] {
-            let status = bvh_tracer_all_hits(
+            ok(bvh_tracer_all_hits(
                 tracer,
                 rays.as_ptr(),
                 count,
@@ -144,8 +139,7 @@ fn surfaces_all_hits_closest_points_and_insides_equal_the_results_of_the_rust_cr
                 capacity,
                 counts.as_mut_ptr(),
                 &mut total,
-            );
-            assert_eq!(status, BvhStatus::Ok);
+            ));
         }
         bvh_tracer_free(tracer);
         bvh_tree_free(tree);
@@ -204,10 +198,7 @@ fn a_search_of_hours_ends_when_the_caller_cancels_it_and_keeps_its_tree() {
     unsafe {
         bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut before);
         let context = (&raw mut asked).cast();
-        assert_eq!(
-            bvh_tree_improve_until(tree, 36_000.0, Some(asked_enough), context),
-            BvhStatus::Ok
-        );
+        ok(bvh_tree_improve_until(tree, 36_000.0, Some(asked_enough), context));
         bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut after);
         bvh_tree_free(tree);
     }
@@ -216,53 +207,35 @@ fn a_search_of_hours_ends_when_the_caller_cancels_it_and_keeps_its_tree() {
 }
 
 #[test]
-fn a_saved_tree_is_loaded_again_and_a_wrong_file_is_named() {
-    let corners = corners(9);
-    let tree = tree(&corners);
-    let path = std::env::temp_dir().join(format!("bvh-c.{}.bvh", std::process::id()));
-    let named = CString::new(path.to_str().unwrap()).unwrap();
-    // SAFETY: `corners` has nine floats for each triangle, and the strings end with a zero.
-    unsafe {
-        assert_eq!(bvh_tree_save(tree, named.as_ptr()), BvhStatus::Ok, "{}", last_error());
-        let loaded = bvh_tree_load_triangles(named.as_ptr(), corners.as_ptr(), 9);
-        assert_eq!((*loaded).owned.tree(), (*tree).owned.tree());
-        assert!(bvh_tree_load_triangles(named.as_ptr(), corners.as_ptr(), 8).is_null());
-        assert!(last_error().contains("9 objects; this one has 8"), "{}", last_error());
-        std::fs::remove_file(&path).unwrap();
-        assert!(bvh_tree_load_triangles(named.as_ptr(), corners.as_ptr(), 9).is_null());
-        assert!(last_error().contains(path.to_str().unwrap()), "{}", last_error());
-        assert_eq!(bvh_tree_save(tree, c"/nowhere/at/all".as_ptr()), BvhStatus::File);
-        assert_eq!(bvh_tree_save(tree, c"\xff".as_ptr()), BvhStatus::Invalid);
-        bvh_tree_free(loaded);
-        bvh_tree_free(tree);
-    }
-}
-
-#[test]
-fn an_export_is_the_file_of_every_tracer_and_others_are_named() {
+fn files_are_those_of_the_library_and_a_wrong_one_is_named() {
     let corners = corners(9);
     let tree = tree(&corners);
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("tree.bin");
+    let path = folder.path().join("tree.bvh");
     let named = CString::new(path.to_str().unwrap()).unwrap();
-    // SAFETY: the tree is freed last, and the strings end with a zero.
+    // SAFETY: `corners` has nine floats for each triangle, the strings end with a zero, and the
+    // trees are freed last.
     unsafe {
         for target in Target::ALL {
             let tracer = CString::new(target.name).unwrap();
-            let status = bvh_tree_export(tree, tracer.as_ptr(), named.as_ptr());
-            assert_eq!(status, BvhStatus::Ok, "{}", last_error());
+            ok(bvh_tree_export(tree, tracer.as_ptr(), named.as_ptr()));
             assert_eq!(std::fs::read(&path).unwrap(), (*tree).owned.export(&target));
         }
         let status = bvh_tree_export(tree, c"embree".as_ptr(), named.as_ptr());
-        assert_eq!(status, BvhStatus::Invalid);
-        assert!(last_error().starts_with("tracer is \"embree\"; accepted: three-mesh-bvh, "));
+        invalid(status, "tracer is \"embree\"; accepted: three-mesh-bvh, ");
+        ok(bvh_tree_save(tree, named.as_ptr()));
+        let loaded = bvh_tree_load_triangles(named.as_ptr(), corners.as_ptr(), 9);
+        assert_eq!((*loaded).owned.tree(), (*tree).owned.tree());
+        let other = bvh_tree_load_triangles(named.as_ptr(), corners.as_ptr(), 8);
+        rejected(other.is_null(), "9 objects; this one has 8");
+        std::fs::remove_file(&path).unwrap();
+        let removed = bvh_tree_load_triangles(named.as_ptr(), corners.as_ptr(), 9);
+        rejected(removed.is_null(), path.to_str().unwrap());
+        assert_eq!(bvh_tree_save(tree, c"/nowhere/at/all".as_ptr()), BvhStatus::File);
+        invalid(bvh_tree_save(tree, c"\xff".as_ptr()), "path is not UTF-8");
+        bvh_tree_free(loaded);
         bvh_tree_free(tree);
     }
-}
-
-#[track_caller]
-fn rejected(part: &str) {
-    assert!(last_error().contains(part), "{}", last_error());
 }
 
 #[test]
@@ -275,52 +248,42 @@ fn invalid_arguments_are_rejected_by_name() {
     // SAFETY: every pointer that a call dereferences comes with its array's length; null, unaligned
     // and oversized arrays are rejected before.
     unsafe {
-        assert!(bvh_tree_from_triangles(wrong.as_ptr(), 5, 0.0, 1.0).is_null());
-        rejected("3");
-        assert!(bvh_tree_from_triangles(null(), 5, 0.0, 1.0).is_null());
-        rejected("corners is null");
-        assert!(bvh_tree_from_triangles(wrong.as_ptr().byte_add(1), 5, 0.0, 1.0).is_null());
-        rejected("corners is not aligned to a multiple of 4");
-        assert!(bvh_tree_from_triangles(wrong.as_ptr(), usize::MAX, 0.0, 1.0).is_null());
-        rejected("more than memory has");
-        assert!(bvh_tree_from_triangles(wrong.as_ptr(), 5, 0.0, f64::NAN).is_null());
-        rejected("references is NaN; accepted: 1 to 16");
-        assert!(bvh_tree_from_boxes(boxes.as_ptr(), 1, -1.0).is_null());
-        rejected("seconds is -1.0; accepted: 0 to 1e19");
-        assert!(bvh_tree_from_boxes(boxes.as_ptr().add(1), 0, f64::INFINITY).is_null());
-        rejected("seconds is inf");
+        for (corners, count, seconds, references, message) in [
+            (wrong.as_ptr(), 5, 0.0, 1.0, "3"),
+            (null(), 5, 0.0, 1.0, "corners is null"),
+            (wrong.as_ptr().byte_add(1), 5, 0.0, 1.0, "corners is not aligned to a multiple of 4"),
+            (wrong.as_ptr(), usize::MAX, 0.0, 1.0, "more than memory has"),
+            (wrong.as_ptr(), 5, 0.0, f64::NAN, "references is NaN; accepted: 1 to 16"),
+            (wrong.as_ptr(), 5, -1.0, 1.0, "seconds is -1.0; accepted: 0 to 1e19"),
+            (wrong.as_ptr(), 0, f64::INFINITY, 1.0, "seconds is inf"),
+        ] {
+            let tree = bvh_tree_from_triangles(corners, count, seconds, references);
+            rejected(tree.is_null(), message);
+        }
         let boxed = bvh_tree_from_boxes(boxes.as_ptr(), 1, 0.0);
-        assert!(bvh_tracer_new(boxed).is_null());
-        rejected("tree is over boxes");
-        assert!(bvh_tree_load_boxes(null(), boxes.as_ptr(), 1).is_null());
-        rejected("path is null");
+        rejected(bvh_tracer_new(boxed).is_null(), "tree is over boxes");
+        rejected(bvh_tree_load_boxes(null(), boxes.as_ptr(), 1).is_null(), "path is null");
         let mut cost = 7.0;
-        assert_eq!(bvh_tree_cost(tree, 4, &mut cost), BvhStatus::Invalid);
-        rejected("kind is 4; accepted: 0 to 3");
-        assert_eq!((bvh_tree_cost(null(), 0, &mut cost), cost), (BvhStatus::Invalid, 7.0));
-        rejected("tree is null");
-        assert_eq!(bvh_tree_cost(tree, 0, null_mut()), BvhStatus::Invalid);
+        invalid(bvh_tree_cost(tree, 4, &mut cost), "kind is 4; accepted: 0 to 3");
+        invalid(bvh_tree_cost(null(), 0, &mut cost), "tree is null");
+        assert_eq!(cost, 7.0);
+        invalid(bvh_tree_cost(tree, 0, null_mut()), "cost is null");
         let misaligned = (&raw mut cost).byte_add(1);
-        assert_eq!(bvh_tree_cost(tree, 0, misaligned), BvhStatus::Invalid);
-        rejected("cost is not aligned to a multiple of 8");
+        invalid(bvh_tree_cost(tree, 0, misaligned), "cost is not aligned to a multiple of 8");
         let both = BvhBake { boxes: wrong.as_ptr(), corners: wrong.as_ptr(), count: 3, ..NO_BAKE };
-        assert!(bvh_tree_bake(&both).is_null());
-        rejected("boxes and corners; accepted: one of the two");
+        rejected(bvh_tree_bake(&both).is_null(), "boxes and corners; accepted: one of the two");
         let many = BvhBake { boxes: null(), references: 17.0, count: 0, ..both };
-        assert!(bvh_tree_bake(&many).is_null());
-        rejected("references is 17; accepted: 1 to 16");
-        assert!(bvh_tree_bake(null()).is_null());
-        rejected("bake is null");
-        assert!(
-            bvh_tree_nodes(tree, null_mut()).is_null() && bvh_tree_nodes(null(), &mut 0).is_null()
-        );
-        assert_eq!(bvh_tree_improve(null_mut(), 1.0), BvhStatus::Invalid);
+        rejected(bvh_tree_bake(&many).is_null(), "references is 17; accepted: 1 to 16");
+        rejected(bvh_tree_bake(null()).is_null(), "bake is null");
+        rejected(bvh_tree_nodes(tree, null_mut()).is_null(), "count is null");
+        rejected(bvh_tree_nodes(null(), &mut 0).is_null(), "tree is null");
+        invalid(bvh_tree_improve(null_mut(), 1.0), "tree is null");
         let tracer = bvh_tracer_new(tree);
         let mut hit = BvhHit { t: 5.0, object: 5 };
-        assert_eq!(bvh_tracer_nearest_hits(tracer, &ray, 1, 0, &mut hit), BvhStatus::Invalid);
-        rejected("rays[0]: the ray's direction");
-        assert_eq!(bvh_tracer_nearest_hits(tracer, null(), 0, 0, null_mut()), BvhStatus::Ok);
-        assert_eq!(bvh_tracer_any_hits(tracer, null(), 1, 0, null_mut()), BvhStatus::Invalid);
+        let status = bvh_tracer_nearest_hits(tracer, &ray, 1, 0, &mut hit);
+        invalid(status, "rays[0]: the ray's direction");
+        ok(bvh_tracer_nearest_hits(tracer, null(), 0, 0, null_mut()));
+        invalid(bvh_tracer_any_hits(tracer, null(), 1, 0, null_mut()), "rays is null");
         assert_eq!(hit.object, 5);
         for freed in [tree, boxed, null_mut()] {
             bvh_tree_free(freed);
@@ -360,7 +323,7 @@ fn a_budget_of_work_gives_the_file_of_the_rust_crates() {
         // SAFETY: every pointer comes with its array's length, and the tree is freed once.
         unsafe {
             let tree = bvh_tree_bake(&bake);
-            assert_eq!(bvh_tree_save(tree, name.as_ptr()), BvhStatus::Ok);
+            ok(bvh_tree_save(tree, name.as_ptr()));
             bvh_tree_free(tree);
         }
         let objects = Objects::Shapes(Primitives::Triangles(triangles.clone()));
