@@ -3,7 +3,7 @@
 //! accepted.
 
 use bvh_search::bvh_core::glam::DVec3;
-use bvh_search::bvh_core::{InvalidRay, MeshError, Primitives};
+use bvh_search::bvh_core::{MeshError, Primitives};
 use bvh_search::{Objects, prelude::*};
 use numpy::{
     Element, PyArrayDescrMethods, PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArray,
@@ -40,48 +40,38 @@ impl<'py, T: Element> Array<'py, T> {
     }
 }
 
-/// Converts anything that numpy accepts as an array to `float32`, and checks its shape.
-pub fn floats<'py>(
-    name: &str,
-    argument: &Bound<'py, PyAny>,
-    accepted: &str,
-    accepts: impl Fn(&[usize]) -> bool,
-) -> PyResult<Array<'py, f32>> {
-    numbers(name, argument, ("float32", REAL_NUMBERS), accepted, accepts)
-}
-
-/// Converts anything that numpy accepts as an array to `float64`, and checks its shape.
-pub fn doubles<'py>(
-    name: &str,
-    argument: &Bound<'py, PyAny>,
-    accepted: &str,
-    accepts: impl Fn(&[usize]) -> bool,
-) -> PyResult<Array<'py, f64>> {
-    numbers(name, argument, ("float64", REAL_NUMBERS), accepted, accepts)
-}
-
-/// Converts anything that numpy accepts as an array of integers to `int64`, and checks its shape.
-pub fn integers<'py>(
-    name: &str,
-    argument: &Bound<'py, PyAny>,
-    accepted: &str,
-    accepts: impl Fn(&[usize]) -> bool,
-) -> PyResult<Array<'py, i64>> {
-    numbers(name, argument, ("int64", INTEGERS), accepted, accepts)
-}
-
 /// The kinds of elements that are accepted, by numpy's letters, and their name.
 type Kinds = (&'static str, &'static str);
 
 const REAL_NUMBERS: Kinds = ("biuf", "real numbers");
 const INTEGERS: Kinds = ("iu", "integers");
 
-/// Converts anything that numpy accepts as an array of some kinds to `dtype`, which is the type
-/// `T`, and checks its shape. An array that is in row order already is not copied.
-fn numbers<'py, T: Element>(
+/// A type of elements, with its name in numpy and the kinds that are converted to it.
+pub trait Number: Element {
+    const DTYPE: &str;
+    const KINDS: Kinds;
+}
+
+impl Number for f32 {
+    const DTYPE: &str = "float32";
+    const KINDS: Kinds = REAL_NUMBERS;
+}
+
+impl Number for f64 {
+    const DTYPE: &str = "float64";
+    const KINDS: Kinds = REAL_NUMBERS;
+}
+
+impl Number for i64 {
+    const DTYPE: &str = "int64";
+    const KINDS: Kinds = INTEGERS;
+}
+
+/// Converts anything that numpy accepts as an array, and checks its shape. An array that has the
+/// type and is in row order already is not copied.
+pub fn numbers<'py, T: Number>(
     name: &str,
     argument: &Bound<'py, PyAny>,
-    (dtype, kinds): (&str, Kinds),
     accepted: &str,
     accepts: impl Fn(&[usize]) -> bool,
 ) -> PyResult<Array<'py, T>> {
@@ -91,9 +81,9 @@ fn numbers<'py, T: Element>(
         |error: PyErr| invalid(format!("{name}: {}; accepted: {accepted}", error.value(py)));
     // `asanyarray` keeps masked arrays, whose masks the conversion below would drop silently.
     let given = numpy.call_method1("asanyarray", (argument,)).map_err(no_array)?;
-    check_elements(name, &numpy, &given, kinds)?;
+    check_elements(name, &numpy, &given, T::KINDS)?;
     // In row order, aligned, and no subclass.
-    let array = numpy.call_method1("require", (given, dtype, "CAE")).map_err(no_array)?;
+    let array = numpy.call_method1("require", (given, T::DTYPE, "CAE")).map_err(no_array)?;
     let array: PyReadonlyArrayDyn<T> = array.extract()?;
     assert!(array.is_c_contiguous(), "numpy converts to row order");
     if accepts(array.shape()) {
@@ -135,7 +125,8 @@ fn check_elements(
 
 /// Reads triangles with three corners each.
 pub fn triangles(argument: &Bound<PyAny>) -> PyResult<Objects> {
-    let array = floats("triangles", argument, "(n, 3, 3)", |shape| matches!(shape, [_, 3, 3]))?;
+    let array =
+        numbers::<f32>("triangles", argument, "(n, 3, 3)", |shape| matches!(shape, [_, 3, 3]))?;
     let triangles: &[Triangle] = bytemuck::cast_slice(array.elements()?);
     Ok(shapes(triangles.to_vec()))
 }
@@ -161,7 +152,7 @@ pub fn mesh(
     vertices: &Bound<PyAny>,
     faces: &Bound<PyAny>,
 ) -> PyResult<(Vec<Triangle>, Vec<[u32; 3]>)> {
-    let faces = integers(names.faces, faces, "(n, 3)", |shape| matches!(shape, [_, 3]))?;
+    let faces = numbers::<i64>(names.faces, faces, "(n, 3)", |shape| matches!(shape, [_, 3]))?;
     let vertices = positions(names, vertices)?;
     let accepted = vertices.shape()[0];
     let outside = |face: usize, vertex: i64| {
@@ -194,7 +185,7 @@ pub fn moved_mesh(vertices: &Bound<PyAny>, faces: &[[u32; 3]]) -> PyResult<Objec
 }
 
 fn positions<'py>(names: MeshNames, vertices: &Bound<'py, PyAny>) -> PyResult<Array<'py, f32>> {
-    floats(names.vertices, vertices, "(v, 3)", |shape| matches!(shape, [_, 3]))
+    numbers::<f32>(names.vertices, vertices, "(v, 3)", |shape| matches!(shape, [_, 3]))
 }
 
 /// Makes the triangles of a mesh. `unknown` creates the error of a face, by its number, that names
@@ -219,7 +210,7 @@ fn triangles_of(
 /// Reads recorded rays: segments of the shape `(m, 2, 3)`.
 pub fn segments(argument: Option<&Bound<PyAny>>) -> PyResult<Vec<Segment>> {
     let Some(argument) = argument else { return Ok(vec![]) };
-    let array = floats("rays", argument, "(m, 2, 3)", |shape| matches!(shape, [_, 2, 3]))?;
+    let array = numbers::<f32>("rays", argument, "(m, 2, 3)", |shape| matches!(shape, [_, 2, 3]))?;
     let (segments, _) = array.elements()?.as_chunks::<6>();
     let segment = |&[a, b, c, d, e, f]: &[f32; 6]| Segment { from: [a, b, c], to: [d, e, f] };
     Ok(segments.iter().map(segment).collect())
@@ -239,7 +230,7 @@ pub fn points(argument: &Bound<PyAny>, place: Option<&Place>) -> PyResult<Vec<Ve
 
 /// Reads a point.
 pub fn point(name: &str, argument: &Bound<PyAny>) -> PyResult<DVec3> {
-    let array = doubles(name, argument, "(3,)", |shape| shape == [3])?;
+    let array = numbers::<f64>(name, argument, "(3,)", |shape| shape == [3])?;
     let point = DVec3::from_slice(array.elements()?);
     if !point.is_finite() {
         return Err(invalid(format!("{name} is {point}; accepted: finite coordinates")));
@@ -249,7 +240,7 @@ pub fn point(name: &str, argument: &Bound<PyAny>) -> PyResult<DVec3> {
 
 /// Reads boxes with a lower and an upper corner each.
 pub fn boxes(argument: &Bound<PyAny>) -> PyResult<Objects> {
-    let array = floats("boxes", argument, "(n, 2, 3) or (n, 6)", |shape| {
+    let array = numbers::<f32>("boxes", argument, "(n, 2, 3) or (n, 6)", |shape| {
         matches!(shape, [_, 2, 3] | [_, 6])
     })?;
     let boxes: &[Aabb] = bytemuck::cast_slice(array.elements()?);
@@ -276,9 +267,9 @@ impl<'py> Vectors<'py> {
             dtype.kind() == b'f' && dtype.itemsize() <= size_of::<f32>()
         });
         if is_single {
-            floats(name, argument, accepted, accepts).map(Self::Single)
+            numbers::<f32>(name, argument, accepted, accepts).map(Self::Single)
         } else {
-            doubles(name, argument, accepted, accepts).map(Self::Double)
+            numbers::<f64>(name, argument, accepted, accepts).map(Self::Double)
         }
     }
 
@@ -398,7 +389,7 @@ impl<'py> RayArrays<'py> {
         {
             if let Some(argument) = argument {
                 // An array without axes is one number for all rays.
-                *limit = doubles(name, argument, &accepted, |shape| {
+                *limit = numbers::<f64>(name, argument, &accepted, |shape| {
                     shape.is_empty() || shape == [rays]
                 })?
                 .elements()?
@@ -410,12 +401,10 @@ impl<'py> RayArrays<'py> {
 
     /// Returns the rays for threads without Python.
     pub fn source(&self, place: Option<Place>) -> PyResult<RaySource<'_>> {
-        let [t_min, t_max] = self.limits.each_ref().map(Vec::as_slice);
         Ok(RaySource {
             origins: self.origins.slice()?,
             directions: self.directions.slice()?,
-            t_min,
-            t_max,
+            limits: self.limits.each_ref().map(Vec::as_slice),
             rays: self.origins.len(),
             misses: self.misses,
             place,
@@ -428,8 +417,7 @@ impl<'py> RayArrays<'py> {
 pub struct RaySource<'a> {
     origins: VectorSlice<'a>,
     directions: VectorSlice<'a>,
-    t_min: &'a [f64],
-    t_max: &'a [f64],
+    limits: [&'a [f64]; 2],
     pub rays: usize,
     misses: bool,
     place: Option<Place>,
@@ -454,10 +442,8 @@ impl Batch {
 }
 
 impl RaySource<'_> {
-    /// Returns some of the rays, or the number of an invalid one and its fault.
-    pub fn batch(&self, range: Range<usize>) -> Result<Batch, (usize, InvalidRay)> {
-        let limit =
-            |limits: &[f64], index: usize| limits[if limits.len() == 1 { 0 } else { index }];
+    /// Returns some of the rays, or the fault of an invalid one.
+    pub fn batch(&self, range: Range<usize>) -> Result<Batch, String> {
         let mut batch = Batch::default();
         for index in range {
             let direction = self.directions.at(index);
@@ -467,12 +453,13 @@ impl RaySource<'_> {
                 }
                 None => (self.origins.at(index), 0.0),
             };
-            let limits = [limit(self.t_min, index), limit(self.t_max, index)];
+            // One number is for all rays.
+            let limits = self.limits.map(|limits| *limits.get(index).unwrap_or(&limits[0]));
             let [t_min, t_max] = limits.map(|t| t as f32);
             let ray = match Ray::new(origin, direction, t_min, t_max) {
                 // An empty range hits nothing.
                 Err(_) if self.misses => Ray::assume_valid(Vec3::ZERO, Vec3::X, 1.0, 0.0),
-                Err(error) => return Err((index, error)),
+                Err(error) => return Err(format!("ray {index}: {error}")),
                 Ok(_) if advance > 0.0 => {
                     let [t_min, t_max] = limits.map(|t| (t - advance) as f32);
                     Ray::assume_valid(origin, direction, t_min, t_max)
@@ -486,9 +473,4 @@ impl RaySource<'_> {
         }
         Ok(batch)
     }
-}
-
-/// Creates the error of an invalid ray.
-pub fn invalid_ray((index, error): (usize, InvalidRay)) -> PyErr {
-    invalid(format!("ray {index}: {error}"))
 }

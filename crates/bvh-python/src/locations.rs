@@ -1,6 +1,6 @@
 //! The function `locations`: hit points in double precision.
 
-use crate::arrays::{doubles, integers, invalid};
+use crate::arrays::{invalid, numbers};
 use bvh_search::bvh_core::glam::DVec3;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
@@ -17,23 +17,23 @@ pub fn locations<'py>(
     ray: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let py = triangles.py();
-    let corners = doubles("triangles", triangles, "(n, 3, 3)", |shape| matches!(shape, [_, 3, 3]))?;
+    let corners =
+        numbers::<f64>("triangles", triangles, "(n, 3, 3)", |shape| matches!(shape, [_, 3, 3]))?;
     let vectors = |name, argument| {
-        doubles(name, argument, "(m, 3)", |shape: &[usize]| matches!(shape, [_, 3]))
+        numbers::<f64>(name, argument, "(m, 3)", |shape: &[usize]| matches!(shape, [_, 3]))
     };
     let origins = vectors("origins", origins)?;
     let directions = vectors("directions", directions)?;
-    let triangle = integers("triangle", triangle, "(h,)", |shape| shape.len() == 1)?;
-    let ray = integers("ray", ray, "(h,)", |shape| shape == triangle.shape())?;
-    let (corners, _) = corners.elements()?.as_chunks::<9>();
+    let triangle = numbers::<i64>("triangle", triangle, "(h,)", |shape| shape.len() == 1)?;
+    let ray = numbers::<i64>("ray", ray, "(h,)", |shape| shape == triangle.shape())?;
+    let (corners, _) = corners.elements()?.as_chunks::<3>();
+    let (triangles, _) = corners.as_chunks::<3>();
     let (origins, _) = origins.elements()?.as_chunks::<3>();
     let (directions, _) = directions.elements()?.as_chunks::<3>();
     let mut points = Vec::with_capacity(3 * ray.shape()[0]);
     for (&triangle, &ray) in triangle.elements()?.iter().zip(ray.elements()?) {
         let missing = || invalid("locations: accepted: hits of these rays and triangles");
-        let &[ax, ay, az, bx, by, bz, cx, cy, cz] =
-            corners.get(triangle as usize).ok_or_else(missing)?;
-        let corners = [DVec3::new(ax, ay, az), DVec3::new(bx, by, bz), DVec3::new(cx, cy, cz)];
+        let corners = triangles.get(triangle as usize).ok_or_else(missing)?.map(DVec3::from);
         let origin = DVec3::from(*origins.get(ray as usize).ok_or_else(missing)?);
         let direction = DVec3::from(*directions.get(ray as usize).ok_or_else(missing)?);
         points.extend(location(corners, origin, direction).to_array());

@@ -1,6 +1,6 @@
 //! The functions that check the arrays of the class `RaycastingScene`.
 
-use crate::arrays::{MeshNames, Vectors, doubles, mesh};
+use crate::arrays::{MeshNames, Vectors, mesh, numbers};
 use numpy::{IntoPyArray, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 
@@ -15,7 +15,8 @@ pub fn corners<'py>(
     triangle_indices: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let (_, faces) = mesh(NAMES, vertex_positions, triangle_indices)?;
-    let vertices = doubles(NAMES.vertices, vertex_positions, "(v, 3)", |shape| shape.len() == 2)?;
+    let vertices =
+        numbers::<f64>(NAMES.vertices, vertex_positions, "(v, 3)", |shape| shape.len() == 2)?;
     let (vertices, _) = vertices.elements()?.as_chunks::<3>();
     let numbers: Vec<f64> =
         faces.as_flattened().iter().flat_map(|&vertex| vertices[vertex as usize]).collect();

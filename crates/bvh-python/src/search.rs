@@ -3,8 +3,7 @@
 use crate::arrays::invalid;
 use crate::scalars::SECONDS;
 use crate::threads::pool;
-use bvh_search::Event;
-use bvh_search::{Observer, prelude::*};
+use bvh_search::{Event, Observer, prelude::*};
 use pyo3::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::mpsc::{RecvTimeoutError, channel};

@@ -1,13 +1,10 @@
 //! The class `Tracer`: triangles in the wide layout, which answer batches of rays and points on all
 //! threads.
 
-use crate::arrays::{
-    Batch, Place, RayArrays, RaySource, integers, invalid, invalid_ray, point, points,
-};
+use crate::arrays::{Batch, Place, RayArrays, RaySource, invalid, numbers, point, points};
 use crate::threads::detached;
 use crate::tree::Tree;
 use bvh_search::OwnedTree;
-use bvh_search::bvh_core::InvalidRay;
 use bvh_search::bvh_core::glam::DVec3;
 use bvh_search::prelude::*;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
@@ -15,8 +12,10 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::sync::{Arc, OnceLock};
 
-/// The distances of hits, and the indices of their triangles.
-type Hits<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<i32>>);
+/// One number per ray, hit or point.
+type Column<'py, T> = Bound<'py, PyArray1<T>>;
+/// One point or direction per ray or point.
+type Rows<'py, T> = Bound<'py, PyArray2<T>>;
 
 /// The triangles of a tree in a layout for fast traversal. Later improvements and updates of the
 /// tree do not change the tracer.
@@ -79,7 +78,7 @@ impl Tracer {
         t_max: Option<&Bound<'py, PyAny>>,
         coherent: Option<bool>,
         invalid: &str,
-    ) -> PyResult<Hits<'py>> {
+    ) -> PyResult<(Column<'py, f32>, Column<'py, i32>)> {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source(self.place)?;
@@ -102,7 +101,7 @@ impl Tracer {
             })?;
             Ok((t, objects))
         })?
-        .map_err(invalid_ray)?;
+        .map_err(self::invalid)?;
         Ok((t.into_pyarray(py), objects.into_pyarray(py)))
     }
 
@@ -120,7 +119,7 @@ impl Tracer {
         t_max: Option<&Bound<'py, PyAny>>,
         coherent: Option<bool>,
         invalid: &str,
-    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+    ) -> PyResult<Column<'py, bool>> {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source(self.place)?;
@@ -131,7 +130,7 @@ impl Tracer {
                 Ok(())
             })
         })?
-        .map_err(invalid_ray)?;
+        .map_err(self::invalid)?;
         Ok(hits.into_pyarray(py))
     }
 
@@ -142,7 +141,6 @@ impl Tracer {
     /// >>> tracer.all([[0.5, 0.5, 3], [2, 2, 3]], [[0, 0, -1], [0, 0, -1]])
     /// (array([3.], dtype=float32), array([0], dtype=int32), array([0]))
     #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, invalid = "error"))]
-    #[allow(clippy::type_complexity, reason = "three arrays")]
     fn all<'py>(
         &self,
         origins: &Bound<'py, PyAny>,
@@ -150,8 +148,7 @@ impl Tracer {
         t_min: Option<&Bound<'py, PyAny>>,
         t_max: Option<&Bound<'py, PyAny>>,
         invalid: &str,
-    ) -> PyResult<(Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<i64>>)>
-    {
+    ) -> PyResult<(Column<'py, f32>, Column<'py, i32>, Column<'py, i64>)> {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source(self.place)?;
@@ -187,7 +184,7 @@ impl Tracer {
             }
             Ok((t, objects, numbers))
         })?
-        .map_err(invalid_ray)?;
+        .map_err(self::invalid)?;
         Ok((t.into_pyarray(py), objects.into_pyarray(py), numbers.into_pyarray(py)))
     }
 
@@ -203,7 +200,7 @@ impl Tracer {
         t_min: Option<&Bound<'py, PyAny>>,
         t_max: Option<&Bound<'py, PyAny>>,
         invalid: &str,
-    ) -> PyResult<Bound<'py, PyArray1<u32>>> {
+    ) -> PyResult<Column<'py, u32>> {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source(self.place)?;
@@ -213,7 +210,7 @@ impl Tracer {
                 Ok(())
             })
         })?
-        .map_err(invalid_ray)?;
+        .map_err(self::invalid)?;
         Ok(counts.into_pyarray(py))
     }
 
@@ -241,11 +238,7 @@ impl Tracer {
     /// >>> tracer.contains([[0.5, 0.5, 1]])
     /// array([False])
     #[pyo3(signature = (points, *, by = "auto"))]
-    fn contains<'py>(
-        &self,
-        points: &Bound<'py, PyAny>,
-        by: &str,
-    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+    fn contains<'py>(&self, points: &Bound<'py, PyAny>, by: &str) -> PyResult<Column<'py, bool>> {
         let py = points.py();
         let rule = rule(by)?;
         let points = self::points(points, self.place.as_ref())?;
@@ -265,12 +258,10 @@ impl Tracer {
     ///
     /// >>> tracer.closest([[0.5, 0.25, 2]])
     /// (array([[0.5 , 0.25, 0.  ]]), array([0], dtype=int32), array([2.]))
-    #[allow(clippy::type_complexity, reason = "three arrays")]
     fn closest<'py>(
         &self,
         points: &Bound<'py, PyAny>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<f64>>)>
-    {
+    ) -> PyResult<(Rows<'py, f64>, Column<'py, i32>, Column<'py, f64>)> {
         let py = points.py();
         let points = self::points(points, self.place.as_ref())?;
         let center = self.place.map_or(DVec3::ZERO, |place| place.center);
@@ -303,7 +294,7 @@ impl Tracer {
         &self,
         points: &Bound<'py, PyAny>,
         by: &str,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    ) -> PyResult<Column<'py, f64>> {
         let py = points.py();
         let rule = rule(by)?;
         let points = self::points(points, self.place.as_ref())?;
@@ -322,19 +313,18 @@ impl Tracer {
     ///
     /// >>> tracer.surface([[0.5, 0.25, 3]], [[0, 0, -1]], [0])
     /// (array([0.25]), array([0.25]), array([[0., 0., 1.]], dtype=float32))
-    #[allow(clippy::type_complexity, reason = "three arrays")]
     fn surface<'py>(
         &self,
         origins: &Bound<'py, PyAny>,
         directions: &Bound<'py, PyAny>,
         triangle: &Bound<'py, PyAny>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f32>>)>
-    {
+    ) -> PyResult<(Column<'py, f64>, Column<'py, f64>, Rows<'py, f32>)> {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, None, None, "miss")?;
         let source = arrays.source(self.place)?;
         let accepted = format!("({},), as origins", source.rays);
-        let indices = integers("triangle", triangle, &accepted, |shape| shape == [source.rays])?;
+        let indices =
+            numbers::<i64>("triangle", triangle, &accepted, |shape| shape == [source.rays])?;
         let indices = indices.elements()?;
         let triangles = self.source.triangles().unwrap_or(&[]);
         let is_index = |&index: &i64| (-1..triangles.len() as i64).contains(&index);
@@ -357,7 +347,7 @@ impl Tracer {
                 Ok(())
             })
         })?
-        .map_err(invalid_ray)?;
+        .map_err(invalid)?;
         let u: Vec<f64> = surfaces.iter().map(|([u, _], _)| *u).collect();
         let v: Vec<f64> = surfaces.iter().map(|([_, v], _)| *v).collect();
         let normals: Vec<f32> = surfaces.iter().flat_map(|(_, normal)| *normal).collect();
@@ -425,7 +415,7 @@ fn rule(by: &str) -> PyResult<InsideRule> {
     }
 }
 
-fn batch_of(source: RaySource, batch: usize) -> Result<Batch, (usize, InvalidRay)> {
+fn batch_of(source: RaySource, batch: usize) -> Result<Batch, String> {
     let first = batch * BATCH;
     source.batch(first..(first + BATCH).min(source.rays))
 }
@@ -434,8 +424,8 @@ fn batch_of(source: RaySource, batch: usize) -> Result<Batch, (usize, InvalidRay
 fn answers<T: Clone + Send + Sync>(
     rays: usize,
     filler: T,
-    answer: impl Fn(usize, &mut [T]) -> Result<(), (usize, InvalidRay)> + Sync,
-) -> Result<Vec<T>, (usize, InvalidRay)> {
+    answer: impl Fn(usize, &mut [T]) -> Result<(), String> + Sync,
+) -> Result<Vec<T>, String> {
     let mut answers = vec![filler; rays];
     answers
         .par_chunks_mut(BATCH)

@@ -8,7 +8,6 @@ use crate::scalars;
 use crate::search::{self, Limits};
 use bvh_scenes::files::{self, WriteError};
 use bvh_scenes::tree_file::{self, TreeFileError};
-use bvh_search::bvh_core::Segment;
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
 use bvh_search::bvh_core::export::Target;
 use bvh_search::{BakeError, Objects, Options, OwnedTree, SearchError};
@@ -96,9 +95,8 @@ impl Tree {
     ) -> PyResult<Self> {
         let (triangles, faces) = mesh(MESH, vertices, faces)?;
         let limits = Limits { seconds, work, progress };
-        let rays = segments(rays)?;
-        let py = vertices.py();
-        let mut tree = found(py, "vertices", shapes(triangles), references, seed, &rays, limits)?;
+        let options = Options { references, seed, rays: &segments(rays)?, ..Options::default() };
+        let mut tree = found(vertices.py(), "vertices", shapes(triangles), &options, limits)?;
         tree.faces = Some(Arc::new(faces));
         Ok(tree)
     }
@@ -120,8 +118,8 @@ impl Tree {
     ) -> PyResult<Self> {
         let objects = self::triangles(triangles)?;
         let limits = Limits { seconds, work, progress };
-        let rays = segments(rays)?;
-        found(triangles.py(), "triangles", objects, references, seed, &rays, limits)
+        let options = Options { references, seed, rays: &segments(rays)?, ..Options::default() };
+        found(triangles.py(), "triangles", objects, &options, limits)
     }
 
     /// Searches for the best tree over boxes, `(n, 2, 3)` or `(n, 6)`, lower corners first.
@@ -138,8 +136,8 @@ impl Tree {
         rays: Option<&Bound<PyAny>>,
     ) -> PyResult<Self> {
         let limits = Limits { seconds, work, progress };
-        let rays = segments(rays)?;
-        found(boxes.py(), "boxes", self::boxes(boxes)?, 1.0, seed, &rays, limits)
+        let options = Options { seed, rays: &segments(rays)?, ..Options::default() };
+        found(boxes.py(), "boxes", self::boxes(boxes)?, &options, limits)
     }
 
     /// Loads the tree in a file. The triangles or boxes must be the ones that it was saved for.
@@ -318,14 +316,11 @@ fn found(
     py: Python,
     name: &str,
     objects: Objects,
-    references: f64,
-    seed: u64,
-    rays: &[Segment],
+    options: &Options,
     limits: Limits,
 ) -> PyResult<Tree> {
     let (found, raised) = search::run(py, limits, |budget, observer| {
-        let options = Options { references, seed, budget, rays };
-        OwnedTree::find(objects, &options, observer)
+        OwnedTree::find(objects, &Options { budget, ..*options }, observer)
     })?;
     raised?;
     found.map(Tree::new).map_err(|error| match error {
