@@ -5,11 +5,6 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-fn outcome(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
-    let output = run(folder, args);
-    (output.status.code(), text(&[output.stdout, output.stderr].concat()))
-}
-
 /// Returns the arguments of a command. The command that runs specs has no name.
 fn call<'a>(command: &'a str, args: &[&'a str]) -> Vec<&'a str> {
     let name: &[&str] = if command.is_empty() { &[] } else { &[command] };
@@ -20,17 +15,13 @@ fn call<'a>(command: &'a str, args: &[&'a str]) -> Vec<&'a str> {
 fn flags(folder: &Path, command: &str) -> Vec<(String, Option<String>)> {
     let help = said(folder, &call(command, &["--help"]));
     let mut flags = Vec::new();
-    for line in help.lines() {
-        let mut words = line.split_whitespace();
-        // Other lines explain a flag, and may mention further ones.
-        if !line.trim_start().starts_with('-') {
-            continue;
-        }
-        let Some(word) = words.find(|word| word.starts_with("--")) else { continue };
-        let name = word.trim_end_matches(',').to_owned();
+    // Other lines explain a flag, and may mention further ones.
+    for line in help.lines().filter(|line| line.trim_start().starts_with('-')) {
+        let mut words = line.split_whitespace().skip_while(|word| !word.starts_with("--"));
+        let Some(name) = words.next() else { continue };
         let value = words.next().filter(|word| word.starts_with('<')).map(str::to_owned);
-        if !["--help", "--version"].contains(&name.as_str()) {
-            flags.push((name, value));
+        if !["--help", "--version"].contains(&name) {
+            flags.push((name.to_owned(), value));
         }
     }
     flags
@@ -71,7 +62,9 @@ pub fn wrong_flags(at: &Path, commands: &[(&str, &[&str])]) -> usize {
                 // A flag may not be given twice.
                 args.retain(|arg| !arg.starts_with(&format!("{flag}=")));
                 args.push(&given);
-                let (code, said) = outcome(at, &args);
+                let output = run(at, &args);
+                let code = output.status.code();
+                let said = text(&output.stderr);
                 let named = said.contains(&flag)
                     || (flag == "--scene" && said.contains(&format!("scene {wrong}")));
                 if code != Some(2) || !named {

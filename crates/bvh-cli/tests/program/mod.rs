@@ -16,6 +16,21 @@ pub fn top() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
+/// The pages at the top, of `docs/`, of `results/`, and of the crates.
+pub fn pages() -> Vec<PathBuf> {
+    let mut pages = vec![top().join("results/README.md")];
+    let crates = fs::read_dir(top().join("crates")).unwrap();
+    let of_crates = crates.map(|entry| entry.unwrap().path().join("README.md"));
+    pages.extend(of_crates.filter(|page| page.is_file()));
+    for folder in [top(), top().join("docs")] {
+        let entries = fs::read_dir(folder).unwrap();
+        pages.extend(entries.map(|entry| entry.unwrap().path()));
+    }
+    pages.retain(|page| page.extension().is_some_and(|extension| extension == "md"));
+    pages.sort();
+    pages
+}
+
 /// Creates a folder with a spec of this name.
 pub fn folder_with(spec: &str, text: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();

@@ -10,7 +10,7 @@ use bvh_scenes::Scene;
 use harness::report::query::Row;
 pub use program::*;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_harness");
 
@@ -70,21 +70,6 @@ pub fn experiments() -> Vec<(String, String)> {
         (file.trim_end_matches(".toml").into(), fs::read_to_string(folder.join(file)).unwrap())
     };
     names(&folder).into_iter().map(read).collect()
-}
-
-/// The pages at the top, of `docs/`, of `results/`, and of the crates.
-pub fn pages() -> Vec<PathBuf> {
-    let mut pages = vec![top().join("results/README.md")];
-    let crates = fs::read_dir(top().join("crates")).unwrap();
-    let of_crates = crates.map(|entry| entry.unwrap().path().join("README.md"));
-    pages.extend(of_crates.filter(|page| page.is_file()));
-    for folder in [top(), top().join("docs")] {
-        let entries = fs::read_dir(folder).unwrap();
-        pages.extend(entries.map(|entry| entry.unwrap().path()));
-    }
-    pages.retain(|page| page.extension().is_some_and(|extension| extension == "md"));
-    pages.sort();
-    pages
 }
 
 /// A page of the documentation is what it is made to be by the test `by`, which rewrites it where
