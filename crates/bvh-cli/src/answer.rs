@@ -1,24 +1,25 @@
 //! The results of a command: text for people, or one JSON object with all digits.
 
 use crate::output::print_line;
-use serde_json::{Map, Value};
-
-/// The form of the results.
-#[derive(clap::Args, Clone, Copy, Debug, Default)]
-pub struct Form {
-    /// Print the results as JSON, with all digits.
-    #[arg(long)]
-    pub json: bool,
-}
+use indicatif::HumanCount;
+use serde_json::{Map, Value, json};
+use std::time::Instant;
 
 /// The results of one command.
 pub struct Answer {
     facts: Option<Map<String, Value>>,
+    start: Instant,
 }
 
 impl Answer {
-    pub fn new(form: Form) -> Self {
-        Self { facts: form.json.then(Map::new) }
+    /// Collects facts for JSON, or prints lines for people.
+    pub fn new(is_json: bool) -> Self {
+        Self { facts: is_json.then(Map::new), start: Instant::now() }
+    }
+
+    /// The seconds since the command began.
+    pub fn seconds(&self) -> f64 {
+        self.start.elapsed().as_secs_f64()
     }
 
     /// Prints a line for people.
@@ -37,9 +38,8 @@ impl Answer {
 
     /// Adds a fact to a list.
     pub fn list(&mut self, name: &str, value: impl Into<Value>) {
-        let Some(facts) = &mut self.facts else { return };
-        let list = facts.entry(name).or_insert_with(|| Value::Array(Vec::new()));
-        if let Value::Array(values) = list {
+        let list = self.facts.as_mut().map(|facts| facts.entry(name).or_insert(json!([])));
+        if let Some(Value::Array(values)) = list {
             values.push(value.into());
         }
     }
@@ -75,15 +75,7 @@ impl Answer {
 
 /// Writes a whole number with its digits in groups of three.
 pub fn whole(number: impl TryInto<u64>) -> String {
-    let digits = number.try_into().unwrap_or(u64::MAX).to_string();
-    let mut text = String::new();
-    for (place, digit) in digits.char_indices() {
-        if place > 0 && (digits.len() - place).is_multiple_of(3) {
-            text.push(' ');
-        }
-        text.push(digit);
-    }
-    text
+    HumanCount(number.try_into().unwrap_or(u64::MAX)).to_string().replace(',', " ")
 }
 
 /// Writes a number with four significant digits.

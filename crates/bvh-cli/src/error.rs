@@ -5,7 +5,6 @@ use bvh_scenes::SceneError;
 use bvh_scenes::files::{ReadError, WriteError};
 use bvh_scenes::tree_file::TreeFileError;
 use bvh_search::SearchError;
-use std::path::{Path, PathBuf};
 
 /// A failure, with its file or object.
 #[derive(Debug, thiserror::Error)]
@@ -17,9 +16,6 @@ pub enum Error {
     /// The command line has an invalid value or contradicts itself.
     #[error("{0}")]
     Usage(String),
-    /// The file of rays is invalid. The message names the key, what was found and what is accepted.
-    #[error("{}: {message}", .file.display())]
-    Rays { file: PathBuf, message: String },
     /// An input cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
@@ -44,7 +40,7 @@ impl Error {
     /// Returns 2 for faults of the command line or its inputs, 130 after Ctrl-C, otherwise 1.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Scene(_) | Self::Usage(_) | Self::Rays { .. } => 2,
+            Self::Scene(_) | Self::Usage(_) => 2,
             // A wrong path is a fault of the command line, a failing disk is not.
             Self::Read(error) | Self::TreeFile(TreeFileError::Read(error)) => {
                 if error.is_of_the_path() { 2 } else { 1 }
@@ -53,11 +49,6 @@ impl Error {
             Self::Interrupted(_) => 130,
             Self::Write(_) | Self::Search { .. } | Self::Tracing { .. } => 1,
         }
-    }
-
-    /// Returns a function for `map_err` on tables that names the file.
-    pub fn csv(path: &Path) -> impl FnOnce(csv::Error) -> Self {
-        move |error| WriteError::of(path, "write the table")(error.into()).into()
     }
 
     /// Returns a function for `map_err` on builders and searches that names the scene and the

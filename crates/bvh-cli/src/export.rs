@@ -1,12 +1,11 @@
 //! `bvh export`: writes a tree for the tracer of another library.
 
 use crate::Error;
-use crate::answer::{Answer, Form, gain, whole};
+use crate::answer::{Answer, gain, whole};
 use crate::arguments::{load_scene, output_file};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::export::{Layout, Target};
-use bvh_core::{Bvh, Triangle};
-use bvh_scenes::{Scene, files, tree_file};
+use bvh_scenes::{files, tree_file};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
@@ -27,8 +26,6 @@ pub struct ExportArgs {
     /// The file to write, replaced when it is complete; `.json` for json.
     #[arg(long, value_name = "FILE.bin|.json")]
     pub out: PathBuf,
-    #[command(flatten)]
-    pub form: Form,
 }
 
 /// Parses the names of the targets.
@@ -38,7 +35,7 @@ pub fn tracers() -> impl TypedValueParser<Value = Target> {
 }
 
 /// Writes the better of the tree and a greedy one for the tracer, and prints how they compare.
-pub fn export(args: &ExportArgs) -> Result<(), Error> {
+pub fn export(args: &ExportArgs, answer: &mut Answer) -> Result<(), Error> {
     let target = args.tracer;
     let extension = if target.layout == Layout::Json { "json" } else { "bin" };
     output_file("--out", &args.out, extension)?;
@@ -46,41 +43,26 @@ pub fn export(args: &ExportArgs) -> Result<(), Error> {
     let (tree, _) = tree_file::load(&args.file, &scene)?;
     // Only triangles can be traced there.
     let triangles = scene.triangles().map_err(|fault| Error::Usage(fault.to_string()))?;
-    let mut answer = Answer::new(args.form);
-    let (better, compared) = compare(&target, &tree, &scene, triangles, &mut answer);
-    let bytes = target.bytes(&better, &scene.boxes);
-    files::write(&args.out, &bytes)?;
-    let nodes = better.nodes.len();
-    answer.say(&format!("{}: {} nodes of {compared}", args.out.display(), whole(nodes)));
-    answer.record("nodes", nodes);
-    answer.record("cost of a ray", target.cost(&better));
-    answer.end();
-    Ok(())
-}
-
-/// Returns the better of the tree and a greedy one for the tracer, and which one it is and why,
-/// which it also records.
-pub fn compare(
-    target: &Target,
-    tree: &Bvh,
-    scene: &Scene,
-    triangles: &[Triangle],
-    answer: &mut Answer,
-) -> (Bvh, String) {
     // The loaded tree is over the same boxes, so that these can be built over, too.
     let greedy = muller_fellner::Config::default().build(&scene.boxes).unwrap_or_default();
-    let better = target.fit_better(tree, &greedy, triangles);
+    let better = target.fit_better(&tree, &greedy, triangles);
+    files::write(&args.out, &target.bytes(&better.tree, &scene.boxes))?;
     let which = match better.is_searched() {
         true => "this tree",
         false => "a greedy tree instead, which takes fewer tests",
     };
+    let [inside, outside] = better.gains.map(|times| gain(1.0, times));
+    let nodes = better.tree.nodes.len();
+    answer.say(&format!(
+        "{}: {} nodes of {which}; tests of rays from inside the scene {inside} a greedy tree's, of \
+         rays from outside {outside}",
+        args.out.display(),
+        whole(nodes)
+    ));
+    answer.record("nodes", nodes);
+    answer.record("cost of a ray", target.cost(&better.tree));
     answer.record("is searched", better.is_searched());
     answer.record("gain inside", better.gains[0]);
     answer.record("gain outside", better.gains[1]);
-    let [inside, outside] = better.gains.map(|times| gain(1.0, times));
-    let compared = format!(
-        "{which}; tests of rays from inside the scene {inside} a greedy tree's, of rays from \
-         outside {outside}"
-    );
-    (better.tree, compared)
+    Ok(())
 }

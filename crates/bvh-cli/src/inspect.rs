@@ -2,8 +2,9 @@
 //! its tree.
 
 use crate::Error;
-use crate::answer::{Answer, Form};
+use crate::answer::Answer;
 use crate::arguments::{load_scene, output_file};
+use crate::output::write_table;
 use crate::rays::Rays;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::{self, Objective, SahConstants};
@@ -12,7 +13,7 @@ use bvh_core::{Bvh, NodeKind};
 use bvh_scenes::{files, tree_file};
 use clap::Args;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Report the origin of a tree file, and the costs, depth, arity and validity of its tree.
 #[derive(Args, Clone, Debug)]
@@ -31,27 +32,17 @@ pub struct InspectArgs {
     /// Write the nodes to a CSV file, one row each, in full precision.
     #[arg(long, value_name = "NODES.csv")]
     pub nodes: Option<PathBuf>,
-    #[command(flatten)]
-    pub form: Form,
 }
 
 /// Prints the facts about a file. Rejects a damaged file, and a file for a different scene.
-pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
+pub fn inspect(args: &InspectArgs, answer: &mut Answer) -> Result<(), Error> {
     // A wrong path is reported before the scene is loaded, which may take long.
     if let Some(nodes) = &args.nodes {
         output_file("--nodes", nodes, "csv")?;
     }
     let rays = args.rays.as_deref().map(Rays::read).transpose()?;
     let scene = args.scene.as_deref().map(load_scene).transpose()?;
-    if let (Some(named), Some(rays), Some(scene)) = (&args.rays, &rays, &scene) {
-        rays.check(named, scene)?;
-    }
     let (tree, header) = tree_file::load(&args.file, scene.as_ref())?;
-    let tests = match (rays, &scene) {
-        (Some(rays), Some(scene)) => Some(rays.expected_tests(&tree, scene)?),
-        _ => None,
-    };
-    let mut answer = Answer::new(args.form);
     match &scene {
         Some(scene) => {
             answer.fact("valid", "yes, over this scene's objects");
@@ -62,9 +53,9 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
     }
     answer.fact("version", Header::VERSION);
     answer.fact("bytes", files::regular(&args.file)?);
-    describe(&header, &mut answer);
+    describe(&header, answer);
     answer.fact("cost", header.objective.cost(&tree));
-    measure(&tree, &mut answer);
+    measure(&tree, answer);
     // The build cannot fail, because a valid tree over these boxes proves that they are finite.
     if let Some(scene) = &scene
         && let Ok(greedy) = muller_fellner::Config::default().build(&scene.boxes)
@@ -73,54 +64,31 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Error> {
         let ratio = cost::internal_area(&tree) / cost::internal_area(&greedy);
         answer.fact("internal area over Müller–Fellner's", ratio);
     }
-    if let Some(tests) = tests {
-        answer.fact("expected tests of a ray", tests);
+    if let (Some(rays), Some(scene)) = (&rays, &scene) {
+        answer.fact("expected tests of a ray", rays.expected_tests(&tree, scene)?);
     }
     if let Some(path) = &args.nodes {
-        files::write(path, &nodes_table(&tree).map_err(Error::csv(path))?)?;
+        write_nodes(&tree, path)?;
     }
-    answer.end();
     Ok(())
 }
 
-/// Returns the nodes as CSV, whose columns docs/TREE_FILES.md describes.
-fn nodes_table(tree: &Bvh) -> Result<Vec<u8>, csv::Error> {
+/// Writes the nodes as CSV, whose columns docs/TREE_FILES.md describes.
+fn write_nodes(tree: &Bvh, path: &Path) -> Result<(), Error> {
     // The flat tree stores no parents, so one pass over all children finds them.
     let mut parents = vec![None; tree.nodes.len()];
     for (index, node) in tree.nodes.iter().enumerate() {
         parents[node.children()].fill(Some(index));
     }
-    let columns = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(columns.split(','))?;
-    for (index, (node, parent)) in tree.nodes.iter().zip(parents).enumerate() {
+    let rows = tree.nodes.iter().zip(parents).enumerate().map(|(index, (node, parent))| {
         let (kind, first, count) = match node.kind() {
             NodeKind::Inner { first, count } => ("inner", first, count),
             NodeKind::Leaf { first, count } => ("leaf", first, count),
         };
-        let corners = [node.aabb.min.to_array(), node.aabb.max.to_array()];
-        writer.serialize((index, parent, kind, first, count, corners))?;
-    }
-    writer.into_inner().map_err(|error| error.into_error().into())
-}
-
-/// Prove that a tree file from any source contains a tree for a scene. Computes validity and costs
-/// again.
-#[derive(Args, Clone, Debug)]
-pub struct VerifyArgs {
-    /// The tree file.
-    #[arg(value_name = "FILE.bvh")]
-    pub file: PathBuf,
-    /// The tree's scene, by name or path of a mesh file.
-    pub scene: String,
-    #[command(flatten)]
-    pub form: Form,
-}
-
-/// Does the same as [`inspect`], and requires a scene.
-pub fn verify(args: &VerifyArgs) -> Result<(), Error> {
-    let VerifyArgs { file, scene, form } = args.clone();
-    inspect(&InspectArgs { file, scene: Some(scene), rays: None, nodes: None, form })
+        (index, parent, kind, first, count, node.aabb.min.to_array(), node.aabb.max.to_array())
+    });
+    let columns = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
+    write_table(path, columns, rows)
 }
 
 fn describe(header: &Header, answer: &mut Answer) {
@@ -141,7 +109,7 @@ fn objective(objective: &Objective) -> String {
     match objective {
         Objective::InternalArea => "internal area".to_owned(),
         Objective::GoldsmithSalmon => "Goldsmith–Salmon".to_owned(),
-        Objective::Layout => "cost of the wide layout, by area".to_owned(),
+        Objective::Layout => "cost of the wide layout".to_owned(),
         Objective::Sah(constants) => {
             let traversal = constants.traversal();
             let intersection = constants.intersection();

@@ -15,11 +15,13 @@ mod render;
 mod report;
 mod scenes;
 
+use answer::Answer;
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use error::Error;
-use interrupt::INTERRUPTED;
-use output::{answered, print_bytes, print_error, succeeded};
+use inspect::InspectArgs;
+use output::{print_bytes, print_error, succeeded};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 #[global_allocator]
@@ -32,17 +34,34 @@ static ALLOCATOR: memory::HugePages = memory::HugePages;
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// Print the results as JSON, with all digits.
+    #[arg(long, global = true)]
+    json: bool,
+    /// Number of threads; the default is one per processor. It changes only times, and the results
+    /// of budgets of time.
+    #[arg(long, global = true, value_name = "N")]
+    #[arg(value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
 }
 
 #[derive(Subcommand)]
 enum Command {
     Bake(Box<bake::BakeArgs>),
-    Inspect(inspect::InspectArgs),
-    Verify(inspect::VerifyArgs),
+    Inspect(InspectArgs),
+    /// Prove that a tree file from any source contains a tree for a scene. Computes validity and
+    /// costs again.
+    Verify {
+        /// The tree file.
+        #[arg(value_name = "FILE.bvh")]
+        file: PathBuf,
+        /// The tree's scene, by name or path of a mesh file.
+        scene: String,
+    },
     Export(export::ExportArgs),
     Render(render::RenderArgs),
     Report(report::ReportArgs),
-    Scenes(scenes::ScenesArgs),
+    /// List the built-in scenes and their sizes.
+    Scenes,
     /// Print the file with which a shell completes arguments.
     Completions {
         shell: Shell,
@@ -50,13 +69,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(answer) => return answered(&answer),
-    };
-    // Signals are heard before any work begins.
-    interrupt::listen();
-    match run(cli.command) {
+    match run(Cli::parse()) {
         Ok(()) => succeeded(),
         Err(error) => {
             print_error(&format!("error: {error}"));
@@ -65,24 +78,37 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(command: Command) -> Result<(), Error> {
+fn run(Cli { command, json, jobs }: Cli) -> Result<(), Error> {
+    // By default rayon starts one thread per processor when it is first used.
+    if let Some(jobs) = jobs {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(jobs.into())
+            .build_global()
+            .map_err(|error| Error::Usage(format!("--jobs {jobs}: {error}")))?;
+    }
+    let mut answer = Answer::new(json);
     match command {
-        Command::Bake(args) if args.instances => bake::instances::bake(&args, &INTERRUPTED),
+        Command::Bake(args) if args.instances => bake::instances::bake(&args, &mut answer)?,
         Command::Bake(args) => match args.parts {
-            Some(count) => bake::parts::bake(&args, count, &INTERRUPTED),
-            None => bake::bake(&args, &INTERRUPTED),
+            Some(count) => bake::parts::bake(&args, count, &mut answer)?,
+            None => bake::bake(&args, &mut answer)?,
         },
-        Command::Inspect(args) => inspect::inspect(&args),
-        Command::Verify(args) => inspect::verify(&args),
-        Command::Export(args) => export::export(&args),
-        Command::Render(args) => render::render(&args),
-        Command::Report(args) => report::report(&args),
-        Command::Scenes(args) => scenes::scenes(&args),
+        Command::Inspect(args) => inspect::inspect(&args, &mut answer)?,
+        Command::Verify { file, scene } => {
+            let args = InspectArgs { file, scene: Some(scene), rays: None, nodes: None };
+            inspect::inspect(&args, &mut answer)?;
+        }
+        Command::Export(args) => export::export(&args, &mut answer)?,
+        Command::Render(args) => render::render(&args, &mut answer)?,
+        Command::Report(args) => report::report(&args, &mut answer)?,
+        Command::Scenes => scenes::scenes(&mut answer)?,
         Command::Completions { shell } => {
             let mut file = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "bvh", &mut file);
             print_bytes(&file);
-            Ok(())
+            return Ok(());
         }
     }
+    answer.end();
+    Ok(())
 }

@@ -68,16 +68,14 @@ fn advise(_: *mut u8, _: usize) {}
 mod tests {
     use super::LARGE;
 
+    /// Returns the flags of the mapping that contains an address. Mappings come in order.
     fn flags(address: usize) -> String {
         let maps = std::fs::read_to_string("/proc/self/smaps").unwrap();
-        let mut contains = false;
+        let mut end = 0;
         for line in maps.lines() {
-            let ends = line.split(' ').next().and_then(|range| range.split_once('-'));
-            let ends = ends.map(|(a, b)| [a, b].map(|end| usize::from_str_radix(end, 16)));
-            if let Some([Ok(first), Ok(end)]) = ends {
-                contains = (first..end).contains(&address);
-            }
-            if let Some(flags) = line.strip_prefix("VmFlags:").filter(|_| contains) {
+            let range = line.split(' ').next().and_then(|range| range.split_once('-'));
+            end = range.and_then(|(_, end)| usize::from_str_radix(end, 16).ok()).unwrap_or(end);
+            if let Some(flags) = line.strip_prefix("VmFlags:").filter(|_| end > address) {
                 return flags.to_owned();
             }
         }

@@ -1,8 +1,11 @@
-//! Writes to the terminal.
+//! Writes to the terminal, and tables to files.
 
+use crate::Error;
+use bvh_scenes::files::{self, WriteError};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::borrow::Cow;
+use serde::Serialize;
 use std::io::{ErrorKind, Write};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -45,39 +48,34 @@ pub fn bar(length: u64, template: &str) -> ProgressBar {
     ProgressBar::new(length).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
-/// Prints the parser's answer to the arguments: help, version, or their fault. Returns the exit
-/// code.
-pub fn answered(answer: &clap::Error) -> ExitCode {
-    const USAGE: u8 = 2;
-    let text = answer.render().to_string();
-    // Help and version are results and go to standard output.
-    if answer.use_stderr() {
-        print_error(text.trim_end());
-        return ExitCode::from(USAGE);
+/// Writes rows as CSV to a file.
+pub fn write_table<R: Serialize>(
+    path: &Path,
+    columns: &str,
+    rows: impl Iterator<Item = R>,
+) -> Result<(), Error> {
+    let failed = |error: csv::Error| WriteError::of(path, "write the table")(error.into());
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(columns.split(',')).map_err(failed)?;
+    for row in rows {
+        writer.serialize(row).map_err(failed)?;
     }
-    print_bytes(text.as_bytes());
-    succeeded()
+    let table = writer.into_inner().map_err(|error| failed(error.into_error().into()))?;
+    Ok(files::write(path, &table)?)
 }
 
 /// Escapes control characters except ends of lines. Names of files and keys of specs come from the
 /// user and must not control the terminal.
-fn plain(text: &str) -> Cow<'_, str> {
-    if !text.contains(is_command) {
-        return text.into();
-    }
-    let mut escaped = String::new();
+fn plain(text: &str) -> String {
+    let mut plain = String::new();
     for c in text.chars() {
-        if is_command(c) {
-            escaped.extend(c.escape_default());
+        if c.is_control() && c != '\n' {
+            plain.extend(c.escape_default());
         } else {
-            escaped.push(c);
+            plain.push(c);
         }
     }
-    escaped.into()
-}
-
-fn is_command(c: char) -> bool {
-    c.is_control() && c != '\n'
+    plain
 }
 
 #[cfg(test)]

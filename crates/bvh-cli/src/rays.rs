@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::arguments::input_file;
+use crate::interrupt::is_interrupted;
 use crate::npy::read_npy;
 use bvh_config::fault;
 use bvh_core::cost::Objective;
@@ -11,40 +12,38 @@ use bvh_scenes::files::{read, read_text};
 use bvh_scenes::rays::{RenderedRays, TRAINED, density, of_anything, of_renderer};
 use bvh_search::ray_density;
 use glam::Vec3;
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::path::Path;
 
 /// The rays that train a tree.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub enum Rays {
     /// Rays that need no camera.
     Default,
     /// The rays of a renderer.
     Rendered(RenderedRays),
-    /// The segments of a file.
-    Recorded(Vec<Segment>),
+    /// The segments of the file of this name.
+    Recorded(String, Vec<Segment>),
 }
 
 impl Rays {
-    /// The name of [`Rays::Default`].
-    pub const DEFAULT: &str = "default";
     /// The seed of rays that judge trees. A bake trains on other rays, unless its `--seed` is this
     /// number.
     pub const JUDGING: u64 = u64::MAX;
 
     /// Returns the rays named `default`, or reads the file with this name.
     pub fn read(named: &str) -> Result<Self, Error> {
-        if named == Self::DEFAULT {
+        if named == "default" {
             return Ok(Self::Default);
         }
         let path = Path::new(named);
         input_file("--rays", path)?;
         let extension = path.extension().and_then(|extension| extension.to_str());
-        let invalid = |message| Error::Rays { file: path.to_owned(), message };
+        let invalid = |message: String| Error::Usage(format!("{named}: {message}"));
         match extension {
             Some("toml") => fault::parse(&read_text(path)?).map(Self::Rendered).map_err(invalid),
             Some(format @ ("csv" | "npy" | "bin")) => {
-                recorded(format, &read(path)?).map(Self::Recorded).map_err(invalid)
+                let segments = recorded(format, &read(path)?).map_err(invalid)?;
+                Ok(Self::Recorded(named.to_owned(), segments))
             }
             _ => {
                 Err(invalid("--rays accepts files that end with .toml, .csv, .npy or .bin".into()))
@@ -52,10 +51,10 @@ impl Rays {
         }
     }
 
-    /// Rejects recorded rays of the file `named` if no ray meets the scene. The search could not
-    /// find that out: it adds rays from anywhere in the scene.
-    pub fn check(&self, named: &str, scene: &Scene) -> Result<(), Error> {
-        let Self::Recorded(segments) = self else { return Ok(()) };
+    /// Rejects recorded rays if no ray meets the scene. The search could not find that out: it adds
+    /// rays from anywhere in the scene.
+    pub fn check(&self, scene: &Scene) -> Result<(), Error> {
+        let Self::Recorded(file, segments) = self else { return Ok(()) };
         let bounds = Aabb::union_of(&scene.boxes);
         let meets = |&Segment { from, to }: &Segment| {
             let from = Vec3::from(from);
@@ -68,41 +67,39 @@ impl Rays {
             return Ok(());
         }
         let message = format!(
-            "none of the {} segments meets the box of scene {}, {} to {}; accepted: one or more \
-             segments that do",
+            "{file}: none of the {} segments meets the box of scene {}, {} to {}; accepted: one or \
+             more segments that do",
             segments.len(),
             scene.name,
             bounds.min,
             bounds.max
         );
-        Err(Error::Rays { file: PathBuf::from(named), message })
+        Err(Error::Usage(message))
     }
 
-    /// Returns the rays' density in a scene, or `None` soon after `interrupted` becomes true;
-    /// `tree` is any valid tree over the scene.
+    /// Returns the rays' density in a scene, or `None` soon after the user interrupts; `tree` is any
+    /// valid tree over the scene.
     pub fn density(
         &self,
         scene: &Scene,
         tree: &Bvh,
         seed: u64,
-        interrupted: &AtomicBool,
     ) -> Result<Option<RayDensity>, Error> {
-        let is_over = || interrupted.load(Relaxed);
         let density = match self {
             Self::Default => {
-                let rays = of_anything(TRAINED, scene, tree, seed, &is_over);
+                let rays = of_anything(TRAINED, scene, tree, seed, &is_interrupted);
                 density(&rays, tree).map(Some)
             }
             Self::Rendered(config) => {
-                let rays = of_renderer(config, scene, tree, &is_over);
+                let rays = of_renderer(config, scene, tree, &is_interrupted);
                 density(&rays, tree).map(Some)
             }
-            Self::Recorded(segments) => {
-                ray_density(tree, Some(&scene.primitives), segments, &is_over)
+            Self::Recorded(_, segments) => {
+                ray_density(tree, Some(&scene.primitives), segments, &is_interrupted)
             }
         };
         // After an interruption some rays are missing, or all of them, which is an error otherwise.
-        if is_over() {
+        if is_interrupted() {
             return Ok(None);
         }
         density.map_err(|source| Error::Tracing { scene: scene.name.clone(), source })
@@ -111,7 +108,8 @@ impl Rays {
     /// Returns the expected number of tests of a ray that enters the scene, in the wide layout of a
     /// tree. No bake trains on the same default rays.
     pub fn expected_tests(&self, tree: &Bvh, scene: &Scene) -> Result<f64, Error> {
-        let density = self.density(scene, tree, Self::JUDGING, &AtomicBool::new(false))?;
+        self.check(scene)?;
+        let density = self.density(scene, tree, Self::JUDGING)?;
         let (Some(density), Some(root)) = (density, tree.root_aabb()) else { return Ok(0.0) };
         let tests = Objective::Layout.cost_by(tree, &density);
         let entering = density.measure(&root);

@@ -1,8 +1,8 @@
 //! `bvh render`: draws a scene into a PNG file, and prints times and counts.
 
 use crate::Error;
-use crate::answer::{Answer, Form, whole};
-use crate::arguments::{Jobs, input_file, load_scene, output_file};
+use crate::answer::{Answer, whole};
+use crate::arguments::{input_file, load_scene, output_file};
 use crate::output::bar;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, WideBvh};
@@ -45,27 +45,19 @@ pub struct RenderArgs {
     /// The middle of the picture. The default is the centre of the scene.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub at: Option<DVec3>,
-    #[command(flatten)]
-    pub jobs: Jobs,
-    #[command(flatten)]
-    pub form: Form,
 }
 
 /// The largest number of pixels of a picture. With their counts they need a gigabyte.
 const LARGEST: u64 = 100_000_000;
 
 fn size(text: &str) -> Result<(u32, u32), String> {
-    let parsed = text
-        .split_once('x')
-        .and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
-    match parsed {
-        Some((width, height))
-            if width > 0 && height > 0 && u64::from(width) * u64::from(height) <= LARGEST =>
-        {
-            Ok((width, height))
-        }
-        _ => Err(format!("accepted: width and height as in 960x540, {LARGEST} pixels at most")),
-    }
+    let pixels = |&(width, height): &(u32, u32)| u64::from(width) * u64::from(height);
+    text.split_once('x')
+        .and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)))
+        .filter(|size| (1..=LARGEST).contains(&pixels(size)))
+        .ok_or_else(|| {
+            format!("accepted: width and height as in 960x540, {LARGEST} pixels at most")
+        })
 }
 
 fn point(text: &str) -> Result<DVec3, String> {
@@ -96,12 +88,11 @@ impl RenderArgs {
 }
 
 /// Draws the picture, writes it, and prints its times.
-pub fn render(args: &RenderArgs) -> Result<(), Error> {
+pub fn render(args: &RenderArgs, answer: &mut Answer) -> Result<(), Error> {
     if args.accel.ends_with(".bvh") {
         input_file("--accel", Path::new(&args.accel))?;
     }
     output_file("--out", &args.out, "png")?;
-    args.jobs.apply()?;
     let scene = load_scene(&args.scene)?;
     if args.heatmap && args.accel == "wide" {
         return Err(Error::Usage(
@@ -124,7 +115,6 @@ pub fn render(args: &RenderArgs) -> Result<(), Error> {
     let bytes = image::png(film.width, heat.as_ref().unwrap_or(&film.pixels))
         .map_err(WriteError::of(&args.out, "encode the picture"))?;
     files::write(&args.out, &bytes)?;
-    let mut answer = Answer::new(args.form);
     let objects = scene.boxes.len();
     answer.say(&format!(
         "{}: {} objects, {} rays; built in {built:.3} s, rendered in {rendered:.3} s",
@@ -144,7 +134,6 @@ pub fn render(args: &RenderArgs) -> Result<(), Error> {
         answer.fact("tests per ray of the last colour of --heatmap", top / rays_per_pixel);
     }
     answer.say(&format!("picture: {}", args.out.display()));
-    answer.end();
     Ok(())
 }
 

@@ -1,21 +1,22 @@
 //! `bvh report`: one page about a tree file, compared with the plain tree that a library builds.
 
-mod page;
-
 use crate::Error;
-use crate::answer::{Answer, Form, whole};
-use crate::arguments::{Jobs, load_scene, output_file, output_or_free};
+use crate::answer::{Answer, short, whole};
+use crate::arguments::{load_scene, output_file, output_or_free};
 use crate::rays::Rays;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::Bvh;
 use bvh_core::cost::{self, Objective};
+use bvh_core::file::Header;
 use bvh_scenes::files::{Reserved, WriteError};
 use bvh_scenes::rays::View;
 use bvh_scenes::render::{Film, Options, framing, heat, image, render};
 use bvh_scenes::trace::Accelerator;
 use bvh_scenes::{Scene, tree_file};
 use clap::Args;
-use page::{Page, Row};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -32,73 +33,58 @@ pub struct ReportArgs {
     /// of the tree file with the extension html, which must be free.
     #[arg(long, value_name = "FILE.html")]
     pub out: Option<PathBuf>,
-    #[command(flatten)]
-    pub jobs: Jobs,
-    #[command(flatten)]
-    pub form: Form,
 }
 
-struct Measured {
-    tree: Bvh,
-    /// The expected tests of a ray in the wide layout, for triangles.
-    tests: Option<f64>,
-    film: Film,
-}
-
+const STYLE: &str = include_str!("report.css");
 const WIDTH: u32 = 640;
 const HEIGHT: u32 = 400;
 
+/// A number about a tree, with its name.
+type Fact = (&'static str, f64);
+
 /// Measures the tree in a file and the greedy tree, draws both, and writes the page.
-pub fn report(args: &ReportArgs) -> Result<(), Error> {
+pub fn report(args: &ReportArgs, answer: &mut Answer) -> Result<(), Error> {
     let out = output_or_free(args.out.as_ref(), || args.file.with_extension("html"))?;
     output_file("--out", &out, "html")?;
-    args.jobs.apply()?;
     let scene = load_scene(&args.scene)?;
     let (tree, header) = tree_file::load(&args.file, &scene)?;
     let greedy = muller_fellner::Config::default()
         .build(&scene.boxes)
         .map_err(Error::search(&scene.name, "muller_fellner"))?;
     let view = framing::automatic(&scene, f64::from(WIDTH) / f64::from(HEIGHT));
-    let baked = measure(tree, &scene, &view)?;
-    let greedy = measure(greedy, &scene, &view)?;
-    let rows = rows(&baked, &greedy);
-    let title = title(&scene.name, &rows[0]);
-    let mut answer = Answer::new(args.form);
+    let (facts, film) = measure(&tree, &scene, &view)?;
+    let (facts_of_greedy, film_of_greedy) = measure(&greedy, &scene, &view)?;
+    let title = title(&scene.name, facts[0].1, facts_of_greedy[0].1);
     answer.say(&format!("{}: {title}", out.display()));
     answer.record("file", out.display().to_string());
-    for Row { name, baked, greedy, .. } in &rows {
+    for ((name, baked), (_, greedy)) in facts.iter().zip(&facts_of_greedy) {
         answer.record(name, json!({ "baked": baked, "greedy": greedy }));
     }
-    let ranges = [&baked, &greedy].map(Measured::range);
+    let ranges = [&film, &film_of_greedy].map(range);
     // The same colour must mean the same number of tests in both.
     let top = ranges[0].top.max(ranges[1].top);
-    let png = |pixels: &[[u8; 3]]| {
-        image::png(WIDTH, pixels).map_err(WriteError::of(&out, "encode the picture"))
+    let picture = |pixels: &[[u8; 3]], caption: &str| {
+        let png = image::png(WIDTH, pixels).map_err(WriteError::of(&out, "encode the picture"))?;
+        let source = format!("data:image/png;base64,{}", STANDARD.encode(png));
+        Ok::<_, Error>(html! {
+            figure { img alt=(caption) src=(source); figcaption { (caption) } }
+        })
     };
-    let page = Page {
-        title: &title,
-        origin: format!(
-            "{} objects, {} references; {}, seed {}, {} nodes visited by the search.",
-            whole(header.objects),
-            whole(header.references),
-            header.method,
-            header.seed,
-            whole(header.work)
-        ),
-        rows,
-        scene: png(&baked.film.pixels)?,
-        heat: [png(&heat::colours(&baked.film, top))?, png(&heat::colours(&greedy.film, top))?],
-        medians: ranges.map(|range| range.median),
-        top,
-    };
-    Reserved::new(&out, 0, args.out.is_none())?.write(&[page.html().as_bytes()])?;
-    answer.end();
+    let mut pictures = vec![picture(&film.pixels, "The scene.")?];
+    for (film, range, tree) in [(&film, ranges[0], "baked"), (&film_of_greedy, ranges[1], "greedy")]
+    {
+        let median = number(range.median);
+        let caption = format!("Tests of each pixel's rays in the {tree} tree: median {median}.");
+        pictures.push(picture(&heat::colours(film, top), &caption)?);
+    }
+    let page = page(&title, &header, &table(&facts, &facts_of_greedy), &pictures, top);
+    Reserved::new(&out, 0, args.out.is_none())?.write(&[page.into_string().as_bytes()])?;
     Ok(())
 }
 
-/// Says what the tree is worth: its gain in the first row of the table.
-fn title(scene: &str, row: &Row) -> String {
-    let percent = if row.greedy > 0.0 { 100.0 * (1.0 - row.baked / row.greedy) } else { 0.0 };
+/// Says what the tree is worth by its total area and that of the greedy tree.
+fn title(scene: &str, baked: f64, greedy: f64) -> String {
+    let percent = if greedy > 0.0 { 100.0 * (1.0 - baked / greedy) } else { 0.0 };
     match percent.round() {
         0.0 => format!("{scene}: as cheap as a plain build"),
         gain if gain > 0.0 => format!("{scene}: {gain:.0} % cheaper than a plain build"),
@@ -106,54 +92,102 @@ fn title(scene: &str, row: &Row) -> String {
     }
 }
 
-impl Measured {
-    /// Returns the distribution of tests over the pixels whose rays meet the box of the scene. All
-    /// other rays have one test, which would hide the median of a small scene.
-    fn range(&self) -> heat::Range {
-        let tests = self.film.tests.iter().copied().filter(|&tests| tests > 1).collect();
-        heat::range(tests)
-    }
-}
-
-fn measure(tree: Bvh, scene: &Scene, view: &View) -> Result<Measured, Error> {
-    let tests = match scene.triangles() {
-        Ok(_) => Some(Rays::Default.expected_tests(&tree, scene)?),
-        Err(_) => None,
-    };
+fn measure(tree: &Bvh, scene: &Scene, view: &View) -> Result<(Vec<Fact>, Film), Error> {
     let options = Options {
         samples: 1,
         depth: 0,
         ground: false,
         ..Options::new(WIDTH, HEIGHT, view.clone())
     };
-    let accelerator = Accelerator::of_tree(&scene.primitives, &tree);
+    let accelerator = Accelerator::of_tree(&scene.primitives, tree);
     let film = render(scene, &accelerator, &options, &|| ());
-    Ok(Measured { tree, tests, film })
+    let over_root = |cost| cost::over_root_area(tree, cost);
+    let tests = (film.counts.boxes + film.counts.objects) as f64 / film.rays.max(1) as f64;
+    let mut facts = vec![
+        ("Total area of inner nodes over the root's", over_root(cost::internal_area(tree))),
+        ("Cost of the wide layout by area", over_root(Objective::Layout.cost(tree))),
+        ("Tests per ray of the picture, in the binary tree", tests),
+        ("Depth", tree.depth() as f64),
+        ("Nodes", tree.nodes.len() as f64),
+    ];
+    if scene.triangles().is_ok() {
+        let tests = Rays::Default.expected_tests(tree, scene)?;
+        facts.insert(2, ("Expected tests of a ray from anywhere", tests));
+    }
+    Ok((facts, film))
 }
 
-fn rows(baked: &Measured, greedy: &Measured) -> Vec<Row> {
-    let over_root = |of: &Measured, cost| Some(cost::over_root_area(&of.tree, cost));
-    let facts = |of: &Measured| {
-        let counts = of.film.counts;
-        let area = over_root(of, cost::internal_area(&of.tree));
-        let layout = over_root(of, Objective::Layout.cost(&of.tree));
-        let tests = (counts.boxes + counts.objects) as f64 / of.film.rays.max(1) as f64;
-        [
-            ("Total area of inner nodes over the root's", true, area),
-            ("Cost of the wide layout by area", true, layout),
-            ("Expected tests of a ray from anywhere", true, of.tests),
-            ("Tests per ray of the picture, in the binary tree", true, Some(tests)),
-            ("Depth", false, Some(of.tree.depth() as f64)),
-            ("Nodes", false, Some(of.tree.nodes.len() as f64)),
-        ]
-    };
-    facts(baked)
-        .into_iter()
-        .zip(facts(greedy))
-        .filter_map(|((name, is_cost, baked), (.., greedy))| {
-            Some(Row { name, baked: baked?, greedy: greedy?, is_cost })
-        })
-        .collect()
+/// Returns the distribution of tests over the pixels whose rays meet the box of the scene. All other
+/// rays have one test, which would hide the median of a small scene.
+fn range(film: &Film) -> heat::Range {
+    heat::range(film.tests.iter().copied().filter(|&tests| tests > 1).collect())
+}
+
+fn page(title: &str, header: &Header, table: &Markup, pictures: &[Markup], top: f64) -> Markup {
+    let colours = heat::scale(17).into_iter().map(|[r, g, b]| format!(", rgb({r} {g} {b})"));
+    let scale = format!("background: linear-gradient(to right{})", colours.collect::<String>());
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                h1 { (title) }
+                p {
+                    (whole(header.objects)) " objects, " (whole(header.references))
+                    " references; " (header.method) ", seed " (header.seed) ", "
+                    (whole(header.work)) " nodes visited by the search."
+                }
+                (table)
+                p {
+                    "The greedy tree is a plain build, as by Müller and Fellner. Less is better, but \
+                     depth and nodes are no costs. A tree baked for the wide layout saves tests \
+                     there, and not always in the binary tree."
+                }
+                h2 { "Rays" }
+                div.pictures { @for picture in pictures { (picture) } }
+                div.scale style=(scale) {}
+                p.ends {
+                    span { "0 tests" }
+                    span { (number(top)) " or more, in one pixel of 200" }
+                }
+                p { "Medians are over the pixels whose rays meet the box of the scene." }
+                footer { p { "Written by bvh " (env!("CARGO_PKG_VERSION")) "." } }
+            }
+        }
+    }
+}
+
+fn table(baked: &[Fact], greedy: &[Fact]) -> Markup {
+    html! {
+        table {
+            tr { th {} th { "baked" } th { "greedy" } th { "difference" } }
+            @for ((name, baked), (_, greedy)) in baked.iter().zip(greedy) {
+                tr {
+                    td { (name) }
+                    td { (number(*baked)) }
+                    td { (number(*greedy)) }
+                    td { (difference(*baked, *greedy)) }
+                }
+            }
+        }
+    }
+}
+
+fn difference(baked: f64, greedy: f64) -> String {
+    if greedy <= 0.0 {
+        return String::new();
+    }
+    // A hyphen would be shorter than the plus.
+    format!("{:+.1} %", 100.0 * (baked / greedy - 1.0)).replace('-', "−")
+}
+
+fn number(value: f64) -> String {
+    if value.fract() == 0.0 && value >= 0.0 { whole(value as u64) } else { short(value) }
 }
 
 #[cfg(test)]
@@ -162,13 +196,21 @@ mod tests {
 
     #[test]
     fn a_title_says_what_the_tree_is_worth() {
-        for (baked, title_of) in [
+        for (baked, worth) in [
             (0.8, "20 % cheaper than a plain build"),
             (1.034, "3 % dearer than a plain build"),
             (1.001, "as cheap as a plain build"),
         ] {
-            let row = Row { name: "", baked, greedy: 1.0, is_cost: true };
-            assert_eq!(title("escher", &row), format!("escher: {title_of}"));
+            assert_eq!(title("escher", baked, 1.0), format!("escher: {worth}"));
+        }
+    }
+
+    #[test]
+    fn a_table_has_differences_where_they_exist() {
+        let [baked, greedy] = [[("a", 1.0), ("b", 1.0)], [("a", 2.0), ("b", 0.0)]];
+        let table = table(&baked, &greedy).into_string();
+        for cells in ["<td>1</td><td>2</td><td>−50.0 %</td>", "<td>1</td><td>0</td><td></td>"] {
+            assert!(table.contains(cells), "{table}");
         }
     }
 }

@@ -1,21 +1,13 @@
 //! `bvh scenes`: lists the scenes that need no path.
 
 use crate::Error;
-use crate::answer::{Answer, Form, whole};
+use crate::answer::{Answer, whole};
 use bvh_scenes::builtin::stand_ins::STAND_INS;
 use bvh_scenes::{FETCHED, SPHERES, Scene, fetched_path};
 use serde_json::json;
 
-/// List the built-in scenes and their sizes.
-#[derive(clap::Args, Clone, Debug)]
-pub struct ScenesArgs {
-    #[command(flatten)]
-    pub form: Form,
-}
-
 /// Prints the table.
-pub fn scenes(args: &ScenesArgs) -> Result<(), Error> {
-    let mut answer = Answer::new(args.form);
+pub fn scenes(answer: &mut Answer) -> Result<(), Error> {
     answer.say(&line("name", "objects", "kind", "description"));
     let mut add = |name: &str, objects: Option<usize>, kind: &str, description: &str| {
         let count = objects.map_or_else(|| "not fetched".into(), whole);
@@ -26,8 +18,7 @@ pub fn scenes(args: &ScenesArgs) -> Result<(), Error> {
         add(scene.name, Some((scene.triangles)().len()), "stand-in", scene.character);
     }
     for (name, count) in SPHERES {
-        let origin = "Spheres, as in the second source document.";
-        add(name, Some(count), "procedural", origin);
+        add(name, Some(count), "procedural", "Spheres, as in the second source document.");
     }
     for (name, package) in FETCHED {
         // The size of a scene is known only after it has been fetched.
@@ -39,7 +30,6 @@ pub fn scenes(args: &ScenesArgs) -> Result<(), Error> {
         add(name, objects, "file", &origin);
     }
     answer.say("\nAny OBJ, PLY, STL or glTF file can be named by its path.");
-    answer.end();
     Ok(())
 }
 

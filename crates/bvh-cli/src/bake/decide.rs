@@ -9,12 +9,12 @@ use super::plan::{Plan, Prepared};
 use super::{BakeArgs, Effort};
 use crate::Error;
 use crate::answer::Answer;
-use crate::output::{bar, print_error};
+use crate::interrupt::{INTERRUPTED, is_interrupted};
+use crate::output::bar;
 use crate::rays::Rays;
 use bvh_core::cost::Objective;
 use bvh_scenes::Scene;
 use bvh_search::{Bake, Budget, Method};
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// The work per object of a bake that chooses its own budget. On the 7 scenes of
 /// `results/anytime`, `best` ends within 0.3 % of the best known cost after this work; six times
@@ -54,12 +54,11 @@ pub fn work(objects: usize, answer: &mut Answer) -> Effort {
 
 /// Tries the combinations of the choices that the arguments leave open, and explains each choice in
 /// one line. Returns the plan with the choices that pay, and the parts of the decision that the
-/// bake needs too. Keeps the plan as it is if `interrupted` becomes true.
+/// bake needs too. Keeps the plan as it is if the user interrupts.
 pub fn decide(
     args: &BakeArgs,
     plan: Plan,
     scene: &Scene,
-    interrupted: &AtomicBool,
     answer: &mut Answer,
 ) -> Result<(Plan, Prepared), Error> {
     let mut prepared = Prepared::default();
@@ -76,62 +75,51 @@ pub fn decide(
     if chooses_cost {
         costs.push((Objective::Layout, None));
     }
+    let last = costs.len();
     if args.rays.is_none() {
-        costs.push((costs[costs.len() - 1].0, Some(Rays::Default)));
+        costs.push((costs[last - 1].0, Some(Rays::Default)));
     }
-    let references = match args.references {
-        None => vec![1.0, REFERENCES],
-        Some(given) => vec![given],
-    };
-    let trials = costs.len() * references.len();
-    if trials == 1 {
-        return Ok((plan, prepared));
+    let references = args.references.map_or(vec![1.0, REFERENCES], |given| vec![given]);
+    let mut plans = Vec::new();
+    for &references in &references {
+        for (objective, rays) in costs.iter().cloned() {
+            plans.push(Plan { objective, rays, references, ..plan.clone() });
+        }
     }
+    let [_, .., most] = &plans[..] else { return Ok((plan, prepared)) };
     let failed = |error| Error::search(&scene.name, plan.method.name())(error);
-    let most = Bake { references: references[references.len() - 1], ..plan.bake(scene, None) };
-    prepared.greedy = most.greedy(interrupted).map_err(failed)?;
+    prepared.greedy = most.bake(scene, None).greedy(&INTERRUPTED).map_err(failed)?;
     let Some(greedy) = &prepared.greedy else { return Ok((plan, prepared)) };
-    let judging = Rays::Default.density(scene, greedy, Rays::JUDGING, interrupted)?;
-    if let Some(rays) = &costs[costs.len() - 1].1 {
-        prepared.density = rays.density(scene, greedy, plan.seed, interrupted)?;
+    let judging = Rays::Default.density(scene, greedy, Rays::JUDGING)?;
+    if let Some(rays) = &most.rays {
+        prepared.density = rays.density(scene, greedy, plan.seed)?;
     }
-    prepared.division = most.divided(interrupted).map_err(failed)?;
+    prepared.division = most.bake(scene, None).divided(&INTERRUPTED).map_err(failed)?;
     let tried = (TRIED * work as f64).max(LEAST_TRIED.min(MOST_TRIED * work as f64));
     let budget = Budget { max_work: Some(tried as u64), ..Budget::UNLIMITED };
     // The expected tests of the judging rays, by references and then by costs.
     let mut tests = Vec::new();
-    let mut plans = Vec::new();
-    let bar = bar(trials as u64, "{bar:10} trying the choices, {pos} of {len}");
+    let bar = bar(plans.len() as u64, "{bar:10} trying the choices, {pos} of {len}");
     bar.tick();
-    if bar.is_hidden() {
-        print_error(&format!("trying {trials} combinations of the choices"));
-    }
-    for &references in &references {
-        for (objective, rays) in &costs {
-            // A trial of no work takes seconds in large scenes.
-            let Some(judging) = judging.as_ref().filter(|_| !interrupted.load(Relaxed)) else {
-                break;
-            };
-            let (objective, rays) = (*objective, rays.clone());
-            let plan = Plan { objective, rays, references, ..plan.clone() };
-            let density = prepared.density.as_ref().filter(|_| plan.rays.is_some());
-            let division = prepared.division.as_ref();
-            let bake = Bake { division, budget, ..plan.bake(scene, density) };
-            let baked = bake.search(Some(greedy.clone()), interrupted).map_err(failed)?;
-            tests.push(Objective::Layout.cost_by(&baked.outcome.tree, judging));
-            plans.push(plan);
-            bar.inc(1);
-        }
+    for plan in &plans {
+        // A trial of no work takes seconds in large scenes.
+        let Some(judging) = judging.as_ref().filter(|_| !is_interrupted()) else { break };
+        let density = prepared.density.as_ref().filter(|_| plan.rays.is_some());
+        let division = prepared.division.as_ref();
+        let bake = Bake { division, budget, ..plan.bake(scene, density) };
+        let baked = bake.search(Some(greedy.clone()), &INTERRUPTED).map_err(failed)?;
+        tests.push(Objective::Layout.cost_by(&baked.outcome.tree, judging));
+        bar.inc(1);
     }
     bar.finish_and_clear();
     // An interrupted search says nothing about the choices.
-    if interrupted.load(Relaxed) {
+    if is_interrupted() {
         return Ok((plan, Prepared { density: None, division: None, ..prepared }));
     }
     let best = tests.iter().copied().fold(f64::INFINITY, f64::min);
     let chosen = tests.iter().position(|&tests| tests <= best * (1.0 + TOLERANCE)).unwrap_or(0);
-    let (row, column) = (chosen / costs.len() * costs.len(), chosen % costs.len());
-    let last = costs.len() - 1;
+    let column = chosen % costs.len();
+    let row = chosen - column;
     // Each choice is compared with its alternative, other things being equal.
     let mut explain = |name: &str, is_chosen: bool, with: usize, without: usize| {
         let saved = 1.0 - tests[with] / tests[without];

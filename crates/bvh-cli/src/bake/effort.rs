@@ -1,6 +1,5 @@
 //! Budgets of time or work on the command line.
 
-use bvh_search::Deadline;
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -29,11 +28,6 @@ impl Effort {
             Self::Work(work) => Some(work),
         }
     }
-
-    /// Returns the deadline of a search that begins now. A budget of work has none.
-    pub(super) fn deadline(self) -> Deadline {
-        Deadline::after(if let Self::Time(limit) = self { limit } else { Duration::MAX })
-    }
 }
 
 impl FromStr for Effort {
@@ -41,18 +35,7 @@ impl FromStr for Effort {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let effort = match text.strip_suffix("work") {
-            Some(amount) => {
-                let digits = amount.trim_end_matches(['k', 'M', 'G']);
-                let unit = match &amount[digits.len()..] {
-                    "" => Some(1),
-                    "k" => Some(1_000),
-                    "M" => Some(1_000_000),
-                    "G" => Some(1_000_000_000),
-                    _ => None,
-                };
-                let number: Option<u64> = digits.trim_end().parse().ok();
-                number.zip(unit).and_then(|(number, unit)| number.checked_mul(unit)).map(Self::Work)
-            }
+            Some(amount) => work(amount).map(Self::Work),
             // `5M` would be five months, but its author probably forgot `work`.
             None if text.contains('M') => None,
             None => humantime::parse_duration(text).ok().map(Self::Time),
@@ -63,6 +46,14 @@ impl FromStr for Effort {
                 .into()
         })
     }
+}
+
+/// Parses an amount of work, such as `50M`.
+fn work(amount: &str) -> Option<u64> {
+    let units = [("k", 1_000), ("M", 1_000_000), ("G", 1_000_000_000), ("", 1)];
+    let split = |(name, unit)| Some((amount.strip_suffix(name)?, unit));
+    let (number, unit) = units.into_iter().find_map(split)?;
+    number.trim_end().parse::<u64>().ok()?.checked_mul(unit)
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@ use super::plan::{Found, Plan, Prepared};
 use super::{BakeArgs, decide};
 use crate::Error;
 use crate::answer::{Answer, gain, short, whole};
-use crate::output::print_error;
+use crate::interrupt::is_interrupted;
+use crate::output::{print_error, write_table};
 use bvh_build::{Builder, median_cut};
 use bvh_core::cost::Objective;
 use bvh_core::{Instance, InvalidInstances, Primitives, Triangle, WideBvh};
@@ -16,7 +17,6 @@ use glam::Affine3A;
 use serde_json::json;
 use std::fs;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// The tree over the instances, whose ids are rows of [`INSTANCES`]. It is written last, so that a
 /// folder with this file is complete.
@@ -26,12 +26,11 @@ const INSTANCES: &str = "instances.csv";
 /// The columns of [`INSTANCES`], which docs/TREE_FILES.md describes.
 const COLUMNS: &str = "node,mesh,xx,xy,xz,yx,yy,yz,zx,zy,zz,tx,ty,tz";
 
-/// Searches for one tree after the other until the budget is spent or `interrupted` becomes true,
-/// and writes each tree as soon as its search ends. An interrupted bake still writes all files.
-pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
+/// Searches for one tree after the other until the budget is spent or the user interrupts, and
+/// writes each tree as soon as its search ends. An interrupted bake still writes all files.
+pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     let out = args.out()?;
     new_folder(&out)?;
-    args.jobs.apply()?;
     let mut plan = args.plan()?;
     let path = Path::new(&args.scene);
     let parts = parts(path)?;
@@ -39,24 +38,28 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     if !parts.remarks.is_empty() {
         print_error(&format!("scene {stem}: {}", parts.remarks.join("; ")));
     }
-    let mut scenes = Vec::new();
-    for (mesh, triangles) in &parts.meshes {
-        let name = format!("{stem}, mesh {mesh}");
+    let scene = |(mesh, triangles): (&usize, &Vec<Triangle>)| {
         let primitives = Primitives::Triangles(triangles.clone());
-        scenes.push(Scene::new(&name, SceneKind::File, primitives));
-    }
-    let instances = instances(&parts);
+        Scene::new(&format!("{stem}, mesh {mesh}"), SceneKind::File, primitives)
+    };
+    let scenes: Vec<Scene> = parts.meshes.iter().map(scene).collect();
+    let instance = |place: &gltf::Placed| Instance {
+        // The rank of the mesh among those that are baked.
+        part: parts.meshes.range(..place.mesh).count() as u32,
+        transform: Affine3A::from_mat4(place.transform.as_mat4()),
+    };
+    let instances: Vec<Instance> = parts.places.iter().map(instance).collect();
     let top = top(&stem, &scenes, &instances, &parts)?;
     // Everything that can be invalid has been checked, so that a fault leaves no folder behind.
     fs::create_dir_all(&out).map_err(files::WriteError::of(&out, "create the folder"))?;
     let path = out.join(INSTANCES);
-    let table = table(&instances, &parts).map_err(Error::csv(&path))?;
-    files::write(&path, &table)?;
-
+    let places = parts.places.iter().zip(&instances);
+    let rows = places
+        .map(|(place, instance)| (place.node, place.mesh, instance.transform.to_cols_array()));
+    write_table(&path, COLUMNS, rows)?;
     let objects: usize = scenes.iter().chain([&top]).map(|scene| scene.boxes.len()).sum();
-    let mut answer = Answer::new(args.form);
     if args.budget.is_none() {
-        plan.effort = decide::work(objects, &mut answer);
+        plan.effort = decide::work(objects, answer);
     }
     // The top tree's objects are boxes, which cannot be divided, and no wide layout is made of it.
     let plan_of_top = Plan { references: 1.0, objective: Objective::InternalArea, ..plan.clone() };
@@ -66,10 +69,10 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         // Every tree gets a share of the budget in proportion to its number of objects.
         let part = scene.boxes.len() as f64 / objects as f64;
         let plan = Plan { effort: plan.effort.share(part), ..plan.clone() };
-        let found = plan.search(scene, None, Prepared::default(), interrupted)?;
-        save_part(&found, &out.join(name), &mut answer)?;
+        let found = plan.search(scene, None, Prepared::default())?;
+        save_part(&found, &out.join(name), answer)?;
     }
-    if interrupted.load(Relaxed) {
+    if is_interrupted() {
         return Err(Error::Interrupted(format!(
             "the best trees so far, of all meshes and over the instances, are in {}",
             out.display()
@@ -84,7 +87,6 @@ pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     answer.record("instances", instances.len());
     answer.record("meshes", scenes.len());
     answer.record("file", path.display().to_string());
-    answer.end();
     Ok(())
 }
 
@@ -135,18 +137,6 @@ fn parts(path: &Path) -> Result<gltf::Parts, Error> {
     Ok(gltf::parts(&bytes, path).map_err(|error| SceneError::new(&name, error))?)
 }
 
-/// Returns the instances. A part is the rank of its mesh among the meshes that are baked.
-fn instances(parts: &gltf::Parts) -> Vec<Instance> {
-    let mut instances = Vec::new();
-    for place in &parts.places {
-        instances.push(Instance {
-            part: parts.meshes.range(..place.mesh).count() as u32,
-            transform: Affine3A::from_mat4(place.transform.as_mat4()),
-        });
-    }
-    instances
-}
-
 /// Returns a scene of the boxes of all instances.
 fn top(
     stem: &str,
@@ -177,15 +167,4 @@ fn top(
     // A scene needs objects, and the search reads only their boxes.
     let triangles = boxes.iter().map(|aabb| Triangle([aabb.min, aabb.max, aabb.min])).collect();
     Ok(Scene::new(&name, SceneKind::File, Primitives::Triangles(triangles)))
-}
-
-/// Returns the text of [`INSTANCES`]: the node, the mesh and the transform of each instance.
-fn table(instances: &[Instance], parts: &gltf::Parts) -> Result<Vec<u8>, csv::Error> {
-    let places = parts.places.iter().zip(instances);
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(COLUMNS.split(','))?;
-    for (place, instance) in places {
-        writer.serialize((place.node, place.mesh, instance.transform.to_cols_array()))?;
-    }
-    writer.into_inner().map_err(|error| error.into_error().into())
 }

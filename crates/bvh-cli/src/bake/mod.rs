@@ -8,25 +8,21 @@ mod plan;
 mod watch;
 
 use crate::Error;
-use crate::answer::{Answer, Form, gain, short, whole};
-use crate::arguments::{Jobs, input_file, load_scene, output_file, output_or_free};
-use crate::export::{compare, tracers};
-use crate::interrupt;
+use crate::answer::{Answer, gain, short, whole};
+use crate::arguments::{input_file, load_scene, output_file, output_or_free};
+use crate::export::tracers;
+use crate::interrupt::{hold, is_interrupted};
 use crate::rays::Rays;
-use bvh_build::BuildError;
-use bvh_core::Aabb;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::export::Target;
-use bvh_scenes::Scene;
-use bvh_scenes::files::Reserved;
-use bvh_search::{Bake, Method, Outcome, StopReason, shortcuts};
+use bvh_scenes::files::{Reserved, regular};
+use bvh_search::{Bake, Division, Method, Outcome, StopReason, shortcuts};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use decide::decide;
 use effort::Effort;
 use plan::{Found, Plan, Start};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Search for the best tree of a scene within a budget, and save it.
 #[derive(Args, Clone, Debug)]
@@ -88,13 +84,9 @@ pub struct BakeArgs {
     /// With --parts, bake only the part with this identifier.
     #[arg(long, value_name = "ID", requires = "parts", help_heading = ADVANCED)]
     pub part: Option<String>,
-    #[command(flatten)]
-    pub jobs: Jobs,
     /// First list the steps that the scene does not need and that are skipped, with reasons.
     #[arg(long)]
     pub explain: bool,
-    #[command(flatten)]
-    pub form: Form,
 }
 
 const ADVANCED: &str = "Advanced";
@@ -116,87 +108,70 @@ fn methods() -> impl TypedValueParser<Value = Method> {
     })
 }
 
-/// Searches until the budget is spent or `interrupted` becomes true, writes the best tree, and
-/// prints its cost. An interrupted bake writes the file as well, and returns [`Error::Interrupted`].
-pub fn bake(args: &BakeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
+/// Searches until the budget is spent or the user interrupts, writes the best tree, and prints its
+/// cost. An interrupted bake writes the file as well, and returns [`Error::Interrupted`].
+pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     // Wrong paths are reported before the scene is loaded, which may take long.
     if let Some(from) = &args.from {
         input_file("--from", from)?;
     }
-    let mut answer = Answer::new(args.form);
     let out = args.out()?;
     output_file("--out", &out, "bvh")?;
     let mut plan = args.plan()?;
-    args.jobs.apply()?;
     let scene = load_scene(&args.scene)?;
-    if let (Some(named), Some(rays)) = (&args.rays, &plan.rays) {
-        rays.check(named, &scene)?;
+    if let Some(rays) = &plan.rays {
+        rays.check(&scene)?;
     }
     if args.explain {
-        explain(&scene, &mut answer).map_err(Error::search(&scene.name, "--explain"))?;
+        let skipped = shortcuts::of(&scene.boxes);
+        for (_, why) in skipped.map_err(Error::search(&scene.name, "--explain"))? {
+            answer.choice(format!("skipped: {why}"));
+        }
+    }
+    let start = args.from.as_ref().map(|path| Start::load(path, &scene)).transpose()?;
+    let objects = scene.boxes.len();
+    if let Some(Start { tree, .. }) = &start
+        && tree.prim_ids.len() > objects
+    {
+        // No search makes all divided objects whole again. Half a reference more keeps the product
+        // with the number of objects from being rounded down.
+        let references = (tree.prim_ids.len() as f64 + 0.5) / objects as f64;
+        plan.references = plan.references.max(references);
     }
     // Without a budget the decision may add references.
     let least = if args.budget.is_none() { decide::REFERENCES } else { 1.0 };
-    let most_references = plan.references.max(least);
-    let start =
-        args.from.as_ref().map(|path| Start::load(path, &scene, most_references)).transpose()?;
-    interrupt::hold();
+    hold();
     if args.budget.is_none() {
-        plan.effort = decide::work(scene.boxes.len(), &mut answer);
+        plan.effort = decide::work(objects, answer);
     }
     // Reserving the file first reports a full disk before the search and not after it.
-    let bytes = plan::most_bytes(&scene, most_references);
+    let bytes = plan::most_bytes(&scene, plan.references.max(least));
     let reserved = Reserved::new(&out, bytes, args.out.is_none())?;
-    let (plan, prepared) = decide(args, plan, &scene, interrupted, &mut answer)?;
-    let found = plan.search(&scene, start.as_ref(), prepared, interrupted)?;
-    save(&found, &out, reserved, interrupted, &mut answer)?;
-    // Rays are counted once the tree is safe.
-    if let (Some(target), Ok(triangles)) = (&args.tracer, scene.triangles()) {
-        let (_, compared) =
-            compare(target, &found.baked.outcome.tree, &scene, triangles, &mut answer);
-        answer.say(&format!("for {}, export writes {compared}", target.name));
-    }
-    answer.end();
-    Ok(())
+    let (plan, prepared) = decide(args, plan, &scene, answer)?;
+    let found = plan.search(&scene, start.as_ref(), prepared)?;
+    save(&found, &out, reserved, answer)
 }
 
-/// Lists the steps that the scene does not need and that are skipped, one line each.
-fn explain(scene: &Scene, answer: &mut Answer) -> Result<(), BuildError> {
-    let size = Aabb::union_of(&scene.boxes).extent().as_vec3();
-    let mut text = format!("{}: {} objects within {size}\n", scene.name, scene.boxes.len());
-    for (_, why) in shortcuts::of(&scene.boxes)? {
-        text += &format!("  skipped: {why}\n");
-    }
-    answer.say(&text);
-    answer.record("explanation", text);
-    Ok(())
-}
-
-fn save(
-    found: &Found,
-    out: &Path,
-    reserved: Reserved,
-    interrupted: &AtomicBool,
-    answer: &mut Answer,
-) -> Result<(), Error> {
-    let (bytes, cost_for_lines) = found.save(out, reserved)?;
-    if interrupted.load(Relaxed) {
+/// Writes the file of the tree, and describes it.
+fn save(found: &Found, out: &Path, reserved: Reserved, answer: &mut Answer) -> Result<(), Error> {
+    found.save(out, reserved)?;
+    if is_interrupted() {
         let out = out.display();
         let cost = short(found.baked.outcome.cost);
         return Err(Error::Interrupted(format!(
             "the best tree so far, of cost {cost}, is in {out}; `--from {out}` continues"
         )));
     }
-    summarise(found, cost_for_lines, answer);
+    summarise(found, answer);
+    let bytes = regular(out)?;
     answer.say(&format!("{}: {} bytes", out.display(), whole(bytes)));
     answer.record("file", out.display().to_string());
     answer.record("bytes", bytes);
     Ok(())
 }
 
-/// Describes the result of a search, whose tree has this cost for random lines.
-fn summarise(found: &Found, cost_for_lines: f64, answer: &mut Answer) {
-    let Found { plan, scene, baked, seconds, .. } = found;
+fn summarise(found: &Found, answer: &mut Answer) {
+    let Found { plan, scene, baked, .. } = found;
     let Outcome { tree, cost, evaluations: moves, work, stop, .. } = &baked.outcome;
     let objects = scene.boxes.len();
     let references = tree.prim_ids.len();
@@ -214,7 +189,7 @@ fn summarise(found: &Found, cost_for_lines: f64, answer: &mut Answer) {
     answer.record("method", method);
     answer.record("seed", plan.seed);
     let area = internal_area(tree);
-    if let Some([base, _]) = found.costs_of_greedy {
+    if let Some(base) = found.area_of_greedy {
         answer.say(&format!(
             "total area of inner nodes {} that of a greedy SAH sweep's tree",
             gain(area, base)
@@ -229,44 +204,29 @@ fn summarise(found: &Found, cost_for_lines: f64, answer: &mut Answer) {
         answer.record("cost in the greedy tree", base);
     }
     answer.record("cost", *cost);
-    if let (Some([_, base]), Some(_)) = (found.costs_of_greedy, &found.density) {
-        answer.say(&format!(
-            "risk: a tree for rays may be worse for others; for random lines it is {} the greedy \
-             tree's",
-            gain(cost_for_lines, base)
-        ));
-    }
     if let Some(before) = baked.start {
         answer.say(&format!("{} the cost of the tree it started from", gain(*cost, before)));
         answer.record("cost of the start", before);
     }
     if references > objects {
-        answer.say(&format!(
-            "{} references to {} objects, at most {} per object",
-            whole(references),
-            whole(objects),
-            plan.references
-        ));
-    } else if plan.references > 1.0 {
-        answer.say("no object is divided, because no division paid within the budget");
+        answer.say(&format!("{} references to {} objects", whole(references), whole(objects)));
+    } else if baked.division == Division::Useless {
+        answer.say("no object is divided, because no spatial split saves anything");
     }
-    // A method that plans its time completes its plan just before the time is over, and then could
-    // have used more.
-    let in_time =
-        matches!(plan.effort, Effort::Time(limit) if *seconds >= 0.5 * limit.as_secs_f64());
-    let why = match stop {
-        StopReason::Completed if !in_time => ", and the method has completed",
-        StopReason::Optimal => ", and no tree is better",
+    let why = match (stop, plan.effort) {
+        (StopReason::Completed, Effort::Work(_)) => ", and the method has completed",
+        (StopReason::Optimal, _) => ", and no tree is better",
         _ => "",
     };
+    let seconds = answer.seconds();
     answer.say(&format!(
-        "{} moves, {} nodes visited, {seconds:.1} s{why}",
+        "{} moves, {} nodes visited, {seconds:.1} s in all{why}",
         whole(*moves),
         whole(*work)
     ));
     answer.record("moves", *moves);
     answer.record("work", *work);
-    answer.record("seconds", *seconds);
+    answer.record("seconds", seconds);
 }
 
 impl BakeArgs {

@@ -1,5 +1,5 @@
 //! `bvh bake --parts`: cuts a scene by space into parts, bakes each as a job of its own, and joins
-//! the trees of the parts under a searched top.
+//! the trees of the parts under a greedy top.
 
 use super::instances::save_part;
 use super::plan::{Plan, Prepared, Start, most_bytes};
@@ -7,20 +7,18 @@ use super::{BakeArgs, save};
 use crate::Error;
 use crate::answer::Answer;
 use crate::arguments::{load_scene, output_file};
+use crate::interrupt::is_interrupted;
+use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, Bvh, Node, NodeKind};
 use bvh_scenes::files::{Reserved, WriteError};
 use bvh_scenes::tree_file;
 use bvh_scenes::{Scene, fnv1a};
-use bvh_search::{Budget, Problem, best, solve};
 use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// The fraction of the budget for the parts. The rest moves subtrees across the borders.
 const SHARE_OF_PARTS: f64 = 0.8;
-/// The largest work on the tree over all parts, in nodes visited per part.
-const WORK_PER_PART: u64 = 10_000;
 
 struct Part {
     /// The identifier, which another scene, seed, budget or number of parts changes.
@@ -42,14 +40,12 @@ impl Part {
 }
 
 /// Lists the parts, bakes one part, or bakes the missing parts and joins all.
-pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(), Error> {
+pub fn bake(args: &BakeArgs, count: u32, answer: &mut Answer) -> Result<(), Error> {
     let out = args.out()?;
     output_file("--out", &out, "bvh")?;
     let plan = args.plan()?;
-    args.jobs.apply()?;
     let scene = load_scene(&args.scene)?;
     let parts = parts(&plan, &scene, count)?;
-    let mut answer = Answer::new(args.form);
     if args.list {
         for (number, Part { id, objects, plan }) in (1..).zip(&parts) {
             let objects = objects.len();
@@ -58,7 +54,6 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
             answer.say(&format!("{id} {work} part {number} of {count}, {objects} objects"));
             answer.list("parts", json!({ "id": id, "work": work, "objects": objects }));
         }
-        answer.end();
         return Ok(());
     }
     let folder = out.with_extension("parts");
@@ -75,49 +70,40 @@ pub fn bake(args: &BakeArgs, count: u32, interrupted: &AtomicBool) -> Result<(),
             continue;
         }
         let scene = part.scene(&scene);
-        let found = part.plan.search(&scene, None, Prepared::default(), interrupted)?;
+        let found = part.plan.search(&scene, None, Prepared::default())?;
         // A part whose search was cut short would differ from run to run.
-        if interrupted.load(Relaxed) {
+        if is_interrupted() {
             let folder = folder.display();
             let left =
                 format!("finished parts are in {folder}, and the same command bakes the rest");
             return Err(Error::Interrupted(left));
         }
-        save_part(&found, &path, &mut answer)?;
+        save_part(&found, &path, answer)?;
     }
     if args.part.is_some() {
-        answer.end();
         return Ok(());
     }
     let bytes = most_bytes(&scene, plan.references);
     let reserved = Reserved::new(&out, bytes, args.out.is_none())?;
     let start = join(&scene, &parts, &folder)?;
     let plan = Plan { effort: plan.effort.share(1.0 - SHARE_OF_PARTS), ..plan };
-    let found = plan.search(&scene, Some(&start), Prepared::default(), interrupted)?;
-    save(&found, &out, reserved, interrupted, &mut answer)?;
-    answer.end();
-    Ok(())
+    let found = plan.search(&scene, Some(&start), Prepared::default())?;
+    save(&found, &out, reserved, answer)
 }
 
 /// Cuts a scene, and gives every part a share of the budget in proportion to its objects.
 fn parts(plan: &Plan, scene: &Scene, count: u32) -> Result<Vec<Part>, Error> {
     let all = scene.boxes.len();
     if count as usize > all {
-        let accepted = if all < 2 { "no parts".into() } else { format!("2 to {all}") };
-        let message =
-            format!("--parts {count} of a scene with {all} objects; accepted: {accepted}");
-        return Err(Error::Usage(message));
+        let accepted = format!("2 to the number of objects, {all}");
+        return Err(Error::Usage(format!("--parts {count}; accepted: {accepted}")));
     }
+    let checksum = scene.checksum();
     let mut parts = Vec::new();
     for (number, objects) in cut(&scene.boxes, count as usize).into_iter().enumerate() {
         let share = SHARE_OF_PARTS * objects.len() as f64 / all as f64;
         let plan = Plan { effort: plan.effort.share(share), ..plan.clone() };
-        let Plan { method, effort, seed, objective, references, .. } = &plan;
-        let method = method.name();
-        let identity = format!(
-            "{} {count} {number} {method} {effort:?} {seed} {objective:?} {references}",
-            scene.checksum()
-        );
+        let identity = format!("{checksum} {count} {number} {plan:?}");
         let id = format!("{:016x}", fnv1a(identity.into_bytes()));
         parts.push(Part { id, objects, plan });
     }
@@ -154,7 +140,7 @@ fn cut(boxes: &[Aabb], count: usize) -> Vec<Vec<usize>> {
     parts
 }
 
-/// Reads the trees of all parts, and joins them under the best tree over their boxes.
+/// Reads the trees of all parts, and joins them under a greedy tree over their boxes.
 fn join(scene: &Scene, parts: &[Part], folder: &Path) -> Result<Start, Error> {
     let mut trees = Vec::new();
     let mut work = 0;
@@ -164,10 +150,9 @@ fn join(scene: &Scene, parts: &[Part], folder: &Path) -> Result<Start, Error> {
         trees.push(tree);
     }
     let boxes: Vec<Aabb> = trees.iter().filter_map(Bvh::root_aabb).collect();
-    let budget = Budget { max_work: Some(WORK_PER_PART * parts.len() as u64), ..Budget::UNLIMITED };
-    let top = solve(&best::Config::default(), &Problem::new(&boxes), 1, budget, &())
-        .map_err(Error::search(&scene.name, "the tree over all parts"))?
-        .tree;
+    let top = muller_fellner::Config::default()
+        .build(&boxes)
+        .map_err(Error::search(&scene.name, "the tree over all parts"))?;
     let objects: Vec<&[usize]> = parts.iter().map(|part| &part.objects[..]).collect();
     Ok(Start { tree: joined(&top, &trees, &objects), work })
 }
@@ -206,7 +191,6 @@ fn joined(top: &Bvh, trees: &[Bvh], objects: &[&[usize]]) -> Bvh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bvh_build::{Builder, muller_fellner};
     use bvh_core::validate;
     use bvh_scenes::builtin::stiff::{STIFF, boxes};
 

@@ -3,7 +3,7 @@
 use super::effort::Effort;
 use super::watch::Watch;
 use crate::Error;
-use crate::interrupt;
+use crate::interrupt::{INTERRUPTED, hold};
 use crate::rays::Rays;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::file::Header;
@@ -13,10 +13,9 @@ use bvh_scenes::files::Reserved;
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_search::{Bake, Baked, Budget, Division, Method};
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 /// A search for the best tree of any scene.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Plan {
     pub method: Method,
     pub effort: Effort,
@@ -44,27 +43,18 @@ pub struct Start {
 }
 
 impl Start {
-    /// Reads the tree of `--from` over the scene. Rejects a tree that has more references than the
-    /// bake may keep, or nodes that no search moves.
-    pub fn load(from: &Path, scene: &Scene, most_references: f64) -> Result<Self, Error> {
+    /// Reads the tree of `--from` over the scene. Rejects a tree with nodes that no search moves.
+    pub fn load(from: &Path, scene: &Scene) -> Result<Self, Error> {
         let (tree, header) = tree_file::load(from, scene)?;
-        let objects = scene.boxes.len();
-        let references = tree.prim_ids.len();
         let is_wide = |node: &Node| !node.is_leaf() && node.children().len() != 2;
-        let fault = if references > objects.max((most_references * objects as f64) as usize) {
-            // Rounded up, so that the message's number suffices.
-            let least = (100 * references).div_ceil(objects) as f64 / 100.0;
-            format!(
-                "the tree has {references} references to {objects} objects; accepted: \
-                 --references {least:.2} or more"
-            )
-        } else if let Some(wide) = tree.nodes.iter().position(is_wide) {
-            let children = tree.nodes[wide].children().len();
-            format!("inner node {wide} has {children} children; accepted: a tree of nodes with two")
-        } else {
-            return Ok(Self { tree, work: header.work });
-        };
-        Err(Error::Usage(format!("--from {}: {fault}", from.display())))
+        if let Some(wide) = tree.nodes.iter().position(is_wide) {
+            return Err(Error::Usage(format!(
+                "--from {}: inner node {wide} has {} children; accepted: a tree of nodes with two",
+                from.display(),
+                tree.nodes[wide].children().len()
+            )));
+        }
+        Ok(Self { tree, work: header.work })
     }
 }
 
@@ -96,27 +86,25 @@ impl Plan {
         }
     }
 
-    /// Searches until the budget is spent or `interrupted` becomes true. The time of a budget
-    /// begins when the greedy tree is built.
+    /// Searches until the budget is spent or the user interrupts. The time of a budget begins
+    /// when the greedy tree is built.
     pub fn search<'a>(
         &'a self,
         scene: &'a Scene,
         start: Option<&'a Start>,
         prepared: Prepared,
-        interrupted: &AtomicBool,
     ) -> Result<Found<'a>, Error> {
-        interrupt::hold();
+        hold();
         let failed = |error| Error::search(&scene.name, self.method.name())(error);
         let Prepared { mut greedy, mut density, division } = prepared;
         if greedy.is_none() {
-            greedy = self.bake(scene, None).greedy(interrupted).map_err(failed)?;
+            greedy = self.bake(scene, None).greedy(&INTERRUPTED).map_err(failed)?;
         }
-        let watch = Watch::new(self.effort, interrupted);
+        let watch = Watch::new(self.effort);
         if let (None, Some(rays), Some(tree)) = (&density, &self.rays, &greedy) {
-            density = rays.density(scene, tree, self.seed, interrupted)?;
+            density = rays.density(scene, tree, self.seed)?;
         }
-        let costs_of_greedy =
-            greedy.as_ref().map(|tree| [internal_area(tree), self.objective.cost(tree)]);
+        let area_of_greedy = greedy.as_ref().map(internal_area);
         let bake = Bake {
             division: division.as_ref(),
             start: start.map(|start| &start.tree),
@@ -125,10 +113,9 @@ impl Plan {
         let baked = bake.search(greedy, &watch);
         watch.bar.finish_and_clear();
         let baked = baked.map_err(failed)?;
-        let seconds = watch.deadline.elapsed().as_secs_f64();
         // The work of all bakes that led to this tree, one after the other.
         let work = start.map_or(0, |start| start.work).saturating_add(baked.outcome.work);
-        Ok(Found { plan: self, scene, density, baked, costs_of_greedy, work, seconds })
+        Ok(Found { plan: self, scene, density, baked, area_of_greedy, work })
     }
 }
 
@@ -138,23 +125,18 @@ pub struct Found<'a> {
     pub scene: &'a Scene,
     pub density: Option<RayDensity>,
     pub baked: Baked,
-    /// The total area of inner nodes of the greedy tree, which the documentation compares, and its
-    /// cost for random lines by the plan's objective.
-    pub costs_of_greedy: Option<[f64; 2]>,
+    /// The total area of inner nodes of the greedy tree, which the documentation compares.
+    pub area_of_greedy: Option<f64>,
     work: u64,
-    /// The time since the greedy tree was built.
-    pub seconds: f64,
 }
 
 impl Found<'_> {
-    /// Writes the file of the tree. Returns its number of bytes and the cost in its header.
-    pub fn save(&self, path: &Path, reserved: Reserved) -> Result<(usize, f64), Error> {
+    /// Writes the file of the tree.
+    pub fn save(&self, path: &Path, reserved: Reserved) -> Result<(), Error> {
         let bake = self.plan.bake(self.scene, self.density.as_ref());
-        let saved = bake.write(&self.baked.outcome.tree, self.work, |sections, cost| {
-            reserved.write(sections)?;
-            Ok((sections.iter().map(|section| section.len()).sum(), cost))
-        });
-        saved.map_err(TreeFileError::of(path))?
+        let tree = &self.baked.outcome.tree;
+        let written = bake.write(tree, self.work, |sections, _| reserved.write(sections));
+        Ok(written.map_err(TreeFileError::of(path))??)
     }
 
     /// Names the cost that the search minimised, unless it is the total area of inner nodes.

@@ -1,10 +1,11 @@
 //! Observes a bake, ends it in time, and shows its progress.
 
 use super::effort::Effort;
+use crate::interrupt::is_interrupted;
 use crate::output::{bar, print_error};
 use bvh_search::{Deadline, Event, Observer};
 use indicatif::ProgressBar;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 /// The length of the bar: thousandths of the budget.
@@ -12,22 +13,26 @@ const LENGTH: f64 = 1000.0;
 
 /// Ends a bake when its time is over or when it is interrupted, and shows its progress: in a bar, or
 /// without a terminal as a line every ten seconds.
-pub struct Watch<'a> {
+pub struct Watch {
     /// The progress bar, which is hidden unless standard error is a terminal.
     pub bar: ProgressBar,
-    pub deadline: Deadline,
+    /// A budget of work has a deadline that never comes.
+    deadline: Deadline,
     effort: Effort,
     /// The time of the last line, in tens of seconds since the beginning.
     shown: AtomicU64,
-    interrupted: &'a AtomicBool,
 }
 
-impl<'a> Watch<'a> {
+impl Watch {
     /// Begins to measure the time.
-    pub fn new(effort: Effort, interrupted: &'a AtomicBool) -> Self {
-        let bar = bar(LENGTH as u64, "{bar:10} {wide_msg} {eta} left").with_message("searching");
-        let shown = AtomicU64::new(0);
-        Self { bar, deadline: effort.deadline(), effort, shown, interrupted }
+    pub fn new(effort: Effort) -> Self {
+        let limit = if let Effort::Time(limit) = effort { limit } else { Duration::MAX };
+        Self {
+            bar: bar(LENGTH as u64, "{bar:10} {wide_msg} {eta} left").with_message("searching"),
+            deadline: Deadline::after(limit),
+            effort,
+            shown: AtomicU64::new(0),
+        }
     }
 
     /// Returns whether this caller, of all threads of the search, must show the next line.
@@ -43,7 +48,7 @@ impl<'a> Watch<'a> {
     }
 }
 
-impl Observer for Watch<'_> {
+impl Observer for Watch {
     fn event(&self, event: &Event) {
         self.bar.set_message(format!("cost {:.6e}", event.incumbent));
     }
@@ -63,7 +68,7 @@ impl Observer for Watch<'_> {
         if self.is_due(elapsed) && self.bar.is_hidden() {
             print_error(&self.line(elapsed));
         }
-        self.interrupted.load(Relaxed) || self.deadline.has_passed()
+        is_interrupted() || self.deadline.has_passed()
     }
 
     fn progress(&self) -> Option<f64> {
@@ -76,22 +81,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ten_seconds_give_one_line_whichever_thread_comes_first() {
-        let interrupted = AtomicBool::new(false);
-        let watch = Watch::new(Effort::Work(1000), &interrupted);
-        let times = [0.0, 9.9, 10.0, 10.1, 45.0, 39.0, 49.9, 50.0];
-        let due = times.map(|seconds| watch.is_due(Duration::from_secs_f64(seconds)));
-        assert_eq!(due, [false, false, true, false, true, false, false, true]);
-    }
-
-    #[test]
-    fn a_line_says_how_far_the_search_has_come() {
-        let interrupted = AtomicBool::new(false);
-        let watch = Watch::new(Effort::Work(1000), &interrupted);
+    fn every_ten_seconds_one_line_says_how_far_the_search_has_come() {
+        let watch = Watch::new(Effort::Work(1000));
         let line = || watch.line(Duration::from_secs(12));
         assert_eq!(line(), "searching after 12 s, 0.0 % of the budget");
         watch.counted(7, 255);
         watch.event(&Event { evaluations: 7, work: 255, cost: 2e3, incumbent: 1.25e3 });
         assert_eq!(line(), "cost 1.250000e3 after 12 s, 25.5 % of the budget");
+        // Whichever thread comes first.
+        let times = [0.0, 9.9, 10.0, 10.1, 45.0, 39.0, 49.9, 50.0];
+        let due = times.map(|seconds| watch.is_due(Duration::from_secs_f64(seconds)));
+        assert_eq!(due, [false, false, true, false, true, false, false, true]);
     }
 }

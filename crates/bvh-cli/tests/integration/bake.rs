@@ -63,10 +63,7 @@ fn a_bake_for_rays_saves_the_number_of_visits_of_each_node() {
     for rays in ["default", "walk.toml"] {
         let bake = format!("escher:500 --budget=1Mwork --rays={rays}");
         let (said, bytes) = bake_twice(at, &bake);
-        for part in ["cost of the wide layout for rays, which was minimised, ", "risk: a tree for"]
-        {
-            assert!(said.contains(part), "{said}");
-        }
+        assert!(said.contains("cost of the wide layout for rays, which was minimised, "), "{said}");
         let file = TreeFile::open(&bytes).unwrap().for_boxes(&scene.boxes).unwrap();
         assert_eq!(file.header().method, "best for rays");
         let tree = file.tree().unwrap();
@@ -108,19 +105,6 @@ fn a_bake_of_work_writes_the_bytes_that_the_library_gives_other_languages() {
         let owned = OwnedTree::find(objects, &options, &()).unwrap();
         assert!(fs::read(at.join("x.bvh")).unwrap() == owned.save().unwrap(), "{flags}");
     }
-}
-
-#[test]
-fn recorded_rays_that_all_miss_the_scene_are_rejected_before_the_work() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let away = "1000,1000,1000,1001,1002,1003\n".repeat(9);
-    fs::write(at.join("away.csv"), &away).unwrap();
-    fs::write(at.join("one.csv"), away + "-50,1,0.5,50,1,0.5\n").unwrap();
-    let parts = ["away.csv: none of the 9 segments meets the box of scene escher", "accepted: one"];
-    wrong(at, "bake escher --budget=100s --out=x.bvh --rays=away.csv", &parts);
-    assert_eq!(names(at), ["away.csv", "one.csv"]);
-    bvh(at, "bake escher --budget=10kwork --out=x.bvh --rays=one.csv");
 }
 
 #[test]
@@ -184,7 +168,7 @@ fn a_bake_divides_objects_where_it_pays_and_minimises_the_cost_of_the_layout() {
     assert!(split_sah < whole_sah);
     let (said, _) = bake("layout.bvh", "--cost=layout");
     assert!(said.contains("cost of the wide layout, which was minimised, "), "{said}");
-    assert_eq!(facts(at, "inspect layout.bvh")["objective"], "cost of the wide layout, by area");
+    assert_eq!(facts(at, "inspect layout.bvh")["objective"], "cost of the wide layout");
     let scene = Scene::load("pinecon2").unwrap();
     let [layout, whole] = ["layout.bvh", "whole.bvh"].map(|file| {
         let (tree, header) = tree_file::load(&at.join(file), &scene).unwrap();
@@ -192,13 +176,8 @@ fn a_bake_divides_objects_where_it_pays_and_minimises_the_cost_of_the_layout() {
         layout_area(&tree)
     });
     assert!(layout < whole, "{layout} {whole}");
-    bake("further.bvh", "--references=1.3 --from=split.bvh");
-    let accepted = (100.0 * references / objects).ceil() / 100.0;
-    let message = format!(
-        "--from split.bvh: the tree has {references} references to {objects} objects; accepted: \
-         --references {accepted:.2} or more"
-    );
-    wrong(at, "bake pinecon2 --budget=1Mwork --out=no.bvh --from=split.bvh", &[&message]);
+    let (_, [_, further, _]) = bake("further.bvh", "--from=split.bvh");
+    assert!(further > objects && further <= references, "{further} of {references}");
     bvh(at, "render pinecon2 --accel=split.bvh --out=a.png --size=16x16");
 }
 
@@ -224,35 +203,26 @@ fn a_scene_that_needs_no_divided_objects_gives_the_same_tree_and_a_note() {
 }
 
 #[test]
-fn a_bake_without_flags_chooses_says_why_and_writes_the_same_bytes_on_any_number_of_threads() {
+fn a_bake_without_budget_tries_what_is_not_given_the_same_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let said = bvh(at, "bake escher:400 --out=one.bvh --jobs=1");
-    let json = facts(at, "bake escher:400 --out=two.bvh --jobs=2");
-    for choice in ["budget: 3 Mwork, 8000 nodes per object", "cost: ", "rays: ", "references: "] {
-        assert_eq!(said.matches(choice).count(), 1, "{choice}: {said}");
-    }
-    assert_eq!(json["choices"].as_array().unwrap().len(), 4);
-    let [one, two] = ["one.bvh", "two.bvh"].map(|file| fs::read(at.join(file)).unwrap());
-    assert!(one == two);
-}
-
-#[test]
-fn a_given_choice_is_kept_and_not_tried() {
-    let folder = tempfile::tempdir().unwrap();
     // Spheres have no wide layout, and other methods than `best` offer no choices.
     for (bake, tried) in [
-        ("escher:60 --cost=area --references=1", &["rays: "][..]),
+        ("escher:400", &["cost: ", "rays: ", "references: "][..]),
+        ("escher:60 --cost=area --references=1", &["rays: "]),
         ("escher:60 --rays=default", &["references: "]),
         ("spheres75", &[]),
         ("escher:60 --method=reinsertion", &[]),
     ] {
-        let said = bvh(folder.path(), &format!("bake {bake} --out=a.bvh"));
+        let (said, _) = bake_twice(at, bake);
         for choice in ["cost: ", "rays: ", "references: "] {
-            assert_eq!(said.contains(choice), tried.contains(&choice), "{bake}: {said}");
+            let count = usize::from(tried.contains(&choice));
+            assert_eq!(said.matches(choice).count(), count, "{bake}, {choice}: {said}");
         }
         assert!(said.contains("budget: "), "{bake}: {said}");
     }
+    let json = facts(at, "bake escher:400 --out=x.bvh");
+    assert_eq!(json["choices"].as_array().unwrap().len(), 4);
 }
 
 #[test]

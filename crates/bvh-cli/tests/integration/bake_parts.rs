@@ -15,20 +15,10 @@ fn joined_parts_cost_at_most_a_percent_more_than_a_whole_bake_of_the_same_work()
 }
 
 #[test]
-fn joined_parts_may_have_divided_objects() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    bvh(at, "bake escher:900 --budget=1Mwork --parts=4 --out=parts.bvh --references=1.2");
-    let [references, objects] =
-        ["references", "objects"].map(|name| number(at, "verify parts.bvh escher:900", name));
-    assert!(references > objects && references <= 1.2 * objects, "{references} of {objects}");
-}
-
-#[test]
 fn parts_baked_apart_give_the_same_file_although_one_process_is_killed() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let bake = "bake escher:2000 --budget=6Mwork --parts=4";
+    let bake = "bake escher:2000 --budget=6Mwork --parts=4 --references=1.2";
     bvh(at, &format!("{bake} --out=one.bvh"));
     let several = format!("{bake} --out=several.bvh");
     let list = bvh(at, &format!("{several} --list"));
@@ -48,6 +38,8 @@ fn parts_baked_apart_give_the_same_file_although_one_process_is_killed() {
     assert!(ids.iter().all(|id| found.contains(&format!("{id}.bvh"))), "{found:?}");
     assert!(!at.join("several.bvh").exists());
     bvh(at, &several);
+    let references = number(at, "verify several.bvh escher:2000", "references");
+    assert!(references > 2000.0 && references <= 2400.0, "{references}");
     let [one, several] = ["one.bvh", "several.bvh"].map(|file| fs::read(at.join(file)).unwrap());
     assert!(one == several);
 }

@@ -1,6 +1,7 @@
 //! Inspecting and verifying tree files from the command line and from other languages.
 
 use crate::support::{bvh, facts, number, text};
+use bvh_core::NodeKind;
 use bvh_scenes::{Scene, tree_file};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -34,19 +35,20 @@ fn the_nodes_are_written_in_full_precision() {
     let columns = "node,parent,kind,first,count,min_x,min_y,min_z,max_x,max_y,max_z";
     let headers: Vec<&str> = reader.headers().unwrap().iter().collect();
     assert_eq!(headers.join(","), columns);
-    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    type Row = (usize, Option<usize>, String, u32, u32, [f32; 6]);
+    let rows: Vec<Row> = reader.deserialize().map(Result::unwrap).collect();
     assert_eq!(rows.len(), tree.nodes.len());
     for (index, (row, node)) in rows.iter().zip(&tree.nodes).enumerate() {
-        let corners = [node.aabb.min.to_array(), node.aabb.max.to_array()].concat();
-        let written: Vec<f32> = (5..11).map(|column| row[column].parse().unwrap()).collect();
-        assert_eq!(written, corners);
-        let kind = if node.is_leaf() { "leaf" } else { "inner" };
-        assert_eq!((&row[0], &row[2]), (index.to_string().as_str(), kind));
+        let (number, parent, kind, first, count, corners) = row;
+        assert_eq!(corners[..], [node.aabb.min.to_array(), node.aabb.max.to_array()].concat());
+        let expected = match node.kind() {
+            NodeKind::Inner { first, count } => ("inner", first, count),
+            NodeKind::Leaf { first, count } => ("leaf", first, count),
+        };
+        assert_eq!((*number, (kind.as_str(), *first, *count)), (index, expected));
         // Only the root has an empty cell instead of a parent.
-        match row[1].parse::<usize>() {
-            Ok(parent) => assert!(tree.nodes[parent].children().contains(&index)),
-            Err(_) => assert_eq!((&row[1], index), ("", 0)),
-        }
+        assert_eq!(parent.is_none(), index == 0);
+        assert!(parent.is_none_or(|parent| tree.nodes[parent].children().contains(&index)));
     }
 }
 

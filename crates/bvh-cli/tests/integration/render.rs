@@ -47,6 +47,7 @@ fn a_report_compares_a_tree_with_the_greedy_tree_on_one_page_and_replaces_no_fil
             assert!(page.contains(part), "{scene}: {part}");
         }
         assert_eq!(page.matches("data:image/png;base64,").count(), 3, "{scene}");
+        assert!(!page.contains("http") && !page.contains("<script"), "{scene}");
         assert_eq!(page.contains("Expected tests of a ray"), has_layout, "{scene}");
     }
     wrong(at, "report a.bvh spheres75", &["a.html exists", "--out"]);
