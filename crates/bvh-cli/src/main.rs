@@ -10,6 +10,7 @@ mod interrupt;
 mod memory;
 mod npy;
 mod output;
+mod picture;
 mod rays;
 mod render;
 mod report;

@@ -4,11 +4,12 @@ use crate::Error;
 use crate::answer::{Answer, whole};
 use crate::arguments::{input_file, load_scene, output_file};
 use crate::output::bar;
+use crate::picture::png;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, WideBvh};
 use bvh_scenes::files::{self, WriteError};
 use bvh_scenes::rays::View;
-use bvh_scenes::render::{Options, framing, heat, image, render as draw};
+use bvh_scenes::render::{Options, framing, heat, render as draw};
 use bvh_scenes::trace::{Accelerator, KdTree, Structure};
 use bvh_scenes::{Scene, tree_file};
 use glam::DVec3;
@@ -112,7 +113,7 @@ pub fn render(args: &RenderArgs, answer: &mut Answer) -> Result<(), Error> {
     let rendered = start.elapsed().as_secs_f64() - built;
     let heat::Range { median, top } = heat::range(film.tests.clone());
     let heat = args.heatmap.then(|| heat::colours(&film, top));
-    let bytes = image::png(film.width, heat.as_ref().unwrap_or(&film.pixels))
+    let bytes = png(film.width, heat.as_ref().unwrap_or(&film.pixels))
         .map_err(WriteError::of(&args.out, "encode the picture"))?;
     files::write(&args.out, &bytes)?;
     let objects = scene.boxes.len();

@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::answer::{Answer, short, whole};
 use crate::arguments::{load_scene, output_file, output_or_free};
+use crate::picture::png;
 use crate::rays::Rays;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -12,11 +13,11 @@ use bvh_core::cost::{self, Objective};
 use bvh_core::file::Header;
 use bvh_scenes::files::{Reserved, WriteError};
 use bvh_scenes::rays::View;
-use bvh_scenes::render::{Film, Options, framing, heat, image, render};
+use bvh_scenes::render::{Film, Options, framing, heat, render};
 use bvh_scenes::trace::Accelerator;
 use bvh_scenes::{Scene, tree_file};
 use clap::Args;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use html_escape::encode_double_quoted_attribute as escaped;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -64,21 +65,22 @@ pub fn report(args: &ReportArgs, answer: &mut Answer) -> Result<(), Error> {
     // The same colour must mean the same number of tests in both.
     let top = ranges[0].top.max(ranges[1].top);
     let picture = |pixels: &[[u8; 3]], caption: &str| {
-        let png = image::png(WIDTH, pixels).map_err(WriteError::of(&out, "encode the picture"))?;
-        let source = format!("data:image/png;base64,{}", STANDARD.encode(png));
-        Ok::<_, Error>(html! {
-            figure { img alt=(caption) src=(source); figcaption { (caption) } }
-        })
+        let png = png(WIDTH, pixels).map_err(WriteError::of(&out, "encode the picture"))?;
+        let data = STANDARD.encode(png);
+        Ok::<_, Error>(format!(
+            "<figure><img alt=\"{caption}\" src=\"data:image/png;base64,{data}\">\
+             <figcaption>{caption}</figcaption></figure>\n"
+        ))
     };
-    let mut pictures = vec![picture(&film.pixels, "The scene.")?];
+    let mut pictures = picture(&film.pixels, "The scene.")?;
     for (film, range, tree) in [(&film, ranges[0], "baked"), (&film_of_greedy, ranges[1], "greedy")]
     {
         let median = number(range.median);
         let caption = format!("Tests of each pixel's rays in the {tree} tree: median {median}.");
-        pictures.push(picture(&heat::colours(film, top), &caption)?);
+        pictures += &picture(&heat::colours(film, top), &caption)?;
     }
     let page = page(&title, &header, &table(&facts, &facts_of_greedy), &pictures, top);
-    Reserved::new(&out, 0, args.out.is_none())?.write(&[page.into_string().as_bytes()])?;
+    Reserved::new(&out, 0, args.out.is_none())?.write(&[page.as_bytes()])?;
     Ok(())
 }
 
@@ -123,59 +125,47 @@ fn range(film: &Film) -> heat::Range {
     heat::range(film.tests.iter().copied().filter(|&tests| tests > 1).collect())
 }
 
-fn page(title: &str, header: &Header, table: &Markup, pictures: &[Markup], top: f64) -> Markup {
+fn page(title: &str, header: &Header, table: &str, pictures: &str, top: f64) -> String {
     let colours = heat::scale(17).into_iter().map(|[r, g, b]| format!(", rgb({r} {g} {b})"));
-    let scale = format!("background: linear-gradient(to right{})", colours.collect::<String>());
-    html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (title) }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                h1 { (title) }
-                p {
-                    (whole(header.objects)) " objects, " (whole(header.references))
-                    " references; " (header.method) ", seed " (header.seed) ", "
-                    (whole(header.work)) " nodes visited by the search."
-                }
-                (table)
-                p {
-                    "The greedy tree is a plain build, as by Müller and Fellner. Less is better, but \
-                     depth and nodes are no costs. A tree baked for the wide layout saves tests \
-                     there, and not always in the binary tree."
-                }
-                h2 { "Rays" }
-                div.pictures { @for picture in pictures { (picture) } }
-                div.scale style=(scale) {}
-                p.ends {
-                    span { "0 tests" }
-                    span { (number(top)) " or more, in one pixel of 200" }
-                }
-                p { "Medians are over the pixels whose rays meet the box of the scene." }
-                footer { p { "Written by bvh " (env!("CARGO_PKG_VERSION")) "." } }
-            }
-        }
-    }
+    let colours: String = colours.collect();
+    let (title, method, seed) = (escaped(title), escaped(&header.method), header.seed);
+    let [objects, references, work, top] =
+        [whole(header.objects), whole(header.references), whole(header.work), number(top)];
+    let version = env!("CARGO_PKG_VERSION");
+    format!(
+        r#"<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title><style>{STYLE}</style></head>
+<body>
+<h1>{title}</h1>
+<p>{objects} objects, {references} references; {method}, seed {seed}, {work} nodes visited by the
+search.</p>
+{table}
+<p>The greedy tree is a plain build, as by Müller and Fellner. Less is better, but depth and nodes
+are no costs. A tree baked for the wide layout saves tests there, and not always in the binary
+tree.</p>
+<h2>Rays</h2>
+<div class="pictures">{pictures}</div>
+<div class="scale" style="background: linear-gradient(to right{colours})"></div>
+<p class="ends"><span>0 tests</span><span>{top} or more, in one pixel of 200</span></p>
+<p>Medians are over the pixels whose rays meet the box of the scene.</p>
+<footer><p>Written by bvh {version}.</p></footer>
+</body></html>
+"#
+    )
 }
 
-fn table(baked: &[Fact], greedy: &[Fact]) -> Markup {
-    html! {
-        table {
-            tr { th {} th { "baked" } th { "greedy" } th { "difference" } }
-            @for ((name, baked), (_, greedy)) in baked.iter().zip(greedy) {
-                tr {
-                    td { (name) }
-                    td { (number(*baked)) }
-                    td { (number(*greedy)) }
-                    td { (difference(*baked, *greedy)) }
-                }
-            }
-        }
-    }
+fn table(baked: &[Fact], greedy: &[Fact]) -> String {
+    let rows = baked.iter().zip(greedy).map(|((name, baked), (_, greedy))| {
+        let difference = difference(*baked, *greedy);
+        let [baked, greedy] = [*baked, *greedy].map(number);
+        format!("<tr><td>{name}</td><td>{baked}</td><td>{greedy}</td><td>{difference}</td></tr>\n")
+    });
+    let rows: String = rows.collect();
+    format!(
+        "<table>\n<tr><th></th><th>baked</th><th>greedy</th><th>difference</th></tr>\n{rows}</table>"
+    )
 }
 
 fn difference(baked: f64, greedy: f64) -> String {
@@ -208,7 +198,7 @@ mod tests {
     #[test]
     fn a_table_has_differences_where_they_exist() {
         let [baked, greedy] = [[("a", 1.0), ("b", 1.0)], [("a", 2.0), ("b", 0.0)]];
-        let table = table(&baked, &greedy).into_string();
+        let table = table(&baked, &greedy);
         for cells in ["<td>1</td><td>2</td><td>−50.0 %</td>", "<td>1</td><td>0</td><td></td>"] {
             assert!(table.contains(cells), "{table}");
         }
