@@ -236,9 +236,10 @@ impl<C: SplitCost> Sweep<'_, C> {
             let lowest = value_block(boxes, *split_cost, objects, block, &mut costs);
             bound = if BEST { bound.min(lowest) } else { bound };
             if lowest <= bound {
-                for (left, &cost) in costs.iter().enumerate().take(objects.len()).skip(1) {
+                let first = index * size + 1;
+                for (left, &cost) in (first..).zip(&costs[1..objects.len()]) {
                     if cost <= bound {
-                        bound = visit(candidate(cost, index * size + left));
+                        bound = visit(candidate(cost, left));
                     }
                 }
             }
@@ -316,7 +317,7 @@ fn value_block<C: SplitCost>(
 ) -> f64 {
     let mut aabb = block.right;
     let mut load = block.right_load;
-    for (&object, value) in objects.iter().zip(costs.iter_mut()).skip(1).rev() {
+    for (&object, value) in objects[1..].iter().zip(&mut costs[1..objects.len()]).rev() {
         aabb.grow(&boxes[object as usize]);
         load += split_cost.load(object);
         *value = split_cost.side(split_cost.size(&aabb), load);
