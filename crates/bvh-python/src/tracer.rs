@@ -82,7 +82,7 @@ impl Tracer {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source(self.place)?;
-        let (t, objects) = detached(py, || {
+        let (t, objects) = traced(py, || {
             let mut t = vec![0.0; source.rays];
             let mut objects = vec![0; source.rays];
             let parts = t.par_chunks_mut(BATCH).zip(objects.par_chunks_mut(BATCH));
@@ -97,11 +97,10 @@ impl Tracer {
                     // The cast turns the id of a miss, `u32::MAX`, into −1.
                     *object = hit.object as i32;
                 }
-                Ok(())
+                Ok::<_, String>(())
             })?;
             Ok((t, objects))
-        })?
-        .map_err(self::invalid)?;
+        })?;
         Ok((t.into_pyarray(py), objects.into_pyarray(py)))
     }
 
@@ -123,14 +122,13 @@ impl Tracer {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source(self.place)?;
-        let hits = detached(py, || {
+        let hits = traced(py, || {
             answers(source.rays, false, |batch, hits| {
                 let rays = batch_of(source, batch)?.rays;
                 self.wide.any_hits(&rays, hits, self.coherence(coherent, &rays));
                 Ok(())
             })
-        })?
-        .map_err(self::invalid)?;
+        })?;
         Ok(hits.into_pyarray(py))
     }
 
@@ -152,7 +150,7 @@ impl Tracer {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source(self.place)?;
-        let (t, objects, numbers) = detached(py, || {
+        let (t, objects, numbers) = traced(py, || {
             let batches = (0..source.rays.div_ceil(BATCH)).into_par_iter();
             let found: Vec<(Vec<Hit>, Vec<u32>)> = batches
                 .map(|batch| {
@@ -168,7 +166,7 @@ impl Tracer {
                     }
                     Ok((hits, counts))
                 })
-                .collect::<Result<_, _>>()?;
+                .collect::<Result<_, String>>()?;
             let hits = found.iter().map(|(hits, _)| hits.len()).sum();
             let mut t = Vec::with_capacity(hits);
             let mut objects = Vec::with_capacity(hits);
@@ -183,8 +181,7 @@ impl Tracer {
                 }
             }
             Ok((t, objects, numbers))
-        })?
-        .map_err(self::invalid)?;
+        })?;
         Ok((t.into_pyarray(py), objects.into_pyarray(py), numbers.into_pyarray(py)))
     }
 
@@ -204,13 +201,12 @@ impl Tracer {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source(self.place)?;
-        let counts = detached(py, || {
+        let counts = traced(py, || {
             answers(source.rays, 0, |batch, counts| {
                 self.wide.all_hits_of(&batch_of(source, batch)?.rays, &mut Vec::new(), counts);
                 Ok(())
             })
-        })?
-        .map_err(self::invalid)?;
+        })?;
         Ok(counts.into_pyarray(py))
     }
 
@@ -333,7 +329,7 @@ impl Tracer {
                 format!("triangle: accepted: an index below {} per ray, or -1", triangles.len());
             return Err(invalid(message));
         }
-        let surfaces = detached(py, || {
+        let surfaces = traced(py, || {
             answers(source.rays, ([0.0; 2], [0.0; 3]), |batch, surfaces| {
                 let rays = batch_of(source, batch)?.rays;
                 for ((ray, &index), surface) in
@@ -346,8 +342,7 @@ impl Tracer {
                 }
                 Ok(())
             })
-        })?
-        .map_err(invalid)?;
+        })?;
         let u: Vec<f64> = surfaces.iter().map(|([u, _], _)| *u).collect();
         let v: Vec<f64> = surfaces.iter().map(|([_, v], _)| *v).collect();
         let normals: Vec<f32> = surfaces.iter().flat_map(|(_, normal)| *normal).collect();
@@ -413,6 +408,11 @@ fn rule(by: &str) -> PyResult<InsideRule> {
         "winding" => Ok(InsideRule::Winding),
         _ => Err(invalid(format!("by is {by:?}; accepted: auto, parity, winding"))),
     }
+}
+
+/// Calls a function on all threads, and turns the fault of a ray into an error.
+fn traced<T: Send>(py: Python, function: impl FnOnce() -> Result<T, String> + Send) -> PyResult<T> {
+    detached(py, function)?.map_err(invalid)
 }
 
 fn batch_of(source: RaySource, batch: usize) -> Result<Batch, String> {
