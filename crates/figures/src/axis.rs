@@ -1,8 +1,8 @@
 //! Chooses the shown part of an axis and its ticks.
 //!
 //! Panels are drawn in coordinates: the values of a linear axis, the decimal logarithms of a
-//! logarithmic axis, and the negative indices of rows. Logarithms come from a library whose last
-//! digit is the same on every machine.
+//! logarithmic axis, and the indices of rows. Logarithms come from a library whose last digit is the
+//! same on every machine.
 
 use plotters::coord::ranged1d::Ranged;
 use plotters::coord::types::RangedCoordf64;
@@ -13,19 +13,16 @@ use super::model::{Axis, Layer, Marks, Panel, Scale, Unit};
 /// Values of a larger magnitude count as non-finite, so that no difference overflows.
 const LARGEST: f64 = 1e300;
 
-/// The shown part of an axis with its ticks, in coordinates: `low < high`.
+/// The shown part of an axis with its ticks, in coordinates. `low` is at the left or the bottom; it
+/// is above `high` for rows, which are counted from the top.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Ruled {
     log: bool,
-    /// True for rows, which are counted downwards.
-    down: bool,
     unit: Unit,
     pub low: f64,
     pub high: f64,
-    /// Labelled ticks.
-    pub major: Vec<(f64, String)>,
-    /// Unlabelled grid lines.
-    pub minor: Vec<f64>,
+    /// Ticks with labels.
+    pub ticks: Vec<(f64, String)>,
 }
 
 /// Returns both axes of a panel, without ticks, and true if any series has data to show.
@@ -77,7 +74,7 @@ impl Ruled {
         let log = axis.scale == Scale::Log;
         let any = Self { log, unit: axis.unit, ..Self::default() };
         if let Scale::Rows(names, _) = &axis.scale {
-            return Self { low: 0.5 - names.len().max(1) as f64, high: 0.5, down: true, ..any };
+            return Self { low: names.len().max(1) as f64 - 0.5, high: -0.5, ..any };
         }
         let shown = || values.iter().filter_map(|&value| any.coordinate(value));
         let least = shown().reduce(f64::min).unwrap_or(0.0);
@@ -108,11 +105,7 @@ impl Ruled {
     /// cannot show the value.
     pub fn coordinate(&self, value: f64) -> Option<f64> {
         let possible = value.abs() <= LARGEST && (value > 0.0 || !self.log);
-        possible.then(|| match (self.log, self.down) {
-            (true, _) => libm::log10(value),
-            (_, true) => -value,
-            _ => value,
-        })
+        possible.then(|| if self.log { libm::log10(value) } else { value })
     }
 
     /// Returns the coordinate if it is in the shown part or less than a pixel outside.
@@ -124,7 +117,7 @@ impl Ruled {
     /// a logarithm.
     pub fn nearest(&self, value: f64) -> Option<f64> {
         let at = self.coordinate(value).or((value.abs() <= LARGEST).then_some(self.low));
-        at.map(|at| at.clamp(self.low, self.high))
+        at.map(|at| at.clamp(self.low.min(self.high), self.high.max(self.low)))
     }
 
     /// Returns the position of a coordinate on the axis, 0 at the low end and 1 at the high end.
@@ -135,11 +128,6 @@ impl Ruled {
     /// Adds at most `most` ticks, and at least two if possible.
     pub fn rule(&mut self, most: usize) {
         if self.unit == Unit::Bare {
-            return;
-        }
-        if self.down {
-            // Faint lines guide the eye from a name to its marks.
-            self.minor = (0..=(-self.low) as i32).map(|row| f64::from(-row)).collect();
             return;
         }
         let (low, high) = match self.log {
@@ -154,7 +142,7 @@ impl Ruled {
             ticks = ample.unwrap_or_else(|| linear(most));
         }
         let tick = |value| Some((self.coordinate(value)?, self.label(value)));
-        self.major = ticks.into_iter().filter_map(tick).collect();
+        self.ticks = ticks.into_iter().filter_map(tick).collect();
     }
 
     /// Returns powers of ten, every so many-th if there are many, and their multiples if there are
@@ -196,7 +184,7 @@ mod tests {
     fn labels(axis: &Axis, values: &[f64], most: usize) -> Vec<String> {
         let mut ruled = Ruled::new(axis, values, 0.0);
         ruled.rule(most);
-        ruled.major.into_iter().map(|tick| tick.1).collect()
+        ruled.ticks.into_iter().map(|tick| tick.1).collect()
     }
 
     #[test]

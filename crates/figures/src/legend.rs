@@ -2,7 +2,7 @@
 
 use super::canvas::{Align, Point, Sheet};
 use super::model::{Figure, Layer};
-use super::style::{BAND, INK, REFERENCE_LINE, Stroke, Strokes};
+use super::style::{BAND, INK, Stroke, Strokes};
 use super::text::{self, BODY};
 
 /// Width of a sample.
@@ -12,14 +12,12 @@ const GAPS: (f64, f64) = (7.0, 18.0);
 /// Height of a row.
 const ROW: f64 = 23.0;
 
-/// One series with the kinds of marks it has.
+/// One series or reference line with the kinds of marks it has.
 struct Entry {
     name: String,
     stroke: Stroke,
     line: bool,
     marker: bool,
-    /// True if the series has nothing but bands.
-    area: bool,
 }
 
 /// The entries: series in order of appearance, then reference lines. Columns have equal widths and
@@ -32,31 +30,17 @@ pub(super) struct Legend {
 
 impl Legend {
     pub fn new(figure: &Figure, strokes: &Strokes, width: f64) -> Self {
-        let layers = || figure.panels.iter().flat_map(|panel| &panel.layers);
-        let entry = |(name, stroke): &(String, Stroke)| {
-            let has = |kind: fn(&Layer) -> bool| {
-                layers().any(|layer| layer.series() == Some(name) && kind(layer))
-            };
-            let line = has(Layer::is_line);
-            let marker = has(Layer::is_marked);
-            Entry { name: name.clone(), stroke: *stroke, line, marker, area: !line && !marker }
-        };
-        let mut entries: Vec<Entry> = strokes.0.iter().map(entry).collect();
-        for layer in layers() {
-            let is_new = entries.iter().all(|entry| entry.name != layer.name);
-            if layer.series().is_none() && !layer.name.trim().is_empty() && is_new {
-                let name = layer.name.clone();
-                let stroke = REFERENCE_LINE;
-                entries.push(Entry { name, stroke, line: true, marker: false, area: false });
-            }
-        }
-        Self::arrange(entries, width)
-    }
-
-    fn arrange(mut entries: Vec<Entry>, width: f64) -> Self {
         let before = SAMPLE + GAPS.0;
-        let room = width - before;
-        entries.iter_mut().for_each(|entry| entry.name = text::shorten(&entry.name, room, BODY));
+        let entry = |(name, stroke): &(String, Stroke)| {
+            let layers = figure.panels.iter().flat_map(|panel| &panel.layers);
+            let has = |kind: fn(&Layer) -> bool| {
+                layers.clone().any(|layer| layer.name == *name && kind(layer))
+            };
+            let (line, marker) = (has(Layer::is_line), has(Layer::is_marked));
+            let name = text::shorten(name, width - before, BODY);
+            Entry { name, stroke: *stroke, line, marker }
+        };
+        let entries: Vec<Entry> = strokes.0.iter().map(entry).collect();
         let column_width =
             before + text::widest(entries.iter().map(|entry| &entry.name), BODY) + GAPS.1;
         let most = (((width + GAPS.1) / column_width).floor() as usize).max(1);
@@ -78,7 +62,8 @@ impl Legend {
             let left = corner.0 + self.column_width * (index % self.columns) as f64;
             let middle = corner.1 + ROW * ((index / self.columns) as f64 + 0.5);
             let Entry { stroke, .. } = entry;
-            if entry.area {
+            // A series that has nothing but bands.
+            if !entry.line && !entry.marker {
                 let corners = [(8.0, -6.0), (22.0, -6.0), (22.0, 6.0), (8.0, 6.0)];
                 let corners = corners.map(|(x, y)| (left + x, middle + y));
                 sheet.polygon(&corners, stroke.colour, BAND);

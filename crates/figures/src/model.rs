@@ -20,23 +20,23 @@ pub struct Figure {
 }
 
 /// The colours of Okabe and Ito without yellow, which is invisible on white; then darker ones of
-/// Paul Tol, and the colour of text.
+/// Paul Tol, and the colour of text. Their numbers are red, green and blue.
 #[allow(missing_docs, reason = "the names of colours")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hue {
-    Blue,
-    Orange,
-    Green,
-    Pink,
-    Amber,
-    Sky,
-    Wine,
-    Grey,
-    Indigo,
-    Olive,
-    Brown,
-    Forest,
-    Ink,
+    Blue = 0x0072B2,
+    Orange = 0xD55E00,
+    Green = 0x009E73,
+    Pink = 0xCC79A7,
+    Amber = 0xE69F00,
+    Sky = 0x56B4E9,
+    Wine = 0x882255,
+    Grey = 0x828282,
+    Indigo = 0x332288,
+    Olive = 0x999933,
+    Brown = 0x8C564B,
+    Forest = 0x117733,
+    Ink = 0x222222,
 }
 
 /// One pair of axes with layers. Bands are drawn first, then reference lines, spans, lines and
@@ -105,7 +105,7 @@ impl Axis {
 
     /// Makes a vertical axis with a row of this height in pixels for each name.
     pub fn rows(names: Vec<String>, height: f64) -> Self {
-        Self { scale: Scale::Rows(names, height), ..Self::default() }
+        Self { scale: Scale::Rows(names, height), unit: Unit::Bare, ..Self::default() }
     }
 
     /// Chooses how ticks are written.
@@ -174,9 +174,9 @@ impl Layer {
         (!is_reference).then_some(&self.name)
     }
 
-    /// Returns true for lines.
+    /// Returns true for lines, those of reference included.
     pub(super) fn is_line(&self) -> bool {
-        matches!(self.marks, Marks::Line(_))
+        matches!(self.marks, Marks::Line(_) | Marks::HLine(_) | Marks::VLine(_))
     }
 
     /// Returns true for layers with markers at their points.

@@ -47,7 +47,7 @@ impl<'a> Plot<'a> {
             ),
             _ => (Vec::new(), height),
         };
-        let widest = text::widest(y.major.iter().map(|tick| &tick.1).chain(&names), BODY);
+        let widest = text::widest(y.ticks.iter().map(|tick| &tick.1).chain(&names), BODY);
         let left = (2.0 * TICK + widest + LABEL + BODY.line() * y_label.len() as f64).ceil();
         Self {
             panel,
@@ -84,7 +84,7 @@ impl<'a> Plot<'a> {
 
     /// Returns true if two neighbouring labels of the x axis leave no gap between them.
     fn labels_touch(&self, width: f64) -> bool {
-        let ends = self.x.major.iter().map(|(at, label)| {
+        let ends = self.x.ticks.iter().map(|(at, label)| {
             let (middle, half) = (self.x.fraction(*at) * width, text::width(label, BODY) / 2.0);
             (middle - half, middle + half)
         });
@@ -107,32 +107,33 @@ impl<'a> Plot<'a> {
         let (centre, middle) = (left + width / 2.0, top + height / 2.0);
         let across = |at: f64| left + self.x.fraction(at) * width;
         let down = |at: f64| bottom - self.y.fraction(at) * height;
-        let majors = |axis: &Ruled| axis.major.iter().map(|tick| tick.0).collect();
-        let minors: [Vec<f64>; 2] = [self.x.minor.clone(), self.y.minor.clone()];
-        for ([xs, ys], colour) in [(minors, FAINT), ([majors(&self.x), majors(&self.y)], GRID)] {
-            for x in xs.into_iter().map(across) {
-                sheet.line(&[(x, top), (x, bottom)], colour, 1.0, None);
-            }
-            for y in ys.into_iter().map(down) {
-                sheet.line(&[(left, y), (right, y)], colour, 1.0, None);
-            }
+        // Faint lines guide the eye from a name to its marks.
+        for row in 0..self.names.len() {
+            let y = down(row as f64);
+            sheet.line(&[(left, y), (right, y)], FAINT, 1.0, None);
+        }
+        for x in self.x.ticks.iter().map(|tick| across(tick.0)) {
+            sheet.line(&[(x, top), (x, bottom)], GRID, 1.0, None);
+        }
+        for y in self.y.ticks.iter().map(|tick| down(tick.0)) {
+            sheet.line(&[(left, y), (right, y)], GRID, 1.0, None);
         }
         sheet.line(&[(left, top), (left, bottom), (right, bottom)], INK, 1.0, None);
         let (layers, x, y) = (&self.panel.layers, &self.x, &self.y);
         Layers { layers, x, y, strokes, frame }.draw(sheet);
-        for (at, label) in &self.x.major {
+        for (at, label) in &self.x.ticks {
             let x = across(*at);
             sheet.line(&[(x, bottom), (x, bottom + TICK)], INK, 1.0, None);
             let below = bottom + 2.0 * TICK + BODY.line() / 2.0;
             sheet.text((x, below), label, BODY, INK, Align::Center);
         }
-        for (at, label) in &self.y.major {
+        for (at, label) in &self.y.ticks {
             let y = down(*at);
             sheet.line(&[(left - TICK, y), (left, y)], INK, 1.0, None);
             sheet.text((left - 2.0 * TICK, y), label, BODY, INK, Align::Right);
         }
-        for (row, name) in (0..).zip(&self.names) {
-            let place = (left - 2.0 * TICK, down(-f64::from(row)));
+        for (row, name) in self.names.iter().enumerate() {
+            let place = (left - 2.0 * TICK, down(row as f64));
             sheet.text(place, name, BODY, INK, Align::Right);
         }
         if !self.has_data {
@@ -161,7 +162,7 @@ mod tests {
             for width in (160..600).step_by(10) {
                 let mut plot = Plot::new(&panel, 100.0);
                 plot.fit_width(f64::from(width));
-                let ticks: Vec<f64> = plot.x.major.iter().map(|tick| tick.0).collect();
+                let ticks: Vec<f64> = plot.x.ticks.iter().map(|tick| tick.0).collect();
                 let gaps: Vec<f64> = ticks.windows(2).map(|pair| pair[1] - pair[0]).collect();
                 assert!(ticks.len() > 1 && !plot.labels_touch(f64::from(width)), "{ticks:?}");
                 assert!(gaps.iter().all(|gap| (gap / gaps[0] - 1.0).abs() < 1e-6), "{ticks:?}");

@@ -3,7 +3,7 @@
 use plotters::prelude::RGBColor;
 
 use super::canvas::{Colour, Dash, Point, Sheet, WHITE};
-use super::model::{Figure, Hue};
+use super::model::{Figure, Hue, Layer};
 
 /// The colour of text and axes.
 pub(super) const INK: Colour = RGBColor(0x22, 0x22, 0x22);
@@ -16,23 +16,6 @@ pub(super) const FAINT: Colour = RGBColor(0xF0, 0xF0, 0xF0);
 
 /// The opacity of bands.
 pub(super) const BAND: f64 = 0.2;
-
-/// The colours by [`Hue`].
-const PALETTE: [Colour; 13] = [
-    RGBColor(0x00, 0x72, 0xB2),
-    RGBColor(0xD5, 0x5E, 0x00),
-    RGBColor(0x00, 0x9E, 0x73),
-    RGBColor(0xCC, 0x79, 0xA7),
-    RGBColor(0xE6, 0x9F, 0x00),
-    RGBColor(0x56, 0xB4, 0xE9),
-    RGBColor(0x88, 0x22, 0x55),
-    RGBColor(0x82, 0x82, 0x82),
-    RGBColor(0x33, 0x22, 0x88),
-    RGBColor(0x99, 0x99, 0x33),
-    RGBColor(0x8C, 0x56, 0x4B),
-    RGBColor(0x11, 0x77, 0x33),
-    INK,
-];
 
 /// The dashes of series, repeating.
 const DASHES: [Dash; 3] = [None, Some((9.0, 3.0)), Some((3.0, 2.5))];
@@ -63,8 +46,9 @@ impl Stroke {
     /// The stroke of the series of this number in its figure. Successive ones can be told apart in
     /// grey.
     fn of(hue: Hue, number: usize) -> Self {
+        let [_, red, green, blue] = (hue as u32).to_be_bytes();
         Self {
-            colour: PALETTE[hue as usize],
+            colour: RGBColor(red, green, blue),
             dash: DASHES[number % DASHES.len()],
             marker: MARKERS[number % MARKERS.len()],
         }
@@ -102,26 +86,34 @@ const FREE: [Hue; 12] = {
     [Wine, Amber, Sky, Pink, Olive, Forest, Brown, Grey, Indigo, Green, Orange, Blue]
 };
 
-/// The strokes of all series of a figure, in order of their first appearance.
+/// The strokes of all series of a figure, in order of their first appearance, and then those of
+/// named reference lines.
 pub(super) struct Strokes(pub Vec<(String, Stroke)>);
 
 impl Strokes {
     pub fn new(figure: &Figure) -> Self {
         let layers = figure.panels.iter().flat_map(|panel| &panel.layers);
-        let mut names: Vec<&str> = Vec::new();
-        for name in layers.filter_map(|layer| layer.series()).filter(|name| !name.is_empty()) {
-            if !names.contains(&name) {
-                names.push(name);
-            }
-        }
-        let given = |name: &&str| figure.hues.iter().find(|(known, _)| known == name);
-        let is_free = |hue: &Hue| !names.iter().filter_map(given).any(|(_, own)| own == hue);
-        // Series without a colour of their own get some that no other has, while they last.
+        let named = layers.filter(|layer| !layer.name.is_empty());
+        let (series, lines): (Vec<&Layer>, Vec<&Layer>) =
+            named.partition(|layer| layer.series().is_some());
+        // Series without a given colour get some that no other has, while they last.
+        let is_free = |hue: &Hue| figure.hues.iter().all(|(_, given)| given != hue);
         let mut free = FREE.into_iter().filter(is_free).chain(FREE.into_iter().cycle());
-        let mut hue = |name| given(name).map(|given| given.1).or_else(|| free.next());
-        let hues: Vec<Hue> = names.iter().filter_map(&mut hue).collect();
-        let strokes = (0..).zip(hues).map(|(number, hue)| Stroke::of(hue, number));
-        Self(names.iter().map(|name| (*name).to_owned()).zip(strokes).collect())
+        let mut strokes: Vec<(String, Stroke)> = Vec::new();
+        for layer in series.into_iter().chain(lines) {
+            let name = &layer.name;
+            if strokes.iter().any(|(known, _)| known == name) {
+                continue;
+            }
+            let given = figure.hues.iter().find(|(known, _)| known == name);
+            let stroke = match (layer.series(), given) {
+                (None, _) => REFERENCE_LINE,
+                (_, Some((_, hue))) => Stroke::of(*hue, strokes.len()),
+                _ => Stroke::of(free.next().expect("endless"), strokes.len()),
+            };
+            strokes.push((name.clone(), stroke));
+        }
+        Self(strokes)
     }
 
     /// Returns the stroke of the named series; solid grey for a series without a name.
@@ -132,7 +124,7 @@ impl Strokes {
 
 #[cfg(test)]
 mod tests {
-    use super::super::model::{Layer, Marks, Panel};
+    use super::super::model::{Marks, Panel};
     use super::*;
 
     fn strokes(names: &[String], hues: Vec<(String, Hue)>) -> Vec<(String, Stroke)> {
