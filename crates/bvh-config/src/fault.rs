@@ -5,14 +5,14 @@ use serde::de::DeserializeOwned;
 use serde_path_to_error::{Deserializer, Track};
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
-use toml::{Spanned, Table, Value};
+use toml::{Table, Value};
 
 impl OutOfRange {
     /// Returns the message with the line of the key in the text. A key of the table `above` takes
     /// precedence over the same key at the top level.
     pub fn in_text(&self, text: &str, above: Option<&str>) -> String {
-        let table = DeTable::parse(text).ok();
-        let start = |key: &str| Some(in_table(table.as_ref()?.get_ref(), key)?.start);
+        let root = DeTable::parse(text).map(|table| DeValue::Table(table.into_inner())).ok();
+        let start = |key: &str| Some(place(root.as_ref()?, key)?.start);
         let of_table = above.and_then(start);
         let replaced = above.and_then(|above| start(&format!("{above}.{}", self.key)));
         let place = replaced.filter(|_| replaced != of_table).or_else(|| start(&self.key));
@@ -74,24 +74,21 @@ pub fn tagged<T: Check>(
     known.ok_or_else(|| OutOfRange::new(tag, found, accepted()))
 }
 
-fn in_table(table: &DeTable, key: &str) -> Option<Range<usize>> {
-    table.iter().find_map(|(name, value)| match key.strip_prefix(name.get_ref().as_ref())? {
-        "" => Some(name.span()),
-        // A name may be the beginning of another; only a dot or an index continues the path.
-        rest if rest.starts_with(['.', '[']) => Some(in_value(value, rest).unwrap_or(name.span())),
-        _ => None,
-    })
-}
-
-fn in_value(value: &Spanned<DeValue>, key: &str) -> Option<Range<usize>> {
-    match value.get_ref() {
-        DeValue::Table(table) => in_table(table, key.strip_prefix('.')?),
+/// Returns the bytes of the name or the element that a path below a value leads to, or of the last
+/// one that exists.
+fn place(value: &DeValue, path: &str) -> Option<Range<usize>> {
+    let path = path.strip_prefix('.').unwrap_or(path);
+    match value {
+        DeValue::Table(table) => table.iter().find_map(|(name, value)| {
+            let below = path.strip_prefix(name.get_ref().as_ref())?;
+            // A name may be the beginning of another; only a dot or an index continues the path.
+            let is_name = below.is_empty() || below.starts_with(['.', '[']);
+            is_name.then(|| place(value.get_ref(), below).unwrap_or(name.span()))
+        }),
         DeValue::Array(array) => {
-            let (index, rest) = key.strip_prefix('[')?.split_once(']')?;
-            let index: usize = index.parse().ok()?;
-            let element = array.get(index)?;
-            // A key below that is missing is reported at the line of its list's element.
-            Some(in_value(element, rest).unwrap_or(element.span()))
+            let (index, below) = path.strip_prefix('[')?.split_once(']')?;
+            let element = array.get(index.parse::<usize>().ok()?)?;
+            Some(place(element.get_ref(), below).unwrap_or(element.span()))
         }
         _ => None,
     }

@@ -3,8 +3,20 @@
 //!
 //! ```
 //! bvh_config::config! {
+//!     /// The order of measurements.
+//!     #[derive(Copy, Eq)]
+//!     pub enum Order {
+//!         /// By the time of arrival.
+//!         FirstIn,
+//!         /// By the measured value.
+//!         Ascending,
+//!     }
+//! }
+//! bvh_config::config! {
 //!     /// The parameters of a measurement.
 //!     pub struct Config {
+//!         /// The order of measurements.
+//!         order: Order = Order::FirstIn;
 //!         /// Number of measurements.
 //!         count: u32 = 3, in 1..=1000;
 //!         /// Fraction of the measurements to discard, if any.
@@ -109,12 +121,12 @@ macro_rules! ranges {
             fn check(&self, key: &str, found: &V) -> Result<(), OutOfRange> {
                 // `1.0..` contains infinity, which is accepted only if the range names it.
                 let unlimited = matches!(self.end_bound(), Unbounded);
-                found.each(key, &mut |key, number| {
-                    if !self.contains(number) || unlimited && !number.is_finite() {
+                for (key, number) in found.numbers(key) {
+                    if !self.contains(&number) || unlimited && !number.is_finite() {
                         return Err(OutOfRange::new(key, number, in_words(self)));
                     }
-                    Ok(())
-                })
+                }
+                Ok(())
             }
         }
     )* };
@@ -161,21 +173,7 @@ fn in_words<N: Display>(range: &impl RangeBounds<N>) -> String {
 /// of fields, each of which is in range, as in `check Self::check_temperatures;`.
 ///
 /// An `enum` instead of the struct gets the same traits except [`Default`] and
-/// [`Check`](crate::Check), and names in snake case:
-///
-/// ```
-/// bvh_config::config! {
-///     /// The order of measurements.
-///     #[derive(Copy, Eq)]
-///     pub enum Order {
-///         /// By the time of arrival.
-///         FirstIn,
-///         /// By the measured value.
-///         Ascending,
-///     }
-/// }
-/// assert_ne!(Order::FirstIn, Order::Ascending);
-/// ```
+/// [`Check`](crate::Check), and names in snake case.
 #[macro_export]
 macro_rules! config {
     ($(#[$meta:meta])* $visibility:vis enum $name:ident { $($variants:tt)* }) => {

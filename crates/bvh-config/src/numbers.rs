@@ -1,14 +1,10 @@
 //! The numbers, and collections of numbers, that a range can check.
 
-use crate::OutOfRange;
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
-/// A check of one number and its key.
-pub type Visit<'a, N> = &'a mut dyn FnMut(&str, &N) -> Result<(), OutOfRange>;
-
 /// A number that can be a parameter.
-pub trait Number: PartialOrd + Display {
+pub trait Number: Copy + PartialOrd + Display {
     /// Returns whether the number is neither infinite nor NaN. Infinity is accepted only if a range
     /// names it as its end.
     fn is_finite(&self) -> bool {
@@ -20,9 +16,8 @@ pub trait Number: PartialOrd + Display {
 pub trait Numbers {
     /// The type of the numbers.
     type Number: Number;
-    /// Calls `visit` with every number and its key, below `key` in a collection, up to the first
-    /// error.
-    fn each(&self, key: &str, visit: Visit<Self::Number>) -> Result<(), OutOfRange>;
+    /// Returns every number with its key, below `key` in a collection.
+    fn numbers(&self, key: &str) -> Vec<(String, Self::Number)>;
 }
 
 macro_rules! numbers {
@@ -32,8 +27,8 @@ macro_rules! numbers {
         }
         impl Numbers for $number {
             type Number = Self;
-            fn each(&self, key: &str, visit: Visit<Self>) -> Result<(), OutOfRange> {
-                visit(key, self)
+            fn numbers(&self, key: &str) -> Vec<(String, Self)> {
+                vec![(key.into(), *self)]
             }
         }
     )* };
@@ -43,36 +38,36 @@ numbers!(u8, u16, u32, u64, usize, i32, i64, f32 by f32::is_finite, f64 by f64::
 
 impl<V: Numbers> Numbers for Option<V> {
     type Number = V::Number;
-    fn each(&self, key: &str, visit: Visit<V::Number>) -> Result<(), OutOfRange> {
-        self.iter().try_for_each(|inner| inner.each(key, visit))
+    fn numbers(&self, key: &str) -> Vec<(String, V::Number)> {
+        self.iter().flat_map(|inner| inner.numbers(key)).collect()
     }
 }
 
 impl<V: Numbers> Numbers for [V] {
     type Number = V::Number;
-    fn each(&self, key: &str, visit: Visit<V::Number>) -> Result<(), OutOfRange> {
-        let mut inner = self.iter().enumerate();
-        inner.try_for_each(|(index, inner)| inner.each(&format!("{key}[{index}]"), visit))
+    fn numbers(&self, key: &str) -> Vec<(String, V::Number)> {
+        let inner = self.iter().enumerate();
+        inner.flat_map(|(index, inner)| inner.numbers(&format!("{key}[{index}]"))).collect()
     }
 }
 
 impl<V: Numbers, const N: usize> Numbers for [V; N] {
     type Number = V::Number;
-    fn each(&self, key: &str, visit: Visit<V::Number>) -> Result<(), OutOfRange> {
-        self.as_slice().each(key, visit)
+    fn numbers(&self, key: &str) -> Vec<(String, V::Number)> {
+        self.as_slice().numbers(key)
     }
 }
 
 impl<V: Numbers> Numbers for Vec<V> {
     type Number = V::Number;
-    fn each(&self, key: &str, visit: Visit<V::Number>) -> Result<(), OutOfRange> {
-        self.as_slice().each(key, visit)
+    fn numbers(&self, key: &str) -> Vec<(String, V::Number)> {
+        self.as_slice().numbers(key)
     }
 }
 
 impl<V: Numbers> Numbers for BTreeMap<String, V> {
     type Number = V::Number;
-    fn each(&self, key: &str, visit: Visit<V::Number>) -> Result<(), OutOfRange> {
-        self.iter().try_for_each(|(name, inner)| inner.each(&format!("{key}.{name}"), visit))
+    fn numbers(&self, key: &str) -> Vec<(String, V::Number)> {
+        self.iter().flat_map(|(name, inner)| inner.numbers(&format!("{key}.{name}"))).collect()
     }
 }
