@@ -34,8 +34,8 @@ pub struct Case {
 pub enum Check {
     /// A further promise about the outcome of every method on the scene.
     Outcome(fn(&Method, &[Aabb], &Outcome) -> Verdict),
-    /// Every method rejects that many boxes of this kind, and names [`Case::BAD`].
-    Refused(fn(usize) -> Vec<Aabb>),
+    /// Every method rejects a scene with a box that is damaged in this way, and names its object.
+    Refused(fn(&mut Aabb)),
     /// A check of the method with this name, or of all methods if it is empty.
     Method(&'static str, fn(&Method) -> Verdict),
     /// A check of another part of the program, of this name.
@@ -116,9 +116,6 @@ pub struct Cell {
 }
 
 impl Case {
-    /// The object that is damaged where every method rejects the scene.
-    pub const BAD: usize = 7;
-
     /// Returns the case's scene with this number of triangles; none if the case has no scene.
     pub fn triangles(&self, objects: usize) -> Vec<Triangle> {
         stiff::by_id(self.id).map_or_else(Vec::new, |triangles| triangles(objects))
@@ -164,11 +161,9 @@ impl Case {
         }
         for check in self.checks {
             match check {
-                Check::Refused(boxes) => {
+                Check::Refused(damage) => {
                     cell.outcome = Class::Refused;
-                    // The exact method rejects larger scenes for their size first.
-                    let objects = if let Method::Exact(_) = method { EXACT_OBJECTS } else { 100 };
-                    cell.note = examine::refuses(method, &boxes(objects), Self::BAD)?;
+                    cell.note = examine::refuses(method, *damage)?;
                 }
                 Check::Method(name, check) if ["", method.name()].contains(name) => {
                     cell.note = format!("{} {}", cell.note, check(method)?).trim().to_owned();

@@ -2,10 +2,11 @@
 
 use crate::Verdict;
 use crate::exact::{internal_area, relative_error};
-use crate::methods::is_builder;
+use crate::methods::{EXACT_OBJECTS, is_builder};
 use crate::transform::{same_topology, scaled, scaled_area};
 use anyhow::{Context, Result, bail, ensure};
 use bvh_core::{Aabb, cost, validate};
+use bvh_scenes::builtin::stiff;
 use bvh_search::{Budget, Method, Outcome, Problem, SearchError, solve};
 
 /// The largest accepted relative error of a cost.
@@ -60,14 +61,19 @@ pub fn check_scale(
     Ok(())
 }
 
-/// Checks that the method rejects the boxes and names the object. Returns the error's text.
-pub fn refuses(method: &Method, boxes: &[Aabb], object: usize) -> Verdict {
-    let Err(error) = solve(method, &Problem::new(boxes), 1, Budget::UNLIMITED, &()) else {
-        bail!("P1: built a tree over object {object}");
+/// Checks that the method rejects the uniform scene with one damaged box, and names its object.
+/// Returns the error's text.
+pub fn refuses(method: &Method, damage: fn(&mut Aabb)) -> Verdict {
+    const DAMAGED: usize = 7;
+    // The exact method rejects larger scenes for their size first.
+    let objects = if let Method::Exact(_) = method { EXACT_OBJECTS } else { 100 };
+    let mut boxes = stiff::boxes(&stiff::uniform(objects));
+    damage(&mut boxes[DAMAGED]);
+    let error = match solve(method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()) {
+        Err(SearchError::Build(error)) => error.to_string(),
+        other => bail!("P1: not rejected as a scene: {other:?}"),
     };
-    let text = error.to_string();
-    let is_named =
-        matches!(error, SearchError::Build(_)) && text.contains(&format!("object {object} "));
-    ensure!(is_named, "P1: the error names no object {object}: {text}");
-    Ok(text)
+    let is_named = error.contains(&format!("object {DAMAGED} "));
+    ensure!(is_named, "P1: the error names no object {DAMAGED}: {error}");
+    Ok(error)
 }

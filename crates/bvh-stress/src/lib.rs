@@ -19,7 +19,6 @@ mod case;
 mod checks;
 pub mod exact;
 pub mod examine;
-pub mod hard_rays;
 mod methods;
 mod table;
 pub mod tracing;

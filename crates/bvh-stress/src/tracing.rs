@@ -1,6 +1,6 @@
 //! Compares every traversal with testing every triangle, and makes difficult rays.
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Result, ensure};
 use bvh_build::{Builder, goldsmith_salmon, median_cut, muller_fellner};
 use bvh_core::{
     Aabb, Bvh, Coherence, Hit, Kernel, Primitives, Ray, Triangle, WideBvh, collapse_leaves,
@@ -30,7 +30,7 @@ pub const TRAVERSALS: &[(&str, Traversal)] = &[
     ("wide, SIMD", by_every_kernel),
     ("wide, portable", |objects| {
         let portable = |wide| singly("portable", objects, Structure::WidePortable(wide));
-        Ok(wide_layouts(objects)?.map(portable).into())
+        Ok(wide_layouts(objects)?.into_iter().map(portable).collect())
     }),
     ("KD-tree", |objects| {
         let cells = KdTree::build(&objects.boxes())?;
@@ -53,14 +53,12 @@ fn over_binary_trees(objects: &Primitives) -> Result<Vec<(String, Answers<'_>)>>
     Ok(trees.map(|(tree, name)| singly(name, objects, Structure::Tree(Cow::Owned(tree)))).collect())
 }
 
-/// Lays out a binary tree and a tree with many children per node.
-fn wide_layouts(objects: &Primitives) -> Result<[WideBvh; 2]> {
-    let Primitives::Triangles(triangles) = objects else {
-        bail!("only triangles have a wide layout");
-    };
+/// Lays out a binary tree and a tree with many children per node. Only triangles have layouts.
+fn wide_layouts(objects: &Primitives) -> Result<Vec<WideBvh>> {
+    let Primitives::Triangles(triangles) = objects else { return Ok(vec![]) };
     let binary = build(objects, &muller_fellner::Config::default())?;
     let wide = build(objects, &goldsmith_salmon::Config::default())?;
-    Ok([WideBvh::new(&binary, triangles)?, WideBvh::new(&wide, triangles)?])
+    Ok(vec![WideBvh::new(&binary, triangles)?, WideBvh::new(&wide, triangles)?])
 }
 
 /// Answers rays by every kernel of this processor, ray by ray and together, with both hints.
@@ -99,14 +97,10 @@ fn together(wide: &WideBvh, rays: &[Ray], coherence: Coherence) -> Vec<(Option<H
     nearest.into_iter().map(|hit| (!hit.is_miss()).then_some(hit)).zip(any).collect()
 }
 
-/// Returns the bits of an answer, for exact comparison.
-pub fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {
-    hit.map(|hit| (hit.t.to_bits(), hit.object))
-}
-
 /// Checks P3: for all rays the traversal gives the answers of testing every object, bit by bit.
 /// Returns the number of rays that hit.
 pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Result<usize> {
+    let bits = |hit: Option<Hit>| hit.map(|hit| (hit.t.to_bits(), hit.object));
     let (_, brute_force) = singly("", objects, Structure::Brute);
     let expected = brute_force(rays);
     for (way, answers) in traversal(objects)? {

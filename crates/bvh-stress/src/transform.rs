@@ -1,23 +1,26 @@
 //! Exact transformations of a scene with a known effect on trees: scale, reflection, order.
 
-use bvh_core::{Aabb, Bvh};
+use bvh_core::{Aabb, Bvh, Triangle};
 use bvh_search::Stream;
 use glam::Vec3;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use std::ops::RangeInclusive;
 
+/// Multiplies all coordinates of a point by 2^k; exact for every k of [`scale_range`].
+fn point(point: Vec3, k: i32) -> Vec3 {
+    // The product is exact in f64 and, within the range, in f32.
+    (point.as_dvec3() * libm::exp2(k.into())).as_vec3()
+}
+
 /// Multiplies all coordinates by 2^k; exact for every k of [`scale_range`].
 pub fn scaled(boxes: &[Aabb], k: i32) -> Vec<Aabb> {
-    // The product is exact in f64 and, within the range, in f32.
-    let factor = libm::exp2(k.into());
-    boxes
-        .iter()
-        .map(|aabb| Aabb {
-            min: (aabb.min.as_dvec3() * factor).as_vec3(),
-            max: (aabb.max.as_dvec3() * factor).as_vec3(),
-        })
-        .collect()
+    boxes.iter().map(|b| Aabb { min: point(b.min, k), max: point(b.max, k) }).collect()
+}
+
+/// Multiplies all corners by 2^k; exact unless they overflow or become denormal.
+pub fn scaled_triangles(triangles: &[Triangle], k: i32) -> Vec<Triangle> {
+    triangles.iter().map(|t| Triangle(t.0.map(|corner| point(corner, k)))).collect()
 }
 
 /// Returns a cost in units of area after the scene is scaled by 2^k.

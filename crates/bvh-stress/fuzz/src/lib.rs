@@ -3,14 +3,8 @@
 //! A target returns if the promises hold and panics if one is broken. Where most bytes would be
 //! rejected immediately, the first bytes select how the rest is read.
 
-pub mod mesh;
-pub mod tree_file;
+mod mesh;
+mod tree_file;
 
 pub use mesh::mesh;
 pub use tree_file::tree_file;
-
-/// A function of arbitrary bytes.
-pub type Target = fn(&[u8]);
-
-/// Every target by name.
-pub const TARGETS: [(&str, Target); 2] = [("mesh", mesh), ("tree_file", tree_file)];

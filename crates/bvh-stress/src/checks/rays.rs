@@ -1,5 +1,6 @@
 //! Checks of rays, their ranges, and the estimator that traces random rays.
 
+use crate::transform::scaled_triangles;
 use crate::{Verdict, tracing};
 use anyhow::{Context, ensure};
 use bvh_build::{Builder, muller_fellner};
@@ -85,11 +86,7 @@ pub fn denormal_distances() -> Verdict {
     let ray = Ray::new(Vec3::ZERO, Vec3::Z * 1e20, 0.0, 0.0)?;
     check(&Primitives::Triangles(vec![facing]), &[ray])?;
     for k in [-100, -60, -40, -20] {
-        let scale = 2f32.powi(k);
-        let triangles: Vec<Triangle> = stiff::uniform(60)
-            .into_iter()
-            .map(|triangle| Triangle(triangle.0.map(|p| p * scale)))
-            .collect();
+        let triangles = scaled_triangles(&stiff::uniform(60), k);
         let mut rays = Vec::new();
         for (ray, attempt) in tracing::rays(&triangles, 400, 22).iter().zip(0usize..) {
             let length = [1.0, 1e20, 1e25, 1e30][attempt % 4] / ray.direction().abs().max_element();

@@ -4,14 +4,11 @@
 use crate::laws::any_boxes;
 use bvh_build::{Builder, goldsmith_salmon, muller_fellner};
 use bvh_core::cost::{self, SahConstants};
-use bvh_core::{
-    Aabb, Bvh, Primitives, Ray, Sphere, Triangle, any_hit_by, clip_to_box, collapse_leaves, file,
-    nearest_hit_by, nearest_hit_of_all, validate,
-};
+use bvh_core::{Bvh, Primitives, Ray, Sphere, Triangle, collapse_leaves, file, validate};
 use bvh_scenes::trace::KdTree;
 use bvh_search::{Budget, Problem, best, lower_bound, optimize};
 use bvh_stress::examine::ROUNDING;
-use bvh_stress::tracing::{TRAVERSALS, bits, check};
+use bvh_stress::tracing::{TRAVERSALS, check};
 use glam::Vec3;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -50,26 +47,6 @@ fn triangles_and_rays() -> impl Strategy<Value = (Vec<Triangle>, Vec<MaybeRay>)>
     })
 }
 
-/// Checks that trees and a KD-tree over the boxes give the answers of testing every object.
-fn check_trees(boxes: &[Aabb], ray: &Ray, test: impl Fn(u32, f32) -> Option<f32>) {
-    let expected = nearest_hit_of_all(boxes.len() as u32, ray, &test, &mut ());
-    let any = |id: u32| test(id, ray.t_max()).is_some();
-    for builder in
-        [&muller_fellner::Config::default() as &dyn Builder, &goldsmith_salmon::Config::default()]
-    {
-        let tree = builder.build(boxes).unwrap();
-        assert_eq!(bits(nearest_hit_by(&tree, ray, &test, &mut ())), bits(expected), "{ray:?}");
-        assert_eq!(any_hit_by(&tree, ray, any, &mut ()), expected.is_some(), "{ray:?}");
-    }
-    let cells = KdTree::build(boxes).unwrap();
-    assert_eq!(bits(cells.nearest_hit(ray, &test, &mut ())), bits(expected), "KD-tree: {ray:?}");
-    assert_eq!(cells.any_hit(ray, any, &mut ()), expected.is_some(), "KD-tree: {ray:?}");
-}
-
-fn is_binary(tree: &Bvh) -> bool {
-    tree.nodes.iter().all(|node| node.is_leaf() || node.children().len() == 2)
-}
-
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(3000))]
 
@@ -93,21 +70,14 @@ proptest! {
                 ),
             }
         }
-        let objects = Primitives::Triangles(triangles.clone());
-        for (name, traversal) in TRAVERSALS {
-            let found = check(*traversal, &objects, &rays);
-            prop_assert!(found.is_ok(), "{name}: {found:?}");
-        }
-        let boxes = objects.boxes();
-        // Spheres from the same bits test the traversal with another object test.
+        // Spheres from the same bits test the traversals with another object test.
         let sphere = |t: &Triangle| Sphere::new(t.0[0] / 4.0, t.0[1].x.abs() / 4.0);
-        let spheres: Vec<Sphere> = triangles.iter().map(sphere).collect();
-        let around: Vec<Aabb> = spheres.iter().map(Sphere::aabb).collect();
-        for ray in &rays {
-            check_trees(&boxes, ray, |id, t_max| {
-                clip_to_box(ray, &boxes[id as usize], ray.t_min(), t_max)
-            });
-            check_trees(&around, ray, |id, t_max| spheres[id as usize].intersect(ray, t_max));
+        let spheres = Primitives::Spheres(triangles.iter().map(sphere).collect());
+        for objects in [Primitives::Triangles(triangles), spheres] {
+            for (name, traversal) in TRAVERSALS {
+                let found = check(*traversal, &objects, &rays);
+                prop_assert!(found.is_ok(), "{name}: {found:?}");
+            }
         }
     }
 
@@ -127,12 +97,9 @@ proptest! {
             prop_assert_eq!(validate(&merged, &boxes), Ok(()));
             let [sah, merged_sah] = [tree, &merged].map(|tree| cost::sah(tree, &constants));
             prop_assert!(merged_sah <= sah * (1.0 + ROUNDING));
-            if is_binary(tree) {
-                let nodes = tree.to_first_count();
-                let other = Bvh::from_first_count(&nodes, &tree.prim_ids).unwrap();
-                prop_assert_eq!(validate(&other, &boxes), Ok(()));
-            }
         }
+        let other = Bvh::from_first_count(&greedy.to_first_count(), &greedy.prim_ids).unwrap();
+        prop_assert_eq!(validate(&other, &boxes), Ok(()));
         for start in [&greedy, &collapse_leaves(&greedy, &constants)] {
             let budget = Budget { max_work: Some(work), ..Budget::UNLIMITED };
             let config = best::Config::default();

@@ -1,40 +1,46 @@
 //! Rays where rounding decides, alone and in bundles.
 
-use crate::tracing;
 use bvh_core::{Primitives, Ray, Triangle};
 use bvh_scenes::trace::{Accelerator, Structure};
 use bvh_search::Stream;
+use bvh_stress::tracing;
 use glam::Vec3;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 
-/// Returns rays of [`tracing::rays`], half of them single, half in bundles.
-pub fn random(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
-    half_in_bundles(count, seed, |count| tracing::rays(triangles, count, seed))
-}
+/// The number of rays in a bundle, the same as in a packet.
+const BUNDLE: usize = 64;
 
-/// Returns rays where rounding decides, half of them single, half in bundles.
-///
-/// The rays run in planes of triangles and along edges, from and through their corners, edges and
-/// centres, and along axes, exactly or nearly. Their directions have any length, which makes
-/// distances underflow. They cover half lines, single points, and ranges that end at a hit or next
-/// to it.
-pub fn adversarial(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
+/// Returns rays: three eighths are of [`tracing::rays`], an eighth is where rounding decides, and
+/// half are in bundles around others, equal, nearly equal or close to each other.
+pub fn rays(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
     let objects = Primitives::Triangles(triangles.to_vec());
-    let brute_force = Accelerator::new(&objects, Structure::Brute);
-    let mut rng = Stream::seed_from_u64(seed);
-    half_in_bundles(count, seed, |count| {
-        let draws =
-            (0..20 * count).filter_map(|_| one_adversarial(triangles, &brute_force, &mut rng));
-        draws.take(count).collect()
-    })
+    let all = Accelerator::new(&objects, Structure::Brute);
+    // Another stream than that of the other rays, so that no numbers are repeated.
+    let mut rng = Stream::seed_from_u64(!seed);
+    let mut rays = tracing::rays(triangles, count * 3 / 8, seed);
+    let draws = (0..20 * count).filter_map(|_| adversarial(triangles, &all, &mut rng));
+    rays.extend(draws.take(count / 8));
+    while rays.len() < count {
+        let ray = pick(&rays, &mut rng);
+        let spread = pick(&[0.0, 1e-7, 1e-3, 0.1], &mut rng);
+        let mut near =
+            || Vec3::from([(); 3].map(|()| 1.0 + spread * rng.random_range(-1.0..1.0f32)));
+        for _ in 0..BUNDLE {
+            // Factors instead of offsets keep zeros, and work at every scale.
+            let origin = ray.origin() * near();
+            let direction = ray.direction() * near();
+            rays.push(Ray::new(origin, direction, ray.t_min(), ray.t_max()).unwrap_or(ray));
+        }
+    }
+    rays.truncate(count);
+    rays
 }
 
-fn one_adversarial(
-    triangles: &[Triangle],
-    brute_force: &Accelerator,
-    rng: &mut Stream,
-) -> Option<Ray> {
+/// Returns a ray in the plane of a triangle, along an edge, from or through a corner, an edge or the
+/// centre, or along an axis, exactly or nearly. Its direction has any length, which makes distances
+/// underflow. It covers a half line, a single point, or a range that ends at a hit or next to it.
+fn adversarial(triangles: &[Triangle], all: &Accelerator, rng: &mut Stream) -> Option<Ray> {
     let nowhere = Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]);
     let triangle = triangles.choose(rng).unwrap_or(&nowhere);
     let target = in_plane(triangle, rng);
@@ -59,7 +65,7 @@ fn one_adversarial(
     let direction = direction * 2f32.powi(pick(&[0, 0, 1, -99, 99, 60, -60], rng));
     let t = Ray::half_line(origin, direction)
         .ok()
-        .map(|ray| brute_force.nearest_hit(&ray))?
+        .map(|ray| all.nearest_hit(&ray))?
         .map_or(1.0, |hit| hit.t);
     // Ranges that end at a hit or next to it decide by the last bit of the distance.
     let (t_min, t_max) = match rng.random_range(0..12) {
@@ -88,38 +94,4 @@ fn in_plane(Triangle([a, b, c]): &Triangle, rng: &mut Stream) -> Vec3 {
 
 fn pick<T: Copy>(of: &[T], rng: &mut Stream) -> T {
     *of.choose(rng).expect("some")
-}
-
-/// The number of rays in a bundle, the same as in a packet.
-const BUNDLE: usize = 64;
-
-/// Returns `count` rays: half of them directly from `make`, half in bundles around further rays of
-/// `make`. The rays of a bundle are equal, nearly equal, or close to each other.
-fn half_in_bundles(count: usize, seed: u64, mut make: impl FnMut(usize) -> Vec<Ray>) -> Vec<Ray> {
-    // A different stream from the rays' own, so that bundles do not repeat their numbers.
-    let mut rng = Stream::seed_from_u64(!seed);
-    let mut rays = make(count / 2);
-    let first = rays.len();
-    for ray in make((count - first).div_ceil(BUNDLE)) {
-        let spread = pick(&[0.0, 1e-7, 1e-3, 0.1], &mut rng);
-        let mut near =
-            || Vec3::from([(); 3].map(|()| 1.0 + spread * rng.random_range(-1.0..1.0f32)));
-        for _ in 0..BUNDLE {
-            // Factors instead of offsets keep zeros, and work at every scale.
-            let origin = ray.origin() * near();
-            let direction = ray.direction() * near();
-            rays.push(Ray::new(origin, direction, ray.t_min(), ray.t_max()).unwrap_or(ray));
-        }
-    }
-    rays.truncate(count);
-    rays
-}
-
-/// Scales triangles by 2^`exponent`, which makes some of them denormal if the exponent is very low;
-/// `None` if they would not be finite.
-pub fn scaled(triangles: &[Triangle], exponent: i32) -> Option<Vec<Triangle>> {
-    // Two steps, because 2^-140 itself is denormal and would lose bits.
-    let step = 2f32.powi(exponent / 2);
-    let scaled: Vec<_> = triangles.iter().map(|t| Triangle(t.0.map(|p| p * step * step))).collect();
-    scaled.iter().all(|t| t.aabb().check().is_ok()).then_some(scaled)
 }

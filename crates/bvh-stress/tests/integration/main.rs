@@ -2,6 +2,7 @@
 
 mod any_bits;
 mod fuzz;
+mod hard_rays;
 mod laws;
 mod never_worse;
 mod objectives;
