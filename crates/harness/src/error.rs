@@ -57,7 +57,7 @@ pub enum Error {
     /// A repetition has numbers that differ from the committed ones.
     #[error(
         "{differences} difference(s) from the committed results; \
-         if they are intended, --force replaces the results"
+         if they are intended, --force replaces the results, another --out keeps both"
     )]
     Differs { differences: usize },
     /// A file of a finished run that no longer matches its checksum.

@@ -53,15 +53,15 @@ pub fn merge(args: &MergeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         experiment
             .check_run_count()
             .map_err(|fault| Error::Usage(format!("{}: {fault}", spec.display())))?;
-        // What an earlier merge has taken is kept.
-        let existing = if args.force { Existing::Replace } else { Existing::Resume };
-        let extent = Extent { existing, parts, ..Extent::default() };
         let named = |error| Overrides::default().named(&spec, error);
         if !args.force && finish::has_results_of(&experiment, &args.out)? {
             differences +=
-                repeat(&experiment, &args.out, &extent, interrupted, false).map_err(named)?;
+                repeat(&experiment, &args.out, &parts, interrupted, false).map_err(named)?;
             continue;
         }
+        // What an earlier merge has taken is kept.
+        let existing = if args.force { Existing::Replace } else { Existing::Resume };
+        let extent = Extent { existing, parts, ..Extent::default() };
         let summary = execute(&experiment, &args.out, &extent, interrupted).map_err(named)?;
         print_outcome(&experiment, &summary, "Results:", &summary.folder, false);
     }

@@ -3,13 +3,12 @@
 
 use super::terminal::{Jobs, output_folder, print_error, print_line};
 use crate::Error;
-use crate::rows::store::{Existing, is_unfinished};
+use crate::rows::store::Existing;
 use crate::run::execute::{Extent, execute};
 use crate::run::finish::Summary;
 use crate::run::{check, finish, reference};
 use crate::spec::{Experiment, Overrides};
 use std::collections::HashSet;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -35,8 +34,7 @@ pub struct RunArgs {
     /// nothing.
     #[arg(long, conflicts_with_all = ["check", "resume", "runs"])]
     pub redraw: bool,
-    /// Keep the finished runs of an interrupted experiment, or of its interrupted repetition, and
-    /// perform the missing ones.
+    /// Keep the finished runs of an interrupted experiment, and perform the missing ones.
     #[arg(long)]
     pub resume: bool,
     /// Replace existing results.
@@ -92,13 +90,9 @@ fn perform(
     extent: &Extent,
     interrupted: &AtomicBool,
 ) -> Result<usize, Error> {
-    if args.check {
-        return check(args, experiment, interrupted);
-    }
-    let is_new = args.redraw || args.force || !args.runs.is_empty();
-    let is_over = args.resume && !is_interrupted(experiment, &args.out);
-    if !is_new && !is_over && finish::has_results_of(experiment, &args.out)? {
-        return repeat(experiment, &args.out, extent, interrupted, args.quiet);
+    let is_new = args.redraw || args.force || args.resume || !args.runs.is_empty();
+    if args.check || !is_new && finish::has_results_of(experiment, &args.out)? {
+        return repeat(experiment, &args.out, &[], interrupted, args.quiet || args.check);
     }
     let summary = if args.redraw {
         finish::redraw(experiment, &args.out)?
@@ -128,112 +122,36 @@ pub(super) fn print_outcome(
     print_line(&format!("\n{}{label} {}", summary.text, folder.display()));
 }
 
-/// Runs into a temporary folder and prints how the rows differ from the committed ones. Returns the
-/// number of differences.
-fn check(
-    args: &RunArgs,
-    experiment: &Experiment,
-    interrupted: &AtomicBool,
-) -> Result<usize, Error> {
-    // A check must not touch the committed results, not even for a moment.
-    let temporary =
-        tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
-    let extent = Extent::default();
-    let (summary, found) = compare(experiment, &args.out, temporary.path(), &extent, interrupted)
-        .map_err(Error::without_kept_runs)?;
-    for scene in &summary.skipped_scenes {
-        let name = &experiment.name;
-        print_line(&format!("{name}: scene {scene} is not fetched; its rows are not compared"));
-    }
-    print_differences(experiment, &found);
-    Ok(found.len())
-}
-
-/// Returns the folder in `out` for a repetition of finished results. No experiment has its name.
-fn repeated(experiment: &Experiment, out: &Path) -> PathBuf {
-    out.join(".repeated").join(experiment.folder())
-}
-
-/// Removes a repetition, and the folders above it that are then empty.
-fn discard(repeated: &Path, out: &Path) -> Result<(), Error> {
-    if repeated.is_dir() {
-        fs::remove_dir_all(repeated).map_err(Error::io(repeated, "remove the folder"))?;
-    }
-    // The folders of another repetition are not empty, and stay.
-    let mut above = repeated.ancestors().skip(1).take_while(|&above| above != out);
-    let _ = above.try_for_each(fs::remove_dir);
-    Ok(())
-}
-
-/// Returns true if a repetition of finished results in `out` was interrupted.
-fn is_interrupted(experiment: &Experiment, out: &Path) -> bool {
-    is_unfinished(&repeated(experiment, out).join(experiment.folder()))
-}
-
-/// Runs again what has finished results in `out`, prints the tables and how the rows differ from
-/// those, and replaces nothing. Returns the number of differences; with any, or after an
-/// interruption, the repetition stays beside the results.
+/// Runs into a temporary folder what has results in `out`, with the runs of the parts, and prints
+/// how its rows differ from those; unless `quiet`, also the tables. Returns the number of
+/// differences.
 pub(super) fn repeat(
     experiment: &Experiment,
     out: &Path,
-    extent: &Extent,
+    parts: &[PathBuf],
     interrupted: &AtomicBool,
     quiet: bool,
 ) -> Result<usize, Error> {
-    let repeated = repeated(experiment, out);
-    match (is_interrupted(experiment, out), extent.existing) {
-        (true, Existing::Resume) => {}
-        (true, _) => {
-            let repeated = repeated.display();
-            return Err(Error::Usage(format!(
-                "{repeated} has an interrupted repetition; --resume does the rest, removing the \
-                 folder discards it"
-            )));
-        }
-        // An earlier one that differed.
-        (false, _) => discard(&repeated, out)?,
-    }
-    let extent = Extent { existing: Existing::Resume, ..extent.clone() };
-    fs::create_dir_all(&repeated).map_err(Error::io(&repeated, "create the folder"))?;
-    let compared = compare(experiment, out, &repeated, &extent, interrupted);
-    if compared.is_err() && !is_interrupted(experiment, out) {
-        discard(&repeated, out)?;
-    }
-    let (summary, found) = compared?;
-    let folder = out.join(experiment.folder());
-    print_outcome(experiment, &summary, "Compared with", &folder, quiet);
-    print_differences(experiment, &found);
-    if found.is_empty() {
-        discard(&repeated, out)?;
-    } else {
-        print_error(&format!("the repetition is kept in {}", repeated.display()));
-    }
-    Ok(found.len())
-}
-
-/// Runs into `fresh` what has results in `out`. Returns how its rows differ from those.
-fn compare(
-    experiment: &Experiment,
-    out: &Path,
-    fresh: &Path,
-    extent: &Extent,
-    interrupted: &AtomicBool,
-) -> Result<(Summary, Vec<String>), Error> {
+    // A repetition must not touch the committed results, not even for a moment.
+    let temporary =
+        tempfile::tempdir().map_err(Error::io(&std::env::temp_dir(), "create a folder"))?;
     let committed = out.join(experiment.folder());
     // Gaps are measured from the references of the committed run, not from later finds.
-    reference::adopt(&committed, fresh)?;
-    let summary = execute(experiment, fresh, extent, interrupted)?;
-    let fresh = fresh.join(experiment.folder());
-    let found = check::compare(&fresh, &committed, &summary.skipped_scenes)?;
-    Ok((summary, found))
-}
-
-fn print_differences(experiment: &Experiment, found: &[String]) {
+    reference::adopt(&committed, temporary.path())?;
+    let extent = Extent { parts: parts.to_vec(), ..Extent::default() };
+    let summary = execute(experiment, temporary.path(), &extent, interrupted)
+        .map_err(Error::without_kept_runs)?;
+    let differences = check::compare(&summary.folder, &committed, &summary.skipped_scenes)?;
+    print_outcome(experiment, &summary, "Compared with", &committed, quiet);
     let name = &experiment.name;
-    for difference in found {
+    for scene in &summary.skipped_scenes {
+        print_line(&format!("{name}: scene {scene} is not fetched; its rows are not compared"));
+    }
+    for difference in &differences {
         print_line(&format!("{name}: {difference}"));
     }
-    if found.is_empty() {
+    if differences.is_empty() {
         print_line(&format!("{name}: as committed"));
     }
+    Ok(differences.len())
 }

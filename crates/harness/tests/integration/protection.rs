@@ -38,23 +38,15 @@ fn finished_results_are_replaced_by_force_only() {
     // A repetition prints its tables and compares them, and writes nothing.
     let repetition = said(dir, &["spec.toml"]);
     assert!(repetition.contains("What stays?") && repetition.contains("spec: as committed"));
-    // Rows that differ are kept elsewhere.
     let rows = fs::read(results.join("runs.csv")).unwrap();
     fs::write(results.join("runs.csv"), rows.repeat(2)).unwrap();
-    let differing = run(dir, &["spec.toml"]);
-    ended(&differing, 1, &["the repetition is kept in"]);
-    let repeated = dir.join("results/.repeated/spec");
-    assert!(fs::read(repeated.join("spec/runs.csv")).unwrap() == rows);
+    ended(&run(dir, &["spec.toml"]), 1, &["1 difference(s)", "--force", "--out"]);
     fs::write(results.join("runs.csv"), rows).unwrap();
-    // An interrupted repetition is resumed, and parts are compared as it is.
+    // Parts are compared as it is.
     let part = of_part(dir, "spec.toml", 0, 1000);
-    fs::remove_dir_all(&repeated).unwrap();
-    said(dir, &["spec.toml", &part[0], "--out=results/.repeated/spec"]);
-    refused(dir, &["spec.toml"], &["results/.repeated/spec", "--resume does the rest"]);
-    assert!(said(dir, &["spec.toml", "--resume"]).contains("spec: as committed"));
     said(dir, &["spec.toml", &part[0], "--out=one"]);
     assert!(said(dir, &["merge", "one", "--out=results"]).contains("spec: as committed"));
-    assert!(!dir.join("results/.repeated").exists());
+    assert_eq!(names(&dir.join("results")), [".lock", "best_known.csv", "spec"]);
     for other in ["--scene=spheres750", "--seed=2", part[0].as_str()] {
         refused(dir, &["spec.toml", other], &["results/spec", "--force", "--out"]);
     }
