@@ -4,13 +4,15 @@
 use crate::rows::{PeerRayRow, RayRatioRow};
 use crate::tracing::layout::{COMPILED, is_repeat, is_single};
 use crate::tracing::speed::Traced;
-use harness::peers::OURS;
 use harness::processor::PROCESSOR;
 use harness::statistics::{self, geometric_mean, range};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The value of the column `scene` in rows that are means over all scenes.
 pub const MEAN: &str = "geometric mean";
+
+/// The library of our own contenders.
+pub const OURS: &str = "ours";
 
 /// The largest accepted share of wrong answers is one in this number of rays. The time of a
 /// contender above it is meaningless: tinybvh's packets overflow their stack in deep trees.

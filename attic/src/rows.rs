@@ -1,4 +1,4 @@
-//! The rows of comparisons with other libraries.
+//! The rows of traced rays, and of comparisons with other libraries.
 
 use harness::rows::Row;
 use serde::{Deserialize, Serialize};
@@ -66,4 +66,56 @@ pub struct RayRatioRow {
 
 impl Row for RayRatioRow {
     const FILE: &str = "timing_ratios.csv";
+}
+
+/// One row of `traversal.csv`: what rays of one kind found and took in one layout of a run's tree.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TraceRow {
+    pub scene: String,
+    pub method: String,
+    /// Layout of the tree in memory while rays are traced.
+    pub layout: String,
+    /// Kind of the rays, the same ones for all methods and layouts.
+    pub rays: String,
+    pub count: u64,
+    /// Number of rays that hit something.
+    pub hits: u64,
+    /// Rays that miss a hit.
+    pub missed_hits: u64,
+    /// Rays that hit nothing real.
+    pub false_hits: u64,
+    /// Rays that hit elsewhere.
+    pub other_hits: u64,
+    /// Mean number of tests against boxes, the root's included where it is tested; 8 for every wide
+    /// node.
+    pub boxes_per_ray: Option<f64>,
+    /// Mean number of tests against objects; 4 for every block of triangles.
+    pub objects_per_ray: Option<f64>,
+}
+
+impl Row for TraceRow {
+    const FILE: &str = "traversal.csv";
+}
+
+/// One row of `timing_traversal.csv`: the time of rays of one kind in one layout of a run's tree, on
+/// one thread.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TraceTimeRow {
+    pub scene: String,
+    pub method: String,
+    pub layout: String,
+    pub rays: String,
+    pub count: u64,
+    /// Turns that were timed.
+    pub rounds: u32,
+    /// Wall time of making the layout from the tree; for other libraries, with the tree.
+    pub preparation_seconds: f64,
+    /// Wall time of all rays: the sum over small parts of them of each part's fastest turn.
+    pub seconds: f64,
+    /// Sum over the same parts of each part's median turn.
+    pub median_seconds: f64,
+}
+
+impl Row for TraceTimeRow {
+    const FILE: &str = "timing_traversal.csv";
 }

@@ -1,5 +1,5 @@
 use super::*;
-use harness::rows::{TraceRow, TraceTimeRow};
+use crate::rows::{TraceRow, TraceTimeRow};
 
 fn speed(scene: &str, library: &str, mode: &str, million_per_s: f64) -> Speed {
     let row = PeerRayRow {

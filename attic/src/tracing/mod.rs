@@ -6,13 +6,14 @@ pub mod layout;
 pub mod rays;
 pub mod speed;
 
-use crate::comparison::{self, Raced};
+use crate::comparison::{self, OURS, Raced};
+use crate::rows::{TraceRow, TraceTimeRow};
 use crate::{RACERS, programs};
 use bvh_config::{OutOfRange, fault};
 use contender::Contender;
 use harness::Error;
-use harness::peers::{FirstRun, NamedBytes, OURS, Tracing};
-use harness::rows::{Row, TraceRow, TraceTimeRow, to_bytes};
+use harness::peers::{FirstRun, NamedBytes, Tracing};
+use harness::rows::{Row, to_bytes};
 use layout::own_contenders;
 use speed::{Config, Traced};
 use std::collections::BTreeSet;

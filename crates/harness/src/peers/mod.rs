@@ -101,9 +101,6 @@ pub struct FirstRun<'a> {
 /// The name of a file of results, and its bytes.
 pub type NamedBytes = (&'static str, Vec<u8>);
 
-/// The library of our own contenders.
-pub const OURS: &str = "ours";
-
 /// A proven lower bound of the internal area of every binary tree over boxes, which grows with an
 /// effort.
 pub type LowerBound = fn(&[Aabb], u32, &dyn Observer) -> Result<f64, BuildError>;

@@ -7,11 +7,9 @@
 //! |---|---|
 //! | `threads` | Number of the run's threads. |
 //! | `collapsed_sah` | Surface area heuristic with both constants 1, after the best collapse of leaves. |
-//! | `layout` | Layout of the tree in memory while rays are traced. |
 //! | `rays`, `judged_on`, `trained_on` | Kinds of rays: traced, judging the tree, training it. |
 //! | `camera` | Camera of the judging rays: `same` as in training, `other`, or `none`. |
 //! | `boxes_per_ray`, `objects_per_ray` | Mean number of tests; `boxes_low` and `boxes_high` end its 95 % interval. |
-//! | `missed_hits`, `false_hits`, `other_hits` | Rays that miss a hit, hit nothing real, or hit elsewhere. |
 //! | `references_per_object` | Leaves that name an object, per object: above 1 where objects are divided. |
 #![allow(missing_docs, reason = "columns in the table above, or whose names are clear")]
 
@@ -38,8 +36,8 @@ macro_rules! rows {
         }
         )*
 
-        /// The files that runs write.
-        pub const FILES: &[&str] = &[$($file),*];
+        /// The files that runs write; the program in `attic/` has the rows of the last two.
+        pub const FILES: &[&str] = &[$($file,)* "traversal.csv", "timing_traversal.csv"];
     };
 }
 
@@ -147,47 +145,6 @@ rows! {
         objects_per_ray: f64,
         /// Standard error of `objects_per_ray`.
         objects_standard_error: f64,
-    }
-
-    #[derive(Default)]
-    /// One row of `traversal.csv`: what rays of one kind found and took in one layout of a run's
-    /// tree.
-    TraceRow in "traversal.csv" {
-        scene: String,
-        method: String,
-        layout: String,
-        /// Kind of the rays, the same ones for all methods and layouts.
-        rays: String,
-        count: u64,
-        /// Number of rays that hit something.
-        hits: u64,
-        missed_hits: u64,
-        false_hits: u64,
-        other_hits: u64,
-        /// Mean number of tests against boxes, the root's included where it is tested; 8 for every
-        /// wide node.
-        boxes_per_ray: Option<f64>,
-        /// Mean number of tests against objects; 4 for every block of triangles.
-        objects_per_ray: Option<f64>,
-    }
-
-    #[derive(Default)]
-    /// One row of `timing_traversal.csv`: the time of rays of one kind in one layout of a run's
-    /// tree, on one thread.
-    TraceTimeRow in "timing_traversal.csv" {
-        scene: String,
-        method: String,
-        layout: String,
-        rays: String,
-        count: u64,
-        /// Turns that were timed.
-        rounds: u32,
-        /// Wall time of making the layout from the tree; for other libraries, with the tree.
-        preparation_seconds: f64,
-        /// Wall time of all rays: the sum over small parts of them of each part's fastest turn.
-        seconds: f64,
-        /// Sum over the same parts of each part's median turn.
-        median_seconds: f64,
     }
 
     /// One row of `tests.csv`: the tests of rays that a tree was not trained on, in the wide
