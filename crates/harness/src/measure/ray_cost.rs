@@ -3,11 +3,11 @@
 
 use bvh_build::{Builder, muller_fellner};
 use bvh_config::{OutOfRange, config};
-use bvh_core::{Bvh, Ray, RayDensity, Segment, WideBvh};
+use bvh_core::{Bvh, Ray, RayDensity, Segment};
 use bvh_scenes::Scene;
 use bvh_scenes::rays::{
     Family, Kind, OF_ANYTHING, Pose, RenderedRays, TRAINED, TracedRay, Viewpoint, check_count,
-    density, in_box, of_anything, of_inside, of_renderer, random_ray, tests_per_ray,
+    density, in_box, of_anything, of_inside, of_renderer, random_ray,
 };
 use bvh_search::{Stream, ray_density};
 use rand::SeedableRng;
@@ -198,17 +198,11 @@ pub fn test_rays(config: &Config, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<T
     test_rays
 }
 
-impl TestRays {
-    /// Returns the tests of nodes and of blocks of triangles per ray in a layout. They do not
-    /// depend on the machine.
-    pub fn tests(&self, wide: &WideBvh) -> [f64; 2] {
-        tests_per_ray(wide, self.kind, &self.rays)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bvh_core::WideBvh;
+    use bvh_scenes::rays::tests_per_ray;
 
     #[test]
     fn a_layout_for_rays_needs_fewer_tests_of_other_rays_of_the_same_camera() {
@@ -225,7 +219,7 @@ mod tests {
         assert_eq!((kinds.len(), kinds[6]), (7, (Kind::Incoherent, "none")));
         let [plain_tests, trained_tests] = [&plain, &trained].map(|wide| {
             let same_camera = test_rays[..3].iter();
-            same_camera.flat_map(|test_rays| test_rays.tests(wide)).sum::<f64>()
+            same_camera.flat_map(|rays| tests_per_ray(wide, rays.kind, &rays.rays)).sum::<f64>()
         });
         assert!(trained_tests < plain_tests, "{trained_tests} {plain_tests}");
     }

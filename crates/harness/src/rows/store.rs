@@ -43,6 +43,18 @@ pub struct Store {
 }
 
 impl Store {
+    /// Creates and locks `folder`, whatever it has.
+    ///
+    /// # Errors
+    ///
+    /// If another harness has locked the folder, or if it cannot be written.
+    pub fn lock(folder: &Path) -> Result<Self, Error> {
+        let (folder, partial) = (folder.to_owned(), folder.join(".partial"));
+        fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;
+        let lock = lock_folder(&folder)?;
+        Ok(Self { folder, partial, _lock: lock })
+    }
+
     /// Creates and locks `folder` for the experiment whose resolved spec is the text `resolved`. If
     /// the folder has finished runs of an interrupted experiment, `existing` decides: they are
     /// resumed, which requires the same resolved spec, or discarded, or the folder is rejected.
@@ -52,46 +64,32 @@ impl Store {
     /// If another harness has locked the folder, if its finished runs may be neither resumed nor
     /// discarded, or if the folder cannot be read or written.
     pub fn open(folder: &Path, resolved: &str, existing: Existing) -> Result<Self, Error> {
-        let folder = folder.to_owned();
-        let partial = folder.join(".partial");
-        fs::create_dir_all(&folder).map_err(Error::io(&folder, "create the folder"))?;
-        let lock = lock_folder(&folder)?;
-        let store = Self { folder, partial, _lock: lock };
+        let store = Self::lock(folder)?;
         // The spec is kept with the runs, because a run of another spec must never be resumed.
         let spec = store.partial.join(SPEC);
-        let found = match existing {
-            Existing::Replace => None,
-            // Where that cannot be told, reading says why.
-            _ if !spec.try_exists().unwrap_or(true) => None,
-            Existing::Keep | Existing::Resume => Some(read_text(&spec)?),
-        };
-        match (existing, found) {
-            (Existing::Resume, Some(found)) if found == resolved => return Ok(store),
-            (Existing::Resume, Some(_)) => {
-                return Err(store.rejected(
+        // Where it cannot be told whether there is one, reading says why.
+        if existing != Existing::Replace && spec.try_exists().unwrap_or(true) {
+            let is_same = read_text(&spec)? == resolved;
+            let has_runs = files::names(&store.partial)?.iter().any(|name| name.ends_with(RUN));
+            let reason = match existing {
+                Existing::Resume if is_same => return Ok(store),
+                Existing::Resume => Some(
                     "the interrupted experiment had another spec, scene or seed; --force discards it",
-                ));
-            }
-            (Existing::Keep, Some(_))
-                if files::names(&store.partial)?.iter().any(|name| name.ends_with(RUN)) =>
-            {
-                return Err(store.rejected(
+                ),
+                _ => has_runs.then_some(
                     "there are finished runs of an interrupted experiment; --resume does the rest, \
                      --force discards them",
-                ));
+                ),
+            };
+            if let Some(reason) = reason {
+                return Err(Error::Usage(format!("{}: {reason}", folder.display())));
             }
-            _ => {}
         }
         store.discard_runs()?;
         fs::create_dir_all(&store.partial)
             .map_err(Error::io(&store.partial, "create the folder"))?;
         files::write(&spec, resolved.as_bytes())?;
         Ok(store)
-    }
-
-    /// Returns the error that the folder is rejected, with the reason.
-    fn rejected(&self, reason: &str) -> Error {
-        Error::Usage(format!("{}: {reason}", self.folder.display()))
     }
 
     /// Removes `.partial/`, if there is one.

@@ -154,56 +154,49 @@ mod tests {
     use super::*;
     use std::fs;
 
-    fn differences(fresh: &str, committed: &str, skipped_scenes: &[String]) -> Vec<String> {
-        let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
-        fs::write(folders[0].path().join("runs.csv"), fresh).unwrap();
-        fs::write(folders[1].path().join("runs.csv"), committed).unwrap();
-        fs::write(folders[0].path().join("timing.csv"), "seconds\n1\n").unwrap();
-        for folder in &folders {
+    /// Compares folders that differ in the text of one file.
+    fn differences(file: &str, texts: [&str; 2], skipped: &[&str]) -> Vec<String> {
+        let folders = texts.map(|text| {
+            let folder = tempfile::tempdir().unwrap();
             fs::write(folder.path().join("resolved.toml"), "").unwrap();
-        }
-        compare(folders[0].path(), folders[1].path(), skipped_scenes).unwrap()
-    }
-
-    const COMMITTED: &str = "scene,method,cost\na,m,1.5\nb,m,2.5\n";
-
-    #[test]
-    fn a_summary_of_all_scenes_is_compared_only_without_skipped_scenes() {
-        let fresh = "lower\n1\n";
-        let committed = "lower\n2\n";
-        assert_eq!(differences(fresh, committed, &["b".to_owned()]), Vec::<String>::new());
-        assert_eq!(differences(fresh, committed, &[]).len(), 1);
+            fs::write(folder.path().join(file), text).unwrap();
+            folder
+        });
+        // Seconds are not compared.
+        fs::write(folders[0].path().join("timing.csv"), "seconds\n1\n").unwrap();
+        let skipped: Vec<String> = skipped.iter().map(|scene| (*scene).to_owned()).collect();
+        compare(folders[0].path(), folders[1].path(), &skipped).unwrap()
     }
 
     #[test]
-    fn missing_rows_and_columns_are_named() {
+    fn differences_are_named_except_those_of_skipped_scenes() {
+        let rows = "scene,method,cost\na,m,1.5\nb,m,2.5\n";
         let fewer = "scene,method,cost\na,m,1.5\n";
-        assert_eq!(differences(fewer, COMMITTED, &[]), ["runs.csv: 1 rows, committed 2"]);
-        assert_eq!(differences(fewer, COMMITTED, &["b".into()]), Vec::<String>::new());
-        assert!(differences("scene\na\n", COMMITTED, &[])[0].contains("columns"));
+        for (texts, skipped, expected) in [
+            ([fewer, rows], &[][..], &["runs.csv: 1 rows, committed 2"][..]),
+            ([fewer, rows], &["b"], &[]),
+            // A summary of all scenes.
+            (["lower\n1\n", "lower\n2\n"], &[], &["runs.csv: : lower is 1, committed 2"]),
+            (["lower\n1\n", "lower\n2\n"], &["b"], &[]),
+        ] {
+            assert_eq!(differences("runs.csv", texts, skipped), expected, "{texts:?}");
+        }
+        assert!(differences("runs.csv", ["scene\na\n", rows], &[])[0].contains("columns"));
     }
 
     #[test]
     fn a_stale_resolved_spec_is_named_by_its_lines() {
-        let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
-        let specs = [
-            "[experiment]\nseed = 1\n[[scenes]]\nname = 'x'\n",
-            "[experiment]\nseed = 2\n[[scenes]]\nname = 'x'\n[[scenes]]\nname = 'y'\n",
-        ];
-        for (folder, spec) in folders.iter().zip(specs) {
-            fs::write(folder.path().join("resolved.toml"), spec).unwrap();
-        }
-        let found = compare(folders[0].path(), folders[1].path(), &["y".into()]).unwrap();
+        let [x, y, z] = ["x", "y", "z"].map(|name| format!("[[scenes]]\nname = '{name}'\n"));
+        let texts = [format!("seed = 1\n{x}"), format!("seed = 2\n{x}{y}")];
         assert_eq!(
-            found,
+            differences("resolved.toml", texts.each_ref().map(String::as_str), &["y"]),
             ["resolved.toml: not committed: seed = 1", "resolved.toml: only committed: seed = 2"]
         );
         // Values exchanged between two tables are the same lines.
-        for (folder, names) in folders.iter().zip([["x", "z"], ["z", "x"]]) {
-            let scenes = names.map(|name| format!("[[scenes]]\nname = '{name}'\n")).concat();
-            fs::write(folder.path().join("resolved.toml"), scenes).unwrap();
-        }
-        let found = compare(folders[0].path(), folders[1].path(), &[]).unwrap();
-        assert_eq!(found, ["resolved.toml: the same lines in another order or number"]);
+        let texts = [format!("{x}{z}"), format!("{z}{x}")];
+        assert_eq!(
+            differences("resolved.toml", texts.each_ref().map(String::as_str), &[]),
+            ["resolved.toml: the same lines in another order or number"]
+        );
     }
 }

@@ -75,7 +75,9 @@ fn run(
     let resolved = Resolved::new(experiment, &scenes);
     let folder = out.join(experiment.folder());
     if is_finished(&folder, &resolved, existing, is_part)? {
-        return Ok(Summary { skipped_scenes, ..Summary::finished(folder) });
+        let text = "All runs are finished; nothing was done. \
+                    --force repeats them, --redraw makes the reports again.\n";
+        return Ok(Summary { text: text.into(), skipped_scenes, folder, ..Summary::default() });
     }
     // Neither an unknown identifier nor a base that cannot be built leaves a folder.
     let jobs = selected(experiment, &scenes, ids)?;

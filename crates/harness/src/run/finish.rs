@@ -4,7 +4,7 @@
 use crate::Error;
 use crate::report;
 use crate::report::output::Output;
-use crate::rows::store::{self, Existing, Store};
+use crate::rows::store::{self, Store};
 use crate::run::provenance::Provenance;
 use crate::run::reference;
 use crate::run::resolved::{Resolved, finished, read_toml, to_toml};
@@ -24,15 +24,6 @@ pub struct Summary {
     pub remarks: Vec<String>,
     /// The folder of the results.
     pub folder: PathBuf,
-}
-
-impl Summary {
-    /// Summarises an experiment that has nothing left to resume.
-    pub(crate) fn finished(folder: PathBuf) -> Self {
-        let text = "All runs are finished; nothing was done. \
-                    --force repeats them, --redraw makes the reports again.\n";
-        Self { text: text.into(), folder, ..Self::default() }
-    }
 }
 
 /// Joins the kept runs and makes the reports of results in `out`. Returns the text for the terminal,
@@ -74,18 +65,19 @@ fn report(
 }
 
 /// Makes tables and figures from the CSV files in an experiment's folder. Writes nothing.
-pub fn outputs(experiment: &Experiment, folder: &Path) -> Result<Vec<Output>, Error> {
+fn outputs(experiment: &Experiment, folder: &Path) -> Result<Vec<Output>, Error> {
     match &experiment.suite {
         Some(_) => Ok(vec![stress::output(folder)?]),
         None => report::outputs(&experiment.reports, folder),
     }
 }
 
-/// Makes the reports of a finished experiment again, with the spec that its folder holds. Writes
+/// Reads the spec of a finished experiment from its folder, and makes its reports again. Writes
 /// nothing.
-pub fn remade(folder: &Path) -> Result<Vec<Output>, Error> {
-    let resolved: Resolved = read_toml(&folder.join("resolved.toml"))?;
-    outputs(&resolved.experiment, folder)
+pub fn remade(folder: &Path) -> Result<(Experiment, Vec<Output>), Error> {
+    let Resolved { experiment, .. } = read_toml(&folder.join("resolved.toml"))?;
+    let outputs = outputs(&experiment, folder)?;
+    Ok((experiment, outputs))
 }
 
 /// Returns true if `out` has finished results of the same runs, perhaps with other reports.
@@ -101,32 +93,28 @@ pub fn has_results_of(experiment: &Experiment, out: &Path) -> Result<bool, Error
 /// differ only in its reports.
 pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
     let folder = out.join(experiment.folder());
+    let rejected = |fault: &str| Err(Error::Usage(format!("{}: {fault}", folder.display())));
     if store::is_unfinished(&folder) {
-        let message = "the experiment was interrupted; finish it with --resume first";
-        return Err(Error::Usage(format!("{}: {message}", folder.display())));
+        return rejected("the experiment was interrupted; finish it with --resume first");
     }
-    let recorded_spec = read_text(&folder.join("resolved.toml"))?;
-    let recorded: Option<Resolved> = toml::from_str(&recorded_spec).ok();
+    let recorded: Option<Resolved> =
+        toml::from_str(&read_text(&folder.join("resolved.toml"))?).ok();
     let Some(recorded) = recorded.filter(|recorded| recorded.has_runs_of(experiment)) else {
-        let message =
-            "the rows come from another spec, scene or seed; run it again without --redraw";
-        return Err(Error::Usage(format!("{}: {message}", folder.display())));
+        return rejected(
+            "the rows come from another spec, scene or seed; run it again without --redraw",
+        );
     };
-    if !recorded.experiment.keeps_rows_for(&experiment.reports) {
-        let message = "a new report reads trials or times of events, which were not kept; \
-                       run it again without --redraw";
-        return Err(Error::Usage(format!("{}: {message}", folder.display())));
+    if !recorded.experiment.keeps_rows_for(experiment) {
+        return rejected(
+            "a new report reads trials or times of events, which were not kept; run it again \
+             without --redraw",
+        );
     }
     let resolved = Resolved { experiment: experiment.clone(), scenes: recorded.scenes };
-    let store = Store::open(&folder, &recorded_spec, Existing::Keep)?;
+    let store = Store::lock(&folder)?;
     // The rows are still the output of the program that ran, so its provenance is kept.
     let provenance: Provenance = read_toml(&folder.join("provenance.toml"))?;
-    let made = report(&resolved, out, &provenance, &store);
-    if made.is_ok() {
-        store.write("resolved.toml", to_toml(&resolved)?.as_bytes())?;
-    }
-    // A failing report leaves finished results, not an interrupted experiment.
-    store.finish()?;
-    let text = made?;
-    Ok(Summary { text, skipped_scenes: vec![], remarks: vec![], folder })
+    let text = report(&resolved, out, &provenance, &store)?;
+    store.write("resolved.toml", to_toml(&resolved)?.as_bytes())?;
+    Ok(Summary { text, folder, ..Summary::default() })
 }

@@ -112,7 +112,7 @@ pub(crate) fn perform(work: &Work, job: &Job) -> Result<Option<(FinishedRun, Bvh
         }
     }
     let mut trials = Vec::new();
-    if experiment.keeps_trials_of(&labelled.label) {
+    if experiment.trial_methods().contains(&*labelled.label) {
         for event in &outcome.history {
             let Event { evaluations, cost, .. } = *event;
             let (scene, method, repetition) = identity();

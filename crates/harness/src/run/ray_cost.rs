@@ -6,9 +6,10 @@ use crate::Error;
 use crate::measure::ray_cost::{Config, TestRays, TrainedOn, test_rays};
 use crate::rows::{LayoutRow, RunTestRow, TestRow, VisitRow};
 use crate::spec::Experiment;
-use crate::statistics::mean;
+use crate::statistics::{mean, variance};
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_core::{Bvh, WideBvh, collapse_leaves};
+use bvh_scenes::rays::tests_per_ray;
 use bvh_search::Observer;
 use rayon::prelude::*;
 
@@ -53,7 +54,8 @@ pub(crate) fn measure(config: &Config, work: &mut Work) -> Result<(), Error> {
             if work.watch.cancelled() {
                 return Err(work.interrupted());
             }
-            let of_runs: Vec<[f64; 2]> = layouts.par_iter().map(|wide| rays.tests(wide)).collect();
+            let tests_of = |wide: &WideBvh| tests_per_ray(wide, rays.kind, &rays.rays);
+            let of_runs: Vec<[f64; 2]> = layouts.par_iter().map(tests_of).collect();
             if !config.costs.is_empty() {
                 run_tests.extend(runs.iter().zip(&of_runs).map(|((job, _), tests)| RunTestRow {
                     scene: scene.name.clone(),
@@ -135,9 +137,6 @@ fn layout_row(runs: &[Run], layouts: &[WideBvh]) -> LayoutRow {
 
 /// The standard error of the mean number of all tests, if there are several repetitions.
 fn standard_error(tests: &[[f64; 2]]) -> Option<f64> {
-    let totals = tests.iter().map(|tests| tests[0] + tests[1]);
-    let n = tests.len() as f64;
-    let mean = mean(totals.clone());
-    let squares: f64 = totals.map(|total| (total - mean).powi(2)).sum();
-    (tests.len() > 1).then(|| (squares / (n - 1.0) / n).sqrt())
+    let totals: Vec<f64> = tests.iter().map(|tests| tests[0] + tests[1]).collect();
+    variance(&totals).map(|variance| (variance / totals.len() as f64).sqrt())
 }

@@ -5,6 +5,7 @@
 use super::Experiment;
 use crate::contestant::{Contestant, EntryOptions, Labelled};
 use crate::peers;
+use crate::report::Report;
 use crate::rows;
 use bvh_config::OutOfRange;
 use bvh_scenes::subset;
@@ -21,7 +22,11 @@ impl Experiment {
         self.check_scenes()?;
         self.check_run_count()?;
         self.check_labels()?;
-        self.check_files()?;
+        let mut files: Vec<String> = rows::FILES.iter().map(|file| (*file).to_owned()).collect();
+        for (index, report) in self.reports.iter().enumerate() {
+            let checked = self.check_report(report, &mut files);
+            checked.map_err(|fault| fault.below(format!("reports[{index}]")))?;
+        }
         if self.lower_bound.is_some() {
             peers::others("lower_bound")?;
         }
@@ -106,18 +111,12 @@ impl Experiment {
             let accepted = "with the experiment's `ray_cost`";
             return Err(OutOfRange::new("for_rays", "set without `ray_cost`", accepted));
         }
-        self.check_library(method)
-    }
-
-    /// Checks that the experiment can run a third-party method.
-    fn check_library(&self, method: &Contestant) -> Result<(), OutOfRange> {
-        let name = method.name();
-        if self.suite.is_some() && !matches!(method, Contestant::Ours(_)) {
-            // One that crashes must not end the suite; it runs each library in a separate process.
-            let accepted = "methods of ours";
-            return Err(OutOfRange::new("method", format!("{name:?}, none of ours"), accepted));
-        }
         let Contestant::Peer(peer) = method else { return Ok(()) };
+        if self.suite.is_some() {
+            // One that crashes must not end the suite; it runs each library in a separate process.
+            let found = format!("{:?}, none of ours", peer.name());
+            return Err(OutOfRange::new("method", found, "methods of ours"));
+        }
         peer.check_settings()
     }
 
@@ -140,55 +139,41 @@ impl Experiment {
         Err(OutOfRange::new("budget", found, accepted))
     }
 
-    /// Rejects a file that no run and no earlier report writes, and one that two reports make.
-    fn check_files(&self) -> Result<(), OutOfRange> {
-        let mut known: Vec<String> = rows::FILES.iter().map(|file| (*file).to_owned()).collect();
-        for (index, report) in self.reports.iter().enumerate() {
-            let rejected = |key: &str, found: String, accepted: String| {
-                Err(OutOfRange::new(format!("reports[{index}].{key}"), found, accepted))
-            };
-            for (key, file) in report.reads() {
-                if !known.iter().any(|known| known == file) {
-                    let found =
-                        format!("{file:?}, which no run and no report before this one writes");
-                    return rejected(key, found, known.join(", "));
-                }
-            }
-            for file in report.files() {
-                if known.contains(&file) {
-                    let accepted = "one report that makes it, or another `file` in one of them";
-                    return rejected("kind", format!("a second {file}"), accepted.into());
-                }
-                known.push(file);
+    /// Rejects a label of two methods.
+    fn check_labels(&self) -> Result<(), OutOfRange> {
+        let mut known = HashSet::new();
+        for (index, Labelled { label, .. }) in self.methods.iter().enumerate() {
+            if !known.insert(label) {
+                let key = format!("methods[{index}].label");
+                let found = format!("{label:?} for the second time");
+                return Err(OutOfRange::new(key, found, "unique labels"));
             }
         }
         Ok(())
     }
 
-    /// Rejects a label of two methods, and a label in a report that no method has.
-    fn check_labels(&self) -> Result<(), OutOfRange> {
-        let mut known = HashSet::new();
-        for (index, labelled) in self.methods.iter().enumerate() {
-            let label = labelled.label.as_str();
-            if !known.insert(label) {
-                let key = format!("methods[{index}].label");
-                return Err(OutOfRange::new(
-                    key,
-                    format!("{label:?} for the second time"),
-                    "unique labels",
-                ));
+    /// Rejects a label that no method has, a file that no run and no earlier report writes, and one
+    /// that two reports make. `known` are the files of the runs and of earlier reports.
+    fn check_report(&self, report: &Report, known: &mut Vec<String>) -> Result<(), OutOfRange> {
+        let labels: Vec<&str> = self.methods.iter().map(|method| method.label.as_str()).collect();
+        for (key, label) in report.labels() {
+            if !labels.contains(&label) {
+                let found = format!("{label:?}, no label of a method");
+                return Err(OutOfRange::new(key, found, labels.join(", ")));
             }
         }
-        for (index, report) in self.reports.iter().enumerate() {
-            for (key, label) in report.labels() {
-                if !known.contains(label) {
-                    let key = format!("reports[{index}].{key}");
-                    let found = format!("{label:?}, no label of a method");
-                    let labels = self.methods.iter().map(|labelled| labelled.label.as_str());
-                    let accepted = labels.collect::<Vec<_>>().join(", ");
-                    return Err(OutOfRange::new(key, found, accepted));
-                }
+        for (key, file) in report.reads() {
+            if !known.iter().any(|known| known == file) {
+                let found = format!("{file:?}, which no run and no report before this one writes");
+                return Err(OutOfRange::new(key, found, known.join(", ")));
             }
+        }
+        for file in report.files() {
+            if known.contains(&file) {
+                let accepted = "one report that makes it, or another `file` in one of them";
+                return Err(OutOfRange::new("kind", format!("a second {file}"), accepted));
+            }
+            known.push(file);
         }
         Ok(())
     }

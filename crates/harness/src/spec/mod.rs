@@ -18,6 +18,7 @@ use bvh_scenes::fnv1a;
 use bvh_scenes::rays::RandomRays;
 use bvh_search::Budget;
 pub use read::Overrides;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 config! {
@@ -105,9 +106,9 @@ impl Experiment {
         self.reports.iter().any(Report::needs_references)
     }
 
-    /// Returns true if a report reads the costs of all trials of the method with this label.
-    pub fn keeps_trials_of(&self, label: &str) -> bool {
-        self.reports.iter().any(|report| report.trial_methods().contains(&label))
+    /// The labels of the methods of which a report reads the costs of all trials.
+    pub fn trial_methods(&self) -> BTreeSet<&str> {
+        self.reports.iter().flat_map(Report::trial_methods).collect()
     }
 
     /// Returns true if runs keep their improvements: if a report reads them, or if there are no
@@ -116,14 +117,10 @@ impl Experiment {
         self.reports.is_empty() || self.needs_references()
     }
 
-    /// Returns true if the rows of this experiment suffice for these reports.
-    pub fn keeps_rows_for(&self, reports: &[Report]) -> bool {
-        reports.iter().all(|report| {
-            let labels = report.trial_methods();
-            let has_trials = labels.iter().all(|label| self.keeps_trials_of(label));
-            let has_clock = !report.needs_references() || self.needs_references();
-            has_trials && has_clock
-        })
+    /// Returns true if the rows of this experiment suffice for the reports of another one.
+    pub fn keeps_rows_for(&self, other: &Self) -> bool {
+        let has_clock = self.needs_references() || !other.needs_references();
+        has_clock && other.trial_methods().is_subset(&self.trial_methods())
     }
 
     /// The limits of a method's runs.

@@ -113,18 +113,26 @@ pub fn geometric_mean(values: &[f64]) -> f64 {
     (values.iter().map(|value| value.ln()).sum::<f64>() / values.len() as f64).exp()
 }
 
+/// Returns the variance of the distribution that values are drawn from; `None` for fewer than two
+/// values.
+pub fn variance(values: &[f64]) -> Option<f64> {
+    let freedom = values.len().checked_sub(1).filter(|&freedom| freedom > 0)?;
+    let mean = mean(values.iter().copied());
+    Some(values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / freedom as f64)
+}
+
 /// Returns the mean of values and the 95 % interval of their distribution's mean, by Student's t.
 ///
 /// Fewer than two values have no interval, and no values have no mean.
 pub fn mean_interval(values: &[f64]) -> Option<(f64, Option<(f64, f64)>)> {
-    let n = values.len() as f64;
+    if values.is_empty() {
+        return None;
+    }
     let mean = mean(values.iter().copied());
-    let freedom = values.len().checked_sub(1)?;
-    // One value says nothing about the spread.
-    let Some(factor) = student(values.len()) else { return Some((mean, None)) };
-    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / freedom as f64;
-    let half = factor * (variance / n).sqrt();
-    Some((mean, Some((mean - half, mean + half))))
+    let half = student(values.len())
+        .zip(variance(values))
+        .map(|(factor, variance)| factor * (variance / values.len() as f64).sqrt());
+    Some((mean, half.map(|half| (mean - half, mean + half))))
 }
 
 /// Returns half the width of the 95 % interval of a mean, in standard errors; `None` for fewer than
