@@ -9,7 +9,7 @@ use crate::report::output::{Output, panel};
 use crate::rows::store::Store;
 use crate::rows::{read, to_bytes};
 use bvh_search::Method;
-use bvh_stress::{CASES, Case, Cell, Class, Effort, KINDS, is_builder, tracing};
+use bvh_stress::{CASES, Case, Cell, Class, Effort, KINDS};
 use figures::{Axis, Layer, Marks, Panel, Unit};
 use rayon::prelude::*;
 use std::path::Path;
@@ -64,7 +64,8 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
     );
     let mut output = Output::new("", &title);
     if !broken.is_empty() {
-        output.show("Broken promises:", &broken, "scene method outcome note")?;
+        let bytes = to_bytes(&broken, Path::new("cells.csv"))?;
+        output.unwritten.push(("Broken promises".into(), bytes));
     }
     let caption = "A mark per case and method: builders, searches, traversals, then readers of files \
                    and others. Empty where the case has no check of it.";
@@ -79,55 +80,32 @@ const OUTCOMES: [(&str, Class); 3] = [
     ("broken promise", Class::Broken),
 ];
 
-/// Groups of methods, in the order of the figure.
-const GROUPS: [&str; 4] = ["Build", "Search", "Trace", "Other"];
-
-fn group(method: &str) -> &'static str {
-    if tracing::TRAVERSALS.iter().any(|(name, _)| *name == method) {
-        return "Trace";
-    }
-    match Method::all().iter().find(|known| known.name() == method) {
-        Some(method) if is_builder(method) => "Build",
-        Some(_) => "Search",
-        None => "Other",
-    }
-}
-
 /// One panel per kind of cases: a row per case and a column per method.
 fn panels(cells: &[Cell]) -> Vec<Panel> {
-    let methods = distinct(cells.iter().map(|cell| cell.method.as_str()));
-    let mut columns: Vec<(&str, f64)> = Vec::new();
-    let mut next = 0.0;
-    for name in GROUPS {
-        for method in methods.iter().filter(|method| group(method) == name) {
-            columns.push((method, next));
-            next += 1.0;
-        }
-        next += 1.0;
-    }
+    let methods = distinct(cells.iter().map(|cell| &cell.method));
     let mut panels = Vec::new();
     for (name, ids) in KINDS {
         let is_own = |cell: &&Cell| ids.iter().any(|id| cell.scene.starts_with(id));
         let own: Vec<&Cell> = cells.iter().filter(is_own).collect();
         let scenes = distinct(own.iter().map(|cell| cell.scene.as_str()));
         let mut layers = Vec::new();
-        if own.is_empty() {
-            continue;
-        }
         for (name, outcome) in OUTCOMES {
             let place = |cell: &&Cell| {
-                let column = columns.iter().find(|(method, _)| *method == cell.method)?;
+                let column = methods.iter().position(|method| **method == cell.method)?;
                 let row = scenes.iter().position(|scene| *scene == cell.scene)?;
-                Some((column.1, row as f64))
+                Some((column as f64, row as f64))
             };
-            let own = own.iter().filter(|cell| cell.outcome == outcome).copied();
-            let points: Vec<_> = own.filter_map(|cell| place(&cell)).collect();
+            let own = own.iter().filter(|cell| cell.outcome == outcome);
+            let points: Vec<_> = own.filter_map(place).collect();
             if !points.is_empty() {
                 layers.push(Layer::new(name, Marks::Points(points)));
             }
         }
+        if layers.is_empty() {
+            continue;
+        }
         let names = scenes.iter().map(|scene| scene.get(4..).unwrap_or_default().to_owned());
-        let x = Axis::linear("").unit(Unit::Bare).range(-1.5, next - 1.0);
+        let x = Axis::linear("").unit(Unit::Bare).range(-1.5, methods.len() as f64 + 0.5);
         panels.push(panel(name, x, Axis::rows(names.collect(), 20.0), layers));
     }
     panels

@@ -3,13 +3,12 @@
 
 use crate::Error;
 use crate::files;
-use crate::report::output::Output;
 use crate::report::paper::{PaperRow, Verdict};
-use crate::run::finish::outputs;
+use crate::report::query::Row;
+use crate::run::finish::remade;
 use crate::run::provenance::Provenance;
-use crate::run::resolved::{Resolved, read_toml};
+use crate::run::resolved::read_toml;
 use crate::stress;
-use comfy_table::{Row, Table};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use std::path::{Path, PathBuf};
@@ -23,7 +22,10 @@ const OVERVIEW: &str = "timing_overview";
 struct Section {
     name: String,
     question: String,
-    outputs: Vec<Output>,
+    /// The comparisons with the paper's numbers and words.
+    paper: Vec<PaperRow>,
+    /// The tables of the reports, each with its title.
+    shown: Vec<(String, Vec<Row>)>,
     /// The figures and the CSV files in the folder: name, and path relative to the page.
     figures: Vec<(String, String)>,
     tables: Vec<(String, String)>,
@@ -34,26 +36,29 @@ impl Section {
     /// Reads what an experiment has written, and makes its reports again, which read CSV files only.
     fn read(results: &Path, name: &str) -> Result<Self, Error> {
         let folder = results.join(name);
-        let Resolved { experiment, .. } = read_toml(&folder.join("resolved.toml"))?;
+        let (experiment, outputs) = remade(&folder)?;
         let names = files::names(&folder)?;
         let ending = |suffix: &str| {
             let ours = names.iter().filter(|file| file.ends_with(suffix));
             ours.map(|file| (file.clone(), format!("{}/{}", in_url(name), in_url(file)))).collect()
         };
+        let (mut shown, mut paper) = (Vec::new(), Vec::new());
+        for output in outputs {
+            let tables = output.tables()?.into_iter();
+            shown
+                .extend(tables.map(|(title, rows)| (format!("{}: {title}", output.heading), rows)));
+            paper.extend(output.paper);
+        }
+        paper.retain(|row| row.verdict != Verdict::NotInPaper);
         Ok(Self {
             name: name.into(),
-            outputs: outputs(&experiment, &folder)?,
+            paper,
+            shown,
             question: experiment.question,
             figures: ending(".svg"),
             tables: ending(".csv"),
             provenance: read_toml(&folder.join("provenance.toml"))?,
         })
-    }
-
-    /// Returns the comparisons with the paper's numbers and words.
-    fn paper(&self) -> Vec<&PaperRow> {
-        let rows = self.outputs.iter().flat_map(|output| &output.paper);
-        rows.filter(|row| row.verdict != Verdict::NotInPaper).collect()
     }
 }
 
@@ -74,7 +79,7 @@ pub fn write(results: &Path) -> Result<(usize, PathBuf), Error> {
     }
     // In the order of the paper's tables and figures.
     sections.sort_by_cached_key(|section| {
-        let source = section.paper().first().map(|row| row.source.clone());
+        let source = section.paper.first().map(|row| row.source.clone());
         (source.is_none(), source, section.name.clone())
     });
     let out = results.join("report.html");
@@ -129,7 +134,7 @@ fn pictures(sections: &[Section]) -> Markup {
 /// The numbers and words of the paper beside ours, in the paper's order.
 fn scoreboard(sections: &[Section]) -> Markup {
     html! {
-        @if sections.iter().any(|section| !section.paper().is_empty()) {
+        @if sections.iter().any(|section| !section.paper.is_empty()) {
             div.wide tabindex="0" { table {
                 caption { span {
                     "Ng & Trifonov (2003) beside ours. Their scenes are gone; ours are stand-ins. \
@@ -138,7 +143,7 @@ fn scoreboard(sections: &[Section]) -> Markup {
                 thead { tr { @for name in ["source", "paper", "ours", "verdict", "scene", "quantity"] {
                     th scope="col" { (name) }
                 } } }
-                tbody { @for section in sections { @for row in section.paper() { tr {
+                tbody { @for section in sections { @for row in &section.paper { tr {
                     th scope="row" { a href={ "#" (in_url(&section.name)) } { (row.source) } }
                     td.number { (row.paper) }
                     td.number { (row.ours) }
@@ -160,12 +165,9 @@ fn experiment(section: &Section) -> Markup {
             @for (name, path) in &section.figures {
                 figure { img.sheet src=(path) alt=(name) loading="lazy"; }
             }
-            @for output in &section.outputs { @for (explanation, rows) in &output.tables {
-                details {
-                    summary { (output.heading) ": " (explanation.trim_end_matches(':')) }
-                    (table(rows))
-                }
-            } }
+            @for (title, rows) in &section.shown {
+                details { summary { (title) } (table(rows)) }
+            }
             p.files {
                 "Rows of " (section.name) ": "
                 @for (name, path) in &section.tables { a href=(path) { (name) } " " }
@@ -180,17 +182,16 @@ fn experiment(section: &Section) -> Markup {
 
 /// A table in a box that scrolls if it is too wide for the page. The first cell of a row is its
 /// header.
-fn table(table: &Table) -> Markup {
-    let cells = |row: &Row| row.cell_iter().map(|cell| cell.content()).collect::<Vec<String>>();
+fn table(rows: &[Row]) -> Markup {
     let is_number =
         |text: &str| text.trim_end_matches(" %").trim_start_matches('+').parse::<f64>().is_ok();
     html! {
         div.wide tabindex="0" { table {
-            thead { tr { @for name in table.header().map(cells).unwrap_or_default() {
+            thead { tr { @for name in rows[0].keys() {
                 th scope="col" { (name.replace('_', " ")) }
             } } }
-            tbody { @for row in table.row_iter() { tr {
-                @for (at, text) in cells(row).iter().enumerate() {
+            tbody { @for row in rows { tr {
+                @for (at, text) in row.values().enumerate() {
                     @if at == 0 { th scope="row" { (text) } }
                     @else if is_number(text) { td.number { (text) } }
                     @else { td { (text) } }

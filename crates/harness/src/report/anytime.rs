@@ -14,7 +14,7 @@ report! {
         /// Labels of the methods. One event per run, as a builder has, is shown as a point.
         methods: Vec<String>, in OneOrMore;
     }
-    check |config: &Self| check_file("timing_", &config.file);
+    check |config: &Self| check_file(&config.csv());
 }
 
 /// One corner of a curve, which is flat up to the next, or its end, as written to
@@ -39,6 +39,11 @@ impl Point<'_> {
 const PER_DECADE: f64 = 20.0;
 
 impl Config {
+    /// Returns the name of the CSV file without its extension.
+    pub(super) fn csv(&self) -> String {
+        format!("timing_{}", self.file)
+    }
+
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
         let mut points = Vec::new();
         for scene in rows.scenes() {
@@ -65,7 +70,7 @@ impl Config {
         let caption = "Median and quartiles over repetitions. Points are builders. A curve falls \
                        to the floor where it is the best known.";
         let mut output = Output::default();
-        let file = format!("timing_{}", self.file);
+        let file = self.csv();
         output.add_csv(&file, &corners(&points))?;
         output.add_figure(file, caption, 2, figure.panels(rows, &output.table()?));
         Ok(output)

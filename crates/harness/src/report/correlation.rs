@@ -4,12 +4,12 @@
 //! Trees of different methods are never pooled: a ranking of binary and n-ary trees together mostly
 //! separates the two kinds (Simpson 1951).
 
-use super::data::distinct;
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
-use crate::rows::{RunRow, VisitRow};
 use crate::statistics::{pearson, pearson_interval, spearman};
 use bvh_config::above;
+use indexmap::IndexMap;
+use std::collections::BTreeMap;
 
 report! {
     /// Costs against tests per ray.
@@ -51,72 +51,74 @@ const OF_PAPER: (&str, &str) = ("inside", "any");
 /// The cost that the paper compares with tests, as in `runs.csv`.
 const OF_AREA: &str = "goldsmith_salmon";
 
-/// A tree by its run, and the tests per ray of one kind in it.
-struct Tree<'a> {
-    run: &'a RunRow,
-    /// Family and query of random rays, or kind of rays and camera.
-    kind: (&'a str, &'a str),
-    tests: f64,
-}
+/// A tree by its run: scene, method and repetition.
+type Tree<'a> = (&'a str, &'a str, u32);
 
-/// All trees through which rays were sent. Random rays traverse the binary tree, all other rays the
-/// wide layout.
-fn trees(rows: &Rows) -> Vec<Tree<'_>> {
-    let tree = |scene: &str, method: &str, repetition: u32, kind, tests| {
-        let run = rows.runs_of(scene, method).find(|run| run.repetition == repetition)?;
-        Some(Tree { run, kind, tests })
+/// The costs of all trees by their names: by area, and one by the density of each kind of rays.
+fn costs(rows: &Rows) -> IndexMap<String, BTreeMap<Tree<'_>, f64>> {
+    let mut costs: IndexMap<String, BTreeMap<Tree, f64>> = IndexMap::new();
+    let mut add = |name: &str, tree, cost| {
+        costs.entry(name.into()).or_default().insert(tree, cost);
     };
-    let random = rows.rays.iter().filter_map(|row| {
-        let kind = (row.family.as_str(), row.query.as_str());
-        tree(&row.scene, &row.method, row.repetition, kind, row.boxes_per_ray)
-    });
-    let of_layouts = rows.run_tests.iter().filter_map(|row| {
-        let kind = (row.judged_on.as_str(), row.camera.as_str());
-        tree(&row.scene, &row.method, row.repetition, kind, row.tests)
-    });
-    random.chain(of_layouts).collect()
-}
-
-/// The names of the costs by area, and of one cost by the density of each kind of rays.
-fn costs(rows: &Rows) -> Vec<String> {
-    let rays = distinct(rows.visits.iter().map(|row| &row.rays));
-    let of_rays = rays.into_iter().map(|rays| format!("{OF_AREA}_{rays}"));
-    let of_area = [OF_AREA, "cost_over_root_area", "sah"].map(str::to_owned);
-    of_area.into_iter().chain(of_rays).collect()
-}
-
-/// The cost of this name of a run's tree.
-fn cost_of(rows: &Rows, cost: &str, run: &RunRow) -> Option<f64> {
-    match cost {
-        OF_AREA => Some(run.goldsmith_salmon),
-        "cost_over_root_area" => Some(run.cost_over_root_area),
-        "sah" => Some(run.sah),
-        of_rays => {
-            let rays = of_rays.strip_prefix(OF_AREA)?.strip_prefix('_')?;
-            let tree = (&run.scene, &run.method, run.repetition, rays);
-            let of_tree =
-                |row: &&VisitRow| (&row.scene, &row.method, row.repetition, &*row.rays) == tree;
-            Some(rows.visits.iter().find(of_tree)?.goldsmith_salmon)
-        }
+    for run in &rows.runs {
+        let tree = (run.scene.as_str(), run.method.as_str(), run.repetition);
+        add(OF_AREA, tree, run.goldsmith_salmon);
+        add("cost_over_root_area", tree, run.cost_over_root_area);
+        add("sah", tree, run.sah);
     }
+    for row in &rows.visits {
+        let tree = (row.scene.as_str(), row.method.as_str(), row.repetition);
+        add(&format!("{OF_AREA}_{}", row.rays), tree, row.goldsmith_salmon);
+    }
+    costs
+}
+
+/// The tests per ray in all trees, by the family and query of random rays, which traverse the binary
+/// tree, or by the kind and camera of all other rays, which traverse the wide layout.
+fn ray_tests(rows: &Rows) -> IndexMap<(&str, &str), Vec<(Tree<'_>, f64)>> {
+    let mut tests: IndexMap<_, Vec<(Tree, f64)>> = IndexMap::new();
+    for row in &rows.rays {
+        let tree = (row.scene.as_str(), row.method.as_str(), row.repetition);
+        let kind = (row.family.as_str(), row.query.as_str());
+        tests.entry(kind).or_default().push((tree, row.boxes_per_ray));
+    }
+    for row in &rows.run_tests {
+        let tree = (row.scene.as_str(), row.method.as_str(), row.repetition);
+        let kind = (row.judged_on.as_str(), row.camera.as_str());
+        tests.entry(kind).or_default().push((tree, row.tests));
+    }
+    tests
 }
 
 pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     let mut correlations = Vec::new();
     let costs = costs(rows);
-    let trees = trees(rows);
-    let kinds = distinct(trees.iter().map(|tree| tree.kind));
+    let tests = ray_tests(rows);
     for scene in rows.scenes() {
-        for &kind in &kinds {
+        for (&(family, query), tests) in &tests {
             for method in &config.methods {
-                let is_own = |tree: &&Tree| {
-                    (tree.run.scene.as_str(), &tree.run.method, tree.kind) == (scene, method, kind)
-                };
-                let own: Vec<&Tree> = trees.iter().filter(is_own).collect();
-                for cost in &costs {
-                    let pair = |tree: &&Tree| Some((cost_of(rows, cost, tree.run)?, tree.tests));
-                    let pairs: Vec<_> = own.iter().filter_map(pair).collect();
-                    correlations.push(correlate(scene, method, kind, cost, &pairs));
+                let is_own =
+                    |(tree, _): &&(Tree, f64)| (tree.0, tree.1) == (scene, method.as_str());
+                for (cost, of_trees) in &costs {
+                    let own = tests.iter().filter(is_own);
+                    let pairs: Vec<_> = own
+                        .filter_map(|(tree, tests)| Some((*of_trees.get(tree)?, *tests)))
+                        .collect();
+                    let pearson = pearson(&pairs);
+                    let interval = pearson.and_then(|r| pearson_interval(r, pairs.len()));
+                    let (pearson_low, pearson_high) = interval.unzip();
+                    correlations.push(Correlation {
+                        scene,
+                        method,
+                        cost,
+                        family,
+                        query,
+                        trees: pairs.len(),
+                        pearson,
+                        pearson_low,
+                        pearson_high,
+                        spearman: spearman(&pairs),
+                    });
                 }
             }
         }
@@ -124,12 +126,6 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     let mut output = Output::default();
     output.add_csv("correlation", &correlations)?;
     output.paper = config.compare(rows, &correlations);
-    let columns = "scene method trees cost family query pearson spearman";
-    output.show(
-        "Correlation of costs and tests per ray over the trees of each method:",
-        &correlations,
-        columns,
-    )?;
     Ok(output)
 }
 
@@ -167,36 +163,11 @@ impl Config {
     }
 }
 
-fn correlate<'a>(
-    scene: &'a str,
-    method: &'a str,
-    (family, query): (&'a str, &'a str),
-    cost: &'a str,
-    pairs: &[(f64, f64)],
-) -> Correlation<'a> {
-    let (pearson, trees) = (pearson(pairs), pairs.len());
-    let interval = pearson.and_then(|pearson| pearson_interval(pearson, trees));
-    let (pearson_low, pearson_high) = interval.unzip();
-    let spearman = spearman(pairs);
-    Correlation {
-        scene,
-        method,
-        cost,
-        family,
-        query,
-        trees,
-        pearson,
-        pearson_low,
-        pearson_high,
-        spearman,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::report::data::run;
-    use crate::rows::RayRow;
+    use crate::rows::{RayRow, RunRow};
 
     /// Rows of two methods, whose costs predict nothing within either, though the second is dearer
     /// and takes more tests.

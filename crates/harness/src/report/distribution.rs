@@ -3,7 +3,7 @@
 use super::drawing::{Point, Shape, curve};
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
-use crate::statistics::{mean, quantile, range, sorted};
+use crate::statistics::{mean, quantile, range, sorted, variance};
 use bvh_config::above;
 use bvh_scenes::SceneKind;
 
@@ -71,8 +71,6 @@ pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
     }
     output.add_csv("distribution", &summaries)?;
     output.add_figure("distribution", "Every trial of every repetition.", 2, panels);
-    let columns = "scene method lowest_cost median_cost highest_cost relative_deviation base_cost";
-    output.show("Costs of all trials:", &summaries, columns)?;
     Ok(output)
 }
 
@@ -102,9 +100,8 @@ fn fraction_below(costs: &[f64], limit: f64) -> f64 {
 }
 
 fn summarise<'a>(scene: &'a str, method: &'a str, costs: &[f64], base_cost: f64) -> Summary<'a> {
-    let (n, at) = (costs.len() as f64, |q| quantile(costs, q).unwrap_or(f64::NAN));
+    let at = |q| quantile(costs, q).unwrap_or(f64::NAN);
     let mean_cost = mean(costs.iter().copied());
-    let variance = costs.iter().map(|cost| (cost - mean_cost).powi(2)).sum::<f64>() / (n - 1.0);
     Summary {
         scene,
         method,
@@ -115,7 +112,7 @@ fn summarise<'a>(scene: &'a str, method: &'a str, costs: &[f64], base_cost: f64)
         quartile_3_cost: at(0.75),
         highest_cost: at(1.0),
         mean_cost,
-        relative_deviation: variance.sqrt() / mean_cost,
+        relative_deviation: variance(costs).map_or(f64::NAN, f64::sqrt) / mean_cost,
         base_cost,
         fraction_below_base: fraction_below(costs, base_cost),
         fraction_within_5_percent: fraction_below(costs, 1.05 * base_cost),

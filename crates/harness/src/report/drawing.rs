@@ -53,9 +53,6 @@ bvh_config::config! { serde;
         log_y: bool;
         /// True for fractions along the vertical axis, which are written in per cent.
         percent_y: bool;
-        /// Ends of the vertical axis for lines, by the column `y`; by default around the values.
-        #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-        ranges: BTreeMap<String, [f64; 2]>, in 0.0..=1e300;
         /// Names in words for scenes, rows and series, by what they are called in the table; for
         /// lines also labels of the vertical axis by the column `y`, in place of `y_label`.
         names: BTreeMap<String, String>;
@@ -91,12 +88,6 @@ pub(super) struct Point {
 
 impl Drawing {
     fn check_conditions(&self) -> Result<(), OutOfRange> {
-        for (y, [low, high]) in &self.ranges {
-            if low >= high || !self.y.split(", ").any(|column| column == y) {
-                let found = format!("{y} = [{low}, {high}]");
-                return Err(OutOfRange::new("ranges", found, "a column of y, and a rising range"));
-            }
-        }
         accept("select", Conditions::parse(&self.select))?;
         accept("first", Conditions::parse(&self.first))
     }
@@ -163,8 +154,7 @@ impl Drawing {
         layers.extend(self.line_at.map(|at| Layer::new("", Marks::HLine(at))));
         let unit = if self.percent_y { Unit::Percent } else { Unit::Number };
         let label = self.names.get(y).unwrap_or(&self.y_label);
-        let range = self.ranges.get(y).map(|&[low, high]| (low, high));
-        let y = Axis { unit, range, ..axis(label, self.log_y) };
+        let y = axis(label, self.log_y).unit(unit);
         panel(title, axis(&self.x_label, self.log_x), y, layers)
     }
 
@@ -367,7 +357,7 @@ b,x,8,7,9,16,6,,1
     }
 
     #[test]
-    fn panels_have_the_same_axes_if_asked_and_the_range_that_a_column_has() {
+    fn panels_have_the_same_axes_if_asked() {
         let common = "marks = 'points'\nx = 'seconds'\npanels = ['scene']\n";
         let axes = |config: &str| -> Vec<_> {
             let panels = panels(&format!("{common}{config}")).into_iter();
@@ -376,8 +366,6 @@ b,x,8,7,9,16,6,,1
         let shared = axes("y = 'cost'\nsame_axes = true");
         let (low, high) = shared[0].1.unwrap();
         assert!(shared.len() == 2 && shared[0] == shared[1] && low < 2.0 && high > 8.0);
-        let ranges = axes("y = 'cost, paper'\nranges = { paper = [0.0, 1.0] }");
-        let paper = (None, Some((0.0, 1.0)));
-        assert_eq!(ranges, [(None, None), paper, (None, None), paper]);
+        assert_eq!(axes("y = 'cost'"), [(None, None); 2]);
     }
 }

@@ -39,15 +39,6 @@ pub(super) struct Gaps<'a> {
 
 impl Config {
     pub(super) fn write(&self, rows: &Rows) -> Result<Output, Error> {
-        let summaries = self.summaries(rows);
-        let mut output = Output::default();
-        output.add_csv("gaps", &summaries)?;
-        let columns = "method part objects runs solved_fraction median_gap maximum_gap";
-        output.show("Gaps to the exact optimum:", &summaries, columns)?;
-        Ok(output)
-    }
-
-    fn summaries<'a>(&'a self, rows: &Rows) -> Vec<Gaps<'a>> {
         let optimal = rows.runs.iter().filter(|run| run.method == self.optimum);
         let optima: BTreeMap<&str, f64> =
             optimal.map(|run| (run.scene.as_str(), run.cost)).collect();
@@ -74,7 +65,9 @@ impl Config {
                 }
             }));
         }
-        summaries
+        let mut output = Output::default();
+        output.add_csv("gaps", &summaries)?;
+        Ok(output)
     }
 }
 

@@ -25,13 +25,11 @@ pub mod trials;
 
 use crate::Error;
 use crate::rows::store::Store;
-use crate::rows::{Row as _, RunRow, TimingRow};
 use bvh_config::{Check, OutOfRange};
 use config::Labels as _;
 use data::Rows;
 use output::Output;
 use paper::PaperRow;
-use query_column::Column;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::path::Path;
 
@@ -136,7 +134,7 @@ impl Report {
     /// Returns the CSV files that the report makes; those of its figures have their names.
     pub fn files(&self) -> Vec<String> {
         let names = match self {
-            Self::Anytime(config) => return vec![format!("timing_{}.csv", config.file)],
+            Self::Anytime(config) => return vec![format!("{}.csv", config.csv())],
             Self::Numbers(config) if config.targets.is_empty() => {
                 vec!["numbers", "timing_numbers"]
             }
@@ -201,39 +199,35 @@ pub fn write_all(outputs: &[Output], store: &Store, drawn: bool) -> Result<Strin
             store.write(&format!("{name}.svg"), figures::svg(figure).as_bytes())?;
         }
     }
-    Ok(outputs.iter().map(Output::text).collect())
+    outputs.iter().map(Output::text).collect()
 }
 
-/// Returns the table of final costs, for experiments without reports.
+/// The report of experiments without reports.
+const FINAL_COSTS: &str = "
+file = 'Runs'
+rows = 'runs.csv'
+join = 'timing.csv'
+by = ['scene', 'scene_kind', 'method']
+columns = [
+    { name = 'runs', value = 'count cost' },
+    { name = 'least_over_base', value = 'min cost_over_base' },
+    { name = 'median_over_base', value = 'median cost_over_base' },
+    { name = 'median_seconds', value = 'median seconds' },
+]
+";
+
 fn final_costs(rows: &Rows) -> Result<Output, Error> {
-    let columns = [
-        ("runs", "count cost"),
-        ("least_over_base", "min cost_over_base"),
-        ("median_over_base", "median cost_over_base"),
-        ("median_seconds", "median seconds"),
-    ];
-    let column = |(name, value): (&str, &str)| Column {
-        name: name.into(),
-        value: value.into(),
-        ..Column::default()
-    };
-    let costs = query_report::Config {
-        rows: RunRow::FILE.into(),
-        join: TimingRow::FILE.into(),
-        by: ["scene", "scene_kind", "method"].map(str::to_owned).into(),
-        columns: columns.map(column).into(),
-        ..query_report::Config::default()
-    };
-    let tables = costs.write(rows)?.tables;
-    Ok(Output { tables, ..Output::new("", "Final costs over those of the greedy tree") })
+    let costs: query_report::Config =
+        toml::from_str(FINAL_COSTS).map_err(Error::toml(Path::new("final costs")))?;
+    // It is only shown: a file with seconds would need another name.
+    let unwritten = costs.write(rows)?.csv;
+    Ok(Output { unwritten, ..Output::new("", "Final costs over those of the greedy tree") })
 }
 
 /// Collects the comparisons with the paper of all reports.
 fn beside_paper(rows: &[PaperRow]) -> Result<Output, Error> {
     let mut output = Output::new("", "Ng & Trifonov 2003 beside our results");
     output.add_csv("paper", rows)?;
-    let explanation = "What the paper says beside ours, which lies between low and high:";
-    output.show(explanation, rows, "scene quantity paper ours ours_low ours_high verdict")?;
     output.paper = rows.to_vec();
     Ok(output)
 }

@@ -119,17 +119,8 @@ impl Config {
         let mut output = Output::default();
         output.add_csv("numbers", &numbers)?;
         output.add_csv("timing_numbers", &timing)?;
-        let explanation = "Gaps are to the best known cost; the lower bound is relative to that:";
-        let columns = "scene method runs cost_over_base_median gap_quartile_1 gap_median gap_quartile_3 \
-                       lower_bound_over_reference";
-        output.show(explanation, &numbers, columns)?;
-        let columns = "scene method seconds_quartile_1 seconds_median seconds_quartile_3";
-        output.show("Seconds of the runs:", &timing, columns)?;
         if !self.targets.is_empty() {
             output.add_csv("timing_to_target", &reached)?;
-            let columns = "scene target method runs solved median quantile_90";
-            let explanation = "Seconds until the target is reached, over all runs:";
-            output.show(explanation, &reached, columns)?;
         }
         Ok(output)
     }

@@ -3,7 +3,7 @@
 
 use super::colours::hue;
 use super::paper::PaperRow;
-use super::query::{Row, cell};
+use super::query::Row;
 use crate::Error;
 use crate::rows::csv_file::{bytes_of, parse, to_bytes};
 use comfy_table::{Table, presets};
@@ -22,9 +22,15 @@ pub struct Output {
     pub figures: Vec<(String, Figure)>,
     /// Comparisons with the paper.
     pub paper: Vec<PaperRow>,
-    /// The tables, each under a line that explains it.
-    pub tables: Vec<(String, Table)>,
+    /// Tables that are only shown: title, and the bytes of a CSV file.
+    pub unwritten: Vec<(String, Vec<u8>)>,
 }
+
+/// The greatest number of rows of a table that is shown: nobody reads more.
+const MOST_SHOWN: usize = 100;
+
+/// Columns of sentences, which would not fit beside others.
+const SENTENCES: [&str; 2] = ["rule", "reason"];
 
 impl Output {
     /// Makes the empty output of a report with this title. The source may be empty.
@@ -51,14 +57,8 @@ impl Output {
     }
 
     /// Adds the CSV file `name`, without its extension.
-    pub fn add_csv(
-        &mut self,
-        name: impl Into<String>,
-        rows: &[impl Serialize],
-    ) -> Result<(), Error> {
-        let name = name.into();
-        let bytes = to_bytes(rows, Path::new(&name))?;
-        self.csv.push((name, bytes));
+    pub fn add_csv(&mut self, name: &str, rows: &[impl Serialize]) -> Result<(), Error> {
+        self.csv.push((name.into(), to_bytes(rows, Path::new(name))?));
         Ok(())
     }
 
@@ -83,47 +83,37 @@ impl Output {
             .push((name.into(), Figure { title, caption: caption.into(), columns, panels, hues }));
     }
 
-    /// Adds a table of some columns of a CSV file's rows, numbers with four digits. `columns` are
-    /// their names with blanks between them.
-    pub fn show(
-        &mut self,
-        explanation: &str,
-        rows: &[impl Serialize],
-        columns: &str,
-    ) -> Result<(), Error> {
-        let bytes = to_bytes(rows, Path::new("table"))?;
-        let columns: Vec<&str> = columns.split(' ').collect();
-        self.show_csv(explanation, &bytes, &columns)
-    }
-
-    /// Adds a table of some columns of a CSV file.
-    pub fn show_csv(
-        &mut self,
-        explanation: &str,
-        bytes: &[u8],
-        columns: &[impl AsRef<str>],
-    ) -> Result<(), Error> {
-        let path = Path::new("table");
-        let columns: Vec<&str> = columns.iter().map(AsRef::as_ref).collect();
-        let mut table = Table::new();
-        table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(&columns);
-        for row in parse::<Row>(bytes, path)? {
-            let cells =
-                columns.iter().map(|column| cell(&row, column).map(|text| four_digits(text)));
-            let cells: Vec<String> = cells
-                .collect::<Result<_, _>>()
-                .map_err(|error| Error::Query { path: path.into(), message: error.to_string() })?;
-            table.add_row(cells);
+    /// Returns the tables to show, each with its title: those of 1 to [`MOST_SHOWN`] rows, without
+    /// sentences and with numbers of four digits.
+    pub fn tables(&self) -> Result<Vec<(String, Vec<Row>)>, Error> {
+        let files = self.csv.iter().map(|(name, bytes)| (format!("{name}.csv"), bytes));
+        let others = self.unwritten.iter().map(|(title, bytes)| (title.clone(), bytes));
+        let mut tables = Vec::new();
+        for (title, bytes) in files.chain(others) {
+            let mut rows: Vec<Row> = parse(bytes, Path::new(&title))?;
+            for row in &mut rows {
+                row.retain(|column, _| !SENTENCES.contains(&column.as_str()));
+                row.values_mut().for_each(|text| *text = four_digits(text));
+            }
+            if (1..=MOST_SHOWN).contains(&rows.len()) {
+                tables.push((title, rows));
+            }
         }
-        self.tables.push((explanation.into(), table));
-        Ok(())
+        Ok(tables)
     }
 
     /// Returns heading and tables for the terminal, separated by empty lines.
-    pub fn text(&self) -> String {
-        let table = |(explanation, table): &(String, Table)| format!("{explanation}\n{table}\n");
-        let tables: String = self.tables.iter().map(table).collect();
-        format!("{}\n\n{}\n\n", self.heading, tables.trim_end())
+    pub fn text(&self) -> Result<String, Error> {
+        let mut text = format!("{}\n\n", self.heading);
+        for (title, rows) in self.tables()? {
+            let mut table = Table::new();
+            // Numbers are shorter than the names of their columns.
+            let header = rows[0].keys().map(|name| name.replace('_', "\n"));
+            table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(header);
+            table.add_rows(rows.iter().map(Row::values));
+            text += &format!("{title}:\n{table}\n\n");
+        }
+        Ok(text)
     }
 }
 
@@ -164,12 +154,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_table_shows_columns_by_name_and_rejects_those_that_its_rows_lack() {
-        let mut output = Output::default();
-        output.show_csv("All:", b"scene,cost\ns,1.23456\n", &["cost", "scene"]).unwrap();
-        assert!(output.text().contains("│ 1.235 ┆ s     │"), "{}", output.text());
-        let error = output.show_csv("All:", b"scene\ns\n", &["cost"]).unwrap_err().to_string();
-        assert!(error.contains("no column \"cost\"; accepted: scene"), "{error}");
+    fn short_tables_are_shown_with_four_digits_and_their_names() {
+        let short = b"scene,cost\ns,1.23456\n".to_vec();
+        let long = format!("scene\n{}", "s\n".repeat(MOST_SHOWN + 1)).into_bytes();
+        let csv = vec![("short".into(), short.clone()), ("long".into(), long)];
+        let unwritten = vec![("Title".into(), short)];
+        let text = Output { csv, unwritten, ..Output::default() }.text().unwrap();
+        assert_eq!(text.matches("│ s     ┆ 1.235 │").count(), 2, "{text}");
+        assert!(text.contains("short.csv:") && text.contains("Title:") && !text.contains("long"));
     }
 
     #[test]

@@ -39,12 +39,6 @@ impl PaperRow {
         Self { scene: scene.into(), quantity: quantity.into(), ..Self::default() }
     }
 
-    /// Adds a reason other than that of the whole report.
-    #[must_use]
-    pub fn because(self, reason: &str) -> Self {
-        Self { reason: reason.into(), ..self }
-    }
-
     /// Adds both sides as they are shown, the verdict on them, and its rule.
     #[must_use]
     pub fn compare(

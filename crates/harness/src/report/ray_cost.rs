@@ -69,14 +69,9 @@ impl Config {
         table.extend(means);
         let mut output = Output::default();
         output.add_csv("ray_cost", &table)?;
-        let columns =
-            "scene tree trained_on judged_on camera over_base_low tests_over_base over_base_high";
-        output.show(&format!("Tests per ray over those of {}:", self.base), &table, columns)?;
         let paired: Vec<Paired> = self.pairs.iter().flat_map(|pair| paired(rows, pair)).collect();
         if !paired.is_empty() {
             output.add_csv("ray_cost_pairs", &paired)?;
-            let columns = "scene method against judged_on camera low tests_over_other high verdict";
-            output.show("Tests per ray over those of another method:", &paired, columns)?;
         }
         Ok(output)
     }

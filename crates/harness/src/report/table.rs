@@ -95,9 +95,6 @@ impl Config {
             let cells = others.flat_map(|column| of_column(&cells, column));
             cells.filter_map(|cell| self.compare(rows, cell)).collect()
         };
-        let columns = "scene scene_kind column cost_over_base low_over_base high_over_base \
-                       paper_over_base";
-        output.show("Cost over base (and the paper's, on its own scenes):", &cells, columns)?;
         Ok(output)
     }
 
@@ -142,9 +139,10 @@ impl Config {
     /// Compares a number of the paper with ours.
     fn compare(&self, rows: &Rows, cell: &Cell) -> Option<PaperRow> {
         let quantity = format!("{}, cost over base", cell.column);
-        let row = PaperRow::new(rows.shown(cell.scene), quantity).because(cell.reason);
         let (paper, ours) = (cell.paper_over_base?, cell.cost_over_base);
-        Some(row.compare_ratios(paper, ours, cell.interval(), self.tolerance))
+        let row = PaperRow::new(rows.shown(cell.scene), quantity);
+        let row = row.compare_ratios(paper, ours, cell.interval(), self.tolerance);
+        Some(PaperRow { reason: cell.reason.into(), ..row })
     }
 
     /// Compares a number of the paper with the closest of the columns that read it in different
@@ -158,8 +156,7 @@ impl Config {
         // The paper prints no formula, so the closest reading is the most favourable to it.
         let is_close = (ours / paper - 1.0).abs() <= self.tolerance;
         let quantity = "cost over base, the closest reading";
-        let row = PaperRow::new(rows.shown(scene), quantity).because(closest.reason);
-        let row = row.compare(
+        let row = PaperRow::new(rows.shown(scene), quantity).compare(
             format!("{paper:.4}"),
             format!("{ours:.4}, by {}", closest.column),
             if is_close { Verdict::Inconclusive } else { Verdict::Differs },
@@ -168,7 +165,12 @@ impl Config {
                  formula, so that a reading which is within cannot be distinguished from the paper's"
             ),
         );
-        Some(PaperRow { paper_over_base: Some(paper), ours_over_base: Some(ours), ..row })
+        Some(PaperRow {
+            paper_over_base: Some(paper),
+            ours_over_base: Some(ours),
+            reason: closest.reason.into(),
+            ..row
+        })
     }
 
     /// Returns true if all columns except the base are readings of one column of the paper.

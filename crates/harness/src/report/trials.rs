@@ -45,14 +45,6 @@ impl Config {
             points.extend(curves.into_iter().flatten());
         }
         output.add_csv("trials", &points)?;
-        let last: Vec<&Point> =
-            points.iter().filter(|point| point.trials == self.best_of).collect();
-        let columns = "scene method expected_over_base expected_low expected_high";
-        output.show(
-            &format!("Expected best of {} trials over base:", self.best_of),
-            &last,
-            columns,
-        )?;
         Ok(output)
     }
 

@@ -204,10 +204,7 @@ fn without_reports_there_is_a_table_and_on_request_nothing_is_printed() {
     let folder = folder_with("plain.toml", spec);
     let output = run(folder.path(), &["plain.toml"]);
     let out = text(&output.stdout);
-    assert!(
-        ["spheres75", "median_cut", "least_over_base"].iter().all(|part| out.contains(part)),
-        "{out}"
-    );
+    assert!(["spheres75", "median_cut", "least"].iter().all(|part| out.contains(part)), "{out}");
     assert!(output.stderr.is_empty());
     let quiet = run(folder.path(), &["plain.toml", "--quiet", "--force"]);
     assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty());

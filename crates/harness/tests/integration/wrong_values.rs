@@ -26,20 +26,32 @@ fn follow<'a>(value: &'a mut Value, step: &str) -> &'a mut Value {
     }
 }
 
-/// Collects the paths of all tables in a value.
-fn tables(value: &Value, path: &[String], found: &mut Vec<Steps>) {
-    let inside: Vec<(String, &Value)> = match value {
+/// A table of a spec: the way to it, its place and its keys. Places name elements of arrays by their
+/// method or kind instead of their index, so that each method and kind is tested once.
+struct Place {
+    path: Steps,
+    name: String,
+    keys: Vec<String>,
+}
+
+/// Collects all tables in a value.
+fn tables(value: &Value, path: &[String], name: &str, found: &mut Vec<Place>) {
+    match value {
         Value::Table(table) => {
-            found.push(path.to_vec());
-            table.iter().map(|(key, value)| (key.clone(), value)).collect()
+            let keys = table.keys().cloned().collect();
+            found.push(Place { path: path.to_vec(), name: name.into(), keys });
+            for (key, value) in table {
+                tables(value, &[path, &[key.clone()]].concat(), &format!("{name}.{key}"), found);
+            }
         }
         Value::Array(values) => {
-            (0..).zip(values).map(|(i, value): (usize, _)| (i.to_string(), value)).collect()
+            for (index, value) in values.iter().enumerate() {
+                let tag = ["kind", "method"].iter().find_map(|tag| value.get(tag)?.as_str());
+                let name = format!("{name}[{}]", tag.unwrap_or_default());
+                tables(value, &[path, &[index.to_string()]].concat(), &name, found);
+            }
         }
-        _ => return,
-    };
-    for (step, value) in inside {
-        tables(value, &[path, &[step]].concat(), found);
+        _ => {}
     }
 }
 
@@ -65,21 +77,6 @@ fn read(spec: &Value) -> Result<Experiment, (u8, String)> {
 fn accepted(message: &str) -> Vec<String> {
     let Some((_, names)) = message.split_once("expected ") else { return Vec::new() };
     names.split('`').skip(1).step_by(2).map(str::to_owned).collect()
-}
-
-/// Returns the place of a table. It names elements of arrays by their method or kind instead of
-/// their index, so that each method and kind is tested once.
-fn place(spec: &Value, path: &[String]) -> String {
-    let mut value = spec.clone();
-    let mut place = String::new();
-    for step in path {
-        let is_index = value.is_array();
-        value = follow(&mut value, step).clone();
-        let tag = ["kind", "method"].iter().find_map(|tag| value.get(tag)?.as_str());
-        place +=
-            &if is_index { format!("[{}]", tag.unwrap_or_default()) } else { format!(".{step}") };
-    }
-    place
 }
 
 /// Returns the committed experiments with every default spelled out, and one with every method.
@@ -149,20 +146,12 @@ fn a_wrong_value_under_any_key_of_a_spec_is_rejected_by_name() {
     let complain = |message: String| found.borrow_mut().insert(message);
     for spec in specs() {
         assert!(read(&spec).is_ok(), "{:?}", read(&spec));
-        let mut paths = Vec::new();
-        tables(&spec, &[], &mut paths);
-        for path in paths {
-            let place = place(&spec, &path);
+        let mut places = Vec::new();
+        tables(&spec, &[], "", &mut places);
+        for Place { path, name: place, keys: own } in places {
             if listed.contains(&place) {
                 continue;
             }
-            let mut table = spec.clone();
-            let table = path
-                .iter()
-                .fold(&mut table, |value, step| follow(value, step))
-                .as_table()
-                .unwrap()
-                .clone();
             // An unknown key makes the parser list the keys that it accepts. Where it does not, the
             // keys are names, and other specs may have others.
             let unknown = read(&with(&spec, &path, "unheard_of", 1.into()));
@@ -170,7 +159,7 @@ fn a_wrong_value_under_any_key_of_a_spec_is_rejected_by_name() {
             if !keys.is_empty() {
                 listed.insert(place.clone());
             }
-            for key in table.keys().cloned().chain(keys) {
+            for key in own.into_iter().chain(keys) {
                 if key == "unheard_of" || !seen.insert(format!("{place}.{key}")) {
                     continue;
                 }

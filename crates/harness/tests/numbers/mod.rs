@@ -103,18 +103,6 @@ fn what_the_prose_judges_is_a_fact() {
 }
 
 #[test]
-fn numbers_are_bound_to_the_ids_behind_them() {
-    let pairs = |text: &str| {
-        let bound = bound_numbers(text).unwrap();
-        bound.into_iter().map(|(number, id)| format!("{number} {id}")).collect::<Vec<_>>()
-    };
-    let text = "In 3 runs 8 to 25<!-- =a.least a.most --> % and −0.5<!-- =b -->, then 7.";
-    assert_eq!(pairs(text), ["8 a.least", "25 a.most", "−0.5 b"]);
-    assert_eq!(pairs("As in `8<!-- =a -->`, 9<!-- =b -->."), ["9 b"]);
-    assert!(bound_numbers("only 1<!-- =a b -->").is_err());
-}
-
-#[test]
 fn a_correct_rounding_at_the_digits_shown_is_accepted() {
     for (shown, value) in
         [("8", 7.5), ("8", 8.49), ("0.07", 0.0651), ("−1.2", -1.16), ("1.50", 1.5)]
