@@ -83,7 +83,7 @@ impl Output {
             .push((name.into(), Figure { title, caption: caption.into(), columns, panels, hues }));
     }
 
-    /// Returns the tables to show, each with its title: those of 1 to [`MOST_SHOWN`] rows, without
+    /// Returns the tables to show, each with its title: those of 1 to 100 rows, without
     /// sentences and with numbers of four digits.
     pub fn tables(&self) -> Result<Vec<(String, Vec<Row>)>, Error> {
         let files = self.csv.iter().map(|(name, bytes)| (format!("{name}.csv"), bytes));

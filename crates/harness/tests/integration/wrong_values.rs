@@ -41,7 +41,12 @@ fn tables(value: &Value, path: &[String], name: &str, found: &mut Vec<Place>) {
             let keys = table.keys().cloned().collect();
             found.push(Place { path: path.to_vec(), name: name.into(), keys });
             for (key, value) in table {
-                tables(value, &[path, &[key.clone()]].concat(), &format!("{name}.{key}"), found);
+                tables(
+                    value,
+                    &[path, std::slice::from_ref(key)].concat(),
+                    &format!("{name}.{key}"),
+                    found,
+                );
             }
         }
         Value::Array(values) => {
