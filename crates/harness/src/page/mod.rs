@@ -9,8 +9,9 @@ use crate::run::finish::remade;
 use crate::run::provenance::Provenance;
 use crate::run::resolved::read_toml;
 use crate::stress;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use html_escape::encode_double_quoted_attribute as escaped;
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 const STYLE: &str = include_str!("style.css");
@@ -83,122 +84,134 @@ pub fn write(results: &Path) -> Result<(usize, PathBuf), Error> {
         (source.is_none(), source, section.name.clone())
     });
     let out = results.join("report.html");
-    files::write(&out, page(&sections).into_string().as_bytes())?;
+    files::write(&out, page(&sections).as_bytes())?;
     Ok((sections.len(), out))
 }
 
-fn page(sections: &[Section]) -> Markup {
-    html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                title { "BVH by stochastic search: results" }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                h1 { "BVH by stochastic search: results" }
-                main {
-                    (pictures(sections))
-                    (scoreboard(sections))
-                    h2 { "All questions" }
-                    ul {
-                        @for section in sections {
-                            li {
-                                a href={ "#" (in_url(&section.name)) } { (section.question) }
-                            }
-                        }
-                    }
-                    @for section in sections { (experiment(section)) }
-                }
-                footer { p { "Made by harness " (env!("CARGO_PKG_VERSION")) " from the CSV files that it leads to." } }
-            }
-        }
-    }
-}
-
-/// The two pictures that say the most, wherever they are: error against run time, and all checks of
-/// extreme scenes.
-fn pictures(sections: &[Section]) -> Markup {
+fn page(sections: &[Section]) -> String {
+    // The two pictures that say the most, wherever they are: error against run time, and all checks
+    // of extreme scenes.
     let files = [OVERVIEW, stress::FIGURE].map(|name| format!("{name}.svg"));
     let figures = sections.iter().flat_map(|section| &section.figures);
-    html! {
-        @for (name, path) in figures.filter(|(name, _)| files.contains(name)) {
-            figure { img.sheet src=(path) alt=(name); }
-        }
-    }
+    let pictures: String = figures.filter(|(name, _)| files.contains(name)).map(figure).collect();
+    let scoreboard = scoreboard(sections);
+    let question = |section: &Section| format!("<li>{}</li>\n", link(section, &section.question));
+    let questions: String = sections.iter().map(question).collect();
+    let experiments: String = sections.iter().map(experiment).collect();
+    let version = env!("CARGO_PKG_VERSION");
+    format!(
+        r#"<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>BVH by stochastic search: results</title>
+<style>{STYLE}</style>
+</head>
+<body>
+<h1>BVH by stochastic search: results</h1>
+<main>
+{pictures}{scoreboard}<h2>All questions</h2>
+<ul>
+{questions}</ul>
+{experiments}</main>
+<footer><p>Made by harness {version} from the CSV files that it leads to.</p></footer>
+</body>
+</html>
+"#
+    )
 }
 
 /// The numbers and words of the paper beside ours, in the paper's order.
-fn scoreboard(sections: &[Section]) -> Markup {
-    html! {
-        @if sections.iter().any(|section| !section.paper.is_empty()) {
-            div.wide tabindex="0" { table {
-                caption { span {
-                    "Ng & Trifonov (2003) beside ours. Their scenes are gone; ours are stand-ins. \
-                     Costs are ratios to the greedy Müller–Fellner tree."
-                } }
-                thead { tr { @for name in ["source", "paper", "ours", "verdict", "scene", "quantity"] {
-                    th scope="col" { (name) }
-                } } }
-                tbody { @for section in sections { @for row in &section.paper { tr {
-                    th scope="row" { a href={ "#" (in_url(&section.name)) } { (row.source) } }
-                    td.number { (row.paper) }
-                    td.number { (row.ours) }
-                    td { (row.verdict.name()) }
-                    td { (row.scene) }
-                    td { (row.quantity) }
-                } } } }
-            } }
-        }
+fn scoreboard(sections: &[Section]) -> String {
+    let row = |(section, row): (&Section, &PaperRow)| {
+        let PaperRow { paper, ours, verdict, scene, quantity, .. } = row;
+        let verdict = verdict.name();
+        let others =
+            [paper, ours, &verdict, scene, quantity].map(|text| escaped(text).into_owned());
+        [link(section, &row.source)].into_iter().chain(others).collect()
+    };
+    let rows =
+        sections.iter().flat_map(|section| section.paper.iter().map(move |row| (section, row)));
+    let rows: Vec<Vec<String>> = rows.map(row).collect();
+    if rows.is_empty() {
+        return String::new();
     }
+    let caption = "<caption><span>Ng &amp; Trifonov (2003) beside ours. Their scenes are gone; ours are \
+                   stand-ins. Costs are ratios to the greedy Müller–Fellner tree.</span></caption>";
+    table(caption, "source paper ours verdict scene quantity".split(' '), rows)
 }
 
 /// An experiment with all that belongs to it.
-fn experiment(section: &Section) -> Markup {
+fn experiment(section: &Section) -> String {
+    let id = in_url(&section.name);
+    let [name, question] = [&section.name, &section.question].map(|text| escaped(text));
+    let figures: String = section.figures.iter().map(figure).collect();
+    let tables: String = section
+        .shown
+        .iter()
+        .map(|(title, rows)| {
+            let columns = rows[0].keys().map(|name| escaped(name).replace('_', " "));
+            let rows = rows
+                .iter()
+                .map(|row| row.values().map(|text| escaped(text).into_owned()).collect());
+            let (title, table) = (escaped(title), table("", columns, rows));
+            format!("<details><summary>{title}</summary>\n{table}</details>\n")
+        })
+        .collect();
+    let file =
+        |(name, path): &(String, String)| format!("<a href=\"{path}\">{}</a>\n", escaped(name));
+    let files: String = section.tables.iter().map(file).collect();
     let Provenance { command, revision, rustc, cpu, threads, date, .. } = &section.provenance;
-    html! {
-        section id=(in_url(&section.name)) {
-            h2 { (section.question) }
-            @for (name, path) in &section.figures {
-                figure { img.sheet src=(path) alt=(name) loading="lazy"; }
-            }
-            @for (title, rows) in &section.shown {
-                details { summary { (title) } (table(rows)) }
-            }
-            p.files {
-                "Rows of " (section.name) ": "
-                @for (name, path) in &section.tables { a href=(path) { (name) } " " }
-            }
-            p.files {
-                code { (command) } ", revision " (revision) ", " (rustc) ", " (cpu) ", "
-                (threads) " thread(s), " (date)
-            }
-        }
-    }
+    let command = escaped(command);
+    let origin = format!("revision {revision}, {rustc}, {cpu}, {threads} thread(s), {date}");
+    let origin = escaped(&origin);
+    format!(
+        "<section id=\"{id}\">\n<h2>{question}</h2>\n{figures}{tables}\
+         <p class=\"files\">Rows of {name}:\n{files}</p>\n\
+         <p class=\"files\"><code>{command}</code>, {origin}</p>\n</section>\n"
+    )
 }
 
-/// A table in a box that scrolls if it is too wide for the page. The first cell of a row is its
-/// header.
-fn table(rows: &[Row]) -> Markup {
+/// A link to an experiment on the page.
+fn link(section: &Section, text: &str) -> String {
+    format!("<a href=\"#{}\">{}</a>", in_url(&section.name), escaped(text))
+}
+
+/// A figure by its name and path.
+fn figure((name, path): &(String, String)) -> String {
+    let name = escaped(name);
+    format!(
+        "<figure><img class=\"sheet\" src=\"{path}\" alt=\"{name}\" loading=\"lazy\"></figure>\n"
+    )
+}
+
+/// A table of cells in HTML, in a box that scrolls if it is too wide for the page. The first cell of a row
+/// is its header.
+fn table<S: Display>(
+    caption: &str,
+    columns: impl IntoIterator<Item = S>,
+    rows: impl IntoIterator<Item = Vec<String>>,
+) -> String {
     let is_number =
         |text: &str| text.trim_end_matches(" %").trim_start_matches('+').parse::<f64>().is_ok();
-    html! {
-        div.wide tabindex="0" { table {
-            thead { tr { @for name in rows[0].keys() {
-                th scope="col" { (name.replace('_', " ")) }
-            } } }
-            tbody { @for row in rows { tr {
-                @for (at, text) in row.values().enumerate() {
-                    @if at == 0 { th scope="row" { (text) } }
-                    @else if is_number(text) { td.number { (text) } }
-                    @else { td { (text) } }
-                }
-            } } }
-        } }
-    }
+    let cell = |(at, text): (usize, &String)| match at {
+        0 => format!("<th scope=\"row\">{text}</th>"),
+        _ if is_number(text) => format!("<td class=\"number\">{text}</td>"),
+        _ => format!("<td>{text}</td>"),
+    };
+    let row = |row: Vec<String>| {
+        let cells: String = row.iter().enumerate().map(cell).collect();
+        format!("<tr>{cells}</tr>\n")
+    };
+    let columns: String =
+        columns.into_iter().map(|name| format!("<th scope=\"col\">{name}</th>")).collect();
+    let rows: String = rows.into_iter().map(row).collect();
+    format!(
+        "<div class=\"wide\" tabindex=\"0\"><table>{caption}\n<thead><tr>{columns}</tr></thead>\n\
+         <tbody>\n{rows}</tbody>\n</table></div>\n"
+    )
 }
 
 /// A name as it stands in a URL.
