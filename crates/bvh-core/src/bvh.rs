@@ -2,7 +2,6 @@
 //! ids.
 
 use crate::Aabb;
-use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 
 /// The largest number of objects in one tree. It keeps node indices and counts within 31 bits.
@@ -144,7 +143,7 @@ impl Bvh {
     /// May panic on a tree that [`validate`](crate::validate()) rejects.
     pub fn depth(&self) -> usize {
         // One pass from the front is enough, because children come after their parents.
-        let mut depth = alloc::vec![0u32; self.nodes.len()];
+        let mut depth = vec![0u32; self.nodes.len()];
         for (index, node) in self.nodes.iter().enumerate() {
             let below = depth[index] + 1;
             depth[node.children()].fill(below);
@@ -208,7 +207,6 @@ impl Bvh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use alloc::vec;
 
     #[test]
     fn a_tree_with_a_padded_box_is_not_tight_until_it_is_refitted() {

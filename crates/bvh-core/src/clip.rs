@@ -143,7 +143,6 @@ fn cut(polygon: &Polygon, axis: usize, position: f64, side: f64) -> Polygon {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use alloc::vec::Vec;
     use proptest::prelude::*;
 
     fn coordinate() -> impl Strategy<Value = f32> {
@@ -166,7 +165,7 @@ mod tests {
     }
 
     fn scene(corners: [Vec3; 3]) -> Vec<Triangle> {
-        alloc::vec![Triangle(corners)]
+        vec![Triangle(corners)]
     }
 
     proptest! {

@@ -3,7 +3,7 @@
 
 use crate::cost::SahConstants;
 use crate::{Aabb, Bvh, Node};
-use alloc::{borrow::Cow, vec, vec::Vec};
+use std::borrow::Cow;
 
 /// The cheapest form of a subtree.
 #[derive(Clone, Copy, Default)]

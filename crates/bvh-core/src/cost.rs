@@ -282,8 +282,6 @@ impl FromIterator<f64> for Sum {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use alloc::string::ToString;
-    use alloc::{vec, vec::Vec};
 
     /// Unit cubes at x = 0 and x = 2 under one root of half area 7.
     fn two_cubes() -> Bvh {
@@ -316,7 +314,7 @@ mod tests {
         for wrong in [f64::NAN, f64::INFINITY, -1.0, 2e200] {
             for rejected in [SahConstants::new(wrong, 1.0), SahConstants::new(1.0, wrong)] {
                 let error = rejected.unwrap_err().to_string();
-                assert_eq!(error, alloc::format!("{wrong} is not a constant from 0 to 1e200"));
+                assert_eq!(error, format!("{wrong} is not a constant from 0 to 1e200"));
             }
         }
         let largest_box =

@@ -4,8 +4,7 @@
 /// Defines the function `$fast`. It runs the `#[inline(always)]` function `$plain`, compiled with
 /// AVX2 if the processor has it: a [`PackedAabb`](crate::PackedAabb) is then one register, which
 /// makes builds about a third faster. The operations and their order are the same, and none is
-/// fused, hence the same bits. The macro is for the crates of this workspace and needs `std` in the
-/// calling crate.
+/// fused, hence the same bits. The macro is for the crates of this workspace.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! with_vector_instructions {

@@ -21,7 +21,6 @@ use crate::collapse::binary;
 use crate::cost::Measure;
 use crate::wide::{BLOCK_COST, NODE_COST, TriangleBlock};
 use crate::{Bvh, PackedAabb};
-use alloc::vec::Vec;
 
 /// The costs of a subtree as parts of a wide layout, in the unit of its boxes' sizes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -195,12 +194,9 @@ fn row(tree: &impl LayoutTree, node: usize, levels: u32, both: CallBoth) -> Layo
     LayoutCost::join(tree.size(node), &left, &right)
 }
 
-#[cfg(feature = "std")]
 crate::with_vector_instructions! {
     row_alone = row_alone_plain<T: LayoutTree>(tree: &T, root: usize) -> LayoutCost
 }
-#[cfg(not(feature = "std"))]
-use row_alone_plain as row_alone;
 
 /// Returns the row of a node, computed by this thread.
 #[inline(always)]
@@ -208,7 +204,7 @@ fn row_alone_plain<T: LayoutTree>(tree: &T, root: usize) -> LayoutCost {
     // Children before parents, so that the rows of a path suffice: a row for every node would take
     // twice the memory of the tree.
     let mut rows: Vec<LayoutCost> = Vec::new();
-    let mut pending = alloc::vec![(root, false)];
+    let mut pending = vec![(root, false)];
     while let Some((node, has_rows)) = pending.pop() {
         match tree.children(node) {
             Err(objects) => rows.push(LayoutCost::leaf(tree.size(node), objects)),

@@ -1,8 +1,5 @@
 // The README is the front page of the crate's documentation.
 #![doc = include_str!("../README.md")]
-#![cfg_attr(not(feature = "std"), no_std)]
-
-extern crate alloc;
 
 mod aabb;
 mod bvh;

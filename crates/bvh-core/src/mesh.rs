@@ -1,7 +1,6 @@
 //! Triangles from the arrays of an indexed mesh.
 
 use crate::{MAX_OBJECTS, Triangle};
-use alloc::vec::Vec;
 use glam::Vec3;
 
 /// The reason why arrays are rejected as a mesh.
@@ -86,7 +85,6 @@ impl From<[f32; 9]> for Triangle {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use alloc::string::{String, ToString};
 
     #[test]
     fn arrays_and_vectors_give_the_same_triangles_in_the_order_of_their_indices() {

@@ -1,7 +1,6 @@
 //! The geometry of a scene's objects.
 
 use crate::{Aabb, PreparedRay, Ray, Sphere, Triangle};
-use alloc::vec::Vec;
 
 /// An object of any kind that has a box and that can be tested against rays.
 pub trait Primitive {

@@ -11,7 +11,6 @@
 use crate::exact::normal_sign;
 use crate::winding::{Open, Winding};
 use crate::{Aabb, BvhView, Hit, Ray, Triangle, WideBvh};
-use alloc::vec::Vec;
 use core::cmp::Ordering;
 use glam::Vec3;
 
@@ -131,9 +130,9 @@ impl Solid {
         distances: &mut [f64],
     ) {
         assert_eq!(points.len(), distances.len(), "a distance for every point");
-        let mut inside = alloc::vec![false; points.len()];
+        let mut inside = vec![false; points.len()];
         self.contains(wide, points, rule, &mut inside);
-        let mut closest = alloc::vec![None; points.len()];
+        let mut closest = vec![None; points.len()];
         wide.closest_points(points, &mut closest);
         for ((closest, inside), distance) in closest.iter().zip(inside).zip(distances) {
             let size = closest.map_or(f64::INFINITY, |closest| closest.distance);
@@ -178,7 +177,7 @@ fn by_crossings(
     };
     let rays: Vec<Ray> = points.iter().map(half_line).collect();
     let mut hits = Vec::new();
-    let mut counts = alloc::vec![0; rays.len()];
+    let mut counts = vec![0; rays.len()];
     wide.all_hits_of(&rays, &mut hits, &mut counts);
     let mut hits = &hits[..];
     for (inside, count) in inside.iter_mut().zip(counts) {

@@ -32,7 +32,6 @@
 //! ```
 
 use crate::{BvhView, Hit, Node, NodeKind, Primitive, Ray, Slabs};
-use alloc::vec::Vec;
 use core::ops::ControlFlow;
 use smallvec::SmallVec;
 

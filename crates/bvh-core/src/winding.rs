@@ -28,11 +28,10 @@
 //! paper: errors are bounded, and no parameter trades them for time.
 
 use crate::{Aabb, BvhView, Triangle};
-use alloc::collections::{BinaryHeap, VecDeque};
-use alloc::vec::Vec;
 use core::f64::consts::PI;
 use core::ops::Range;
 use glam::{DMat3, DVec3, Vec3};
+use std::collections::{BinaryHeap, VecDeque};
 
 /// Triangles that are near to each other, and the terms of their solid angles.
 #[derive(Clone, Debug)]
@@ -165,11 +164,11 @@ impl Winding {
         /// The number of triangles up to which a subtree becomes a leaf.
         const LEAF: u32 = 8;
         // A divided triangle belongs to the first of its leaves.
-        let mut is_seen = alloc::vec![false; triangles.len()];
+        let mut is_seen = vec![false; triangles.len()];
         let first_ids: Vec<bool> = (tree.prim_ids.iter())
             .map(|&id| !core::mem::replace(&mut is_seen[id as usize], true))
             .collect();
-        let mut counts = alloc::vec![0; tree.nodes.len()];
+        let mut counts = vec![0; tree.nodes.len()];
         for (i, node) in tree.nodes.iter().enumerate().rev() {
             let own = first_ids[node.prims()].iter().filter(|&&is_first| is_first).count() as u32;
             counts[i] = own + counts[node.children()].iter().sum::<u32>();
@@ -186,7 +185,7 @@ impl Winding {
                 continue;
             }
             let first = made.triangles.len();
-            let mut subtree = alloc::vec![index];
+            let mut subtree = vec![index];
             while let Some(index) = subtree.pop() {
                 let node = &tree.nodes[index];
                 subtree.extend(node.children());

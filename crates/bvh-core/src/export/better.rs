@@ -4,7 +4,6 @@ use super::three_mesh::LEAF;
 use super::{Layout, Target, ThreeMeshNode};
 use crate::traverse::{TestCounts, nearest_hit_by};
 use crate::{Aabb, Bvh, PreparedRay, Ray, Triangle};
-use alloc::vec::Vec;
 use core::f64::consts::TAU;
 use glam::DVec3;
 
@@ -185,7 +184,6 @@ mod tests {
     use super::*;
     use crate::collapse::tests::scene;
     use crate::{Node, boxes, nearest_hit};
-    use alloc::vec;
 
     #[test]
     fn the_traversal_of_three_mesh_bvh_finds_the_nearest_hit() {

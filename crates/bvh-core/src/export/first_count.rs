@@ -4,7 +4,6 @@
 use super::unpack::{Below, unpack};
 use crate::collapse::binary;
 use crate::{Aabb, Bvh, InvalidBvh, NodeKind};
-use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 
 /// A binary node of 32 bytes, as in most libraries. The fields have the same order as in `BVHNode`
@@ -77,7 +76,7 @@ impl Bvh {
 /// Converts the nodes of a binary tree, with `spare` unused nodes after the root. In the tree
 /// itself every pair of siblings begins at an odd index.
 fn first_count(tree: &Bvh, spare: usize) -> Vec<FirstCountNode> {
-    let mut nodes = alloc::vec![FirstCountNode::default(); tree.nodes.len()];
+    let mut nodes = vec![FirstCountNode::default(); tree.nodes.len()];
     // A root without children needs no spare node.
     if nodes.len() > 1 {
         nodes.resize(nodes.len() + spare, FirstCountNode::default());

@@ -5,7 +5,6 @@ use super::FirstCountNode;
 use crate::collapse::{binary, collapse_at_most};
 use crate::cost::{self, SahConstants};
 use crate::{Aabb, Bvh, Node, file};
-use alloc::{format, string::String, vec, vec::Vec};
 use bytemuck::NoUninit;
 
 /// A tracer that traces rays through a ready tree.

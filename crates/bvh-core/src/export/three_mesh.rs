@@ -4,7 +4,6 @@
 use super::unpack::{Below, unpack};
 use crate::collapse::binary;
 use crate::{Aabb, Bvh, InvalidBvh, Node};
-use alloc::{vec, vec::Vec};
 use bytemuck::{Pod, Zeroable};
 
 /// A node of 32 bytes in the first version of the format that `MeshBVH.deserialize` reads. Nodes

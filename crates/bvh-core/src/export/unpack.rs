@@ -2,7 +2,6 @@
 
 use crate::validate::Marks;
 use crate::{Aabb, Bvh, InvalidBvh, MAX_OBJECTS, Node};
-use alloc::vec::Vec;
 
 /// What is below a node of a layout.
 pub(super) enum Below {

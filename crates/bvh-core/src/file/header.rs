@@ -4,9 +4,6 @@
 use super::error::{FileError, VERSION};
 use crate::cost::{Objective, SahConstants};
 use crate::{Aabb, MAX_OBJECTS, Node};
-use alloc::borrow::ToOwned;
-use alloc::string::String;
-use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 
 /// The header of a tree file. [The format](super) documents the position of each field.

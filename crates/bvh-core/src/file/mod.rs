@@ -77,11 +77,10 @@ pub use header::Header;
 use crate::cost::{CallBoth, Objective, call_in_turn};
 use crate::validate::{Leaves, check_structure};
 use crate::{Aabb, Bvh, BvhView, InvalidBvh, Node, validate};
-use alloc::borrow::Cow;
-use alloc::vec::Vec;
 use bytemuck::Pod;
 use crc32fast::Hasher;
 use glam::Vec3;
+use std::borrow::Cow;
 
 const _: () = assert!(cfg!(target_endian = "little"), "tree files have the bytes of memory");
 

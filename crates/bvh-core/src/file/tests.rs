@@ -3,7 +3,6 @@
 use super::*;
 use crate::cost::SahConstants;
 use crate::{Clip, Ray, nearest_hit_by, validate_references};
-use alloc::vec;
 
 const ORIGIN: Origin = Origin {
     method: "best",

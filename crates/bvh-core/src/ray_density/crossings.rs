@@ -2,8 +2,6 @@
 //! counts into tables.
 
 use super::{Cell, Corner};
-use alloc::vec;
-use alloc::vec::Vec;
 use glam::{DVec3, Vec4};
 
 /// The number of cells of the grid along each axis.

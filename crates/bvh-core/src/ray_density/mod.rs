@@ -41,7 +41,6 @@ mod segment;
 
 use crate::cost::Measure;
 use crate::{Aabb, Bvh, Node, PackedAabb};
-use alloc::vec::Vec;
 use crossings::{CELLS, Crossings, index};
 use glam::{DVec3, DVec4, Vec4};
 pub use segment::{DensityError, Segment};
@@ -295,12 +294,9 @@ impl RayDensity {
     }
 }
 
-#[cfg(feature = "std")]
 crate::with_vector_instructions! {
     fractional_entries = entries_plain(density: &RayDensity, bounds: &PackedAabb) -> f64
 }
-#[cfg(not(feature = "std"))]
-use entries_plain as fractional_entries;
 
 /// Returns the entries times 512³ of a box that is not empty.
 #[inline(always)]

@@ -5,7 +5,6 @@
 //! in this cell is in no leaf.
 
 use crate::{Aabb, Clip};
-use alloc::vec::Vec;
 
 /// The number of cuts per leaf after which a covering is rejected, so that a forged file cannot
 /// keep the check busy forever. Leaves that builders and searches make by dividing an object at
@@ -19,7 +18,7 @@ const CUTS_PER_LEAF: usize = 256;
 /// O(leaves²): every cut compares its part with every leaf.
 pub(super) fn is_covered(objects: &dyn Clip, object: u32, full: &Aabb, leaves: &[Aabb]) -> bool {
     let mut cuts_left = CUTS_PER_LEAF * leaves.len();
-    let mut open: Vec<Aabb> = alloc::vec![*full];
+    let mut open: Vec<Aabb> = vec![*full];
     while let Some(region) = open.pop() {
         // Clip tightly, because a slightly enlarged part might extend beyond the leaf that was made
         // for it.
@@ -93,7 +92,7 @@ mod tests {
             [Triangle([Vec3::ZERO, Vec3::new(3.0, 2.0, 0.1), Vec3::new(2.9, 2.1, 0.3)])];
         let objects = triangles.as_slice();
         let full = triangles[0].aabb();
-        let mut leaves = alloc::vec![full];
+        let mut leaves = vec![full];
         // Every part is cut at its middle along one axis after the other.
         for axis in [0, 1, 2, 0] {
             leaves = leaves.iter().flat_map(|part| halves_of_part(&objects, part, axis)).collect();

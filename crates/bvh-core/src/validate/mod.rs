@@ -4,7 +4,6 @@
 mod covering;
 
 use crate::{Aabb, Bvh, BvhView, Clip, InvalidBoxReason, MAX_OBJECTS, NodeKind};
-use alloc::vec::Vec;
 
 /// The reason why a tree is rejected. Nodes and objects are identified by index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -78,7 +77,7 @@ pub fn validate_references(
     }
     check_structure(tree.into(), boxes.len(), Leaves::OneOrMore)?;
     check_nesting(tree)?;
-    let mut leaf_counts = alloc::vec![0u32; boxes.len()];
+    let mut leaf_counts = vec![0u32; boxes.len()];
     for &object in &tree.prim_ids {
         leaf_counts[object as usize] += 1;
     }
@@ -223,7 +222,7 @@ pub(crate) struct Marks(Vec<u64>);
 
 impl Marks {
     pub(crate) fn new(len: usize) -> Self {
-        Self(alloc::vec![0; len.div_ceil(64)])
+        Self(vec![0; len.div_ceil(64)])
     }
 
     /// Marks an index. Returns whether it was not marked before.
@@ -245,7 +244,6 @@ impl Marks {
 mod tests {
     use super::*;
     use crate::Node;
-    use alloc::vec;
 
     fn cube(x: f32) -> Aabb {
         Aabb::from(([x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]))

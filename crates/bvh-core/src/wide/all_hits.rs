@@ -46,7 +46,6 @@ use super::triangles::TriangleBlock;
 use super::{portable, vector};
 use crate::exact::Line;
 use crate::{Coherence, Hit, Kernel, Ray, Slabs, Triangle};
-use alloc::vec::Vec;
 
 impl WideBvh {
     /// Returns the hits of the ray in its range, each crossing of a surface once, the nearest

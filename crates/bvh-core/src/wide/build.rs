@@ -5,7 +5,6 @@ use super::layout::{Child, WideBvh, WideNode};
 use super::triangles::TriangleBlock;
 use crate::collapse::{binary, binary_visited, collect};
 use crate::{Aabb, Bvh, Triangle};
-use alloc::{vec, vec::Vec};
 
 /// By how much each subtree promises to stop a ray, in relation to the expected time of tracing a
 /// ray through it. Rays that ask for any hit visit the child of most promise first, which is in the

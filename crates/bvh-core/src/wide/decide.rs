@@ -3,7 +3,6 @@
 
 use super::triangles::TriangleBlock;
 use crate::{Bvh, NodeKind};
-use alloc::{vec, vec::Vec};
 
 /// Expected time of visiting a wide node: the unit.
 pub(crate) const NODE_COST: f32 = 1.0;

@@ -31,7 +31,6 @@
 
 use super::layout::WideBvh;
 use crate::{Aabb, Bvh, Hit, InvalidBvh, Ray, Slabs, any_hit_by, nearest_hit_by, validate};
-use alloc::vec::Vec;
 use glam::{Affine3A, DAffine3, DMat3, DVec3, Vec3Swizzles};
 
 /// A transformed copy of a part.

@@ -1,7 +1,6 @@
 //! The implementations of the wide layout's traversal, and which of them this processor can run.
 
 use super::lanes::Aligned;
-use alloc::vec::Vec;
 
 /// An implementation of the traversal of a [`WideBvh`](crate::WideBvh). All answer rays by the same
 /// bits, and find the same [closest points](crate::WideBvh::closest_point); only in a layout with
@@ -10,9 +9,9 @@ use alloc::vec::Vec;
 pub enum Kernel {
     /// Code for any machine; counts its tests on request.
     Portable,
-    /// x86-64 with AVX2 and FMA. Needs the feature `std`, which detects them.
+    /// x86-64 with AVX2 and FMA.
     Avx2,
-    /// x86-64 with AVX-512 F, VL, DQ and BW. Needs the feature `std`, too.
+    /// x86-64 with AVX-512 F, VL, DQ and BW.
     Avx512,
     /// Registers of 128 bits: NEON on 64-bit ARM, and WebAssembly compiled with SIMD128.
     Simd128,

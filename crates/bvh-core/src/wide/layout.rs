@@ -4,7 +4,6 @@ use super::kernel::Kernel;
 use super::triangles::TriangleBlock;
 use crate::slabs::near_region;
 use crate::{Aabb, Bvh, Node};
-use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 
 /// A node's eight children, or fewer in the lower lanes: four cache lines.

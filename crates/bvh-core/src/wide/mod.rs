@@ -2,7 +2,7 @@
 //! block, tested at once.
 
 // Some machines have no vector kernel, and then its parts are unused.
-#![cfg_attr(not(all(feature = "std", target_arch = "x86_64")), allow(dead_code))]
+#![cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
 
 mod all_hits;
 mod answer;
@@ -30,7 +30,7 @@ mod refit;
 mod tightness;
 mod triangles;
 // The kernels of the target, or none.
-#[cfg_attr(all(feature = "std", target_arch = "x86_64"), path = "x86/mod.rs")]
+#[cfg_attr(target_arch = "x86_64", path = "x86/mod.rs")]
 #[cfg_attr(
     any(
         all(target_arch = "aarch64", target_feature = "neon"),
@@ -53,7 +53,6 @@ pub use tightness::NodeTest;
 pub(crate) use triangles::TriangleBlock;
 
 use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate_references};
-use alloc::vec::Vec;
 use answer::{ANY_HIT, NEAREST_HIT};
 use one_ray::{All, Filter, OneRay};
 use portable::walk;

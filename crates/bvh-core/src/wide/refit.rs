@@ -4,7 +4,6 @@ use super::layout::{Child, WideBvh, WideNode};
 use super::triangles::TriangleBlock;
 use crate::slabs::near_region;
 use crate::{Aabb, Triangle};
-use alloc::vec;
 
 /// Why a layout cannot follow its triangles, and has to be made anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

@@ -10,7 +10,6 @@ use super::prepared::{Prepared, Ready};
 use super::ray_lanes::{RayBounds, RayLanes};
 use super::{WideBvh, vector};
 use crate::{Aabb, Kernel, Ray, TestCounts};
-use alloc::vec;
 use core::mem::MaybeUninit;
 
 /// A test of the boxes of a node.
