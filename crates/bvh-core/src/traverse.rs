@@ -31,7 +31,7 @@
 //! # Ok::<(), bvh_core::InvalidRay>(())
 //! ```
 
-use crate::{BvhView, Hit, Node, NodeKind, Primitive, Ray, Slabs};
+use crate::{BvhView, Hit, NodeKind, Primitive, Ray, Slabs};
 use core::ops::ControlFlow;
 use smallvec::SmallVec;
 
@@ -214,9 +214,6 @@ struct Pending {
     kind: NodeKind,
 }
 
-/// Only very deep trees need memory from the heap.
-type Stack = SmallVec<[Pending; 64]>;
-
 /// Calls `leaf` with the objects of every leaf that the ray may hit, the nearest leaf first, until
 /// `leaf` breaks. `leaf` may lower the distance beyond which boxes are skipped.
 #[inline(always)]
@@ -234,42 +231,59 @@ fn walk<C: Counter>(
         return;
     }
     let mut kind = root.kind();
-    let mut stack = Stack::new();
+    let mut stack = SmallVec::<[Pending; 64]>::new();
     loop {
         match kind {
-            NodeKind::Leaf { .. } => {
-                if leaf(objects(tree, kind), &mut t_max, counter).is_break() {
+            NodeKind::Leaf { first, count } => {
+                let first = first as usize;
+                let objects = &tree.prim_ids[first..first + count as usize];
+                if leaf(objects, &mut t_max, counter).is_break() {
                     return;
                 }
             }
             NodeKind::Inner { first, count: 2 } => {
                 counter.boxes(2);
                 let pair = &tree.nodes[first as usize..first as usize + 2];
-                let a = slabs.entry(&pair[0].aabb);
-                let b = slabs.entry(&pair[1].aabb);
-                let mut visit = |near, far, entries| {
-                    descend(tree, near, far, entries, &mut t_max, &mut stack, &mut leaf, counter)
-                };
+                let (a, b) = (slabs.entry(&pair[0].aabb), slabs.entry(&pair[1].aabb));
                 // This branch is often mispredicted, but it pays: the processor continues with the
                 // child that it expects to be nearer while the distances are still being computed.
-                let next = if b < a {
-                    visit(&pair[1], &pair[0], [b, a])
-                } else {
-                    visit(&pair[0], &pair[1], [a, b])
-                };
-                match next {
-                    ControlFlow::Continue(Some(next)) => {
-                        kind = next;
-                        continue;
+                let (entry, near, far_entry, far) =
+                    if b < a { (b, &pair[1], a, &pair[0]) } else { (a, &pair[0], b, &pair[1]) };
+                if entry <= t_max {
+                    if far_entry <= t_max {
+                        stack.push(Pending { entry: far_entry, kind: far.kind() });
                     }
-                    ControlFlow::Continue(None) => {}
-                    ControlFlow::Break(()) => return,
+                    kind = near.kind();
+                    continue;
                 }
             }
             NodeKind::Inner { first, count } => {
                 counter.boxes(count as usize);
-                let children = &tree.nodes[first as usize..first as usize + count as usize];
-                push_sorted(children, &slabs, t_max, &mut stack);
+                let mut nearest: Option<Pending> = None;
+                let waiting = stack.len();
+                // From the last on, so that the first of several at the same distance is nearest.
+                for child in tree.nodes[first as usize..][..count as usize].iter().rev() {
+                    let mut child = Pending { entry: slabs.entry(&child.aabb), kind: child.kind() };
+                    if child.entry > t_max {
+                        continue;
+                    }
+                    let Some(nearest) = &mut nearest else {
+                        nearest = Some(child);
+                        continue;
+                    };
+                    if child.entry <= nearest.entry {
+                        core::mem::swap(&mut child, nearest);
+                    }
+                    stack.push(child);
+                }
+                if stack.len() > waiting + 1 {
+                    // Stable, for the same reason.
+                    stack[waiting..].sort_by(|a, b| b.entry.total_cmp(&a.entry));
+                }
+                if let Some(nearest) = nearest {
+                    kind = nearest.kind;
+                    continue;
+                }
             }
         }
         kind = loop {
@@ -279,73 +293,5 @@ fn walk<C: Counter>(
                 break pending.kind;
             }
         };
-    }
-}
-
-/// Visits the nearer of two children at once if it is a leaf, and otherwise returns it to be
-/// visited next. Pushes the farther child if it has to wait, and returns it if the nearer one is
-/// done. Returns `None` if the ray enters neither.
-#[inline(always)]
-#[allow(clippy::too_many_arguments, reason = "the state of a walk, in registers")]
-fn descend<C: Counter>(
-    tree: BvhView,
-    near: &Node,
-    far: &Node,
-    [near_entry, far_entry]: [f32; 2],
-    t_max: &mut f32,
-    stack: &mut Stack,
-    leaf: &mut impl FnMut(&[u32], &mut f32, &mut C) -> ControlFlow<()>,
-    counter: &mut C,
-) -> ControlFlow<(), Option<NodeKind>> {
-    if near_entry > *t_max {
-        return ControlFlow::Continue(None);
-    }
-    if let NodeKind::Leaf { .. } = near.kind() {
-        leaf(objects(tree, near.kind()), t_max, counter)?;
-        // `leaf` may have lowered `t_max`.
-        return ControlFlow::Continue((far_entry <= *t_max).then(|| far.kind()));
-    }
-    if far_entry <= *t_max {
-        stack.push(Pending { entry: far_entry, kind: far.kind() });
-    }
-    ControlFlow::Continue(Some(near.kind()))
-}
-
-#[inline(always)]
-fn objects(tree: BvhView<'_>, leaf: NodeKind) -> &[u32] {
-    match leaf {
-        NodeKind::Leaf { first, count } => {
-            &tree.prim_ids[first as usize..first as usize + count as usize]
-        }
-        NodeKind::Inner { .. } => &[],
-    }
-}
-
-/// Pushes the children that the ray enters, in such an order that the nearest one is popped first.
-/// Among children at the same distance, the lower index is popped first.
-fn push_sorted(children: &[Node], slabs: &Slabs, t_max: f32, stack: &mut Stack) {
-    // Only nodes with more than 16 children need memory from the heap.
-    let mut few = [(0.0, 0); 16];
-    let mut many = Vec::new();
-    let entered = match few.get_mut(..children.len()) {
-        Some(few) => few,
-        None => {
-            many.resize(children.len(), (0.0, 0));
-            &mut many[..]
-        }
-    };
-    let mut count = 0;
-    for (index, child) in children.iter().enumerate() {
-        let entry = slabs.entry(&child.aabb);
-        // Written always and kept only if the ray enters the child: no branch.
-        entered[count] = (entry, index);
-        count += usize::from(entry <= t_max);
-    }
-    entered[..count].sort_unstable_by(|a, b| {
-        let by_distance = b.0.total_cmp(&a.0);
-        by_distance.then(b.1.cmp(&a.1))
-    });
-    for &(entry, index) in &entered[..count] {
-        stack.push(Pending { entry, kind: children[index].kind() });
     }
 }
