@@ -2,7 +2,7 @@
 //! children per node.
 
 use crate::cost::SahConstants;
-use crate::{Aabb, Bvh, Node};
+use crate::{Aabb, Bvh, BvhView, Node};
 use std::borrow::Cow;
 
 /// The cheapest form of a subtree.
@@ -23,11 +23,11 @@ struct Subtree {
 /// # Panics
 /// May panic on a tree that [`validate`](crate::validate()) rejects.
 pub fn collapse_leaves(tree: &Bvh, constants: &SahConstants) -> Bvh {
-    collapse_at_most(tree, constants, u32::MAX)
+    collapse_at_most(tree.into(), constants, u32::MAX)
 }
 
 /// Does the same, but makes no leaves of more than `most` objects.
-pub(crate) fn collapse_at_most(tree: &Bvh, constants: &SahConstants, most: u32) -> Bvh {
+pub(crate) fn collapse_at_most(tree: BvhView, constants: &SahConstants, most: u32) -> Bvh {
     let mut best = vec![Subtree::default(); tree.nodes.len()];
     // Backwards, because the cost of a node depends on its children, which come after it.
     for (index, node) in tree.nodes.iter().enumerate().rev() {
@@ -69,7 +69,7 @@ pub(crate) fn collapse_at_most(tree: &Bvh, constants: &SahConstants, most: u32) 
 }
 
 /// Appends the ids of the objects below `subtree`, in the tree's order.
-pub(crate) fn collect(tree: &Bvh, subtree: usize, ids: &mut Vec<u32>) {
+pub(crate) fn collect(tree: BvhView, subtree: usize, ids: &mut Vec<u32>) {
     // Most subtrees are leaves, which need no stack.
     if tree.nodes[subtree].is_leaf() {
         ids.extend_from_slice(&tree.prim_ids[tree.nodes[subtree].prims()]);
@@ -194,7 +194,7 @@ pub(crate) mod tests {
 
     pub(crate) fn objects(tree: &Bvh, node: usize) -> f64 {
         let mut ids = Vec::new();
-        collect(tree, node, &mut ids);
+        collect(tree.into(), node, &mut ids);
         ids.len() as f64
     }
 

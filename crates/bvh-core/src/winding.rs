@@ -27,11 +27,13 @@
 //! van Oosterom & Strackee 1983, 'The solid angle of a plane triangle'. Differs from the first
 //! paper: errors are bounded, and no parameter trades them for time.
 
-use crate::{Aabb, BvhView, Triangle};
+use crate::collapse::collapse_at_most;
+use crate::cost::SahConstants;
+use crate::{Aabb, Bvh, BvhView, Triangle};
 use core::f64::consts::PI;
 use core::ops::Range;
 use glam::{DMat3, DVec3, Vec3};
-use std::collections::{BinaryHeap, VecDeque};
+use std::collections::BinaryHeap;
 
 /// Triangles that are near to each other, and the terms of their solid angles.
 #[derive(Clone, Debug)]
@@ -55,21 +57,18 @@ struct Patch {
 }
 
 impl Patch {
-    /// Returns a patch without area over a range.
-    fn new(range: Range<usize>, is_leaf: bool) -> Self {
-        Self {
-            center: DVec3::ZERO,
-            radius: 0.0,
-            area: 0.0,
-            normal: DVec3::ZERO,
-            moment: DMat3::ZERO,
-            spread: 0.0,
-            aabb: Aabb::EMPTY,
-            first: range.start as u32,
-            count: range.len() as u32,
-            is_leaf,
-        }
-    }
+    const EMPTY: Self = Self {
+        center: DVec3::ZERO,
+        radius: 0.0,
+        area: 0.0,
+        normal: DVec3::ZERO,
+        moment: DMat3::ZERO,
+        spread: 0.0,
+        aabb: Aabb::EMPTY,
+        first: 0,
+        count: 0,
+        is_leaf: true,
+    };
 
     fn range(&self) -> Range<usize> {
         self.first as usize..(self.first + self.count) as usize
@@ -84,26 +83,29 @@ impl Patch {
         let squares: f64 = [a, b, c].iter().map(|p| p.distance_squared(center)).sum();
         let spread = area * squares / 12.0;
         let aabb = triangle.aabb();
-        Self { center, area, normal, spread, aabb, ..Self::new(0..0, true) }
+        Self { center, area, normal, spread, aabb, ..Self::EMPTY }
     }
 
-    /// Writes the terms of all parts together.
-    fn merge(&mut self, parts: impl Iterator<Item = Patch> + Clone) {
+    /// Returns the terms of all parts together.
+    fn merged(parts: impl Iterator<Item = Patch> + Clone) -> Self {
+        let mut whole = Self::EMPTY;
         for part in parts.clone() {
-            self.area += part.area;
-            self.center += part.area * part.center;
-            self.aabb = self.aabb.union(&part.aabb);
+            whole.area += part.area;
+            whole.center += part.area * part.center;
+            whole.aabb = whole.aabb.union(&part.aabb);
         }
-        let [lower, upper] = [self.aabb.min.as_dvec3(), self.aabb.max.as_dvec3()];
-        self.center = if self.area > 0.0 { self.center / self.area } else { (lower + upper) / 2.0 };
+        // Any centre will do where nothing has an area.
+        whole.center /= if whole.area > 0.0 { whole.area } else { 1.0 };
         for part in parts {
-            let h = part.center - self.center;
-            self.normal += part.normal;
-            self.spread += part.spread + part.area * h.length_squared();
-            self.moment += part.moment
+            let h = part.center - whole.center;
+            whole.normal += part.normal;
+            whole.spread += part.spread + part.area * h.length_squared();
+            whole.moment += part.moment
                 + DMat3::from_cols(part.normal * h.x, part.normal * h.y, part.normal * h.z);
         }
-        self.radius = (self.center - lower).max(upper - self.center).length();
+        let [lower, upper] = [whole.aabb.min, whole.aabb.max].map(Vec3::as_dvec3);
+        whole.radius = (whole.center - lower).max(upper - whole.center).length();
+        whole
     }
 
     /// Returns an estimate of the solid angle, and a bound of its error; `None` for a near point.
@@ -163,48 +165,30 @@ impl Winding {
     pub(crate) fn new(tree: BvhView, triangles: &[Triangle]) -> Self {
         /// The number of triangles up to which a subtree becomes a leaf.
         const LEAF: u32 = 8;
-        // A divided triangle belongs to the first of its leaves.
+        let free_leaves = SahConstants { traversal: 1.0, intersection: 0.0 };
+        let Bvh { nodes, prim_ids } = collapse_at_most(tree, &free_leaves, LEAF);
+        let mut patches = vec![Patch::EMPTY; nodes.len()];
+        let mut sorted = Vec::with_capacity(triangles.len());
         let mut is_seen = vec![false; triangles.len()];
-        let first_ids: Vec<bool> = (tree.prim_ids.iter())
-            .map(|&id| !core::mem::replace(&mut is_seen[id as usize], true))
-            .collect();
-        let mut counts = vec![0; tree.nodes.len()];
-        for (i, node) in tree.nodes.iter().enumerate().rev() {
-            let own = first_ids[node.prims()].iter().filter(|&&is_first| is_first).count() as u32;
-            counts[i] = own + counts[node.children()].iter().sum::<u32>();
-        }
-        let mut made = Self { patches: Vec::new(), triangles: Vec::with_capacity(triangles.len()) };
-        let mut open: VecDeque<usize> = tree.nodes.first().map(|_| 0).into_iter().collect();
-        while let Some(index) = open.pop_front() {
-            let node = &tree.nodes[index];
-            if counts[index] > LEAF && !node.is_leaf() {
-                let first = made.patches.len() + 1 + open.len();
-                open.extend(node.children().filter(|&child| counts[child] > 0));
-                let end = made.patches.len() + 1 + open.len();
-                made.patches.push(Patch::new(first..end, false));
-                continue;
+        // Children come after their parents.
+        for (index, node) in nodes.iter().enumerate().rev() {
+            let first = sorted.len();
+            for &id in &prim_ids[node.prims()] {
+                // A divided triangle belongs to one of its leaves.
+                if !core::mem::replace(&mut is_seen[id as usize], true) {
+                    sorted.push(triangles[id as usize]);
+                }
             }
-            let first = made.triangles.len();
-            let mut subtree = vec![index];
-            while let Some(index) = subtree.pop() {
-                let node = &tree.nodes[index];
-                subtree.extend(node.children());
-                let ids = node.prims().filter(|&position| first_ids[position]);
-                made.triangles.extend(ids.map(|i| triangles[tree.prim_ids[i] as usize]));
-            }
-            made.patches.push(Patch::new(first..made.triangles.len(), true));
-        }
-        for i in (0..made.patches.len()).rev() {
-            let (before, after) = made.patches.split_at_mut(i + 1);
-            let patch = &mut before[i];
-            let range = patch.range();
-            if patch.is_leaf {
-                patch.merge(made.triangles[range].iter().map(Patch::of));
+            let (patch, range) = if node.is_leaf() {
+                (Patch::merged(sorted[first..].iter().map(Patch::of)), first..sorted.len())
             } else {
-                patch.merge(after[range.start - i - 1..range.end - i - 1].iter().cloned());
-            }
+                let range = node.children();
+                (Patch::merged(patches[range.clone()].iter().cloned()), range)
+            };
+            let (first, count) = (range.start as u32, range.len() as u32);
+            patches[index] = Patch { first, count, is_leaf: node.is_leaf(), ..patch };
         }
-        made
+        Self { patches, triangles: sorted }
     }
 
     /// Returns whether triangles wind round a finite point, in either direction: whether the size
@@ -277,8 +261,7 @@ mod tests {
                     triangles.push(Triangle([a, c, b]));
                 }
             }
-            let mut patch = Patch::new(0..triangles.len(), true);
-            patch.merge(triangles.iter().map(Patch::of));
+            let patch = Patch::merged(triangles.iter().map(Patch::of));
             let direction = DVec3::from(direction).try_normalize().unwrap_or(DVec3::X);
             let point = patch.center + direction * (patch.radius / ratio);
             let [value, error] = patch.estimate(point).unwrap();
@@ -293,19 +276,15 @@ mod tests {
         fn patches_of_patches_have_the_terms_of_all_their_triangles(corners in points(6..60)) {
             let (corners, _) = corners.as_chunks::<3>();
             let parts: Vec<Patch> = corners.iter().map(|&c| Patch::of(&Triangle(c))).collect();
-            let mut whole = Patch::new(0..0, true);
-            whole.merge(parts.iter().cloned());
-            let mut halves = [Patch::new(0..0, true), Patch::new(0..0, true)];
+            let whole = Patch::merged(parts.iter().cloned());
             let (left, right) = parts.split_at(parts.len() / 2);
-            halves[0].merge(left.iter().cloned());
-            halves[1].merge(right.iter().cloned());
-            let mut merged = Patch::new(0..0, false);
-            merged.merge(halves.into_iter());
+            let halves = [left, right].map(|half| Patch::merged(half.iter().cloned()));
+            let merged = Patch::merged(halves.into_iter());
             prop_assert!((merged.spread - whole.spread).abs() < 1e-9);
             prop_assert!(merged.center.abs_diff_eq(whole.center, 1e-9));
             prop_assert!(merged.moment.abs_diff_eq(whole.moment, 1e-9));
             prop_assert!(merged.normal.abs_diff_eq(whole.normal, 1e-9));
-            prop_assert_eq!(merged.radius, (merged.center - whole.aabb.min.as_dvec3()).max(whole.aabb.max.as_dvec3() - merged.center).length());
+            prop_assert!((merged.radius - whole.radius).abs() < 1e-9);
         }
     }
 }

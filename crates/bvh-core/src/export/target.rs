@@ -131,7 +131,8 @@ impl Target {
     /// # Panics
     /// May panic on a tree that [`validate`](crate::validate()) rejects.
     pub fn fit(&self, tree: &Bvh) -> Bvh {
-        let mut fitted = collapse_at_most(&binary(tree), &self.constants, self.most_objects);
+        let mut fitted =
+            collapse_at_most((&*binary(tree)).into(), &self.constants, self.most_objects);
         fitted.halve_leaves(self.most_objects as usize);
         limit_depth(&mut fitted, self.most_depth);
         larger_first(&mut fitted);
@@ -270,5 +271,5 @@ fn balance(tree: &mut Bvh, root: usize) {
 /// Returns the nodes that the root reaches, in depth-first order.
 fn compact(tree: &Bvh) -> Bvh {
     // No inner node becomes a leaf of at most no objects, whatever the constants.
-    collapse_at_most(tree, &SahConstants::default(), 0)
+    collapse_at_most(tree.into(), &SahConstants::default(), 0)
 }

@@ -82,7 +82,7 @@ pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) 
     let leaf = |subtree| {
         let child = Child::leaf(all_blocks.len() as u32);
         ids.clear();
-        collect(tree, subtree, &mut ids);
+        collect(tree.into(), subtree, &mut ids);
         if split {
             // Several parts of one triangle in one leaf are the triangle.
             ids.sort_unstable();
