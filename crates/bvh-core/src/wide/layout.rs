@@ -2,8 +2,7 @@
 
 use super::kernel::Kernel;
 use super::triangles::TriangleBlock;
-use crate::slabs::near_region;
-use crate::{Aabb, Bvh, Node};
+use crate::Aabb;
 use bytemuck::{Pod, Zeroable};
 
 /// A node's eight children, or fewer in the lower lanes: four cache lines.
@@ -128,7 +127,7 @@ pub struct WideBvh {
     pub(crate) root: Option<Child>,
     pub(crate) nodes: Vec<WideNode>,
     pub(crate) blocks: Vec<TriangleBlock>,
-    /// The [region](near_region) from which f32 tells the boxes apart.
+    /// The [region](crate::slabs::near_region) from which f32 tells the boxes apart.
     pub(crate) near: Aabb,
     /// The kernel that traces it. The processor has its instructions.
     pub(crate) kernel: Kernel,
@@ -140,52 +139,5 @@ impl WideBvh {
     #[inline(always)]
     pub(crate) fn places(&self) -> Places {
         Places { nodes: self.nodes.as_ptr().cast(), blocks: self.blocks.as_ptr().cast() }
-    }
-
-    /// Returns the layout as a tree, for the wide nodes of other tracers: up to eight children of a
-    /// node in the order of the lanes, and leaves of the triangles of their blocks. Triangles without
-    /// area are in no leaf, so that a node may have a single child. O(n).
-    pub fn to_tree(&self) -> Bvh {
-        let mut tree = Bvh::default();
-        let mut open = Vec::new();
-        if let Some(root) = self.root {
-            tree.nodes.push(Node::leaf(self.bounds, 0, 0));
-            open.push((0, root));
-        }
-        while let Some((place, child)) = open.pop() {
-            let aabb = tree.nodes[place].aabb;
-            if child.is_node() {
-                let node = &self.nodes[child.index()];
-                let first = tree.nodes.len();
-                for (lane, &child) in node.children.iter().enumerate() {
-                    if let Some(aabb) = node.lane_box(lane) {
-                        open.push((tree.nodes.len(), child));
-                        tree.nodes.push(Node::leaf(aabb, 0, 0));
-                    }
-                }
-                let children = tree.nodes.len() - first;
-                tree.nodes[place] = Node::inner(aabb, first as u32, children as u32);
-            } else {
-                let first = tree.prim_ids.len();
-                let triangles = self.leaf(child).iter().flat_map(TriangleBlock::triangles);
-                tree.prim_ids.extend(triangles.map(|(id, _)| id));
-                let objects = tree.prim_ids.len() - first;
-                tree.nodes[place] = Node::leaf(aabb, first as u32, objects as u32);
-            }
-        }
-        tree
-    }
-
-    /// Returns the layout of nothing within these bounds, for the portable kernel.
-    pub(super) fn without_nodes(bounds: Aabb) -> Self {
-        Self {
-            bounds,
-            root: None,
-            nodes: Vec::new(),
-            blocks: Vec::new(),
-            near: near_region(&bounds),
-            kernel: Kernel::Portable,
-            stack_need: 0,
-        }
     }
 }

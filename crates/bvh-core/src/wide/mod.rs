@@ -116,9 +116,7 @@ impl WideBvh {
         validate_references(tree, &boxes, &triangles)?;
         // Boxes take a quarter of the layout's memory, and nobody reads them again.
         drop(boxes);
-        let mut wide = build::widen(tree, triangles, visits);
-        wide.kernel = Kernel::best();
-        Ok(wide)
+        Ok(build::widen(tree, triangles, visits))
     }
 
     /// Returns the nearest triangle that `ray` meets in its range. Of several at the same distance,

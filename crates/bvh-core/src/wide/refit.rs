@@ -76,6 +76,15 @@ impl WideBvh {
         Aabb::around(corners)
     }
 
+    /// The boxes of all nodes and leaves.
+    pub(super) fn boxes(&self) -> impl Iterator<Item = (Aabb, Child)> {
+        let lanes = self.nodes.iter().flat_map(|node| {
+            let child = move |lane| Some((node.lane_box(lane)?, node.children[lane]));
+            (0..WideNode::LANES).filter_map(child)
+        });
+        self.root.map(|root| (self.bounds, root)).into_iter().chain(lanes)
+    }
+
     /// The blocks of a leaf.
     pub(super) fn leaf(&self, leaf: Child) -> &[TriangleBlock] {
         let blocks = &self.blocks[leaf.index()..];
@@ -91,12 +100,7 @@ impl WideBvh {
         let visits = |(aabb, child): (Aabb, Child)| {
             aabb.half_area() * if child.is_node() { 1.0 } else { self.leaf(child).len() as f64 }
         };
-        let lanes = |node: &WideNode| {
-            let of_lane = |lane| Some((node.lane_box(lane)?, node.children[lane]));
-            (0..WideNode::LANES).filter_map(of_lane).map(visits).sum::<f64>()
-        };
-        let total = self.root.map_or(0.0, |root| visits((self.bounds, root)))
-            + self.nodes.iter().map(lanes).sum::<f64>();
+        let total: f64 = self.boxes().map(visits).sum();
         let area = self.bounds.half_area();
         if area > 0.0 { total / area } else { 0.0 }
     }
