@@ -49,8 +49,7 @@ pub use segment::{DensityError, Segment};
 const FRACTIONS: f64 = 512.0;
 /// The value of one entry in the integer arithmetic: a product of fractions along all three axes.
 const FRACTIONS_OF_ENTRY: f64 = FRACTIONS * FRACTIONS * FRACTIONS;
-/// The length by which [`RayDensity::of_rays`] extends segments at both ends, in cells along their
-/// main axis.
+/// The length by which segments are extended at both ends, in cells along their main axis.
 ///
 /// Found on the kitchen, Sponza and smooth meshes. Without the extension the number of inner nodes
 /// that rays enter is underestimated by up to a sixth, and trees for rays from a camera in the
@@ -101,9 +100,9 @@ impl Grid {
         Ok(Self { low: min - 0.5 * padding, cells_per_unit })
     }
 
-    /// Returns the ends of a segment in cells, extended by `extension` cells along the segment's
-    /// main axis; `None` if the segment is not finite.
-    fn in_cells(&self, segment: &Segment, extension: f64) -> Option<[DVec3; 2]> {
+    /// Returns the ends of a segment in cells, [extended](LENGTHENED); `None` if the segment is not
+    /// finite.
+    fn in_cells(&self, segment: &Segment) -> Option<[DVec3; 2]> {
         let start = DVec3::from(segment.from.map(f64::from));
         let end = DVec3::from(segment.to.map(f64::from));
         if !start.is_finite() || !end.is_finite() {
@@ -114,7 +113,7 @@ impl Grid {
         let length = (to - from).abs().max_element();
         // A segment of length 0 has no direction and is not extended.
         let direction = (to - from) / length.max(f64::MIN_POSITIVE);
-        Some([from - extension * direction, to + extension * direction])
+        Some([from - LENGTHENED * direction, to + LENGTHENED * direction])
     }
 }
 
@@ -146,46 +145,24 @@ impl RayDensity {
     /// The largest number of segments for which all arithmetic is exact: 4 · 2²⁰ · 2²⁷ · 8 < 2⁵³.
     pub const MOST_SEGMENTS: usize = 1 << 20;
 
-    /// Makes the density of `segments` over a scene with these bounds. `area_weight` is the share
-    /// of the area in the measure of a box, 0 to 1. With a weight above 0, boxes that no sample
-    /// enters are not free; a tenth works well. O(segments · cells that a segment visits).
+    /// Makes the density of the rays between `segments`' ends over a scene with these bounds.
+    /// `area_weight` is the share of the area in the measure of a box, 0 to 1. With a weight above
+    /// 0, boxes that no sample enters are not free; a tenth works well. O(segments · cells that a
+    /// segment visits).
+    ///
+    /// Segments are extended at both ends by a quarter of a cell along their main axis. Rays end on
+    /// surfaces, most rays also begin on surfaces, and boxes are around surfaces. Every ray that
+    /// ends on a wall enters a flat box around the wall. But the density is interpolated within a
+    /// cell. Between the last face that rays cross and the next face, which they do not cross, half
+    /// of the rays would seem to be missing.
     ///
     /// # Errors
     /// Returns a [`DensityError`] if there are no segments or too many, if none meets the bounds,
     /// if one is not finite, or if the bounds or the weight are invalid.
-    pub fn new(
-        bounds: &Aabb,
-        segments: &[Segment],
-        area_weight: f64,
-    ) -> Result<Self, DensityError> {
-        Self::lengthened(bounds, segments, area_weight, 0.0)
-    }
-
-    /// Makes the density of rays between surfaces. It extends segments at both ends by a quarter of
-    /// a cell; otherwise it is the same as [`new`](Self::new).
-    ///
-    /// Rays end on surfaces, most rays also begin on surfaces, and boxes are around surfaces. Every
-    /// ray that ends on a wall enters a flat box around the wall. But the density is interpolated
-    /// within a cell. Between the last face that rays cross and the next face, which they do not
-    /// cross, half of the rays would seem to be missing.
-    ///
-    /// # Errors
-    /// The same as for [`new`](Self::new).
     pub fn of_rays(
         bounds: &Aabb,
         segments: &[Segment],
         area_weight: f64,
-    ) -> Result<Self, DensityError> {
-        Self::lengthened(bounds, segments, area_weight, LENGTHENED)
-    }
-
-    /// Makes the density of segments that are extended at both ends, by `extension` cells along
-    /// their main axis.
-    fn lengthened(
-        bounds: &Aabb,
-        segments: &[Segment],
-        area_weight: f64,
-        extension: f64,
     ) -> Result<Self, DensityError> {
         if !(0.0..=1.0).contains(&area_weight) {
             return Err(DensityError::AreaWeight(area_weight));
@@ -196,8 +173,7 @@ impl RayDensity {
         let grid = Grid::new(bounds)?;
         let mut crossings = Crossings::new();
         for (index, segment) in segments.iter().enumerate() {
-            let [from, to] =
-                grid.in_cells(segment, extension).ok_or(DensityError::NotFinite { index })?;
+            let [from, to] = grid.in_cells(segment).ok_or(DensityError::NotFinite { index })?;
             crossings.record(from, to);
         }
         if crossings.segments == 0 {
@@ -367,7 +343,7 @@ mod tests {
             let segments: Vec<_> = pairs.iter().map(|&[from, to]| Segment { from, to }).collect();
             // The cells have a side of 1.
             let bounds = Aabb::from([[0.0; 3], [CELLS as f32; 3]]);
-            let density = RayDensity::new(&bounds, &segments, 0.0).unwrap();
+            let density = RayDensity::of_rays(&bounds, &segments, 0.0).unwrap();
             for numbers in boxes {
                 let [i, j, k, a, b, c, d, e, f] = numbers.map(f64::from);
                 let cell = (DVec4::new(i, j, k, 0.0) % CELLS as f64).floor();

@@ -139,7 +139,7 @@ fn trees_for_a_sample_of_rays_are_entered_less_often_than_trees_by_area() {
             Segment { from: bounds.min.to_array(), to: to.to_array() }
         })
         .collect();
-    let density = RayDensity::new(&bounds, &segments, 0.1).unwrap();
+    let density = RayDensity::of_rays(&bounds, &segments, 0.1).unwrap();
     let method = Method::Best(best::Config::default());
     let area = run(&method, &boxes, None);
     let rays = run(&method, &boxes, Some(&density));
