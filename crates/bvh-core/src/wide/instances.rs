@@ -171,9 +171,8 @@ impl InstanceHit {
 pub struct Instances {
     parts: Vec<WideBvh>,
     placed: Vec<Placed>,
+    /// Its boxes are tight.
     top: Bvh,
-    /// The box of all instances; the root of the tree may be larger.
-    bounds: Aabb,
 }
 
 impl Instances {
@@ -183,19 +182,24 @@ impl Instances {
     pub fn new(
         parts: Vec<WideBvh>,
         instances: Vec<Instance>,
-        top: Bvh,
+        mut top: Bvh,
     ) -> Result<Self, InvalidInstances> {
         let placed: Vec<Placed> = (instances.iter().enumerate())
             .map(|(index, instance)| instance.place(index, &parts))
             .collect::<Result<_, _>>()?;
         let boxes: Vec<Aabb> = placed.iter().map(|placed| placed.aabb).collect();
         validate(&top, &boxes)?;
-        let bounds = Aabb::union_of(&boxes);
-        Ok(Self { parts, placed, top, bounds })
+        // Slabs depend on the root's box, and so would answers.
+        top.refit(&boxes);
+        Ok(Self { parts, placed, top })
     }
 
     fn part_of(&self, instance: u32) -> &WideBvh {
         &self.parts[self.placed[instance as usize].part as usize]
+    }
+
+    fn slabs(&self, ray: &Ray) -> Slabs {
+        Slabs::new(ray, &self.top.root_aabb().unwrap_or(Aabb::EMPTY))
     }
 
     /// Returns the nearest triangle of any instance that `ray` hits in its range. Among triangles
@@ -223,15 +227,14 @@ impl Instances {
         ray: &Ray,
         mut find: impl FnMut(&WideBvh, u32, &Ray) -> Option<Hit>,
     ) -> Option<InstanceHit> {
-        let slabs = Slabs::new(ray, &self.bounds);
+        let slabs = self.slabs(ray);
         let mut nearest: Option<(Hit, u32)> = None;
         let test = |instance: u32, t_max: f32| {
             let placed = &self.placed[instance as usize];
             let local_ray = placed.local(ray, t_max)?;
             let found = find(self.part_of(instance), instance, &local_ray)?;
             // A hit in front of the instance's box would depend on the tree: a tree that visits the
-            // box later would skip it. So would an entry by the slabs of a root that is larger than
-            // the instances.
+            // box later would skip it.
             let t = found.t.max(slabs.entry(&placed.aabb));
             let hit = Hit { t, object: instance };
             if t <= t_max && nearest.is_none_or(|(nearest, _)| hit.precedes(&nearest)) {
@@ -260,7 +263,7 @@ impl Instances {
     /// part.
     #[inline(always)]
     fn any(&self, ray: &Ray, mut hits: impl FnMut(&WideBvh, u32, &Ray) -> bool) -> bool {
-        let slabs = Slabs::new(ray, &self.bounds);
+        let slabs = self.slabs(ray);
         let test = |instance: u32| {
             let placed = &self.placed[instance as usize];
             // The nearest hit is never in front of the instance's box. If the ray ends before the

@@ -4,8 +4,8 @@
 use crate::support::layouts::bundles;
 use crate::support::{self, Random, SHAPES, ball, boxes, chain, grid_box, soup, tree};
 use bvh_core::{
-    Aabb, Bvh, Instance, InstanceHit, Instances, InvalidInstances, Kernel, Node, Ray, Triangle,
-    WideBvh, nearest_hit,
+    Aabb, Bvh, Instance, InstanceHit, Instances, InvalidInstances, Kernel, Ray, Triangle, WideBvh,
+    nearest_hit,
 };
 use glam::{Affine3A, Mat3, Mat3A, Quat, Vec3, Vec3A};
 
@@ -34,7 +34,9 @@ impl Scene {
         let boxes = Instance::boxes(&self.instances, &self.parts).unwrap();
         let mut scenes = Vec::new();
         for shape in SHAPES {
-            let top = tree(&boxes, shape, random);
+            let mut top = tree(&boxes, shape, random);
+            // Padded boxes change no answer: a ray is far from some of these roots, and near others.
+            top.nodes[0].aabb.max += random.of(&[0.0, 10.0, 1e4]);
             scenes.push(Instances::new(self.parts.clone(), self.instances.clone(), top).unwrap());
         }
         scenes
@@ -226,8 +228,6 @@ fn every_tree_and_every_kernel_answers_alike_and_filters_see_every_hit() {
         }
     }
     assert!(hits > 4000, "{hits}");
-    let empty = Instances::new(vec![], vec![], Bvh::default()).unwrap();
-    assert!(!empty.any_hit(&Ray::half_line(Vec3::ZERO, Vec3::X).unwrap()));
 }
 
 /// Returns a point whose coordinates are integers from 0 to `end` − 1.
@@ -260,24 +260,4 @@ fn an_invalid_scene_is_rejected_by_its_instance() {
     let empty = Instances::new(parts, vec![], Bvh::default()).unwrap();
     let ray = Ray::half_line([0.0; 3], [1.0; 3]).unwrap();
     assert!(empty.nearest_hit(&ray).is_none() && !empty.any_hit(&ray));
-}
-
-fn one_triangle() -> WideBvh {
-    let triangles = [Triangle::from([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]])];
-    let top = Bvh { nodes: vec![Node::leaf(boxes(&triangles)[0], 0, 1)], prim_ids: vec![0] };
-    WideBvh::new(&top, &triangles).unwrap()
-}
-
-#[test]
-fn a_tree_with_a_padded_root_gives_the_same_distances() {
-    let transform = Affine3A::from_translation(Vec3::Z * 0.1);
-    let instances = vec![Instance { part: 0, transform }];
-    let tight = Instance::boxes(&instances, &[one_triangle()]).unwrap()[0];
-    // The ray is far from the tight root, and near the padded one.
-    let ray = Ray::half_line([0.0, 0.0, -1000.0], [0.0, 0.0, 5.0]).unwrap();
-    let [one, other] = [tight, Aabb::from([[-10.0; 3], [10.0; 3]])].map(|root| {
-        let top = Bvh { nodes: vec![Node::leaf(root, 0, 1)], prim_ids: vec![0] };
-        Instances::new(vec![one_triangle()], instances.clone(), top).unwrap().nearest_hit(&ray)
-    });
-    assert!(one.is_some() && one == other, "{one:?} {other:?}");
 }
