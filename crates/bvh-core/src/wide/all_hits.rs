@@ -41,7 +41,6 @@ use super::instructions::{Instructions, Task};
 use super::lanes::{Lanes, Mask};
 use super::layout::{WideBvh, WideNode};
 use super::one_ray::{LeafRay, Leaves, traverse};
-use super::pairs::Plane;
 use super::triangles::TriangleBlock;
 use super::{portable, vector};
 use crate::exact::Line;
@@ -232,9 +231,7 @@ impl<K: Instructions> Leaves<K> for AllHits<'_, K::Block> {
         let crossings = rays.candidates(&corners).crossings;
         if crossings.possible != 0 {
             let t_max = corners[0][0].filled(nearest.t);
-            let plane = Plane::of_lanes(&corners);
-            let decided = rays.decide_in_f64(&corners, &plane, crossings, t_max);
-            let decided = Decided::new(decided);
+            let decided = Decided::new(rays.decide_in_f64(&corners, crossings, t_max));
             for lane in 0..block.len() {
                 self.hits.extend(decided.hit_of(lane, block, lane, self.ray));
             }

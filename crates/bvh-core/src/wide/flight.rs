@@ -319,9 +319,9 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
                     pairs.push(&traversal.ray, block, traversal.t(), lane, i as u32, is_certain);
                 }
             }
-            for first in (0..pairs.count()).step_by(K::Rays::N) {
+            for first in (0..pairs.count).step_by(K::Rays::N) {
                 let decided = pairs.decide::<K::Rays>(first, F::ALL);
-                for pair in first..(first + K::Rays::N).min(pairs.count()) {
+                for pair in first..(first + K::Rays::N).min(pairs.count) {
                     let (ray, lane) = pairs.names(pair);
                     let traversal = &mut *hopeful.get_unchecked(ray).traversal;
                     let block = traversal.block(wide);
@@ -475,16 +475,14 @@ unsafe fn candidates<L: Lanes, F: Find>(
     // SAFETY: the processor has the instructions; the rays are at blocks; the bits of the nearest
     // hit are the first two of four aligned lanes.
     unsafe {
-        let test = |i: usize| Test { ray: &(*four[i]).ray, block: (*four[i]).block(wide) };
-        let tests = [test(0), test(1), test(2), test(3)];
+        let tests = four.map(|at| Test { ray: &(*at).ray, block: (*at).block(wide) });
         let rays = Test::rays::<L>(tests);
         let candidates = rays.candidates(&Test::corners(tests));
         let crossings = candidates.crossings;
         if F::ALL {
             return (crossings, 0);
         }
-        let nearest = |i: usize| (&raw const (*four[i]).nearest).cast();
-        let t_max = L::load_quarters([nearest(0), nearest(1), nearest(2), nearest(3)]);
+        let t_max = L::load_quarters(four.map(|at| (&raw const (*at).nearest).cast()));
         let (possible, sure) = rays.within(&candidates, t_max.spread::<1>());
         (Crossings { possible, ..crossings }, sure)
     }

@@ -2,7 +2,7 @@
 
 use super::all_hits::Decided;
 use super::lanes::Lanes;
-use super::pairs::{Crossings, Pairs, Plane};
+use super::pairs::{Crossings, Pairs};
 use super::prepared::Prepared;
 use super::triangles::{TriangleBlock, three_by_three};
 
@@ -24,7 +24,7 @@ pub(crate) struct Gathered {
     certain: u64,
     /// The number of each pair's ray, and the lane of its triangle.
     names: [[u8; 2]; PAIRS],
-    count: usize,
+    pub(crate) count: usize,
 }
 
 impl Gathered {
@@ -44,11 +44,6 @@ impl Gathered {
     pub(crate) fn clear(&mut self) {
         self.certain = 0;
         self.count = 0;
-    }
-
-    #[inline(always)]
-    pub(crate) fn count(&self) -> usize {
-        self.count
     }
 
     /// Returns the number of a pair's ray, and the lane of its triangle.
@@ -117,11 +112,10 @@ impl Gathered {
             let possible = u32::MAX >> (32 - lanes);
             let certain = (self.certain >> first) as u32;
             let crossings = Crossings { possible, certain };
-            let plane = Plane::of_lanes(&corners);
             if left_open {
-                return Decided::new(rays.decide_in_f64(&corners, &plane, crossings, t_max));
+                return Decided::new(rays.decide_in_f64(&corners, crossings, t_max));
             }
-            let (hits, t) = rays.decide(&corners, &plane, crossings, t_max);
+            let (hits, t) = rays.decide(&corners, crossings, t_max);
             Decided::new((hits, 0, t))
         }
     }

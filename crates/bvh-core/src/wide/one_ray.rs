@@ -5,7 +5,7 @@ use super::instructions::{Instructions, Pending, Task, last_pending};
 use super::kernel::{SPARE, STACK, deep_stacks};
 use super::lanes::{Aligned, Lanes, Mask};
 use super::layout::{Child, WideBvh};
-use super::pairs::{Crossings, Pairs, Plane};
+use super::pairs::{Crossings, Pairs};
 use super::triangles::TriangleBlock;
 use crate::ray::{AXES, largest_axis};
 use crate::{Aabb, Hit, Ray};
@@ -210,7 +210,44 @@ impl<K: Instructions, F: Filter, const ANY: bool> Leaves<K> for FirstHits<'_, K:
                 self.is_prepared = true;
             }
             let ray = self.leaf_ray.assume_init_ref();
-            ray.visit::<K, F, ANY>(block, nearest, &mut self.filter)
+            let corners = ray.corners(block);
+            let t_max = K::Block::splat(nearest.t);
+            let mut candidates = ray.pairs.candidates(&corners);
+            if ANY {
+                let (possible, sure) = ray.pairs.within(&candidates, t_max);
+                if F::ACCEPTS_ALL && sure != 0 {
+                    nearest.object = block.id(sure.trailing_zeros() as usize & 3);
+                    return true;
+                }
+                candidates.crossings.possible = possible;
+            }
+            let crossings = candidates.crossings;
+            if crossings.possible == 0 {
+                return false;
+            }
+            let (mut inside, unsure, mut t) = ray.pairs.decide_certain(&corners, crossings, t_max);
+            if unsure != 0 {
+                let t_max = nearest.t;
+                (inside, t) = K::call(Doubt { ray, block, crossings, t_max });
+            }
+            let mut hits = inside.bits();
+            if hits == 0 {
+                return false;
+            }
+            let mut distances = [0.0; TriangleBlock::LANES];
+            t.store(distances.as_mut_ptr());
+            let mut is_nearer = false;
+            while hits != 0 {
+                let lane = hits.trailing_zeros() as usize & 3;
+                hits &= hits - 1;
+                let hit = Hit { t: distances[lane], object: block.id(lane) };
+                // An unused lane repeats a triangle, which a filter may have rejected.
+                if !hit.is_miss() && hit.precedes(nearest) && self.filter.accepts(hit) {
+                    *nearest = hit;
+                    is_nearer = true;
+                }
+            }
+            is_nearer
         }
     }
 }
@@ -249,7 +286,7 @@ impl<K: Instructions> Task<K> for Doubt<'_, K::Block> {
         let Self { ray, block, crossings, t_max } = self;
         // SAFETY: the processor has the instructions.
         let (corners, t_max) = unsafe { (ray.corners(block), K::Block::splat(t_max)) };
-        ray.pairs.decide(&corners, &Plane::of_lanes(&corners), crossings, t_max)
+        ray.pairs.decide(&corners, crossings, t_max)
     }
 }
 
@@ -289,58 +326,5 @@ impl<L: Lanes> LeafRay<L> {
     pub(crate) unsafe fn corners(&self, block: &TriangleBlock) -> [[L; 3]; 3] {
         // SAFETY: the processor has the instructions; these are rows.
         unsafe { block.corners_along::<L>(self.rows) }
-    }
-
-    /// Tests the triangles of a block. Returns whether one of them is the new nearest hit.
-    #[inline(always)]
-    unsafe fn visit<K: Instructions<Block = L>, F: Filter, const ANY: bool>(
-        &self,
-        block: &TriangleBlock,
-        nearest: &mut Hit,
-        filter: &mut F,
-    ) -> bool {
-        // SAFETY: the processor has the instructions.
-        unsafe {
-            let corners = self.corners(block);
-            let t_max = L::splat(nearest.t);
-            let mut candidates = self.pairs.candidates(&corners);
-            if ANY {
-                let (possible, sure) = self.pairs.within(&candidates, t_max);
-                if F::ACCEPTS_ALL && sure != 0 {
-                    nearest.object = block.id(sure.trailing_zeros() as usize & 3);
-                    return true;
-                }
-                candidates.crossings.possible = possible;
-            }
-            let crossings = candidates.crossings;
-            if crossings.possible == 0 {
-                return false;
-            }
-            let plane = Plane::of_lanes(&corners);
-            let (mut inside, unsure, mut t) =
-                self.pairs.decide_certain(&corners[0], &plane, crossings, t_max);
-            if unsure != 0 {
-                let t_max = nearest.t;
-                (inside, t) = K::call(Doubt { ray: self, block, crossings, t_max });
-            }
-            let mut hits = inside.bits();
-            if hits == 0 {
-                return false;
-            }
-            let mut distances = [0.0; TriangleBlock::LANES];
-            t.store(distances.as_mut_ptr());
-            let mut is_nearer = false;
-            while hits != 0 {
-                let lane = hits.trailing_zeros() as usize & 3;
-                hits &= hits - 1;
-                let hit = Hit { t: distances[lane], object: block.id(lane) };
-                // An unused lane repeats a triangle, which a filter may have rejected.
-                if !hit.is_miss() && hit.precedes(nearest) && filter.accepts(hit) {
-                    *nearest = hit;
-                    is_nearer = true;
-                }
-            }
-            is_nearer
-        }
     }
 }

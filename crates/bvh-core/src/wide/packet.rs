@@ -12,7 +12,6 @@ use super::kernel::{SPARE, STACK, deep_stacks};
 use super::lanes::{Lanes, Mask};
 use super::layout::{Child, WideBvh, WideNode};
 use super::packet_vector::Vector;
-use super::pairs::Plane;
 use super::pinhole::{Seen, one_origin};
 use super::ray_lanes::{RayBounds, RayLanes};
 use super::triangles::TriangleBlock;
@@ -339,8 +338,7 @@ unsafe fn test<L: Lanes, const ANY: bool>(
             if crossings.possible == 0 {
                 continue;
             }
-            let plane = Plane::of_lanes(&corners);
-            let (inside, t) = pairs.decide(&corners, &plane, crossings, nearest.t);
+            let (inside, t) = pairs.decide(&corners, crossings, nearest.t);
             let inside = inside & t.mask(entered);
             is_hit |= if ANY {
                 nearest.end(inside, block.id(lane))

@@ -108,6 +108,20 @@ pub(crate) struct Crossings {
     pub(crate) certain: u32,
 }
 
+impl Crossings {
+    /// Decides by edge values and the bound of their errors.
+    #[inline(always)]
+    pub(super) fn new<L: Lanes>([u, v, w]: [L; 3], error: L) -> Self {
+        let least = u.min(v).min(w);
+        let most = u.max(v).max(w);
+        let below = error.filled(0.0) - error;
+        let all = u32::MAX >> (32 - L::N);
+        let possible = all & !(least.lt(below) & error.lt(most)).bits();
+        let certain = (error.lt(least) | most.lt(below)).bits();
+        Self { possible, certain }
+    }
+}
+
 /// The same, with what the layer's next question needs.
 pub(crate) struct Candidates<L> {
     pub(crate) crossings: Crossings,
@@ -171,16 +185,11 @@ impl<L: Lanes> Pairs<L> {
         let u = cx.mul_sub(by, cy * bx);
         let v = ax.mul_sub(cy, ay * cx);
         let w = bx.mul_sub(ay, by * ax);
-        let least = u.min(v).min(w);
-        let most = u.max(v).max(w);
         let [error, underflow, _] = self.errors;
         let error = error.mul_add(self.spread(&[a, b, c]), underflow);
-        let below = error.filled(0.0) - error;
-        let all = u32::MAX >> (32 - L::N);
-        let possible = all & !(least.lt(below) & error.lt(most)).bits();
-        let certain = (error.lt(least) | most.lt(below)).bits();
-        let crossings = Crossings { possible, certain };
-        Candidates { crossings, edges: [u, v, w], error, depths: [az, bz, cz] }
+        let edges = [u, v, w];
+        let crossings = Crossings::new(edges, error);
+        Candidates { crossings, edges, error, depths: [az, bz, cz] }
     }
 
     /// Returns the candidates that may be hits in the range up to `t_max`, and those that certainly
@@ -218,16 +227,15 @@ impl<L: Lanes> Pairs<L> {
     }
 
     /// Returns the candidates whose triangle the ray hits at most at `t_max`, and the distances. No
-    /// triangle is degenerate. `plane` are the planes of the triangles.
+    /// triangle is degenerate.
     #[inline(always)]
     pub(crate) fn decide(
         &self,
         corners: &[[L; 3]; 3],
-        plane: &Plane<L>,
         crossings: Crossings,
         t_max: L,
     ) -> (L::Mask, L) {
-        let (hits, unsure, t) = self.decide_in_f64(corners, plane, crossings, t_max);
+        let (hits, unsure, t) = self.decide_in_f64(corners, crossings, t_max);
         if unsure != 0 {
             return Self::decide_exactly(*self, *corners, t_max, unsure, hits, t);
         }
@@ -240,16 +248,15 @@ impl<L: Lanes> Pairs<L> {
     pub(crate) fn decide_in_f64(
         &self,
         corners: &[[L; 3]; 3],
-        plane: &Plane<L>,
         crossings: Crossings,
         t_max: L,
     ) -> (L::Mask, u32, L) {
-        let decided = self.decide_certain(&corners[0], plane, crossings, t_max);
+        let decided = self.decide_certain(corners, crossings, t_max);
         if decided.1 == 0 {
             return decided;
         }
         let possible = crossings.possible;
-        let (is_hit, is_behind, t) = self.meet(&corners[0], plane);
+        let (is_hit, is_behind, t) = self.meet(corners);
         let (is_inside, is_outside) = self.cross(corners);
         let crossed = is_inside & t.mask(possible);
         let unsure = possible & !(is_outside | is_inside & (is_hit | is_behind)).bits();
@@ -260,34 +267,20 @@ impl<L: Lanes> Pairs<L> {
     #[inline(always)]
     pub(crate) fn decide_certain(
         &self,
-        first: &[L; 3],
-        plane: &Plane<L>,
+        corners: &[[L; 3]; 3],
         Crossings { possible, certain }: Crossings,
         t_max: L,
     ) -> (L::Mask, u32, L) {
-        let (is_hit, is_behind, t) = self.meet(first, plane);
+        let (is_hit, is_behind, t) = self.meet(corners);
         let crossed = t.mask(certain & possible);
         let unsure = possible & !(crossed & (is_hit | is_behind)).bits();
         (is_hit & crossed & self.t_min.le(t) & t.le(t_max), unsure, t)
     }
 
-    /// Returns the pairs whose ray meets the plane at the returned rounded distance, and those
-    /// whose ray meets it before its origin, where the ray's line crosses the triangle.
     #[inline(always)]
-    fn meet(&self, first: &[L; 3], plane: &Plane<L>) -> (L::Mask, L::Mask, L) {
-        let [nx, ny, nz] = plane.normal;
-        let (height, slack) = plane.height(first, &self.origin);
-        let [dx, dy, dz] = self.direction.map(L::double);
-        let speed = nz.mul_add(dz, ny.mul_add(dy, nx * dx));
-        let inverse = speed.inverse();
-        let t = height * inverse;
-        let slack = slack * inverse.abs();
-        let low = t - slack;
-        let high = t + slack;
-        let rounded = L::single(high);
-        let zero = t.filled(0.0);
-        let is_hit = L::narrow(zero.le(low)) & L::single(low).eq(rounded);
-        (is_hit, L::narrow(high.lt(zero)), rounded)
+    fn meet(&self, corners: &[[L; 3]; 3]) -> (L::Mask, L::Mask, L) {
+        let plane = Plane::of_lanes(corners);
+        meet(&plane.normal, self.direction, plane.height(&corners[0], &self.origin))
     }
 
     /// Returns the pairs whose triangle the ray's line certainly crosses, and those whose triangle
@@ -403,6 +396,28 @@ impl<L: Lanes> Plane<L> {
         let size = (first.double() + first.double()) * second.double();
         Self { corner: a, normal: normal(&a, &b, &c), size, sides: first + second }
     }
+}
+
+/// Returns the pairs whose ray meets a plane of this normal at the returned rounded distance, and
+/// those whose ray meets it before its origin, where the ray's line crosses the triangle. `height`
+/// and `slack` are those of [`Plane::height`].
+#[inline(always)]
+pub(super) fn meet<L: Lanes>(
+    [nx, ny, nz]: &[L::Double; 3],
+    direction: [L; 3],
+    (height, slack): (L::Double, L::Double),
+) -> (L::Mask, L::Mask, L) {
+    let [dx, dy, dz] = direction.map(L::double);
+    let speed = nz.mul_add(dz, ny.mul_add(dy, *nx * dx));
+    let inverse = speed.inverse();
+    let t = height * inverse;
+    let slack = slack * inverse.abs();
+    let low = t - slack;
+    let high = t + slack;
+    let rounded = L::single(high);
+    let zero = t.filled(0.0);
+    let is_hit = L::narrow(zero.le(low)) & L::single(low).eq(rounded);
+    (is_hit, L::narrow(high.lt(zero)), rounded)
 }
 
 #[inline(always)]

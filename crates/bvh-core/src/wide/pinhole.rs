@@ -22,7 +22,7 @@
 
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use super::packet_vector::Vector;
-use super::pairs::Plane;
+use super::pairs::{Crossings, Plane, meet};
 use super::ray_lanes::RayBounds;
 use super::triangles::TriangleBlock;
 use crate::Aabb;
@@ -119,38 +119,23 @@ impl Seen {
                     let x = edge(row) * direction[0];
                     edge(row + 2).mul_add(direction[2], edge(row + 1).mul_add(direction[1], x))
                 };
-                let u = value(0);
-                let v = value(3);
-                let w = value(6);
-                let least = u.min(v).min(w);
-                let most = u.max(v).max(w);
                 let error = edge(9).mul_add(longest, underflow);
-                let below = error.filled(0.0) - error;
-                let possible = entered & !(least.lt(below) & error.lt(most)).bits();
+                let crossings = Crossings::new([value(0), value(3), value(6)], error);
+                let possible = entered & crossings.possible;
                 if possible == 0 {
                     continue;
                 }
-                let certain = possible & (error.lt(least) | most.lt(below)).bits();
+                let certain = possible & crossings.certain;
                 let plane = |row: usize| L::Double::splat(*self.plane[row].get_unchecked(lane));
-                let [dx, dy, dz] = direction;
-                let speed = plane(1).mul_add(dy.double(), plane(0) * dx.double());
-                let inverse = plane(2).mul_add(dz.double(), speed).inverse();
-                let distance = plane(3) * inverse;
-                let slack = plane(4) * inverse.abs();
-                let low = distance - slack;
-                let high = distance + slack;
-                let zero = distance.filled(0.0);
-                let mut t = L::single(high);
-                let meets = L::narrow(zero.le(low)) & L::single(low).eq(t);
-                let is_behind = L::narrow(high.lt(zero));
+                let normal = [plane(0), plane(1), plane(2)];
+                let (meets, is_behind, mut t) = meet(&normal, direction, (plane(3), plane(4)));
                 let mut inside = meets & t.mask(certain);
                 if possible & !(certain & (meets | is_behind).bits()) != 0 {
                     vector.shear(bounds);
                     let pairs = vector.pairs.assume_init_ref();
                     let corners = block.splat_corners::<L>(lane, vector.axes);
-                    let plane = Plane::of_lanes(&corners);
                     let crossings = pairs.candidates(&corners).crossings;
-                    (inside, t) = pairs.decide(&corners, &plane, crossings, vector.nearest.t);
+                    (inside, t) = pairs.decide(&corners, crossings, vector.nearest.t);
                     inside = inside & t.mask(entered);
                 }
                 let inside = inside & vector.t_min.le(t);

@@ -185,14 +185,7 @@ impl Test<'_> {
     pub(crate) unsafe fn rays<L: Lanes>(four: [Self; 4]) -> Pairs<L> {
         // SAFETY: there are so many rows of four aligned lanes.
         unsafe {
-            let row = |row: usize| {
-                L::load_quarters([
-                    four[0].ray.row(row),
-                    four[1].ray.row(row),
-                    four[2].ray.row(row),
-                    four[3].ray.row(row),
-                ])
-            };
+            let row = |row: usize| L::load_quarters(four.map(|test| test.ray.row(row)));
             let origin = row(3);
             let last = row(4);
             let errors = row(7);
@@ -210,25 +203,14 @@ impl Test<'_> {
     /// Returns the corners of the blocks, along the axes of each ray's shear.
     #[inline(always)]
     pub(crate) unsafe fn corners<L: Lanes>(four: [Self; 4]) -> [[L; 3]; 3] {
-        let lanes = |i: usize, corner: usize, axis: usize| {
-            let Self { ray, block } = four[i];
-            let axis = ray.axes()[axis];
-            block
-                .corners
-                .as_ptr()
-                .cast::<f32>()
-                .wrapping_add((3 * corner + axis) * TriangleBlock::LANES)
-        };
-        // SAFETY: there are three axes of four aligned lanes for every corner.
-        let of = |corner: usize, axis: usize| unsafe {
-            L::load_quarters([
-                lanes(0, corner, axis),
-                lanes(1, corner, axis),
-                lanes(2, corner, axis),
-                lanes(3, corner, axis),
-            ])
-        };
-        three_by_three(of)
+        three_by_three(|corner, axis| {
+            let lanes = |Self { ray, block }: Self| {
+                let row = 3 * corner + ray.axes()[axis];
+                block.corners.as_ptr().cast::<f32>().wrapping_add(row * TriangleBlock::LANES)
+            };
+            // SAFETY: there are three axes of four aligned lanes for every corner.
+            unsafe { L::load_quarters(four.map(lanes)) }
+        })
     }
 }
 

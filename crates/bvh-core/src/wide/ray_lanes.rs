@@ -155,12 +155,7 @@ unsafe fn transpose<L: Lanes>(rays: *const Ray, vector: usize) -> [L; 4] {
     unsafe {
         let row = |i: usize| {
             let ray = rays.cast::<f32>().wrapping_add(4 * vector + i * STEP);
-            L::load_quarters([
-                ray,
-                ray.wrapping_add(4 * STEP),
-                ray.wrapping_add(8 * STEP),
-                ray.wrapping_add(12 * STEP),
-            ])
+            L::load_quarters([0, 4, 8, 12].map(|other| ray.wrapping_add(other * STEP)))
         };
         L::transpose_quarters([row(0), row(1), row(2), row(3)])
     }
