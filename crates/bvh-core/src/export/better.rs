@@ -3,7 +3,7 @@
 use super::three_mesh::LEAF;
 use super::{Layout, Target, ThreeMeshNode};
 use crate::traverse::{TestCounts, nearest_hit_by};
-use crate::{Aabb, Bvh, PreparedRay, Ray, Triangle};
+use crate::{Aabb, Bvh, PreparedRay, Ray, Slabs, Triangle};
 use core::f64::consts::TAU;
 use glam::DVec3;
 
@@ -113,11 +113,9 @@ struct ThreeMeshRay<'a> {
     nodes: &'a [ThreeMeshNode],
     ids: &'a [u32],
     triangles: &'a [Triangle],
+    ray: &'a Ray,
     prepared: PreparedRay,
-    t_max: f32,
-    origin: DVec3,
-    direction: DVec3,
-    inverse: DVec3,
+    slabs: Slabs,
     counts: &'a mut TestCounts,
 }
 
@@ -126,13 +124,11 @@ impl<'a> ThreeMeshRay<'a> {
         nodes: &'a [ThreeMeshNode],
         ids: &'a [u32],
         triangles: &'a [Triangle],
-        ray: &Ray,
+        ray: &'a Ray,
         counts: &'a mut TestCounts,
     ) -> Self {
-        let [origin, direction] = [ray.origin(), ray.direction()].map(|vector| vector.as_dvec3());
-        let (prepared, inverse) = (PreparedRay::new(ray), direction.recip());
-        let t_max = ray.t_max();
-        Self { nodes, ids, triangles, prepared, t_max, origin, direction, inverse, counts }
+        let (prepared, slabs) = (PreparedRay::new(ray), Slabs::new(ray, &nodes[0].aabb()));
+        Self { nodes, ids, triangles, ray, prepared, slabs, counts }
     }
 
     /// Returns the distance of the first hit below a node, infinite without one. Recursive, as the
@@ -143,12 +139,13 @@ impl<'a> ThreeMeshRay<'a> {
             self.counts.objects += u64::from(count);
             return self.ids[below as usize..][..count as usize]
                 .iter()
-                .filter_map(|&id| self.triangles[id as usize].intersect(&self.prepared, self.t_max))
+                .filter_map(|&id| self.triangles[id as usize].intersect(&self.prepared, f32::MAX))
                 .fold(f32::INFINITY, f32::min);
         }
         let axis = axis_or_count as usize;
         let [low, high] = [index + 1, index + below as usize];
-        let [origin, direction] = [self.origin[axis], self.direction[axis]];
+        let [origin, direction] =
+            [self.ray.origin(), self.ray.direction()].map(|vector| f64::from(vector[axis]));
         let (first, second) = if direction >= 0.0 { (low, high) } else { (high, low) };
         let found = if self.meets(first) { self.first_hit(first) } else { f32::INFINITY };
         let point = origin + f64::from(found) * direction;
@@ -166,16 +163,7 @@ impl<'a> ThreeMeshRay<'a> {
     /// Returns whether the ray meets a node's box, and counts the test.
     fn meets(&mut self, index: usize) -> bool {
         self.counts.boxes += 1;
-        let node = &self.nodes[index];
-        let (mut low, mut high) = (0.0, f64::INFINITY);
-        for axis in 0..3 {
-            let [a, b] = [node.min, node.max]
-                .map(|corner| (f64::from(corner[axis]) - self.origin[axis]) * self.inverse[axis]);
-            // `max` and `min` leave out NaN, of a ray in the plane of a face.
-            low = f64::max(low, a.min(b));
-            high = f64::min(high, a.max(b));
-        }
-        low <= high
+        self.slabs.entry(&self.nodes[index].aabb()) < f32::INFINITY
     }
 }
 

@@ -28,6 +28,12 @@ pub struct ThreeMeshNode {
     pub axis_or_count: u32,
 }
 
+impl ThreeMeshNode {
+    pub(super) fn aabb(&self) -> Aabb {
+        Aabb::from([self.min, self.max])
+    }
+}
+
 /// The upper half of `axis_or_count` in a leaf.
 pub(super) const LEAF: u32 = 0xffff << 16;
 
@@ -77,7 +83,7 @@ impl Bvh {
     /// The boxes are the library's; [`refit`](Bvh::refit) makes them tight.
     pub fn from_three_mesh(nodes: &[ThreeMeshNode], prim_ids: &[u32]) -> Result<Self, InvalidBvh> {
         unpack(nodes.len(), prim_ids, |index| {
-            let ThreeMeshNode { min, max, below, axis_or_count } = nodes[index];
+            let ThreeMeshNode { below, axis_or_count, .. } = nodes[index];
             let below = match axis_or_count.checked_sub(LEAF) {
                 Some(count) => Below::Objects { first: below, count },
                 None => {
@@ -85,7 +91,7 @@ impl Bvh {
                     Below::Children { named: below, at }
                 }
             };
-            (Aabb::from([min, max]), below)
+            (nodes[index].aabb(), below)
         })
     }
 }
