@@ -207,22 +207,15 @@ impl Bvh {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cost::tests::two_cubes;
 
     #[test]
     fn a_tree_with_a_padded_box_is_not_tight_until_it_is_refitted() {
-        let boxes = [0.0, 2.0].map(|x| Aabb::from(([x, 0.0, 0.0], [x + 1.0, 1.0, 1.0])));
-        let padded = Aabb::from(([0.0; 3], [4.0; 3]));
         for loose in 0..3 {
-            let mut tree = Bvh {
-                nodes: vec![
-                    Node::inner(boxes[0].union(&boxes[1]), 1, 2),
-                    Node::leaf(boxes[0], 0, 1),
-                    Node::leaf(boxes[1], 1, 1),
-                ],
-                prim_ids: vec![0, 1],
-            };
+            let mut tree = two_cubes();
+            let boxes = [1, 2].map(|leaf| tree.nodes[leaf].aabb);
             assert!(tree.is_tight(&boxes));
-            tree.nodes[loose].aabb = padded;
+            tree.nodes[loose].aabb = Aabb::from(([0.0; 3], [4.0; 3]));
             assert!(!tree.is_tight(&boxes), "{loose}");
             tree.refit(&boxes);
             assert!(tree.is_tight(&boxes));

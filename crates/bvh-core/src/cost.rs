@@ -280,11 +280,11 @@ impl FromIterator<f64> for Sum {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
     /// Unit cubes at x = 0 and x = 2 under one root of half area 7.
-    fn two_cubes() -> Bvh {
+    pub(crate) fn two_cubes() -> Bvh {
         let boxes =
             [Aabb::from(([0.0; 3], [1.0; 3])), Aabb::from(([2.0, 0.0, 0.0], [3.0, 1.0, 1.0]))];
         let root = Node::inner(boxes[0].union(&boxes[1]), 1, 2);

@@ -209,21 +209,6 @@ pub fn boxes_checksum(boxes: &[Aabb]) -> u32 {
     hasher.finalize()
 }
 
-/// Returns the checksum of a file that has at least the length of a header.
-fn checksum(file: &[u8]) -> u32 {
-    let (header, body) = file.split_at(Header::BYTES);
-    let mut hasher = Hasher::new();
-    hasher.update(body);
-    hasher.update(&header[..Header::CHECKSUM.start]);
-    hasher.finalize()
-}
-
-#[cfg(test)]
-fn seal(file: &mut [u8]) {
-    let sum = checksum(file);
-    file[Header::CHECKSUM].copy_from_slice(&sum.to_le_bytes());
-}
-
 /// A tree file of the correct length and checksum. The tree is checked when it is requested.
 ///
 /// Files can be mapped instead of read. For any bytes, forged ones included, traversals of
@@ -244,7 +229,10 @@ impl<'a> TreeFile<'a> {
         let [node_bytes, id_bytes, _] = header.sections();
         let (nodes, rest) = bytes[Header::BYTES..].split_at(node_bytes as usize);
         let (prim_ids, visits) = rest.split_at(id_bytes as usize);
-        if checksum(bytes).to_le_bytes() != bytes[Header::CHECKSUM] {
+        let mut hasher = Hasher::new();
+        hasher.update(&bytes[Header::BYTES..]);
+        hasher.update(&bytes[..Header::CHECKSUM.start]);
+        if hasher.finalize().to_le_bytes() != bytes[Header::CHECKSUM] {
             return Err(FileError::Checksum);
         }
         let file = Self { header, nodes, prim_ids, visits };
@@ -290,7 +278,14 @@ impl<'a> TreeFile<'a> {
 
     /// Returns the tree without copying it, after the same checks as [`tree`](Self::tree).
     pub fn view(&self) -> Result<BvhView<'a>, FileError> {
-        let tree = self.cast()?;
+        fn cast<T: Pod>(bytes: &[u8]) -> Result<&[T], FileError> {
+            // An empty slice may have any address, and `bytemuck` would reject it as misaligned.
+            if bytes.is_empty() {
+                return Ok(&[]);
+            }
+            bytemuck::try_cast_slice(bytes).map_err(|_| FileError::Alignment(align_of::<T>()))
+        }
+        let tree = BvhView { nodes: cast(self.nodes)?, prim_ids: cast(self.prim_ids)? };
         self.check(tree)?;
         Ok(tree)
     }
@@ -306,24 +301,9 @@ impl<'a> TreeFile<'a> {
         Ok(Some(visits))
     }
 
-    /// Returns the tree without copying or checking it.
-    fn cast(&self) -> Result<BvhView<'a>, FileError> {
-        fn cast<T: Pod>(bytes: &[u8]) -> Result<&[T], FileError> {
-            // An empty slice may have any address, and `bytemuck` would reject it as misaligned.
-            if bytes.is_empty() {
-                return Ok(&[]);
-            }
-            bytemuck::try_cast_slice(bytes).map_err(|_| FileError::Alignment(align_of::<T>()))
-        }
-        Ok(BvhView { nodes: cast(self.nodes)?, prim_ids: cast(self.prim_ids)? })
-    }
-
     fn check(&self, tree: BvhView) -> Result<(), InvalidBvh> {
         let Header { objects, references, .. } = self.header;
         let leaves = if references > objects { Leaves::OneOrMore } else { Leaves::One };
         check_structure(tree, objects, leaves)
     }
 }
-
-#[cfg(test)]
-mod tests;

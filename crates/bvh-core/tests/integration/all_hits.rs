@@ -2,80 +2,10 @@
 //! for rays through edges and corners.
 
 use crate::support::layouts::layout;
-use crate::support::{Random, ball, grid_box, scaled};
-use bvh_core::{Hit, PreparedRay, Ray, Triangle};
-use glam::{Quat, Vec3};
+use crate::support::{Random, closed_meshes};
+use bvh_core::{PreparedRay, Ray, Triangle};
+use glam::Vec3;
 use num_bigint::{BigInt, Sign};
-
-/// Returns a closed torus whose tube has `sides` and is bent along `rings`.
-fn torus(rings: usize, sides: usize) -> Vec<Triangle> {
-    let at = |ring: usize, side: usize| {
-        let turn = std::f32::consts::TAU;
-        let (bent, along) = ((ring % rings) as f32 / rings as f32 * turn).sin_cos();
-        let (up, out) = ((side % sides) as f32 / sides as f32 * turn).sin_cos();
-        Vec3::new(along * (1.0 + 0.4 * out), bent * (1.0 + 0.4 * out), 0.4 * up)
-    };
-    let mut triangles = Vec::new();
-    for ring in 0..rings {
-        for side in 0..sides {
-            let a = at(ring, side);
-            let b = at(ring + 1, side);
-            let c = at(ring + 1, side + 1);
-            let d = at(ring, side + 1);
-            triangles.extend([[a, b, c], [a, c, d]].map(Triangle));
-        }
-    }
-    triangles
-}
-
-/// Returns a tetrahedron. One of its edges is divided on one side only, and a triangle without area
-/// closes the gap.
-pub fn junction() -> Vec<Triangle> {
-    let [a, b, c, d] =
-        [Vec3::ZERO, Vec3::new(2.0, 4.0, 6.0), 3.0 * Vec3::X, Vec3::new(0.3, 2.0, 0.1)];
-    let middle = (a + b) / 2.0;
-    [[a, b, c], [a, d, middle], [middle, d, b], [a, middle, b], [a, c, d], [b, d, c]]
-        .map(Triangle)
-        .to_vec()
-}
-
-/// Returns closed meshes, each with a point in its inside. The corners of most of them run in both
-/// directions.
-pub fn closed_meshes() -> Vec<(&'static str, Vec<Triangle>, Vec3)> {
-    let turned = |triangles: Vec<Triangle>| -> Vec<Triangle> {
-        let turn = Quat::from_xyzw(0.1, 0.7, -0.3, 0.5).normalize();
-        // Neighbours have the same corners, and the same operations move them.
-        (triangles.iter())
-            .map(|triangle| Triangle(triangle.0.map(|corner| turn * corner)))
-            .collect()
-    };
-    let nested = [scaled(&ball(2), 2.0), ball(2)].concat();
-    let center = Vec3::new(0.013, -0.02, 0.017);
-    let torus_inside = Vec3::new(0.99, 0.02, 0.03);
-    let turn = Quat::from_xyzw(0.1, 0.7, -0.3, 0.5).normalize();
-    vec![
-        ("octahedron", ball(0), center),
-        ("ball", ball(3), center),
-        ("turned ball", turned(ball(2)), center),
-        ("box", grid_box(1), center),
-        ("grid box", grid_box(4), center),
-        ("turned grid box", turned(grid_box(3)), center),
-        ("torus", torus(12, 8), torus_inside),
-        ("turned torus", turned(torus(9, 7)), turn * torus_inside),
-        ("nested balls", nested, Vec3::new(1.5, 0.1, 0.1)),
-        ("junction", junction(), Vec3::new(1.2, 1.3, 1.2)),
-    ]
-}
-
-/// Returns all hits, the nearest first, by testing every triangle.
-pub fn all_of(triangles: &[Triangle], ray: &Ray) -> Vec<Hit> {
-    let mut hits: Vec<Hit> = (0..)
-        .zip(triangles)
-        .filter_map(|(object, triangle)| Some(Hit { t: triangle.crossing(ray)?, object }))
-        .collect();
-    hits.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.object.cmp(&b.object)));
-    hits
-}
 
 /// A point outside of all closed meshes.
 const OUTSIDE: Vec3 = Vec3::new(7.0, -5.5, 6.25);
@@ -180,7 +110,7 @@ fn compare_with_exact_arithmetic(count: usize) -> usize {
     let mut crossed = 0;
     for (name, triangles, inside) in closed_meshes() {
         let wide = layout(&triangles, 0);
-        for (origin, parity) in [(inside, 1), (OUTSIDE, 0)] {
+        for origin in [inside, OUTSIDE] {
             for ray in rays_through(&triangles, origin, count, &mut random) {
                 let hits = wide.all_hits(&ray);
                 for (object, triangle) in (0..).zip(&triangles) {
@@ -191,10 +121,6 @@ fn compare_with_exact_arithmetic(count: usize) -> usize {
                     if met.is_some() {
                         assert_eq!(hit.is_some(), is_crossed(&ray, triangle), "{}", case());
                     }
-                }
-                // A triangle that both tests miss is missed here.
-                if ray.origin() == origin {
-                    assert_eq!(hits.len() % 2, parity, "{name}: {ray:?}");
                 }
                 crossed += hits.len();
             }

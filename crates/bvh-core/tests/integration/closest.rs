@@ -50,12 +50,16 @@ fn brute_force(triangles: &[Triangle], point: Vec3) -> (f64, u32) {
 #[test]
 fn the_closest_point_is_as_close_as_that_of_any_triangle_at_every_scale() {
     let mut random = Random(1);
-    for exponent in [-120, -60, 0, 60, 120] {
+    for exponent in [-120, -60, 0, 60, 120, 126] {
         let scale = libm::exp2f(exponent as f32);
-        for scene in [soup(150, &mut random), ball(3), grid_box(3)] {
+        // All of the last scene is on one side of zero, and the largest point far on the other.
+        let aside =
+            soup(150, &mut random).iter().map(|t| Triangle(t.0.map(|p| -p.abs()))).collect();
+        for scene in [soup(150, &mut random), ball(3), grid_box(3), aside] {
             let triangles = scaled(&scene, scale);
             let corner = random.of(&triangles).0[1];
-            let mut points = vec![corner, Vec3::ZERO, Vec3::splat(9.0 * scale)];
+            let mut points =
+                vec![corner, Vec3::ZERO, Vec3::splat((9.0 * scale).min(f32::MAX)), Vec3::MAX];
             points.extend((0..200).map(|_| random.point() * 1.5 * scale));
             for shape in 0..SHAPES.len() {
                 let mut closest = vec![None; points.len()];
@@ -69,7 +73,7 @@ fn the_closest_point_is_as_close_as_that_of_any_triangle_at_every_scale() {
                 for (&point, closest) in points.iter().zip(closest) {
                     let found = closest.unwrap();
                     let expected = brute_force(&triangles, point).0.sqrt();
-                    let slack = 1e-13 * f64::from(scale);
+                    let slack = 1e-13 * expected.max(f64::from(scale));
                     assert!((found.distance - expected).abs() <= slack, "{point}: {found:?}");
                     let offset = found.point - point.as_dvec3();
                     assert!(
@@ -144,39 +148,5 @@ fn triangles_with_the_same_closest_point_tie_to_the_lowest_id() {
         let first = triangles.iter().position(|triangle| triangle.0.contains(&corner));
         let found = wide.closest_point(corner).unwrap();
         assert_eq!((Some(found.object as usize), found.distance), (first, 0.0));
-    }
-}
-
-#[test]
-fn many_triangles_without_area_have_no_closest_point() {
-    let triangles: Vec<Triangle> =
-        (0..100u8).map(|i| Triangle([Vec3::splat(f32::from(i)); 3])).collect();
-    for (_, wide) in by_kernel(&layout(&triangles, 0)) {
-        for point in [Vec3::ZERO, Vec3::splat(3.5), Vec3::MAX] {
-            assert_eq!(wide.closest_point(point), None);
-        }
-    }
-}
-
-#[test]
-fn differences_of_the_largest_coordinates_do_not_overflow() {
-    let mut random = Random(7);
-    for exponent in [100, 110, 120, 126] {
-        // All of the scene is on one side of zero, and the points are far on the other side.
-        let triangles: Vec<Triangle> =
-            scaled(&soup(100, &mut random), libm::exp2f(exponent as f32))
-                .iter()
-                .map(|triangle| Triangle(triangle.0.map(|corner| -corner.abs())))
-                .collect();
-        let mut points = vec![Vec3::MAX, Vec3::MIN];
-        points.extend((0..50).map(|_| random.point() * f32::MAX));
-        for (_, wide) in by_kernel(&layout(&triangles, 0)) {
-            for &point in &points {
-                let found = wide.closest_point(point).unwrap();
-                let (expected, _) = brute_force(&triangles, point);
-                let slack = 1e-13 * expected.sqrt();
-                assert!((found.distance - expected.sqrt()).abs() <= slack, "{point}: {found:?}");
-            }
-        }
     }
 }

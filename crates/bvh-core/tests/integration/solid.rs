@@ -1,7 +1,6 @@
 //! Points are inside of meshes, closed or not, exactly where the sum over all triangles says so.
 
-use crate::all_hits::closed_meshes;
-use crate::support::{Random, SHAPES, ball, boxes, grid_box, scaled, soup, tree};
+use crate::support::{Random, SHAPES, ball, boxes, closed_meshes, grid_box, scaled, soup, tree};
 use InsideRule::{Auto, Parity, Winding};
 use bvh_core::{Aabb, Bvh, InsideRule, Node, Solid, Triangle, WideBvh};
 use glam::Vec3;

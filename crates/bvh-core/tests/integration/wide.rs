@@ -1,15 +1,14 @@
 //! Trees, also of divided triangles, and every kernel of the wide layout, ray by ray and in batches,
 //! give the answers of testing every triangle, bit by bit.
 
-use crate::all_hits::{all_of, junction};
-use crate::references::rays_on_planes;
-use crate::support::layouts::{Traced, bundles};
+use crate::support::layouts::{Traced, bundles, rays_on_planes};
 use crate::support::{
-    Random, SHAPES, ball, bits, boxes, brute_force, chain, grid_box, rays, scaled, soup, tree,
+    Random, SHAPES, all_of, ball, bits, boxes, brute_force, chain, grid_box, junction, rays,
+    scaled, soup, tree,
 };
 use bvh_core::{
-    Aabb, Bvh, Coherence, Hit, Node, PreparedRay, Ray, RefitError, Triangle, WideBvh, any_hit,
-    nearest_hit,
+    Aabb, Bvh, Coherence, Hit, Node, PreparedRay, Ray, RefitError, TestCounts, Triangle, WideBvh,
+    any_hit, nearest_hit,
 };
 use glam::Vec3;
 
@@ -321,6 +320,9 @@ fn triangles_without_area_are_left_out_and_never_hit() {
         corners.iter().flat_map(|&p| corners.iter().map(move |&q| flat(p, q))).collect();
     let empty = Traced::all(&triangles, &mut random);
     assert_eq!(check("empty", &triangles, &empty, &rays(&triangles, 500, &mut random)), 0);
+    for (_, wide) in empty.iter().flat_map(|traced| &traced.layouts) {
+        assert_eq!(wide.closest_point(Vec3::splat(3.5)), None);
+    }
     triangles.push(Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]));
     let traced = Traced::all(&triangles, &mut random);
     assert!(check("flat", &triangles, &traced, &rays(&triangles, 500, &mut random)) > 0);
@@ -460,5 +462,45 @@ fn rays_that_are_not_finite_end_and_meet_only_triangles_that_exist() {
                 assert!(hits.iter().all(|hit| hit.is_miss() || hit.object < 5));
             }
         }
+    }
+}
+
+#[test]
+fn visits_whose_sums_are_infinite_or_no_numbers_give_a_layout() {
+    let mut random = Random(15);
+    let triangles = soup(40, &mut random);
+    let tree = tree(&boxes(&triangles), SHAPES[0], &mut random);
+    let rays = rays(&triangles, 100, &mut random);
+    for visits in [3e38, f32::INFINITY, f32::NAN] {
+        let wide = WideBvh::for_rays(&tree, &triangles, &vec![visits; tree.nodes.len()]).unwrap();
+        for ray in &rays {
+            assert_eq!(wide.nearest_hit(ray), brute_force(&triangles, ray), "{visits}: {ray:?}");
+        }
+    }
+}
+
+#[test]
+fn rays_that_ask_for_any_hit_come_to_a_wall_before_what_is_scattered_whether_it_is_divided_or_not()
+{
+    let wall = Triangle::from([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]]);
+    let speck = |i: u8| {
+        let at = f32::from(i % 3);
+        Triangle::from([[at, at, 1.0 + at], [at + 0.1, at, 1.0 + at], [at, at + 0.1, 1.0 + at]])
+    };
+    let triangles: Vec<Triangle> = [wall].into_iter().chain((0..24).map(speck)).collect();
+    let halves = [[[0.0; 3], [1.1, 2.0, 0.0]], [[1.0, 0.0, 0.0], [2.0, 1.1, 0.0]]].map(Aabb::from);
+    let scattered = Aabb::from([[0.0, 0.0, 1.0], [2.1, 2.1, 3.0]]);
+    for walls in [&[wall.aabb()][..], &halves] {
+        let parts = walls.len() as u32;
+        let root = Aabb::from([[0.0; 3], [2.1, 2.1, 3.0]]);
+        let mut nodes = vec![Node::inner(root, 1, parts + 1)];
+        nodes.extend((0..).zip(walls).map(|(i, &aabb)| Node::leaf(aabb, i, 1)));
+        nodes.push(Node::leaf(scattered, parts, 24));
+        let prim_ids = walls.iter().map(|_| 0).chain(1..25).collect();
+        let wide = WideBvh::new(&Bvh { nodes, prim_ids }, &triangles).unwrap();
+        let ray = Ray::half_line([0.1, 0.1, -1.0], [0.0, 0.0, 1.0]).unwrap();
+        let mut counts = TestCounts::default();
+        assert!(wide.any_hit_counted(&ray, &mut counts));
+        assert_eq!(counts.objects, WideBvh::OBJECTS_OF_BLOCK, "{parts}");
     }
 }

@@ -1,9 +1,48 @@
-//! Layouts of several trees by every kernel, and rays that packets are made for.
+//! Trees of divided triangles, layouts of several trees by every kernel, and rays for both.
 
-use super::{Random, SHAPES, boxes, chain, tree};
-use crate::references::divided;
-use bvh_core::{Bvh, Kernel, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants};
+use super::{Random, SHAPES, boxes, chain, size, tree};
+use bvh_core::{
+    Aabb, Bvh, Clip, Kernel, Node, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants,
+};
 use glam::Vec3;
+
+/// Divides leaves of `tree` at random planes, and divides parts again. Returns the tree, and the
+/// object, axis and coordinate of each plane.
+pub fn divided(
+    tree: &Bvh,
+    triangles: &[Triangle],
+    random: &mut Random,
+) -> (Bvh, Vec<(u32, usize, f32)>) {
+    let mut tree = tree.clone();
+    let mut planes = Vec::new();
+    let mut index = 0;
+    while index < tree.nodes.len() {
+        let Node { aabb, .. } = tree.nodes[index];
+        let range = tree.nodes[index].prims();
+        if range.len() == 1 && random.below(3) > 0 {
+            let object = tree.prim_ids[range.start];
+            let axis = random.below(3);
+            let corner = random.of(&triangles[object as usize].0)[axis];
+            let somewhere = aabb.min[axis] + random.unit() * aabb.extent()[axis] as f32;
+            // Planes through corners are the hard ones.
+            let plane = random.of(&[somewhere, corner]);
+            let [low, high] =
+                aabb.halves(axis, plane).map(|region| triangles.clip(object, &region));
+            let divides = aabb.min[axis] < plane && plane < aabb.max[axis];
+            if divides && low != Aabb::EMPTY && high != Aabb::EMPTY {
+                let first = tree.nodes.len() as u32;
+                let added = tree.prim_ids.len() as u32;
+                tree.nodes[index] = Node::inner(aabb, first, 2);
+                tree.nodes.push(Node::leaf(low, range.start as u32, 1));
+                tree.nodes.push(Node::leaf(high, added, 1));
+                tree.prim_ids.push(object);
+                planes.push((object, axis, plane));
+            }
+        }
+        index += 1;
+    }
+    (tree, planes)
+}
 
 /// Returns a layout of the triangles by a tree of one of the shapes.
 pub fn layout(triangles: &[Triangle], shape: usize) -> WideBvh {
@@ -50,17 +89,44 @@ impl Traced {
     }
 }
 
+/// Makes rays through the points where planes divide triangles. Some rays cross the plane and some
+/// are within it. Without a plane there are none.
+pub fn rays_on_planes(
+    triangles: &[Triangle],
+    planes: &[(u32, usize, f32)],
+    count: usize,
+    random: &mut Random,
+) -> Vec<Ray> {
+    let size = size(triangles);
+    let mut rays = Vec::new();
+    if planes.is_empty() {
+        return rays;
+    }
+    for _ in 0..count {
+        let (object, axis, plane) = random.of(planes);
+        let Triangle([a, b, c]) = triangles[object as usize];
+        let u = random.unit();
+        let v = random.unit();
+        let mut target = a + (b - a) * u + (c - a) * (v * (1.0 - u));
+        target[axis] = plane;
+        let mut from = target + random.point() * (size * random.of(&[3.0, 0.1, 1e-3]));
+        if random.below(2) == 0 {
+            from[axis] = plane;
+        }
+        // Scaled, so that the direction stays in range for huge and tiny scenes.
+        rays.extend(Ray::half_line(from, (target - from) / size));
+    }
+    rays
+}
+
 /// Returns groups of sixteen rays that begin close to each other and run nearly in the same
 /// direction, towards and beyond an edge or a corner of some triangle: the rays that packets are
 /// made for, in the hardest places.
 pub fn bundles(triangles: &[Triangle], count: usize, random: &mut Random) -> Vec<Ray> {
     let mut rays = Vec::new();
+    let size = size(triangles);
     for _ in 0..count {
         let Triangle([a, b, c]) = random.of(triangles);
-        let size = triangles
-            .iter()
-            .flat_map(|t| t.0)
-            .fold(0.0f32, |size, p| size.max(p.abs().max_element()));
         let target = random.of(&[a, (a + b) * 0.5, (a + b + c) / 3.0]);
         let far = random.point() * 3.0;
         let inside = random.point();

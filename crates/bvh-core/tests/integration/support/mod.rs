@@ -2,10 +2,11 @@
 
 pub mod layouts;
 
+pub use bvh_core::boxes;
 use bvh_core::{
     Aabb, Bvh, Hit, Node, PreparedRay, Ray, Triangle, any_hit_of_all, nearest_hit_of_all,
 };
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use std::collections::VecDeque;
 
 /// SplitMix64 (Steele, Lea & Flood 2014).
@@ -98,22 +99,14 @@ pub fn tree(boxes: &[Aabb], shape: Shape, random: &mut Random) -> Bvh {
 /// Builds the deepest tree: every inner node has one leaf and the rest.
 pub fn chain(boxes: &[Aabb]) -> Bvh {
     let n = boxes.len() as u32;
-    let mut nodes =
-        vec![if n == 1 { Node::leaf(Aabb::EMPTY, 0, 1) } else { Node::inner(Aabb::EMPTY, 1, 2) }];
+    let mut nodes = Vec::new();
     for i in 0..n - 1 {
-        nodes.push(Node::leaf(Aabb::EMPTY, i, 1));
-        nodes.push(match i + 2 == n {
-            true => Node::leaf(Aabb::EMPTY, n - 1, 1),
-            false => Node::inner(Aabb::EMPTY, 2 * i + 3, 2),
-        });
+        nodes.extend([Node::inner(Aabb::EMPTY, 2 * i + 1, 2), Node::leaf(Aabb::EMPTY, i, 1)]);
     }
+    nodes.push(Node::leaf(Aabb::EMPTY, n - 1, 1));
     let mut tree = Bvh { nodes, prim_ids: (0..n).collect() };
     tree.refit(boxes);
     tree
-}
-
-pub fn boxes(triangles: &[Triangle]) -> Vec<Aabb> {
-    triangles.iter().map(Triangle::aabb).collect()
 }
 
 /// Returns small and large triangles, some of them degenerate, some twice.
@@ -183,6 +176,69 @@ pub fn ball(levels: usize) -> Vec<Triangle> {
     triangles
 }
 
+/// Returns a closed torus whose tube has `sides` and is bent along `rings`.
+fn torus(rings: usize, sides: usize) -> Vec<Triangle> {
+    let at = |ring: usize, side: usize| {
+        let turn = std::f32::consts::TAU;
+        let (bent, along) = ((ring % rings) as f32 / rings as f32 * turn).sin_cos();
+        let (up, out) = ((side % sides) as f32 / sides as f32 * turn).sin_cos();
+        Vec3::new(along * (1.0 + 0.4 * out), bent * (1.0 + 0.4 * out), 0.4 * up)
+    };
+    let mut triangles = Vec::new();
+    for ring in 0..rings {
+        for side in 0..sides {
+            let a = at(ring, side);
+            let b = at(ring + 1, side);
+            let c = at(ring + 1, side + 1);
+            let d = at(ring, side + 1);
+            triangles.extend([[a, b, c], [a, c, d]].map(Triangle));
+        }
+    }
+    triangles
+}
+
+/// Returns a tetrahedron. One of its edges is divided on one side only, and a triangle without area
+/// closes the gap.
+pub fn junction() -> Vec<Triangle> {
+    let [a, b, c, d] =
+        [Vec3::ZERO, Vec3::new(2.0, 4.0, 6.0), 3.0 * Vec3::X, Vec3::new(0.3, 2.0, 0.1)];
+    let middle = (a + b) / 2.0;
+    [[a, b, c], [a, d, middle], [middle, d, b], [a, middle, b], [a, c, d], [b, d, c]]
+        .map(Triangle)
+        .to_vec()
+}
+
+/// Returns closed meshes, each with a point in its inside. The corners of most of them run in both
+/// directions.
+pub fn closed_meshes() -> Vec<(&'static str, Vec<Triangle>, Vec3)> {
+    let turn = Quat::from_xyzw(0.1, 0.7, -0.3, 0.5).normalize();
+    // Neighbours have the same corners, and the same operations move them.
+    let turned = |triangles: Vec<Triangle>| -> Vec<Triangle> {
+        triangles.iter().map(|t| Triangle(t.0.map(|corner| turn * corner))).collect()
+    };
+    let nested = [scaled(&ball(2), 2.0), ball(2)].concat();
+    let center = Vec3::new(0.013, -0.02, 0.017);
+    let torus_inside = Vec3::new(0.99, 0.02, 0.03);
+    vec![
+        ("octahedron", ball(0), center),
+        ("ball", ball(3), center),
+        ("turned ball", turned(ball(2)), center),
+        ("box", grid_box(1), center),
+        ("grid box", grid_box(4), center),
+        ("turned grid box", turned(grid_box(3)), center),
+        ("torus", torus(12, 8), torus_inside),
+        ("turned torus", turned(torus(9, 7)), turn * torus_inside),
+        ("nested balls", nested, Vec3::new(1.5, 0.1, 0.1)),
+        ("junction", junction(), Vec3::new(1.2, 1.3, 1.2)),
+    ]
+}
+
+/// Returns the largest coordinate.
+pub fn size(triangles: &[Triangle]) -> f32 {
+    let sizes = triangles.iter().flat_map(|t| t.0).map(|p| p.abs().max_element());
+    sizes.fold(0.0, f32::max)
+}
+
 pub fn scaled(triangles: &[Triangle], factor: f32) -> Vec<Triangle> {
     triangles.iter().map(|t| Triangle(t.0.map(|p| p * factor))).collect()
 }
@@ -243,6 +299,16 @@ pub fn brute_force(triangles: &[Triangle], ray: &Ray) -> Option<Hit> {
     let any = any_hit_of_all(objects, |id| test(id, ray.t_max()).is_some(), &mut ());
     assert_eq!(any, nearest.is_some());
     nearest
+}
+
+/// Returns all hits, the nearest first, by testing every triangle.
+pub fn all_of(triangles: &[Triangle], ray: &Ray) -> Vec<Hit> {
+    let mut hits: Vec<Hit> = (0..)
+        .zip(triangles)
+        .filter_map(|(object, triangle)| Some(Hit { t: triangle.crossing(ray)?, object }))
+        .collect();
+    hits.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.object.cmp(&b.object)));
+    hits
 }
 
 /// Returns an answer as bits, for exact comparison.
