@@ -10,7 +10,6 @@ mod interrupt;
 mod memory;
 mod npy;
 mod output;
-mod picture;
 mod rays;
 mod render;
 mod report;

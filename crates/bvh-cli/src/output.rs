@@ -1,4 +1,4 @@
-//! Writes to the terminal, and tables to files.
+//! Writes to the terminal, and the contents of files: tables and pictures.
 
 use crate::Error;
 use bvh_scenes::files::{self, WriteError};
@@ -64,6 +64,20 @@ pub fn write_table<R: Serialize>(
     Ok(files::write(path, &table)?)
 }
 
+/// Encodes pixels, row by row from the top, as a PNG file with the highest compression.
+pub fn png(width: u32, pixels: &[[u8; 3]]) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, pixels.len() as u32 / width);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
+    encoder.set_filter(png::Filter::Adaptive);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(pixels.as_flattened())?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
 /// Escapes control characters except ends of lines. Names of files and keys of specs come from the
 /// user and must not control the terminal.
 fn plain(text: &str) -> String {
@@ -84,5 +98,16 @@ mod tests {
     fn control_characters_are_escaped() {
         assert_eq!(super::plain("key \u{1b}[2J\nis 1"), "key \\u{1b}[2J\nis 1");
         assert_eq!(super::plain("Müller–Fellner\n"), "Müller–Fellner\n");
+    }
+
+    #[test]
+    fn decoded_pixels_equal_the_encoded_ones() {
+        let pixels = [[1, 2, 3], [255, 0, 128], [9, 9, 9], [0, 0, 0], [7, 70, 250], [4, 5, 6]];
+        let bytes = super::png(3, &pixels).unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+        let mut read = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut read).unwrap();
+        assert_eq!((info.width, info.height, info.color_type), (3, 2, png::ColorType::Rgb));
+        assert_eq!(read, pixels.as_flattened());
     }
 }

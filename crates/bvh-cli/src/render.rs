@@ -3,8 +3,7 @@
 use crate::Error;
 use crate::answer::{Answer, whole};
 use crate::arguments::{input_file, load_scene, output_file};
-use crate::output::bar;
-use crate::picture::png;
+use crate::output::{bar, png};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, WideBvh};
 use bvh_scenes::files::{self, WriteError};

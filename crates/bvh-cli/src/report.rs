@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::answer::{Answer, short, whole};
 use crate::arguments::{load_scene, output_file, output_or_free};
-use crate::picture::png;
+use crate::output::png;
 use crate::rays::Rays;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

@@ -18,16 +18,6 @@ fn scenes_are_listed_with_their_sizes() {
 }
 
 #[test]
-fn every_shell_gets_all_commands() {
-    for shell in ["bash", "zsh", "fish"] {
-        let said = bvh(Path::new("."), &format!("completions {shell}"));
-        for part in ["inspect", "budget", "heatmap"] {
-            assert!(said.contains(part), "{shell}: {part}");
-        }
-    }
-}
-
-#[test]
 fn the_steps_that_a_scene_does_not_need_are_listed() {
     let folder = tempfile::tempdir().unwrap();
     for (scene, skipped) in
