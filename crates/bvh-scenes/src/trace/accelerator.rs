@@ -80,9 +80,14 @@ impl<'a> Accelerator<'a> {
     /// Answers as [`nearest_hit`](Self::nearest_hit) does and counts the tests, except in
     /// [`Structure::Wide`].
     pub fn nearest_hit_counted(&self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
+        let test = || test(self.objects, ray);
         match &self.structure {
             Structure::Wide(wide) => wide.nearest_hit(ray),
-            _ => self.find(ray, counter),
+            Structure::WidePortable(wide) => wide.nearest_hit_counted(ray, counter),
+            Structure::Tree(tree) => nearest_hit_by(&**tree, ray, test(), counter),
+            Structure::Unpruned(tree) => unpruned::nearest_hit(tree, ray, test(), counter),
+            Structure::KdTree(tree) => tree.nearest_hit(ray, test(), counter),
+            Structure::Brute => nearest_hit_of_all(count(self.objects), ray, test(), counter),
         }
     }
 
@@ -91,7 +96,10 @@ impl<'a> Accelerator<'a> {
     pub fn any_hit_counted(&self, ray: &Ray, counter: &mut impl Counter) -> bool {
         match &self.structure {
             Structure::Wide(wide) => wide.any_hit(ray),
-            _ => self.meets(ray, counter),
+            Structure::WidePortable(wide) => wide.any_hit_counted(ray, counter),
+            // Its hits need distances, and none of them ends the traversal.
+            Structure::Unpruned(_) => self.nearest_hit_counted(ray, counter).is_some(),
+            _ => self.visit(ray, true, counter),
         }
     }
 
@@ -99,38 +107,14 @@ impl<'a> Accelerator<'a> {
     /// portable code here, so that the counts are the same on every machine; for [`Query::All`]
     /// they test every object.
     pub fn count(&self, query: Query, ray: &Ray, counts: &mut TestCounts) -> bool {
-        match query {
-            Query::All => self.visit(ray, false, counts),
-            Query::Nearest => self.find(ray, counts).is_some(),
-            Query::Any => self.meets(ray, counts),
-        }
-    }
-
-    /// Returns the nearest object. The wide layouts use portable code.
-    #[inline(always)]
-    fn find(&self, ray: &Ray, counter: &mut impl Counter) -> Option<Hit> {
-        let test = || test(self.objects, ray);
-        match &self.structure {
-            Structure::Wide(wide) | Structure::WidePortable(wide) => {
-                wide.nearest_hit_counted(ray, counter)
+        match (query, &self.structure) {
+            (Query::All, _) => self.visit(ray, false, counts),
+            (Query::Nearest, Structure::Wide(wide)) => {
+                wide.nearest_hit_counted(ray, counts).is_some()
             }
-            Structure::Tree(tree) => nearest_hit_by(&**tree, ray, test(), counter),
-            Structure::Unpruned(tree) => unpruned::nearest_hit(tree, ray, test(), counter),
-            Structure::KdTree(tree) => tree.nearest_hit(ray, test(), counter),
-            Structure::Brute => nearest_hit_of_all(count(self.objects), ray, test(), counter),
-        }
-    }
-
-    /// Returns whether any object is hit. The wide layouts use portable code.
-    #[inline(always)]
-    fn meets(&self, ray: &Ray, counter: &mut impl Counter) -> bool {
-        match &self.structure {
-            Structure::Wide(wide) | Structure::WidePortable(wide) => {
-                wide.any_hit_counted(ray, counter)
-            }
-            // Its hits need distances, and none of them ends the traversal.
-            Structure::Unpruned(_) => self.find(ray, counter).is_some(),
-            _ => self.visit(ray, true, counter),
+            (Query::Nearest, _) => self.nearest_hit_counted(ray, counts).is_some(),
+            (Query::Any, Structure::Wide(wide)) => wide.any_hit_counted(ray, counts),
+            (Query::Any, _) => self.any_hit_counted(ray, counts),
         }
     }
 

@@ -51,21 +51,6 @@ enum Cell {
     Leaf { first: u32, count: u32 },
 }
 
-impl KdTree {
-    /// The limit on the depth in [`build`](Self::build) for 2^31 objects, more than a scene can have.
-    const MAX_DEPTH: usize = 49;
-
-    /// Returns the number of references from leaves to objects: at least the number of objects.
-    pub fn references(&self) -> usize {
-        self.objects.len()
-    }
-
-    /// Returns the number of edges from the root to the deepest leaf; 0 for the tree without cells.
-    pub fn depth(&self) -> usize {
-        self.depth
-    }
-}
-
 /// The start or the end of an object's box along an axis. At equal positions ends come first and
 /// starts last: a box that ends at a plane is not above the plane, and a box that starts there is
 /// not below.
@@ -84,20 +69,13 @@ enum Kind {
     Start,
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum Side {
-    Below,
-    Above,
-    Both,
-}
-
 struct Split {
     axis: usize,
     position: f32,
     /// True if boxes in the plane go below it, and false if they go above it.
     planar_below: bool,
-    below: usize,
-    above: usize,
+    /// The numbers of objects below and above the plane.
+    counts: [usize; 2],
 }
 
 struct Frame {
@@ -111,6 +89,9 @@ struct Frame {
 }
 
 impl KdTree {
+    /// The limit on the depth in [`build`](Self::build) for 2^31 objects, more than a scene can have.
+    const MAX_DEPTH: usize = 49;
+
     /// Builds a tree over `boxes`; `boxes[i]` bounds object `i`. No boxes give the tree without
     /// cells. O(n log n).
     ///
@@ -124,7 +105,7 @@ impl KdTree {
             return Ok(tree);
         }
         let max_depth = ((8.0 + 1.3 * libm::log2(n as f64)) as usize).min(Self::MAX_DEPTH);
-        let mut sides = vec![Side::Both; n];
+        let mut sides = vec![[true; 2]; n];
         let placeholder = Cell::Leaf { first: 0, count: 0 };
         tree.cells.push(placeholder);
         let budget = n.saturating_mul(MAX_REFERENCES).min(u32::MAX as usize);
@@ -145,28 +126,42 @@ impl KdTree {
             };
             let below = tree.cells.len();
             tree.cells.extend([placeholder; 2]);
-            let axis = split.axis;
-            let position = split.position;
+            let Split { axis, position, counts, .. } = split;
             tree.cells[frame.cell] =
                 Cell::Inner { axis: axis as u8, position, below: below as u32 };
             for event in &frame.events[axis] {
-                sides[event.object as usize] = split.side(&boxes[event.object as usize]);
+                sides[event.object as usize] = split.sides(&boxes[event.object as usize]);
             }
-            let mut lower = frame.bounds;
-            lower.max[axis] = position;
-            let mut upper = frame.bounds;
-            upper.min[axis] = position;
-            let all = split.below + split.above;
-            for (side, cell, bounds, count) in [
-                (Side::Above, below + 1, upper, split.above),
-                (Side::Below, below, lower, split.below),
-            ] {
-                let events = events_on(side, &frame.events, &sides);
-                let budget = share(frame.budget, count, all);
-                stack.push(Frame { cell, bounds, events, count, depth: frame.depth + 1, budget });
+            let halves = frame.bounds.halves(axis, position);
+            for side in [1, 0] {
+                let count = counts[side];
+                let is_here = |event: &&Event| sides[event.object as usize][side];
+                // Filtering keeps the lists sorted.
+                let events = [0, 1, 2]
+                    .map(|axis| frame.events[axis].iter().filter(is_here).copied().collect());
+                // The product can exceed 64 bits.
+                let share = frame.budget as u128 * count as u128 / (counts[0] + counts[1]) as u128;
+                stack.push(Frame {
+                    cell: below + side,
+                    bounds: halves[side],
+                    events,
+                    count,
+                    depth: frame.depth + 1,
+                    budget: share as usize,
+                });
             }
         }
         Ok(tree)
+    }
+
+    /// Returns the number of references from leaves to objects: at least the number of objects.
+    pub fn references(&self) -> usize {
+        self.objects.len()
+    }
+
+    /// Returns the number of edges from the root to the deepest leaf; 0 for the tree without cells.
+    pub fn depth(&self) -> usize {
+        self.depth
     }
 }
 
@@ -208,7 +203,8 @@ impl Frame {
                         let cost = factor * (TRAVERSAL + INTERSECTION * tests);
                         if cost < limit && below + above <= self.budget {
                             limit = cost;
-                            best = Some(Split { axis, position, planar_below, below, above });
+                            let counts = [below, above];
+                            best = Some(Split { axis, position, planar_below, counts });
                         }
                     }
                 }
@@ -220,36 +216,14 @@ impl Frame {
 }
 
 impl Split {
-    fn side(&self, object: &Aabb) -> Side {
-        let min = object.min[self.axis];
-        let max = object.max[self.axis];
-        if min == max && min == self.position {
-            if self.planar_below { Side::Below } else { Side::Above }
-        } else if max <= self.position {
-            Side::Below
-        } else if min >= self.position {
-            Side::Above
-        } else {
-            Side::Both
+    /// Returns whether the object is below the plane, and whether it is above it.
+    fn sides(&self, object: &Aabb) -> [bool; 2] {
+        let (min, max) = (object.min[self.axis], object.max[self.axis]);
+        if min == self.position && max == self.position {
+            return [self.planar_below, !self.planar_below];
         }
+        [min < self.position, max > self.position]
     }
-}
-
-/// Returns the share of the references that a child with `count` of `all` objects may have.
-fn share(budget: usize, count: usize, all: usize) -> usize {
-    // The product can exceed 64 bits.
-    (budget as u128 * count as u128 / all as u128) as usize
-}
-
-/// Returns the events of the objects on one side of a split. Filtering keeps the lists sorted.
-fn events_on(side: Side, events: &[Vec<Event>; 3], sides: &[Side]) -> [Vec<Event>; 3] {
-    [0, 1, 2].map(|axis| {
-        events[axis]
-            .iter()
-            .filter(|event| [side, Side::Both].contains(&sides[event.object as usize]))
-            .copied()
-            .collect()
-    })
 }
 
 fn events(boxes: &[Aabb], axis: usize) -> Vec<Event> {
@@ -284,18 +258,15 @@ impl KdTree {
         counter: &mut impl Counter,
     ) -> Option<Hit> {
         let mut nearest: Option<Hit> = None;
-        self.walk(ray, counter, |objects, t_max, counter| {
-            for &object in objects {
-                counter.object();
-                if let Some(t) = test(object, *t_max)
-                    && t <= *t_max
-                {
-                    let hit = Hit { t, object };
-                    // Cells may return equal distances in any order; the lowest id decides.
-                    if nearest.is_none_or(|nearest| hit.precedes(&nearest)) {
-                        nearest = Some(hit);
-                        *t_max = t;
-                    }
+        let _ = self.walk(ray, counter, |object, t_max| {
+            if let Some(t) = test(object, *t_max)
+                && t <= *t_max
+            {
+                let hit = Hit { t, object };
+                // Cells may return equal distances in any order; the lowest id decides.
+                if nearest.is_none_or(|nearest| hit.precedes(&nearest)) {
+                    nearest = Some(hit);
+                    *t_max = t;
                 }
             }
             ControlFlow::Continue(())
@@ -312,31 +283,24 @@ impl KdTree {
         mut test: impl FnMut(u32) -> bool,
         counter: &mut impl Counter,
     ) -> bool {
-        let mut is_hit = false;
-        self.walk(ray, counter, |objects, _, counter| {
-            for &object in objects {
-                counter.object();
-                if test(object) {
-                    is_hit = true;
-                    return ControlFlow::Break(());
-                }
-            }
-            ControlFlow::Continue(())
-        });
-        is_hit
+        let visit = |object, _: &mut f32| match test(object) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        };
+        self.walk(ray, counter, visit).is_break()
     }
 
-    /// Calls `leaf` with the objects of every leaf that the ray may hit, from near to far, until
-    /// `leaf` breaks. `leaf` may lower the distance beyond which cells are skipped.
+    /// Calls `visit` with the objects of every leaf on the ray, from near to far, until it breaks.
+    /// It may lower the distance beyond which cells are skipped.
     #[inline(always)]
-    fn walk<C: Counter>(
+    fn walk(
         &self,
         ray: &Ray,
-        counter: &mut C,
-        mut leaf: impl FnMut(&[u32], &mut f32, &mut C) -> ControlFlow<()>,
-    ) {
+        counter: &mut impl Counter,
+        mut visit: impl FnMut(u32, &mut f32) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
         if self.cells.is_empty() {
-            return;
+            return ControlFlow::Continue(());
         }
         let slabs = Slabs::new(ray, &self.bounds);
         let backwards = ray.inverse_direction().to_array().map(|inverse| inverse < 0.0);
@@ -344,7 +308,7 @@ impl KdTree {
         counter.boxes(1);
         let (mut entry, mut exit) = slabs.interval(&self.bounds);
         if entry > exit || entry > t_max {
-            return;
+            return ControlFlow::Continue(());
         }
         // Every level adds at most one pending cell, so the stack cannot overflow.
         let mut stack = [(0, 0.0, 0.0); Self::MAX_DEPTH];
@@ -353,9 +317,9 @@ impl KdTree {
         loop {
             match self.cells[cell] {
                 Cell::Leaf { first, count } => {
-                    let objects = &self.objects[first as usize..first as usize + count as usize];
-                    if leaf(objects, &mut t_max, counter).is_break() {
-                        return;
+                    for &object in &self.objects[first as usize..][..count as usize] {
+                        counter.object();
+                        visit(object, &mut t_max)?;
                     }
                 }
                 Cell::Inner { axis, position, below } => {
@@ -383,7 +347,7 @@ impl KdTree {
             }
             loop {
                 if pending == 0 {
-                    return;
+                    return ControlFlow::Continue(());
                 }
                 pending -= 1;
                 (cell, entry, exit) = stack[pending];

@@ -60,49 +60,30 @@ fn interval(ray: &Ray, aabb: &Aabb) -> Option<RangeInclusive<f32>> {
 mod tests {
     use super::*;
     use bvh_build::{Builder, median_cut};
-    use bvh_core::{Node, TestCounts};
+    use bvh_core::TestCounts;
     use glam::Vec3;
 
-    /// Returns unit cubes with their lower corners at x = 0, 2, 4, … on the x axis.
-    fn row(n: usize) -> Vec<Aabb> {
-        let min = |i: usize| Vec3::X * (2 * i) as f32;
-        (0..n).map(|i| Aabb { min: min(i), max: min(i) + 1.0 }).collect()
-    }
-
-    fn along_x() -> Ray {
-        Ray::half_line(Vec3::new(-1.0, 0.5, 0.5), Vec3::X).unwrap()
-    }
-
-    /// Returns the distance at which that ray enters a cube of the row.
-    fn entry(cube: u32, t_max: f32) -> Option<f32> {
-        let t = (2 * cube + 1) as f32;
-        (t <= t_max).then_some(t)
-    }
-
     #[test]
-    fn all_boxes_and_objects_on_the_ray_are_tested_from_the_last_child_to_the_first() {
-        let boxes = row(100);
+    fn all_boxes_on_the_ray_are_opened_last_child_first_and_hits_count_in_the_box_of_their_leaf() {
+        // Unit cubes on the x axis, the first from 0 to 1, the last from 198 to 199.
+        let min = |i: usize| Vec3::X * (2 * i) as f32;
+        let boxes: Vec<Aabb> = (0..100).map(|i| Aabb { min: min(i), max: min(i) + 1.0 }).collect();
         let config = median_cut::Config { leaf_fraction: 0.1, ..Default::default() };
         let tree = config.build(&boxes).unwrap();
+        let ray = Ray::half_line(Vec3::new(-1.0, 0.5, 0.5), Vec3::X).unwrap();
         let mut order = vec![];
         let mut counts = TestCounts::default();
-        let test = |id, t_max| {
+        let entry = |id: u32, _| {
             order.push(id);
-            entry(id, t_max)
+            Some((2 * id + 1) as f32)
         };
-        let hit = nearest_hit(&tree, &along_x(), test, &mut counts);
+        let hit = nearest_hit(&tree, &ray, entry, &mut counts);
         assert_eq!(hit, Some(Hit { t: 1.0, object: 0 }));
         assert_eq!(counts, TestCounts { boxes: tree.nodes.len() as u64, objects: 100 });
-        assert!(order[0] >= 50, "the last child comes first: {order:?}");
-    }
-
-    #[test]
-    fn a_hit_outside_the_box_of_its_leaf_does_not_count() {
-        let tree = Bvh { nodes: vec![Node::leaf(row(1)[0], 0, 1)], prim_ids: vec![0] };
-        // The ray is in the box from 1 to 2.
-        for (t, counts) in [(0.5, false), (1.0, true), (2.0, true), (2.5, false)] {
-            let hit = nearest_hit(&tree, &along_x(), |_, _| Some(t), &mut ());
-            assert_eq!(hit.is_some(), counts, "{t}");
+        assert!(order[0] >= 50, "{order:?}");
+        for (t, is_in_a_leaf) in [(0.5, false), (1.0, true), (200.0, true), (200.5, false)] {
+            let hit = nearest_hit(&tree, &ray, |_, _| Some(t), &mut ());
+            assert_eq!(hit.is_some(), is_in_a_leaf, "{t}");
         }
     }
 }
