@@ -41,9 +41,9 @@ pub struct Camera {
     /// The point at which all rays begin.
     pub origin: DVec3,
     /// The vector from the origin to the upper left corner of the picture at distance 1.
-    pub(crate) corner: DVec3,
+    corner: DVec3,
     /// The vectors from one pixel to the next one on the right and to the next one below.
-    pub(crate) steps: [DVec3; 2],
+    steps: [DVec3; 2],
 }
 
 impl Camera {

@@ -85,8 +85,8 @@ impl Kind {
     }
 }
 
-/// The camera of a scene's primary rays, in fractions of the root's box: 0 is the lower corner and
-/// 1 the upper corner.
+/// A place of a camera, in world units, or in fractions of a scene's box: 0 is the lower corner and 1
+/// the upper corner. The default, in fractions, sees a scene from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",

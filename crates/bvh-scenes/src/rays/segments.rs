@@ -2,7 +2,7 @@
 //! renderer, or any through a scene.
 
 use super::camera::{Camera, View};
-use super::random::{Family, Kind, in_box, on_sphere, random_ray};
+use super::random::{Family, Kind, Viewpoint, in_box, on_sphere, random_ray};
 use crate::Scene;
 use crate::trace::Accelerator;
 use bvh_config::{OutOfRange, above, config};
@@ -17,7 +17,7 @@ config! {
     /// are in world units.
     pub struct RenderedRays {
         /// The poses of the camera on its path, at least one. The camera moves in straight lines.
-        cameras: Vec<Pose>;
+        cameras: Vec<Viewpoint>;
         /// The angle between the lower and the upper edge of the picture, in degrees.
         fov: f64 = 60.0, in (Excluded(0.0), Excluded(180.0));
         /// The picture's width divided by its height.
@@ -32,16 +32,6 @@ config! {
         seed: u64 = 1;
     }
     check Self::check_cameras;
-}
-
-config! {
-    /// The position and the target of a camera, in world units.
-    pub struct Pose {
-        /// The eye.
-        eye: [f64; 3];
-        /// The point in the middle of the picture.
-        target: [f64; 3];
-    }
 }
 
 impl RenderedRays {
@@ -298,7 +288,7 @@ mod tests {
 
     #[test]
     fn more_rays_than_a_density_counts_are_rejected_before_they_are_traced() {
-        let pose = Pose { eye: [0.0; 3], target: [1.0; 3] };
+        let pose = Viewpoint { eye: [0.0; 3], target: [1.0; 3] };
         let mut rays =
             RenderedRays { cameras: vec![pose], bounces: 2, count: 349_525, ..Default::default() };
         assert_eq!(rays.check(), Ok(()));
@@ -311,7 +301,7 @@ mod tests {
     fn a_renderer_sends_its_number_of_primary_rays_and_a_bounce_from_every_hit() {
         let scene = Scene::load("escher:500").unwrap();
         let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
-        let pose = Pose { eye: [9.0, 5.0, 8.0], target: [0.0; 3] };
+        let pose = Viewpoint { eye: [9.0, 5.0, 8.0], target: [0.0; 3] };
         let rays = RenderedRays { cameras: vec![pose], count: 100, ..Default::default() };
         let traced = of_renderer(&rays, &scene, &tree, &|| false);
         let of_kind = |kind| traced.iter().filter(move |traced| traced.kind == kind);

@@ -4,7 +4,7 @@ use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Bvh, Coherence, Hit, Kernel, Ray, WideBvh};
 use bvh_scenes::Scene;
 use bvh_scenes::builtin::stand_ins::STAND_INS;
-use bvh_scenes::rays::{Pose, RenderedRays, TracedRay, Viewpoint, in_box, of_inside, of_renderer};
+use bvh_scenes::rays::{RenderedRays, TracedRay, Viewpoint, in_box, of_inside, of_renderer};
 use std::arch::asm;
 
 /// The flags of the control and status register for subnormal operands and results.
@@ -51,7 +51,8 @@ fn flags(wide: &WideBvh, rays: &[Ray]) -> Vec<(&'static str, u32)> {
 fn ordinary(scene: &Scene, tree: &Bvh) -> Vec<TracedRay> {
     let root = tree.root_aabb().unwrap();
     let in_scene = |place| in_box(&root, place).to_array();
-    let pose = |view: Viewpoint| Pose { eye: in_scene(view.eye), target: in_scene(view.target) };
+    let pose =
+        |view: Viewpoint| Viewpoint { eye: in_scene(view.eye), target: in_scene(view.target) };
     let inside = Viewpoint { eye: [0.3, 0.4, 0.6], target: [0.8, 0.5, 0.3] };
     let cameras = [Viewpoint::default(), inside].map(pose).into();
     let lights = vec![in_scene([0.5, 0.95, 0.5])];
@@ -64,8 +65,7 @@ fn ordinary(scene: &Scene, tree: &Bvh) -> Vec<TracedRay> {
 #[test]
 fn ordinary_rays_make_no_kernel_meet_subnormal_numbers() {
     let mut broken = Vec::new();
-    for scene in STAND_INS {
-        let name = scene.name;
+    for (name, ..) in STAND_INS {
         let scene = Scene::load(&format!("{name}:4000")).unwrap();
         let tree = muller_fellner::Config::default().build(&scene.boxes).unwrap();
         let wide = WideBvh::new(&tree, scene.triangles().unwrap()).unwrap();

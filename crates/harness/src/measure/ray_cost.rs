@@ -6,8 +6,8 @@ use bvh_config::{OutOfRange, config};
 use bvh_core::{Bvh, Ray, RayDensity, Segment};
 use bvh_scenes::Scene;
 use bvh_scenes::rays::{
-    Family, Kind, OF_ANYTHING, Pose, RenderedRays, TRAINED, TracedRay, Viewpoint, check_count,
-    density, in_box, of_anything, of_inside, of_renderer, random_ray,
+    Family, Kind, OF_ANYTHING, RenderedRays, TRAINED, TracedRay, Viewpoint, check_count, density,
+    in_box, of_anything, of_inside, of_renderer, random_ray,
 };
 use bvh_search::{Stream, ray_density};
 use rand::SeedableRng;
@@ -154,7 +154,8 @@ fn rendered(
     // Viewpoints are fractions of the root's box, which an empty tree lacks.
     let Some(root) = tree.root_aabb() else { return Vec::new() };
     let place = |place| in_box(&root, place).to_array();
-    let poses = path.iter().map(|view| Pose { eye: place(view.eye), target: place(view.target) });
+    let poses =
+        path.iter().map(|view| Viewpoint { eye: place(view.eye), target: place(view.target) });
     let rays = RenderedRays {
         cameras: poses.collect(),
         lights: lights.iter().copied().map(place).collect(),
