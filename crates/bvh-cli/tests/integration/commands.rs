@@ -95,7 +95,7 @@ bake /dev/zero LONG ! /dev/zero
 bake spheres75 LONG --from=/dev/zero ! --from | /dev/zero
 render spheres75 --accel=folder.bvh --out=x.png ! --accel | folder.bvh
 export good.bvh escher:75 --for=obvhs --out=x.bin ! good.bvh | scene
-export good.bvh spheres75 --for=obvhs --out=x.bin ! spheres75 has spheres
+export good.bvh spheres75 --for=obvhs --out=x.bin ! spheres75: spheres
 render sofa --out=x.png ! no such scene | spheres75
 render spheres75 --out=x.png --accel=none.bvh ! none.bvh
 
@@ -116,7 +116,7 @@ bake escher --parts=4 ! --budget
 inspect good.bvh --rays=default ! --rays | SCENE
 export good.bvh spheres75 --for=embree --out=x.bin ! embree | obvhs
 render spheres75 --out=x.png --accel=octree ! octree | brute, kdtree, bvh, wide
-render spheres75 --out=x.png --accel=wide ! spheres75 has spheres | --accel brute
+render spheres75 --out=x.png --accel=wide ! spheres75: spheres | --accel brute
 render escher --out=x.png --accel=wide --heatmap ! counts no tests
 render spheres75 --out=x.png --size=0x10 ! --size | 960x540
 render spheres75 --out=x.png --from=1,2 ! --from | three numbers

@@ -25,43 +25,23 @@ const SPRING: f64 = 3.0;
 /// Height of wall plate and eaves, metres.
 const EAVES: f64 = 5.4;
 
-/// Generates the triangles of the scene. Every call gives the same bytes on every machine.
 pub fn triangles() -> Vec<Triangle> {
     let mut cloister = MeshBuilder::default();
     // The court's sides in bays: the long walks run along x, the short ones along y.
     let long = 9;
     let short = 7;
     let half = dvec3(long as f64, short as f64, 0.0) * (0.5 * BAY);
-    let parts = Parts::new();
     for (turns, bays, offset) in
         [(0.0, long, half.y), (0.25, short, half.x), (0.5, long, half.y), (0.75, short, half.x)]
     {
         // Each walk is built along +x with the court on its +y side, its corner vault at its far
         // end.
         let place = upright(turns, 0.0, 0.0, 0.0) * upright(0.0, 0.0, -offset, 0.0);
-        cloister.part(&place, |mesh| walk(mesh, &parts, bays));
+        cloister.part(&place, |mesh| walk(mesh, bays));
     }
     court(&mut cloister, half);
     cloister.part(&upright(0.037, 2.1, -1.4, 0.0), well);
     cloister.finish(UNIT, dvec3(1250.0, -430.0, 75.0))
-}
-
-struct Parts {
-    column: MeshBuilder,
-    arch: MeshBuilder,
-    vault: MeshBuilder,
-    tile: MeshBuilder,
-}
-
-impl Parts {
-    fn new() -> Self {
-        Self {
-            column: MeshBuilder::of(column),
-            arch: MeshBuilder::of(arcade_arch),
-            vault: MeshBuilder::of(vault),
-            tile: MeshBuilder::of(tile),
-        }
-    }
 }
 
 /// A barrel tile of length 1 down the slope, slightly conical.
@@ -143,7 +123,7 @@ fn vault(vault: &mut MeshBuilder) {
 
 /// A walk of `bays` bays along x, centred, its arcade in the plane y = 0 and its back wall at y =
 /// −`BAY`.
-fn walk(walk: &mut MeshBuilder, parts: &Parts, bays: usize) {
+fn walk(walk: &mut MeshBuilder, bays: usize) {
     let start = -0.5 * BAY * bays as f64;
     let end = -start;
     let back = -BAY - 0.25;
@@ -157,12 +137,12 @@ fn walk(walk: &mut MeshBuilder, parts: &Parts, bays: usize) {
         let x = start + BAY * bay as f64;
         // Bays continue into the corner, which has a shared vault and no arch.
         let middle = x + 0.5 * BAY;
-        walk.copy(&upright(0.0, middle, -0.5 * BAY - 0.1, SPRING), &parts.vault);
+        walk.part(&upright(0.0, middle, -0.5 * BAY - 0.1, SPRING), vault);
         if bay < bays {
             for (turns, y) in [(0.003 * bay as f64, -0.18), (0.002 * bay as f64 - 0.01, 0.18)] {
-                walk.copy(&upright(turns, x, y, PARAPET), &parts.column);
+                walk.part(&upright(turns, x, y, PARAPET), column);
             }
-            walk.copy(&upright(0.0, middle, 0.0, SPRING), &parts.arch);
+            walk.part(&upright(0.0, middle, 0.0, SPRING), arcade_arch);
             buttress(walk, x);
         }
         paving(walk, x, bay);
@@ -193,7 +173,7 @@ fn walk(walk: &mut MeshBuilder, parts: &Parts, bays: usize) {
             }
         });
     });
-    roof(walk, parts, end);
+    roof(walk, end);
 }
 
 /// A slender stepped pier against the arcade's court side.
@@ -233,7 +213,7 @@ fn paving(mesh: &mut MeshBuilder, x: f64, bay: usize) {
 
 /// The lean-to roof over a walk, `half` its arcade's half length: rafters below, boarding in five
 /// panels, rows of barrel tiles above; mitred at both corners.
-fn roof(mesh: &mut MeshBuilder, parts: &Parts, half: f64) {
+fn roof(mesh: &mut MeshBuilder, half: f64) {
     let eaves = dvec3(0.0, 0.7, EAVES);
     let ridge = dvec3(0.0, -BAY - 0.25, EAVES + 1.5);
     let slope = (ridge - eaves).length();
@@ -262,7 +242,7 @@ fn roof(mesh: &mut MeshBuilder, parts: &Parts, half: f64) {
             let limit = low + (high - low) * fraction(2 * j + 1, 2 * rows);
             if x.abs() < limit {
                 let foot = eaves + along(x) + up * (length * j as f64) + normal * 0.02;
-                mesh.copy(&placed(frame, foot), &parts.tile);
+                mesh.part(&placed(frame, foot), tile);
             }
         }
     }
@@ -303,10 +283,11 @@ fn well(well: &mut MeshBuilder) {
     }
     let yoke = half_circle(20, |c, s| dvec3(0.83 * c, 0.0, 1.36 + 1.9 * libm::sqrt(s)));
     well.sweep(&yoke, DVec3::Y, &circle(0.035, 7));
-    let link = MeshBuilder::of(|link| link.torus(0.03, 0.012, 9, 6));
     for k in 0..18 {
         let turned = about_z(if k % 2 == 0 { 0.02 } else { 0.27 }) * about_y(0.25);
-        well.copy(&placed(turned, dvec3(0.0, 0.0, 3.2 - 0.05 * k as f64)), &link);
+        well.part(&placed(turned, dvec3(0.0, 0.0, 3.2 - 0.05 * k as f64)), |link| {
+            link.torus(0.03, 0.012, 9, 6);
+        });
     }
     // A wooden bucket, hoops included: its outside, then its inside.
     let outside =

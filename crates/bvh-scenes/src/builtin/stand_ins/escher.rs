@@ -20,7 +20,6 @@ const RAIL: f64 = 2.6;
 /// Side of the room, in tread depths.
 const ROOM: f64 = 30.0;
 
-/// Generates the triangles of the scene. Every call gives the same bytes on every machine.
 pub fn triangles() -> Vec<Triangle> {
     let mut room = MeshBuilder::default();
     // Each cyclic permutation of the axes sends 'up' to a different axis.
@@ -149,9 +148,7 @@ fn balustrade(mesh: &mut MeshBuilder, feet: &[DVec3]) {
             baluster.revolve(&[(0.08, 0.0), (0.08, RAIL)], 4);
         });
     }
-    let (Some(&first), Some(&last)) = (feet.first(), feet.last()) else {
-        return;
-    };
+    let [first, .., last] = *feet else { return };
     let rail =
         [(0.16, -0.08), (0.16, 0.06), (0.07, 0.14), (-0.07, 0.14), (-0.16, 0.06), (-0.16, -0.08)];
     mesh.sweep(&[first + up, last + up], DVec3::Z, &rail);

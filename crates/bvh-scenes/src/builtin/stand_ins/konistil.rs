@@ -19,7 +19,6 @@ const SIZE: (f64, f64) = (2700.0, 2000.0);
 const CELLS: (usize, usize) = (36, 27);
 const TRACK: f64 = 78.0;
 
-/// Generates the triangles of the scene. Every call gives the same bytes on every machine.
 pub fn triangles() -> Vec<Triangle> {
     let mut valley = MeshBuilder::default();
     terrain(&mut valley);
@@ -51,6 +50,7 @@ fn ground(x: f64, y: f64) -> f64 {
 fn value_noise(stream: u32, x: f64, y: f64) -> f64 {
     let i = x.floor();
     let j = y.floor();
+    let ease = |t: f64| t * t * (3.0 - 2.0 * t);
     let u = ease(x - i);
     let v = ease(y - j);
     // The offset keeps the index of the jitter positive.
@@ -58,11 +58,6 @@ fn value_noise(stream: u32, x: f64, y: f64) -> f64 {
     let low = value(0.0, 0.0) * (1.0 - u) + value(1.0, 0.0) * u;
     let high = value(0.0, 1.0) * (1.0 - u) + value(1.0, 1.0) * u;
     low * (1.0 - v) + high * v
-}
-
-/// Returns the cubic ease of `t` in 0..=1, whose slope is 0 at both ends.
-fn ease(t: f64) -> f64 {
-    t * t * (3.0 - 2.0 * t)
 }
 
 /// The line that valley and railway follow: y in metres at x, oblique to the map and slightly

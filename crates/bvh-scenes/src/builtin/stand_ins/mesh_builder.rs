@@ -14,14 +14,6 @@ pub struct MeshBuilder {
 }
 
 impl MeshBuilder {
-    /// Returns what `draw` adds.
-    pub fn of(draw: impl FnOnce(&mut Self)) -> Self {
-        let mut mesh = Self::default();
-        draw(&mut mesh);
-        mesh
-    }
-
-    /// Adds one triangle.
     pub fn triangle(&mut self, a: DVec3, b: DVec3, c: DVec3) {
         self.triangles.push([a, b, c]);
     }
@@ -50,10 +42,14 @@ impl MeshBuilder {
     /// Adds a surface of `columns` × `rows` quadrilaterals with the corners `point(i, j)`, `i <=
     /// columns`, `j <= rows`. Not generic, because every call would compile it again.
     pub fn grid(&mut self, columns: usize, rows: usize, point: &dyn Fn(usize, usize) -> DVec3) {
-        for j in 0..rows {
+        let row = |j| (0..=columns).map(|i| point(i, j)).collect::<Vec<_>>();
+        let mut low = row(0);
+        for j in 1..=rows {
+            let high = row(j);
             for i in 0..columns {
-                self.quad(point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1));
+                self.quad(low[i], low[i + 1], high[i + 1], high[i]);
             }
+            low = high;
         }
     }
 
@@ -143,11 +139,8 @@ impl MeshBuilder {
                 let arc = front(i, y);
                 if j == 0 { arc } else { dvec3(arc.x, y, top) }
             });
-            for (inner, outer) in [(radius, half_width), (-half_width, -radius)] {
-                self.grid(1, 1, &|i, j| {
-                    dvec3(if i == 0 { inner } else { outer }, y, if j == 0 { 0.0 } else { top })
-                });
-            }
+            self.wall(radius, half_width, y, 0.0, top);
+            self.wall(-half_width, -radius, y, 0.0, top);
         }
         self.grid(segments, 1, &|i, j| front(i, if j == 0 { -0.5 } else { 0.5 } * thickness));
     }
@@ -159,11 +152,6 @@ impl MeshBuilder {
         for corner in self.triangles[before..].as_flattened_mut() {
             *corner = placement.transform_point3(*corner);
         }
-    }
-
-    /// Adds a moved copy of a part of which there are many.
-    pub fn copy(&mut self, placement: &DAffine3, part: &Self) {
-        self.part(placement, |mesh| mesh.triangles.extend(&part.triangles));
     }
 
     /// Multiplies by `unit`, adds `origin`, rounds to f32, and drops triangles without area, which

@@ -18,7 +18,6 @@ const GOLDEN: f64 = 0.381_966_011_250_105_1;
 const SCALES: usize = 122;
 const SUB_SCALES: usize = 6;
 
-/// Generates the triangles of the scene. Every call gives the same bytes on every machine.
 pub fn triangles() -> Vec<Triangle> {
     let mut cone = MeshBuilder::default();
     let core = [0.0, 0.0, 0.25, 0.5, 0.75, 1.0].map(|t| (0.6 * belly(t), 0.97 * t));
