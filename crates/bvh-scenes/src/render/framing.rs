@@ -5,22 +5,10 @@ use crate::rays::{View, frame};
 use bvh_core::{Aabb, Primitives};
 use glam::DVec3;
 
-/// Views of scenes that should be seen from inside: the name, the eye, the point in the middle of
-/// the picture, and the angle.
-const INSIDE: [(&str, [f64; 3], [f64; 3], f64); 1] =
-    [("sponza", [-11.3, 1.9, -0.9], [3.0, 4.4, 0.5], 62.0)];
-
-/// Returns a view of a scene: the view in `INSIDE`, or otherwise a view from outside, from above
-/// and a little from the side, whose distance just fits the whole box.
+/// Returns a view of a scene from outside, from above and a little from the side, whose distance
+/// just fits the whole box.
 pub fn automatic(scene: &Scene, aspect: f64) -> View {
     let bounds = &Aabb::union_of(&scene.boxes);
-    if let Some((_, from, at, fov)) = INSIDE.iter().find(|view| view.0 == scene.name) {
-        let view = View { from: (*from).into(), at: (*at).into(), fov: *fov };
-        // A different scene may have the same name.
-        if view.is_inside(bounds) {
-            return view;
-        }
-    }
     let up = scene.up();
     let front = if up == DVec3::Y { DVec3::Z } else { -DVec3::Y };
     // Meshes are seen from higher above, because their floor would otherwise be edge on.
@@ -59,7 +47,6 @@ fn framing(bounds: &Aabb, towards_eye: DVec3, up: DVec3, aspect: f64) -> View {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rays::Camera;
 
     #[test]
     fn every_corner_of_every_box_is_in_the_picture_and_one_is_near_its_edge() {
@@ -71,21 +58,21 @@ mod tests {
             let bounds = Aabb::from((min, max));
             let towards = DVec3::new(0.4, 0.6, 1.0);
             let view = framing(&bounds, towards, DVec3::Y, 1.5);
-            let camera = Camera::new(&view, DVec3::Y, 300, 200);
+            let forward = (view.at - view.from).normalize();
+            let [right, top] = frame(forward, DVec3::Y);
+            let slope = libm::tan(View::FOV.to_radians() / 2.0);
             let mut widest: f64 = 0.0;
             for number in 0..8 {
                 let corner = DVec3::from([0, 1, 2].map(|axis| {
                     let side = if number >> axis & 1 == 1 { bounds.max } else { bounds.min };
                     f64::from(side[axis])
                 }));
-                let to = corner - camera.origin;
-                let forward = camera.corner + camera.steps[0] * 150.0 + camera.steps[1] * 100.0;
-                let scaled = to / to.dot(forward) - forward;
-                // The corner's distance from the middle of the picture, in pixels.
-                let [x, y] =
-                    camera.steps.map(|step| (scaled.dot(step) / step.length_squared()).abs());
-                assert!(x < 150.0 && y < 100.0, "{bounds:?}");
-                widest = widest.max(x / 150.0).max(y / 100.0);
+                let to = corner - view.from;
+                // The distance from the middle of the picture over that of its edge.
+                let far = to.dot(forward) * slope;
+                let away = (to.dot(right).abs() / 1.5).max(to.dot(top).abs()) / far;
+                assert!(far > 0.0 && away < 1.0, "{bounds:?}");
+                widest = widest.max(away);
             }
             assert!(widest > 0.9, "{bounds:?}: {widest}");
         }

@@ -24,13 +24,8 @@ impl Light {
     }
 
     fn at(&self, distance: f64) -> DVec3 {
-        // A distance of ∞ over a reach of ∞ would be NaN.
-        if self.reach.is_finite() {
-            let relative = distance / self.reach;
-            self.colour / (1.0 + relative * relative)
-        } else {
-            self.colour
-        }
+        let relative = distance / self.reach;
+        self.colour / (1.0 + relative * relative)
     }
 }
 
@@ -65,13 +60,14 @@ fn automatic(view: &View, up: DVec3, bounds: &Aabb) -> Vec<Light> {
     ]
 }
 
-/// All surfaces that a ray can meet, and the lights.
+/// All surfaces that a ray can meet, the lights, and the camera.
 pub struct World<'a> {
     accelerator: &'a Accelerator<'a>,
+    options: &'a Options,
+    camera: Camera,
     up: DVec3,
     lights: Vec<Light>,
     ground: Option<Ground>,
-    depth: u32,
 }
 
 const HORIZON: DVec3 = DVec3::new(0.58, 0.66, 0.76);
@@ -82,25 +78,22 @@ const BELOW: DVec3 = DVec3::new(0.22, 0.20, 0.18);
 const AMBIENT: f64 = 0.42;
 
 impl<'a> World<'a> {
-    pub fn new(
-        accelerator: &'a Accelerator<'a>,
-        scene: &Scene,
-        bounds: &Aabb,
-        options: &Options,
-    ) -> Self {
-        let &Options { ref view, ground, depth, .. } = options;
+    pub fn new(accelerator: &'a Accelerator<'a>, scene: &Scene, options: &'a Options) -> Self {
+        let Options { view, width, height, ground, .. } = options;
+        let bounds = &Aabb::union_of(&scene.boxes);
         let up = scene.up();
         // An interior has its own floor.
-        let ground = if ground && !view.is_inside(bounds) {
+        let ground = if *ground && !view.is_inside(bounds) {
             Ground::below(accelerator.objects(), bounds, up)
         } else {
             None
         };
-        Self { accelerator, up, lights: automatic(view, up, bounds), ground, depth }
+        let camera = Camera::new(view, up, *width, *height);
+        Self { accelerator, options, camera, up, lights: automatic(view, up, bounds), ground }
     }
 
-    /// Draws a row of the picture with `samples`² rays per pixel.
-    pub fn row(&self, camera: &Camera, y: u32, width: u32, samples: u32) -> Film {
+    pub fn row(&self, y: u32) -> Film {
+        let &Options { width, samples, .. } = self.options;
         let mut row = Film { width, ..Film::default() };
         for x in 0..width {
             let mut sum = DVec3::ZERO;
@@ -109,8 +102,8 @@ impl<'a> World<'a> {
                 for u in 0..samples {
                     let right = f64::from(x) + (f64::from(u) + 0.5) / f64::from(samples);
                     let down = f64::from(y) + (f64::from(v) + 0.5) / f64::from(samples);
-                    let direction = camera.direction(right, down);
-                    let light = self.radiance(camera.origin, direction, &mut row);
+                    let direction = self.camera.direction(right, down);
+                    let light = self.radiance(self.camera.origin, direction, &mut row);
                     // Exposure before the average keeps the edges of highlights smooth.
                     sum += image::expose(light);
                 }
@@ -126,7 +119,7 @@ impl<'a> World<'a> {
     fn radiance(&self, mut origin: DVec3, mut direction: DVec3, film: &mut Film) -> DVec3 {
         let mut light = DVec3::ZERO;
         let mut weight = 1.0;
-        for _ in 0..=self.depth {
+        for _ in 0..=self.options.depth {
             let Some(surface) = self.meet(origin, direction, film) else { break };
             let facing = -surface.normal.dot(direction);
             // Schlick 1994, 'An inexpensive BRDF model for physically-based rendering'.

@@ -6,9 +6,9 @@
 //! grid of rays instead of an adaptive one, no light is refracted, the ambient light is a
 //! hemisphere, and a scene that is seen from outside has a ground.
 //!
-//! Data flows one way: [`View`](crate::rays::View) → [`Camera`] → rays → [`Accelerator`] →
-//! `Surface` → light → [`Film`]. All computations except ray tests use f64, and `libm` where the
-//! platform's functions may differ. The same scene therefore gives the same bytes on every machine.
+//! Data flows one way: [`View`](crate::rays::View) → camera → rays → [`Accelerator`] → `Surface` →
+//! light → [`Film`]. All computations except ray tests use f64, and `libm` where the platform's
+//! functions may differ. The same scene therefore gives the same bytes on every machine.
 
 pub mod framing;
 pub mod heat;
@@ -17,9 +17,7 @@ mod light;
 mod surface;
 
 use crate::Scene;
-use crate::rays::Camera;
 use crate::trace::Accelerator;
-use bvh_core::Aabb;
 pub use image::{Film, Options};
 use light::World;
 use rayon::prelude::*;
@@ -32,38 +30,11 @@ pub fn render(
     options: &Options,
     row_done: &(dyn Fn() + Sync),
 ) -> Film {
-    let bounds = Aabb::union_of(&scene.boxes);
-    let &Options { width, height, samples, .. } = options;
-    let camera = Camera::new(&options.view, scene.up(), width, height);
-    let world = World::new(accelerator, scene, &bounds, options);
+    let world = World::new(accelerator, scene, options);
     // Rows are collected in order, so that the picture does not depend on the order of completion.
-    let rows: Vec<Film> = (0..height)
-        .into_par_iter()
-        .map(|y| {
-            let row = world.row(&camera, y, width, samples);
-            row_done();
-            row
-        })
-        .collect();
-    let mut film = Film { width, ..Film::default() };
+    let rows: Vec<Film> =
+        (0..options.height).into_par_iter().map(|y| world.row(y)).inspect(|_| row_done()).collect();
+    let mut film = Film { width: options.width, ..Film::default() };
     rows.into_iter().for_each(|row| film.append(row));
     film
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::trace::Structure;
-
-    #[test]
-    fn rays_follow_as_many_reflections_as_the_options_say() {
-        let scene = Scene::load("spheres75").unwrap();
-        let brute = Accelerator::new(&scene.primitives, Structure::Brute);
-        let options = Options::new(32, 18, framing::automatic(&scene, 16.0 / 9.0));
-        let rays = [0, 1, 2].map(|depth| {
-            let options = Options { samples: 1, depth, ..options.clone() };
-            render(&scene, &brute, &options, &|| ()).rays
-        });
-        assert!(rays.is_sorted_by(|a, b| a < b), "{rays:?}");
-    }
 }
