@@ -11,7 +11,7 @@ mod nodes;
 
 use super::MeshError;
 use super::mesh::{Fault, MOST_TRIANGLES, Mesh, counted};
-use accessors::{Accessors, F32, I8, I16, U8, U16, U32};
+use accessors::{F32, I8, I16, U8, U16, U32};
 use buffers::Buffers;
 use bvh_core::Triangle;
 use document::{Document, Primitive, document, is_covered};
@@ -87,8 +87,8 @@ pub fn parts(bytes: &[u8], path: &Path) -> Result<Parts, MeshError> {
 
 fn read(bytes: &[u8], path: &Path) -> Result<Parts, Fault> {
     let (document, chunk) = document(bytes)?;
-    let accessors = Accessors::new(&document, Buffers::new(path, chunk));
-    let mut loader = Loader { accessors, total: 0, left_out: BTreeMap::new() };
+    let buffers = Buffers::new(&document, path, chunk);
+    let mut loader = Loader { buffers, total: 0, left_out: BTreeMap::new() };
     let mut places = places(&document)?;
     let all = places.len();
     places.retain(|place| has_area(&place.transform));
@@ -153,7 +153,7 @@ fn remarks(document: &Document) -> Vec<String> {
 }
 
 struct Loader<'a> {
-    accessors: Accessors<'a>,
+    buffers: Buffers<'a>,
     /// The number of triangles so far.
     total: usize,
     /// The numbers of nodes and of primitives that are not read, by kind.
@@ -162,8 +162,7 @@ struct Loader<'a> {
 
 const FLAT: &str = "meshes without area in their places left out";
 const UNBENT: &str = "meshes read without what bends them, a skin or morph targets";
-const LINES: &str = "primitives of points or lines left out";
-const WITHOUT_POSITIONS: &str = "primitives without positions left out";
+const WITHOUT_TRIANGLES: &str = "primitives of points, of lines or without positions left out";
 const INCOMPLETE: &str = "primitives that end in an incomplete triangle";
 
 /// Positions are floats, or integers by `KHR_mesh_quantization`.
@@ -175,20 +174,16 @@ impl Loader<'_> {
     }
 
     fn add(&mut self, primitive: &Primitive, triangles: &mut Vec<Triangle>) -> Result<(), String> {
-        match primitive.mode {
-            0..4 => {
-                self.leave_out(LINES);
-                return Ok(());
-            }
-            4..7 => {}
-            mode => return Err(format!("mode {mode}; expected 0 to 6")),
+        let mode = primitive.mode.unwrap_or(4);
+        if mode > 6 {
+            return Err(format!("mode {mode}; expected 0 to 6"));
         }
-        let points = match primitive.attributes.get("POSITION") {
-            Some(&accessor) => self.accessors.read::<3>(accessor, &POSITIONS)?,
+        let points = match primitive.attributes.get("POSITION").filter(|_| mode >= 4) {
+            Some(&accessor) => self.buffers.accessor::<3>(accessor, &POSITIONS)?,
             None => Vec::new(),
         };
         if points.is_empty() {
-            self.leave_out(WITHOUT_POSITIONS);
+            self.leave_out(WITHOUT_TRIANGLES);
             return Ok(());
         }
         let points: Vec<Vec3> =
@@ -196,7 +191,7 @@ impl Loader<'_> {
         let indices: Vec<usize> = match primitive.indices {
             None => (0..points.len()).collect(),
             Some(accessor) => {
-                let indices = self.accessors.read::<1>(accessor, &[U8, U16, U32])?;
+                let indices = self.buffers.accessor::<1>(accessor, &[U8, U16, U32])?;
                 indices.into_iter().map(|[index]| index as usize).collect()
             }
         };
@@ -211,13 +206,10 @@ impl Loader<'_> {
                 }
             }
         }
-        let count = match primitive.mode {
-            4 => indices.len() / 3,
-            _ => indices.len().saturating_sub(2),
-        };
-        let is_incomplete = match primitive.mode {
-            4 => !indices.len().is_multiple_of(3),
-            _ => matches!(indices.len(), 1 | 2),
+        let n = indices.len();
+        let (count, is_incomplete) = match mode {
+            4 => (n / 3, !n.is_multiple_of(3)),
+            _ => (n.saturating_sub(2), matches!(n, 1 | 2)),
         };
         if is_incomplete {
             self.leave_out(INCOMPLETE);
@@ -225,7 +217,7 @@ impl Loader<'_> {
         self.total += count;
         check_total(self.total)?;
         triangles.extend((0..count).map(|i| {
-            let corners = match primitive.mode {
+            let corners = match mode {
                 4 => [3 * i, 3 * i + 1, 3 * i + 2],
                 // Every second triangle of a strip is turned, so that all have one orientation.
                 5 => [i, i + 1 + i % 2, i + 2 - i % 2],

@@ -4,17 +4,17 @@
 //! statements that `Geometry` finds, because `tobj` 4.0.5 reads a polyline `l 1 2 3` as a triangle,
 //! skips the first vertex after a byte order mark, and rejects Latin-1 comments, comments at the end
 //! of a line, continued lines, and files in which only some vertices have a colour. Its errors name
-//! no line, and it accepts `nan`. `Geometry` therefore checks every number before `tobj` receives
-//! it. `tobj` splits every polygon into a fan, so that `Polygons` splits them instead.
+//! no line. `Geometry` therefore checks every number before `tobj` receives it. `tobj` would make fans
+//! of polygons, so that `Polygons` splits them instead.
 //!
 //! Points, lines, curves, names, groups, materials (whose files are never opened), normals and
 //! texture coordinates are ignored. Lines may end in LF, CRLF or CR, and a backslash at the end
 //! continues a statement on the next line.
 
-use super::mesh::{Fault, Mesh, UNUSED, counted};
-use super::polygon::{MOST_CORNERS, Polygons, open};
+use super::mesh::{Fault, Mesh, counted};
+use super::polygon::{MOST_CORNERS, Polygons};
 use super::text::{self, number, shown};
-use glam::Vec3;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Reads the bytes of an OBJ file. Any bytes give a mesh or an error. O(bytes), and more for faces
@@ -28,27 +28,17 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
     let loaded = tobj::load_obj_buf(&mut &geometry.text[..], &options, no_material);
     let (models, _) = loaded
         .map_err(|error| Fault::of_file(format!("{error}; expected a Wavefront OBJ file")))?;
-    let mut polygons = Polygons::default();
-    let mut lines = geometry.lines.iter();
-    let mut corners = Vec::new();
-    let mut used = 0;
-    for tobj::Model { mesh, .. } in models {
-        // `tobj` keeps exactly the vertices that faces use, each once, and names no lengths of
-        // faces if all are triangles.
-        let (positions, _) = mesh.positions.as_chunks::<3>();
-        let mut indices = &mesh.indices[..];
-        let mut arities = mesh.face_arities.iter();
-        while !indices.is_empty() {
-            let (face, rest) = indices.split_at(arities.next().map_or(3, |&arity| arity as usize));
-            corners.clear();
-            corners.extend(open(face).iter().map(|&index| Vec3::from(positions[index as usize])));
-            let line = lines.next().copied().unwrap_or_default();
-            polygons
-                .add(&corners)
-                .map_err(|message| Fault::in_line(line, format!("face of {message}")))?;
-            indices = rest;
-        }
-        used += positions.len();
+    // Nothing divides the statements, so that there is one model at most.
+    let mesh = models.into_iter().next().map(|model| model.mesh).unwrap_or_default();
+    // `tobj` keeps exactly the vertices that faces use, and names no lengths of faces if all are
+    // triangles.
+    let mut polygons = Polygons::new(mesh.positions.as_chunks().0);
+    let mut indices = &mesh.indices[..];
+    let mut arities = mesh.face_arities.iter();
+    for &line in &geometry.lines {
+        let (face, rest) = indices.split_at(arities.next().map_or(3, |&arity| arity as usize));
+        polygons.add(face).map_err(|message| Fault::in_line(line, format!("face: {message}")))?;
+        indices = rest;
     }
     if polygons.triangles.is_empty() {
         let found = format!("{} vertices and no face of three or more", geometry.vertices);
@@ -56,9 +46,8 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
         return Err(Fault::of_file(message));
     }
     polygons.short += geometry.short_faces;
-    let unused = counted(UNUSED, geometry.vertices - used);
-    let remarks = unused.into_iter().chain(polygons.remarks()).chain(geometry.unknown);
-    let remarks = remarks.collect();
+    let mut remarks = polygons.remarks(geometry.vertices);
+    remarks.extend(geometry.unknown);
     Ok(Mesh::new(polygons.triangles, remarks))
 }
 
@@ -76,23 +65,18 @@ struct Geometry {
     /// The clause about lines that begin with no keyword.
     unknown: Option<String>,
     /// The numbers of the vertices that no face may use, counted from 1, with the reasons.
-    invalid: Vec<(usize, Fault)>,
+    invalid: BTreeMap<usize, Fault>,
     /// The vertices below a face that the face names, counted from 1, and the face's line.
     ahead: Vec<(usize, usize)>,
 }
 
 impl Geometry {
     /// Checks the statements of a file.
-    ///
-    /// # Errors
-    ///
-    /// The first fault in the order of the file. A fault of a vertex below the face that names it
-    /// is found only at the end of the file, and is reported last.
     fn of(bytes: &[u8]) -> Result<Self, Fault> {
         let mut geometry = Self::default();
         let mut statements = Statements::new(bytes);
         let mut words = Vec::new();
-        while let Some((keyword, line)) = statements.next(&mut words, MOST_CORNERS + 1) {
+        while let Some((keyword, line)) = statements.next(&mut words) {
             match keyword {
                 b'v' => geometry.add_vertex(&words, line)?,
                 _ => geometry.add_face(&words, line)?,
@@ -104,7 +88,7 @@ impl Geometry {
                 let expected = format!("expected at most {most}, the file's vertex count");
                 return Err(Fault::in_line(line, format!("face vertex {vertex}; {expected}")));
             }
-            geometry.usable(vertex)?;
+            geometry.check(vertex)?;
         }
         geometry.unknown = statements.unknown.and_then(|(count, line, word)| {
             let lines = counted("lines with unknown keywords ignored", count)?;
@@ -123,32 +107,24 @@ impl Geometry {
             return Err(Fault::in_line(line, message));
         }
         let words = &words[..if matches!(length, 4 | 8) { 4 } else { 3 }];
-        let mut position = [0.0; 3];
-        for (coordinate, word) in position.iter_mut().zip(words) {
-            let message = || {
-                let expected = "expected a finite number up to ±3.4e38";
-                Fault::in_line(line, format!("vertex coordinate `{}`; {expected}", shown(word)))
-            };
-            *coordinate = number(word).ok_or_else(message)?;
+        let fault = || {
+            let expected = "expected finite numbers up to ±3.4e38, also divided by the weight";
+            let found = shown(&words.join(&b' '));
+            Fault::in_line(line, format!("vertex `{found}`; {expected}"))
+        };
+        let mut numbers = [1.0; 4];
+        for (place, word) in numbers.iter_mut().zip(words) {
+            *place = number(word).ok_or_else(fault)?;
+        }
+        // `tobj` divides by the weight, and x / ∞ is finite.
+        let [position @ .., weight] = numbers;
+        if weight.is_finite() && position.iter().all(|x| (x / weight).is_finite()) {
+            self.add(b'v', words.iter().copied());
+        } else {
             // Some programs write vertices that they do not use in this way.
-            if !coordinate.is_finite() {
-                self.invalid.push((self.vertices, message()));
-                add(b'v', [&b"0"[..]; 3].into_iter(), &mut self.text);
-                return Ok(());
-            }
+            self.invalid.insert(self.vertices, fault());
+            self.text.extend(b"v 0 0 0\n");
         }
-        if let [_, _, _, word] = words {
-            // `tobj` divides by the weight. The quotients reject the weight 0; an infinite weight
-            // needs its own test, because x / ∞ is finite.
-            let expected = "expected a finite number other than 0 that keeps the divided \
-                            coordinates within ±3.4e38";
-            number(word)
-                .filter(|w| w.is_finite() && position.iter().all(|x| (x / w).is_finite()))
-                .ok_or_else(|| {
-                    Fault::in_line(line, format!("vertex weight `{}`; {expected}", shown(word)))
-                })?;
-        }
-        add(b'v', words.iter().copied(), &mut self.text);
         Ok(())
     }
 
@@ -169,50 +145,45 @@ impl Geometry {
                                     file or from -1 for the latest one";
                     Fault::in_line(line, format!("face vertex `{}`; {expected}", shown(corner)))
                 })?;
-            let vertex = match usize::try_from(index) {
-                Ok(index) => Some(index),
-                Err(_) => (vertices + 1).checked_sub(index.unsigned_abs()).filter(|&v| v > 0),
-            };
-            match vertex {
-                Some(vertex) if vertex > vertices => self.ahead.push((vertex, line)),
-                Some(vertex) => self.usable(vertex)?,
-                None => {
-                    let expected =
-                        format!("expected at least -{vertices}, the number of vertices above");
-                    return Err(Fault::in_line(line, format!("face vertex {index}; {expected}")));
-                }
+            let size = index.unsigned_abs();
+            if index < 0 && size > vertices {
+                let expected =
+                    format!("expected at least -{vertices}, the number of vertices above");
+                return Err(Fault::in_line(line, format!("face vertex {index}; {expected}")));
             }
+            let vertex = if index > 0 { size } else { vertices + 1 - size };
+            if vertex > vertices {
+                self.ahead.push((vertex, line));
+            }
+            self.check(vertex)?;
         }
         if words.len() < 3 {
             self.short_faces += 1;
         } else {
-            add(b'f', words.iter().map(vertex_index), &mut self.text);
+            self.add(b'f', words.iter().map(|word| vertex_index(word)));
             self.lines.push(line);
         }
         Ok(())
     }
 
-    /// Rejects a vertex without finite coordinates.
-    fn usable(&self, vertex: usize) -> Result<(), Fault> {
-        match self.invalid.binary_search_by_key(&vertex, |(invalid, _)| *invalid) {
-            Ok(found) => Err(self.invalid[found].1.clone()),
-            Err(_) => Ok(()),
+    /// Adds a statement to the text for `tobj`.
+    fn add<'a>(&mut self, keyword: u8, words: impl Iterator<Item = &'a [u8]>) {
+        self.text.push(keyword);
+        for word in words {
+            self.text.push(b' ');
+            self.text.extend_from_slice(word);
         }
+        self.text.push(b'\n');
+    }
+
+    fn check(&self, vertex: usize) -> Result<(), Fault> {
+        self.invalid.get(&vertex).map_or(Ok(()), |fault| Err(fault.clone()))
     }
 }
 
 /// Returns the `7` of `7`, `7/1`, `7//3` and `7/1/3`.
-fn vertex_index<'a>(corner: &&'a [u8]) -> &'a [u8] {
+fn vertex_index(corner: &[u8]) -> &[u8] {
     corner.split(|&b| b == b'/').next().unwrap_or_default()
-}
-
-fn add<'a>(keyword: u8, words: impl Iterator<Item = &'a [u8]>, text: &mut Vec<u8>) {
-    text.push(keyword);
-    for word in words {
-        text.push(b' ');
-        text.extend_from_slice(word);
-    }
-    text.push(b'\n');
 }
 
 /// Keywords of the format that are ignored (Wavefront, "Object Files", version 3.0).
@@ -244,8 +215,10 @@ impl<'a> Statements<'a> {
     }
 
     /// Returns the keyword `v` or `f` of the next such statement, and the number of its first line.
-    /// Capitals and the obsolete `fo` count as well. Replaces the contents of `words` by the words after the keyword, at most `most` of them.
-    fn next(&mut self, words: &mut Vec<&'a [u8]>, most: usize) -> Option<(u8, usize)> {
+    /// Capitals and the obsolete `fo` count as well. Replaces the contents of `words` by the words
+    /// after the keyword, of which only one more than a face may have are read.
+    fn next(&mut self, words: &mut Vec<&'a [u8]>) -> Option<(u8, usize)> {
+        let most = MOST_CORNERS + 1;
         loop {
             let (code, mut continued) = self.line()?;
             let number = self.lines;
@@ -301,14 +274,9 @@ mod tests {
 
     #[test]
     fn an_endless_statement_needs_memory_for_a_limited_number_of_words() {
-        for text in ["f 1 2 3 4 5 6 7 8 9", "f 1 2 \\\n3 4 \\\n5 6 7 8 9"] {
-            let mut words = Vec::new();
-            let found = Statements::new(text.as_bytes()).next(&mut words, 4);
-            assert_eq!(
-                (found, words),
-                (Some((b'f', 1)), vec![b"1", b"2", b"3", &b"4"[..]]),
-                "{text}"
-            );
-        }
+        let text = format!("f{}", " 1 \\\n2 3".repeat(MOST_CORNERS));
+        let mut words = Vec::new();
+        assert_eq!(Statements::new(text.as_bytes()).next(&mut words), Some((b'f', 1)));
+        assert_eq!(words.len(), MOST_CORNERS + 1);
     }
 }

@@ -4,10 +4,9 @@
 //! Latin-1, lines that end in CR, elements without properties, and `-nan(ind)`; it reads an element
 //! that is declared twice at wrong places; and its errors speak of its grammar.
 
-use super::mesh::{AFTER_END, Fault, MOST_TRIANGLES, Mesh, UNUSED, counted};
-use super::polygon::{Polygons, open};
+use super::mesh::{AFTER_END, Fault, MOST_TRIANGLES, Mesh, counted};
+use super::polygon::Polygons;
 use super::{text, without_mark};
-use glam::Vec3;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
@@ -38,15 +37,6 @@ impl Scalar {
             _ => return Err(format!("type `{word}`; expected a type such as uchar, int or float")),
         };
         Ok(Self { kind, size })
-    }
-
-    fn integer(word: &str, what: &str) -> Result<Self, String> {
-        match Self::named(word)? {
-            Self { kind: Kind::Float, .. } => {
-                Err(format!("{what} of type {word}; expected an integer type"))
-            }
-            integer => Ok(integer),
-        }
     }
 }
 
@@ -100,15 +90,28 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
                 }
             })?;
             match name.as_str() {
-                "vertex" => vertices.push(Vec3::from(point)),
+                "vertex" => vertices.push(point),
                 "face" => ends.push(indices.len()),
                 _ => {}
             }
         }
     }
-    let after = counted(AFTER_END, file.rest.trim_ascii().len());
+    let mut polygons = Polygons::new(&vertices);
     let starts = [0].iter().chain(&ends);
-    mesh(&vertices, starts.zip(&ends).map(|(&start, &end)| &indices[start..end]), after)
+    for (number, (&start, &end)) in starts.zip(&ends).enumerate() {
+        polygons
+            .add(&indices[start..end])
+            .map_err(|message| Fault::of(&format!("face {number}, counted from 0"), message))?;
+    }
+    let mut remarks = polygons.remarks(vertices.len());
+    remarks.extend(counted(AFTER_END, file.rest.trim_ascii().len()));
+    let triangles = polygons.triangles;
+    if triangles.is_empty() || triangles.len() > MOST_TRIANGLES {
+        let found = format!("{} vertices and {} triangles", vertices.len(), triangles.len());
+        let message = format!("{found}; expected 1 to {MOST_TRIANGLES} triangles");
+        return Err(Fault::of_file(message));
+    }
+    Ok(Mesh::new(triangles, remarks))
 }
 
 /// The part of a file that is not read yet.
@@ -146,19 +149,16 @@ impl<'a> File<'a> {
                     return Err(format!("`{}`; expected ply", text::shown(line)));
                 }
                 [] | ["comment" | "obj_info", ..] => {}
-                ["format", name, "1.0"] => {
-                    encoding = Some(match name {
-                        "ascii" => Encoding::Text,
-                        "binary_little_endian" => Encoding::LittleEndian,
-                        "binary_big_endian" => Encoding::BigEndian,
+                ["format", name, version] => {
+                    encoding = Some(match (name, version) {
+                        ("ascii", "1.0") => Encoding::Text,
+                        ("binary_little_endian", "1.0") => Encoding::LittleEndian,
+                        ("binary_big_endian", "1.0") => Encoding::BigEndian,
                         _ => {
-                            let known = "ascii, binary_little_endian or binary_big_endian";
-                            return Err(format!("format `{name}`; expected {known}"));
+                            let known = "ascii, binary_little_endian or binary_big_endian, and 1.0";
+                            return Err(format!("format `{name} {version}`; expected {known}"));
                         }
                     });
-                }
-                ["format", _, version] => {
-                    return Err(format!("version {version}; expected 1.0"));
                 }
                 ["element", name, count] => {
                     if elements.iter().any(|element| element.name == name) {
@@ -297,21 +297,25 @@ impl Element {
             ("face", _) if matches!(name, "vertex_indices" | "vertex_index") => Purpose::Indices,
             _ => Purpose::Ignored,
         };
-        let (length, scalar) = match (types, purpose) {
-            (&[scalar], Purpose::Ignored | Purpose::Axis(_)) => (None, Scalar::named(scalar)?),
-            (&["list", length, scalar], Purpose::Ignored | Purpose::Indices) => {
-                let scalar = match purpose {
-                    Purpose::Indices => Scalar::integer(scalar, "indices")?,
-                    _ => Scalar::named(scalar)?,
-                };
-                (Some(Scalar::integer(length, "a length")?), scalar)
-            }
-            (_, Purpose::Axis(_)) => return Err(format!("`{name}`; expected one number")),
-            (_, Purpose::Indices) => return Err(format!("`{name}`; expected a list")),
+        let (length, scalar) = match *types {
+            [scalar] => (None, Scalar::named(scalar)?),
+            ["list", length, scalar] => (Some(Scalar::named(length)?), Scalar::named(scalar)?),
             _ => return Err(format!("the type of `{name}`; expected one type, or list and two")),
         };
-        self.properties.push(Property { name: name.into(), length, scalar, purpose });
-        Ok(())
+        let expected = match purpose {
+            Purpose::Axis(_) if length.is_some() => "one number",
+            Purpose::Indices if length.is_none() || scalar.kind == Kind::Float => {
+                "a list of an integer type"
+            }
+            _ if length.is_some_and(|length| length.kind == Kind::Float) => {
+                "a length of an integer type"
+            }
+            _ => {
+                self.properties.push(Property { name: name.into(), length, scalar, purpose });
+                return Ok(());
+            }
+        };
+        Err(format!("`{name}` of type {}; expected {expected}", types.join(" ")))
     }
 
     /// Rejects an element without the properties that make it a vertex or a face.
@@ -330,45 +334,4 @@ impl Element {
             false => Ok(()),
         }
     }
-}
-
-fn mesh<'a>(
-    vertices: &[Vec3],
-    faces: impl Iterator<Item = &'a [i64]>,
-    after: Option<String>,
-) -> Result<Mesh, Fault> {
-    // Unused vertices are reported, because they often show that an export went wrong.
-    let mut used = vec![false; vertices.len()];
-    let mut point = |index: i64| -> Result<Vec3, String> {
-        let index = usize::try_from(index)
-            .ok()
-            .filter(|index| *index < vertices.len())
-            .ok_or_else(|| format!("vertex {index}; expected 0 to below {}", vertices.len()))?;
-        used[index] = true;
-        match vertices[index] {
-            point if point.is_finite() => Ok(point),
-            point => Err(format!("vertex {index} at {point}; expected finite x, y and z")),
-        }
-    };
-    let mut polygons = Polygons::default();
-    let mut corners = Vec::new();
-    for (number, face) in faces.enumerate() {
-        corners.clear();
-        let mut add = || {
-            for &index in open(face) {
-                corners.push(point(index)?);
-            }
-            polygons.add(&corners)
-        };
-        add().map_err(|message| Fault::of(&format!("face {number}, counted from 0"), message))?;
-    }
-    let remarks = counted(UNUSED, used.iter().filter(|used| !**used).count());
-    let remarks = remarks.into_iter().chain(polygons.remarks()).chain(after).collect();
-    let triangles = polygons.triangles;
-    if triangles.is_empty() || triangles.len() > MOST_TRIANGLES {
-        let found = format!("{} vertices and {} triangles", vertices.len(), triangles.len());
-        let message = format!("{found}; expected 1 to {MOST_TRIANGLES} triangles");
-        return Err(Fault::of_file(message));
-    }
-    Ok(Mesh::new(triangles, remarks))
 }

@@ -1,6 +1,6 @@
 //! Polygons, split into triangles.
 
-use super::mesh::counted;
+use super::mesh::{UNUSED, counted};
 use bvh_core::Triangle;
 use earcut::Earcut;
 use glam::{DVec2, DVec3, Vec3};
@@ -17,17 +17,12 @@ const MOST_CLIPPED: usize = 1 << 13;
 /// clipping fails to cover. Without it a forged file of a few megabytes would take an hour.
 const MOST_FAILED: usize = 1 << 26;
 
-/// Returns a polygon's vertices without the last one if it repeats the first.
-pub fn open<T: PartialEq>(vertices: &[T]) -> &[T] {
-    match vertices {
-        [open @ .., last] if open.len() > 2 && *last == open[0] => open,
-        _ => vertices,
-    }
-}
-
-/// The triangles of polygons, in the order in which the polygons were added.
+/// The triangles of polygons between vertices, in the order in which the polygons were added.
 #[derive(Default)]
-pub struct Polygons {
+pub struct Polygons<'a> {
+    vertices: &'a [[f32; 3]],
+    /// Whether a polygon has the vertex.
+    is_used: Vec<bool>,
     pub triangles: Vec<Triangle>,
     /// The number of polygons with fewer than three corners, which have no triangle.
     pub short: usize,
@@ -35,36 +30,70 @@ pub struct Polygons {
     crossing: usize,
     /// The sum that [`MOST_FAILED`] limits.
     failed: usize,
+    /// The corners of the polygon that is being added, and their projections.
+    corners: Vec<Vec3>,
     flat: Vec<DVec2>,
 }
 
-impl Polygons {
-    /// Adds the polygon of these finite corners. O(n) if the fan
-    /// around the first corner covers the polygon, which it does if the polygon is convex. Rejects
-    /// polygons that would take too much memory or time.
-    pub fn add(&mut self, corners: &[Vec3]) -> Result<(), String> {
-        match *corners {
+impl<'a> Polygons<'a> {
+    pub fn new(vertices: &'a [[f32; 3]]) -> Self {
+        Self { vertices, is_used: vec![false; vertices.len()], ..Self::default() }
+    }
+
+    /// Adds the polygon with the vertices of these indices; a last one that repeats the first is no
+    /// further corner. O(n) if the fan around the first corner covers the polygon, which it does if
+    /// the polygon is convex. Rejects vertices that are missing or not finite, and polygons that
+    /// would take too much memory or time.
+    pub fn add(&mut self, indices: &[impl Copy + PartialEq + Into<i64>]) -> Result<(), String> {
+        let indices = match indices {
+            [open @ .., last] if open.len() > 2 && *last == open[0] => open,
+            _ => indices,
+        };
+        if indices.len() > MOST_CORNERS {
+            let found = indices.len();
+            return Err(format!("{found} vertices; expected at most {MOST_CORNERS}"));
+        }
+        self.corners.clear();
+        for &index in indices {
+            let corner = self.vertex(index.into())?;
+            self.corners.push(corner);
+        }
+        match self.corners[..] {
             [] | [_] | [_, _] => self.short += 1,
             [a, b, c] => self.triangles.push(Triangle([a, b, c])),
-            _ if corners.len() > MOST_CORNERS => {
-                let found = corners.len();
-                return Err(format!("{found} vertices; expected at most {MOST_CORNERS}"));
-            }
-            _ => self.split(corners)?,
+            _ => self.split()?,
         }
         Ok(())
     }
 
-    /// Returns the clauses about polygons that do not become triangles as one expects.
-    pub fn remarks(&self) -> impl Iterator<Item = String> {
-        let short = counted("faces of fewer than three vertices skipped", self.short);
-        let fans = "faces that cross themselves, read as the fans around their first vertices";
-        short.into_iter().chain(counted(fans, self.crossing))
+    fn vertex(&mut self, index: i64) -> Result<Vec3, String> {
+        let count = self.vertices.len();
+        let place = usize::try_from(index).ok().filter(|place| *place < count);
+        let place = place.ok_or_else(|| format!("vertex {index}; expected 0 to below {count}"))?;
+        self.is_used[place] = true;
+        match Vec3::from(self.vertices[place]) {
+            point if point.is_finite() => Ok(point),
+            point => Err(format!("vertex {index} at {point}; expected finite x, y and z")),
+        }
     }
 
-    fn split(&mut self, corners: &[Vec3]) -> Result<(), String> {
-        self.flatten(corners);
-        let (flat, last) = (&self.flat, corners.len() as u32 - 1);
+    /// Returns the clauses about those of a file's vertices that no polygon has, and about polygons
+    /// that do not become triangles as one expects.
+    pub fn remarks(&self, vertices: usize) -> Vec<String> {
+        let used = self.is_used.iter().filter(|is_used| **is_used).count();
+        let fans = "faces that cross themselves, read as the fans around their first vertices";
+        let remarks = [
+            counted(UNUSED, vertices - used),
+            counted("faces of fewer than three vertices skipped", self.short),
+            counted(fans, self.crossing),
+        ];
+        remarks.into_iter().flatten().collect()
+    }
+
+    fn split(&mut self) -> Result<(), String> {
+        self.flatten();
+        let (corners, flat, last) = (&self.corners, &self.flat, self.corners.len() as u32 - 1);
+        let at = |triangle: [u32; 3]| Triangle(triangle.map(|corner| corners[corner as usize]));
         // Twice the signed area.
         let area = |[a, b, c]: [u32; 3]| {
             let [a, b, c] = [a, b, c].map(|corner| flat[corner as usize]);
@@ -72,7 +101,7 @@ impl Polygons {
         };
         let fan = (1..last).map(|corner| [0, corner, corner + 1]);
         if fan.clone().all(|triangle| area(triangle) >= 0.0) {
-            self.triangles.extend(fan.map(|triangle| at(corners, triangle)));
+            self.triangles.extend(fan.map(at));
             return Ok(());
         }
         let n = corners.len();
@@ -91,19 +120,20 @@ impl Polygons {
         if (covered - whole).abs() > 1e-9 * whole {
             self.crossing += 1;
             self.failed += if n > 64 { n * n } else { 0 };
-            self.triangles.extend(fan.map(|triangle| at(corners, triangle)));
+            self.triangles.extend(fan.map(at));
             return Ok(());
         }
         // One order, and the polygon's orientation, whatever ear was cut first.
         ears.iter_mut().for_each(|ear| ear.sort_unstable());
         ears.sort_unstable();
-        self.triangles.extend(ears.into_iter().map(|ear| at(corners, ear)));
+        self.triangles.extend(ears.into_iter().map(at));
         Ok(())
     }
 
     /// Projects the corners along the axis in which the polygon is thinnest, so that it runs
     /// counterclockwise.
-    fn flatten(&mut self, corners: &[Vec3]) {
+    fn flatten(&mut self) {
+        let corners = &self.corners;
         let from_first = |corner: &Vec3| corner.as_dvec3() - corners[0].as_dvec3();
         let normal: DVec3 =
             corners.windows(2).map(|pair| from_first(&pair[0]).cross(from_first(&pair[1]))).sum();
@@ -118,8 +148,4 @@ impl Polygons {
             DVec2::new(corner[u], corner[v])
         }));
     }
-}
-
-fn at(corners: &[Vec3], triangle: [u32; 3]) -> Triangle {
-    Triangle(triangle.map(|corner| corners[corner as usize]))
 }

@@ -1,54 +1,28 @@
 //! Any bytes give a mesh or an error that names its place.
 
-use crate::samples::{INDEXED, NODE, error, glb, gltf, read, samples, stl_binary, with};
+use crate::samples::{error, glb, read, samples, stl_binary};
 use proptest::prelude::*;
-use std::time::{Duration, Instant};
 
 #[test]
 fn malicious_files_are_rejected() {
-    for cycle in [
-        r#"{"children": [1]}, {"children": [0], "mesh": 0}"#,
-        r#"{"children": [0], "mesh": 0}"#,
-        r#"{"children": [1, 1]}, {"mesh": 0}"#,
-    ] {
-        let message = error(gltf(cycle, INDEXED), "a.gltf");
-        assert!(message.contains("expected a tree of nodes"), "{cycle}: {message}");
-    }
-    let json = gltf(NODE, INDEXED);
-    let beyond = "18446744073709551615";
-    for (from, to) in [
-        (r#""byteOffset": 48"#, format!(r#""byteOffset": {beyond}"#)),
-        (r#""count": 4"#, format!(r#""count": {beyond}"#)),
-        (
-            r#""buffer": 0, "byteLength": 48"#,
-            r#""buffer": 0, "byteStride": 4, "byteLength": 48"#.to_string(),
-        ),
-        (r#""byteLength": 60"#, format!(r#""byteLength": {beyond}"#)),
-    ] {
-        error(with(&json, from, &to), "a.gltf");
-    }
     for length in [0, 1, u32::MAX - 3, u32::MAX] {
         let mut bytes = glb();
         bytes[12..16].copy_from_slice(&length.to_le_bytes());
         error(bytes, "a.glb");
     }
+    for length in [13, glb().len() - 60, glb().len() - 1] {
+        let message = error(&glb()[..length], "a.glb");
+        assert!(message.contains("expected a GLB file, and whole"), "{message}");
+    }
     let deep = format!("{}1{}", "[".repeat(100_000), "]".repeat(100_000));
     error(format!(r#"{{"asset": {deep}}}"#), "a.gltf");
-    let header = "ply\nformat binary_little_endian 1.0\nelement vertex 90000000000\nend_header\n";
-    assert!(error(header, "a.ply").contains("element vertex has other properties"));
     // The length of the list is 2³² − 1.
     let list = "ply\nformat binary_little_endian 1.0\nelement face 1\n\
                 property list uint int vertex_indices\nend_header\n";
     error([list.as_bytes(), &[255; 8]].concat(), "a.ply");
     let mut stl = stl_binary();
     stl[80..84].copy_from_slice(&(u32::MAX - 1).to_le_bytes());
-    assert!(error(&stl, "a.stl").contains("4294967294"));
-    // The time follows from the bytes of the file, not from the facets that it promises.
-    let start = Instant::now();
-    for _ in 0..20 {
-        error(&stl, "a.stl");
-    }
-    assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
+    assert!(error(stl, "a.stl").contains("4294967294"));
 }
 
 #[test]

@@ -2,8 +2,8 @@
 //! contain, with a remark where a reader has to choose. Faults are named.
 
 use crate::samples::{
-    INDEXED, NODE, buffer, changes, data_uri, error, glb, gltf, gltf_json, ply_binary, ply_text,
-    read, samples, square, stl_binary, stl_text, with,
+    buffer, changes, data_uri, error, glb, gltf, gltf_json, ply_binary, ply_text, read, samples,
+    square, stl_binary, stl_text, with,
 };
 
 const PLY: &str = r"
@@ -23,7 +23,7 @@ end_header → element tristrips 0\nproperty list int int vertex_indices\nend_he
 element v → element camera 2\nproperty list uchar float m\nelement v & 0 0 0 → 2 nan 5\n0\n0 0 0 |
 4 0 1 2 3 → 5 0 1 2 3 0 |
 face 1 → face 2 & 4 0 1 → 2 0 1\n4 0 1 | faces of fewer than three vertices skipped: 1
-1 1 0.5 → 1 nan 0.5 ! face 0 | vertex 2 at [1, NaN, 0.5]
+1 1 0.5 → 1 nan 0.5 ! face 0 | vertex 2 at [1, NaN, 0.5]; expected finite
 1 1 0.5 → 1 1e99 0.5 ! face 0 | vertex 2 at [1, inf, 0.5]
 1 1 0.5 → 1 one 0.5 ! a.ply:14: vertex 2 | y: `one`
 1 1 0.5 → 1 1 ! a.ply:14: vertex 2 | red: its line ends
@@ -35,13 +35,13 @@ face 1 → face 2 & 4 0 1 → 2 0 1\n4 0 1 | faces of fewer than three vertices 
 4 0 1 2 3 → 2 0 1 ! 4 vertices and 0 triangles
 property float x → property float u ! element vertex has other properties; expected x, y and z
 element vertex 4 → element vertex 4000000000 ! a.ply:16: vertex 4, counted from 0
-format ascii → format octal ! a.ply:2: format `octal`; expected ascii, binary_little
+format ascii → format octal ! a.ply:2: format `octal 1.0`; expected ascii, binary_little
 ply\n → p\x00ly\n ! a.ply:1: `p\x00ly`; expected ply
-format ascii 1.0 → format ascii 2.0 ! a.ply:2: version 2.0; expected 1.0
+format ascii 1.0 → format ascii 2.0 ! a.ply:2: format `ascii 2.0`; expected ascii
 format ascii 1.0 → comment ! no format; expected a line
-list uchar int → list float int ! a.ply:10: a length of type float; expected an integer type
-list uchar int → list uchar double ! a.ply:10: indices of type double; expected an integer type
-list uchar int → int ! `vertex_indices`; expected a list
+list uchar int → list float int ! a.ply:10: | list float int; expected a length of an integer type
+list uchar int → list uchar double ! a.ply:10: | list uchar double; expected a list of an integer
+list uchar int → int ! `vertex_indices` of type int; expected a list
 property float x → property f x ! a.ply:5: type `f`
 end_header → end ! a.ply:11: `end`; expected format, comment
 element face → element tristrips ! a.ply:11: element tristrips; expected faces instead
@@ -71,10 +71,51 @@ endfacet\r\nendsolid\r\nsolid\r → vertecks\r ! a.stl:8: | `vertecks`
 ";
 
 const OBJ: &str = r"
-f 1 → fo 1 |
+\n ⇒ \r |
+\n ⇒ \r\n |
+v 0 0 0 → \xef\xbb\xbf\xef\xbb\xbfv 0 0 0 |
+v 0 0 0 → # caf\xe9\ng \xff\nv 0 0 0 |
+v 0 0 0 → g a\nf 1 2 3 4\ng b\nv 0 0 0 & 0.5\nf 1 → 0.5\n# |
+v 0 0 0 → v 0 0 0 1 0.5 nan & v 1 0 0 → v 1 0 0 1 1 1 1 |
 \nv 1 1 0.5 ⇒ \nv 1 1 0.5 1 0.5 nan 0 1 |
+v 1 1 0.5 → v 2 2 1 2 & v 0 1 0.5 → v 0 -2 -1 -2 |
 f 1 → v nan 1.#QNAN -nan(ind)\nf 1 | vertices that no face uses: 1
+f 1 → fo 1 |
 f 1 2 3 4 → f 1 2 3 4 1 |
+f 1 2 3 4 → f -4 -3 -2 -1 |
+f 1 2 3 4 → f 1/1 2/2/2 3//3 4 |
+f 1 2 3 4 → vt 0 0\nvn 0 0 1\nf 1/-9 2/99 3//-9 4 |
+f 1 2 3 4\n →   f\x091 2  3 4 |
+f 1 2 3 4 → f 1 2 3 4 # the first |
+f 1 2 3 4 → f 1 2\x5c\n3 4 |
+f 1 2 3 4 → f \x5c\r\n1 2 \x5c  \r\n\x5c\r\n3 4\r |
+f 1 2 3 4 → f 1 2 3 4 \x5c |
+f 1 2 3 4 → # f 1 2 4 \x5c\nf 1 2 3 4\n#f 1 2 4 |
+f 1 2 3 4 → l 1 2 3 4\np 1 2 3\nl\nf 1 2 3 4 |
+f 1 2 3 4 → mtllib none.mtl\nusemtl\nusemtl gold\ng\no\ns off\nf 1 2 3 4\ncurv 0 1 1 2 \x5c\n3 |
+f 1 2 3 4 → o a\nf 1 2 3\ng b\nusemtl c\nf 1 3 4 |
+f 1 2 3 4 → f 1 2 3 4\nf 1 2\nf\nf 1 | faces of fewer than three vertices skipped: 3
+f 1 → w 7 7 7\ncurv 0 1 \x5c\n1 2\nfx 1 2 4\nf 1 | lines with unknown keywords ignored: 2 (`w` in line 5)
+f 1 2 3 4 → v nan 0 0\nf 1 2 5 ! a.obj:5: vertex `nan 0 0`; expected finite numbers
+f 1 2 3 4 → v 1 -1.#IND 0\nf 1 2 -1 ! a.obj:5: | `1 -1.#IND 0` | finite
+f 1 2 3 4 → f 1 2 5\n\nv 0 -inf 0 ! a.obj:7: | `0 -inf 0` | finite
+f 1 2 3 4 → v 0 0 1e39\nf 5 1 2 ! a.obj:5: | `0 0 1e39` | up to ±3.4e38
+f 1 2 3 4 → v 0 0 0 0\nf 1 2 5 ! a.obj:5: | `0 0 0 0` | divided by the weight
+f 1 2 3 4 → v 1e30 0 0 1e-30\nf 1 2 5 ! a.obj:5: | `1e30 0 0 1e-30` | divided
+f 1 2 3 4 → v 1 1 1 inf\nf 1 2 5 ! a.obj:5: | `1 1 1 inf` | finite
+f 1 2 3 4 → v 0 0 0,5 ! a.obj:5: | `0 0 0,5` | finite number
+f 1 2 3 4 → v 0 0 ! a.obj:5: | length 2 | 3 (x y z)
+f 1 2 3 4 → v 0 0 0 1 1 ! a.obj:5: | length 5 | 3 (x y z)
+f 1 2 3 4 → f 0 1 2 ! a.obj:5: | `0` | from 1
+f 1 2 3 4 → f 1 2 x/1 ! a.obj:5: | `x/1` | whole number
+f 1 2 3 4 → f 1 2 \xc2\xa03 ! a.obj:5: | `\xc2\xa03` | whole number
+f 1 2 3 4 → f 1 2 3\x5c\n4 \x5c\n\nf 1 2 5 ! a.obj:8: | 5 | at most 4
+f 1 2 3 4 → f 5\nf 1 2 3 ! a.obj:5: | 5 | at most 4
+f 1 2 3 4 → f -5 1 2\nv 0 0 0 ! a.obj:5: | -5 | at least -4
+f 1 2 3 4 → f 1 2 9223372036854775808 ! a.obj:5: | 5808` | from 1
+f 1 2 3 4 → f 1 2 9223372036854775807 ! a.obj:5: | 5807 | most 4
+f 1 2 3 4 → f 1 2 -9223372036854775808 ! a.obj:5: | 5808 | least -4
+f 1 2 3 4 → l 1 2 3\nf 1 2 ! 4 vertices and no face of three
 ";
 
 const GLTF: &str = r#"
@@ -85,6 +126,22 @@ const GLTF: &str = r#"
 "indices": 1 → "indices": 1, "mode": 99 ! meshes[0].primitives[0]: mode 99; expected 0 to 6
 5126 → 5125 ! accessors[0]: VEC3 of unsigned int; expected VEC3 of float or byte
 "byteLength": 60 → "byteLength": 61 ! buffers[0]: 60 bytes; expected 61
+[{"mesh": 0}] → [{"children": [1]}, {"children": [0], "mesh": 0}] ! expected a tree of nodes
+[{"mesh": 0}] → [{"children": [0], "mesh": 0}] ! expected a tree of nodes
+[{"mesh": 0}] → [{"children": [1, 1]}, {"mesh": 0}] ! expected a tree of nodes
+"byteOffset": 48 → "byteOffset": 18446744073709551615 ! bufferViews[1] has no room
+"count": 4 → "count": 18446744073709551615 ! accessors[0]: 18446744073709551615 items
+0, "byteLength": 48 → 0, "byteStride": 4, "byteLength": 48 ! bufferViews[0] has no room
+"byteLength": 60 → "byteLength": 18446744073709551615 ! buffers[0]: 60 bytes; expected 184467
+"POSITION": 0 → "POSITION": 4294967296 ! accessors[4294967296]
+"indices": 1 → "indices": 4294967297 ! accessors[4294967297]
+"bufferView": 0 → "bufferView": 4294967296 ! bufferViews[4294967296]
+"buffer": 0 → "buffer": 4294967296 ! buffers[4294967296]
+"componentType": 5126 → "componentType": 4294972422 ! 4294972422
+"mesh": 0 → "mesh": 4294967296 ! meshes[4294967296]
+"scene": 0 → "scene": 4294967296 ! scenes[4294967296]
+"nodes": [0] → "nodes": [4294967296] ! nodes[4294967296]
+{"asset" → {"extras": {"mesh": 4294967296}, "asset" |
 "#;
 
 /// Asserts that the file contains the square, and nothing but what the remark names.
@@ -104,12 +161,11 @@ fn assert_refused(bytes: impl AsRef<[u8]>, name: &str, words: &[&str]) {
 #[test]
 fn files_as_programs_write_them_are_read_and_faults_are_named_with_their_places() {
     let (_, _, obj) = samples()[0].clone();
-    let json = gltf(NODE, INDEXED);
     for (name, file, table) in [
         ("a.ply", ply_text(), PLY),
         ("a.stl", stl_text(), STL),
         ("a.obj", obj, OBJ),
-        ("a.gltf", json, GLTF),
+        ("a.gltf", gltf(), GLTF),
     ] {
         for (line, bytes, is_fault, words) in changes(&file, table) {
             match is_fault {
@@ -126,13 +182,15 @@ fn files_as_programs_write_them_are_read_and_faults_are_named_with_their_places(
     let face = format!("element {} 9000", "face".repeat(1000));
     let long = with(&ply_text(), "element face 1", &face);
     assert_refused(long, "a.ply", &["a.ply:16: facefaceface", "…"]);
+    assert_refused(format!("v 0 0 {}", "x".repeat(1_000_000)), "a.obj", &["a.obj:1: ", "…"]);
+    assert_refused("[package]\nname = 1\n", "a.obj", &["a.obj: 0 vertices and no face"]);
     let cut = &["a.ply: vertex 1, counted from 0: z: the file ends"];
     assert_refused(&ply_binary(false)[..190], "a.ply", cut);
     let mut nan = stl_binary();
     nan[84 + 50 + 20..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
     assert_refused(nan, "a.stl", &["a.stl: facet 1", "NaN"]);
     assert_refused(&stl_binary()[..150], "a.stl", &["room for 1 facets; expected the 2"]);
-    assert_refused(&gltf(NODE, INDEXED)[..200], "a.gltf", &["a.gltf: ", "EOF"]);
+    assert_refused(&gltf()[..200], "a.gltf", &["a.gltf: ", "EOF"]);
 }
 
 #[test]
@@ -198,7 +256,7 @@ fn binary_stl_files_as_programs_write_them() {
 
 #[test]
 fn gltf_files_as_programs_write_them() {
-    let json = |uri: &str| gltf_json(uri, NODE, INDEXED).into_bytes();
+    let json = |uri: &str| gltf_json(uri).into_bytes();
     let base64 = data_uri().split_once(',').unwrap().1.to_owned();
     let percents: String = buffer().iter().map(|byte| format!("%{byte:02x}")).collect();
     let glb = glb();

@@ -1,18 +1,17 @@
 //! The triangles of glTF files, and the files to which they may refer.
 
 use crate::glb::glb;
-use crate::samples::{INDEXED, NODE, buffer, error, gltf_json, read, square};
+use crate::samples::{buffer, error, gltf, gltf_json, read, square};
 use bvh_core::Triangle;
 use bvh_scenes::load::load;
-use bvh_scenes::load::mesh::Mesh;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
 
 /// Files by what differs from a node with a mesh of one triangle, in groups that share more. `views`
-/// are numbers after their type, `accessors` are a view, a type, a count and a shape, `node`, `mesh`
-/// and `accessor` are the first of their lists, and all else is as in the format. Then follow the
-/// triangles, nine numbers each, and the remark, or words of the fault.
+/// are numbers after their type, `node`, `mesh` and `accessor` are the first of their lists, and all
+/// else is as in the format. Then follow the triangles, nine numbers each, and the remark, or words
+/// of the fault.
 const CASES: &str = include_str!("gltf_cases.json");
 
 /// Changes a value as RFC 7396 says: objects key by key, everything else as a whole.
@@ -29,43 +28,25 @@ fn merge(value: &mut Value, patch: &Value) {
     }
 }
 
-/// Returns the bytes of a number.
-type Bytes = fn(&str) -> Vec<u8>;
-
-/// The types of numbers: the name here and the number in the format.
-const TYPES: [(&str, u32, Bytes); 5] = [
-    ("i8", 5120, |word| word.parse::<i8>().unwrap().to_le_bytes().into()),
-    ("u8", 5121, |word| word.parse::<u8>().unwrap().to_le_bytes().into()),
-    ("i16", 5122, |word| word.parse::<i16>().unwrap().to_le_bytes().into()),
-    ("u16", 5123, |word| word.parse::<u16>().unwrap().to_le_bytes().into()),
-    ("f32", 5126, |word| word.parse::<f32>().unwrap().to_le_bytes().into()),
-];
-
+/// Returns the bytes of numbers after the name of their type.
 fn view(text: &str) -> Vec<u8> {
-    let mut words = text.split(' ');
-    let kind = words.next().unwrap();
-    let bytes = TYPES.iter().find(|(name, ..)| *name == kind).unwrap().2;
-    words.flat_map(bytes).collect()
-}
-
-fn accessor(text: &Value) -> Value {
-    let words: Vec<&str> = text.as_str().unwrap().split(' ').collect();
-    let component = TYPES.iter().find(|(name, ..)| *name == words[1]).unwrap().1;
-    let count: usize = words[2].parse().unwrap();
-    let mut accessor = json!({ "componentType": component, "count": count, "type": words[3] });
-    accessor["normalized"] = (words.len() > 4).into();
-    if let Ok(view) = words[0].parse::<usize>() {
-        accessor["bufferView"] = view.into();
-    }
-    accessor
+    let (kind, numbers) = text.split_once(' ').unwrap();
+    let bytes = |word: &str| -> Vec<u8> {
+        match kind {
+            "i8" => word.parse::<i8>().unwrap().to_le_bytes().into(),
+            "u8" => word.parse::<u8>().unwrap().to_le_bytes().into(),
+            "i16" => word.parse::<i16>().unwrap().to_le_bytes().into(),
+            "u16" => word.parse::<u16>().unwrap().to_le_bytes().into(),
+            _ => word.parse::<f32>().unwrap().to_le_bytes().into(),
+        }
+    };
+    numbers.split(' ').flat_map(bytes).collect()
 }
 
 fn file(case: &Value) -> Vec<u8> {
-    let list = |name: &str| case[name].as_array().cloned().unwrap_or_default();
-    let first = |name: &str| case.get(name).cloned();
     let mut binary = Vec::new();
     let mut views = Vec::new();
-    for text in list("views") {
+    for text in case["views"].as_array().unwrap() {
         let bytes = view(text.as_str().unwrap());
         let (start, length) = (binary.len(), bytes.len());
         let mut view = json!({ "buffer": 0, "byteOffset": start, "byteLength": length });
@@ -74,34 +55,26 @@ fn file(case: &Value) -> Vec<u8> {
         binary.extend(bytes);
         binary.resize(binary.len().next_multiple_of(4), 0);
     }
-    let accessors = first("accessor").map_or_else(
-        || list("accessors").iter().map(accessor).collect(),
-        |accessor| vec![accessor],
-    );
-    let nodes: Vec<Value> = first("node").into_iter().chain(list("nodes")).collect();
     let mut document = json!({
         "asset": { "version": "2.0" },
         "buffers": [{ "byteLength": binary.len() }],
         "bufferViews": views,
     });
     merge(&mut document, case);
-    merge(&mut document, &json!({ "accessors": accessors, "nodes": nodes }));
-    document["meshes"] = first("mesh").into_iter().collect();
+    for (list, first) in [("accessors", "accessor"), ("nodes", "node"), ("meshes", "mesh")] {
+        let further = case[list].as_array().into_iter().flatten();
+        document[list] = [&case[first]].into_iter().chain(further).cloned().collect();
+    }
     glb(document.to_string(), &binary)
-}
-
-#[track_caller]
-fn assert_near(found: &[Triangle], expected: &[Triangle], name: &str) {
-    let pairs = found.iter().zip(expected).flat_map(|(a, b)| a.0.into_iter().zip(b.0));
-    let is_near = pairs.into_iter().all(|(a, b)| a.distance(b) < 1e-6);
-    assert!(found.len() == expected.len() && is_near, "{name}: {found:?}, not {expected:?}");
 }
 
 #[test]
 fn everything_that_moves_or_repeats_a_vertex_is_read_or_named() {
     let default = json!({
-        "views": ["f32 0 0 0 1 0 0 0 1 0"], "accessors": ["0 f32 3 VEC3"], "node": { "mesh": 0 },
+        "views": ["f32 0 0 0 1 0 0 0 1 0"],
+        "accessor": { "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3" },
         "mesh": { "primitives": [{ "attributes": { "POSITION": 0 } }] },
+        "node": { "mesh": 0 },
         "triangles": [[0, 0, 0, 1, 0, 0, 0, 1, 0]], "remark": "",
     });
     let groups: Vec<Value> = serde_json::from_str(CASES).unwrap();
@@ -122,39 +95,22 @@ fn everything_that_moves_or_repeats_a_vertex_is_read_or_named() {
             let expected: Vec<[f32; 9]> =
                 serde_json::from_value(case["triangles"].clone()).unwrap();
             let expected: Vec<Triangle> = expected.into_iter().map(Triangle::from).collect();
-            assert_near(&mesh.triangles, &expected, name);
+            assert_eq!(mesh.triangles, expected, "{name}");
             assert_eq!(mesh.remark().unwrap_or_default(), case["remark"], "{name}");
         }
     }
 }
 
-fn mesh() -> Mesh {
-    Mesh::new(square(), vec![])
-}
-
-/// Returns the JSON of the square in the binary chunk, with further keys at the top.
-fn json(more: &str) -> String {
-    gltf_json("", NODE, INDEXED).replacen('{', &format!("{{{more}"), 1)
-}
-
-fn glb_of(json: String) -> Vec<u8> {
-    glb(json, &buffer())
-}
-
-fn read_glb(json: String) -> Mesh {
-    read(glb_of(json), "a.glb").unwrap()
-}
-
 /// Creates a folder with `scene.gltf`, whose buffer is the file of this name.
 fn folder(name: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("scene.gltf"), gltf_json(name, NODE, INDEXED)).unwrap();
+    fs::write(folder.path().join("scene.gltf"), gltf_json(name)).unwrap();
     folder
 }
 
 #[test]
 fn extras_of_any_kind_are_ignored_in_any_place() {
-    let text = json("");
+    let text = String::from_utf8(gltf()).unwrap();
     // Attributes contain names of accessors and nothing else.
     let places = text.match_indices('{').map(|(place, _)| place);
     let places: Vec<usize> =
@@ -163,7 +119,7 @@ fn extras_of_any_kind_are_ignored_in_any_place() {
         for &place in &places {
             let mut text = text.clone();
             text.insert_str(place + 1, &format!(r#""extras": {extras}, "#));
-            assert_eq!(read_glb(text), mesh(), "{extras}");
+            assert_eq!(read(text, "a.gltf").unwrap().triangles, square(), "{extras}");
         }
     }
 }
@@ -181,6 +137,8 @@ fn a_buffer_outside_the_folder_of_the_scene_is_rejected() {
         format!("%2e%2e/{folder_name}/outside.bin"),
         format!("%2e%2e%2f{folder_name}%2Foutside.bin"),
         format!("./a/../../{folder_name}/outside.bin"),
+        // A name that leads out and back is rejected as well.
+        "a/../b.bin".to_owned(),
     ] {
         let folder = folder(&name);
         fs::create_dir(folder.path().join("a")).unwrap();
@@ -189,7 +147,7 @@ fn a_buffer_outside_the_folder_of_the_scene_is_rejected() {
     // The message must not reveal whether the file exists.
     let scene_folder = folder("../no_such_file");
     let message = load(&scene_folder.path().join("scene.gltf")).unwrap_err().to_string();
-    assert!(message.contains("`../no_such_file` is outside"), "{message}");
+    assert!(message.contains("`../no_such_file` may be outside"), "{message}");
     #[cfg(unix)]
     {
         let folder = folder("link.bin");
@@ -208,13 +166,13 @@ fn assert_outside(folder: &Path) {
 
 #[test]
 fn files_in_the_folder_of_the_scene_and_below_are_read() {
-    for name in ["my%20buffer.bin", "a/b.bin", "./a/../b.bin", "..bin"] {
+    for name in ["my%20buffer.bin", "a/b.bin", "./a/./b.bin", "..bin"] {
         let folder = folder(name);
         fs::create_dir(folder.path().join("a")).unwrap();
         let file = folder.path().join(name.replace("%20", " "));
         fs::write(&file, buffer()).unwrap();
         let read = || load(&folder.path().join("scene.gltf"));
-        assert_eq!(read().unwrap(), mesh(), "{name}");
+        assert_eq!(read().unwrap().triangles, square(), "{name}");
         fs::write(&file, &buffer()[..50]).unwrap();
         let short = read().unwrap_err().to_string();
         assert!(short.contains("buffers[0]: 50 bytes; expected 60"), "{short}");
@@ -223,31 +181,6 @@ fn files_in_the_folder_of_the_scene_and_below_are_read() {
         let words = ["buffers[0]", "bin: no such file"];
         assert!(words.iter().all(|words| missing.contains(words)), "{missing}");
     }
-    let remote = error(gltf_json("http://example.org/a.bin", NODE, INDEXED), "a.gltf");
+    let remote = error(gltf_json("http://example.org/a.bin"), "a.gltf");
     assert!(remote.contains("a file in this folder"), "{remote}");
-}
-
-#[test]
-fn an_index_of_33_bits_is_not_taken_for_its_lower_32() {
-    let whole = json("");
-    for key in ["POSITION", "indices", "buffer", "bufferView", "componentType", "mesh", "scene"] {
-        let (before, number) = whole.split_once(&format!(r#""{key}": "#)).unwrap();
-        let digits = number.find(|c: char| !c.is_ascii_digit()).unwrap();
-        let wrapped = (number[..digits].parse::<u64>().unwrap() + (1 << 32)).to_string();
-        let damaged = format!(r#"{before}"{key}": {wrapped}{}"#, &number[digits..]);
-        let message = error(glb_of(damaged), "a.glb");
-        assert!(message.contains(&wrapped), "{message}");
-    }
-    error(glb_of(whole.replace(r#""nodes": [0]"#, r#""nodes": [4294967296]"#)), "a.glb");
-    // Numbers that are no reference may be as large as they like.
-    assert_eq!(read_glb(json(r#""extras": {"mesh": 4294967296}, "#)), mesh());
-}
-
-#[test]
-fn a_glb_file_shorter_than_its_header_says_is_rejected_as_a_part() {
-    let whole = glb_of(json(""));
-    for length in [13, whole.len() - 60, whole.len() - 1] {
-        let message = error(&whole[..length], "a.glb");
-        assert!(message.contains("expected a GLB file, and whole"), "{message}");
-    }
 }

@@ -72,27 +72,23 @@ pub fn stl_binary() -> Vec<u8> {
     bytes
 }
 
-/// Returns the JSON of a scene over a buffer of four positions and of the indices of two triangles,
-/// `u16`.
-pub fn gltf_json(uri: &str, nodes: &str, primitive: &str) -> String {
-    let uri = if uri.is_empty() { String::new() } else { format!(r#""uri": "{uri}", "#) };
-    format!(
-        r#"{{"asset": {{"version": "2.0"}},
-        "scene": 0, "scenes": [{{"nodes": [0]}}], "nodes": [{nodes}],
-        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}{primitive}}}]}}],
-        "accessors": [
-            {{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
-              "min": [0, 0, 0], "max": [1, 1, 1]}},
-            {{"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}}],
-        "bufferViews": [
-            {{"buffer": 0, "byteLength": 48}},
-            {{"buffer": 0, "byteOffset": 48, "byteLength": 12}}],
-        "buffers": [{{{uri}"byteLength": 60}}]}}"#
-    )
-}
+/// A scene over a buffer of four positions and of the indices of two triangles, `u16`.
+const GLTF: &str = r#"{"asset": {"version": "2.0"},
+    "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+    "accessors": [
+        {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+         "min": [0, 0, 0], "max": [1, 1, 1]},
+        {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}],
+    "bufferViews": [
+        {"buffer": 0, "byteLength": 48},
+        {"buffer": 0, "byteOffset": 48, "byteLength": 12}],
+    "buffers": [{"byteLength": 60}]}"#;
 
-pub const INDEXED: &str = r#", "indices": 1"#;
-pub const NODE: &str = r#"{"mesh": 0}"#;
+/// Returns the JSON of the scene whose buffer is at this URI.
+pub fn gltf_json(uri: &str) -> String {
+    GLTF.replace(r#"{"byteLength": 60}"#, &format!(r#"{{"uri": "{uri}", "byteLength": 60}}"#))
+}
 
 pub fn buffer() -> Vec<u8> {
     let indices = FACES.as_flattened().iter().flat_map(|&index| (index as u16).to_le_bytes());
@@ -106,12 +102,12 @@ pub fn data_uri() -> String {
     )
 }
 
-pub fn gltf(nodes: &str, primitive: &str) -> Vec<u8> {
-    gltf_json(&data_uri(), nodes, primitive).into_bytes()
+pub fn gltf() -> Vec<u8> {
+    gltf_json(&data_uri()).into_bytes()
 }
 
 pub fn glb() -> Vec<u8> {
-    crate::glb::glb(gltf_json("", NODE, INDEXED), &buffer())
+    crate::glb::glb(GLTF.to_owned(), &buffer())
 }
 
 /// Returns files of a square in every format.
@@ -124,7 +120,7 @@ pub fn samples() -> [(&'static str, Format, Vec<u8>); 8] {
         ("big.ply", Format::Ply, ply_binary(true)),
         ("text.stl", Format::Stl, stl_text()),
         ("binary.stl", Format::Stl, stl_binary()),
-        ("square.gltf", Format::Gltf, gltf(NODE, INDEXED)),
+        ("square.gltf", Format::Gltf, gltf()),
         ("square.glb", Format::Gltf, glb()),
     ]
 }

@@ -1,7 +1,7 @@
 //! The numbers of a glTF file: accessors and their views.
 
 use super::buffers::Buffers;
-use super::document::{Accessor, Document};
+use super::document::Accessor;
 use super::{MOST_ITEMS, get};
 
 /// The types of numbers.
@@ -46,31 +46,18 @@ fn decode(bytes: &[u8], component: u32, normalized: bool) -> f64 {
     if normalized { (number / largest).max(-1.0) } else { number }
 }
 
-/// The accessors of one file.
-pub struct Accessors<'a> {
-    document: &'a Document,
-    buffers: Buffers<'a>,
-    /// Items read so far.
-    items: u64,
-}
-
-impl<'a> Accessors<'a> {
-    pub fn new(document: &'a Document, buffers: Buffers<'a>) -> Self {
-        Self { document, buffers, items: 0 }
-    }
-
+impl Buffers<'_> {
     /// Reads an accessor whose items have `N` numbers of one of the types `wanted`.
-    pub fn read<const N: usize>(
+    pub fn accessor<const N: usize>(
         &mut self,
         index: usize,
         wanted: &[u32],
     ) -> Result<Vec<[f64; N]>, String> {
         let accessor = get(&self.document.accessors, index, "accessors")?;
-        self.read_checked(accessor, wanted)
-            .map_err(|message| format!("accessors[{index}]: {message}"))
+        self.items(accessor, wanted).map_err(|message| format!("accessors[{index}]: {message}"))
     }
 
-    fn read_checked<const N: usize>(
+    fn items<const N: usize>(
         &mut self,
         accessor: &Accessor,
         wanted: &[u32],
@@ -87,11 +74,11 @@ impl<'a> Accessors<'a> {
             ));
         }
         // A few accessors over the same bytes can stand for any number of items.
-        self.items = self.items.saturating_add(count as u64);
-        if self.items > MOST_ITEMS {
+        self.item_count = self.item_count.saturating_add(count as u64);
+        if self.item_count > MOST_ITEMS {
             return Err(format!(
                 "{count} items, {} with those before; expected at most {MOST_ITEMS}",
-                self.items
+                self.item_count
             ));
         }
         if count == 0 {
@@ -102,7 +89,7 @@ impl<'a> Accessors<'a> {
              compressed meshes cannot be read)",
         )?;
         let view = get(&self.document.buffer_views, number, "bufferViews")?;
-        let buffer = self.buffers.bytes(self.document, view.buffer)?;
+        let buffer = self.bytes(view.buffer)?;
         let size = size(component);
         let stride = view.byte_stride.unwrap_or(size * N);
         // Every number comes from the file, so each step checks for overflow and for the end.

@@ -1,103 +1,98 @@
-//! The buffers of a glTF file. A buffer is read when a mesh first needs it, and a file once.
+//! The buffers of a glTF file. What a URI names is read when a mesh first needs it, and once.
 
-use super::document::{Buffer, Document};
+use super::document::Document;
 use super::{MOST_BYTES, get};
 use crate::files::{read, regular};
 use data_url::DataUrl;
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Component, Path, PathBuf};
-use std::rc::Rc;
-
-/// The binary chunk of a GLB file, or what was read. Several buffers may name the same file.
-type Bytes<'a> = Rc<Cow<'a, [u8]>>;
+use std::path::{Component, Path};
 
 /// The buffers of one glTF file.
 pub struct Buffers<'a> {
+    pub document: &'a Document,
     path: &'a Path,
     /// The binary chunk of a GLB file.
     chunk: Option<&'a [u8]>,
-    /// The buffers that a mesh has needed, by their number.
-    needed: BTreeMap<usize, Bytes<'a>>,
-    /// The files that buffers have named, by their canonical path.
-    files: BTreeMap<PathBuf, Bytes<'a>>,
+    /// What the URIs name that a mesh has needed. Several buffers may have the same.
+    contents: BTreeMap<&'a str, Vec<u8>>,
     /// Bytes read so far.
     total: u64,
+    /// Items of accessors read so far.
+    pub item_count: u64,
 }
 
 impl<'a> Buffers<'a> {
     /// Prepares the buffers of the file at `path` without reading any.
-    pub fn new(path: &'a Path, chunk: Option<&'a [u8]>) -> Self {
-        Self { path, chunk, needed: BTreeMap::new(), files: BTreeMap::new(), total: 0 }
+    pub fn new(document: &'a Document, path: &'a Path, chunk: Option<&'a [u8]>) -> Self {
+        Self { document, path, chunk, contents: BTreeMap::new(), total: 0, item_count: 0 }
     }
 
     /// Returns the bytes of a buffer, which is read if no mesh has needed it before.
-    pub fn bytes(&mut self, document: &Document, number: usize) -> Result<&[u8], String> {
-        if !self.needed.contains_key(&number) {
-            let buffer = get(&document.buffers, number, "buffers")?;
-            let read = self.read(number, buffer);
-            let bytes = read.map_err(|message| format!("buffers[{number}]: {message}"))?;
-            self.needed.insert(number, bytes);
-        }
-        Ok(&self.needed[&number])
-    }
-
-    fn read(&mut self, number: usize, buffer: &Buffer) -> Result<Bytes<'a>, String> {
+    pub fn bytes(&mut self, number: usize) -> Result<&[u8], String> {
+        let buffer = get(&self.document.buffers, number, "buffers")?;
+        let in_buffer = |message: String| format!("buffers[{number}]: {message}");
         let bytes = match (&buffer.uri, self.chunk) {
-            (Some(uri), _) => self.of_uri(uri)?,
-            (None, Some(chunk)) if number == 0 => Rc::new(chunk.into()),
+            (Some(uri), _) => self.contents(uri).map_err(in_buffer)?,
+            (None, Some(chunk)) if number == 0 => chunk,
             (None, _) => {
-                return Err("no URI; expected one, or the binary chunk of a GLB file, which is \
-                            buffers[0]"
-                    .into());
+                let expected =
+                    "expected one, or the binary chunk of a GLB file, which is buffers[0]";
+                return Err(in_buffer(format!("no URI; {expected}")));
             }
         };
         match buffer.byte_length > bytes.len() {
-            true => Err(format!("{} bytes; expected {}", bytes.len(), buffer.byte_length)),
+            true => {
+                Err(in_buffer(format!("{} bytes; expected {}", bytes.len(), buffer.byte_length)))
+            }
             false => Ok(bytes),
         }
     }
 
-    fn of_uri(&mut self, uri: &str) -> Result<Bytes<'a>, String> {
+    fn contents(&mut self, uri: &'a str) -> Result<&[u8], String> {
+        if !self.contents.contains_key(uri) {
+            let bytes = self.read(uri)?;
+            self.contents.insert(uri, bytes);
+        }
+        Ok(&self.contents[uri])
+    }
+
+    fn read(&mut self, uri: &str) -> Result<Vec<u8>, String> {
         if let Ok(data) = DataUrl::process(uri) {
             let (bytes, _) = data.decode_to_vec().map_err(|_| "a data URI of invalid base64")?;
             self.count(bytes.len() as u64)?;
-            return Ok(Rc::new(bytes.into()));
+            return Ok(bytes);
         }
         if uri.contains("://") {
             return Err(format!("`{uri}`; expected a file in this folder, or a data URI"));
         }
         let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
-        let path = self.allowed(Path::new(&*name))?;
-        if let Some(bytes) = self.files.get(&path) {
-            return Ok(bytes.clone());
+        let path = self.path.with_file_name(&*name);
+        if !self.is_allowed(Path::new(&*name), &path) {
+            return Err(format!(
+                "`{name}` may be outside the scene's folder; accepted: a file in this folder or \
+                 below, by a path without `..`"
+            ));
         }
         // A file that is too long is rejected before it takes memory.
         self.count(regular(&path).map_err(|error| error.to_string())?)?;
-        let bytes = Rc::new(read(&path).map_err(|error| error.to_string())?.into());
-        self.files.insert(path, Rc::clone(&bytes));
-        Ok(bytes)
+        read(&path).map_err(|error| error.to_string())
     }
 
-    /// Returns the path of a file by its name in a URI. Rejects a file outside the folder of the
-    /// glTF file, also one behind a symbolic link, because otherwise the author of a file decides
-    /// which files of the user are opened.
-    fn allowed(&self, name: &Path) -> Result<PathBuf, String> {
-        let path = self.path.with_file_name(name);
-        if leaves(name) {
-            return Err(outside_message(name));
+    /// Returns whether the file at `path`, by this name in a URI, is in the folder of the glTF file
+    /// or below. Otherwise the author of a file would decide which files of the user are opened.
+    fn is_allowed(&self, name: &Path, path: &Path) -> bool {
+        // The name is judged first, because the answer must not reveal whether the file exists.
+        let is_below = |part| matches!(part, Component::Normal(_) | Component::CurDir);
+        if !name.components().all(is_below) {
+            return false;
         }
         // A missing file has no canonical path; the reader then reports that the file is missing.
-        let Ok(path) = fs::canonicalize(&path) else { return Ok(path) };
+        let Ok(path) = fs::canonicalize(path) else { return true };
         // A file name without a folder has the empty parent, which cannot be canonicalised.
         let folder = Path::new(".").join(self.path.parent().unwrap_or(Path::new("")));
         // Canonical paths follow symbolic links, which the name alone does not reveal.
-        let is_below = fs::canonicalize(folder).is_ok_and(|folder| path.starts_with(folder));
-        if !is_below {
-            return Err(outside_message(name));
-        }
-        Ok(path)
+        fs::canonicalize(folder).is_ok_and(|folder| path.starts_with(folder))
     }
 
     /// Adds to the bytes read so far, and rejects more than a scene can use.
@@ -113,27 +108,6 @@ impl<'a> Buffers<'a> {
     }
 }
 
-fn outside_message(name: &Path) -> String {
-    format!(
-        "`{}` is outside the scene's folder; accepted: a file in this folder or below",
-        name.display()
-    )
-}
-
-/// Returns whether a path leads out of its folder or is absolute.
-fn leaves(name: &Path) -> bool {
-    let mut depth = 0i64;
-    name.components().any(|component| {
-        depth += match component {
-            Component::Normal(_) => 1,
-            Component::CurDir => 0,
-            Component::ParentDir => -1,
-            Component::Prefix(_) | Component::RootDir => return true,
-        };
-        depth < 0
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -141,23 +115,15 @@ mod tests {
     #[test]
     fn a_file_that_several_buffers_name_is_read_once() {
         let folder = tempfile::tempdir().unwrap();
-        fs::create_dir(folder.path().join("a")).unwrap();
         fs::write(folder.path().join("b.bin"), [7; 60]).unwrap();
         let path = folder.path().join("scene.gltf");
-        let mut buffers = Buffers::new(&path, None);
-        for name in ["b.bin", "./b.bin", "a/../b.bin", "%62.bin"] {
-            assert_eq!(buffers.of_uri(name).unwrap()[..], [7; 60], "{name}");
+        let buffer = r#"{"byteLength": 60, "uri": "b.bin"}"#;
+        let json = format!(r#"{{"buffers": [{buffer}, {buffer}]}}"#);
+        let document = serde_json::from_str(&json).unwrap();
+        let mut buffers = Buffers::new(&document, &path, None);
+        for number in [0, 1] {
+            assert_eq!(buffers.bytes(number), Ok(&[7; 60][..]));
         }
-        assert_eq!((buffers.files.len(), buffers.total), (1, 60));
-    }
-
-    #[test]
-    fn paths_that_lead_out_of_their_folder_are_recognised() {
-        for name in ["a.bin", "./a.bin", "a/b/../../c.bin", "..a/b", "a..", ".a"] {
-            assert!(!leaves(Path::new(name)), "{name}");
-        }
-        for name in ["../a.bin", "a/../../b.bin", "/a.bin", "./../a", ".."] {
-            assert!(leaves(Path::new(name)), "{name}");
-        }
+        assert_eq!(buffers.total, 60);
     }
 }
