@@ -210,13 +210,18 @@ mod tests {
     }
 
     #[test]
-    fn folders_devices_and_missing_files_are_rejected_unread() {
+    fn only_regular_files_are_read_and_replaced() {
         let folder = tempfile::tempdir().unwrap();
-        let kind = |path: &Path| read(path).unwrap_err().kind();
-        assert_eq!(kind(folder.path()), io::ErrorKind::IsADirectory);
-        assert_eq!(kind(&folder.path().join("x")), io::ErrorKind::NotFound);
-        #[cfg(unix)]
-        assert_eq!(kind(Path::new("/dev/zero")), io::ErrorKind::InvalidInput);
+        let missing = folder.path().join("no/x.bvh");
+        for (path, kind) in [
+            (folder.path(), io::ErrorKind::IsADirectory),
+            (missing.as_path(), io::ErrorKind::NotFound),
+            #[cfg(unix)]
+            (Path::new("/dev/zero"), io::ErrorKind::InvalidInput),
+        ] {
+            assert_eq!(read(path).unwrap_err().kind(), kind);
+            assert!(Reserved::new(path, 1, false).is_err(), "{}", path.display());
+        }
     }
 
     #[test]
@@ -273,14 +278,6 @@ mod tests {
         let bytes = fs::read(path).unwrap();
         assert!(bytes.len() == 100 && bytes.iter().all(|byte| *byte == bytes[0]), "{bytes:?}");
         assert_eq!(names(folder.path()).len(), 1);
-    }
-
-    #[test]
-    fn only_regular_files_are_replaced() {
-        let folder = tempfile::tempdir().unwrap();
-        for wrong in [folder.path(), &folder.path().join("no/x.bvh"), Path::new("/dev/null")] {
-            assert!(Reserved::new(wrong, 1, false).is_err(), "{}", wrong.display());
-        }
     }
 
     #[cfg(unix)]

@@ -84,18 +84,17 @@ fn range(word: &str) -> Option<(u32, u32)> {
 /// Replaces every `A..B` after a colon of `name` by A, A + 1, …, B. One line of a spec can thus
 /// name many subsets of a scene.
 pub fn expand(name: &str) -> Vec<String> {
-    let mut names = vec![String::new()];
-    for (index, word) in name.split(':').enumerate() {
-        let words: Vec<String> = match range(word).filter(|_| index > 0) {
+    let mut words = name.split(':');
+    let mut names = vec![words.next().unwrap_or_default().to_owned()];
+    for word in words {
+        let words: Vec<String> = match range(word) {
             Some((low, high)) => (low..=high).map(|number| number.to_string()).collect(),
             None => vec![word.to_owned()],
         };
-        let colon = if index > 0 { ":" } else { "" };
-        let mut longer = Vec::new();
-        for name in &names {
-            longer.extend(words.iter().map(|word| format!("{name}{colon}{word}")));
-        }
-        names = longer;
+        names = names
+            .iter()
+            .flat_map(|name| words.iter().map(move |word| format!("{name}:{word}")))
+            .collect();
     }
     names
 }
