@@ -6,6 +6,7 @@ use crate::Error;
 use crate::rows::store::Existing;
 use crate::run::execute::{Extent, execute};
 use crate::run::finish::Summary;
+use crate::run::resolved::load_scenes;
 use crate::run::{check, finish, reference};
 use crate::spec::{Experiment, Overrides};
 use std::collections::HashSet;
@@ -74,6 +75,12 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         _ => Existing::Keep,
     };
     let extent = Extent { existing, runs: args.runs.clone(), ..Extent::default() };
+    // Nor must a missing scene of the last spec; those of the first are loaded at once.
+    for (path, experiment) in args.specs.iter().zip(&experiments).skip(1) {
+        if !args.redraw {
+            load_scenes(experiment).map_err(|error| args.overrides.named(path, error))?;
+        }
+    }
     let mut differences = 0;
     for (path, experiment) in args.specs.iter().zip(&experiments) {
         differences += perform(args, experiment, &extent, interrupted)

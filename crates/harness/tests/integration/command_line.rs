@@ -138,6 +138,7 @@ fn mistakes_are_named_before_any_work() {
             &["scene.toml: scenes: ", "sofa", "accepted: bijou, cloister, escher, konistil"],
         ),
         (&["jobs", "scene.toml"], &["scene.toml: scenes: ", "sofa"]),
+        (&["spec.toml", "scene.toml"], &["scene.toml: scenes: ", "sofa"]),
         (&["spec.toml", "--scene", "nan.obj"], &["nan.obj:2", "nan"]),
         (&["spec.toml", "--scene", "empty.obj"], &["empty.obj: empty"]),
         (&["spec.toml", "--scene", "none.obj"], &["none.obj", "no such file"]),
