@@ -61,7 +61,9 @@ fn brilliant(stone: &mut MeshBuilder) {
 fn ring(ring: &mut MeshBuilder) {
     shank(ring);
     let head = 1.62;
-    ring.part(&placed(about_z(0.013) * 0.52, DVec3::Z * head), brilliant);
+    let stone = MeshBuilder::of(brilliant);
+    let bead = MeshBuilder::of(bead);
+    ring.copy(&placed(about_z(0.013) * 0.52, DVec3::Z * head), &stone);
 
     // The setting has two gallery rails, a halo plate, and six prongs bent over the girdle.
     for (radius, z, thickness) in [(0.3, 1.22, 0.035), (0.46, 1.47, 0.04)] {
@@ -80,10 +82,10 @@ fn ring(ring: &mut MeshBuilder) {
 
     // Halo stones in a circle, then pavé rows over both shoulders, beads between neighbours.
     for k in 0..24 {
-        ring.part(&(on_halo(fraction(k, 24), 1.58) * small(0.076)), brilliant);
+        ring.copy(&(on_halo(fraction(k, 24), 1.58) * small(0.076)), &stone);
         for (shift, radial) in [(0.5, 0.075), (0.5, -0.075)] {
             let between = on_halo((k as f64 + shift) / 24.0, 1.55);
-            ring.part(&(between * upright(0.0, radial, 0.0, 0.0) * small(0.024)), bead);
+            ring.copy(&(between * upright(0.0, radial, 0.0, 0.0) * small(0.024)), &bead);
         }
     }
     for row in [-1.0, 0.0, 1.0] {
@@ -94,9 +96,9 @@ fn ring(ring: &mut MeshBuilder) {
             let away = half * (0.082 + 0.0105 * i as f64 + 0.002 * row);
             let size = 0.042 - 0.0009 * i as f64;
             let lean = placed(about_x(-0.035 * row), DVec3::ZERO);
-            ring.part(&(seat(away, 0.105 * row) * lean * small(size)), brilliant);
+            ring.copy(&(seat(away, 0.105 * row) * lean * small(size)), &stone);
             for (along, across) in [(-0.0053, 0.052), (0.0053, -0.052)] {
-                ring.part(&(seat(away + along, 0.105 * row + across) * small(0.016)), bead);
+                ring.copy(&(seat(away + along, 0.105 * row + across) * small(0.016)), &bead);
             }
         }
     }
@@ -156,6 +158,7 @@ fn bead(bead: &mut MeshBuilder) {
 
 /// A chain of `links` oval links, alternately flat and on edge, laid in a wave around the ring.
 fn chain(mesh: &mut MeshBuilder, links: usize) {
+    let link = MeshBuilder::of(|link| link.torus(0.06, 0.016, 12, 6));
     for k in 0..links {
         let before = on_wave(fraction(k, links));
         let here = on_wave(fraction(2 * k + 1, 2 * links));
@@ -165,9 +168,7 @@ fn chain(mesh: &mut MeshBuilder, links: usize) {
         let heading = DMat3::from_cols(along, across, along.cross(across));
         let roll = if k % 2 == 0 { 0.02 } else { 0.23 };
         let stretch = DMat3::from_diagonal(dvec3(1.7, 1.0, 1.0));
-        mesh.part(&placed(heading * about_x(roll) * stretch, here), |link| {
-            link.torus(0.06, 0.016, 12, 6);
-        });
+        mesh.copy(&placed(heading * about_x(roll) * stretch, here), &link);
     }
 }
 

@@ -127,6 +127,8 @@ fn walk(walk: &mut MeshBuilder, bays: usize) {
     let start = -0.5 * BAY * bays as f64;
     let end = -start;
     let back = -BAY - 0.25;
+    let parts: [fn(&mut MeshBuilder); 3] = [vault, column, arcade_arch];
+    let [vault, column, arch] = parts.map(MeshBuilder::of);
     walk.cuboid(dvec3(start, -0.3, 0.0), dvec3(end, 0.3, PARAPET));
     walk.sweep(
         &[dvec3(start, 0.0, PARAPET), dvec3(end, 0.0, PARAPET)],
@@ -137,12 +139,12 @@ fn walk(walk: &mut MeshBuilder, bays: usize) {
         let x = start + BAY * bay as f64;
         // Bays continue into the corner, which has a shared vault and no arch.
         let middle = x + 0.5 * BAY;
-        walk.part(&upright(0.0, middle, -0.5 * BAY - 0.1, SPRING), vault);
+        walk.copy(&upright(0.0, middle, -0.5 * BAY - 0.1, SPRING), &vault);
         if bay < bays {
             for (turns, y) in [(0.003 * bay as f64, -0.18), (0.002 * bay as f64 - 0.01, 0.18)] {
-                walk.part(&upright(turns, x, y, PARAPET), column);
+                walk.copy(&upright(turns, x, y, PARAPET), &column);
             }
-            walk.part(&upright(0.0, middle, 0.0, SPRING), arcade_arch);
+            walk.copy(&upright(0.0, middle, 0.0, SPRING), &arch);
             buttress(walk, x);
         }
         paving(walk, x, bay);
@@ -236,13 +238,14 @@ fn roof(mesh: &mut MeshBuilder, half: f64) {
     let columns = (2.0 * high / 0.5) as usize;
     let length = slope / rows as f64;
     let frame = DMat3::from_cols(DVec3::X, up * length, normal);
+    let tile = MeshBuilder::of(tile);
     for i in 0..columns {
         let x = high * (2.0 * fraction(2 * i + 1, 2 * columns) - 1.0);
         for j in 0..rows {
             let limit = low + (high - low) * fraction(2 * j + 1, 2 * rows);
             if x.abs() < limit {
                 let foot = eaves + along(x) + up * (length * j as f64) + normal * 0.02;
-                mesh.part(&placed(frame, foot), tile);
+                mesh.copy(&placed(frame, foot), &tile);
             }
         }
     }
@@ -283,11 +286,10 @@ fn well(well: &mut MeshBuilder) {
     }
     let yoke = half_circle(20, |c, s| dvec3(0.83 * c, 0.0, 1.36 + 1.9 * libm::sqrt(s)));
     well.sweep(&yoke, DVec3::Y, &circle(0.035, 7));
+    let link = MeshBuilder::of(|link| link.torus(0.03, 0.012, 9, 6));
     for k in 0..18 {
         let turned = about_z(if k % 2 == 0 { 0.02 } else { 0.27 }) * about_y(0.25);
-        well.part(&placed(turned, dvec3(0.0, 0.0, 3.2 - 0.05 * k as f64)), |link| {
-            link.torus(0.03, 0.012, 9, 6);
-        });
+        well.copy(&placed(turned, dvec3(0.0, 0.0, 3.2 - 0.05 * k as f64)), &link);
     }
     // A wooden bucket, hoops included: its outside, then its inside.
     let outside =

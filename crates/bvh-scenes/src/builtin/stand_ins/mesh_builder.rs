@@ -14,6 +14,13 @@ pub struct MeshBuilder {
 }
 
 impl MeshBuilder {
+    /// Returns what `draw` adds.
+    pub fn of(draw: impl FnOnce(&mut Self)) -> Self {
+        let mut mesh = Self::default();
+        draw(&mut mesh);
+        mesh
+    }
+
     pub fn triangle(&mut self, a: DVec3, b: DVec3, c: DVec3) {
         self.triangles.push([a, b, c]);
     }
@@ -152,6 +159,11 @@ impl MeshBuilder {
         for corner in self.triangles[before..].as_flattened_mut() {
             *corner = placement.transform_point3(*corner);
         }
+    }
+
+    /// Adds a moved copy of a part of which there are many.
+    pub fn copy(&mut self, placement: &DAffine3, part: &Self) {
+        self.part(placement, |mesh| mesh.triangles.extend(&part.triangles));
     }
 
     /// Multiplies by `unit`, adds `origin`, rounds to f32, and drops triangles without area, which
