@@ -65,17 +65,3 @@ impl Camera {
         (self.corner + self.steps[0] * x + self.steps[1] * y).normalize()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_middle_of_the_picture_looks_at_the_middle_of_the_view() {
-        for at in [DVec3::X, DVec3::Y, DVec3::new(1.0, -2.0, 0.3)] {
-            let camera =
-                Camera::new(&View { from: DVec3::ZERO, at, fov: 60.0 }, DVec3::Y, 640, 480);
-            assert!(camera.direction(320.0, 240.0).distance(at.normalize()) < 1e-12);
-        }
-    }
-}

@@ -38,3 +38,21 @@ pub fn render(
     rows.into_iter().for_each(|row| film.append(row));
     film
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::Structure;
+
+    #[test]
+    fn rays_follow_as_many_reflections_as_the_options_say() {
+        let scene = Scene::load("spheres75").unwrap();
+        let brute = Accelerator::new(&scene.primitives, Structure::Brute);
+        let options = Options::new(32, 18, framing::automatic(&scene, 16.0 / 9.0));
+        let rays = [0, 1, 2].map(|depth| {
+            let options = Options { samples: 1, depth, ..options.clone() };
+            render(&scene, &brute, &options, &|| ()).rays
+        });
+        assert!(rays.is_sorted_by(|a, b| a < b), "{rays:?}");
+    }
+}
