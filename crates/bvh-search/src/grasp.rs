@@ -89,7 +89,7 @@ impl Config {
         run: &mut Run,
     ) -> Found {
         let scene = Presorted::new(problem.boxes)?;
-        let construction = (2 * scene.len() as u64).saturating_sub(1);
+        let construction = (2 * problem.boxes.len() as u64).saturating_sub(1);
         let observer = run.observer();
         // The work of trials with local search is not known in advance. Smaller batches waste less
         // at the end of a budget.
@@ -113,7 +113,7 @@ impl Config {
                 let (workspace, tree): &mut (Workspace, Bvh) = buffers;
                 let constructed = watched(observer, |watch| {
                     let Problem { measure, .. } = *problem;
-                    self.construction.construct(&scene, measure, rule, workspace, tree, watch)
+                    self.construction.construct(&scene, measure, Some(rule), workspace, tree, watch)
                 });
                 match constructed {
                     // A trial is either complete or, without any other, an error.

@@ -82,13 +82,9 @@ struct Object {
 }
 
 impl<'a> Scene<'a> {
-    /// Checks and packs the boxes. O(n).
-    pub fn new(boxes: &[Aabb]) -> Result<Self, BuildError> {
-        Self::by(boxes, None)
-    }
-
-    /// Checks and packs the boxes, with a measure instead of the half area. O(n).
-    pub fn by(boxes: &[Aabb], measure: Option<&'a dyn Measure>) -> Result<Self, BuildError> {
+    /// Checks and packs the boxes. Their size is the `measure`, or the half area if there is none.
+    /// O(n).
+    pub fn new(boxes: &[Aabb], measure: Option<&'a dyn Measure>) -> Result<Self, BuildError> {
         check_scene(boxes)?;
         let objects = boxes.iter().map(|b| {
             let min = -b.min;
@@ -98,16 +94,6 @@ impl<'a> Scene<'a> {
             Object { bounds: [min.x, min.y, min.z, max.x, max.y, max.z], area }
         });
         Ok(Self { objects: objects.collect(), measure })
-    }
-
-    /// Returns the number of objects.
-    pub fn len(&self) -> usize {
-        self.objects.len()
-    }
-
-    /// Returns whether there are no objects.
-    pub fn is_empty(&self) -> bool {
-        self.objects.is_empty()
     }
 }
 
@@ -172,24 +158,14 @@ impl Config {
         workspace: &mut Workspace,
         watch: &Watch,
     ) -> Result<f64, InvalidOrder> {
-        check_order(order, scene.len(), &mut workspace.named)?;
-        self.insert_valid(scene, order, workspace, watch).ok_or(InvalidOrder::Cancelled)
-    }
-
-    /// Inserts a valid order; `None` if the `watch` cancels.
-    fn insert_valid(
-        &self,
-        scene: &Scene,
-        order: &[u32],
-        workspace: &mut Workspace,
-        watch: &Watch,
-    ) -> Option<f64> {
-        // The measure is a type, so that the descent is compiled without branches on it.
+        check_order(order, scene.objects.len(), &mut workspace.named)?;
         let pace = Pace::new(watch);
-        match scene.measure {
+        // The measure is a type, so that the descent is compiled without branches on it.
+        let cost = match scene.measure {
             Some(measure) => self.insert_by(measure, scene, order, workspace, pace),
             None => self.insert_by(Area, scene, order, workspace, pace),
-        }
+        };
+        cost.ok_or(InvalidOrder::Cancelled)
     }
 
     fn insert_by(
@@ -222,11 +198,13 @@ impl Builder for Config {
         measure: Option<&dyn Measure>,
         watch: &Watch,
     ) -> Result<Bvh, BuildError> {
-        let scene = Scene::by(boxes, measure)?;
+        let scene = Scene::new(boxes, measure)?;
         let order: Vec<u32> = (0..boxes.len() as u32).collect();
         let mut workspace = Workspace::default();
         let mut tree = Bvh::default();
-        self.insert_valid(&scene, &order, &mut workspace, watch).ok_or(BuildError::Cancelled)?;
+        // The order is valid, so nothing else can end the insertion.
+        let inserted = self.insert_all(&scene, &order, &mut workspace, watch);
+        inserted.map_err(|_| BuildError::Cancelled)?;
         workspace.write(&mut tree);
         Ok(tree)
     }

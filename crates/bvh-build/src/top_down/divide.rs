@@ -11,11 +11,12 @@
 use super::presort::PARALLEL_OBJECTS;
 use super::presort::{Presorted, note_same_orders};
 use super::rule::{Split, SplitRule, TakeBest};
-use super::split_cost::SplitCost;
+use super::split_cost::{ByMeasure, SplitCost};
 use super::stall::{LEAST_STALLED, is_stall};
 use super::sweep::{Block, Sweep, union_of};
 use crate::watch::Pace;
 use crate::{BuildError, Watch};
+use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh, Node, PackedAabb, with_vector_instructions};
 #[cfg(feature = "rayon")]
 use std::sync::Mutex;
@@ -61,15 +62,10 @@ struct Task<'a> {
 }
 
 /// A division of a scene into a tree, ready to be made.
-#[derive(Clone, Copy, Debug)]
-pub struct Division<'a, C> {
-    /// The objects.
+pub(super) struct Division<'a, C> {
     pub scene: &'a Presorted,
-    /// The cost of splits.
     pub split_cost: &'a C,
-    /// Whether to find axes that order a node's objects identically.
     pub skip_same_order: bool,
-    /// The caller's way to cancel the division.
     pub watch: &'a Watch<'a>,
 }
 
@@ -82,40 +78,42 @@ fn stalls<C: SplitCost>(node: &Sweep<C>, split: &Split, side_boxes: &[PackedAabb
 }
 
 impl<C: SplitCost> Division<'_, C> {
-    /// Divides by `rule` into `tree` on one thread and reuses the memory of tree and workspace. O(n
-    /// log n); for split costs without a [limit](SplitCost::most_stalls) on stalls O(n²), if every
-    /// split separates a single object. Clears the tree if the watch cancels.
-    pub fn on_one_thread(
+    /// Divides by `rule` into `tree` on one thread, or without a rule by the best splits, on the
+    /// threads of the current rayon pool if the scene is large enough, into the same bytes. Reuses
+    /// the memory of tree and workspace. O(n log n); for split costs without a
+    /// [limit](SplitCost::most_stalls) on stalls O(n²), if every split separates a single object.
+    /// Clears the tree if the watch cancels.
+    pub fn divide(
         &self,
-        rule: &mut dyn SplitRule,
+        measure: Option<&dyn Measure>,
+        rule: Option<&mut dyn SplitRule>,
+        workspace: &mut Workspace,
+        tree: &mut Bvh,
+    ) -> Result<(), BuildError> {
+        let &Self { scene, split_cost: cost, skip_same_order, watch } = self;
+        let Some(measure) = measure else { return self.divide_by_cost(rule, workspace, tree) };
+        let split_cost = &ByMeasure { cost, measure };
+        let by_measure = Division { scene, split_cost, skip_same_order, watch };
+        by_measure.divide_by_cost(rule, workspace, tree)
+    }
+
+    fn divide_by_cost(
+        &self,
+        rule: Option<&mut dyn SplitRule>,
         workspace: &mut Workspace,
         tree: &mut Bvh,
     ) -> Result<(), BuildError> {
         if let Some((task, scratch)) = prepare(self.scene, workspace, tree) {
-            build(self, task, rule, scratch);
-        }
-        self.finish(tree)
-    }
-
-    /// Divides by the best splits, on the threads of the current rayon pool if the scene is large
-    /// enough, into the same bytes as [`on_one_thread`](Self::on_one_thread).
-    pub fn by_best_splits(
-        &self,
-        workspace: &mut Workspace,
-        tree: &mut Bvh,
-    ) -> Result<(), BuildError> {
-        #[cfg(feature = "rayon")]
-        if self.scene.len() >= PARALLEL_OBJECTS && rayon::current_num_threads() > 1 {
-            if let Some((task, scratch)) = prepare(self.scene, workspace, tree) {
-                let scratches = &Mutex::new(vec![std::mem::take(scratch)]);
-                rayon::scope(|scope| spawn(scope, self, scratches, task));
+            match rule {
+                Some(rule) => build(self, task, rule, scratch),
+                #[cfg(feature = "rayon")]
+                None if task.objects() >= PARALLEL_OBJECTS && rayon::current_num_threads() > 1 => {
+                    let scratches = &Mutex::new(vec![std::mem::take(scratch)]);
+                    rayon::scope(|scope| spawn(scope, self, scratches, task));
+                }
+                None => build(self, task, &mut TakeBest, scratch),
             }
-            return self.finish(tree);
         }
-        self.on_one_thread(&mut TakeBest, workspace, tree)
-    }
-
-    fn finish(&self, tree: &mut Bvh) -> Result<(), BuildError> {
         let finished = self.watch.ensure_wanted();
         if finished.is_err() {
             tree.nodes.clear();
@@ -138,7 +136,7 @@ fn spawn<'s, C: SplitCost>(
     let pooled = || scratches.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     let mut scratch = pooled().pop().unwrap_or_default();
     // Marks need no reset: every object of a node is marked before the node is partitioned.
-    scratch.goes_left.resize(division.scene.len(), 0);
+    scratch.goes_left.resize(division.scene.boxes.len(), 0);
     let mut pace = Pace::new(division.watch);
     // A loop instead of a recursion: one side goes to the pool and the other stays, so unbalanced
     // splits need no deep stack.
@@ -167,7 +165,7 @@ fn prepare<'a>(
     workspace: &'a mut Workspace,
     tree: &'a mut Bvh,
 ) -> Option<(Task<'a>, &'a mut Scratch)> {
-    let n = scene.len();
+    let n = scene.boxes.len();
     let Workspace { orders: [y, z], scratch } = workspace;
     tree.prim_ids.clone_from(&scene.orders[0]);
     y.clone_from(&scene.orders[1]);

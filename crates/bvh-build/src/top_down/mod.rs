@@ -11,7 +11,7 @@ mod split_cost;
 mod stall;
 mod sweep;
 
-pub use divide::{Division, Workspace};
-pub use presort::{PARALLEL_OBJECTS, Presorted};
+pub use divide::Workspace;
+pub use presort::Presorted;
 pub use rule::{Shortlist, Split, SplitRule, TakeBest};
-pub use split_cost::{AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, SplitCost};
+pub use split_cost::AreaOnly;

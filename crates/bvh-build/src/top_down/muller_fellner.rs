@@ -10,9 +10,7 @@
 use super::divide::{Division, Workspace};
 use super::presort::Presorted;
 use super::rule::SplitRule;
-use super::split_cost::{
-    AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, ByMeasure, SplitCost,
-};
+use super::split_cost::{AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight};
 use crate::{BuildError, Builder, Check, OutOfRange, Watch};
 use bvh_config::{Accepts, Nested};
 use bvh_core::cost::Measure;
@@ -102,80 +100,50 @@ impl Builder for Config {
         // All trees over a scene without area have the same area, but measures may differ.
         let scene = &Presorted::sort(boxes, self.skip_sorted, self.skip_flat && measure.is_none())?;
         self.check()?;
-        let workspace = &mut Workspace::default();
         let mut tree = Bvh::default();
-        let by_heuristic = ByHeuristic {
-            config: self,
-            scene,
-            measure,
-            rule: None,
-            workspace,
-            tree: &mut tree,
-            watch,
-        };
-        by_heuristic.divide()?;
+        self.construct(scene, measure, None, &mut Workspace::default(), &mut tree, watch)?;
         Ok(tree)
     }
 }
 
-/// A division that is ready except for its split cost.
-struct ByHeuristic<'a, 'r> {
-    config: &'a Config,
-    scene: &'a Presorted,
-    /// Instead of half areas.
-    measure: Option<&'a dyn Measure>,
-    /// Instead of the best splits.
-    rule: Option<&'r mut (dyn SplitRule + 'r)>,
-    workspace: &'a mut Workspace,
-    tree: &'a mut Bvh,
-    watch: &'a Watch<'a>,
-}
-
-impl ByHeuristic<'_, '_> {
-    fn divide(self) -> Result<(), BuildError> {
-        let objects = self.scene.len();
-        match self.config.heuristic {
-            Heuristic::AreaTimesCount => self.divide_by(&AreaTimesCount),
-            Heuristic::AreaTimesPower(p) => self.divide_by(&AreaTimesPower::new(objects, p)),
-            Heuristic::AreaOnly(reading) => self.divide_by(&reading),
-            Heuristic::AreaTimesCost(made_up) => {
-                self.divide_by(&AreaTimesWeight(&made_up.costs(objects)))
-            }
-        }
-    }
-
-    fn divide_by(self, cost: &impl SplitCost) -> Result<(), BuildError> {
-        match self.measure {
-            Some(measure) => self.divide_by_cost(&ByMeasure { cost, measure }),
-            None => self.divide_by_cost(cost),
-        }
-    }
-
-    fn divide_by_cost(self, split_cost: &impl SplitCost) -> Result<(), BuildError> {
-        let Self { config, scene, rule, workspace, tree, watch, .. } = self;
-        let skip_same_order = config.skip_same_order;
-        let division = Division { scene, split_cost, skip_same_order, watch };
-        match rule {
-            Some(rule) => division.on_one_thread(rule, workspace, tree),
-            None => division.by_best_splits(workspace, tree),
-        }
-    }
-}
-
 impl Config {
-    /// Divides by any rule, for example a randomised one, on one thread, by half area or by a
-    /// measure, unless the `watch` cancels. Reuses the memory of `workspace` and `tree`. The
-    /// heuristic's parameter must be [in range](Check).
+    /// Divides by any rule, for example a randomised one, on one thread, or without a rule by the
+    /// best splits; by half area or by a measure; unless the `watch` cancels. Reuses the memory of
+    /// `workspace` and `tree`. The heuristic's parameter must be [in range](Check).
     pub fn construct(
         &self,
         scene: &Presorted,
         measure: Option<&dyn Measure>,
-        rule: &mut dyn SplitRule,
+        rule: Option<&mut dyn SplitRule>,
         workspace: &mut Workspace,
         tree: &mut Bvh,
         watch: &Watch,
     ) -> Result<(), BuildError> {
-        let rule = Some(rule);
-        ByHeuristic { config: self, scene, measure, rule, workspace, tree, watch }.divide()
+        let objects = scene.boxes.len();
+        match self.heuristic {
+            Heuristic::AreaTimesCount => {
+                self.division(&AreaTimesCount, scene, watch).divide(measure, rule, workspace, tree)
+            }
+            Heuristic::AreaTimesPower(p) => {
+                let powers = AreaTimesPower::new(objects, p);
+                self.division(&powers, scene, watch).divide(measure, rule, workspace, tree)
+            }
+            Heuristic::AreaOnly(reading) => {
+                self.division(&reading, scene, watch).divide(measure, rule, workspace, tree)
+            }
+            Heuristic::AreaTimesCost(made_up) => {
+                let costs = &AreaTimesWeight(&made_up.costs(objects));
+                self.division(costs, scene, watch).divide(measure, rule, workspace, tree)
+            }
+        }
+    }
+
+    fn division<'a, C>(
+        &self,
+        split_cost: &'a C,
+        scene: &'a Presorted,
+        watch: &'a Watch,
+    ) -> Division<'a, C> {
+        Division { scene, split_cost, skip_same_order: self.skip_same_order, watch }
     }
 }

@@ -6,7 +6,7 @@ use bvh_core::{Aabb, PackedAabb};
 
 /// Least number of objects that are sorted and divided in parallel. It is large enough that the
 /// start of a task takes a negligible part of its time.
-pub const PARALLEL_OBJECTS: usize = 4096;
+pub(super) const PARALLEL_OBJECTS: usize = 4096;
 
 /// A scene's objects, sorted along every axis: the input of any number of top-down builds.
 #[derive(Clone, Debug)]
@@ -70,16 +70,6 @@ impl Presorted {
         let mut same_as = [0, 1, 2];
         note_same_orders(orders, &mut same_as);
         same_as
-    }
-
-    /// Returns the number of objects.
-    pub fn len(&self) -> usize {
-        self.boxes.len()
-    }
-
-    /// Returns whether there are no objects.
-    pub fn is_empty(&self) -> bool {
-        self.boxes.is_empty()
     }
 }
 

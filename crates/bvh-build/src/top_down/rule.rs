@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 /// A candidate: the first `left` objects in the order of `axis` against the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Split {
-    /// The cost by the build's [`SplitCost`](super::SplitCost); lower is better.
+    /// The cost by the builder's heuristic; lower is better.
     pub cost: f64,
     /// 0, 1 or 2.
     pub axis: u8,

@@ -2,6 +2,7 @@
 //! method.
 
 use crate::plain_tree::brute_force;
+use crate::{hash, sized_box};
 use bvh_build::goldsmith_salmon::{Config, Descent, InvalidOrder, Scene, Workspace};
 use bvh_build::{Builder, Watch};
 use bvh_core::{Aabb, Bvh, NodeKind, cost, validate};
@@ -30,7 +31,7 @@ fn topology(tree: &Bvh) -> Vec<Result<usize, u32>> {
 }
 
 fn insert(config: &Config, boxes: &[Aabb], order: &[u32], workspace: &mut Workspace) -> (Bvh, f64) {
-    let scene = Scene::new(boxes).unwrap();
+    let scene = Scene::new(boxes, None).unwrap();
     let cost = config.insert_all(&scene, order, workspace, &Watch::default()).unwrap();
     let mut tree = Bvh::default();
     workspace.write(&mut tree);
@@ -48,7 +49,7 @@ fn insert(config: &Config, boxes: &[Aabb], order: &[u32], workspace: &mut Worksp
 fn whole(cells: i32, size: i32, max: usize) -> impl Strategy<Value = (Vec<Aabb>, Vec<u32>)> {
     let corner = prop::array::uniform3((-cells..cells).prop_map(|x| x as f32));
     let size = prop::array::uniform3((0..size).prop_map(|x| x as f32));
-    let boxes = (corner, size).prop_map(|(low, size)| sized_box(low, size));
+    let boxes = (corner, size).prop_map(sized_box);
     with_order(prop::collection::vec(boxes, 1..max))
 }
 
@@ -60,14 +61,9 @@ fn real(max: usize) -> impl Strategy<Value = (Vec<Aabb>, Vec<u32>)> {
         if flat < 3 {
             size[flat] = 0.0;
         }
-        sized_box(low, size)
+        sized_box((low, size))
     });
     with_order(prop::collection::vec(boxes, 1..max))
-}
-
-fn sized_box(low: [f32; 3], size: [f32; 3]) -> Aabb {
-    let high = [0, 1, 2].map(|axis| low[axis] + size[axis]);
-    Aabb::from((low, high))
 }
 
 fn with_order(
@@ -150,11 +146,6 @@ fn the_tree_is_the_brute_force_one_with_wide_nodes_too() {
     }
 }
 
-fn hash(i: u32, salt: u32, end: u32) -> f32 {
-    let bits = i.wrapping_mul(2_654_435_761).rotate_left(salt);
-    (bits % end) as f32
-}
-
 fn integer_corner(i: u32, salt: u32) -> [f32; 3] {
     [hash(i, salt, 1021), hash(i, salt + 5, 1021), hash(i, salt + 9, 1021)]
 }
@@ -223,7 +214,7 @@ fn a_hundred_thousand_objects_in_sorted_order_make_a_shallow_tree() {
 #[test]
 fn an_invalid_order_is_rejected_and_the_tree_is_kept() {
     let boxes = [0.0, 2.0, 4.0].map(|x| cube([x; 3], 1.0));
-    let scene = Scene::new(&boxes).unwrap();
+    let scene = Scene::new(&boxes, None).unwrap();
     let mut workspace = Workspace::default();
     let mut before = Bvh::default();
     let mut after = Bvh::default();

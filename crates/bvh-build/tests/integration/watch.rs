@@ -79,7 +79,7 @@ fn every_builder_ends_when_its_watch_says_so_whenever_that_is() {
     let mut workspace = Workspace::default();
     let mut tree = Bvh::default();
     let construct = |watch: &Watch| {
-        power(0.9).construct(&scene, None, &mut TakeBest, &mut workspace, &mut tree, watch)
+        power(0.9).construct(&scene, None, Some(&mut TakeBest), &mut workspace, &mut tree, watch)
     };
     assert_eq!(asked(2, construct), (Err(BuildError::Cancelled), 2));
     assert_eq!(tree, Bvh::default());

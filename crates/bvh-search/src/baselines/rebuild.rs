@@ -218,7 +218,7 @@ impl Config {
         let scene = Presorted::new(&boxes)?;
         let workspace = &mut Workspace::default();
         let constructed = watched(observer, |watch| {
-            construction().construct(&scene, measure, &mut rule, workspace, &mut other, watch)
+            construction().construct(&scene, measure, Some(&mut rule), workspace, &mut other, watch)
         });
         match constructed {
             Err(BuildError::Cancelled) => return Ok((None, Tally::default())),

@@ -24,19 +24,19 @@ type Buffers = (Workspace, Bvh);
 impl<'p> Insertion<'p> {
     fn new(problem: &Problem<'p>, config: &goldsmith_salmon::Config) -> Result<Self, SearchError> {
         Ok(Self {
-            scene: Scene::by(problem.boxes, problem.measure)?,
+            scene: Scene::new(problem.boxes, problem.measure)?,
             config: config.clone(),
             problem: *problem,
         })
     }
 
     fn len(&self) -> usize {
-        self.scene.len()
+        self.problem.boxes.len()
     }
 
     /// Nodes created or visited by an evaluation: a leaf per object and about as many inner nodes.
     fn work(&self) -> u64 {
-        2 * self.scene.len() as u64
+        2 * self.len() as u64
     }
 
     /// Inserts the objects in this order and returns the Goldsmith–Salmon cost.

@@ -157,7 +157,7 @@ pub fn insertion_keeps_its_cost() -> Verdict {
         [stiff::uniform, stiff::slivers, stiff::two_densities, stiff::enormous, stiff::denormal]
     {
         let boxes = stiff::boxes(&make(2000));
-        let scene = goldsmith_salmon::Scene::new(&boxes)?;
+        let scene = goldsmith_salmon::Scene::new(&boxes, None)?;
         let mut workspace = goldsmith_salmon::Workspace::default();
         let mut tree = Default::default();
         let order: Vec<u32> = (0..boxes.len() as u32).collect();
