@@ -2,11 +2,11 @@
 //! Python alike.
 
 use crate::parallel;
-use crate::run::watched;
+use crate::run::built_unless_cancelled;
 use crate::{Budget, Kept, Observer, Outcome, Problem, Search, SearchError, Splits};
 use crate::{best, optimize, ray_density, solve_or_keep};
 use best::Horizon;
-use bvh_build::{BuildError, Builder, muller_fellner};
+use bvh_build::{Builder, muller_fellner};
 use bvh_config::OutOfRange;
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::file::{self, FileError, Origin};
@@ -140,7 +140,7 @@ impl<'a> Bake<'a> {
     /// Builds the greedy tree, with which gains are compared. `None` if the observer cancels first.
     pub fn greedy(&self, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
         let config = muller_fellner::Config::default();
-        unless_cancelled(watched(observer, |watch| config.build_watched(self.boxes, None, watch)))
+        built_unless_cancelled(observer, |watch| config.build_watched(self.boxes, None, watch))
     }
 
     /// Searches until the budget is spent or the observer cancels. A budget of no work gives the
@@ -170,10 +170,8 @@ impl<'a> Bake<'a> {
         // A division may take all the time of a search that has no tree yet. Such a search divides
         // later itself.
         let is_later = self.starts_divided() || is_timed && greedy.is_none();
-        let divided = match &splits {
-            Some(splits) if splits.division.is_none() && !is_later => {
-                self.divided_by(splits, observer)?
-            }
+        let divided = match self.division {
+            None if !is_later => self.divided(observer)?,
             _ => None,
         };
         let mut division = Division::No;
@@ -236,15 +234,7 @@ impl<'a> Bake<'a> {
     /// Divides the objects with spatial splits, unless they stay whole anyway. `None` if the
     /// observer cancels first.
     pub fn divided(&self, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
-        self.splits().map_or(Ok(None), |splits| self.divided_by(&splits, observer))
-    }
-
-    fn divided_by(
-        &self,
-        splits: &Splits,
-        observer: &dyn Observer,
-    ) -> Result<Option<Bvh>, SearchError> {
-        unless_cancelled(watched(observer, |watch| splits.divide(self.boxes, watch)))
+        best::division(self.splits(), self.boxes, observer)
     }
 
     /// Returns whether the start divides objects, after which no search returns to whole ones.
@@ -310,12 +300,4 @@ pub(crate) fn density_of(
     let greedy = muller_fellner::Config::default().build(boxes).map_err(SearchError::from)?;
     let density = ray_density(&greedy, shapes, segments, &|| false)?;
     Ok((greedy, density.expect("the density of rays that nobody cancels")))
-}
-
-/// Returns a tree, or `None` if its construction was cancelled.
-fn unless_cancelled(built: Result<Bvh, BuildError>) -> Result<Option<Bvh>, SearchError> {
-    match built {
-        Err(BuildError::Cancelled) => Ok(None),
-        built => Ok(Some(built?)),
-    }
 }

@@ -152,7 +152,7 @@ impl Config {
         if self.local_search.is_none() {
             return Ok(0);
         }
-        let mut working = Working::from_bvh(tree, metric.internal(tree), metric)?;
+        let mut working = Working::from_bvh(tree, metric)?;
         let tally = reinsertion::to_local_optimum(&mut working, Quota::ENDLESS, observer);
         if !observer.cancelled() {
             *tree = working.to_bvh();
@@ -172,8 +172,8 @@ mod tests {
     use super::*;
     use crate::scatter::scatter;
     use crate::{Budget, solve};
-    use bvh_build::Builder;
     use bvh_core::validate;
+    use std::sync::atomic::AtomicBool;
 
     fn configs() -> [Config; 6] {
         let config =
@@ -192,30 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn rules_that_leave_no_choice_construct_the_greedy_tree() {
-        let boxes = scatter(700);
-        let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
-        let every = [
-            Candidates::AxisBest,
-            Candidates::KBest(1),
-            Candidates::KBest(9),
-            Candidates::Within(0.0),
-        ];
-        for (candidates, noise) in
-            every.map(|candidates| (candidates, Some(0.0))).into_iter().chain([
-                (Candidates::KBest(1), None),
-                (Candidates::KBest(1), Some(1.0)),
-                (Candidates::Within(0.0), None),
-            ])
-        {
-            let config = Config { trials: 2, candidates, noise, ..Config::default() };
-            let outcome = solve(&config, &Problem::new(&boxes), 7, Budget::UNLIMITED, &()).unwrap();
-            assert_eq!(outcome.tree, greedy, "{config:?}");
-        }
-    }
-
-    #[test]
-    fn every_rule_constructs_valid_trees_whose_cost_is_the_recorded_one() {
+    fn every_rule_constructs_different_valid_trees_whose_cost_is_the_recorded_one() {
         for boxes in
             [scatter(300), scatter(1), scatter(2), scatter(3), vec![scatter(1)[0]; 100], vec![]]
         {
@@ -225,6 +202,8 @@ mod tests {
                 validate(&outcome.tree, &boxes).unwrap();
                 assert_eq!(outcome.cost, problem.objective.cost(&outcome.tree), "{config:?}");
                 assert_eq!(outcome.evaluations, 12);
+                let differ = outcome.history.iter().any(|event| event.cost != outcome.cost);
+                assert!(boxes.len() < 300 || differ, "{config:?}");
             }
         }
     }
@@ -254,28 +233,13 @@ mod tests {
 
     #[test]
     fn a_trial_cut_off_by_the_observer_is_recorded_as_constructed() {
-        struct Cancelled;
-        impl Observer for Cancelled {
-            fn cancelled(&self) -> bool {
-                true
-            }
-        }
         let boxes = scatter(500);
         let config = Config { local_search: LocalSearch::Reinsertion, ..Config::default() };
+        let cancelled = AtomicBool::new(true);
         let outcome =
-            solve(&config, &Problem::new(&boxes), 3, Budget::UNLIMITED, &Cancelled).unwrap();
+            solve(&config, &Problem::new(&boxes), 3, Budget::UNLIMITED, &cancelled).unwrap();
         let plain = Config { trials: 1, ..Config::default() };
         let plain = solve(&plain, &Problem::new(&boxes), 3, Budget::UNLIMITED, &()).unwrap();
         assert_eq!((outcome.tree, outcome.cost), (plain.tree, plain.cost));
-    }
-
-    #[test]
-    fn noise_makes_trials_differ() {
-        let boxes = scatter(500);
-        for config in configs() {
-            let history =
-                solve(&config, &Problem::new(&boxes), 3, Budget::UNLIMITED, &()).unwrap().history;
-            assert!(history.iter().any(|event| event.cost != history[0].cost), "{config:?}");
-        }
     }
 }

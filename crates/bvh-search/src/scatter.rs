@@ -2,7 +2,7 @@
 
 use crate::tree::{Area, Working};
 use bvh_build::Builder;
-use bvh_core::{Aabb, RayDensity, Segment, cost};
+use bvh_core::{Aabb, RayDensity, Segment};
 
 /// Returns a reproducible scatter of `n` small boxes.
 pub(crate) fn scatter(n: u32) -> Vec<Aabb> {
@@ -19,7 +19,7 @@ pub(crate) fn scatter(n: u32) -> Vec<Aabb> {
 /// Builds the working form of a binary tree over finite boxes.
 pub(crate) fn built(builder: &dyn Builder, boxes: &[Aabb]) -> Working {
     let tree = builder.build(boxes).unwrap();
-    Working::from_bvh(&tree, cost::internal_area(&tree), Area).unwrap()
+    Working::from_bvh(&tree, Area).unwrap()
 }
 
 /// Returns the density of rays from a corner of the scene to the corners of all objects; `None` if

@@ -19,7 +19,8 @@ pub(crate) struct Layout {
     marks: Vec<u32>,
     change: u32,
     stack: Vec<(u32, bool)>,
-    cost: f64,
+    /// The cost of the tree after the last accepted change.
+    pub cost: f64,
     /// The number of rows computed so far.
     pub visits: u64,
 }
@@ -50,11 +51,6 @@ impl Layout {
 
     fn root(&self, tree: &Working<impl Metric>) -> f64 {
         tree.root().map_or(0.0, |root| self.rows[root as usize].value())
-    }
-
-    /// The cost of the tree after the last accepted change.
-    pub fn current(&self) -> f64 {
-        self.cost
     }
 
     /// Returns whether the tree's current change makes the layout more expensive by less than

@@ -220,7 +220,7 @@ impl<'a> Divider<'a> {
     /// division that saves almost nothing is no gain.
     #[inline(always)]
     fn price(&self, tree: &Working<impl Metric>) -> f64 {
-        let cost = self.layout.as_ref().map_or(tree.area(), Layout::current);
+        let cost = self.layout.as_ref().map_or(tree.area(), |layout| layout.cost);
         PRICE_OF_A_REFERENCE * cost / self.count as f64
     }
 

@@ -8,7 +8,7 @@
 use super::layout::Layout;
 use super::metropolis::Mover;
 use super::node_sampler::NodeSampler;
-use super::schedule::{AnnealingRun, check_fall};
+use super::schedule::{anneal_initial, check_fall};
 use super::side::Side;
 use crate::run::{Found, Problem, Run, Stream};
 use crate::tree::{ANCHOR, Metric, Node, PositionSearch, Scope, Working, search_by_metric};
@@ -84,10 +84,10 @@ impl Config {
         run: &mut Run,
     ) -> Found {
         let Self { hot, cold, work_per_object, .. } = *self;
-        let annealing = AnnealingRun { heat: [hot, cold], work_per_object };
         let length =
             work_per_object.min(run.left().work / problem.boxes.len().max(1) as u64) as f64;
-        annealing.search(|| RuinMover::new(&self.ruin, length, false), metric, problem, seed, run)
+        let mover = || RuinMover::new(&self.ruin, length, false);
+        anneal_initial(mover, [hot, cold], work_per_object, metric, problem, seed, run)
     }
 }
 

@@ -15,11 +15,10 @@
 use super::metropolis::Mover;
 use super::subtrees::{self, Round};
 use crate::local::incumbent::Incumbent;
-use crate::run::{Observer, Problem, Quota, Run, SearchError, Tally};
+use crate::run::{Found, Observer, Problem, Quota, Run, Tally};
 use crate::tree::{Metric, Working};
 use crate::tuning::{FINAL_PASSES_PART, FINAL_PASSES_WORK, LAST_ROUND, ROUNDS, WORK_PER_ROUND};
 use bvh_config::OutOfRange;
-use bvh_core::Bvh;
 
 /// The temperatures and the length of one annealing run.
 #[derive(Clone, Copy, Debug)]
@@ -40,36 +39,26 @@ pub(crate) struct Schedule {
     pub to_local_optimum: bool,
 }
 
-/// A search that consists of one annealing run.
-pub(crate) struct AnnealingRun {
-    /// First and last temperature, above 0.
-    pub heat: [f64; 2],
-    pub work_per_object: u64,
-}
-
-impl AnnealingRun {
-    /// Anneals the initial tree by moves of one kind, until the work of the run or the budget is
-    /// used up, and ends in passes of reinsertion to a local optimum.
-    pub fn search<M: Mover>(
-        &self,
-        mover: impl Fn() -> M + Sync,
-        metric: impl Metric,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Result<Bvh, SearchError> {
-        let [hot, cold] = self.heat;
-        let (mut best, mut tree) = Incumbent::build(problem, metric, run)?;
-        let quota =
-            run.left().at_most(self.work_per_object.saturating_mul(problem.boxes.len() as u64));
-        let schedule = Schedule { hot, cold, quota, end: 1.0, subtrees: 1, to_local_optimum: true };
-        let observer = run.observer();
-        anneal(mover, &schedule, &mut tree, [seed, 0], observer, &mut |tree, tally| {
-            run.count(tally);
-            best.offer(tree, run);
-        });
-        Ok(best.tree)
-    }
+/// Anneals the initial tree by moves of one kind, until the work or the budget is used up, and ends
+/// in passes of reinsertion to a local optimum: a search that consists of one annealing run.
+pub(crate) fn anneal_initial<M: Mover>(
+    mover: impl Fn() -> M + Sync,
+    [hot, cold]: [f64; 2],
+    work_per_object: u64,
+    metric: impl Metric,
+    problem: &Problem,
+    seed: u64,
+    run: &mut Run,
+) -> Found {
+    let (mut best, mut tree) = Incumbent::build(problem, metric, run)?;
+    let quota = run.left().at_most(work_per_object.saturating_mul(problem.boxes.len() as u64));
+    let schedule = Schedule { hot, cold, quota, end: 1.0, subtrees: 1, to_local_optimum: true };
+    let observer = run.observer();
+    anneal(mover, &schedule, &mut tree, [seed, 0], observer, &mut |tree, tally| {
+        run.count(tally);
+        best.offer(tree, run);
+    });
+    Ok(best.tree)
 }
 
 pub(crate) fn check_fall(hot: f64, cold: f64) -> Result<(), OutOfRange> {

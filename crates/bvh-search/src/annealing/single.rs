@@ -7,7 +7,7 @@
 
 use super::metropolis::Mover;
 use super::node_sampler::NodeSampler;
-use super::schedule::{AnnealingRun, check_fall};
+use super::schedule::{anneal_initial, check_fall};
 use crate::run::{Found, Problem, Run, Stream};
 use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
 use bvh_config::above;
@@ -42,8 +42,8 @@ impl Config {
         run: &mut Run,
     ) -> Found {
         let Self { climb, hot, cold, work_per_object } = *self;
-        let annealing = AnnealingRun { heat: [hot, cold], work_per_object };
-        annealing.search(|| SingleMover::new(climb), metric, problem, seed, run)
+        let mover = || SingleMover::new(climb);
+        anneal_initial(mover, [hot, cold], work_per_object, metric, problem, seed, run)
     }
 }
 

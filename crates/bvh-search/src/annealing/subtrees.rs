@@ -193,11 +193,13 @@ fn improve_each<A: Metric>(
 impl Subtree {
     /// Copies the subtree, whose nodes are these, into a separate tree.
     fn take<A: Metric>(&self, nodes: &[Node], metric: A) -> Working<A> {
+        let place = |index: u32| index.wrapping_sub(self.root - 1);
         let mut copy = Vec::with_capacity(nodes.len() + 1);
         copy.push(Node { children: [1, NONE], ..Node::ANCHOR });
-        copy.extend(
-            nodes.iter().map(|node| moved(node, |index| index.wrapping_sub(self.root - 1))),
-        );
+        copy.extend(nodes.iter().map(|node| {
+            let children = if node.is_leaf() { node.children } else { node.children.map(place) };
+            Node { children, parent: place(node.parent), stamp: 0, ..*node }
+        }));
         copy[1].parent = ANCHOR;
         Working::from_nodes(copy, metric)
     }
@@ -217,13 +219,6 @@ impl Subtree {
         });
         nodes[0].parent = above;
     }
-}
-
-/// Returns the node with all its links mapped. No change has written it.
-fn moved(node: &Node, place: impl Fn(u32) -> u32) -> Node {
-    let children = if node.is_leaf() { node.children } else { node.children.map(&place) };
-    let parent = if node.parent == ANCHOR { ANCHOR } else { place(node.parent) };
-    Node { children, parent, stamp: 0, ..*node }
 }
 
 #[cfg(test)]

@@ -12,10 +12,8 @@
 //! local search (Lourenço, Martin & Stützle 2003).
 
 use crate::candidates::{Candidates, Randomised};
-use crate::local::TOLERANCE;
 use crate::local::incumbent::Incumbent;
-use crate::local::initial::construction;
-use crate::local::reinsertion;
+use crate::local::{TOLERANCE, construction, reinsertion};
 use crate::parallel;
 use crate::run::{
     Found, Observer, Problem, Quota, Run, SearchError, Stream, Tally, stream, watched,
@@ -224,7 +222,7 @@ impl Config {
             Err(BuildError::Cancelled) => return Ok((None, Tally::default())),
             constructed => constructed?,
         }
-        let mut other = Working::from_bvh(&other, tree.metric().internal(&other), tree.metric())?;
+        let mut other = Working::from_bvh(&other, tree.metric())?;
         let mut tally = reinsertion::to_local_optimum(&mut other, quota, observer);
         tally = Tally { moves: 0, kept: 0, work: tally.work + 2 * boxes.len() as u64 };
         let better = other.area() < subtree.area * (1.0 - TOLERANCE);

@@ -183,9 +183,9 @@ mod tests {
     use super::*;
     use crate::local::reinsertion::repeat;
     use crate::scatter::{built, scatter};
-    use crate::{Budget, Method, solve};
+    use crate::{Budget, exact, solve};
     use bvh_build::median_cut;
-    use bvh_core::{cost, validate};
+    use bvh_core::validate;
 
     #[test]
     fn boxes_and_areas_stay_exact_and_a_local_optimum_is_one() {
@@ -217,18 +217,10 @@ mod tests {
             let mut tree = built(&median_cut::Config::default(), &boxes);
             let mut solver = Solver::new(n, &tree);
             repeat(Quota::ENDLESS, &(), |quota| pass(&mut tree, &mut solver, quota, &()));
-            let outcome = solve(
-                &Method::Best(crate::best::Config {
-                    work_per_object: 20_000,
-                    ..Default::default()
-                }),
-                &Problem::new(&boxes),
-                1,
-                Budget::UNLIMITED,
-                &(),
-            );
-            let best = cost::internal_area(&outcome.unwrap().tree);
-            assert!((tree.area() - best).abs() <= 1e-12 * best, "{n}: {} {best}", tree.area());
+            let problem = Problem::new(&boxes);
+            let optimum = solve(&exact::Config {}, &problem, 1, Budget::UNLIMITED, &()).unwrap();
+            let least = optimum.cost;
+            assert!((tree.area() - least).abs() <= 1e-12 * least, "{n}: {} {least}", tree.area());
         }
     }
 }

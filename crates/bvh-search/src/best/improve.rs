@@ -10,7 +10,7 @@ use crate::annealing::schedule::{Schedule, anneal};
 use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion;
 use crate::parallel::threads;
-use crate::run::{Observer, Problem, Quota, Run, StopReason, Stream, Tally, stream};
+use crate::run::{Observer, Problem, Run, StopReason, Tally, stream};
 use crate::tree::{Metric, Shape, Working};
 use crate::tuning::{
     FINISH_AT_MOST, FINISH_WORK, LARGE_SUBTREE, LEAST_LARGE_SUBTREES, MOST_GENERATIONS,
@@ -41,8 +41,8 @@ enum Before {
     /// The incumbent is no worse.
     Incumbent,
     Shape(Shape),
-    /// The tree with its area; leaves may hold parts of objects.
-    Flat(Bvh, f64),
+    /// Leaves may hold parts of objects.
+    Flat(Bvh),
 }
 
 impl Before {
@@ -51,8 +51,8 @@ impl Before {
         // A binary tree stays binary, so that no conversion fails.
         match self {
             Self::Shape(shape) => tree.reshape(&shape, boxes),
-            Self::Flat(flat, area) => _ = tree.refill(&flat, area),
-            Self::Incumbent => _ = best.refill(tree),
+            Self::Flat(flat) => _ = tree.refill(&flat),
+            Self::Incumbent => _ = tree.refill(&best.tree),
         }
     }
 }
@@ -127,10 +127,7 @@ impl Improvement<'_, '_, '_, '_> {
         // The last moves must end early enough for the conversion of the tree.
         let mut end_of_all = 1.0;
         if timed {
-            let quota = self.run.left().at_most(self.left.min(PROBE * n));
-            let (tally, in_time) = self.probe(tree, stream(self.seed, 0), quota);
-            self.left = self.left.saturating_sub(tally.work);
-            self.run.count(tally);
+            let in_time = self.probe(tree);
             let now = observer.progress().unwrap_or(1.0);
             end_of_all = 1.0 - (1.0 - now) * (FINISH_WORK * n as f64 / in_time).min(FINISH_AT_MOST);
             length = length.min(in_time / n as f64);
@@ -193,14 +190,14 @@ impl Improvement<'_, '_, '_, '_> {
         if self.divider.is_none() {
             // A working form is a large part of all memory, so the tree itself is searched.
             let before = tree.shape();
-            if self.best.refill(tree).is_ok() {
+            if tree.refill(&self.best.tree).is_ok() {
                 self.reinsert(tree);
             }
             // After a cancellation nobody continues from the tree.
             if self.run.stopped().is_none() {
                 tree.reshape(&before, self.boxes);
             }
-        } else if let Ok(mut aside) = self.best.working(tree.metric()) {
+        } else if let Ok(mut aside) = Working::from_bvh(&self.best.tree, tree.metric()) {
             self.reinsert(&mut aside);
         }
     }
@@ -217,9 +214,7 @@ impl Improvement<'_, '_, '_, '_> {
         let began = observer.progress().unwrap_or(0.0);
         let work = match horizon {
             Horizon::Known if observer.progress().is_some() => {
-                let quota = self.run.left().at_most(self.left.min(PROBE * self.n));
-                let (tally, in_time) = self.probe(tree, stream(self.seed, 0), quota);
-                self.run.count(tally);
+                let in_time = self.probe(tree);
                 self.secure(tree, in_time / n);
                 TRIAL * in_time.min(self.left as f64)
             }
@@ -274,26 +269,25 @@ impl Improvement<'_, '_, '_, '_> {
         if length >= worth { subtrees } else { 1 }
     }
 
-    /// Makes moves at the lowest temperature. Also returns the work that fits into the rest of the
-    /// time at this rate.
-    fn probe(
-        &self,
-        tree: &mut Working<impl Metric>,
-        mut rng: Stream,
-        quota: Quota,
-    ) -> (Tally, f64) {
+    /// Makes moves at the lowest temperature. Returns the work that fits into the rest of the time
+    /// at this rate.
+    fn probe(&mut self, tree: &mut Working<impl Metric>) -> f64 {
         let observer = self.run.observer();
         let heat = [self.config.cold; 2];
+        let quota = self.run.left().at_most(self.left.min(PROBE * self.n));
+        let rng = &mut stream(self.seed, 0);
         let began = observer.progress();
         let mut mover = RuinMover::new(&self.config.ruin, PROBE as f64, self.by_layout);
-        let tally = cool(&mut mover, tree, Vec::new(), heat, quota, &mut rng, observer);
+        let tally = cool(&mut mover, tree, Vec::new(), heat, quota, rng, observer);
         let in_time = match (began, observer.progress()) {
             (Some(began), Some(now)) => {
                 tally.work as f64 * (1.0 - now).max(0.0) / (now - began).max(1e-9)
             }
             _ => f64::INFINITY,
         };
-        (tally, in_time)
+        self.left = self.left.saturating_sub(tally.work);
+        self.run.count(tally);
+        in_time
     }
 
     /// Makes one annealing run from `tree` and recombines the tree with the result. The first run
@@ -328,7 +322,6 @@ impl Improvement<'_, '_, '_, '_> {
         }
         let metric = tree.metric();
         let cost_before = cost(tree, by_layout);
-        let area_before = tree.area();
         let is_timed = observer.progress().is_some();
         // Recombination needs both trees, and a run that ends worse is discarded. A first run under
         // a time limit is not recombined, so that the incumbent can take the place of the tree,
@@ -339,7 +332,7 @@ impl Improvement<'_, '_, '_, '_> {
             best.offer(tree, run);
             Before::Incumbent
         } else if self.divider.is_some() {
-            Before::Flat(tree.to_bvh(), area_before)
+            Before::Flat(tree.to_bvh())
         } else {
             Before::Shape(tree.shape())
         };
@@ -364,7 +357,7 @@ impl Improvement<'_, '_, '_, '_> {
                 // A cancelled search offers its tree below, once.
                 let is_cancelled = run.stopped() == Some(StopReason::Cancelled);
                 if by_layout && rounds % ROUNDS_PER_LOOK == 0 && !is_cancelled
-                    || !by_layout && tree.area() < best.area() * (1.0 - WORTH_AN_EVENT)
+                    || !by_layout && tree.area() < best.area * (1.0 - WORTH_AN_EVENT)
                 {
                     best.offer(tree, run);
                 }

@@ -20,17 +20,17 @@ mod small_budget;
 
 use crate::exact;
 use crate::local::incumbent::Incumbent;
-use crate::local::initial::construction;
-use crate::local::reinsertion;
+use crate::local::{construction, reinsertion};
 use crate::run::{
-    Budget, Found, Kept, Observer, Outcome, Problem, Run, SearchError, StopReason, solve, watched,
+    Budget, Found, Kept, Observer, Outcome, Problem, Run, SearchError, Splits, StopReason,
+    built_unless_cancelled, solve, watched,
 };
 use crate::tree::{Metric, Working, search_by_metric};
 use crate::tuning::{CLUSTERING, CLUSTERING_MUCH_CHEAPER, REINSERTED_BELOW, SECURED_FROM};
 use bvh_build::ploc::{self, MortonOrder};
-use bvh_build::{BuildError, Builder, Watch};
-use bvh_core::Bvh;
+use bvh_build::{Builder, Watch, spatial};
 use bvh_core::cost::Objective;
+use bvh_core::{Aabb, Bvh};
 pub use config::{Config, Horizon};
 use improve::improve;
 
@@ -64,19 +64,22 @@ pub(crate) fn unless_behind(found: Outcome, fallback: Option<Outcome>) -> Outcom
     }
 }
 
-/// Returns the division with spatial splits, if the problem allows them: the caller's division or a
-/// new one. `None` if the observer cancels first.
-fn division(problem: &Problem, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
-    let Some(splits) = problem.splits.filter(|splits| splits.most > problem.boxes.len()) else {
+/// Divides objects from the top down with spatial splits, if they may be divided and the caller has
+/// no division; `None` if the observer cancels first. If the result has no more references than
+/// objects, no plane saves anything. A search would then hardly find a saving either, and would
+/// spend its work on looking.
+pub(crate) fn division(
+    splits: Option<Splits>,
+    boxes: &[Aabb],
+    observer: &dyn Observer,
+) -> Result<Option<Bvh>, SearchError> {
+    let Some(Splits { objects, most, division }) = splits.filter(|s| s.most > boxes.len()) else {
         return Ok(None);
     };
-    if let Some(division) = splits.division {
+    if let Some(division) = division {
         return Ok(Some(division.clone()));
     }
-    match watched(observer, |watch| splits.divide(problem.boxes, watch)) {
-        Err(BuildError::Cancelled) => Ok(None),
-        divided => Ok(Some(divided?)),
-    }
+    built_unless_cancelled(observer, |watch| spatial::build(most, boxes, objects, watch))
 }
 
 /// Builds a clustering whose larger neighbourhood pays where objects are as large as the scene.
@@ -97,7 +100,7 @@ impl Config {
     ) -> Found {
         if problem.splits.is_some() || problem.objective == Objective::Layout {
             let tree = self.initial(None, problem, run)?;
-            let other = division(problem, run.observer())?;
+            let other = division(problem.splits, problem.boxes, run.observer())?;
             let best = Incumbent::begin(tree, problem, run);
             return self.improved(best, other, metric, problem, seed, run);
         }
@@ -171,15 +174,14 @@ impl Config {
         }
         if problem.splits.is_some() {
             let metric = metric.with_leaves();
-            let mut tree = best.working(metric)?;
-            let working = |tree: &Bvh| Working::from_bvh(tree, metric.internal(tree), metric);
-            let other_working = other.as_ref().map(working).transpose()?;
+            let mut tree = Working::from_bvh(&best.tree, metric)?;
+            let working = other.as_ref().map(|tree| Working::from_bvh(tree, metric)).transpose()?;
             if let Some(other) = other {
                 run.keep_aside(Kept::new(other, problem));
             }
-            improve(self, &mut tree, other_working, seed, problem, &mut best, run);
+            improve(self, &mut tree, working, seed, problem, &mut best, run);
         } else {
-            let mut tree = best.working(metric)?;
+            let mut tree = Working::from_bvh(&best.tree, metric)?;
             improve(self, &mut tree, None, seed, problem, &mut best, run);
         }
         Ok(best.tree)

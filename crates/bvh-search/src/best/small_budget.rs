@@ -50,7 +50,7 @@ pub(super) fn search<'p>(
     }
     let clustered = morton.build(&CLUSTERING, None, &Watch::default())?;
     let mut best = Incumbent::begin(Kept::new(clustered, problem), problem, run);
-    let mut tree = best.working(Area)?;
+    let mut tree = Working::from_bvh(&best.tree, Area)?;
     let is_local_optimum = reinsert_largest(&mut tree, end, run);
     best.offer(&tree, run);
     Ok(Some((best, is_local_optimum)))

@@ -1,7 +1,6 @@
 //! The best tree of a local search. The working form is converted only when it is better.
 
-use super::TOLERANCE;
-use super::initial::construction;
+use super::{TOLERANCE, construction};
 use crate::lower_bound;
 use crate::run::{Kept, Observer, Problem, Quota, Run, SearchError, Shortcut, Tally, watched};
 use crate::tree::{Metric, Working};
@@ -18,7 +17,8 @@ const CERTAIN: f64 = 1e-9;
 pub(crate) struct Incumbent<'p> {
     problem: Problem<'p>,
     pub tree: Bvh,
-    area: f64,
+    /// The total that its working form calls the area.
+    pub area: f64,
     /// A lower bound of the internal area of all trees.
     lower_bound: f64,
 }
@@ -34,18 +34,8 @@ impl<'p> Incumbent<'p> {
             |watch: &Watch| construction().build_watched(problem.boxes, problem.measure, watch);
         let tree = watched(run.observer(), build)?;
         let incumbent = Self::begin(Kept::new(tree, problem), problem, run);
-        let working = incumbent.working(metric)?;
+        let working = Working::from_bvh(&incumbent.tree, metric)?;
         Ok((incumbent, working))
-    }
-
-    /// Converts the best tree to its working form. Builders and moves leave boxes tight.
-    pub fn working<A: Metric>(&self, metric: A) -> Result<Working<A>, SearchError> {
-        Working::from_bvh(&self.tree, self.area, metric)
-    }
-
-    /// Makes `tree` the working form of the best tree, in the memory that it has.
-    pub fn refill(&self, tree: &mut Working<impl Metric>) -> Result<(), SearchError> {
-        tree.refill(&self.tree, self.area)
     }
 
     /// Starts with a valid tree whose boxes are tight. Ends the run if it meets the lower bound.
@@ -71,27 +61,22 @@ impl<'p> Incumbent<'p> {
         }
     }
 
-    /// The internal area of the best tree.
-    pub fn area(&self) -> f64 {
-        self.area
-    }
-
     /// Keeps `tree` if it is the best so far. O(n).
-    pub fn offer(&mut self, tree: &Working<impl Metric>, run: &mut Run) -> bool {
+    pub fn offer(&mut self, tree: &Working<impl Metric>, run: &mut Run) {
         let Problem { objective, measure, splits, judge, .. } = self.problem;
         if objective == Objective::Layout && judge.is_none() {
             // The nodes have their sizes already, so the cost is known before the conversion.
             let cost = tree.layout_cost();
-            if cost >= run.incumbent() {
-                return false;
+            if cost < run.incumbent() {
+                let tree = tree.to_bvh_in(std::mem::take(&mut self.tree));
+                debug_assert_eq!(cost.to_bits(), self.problem.cost(&tree).to_bits());
+                self.keep(tree, cost, run);
             }
-            let tree = tree.to_bvh_in(std::mem::take(&mut self.tree));
-            debug_assert_eq!(cost.to_bits(), self.problem.cost(&tree).to_bits());
-            return self.keep(tree, cost, run);
+            return;
         }
         // The incremental area rejects most trees without the conversion.
         if tree.area() >= self.area && objective != Objective::Layout {
-            return false;
+            return;
         }
         // A tree that is better by more than rounding errors is certain to be kept, so it takes the
         // memory of the tree that it replaces.
@@ -105,24 +90,18 @@ impl<'p> Incumbent<'p> {
         } else {
             Bvh::default()
         };
-        self.offer_tree(tree.to_bvh_in(memory), run)
-    }
-
-    /// Like [`offer`](Self::offer), for a valid tree that needs no conversion.
-    pub fn offer_tree(&mut self, tree: Bvh, run: &mut Run) -> bool {
+        let tree = tree.to_bvh_in(memory);
         let cost = self.problem.cost(&tree);
-        self.keep(tree, cost, run)
+        self.keep(tree, cost, run);
     }
 
-    fn keep(&mut self, tree: Bvh, cost: f64, run: &mut Run) -> bool {
-        let improved = run.improve(cost);
-        if improved {
+    fn keep(&mut self, tree: Bvh, cost: f64, run: &mut Run) {
+        if run.improve(cost) {
             self.area = area(&self.problem, &tree, cost);
             self.tree = tree;
             // Only a new incumbent can meet the bound.
             self.stop_if_optimal(run);
         }
-        improved
     }
 
     /// Repeats a pass over `tree` until it keeps no move, at most `passes` times, and keeps the
@@ -148,13 +127,13 @@ impl<'p> Incumbent<'p> {
     }
 }
 
-/// Returns the total that the working form of a tree of this cost calls the area.
+/// Returns the [area](Incumbent::area) of a tree of this cost.
 fn area(problem: &Problem, tree: &Bvh, cost: f64) -> f64 {
     match *problem {
         Problem { splits: Some(_), measure, .. } => {
             cost::total_measure(tree, measure.unwrap_or(&cost::Area))
         }
-        Problem { objective: Objective::InternalArea, .. } => cost,
+        Problem { objective: Objective::InternalArea, judge: None, .. } => cost,
         Problem { measure: Some(measure), .. } => cost::internal_measure(tree, measure),
         _ => cost::internal_area(tree),
     }

@@ -19,7 +19,7 @@
 //!
 //! Both sums are the same kind: the cost of a position, which `PositionSearch` finds by branch
 //! and bound over the whole tree while X stays where it is (`position_of_attached`). The move is
-//! made by `Working::reinsert`.
+//! made by `Working::detach` and `Working::attach`.
 //!
 //! Differs from the papers: the search is exact and sequential, every node is tried, and the method
 //! ends only when a full pass over the tree finds no improvement.
@@ -140,7 +140,8 @@ fn pass_plain(
         let (position, _) = search.position_of_attached(tree, node, TOLERANCE);
         done.work += search.visits - visits_before;
         if let Some(position) = position {
-            done.work += tree.reinsert(node, position.sibling);
+            tree.begin();
+            done.work += tree.detach(node).2 + tree.attach(node, position.sibling).1;
             done.kept += 1;
         }
     }

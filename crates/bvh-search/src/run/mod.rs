@@ -19,7 +19,7 @@ pub use deadline::Deadline;
 pub(crate) use error::Found;
 pub use error::SearchError;
 pub use observer::{Event, Observer};
-pub(crate) use observer::{WORK_PER_POLL, watched};
+pub(crate) use observer::{WORK_PER_POLL, built_unless_cancelled, watched};
 pub use problem::{Judge, Problem, Shortcut, Splits};
 pub use stream::Stream;
 pub(crate) use stream::stream;

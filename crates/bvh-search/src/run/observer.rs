@@ -1,6 +1,8 @@
 //! [`Observer`]: the caller's way to follow a search and to stop it.
 
-use bvh_build::Watch;
+use super::error::SearchError;
+use bvh_build::{BuildError, Watch};
+use bvh_core::Bvh;
 use core::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// One point of a search's history: a trial, a generation, or an improvement.
@@ -20,6 +22,26 @@ pub struct Event {
 pub(crate) const WORK_PER_POLL: u64 = 1 << 14;
 
 /// Follows a search. The search may call it from any thread. `()` ignores everything.
+///
+/// ```
+/// use bvh_search::{Bake, Event, Observer, prelude::*};
+/// /// A time limit that prints every improvement.
+/// struct Printed(Deadline);
+/// impl Observer for Printed {
+///     fn event(&self, event: &Event) {
+///         println!("{} after {:?}", event.incumbent, self.0.elapsed());
+///     }
+///     fn cancelled(&self) -> bool {
+///         self.0.cancelled()
+///     }
+///     fn progress(&self) -> Option<f64> {
+///         self.0.progress()
+///     }
+/// }
+/// let boxes: Vec<Aabb> = (0..9u8).map(f32::from).map(|x| Aabb::from([[x; 3], [x + 1.5; 3]])).collect();
+/// Bake::new(&boxes).search(None, &Printed(Deadline::after(Duration::from_millis(9))))?;
+/// # Ok::<(), bvh_search::SearchError>(())
+/// ```
 pub trait Observer: Sync {
     /// Called after every event of the history, in order.
     fn event(&self, _event: &Event) {}
@@ -52,4 +74,15 @@ impl Observer for AtomicBool {
 /// Calls `construct` with a watch that the observer can cancel.
 pub(crate) fn watched<T>(observer: &dyn Observer, construct: impl FnOnce(&Watch) -> T) -> T {
     construct(&Watch::new(&|| observer.cancelled()))
+}
+
+/// Builds a tree with a watch that the observer can cancel; `None` if it does.
+pub(crate) fn built_unless_cancelled(
+    observer: &dyn Observer,
+    construct: impl FnOnce(&Watch) -> Result<Bvh, BuildError>,
+) -> Result<Option<Bvh>, SearchError> {
+    match watched(observer, construct) {
+        Err(BuildError::Cancelled) => Ok(None),
+        built => Ok(Some(built?)),
+    }
 }

@@ -1,7 +1,6 @@
 //! The problem that a search solves, and the shortcuts that keep its answer.
 
 use crate::parallel;
-use bvh_build::{BuildError, Watch, spatial};
 use bvh_core::cost::{self, Measure, Objective};
 use bvh_core::{Aabb, Bvh, Clip};
 use std::fmt::Debug;
@@ -21,8 +20,8 @@ pub struct Splits<'a> {
     /// Maximum number of references: leaves, for trees with one reference per leaf. At least the
     /// number of objects.
     pub most: usize,
-    /// The [division](Self::divide) of these objects, if the caller has it, so that the search need
-    /// not repeat it.
+    /// The division of these objects by [`spatial`](bvh_build::spatial), if the caller has it, so
+    /// that the search need not repeat it.
     pub division: Option<&'a Bvh>,
 }
 
@@ -31,14 +30,6 @@ impl<'a> Splits<'a> {
     /// then be divided, and more methods solve the problem without splits.
     pub fn at_most(most: usize, boxes: &[Aabb], objects: &'a dyn Clip) -> Option<Self> {
         (most > boxes.len()).then_some(Self { objects, most, division: None })
-    }
-
-    /// Divides the objects of these `boxes` from the top down with [spatial splits](spatial),
-    /// unless the `watch` cancels. If the result has no more references than objects, no plane
-    /// saves anything. A search would then hardly find a saving either, and would spend its work on
-    /// looking.
-    pub fn divide(&self, boxes: &[Aabb], watch: &Watch) -> Result<Bvh, BuildError> {
-        spatial::build(self.most, boxes, self.objects, watch)
     }
 }
 

@@ -1,23 +1,23 @@
 //! Conversion between flat trees and the working form.
 
-use super::{ANCHOR, Metric, NONE, Node, Working};
+use super::{ANCHOR, Metric, NONE, Node, Working, part};
 use crate::run::SearchError;
 use bvh_core::cost::Sum;
 use bvh_core::{Aabb, Bvh, Node as BvhNode, NodeKind, PackedAabb};
 
 impl<M: Metric> Working<M> {
-    /// Builds the working form of a valid tree with one object per leaf and tight boxes, whose
-    /// internal area by the metric is `area`. Rejects inner nodes with more than two children.
-    /// O(n).
-    pub fn from_bvh(tree: &Bvh, area: f64, metric: M) -> Result<Self, SearchError> {
+    /// Builds the working form of a valid tree with one object per leaf and tight boxes. Rejects
+    /// inner nodes with more than two children. O(n).
+    pub fn from_bvh(tree: &Bvh, metric: M) -> Result<Self, SearchError> {
         let mut working = Self::new(Vec::with_capacity(tree.nodes.len() + 1), metric);
-        working.refill(tree, area)?;
+        working.refill(tree)?;
         Ok(working)
     }
 
     /// Becomes the working form of another tree, in the memory that it has. O(n).
-    pub fn refill(&mut self, tree: &Bvh, area: f64) -> Result<(), SearchError> {
+    pub fn refill(&mut self, tree: &Bvh) -> Result<(), SearchError> {
         let metric = self.metric;
+        let mut sum = Sum::default();
         let nodes = &mut self.nodes;
         nodes.clear();
         nodes.push(Node::ANCHOR);
@@ -39,13 +39,13 @@ impl<M: Metric> Working<M> {
             let aabb = PackedAabb::from(&node.aabb);
             let area = metric.of(&aabb);
             let parent = parents[index];
-            nodes.push(Node { aabb, area, parent, children, ..Node::ANCHOR });
+            let node = Node { aabb, area, parent, children, ..Node::ANCHOR };
+            sum.add(part(&node, metric));
+            nodes.push(node);
         }
         if nodes.len() > 1 {
             nodes[0].children[0] = 1;
         }
-        let mut sum = Sum::default();
-        sum.add(area);
         self.restart(sum);
         Ok(())
     }

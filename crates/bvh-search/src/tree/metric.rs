@@ -2,9 +2,9 @@
 //!
 //! Searches are generic over the metric, so the area costs no indirection.
 
+use bvh_core::PackedAabb;
 pub(crate) use bvh_core::cost::Area;
-use bvh_core::cost::{Measure, Sum};
-use bvh_core::{Bvh, PackedAabb};
+use bvh_core::cost::Measure;
 
 /// The size of a box: finite, not negative, and no smaller for a box that contains another.
 pub(crate) trait Metric: Copy + Send + Sync {
@@ -21,12 +21,6 @@ pub(crate) trait Metric: Copy + Send + Sync {
     }
     /// The size of a box that is not empty.
     fn of(self, aabb: &PackedAabb) -> f64;
-    /// The total size of the boxes of all inner nodes, and of the leaves times their
-    /// [cost](Self::leaf_cost).
-    fn internal(self, tree: &Bvh) -> f64 {
-        let parts = tree.nodes.iter().filter(|node| !node.is_leaf() || self.leaf_cost() > 0.0);
-        parts.map(|node| self.of(&PackedAabb::from(&node.aabb))).collect::<Sum>().value()
-    }
 }
 
 impl Metric for Area {

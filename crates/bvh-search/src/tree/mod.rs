@@ -104,17 +104,12 @@ impl<M: Metric> Working<M> {
 
     /// Begins again with the nodes as they are. O(n).
     pub fn forget_changes(&mut self) {
-        let leaf_cost = self.metric.leaf_cost();
-        let mut parts = Sum::default();
+        let mut area = Sum::default();
         // Once over the nodes of a large tree takes a tenth of a second.
         for node in &mut self.nodes {
             node.stamp = 0;
-            if let Some(part) = part(node, leaf_cost) {
-                parts.add(part);
-            }
+            area.add(part(node, self.metric));
         }
-        let mut area = Sum::default();
-        area.add(parts.value());
         self.restart(area);
     }
 
@@ -137,13 +132,7 @@ impl<M: Metric> Working<M> {
     /// [`area`](Self::area), recomputed. O(n).
     #[cfg(test)]
     pub fn internal_area(&self) -> f64 {
-        self.nodes.iter().filter_map(|node| self.part(node)).collect::<Sum>().value()
-    }
-
-    /// Returns the node's part of the tree's area; `None` if its kind has none.
-    #[inline(always)]
-    fn part(&self, node: &Node) -> Option<f64> {
-        part(node, self.metric.leaf_cost())
+        self.nodes.iter().map(|node| part(node, self.metric)).collect::<Sum>().value()
     }
 
     /// Begins a change, which can be undone until the next change begins.
@@ -255,15 +244,6 @@ impl<M: Metric> Working<M> {
         (added, visits)
     }
 
-    /// Moves the subtree of `node` next to `position`, which is not inside the subtree and neither
-    /// its parent nor its sibling, as one change. Returns the number of nodes visited.
-    #[inline(always)]
-    pub fn reinsert(&mut self, node: u32, position: u32) -> u64 {
-        self.begin();
-        let (_, _, visits) = self.detach(node);
-        visits + self.attach(node, position).1
-    }
-
     /// Adds a detached leaf with its parent node, so that it can be attached. The boxes are empty.
     pub fn push_spare(&mut self, object: u32) -> u32 {
         let leaf = self.nodes.len() as u32;
@@ -314,20 +294,10 @@ impl<M: Metric> Working<M> {
     }
 }
 
+/// Returns the node's part of the area of a tree. Adding 0 for a leaf changes no sum.
 #[inline(always)]
-fn contains(whole: &PackedAabb, part: &PackedAabb) -> bool {
-    whole.union(part) == *whole
-}
-
-/// Returns the node's part of the area of a tree with this cost of leaves; `None` if its kind has
-/// none.
-#[inline(always)]
-fn part(node: &Node, leaf_cost: f64) -> Option<f64> {
-    match node.is_leaf() {
-        false => Some(node.area),
-        true if leaf_cost > 0.0 => Some(leaf_cost * node.area),
-        true => None,
-    }
+fn part(node: &Node, metric: impl Metric) -> f64 {
+    if node.is_leaf() { metric.leaf_cost() * node.area } else { node.area }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The order of the nodes in memory.
 
-use super::{ANCHOR, Metric, NONE, Node, Working};
+use super::{ANCHOR, Metric, NONE, Node, Working, part};
 use bvh_core::cost::Sum;
 
 /// The number of nodes from which a tree is sorted in place, because memory is scarcer than time.
@@ -37,9 +37,7 @@ impl<M: Metric> Working<M> {
         let mut area = Sum::default();
         for (place, &index) in (0..).zip(&order) {
             places[index as usize] = place;
-            if let Some(part) = self.part(&self.nodes[index as usize]) {
-                area.add(part);
-            }
+            area.add(part(&self.nodes[index as usize], self.metric));
         }
         let kept = order.len();
         // Nodes outside the tree go to the end.
@@ -115,9 +113,7 @@ impl<M: Metric> Working<M> {
             let node = &self.nodes[index as usize];
             nodes.push(Node { parent, stamp: 0, ..*node });
             nodes[parent as usize].children[side] = place;
-            if let Some(part) = self.part(node) {
-                area.add(part);
-            }
+            area.add(part(node, self.metric));
         });
         self.spare = std::mem::replace(&mut self.nodes, nodes);
         self.spare.clear();

@@ -25,7 +25,7 @@
 //! promising node and examines the neighbourhood first (Meister & Bittner 2018), so the bound is
 //! tight from the start.
 
-use super::{ANCHOR, Metric, NONE, Node, Working, contains};
+use super::{ANCHOR, Metric, NONE, Node, Working};
 use bvh_core::PackedAabb;
 
 /// Finds positions. Holds the buffers of a search and counts the nodes that it visits.
@@ -84,7 +84,8 @@ impl Scope {
         while scope.above != ANCHOR {
             let root = scope.above;
             scope = Self::of(tree, tree.nodes[root as usize].parent, root);
-            if contains(&tree.nodes[root as usize].aabb, aabb) {
+            let whole = &tree.nodes[root as usize].aabb;
+            if whole.union(aabb) == *whole {
                 break;
             }
         }

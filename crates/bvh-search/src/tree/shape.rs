@@ -1,6 +1,6 @@
 //! The shape of a tree alone, for trees that wait while another is searched.
 
-use super::{ANCHOR, Metric, NONE, Node, Working};
+use super::{ANCHOR, Metric, NONE, Node, Working, part};
 use bvh_core::cost::Sum;
 use bvh_core::{Aabb, PackedAabb};
 
@@ -42,7 +42,7 @@ impl<M: Metric> Working<M> {
             let area = self.metric.of(&aabb);
             (self.nodes[index].aabb, self.nodes[index].area) = (aabb, area);
         }
-        let area: Sum = self.nodes.iter().skip(1).filter_map(|node| self.part(node)).collect();
+        let area: Sum = self.nodes.iter().skip(1).map(|node| part(node, self.metric)).collect();
         self.restart(area);
     }
 }

@@ -52,7 +52,7 @@ fn any(tree: &Working<impl Metric>, rng: &mut impl RngExt) -> u32 {
 fn conversion_there_and_back_changes_nothing() {
     for n in [0, 1, 2, 3, 50] {
         let (boxes, tree) = scene(n);
-        let again = Working::from_bvh(&tree.to_bvh(), tree.internal_area(), Area).unwrap();
+        let again = Working::from_bvh(&tree.to_bvh(), Area).unwrap();
         assert_tight(&again, &boxes);
         assert_eq!((again.area(), again.to_bvh()), (tree.internal_area(), tree.to_bvh()));
         let mut sorted = tree.clone();
@@ -125,8 +125,7 @@ fn the_best_place_is_the_best_of_all_whether_the_node_is_out_or_only_thought_to_
     let (boxes, tree) = scene(60);
     let density = density(&boxes).unwrap();
     let measure = Measured::new(&density);
-    let bvh = tree.to_bvh();
-    assert_best_places(Working::from_bvh(&bvh, measure.internal(&bvh), measure).unwrap());
+    assert_best_places(Working::from_bvh(&tree.to_bvh(), measure).unwrap());
     assert_best_places(tree);
 }
 
