@@ -202,7 +202,7 @@ unsafe impl Sync for Until {}
 
 impl Observer for Until {
     fn cancelled(&self) -> bool {
-        if self.deadline.has_passed() {
+        if self.deadline.cancelled() {
             return true;
         }
         let Some(cancelled) = self.cancelled else { return false };
@@ -211,7 +211,7 @@ impl Observer for Until {
     }
 
     fn progress(&self) -> Option<f64> {
-        Some(self.deadline.fraction())
+        self.deadline.progress()
     }
 }
 

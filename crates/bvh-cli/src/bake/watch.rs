@@ -68,11 +68,11 @@ impl Observer for Watch {
         if self.is_due(elapsed) && self.bar.is_hidden() {
             print_error(&self.line(elapsed));
         }
-        is_interrupted() || self.deadline.has_passed()
+        is_interrupted() || self.deadline.cancelled()
     }
 
     fn progress(&self) -> Option<f64> {
-        matches!(self.effort, Effort::Time(_)).then(|| self.deadline.fraction())
+        self.deadline.progress().filter(|_| matches!(self.effort, Effort::Time(_)))
     }
 }
 

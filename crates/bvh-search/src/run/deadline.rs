@@ -23,26 +23,17 @@ impl Deadline {
     pub fn elapsed(&self) -> Duration {
         self.start.elapsed()
     }
-
-    /// Returns whether the time is over. A limit of zero has passed from the start.
-    pub fn has_passed(&self) -> bool {
-        self.elapsed() >= self.limit
-    }
-
-    /// The elapsed fraction of the limit, 0 to 1.
-    pub fn fraction(&self) -> f64 {
-        // Zero elapsed over a limit of zero is NaN, and `f64::min` of NaN and 1 is 1.
-        self.elapsed().div_duration_f64(self.limit).min(1.0)
-    }
 }
 
 impl Observer for Deadline {
+    /// Returns whether the time is over. A limit of zero has passed from the start.
     fn cancelled(&self) -> bool {
-        self.has_passed()
+        self.elapsed() >= self.limit
     }
 
     fn progress(&self) -> Option<f64> {
-        Some(self.fraction())
+        // Zero elapsed over a limit of zero is NaN, and `f64::min` of NaN and 1 is 1.
+        Some(self.elapsed().div_duration_f64(self.limit).min(1.0))
     }
 }
 
@@ -53,13 +44,13 @@ mod tests {
     #[test]
     fn a_limit_passes_once_and_a_limit_of_zero_has_passed_at_once() {
         let none = Deadline::after(Duration::ZERO);
-        assert!(none.has_passed() && none.fraction() == 1.0);
+        assert!(none.cancelled() && none.progress() == Some(1.0));
         let day = Deadline::after(Duration::from_secs(86_400));
-        assert!(!day.has_passed() && day.fraction() < 0.01);
+        assert!(!day.cancelled() && day.progress() < Some(0.01));
         let short = Deadline::after(Duration::from_millis(1));
-        while !short.has_passed() {
+        while !short.cancelled() {
             std::thread::yield_now();
         }
-        assert_eq!(short.fraction(), 1.0);
+        assert_eq!(short.progress(), Some(1.0));
     }
 }
