@@ -10,161 +10,150 @@
 
 use bvh_build::ploc::Config as Clustering;
 
-/// Declares one constant per entry. Its documentation names the trade-off, the unit and the command
-/// that found the value.
-macro_rules! tuned {
-    ($command:literal { $($(#[doc = $trade:literal])+ $name:ident: $type:ty = $value:expr, $unit:literal;)* }) => { $(
-        $(#[doc = $trade])+
-        #[doc = ""]
-        #[doc = concat!("Unit: ", $unit, ". Found by `", $command, "`.")]
-        pub(crate) const $name: $type = $value;
-    )* };
-}
-
 // Annealing, at equal work.
-tuned! { "cd attic; cargo bench --bench search -- --seconds 1,10,60 SCENE..." {
-    /// Length of a round, after which the nodes are sorted. Shorter rounds sort too often; longer
-    /// rounds miss the cache.
-    WORK_PER_ROUND: [u64; 2] = [64, 256], "work per object, shortest and longest";
-    /// Number of rounds of a long annealing run, within the limits above.
-    ROUNDS: u64 = 100, "rounds";
-    /// Maximum work reserved for the final passes to a local optimum.
-    FINAL_PASSES_WORK: u64 = 300, "work per object";
-    /// Maximum part of a short run that the final passes get.
-    FINAL_PASSES_PART: u64 = 8, "divisor of the work or time of the run";
-    /// A last round that would be shorter than half of the others is joined to the one before it.
-    LAST_ROUND: f64 = 1.5, "rounds";
-    /// Moves between two updates of the temperature and polls of the observer.
-    MOVES_PER_TEMPERATURE: u64 = 64, "moves";
-    /// Half the size of the window in which moves begin. A window eight times as large exceeds the
-    /// near caches, and moves on 66 000 objects take a fifth longer.
-    WINDOW: usize = 512, "nodes";
-    /// Enlargement of the window in short runs; small windows would not cover the tree.
-    WINDOW_OF_SHORT_RUNS: usize = 8, "factor";
-    /// Work below which a run is short. A move takes about 200, so 64 per object visit every node
-    /// about once.
-    SHORT_RUN: f64 = 64.0, "work per object";
-    /// Moves in one window. Fewer moves spend time on choosing windows; more moves let short runs
-    /// visit few windows.
-    MOVES_PER_WINDOW: u32 = 128, "moves";
-    /// Trees smaller than this have no windows.
-    LEAST_WINDOWS: usize = 16, "windows";
-    /// Subtrees with fewer objects are not annealed separately.
-    LEAST_SUBTREE: u32 = 16, "objects";
-    /// Maximum part of a round in which moves use the whole tree: 1/16 was worse at equal work on
-    /// 80 000 objects, 1/4 no better.
-    WHOLE_TREE: f64 = 0.125, "fraction of the work of a round";
-    /// How much more often moves on the whole tree begin at a node outside all subtrees than moves
-    /// on the whole tree alone would. A million objects have few such nodes.
-    MOVES_AT_BORDERS: f64 = 1.5, "factor";
-    /// Maximum depth below the root of a separately annealed subtree at which moves on the whole
-    /// tree begin.
-    BELOW_SUBTREE_ROOTS: u8 = 6, "levels";
-    /// Smallest subtrees of a round, relative to the largest. The size varies, so that the borders
-    /// move.
-    SMALLEST_SUBTREES: f64 = 0.5, "fraction of the size";
-}}
+// Found by `cd attic; cargo bench --bench search -- --seconds 1,10,60 SCENE...`
+
+/// Length of a round, after which the nodes are sorted. Shorter rounds sort too often; longer
+/// rounds miss the cache.
+pub(crate) const WORK_PER_ROUND: [u64; 2] = [64, 256]; // work per object, shortest and longest
+/// Number of rounds of a long annealing run, within the limits above.
+pub(crate) const ROUNDS: u64 = 100; // rounds
+/// Maximum work reserved for the final passes to a local optimum.
+pub(crate) const FINAL_PASSES_WORK: u64 = 300; // work per object
+/// Maximum part of a short run that the final passes get.
+pub(crate) const FINAL_PASSES_PART: u64 = 8; // divisor of the work or time of the run
+/// A last round that would be shorter than half of the others is joined to the one before it.
+pub(crate) const LAST_ROUND: f64 = 1.5; // rounds
+/// Moves between two updates of the temperature and polls of the observer.
+pub(crate) const MOVES_PER_TEMPERATURE: u64 = 64; // moves
+/// Half the size of the window in which moves begin. A window eight times as large exceeds the
+/// near caches, and moves on 66 000 objects take a fifth longer.
+pub(crate) const WINDOW: usize = 512; // nodes
+/// Enlargement of the window in short runs; small windows would not cover the tree.
+pub(crate) const WINDOW_OF_SHORT_RUNS: usize = 8; // factor
+/// Work below which a run is short. A move takes about 200, so 64 per object visit every node
+/// about once.
+pub(crate) const SHORT_RUN: f64 = 64.0; // work per object
+/// Moves in one window. Fewer moves spend time on choosing windows; more moves let short runs
+/// visit few windows.
+pub(crate) const MOVES_PER_WINDOW: u32 = 128; // moves
+/// Trees smaller than this have no windows.
+pub(crate) const LEAST_WINDOWS: usize = 16; // windows
+/// Subtrees with fewer objects are not annealed separately.
+pub(crate) const LEAST_SUBTREE: u32 = 16; // objects
+/// Maximum part of a round in which moves use the whole tree: 1/16 was worse at equal work on
+/// 80 000 objects, 1/4 no better.
+pub(crate) const WHOLE_TREE: f64 = 0.125; // fraction of the work of a round
+/// How much more often moves on the whole tree begin at a node outside all subtrees than moves
+/// on the whole tree alone would. A million objects have few such nodes.
+pub(crate) const MOVES_AT_BORDERS: f64 = 1.5; // factor
+/// Maximum depth below the root of a separately annealed subtree at which moves on the whole
+/// tree begin.
+pub(crate) const BELOW_SUBTREE_ROOTS: u8 = 6; // levels
+/// Smallest subtrees of a round, relative to the largest. The size varies, so that the borders
+/// move.
+pub(crate) const SMALLEST_SUBTREES: f64 = 0.5; // fraction of the size
 
 // The cost of the wide layout.
-tuned! { "bvh bake SCENE --cost layout --budget 100Mwork --out FILE" {
-    /// Factor by which a move may exceed the area that its temperature allows, before the layout
-    /// judges it.
-    DEARER_BY_AREA: f64 = 10.0, "factor";
-    /// Factor of temperatures for the cost of the layout, which is about a third of the tree's area
-    /// and falls by small moves.
-    LAYOUT_HEAT: f64 = 0.05, "factor";
-    /// Rounds of annealing between two evaluations of the layout; one takes as long as ten moves
-    /// per object.
-    ROUNDS_PER_LOOK: u64 = 8, "rounds";
-}}
+// Found by `bvh bake SCENE --cost layout --budget 100Mwork --out FILE`
+
+/// Factor by which a move may exceed the area that its temperature allows, before the layout
+/// judges it.
+pub(crate) const DEARER_BY_AREA: f64 = 10.0; // factor
+/// Factor of temperatures for the cost of the layout, which is about a third of the tree's area
+/// and falls by small moves.
+pub(crate) const LAYOUT_HEAT: f64 = 0.05; // factor
+/// Rounds of annealing between two evaluations of the layout; one takes as long as ten moves
+/// per object.
+pub(crate) const ROUNDS_PER_LOOK: u64 = 8; // rounds
 
 // Split references.
-tuned! { "bvh bake SCENE --references 1.2 --budget 100Mwork --out FILE" {
-    /// Ancestors whose boxes suggest planes at which to divide a leaf.
-    LEVELS_OF_PLANES: u32 = 12, "levels";
-    /// The saving that a division needs. Without a price, layouts end more expensive, and the
-    /// allowed references are spent on divisions that save almost nothing; twice the price prevents
-    /// divisions that pay.
-    PRICE_OF_A_REFERENCE: f64 = 0.25, "cost of the tree per reference";
-    /// Like `DEARER_BY_AREA`, for moves that divide or reunite.
-    DIVISION_DEARER_BY_AREA: f64 = 2.0, "factor";
-    /// Part of the work or time for each of the two trials that choose between whole objects and
-    /// spatial splits as the start.
-    TRIAL: f64 = 0.12, "fraction";
-    /// Part of the work spent on dividing and reuniting, between the rounds of annealing.
-    WORK_ON_REFERENCES: f64 = 0.2, "fraction of the work of a round";
-}}
+// Found by `bvh bake SCENE --references 1.2 --budget 100Mwork --out FILE`
+
+/// Ancestors whose boxes suggest planes at which to divide a leaf.
+pub(crate) const LEVELS_OF_PLANES: u32 = 12; // levels
+/// The saving that a division needs. Without a price, layouts end more expensive, and the
+/// allowed references are spent on divisions that save almost nothing; twice the price prevents
+/// divisions that pay.
+pub(crate) const PRICE_OF_A_REFERENCE: f64 = 0.25; // cost of the tree per reference
+/// Like `DEARER_BY_AREA`, for moves that divide or reunite.
+pub(crate) const DIVISION_DEARER_BY_AREA: f64 = 2.0; // factor
+/// Part of the work or time for each of the two trials that choose between whole objects and
+/// spatial splits as the start.
+pub(crate) const TRIAL: f64 = 0.12; // fraction
+/// Part of the work spent on dividing and reuniting, between the rounds of annealing.
+pub(crate) const WORK_ON_REFERENCES: f64 = 0.2; // fraction of the work of a round
 
 // `best`, from a second on.
-tuned! { "cd attic; cargo bench --bench search -- --seconds 0.1,1,10,60 SCENE..." {
-    /// Minimum gain for which the incumbent is converted and reported during an annealing run.
-    WORTH_AN_EVENT: f64 = 1e-3, "fraction of the cost";
-    /// Longest useful annealing run of the smallest scenes. Beyond it, two runs end lower than one.
-    WORK_PER_PAIR: f64 = 200.0, "work per pair of objects";
-    /// Time reserved for sorting, converting and evaluating the tree after the last move, expressed
-    /// as work.
-    FINISH_WORK: f64 = 10.0, "work per object";
-    /// Maximum of that time in short runs.
-    FINISH_AT_MOST: f64 = 0.5, "fraction of the time left";
-    /// Length of the run at the lowest temperature that measures the rate of work under a time
-    /// limit.
-    PROBE: u64 = 4, "work per object";
-    /// Minimum length of a time-limited search that first keeps a local optimum of reinsertion, in
-    /// case it is stopped early. The local optimum takes 300 to 900 work per object.
-    SECURED_FROM: f64 = 20_000.0, "work per object";
-    /// Work below which plain reinsertion within the same work may end lower, so that a bake makes
-    /// its tree, too.
-    REINSERTED_BELOW: f64 = 300.0, "work per object";
-    /// Minimum length for which several threads anneal disjoint subtrees. Shorter runs have too few
-    /// rounds to cut them.
-    WORTH_SUBTREES: f64 = 256.0, "work per object";
-    /// This minimum for large subtrees, whose borders hold few moves back.
-    WORTH_LARGE_SUBTREES: f64 = 64.0, "work per object";
-    /// Minimum size of large subtrees.
-    LARGE_SUBTREE: u64 = 1 << 15, "objects";
-    /// Minimum number of large subtrees for which a search without a clock anneals them separately,
-    /// on any number of threads. Smaller trees end slightly lower as a whole at equal work.
-    LEAST_LARGE_SUBTREES: u32 = 8, "subtrees";
-    /// Maximum number of subtrees.
-    MOST_SUBTREES: u32 = 4096, "subtrees";
-    /// Subtrees per thread; several unequal subtrees balance the threads.
-    SUBTREES_PER_THREAD: u32 = 4, "subtrees";
-    /// Maximum size of trees that are recombined after a cancellation. Recombination takes about a
-    /// microsecond per object.
-    RECOMBINED_AT_ONCE: usize = 100_000, "objects";
-    /// Ratio of the costs of a clustering and a top-down division below which annealing starts from
-    /// the clustering, although it ends lower from a division of the same cost.
-    CLUSTERING_MUCH_CHEAPER: f64 = 0.9, "fraction";
-    /// End of the plan where generations do not grow.
-    MOST_GENERATIONS: u64 = 10_000, "annealing runs";
-}}
+// Found by `cd attic; cargo bench --bench search -- --seconds 0.1,1,10,60 SCENE...`
+
+/// Minimum gain for which the incumbent is converted and reported during an annealing run.
+pub(crate) const WORTH_AN_EVENT: f64 = 1e-3; // fraction of the cost
+/// Longest useful annealing run of the smallest scenes. Beyond it, two runs end lower than one.
+pub(crate) const WORK_PER_PAIR: f64 = 200.0; // work per pair of objects
+/// Time reserved for sorting, converting and evaluating the tree after the last move, expressed
+/// as work.
+pub(crate) const FINISH_WORK: f64 = 10.0; // work per object
+/// Maximum of that time in short runs.
+pub(crate) const FINISH_AT_MOST: f64 = 0.5; // fraction of the time left
+/// Length of the run at the lowest temperature that measures the rate of work under a time
+/// limit.
+pub(crate) const PROBE: u64 = 4; // work per object
+/// Minimum length of a time-limited search that first keeps a local optimum of reinsertion, in
+/// case it is stopped early. The local optimum takes 300 to 900 work per object.
+pub(crate) const SECURED_FROM: f64 = 20_000.0; // work per object
+/// Work below which plain reinsertion within the same work may end lower, so that a bake makes
+/// its tree, too.
+pub(crate) const REINSERTED_BELOW: f64 = 300.0; // work per object
+/// Minimum length for which several threads anneal disjoint subtrees. Shorter runs have too few
+/// rounds to cut them.
+pub(crate) const WORTH_SUBTREES: f64 = 256.0; // work per object
+/// This minimum for large subtrees, whose borders hold few moves back.
+pub(crate) const WORTH_LARGE_SUBTREES: f64 = 64.0; // work per object
+/// Minimum size of large subtrees.
+pub(crate) const LARGE_SUBTREE: u64 = 1 << 15; // objects
+/// Minimum number of large subtrees for which a search without a clock anneals them separately,
+/// on any number of threads. Smaller trees end slightly lower as a whole at equal work.
+pub(crate) const LEAST_LARGE_SUBTREES: u32 = 8; // subtrees
+/// Maximum number of subtrees.
+pub(crate) const MOST_SUBTREES: u32 = 4096; // subtrees
+/// Subtrees per thread; several unequal subtrees balance the threads.
+pub(crate) const SUBTREES_PER_THREAD: u32 = 4; // subtrees
+/// Maximum size of trees that are recombined after a cancellation. Recombination takes about a
+/// microsecond per object.
+pub(crate) const RECOMBINED_AT_ONCE: usize = 100_000; // objects
+/// Ratio of the costs of a clustering and a top-down division below which annealing starts from
+/// the clustering, although it ends lower from a division of the same cost.
+pub(crate) const CLUSTERING_MUCH_CHEAPER: f64 = 0.9; // fraction
+/// End of the plan where generations do not grow.
+pub(crate) const MOST_GENERATIONS: u64 = 10_000; // annealing runs
 
 // `best` within milliseconds. With 35 instead of 45 sort times, annealing gains one percent on some
 // scenes and loses ten on others: its top-down initial build takes 14 to 20 sort times, 27 where
 // objects are sorted quickly, and half as much again on a busy machine.
-tuned! { "cd attic; cargo bench --bench search -- --seconds 0.005,0.02,0.1 SCENE..." {
-    /// Minimum work with which annealing ends lower than clustering and reinsertion.
-    ANNEAL_FROM_WORK: u64 = 20, "work per object";
-    /// Minimum time in which annealing ends lower, with one thread.
-    ANNEAL_FROM_TIME: f64 = 45.0, "sort times";
-    /// Part of this time that suffices with several threads. Two threads build top-down in
-    /// 0.58 of the time of one, but sort no faster.
-    SEVERAL_THREADS: f64 = 0.65, "fraction";
-    /// Slowdown of the sort in memory that is used for the first time.
-    COLD_MEMORY: f64 = 2.5, "factor";
-    /// Part of the scene on which the sort is timed a second time, in warm memory.
-    WARM_SAMPLE: usize = 16, "divisor of the number of objects";
-    /// Time reserved for converting and evaluating the tree after reinsertion.
-    FINISH_TIME: f64 = 2.0, "sort times";
-    /// The clustering that reinsertion starts from. A better clustering takes the time of more
-    /// reinsertions than it saves.
-    CLUSTERING: Clustering = Clustering { radius: 5, near_rounds: 1 }, "clusters, rounds";
-    /// Part of the nodes that the first pass reinserts, the largest first. Every further pass
-    /// doubles it.
-    FIRST_PASS: f64 = 0.01, "fraction of the nodes";
-    /// Reinsertions between two readings of the clock.
-    MOVES_PER_READING: usize = 16, "moves";
-    /// Number of first nodes among which the k largest are selected. Clustering creates large nodes
-    /// last and stores them first.
-    FRONT: usize = 4, "multiple of k";
-}}
+// Found by `cd attic; cargo bench --bench search -- --seconds 0.005,0.02,0.1 SCENE...`
+
+/// Minimum work with which annealing ends lower than clustering and reinsertion.
+pub(crate) const ANNEAL_FROM_WORK: u64 = 20; // work per object
+/// Minimum time in which annealing ends lower, with one thread.
+pub(crate) const ANNEAL_FROM_TIME: f64 = 45.0; // sort times
+/// Part of this time that suffices with several threads. Two threads build top-down in
+/// 0.58 of the time of one, but sort no faster.
+pub(crate) const SEVERAL_THREADS: f64 = 0.65; // fraction
+/// Slowdown of the sort in memory that is used for the first time.
+pub(crate) const COLD_MEMORY: f64 = 2.5; // factor
+/// Part of the scene on which the sort is timed a second time, in warm memory.
+pub(crate) const WARM_SAMPLE: usize = 16; // divisor of the number of objects
+/// Time reserved for converting and evaluating the tree after reinsertion.
+pub(crate) const FINISH_TIME: f64 = 2.0; // sort times
+/// The clustering that reinsertion starts from. A better clustering takes the time of more
+/// reinsertions than it saves.
+pub(crate) const CLUSTERING: Clustering = Clustering { radius: 5, near_rounds: 1 };
+/// Part of the nodes that the first pass reinserts, the largest first. Every further pass
+/// doubles it.
+pub(crate) const FIRST_PASS: f64 = 0.01; // fraction of the nodes
+/// Reinsertions between two readings of the clock.
+pub(crate) const MOVES_PER_READING: usize = 16; // moves
+/// Number of first nodes among which the k largest are selected. Clustering creates large nodes
+/// last and stores them first.
+pub(crate) const FRONT: usize = 4; // multiple of k
