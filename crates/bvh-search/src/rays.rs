@@ -30,7 +30,12 @@ pub fn ray_density(
     is_over: &dyn Fn() -> bool,
 ) -> Result<Option<RayDensity>, DensityError> {
     let root = tree.root_aabb().unwrap_or(Aabb::EMPTY);
-    let sampled = with_others(segments, |count| match shapes {
+    // The recorded segments leave room for the guard.
+    let most = RayDensity::MOST_SEGMENTS / GUARD * (GUARD - 1);
+    let step = segments.len().div_ceil(most).max(1);
+    let mut sampled: Vec<Segment> = segments.iter().step_by(step).copied().collect();
+    let count = sampled.len() / (GUARD - 1);
+    sampled.extend(match shapes {
         Some(Primitives::Triangles(triangles)) => traced(tree, triangles, &root, count, is_over),
         Some(Primitives::Spheres(spheres)) => traced(tree, spheres, &root, count, is_over),
         None => vec![],
@@ -39,16 +44,6 @@ pub fn ray_density(
         return Ok(None);
     }
     RayDensity::of_rays(&root, &sampled, AREA_WEIGHT).map(Some)
-}
-
-/// Returns as many segments as leave room for those that `others` returns for their number, and
-/// these.
-fn with_others(segments: &[Segment], others: impl FnOnce(usize) -> Vec<Segment>) -> Vec<Segment> {
-    let most = RayDensity::MOST_SEGMENTS / GUARD * (GUARD - 1);
-    let step = segments.len().div_ceil(most).max(1);
-    let mut sampled: Vec<Segment> = segments.iter().step_by(step).copied().collect();
-    sampled.extend(others(sampled.len() / (GUARD - 1)));
-    sampled
 }
 
 /// Returns the segments of `count` rays, up to their nearest hits: from random points of the
@@ -103,23 +98,26 @@ mod tests {
     use bvh_core::Triangle;
     use std::cell::Cell;
 
-    /// Returns walls across the x axis at 0, 1, 2, 3.
-    fn walls() -> Vec<Triangle> {
-        (0..4u8)
+    /// Returns walls across the x axis at 0, 1, 2, 3, and a tree over them.
+    fn walls() -> (Vec<Triangle>, Primitives, Bvh) {
+        let triangles: Vec<Triangle> = (0..4u8)
             .map(f32::from)
             .map(|x| Triangle::from([[x, 0.0, 0.0], [x, 9.0, 0.0], [x, 0.0, 9.0]]))
-            .collect()
+            .collect();
+        let tree = median_cut::Config::default().build(&bvh_core::boxes(&triangles)).unwrap();
+        (triangles.clone(), Primitives::Triangles(triangles), tree)
     }
+
+    /// Ends at the first wall.
+    const RECORDED: Segment = Segment { from: [-1.0, 1.0, 1.0], to: [0.0, 1.0, 1.0] };
 
     #[test]
     fn a_quarter_of_a_density_is_rays_from_anywhere_up_to_their_hits() {
-        let triangles = walls();
+        let (triangles, shapes, tree) = walls();
         let boxes = bvh_core::boxes(&triangles);
-        let recorded = [Segment { from: [-1.0, 1.0, 1.0], to: [0.0, 1.0, 1.0] }; 300];
         let last = boxes[3];
-        let tree = median_cut::Config::default().build(&boxes).unwrap();
-        let shapes = Primitives::Triangles(triangles.clone());
-        let density = |shapes| ray_density(&tree, shapes, &recorded, &|| false).unwrap().unwrap();
+        let density =
+            |shapes| ray_density(&tree, shapes, &[RECORDED; 300], &|| false).unwrap().unwrap();
         let alone = density(None);
         assert_eq!((alone.segments(), alone.entries(&last)), (300, 0.0));
         let guarded = density(Some(&shapes));
@@ -150,12 +148,9 @@ mod tests {
 
     #[test]
     fn more_recorded_segments_than_a_density_counts_leave_room_for_the_guard() {
-        let triangles = walls();
-        let boxes = bvh_core::boxes(&triangles);
+        let (_, shapes, tree) = walls();
         let most = RayDensity::MOST_SEGMENTS;
-        let recorded = vec![Segment { from: [-1.0, 1.0, 1.0], to: [0.0, 1.0, 1.0] }; most];
-        let shapes = Primitives::Triangles(triangles);
-        let tree = median_cut::Config::default().build(&boxes).unwrap();
+        let recorded = vec![RECORDED; most];
         let density = ray_density(&tree, Some(&shapes), &recorded, &|| false).unwrap().unwrap();
         // Every second one is recorded.
         assert_eq!(density.segments() as usize, most / 2 + most / 6);
@@ -163,18 +158,15 @@ mod tests {
 
     #[test]
     fn a_density_is_the_same_through_any_tree_and_ends_when_the_caller_says_so() {
-        let triangles = walls();
-        let boxes = bvh_core::boxes(&triangles);
-        let recorded = [Segment { from: [-1.0, 1.0, 1.0], to: [0.0, 1.0, 1.0] }; 300];
-        let shapes = Primitives::Triangles(triangles);
+        let (triangles, shapes, halved) = walls();
         // The order of their objects makes these trees different.
+        let boxes = bvh_core::boxes(&triangles);
         let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
-        let halved = median_cut::Config::default().build(&boxes).unwrap();
         let polls = Cell::new(0);
         let over_after = |tree: &Bvh, most: usize| {
             polls.set(0);
             let is_over = || polls.replace(polls.get() + 1) >= most;
-            ray_density(tree, Some(&shapes), &recorded, &is_over).unwrap()
+            ray_density(tree, Some(&shapes), &[RECORDED; 300], &is_over).unwrap()
         };
         let [expected, found] =
             [&greedy, &halved].map(|tree| over_after(tree, usize::MAX).unwrap());

@@ -132,59 +132,8 @@ fn select_largest(tree: &Working, part: f64, front: usize, order: &mut Vec<u32>)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::best;
-    use crate::run::{Budget, solve};
     use crate::scatter::{built, scatter};
     use bvh_build::ploc;
-    use bvh_core::{cost, validate};
-    use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
-
-    /// A clock whose time is over after `most` readings.
-    struct CountingClock {
-        most: u32,
-        readings: AtomicU32,
-    }
-
-    impl Observer for CountingClock {
-        fn progress(&self) -> Option<f64> {
-            Some(f64::from(self.readings.fetch_add(1, Relaxed)) / f64::from(self.most))
-        }
-
-        fn cancelled(&self) -> bool {
-            self.readings.load(Relaxed) >= self.most
-        }
-    }
-
-    #[test]
-    fn every_small_budget_gives_a_valid_tree_and_the_next_no_worse_a_one() {
-        let boxes = scatter(300);
-        let mut before = f64::INFINITY;
-        for work in [1, 600, 1200, 2400, 4800, 5900] {
-            let budget = Budget { max_work: Some(work), ..Budget::UNLIMITED };
-            let found =
-                solve(&best::Config::default(), &Problem::new(&boxes), 1, budget, &()).unwrap();
-            validate(&found.tree, &boxes).unwrap();
-            assert_eq!(cost::internal_area(&found.tree), found.cost);
-            assert!(found.cost <= before, "{work}");
-            before = found.cost;
-        }
-    }
-
-    #[test]
-    fn every_short_time_gives_a_valid_tree() {
-        let boxes = scatter(300);
-        for most in 1..100 {
-            let clock = CountingClock { most, readings: AtomicU32::new(0) };
-            let found = solve(
-                &best::Config::default(),
-                &Problem::new(&boxes),
-                1,
-                Budget::UNLIMITED,
-                &clock,
-            );
-            validate(&found.unwrap().tree, &boxes).unwrap();
-        }
-    }
 
     #[test]
     fn the_largest_nodes_are_those_that_a_full_sort_puts_first() {

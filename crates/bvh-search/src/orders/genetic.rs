@@ -243,44 +243,13 @@ mod tests {
     }
 
     #[test]
-    fn the_best_is_never_lost_whatever_the_population_and_the_rates() {
-        let boxes = scatter(80);
-        let problem = Problem { objective: Objective::GoldsmithSalmon, ..Problem::new(&boxes) };
-        for population in [1, 2, 3, 20] {
-            for (crossover, mutation) in
-                [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.7, 0.05), (1.0, 1.0)]
-            {
-                let config = Config {
-                    population,
-                    generations: 15,
-                    crossover,
-                    mutation,
-                    ..Config::default()
-                };
-                let outcome = solve(&config, &problem, 3, Budget::UNLIMITED, &()).unwrap();
-                assert_eq!(outcome.history.len(), 16);
-                assert!(outcome.history.iter().all(|event| event.incumbent <= event.cost));
-                assert!(
-                    outcome.history.windows(2).all(|pair| pair[1].incumbent <= pair[0].incumbent),
-                    "{config:?}"
-                );
-                let cost = problem.objective.cost(&outcome.tree);
-                assert!(
-                    (outcome.cost - cost).abs() <= 1e-12 * cost,
-                    "{config:?}: {} and {cost}",
-                    outcome.cost
-                );
-            }
-        }
-    }
-
-    #[test]
     fn as_many_tournaments_are_held_as_there_are_individuals() {
         // A single individual wins the only tournament, and then its mutant is evaluated.
         let boxes = scatter(80);
         let problem = Problem { objective: Objective::GoldsmithSalmon, ..Problem::new(&boxes) };
         let config = Config { population: 1, generations: 50, mutation: 0.05, ..Config::default() };
         let history = solve(&config, &problem, 3, Budget::UNLIMITED, &()).unwrap().history;
+        assert_eq!(history.len(), 51);
         assert!(history.last().unwrap().incumbent < history[0].cost);
         for count in [1, 2, 7] {
             let population: Vec<Individual> = (0..count).map(f64::from).map(individual).collect();
@@ -314,14 +283,5 @@ mod tests {
         };
         let (judged, cost) = depth(Some(&Depth));
         assert!(judged == cost && judged < depth(None).0);
-    }
-
-    #[test]
-    fn generations_improve_on_random_orders() {
-        let boxes = scatter(300);
-        let problem = Problem { objective: Objective::GoldsmithSalmon, ..Problem::new(&boxes) };
-        let config = Config { population: 20, generations: 40, ..Config::default() };
-        let history = solve(&config, &problem, 3, Budget::UNLIMITED, &()).unwrap().history;
-        assert!(history.last().unwrap().incumbent < history[0].incumbent);
     }
 }

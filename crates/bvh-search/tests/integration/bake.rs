@@ -1,20 +1,13 @@
 //! The everyday calls keep their time limit, use all of it, and end with good trees.
 
+use crate::{scatter, work};
 use bvh_search::bvh_core::Primitives;
 use bvh_search::{Objects, Options, OwnedTree, prelude::*};
 use std::time::Instant;
 
-fn scene() -> Vec<Aabb> {
-    (0..5000u32)
-        .map(|i| i.wrapping_mul(2_654_435_761))
-        .map(|hash| [3, 11, 19].map(|salt| (hash.rotate_left(salt) >> 16) as f32))
-        .map(|low| Aabb::from([low, low.map(|c| c + 900.0)]))
-        .collect()
-}
-
 #[test]
 fn a_bake_of_a_moment_beats_the_greedy_tree_and_ends_in_time() {
-    let boxes = scene();
+    let boxes = scatter(5000, 1);
     let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
     let start = Instant::now();
     let baked = bake(&boxes, Duration::from_millis(400)).unwrap();
@@ -31,7 +24,7 @@ fn a_bake_of_a_moment_beats_the_greedy_tree_and_ends_in_time() {
 
 #[test]
 fn a_time_of_zero_still_gives_a_tree() {
-    let boxes = scene();
+    let boxes = scatter(5000, 1);
     validate(&bake(&boxes, Duration::ZERO).unwrap().tree, &boxes).unwrap();
     let greedy = muller_fellner::Config::default().build(&boxes).unwrap();
     assert!(improve(&greedy, &boxes, Duration::ZERO).unwrap().cost <= cost::internal_area(&greedy));
@@ -40,7 +33,7 @@ fn a_time_of_zero_still_gives_a_tree() {
 
 #[test]
 fn a_tree_of_many_references_per_object_is_loaded_and_improved() {
-    let corners = scene().into_iter().take(20).map(|aabb| {
+    let corners = scatter(20, 1).into_iter().map(|aabb| {
         Triangle::from([aabb.min.to_array(), aabb.max.to_array(), aabb.min.to_array()])
     });
     let triangles: Vec<Triangle> = corners.collect();
@@ -65,12 +58,8 @@ fn improve_owned(owned: &mut OwnedTree, time: Duration) {
 fn a_tree_with_its_objects_is_improved_saved_and_loaded_divided_or_whole() {
     // Long and thin, so that dividing them pays.
     let shifted = |corner: Vec3, by: f32| (corner + Vec3::splat(by)).to_array();
-    let thin = scene().into_iter().take(300).map(|aabb| {
-        Triangle::from([
-            aabb.min.to_array(),
-            shifted(aabb.min, 20_000.0),
-            shifted(aabb.max, 20_000.0),
-        ])
+    let thin = scatter(300, 1).into_iter().map(|aabb| {
+        Triangle::from([aabb.min.to_array(), shifted(aabb.min, 0.3), shifted(aabb.max, 0.3)])
     });
     let triangles: Vec<Triangle> = thin.collect();
     let boxes = boxes(&triangles);
@@ -146,7 +135,7 @@ fn no_bake_of_work_is_behind_reinsertion_within_the_same_work() {
         let scene = bvh_scenes::Scene::load(&format!("{name}:{objects}")).unwrap();
         let boxes = &scene.boxes;
         for per_object in [1, 5, 20, 30, 50, 100, 200, 400, 1000, 3000, 20_000, 60_000] {
-            let budget = Budget { max_work: Some(per_object * objects), ..Budget::UNLIMITED };
+            let budget = work(per_object * objects);
             let method = bvh_search::reinsertion::Config::default();
             for objective in [Objective::InternalArea, Objective::Layout] {
                 let problem = Problem { objective, ..Problem::new(boxes) };
@@ -167,7 +156,7 @@ fn no_bake_of_work_is_behind_reinsertion_within_the_same_work() {
 
 #[test]
 fn references_that_no_bake_may_have_are_rejected_and_a_tree_over_nothing_is_improved() {
-    let boxes = scene();
+    let boxes = scatter(5000, 1);
     for references in [0.5, 16.5, f64::NAN] {
         let error = Bake { references, ..Bake::new(&boxes) }.search(None, &()).unwrap_err();
         let expected = format!("references is {references}; accepted: 1 to 16");

@@ -1,13 +1,14 @@
 //! The laws of every local search: start, budgets, cancellation, threads and rejected trees.
 
+use crate::{scatter, work};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, Bvh, Node, cost, validate};
 use bvh_search::{
-    Budget, Event, Method, Observer, Outcome, Problem, SearchError, StopReason, best, optimize,
-    reinsertion, ruin_recreate, solve,
+    Budget, Method, Observer, Outcome, Problem, Search, SearchError, StopReason, best, genetic,
+    optimize, ruin_recreate, solve,
 };
 use proptest::prelude::*;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 const METHODS: [&str; 7] =
     ["reinsertion", "rotation", "treelet", "annealing", "rebuild", "ruin_recreate", "best"];
@@ -17,32 +18,10 @@ fn methods() -> impl Iterator<Item = Method> {
     Method::all().into_iter().filter(|method| METHODS.contains(&method.name()))
 }
 
-/// Boxes of very different sizes in a unit cube.
-fn scatter(n: u32, salt: u32) -> Vec<Aabb> {
-    let hash = |i: u32, k: u32| {
-        let h = (i ^ salt.wrapping_mul(0x9e37_79b9))
-            .wrapping_mul(2_654_435_761)
-            .rotate_left(k)
-            .wrapping_mul(0x85eb_ca6b);
-        (h >> 8) as f32 / (1 << 24) as f32
-    };
-    (0..n)
-        .map(|i| {
-            let low = [hash(i, 3), hash(i, 11), hash(i, 19)];
-            let size = hash(i, 27) * hash(i, 5) * 0.5;
-            Aabb::from((low, std::array::from_fn(|k| low[k] + size * hash(i, 7 + k as u32))))
-        })
-        .collect()
-}
-
 /// The builder of the tree that local searches begin with.
 fn construction() -> muller_fellner::Config {
     let heuristic = muller_fellner::Heuristic::AreaTimesPower(0.9);
     muller_fellner::Config { heuristic, ..Default::default() }
-}
-
-fn work(max_work: u64) -> Budget {
-    Budget { max_work: Some(max_work), ..Budget::UNLIMITED }
 }
 
 fn run(method: &Method, boxes: &[Aabb], max_work: u64) -> Outcome {
@@ -133,27 +112,6 @@ fn a_budget_barely_above_what_the_best_does_without_one_is_kept() {
 }
 
 #[test]
-fn a_cancelled_search_returns_what_it_has() {
-    struct AfterTheStart(AtomicBool);
-    impl Observer for AfterTheStart {
-        fn event(&self, _: &Event) {
-            self.0.store(true, Relaxed);
-        }
-        fn cancelled(&self) -> bool {
-            self.0.load(Relaxed)
-        }
-    }
-    let boxes = scatter(1000, 4);
-    for method in methods() {
-        let observer = AfterTheStart(false.into());
-        let outcome =
-            solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &observer).unwrap();
-        assert_eq!(outcome.stop, StopReason::Cancelled, "{}", method.name());
-        validate(&outcome.tree, &boxes).unwrap();
-    }
-}
-
-#[test]
 fn the_best_ends_when_the_time_does_and_its_pieces_are_a_valid_tree() {
     /// A clock that advances with every reading.
     struct Clock(AtomicU32);
@@ -233,17 +191,18 @@ fn leaves_of_several_objects_are_kept_and_other_trees_are_rejected_by_name() {
 }
 
 #[test]
-fn parameters_outside_their_range_are_named() {
-    let problem = Problem::new(&[]);
-    let error = |method: Method| {
-        solve(&method, &problem, 1, Budget::UNLIMITED, &()).unwrap_err().to_string()
-    };
+fn parameters_that_contradict_others_or_that_no_poll_could_interrupt_are_named() {
+    fn error(method: &dyn Search, objects: u32) -> String {
+        let boxes = scatter(objects, 1);
+        solve(method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap_err().to_string()
+    }
     let cold = ruin_recreate::Config { cold: 1.0, ..Default::default() };
-    assert_eq!(error(Method::RuinRecreate(cold)), "cold is 1; accepted: above 0, not above hot");
-    let sweeps = reinsertion::Config { sweeps: 0 };
-    assert_eq!(error(Method::Reinsertion(sweeps)), "sweeps is 0; accepted: 1 or more");
-    let pieces = best::Config { pieces: 5000, ..Default::default() };
-    assert_eq!(error(Method::Best(pieces)), "pieces is 5000; accepted: 0 to 4096");
+    assert_eq!(error(&cold, 0), "cold is 1; accepted: above 0, not above hot");
+    let ruin = ruin_recreate::Ruin { removed: u32::MAX, ..Default::default() };
+    let ruin = ruin_recreate::Config { ruin, ..Default::default() };
+    assert_eq!(error(&ruin, 0), "ruin.removed is 4294967295; accepted: 1 to 1000");
+    let population = genetic::Config { population: 1_000_000, ..Default::default() };
+    assert_eq!(error(&population, 1024), "population is 1000000; accepted: at most 262144");
 }
 
 proptest! {

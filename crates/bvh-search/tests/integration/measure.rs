@@ -1,10 +1,10 @@
 //! Measures of boxes instead of the area: every builder and search uses them, and the area as a
 //! measure equals the area.
 
-use bvh_build::{Builder, Watch, muller_fellner};
+use crate::{scatter, work};
 use bvh_core::cost::{self, Measure, Objective};
-use bvh_core::{Aabb, PackedAabb, RayDensity, Segment, glam, validate};
-use bvh_search::{Budget, Method, Outcome, Problem, Shortcut, best, exact, reinsertion, solve};
+use bvh_core::{Aabb, Bvh, PackedAabb, validate};
+use bvh_search::{Budget, Judge, Method, Outcome, Problem, Shortcut, exact, reinsertion, solve};
 
 /// The measure for rays nearly parallel to the x axis: the face across it counts most. It is
 /// monotone, like every sum of products of extents.
@@ -19,36 +19,21 @@ impl Measure for AlongX {
     }
 }
 
-/// Scattered coordinates below 2¹⁶.
-fn coordinate(i: u32, salt: u32) -> f32 {
-    (i.wrapping_mul(2_654_435_761).rotate_left(salt) >> 16) as f32
-}
-
-fn boxes(n: u32) -> Vec<Aabb> {
-    (0..n)
-        .map(|i| {
-            let low = [3, 11, 19].map(|salt| coordinate(i, salt));
-            Aabb::from((low, low.map(|c| c + coordinate(i, 25) / 16.0)))
-        })
-        .collect()
-}
-
 fn methods() -> impl Iterator<Item = Method> {
     Method::all().into_iter().filter(|method| method.name() != "exact")
 }
 
 fn run(method: &Method, boxes: &[Aabb], measure: Option<&dyn Measure>) -> Outcome {
-    let budget = Budget { max_work: Some(500_000), ..Budget::UNLIMITED };
     let disabled = &[Shortcut::BoundMet, Shortcut::Tiny];
     let problem = Problem { measure, disabled, ..Problem::new(boxes) };
-    let outcome = solve(method, &problem, 1, budget, &()).unwrap();
+    let outcome = solve(method, &problem, 1, work(500_000), &()).unwrap();
     validate(&outcome.tree, boxes).unwrap();
     outcome
 }
 
 #[test]
 fn the_area_as_a_measure_gives_the_same_history_as_the_area() {
-    let boxes = boxes(700);
+    let boxes = scatter(700, 1);
     for method in methods() {
         let area = run(&method, &boxes, None);
         let measure = run(&method, &boxes, Some(&cost::Area));
@@ -59,7 +44,7 @@ fn the_area_as_a_measure_gives_the_same_history_as_the_area() {
 
 #[test]
 fn builders_and_searches_use_the_measure_and_report_every_objective_by_it() {
-    let boxes = boxes(700);
+    let boxes = scatter(700, 1);
     let objectives =
         [Objective::GoldsmithSalmon, Objective::Sah(Default::default()), Objective::Layout];
     for method in methods() {
@@ -74,8 +59,7 @@ fn builders_and_searches_use_the_measure_and_report_every_objective_by_it() {
         for objective in objectives {
             let [area, found] = [&cost::Area as &dyn Measure, &AlongX].map(|measure| {
                 let problem = Problem { measure: Some(measure), objective, ..Problem::new(&boxes) };
-                let budget = Budget { max_work: Some(50_000), ..Budget::UNLIMITED };
-                let found = solve(&method, &problem, 1, budget, &()).unwrap();
+                let found = solve(&method, &problem, 1, work(50_000), &()).unwrap();
                 let cost = objective.cost_by(&found.tree, measure);
                 assert!(
                     (found.cost - cost).abs() <= 1e-12 * cost,
@@ -92,17 +76,34 @@ fn builders_and_searches_use_the_measure_and_report_every_objective_by_it() {
 
 #[test]
 fn a_local_search_begins_with_a_tree_by_the_measure() {
-    let boxes = boxes(700);
-    let heuristic = muller_fellner::Heuristic::AreaTimesPower(0.9);
-    let builder = muller_fellner::Config { heuristic, ..Default::default() };
-    let begun = builder.build_watched(&boxes, Some(&AlongX), &Watch::default()).unwrap();
-    let by_area = builder.build(&boxes).unwrap();
-    let [begun, by_area] = [begun, by_area].map(|tree| cost::internal_measure(&tree, &AlongX));
-    assert!(begun < 0.99 * by_area, "{begun} {by_area}");
-    let problem = Problem { measure: Some(&AlongX), ..Problem::new(&boxes) };
-    let budget = Budget { max_evaluations: Some(1), ..Budget::UNLIMITED };
-    let outcome = solve(&reinsertion::Config::default(), &problem, 1, budget, &()).unwrap();
-    assert_eq!(outcome.cost, begun);
+    let boxes = scatter(700, 1);
+    let start = |measure| {
+        let problem = Problem { measure, ..Problem::new(&boxes) };
+        let budget = Budget { max_evaluations: Some(1), ..Budget::UNLIMITED };
+        let outcome = solve(&reinsertion::Config::default(), &problem, 1, budget, &()).unwrap();
+        cost::internal_measure(&outcome.tree, &AlongX)
+    };
+    assert!(start(Some(&AlongX as &dyn Measure)) < 0.99 * start(None));
+}
+
+/// Judges a tree by a small fraction of its area.
+#[derive(Debug)]
+struct Fraction;
+
+impl Judge for Fraction {
+    fn judge(&self, tree: &Bvh) -> f64 {
+        1e-3 * cost::internal_area(tree)
+    }
+}
+
+#[test]
+fn a_judge_below_the_bound_of_areas_does_not_end_a_local_search() {
+    let boxes = scatter(300, 1);
+    let tree = |judge| {
+        let problem = Problem { judge, ..Problem::new(&boxes) };
+        solve(&reinsertion::Config::default(), &problem, 1, Budget::UNLIMITED, &()).unwrap().tree
+    };
+    assert!(tree(Some(&Fraction as &dyn Judge)) == tree(None), "another tree");
 }
 
 #[test]
@@ -110,7 +111,7 @@ fn no_search_goes_below_the_exact_optimum_and_best_reaches_it() {
     // Goldsmith–Salmon trees are not binary: their wider nodes have fewer terms.
     const NOT_BINARY: [&str; 3] = ["goldsmith_salmon", "random_orders", "genetic"];
     for n in 3..13 {
-        let boxes = boxes(10 * n)[9 * n as usize..].to_vec();
+        let boxes = scatter(n, n);
         for measure in [None, Some(&AlongX as &dyn Measure)] {
             let optimum = run(&Method::Exact(exact::Config::default()), &boxes, measure).cost;
             for method in methods().filter(|method| !NOT_BINARY.contains(&method.name())) {
@@ -121,28 +122,4 @@ fn no_search_goes_below_the_exact_optimum_and_best_reaches_it() {
             }
         }
     }
-}
-
-#[test]
-fn trees_for_a_sample_of_rays_are_entered_less_often_than_trees_by_area() {
-    let boxes = boxes(2000);
-    let bounds = Aabb::union_of(&boxes);
-    let size = bounds.max - bounds.min;
-    // A camera in one corner: no ray has a uniform direction.
-    let segments: Vec<Segment> = (0..20_000)
-        .map(|i| {
-            let part = [1, 9, 17].map(|salt| {
-                let hash = u32::wrapping_mul(i, 2_246_822_519).rotate_left(salt);
-                (hash >> 8) as f32 / (1 << 24) as f32
-            });
-            let to = bounds.min + size * glam::Vec3::from(part);
-            Segment { from: bounds.min.to_array(), to: to.to_array() }
-        })
-        .collect();
-    let density = RayDensity::of_rays(&bounds, &segments, 0.1).unwrap();
-    let method = Method::Best(best::Config::default());
-    let area = run(&method, &boxes, None);
-    let rays = run(&method, &boxes, Some(&density));
-    assert!(rays.cost < 0.97 * cost::internal_measure(&area.tree, &density), "{}", rays.cost);
-    assert!(cost::internal_area(&rays.tree) >= cost::internal_area(&area.tree));
 }
