@@ -10,10 +10,12 @@
 use super::divide::{Division, Workspace};
 use super::presort::Presorted;
 use super::rule::SplitRule;
-use super::split_cost::{AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight};
+use super::split_cost::{
+    AreaOnly, AreaTimesCount, AreaTimesPower, AreaTimesWeight, ByMeasure, SplitCost,
+};
 use crate::{BuildError, Builder, Check, OutOfRange, Watch};
 use bvh_config::{Accepts, Nested};
-use bvh_core::cost::Measure;
+use bvh_core::cost::{Area, Measure};
 use bvh_core::{Aabb, Bvh};
 
 bvh_config::config! {
@@ -120,22 +122,29 @@ impl Config {
         watch: &Watch,
     ) -> Result<(), BuildError> {
         let objects = scene.boxes.len();
-        match self.heuristic {
+        let (of_areas, of_weights, costs);
+        // What only tables compare is not compiled once more for the sake of its speed.
+        let cost: &dyn SplitCost = match self.heuristic {
             Heuristic::AreaTimesCount => {
-                self.division(&AreaTimesCount, scene, watch).divide(measure, rule, workspace, tree)
+                let division = self.division(&AreaTimesCount, scene, watch);
+                return division.divide(measure, rule, workspace, tree);
             }
             Heuristic::AreaTimesPower(p) => {
                 let powers = AreaTimesPower::new(objects, p);
-                self.division(&powers, scene, watch).divide(measure, rule, workspace, tree)
+                return self.division(&powers, scene, watch).divide(measure, rule, workspace, tree);
             }
             Heuristic::AreaOnly(reading) => {
-                self.division(&reading, scene, watch).divide(measure, rule, workspace, tree)
+                of_areas = reading;
+                &of_areas
             }
             Heuristic::AreaTimesCost(made_up) => {
-                let costs = &AreaTimesWeight(&made_up.costs(objects));
-                self.division(costs, scene, watch).divide(measure, rule, workspace, tree)
+                costs = made_up.costs(objects);
+                of_weights = AreaTimesWeight(&costs);
+                &of_weights
             }
-        }
+        };
+        let by_measure = ByMeasure { cost, measure: measure.unwrap_or(&Area) };
+        self.division(&by_measure, scene, watch).divide(None, rule, workspace, tree)
     }
 
     fn division<'a, C>(
