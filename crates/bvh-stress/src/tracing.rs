@@ -1,6 +1,6 @@
 //! Compares every traversal with testing every triangle, and makes difficult rays.
 
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use bvh_build::{Builder, goldsmith_salmon, median_cut, muller_fellner};
 use bvh_core::{
     Aabb, Bvh, Coherence, Hit, Kernel, Primitives, Ray, Triangle, WideBvh, collapse_leaves,
@@ -30,7 +30,7 @@ pub const TRAVERSALS: &[(&str, Traversal)] = &[
     ("wide, SIMD", by_every_kernel),
     ("wide, portable", |objects| {
         let portable = |wide| singly("portable", objects, Structure::WidePortable(wide));
-        Ok(wide_layouts(objects)?.into_iter().map(portable).collect())
+        Ok(wide_layouts(objects)?.map(portable).into())
     }),
     ("KD-tree", |objects| {
         let cells = KdTree::build(&objects.boxes())?;
@@ -53,12 +53,14 @@ fn over_binary_trees(objects: &Primitives) -> Result<Vec<(String, Answers<'_>)>>
     Ok(trees.map(|(tree, name)| singly(name, objects, Structure::Tree(Cow::Owned(tree)))).collect())
 }
 
-/// Lays out a binary tree and a tree with many children per node. Only triangles have layouts.
-fn wide_layouts(objects: &Primitives) -> Result<Vec<WideBvh>> {
-    let Primitives::Triangles(triangles) = objects else { return Ok(vec![]) };
+/// Lays out a binary tree and a tree with many children per node.
+fn wide_layouts(objects: &Primitives) -> Result<[WideBvh; 2]> {
+    let Primitives::Triangles(triangles) = objects else {
+        bail!("only triangles have a wide layout");
+    };
     let binary = build(objects, &muller_fellner::Config::default())?;
     let wide = build(objects, &goldsmith_salmon::Config::default())?;
-    Ok(vec![WideBvh::new(&binary, triangles)?, WideBvh::new(&wide, triangles)?])
+    Ok([WideBvh::new(&binary, triangles)?, WideBvh::new(&wide, triangles)?])
 }
 
 /// Answers rays by every kernel of this processor, ray by ray and together, with both hints.
@@ -103,7 +105,9 @@ pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Result
     let bits = |hit: Option<Hit>| hit.map(|hit| (hit.t.to_bits(), hit.object));
     let (_, brute_force) = singly("", objects, Structure::Brute);
     let expected = brute_force(rays);
-    for (way, answers) in traversal(objects)? {
+    let ways = traversal(objects)?;
+    ensure!(!ways.is_empty(), "P3: no way to answer rays");
+    for (way, answers) in ways {
         let answers = answers(rays);
         for ((ray, (nearest, any)), (hit, is_hit)) in rays.iter().zip(answers).zip(&expected) {
             ensure!(
@@ -118,6 +122,10 @@ pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Result
 /// Returns rays for a scene of any scale: random ones; towards corners, edges and centres; along
 /// axes with zeros of both signs; in the planes of faces of boxes; from inside and from corners;
 /// over short, empty and single-point ranges.
+///
+/// # Panics
+///
+/// If the scene allows fewer rays than `count`.
 pub fn rays(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
     let mut rng = Stream::seed_from_u64(seed);
     let bounds = triangles.iter().fold(Aabb::EMPTY, |b, t| b.union(&t.aabb()));
@@ -170,5 +178,7 @@ pub fn rays(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Ray> {
             t_max,
         ));
     }
+    // A scene that allows fewer rays would be tested less than the others without notice.
+    assert_eq!(rays.len(), count, "too few rays");
     rays
 }

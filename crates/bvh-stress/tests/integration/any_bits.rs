@@ -4,7 +4,10 @@
 use crate::laws::any_boxes;
 use bvh_build::{Builder, goldsmith_salmon, muller_fellner};
 use bvh_core::cost::{self, SahConstants};
-use bvh_core::{Bvh, Primitives, Ray, Sphere, Triangle, collapse_leaves, file, validate};
+use bvh_core::{
+    Aabb, Bvh, Hit, Primitives, Ray, Sphere, Triangle, any_hit_by, clip_to_box, collapse_leaves,
+    file, nearest_hit_by, nearest_hit_of_all, validate,
+};
 use bvh_scenes::trace::KdTree;
 use bvh_search::{Budget, Problem, best, lower_bound, optimize};
 use bvh_stress::examine::ROUNDING;
@@ -47,6 +50,27 @@ fn triangles_and_rays() -> impl Strategy<Value = (Vec<Triangle>, Vec<MaybeRay>)>
     })
 }
 
+/// Checks that trees and a KD-tree over boxes, which are the objects themselves, give the answers
+/// of testing every box. Rays of any bits meet boxes far more often than triangles.
+fn check_boxes(boxes: &[Aabb], rays: &[Ray]) {
+    let bits = |hit: Option<Hit>| hit.map(|hit| (hit.t.to_bits(), hit.object));
+    let binary = muller_fellner::Config::default().build(boxes).unwrap();
+    let wide = goldsmith_salmon::Config::default().build(boxes).unwrap();
+    let cells = KdTree::build(boxes).unwrap();
+    for ray in rays {
+        let test = |id: u32, t_max| clip_to_box(ray, &boxes[id as usize], ray.t_min(), t_max);
+        let any = |id: u32| test(id, ray.t_max()).is_some();
+        let expected = nearest_hit_of_all(boxes.len() as u32, ray, test, &mut ());
+        for tree in [&binary, &wide] {
+            assert_eq!(bits(nearest_hit_by(tree, ray, test, &mut ())), bits(expected), "{ray:?}");
+            assert_eq!(any_hit_by(tree, ray, any, &mut ()), expected.is_some(), "{ray:?}");
+        }
+        let nearest = cells.nearest_hit(ray, test, &mut ());
+        assert_eq!(bits(nearest), bits(expected), "KD-tree: {ray:?}");
+        assert_eq!(cells.any_hit(ray, any, &mut ()), expected.is_some(), "KD-tree: {ray:?}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(3000))]
 
@@ -73,8 +97,14 @@ proptest! {
         // Spheres from the same bits test the traversals with another object test.
         let sphere = |t: &Triangle| Sphere::new(t.0[0] / 4.0, t.0[1].x.abs() / 4.0);
         let spheres = Primitives::Spheres(triangles.iter().map(sphere).collect());
-        for objects in [Primitives::Triangles(triangles), spheres] {
+        let triangles = Primitives::Triangles(triangles);
+        check_boxes(&triangles.boxes(), &rays);
+        for objects in [triangles, spheres] {
             for (name, traversal) in TRAVERSALS {
+                // Only triangles have wide layouts.
+                if matches!(objects, Primitives::Spheres(_)) && name.starts_with("wide") {
+                    continue;
+                }
                 let found = check(*traversal, &objects, &rays);
                 prop_assert!(found.is_ok(), "{name}: {found:?}");
             }
