@@ -46,18 +46,21 @@ fn flags(wide: &WideBvh, rays: &[Ray]) -> Vec<(&'static str, u32)> {
     flags
 }
 
-/// Returns random rays, and those of a camera that moves from outside of a scene into it, sorted by
-/// their kind.
+/// Returns random rays, and those of cameras outside and inside of a scene, sorted by their kind.
 fn ordinary(scene: &Scene, tree: &Bvh) -> Vec<TracedRay> {
     let root = tree.root_aabb().unwrap();
     let in_scene = |place| in_box(&root, place).to_array();
     let pose =
         |view: Viewpoint| Viewpoint { eye: in_scene(view.eye), target: in_scene(view.target) };
     let inside = Viewpoint { eye: [0.3, 0.4, 0.6], target: [0.8, 0.5, 0.3] };
-    let cameras = [Viewpoint::default(), inside].map(pose).into();
-    let lights = vec![in_scene([0.5, 0.95, 0.5])];
-    let config = RenderedRays { cameras, lights, count: 8192, ..Default::default() };
-    let mut rays = of_renderer(&config, scene, tree, &|| false);
+    let mut rays = Vec::new();
+    // Each camera stands still, because packets of rays of one origin are traced in another way.
+    for camera in [Viewpoint::default(), inside].map(pose) {
+        let lights = vec![in_scene([0.5, 0.95, 0.5])];
+        let cameras = vec![camera];
+        let config = RenderedRays { cameras, lights, count: 4096, ..Default::default() };
+        rays.extend(of_renderer(&config, scene, tree, &|| false));
+    }
     rays.sort_by_key(|traced| traced.kind.name());
     [of_inside(4096, scene, tree, 1), rays].concat()
 }
