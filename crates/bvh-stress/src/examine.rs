@@ -71,7 +71,8 @@ pub fn refuses(method: &Method, damage: fn(&mut Aabb)) -> Verdict {
     damage(&mut boxes[DAMAGED]);
     let error = match solve(method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()) {
         Err(SearchError::Build(error)) => error.to_string(),
-        other => bail!("P1: not rejected as a scene: {other:?}"),
+        Err(error) => bail!("P1: not rejected as a scene: {error}"),
+        Ok(_) => bail!("P1: built a tree over object {DAMAGED}"),
     };
     let is_named = error.contains(&format!("object {DAMAGED} "));
     ensure!(is_named, "P1: the error names no object {DAMAGED}: {error}");
