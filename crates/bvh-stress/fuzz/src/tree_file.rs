@@ -3,7 +3,8 @@
 use bvh_core::cost::{self, SahConstants};
 use bvh_core::file::{Header, TreeFile, load};
 use bvh_core::{
-    Aabb, Bvh, Ray, TestCounts, Triangle, any_hit_by, collapse_leaves, nearest_hit_by, validate,
+    Aabb, Bvh, Node, Ray, TestCounts, Triangle, any_hit_by, collapse_leaves, nearest_hit_by,
+    validate,
 };
 use glam::Vec3;
 
@@ -73,9 +74,16 @@ fn opened(bytes: &[u8]) {
     assert_eq!([file.tree().is_ok(), file.view().is_ok()], [file.tree().is_ok(); 2]);
     if let (Ok(tree), Ok(view)) = (file.tree(), file.view()) {
         assert!(tree.nodes == view.nodes && tree.prim_ids == view.prim_ids);
+        // Equal numbers may be zeros of different signs.
+        assert_eq!(bits(&tree.nodes), bits(view.nodes));
         traced(&tree, objects);
         measured(tree, objects);
     }
+}
+
+fn bits(nodes: &[Node]) -> Vec<u32> {
+    let corners = nodes.iter().flat_map(|node| [node.aabb.min, node.aabb.max]);
+    corners.flat_map(|corner| corner.to_array()).map(f32::to_bits).collect()
 }
 
 fn rays() -> impl Iterator<Item = Ray> {

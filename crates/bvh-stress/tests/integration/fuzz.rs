@@ -60,7 +60,7 @@ fn mutated(inputs: &[Vec<u8>], rng: &mut Stream) -> Vec<u8> {
     bytes
 }
 
-/// Runs a target on the kept inputs and on mutations.
+/// Runs a target on the kept inputs and on mutations. Checks that its fuzzer runs it too.
 fn run(name: &str, target: fn(&[u8])) {
     let check = |bytes: &[u8]| {
         if let Err(panic) = catch_unwind(AssertUnwindSafe(|| target(bytes))) {
@@ -69,9 +69,12 @@ fn run(name: &str, target: fn(&[u8])) {
             resume_unwind(panic);
         }
     };
-    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(name);
-    let mut inputs = files(&corpus);
-    assert!(!inputs.is_empty(), "{}", corpus.display());
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz");
+    let fuzzer = fs::read_to_string(folder.join(format!("fuzz_targets/{name}.rs"))).unwrap();
+    assert!(fuzzer.contains(&format!("targets::{name}(bytes)")), "{fuzzer}");
+    let mut inputs = files(&folder.join("corpus").join(name));
+    let bytes: usize = inputs.iter().map(Vec::len).sum();
+    assert!((1..10_000).contains(&bytes), "{name}: the kept inputs are small: {bytes} bytes");
     inputs.push(Vec::new());
     inputs.iter().for_each(|input| check(input));
     // The same mutations each time: a commit is judged by its change, not by luck.
