@@ -2,7 +2,7 @@
 
 use super::canvas::{Align, Point, Sheet};
 use super::model::{Figure, Layer};
-use super::style::{BAND, INK, Stroke, Strokes};
+use super::style::{BAND, INK, REFERENCE_LINE, Stroke, Strokes};
 use super::text::{self, BODY};
 
 /// Width of a sample.
@@ -36,7 +36,8 @@ impl Legend {
             let has = |kind: fn(&Layer) -> bool| {
                 layers.clone().any(|layer| layer.name == *name && kind(layer))
             };
-            let (line, marker) = (has(Layer::is_line), has(Layer::is_marked));
+            let line = has(Layer::is_line) || *stroke == REFERENCE_LINE;
+            let marker = has(Layer::is_marked);
             let name = text::shorten(name, width - before, BODY);
             Entry { name, stroke: *stroke, line, marker }
         };

@@ -174,9 +174,9 @@ impl Layer {
         (!is_reference).then_some(&self.name)
     }
 
-    /// Returns true for lines, those of reference included.
+    /// Returns true for lines, except those of reference.
     pub(super) fn is_line(&self) -> bool {
-        matches!(self.marks, Marks::Line(_) | Marks::HLine(_) | Marks::VLine(_))
+        matches!(self.marks, Marks::Line(_))
     }
 
     /// Returns true for layers with markers at their points.

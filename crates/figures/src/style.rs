@@ -11,7 +11,7 @@ pub(super) const INK: Colour = RGBColor(0x22, 0x22, 0x22);
 pub(super) const GREY: Colour = RGBColor(0x55, 0x55, 0x55);
 /// The colour of grid lines at labelled ticks.
 pub(super) const GRID: Colour = RGBColor(0xDD, 0xDD, 0xDD);
-/// The colour of grid lines between labelled ticks.
+/// The colour of the lines of rows.
 pub(super) const FAINT: Colour = RGBColor(0xF0, 0xF0, 0xF0);
 
 /// The opacity of bands.
@@ -93,14 +93,15 @@ pub(super) struct Strokes(pub Vec<(String, Stroke)>);
 impl Strokes {
     pub fn new(figure: &Figure) -> Self {
         let layers = figure.panels.iter().flat_map(|panel| &panel.layers);
-        let named = layers.filter(|layer| !layer.name.is_empty());
+        let named = layers.filter(|layer| !layer.name.trim().is_empty());
         let (series, lines): (Vec<&Layer>, Vec<&Layer>) =
             named.partition(|layer| layer.series().is_some());
         // Series without a given colour get some that no other has, while they last.
-        let is_free = |hue: &Hue| figure.hues.iter().all(|(_, given)| given != hue);
+        let used = figure.hues.iter().filter(|(name, _)| series.iter().any(|s| s.name == *name));
+        let is_free = |hue: &Hue| used.clone().all(|(_, given)| given != hue);
         let mut free = FREE.into_iter().filter(is_free).chain(FREE.into_iter().cycle());
         let mut strokes: Vec<(String, Stroke)> = Vec::new();
-        for layer in series.into_iter().chain(lines) {
+        for layer in series.iter().chain(&lines) {
             let name = &layer.name;
             if strokes.iter().any(|(known, _)| known == name) {
                 continue;
@@ -149,7 +150,9 @@ mod tests {
     #[test]
     fn a_colour_given_in_advance_is_given_to_no_other() {
         let names = ["MF", "GRASP"].map(str::to_owned);
-        let series = strokes(&names, vec![("GRASP".into(), Hue::Wine)]);
+        // A colour of a series of other figures stays free.
+        let hues = vec![("GRASP".into(), Hue::Wine), ("PLOC".into(), Hue::Amber)];
+        let series = strokes(&names, hues);
         let expected = [Stroke::of(Hue::Amber, 0), Stroke::of(Hue::Wine, 1)];
         assert_eq!([series[0].1, series[1].1], expected);
     }
