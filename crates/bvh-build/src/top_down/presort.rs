@@ -6,6 +6,7 @@ use bvh_core::{Aabb, PackedAabb};
 
 /// Least number of objects that are sorted and divided in parallel. It is large enough that the
 /// start of a task takes a negligible part of its time.
+#[cfg(feature = "rayon")]
 pub(super) const PARALLEL_OBJECTS: usize = 4096;
 
 /// A scene's objects, sorted along every axis: the input of any number of top-down builds.
