@@ -25,8 +25,17 @@ fn rays(slope: f32) -> Vec<BvhRay> {
 }
 
 /// A search without objects, and every choice at its default.
-// SAFETY: null pointers and zeros are valid values of the fields.
-const NO_BAKE: BvhBake = unsafe { std::mem::zeroed() };
+const NO_BAKE: BvhBake = BvhBake {
+    boxes: null(),
+    corners: null(),
+    count: 0,
+    rays: null(),
+    ray_count: 0,
+    references: 0.0,
+    seconds: 0.0,
+    work: 0,
+    seed: 0,
+};
 
 fn last_error() -> String {
     // SAFETY: the message ends with a zero, and no call of this thread fails before the copy is
@@ -260,6 +269,8 @@ fn invalid_arguments_are_rejected_by_name() {
             let tree = bvh_tree_from_triangles(corners, count, seconds, references);
             rejected(tree.is_null(), message);
         }
+        let timeless = bvh_tree_from_boxes(boxes.as_ptr(), 1, -1.0);
+        rejected(timeless.is_null(), "seconds is -1.0; accepted: 0 to 1e19");
         let boxed = bvh_tree_from_boxes(boxes.as_ptr(), 1, 0.0);
         rejected(bvh_tracer_new(boxed).is_null(), "tree is over boxes");
         rejected(bvh_tree_load_boxes(null(), boxes.as_ptr(), 1).is_null(), "path is null");
