@@ -19,10 +19,15 @@ impl Block {
     }
 }
 
-/// Returns the blocks of all pages.
+/// Lists the pages without the changelog, whose old commands may be invalid today.
+fn pages_of_today() -> impl Iterator<Item = PathBuf> {
+    pages().into_iter().filter(|page| !page.ends_with("CHANGELOG.md"))
+}
+
+/// Returns the blocks of all pages without the changelog.
 pub fn blocks() -> Vec<Block> {
     let mut blocks: Vec<Block> = Vec::new();
-    for page in pages() {
+    for page in pages_of_today() {
         let mut is_open = false;
         let text = fs::read_to_string(&page).unwrap();
         for (number, line) in text.lines().enumerate() {
@@ -75,8 +80,7 @@ pub fn commands(text: &str, place: &str) -> Vec<Vec<String>> {
 pub fn accepts_printed_commands(name: &str, package: &str) -> usize {
     let mut texts: Vec<(String, String)> =
         blocks_in("sh").into_iter().map(|block| (block.place(), block.text)).collect();
-    // Old commands of the changelog may be invalid today.
-    for page in pages().into_iter().filter(|page| !page.ends_with("CHANGELOG.md")) {
+    for page in pages_of_today() {
         let text = fs::read_to_string(&page).unwrap();
         // Every second part is a block.
         let outside: String = text.split("```").step_by(2).collect();
