@@ -20,7 +20,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use error::Error;
 use inspect::InspectArgs;
-use output::{print_bytes, print_error, succeeded};
+use output::{answered, print_bytes, print_error, succeeded};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -69,7 +69,13 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    match run(Cli::parse()) {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(answer) => return answered(&answer),
+    };
+    // Signals are heard before any work begins.
+    interrupt::listen();
+    match run(cli) {
         Ok(()) => succeeded(),
         Err(error) => {
             print_error(&format!("error: {error}"));

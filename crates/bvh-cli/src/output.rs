@@ -48,6 +48,20 @@ pub fn bar(length: u64, template: &str) -> ProgressBar {
     ProgressBar::new(length).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
+/// Prints the parser's answer to the arguments: help, version, or their fault. Returns the exit
+/// code.
+pub fn answered(answer: &clap::Error) -> ExitCode {
+    const USAGE: u8 = 2;
+    let text = answer.render().to_string();
+    // Help and version are results and go to standard output.
+    if answer.use_stderr() {
+        print_error(text.trim_end());
+        return ExitCode::from(USAGE);
+    }
+    print_bytes(text.as_bytes());
+    succeeded()
+}
+
 /// Writes rows as CSV to a file.
 pub fn write_table<R: Serialize>(
     path: &Path,

@@ -1,6 +1,8 @@
-//! Ctrl-C while `bvh bake` searches: the best tree so far is written, and it is a good one.
+//! Ctrl-C while `bvh bake` searches: the best tree so far is written, and it is a good one. Other
+//! commands end at once.
 use crate::support::{begin, bvh, cost, ended, names, send, words};
 use std::fs;
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -25,6 +27,26 @@ fn ctrl_c_keeps_the_best_tree_so_far_also_while_a_bake_decides() {
         bvh(folder.path(), "verify a.bvh konistil");
         assert_eq!(names(folder.path()), ["a.bvh"]);
     }
+}
+
+#[test]
+fn ctrl_c_ends_a_command_without_a_result_at_once_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("a.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 1 1\n").unwrap();
+    for signal in ["-INT", "-TERM"] {
+        let render = "render a.obj --accel=brute --size=5000x5000 --out=a.png";
+        let mut child = begin(at, &words(render));
+        let mut messages = BufReader::new(child.stderr.take().unwrap());
+        let mut message = String::new();
+        messages.read_line(&mut message).unwrap();
+        assert!(message.contains("without area"), "the scene is loaded: {message}");
+        send(signal, &child);
+        messages.read_to_string(&mut message).unwrap();
+        assert!(message.ends_with("error: interrupted\n"), "{message}");
+        ended(&child.wait_with_output().unwrap(), 130, &[]);
+    }
+    assert_eq!(names(at), ["a.obj"]);
 }
 
 #[test]
