@@ -22,8 +22,8 @@ fn the_eye_may_be_anywhere_and_the_scene_a_single_point() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("point.obj"), "v 1 2 3\nv 1 2 3\nv 1 2 3\nf 1 2 3\n").unwrap();
-    fs::write(at.join("flat.obj"), "v 0 0 0\nv 1e30 0 0\nv 0 0 1e30\nf 1 2 3\n").unwrap();
-    for scene in ["point.obj", "flat.obj"] {
+    fs::write(at.join("a&b.obj"), "v 0 0 0\nv 1e30 0 0\nv 0 0 1e30\nf 1 2 3\n").unwrap();
+    for scene in ["point.obj", "a&b.obj"] {
         for eye in ["", "--from=-1,2,3 --at=-1,2,3", "--from=1,2,3"] {
             bvh(at, &format!("render {scene} --out=p.png --size=20x10 --heatmap {eye}"));
             bvh(at, &format!("render {scene} --out=p.png --size=1x1 {eye}"));
@@ -31,6 +31,8 @@ fn the_eye_may_be_anywhere_and_the_scene_a_single_point() {
         bvh(at, &format!("bake {scene} --out={scene}.bvh --budget=0s"));
         bvh(at, &format!("report {scene}.bvh {scene}"));
     }
+    let page = fs::read_to_string(at.join("a&b.obj.html")).unwrap();
+    assert_eq!(page.matches("a&amp;b").count(), 2, "names are escaped");
 }
 
 #[test]
@@ -47,7 +49,7 @@ fn a_report_compares_a_tree_with_the_greedy_tree_on_one_page_and_replaces_no_fil
             assert!(page.contains(part), "{scene}: {part}");
         }
         assert_eq!(page.matches("data:image/png;base64,").count(), 3, "{scene}");
-        assert!(!page.contains("http") && !page.contains("<script"), "{scene}");
+        assert!(!page.contains("://") && !page.contains("<script"), "{scene}");
         assert_eq!(page.contains("Expected tests of a ray"), has_layout, "{scene}");
     }
     wrong(at, "report a.bvh spheres75", &["a.html exists", "--out"]);
