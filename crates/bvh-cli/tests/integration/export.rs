@@ -1,6 +1,7 @@
 //! Exporting trees to other tracers from the command line.
 
 use crate::support::{bvh, facts};
+use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
 use bvh_core::export::{Layout, Target};
 use bvh_scenes::{Scene, tree_file};
@@ -23,6 +24,19 @@ fn an_export_is_the_fitted_tree_and_says_how_it_compares() {
     }
     let json = facts(at, "export x.bvh escher:900 --for=obvhs --out=x.bin");
     assert!(json["gain inside"].is_f64() && json["is searched"] == true, "{json:?}");
+}
+
+#[test]
+fn a_greedy_tree_is_exported_where_its_rays_take_fewer_tests() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    bvh(at, "bake escher:900 --budget=1Mwork --method=goldsmith_salmon --out=poor.bvh");
+    let line = bvh(at, "export poor.bvh escher:900 --for=obvhs --out=y.bin");
+    assert!(line.contains("nodes of a greedy tree instead"), "{line}");
+    let scene = Scene::load("escher:900").unwrap();
+    let greedy = muller_fellner::Config::default().build(&scene.boxes).unwrap();
+    let expected = Target::OBVHS.bytes(&Target::OBVHS.fit(&greedy), &scene.boxes);
+    assert_eq!(fs::read(at.join("y.bin")).unwrap(), expected);
 }
 
 #[test]
