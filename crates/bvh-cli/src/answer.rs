@@ -3,23 +3,16 @@
 use crate::output::print_line;
 use indicatif::HumanCount;
 use serde_json::{Map, Value, json};
-use std::time::Instant;
 
 /// The results of one command.
 pub struct Answer {
     facts: Option<Map<String, Value>>,
-    start: Instant,
 }
 
 impl Answer {
     /// Collects facts for JSON, or prints lines for people.
     pub fn new(is_json: bool) -> Self {
-        Self { facts: is_json.then(Map::new), start: Instant::now() }
-    }
-
-    /// The seconds since the command began.
-    pub fn seconds(&self) -> f64 {
-        self.start.elapsed().as_secs_f64()
+        Self { facts: is_json.then(Map::new) }
     }
 
     /// Prints a line for people.
@@ -44,10 +37,10 @@ impl Answer {
         }
     }
 
-    /// Explains a choice of the program.
-    pub fn choice(&mut self, reason: String) {
-        self.say(&reason);
-        self.list("choices", reason);
+    /// Prints a line for people, and adds it to a list.
+    pub fn line(&mut self, list: &str, line: String) {
+        self.say(&line);
+        self.list(list, line);
     }
 
     /// Adds a fact and prints it as a line, `name: value`.

@@ -22,6 +22,8 @@ pub fn output_file(flag: &str, path: &Path, ending: &str) -> Result<(), Error> {
     let has_ending = path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending));
     let fault = if !has_ending {
         format!("{}; accepted: a name that ends with .{ending}", path.display())
+    } else if path.exists() && !path.is_file() {
+        format!("{} is not a regular file; accepted: the path of a file to write", path.display())
     } else if !folder.is_dir() {
         format!("{} is no folder; accepted: a path in a folder that is there", folder.display())
     } else {

@@ -43,6 +43,11 @@ pub fn inspect(args: &InspectArgs, answer: &mut Answer) -> Result<(), Error> {
     let rays = args.rays.as_deref().map(Rays::read).transpose()?;
     let scene = args.scene.as_deref().map(load_scene).transpose()?;
     let (tree, header) = tree_file::load(&args.file, scene.as_ref())?;
+    // Rays that miss the scene are rejected before the first fact is printed.
+    let tests = match (&rays, &scene) {
+        (Some(rays), Some(scene)) => Some(rays.expected_tests(&tree, scene)?),
+        _ => None,
+    };
     match &scene {
         Some(scene) => {
             answer.fact("valid", "yes, over this scene's objects");
@@ -64,8 +69,8 @@ pub fn inspect(args: &InspectArgs, answer: &mut Answer) -> Result<(), Error> {
         let ratio = cost::internal_area(&tree) / cost::internal_area(&greedy);
         answer.fact("internal area over Müller–Fellner's", ratio);
     }
-    if let (Some(rays), Some(scene)) = (&rays, &scene) {
-        answer.fact("expected tests of a ray", rays.expected_tests(&tree, scene)?);
+    if let Some(tests) = tests {
+        answer.fact("expected tests of a ray", tests);
     }
     if let Some(path) = &args.nodes {
         write_nodes(&tree, path)?;

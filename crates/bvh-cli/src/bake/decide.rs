@@ -10,7 +10,7 @@ use super::{BakeArgs, Effort};
 use crate::Error;
 use crate::answer::Answer;
 use crate::interrupt::{INTERRUPTED, is_interrupted};
-use crate::output::bar;
+use crate::output::{bar, print_error};
 use crate::rays::Rays;
 use bvh_core::cost::Objective;
 use bvh_scenes::Scene;
@@ -48,7 +48,8 @@ pub fn work(objects: usize, answer: &mut Answer) -> Effort {
         "because the scene is large; more would pay (--budget)"
     };
     let millions = work as f64 / 1e6;
-    answer.choice(format!("budget: {millions:.0} Mwork, {per_object} nodes per object; {why}"));
+    let line = format!("budget: {millions:.0} Mwork, {per_object} nodes per object; {why}");
+    answer.line("choices", line);
     Effort::Work(work)
 }
 
@@ -75,10 +76,10 @@ pub fn decide(
     if chooses_cost {
         costs.push((Objective::Layout, None));
     }
-    let last = costs.len();
     if args.rays.is_none() {
-        costs.push((costs[last - 1].0, Some(Rays::Default)));
+        costs.push((costs[costs.len() - 1].0, Some(Rays::Default)));
     }
+    let last = costs.len() - 1;
     let references = args.references.map_or(vec![1.0, REFERENCES], |given| vec![given]);
     let mut plans = Vec::new();
     for &references in &references {
@@ -86,7 +87,11 @@ pub fn decide(
             plans.push(Plan { objective, rays, references, ..plan.clone() });
         }
     }
-    let [_, .., most] = &plans[..] else { return Ok((plan, prepared)) };
+    if plans.len() < 2 {
+        return Ok((plan, prepared));
+    }
+    // The last combination has all choices, so that it needs all that the others need.
+    let most = &plans[plans.len() - 1];
     let failed = |error| Error::search(&scene.name, plan.method.name())(error);
     prepared.greedy = most.bake(scene, None).greedy(&INTERRUPTED).map_err(failed)?;
     let Some(greedy) = &prepared.greedy else { return Ok((plan, prepared)) };
@@ -101,6 +106,9 @@ pub fn decide(
     let mut tests = Vec::new();
     let bar = bar(plans.len() as u64, "{bar:10} trying the choices, {pos} of {len}");
     bar.tick();
+    if bar.is_hidden() {
+        print_error(&format!("trying {} combinations of the choices", plans.len()));
+    }
     for plan in &plans {
         // A trial of no work takes seconds in large scenes.
         let Some(judging) = judging.as_ref().filter(|_| !is_interrupted()) else { break };
@@ -126,9 +134,10 @@ pub fn decide(
         let verdict = if is_chosen { "yes" } else { "no" };
         let percent = 100.0 * saved.abs();
         let direction = if saved < 0.0 { "more" } else { "fewer" };
-        answer.choice(format!(
+        let line = format!(
             "{name}: {verdict}, {percent:.1} % {direction} expected tests of untrained rays"
-        ));
+        );
+        answer.line("choices", line);
     };
     if chooses_cost {
         explain("cost: the wide layout's", column > 0, row + column.max(1), row);

@@ -13,9 +13,11 @@ use crate::arguments::{input_file, load_scene, output_file, output_or_free};
 use crate::export::tracers;
 use crate::interrupt::{hold, is_interrupted};
 use crate::rays::Rays;
+use bvh_core::Aabb;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::export::Target;
-use bvh_scenes::files::{Reserved, regular};
+use bvh_scenes::Scene;
+use bvh_scenes::files::Reserved;
 use bvh_search::{Bake, Division, Method, Outcome, StopReason, shortcuts};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -58,7 +60,8 @@ pub struct BakeArgs {
     #[arg(long, value_name = "area|layout", value_parser = costs())]
     pub cost: Option<Objective>,
     /// Divide objects among leaves where it pays, up to N references per object, 1 to 16. The cost
-    /// then includes the leaves. With --budget, the default is 1.
+    /// then includes the leaves. With --budget, the default is 1; with --from, as many as the tree
+    /// has.
     #[arg(long, value_name = "N")]
     pub references: Option<f64>,
     /// Search for the tracer of another library, for `bvh export`: by default with `--cost area`,
@@ -73,7 +76,7 @@ pub struct BakeArgs {
     #[arg(long, value_name = "FILE.bvh")]
     pub from: Option<PathBuf>,
     /// Cut the scene by space into N parts, bake each into the folder `FILE.parts`, and join their
-    /// trees under a searched top. Finished parts are not baked again.
+    /// trees under a greedy top. Finished parts are not baked again.
     #[arg(long, value_name = "N", requires = "budget", help_heading = ADVANCED)]
     #[arg(conflicts_with_all = ["rays", "from", "instances", "explain"])]
     #[arg(value_parser = clap::value_parser!(u32).range(2..=65_536))]
@@ -123,20 +126,26 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
         rays.check(&scene)?;
     }
     if args.explain {
-        let skipped = shortcuts::of(&scene.boxes);
-        for (_, why) in skipped.map_err(Error::search(&scene.name, "--explain"))? {
-            answer.choice(format!("skipped: {why}"));
-        }
+        explain(&scene, answer)?;
     }
     let start = args.from.as_ref().map(|path| Start::load(path, &scene)).transpose()?;
     let objects = scene.boxes.len();
-    if let Some(Start { tree, .. }) = &start
-        && tree.prim_ids.len() > objects
+    if let (Some(from), Some(Start { tree, .. })) = (&args.from, &start)
+        && tree.prim_ids.len() > objects.max((plan.references * objects as f64) as usize)
     {
+        let references = tree.prim_ids.len();
+        if args.references.is_some() || args.tracer.is_some() {
+            // Rounded up, so that the message's number suffices.
+            let least = (100 * references).div_ceil(objects) as f64 / 100.0;
+            return Err(Error::Usage(format!(
+                "--from {}: the tree has {references} references to {objects} objects; accepted: \
+                 --references {least:.2} or more",
+                from.display()
+            )));
+        }
         // No search makes all divided objects whole again. Half a reference more keeps the product
         // with the number of objects from being rounded down.
-        let references = (tree.prim_ids.len() as f64 + 0.5) / objects as f64;
-        plan.references = plan.references.max(references);
+        plan.references = (references as f64 + 0.5) / objects as f64;
     }
     // Without a budget the decision may add references.
     let least = if args.budget.is_none() { decide::REFERENCES } else { 1.0 };
@@ -152,9 +161,21 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     save(&found, &out, reserved, answer)
 }
 
+/// Lists the steps that the scene does not need and that are skipped, one line each.
+fn explain(scene: &Scene, answer: &mut Answer) -> Result<(), Error> {
+    let skipped = shortcuts::of(&scene.boxes).map_err(Error::search(&scene.name, "--explain"))?;
+    let size = Aabb::union_of(&scene.boxes).extent().as_vec3();
+    let objects = scene.boxes.len();
+    answer.line("explanation", format!("{}: {objects} objects within {size}", scene.name));
+    for (_, why) in skipped {
+        answer.line("explanation", format!("skipped: {why}"));
+    }
+    Ok(())
+}
+
 /// Writes the file of the tree, and describes it.
 fn save(found: &Found, out: &Path, reserved: Reserved, answer: &mut Answer) -> Result<(), Error> {
-    found.save(out, reserved)?;
+    let bytes = found.save(out, reserved)?;
     if is_interrupted() {
         let out = out.display();
         let cost = short(found.baked.outcome.cost);
@@ -163,7 +184,6 @@ fn save(found: &Found, out: &Path, reserved: Reserved, answer: &mut Answer) -> R
         )));
     }
     summarise(found, answer);
-    let bytes = regular(out)?;
     answer.say(&format!("{}: {} bytes", out.display(), whole(bytes)));
     answer.record("file", out.display().to_string());
     answer.record("bytes", bytes);
@@ -171,7 +191,7 @@ fn save(found: &Found, out: &Path, reserved: Reserved, answer: &mut Answer) -> R
 }
 
 fn summarise(found: &Found, answer: &mut Answer) {
-    let Found { plan, scene, baked, .. } = found;
+    let Found { plan, scene, baked, seconds, .. } = found;
     let Outcome { tree, cost, evaluations: moves, work, stop, .. } = &baked.outcome;
     let objects = scene.boxes.len();
     let references = tree.prim_ids.len();
@@ -212,21 +232,26 @@ fn summarise(found: &Found, answer: &mut Answer) {
         answer.say(&format!("{} references to {} objects", whole(references), whole(objects)));
     } else if baked.division == Division::Useless {
         answer.say("no object is divided, because no spatial split saves anything");
+    } else if plan.references > 1.0 {
+        answer.say("no object is divided, because no division paid within the budget");
     }
-    let why = match (stop, plan.effort) {
-        (StopReason::Completed, Effort::Work(_)) => ", and the method has completed",
-        (StopReason::Optimal, _) => ", and no tree is better",
+    // A method that plans its time completes its plan just before the time is over, and then could
+    // have used more.
+    let in_time =
+        matches!(plan.effort, Effort::Time(limit) if *seconds >= 0.5 * limit.as_secs_f64());
+    let why = match stop {
+        StopReason::Completed if !in_time => ", and the method has completed",
+        StopReason::Optimal => ", and no tree is better",
         _ => "",
     };
-    let seconds = answer.seconds();
     answer.say(&format!(
-        "{} moves, {} nodes visited, {seconds:.1} s in all{why}",
+        "{} moves, {} nodes visited, {seconds:.1} s{why}",
         whole(*moves),
         whole(*work)
     ));
     answer.record("moves", *moves);
     answer.record("work", *work);
-    answer.record("seconds", seconds);
+    answer.record("seconds", *seconds);
 }
 
 impl BakeArgs {

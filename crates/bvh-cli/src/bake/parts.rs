@@ -95,7 +95,10 @@ pub fn bake(args: &BakeArgs, count: u32, answer: &mut Answer) -> Result<(), Erro
 fn parts(plan: &Plan, scene: &Scene, count: u32) -> Result<Vec<Part>, Error> {
     let all = scene.boxes.len();
     if count as usize > all {
-        let accepted = format!("2 to the number of objects, {all}");
+        let accepted = match all {
+            0 | 1 => "no parts".into(),
+            _ => format!("2 to the number of objects, {all}"),
+        };
         return Err(Error::Usage(format!("--parts {count}; accepted: {accepted}")));
     }
     let checksum = scene.checksum();
@@ -103,7 +106,11 @@ fn parts(plan: &Plan, scene: &Scene, count: u32) -> Result<Vec<Part>, Error> {
     for (number, objects) in cut(&scene.boxes, count as usize).into_iter().enumerate() {
         let share = SHARE_OF_PARTS * objects.len() as f64 / all as f64;
         let plan = Plan { effort: plan.effort.share(share), ..plan.clone() };
-        let identity = format!("{checksum} {count} {number} {plan:?}");
+        let Plan { method, effort, seed, objective, references, .. } = &plan;
+        let method = method.name();
+        let identity = format!(
+            "{checksum} {count} {number} {method} {effort:?} {seed} {objective:?} {references}"
+        );
         let id = format!("{:016x}", fnv1a(identity.into_bytes()));
         parts.push(Part { id, objects, plan });
     }

@@ -113,9 +113,10 @@ impl Plan {
         let baked = bake.search(greedy, &watch);
         watch.bar.finish_and_clear();
         let baked = baked.map_err(failed)?;
+        let seconds = watch.deadline.elapsed().as_secs_f64();
         // The work of all bakes that led to this tree, one after the other.
         let work = start.map_or(0, |start| start.work).saturating_add(baked.outcome.work);
-        Ok(Found { plan: self, scene, density, baked, area_of_greedy, work })
+        Ok(Found { plan: self, scene, density, baked, area_of_greedy, work, seconds })
     }
 }
 
@@ -128,15 +129,19 @@ pub struct Found<'a> {
     /// The total area of inner nodes of the greedy tree, which the documentation compares.
     pub area_of_greedy: Option<f64>,
     work: u64,
+    /// The time since the greedy tree was built.
+    pub seconds: f64,
 }
 
 impl Found<'_> {
-    /// Writes the file of the tree.
-    pub fn save(&self, path: &Path, reserved: Reserved) -> Result<(), Error> {
+    /// Writes the file of the tree. Returns its number of bytes.
+    pub fn save(&self, path: &Path, reserved: Reserved) -> Result<usize, Error> {
         let bake = self.plan.bake(self.scene, self.density.as_ref());
-        let tree = &self.baked.outcome.tree;
-        let written = bake.write(tree, self.work, |sections, _| reserved.write(sections));
-        Ok(written.map_err(TreeFileError::of(path))??)
+        let written = bake.write(&self.baked.outcome.tree, self.work, |sections, _| {
+            reserved.write(sections)?;
+            Ok(sections.iter().map(|section| section.len()).sum())
+        });
+        written.map_err(TreeFileError::of(path))?
     }
 
     /// Names the cost that the search minimised, unless it is the total area of inner nodes.

@@ -17,7 +17,7 @@ pub struct Watch {
     /// The progress bar, which is hidden unless standard error is a terminal.
     pub bar: ProgressBar,
     /// A budget of work has a deadline that never comes.
-    deadline: Deadline,
+    pub deadline: Deadline,
     effort: Effort,
     /// The time of the last line, in tens of seconds since the beginning.
     shown: AtomicU64,

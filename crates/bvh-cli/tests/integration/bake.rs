@@ -142,6 +142,9 @@ fn a_bake_of_no_time_or_no_work_gives_the_greedy_tree_or_the_tree_it_starts_from
             assert_eq!((&found["moves"], &found["work"]), (&0.into(), &0.into()), "{bake}");
             assert!(tree("x.bvh") == greedy, "{bake}");
         }
+        let said =
+            bvh(at, &format!("bake escher:200 --budget={budget} --out=x.bvh --references=1.5"));
+        assert!(said.contains("no object is divided, because no division paid"), "{said}");
         bvh(at, &format!("bake escher:200 --budget={budget} --out=x.bvh --from=start.bvh"));
         assert_eq!(cost(at, "x.bvh"), cost(at, "start.bvh"), "{budget}");
     }
@@ -178,6 +181,17 @@ fn a_bake_divides_objects_where_it_pays_and_minimises_the_cost_of_the_layout() {
     assert!(layout < whole, "{layout} {whole}");
     let (_, [_, further, _]) = bake("further.bvh", "--from=split.bvh");
     assert!(further > objects && further <= references, "{further} of {references}");
+    // A limit that is given, or that of a tracer of whole objects, is not raised.
+    let accepted = (100.0 * references / objects).ceil() / 100.0;
+    let message = format!(
+        "--from split.bvh: the tree has {references} references to {objects} objects; accepted: \
+         --references {accepted:.2} or more"
+    );
+    for limit in ["--references=1", "--for=json", "--for=json --references=1.001"] {
+        let bake =
+            format!("bake pinecon2 --budget=1000Gwork --out=no.bvh --from=split.bvh {limit}");
+        wrong(at, &bake, &[&message]);
+    }
     bvh(at, "render pinecon2 --accel=split.bvh --out=a.png --size=16x16");
 }
 

@@ -1,7 +1,7 @@
 //! The files of a baked scene of instances, loaded as users load them, give the same answers as the
 //! flat scene.
 
-use crate::support::{bvh, glb, names, wrong};
+use crate::support::{bvh, glb, names, unsaid, words, wrong};
 use bvh_core::{
     Hit, Instance, Instances, PreparedRay, Ray, Triangle, WideBvh, boxes, file, nearest_hit_of_all,
 };
@@ -99,6 +99,17 @@ fn a_scene_of_instances_is_baked_mesh_by_mesh_and_answers_like_the_flat_scene() 
         hits += u32::from(found.is_some());
     }
     assert!((1000..2000).contains(&hits), "{hits} of 2000 rays hit");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_bake_whose_output_is_lost_still_writes_its_trees() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("forest.glb"), forest().0).unwrap();
+    // This bake prints a line before its search, and another after each tree.
+    unsaid(at, &words("bake forest.glb --instances --out=baked"));
+    assert_eq!(names(&at.join("baked")), ["instances.csv", "mesh_0.bvh", "mesh_1.bvh", "top.bvh"]);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What all commands share: their output, their folders, and the rejection of invalid input.
 
-// Tests that send signals or make links and pipes are left out on Windows, and their imports stay.
+// Tests that make pipes or lose output are left out on Windows, and their imports stay.
 #![cfg_attr(windows, allow(unused_imports))]
 
 use crate::support::{
@@ -8,7 +8,7 @@ use crate::support::{
 };
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 
 #[test]
 fn scenes_are_listed_with_their_sizes() {
@@ -20,11 +20,16 @@ fn scenes_are_listed_with_their_sizes() {
 #[test]
 fn the_steps_that_a_scene_does_not_need_are_listed() {
     let folder = tempfile::tempdir().unwrap();
-    for (scene, skipped) in
-        [("escher:12", "skipped: the search `best`"), ("S10:50", "skipped: splits along y and z")]
-    {
-        let said = bvh(folder.path(), &format!("bake {scene} --explain --budget=0s --out=x.bvh"));
-        assert!(said.contains(skipped), "{scene}: {said}");
+    for (scene, objects, skipped) in [
+        ("escher:12", "12 objects within [", "skipped: the search `best`"),
+        ("S10:50", "50 objects within [", "skipped: splits along y and z"),
+    ] {
+        let bake = format!("bake {scene} --explain --budget=0s --out=x.bvh");
+        let said = bvh(folder.path(), &bake);
+        assert!(said.contains(objects) && said.contains(skipped), "{scene}: {said}");
+        let json = facts(folder.path(), &bake);
+        assert!(json["explanation"][0].as_str().unwrap().contains(objects), "{json:?}");
+        assert!(json["explanation"][1].as_str().unwrap().contains(skipped), "{json:?}");
     }
 }
 
@@ -45,8 +50,10 @@ fn folder() -> tempfile::TempDir {
     write("mesh.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     write("wrong.toml", b"count = 9\nbouncy = 1\ncameras = []\n");
     write("none.toml", b"bounces = 1");
-    write("away.csv", "1000,1000,1000,1001,1002,1003\n".repeat(9).as_bytes());
-    write("through.csv", b"-50,1,0.5,50,1,0.5\n");
+    let away = "1000,1000,1000,1001,1002,1003\n".repeat(9);
+    write("away.csv", away.as_bytes());
+    // One segment that meets the scene is enough.
+    write("through.csv", (away + "-50,1,0.5,50,1,0.5\n").as_bytes());
     fs::create_dir(at.join("folder.bvh")).unwrap();
     fs::create_dir(at.join("full")).unwrap();
     write("full/mine", b"mine");
@@ -66,6 +73,7 @@ bake spheres75 --budget=1h --out=no/x.bvh ! no is no folder | accepted: a path i
 bake mesh.obj --budget=1h --out=mesh.obj ! --out: mesh.obj | .bvh
 bake mesh.obj --budget=1h --out=tree ! --out: tree | .bvh
 bake spheres7500 --parts=2 --budget=1000Gwork --out=no/x.bvh ! no is no folder
+bake spheres7500 --parts=2 --budget=1000Gwork --out=folder.bvh ! --out: folder.bvh | regular | accepted
 render spheres7500 --accel=brute --size=9999x9999 --out=no/x.png ! no is no folder
 render mesh.obj --size=8x8 --out=mesh.obj ! --out: mesh.obj | .png
 render spheres75 --out=/dev/full ! --out | /dev/full
@@ -112,8 +120,11 @@ bake spheres75 LONG --rays=mesh.obj ! mesh.obj: --rays accepts | .npy or .bin
 bake escher VAST --parts=4 --part=0123 ! --part 0123 | no such part | --list
 bake escher VAST --parts=4 --rays=default ! --parts | --rays | cannot be used with
 bake spheres75 VAST --parts=76 ! --parts 76 | accepted: 2 to the number of objects, 75
+bake escher:1 VAST --parts=2 ! --parts 2 | accepted: no parts
 bake escher --parts=4 ! --budget
 inspect good.bvh --rays=default ! --rays | SCENE
+inspect good.bvh spheres75 --rays=away.csv ! away.csv: none of the 9 segments meets the box
+inspect good.bvh spheres75 \u{1b}[2J ! unexpected argument '\\u{1b}[2J'
 export good.bvh spheres75 --for=embree --out=x.bin ! embree | obvhs
 render spheres75 --out=x.png --accel=octree ! octree | brute, kdtree, bvh, wide
 render spheres75 --out=x.png --accel=wide ! spheres75: spheres | --accel brute
@@ -137,20 +148,35 @@ fn what_is_wrong_is_named_before_the_work_and_changes_no_file() {
     assert!(contents(at) == before, "a file was changed or left behind");
 }
 
+#[cfg(unix)]
+#[test]
+fn a_pipe_is_rejected_as_an_input_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let made = Command::new("mkfifo").arg("p.bvh").current_dir(at).status();
+    assert!(made.unwrap().success());
+    wrong(at, "inspect p.bvh", &["p.bvh", "not a regular file"]);
+    wrong(at, "bake spheres75 --budget=0s --from=p.bvh --out=x.bvh", &["--from: p.bvh"]);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_output_is_an_error_and_a_closed_pipe_is_none() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    for line in ["scenes", "completions bash", "bake spheres75:9 --budget=0s --out=x.bvh"] {
+    let help = ["--help", "--version", "-h", "bake --help", "help inspect"];
+    // Without a budget, a bake prints a line before its search.
+    let results = ["scenes", "completions bash", "bake spheres75:9 --out=x.bvh"];
+    for line in help.into_iter().chain(results) {
         unsaid(at, &words(line));
+        // The tree of a bake is written although its results cannot be printed.
+        let is_written = fs::remove_file(at.join("x.bvh")).is_ok();
+        assert_eq!(is_written, line.contains("x.bvh"), "{line}");
         said(at, &words(line));
         let mut child = program(at, &words(line)).stdout(Stdio::piped()).spawn().unwrap();
         drop(child.stdout.take());
         assert!(child.wait().unwrap().success(), "{line}");
     }
-    // The tree of a bake is written although its results cannot be printed.
-    assert_eq!(names(at), ["x.bvh"]);
 }
 
 // Not even root can make files in this folder.

@@ -23,9 +23,11 @@ pub fn bvh(at: &Path, line: &str) -> String {
     said(at, &words(line))
 }
 
-/// Runs a command that must be rejected with each of the parts on standard error.
+/// Runs a command that must be rejected with each of the parts on standard error and no result.
 pub fn wrong(at: &Path, line: &str, parts: &[&str]) {
-    refused(at, &words(line), 2, parts);
+    let output = run(at, &words(line));
+    ended(&output, 2, parts);
+    assert!(output.stdout.is_empty(), "{line}: {}", text(&output.stdout));
 }
 
 /// Returns the results of a command, with all digits.
