@@ -14,7 +14,7 @@ report! {
         /// Labels of the methods. One event per run, as a builder has, is shown as a point.
         methods: Vec<String>, in OneOrMore;
     }
-    check |config: &Self| check_file(&config.csv());
+    check |config: &Self| check_file("timing_", &config.file);
 }
 
 /// One corner of a curve, which is flat up to the next, or its end, as written to

@@ -90,15 +90,15 @@ impl Labels for Series {
     }
 }
 
-/// Rejects names of CSV files, without extension, that could lead to another folder or replace rows
-/// of the runs.
-pub fn check_file(name: &str) -> Result<(), OutOfRange> {
+/// Rejects names of CSV files that could lead to another folder or replace rows of the runs.
+/// `before` stands before the name, and `.csv` behind it.
+pub fn check_file(before: &str, name: &str) -> Result<(), OutOfRange> {
     // Other characters separate folders or are invalid on some system.
     let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if name.is_empty() || !name.chars().all(is_plain) {
         return Err(OutOfRange::new("file", format!("{name:?}"), "letters, digits, - and _"));
     }
-    let csv = format!("{name}.csv");
+    let csv = format!("{before}{name}.csv");
     if rows::FILES.contains(&csv.as_str()) || csv == "paper.csv" {
         let accepted = format!("a name other than that of {csv}, which every experiment writes");
         return Err(OutOfRange::new("file", format!("{name:?}"), accepted));
@@ -122,11 +122,14 @@ mod tests {
 
     #[test]
     fn names_that_lead_elsewhere_or_replace_rows_of_runs_are_rejected() {
-        for name in ["builds", "timing_builds", "timing_runs"] {
-            assert_eq!(check_file(name), Ok(()));
+        for (before, name) in [("", "builds"), ("timing_", "builds"), ("timing_", "runs")] {
+            assert_eq!(check_file(before, name), Ok(()));
         }
         for name in ["runs", "paper", "timing_history", "", "../runs"] {
-            assert!(check_file(name).is_err(), "{name}");
+            assert!(check_file("", name).is_err(), "{name}");
+        }
+        for name in ["history", "", "../runs"] {
+            assert!(check_file("timing_", name).is_err(), "timing_{name}");
         }
     }
 }

@@ -145,7 +145,7 @@ impl Config {
     /// Rejects a file that would replace rows of runs, and conditions and values that cannot be
     /// read. Columns are known only when the rows are.
     fn check_queries(&self) -> Result<(), OutOfRange> {
-        check_file(&self.file)?;
+        check_file("", &self.file)?;
         accept("select", Conditions::parse(&self.select))?;
         accept("base", Conditions::parse(&self.base))?;
         for (index, column) in self.columns.iter().enumerate() {

@@ -47,7 +47,7 @@ const WRONG_LINES: &[(&str, &[&str])] = &[
     ),
     (
         "[[reports]]\nkind = 'anytime'\nmethods = ['grasp']\nfile = '../../x'",
-        &["reports[0].file is \"timing_../../x\"", "letters, digits"],
+        &["reports[0].file is \"../../x\"", "letters, digits"],
     ),
     // Found before hours of runs, not after them.
     (
