@@ -45,7 +45,7 @@ impl Section {
         };
         let (mut shown, mut paper) = (Vec::new(), Vec::new());
         for output in outputs {
-            let tables = output.tables()?.into_iter();
+            let tables = output.tables()?.into_iter().filter(|(_, rows)| !rows.is_empty());
             shown
                 .extend(tables.map(|(title, rows)| (format!("{}: {title}", output.heading), rows)));
             paper.extend(output.paper);

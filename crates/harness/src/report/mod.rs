@@ -25,11 +25,13 @@ pub mod trials;
 
 use crate::Error;
 use crate::rows::store::Store;
+use crate::rows::{Row as _, RunRow, TimingRow};
 use bvh_config::{Check, OutOfRange};
 use config::Labels as _;
 use data::Rows;
 use output::Output;
 use paper::PaperRow;
+use query_column::Column;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::path::Path;
 
@@ -202,25 +204,28 @@ pub fn write_all(outputs: &[Output], store: &Store, drawn: bool) -> Result<Strin
     outputs.iter().map(Output::text).collect()
 }
 
-/// The report of experiments without reports.
-const FINAL_COSTS: &str = "
-file = 'Runs'
-rows = 'runs.csv'
-join = 'timing.csv'
-by = ['scene', 'scene_kind', 'method']
-columns = [
-    { name = 'runs', value = 'count cost' },
-    { name = 'least_over_base', value = 'min cost_over_base' },
-    { name = 'median_over_base', value = 'median cost_over_base' },
-    { name = 'median_seconds', value = 'median seconds' },
-]
-";
-
+/// Returns the table of final costs, for experiments without reports.
 fn final_costs(rows: &Rows) -> Result<Output, Error> {
-    let costs: query_report::Config =
-        toml::from_str(FINAL_COSTS).map_err(Error::toml(Path::new("final costs")))?;
-    // It is only shown: a file with seconds would need another name.
-    let unwritten = costs.write(rows)?.csv;
+    let columns = [
+        ("runs", "count cost"),
+        ("least_over_base", "min cost_over_base"),
+        ("median_over_base", "median cost_over_base"),
+        ("median_seconds", "median seconds"),
+    ];
+    let column = |(name, value): (&str, &str)| Column {
+        name: name.into(),
+        value: value.into(),
+        ..Column::default()
+    };
+    let costs = query_report::Config {
+        rows: RunRow::FILE.into(),
+        join: TimingRow::FILE.into(),
+        by: ["scene", "scene_kind", "method"].map(str::to_owned).into(),
+        columns: columns.map(column).into(),
+        ..query_report::Config::default()
+    };
+    let tables = costs.write(rows)?.csv.into_iter();
+    let unwritten = tables.map(|(_, bytes)| ("Runs".to_owned(), bytes)).collect();
     Ok(Output { unwritten, ..Output::new("", "Final costs over those of the greedy tree") })
 }
 

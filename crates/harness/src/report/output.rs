@@ -26,7 +26,7 @@ pub struct Output {
     pub unwritten: Vec<(String, Vec<u8>)>,
 }
 
-/// The greatest number of rows of a table that is shown: nobody reads more.
+/// The greatest number of rows of a CSV file that are shown: nobody reads more.
 const MOST_SHOWN: usize = 100;
 
 /// Columns of sentences, which would not fit beside others.
@@ -83,21 +83,26 @@ impl Output {
             .push((name.into(), Figure { title, caption: caption.into(), columns, panels, hues }));
     }
 
-    /// Returns the tables to show, each with its title: those of 1 to 100 rows, without
-    /// sentences and with numbers of four digits.
+    /// Returns the tables to show, each with its title, without sentences and with numbers of four
+    /// digits. A CSV file of more than 100 rows has their number in its title instead of its rows.
     pub fn tables(&self) -> Result<Vec<(String, Vec<Row>)>, Error> {
-        let files = self.csv.iter().map(|(name, bytes)| (format!("{name}.csv"), bytes));
-        let others = self.unwritten.iter().map(|(title, bytes)| (title.clone(), bytes));
-        let mut tables = Vec::new();
-        for (title, bytes) in files.chain(others) {
-            let mut rows: Vec<Row> = parse(bytes, Path::new(&title))?;
-            for row in &mut rows {
-                row.retain(|column, _| !SENTENCES.contains(&column.as_str()));
-                row.values_mut().for_each(|text| *text = four_digits(text));
+        let mut tables: Vec<(String, Vec<Row>)> = Vec::new();
+        for (name, bytes) in &self.csv {
+            let title = format!("{name}.csv");
+            let rows = parse(bytes, Path::new(&title))?;
+            match rows.len() {
+                0 => {}
+                1..=MOST_SHOWN => tables.push((title, rows)),
+                count => tables.push((format!("{title}: {count} rows"), vec![])),
             }
-            if (1..=MOST_SHOWN).contains(&rows.len()) {
-                tables.push((title, rows));
-            }
+        }
+        // No file has the other rows of these.
+        for (title, bytes) in &self.unwritten {
+            tables.push((title.clone(), parse(bytes, Path::new(title))?));
+        }
+        for row in tables.iter_mut().flat_map(|(_, rows)| rows) {
+            row.retain(|column, _| !SENTENCES.contains(&column.as_str()));
+            row.values_mut().for_each(|text| *text = four_digits(text));
         }
         Ok(tables)
     }
@@ -106,10 +111,12 @@ impl Output {
     pub fn text(&self) -> Result<String, Error> {
         let mut text = format!("{}\n\n", self.heading);
         for (title, rows) in self.tables()? {
+            let Some(first) = rows.first() else {
+                text += &format!("{title}\n\n");
+                continue;
+            };
             let mut table = Table::new();
-            // Numbers are shorter than the names of their columns.
-            let header = rows[0].keys().map(|name| name.replace('_', "\n"));
-            table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(header);
+            table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(first.keys());
             table.add_rows(rows.iter().map(Row::values));
             text += &format!("{title}:\n{table}\n\n");
         }
@@ -156,12 +163,16 @@ mod tests {
     #[test]
     fn short_tables_are_shown_with_four_digits_and_their_names() {
         let short = b"scene,cost\ns,1.23456\n".to_vec();
-        let long = format!("scene\n{}", "s\n".repeat(MOST_SHOWN + 1)).into_bytes();
-        let csv = vec![("short".into(), short.clone()), ("long".into(), long)];
-        let unwritten = vec![("Title".into(), short)];
-        let text = Output { csv, unwritten, ..Output::default() }.text().unwrap();
-        assert_eq!(text.matches("│ s     ┆ 1.235 │").count(), 2, "{text}");
-        assert!(text.contains("short.csv:") && text.contains("Title:") && !text.contains("long"));
+        let long = format!("scene\n{}", "many\n".repeat(MOST_SHOWN + 1)).into_bytes();
+        let csv = vec![("short".into(), short.clone()), ("long".into(), long.clone())];
+        let text = Output { csv, ..Output::default() }.text().unwrap();
+        assert!(text.contains("short.csv:\n") && text.contains("│ s     ┆ 1.235 │"), "{text}");
+        assert!(text.contains("long.csv: 101 rows\n") && !text.contains("many"), "{text}");
+        // Nothing else has the rows that no file has.
+        let unwritten = vec![("Title".into(), short), ("All".into(), long)];
+        let text = Output { unwritten, ..Output::default() }.text().unwrap();
+        assert!(text.contains("Title:\n") && text.contains("│ s     ┆ 1.235 │"), "{text}");
+        assert_eq!(text.matches("many").count(), MOST_SHOWN + 1, "{text}");
     }
 
     #[test]

@@ -29,7 +29,7 @@ columns = [
 ";
     let folder = folder_with("spec.toml", spec);
     let shown = said(folder.path(), &["spec.toml"]);
-    assert!(shown.contains("18.21") && shown.contains("speed"), "{shown}");
+    assert!(shown.contains("18.21") && shown.contains("speed_up"), "{shown}");
     let results = folder.path().join("results/spec");
     let rows: Vec<RenderRow> = rows::read(&results.join("renders.csv")).unwrap();
     assert_eq!(rows.len(), 2 * (2 + 2 * 2));
