@@ -1,5 +1,6 @@
 use super::*;
 use crate::rows::{TraceRow, TraceTimeRow};
+use harness::rows::{FILES, Row};
 
 fn speed(scene: &str, library: &str, mode: &str, million_per_s: f64) -> Speed {
     let row = PeerRayRow {
@@ -15,6 +16,13 @@ fn speed(scene: &str, library: &str, mode: &str, million_per_s: f64) -> Speed {
         disagreements: 1,
     };
     Speed { row, turns: vec![million_per_s, million_per_s / 2.0] }
+}
+
+#[test]
+fn no_report_of_a_spec_may_replace_the_rows_of_traversals() {
+    for file in [TraceRow::FILE, TraceTimeRow::FILE] {
+        assert!(FILES.contains(&file), "{file}");
+    }
 }
 
 #[test]

@@ -103,6 +103,13 @@ fn what_the_prose_judges_is_a_fact() {
 }
 
 #[test]
+fn numbers_are_bound_to_as_many_ids_and_code_is_not() {
+    let bound = bound_numbers("As in `8<!-- =a -->`, 9<!-- =b -->.").unwrap();
+    assert_eq!(bound, [("9".to_owned(), "b".to_owned())]);
+    assert!(bound_numbers("only 1<!-- =a b -->").is_err());
+}
+
+#[test]
 fn a_correct_rounding_at_the_digits_shown_is_accepted() {
     for (shown, value) in
         [("8", 7.5), ("8", 8.49), ("0.07", 0.0651), ("−1.2", -1.16), ("1.50", 1.5)]

@@ -63,8 +63,11 @@ fn divide(rows: &mut [Row], measure: &str, file: &str, others: &str) {
     let columns: Vec<&str> = columns.split(" + ").collect();
     let column =
         measure.split(' ').nth(1).unwrap_or_else(|| panic!("{measure}: expected AGGREGATE COLUMN"));
-    let others = self::rows(file, conditions);
-    let others = grouped(&others, &columns).unwrap();
+    divide_by_least(rows, column, &self::rows(file, conditions), &columns);
+}
+
+fn divide_by_least(rows: &mut [Row], column: &str, others: &[Row], columns: &[&str]) {
+    let others = grouped(others, columns).unwrap();
     for row in rows {
         let names: Vec<String> = columns.iter().map(|name| row[*name].clone()).collect();
         let numbers = others[&names].iter().filter_map(|other| number_in(other, column));
@@ -156,4 +159,21 @@ fn heading(column: &str, name: &str) -> String {
         Ok(seconds) if column.ends_with("_seconds") => format!("{seconds:.4}"),
         _ => name.into(),
     }
+}
+
+#[test]
+fn values_are_rounded_and_divided_and_a_table_has_empty_cells_where_no_row_is() {
+    let text = "scene,method,cost,rays\na,\"x, y\",2,4\na,z,3,4\nb,z,5,\n";
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let mut rows: Vec<Row> = reader.deserialize().map(Result::unwrap).collect();
+    let all: Vec<&Row> = rows.iter().collect();
+    let shown = |measure: &str, decimals| show(&all, measure, decimals);
+    assert_eq!(shown("median cost", 1), "3.0");
+    assert_eq!(shown("max cost [cost, cost]", 0), "5 [2, 5]");
+    assert_eq!(shown("min cost / rays (rays)", 1), "0.5 (4.0)");
+    let table = pivot(&rows, "scene × method", "only cost", 0);
+    assert_eq!(table, "| scene | x, y | z |\n|---|---|---|\n| a | 2 | 3 |\n| b |  | 5 |");
+    let others = rows.clone();
+    divide_by_least(&mut rows, "cost", &others, &["scene"]);
+    assert_eq!(rows.iter().map(|row| &row["cost"]).collect::<Vec<_>>(), ["1", "1.5", "1"]);
 }
