@@ -76,9 +76,14 @@ fn kept(finished: usize, runs: usize) -> String {
 }
 
 impl Error {
-    /// Says after an interruption that no run is kept, because their folder is temporary.
-    pub(crate) fn without_kept_runs(self) -> Self {
+    /// Says after an interruption of a repetition that no run is kept, and places a failing report
+    /// in the committed results, because the folder of the repetition is temporary.
+    pub(crate) fn without_kept_runs(self, committed: &Path) -> Self {
         match self {
+            Self::Query { path, message } => {
+                let path = committed.join(path.file_name().unwrap_or_default());
+                Self::Query { path, message }
+            }
             Self::Interrupted { runs, .. } => Self::Interrupted { finished: 0, runs },
             error => error,
         }

@@ -147,11 +147,12 @@ pub(super) fn repeat(
     reference::adopt(&committed, temporary.path())?;
     let extent = Extent { parts: parts.to_vec(), ..Extent::default() };
     let summary = execute(experiment, temporary.path(), &extent, interrupted)
-        .map_err(Error::without_kept_runs)?;
+        .map_err(|error| error.without_kept_runs(&committed))?;
     let differences = check::compare(&summary.folder, &committed, &summary.skipped_scenes)?;
     print_outcome(experiment, &summary, "Compared with", &committed, quiet);
     let name = &experiment.name;
-    for scene in &summary.skipped_scenes {
+    // The tables say it otherwise.
+    for scene in summary.skipped_scenes.iter().filter(|_| quiet) {
         print_line(&format!("{name}: scene {scene} is not fetched; its rows are not compared"));
     }
     for difference in &differences {

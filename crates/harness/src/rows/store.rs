@@ -159,10 +159,10 @@ impl Store {
                 None => self.keep(index, &run)?,
                 Some(kept) => {
                     if let Some(name) = kept.difference(&run) {
-                        let (found, kept) = (file.display(), self.run_file(index));
-                        let kept = kept.display();
-                        let message = format!("{found} and {kept} have different {name}");
-                        return Err(Error::Usage(message));
+                        let file = file.display();
+                        return Err(Error::Usage(format!(
+                            "{file}: an earlier part, or --out, has this run with another {name}"
+                        )));
                     }
                 }
             }
@@ -219,7 +219,9 @@ fn run_file_name(index: usize) -> String {
     format!("{index:06}{RUN}")
 }
 
-/// Returns true if an interrupted experiment, or a part of one, has left finished runs in its folder.
+/// Returns true if an interrupted experiment, or a part of one, has left its spec in the folder, with
+/// finished runs or before the first one was finished. Other results in the folder then do not count:
+/// some of their files may be replaced already.
 pub fn is_unfinished(folder: &Path) -> bool {
     spec_of_part(folder).exists()
 }
@@ -248,7 +250,7 @@ mod tests {
         kept.adopt(part.folder(), 1).unwrap();
         part.keep(0, &run("2\n", "0.1\n")).unwrap();
         let error = kept.adopt(part.folder(), 1).unwrap_err().to_string();
-        assert!(error.ends_with("have different runs.csv"), "{error}");
+        assert!(error.ends_with("has this run with another runs.csv"), "{error}");
     }
 
     #[test]

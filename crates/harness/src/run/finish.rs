@@ -94,8 +94,9 @@ pub fn has_results_of(experiment: &Experiment, out: &Path) -> Result<bool, Error
 pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
     let folder = out.join(experiment.folder());
     let rejected = |fault: &str| Err(Error::Usage(format!("{}: {fault}", folder.display())));
+    let unfinished = "the experiment was interrupted; finish it with --resume first";
     if store::is_unfinished(&folder) {
-        return rejected("the experiment was interrupted; finish it with --resume first");
+        return rejected(unfinished);
     }
     let recorded: Option<Resolved> =
         toml::from_str(&read_text(&folder.join("resolved.toml"))?).ok();
@@ -112,6 +113,10 @@ pub fn redraw(experiment: &Experiment, out: &Path) -> Result<Summary, Error> {
     }
     let resolved = Resolved { experiment: experiment.clone(), scenes: recorded.scenes };
     let store = Store::lock(&folder)?;
+    // Another harness may have begun before the folder was locked.
+    if store::is_unfinished(&folder) {
+        return rejected(unfinished);
+    }
     // The rows are still the output of the program that ran, so its provenance is kept.
     let provenance: Provenance = read_toml(&folder.join("provenance.toml"))?;
     let text = report(&resolved, out, &provenance, &store)?;

@@ -5,10 +5,13 @@
 #![cfg_attr(windows, allow(unused_imports))]
 
 use crate::support::{
-    TABLE, begin, ended, folder_with, refused, reproducible, rows, run, said, send, text, wait_for,
+    TABLE, begin, ended, folder_with, names, program, refused, reproducible, rows, run, said, send,
+    text, wait_for,
 };
 use std::fs;
 use std::path::Path;
+use std::process::Stdio;
+use std::time::Duration;
 
 /// Creates a folder with the spec.
 fn folder() -> tempfile::TempDir {
@@ -75,6 +78,21 @@ fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
         &["of 240 runs are kept, `--resume` does the rest"],
     );
     assert!(folder.path().join("results/spec/.partial/000000.run").is_file());
+    said(folder.path(), &["spec.toml", "--resume"]);
+    // A repetition of finished results is in a temporary folder, which goes.
+    let results = folder.path().join("results/spec");
+    let finished = reproducible(&results);
+    let temporary = tempfile::tempdir().unwrap();
+    let mut repetition = program(folder.path(), &["spec.toml"]);
+    repetition.env("TMPDIR", temporary.path()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let child = repetition.spawn().unwrap();
+    while names(temporary.path()).is_empty() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    wait_for(&temporary.path().join(&names(temporary.path())[0]).join("spec/.partial/000000.run"));
+    send("-INT", &child);
+    ended(&child.wait_with_output().unwrap(), 130, &["interrupted; no run is kept"]);
+    assert!(reproducible(&results) == finished && names(temporary.path()).is_empty());
 }
 
 #[test]
@@ -205,7 +223,8 @@ fn without_reports_there_is_a_table_and_on_request_nothing_is_printed() {
     let folder = folder_with("plain.toml", spec);
     let output = run(folder.path(), &["plain.toml"]);
     let out = text(&output.stdout);
-    assert!(["spheres75", "median_cut", "least"].iter().all(|part| out.contains(part)), "{out}");
+    let parts = ["Runs:", "spheres75", "median_cut", "least_over_base"];
+    assert!(parts.iter().all(|part| out.contains(part)), "{out}");
     assert!(output.stderr.is_empty());
     let quiet = run(folder.path(), &["plain.toml", "--quiet", "--force"]);
     assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty());
@@ -228,6 +247,8 @@ fn reports_that_fail_leave_finished_results() {
     fs::write(path.join("plain.toml"), &wrong).unwrap();
     refused(path, &["plain.toml", "--redraw"], 1, &parts);
     assert!(!path.join("results/plain/.partial").exists());
+    // A repetition names the results, not its temporary folder.
+    refused(path, &["plain.toml"], 1, &parts);
     assert!(fs::read(&resolved).unwrap() == before);
     fs::write(path.join("plain.toml"), wrong.replace("SCENE", "spheres75")).unwrap();
     said(path, &["plain.toml", "--redraw"]);
