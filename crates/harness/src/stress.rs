@@ -67,8 +67,7 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
         let bytes = to_bytes(&broken, Path::new("cells.csv"))?;
         output.unwritten.push(("Broken promises".into(), bytes));
     }
-    let caption = "A mark per case and method: builders, searches, traversals, then readers of files \
-                   and others. Empty where the case has no check of it.";
+    let caption = "A mark per case and method. Empty where the case has no check of it.";
     output.add_figure(FIGURE, caption, 1, panels(&cells));
     Ok(output)
 }
