@@ -174,7 +174,7 @@ impl Loader<'_> {
     }
 
     fn add(&mut self, primitive: &Primitive, triangles: &mut Vec<Triangle>) -> Result<(), String> {
-        let mode = primitive.mode.unwrap_or(4);
+        let mode = primitive.mode;
         if mode > 6 {
             return Err(format!("mode {mode}; expected 0 to 6"));
         }

@@ -4,8 +4,8 @@
 //! statements that `Geometry` finds, because `tobj` 4.0.5 reads a polyline `l 1 2 3` as a triangle,
 //! skips the first vertex after a byte order mark, and rejects Latin-1 comments, comments at the end
 //! of a line, continued lines, and files in which only some vertices have a colour. Its errors name
-//! no line. `Geometry` therefore checks every number before `tobj` receives it. `tobj` would make fans
-//! of polygons, so that `Polygons` splits them instead.
+//! no line. `Geometry` therefore checks every number before `tobj` receives it. `tobj` would make
+//! fans of polygons, so that `Polygons` splits them instead.
 //!
 //! Points, lines, curves, names, groups, materials (whose files are never opened), normals and
 //! texture coordinates are ignored. Lines may end in LF, CRLF or CR, and a backslash at the end
@@ -72,6 +72,11 @@ struct Geometry {
 
 impl Geometry {
     /// Checks the statements of a file.
+    ///
+    /// # Errors
+    ///
+    /// The first fault in the order of the file. A fault of a vertex below the face that names it
+    /// is found only at the end of the file, and is reported last.
     fn of(bytes: &[u8]) -> Result<Self, Fault> {
         let mut geometry = Self::default();
         let mut statements = Statements::new(bytes);
@@ -107,23 +112,33 @@ impl Geometry {
             return Err(Fault::in_line(line, message));
         }
         let words = &words[..if matches!(length, 4 | 8) { 4 } else { 3 }];
-        let fault = || {
-            let expected = "expected finite numbers up to ±3.4e38, also divided by the weight";
-            let found = shown(&words.join(&b' '));
-            Fault::in_line(line, format!("vertex `{found}`; {expected}"))
+        let fault = |place: usize| {
+            let (part, expected) = match place {
+                3 => (
+                    "weight",
+                    "expected a finite number other than 0 that keeps the divided coordinates \
+                     within ±3.4e38",
+                ),
+                _ => ("coordinate", "expected a finite number up to ±3.4e38"),
+            };
+            let word = shown(words[place]);
+            Fault::in_line(line, format!("vertex {part} `{word}`; {expected}"))
         };
         let mut numbers = [1.0; 4];
-        for (place, word) in numbers.iter_mut().zip(words) {
-            *place = number(word).ok_or_else(fault)?;
+        for (place, word) in words.iter().enumerate() {
+            numbers[place] = number(word).ok_or_else(|| fault(place))?;
         }
         // `tobj` divides by the weight, and x / ∞ is finite.
         let [position @ .., weight] = numbers;
-        if weight.is_finite() && position.iter().all(|x| (x / weight).is_finite()) {
-            self.add(b'v', words.iter().copied());
-        } else {
-            // Some programs write vertices that they do not use in this way.
-            self.invalid.insert(self.vertices, fault());
-            self.text.extend(b"v 0 0 0\n");
+        let is_divisible = position.iter().all(|x| (x / weight).is_finite());
+        let infinite = numbers.iter().position(|number| !number.is_finite());
+        match infinite.or((!is_divisible).then_some(3)) {
+            None => self.add(b'v', words.iter().copied()),
+            Some(place) => {
+                // Some programs write vertices that they do not use in this way.
+                self.invalid.insert(self.vertices, fault(place));
+                self.text.extend(b"v 0 0 0\n");
+            }
         }
         Ok(())
     }
@@ -274,9 +289,13 @@ mod tests {
 
     #[test]
     fn an_endless_statement_needs_memory_for_a_limited_number_of_words() {
-        let text = format!("f{}", " 1 \\\n2 3".repeat(MOST_CORNERS));
-        let mut words = Vec::new();
-        assert_eq!(Statements::new(text.as_bytes()).next(&mut words), Some((b'f', 1)));
-        assert_eq!(words.len(), MOST_CORNERS + 1);
+        for line in [" 1 2 3", " 1 \\\n2 3"] {
+            let text = format!("f{}", line.repeat(MOST_CORNERS));
+            let mut words = Vec::new();
+            assert_eq!(Statements::new(text.as_bytes()).next(&mut words), Some((b'f', 1)));
+            assert_eq!(words.len(), MOST_CORNERS + 1);
+            let first = [b"1", b"2", b"3"].into_iter().cycle();
+            assert!(words.iter().zip(first).all(|(word, first)| word == first));
+        }
     }
 }

@@ -34,6 +34,7 @@ face 1 → face 2 & 4 0 1 → 2 0 1\n4 0 1 | faces of fewer than three vertices 
 4 0 1 2 3 → 4 0 1 2 3.0 ! a.ply:16: face 0 | `3.0`
 4 0 1 2 3 → 2 0 1 ! 4 vertices and 0 triangles
 property float x → property float u ! element vertex has other properties; expected x, y and z
+element vertex 4\n → element vertex 90000000000\nelement a 0\n ! element vertex has other properties
 element vertex 4 → element vertex 4000000000 ! a.ply:16: vertex 4, counted from 0
 format ascii → format octal ! a.ply:2: format `octal 1.0`; expected ascii, binary_little
 ply\n → p\x00ly\n ! a.ply:1: `p\x00ly`; expected ply
@@ -66,6 +67,7 @@ endsolid\r\n → |
 vertex 1 0e0 0\r → vertex 1 0 0 4\r ! a.stl:5: `4`; expected a keyword
 vertex 1 0e0 0\r → vertex 1 0 inf\r ! a.stl:5: | `1 0 inf` | three finite
 vertex 1 0e0 0\r → vertex 1 0\r ! a.stl:5: | `1 0`
+solid → \xef\xbb\xbfsolid & vertex 1 0e0 0\r → vertex 1 0\r ! a.stl:5: | `1 0`
    vertex 1 0e0 0\r\n → \r\n ! a.stl:7: | 2 vertices
 endfacet\r\nendsolid\r\nsolid\r → vertecks\r ! a.stl:8: | `vertecks`
 ";
@@ -80,6 +82,7 @@ v 0 0 0 → v 0 0 0 1 0.5 nan & v 1 0 0 → v 1 0 0 1 1 1 1 |
 \nv 1 1 0.5 ⇒ \nv 1 1 0.5 1 0.5 nan 0 1 |
 v 1 1 0.5 → v 2 2 1 2 & v 0 1 0.5 → v 0 -2 -1 -2 |
 f 1 → v nan 1.#QNAN -nan(ind)\nf 1 | vertices that no face uses: 1
+f 1 → v 1 1 1 0\nf 1 | vertices that no face uses: 1
 f 1 → fo 1 |
 f 1 2 3 4 → f 1 2 3 4 1 |
 f 1 2 3 4 → f -4 -3 -2 -1 |
@@ -96,14 +99,15 @@ f 1 2 3 4 → mtllib none.mtl\nusemtl\nusemtl gold\ng\no\ns off\nf 1 2 3 4\ncurv
 f 1 2 3 4 → o a\nf 1 2 3\ng b\nusemtl c\nf 1 3 4 |
 f 1 2 3 4 → f 1 2 3 4\nf 1 2\nf\nf 1 | faces of fewer than three vertices skipped: 3
 f 1 → w 7 7 7\ncurv 0 1 \x5c\n1 2\nfx 1 2 4\nf 1 | lines with unknown keywords ignored: 2 (`w` in line 5)
-f 1 2 3 4 → v nan 0 0\nf 1 2 5 ! a.obj:5: vertex `nan 0 0`; expected finite numbers
-f 1 2 3 4 → v 1 -1.#IND 0\nf 1 2 -1 ! a.obj:5: | `1 -1.#IND 0` | finite
-f 1 2 3 4 → f 1 2 5\n\nv 0 -inf 0 ! a.obj:7: | `0 -inf 0` | finite
-f 1 2 3 4 → v 0 0 1e39\nf 5 1 2 ! a.obj:5: | `0 0 1e39` | up to ±3.4e38
-f 1 2 3 4 → v 0 0 0 0\nf 1 2 5 ! a.obj:5: | `0 0 0 0` | divided by the weight
-f 1 2 3 4 → v 1e30 0 0 1e-30\nf 1 2 5 ! a.obj:5: | `1e30 0 0 1e-30` | divided
-f 1 2 3 4 → v 1 1 1 inf\nf 1 2 5 ! a.obj:5: | `1 1 1 inf` | finite
-f 1 2 3 4 → v 0 0 0,5 ! a.obj:5: | `0 0 0,5` | finite number
+f 1 2 3 4 → v nan 0 0\nf 1 2 5 ! a.obj:5: vertex coordinate `nan`; expected a finite number up to ±3.4e38
+f 1 2 3 4 → v 1 -1.#IND 0\nf 1 2 -1 ! a.obj:5: | `-1.#IND` | finite
+f 1 2 3 4 → f 1 2 5\n\nv 0 -inf 0 ! a.obj:7: | `-inf` | finite
+f 1 2 3 4 → v 0 0 1e39\nf 5 1 2 ! a.obj:5: | `1e39` | up to ±3.4e38
+f 1 2 3 4 → v 0 0 0 0\nf 1 2 5 ! a.obj:5: | weight `0` | other than 0
+f 1 2 3 4 → v 1e30 0 0 1e-30\nf 1 2 5 ! a.obj:5: | weight `1e-30` | divided
+f 1 2 3 4 → v 1 1 1 inf\nf 1 2 5 ! a.obj:5: | weight `inf` | finite
+f 1 → v 0.12345678901234567 1.12345678901234567 nan\nf 5 ! a.obj:5: vertex coordinate `nan`
+f 1 2 3 4 → v 0 0 0,5 ! a.obj:5: | `0,5` | finite number
 f 1 2 3 4 → v 0 0 ! a.obj:5: | length 2 | 3 (x y z)
 f 1 2 3 4 → v 0 0 0 1 1 ! a.obj:5: | length 5 | 3 (x y z)
 f 1 2 3 4 → f 0 1 2 ! a.obj:5: | `0` | from 1
@@ -142,6 +146,9 @@ const GLTF: &str = r#"
 "scene": 0 → "scene": 4294967296 ! scenes[4294967296]
 "nodes": [0] → "nodes": [4294967296] ! nodes[4294967296]
 {"asset" → {"extras": {"mesh": 4294967296}, "asset" |
+{"version" → {"copyright": "\xa9 2019", "extras": [1e999, "\x5cud800"], "version" |
+"version" → "version": "2.0", "version" ! duplicate field `version`
+"indices": 1 → "indices": 1, "mode": null ! invalid type: null
 "#;
 
 /// Asserts that the file contains the square, and nothing but what the remark names.

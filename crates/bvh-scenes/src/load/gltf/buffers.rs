@@ -1,4 +1,4 @@
-//! The buffers of a glTF file. What a URI names is read when a mesh first needs it, and once.
+//! The buffers of a glTF file. A buffer is read when a mesh first needs it, and a file once.
 
 use super::document::Document;
 use super::{MOST_BYTES, get};
@@ -6,7 +6,8 @@ use crate::files::{read, regular};
 use data_url::DataUrl;
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
+use std::rc::Rc;
 
 /// The buffers of one glTF file.
 pub struct Buffers<'a> {
@@ -14,8 +15,10 @@ pub struct Buffers<'a> {
     path: &'a Path,
     /// The binary chunk of a GLB file.
     chunk: Option<&'a [u8]>,
-    /// What the URIs name that a mesh has needed. Several buffers may have the same.
-    contents: BTreeMap<&'a str, Vec<u8>>,
+    /// The contents of the URIs of buffers that a mesh has needed, by the buffer's number.
+    contents: BTreeMap<usize, Rc<Vec<u8>>>,
+    /// The contents of files by their canonical path. Several buffers may name the same file.
+    files: BTreeMap<PathBuf, Rc<Vec<u8>>>,
     /// Bytes read so far.
     total: u64,
     /// Items of accessors read so far.
@@ -25,7 +28,8 @@ pub struct Buffers<'a> {
 impl<'a> Buffers<'a> {
     /// Prepares the buffers of the file at `path` without reading any.
     pub fn new(document: &'a Document, path: &'a Path, chunk: Option<&'a [u8]>) -> Self {
-        Self { document, path, chunk, contents: BTreeMap::new(), total: 0, item_count: 0 }
+        let (contents, files) = (BTreeMap::new(), BTreeMap::new());
+        Self { document, path, chunk, contents, files, total: 0, item_count: 0 }
     }
 
     /// Returns the bytes of a buffer, which is read if no mesh has needed it before.
@@ -33,7 +37,7 @@ impl<'a> Buffers<'a> {
         let buffer = get(&self.document.buffers, number, "buffers")?;
         let in_buffer = |message: String| format!("buffers[{number}]: {message}");
         let bytes = match (&buffer.uri, self.chunk) {
-            (Some(uri), _) => self.contents(uri).map_err(in_buffer)?,
+            (Some(uri), _) => self.contents(number, uri).map_err(in_buffer)?,
             (None, Some(chunk)) if number == 0 => chunk,
             (None, _) => {
                 let expected =
@@ -49,50 +53,57 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    fn contents(&mut self, uri: &'a str) -> Result<&[u8], String> {
-        if !self.contents.contains_key(uri) {
+    fn contents(&mut self, number: usize, uri: &str) -> Result<&[u8], String> {
+        if !self.contents.contains_key(&number) {
             let bytes = self.read(uri)?;
-            self.contents.insert(uri, bytes);
+            self.contents.insert(number, bytes);
         }
-        Ok(&self.contents[uri])
+        Ok(&self.contents[&number])
     }
 
-    fn read(&mut self, uri: &str) -> Result<Vec<u8>, String> {
+    fn read(&mut self, uri: &str) -> Result<Rc<Vec<u8>>, String> {
         if let Ok(data) = DataUrl::process(uri) {
             let (bytes, _) = data.decode_to_vec().map_err(|_| "a data URI of invalid base64")?;
             self.count(bytes.len() as u64)?;
-            return Ok(bytes);
+            return Ok(Rc::new(bytes));
         }
         if uri.contains("://") {
             return Err(format!("`{uri}`; expected a file in this folder, or a data URI"));
         }
         let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
-        let path = self.path.with_file_name(&*name);
-        if !self.is_allowed(Path::new(&*name), &path) {
-            return Err(format!(
+        let path = self.allowed(Path::new(&*name)).ok_or_else(|| {
+            format!(
                 "`{name}` may be outside the scene's folder; accepted: a file in this folder or \
                  below, by a path without `..`"
-            ));
+            )
+        })?;
+        if let Some(bytes) = self.files.get(&path) {
+            return Ok(Rc::clone(bytes));
         }
         // A file that is too long is rejected before it takes memory.
         self.count(regular(&path).map_err(|error| error.to_string())?)?;
-        read(&path).map_err(|error| error.to_string())
+        let bytes = Rc::new(read(&path).map_err(|error| error.to_string())?);
+        self.files.insert(path, Rc::clone(&bytes));
+        Ok(bytes)
     }
 
-    /// Returns whether the file at `path`, by this name in a URI, is in the folder of the glTF file
-    /// or below. Otherwise the author of a file would decide which files of the user are opened.
-    fn is_allowed(&self, name: &Path, path: &Path) -> bool {
+    /// Returns the canonical path of the file by this name in a URI if it is in the folder of the
+    /// glTF file or below. Otherwise the author of a file would decide which files of the user are
+    /// opened.
+    fn allowed(&self, name: &Path) -> Option<PathBuf> {
         // The name is judged first, because the answer must not reveal whether the file exists.
         let is_below = |part| matches!(part, Component::Normal(_) | Component::CurDir);
         if !name.components().all(is_below) {
-            return false;
+            return None;
         }
+        let path = self.path.with_file_name(name);
         // A missing file has no canonical path; the reader then reports that the file is missing.
-        let Ok(path) = fs::canonicalize(path) else { return true };
+        let Ok(path) = fs::canonicalize(&path) else { return Some(path) };
         // A file name without a folder has the empty parent, which cannot be canonicalised.
         let folder = Path::new(".").join(self.path.parent().unwrap_or(Path::new("")));
         // Canonical paths follow symbolic links, which the name alone does not reveal.
-        fs::canonicalize(folder).is_ok_and(|folder| path.starts_with(folder))
+        let folder = fs::canonicalize(folder).ok()?;
+        path.starts_with(folder).then_some(path)
     }
 
     /// Adds to the bytes read so far, and rejects more than a scene can use.
@@ -117,13 +128,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("b.bin"), [7; 60]).unwrap();
         let path = folder.path().join("scene.gltf");
-        let buffer = r#"{"byteLength": 60, "uri": "b.bin"}"#;
-        let json = format!(r#"{{"buffers": [{buffer}, {buffer}]}}"#);
-        let document = serde_json::from_str(&json).unwrap();
+        let names = ["b.bin", "b.bin", "./b.bin", "%62.bin"];
+        let list = names.map(|name| format!(r#"{{"byteLength": 60, "uri": "{name}"}}"#)).join(", ");
+        let document = serde_json::from_str(&format!(r#"{{"buffers": [{list}]}}"#)).unwrap();
         let mut buffers = Buffers::new(&document, &path, None);
-        for number in [0, 1] {
+        for number in [0, 1, 2, 3, 3] {
             assert_eq!(buffers.bytes(number), Ok(&[7; 60][..]));
         }
-        assert_eq!(buffers.total, 60);
+        assert_eq!((buffers.files.len(), buffers.total), (1, 60));
     }
 }

@@ -29,7 +29,7 @@ const COVERED: &str = "EXT_lights_ies EXT_lights_image_based EXT_mesh_features E
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
 pub struct Document {
-    asset: Value,
+    asset: Asset,
     pub scene: Option<usize>,
     pub scenes: Vec<Scene>,
     pub nodes: Vec<Node>,
@@ -40,6 +40,12 @@ pub struct Document {
     pub animations: Vec<IgnoredAny>,
     pub extensions_used: Vec<String>,
     extensions_required: Vec<String>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Asset {
+    version: Value,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -72,8 +78,13 @@ pub struct Mesh {
 pub struct Primitive {
     pub attributes: BTreeMap<String, usize>,
     pub indices: Option<usize>,
-    /// Points, three kinds of lines, triangles (4, the default), strips and fans of triangles.
-    pub mode: Option<u32>,
+    /// Points, three kinds of lines, triangles, strips and fans of triangles.
+    #[serde(default = "triangles")]
+    pub mode: u32,
+}
+
+fn triangles() -> u32 {
+    4
 }
 
 #[derive(Debug, Deserialize)]
@@ -120,7 +131,7 @@ pub fn document(bytes: &[u8]) -> Result<(Document, Option<&[u8]>), Fault> {
     let zeros = json.iter().rev().take_while(|&&byte| byte == 0).count();
     let document: Document = serde_json::from_slice(&json[..json.len() - zeros])
         .map_err(|error| Fault::of_file(format!("{error} of the JSON")))?;
-    let version = &document.asset["version"];
+    let version = &document.asset.version;
     let version = version.as_str().map_or_else(|| version.to_string(), Into::into);
     if !version.starts_with("2.") {
         return Err(Fault::of("asset", format!("version `{version}`; expected 2.0")));
