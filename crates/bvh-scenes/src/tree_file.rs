@@ -93,7 +93,9 @@ mod tests {
     fn a_tree_file_is_read_completely_and_nothing_else_is_opened() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.bvh");
-        assert!(matches!(read(folder.path()), Err(TreeFileError::Read(_))));
+        for wrong in [folder.path(), &path, Path::new("/dev/zero")] {
+            assert!(matches!(read(wrong), Err(TreeFileError::Read(_))), "{}", wrong.display());
+        }
         fs::write(&path, tree()).unwrap();
         assert_eq!(read(&path).unwrap(), tree());
     }
@@ -105,11 +107,16 @@ mod tests {
         let length = 64 << 30;
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("huge.bvh");
-        fs::write(&path, tree()).unwrap();
-        File::options().write(true).open(&path).unwrap().set_len(length).unwrap();
-        let Err(TreeFileError::Invalid { source, .. }) = read(&path) else {
-            panic!("no fault of the contents")
-        };
-        assert_eq!(source, FileError::Length { found: length, expected: tree().len() as u64 });
+        for (beginning, expected) in [
+            (vec![], FileError::Magic),
+            (tree(), FileError::Length { found: length, expected: tree().len() as u64 }),
+        ] {
+            fs::write(&path, beginning).unwrap();
+            File::options().write(true).open(&path).unwrap().set_len(length).unwrap();
+            let Err(TreeFileError::Invalid { source, .. }) = read(&path) else {
+                panic!("no fault of the contents")
+            };
+            assert_eq!(source, expected);
+        }
     }
 }

@@ -51,8 +51,14 @@ mod tests {
     }
 
     #[test]
-    fn colours_end_at_the_top_and_a_picture_without_tests_is_dark() {
+    fn more_tests_are_brighter_up_to_the_top_and_a_picture_without_tests_is_dark() {
         let film = |tests: Vec<u64>| Film { tests, ..Film::default() };
+        let shades: Vec<f64> = colours(&film((0..=64).collect()), 64.0)
+            .iter()
+            .map(|colour| colour.map(f64::from))
+            .map(|[r, g, b]| 0.2126 * r + 0.7152 * g + 0.0722 * b)
+            .collect();
+        assert!(shades.is_sorted_by(|a, b| a < b), "{shades:?}");
         assert_eq!(colours(&film(vec![5, 9]), 5.0), [scale(2)[1]; 2]);
         let dark = film(vec![0; 40]);
         assert_eq!(colours(&dark, range(dark.tests.clone()).top), [scale(2)[0]; 40]);

@@ -60,7 +60,7 @@ fn interval(ray: &Ray, aabb: &Aabb) -> Option<RangeInclusive<f32>> {
 mod tests {
     use super::*;
     use bvh_build::{Builder, median_cut};
-    use bvh_core::TestCounts;
+    use bvh_core::{Node, TestCounts};
     use glam::Vec3;
 
     #[test]
@@ -73,17 +73,19 @@ mod tests {
         let ray = Ray::half_line(Vec3::new(-1.0, 0.5, 0.5), Vec3::X).unwrap();
         let mut order = vec![];
         let mut counts = TestCounts::default();
-        let entry = |id: u32, _| {
+        let entry = |id: u32, t_max| {
             order.push(id);
-            Some((2 * id + 1) as f32)
+            Some((2 * id + 1) as f32).filter(|t| *t <= t_max)
         };
         let hit = nearest_hit(&tree, &ray, entry, &mut counts);
         assert_eq!(hit, Some(Hit { t: 1.0, object: 0 }));
         assert_eq!(counts, TestCounts { boxes: tree.nodes.len() as u64, objects: 100 });
         assert!(order[0] >= 50, "{order:?}");
-        for (t, is_in_a_leaf) in [(0.5, false), (1.0, true), (200.0, true), (200.5, false)] {
-            let hit = nearest_hit(&tree, &ray, |_, _| Some(t), &mut ());
-            assert_eq!(hit.is_some(), is_in_a_leaf, "{t}");
+        let leaf = Bvh { nodes: vec![Node::leaf(boxes[0], 0, 1)], prim_ids: vec![0] };
+        // The ray is in the box from 1 to 2.
+        for (t, is_in_leaf) in [(0.5, false), (1.0, true), (2.0, true), (2.5, false)] {
+            let hit = nearest_hit(&leaf, &ray, |_, _| Some(t), &mut ());
+            assert_eq!(hit.is_some(), is_in_leaf, "{t}");
         }
     }
 }
