@@ -14,8 +14,8 @@ pub fn scenes(answer: &mut Answer) -> Result<(), Error> {
         answer.say(&line(name, &count, kind, description));
         answer.list("scenes", json!({ "name": name, "objects": objects, "kind": kind }));
     };
-    for (name, triangles, description) in STAND_INS {
-        add(name, Some(triangles().len()), "stand-in", description);
+    for scene in STAND_INS {
+        add(scene.name, Some((scene.triangles)().len()), "stand-in", scene.character);
     }
     for (name, count) in SPHERES {
         add(name, Some(count), "procedural", "Spheres, as in the second source document.");

@@ -44,7 +44,8 @@ pub struct Scene {
     pub remark: Option<String>,
 }
 
-/// A scene that is neither built in, nor fetched, nor a readable mesh file, or that has no triangles.
+/// A scene that is neither built in, nor fetched, nor a readable mesh file, or that has no
+/// triangles.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("scene {name}: {message}")]
 pub struct SceneError {
@@ -96,8 +97,8 @@ impl Scene {
     }
 
     fn load_whole(name: &str) -> Result<Self, SceneError> {
-        if let Some((_, triangles, _)) = stand_ins::STAND_INS.iter().find(|scene| scene.0 == name) {
-            let triangles = Primitives::Triangles(triangles());
+        if let Some(scene) = stand_ins::STAND_INS.iter().find(|scene| scene.name == name) {
+            let triangles = Primitives::Triangles((scene.triangles)());
             return Ok(Self::new(name, SceneKind::StandIn, triangles));
         }
         if let Some(&(_, count)) = SPHERES.iter().find(|(spheres, _)| *spheres == name) {
@@ -195,7 +196,7 @@ pub fn fetched_path(name: &str) -> Option<PathBuf> {
 }
 
 fn known_names() -> impl Iterator<Item = &'static str> {
-    let names = stand_ins::STAND_INS.iter().map(|scene| scene.0);
+    let names = stand_ins::STAND_INS.iter().map(|scene| scene.name);
     names.chain(SPHERES.map(|(name, _)| name)).chain(FETCHED.map(|(name, _)| name))
 }
 

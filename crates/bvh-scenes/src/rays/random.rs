@@ -85,8 +85,8 @@ impl Kind {
     }
 }
 
-/// A place of a camera, in world units, or in fractions of a scene's box: 0 is the lower corner and 1
-/// the upper corner. The default, in fractions, sees a scene from outside.
+/// A place of a camera, in world units, or in fractions of a scene's box: 0 is the lower corner and
+/// 1 the upper corner. The default, in fractions, sees a scene from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",

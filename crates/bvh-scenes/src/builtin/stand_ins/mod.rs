@@ -14,15 +14,47 @@ mod pinecon2;
 use bvh_core::Triangle;
 pub use mesh_builder::{cos_sin, jitter};
 
-/// Generates a scene, in a few milliseconds.
-pub type Generator = fn() -> Vec<Triangle>;
+/// A procedural scene that replaces an original.
+#[derive(Clone, Copy, Debug)]
+pub struct StandIn {
+    /// The name on the command line and in specs, which is that of Ng & Trifonov's (2003) original.
+    pub name: &'static str,
+    /// A description in one sentence.
+    pub character: &'static str,
+    /// The generator, which takes a few milliseconds.
+    pub triangles: fn() -> Vec<Triangle>,
+}
 
-/// The five mesh scenes, in the order of the paper's tables: the name of Ng & Trifonov's (2003)
-/// original, the generator, and a description in one sentence.
-pub const STAND_INS: [(&str, Generator, &str); 5] = [
-    ("bijou", bijou::triangles, "A ring with a brilliant-cut stone and a chain, on a cushion."),
-    ("cloister", cloister::triangles, "An arcaded courtyard with groin vaults and tiled roofs."),
-    ("escher", escher::triangles, "Staircases that interlock under three directions of gravity."),
-    ("konistil", konistil::triangles, "A valley with a town and a railway, in millimetres."),
-    ("pinecon2", pinecon2::triangles, "A fractal pine cone whose scales carry smaller scales."),
+/// The five mesh scenes, in the order of the paper's tables.
+pub const STAND_INS: [StandIn; 5] = [
+    StandIn {
+        name: "bijou",
+        character: "A ring with a brilliant-cut stone, a halo, pavé shoulders and a chain on a \
+                    cushion.",
+        triangles: bijou::triangles,
+    },
+    StandIn {
+        name: "cloister",
+        character: "An arcaded courtyard: twin columns, round arches, groin vaults, tiled roofs, \
+                    a well.",
+        triangles: cloister::triangles,
+    },
+    StandIn {
+        name: "escher",
+        character: "Staircases, landings, arches and balustrades that interlock under three \
+                    directions of gravity.",
+        triangles: escher::triangles,
+    },
+    StandIn {
+        name: "konistil",
+        character: "A valley with a town, a station, a viaduct and power lines, in millimetres on \
+                    a map grid.",
+        triangles: konistil::triangles,
+    },
+    StandIn {
+        name: "pinecon2",
+        character: "A fractal pine cone whose scales carry smaller scales on the same golden-angle \
+                    spiral.",
+        triangles: pinecon2::triangles,
+    },
 ];
