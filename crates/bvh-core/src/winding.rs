@@ -94,8 +94,11 @@ impl Patch {
             whole.center += part.area * part.center;
             whole.aabb = whole.aabb.union(&part.aabb);
         }
-        // Any centre will do where nothing has an area.
-        whole.center /= if whole.area > 0.0 { whole.area } else { 1.0 };
+        // Nothing without an area winds round a point; with the radius 0 it is never opened.
+        if whole.area == 0.0 {
+            return whole;
+        }
+        whole.center /= whole.area;
         for part in parts {
             let h = part.center - whole.center;
             whole.normal += part.normal;
@@ -242,6 +245,18 @@ mod tests {
 
     fn points(count: Range<usize>) -> impl Strategy<Value = Vec<Vec3>> {
         prop::collection::vec(prop::array::uniform3(-1.0f32..1.0).prop_map(Vec3::from), count)
+    }
+
+    #[test]
+    fn no_patch_without_area_is_opened() {
+        let degenerate = [Vec3::X, Vec3::Y].map(|end| Patch::of(&Triangle([end, end, Vec3::ONE])));
+        let patches = [&[][..], &degenerate[..]].map(|of| Patch::merged(of.iter().cloned()));
+        let whole = Patch::merged(patches.iter().cloned());
+        for patch in patches.iter().chain([&whole]) {
+            for point in [DVec3::X, DVec3::ONE, DVec3::splat(0.6)] {
+                assert_eq!(patch.estimate(point), Some([0.0; 2]), "{patch:?}");
+            }
+        }
     }
 
     proptest! {
