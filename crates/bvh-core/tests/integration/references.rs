@@ -18,6 +18,7 @@ fn a_tree_without_a_part_or_an_object_is_rejected() {
         Err(InvalidBvh::ObjectCount { named: split.prim_ids.len(), objects: triangles.len() })
     );
     let objects = &triangles.as_slice();
+    let mut shrunk = 0;
     for (index, node) in split.nodes.iter().enumerate() {
         if node.prims().len() != 1 {
             continue;
@@ -26,7 +27,17 @@ fn a_tree_without_a_part_or_an_object_is_rejected() {
         let mut other = split.clone();
         other.prim_ids[position] = (split.prim_ids[position] + 1) % triangles.len() as u32;
         assert!(validate_references(&other, &boxes, objects).is_err(), "{index}");
+        let object = split.prim_ids[position];
+        let parts = split.prim_ids.iter().filter(|&&id| id == object).count();
+        if parts > 1 && node.aabb.extent().y > 0.1 {
+            let mut smaller = split.clone();
+            smaller.nodes[index].aabb.max.y -= 0.05;
+            let fault = Err(InvalidBvh::Uncovered { object: object as usize });
+            assert_eq!(validate_references(&smaller, &boxes, objects), fault, "{index}");
+            shrunk += 1;
+        }
     }
+    assert!(shrunk > 10, "{shrunk}");
 }
 
 #[test]
