@@ -119,6 +119,11 @@ fn visits_come_back_and_only_those_of_a_monotone_measure_are_accepted() {
             let shorter = TreeFile::open(&bytes[..bytes.len() - cut]);
             assert!(matches!(shorter, Err(FileError::Length { .. })));
         }
+        let ids = 192 + size_of_val(&tree.nodes[..]);
+        for position in [40, 192, ids, bytes.len() - 1] {
+            let damaged = with_field(&bytes, position, &[bytes[position] ^ 1]);
+            assert_eq!(TreeFile::open(&damaged).unwrap_err(), FileError::Checksum, "{position}");
+        }
         let last = visits.len() - 1;
         for wrong in [-1.0, 1.5, f32::NAN, f32::INFINITY] {
             let mut wrong_visits = visits.clone();
