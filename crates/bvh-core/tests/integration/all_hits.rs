@@ -110,9 +110,12 @@ fn compare_with_exact_arithmetic(count: usize) -> usize {
     let mut crossed = 0;
     for (name, triangles, inside) in closed_meshes() {
         let wide = layout(&triangles, 0);
-        for origin in [inside, OUTSIDE] {
+        for (origin, parity) in [(inside, 1), (OUTSIDE, 0)] {
             for ray in rays_through(&triangles, origin, count, &mut random) {
                 let hits = wide.all_hits(&ray);
+                if ray.origin() == origin {
+                    assert_eq!(hits.len() % 2, parity, "{name}: {ray:?}");
+                }
                 for (object, triangle) in (0..).zip(&triangles) {
                     let case = || format!("{name}: {ray:?} {triangle:?}");
                     let hit = hits.iter().find(|hit| hit.object == object);
