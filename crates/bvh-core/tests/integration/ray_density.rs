@@ -138,16 +138,17 @@ fn three_quarters_of_the_rays_that_end_on_a_wall_enter_the_flat_box_around_it() 
     // Downwards, onto walls at all heights between the grid points at 16 and 17. Without the longer
     // segments it would be half of the rays.
     let mut random = Random(5);
-    let mut entries = 0.0;
-    for i in 0..16u8 {
-        let height = 16.0 + (f32::from(i) + 0.5) / 16.0;
+    let mut entries_at = |height: f32| {
         let mut downwards = || {
             let [x, z] = [GRID * random.unit(), GRID * random.unit()];
             Segment { from: [x, 30.2, z], to: [x, height, z] }
         };
         let rays: Vec<Segment> = (0..1000).map(|_| downwards()).collect();
         let wall = Aabb::from([[0.0, height, 0.0], [GRID, height, GRID]]);
-        entries += RayDensity::of_rays(&bounds(), &rays, 0.0).unwrap().entries(&wall);
-    }
+        RayDensity::of_rays(&bounds(), &rays, 0.0).unwrap().entries(&wall)
+    };
+    let entries: f64 = (0..16u8).map(|i| entries_at(16.0 + (f32::from(i) + 0.5) / 16.0)).sum();
     assert!((0.7..0.8).contains(&(entries / 16_000.0)), "{entries}");
+    // A longer segment crosses the grid's plane below a wall that is nearer than a quarter of a cell.
+    assert_eq!(entries_at(16.125), 1000.0);
 }
