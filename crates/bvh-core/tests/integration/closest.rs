@@ -50,7 +50,7 @@ fn brute_force(triangles: &[Triangle], point: Vec3) -> (f64, u32) {
 #[test]
 fn the_closest_point_is_as_close_as_that_of_any_triangle_at_every_scale() {
     let mut random = Random(1);
-    for exponent in [-120, -60, 0, 60, 120, 126] {
+    for exponent in [-120, -60, 0, 60, 100, 110, 120, 126] {
         let scale = libm::exp2f(exponent as f32);
         // All of the last scene is on one side of zero, and the largest point far on the other.
         let aside =
@@ -58,9 +58,10 @@ fn the_closest_point_is_as_close_as_that_of_any_triangle_at_every_scale() {
         for scene in [soup(150, &mut random), ball(3), grid_box(3), aside] {
             let triangles = scaled(&scene, scale);
             let corner = random.of(&triangles).0[1];
-            let mut points =
-                vec![corner, Vec3::ZERO, Vec3::splat((9.0 * scale).min(f32::MAX)), Vec3::MAX];
+            let distant = Vec3::splat((9.0 * scale).min(f32::MAX));
+            let mut points = vec![corner, Vec3::ZERO, distant, Vec3::MAX, Vec3::MIN];
             points.extend((0..200).map(|_| random.point() * 1.5 * scale));
+            points.extend((0..20).map(|_| random.point() * Vec3::MAX));
             for shape in 0..SHAPES.len() {
                 let mut closest = vec![None; points.len()];
                 let wide = layout(&triangles, shape);
