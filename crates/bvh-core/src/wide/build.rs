@@ -173,7 +173,7 @@ mod tests {
     }
 
     /// Checks that the layout has the least cost for rays that enter a box as often as its size
-    /// says.
+    /// says, that boxes are nested, and that every triangle is in one leaf.
     fn check_optimal(tree: &Bvh, wide: &WideBvh, size: impl Fn(&Aabb) -> f64) {
         let cost_of_leaf = |aabb: &Aabb, objects: f64| {
             size(aabb) * f64::from(BLOCK_COST) * (objects / TriangleBlock::LANES as f64).ceil()
@@ -211,5 +211,20 @@ mod tests {
         };
         let found: f64 = wide.boxes().map(cost).sum();
         assert!((found - least).abs() < 1e-5 * least, "{found} is not {least}");
+        let mut ids = Vec::new();
+        for (aabb, child) in wide.boxes() {
+            if child.is_node() {
+                let node = &wide.nodes[child.index()];
+                let mut boxes = (0..WideNode::LANES).filter_map(|lane| node.lane_box(lane));
+                assert!(boxes.all(|inner| aabb.contains(&inner)));
+            } else {
+                let of_block = |block: &TriangleBlock| {
+                    Vec::from_iter((0..block.len()).map(|lane| block.id(lane)))
+                };
+                ids.extend(wide.leaf(child).iter().flat_map(of_block));
+            }
+        }
+        ids.sort_unstable();
+        assert!(ids.into_iter().eq(0..tree.prim_ids.len() as u32));
     }
 }
