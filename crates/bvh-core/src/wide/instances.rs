@@ -177,8 +177,8 @@ pub struct Instances {
 
 impl Instances {
     /// Makes a scene of `instances` of `parts`, with a tree over the [boxes of the
-    /// instances](Instance::boxes). If instances move, they need a refitted or new tree, but no new
-    /// parts. O(instances).
+    /// instances](Instance::boxes), whose boxes it makes tight. If instances move, they need a
+    /// refitted or new tree, but no new parts. O(instances).
     pub fn new(
         parts: Vec<WideBvh>,
         instances: Vec<Instance>,
