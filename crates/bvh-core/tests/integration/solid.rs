@@ -1,5 +1,6 @@
 //! Points are inside of meshes, closed or not, exactly where the sum over all triangles says so.
 
+use crate::support::layouts::divided;
 use crate::support::{Random, SHAPES, ball, boxes, closed_meshes, grid_box, scaled, soup, tree};
 use InsideRule::{Auto, Parity, Winding};
 use bvh_core::{Aabb, Bvh, InsideRule, Node, Solid, Triangle, WideBvh};
@@ -148,7 +149,7 @@ fn a_divided_triangle_counts_once() {
     let triangles = outward(ball(2))[3..].to_vec();
     let count = triangles.len() as u32;
     let all = boxes(&triangles).iter().fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
-    let tree = Bvh {
+    let halves = Bvh {
         nodes: vec![
             Node::inner(all, 1, 2),
             Node::leaf(all, 0, count),
@@ -156,12 +157,21 @@ fn a_divided_triangle_counts_once() {
         ],
         prim_ids: (0..count).chain(0..count).collect(),
     };
-    let wide = WideBvh::new(&tree, &triangles).unwrap();
+    let mut random = Random(5);
+    let mut parts = tree(&boxes(&triangles), SHAPES[0], &mut random);
+    // So many parts that some subtrees have no triangle that is not counted elsewhere.
+    while parts.prim_ids.len() < 20 * triangles.len() {
+        (parts, _) = divided(&parts, &triangles, &mut random);
+    }
     let points: Vec<Vec3> = (0..200).map(|i| Vec3::Y * (i as f32 / 50.0 - 2.0)).collect();
-    let mut inside = vec![false; points.len()];
-    Solid::new(&tree, &triangles).contains(&wide, &points, Winding, &mut inside);
-    assert_eq!(inside, contains(&triangles, 0, &points, Winding));
-    assert!(inside.contains(&true));
+    let expected = contains(&triangles, 0, &points, Winding);
+    assert!(expected.contains(&true));
+    for tree in [halves, parts] {
+        let wide = WideBvh::new(&tree, &triangles).unwrap();
+        let mut inside = vec![false; points.len()];
+        Solid::new(&tree, &triangles).contains(&wide, &points, Winding, &mut inside);
+        assert_eq!(inside, expected);
+    }
 }
 
 #[test]
