@@ -49,6 +49,7 @@ fn folder() -> tempfile::TempDir {
     write("file", b"");
     write("mesh.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     write("wrong.toml", b"count = 9\nbouncy = 1\ncameras = []\n");
+    write("blind.toml", b"cameras = [{ eye = [1.0, 2.0, 3.0] }]\n");
     write("none.toml", b"bounces = 1");
     let away = "1000,1000,1000,1001,1002,1003\n".repeat(9);
     write("away.csv", away.as_bytes());
@@ -113,6 +114,7 @@ bake spheres75 LONG --method=grasp --from=good.bvh ! grasp | --from | best
 bake spheres75 LONG --method=grasp --references=1.5 ! --references 1.5 with --method grasp | best
 bake spheres75 LONG --references=nan ! --references is NaN; accepted: 1 to 16
 bake spheres75 LONG --rays=wrong.toml ! wrong.toml | line 2 | bouncy | bounces
+bake spheres75 LONG --rays=blind.toml ! blind.toml | line 1 | target
 bake spheres75 LONG --rays=none.toml ! none.toml | cameras is empty | eye
 bake spheres75 LONG --rays=gone.toml ! --rays | gone.toml | no such file
 bake escher LONG --rays=away.csv ! away.csv: none of the 9 segments meets the box of scene escher

@@ -75,9 +75,10 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
         _ => Existing::Keep,
     };
     let extent = Extent { existing, runs: args.runs.clone(), ..Extent::default() };
-    // Nor must a missing scene of the last spec; those of the first are loaded at once.
-    for (path, experiment) in args.specs.iter().zip(&experiments).skip(1) {
-        if !args.redraw {
+    // A missing scene of a later spec is an error now, not after the hours of the specs before it.
+    // Resumed and selected runs are too short for every scene to be loaded twice.
+    if !args.redraw && !args.resume && args.runs.is_empty() {
+        for (path, experiment) in args.specs.iter().zip(&experiments).skip(1) {
             load_scenes(experiment).map_err(|error| args.overrides.named(path, error))?;
         }
     }
