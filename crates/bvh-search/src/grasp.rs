@@ -26,6 +26,7 @@ use bvh_build::top_down::Workspace;
 use bvh_build::{BuildError, Presorted, muller_fellner};
 use bvh_config::Nested;
 use bvh_core::Bvh;
+use std::sync::{Mutex, PoisonError};
 
 bvh_config::config! {
     /// The construction, and the number of trees.
@@ -99,8 +100,10 @@ impl Config {
         while next < self.trials && run.stopped().is_none() {
             let end =
                 self.trials.min(next.saturating_add(run.evaluations_left(construction).min(most)));
-            // Only trees below the incumbent can win, so only these are kept.
+            // Only trees below the incumbent, and below the trials before them, can win, so only
+            // these are kept.
             let limit = run.incumbent();
+            let costs = Mutex::default();
             let results = map_init((end - next) as usize, Default::default, |buffers, index| {
                 let number = next + index as u64;
                 if number > 0 && observer.cancelled() {
@@ -119,8 +122,8 @@ impl Config {
                 }
                 let work = self.improve(tree, metric, observer)?;
                 let cost = problem.cost(tree);
-                let tree = (cost < limit).then(|| std::mem::take(tree));
-                Ok(Some(Trial { cost, work, tree }))
+                let is_kept = cost < limit && can_win(&costs, index, cost);
+                Ok(Some(Trial { cost, work, tree: is_kept.then(|| std::mem::take(tree)) }))
             });
             for result in results {
                 let result: Result<_, SearchError> = result;
@@ -159,6 +162,15 @@ impl Config {
         }
         Ok(tally.work)
     }
+}
+
+/// Returns whether no trial before this one in its batch costs as little, as far as their `costs`
+/// are known. A later trial may be dropped, because the budget ends before it.
+fn can_win(costs: &Mutex<Vec<(usize, f64)>>, index: usize, cost: f64) -> bool {
+    let mut costs = costs.lock().unwrap_or_else(PoisonError::into_inner);
+    let loses = costs.iter().any(|&(other, of_other)| other < index && of_other <= cost);
+    costs.push((index, cost));
+    !loses
 }
 
 /// Number of trials between two checks of the budget, without local search.
