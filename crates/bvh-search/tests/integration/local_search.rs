@@ -4,11 +4,11 @@ use crate::{scatter, work};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, Bvh, Node, cost, validate};
 use bvh_search::{
-    Budget, Method, Observer, Outcome, Problem, Search, SearchError, StopReason, best, genetic,
-    optimize, ruin_recreate, solve,
+    Budget, Event, Method, Observer, Outcome, Problem, Search, SearchError, StopReason, best,
+    genetic, optimize, rebuild, ruin_recreate, solve,
 };
 use proptest::prelude::*;
-use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
 const METHODS: [&str; 7] =
     ["reinsertion", "rotation", "treelet", "annealing", "rebuild", "ruin_recreate", "best"];
@@ -19,7 +19,7 @@ fn methods() -> impl Iterator<Item = Method> {
 }
 
 /// The builder of the tree that local searches begin with.
-fn construction() -> muller_fellner::Config {
+pub(crate) fn construction() -> muller_fellner::Config {
     let heuristic = muller_fellner::Heuristic::AreaTimesPower(0.9);
     muller_fellner::Config { heuristic, ..Default::default() }
 }
@@ -74,7 +74,16 @@ fn subtrees_annealed_in_parallel_do_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn budgets_end_a_search_where_they_say() {
+fn budgets_and_observers_end_a_search_where_they_say() {
+    struct AfterTheStart(AtomicBool);
+    impl Observer for AfterTheStart {
+        fn event(&self, _: &Event) {
+            self.0.store(true, Relaxed);
+        }
+        fn cancelled(&self) -> bool {
+            self.0.load(Relaxed)
+        }
+    }
     let boxes = scatter(1000, 4);
     for method in methods() {
         for max_work in [0, 1, 5_000, 100_000] {
@@ -96,6 +105,11 @@ fn budgets_end_a_search_where_they_say() {
             outcome.evaluations
         );
         assert_eq!(outcome.stop, StopReason::Evaluations);
+        let after_the_start = AfterTheStart(false.into());
+        let outcome =
+            solve(&method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &after_the_start).unwrap();
+        assert_eq!(outcome.stop, StopReason::Cancelled, "{}", method.name());
+        validate(&outcome.tree, &boxes).unwrap();
     }
 }
 
@@ -109,6 +123,14 @@ fn a_budget_barely_above_what_the_best_does_without_one_is_kept() {
         let outcome = solve(&config, &Problem::new(&boxes), 5, work(max_work), &()).unwrap();
         assert!(outcome.work <= max_work + 2000, "{} of {max_work}", outcome.work);
     }
+}
+
+#[test]
+fn a_small_budget_gives_no_worse_a_tree_than_a_smaller_one() {
+    let boxes = scatter(300, 1);
+    let best = Method::Best(best::Config::default());
+    let costs = [1, 600, 1200, 2400, 4800, 5900].map(|max_work| run(&best, &boxes, max_work).cost);
+    assert!(costs.is_sorted_by(|before, after| before >= after), "{costs:?}");
 }
 
 #[test]
@@ -201,6 +223,8 @@ fn parameters_that_contradict_others_or_that_no_poll_could_interrupt_are_named()
     let ruin = ruin_recreate::Ruin { removed: u32::MAX, ..Default::default() };
     let ruin = ruin_recreate::Config { ruin, ..Default::default() };
     assert_eq!(error(&ruin, 0), "ruin.removed is 4294967295; accepted: 1 to 1000");
+    let climb = rebuild::Config { climb: 1 << 31, ..Default::default() };
+    assert_eq!(error(&climb, 0), "climb is 2147483648; accepted: 0 to 1000");
     let population = genetic::Config { population: 1_000_000, ..Default::default() };
     assert_eq!(error(&population, 1024), "population is 1000000; accepted: at most 262144");
 }
