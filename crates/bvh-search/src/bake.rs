@@ -231,8 +231,8 @@ impl<'a> Bake<'a> {
         is_best.then_some(Splits { division: self.division, ..splits })
     }
 
-    /// Divides the objects with spatial splits, unless they stay whole anyway. `None` if the
-    /// observer cancels first.
+    /// Divides the objects with spatial splits, or copies the caller's division, unless they stay
+    /// whole anyway. `None` if the observer cancels first.
     pub fn divided(&self, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
         best::division(self.splits(), self.boxes, observer)
     }

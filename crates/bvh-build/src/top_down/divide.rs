@@ -248,7 +248,7 @@ fn build<C: SplitCost>(
     let mut stack = vec![task];
     while let Some(task) = stack.pop() {
         if pace.ends_after(task.objects()) {
-            // The tree is incomplete, and `finish` clears it.
+            // The tree is incomplete, and `divide_by_cost` clears it.
             return;
         }
         // Two objects have one split, and the order along x decides which is left.
