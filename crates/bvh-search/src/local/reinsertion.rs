@@ -141,7 +141,8 @@ fn pass_plain(
         done.work += search.visits - visits_before;
         if let Some(position) = position {
             tree.begin();
-            done.work += tree.detach(node).2 + tree.attach(node, position.sibling).1;
+            done.work += tree.detach(node).2;
+            done.work += tree.attach(node, position.sibling).1;
             done.kept += 1;
         }
     }

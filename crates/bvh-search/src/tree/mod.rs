@@ -297,7 +297,8 @@ impl<M: Metric> Working<M> {
 /// Returns the node's part of the area of a tree. Adding 0 for a leaf changes no sum.
 #[inline(always)]
 fn part(node: &Node, metric: impl Metric) -> f64 {
-    if node.is_leaf() { metric.leaf_cost() * node.area } else { node.area }
+    let of_leaf = metric.leaf_cost() * node.area;
+    core::hint::select_unpredictable(node.is_leaf(), of_leaf, node.area)
 }
 
 #[cfg(test)]
