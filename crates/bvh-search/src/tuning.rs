@@ -5,8 +5,9 @@
 //! on two virtual cores over the meshes and stand-ins, one at a time, by the commands named here.
 //! Each trades cost at one budget for cost at another; none affects correctness.
 //!
-//! Units: *work* is nodes created or visited; *sort times* are multiples of the time that the
-//! Morton sort of the scene takes, about 25 ns per object; a *fraction* is of the quantity named.
+//! The comment behind a value is its unit: *work* is nodes created or visited; *sort times* are
+//! multiples of the time that the Morton sort of the scene takes, about 25 ns per object; a
+//! *fraction* is of the quantity named.
 
 use bvh_build::ploc::Config as Clustering;
 
@@ -146,8 +147,8 @@ pub(crate) const COLD_MEMORY: f64 = 2.5; // factor
 pub(crate) const WARM_SAMPLE: usize = 16; // divisor of the number of objects
 /// Time reserved for converting and evaluating the tree after reinsertion.
 pub(crate) const FINISH_TIME: f64 = 2.0; // sort times
-/// The clustering that reinsertion starts from. A better clustering takes the time of more
-/// reinsertions than it saves.
+/// The clustering that reinsertion starts from, in clusters and rounds. A better clustering takes
+/// the time of more reinsertions than it saves.
 pub(crate) const CLUSTERING: Clustering = Clustering { radius: 5, near_rounds: 1 };
 /// Part of the nodes that the first pass reinserts, the largest first. Every further pass
 /// doubles it.
