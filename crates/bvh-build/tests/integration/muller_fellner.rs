@@ -176,11 +176,31 @@ proptest! {
             boxes.sort_by(|a, b| a.doubled_centroid().x.total_cmp(&b.doubled_centroid().x));
         }
         let expected = Config::default().build(&boxes);
-        for [same_order, sorted, flat] in [[false, true, true], [true, false, true], [true, true, false], [false; 3]] {
-            let config = Config {
-                skip_same_order: same_order, skip_sorted: sorted, skip_flat: flat, ..Config::default()
-            };
+        for config in skipping_less() {
             prop_assert_eq!(&config.build(&boxes), &expected, "{:?}", config);
+        }
+    }
+}
+
+fn skipping_less() -> [Config; 4] {
+    let skipping = |[skip_same_order, skip_sorted, skip_flat]: [bool; 3]| Config {
+        skip_same_order,
+        skip_sorted,
+        skip_flat,
+        ..Config::default()
+    };
+    [[false, true, true], [true, false, true], [true, true, false], [false; 3]].map(skipping)
+}
+
+#[test]
+fn skipping_work_changes_nothing_where_threads_divide_the_objects() {
+    let x = |i| hash(i, 3, 65_521);
+    let line = |i| sized_box(([x(i), 0.5, 0.5], [0.25, 0.0, 0.0]));
+    let diagonal = |i| sized_box(([x(i), x(i), hash(i, 11, 65_521)], [9.0, 9.0, 0.0]));
+    for boxes in [(0..5000).map(line).collect::<Vec<_>>(), (0..5000).map(diagonal).collect()] {
+        let expected = Config::default().build(&boxes);
+        for config in skipping_less() {
+            assert!(config.build(&boxes) == expected, "{config:?}");
         }
     }
 }

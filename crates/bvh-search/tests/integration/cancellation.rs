@@ -34,7 +34,7 @@ impl Judge for Judged {
 
 #[test]
 fn a_cancelled_search_returns_the_tree_of_its_caller_without_an_evaluation() {
-    let boxes = scatter(300, 1);
+    let boxes = scatter(100_000, 1);
     let judged = Judged::default();
     let problem = Problem { judge: Some(&judged), ..Problem::new(&boxes) };
     let tree = median_cut::Config::default().build(&boxes).unwrap();
@@ -43,9 +43,10 @@ fn a_cancelled_search_returns_the_tree_of_its_caller_without_an_evaluation() {
         let polls = Polls { polled: 0.into(), until: 0 };
         let outcome =
             solve_or_keep(&method, &problem, Some(kept), 1, Budget::UNLIMITED, &polls).unwrap();
-        assert_eq!(outcome.tree, tree, "{}", method.name());
+        assert!(outcome.tree == tree, "{}", method.name());
         assert_eq!((outcome.cost, outcome.evaluations), (7.0, 0), "{}", method.name());
         assert_eq!(outcome.stop, StopReason::Cancelled);
+        assert!(polls.polled.into_inner() < 100, "{}", method.name());
     }
     assert_eq!(judged.0.into_inner(), 0);
 }
@@ -109,14 +110,15 @@ fn a_search_that_is_cancelled_during_its_first_construction_returns_the_tree_of_
 
 #[test]
 fn searches_of_many_trees_are_cancelled_between_them_and_within_one_and_keep_the_incumbent() {
-    for method in [
-        Method::Grasp(grasp::Config { trials: u64::MAX, ..Default::default() }),
-        Method::RandomOrders(random_orders::Config { trials: u64::MAX, ..Default::default() }),
-        Method::Genetic(genetic::Config { generations: u64::MAX, ..Default::default() }),
-    ] {
-        for (objects, until) in [(300, 0), (60_000, 400)] {
-            let boxes = scatter(objects, 1);
-            let problem = Problem::new(&boxes);
+    for (objects, until, population) in [(300, 0, 800_000), (60_000, 400, 4)] {
+        let boxes = scatter(objects, 1);
+        let problem = Problem::new(&boxes);
+        let genetic = genetic::Config { population, generations: u64::MAX, ..Default::default() };
+        for method in [
+            Method::Grasp(grasp::Config { trials: u64::MAX, ..Default::default() }),
+            Method::RandomOrders(random_orders::Config { trials: u64::MAX, ..Default::default() }),
+            Method::Genetic(genetic),
+        ] {
             let polls = Polls { polled: 0.into(), until };
             let outcome = solve(&method, &problem, 1, Budget::UNLIMITED, &polls).unwrap();
             validate(&outcome.tree, &boxes).unwrap();
