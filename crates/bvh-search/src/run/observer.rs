@@ -24,7 +24,7 @@ pub(crate) const WORK_PER_POLL: u64 = 1 << 14;
 /// Follows a search. The search may call it from any thread. `()` ignores everything.
 ///
 /// ```
-/// use bvh_search::{Bake, Event, Observer, prelude::*};
+/// use bvh_search::{Event, Observer, prelude::*};
 /// /// A time limit that prints every improvement.
 /// struct Printed(Deadline);
 /// impl Observer for Printed {
@@ -38,9 +38,15 @@ pub(crate) const WORK_PER_POLL: u64 = 1 << 14;
 ///         self.0.progress()
 ///     }
 /// }
-/// let boxes: Vec<Aabb> = (0..9u8).map(f32::from).map(|x| Aabb::from([[x; 3], [x + 1.5; 3]])).collect();
-/// Bake::new(&boxes).search(None, &Printed(Deadline::after(Duration::from_millis(9))))?;
-/// # Ok::<(), bvh_search::SearchError>(())
+/// let corners = (0..300u16).map(|i| [17, 71, 173].map(|factor| f32::from(i * factor % 251)));
+/// let boxes: Vec<Aabb> = corners.map(|low| Aabb::from([low, low.map(|x| x + 9.0)])).collect();
+/// // Any binary tree will do, also one from another library.
+/// let tree = median_cut::Config::default().build(&boxes)?;
+/// let limit = Printed(Deadline::after(Duration::from_millis(300)));
+/// let method = best::Config::default();
+/// let found = optimize(&tree, &Problem::new(&boxes), &method, 1, Budget::UNLIMITED, &limit)?;
+/// assert!(found.cost < cost::internal_area(&tree));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Observer: Sync {
     /// Called after every event of the history, in order.
