@@ -51,7 +51,7 @@ impl Sphere {
         if discriminant < 0.0 {
             return None;
         }
-        let half_chord = libm::sqrt(length2 * discriminant);
+        let half_chord = (length2 * discriminant).sqrt();
         // The sum of two numbers of the same sign does not cancel.
         let q = along + half_chord.copysign(along);
         // A product, because the difference of the squares would cancel near the surface.

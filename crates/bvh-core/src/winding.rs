@@ -29,6 +29,7 @@
 
 use crate::collapse::collapse_at_most;
 use crate::cost::SahConstants;
+use crate::validate::Marks;
 use crate::{Aabb, Bvh, BvhView, Triangle};
 use core::f64::consts::PI;
 use core::ops::Range;
@@ -172,13 +173,13 @@ impl Winding {
         let Bvh { nodes, prim_ids } = collapse_at_most(tree, &free_leaves, LEAF);
         let mut patches = vec![Patch::EMPTY; nodes.len()];
         let mut sorted = Vec::with_capacity(triangles.len());
-        let mut is_seen = vec![false; triangles.len()];
+        let mut seen = Marks::new(triangles.len());
         // Children come after their parents.
         for (index, node) in nodes.iter().enumerate().rev() {
             let first = sorted.len();
             for &id in &prim_ids[node.prims()] {
                 // A divided triangle belongs to one of its leaves.
-                if !core::mem::replace(&mut is_seen[id as usize], true) {
+                if seen.set(id as usize) {
                     sorted.push(triangles[id as usize]);
                 }
             }

@@ -47,8 +47,8 @@ impl Search for Config {
     }
 }
 
-/// Returns the optimum and ends the run, if there is no judge, the scene is [tiny](most_work_of_tiny)
-/// and the optimum takes no more work than `work` and the rest of the run's budget.
+/// Returns the optimum and ends the run, if the scene is [tiny](most_work_of_tiny) and the optimum
+/// takes no more work than `work` and the rest of the run's budget.
 pub(crate) fn instead(
     problem: &Problem,
     work: u64,
@@ -56,7 +56,7 @@ pub(crate) fn instead(
 ) -> Result<Option<Bvh>, SearchError> {
     let least = most_work_of_tiny(problem.boxes.len());
     let worth = least.is_some_and(|least| least <= work.min(run.left().work));
-    if !worth || problem.judge.is_some() || !problem.allows(Shortcut::Tiny) {
+    if !worth || !problem.allows(Shortcut::Tiny) {
         return Ok(None);
     }
     let tree = Config {}.search(problem, 0, run)?;

@@ -122,7 +122,7 @@ impl Config {
         watch: &Watch,
     ) -> Result<(), BuildError> {
         let objects = scene.boxes.len();
-        let (of_areas, of_weights, costs);
+        let (of_weights, costs);
         // What only tables compare is not compiled once more for the sake of its speed.
         let cost: &dyn SplitCost = match self.heuristic {
             Heuristic::AreaTimesCount => {
@@ -133,10 +133,7 @@ impl Config {
                 let powers = AreaTimesPower::new(objects, p);
                 return self.division(&powers, scene, watch).divide(measure, rule, workspace, tree);
             }
-            Heuristic::AreaOnly(reading) => {
-                of_areas = reading;
-                &of_areas
-            }
+            Heuristic::AreaOnly(ref reading) => reading,
             Heuristic::AreaTimesCost(made_up) => {
                 costs = made_up.costs(objects);
                 of_weights = AreaTimesWeight(&costs);

@@ -92,11 +92,11 @@ fn rays(bounds: &Aabb, index: u32) -> Option<[Ray; 2]> {
     let [x, y, z, height, turn] = [(); 5].map(|()| {
         step /= RATIO;
         let place = 0.5 + step * f64::from(index);
-        place - libm::floor(place)
+        place - place.floor()
     });
     let up = 1.0 - 2.0 * height;
     let (sin, cos) = libm::sincos(TAU * turn);
-    let direction = DVec3::new(cos, sin, 0.0) * libm::sqrt(1.0 - up * up) + DVec3::Z * up;
+    let direction = DVec3::new(cos, sin, 0.0) * (1.0 - up * up).sqrt() + DVec3::Z * up;
     let extent = bounds.extent();
     let point = bounds.min.as_dvec3() + DVec3::new(x, y, z) * extent;
     let centre = 0.5 * bounds.doubled_centroid();

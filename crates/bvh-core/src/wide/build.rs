@@ -218,10 +218,8 @@ mod tests {
                 let mut boxes = (0..WideNode::LANES).filter_map(|lane| node.lane_box(lane));
                 assert!(boxes.all(|inner| aabb.contains(&inner)));
             } else {
-                let of_block = |block: &TriangleBlock| {
-                    Vec::from_iter((0..block.len()).map(|lane| block.id(lane)))
-                };
-                ids.extend(wide.leaf(child).iter().flat_map(of_block));
+                let triangles = wide.leaf(child).iter().flat_map(TriangleBlock::triangles);
+                ids.extend(triangles.map(|(id, _)| id));
             }
         }
         ids.sort_unstable();

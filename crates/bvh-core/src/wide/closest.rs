@@ -66,7 +66,7 @@ impl Nearest {
         is_found.then(|| Closest {
             object: self.object,
             point: self.target + self.offset,
-            distance: libm::sqrt(self.distance_squared),
+            distance: self.distance_squared.sqrt(),
         })
     }
 }

@@ -1,6 +1,6 @@
 //! Hits and distances agree with real arithmetic, rounded once: a comparison with exact rationals.
 
-use crate::support::Random;
+use crate::support::{Random, size};
 use bvh_core::{PreparedRay, Ray, Triangle};
 use glam::Vec3;
 use num_bigint::BigInt;
@@ -128,7 +128,7 @@ fn target(triangle: &Triangle, random: &mut Random) -> Vec3 {
 /// Returns rays towards points where the decision is hard.
 fn hard_ray(triangle: &Triangle, random: &mut Random) -> Option<Ray> {
     let [a, b, c] = triangle.0;
-    let size = triangle.0.iter().fold(0.0f32, |size, p| size.max(p.abs().max_element()));
+    let size = size(std::slice::from_ref(triangle));
     let target = target(triangle, random);
     let mut axis_parallel = Vec3::ZERO;
     axis_parallel[random.below(3)] = random.of(&[1.0, -1.0, 0.125, 3.0]);

@@ -16,11 +16,12 @@ use crate::local::incumbent::Incumbent;
 use crate::local::{TOLERANCE, construction, reinsertion};
 use crate::parallel;
 use crate::run::{
-    Found, Observer, Problem, Quota, Run, SearchError, Stream, Tally, stream, watched,
+    Found, Observer, Problem, Quota, Run, SearchError, Stream, Tally, built_unless_cancelled,
+    stream,
 };
 use crate::tree::{ANCHOR, Metric, Working, search_by_metric};
+use bvh_build::Presorted;
 use bvh_build::top_down::Workspace;
-use bvh_build::{BuildError, Presorted};
 use bvh_core::cost::Measure;
 use bvh_core::{Aabb, Bvh};
 use rand::RngExt;
@@ -215,12 +216,11 @@ impl Config {
         let mut other = Bvh::default();
         let scene = Presorted::new(&boxes)?;
         let workspace = &mut Workspace::default();
-        let constructed = watched(observer, |watch| {
+        let constructed = built_unless_cancelled(observer, |watch| {
             construction().construct(&scene, measure, Some(&mut rule), workspace, &mut other, watch)
-        });
-        match constructed {
-            Err(BuildError::Cancelled) => return Ok((None, Tally::default())),
-            constructed => constructed?,
+        })?;
+        if constructed.is_none() {
+            return Ok((None, Tally::default()));
         }
         let mut other = Working::from_bvh(&other, tree.metric())?;
         let mut tally = reinsertion::to_local_optimum(&mut other, quota, observer);

@@ -64,8 +64,8 @@ pub(crate) fn unless_behind(found: Outcome, fallback: Option<Outcome>) -> Outcom
     }
 }
 
-/// Divides objects from the top down with spatial splits, if they may be divided and the caller has
-/// no division; `None` if the observer cancels first. If the result has no more references than
+/// Divides objects from the top down with spatial splits, or copies the caller's division; `None` if
+/// they may not be divided, or if the observer cancels first. If the result has no more references than
 /// objects, no plane saves anything. A search would then hardly find a saving either, and would
 /// spend its work on looking.
 pub(crate) fn division(

@@ -44,9 +44,9 @@ impl<'p> Incumbent<'p> {
         let area = area(problem, &tree, cost);
         run.record(cost, tree.nodes.len() as u64);
         // The bound holds for areas and undivided objects only.
-        let Problem { boxes, measure, splits, objective, judge, .. } = *problem;
-        let of_areas = measure.is_none() && judge.is_none() && objective != Objective::Layout;
-        let is_bounded = of_areas && splits.is_none() && problem.allows(Shortcut::BoundMet);
+        let Problem { boxes, measure, splits, objective, .. } = *problem;
+        let of_areas = measure.is_none() && splits.is_none() && objective != Objective::Layout;
+        let is_bounded = of_areas && problem.allows(Shortcut::BoundMet);
         let lower_bound =
             if is_bounded { lower_bound::of_largest(boxes) } else { f64::NEG_INFINITY };
         let incumbent = Self { problem: *problem, area, tree, lower_bound };

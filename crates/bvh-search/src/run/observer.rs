@@ -2,7 +2,6 @@
 
 use super::error::SearchError;
 use bvh_build::{BuildError, Watch};
-use bvh_core::Bvh;
 use core::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// One point of a search's history: a trial, a generation, or an improvement.
@@ -82,11 +81,11 @@ pub(crate) fn watched<T>(observer: &dyn Observer, construct: impl FnOnce(&Watch)
     construct(&Watch::new(&|| observer.cancelled()))
 }
 
-/// Builds a tree with a watch that the observer can cancel; `None` if it does.
-pub(crate) fn built_unless_cancelled(
+/// Calls `construct` with a watch that the observer can cancel; `None` if it does.
+pub(crate) fn built_unless_cancelled<T>(
     observer: &dyn Observer,
-    construct: impl FnOnce(&Watch) -> Result<Bvh, BuildError>,
-) -> Result<Option<Bvh>, SearchError> {
+    construct: impl FnOnce(&Watch) -> Result<T, BuildError>,
+) -> Result<Option<T>, SearchError> {
     match watched(observer, construct) {
         Err(BuildError::Cancelled) => Ok(None),
         built => Ok(Some(built?)),

@@ -83,9 +83,10 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Returns whether the search may use this shortcut.
+    /// Returns whether the search may use this shortcut. With a judge it may use none: they end a
+    /// search by areas.
     pub fn allows(&self, shortcut: Shortcut) -> bool {
-        !self.disabled.contains(&shortcut)
+        self.judge.is_none() && !self.disabled.contains(&shortcut)
     }
 }
 

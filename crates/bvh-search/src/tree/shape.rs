@@ -1,7 +1,6 @@
 //! The shape of a tree alone, for trees that wait while another is searched.
 
-use super::{ANCHOR, Metric, NONE, Node, Working, part};
-use bvh_core::cost::Sum;
+use super::{ANCHOR, Metric, NONE, Node, Working};
 use bvh_core::{Aabb, PackedAabb};
 
 /// A tree of whole objects without its boxes: in preorder, the object of every leaf, and `NONE` for
@@ -42,7 +41,6 @@ impl<M: Metric> Working<M> {
             let area = self.metric.of(&aabb);
             (self.nodes[index].aabb, self.nodes[index].area) = (aabb, area);
         }
-        let area: Sum = self.nodes.iter().skip(1).map(|node| part(node, self.metric)).collect();
-        self.restart(area);
+        self.forget_changes();
     }
 }
