@@ -242,16 +242,15 @@ impl<'a> Bake<'a> {
         self.start.is_some_and(|tree| tree.prim_ids.len() > self.boxes.len())
     }
 
-    /// Passes the sections of the [file](bvh_core::file) of a tree over these objects to `write`,
-    /// with the tree's cost for random lines, which the file records. `work` is the work of all
-    /// searches that led to the tree.
+    /// Passes the sections of the [file](bvh_core::file) of a tree over these objects to `write`.
+    /// `work` is the work of all searches that led to the tree.
     ///
     /// Rejects a tree that is not valid over the objects. O(nodes + objects).
     pub fn write<T>(
         &self,
         tree: &Bvh,
         work: u64,
-        write: impl FnOnce(&[&[u8]], f64) -> T,
+        write: impl FnOnce(&[&[u8]]) -> T,
     ) -> Result<T, FileError> {
         let objective = self.objective();
         let mut cost = 0.0;
@@ -277,7 +276,7 @@ impl<'a> Bake<'a> {
         let name = if self.rays.is_some() { format!("{name} for rays") } else { name.into() };
         let origin = Origin { method: &name, seed: self.seed, work, visits: &visits, objective };
         let sections = file::sections(tree, self.boxes, cost, &origin, &parallel::call_both)?;
-        Ok(write(&sections.each_ref().map(|section| &**section), cost))
+        Ok(write(&sections.each_ref().map(|section| &**section)))
     }
 
     /// Returns the visits of all nodes by the rays; none if there are no rays.

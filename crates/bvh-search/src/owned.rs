@@ -157,7 +157,7 @@ impl OwnedTree {
 
     /// Returns the tree as a file, which [`load`](Self::load) and the program `bvh` read.
     pub fn save(&self) -> Result<Vec<u8>, FileError> {
-        self.bake().write(&self.tree, self.work, |sections, _| sections.concat())
+        self.bake().write(&self.tree, self.work, |sections| sections.concat())
     }
 
     /// The cost of the tree by `objective`. O(nodes).

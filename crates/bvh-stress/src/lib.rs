@@ -17,7 +17,7 @@
 
 mod case;
 mod checks;
-pub mod exact;
+mod exact;
 pub mod examine;
 mod methods;
 mod table;

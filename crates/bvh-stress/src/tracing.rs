@@ -99,10 +99,14 @@ fn together(wide: &WideBvh, rays: &[Ray], coherence: Coherence) -> Vec<(Option<H
     nearest.into_iter().map(|hit| (!hit.is_miss()).then_some(hit)).zip(any).collect()
 }
 
+/// Returns the bits of an answer, for exact comparison.
+pub fn bits(hit: Option<Hit>) -> Option<(u32, u32)> {
+    hit.map(|hit| (hit.t.to_bits(), hit.object))
+}
+
 /// Checks P3: for all rays the traversal gives the answers of testing every object, bit by bit.
 /// Returns the number of rays that hit.
 pub fn check(traversal: Traversal, objects: &Primitives, rays: &[Ray]) -> Result<usize> {
-    let bits = |hit: Option<Hit>| hit.map(|hit| (hit.t.to_bits(), hit.object));
     let (_, brute_force) = singly("", objects, Structure::Brute);
     let expected = brute_force(rays);
     let ways = traversal(objects)?;

@@ -6,7 +6,7 @@ use super::canvas::{Colour, Dash, Point, Sheet, WHITE};
 use super::model::{Figure, Hue, Layer};
 
 /// The colour of text and axes.
-pub(super) const INK: Colour = RGBColor(0x22, 0x22, 0x22);
+pub(super) const INK: Colour = colour(Hue::Ink);
 /// The colour of captions and reference lines.
 pub(super) const GREY: Colour = RGBColor(0x55, 0x55, 0x55);
 /// The colour of grid lines at labelled ticks.
@@ -34,6 +34,12 @@ const MARKERS: [Star; 7] = [
     (5, 0.45, 0.75),
 ];
 
+/// Returns the colour of a hue.
+const fn colour(hue: Hue) -> Colour {
+    let [_, red, green, blue] = (hue as u32).to_be_bytes();
+    RGBColor(red, green, blue)
+}
+
 /// The colour, dash and marker of one series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Stroke {
@@ -46,9 +52,8 @@ impl Stroke {
     /// The stroke of the series of this number in its figure. Successive ones can be told apart in
     /// grey.
     fn of(hue: Hue, number: usize) -> Self {
-        let [_, red, green, blue] = (hue as u32).to_be_bytes();
         Self {
-            colour: RGBColor(red, green, blue),
+            colour: colour(hue),
             dash: DASHES[number % DASHES.len()],
             marker: MARKERS[number % MARKERS.len()],
         }

@@ -147,14 +147,15 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
         // with the number of objects from being rounded down.
         plan.references = (references as f64 + 0.5) / objects as f64;
     }
-    // Without a budget the decision may add references.
-    let least = if args.budget.is_none() { decide::REFERENCES } else { 1.0 };
     hold();
+    let mut most_references = plan.references;
     if args.budget.is_none() {
         plan.effort = decide::work(objects, answer);
+        // The decision may add references.
+        most_references = most_references.max(decide::REFERENCES);
     }
     // Reserving the file first reports a full disk before the search and not after it.
-    let bytes = plan::most_bytes(&scene, plan.references.max(least));
+    let bytes = plan::most_bytes(&scene, most_references);
     let reserved = Reserved::new(&out, bytes, args.out.is_none())?;
     let (plan, prepared) = decide(args, plan, &scene, answer)?;
     let found = plan.search(&scene, start.as_ref(), prepared)?;

@@ -137,7 +137,7 @@ impl Found<'_> {
     /// Writes the file of the tree. Returns its number of bytes.
     pub fn save(&self, path: &Path, reserved: Reserved) -> Result<usize, Error> {
         let bake = self.plan.bake(self.scene, self.density.as_ref());
-        let written = bake.write(&self.baked.outcome.tree, self.work, |sections, _| {
+        let written = bake.write(&self.baked.outcome.tree, self.work, |sections| {
             reserved.write(sections)?;
             Ok(sections.iter().map(|section| section.len()).sum())
         });

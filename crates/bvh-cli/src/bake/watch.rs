@@ -72,7 +72,10 @@ impl Observer for Watch {
     }
 
     fn progress(&self) -> Option<f64> {
-        self.deadline.progress().filter(|_| matches!(self.effort, Effort::Time(_)))
+        match self.effort {
+            Effort::Time(_) => self.deadline.progress(),
+            Effort::Work(_) => None,
+        }
     }
 }
 

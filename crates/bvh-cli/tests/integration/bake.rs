@@ -1,6 +1,8 @@
 //! Baking from the command line: the trees, the choices, and the files in all circumstances.
 
-use crate::support::{begin, bvh, cost, ended, facts, names, number, run_on_a_small_disk, wrong};
+use crate::support::{
+    begin, bvh, cost, ended, facts, names, number, run_on_a_small_disk, wait_until, wrong,
+};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::Segment;
 use bvh_core::cost::{internal_area, layout_area};
@@ -9,7 +11,6 @@ use bvh_scenes::{Scene, tree_file};
 use bvh_search::{Budget, Objects, Options, OwnedTree};
 use std::fs;
 use std::path::Path;
-use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 const WALK: &str = "count = 5000
@@ -246,9 +247,7 @@ fn a_bake_without_a_name_uses_its_whole_time_for_a_new_file_and_replaces_none() 
     let start = Instant::now();
     let mut bake = begin(at, &["bake", "escher:50", "--budget=1s"]);
     // The bake has reserved its file once the new one exists.
-    while names(at).is_empty() {
-        sleep(Duration::from_millis(5));
-    }
+    wait_until("the file", || !names(at).is_empty());
     let notes = at.join("escher-50.bvh");
     fs::write(&notes, "notes").unwrap();
     assert_eq!(bake.wait().unwrap().code(), Some(1));

@@ -1,6 +1,6 @@
 //! Ctrl-C while `bvh bake` searches: the best tree so far is written, and it is a good one. Other
 //! commands end at once.
-use crate::support::{begin, bvh, cost, ended, names, send, words};
+use crate::support::{begin, bvh, cost, ended, names, send, wait_until, words};
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -11,9 +11,7 @@ fn interrupted(folder: &Path, bake: &str, after: Duration) {
     let before = fs::read_dir(folder).unwrap().count();
     let child = begin(folder, &words(&format!("bake --out=a.bvh {bake}")));
     // The file is reserved before the search begins.
-    while fs::read_dir(folder).unwrap().count() == before {
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    wait_until("the file", || fs::read_dir(folder).unwrap().count() != before);
     std::thread::sleep(after);
     send("-INT", &child);
     ended(&child.wait_with_output().unwrap(), 130, &["`--from a.bvh` continues"]);

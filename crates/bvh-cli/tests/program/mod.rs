@@ -75,9 +75,14 @@ pub fn run_on_a_small_disk(folder: &Path, args: &str, blocks: u32) -> Option<Out
 
 /// Waits until a file or folder exists.
 pub fn wait_for(path: &Path) {
+    wait_until(&path.display().to_string(), || path.exists());
+}
+
+/// Waits until what has this name is there.
+pub fn wait_until(name: &str, is_there: impl Fn() -> bool) {
     let start = Instant::now();
-    while !path.exists() {
-        assert!(start.elapsed() < Duration::from_secs(60), "{} never came", path.display());
+    while !is_there() {
+        assert!(start.elapsed() < Duration::from_secs(60), "{name} never came");
         std::thread::sleep(Duration::from_millis(1));
     }
 }

@@ -106,6 +106,15 @@ impl Default for Viewpoint {
     }
 }
 
+impl Viewpoint {
+    /// Converts fractions of the root's box into points.
+    #[must_use]
+    pub fn in_box(self, root: &Aabb) -> Self {
+        let [eye, target] = [self.eye, self.target].map(|place| in_box(root, place).to_array());
+        Self { eye, target }
+    }
+}
+
 /// Converts fractions of the root's box into a point.
 pub fn in_box(root: &Aabb, fractions: [f64; 3]) -> DVec3 {
     root.min.as_dvec3() + DVec3::from(fractions) * root.extent()

@@ -12,7 +12,7 @@
 
 pub mod framing;
 pub mod heat;
-pub mod image;
+mod image;
 mod light;
 mod surface;
 

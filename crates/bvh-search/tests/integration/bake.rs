@@ -42,7 +42,7 @@ fn a_tree_of_many_references_per_object_is_loaded_and_improved() {
     let mut tree = muller_fellner::Config::default().build(&boxes.repeat(17)).unwrap();
     tree.prim_ids.iter_mut().for_each(|id| *id %= 20);
     let bake = Bake { shapes: Some(&shapes), ..Bake::new(&boxes) };
-    let bytes = bake.write(&tree, 0, |sections, _| sections.concat()).unwrap();
+    let bytes = bake.write(&tree, 0, |sections| sections.concat()).unwrap();
     let mut owned = OwnedTree::load(Objects::Shapes(shapes), &bytes).unwrap();
     let before = owned.cost(Objective::InternalArea);
     improve_owned(&mut owned, Duration::from_millis(20));

@@ -5,13 +5,13 @@ use crate::laws::any_boxes;
 use bvh_build::{Builder, goldsmith_salmon, muller_fellner};
 use bvh_core::cost::{self, SahConstants};
 use bvh_core::{
-    Aabb, Bvh, Hit, Primitives, Ray, Sphere, Triangle, any_hit_by, clip_to_box, collapse_leaves,
-    file, nearest_hit_by, nearest_hit_of_all, validate,
+    Aabb, Bvh, Primitives, Ray, Sphere, Triangle, any_hit_by, clip_to_box, collapse_leaves, file,
+    nearest_hit_by, nearest_hit_of_all, validate,
 };
 use bvh_scenes::trace::KdTree;
 use bvh_search::{Budget, Problem, best, lower_bound, optimize};
 use bvh_stress::examine::ROUNDING;
-use bvh_stress::tracing::{TRAVERSALS, check};
+use bvh_stress::tracing::{TRAVERSALS, bits, check};
 use glam::Vec3;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -53,7 +53,6 @@ fn triangles_and_rays() -> impl Strategy<Value = (Vec<Triangle>, Vec<MaybeRay>)>
 /// Checks that trees and a KD-tree over boxes, which are the objects themselves, give the answers
 /// of testing every box. Rays of any bits meet boxes far more often than triangles.
 fn check_boxes(boxes: &[Aabb], rays: &[Ray]) {
-    let bits = |hit: Option<Hit>| hit.map(|hit| (hit.t.to_bits(), hit.object));
     let binary = muller_fellner::Config::default().build(boxes).unwrap();
     let wide = goldsmith_salmon::Config::default().build(boxes).unwrap();
     let cells = KdTree::build(boxes).unwrap();

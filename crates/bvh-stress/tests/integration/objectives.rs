@@ -38,7 +38,7 @@ fn check(here: &str, triangles: &[Triangle], bake: &Bake, problem: &Problem) -> 
     let is_reported = (cost - expected).abs() <= examine::ROUNDING * expected;
     assert!(is_reported, "{here}: {cost} reported, {expected}");
     // An invalid tree is not saved.
-    let bytes = bake.write(&tree, 0, |sections, _| sections.concat());
+    let bytes = bake.write(&tree, 0, |sections| sections.concat());
     let bytes = bytes.unwrap_or_else(|fault| panic!("{here}: {fault}"));
     assert_eq!(file::load(&bytes, problem.boxes).as_ref(), Ok(&tree), "{here}");
     let visits = file::TreeFile::open(&bytes).unwrap().visits().unwrap();

@@ -49,14 +49,11 @@ fn flags(wide: &WideBvh, rays: &[Ray]) -> Vec<(&'static str, u32)> {
 /// Returns random rays, and those of cameras outside and inside of a scene, sorted by their kind.
 fn ordinary(scene: &Scene, tree: &Bvh) -> Vec<TracedRay> {
     let root = tree.root_aabb().unwrap();
-    let in_scene = |place| in_box(&root, place).to_array();
-    let pose =
-        |view: Viewpoint| Viewpoint { eye: in_scene(view.eye), target: in_scene(view.target) };
     let inside = Viewpoint { eye: [0.3, 0.4, 0.6], target: [0.8, 0.5, 0.3] };
     let mut rays = Vec::new();
     // Each camera stands still, because packets of rays of one origin are traced in another way.
-    for camera in [Viewpoint::default(), inside].map(pose) {
-        let lights = vec![in_scene([0.5, 0.95, 0.5])];
+    for camera in [Viewpoint::default(), inside].map(|view| view.in_box(&root)) {
+        let lights = vec![in_box(&root, [0.5, 0.95, 0.5]).to_array()];
         let cameras = vec![camera];
         let config = RenderedRays { cameras, lights, count: 4096, ..Default::default() };
         rays.extend(of_renderer(&config, scene, tree, &|| false));

@@ -154,10 +154,8 @@ fn rendered(
     // Viewpoints are fractions of the root's box, which an empty tree lacks.
     let Some(root) = tree.root_aabb() else { return Vec::new() };
     let place = |place| in_box(&root, place).to_array();
-    let poses =
-        path.iter().map(|view| Viewpoint { eye: place(view.eye), target: place(view.target) });
     let rays = RenderedRays {
-        cameras: poses.collect(),
+        cameras: path.iter().map(|view| view.in_box(&root)).collect(),
         lights: lights.iter().copied().map(place).collect(),
         count,
         seed,

@@ -6,7 +6,7 @@ use crate::Error;
 use crate::measure::ray_cost::{Config, TestRays, TrainedOn, test_rays};
 use crate::rows::{LayoutRow, RunTestRow, TestRow, VisitRow};
 use crate::spec::Experiment;
-use crate::statistics::{mean, variance};
+use crate::statistics::{mean, standard_error};
 use bvh_core::cost::{self, Objective, SahConstants};
 use bvh_core::{Bvh, WideBvh, collapse_leaves};
 use bvh_scenes::rays::tests_per_ray;
@@ -86,6 +86,7 @@ fn test_row(job: &Job, rays: &TestRays, tests: &[[f64; 2]]) -> TestRow {
     // Reports compare all plain trees for rays with all trees for areas, so they share one name.
     let is_plain = options.objective.is_none() && options.references.is_none();
     let tree = if options.for_rays.is_some() && is_plain { RAYS } else { &labelled.label };
+    let totals: Vec<f64> = tests.iter().map(|tests| tests[0] + tests[1]).collect();
     TestRow {
         scene: job.scene.name.clone(),
         method: labelled.label.clone(),
@@ -96,7 +97,7 @@ fn test_row(job: &Job, rays: &TestRays, tests: &[[f64; 2]]) -> TestRow {
         node_tests: mean(tests.iter().map(|tests| tests[0])),
         block_tests: mean(tests.iter().map(|tests| tests[1])),
         repetitions: tests.len(),
-        tests_standard_error: standard_error(tests),
+        tests_standard_error: standard_error(&totals),
         rays: rays.rays.len() as u64,
     }
 }
@@ -133,10 +134,4 @@ fn layout_row(runs: &[Run], layouts: &[WideBvh]) -> LayoutRow {
         ),
         layout_over_root: mean(layout_over_root),
     }
-}
-
-/// The standard error of the mean number of all tests, if there are several repetitions.
-fn standard_error(tests: &[[f64; 2]]) -> Option<f64> {
-    let totals: Vec<f64> = tests.iter().map(|tests| tests[0] + tests[1]).collect();
-    variance(&totals).map(|variance| (variance / totals.len() as f64).sqrt())
 }

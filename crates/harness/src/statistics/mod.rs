@@ -121,6 +121,11 @@ pub fn variance(values: &[f64]) -> Option<f64> {
     Some(values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / freedom as f64)
 }
 
+/// Returns the standard error of the mean of values; `None` for fewer than two values.
+pub fn standard_error(values: &[f64]) -> Option<f64> {
+    variance(values).map(|variance| (variance / values.len() as f64).sqrt())
+}
+
 /// Returns the mean of values and the 95 % interval of their distribution's mean, by Student's t.
 ///
 /// Fewer than two values have no interval, and no values have no mean.
@@ -129,9 +134,8 @@ pub fn mean_interval(values: &[f64]) -> Option<(f64, Option<(f64, f64)>)> {
         return None;
     }
     let mean = mean(values.iter().copied());
-    let half = student(values.len())
-        .zip(variance(values))
-        .map(|(factor, variance)| factor * (variance / values.len() as f64).sqrt());
+    let half = student(values.len()).zip(standard_error(values));
+    let half = half.map(|(factor, error)| factor * error);
     Some((mean, half.map(|half| (mean - half, mean + half))))
 }
 

@@ -6,12 +6,11 @@
 
 use crate::support::{
     TABLE, begin, ended, folder_with, names, program, refused, reproducible, rows, run, said, send,
-    text, wait_for,
+    text, wait_for, wait_until,
 };
 use std::fs;
 use std::path::Path;
 use std::process::Stdio;
-use std::time::Duration;
 
 /// Creates a folder with the spec.
 fn folder() -> tempfile::TempDir {
@@ -86,9 +85,7 @@ fn ctrl_c_keeps_finished_runs_and_says_how_to_go_on() {
     let mut repetition = program(folder.path(), &["spec.toml"]);
     repetition.env("TMPDIR", temporary.path()).stdout(Stdio::null()).stderr(Stdio::piped());
     let child = repetition.spawn().unwrap();
-    while names(temporary.path()).is_empty() {
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    wait_until("the temporary folder", || !names(temporary.path()).is_empty());
     wait_for(&temporary.path().join(&names(temporary.path())[0]).join("spec/.partial/000000.run"));
     send("-INT", &child);
     ended(&child.wait_with_output().unwrap(), 130, &["interrupted; no run is kept"]);

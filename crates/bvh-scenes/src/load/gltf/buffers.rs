@@ -35,22 +35,18 @@ impl<'a> Buffers<'a> {
     /// Returns the bytes of a buffer, which is read if no mesh has needed it before.
     pub fn bytes(&mut self, number: usize) -> Result<&[u8], String> {
         let buffer = get(&self.document.buffers, number, "buffers")?;
-        let in_buffer = |message: String| format!("buffers[{number}]: {message}");
         let bytes = match (&buffer.uri, self.chunk) {
-            (Some(uri), _) => self.contents(number, uri).map_err(in_buffer)?,
-            (None, Some(chunk)) if number == 0 => chunk,
-            (None, _) => {
-                let expected =
-                    "expected one, or the binary chunk of a GLB file, which is buffers[0]";
-                return Err(in_buffer(format!("no URI; {expected}")));
-            }
+            (Some(uri), _) => self.contents(number, uri),
+            (None, Some(chunk)) if number == 0 => Ok(chunk),
+            (None, _) => Err("no URI; expected one, or the binary chunk of a GLB file, which is \
+                              buffers[0]"
+                .into()),
         };
-        match buffer.byte_length > bytes.len() {
-            true => {
-                Err(in_buffer(format!("{} bytes; expected {}", bytes.len(), buffer.byte_length)))
-            }
+        let whole = bytes.and_then(|bytes| match buffer.byte_length > bytes.len() {
+            true => Err(format!("{} bytes; expected {}", bytes.len(), buffer.byte_length)),
             false => Ok(bytes),
-        }
+        });
+        whole.map_err(|message| format!("buffers[{number}]: {message}"))
     }
 
     fn contents(&mut self, number: usize, uri: &str) -> Result<&[u8], String> {
