@@ -164,7 +164,7 @@ pub fn to_our_tree(theirs: &TheirBvh<f32, 3>, boxes: &[Aabb]) -> Bvh {
             }
         };
     }
-    Bvh { nodes, prim_ids }
+    Bvh::new(nodes, prim_ids)
 }
 
 /// Builds on one thread; the library's leaves have one object.

@@ -178,6 +178,12 @@ pub(crate) fn round_down(point: DVec3) -> Vec3 {
     }))
 }
 
+/// Rounds each coordinate upwards.
+#[inline]
+pub(crate) fn round_up(point: DVec3) -> Vec3 {
+    -round_down(-point)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,7 +1,7 @@
 //! The one tree type: flat nodes with adjacent siblings, and leaves that refer to ranges of object
 //! ids.
 
-use crate::Aabb;
+use crate::{Aabb, Frame};
 use bytemuck::{Pod, Zeroable};
 
 /// The largest number of objects in one tree. It keeps node indices and counts within 31 bits.
@@ -107,6 +107,9 @@ pub struct Bvh {
     pub nodes: Vec<Node>,
     /// The object ids in the order of the leaves; one entry per object.
     pub prim_ids: Vec<u32>,
+    /// The frame that the boxes lie in; `None` for the axes of the file. Builders and searches,
+    /// which see boxes alone, return `None`: whoever made the boxes knows their frame.
+    pub frame: Option<Frame>,
 }
 
 /// A borrowed [`Bvh`], in a mapped file for example. Traversals accept this type.
@@ -116,16 +119,23 @@ pub struct BvhView<'a> {
     pub nodes: &'a [Node],
     /// The object ids, see [`Bvh::prim_ids`].
     pub prim_ids: &'a [u32],
+    /// The frame, see [`Bvh::frame`].
+    pub frame: Option<&'a Frame>,
 }
 
 impl<'a> From<&'a Bvh> for BvhView<'a> {
     #[inline(always)]
     fn from(tree: &'a Bvh) -> Self {
-        Self { nodes: &tree.nodes, prim_ids: &tree.prim_ids }
+        Self { nodes: &tree.nodes, prim_ids: &tree.prim_ids, frame: tree.frame.as_ref() }
     }
 }
 
 impl Bvh {
+    /// Makes a tree of its nodes and object ids, with boxes along the file's axes.
+    pub fn new(nodes: Vec<Node>, prim_ids: Vec<u32>) -> Self {
+        Self { nodes, prim_ids, frame: None }
+    }
+
     /// Returns the root's box; `None` for the tree over no objects.
     pub fn root_aabb(&self) -> Option<Aabb> {
         self.nodes.first().map(|root| root.aabb)

@@ -18,8 +18,8 @@
 //! Builders and searches see only boxes. [`Clip`] tells them how large the part of an object in a
 //! region is.
 
-use crate::aabb::round_down;
-use crate::{Aabb, Primitives, Triangle};
+use crate::aabb::{round_down, round_up};
+use crate::{Aabb, InFrame, Primitives, Triangle};
 use core::fmt::Debug;
 use glam::{DVec3, Vec3};
 use smallvec::SmallVec;
@@ -43,11 +43,22 @@ pub trait Clip: Debug + Sync {
 impl Clip for &[Triangle] {
     #[inline]
     fn clip(&self, object: u32, region: &Aabb) -> Aabb {
-        clip(&self[object as usize], region, BUILDERS)
+        InFrame { triangles: self, frame: None }.clip(object, region)
     }
 
     fn clip_tightly(&self, object: u32, region: &Aabb) -> Aabb {
-        clip(&self[object as usize], region, VALIDATION)
+        InFrame { triangles: self, frame: None }.clip_tightly(object, region)
+    }
+}
+
+impl Clip for InFrame<'_> {
+    #[inline]
+    fn clip(&self, object: u32, region: &Aabb) -> Aabb {
+        clip(self, object, region, BUILDERS)
+    }
+
+    fn clip_tightly(&self, object: u32, region: &Aabb) -> Aabb {
+        clip(self, object, region, VALIDATION)
     }
 }
 
@@ -81,9 +92,11 @@ const VALIDATION: f64 = 1.0;
 /// by a bound of the error before they cut, and the corners are moved outwards after the cuts. The
 /// result is rounded outwards to f32 and never leaves the region. The bound is relative to the
 /// triangle's largest coordinate: 2⁻⁴⁶ of it, 64 rounding errors, while each of the six cuts makes
-/// at most 5.
-fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
-    let full = triangle.aabb();
+/// at most 5, and a frame at most 4 · 3 where it makes the corners.
+#[inline]
+fn clip(objects: &InFrame, object: u32, region: &Aabb, slack: f64) -> Aabb {
+    let triangle = &objects.triangles[object as usize];
+    let full = objects.aabb(triangle);
     let common = full.intersection(region);
     // Most triangles are inside the region or outside of it, and need no cut.
     if common == full || common == Aabb::EMPTY {
@@ -94,7 +107,9 @@ fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
     let error = DVec3::splat(f64::from(largest) * (slack * (64.0 * f64::EPSILON)));
     let low = region.min.as_dvec3() - error;
     let high = region.max.as_dvec3() + error;
-    let mut kept = Polygon::from_slice(&triangle.0.map(Vec3::as_dvec3));
+    let corners = triangle.0.map(Vec3::as_dvec3);
+    let corners = objects.frame.map_or(corners, |frame| corners.map(|corner| frame.point(corner)));
+    let mut kept = Polygon::from_slice(&corners);
     for axis in 0..3 {
         // Planes that miss the triangle cut nothing off.
         if full.min[axis] < region.min[axis] {
@@ -109,7 +124,7 @@ fn clip(triangle: &Triangle, region: &Aabb, slack: f64) -> Aabb {
     }
     let min = kept.iter().fold(DVec3::INFINITY, |min, corner| min.min(*corner)) - error;
     let max = kept.iter().fold(DVec3::NEG_INFINITY, |max, corner| max.max(*corner)) + error;
-    Aabb { min: round_down(min), max: -round_down(-max) }.intersection(&common)
+    Aabb { min: round_down(min), max: round_up(max) }.intersection(&common)
 }
 
 /// The corners of a convex planar polygon: a triangle cut by up to six planes, of which each adds at

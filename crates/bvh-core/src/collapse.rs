@@ -44,7 +44,7 @@ pub(crate) fn collapse_at_most(tree: BvhView, constants: &SahConstants, most: u3
         let is_leaf = node.is_leaf() || objects <= most && as_leaf <= as_inner;
         best[index] = Subtree { cost: if is_leaf { as_leaf } else { as_inner }, objects, is_leaf };
     }
-    let mut collapsed = Bvh::default();
+    let mut collapsed = Bvh { frame: tree.frame.copied(), ..Bvh::default() };
     // Nodes of `tree` with their indices in `collapsed`.
     let mut open: Vec<(usize, usize)> = Vec::new();
     if let Some(root) = tree.nodes.first() {
@@ -106,7 +106,7 @@ pub(crate) fn binary_visited<'t>(tree: &'t Bvh, visits: &mut Vec<f32>) -> Cow<'t
         return Cow::Borrowed(tree);
     }
     let root = tree.nodes[0];
-    let mut split = Bvh { nodes: vec![root], prim_ids: tree.prim_ids.clone() };
+    let mut split = Bvh { nodes: vec![root], prim_ids: tree.prim_ids.clone(), frame: tree.frame };
     let visits_before = core::mem::replace(visits, vec![visits[0]]);
     // New nodes with the ranges of siblings in `tree` that they replace. A range of one is a node
     // of `tree`; a longer range is a part of a wide node.
@@ -155,8 +155,7 @@ pub(crate) mod tests {
     /// object per leaf.
     pub(crate) fn scene(n: u32, seed: u32) -> (Vec<Triangle>, Bvh) {
         let triangles: Vec<Triangle> = (0..n).map(|i| triangle(i, seed)).collect();
-        let mut tree =
-            Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, n)], prim_ids: (0..n).collect() };
+        let mut tree = Bvh::new(vec![Node::leaf(Aabb::EMPTY, 0, n)], (0..n).collect());
         let mut node = 0;
         while node < tree.nodes.len() {
             let range = tree.nodes[node].prims();

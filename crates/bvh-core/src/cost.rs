@@ -289,7 +289,7 @@ pub(crate) mod tests {
             [Aabb::from(([0.0; 3], [1.0; 3])), Aabb::from(([2.0, 0.0, 0.0], [3.0, 1.0, 1.0]))];
         let root = Node::inner(boxes[0].union(&boxes[1]), 1, 2);
         let nodes = vec![root, Node::leaf(boxes[0], 0, 1), Node::leaf(boxes[1], 1, 1)];
-        Bvh { nodes, prim_ids: vec![0, 1] }
+        Bvh::new(nodes, vec![0, 1])
     }
 
     #[test]
@@ -320,7 +320,7 @@ pub(crate) mod tests {
         let largest_box =
             Aabb { min: glam::Vec3::splat(f32::MIN), max: glam::Vec3::splat(f32::MAX) };
         let largest_leaf = Node::leaf(largest_box, 0, u32::MAX >> 1);
-        let tree = Bvh { nodes: vec![largest_leaf; 100], prim_ids: vec![] };
+        let tree = Bvh::new(vec![largest_leaf; 100], vec![]);
         let constants = SahConstants::new(SahConstants::MAX, SahConstants::MAX).unwrap();
         assert!(sah(&tree, &constants).is_finite());
     }
@@ -328,11 +328,11 @@ pub(crate) mod tests {
     #[test]
     fn trees_without_inner_nodes_or_area_cost_nothing() {
         let point = Aabb::from(([1.0; 3], [1.0; 3]));
-        let flat = Bvh {
-            nodes: vec![Node::inner(point, 1, 2), Node::leaf(point, 0, 1), Node::leaf(point, 1, 1)],
-            prim_ids: vec![0, 1],
-        };
-        let single = Bvh { nodes: vec![Node::leaf(point, 0, 1)], prim_ids: vec![0] };
+        let flat = Bvh::new(
+            vec![Node::inner(point, 1, 2), Node::leaf(point, 0, 1), Node::leaf(point, 1, 1)],
+            vec![0, 1],
+        );
+        let single = Bvh::new(vec![Node::leaf(point, 0, 1)], vec![0]);
         let sah = Objective::Sah(SahConstants::default());
         for tree in [Bvh::default(), single, flat] {
             for objective in

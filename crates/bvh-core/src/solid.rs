@@ -39,7 +39,7 @@ pub enum InsideRule {
 /// let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
 /// let triangles = Triangle::from_mesh(&corners, &faces)?;
 /// let leaf = Node::leaf(Aabb::from([[0.0; 3], [1.0; 3]]), 0, 4);
-/// let tree = Bvh { nodes: vec![leaf], prim_ids: vec![0, 1, 2, 3] };
+/// let tree = Bvh::new(vec![leaf], vec![0, 1, 2, 3]);
 /// let wide = WideBvh::new(&tree, &triangles)?;
 /// let solid = Solid::new(&tree, &triangles);
 /// let points = [[0.2, 0.2, 0.2], [0.5, 0.5, 0.5]].map(Into::into);

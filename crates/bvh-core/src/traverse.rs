@@ -17,10 +17,7 @@
 //! let corners = |z| [Vec3::new(0.0, 0.0, z), Vec3::new(1.0, 0.0, z), Vec3::new(0.0, 1.0, z)];
 //! let triangles = [0.0, 1.0].map(|z| Triangle(corners(z)));
 //! let [a, b] = triangles.map(|t| t.aabb());
-//! let tree = Bvh {
-//!     nodes: vec![Node::inner(a.union(&b), 1, 2), Node::leaf(a, 0, 1), Node::leaf(b, 1, 1)],
-//!     prim_ids: vec![0, 1],
-//! };
+//! let tree = Bvh::new(vec![Node::inner(a.union(&b), 1, 2), Node::leaf(a, 0, 1), Node::leaf(b, 1, 1)], vec![0, 1]);
 //! let ray = Ray::half_line(Vec3::new(0.2, 0.2, 3.0), -Vec3::Z)?;
 //! assert_eq!(nearest_hit(&tree, &triangles, &ray), Some(Hit { t: 2.0, object: 1 }));
 //! let prepared = PreparedRay::new(&ray);

@@ -170,7 +170,7 @@ impl Winding {
         /// The number of triangles up to which a subtree becomes a leaf.
         const LEAF: u32 = 8;
         let free_leaves = SahConstants { traversal: 1.0, intersection: 0.0 };
-        let Bvh { nodes, prim_ids } = collapse_at_most(tree, &free_leaves, LEAF);
+        let Bvh { nodes, prim_ids, .. } = collapse_at_most(tree, &free_leaves, LEAF);
         let mut patches = vec![Patch::EMPTY; nodes.len()];
         let mut sorted = Vec::with_capacity(triangles.len());
         let mut seen = Marks::new(triangles.len());

@@ -85,7 +85,7 @@ mod tests {
 
     fn tree() -> Vec<u8> {
         let aabb = Aabb::from([[0.0; 3], [1.0; 3]]);
-        let tree = Bvh { nodes: vec![Node::leaf(aabb, 0, 1)], prim_ids: vec![0] };
+        let tree = Bvh::new(vec![Node::leaf(aabb, 0, 1)], vec![0]);
         file::save(&tree, &[aabb], &Origin::default()).unwrap()
     }
 

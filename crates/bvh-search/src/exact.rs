@@ -73,7 +73,7 @@ pub(crate) fn most_work_of_tiny(objects: usize) -> Option<u64> {
 
 /// Builds the tree of the best divisions, over one object or more.
 fn tree(boxes: &[Aabb], subsets: &Subsets) -> Bvh {
-    let mut tree = Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, 1)], prim_ids: vec![] };
+    let mut tree = Bvh::new(vec![Node::leaf(Aabb::EMPTY, 0, 1)], vec![]);
     let mut stack = vec![(0, (1usize << boxes.len()) - 1)];
     while let Some((node, set)) = stack.pop() {
         if set.is_power_of_two() {

@@ -53,10 +53,7 @@ mod tests {
     use bvh_core::{Aabb, Node};
 
     fn pair(a: Aabb) -> Bvh {
-        Bvh {
-            nodes: vec![Node::inner(a, 1, 2), Node::leaf(a, 0, 1), Node::leaf(a, 1, 1)],
-            prim_ids: vec![0, 1],
-        }
+        Bvh::new(vec![Node::inner(a, 1, 2), Node::leaf(a, 0, 1), Node::leaf(a, 1, 1)], vec![0, 1])
     }
 
     #[test]

@@ -215,7 +215,7 @@ impl Workspace {
     /// order. The descendants of the first child follow, then the descendants of the next. O(n).
     pub fn write(&mut self, tree: &mut Bvh) {
         let Self { blocks, stack, .. } = self;
-        let Bvh { nodes, prim_ids } = tree;
+        let Bvh { nodes, prim_ids, .. } = tree;
         nodes.clear();
         prim_ids.clear();
         if blocks.is_empty() {

@@ -98,7 +98,7 @@ impl MortonOrder {
             clusters.join();
             round += 1;
         }
-        Ok(Bvh { nodes: clusters.into_nodes(), prim_ids: order })
+        Ok(Bvh::new(clusters.into_nodes(), order))
     }
 }
 

@@ -99,7 +99,7 @@ impl Builder for Config {
             });
             stack.push(Frame { node: first, start, len: half, level: level + 1 });
         }
-        Ok(Bvh { nodes, prim_ids })
+        Ok(Bvh::new(nodes, prim_ids))
     }
 }
 

@@ -167,7 +167,7 @@ fn join(scene: &Scene, parts: &[Part], folder: &Path) -> Result<Start, Error> {
 /// Replaces every leaf of `top`, which has one object each, by the tree with the number of the
 /// object. `objects` has the ids of each tree's objects.
 fn joined(top: &Bvh, trees: &[Bvh], objects: &[&[usize]]) -> Bvh {
-    let mut whole = Bvh { nodes: top.nodes.clone(), prim_ids: Vec::new() };
+    let mut whole = Bvh::new(top.nodes.clone(), Vec::new());
     for (index, leaf) in top.nodes.iter().enumerate() {
         let NodeKind::Leaf { first, .. } = leaf.kind() else { continue };
         let part = top.prim_ids[first as usize] as usize;

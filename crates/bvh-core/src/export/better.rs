@@ -218,7 +218,7 @@ mod tests {
             let [a, b] = [a, b].map(|id| triangles[id as usize].0[0].x);
             a.total_cmp(&b)
         });
-        let leaf = Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, 300)], prim_ids: sorted };
+        let leaf = Bvh::new(vec![Node::leaf(Aabb::EMPTY, 0, 300)], sorted);
         let mut good = Target { most_objects: 1, ..Target::OBVHS }.fit(&leaf);
         good.refit(&boxes(&triangles));
         for target in Target::ALL {

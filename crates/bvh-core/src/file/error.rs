@@ -60,6 +60,9 @@ pub enum FileError {
         /// The checksum in the file.
         expected: u32,
     },
+    /// The tree lies in a frame, and boxes along the file's axes cannot validate it.
+    #[error("the boxes of the tree lie in a frame: save it together with its triangles")]
+    Frame,
     /// The checksum is correct, but the nodes and object ids are not a tree.
     #[error(transparent)]
     Tree(#[from] InvalidBvh),

@@ -3,7 +3,7 @@
 
 use super::error::{FileError, VERSION};
 use crate::cost::{Objective, SahConstants};
-use crate::{Aabb, MAX_OBJECTS, Node};
+use crate::{Aabb, Frame, MAX_OBJECTS, Node};
 use bytemuck::{Pod, Zeroable};
 
 /// The header of a tree file. [The format](super) documents the position of each field.
@@ -33,6 +33,8 @@ pub struct Header {
     /// True if the file records how often rays visit each node; see
     /// [`TreeFile::visits`](super::TreeFile::visits).
     pub has_visits: bool,
+    /// True if the boxes lie in a frame; see [`TreeFile::frame`](super::TreeFile::frame).
+    pub has_frame: bool,
 }
 
 impl Header {
@@ -45,6 +47,8 @@ impl Header {
     pub const VERSION: u32 = VERSION;
     /// The flag of a file that has visits.
     const VISITS: u32 = 1;
+    /// The flag of a file that has a frame.
+    const FRAME: u32 = 2;
     /// A number whose stored bytes identify the byte order of the file.
     pub(super) const ENDIANNESS: u32 = 0x0102_0304;
     /// The bytes of the root's box. They equal the box in the first node.
@@ -66,9 +70,9 @@ impl Header {
         }
     }
 
-    /// Returns the lengths of the nodes, of the object ids and of the visits, in bytes. Counts are
-    /// below 2^32, so nothing overflows.
-    pub(super) fn sections(&self) -> [u64; 3] {
+    /// Returns the lengths of the nodes, of the object ids, of the visits and of the frame, in bytes.
+    /// Counts are below 2^32, so nothing overflows.
+    pub(super) fn sections(&self) -> [u64; 4] {
         let nodes = self.nodes as u64;
         let references = self.references as u64;
         let visits = if self.has_visits { nodes } else { 0 };
@@ -76,6 +80,7 @@ impl Header {
             nodes * size_of::<Node>() as u64,
             references * size_of::<u32>() as u64,
             visits * size_of::<f32>() as u64,
+            if self.has_frame { Frame::BYTES as u64 } else { 0 },
         ]
     }
 
@@ -109,7 +114,8 @@ impl Header {
             bounds: self.bounds,
             method,
             references: self.references as u64,
-            flags: if self.has_visits { Self::VISITS } else { 0 },
+            flags: if self.has_visits { Self::VISITS } else { 0 }
+                | if self.has_frame { Self::FRAME } else { 0 },
             reserved: [0; 2],
             checksum: 0,
         };
@@ -152,7 +158,7 @@ impl Header {
         if nodes > 2 * references {
             return Err(FileError::Field("nodes"));
         }
-        let has_other_flags = flags & !Self::VISITS != 0;
+        let has_other_flags = flags & !(Self::VISITS | Self::FRAME) != 0;
         let is_padded = stored.reserved == [0; 2] && padding.iter().all(|&byte| byte == 0);
         if has_other_flags || !is_padded {
             return Err(FileError::Field("padding"));
@@ -169,6 +175,7 @@ impl Header {
             bounds: stored.bounds,
             method: method.to_owned(),
             has_visits: flags & Self::VISITS != 0,
+            has_frame: flags & Self::FRAME != 0,
         })
     }
 }

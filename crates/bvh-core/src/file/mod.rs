@@ -5,7 +5,7 @@
 //! use bvh_core::{Aabb, Bvh, Node, file::{self, TreeFile}};
 //! let boxes = [Aabb::from([[0.0; 3], [1.0; 3]]), Aabb::from([[2.0; 3], [3.0; 3]])];
 //! let root = Node::inner(boxes[0].union(&boxes[1]), 1, 2);
-//! let tree = Bvh { nodes: vec![root, Node::leaf(boxes[0], 0, 1), Node::leaf(boxes[1], 1, 1)], prim_ids: vec![0, 1] };
+//! let tree = Bvh::new(vec![root, Node::leaf(boxes[0], 0, 1), Node::leaf(boxes[1], 1, 1)], vec![0, 1]);
 //!
 //! let bytes = file::save(&tree, &boxes, &file::Origin { method: "by hand", ..Default::default() })?;
 //! assert_eq!(file::load(&bytes, &boxes)?, tree);
@@ -36,10 +36,10 @@
 //! | 80..104 | `f32[6]` | the root's box, min then max; min +∞ and max −∞ without objects |
 //! | 104..168 | `u8[64]` | name of the method, UTF-8, padded with zeros |
 //! | 168..176 | `u64` | number of references, the object ids in all leaves |
-//! | 176..180 | `u32` | 1 if there are visits, otherwise 0 |
+//! | 176..180 | `u32` | 1 if there are visits, otherwise 0; 2 more if there is a frame |
 //! | 180..188 | | zeros |
 //! | 188..192 | `u32` | checksum of the file: of the bytes from 192 to the end, then of bytes 0..188 |
-//! | 192.. | | the nodes, 32 bytes each, then a `u32` object id per reference, then the visits if there are any, an `f32` per node |
+//! | 192.. | | the nodes, 32 bytes each, then a `u32` object id per reference, then the visits if there are any, an `f32` per node, then the frame if there is one, `f64[12]` |
 //!
 //! | bytes of a node | type | field |
 //! |---|---|---|
@@ -51,6 +51,9 @@
 //! The visits of a node are a number from 0 to 1: the fraction of the rays entering the scene that
 //! enter the node's box, by the measure of boxes that the tree was searched with. No child has more
 //! visits than its parent.
+//!
+//! The [frame](crate::Frame) is its rotation, row by row, and its centre. The boxes of all nodes lie
+//! in it; the checksum of the scene is always that of boxes along the file's axes.
 //!
 //! Node 0 is the root. Siblings are adjacent and come after their parent. Every object id occurs
 //! once, or more often if its object is divided among leaves.
@@ -76,7 +79,7 @@ pub use header::Header;
 
 use crate::cost::{CallBoth, Objective, call_in_turn};
 use crate::validate::{Leaves, check_structure};
-use crate::{Aabb, Bvh, BvhView, InvalidBvh, Node, validate};
+use crate::{Aabb, Bvh, BvhView, Frame, InvalidBvh, Node, validate};
 use bytemuck::Pod;
 use crc32fast::Hasher;
 use glam::Vec3;
@@ -104,16 +107,21 @@ pub struct Origin<'a> {
 }
 
 /// Returns the file of a tree over `boxes`, in [this format](self). Rejects a tree that is not
-/// [valid](validate()) over `boxes`. O(nodes + objects).
+/// [valid](validate()) over `boxes`, and a tree in a [frame](crate::Frame), whose objects are more
+/// than boxes. O(nodes + objects).
 pub fn save(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Result<Vec<u8>, FileError> {
+    if tree.frame.is_some() {
+        return Err(FileError::Frame);
+    }
     validate(tree, boxes)?;
     let cost = origin.objective.cost(tree);
     Ok(sections(tree, boxes, cost, origin, &call_in_turn)?.concat())
 }
 
 /// Returns the sections of a file like that of [`save`], to be written one after the other: the
-/// header, the nodes, the object ids and the visits. All but the header are the tree's memory, which
-/// a file of gigabytes does not need twice. The tree's objects may be divided among leaves.
+/// header, the nodes, the object ids, the visits and the frame. The nodes, ids and visits are the
+/// tree's memory, which a file of gigabytes does not need twice. The tree's objects may be divided
+/// among leaves. `boxes` lie along the file's axes, also those of a tree in a frame.
 ///
 /// The caller has [validated](crate::validate_references()) the tree and knows its cost under the
 /// origin's objective. Neither is checked here, because each takes as long as everything else, and
@@ -125,11 +133,12 @@ pub fn sections<'a>(
     cost: f64,
     origin: &Origin<'a>,
     both: CallBoth,
-) -> Result<[Cow<'a, [u8]>; 4], FileError> {
+) -> Result<[Cow<'a, [u8]>; 5], FileError> {
     let Origin { method, seed, work, objective, visits } = *origin;
     let nodes = bytemuck::cast_slice(&tree.nodes);
     let prim_ids = bytemuck::cast_slice(&tree.prim_ids);
     let visit_bytes = bytemuck::cast_slice(visits);
+    let frame = tree.frame.map_or_else(Vec::new, |frame| frame.to_bytes());
     let mut checked = Ok(());
     let mut scene = 0;
     let mut hasher = Hasher::new();
@@ -141,7 +150,7 @@ pub fn sections<'a>(
             scene = boxes_checksum(boxes);
         },
         &mut || {
-            for section in [nodes, prim_ids, visit_bytes] {
+            for section in [nodes, prim_ids, visit_bytes, &frame] {
                 hasher.update(section);
             }
         },
@@ -159,11 +168,12 @@ pub fn sections<'a>(
         bounds: tree.root_aabb().unwrap_or(Aabb::EMPTY),
         method: method.into(),
         has_visits: !visits.is_empty(),
+        has_frame: tree.frame.is_some(),
     };
     let mut header = header.encode()?;
     hasher.update(&header[..Header::CHECKSUM.start]);
     header[Header::CHECKSUM].copy_from_slice(&hasher.finalize().to_le_bytes());
-    Ok([header.into(), nodes.into(), prim_ids.into(), visit_bytes.into()])
+    Ok([header.into(), nodes.into(), prim_ids.into(), visit_bytes.into(), frame.into()])
 }
 
 /// Rejects visits that no measure can give. Measures are monotone, so no child has more visits than
@@ -220,22 +230,28 @@ pub struct TreeFile<'a> {
     nodes: &'a [u8],
     prim_ids: &'a [u8],
     visits: &'a [u8],
+    frame: Option<Frame>,
 }
 
 impl<'a> TreeFile<'a> {
     /// Checks header, length and checksum. O(bytes).
     pub fn open(bytes: &'a [u8]) -> Result<Self, FileError> {
         let header = Header::of_file(bytes, bytes.len() as u64)?;
-        let [node_bytes, id_bytes, _] = header.sections();
+        let [node_bytes, id_bytes, visit_bytes, _] = header.sections();
         let (nodes, rest) = bytes[Header::BYTES..].split_at(node_bytes as usize);
-        let (prim_ids, visits) = rest.split_at(id_bytes as usize);
+        let (prim_ids, rest) = rest.split_at(id_bytes as usize);
+        let (visits, frame) = rest.split_at(visit_bytes as usize);
         let mut hasher = Hasher::new();
         hasher.update(&bytes[Header::BYTES..]);
         hasher.update(&bytes[..Header::CHECKSUM.start]);
         if hasher.finalize().to_le_bytes() != bytes[Header::CHECKSUM] {
             return Err(FileError::Checksum);
         }
-        let file = Self { header, nodes, prim_ids, visits };
+        let frame = match frame.try_into() {
+            Ok(frame) => Some(Frame::of_bytes(frame).map_err(|_| FileError::Field("frame"))?),
+            Err(_) => None,
+        };
+        let file = Self { header, nodes, prim_ids, visits, frame };
         // The header repeats the first 24 bytes of the first node.
         let agrees = match file.nodes.get(..size_of::<Aabb>()) {
             Some(root) => *root == bytes[Header::BOUNDS],
@@ -247,12 +263,18 @@ impl<'a> TreeFile<'a> {
         Ok(file)
     }
 
+    /// Returns the frame that the boxes lie in; `None` for the file's axes.
+    pub fn frame(&self) -> Option<&Frame> {
+        self.frame.as_ref()
+    }
+
     /// Returns the origin, size and cost of the tree.
     pub fn header(&self) -> &Header {
         &self.header
     }
 
-    /// Rejects all boxes except the boxes that the tree was saved for. O(objects).
+    /// Rejects all boxes except the boxes that the tree was saved for, along the file's axes.
+    /// O(objects).
     pub fn for_boxes(self, boxes: &[Aabb]) -> Result<Self, FileError> {
         let objects = self.header.objects;
         if boxes.len() != objects {
@@ -271,13 +293,14 @@ impl<'a> TreeFile<'a> {
     pub fn tree(&self) -> Result<Bvh, FileError> {
         // The bytes may have any address.
         let nodes = bytemuck::pod_collect_to_vec(self.nodes);
-        let tree = Bvh { nodes, prim_ids: bytemuck::pod_collect_to_vec(self.prim_ids) };
+        let prim_ids = bytemuck::pod_collect_to_vec(self.prim_ids);
+        let tree = Bvh { nodes, prim_ids, frame: self.frame };
         self.check((&tree).into())?;
         Ok(tree)
     }
 
     /// Returns the tree without copying it, after the same checks as [`tree`](Self::tree).
-    pub fn view(&self) -> Result<BvhView<'a>, FileError> {
+    pub fn view(&self) -> Result<BvhView<'_>, FileError> {
         fn cast<T: Pod>(bytes: &[u8]) -> Result<&[T], FileError> {
             // An empty slice may have any address, and `bytemuck` would reject it as misaligned.
             if bytes.is_empty() {
@@ -285,7 +308,8 @@ impl<'a> TreeFile<'a> {
             }
             bytemuck::try_cast_slice(bytes).map_err(|_| FileError::Alignment(align_of::<T>()))
         }
-        let tree = BvhView { nodes: cast(self.nodes)?, prim_ids: cast(self.prim_ids)? };
+        let (nodes, prim_ids) = (cast(self.nodes)?, cast(self.prim_ids)?);
+        let tree = BvhView { nodes, prim_ids, frame: self.frame() };
         self.check(tree)?;
         Ok(tree)
     }

@@ -63,7 +63,7 @@ impl WideBvh {
     /// let [a, b, c, d] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
     /// let square = [[a, b, c], [a, c, d]].map(Triangle::from);
     /// let leaf = Node::leaf(Aabb::from([a, c]), 0, 2);
-    /// let wide = WideBvh::new(&Bvh { nodes: vec![leaf], prim_ids: vec![0, 1] }, &square)?;
+    /// let wide = WideBvh::new(&Bvh::new(vec![leaf], vec![0, 1]), &square)?;
     /// let ray = Ray::half_line([0.5, 0.5, 3.0], [0.0, 0.0, -1.0]).unwrap();
     /// assert_eq!(wide.all_hits(&ray), [Hit { t: 3.0, object: 0 }]);
     /// # Ok::<(), bvh_core::InvalidBvh>(())

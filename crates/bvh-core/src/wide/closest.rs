@@ -85,7 +85,7 @@ impl WideBvh {
     /// # use bvh_core::{Aabb, Bvh, Node, Triangle, WideBvh};
     /// let triangle = Triangle::from([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
     /// # let leaf = Node::leaf(triangle.aabb(), 0, 1);
-    /// # let tree = Bvh { nodes: vec![leaf], prim_ids: vec![0] };
+    /// # let tree = Bvh::new(vec![leaf], vec![0]);
     /// let wide = WideBvh::new(&tree, &[triangle])?;
     /// let closest = wide.closest_point([0.25, 0.25, 3.0]).unwrap();
     /// assert_eq!((closest.object, closest.distance), (0, 3.0));

@@ -16,13 +16,13 @@
 //! use glam::{Affine3A, Vec3};
 //! let triangles = [Triangle::from([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])];
 //! let aabb = boxes(&triangles)[0];
-//! let part = WideBvh::new(&Bvh { nodes: vec![Node::leaf(aabb, 0, 1)], prim_ids: vec![0] }, &triangles)?;
+//! let part = WideBvh::new(&Bvh::new(vec![Node::leaf(aabb, 0, 1)], vec![0]), &triangles)?;
 //! let parts = vec![part];
 //! let moved = |z| Instance { part: 0, transform: Affine3A::from_translation(Vec3::Z * z) };
 //! let instances = vec![moved(0.0), moved(4.0)];
 //! // Any builder of `bvh-build` can make the tree over these boxes. Here it is a single leaf.
 //! let boxes = Instance::boxes(&instances, &parts)?;
-//! let top = Bvh { nodes: vec![Node::leaf(boxes[0].union(&boxes[1]), 0, 2)], prim_ids: vec![0, 1] };
+//! let top = Bvh::new(vec![Node::leaf(boxes[0].union(&boxes[1]), 0, 2)], vec![0, 1]);
 //! let scene = Instances::new(parts, instances, top)?;
 //! let ray = Ray::half_line([0.2, 0.2, 9.0], [0.0, 0.0, -1.0]).unwrap();
 //! assert_eq!(scene.nearest_hit(&ray), Some(InstanceHit { t: 5.0, instance: 1, triangle: 0 }));

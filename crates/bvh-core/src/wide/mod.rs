@@ -174,7 +174,7 @@ impl WideBvh {
     /// ```
     /// # use bvh_core::{Aabb, Bvh, Hit, Node, Ray, Triangle, WideBvh};
     /// # let triangles = [0.0, 1.0].map(|z| Triangle::from([[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z]]));
-    /// # let tree = Bvh { nodes: vec![Node::leaf(Aabb::from([[0.0; 3], [1.0; 3]]), 0, 2)], prim_ids: vec![0, 1] };
+    /// # let tree = Bvh::new(vec![Node::leaf(Aabb::from([[0.0; 3], [1.0; 3]]), 0, 2)], vec![0, 1]);
     /// # let wide = WideBvh::new(&tree, &triangles)?;
     /// let ray = Ray::half_line([0.2, 0.2, 3.0], [0.0, 0.0, -1.0]).unwrap();
     /// let masked = wide.nearest_hit_where(&ray, |hit| hit.object != 1);

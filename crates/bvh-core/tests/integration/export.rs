@@ -84,7 +84,7 @@ fn small_trees_deep_trees_and_trees_of_points_have_layouts() {
         let boxes = boxes(&triangles);
         let count = boxes.len() as u32;
         let leaf = Node::leaf(Aabb::EMPTY, 0, count);
-        let mut one_leaf = Bvh { nodes: vec![leaf], prim_ids: (0..count).collect() };
+        let mut one_leaf = Bvh::new(vec![leaf], (0..count).collect());
         one_leaf.refit(&boxes);
         check("one leaf", &one_leaf, &triangles, &mut random);
         check("chain", &chain(&boxes), &triangles, &mut random);
@@ -104,7 +104,7 @@ fn the_bytes_are_the_documented_ones() {
         Node::leaf(boxes[0], 0, 1),
         Node::leaf(boxes[1], 1, 1),
     ];
-    let tree = Bvh { nodes, prim_ids: vec![1, 0] };
+    let tree = Bvh::new(nodes, vec![1, 0]);
     let mut refitted = tree.clone();
     refitted.refit(&boxes);
     let nodes = refitted.to_three_mesh();
@@ -161,8 +161,7 @@ fn a_fitted_tree_has_what_the_tracer_accepts_and_traces_the_same_hits() {
     let triangles = soup(700, &mut random);
     let boxes = boxes(&triangles);
     let rays = rays(&triangles, 300, &mut random);
-    let mut one_leaf =
-        Bvh { nodes: vec![Node::leaf(Aabb::EMPTY, 0, 700)], prim_ids: (0..700).collect() };
+    let mut one_leaf = Bvh::new(vec![Node::leaf(Aabb::EMPTY, 0, 700)], (0..700).collect());
     one_leaf.refit(&boxes);
     let trees = [tree(&boxes, SHAPES[0], &mut random), chain(&boxes), one_leaf];
     let strict = Target { most_objects: 3, most_depth: 11, ..Target::OBVHS };

@@ -72,6 +72,7 @@ fn a_saved_tree_can_be_loaded_and_viewed() {
             bounds: tree.root_aabb().unwrap_or(Aabb::EMPTY),
             method: "best".into(),
             has_visits: false,
+            has_frame: false,
         };
         assert_eq!(file.header(), &header);
         assert_eq!(file.visits(), Ok(None));

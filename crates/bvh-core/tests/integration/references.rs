@@ -44,9 +44,9 @@ fn a_tree_without_a_part_or_an_object_is_rejected() {
 fn a_triangle_that_is_not_finite_is_rejected_whole_and_divided() {
     let broken = Triangle::from([[0.0; 3], [1.0, 0.0, f32::NAN], [0.0, f32::INFINITY, 0.0]]);
     let root = Aabb::from([[-1.0; 3], [1.0; 3]]);
-    let whole = Bvh { nodes: vec![Node::leaf(root, 0, 1)], prim_ids: vec![0] };
+    let whole = Bvh::new(vec![Node::leaf(root, 0, 1)], vec![0]);
     let nodes = vec![Node::inner(root, 1, 2), Node::leaf(root, 0, 1), Node::leaf(root, 1, 1)];
-    for tree in [whole, Bvh { nodes, prim_ids: vec![0, 0] }] {
+    for tree in [whole, Bvh::new(nodes, vec![0, 0])] {
         assert!(WideBvh::new(&tree, &[broken]).is_err(), "{tree:?}");
     }
 }

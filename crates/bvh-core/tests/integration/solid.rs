@@ -149,14 +149,10 @@ fn a_divided_triangle_counts_once() {
     let triangles = outward(ball(2))[3..].to_vec();
     let count = triangles.len() as u32;
     let all = boxes(&triangles).iter().fold(Aabb::EMPTY, |all, aabb| all.union(aabb));
-    let halves = Bvh {
-        nodes: vec![
-            Node::inner(all, 1, 2),
-            Node::leaf(all, 0, count),
-            Node::leaf(all, count, count),
-        ],
-        prim_ids: (0..count).chain(0..count).collect(),
-    };
+    let halves = Bvh::new(
+        vec![Node::inner(all, 1, 2), Node::leaf(all, 0, count), Node::leaf(all, count, count)],
+        (0..count).chain(0..count).collect(),
+    );
     let mut random = Random(5);
     let mut parts = tree(&boxes(&triangles), SHAPES[0], &mut random);
     // So many parts that some subtrees have no triangle that is not counted elsewhere.

@@ -436,8 +436,7 @@ fn rays_that_are_not_finite_end_and_meet_only_triangles_that_exist() {
     let boxes = boxes(&triangles);
     let root = Node::inner(Aabb::union_of(&boxes), 1, 5);
     let leaves = (0..).zip(&boxes).map(|(i, &aabb)| Node::leaf(aabb, i, 1));
-    let tree =
-        Bvh { nodes: [root].into_iter().chain(leaves).collect(), prim_ids: (0..5).collect() };
+    let tree = Bvh::new([root].into_iter().chain(leaves).collect(), (0..5).collect());
     let traced = Traced::new(tree, &triangles);
     let (nan, inf) = (f32::NAN, f32::INFINITY);
     for (origin, direction) in [
@@ -497,7 +496,7 @@ fn rays_that_ask_for_any_hit_come_to_a_wall_before_what_is_scattered_whether_it_
         nodes.extend((0..).zip(walls).map(|(i, &aabb)| Node::leaf(aabb, i, 1)));
         nodes.push(Node::leaf(scattered, parts, 24));
         let prim_ids = walls.iter().map(|_| 0).chain(1..25).collect();
-        let wide = WideBvh::new(&Bvh { nodes, prim_ids }, &triangles).unwrap();
+        let wide = WideBvh::new(&Bvh::new(nodes, prim_ids), &triangles).unwrap();
         let ray = Ray::half_line([0.1, 0.1, -1.0], [0.0, 0.0, 1.0]).unwrap();
         let mut counts = TestCounts::default();
         assert!(wide.any_hit_counted(&ray, &mut counts));

@@ -81,7 +81,7 @@ mod tests {
         assert_eq!(hit, Some(Hit { t: 1.0, object: 0 }));
         assert_eq!(counts, TestCounts { boxes: tree.nodes.len() as u64, objects: 100 });
         assert!(order[0] >= 50, "{order:?}");
-        let leaf = Bvh { nodes: vec![Node::leaf(boxes[0], 0, 1)], prim_ids: vec![0] };
+        let leaf = Bvh::new(vec![Node::leaf(boxes[0], 0, 1)], vec![0]);
         // The ray is in the box from 1 to 2.
         for (t, is_in_leaf) in [(0.5, false), (1.0, true), (2.0, true), (2.5, false)] {
             let hit = nearest_hit(&leaf, &ray, |_, _| Some(t), &mut ());

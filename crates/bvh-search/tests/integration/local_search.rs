@@ -168,7 +168,7 @@ fn chain(boxes: &[Aabb]) -> Bvh {
             Node::leaf(Aabb::EMPTY, i + 1, 1)
         });
     }
-    let mut tree = Bvh { nodes, prim_ids: (0..n).collect() };
+    let mut tree = Bvh::new(nodes, (0..n).collect());
     tree.refit(boxes);
     tree
 }
@@ -205,7 +205,7 @@ fn leaves_of_several_objects_are_kept_and_other_trees_are_rejected_by_name() {
     let error = |tree: &Bvh, boxes: &[Aabb]| {
         optimize(tree, &Problem::new(boxes), &config, 1, work(0), &()).unwrap_err()
     };
-    let mut flat = Bvh { nodes: vec![Node::inner(Aabb::EMPTY, 1, 3)], prim_ids: vec![0, 1, 2] };
+    let mut flat = Bvh::new(vec![Node::inner(Aabb::EMPTY, 1, 3)], vec![0, 1, 2]);
     flat.nodes.extend((0..3).map(|i| Node::leaf(Aabb::EMPTY, i, 1)));
     flat.refit(&boxes[..3]);
     assert_eq!(error(&flat, &boxes[..3]), SearchError::NotBinary { node: 0, children: 3 });

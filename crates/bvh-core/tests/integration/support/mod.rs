@@ -104,7 +104,7 @@ pub fn chain(boxes: &[Aabb]) -> Bvh {
         nodes.extend([Node::inner(Aabb::EMPTY, 2 * i + 1, 2), Node::leaf(Aabb::EMPTY, i, 1)]);
     }
     nodes.push(Node::leaf(Aabb::EMPTY, n - 1, 1));
-    let mut tree = Bvh { nodes, prim_ids: (0..n).collect() };
+    let mut tree = Bvh::new(nodes, (0..n).collect());
     tree.refit(boxes);
     tree
 }

@@ -1,0 +1,216 @@
+//! Frames: the directions along which the boxes of a tree lie.
+//!
+//! A building that stands obliquely in its file fills little of boxes along the file's axes. Boxes
+//! along its own walls are the boxes of the same building as its author drew it:
+//!
+//! ```text
+//!   boxes along the file's axes      boxes in a frame
+//!   ┌───────────────┐                      ╱╲
+//!   │      ╱╲       │                     ╱  ╲
+//!   │    ╱    ╲     │                   ╱      ╲
+//!   │  ╱        ╲   │                  ╱        ╱
+//!   │  ╲        ╱   │                  ╲      ╱
+//!   │    ╲    ╱     │                    ╲  ╱
+//!   └───────────────┘                     ╲╱
+//! ```
+//!
+//! Triangles, rays and answers stay in the coordinates of the file, bit by bit. Boxes are a filter
+//! that may only be too large, and so may be tested in any coordinates q = R (p − c). In real
+//! arithmetic, a point of an object is in the object's box, and a ray o + t d is at
+//! R (o − c) + t R d for the same t. It does not matter whether R is a rotation; a nearly orthogonal
+//! matrix keeps distances, and so areas and costs mean what they mean in the file.
+//!
+//! # The bounds
+//!
+//! With ε = 2⁻⁵³ and M the sum of |Rᵢⱼ| |pⱼ − cⱼ| over j, a coordinate of R (p − c) that is computed
+//! in f64 is off by less than 4εM from its difference, product and two sums, and one of R d by less
+//! than 3ε times the same sum for d. The rows of R have length 1, and so M ≤ √3 |p − c|.
+//!
+//! *Near.* Let S be the largest coordinate of the root's box in the frame, and let the ray begin in
+//! its [near region](crate::slabs::near_region), at most 513 S from 0 along each axis. Then M is
+//! below 2¹¹ S, and the origin O is off by less than 2⁻⁴⁰ S. Up to a point in the root's box, t |d|
+//! is at most √3 · 514 S: the direction's error moves that point by less than 2⁻⁴⁰ S. Let D be the
+//! computed component of the direction, and x the coordinate of a point of the scene at t. Both
+//! errors together, `slack` = 2⁻³⁸ S, give
+//!
+//! ```text
+//!   x − slack ≤ O + t D ≤ x + slack
+//! ```
+//!
+//! [`Slabs`](crate::Slabs) move the origin by the slack, up for lower faces and down for upper
+//! faces, and round it there to the same side. The rest of their proof holds for O and D.
+//!
+//! Vector kernels round the origin to the nearest number o, off by u|O| with u = 2⁻²⁴, because they
+//! have one origin for both faces. Since |O| ≤ |x| + |x − O|, the planes of the layout are moved
+//! outwards by u|x| + slack, with the largest |x| in the box. What is left is at most ut|D|:
+//!
+//! ```text
+//!   lower − o ≤ t D (1 + u),      upper − o ≥ t D (1 − u)
+//! ```
+//!
+//! A difference, the product of the reciprocal with 1 ∓ 4u, and the final product are rounded by
+//! at most u / (1 + u) of themselves, the last one monotonically. So the reciprocal i has to be so
+//! close to 1 / D that
+//!
+//! ```text
+//!   i D ≤ (1 + 12u²) / (1 − u)  and  i D ≥ (1 + u)² / ((1 + 4u) (1 − u))
+//! ```
+//!
+//! or, without third powers, 1 − u + 8u² ≤ i D ≤ 1 + u + 12u². Rounding to the nearest number keeps
+//! a factor between 1 − u + u² and 1 + u − u². The number that is rounded is therefore 10u² greater
+//! than 1 / D, where 7u² to 13u² would do; three operations in f64 add less than u² / 4.
+//!
+//! *Far.* Other rays are tested in f64. By 4ε for the origin and 9ε for the direction they are off
+//! by less than 2⁻⁴⁸ (M + S) with the largest M, by which their origins are moved as above.
+
+use crate::aabb::{round_down, round_up};
+use crate::{Aabb, Triangle};
+use glam::{DMat3, DVec3, Vec3};
+
+/// The frame of a tree's boxes: a rotation and a centre. The coordinates of a point p in the frame
+/// are rotation · (p − centre).
+///
+/// A tree with a frame is traced by rays in the file's coordinates, and gives the answers of every
+/// other tree. Frames are for triangles only: [`boxes`](Self::boxes) returns the boxes to build a
+/// tree over.
+///
+/// ```
+/// use bvh_core::{Frame, Triangle, glam::{DMat3, DVec3}};
+/// let frame = Frame::new(DMat3::from_rotation_z(-0.5), DVec3::ZERO)?;
+/// // A square that is turned by half a radian, as two triangles.
+/// let (sin, cos) = 0.5f32.sin_cos();
+/// let [a, b, c, d] = [[0.0; 3], [cos, sin, 0.0], [cos - sin, sin + cos, 0.0], [-sin, cos, 0.0]];
+/// let square = [[a, b, c], [a, c, d]].map(Triangle::from);
+/// assert!(square[0].aabb().half_area() > 0.6);
+/// assert!(frame.boxes(&square)[0].half_area() < 0.51);
+/// # Ok::<(), bvh_core::InvalidFrame>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// The directions of the frame's axes in the file's coordinates: the rows of the rotation.
+    pub(crate) axes: [DVec3; 3],
+    pub(crate) centre: DVec3,
+}
+
+/// The reason why numbers are rejected as a frame.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum InvalidFrame {
+    /// The matrix is not a rotation: its rows must have length 1 and be perpendicular to each other
+    /// up to 2⁻⁴⁰, and must not mirror.
+    #[error("the frame's matrix {0} is no rotation")]
+    Rotation(DMat3),
+    /// A coordinate of the centre is not finite, or larger than any coordinate of a scene.
+    #[error("the frame's centre {0} must be finite and within the range of f32")]
+    Centre(DVec3),
+}
+
+impl Frame {
+    /// The number of bytes in a file.
+    pub(crate) const BYTES: usize = 96;
+
+    /// Makes the frame in which the coordinates of p are `rotation · (p − centre)`.
+    pub fn new(rotation: DMat3, centre: DVec3) -> Result<Self, InvalidFrame> {
+        let rows = rotation.transpose();
+        let axes = [rows.x_axis, rows.y_axis, rows.z_axis];
+        let product = rotation * rows;
+        let error = (product - DMat3::IDENTITY).to_cols_array().map(f64::abs);
+        // NaN is in no range.
+        let is_orthogonal = error.iter().all(|&error| error <= 1.0 / (1u64 << 40) as f64);
+        if !(is_orthogonal && rotation.determinant() > 0.0) {
+            return Err(InvalidFrame::Rotation(rotation));
+        }
+        if !(centre.abs().max_element() <= f64::from(f32::MAX)) || centre.is_nan() {
+            return Err(InvalidFrame::Centre(centre));
+        }
+        Ok(Self { axes, centre })
+    }
+
+    /// The rotation from the file's axes to the frame's.
+    pub fn rotation(&self) -> DMat3 {
+        let [x, y, z] = self.axes;
+        DMat3::from_cols(x, y, z).transpose()
+    }
+
+    /// The point of the file that has the coordinates 0, 0, 0 in the frame.
+    pub fn centre(&self) -> DVec3 {
+        self.centre
+    }
+
+    /// Returns the rotation, row by row, and the centre.
+    pub(crate) fn to_bytes(self) -> Vec<u8> {
+        let [x, y, z] = self.axes;
+        let rows = [x, y, z, self.centre].map(|row| row.to_array());
+        bytemuck::bytes_of(&rows).to_vec()
+    }
+
+    pub(crate) fn of_bytes(bytes: &[u8; Self::BYTES]) -> Result<Self, InvalidFrame> {
+        let [x, y, z, centre] = bytemuck::cast::<_, [[f64; 3]; 4]>(*bytes).map(DVec3::from);
+        Self::new(DMat3::from_cols(x, y, z).transpose(), centre)
+    }
+
+    /// Returns the coordinates of a point in the frame, rounded.
+    #[inline]
+    pub fn point(&self, point: DVec3) -> DVec3 {
+        self.direction(point - self.centre)
+    }
+
+    /// Returns the components of a direction in the frame, rounded.
+    #[inline]
+    pub fn direction(&self, direction: DVec3) -> DVec3 {
+        DVec3::from(self.axes.map(|axis| axis.dot(direction)))
+    }
+
+    /// Returns the sums of |Rᵢⱼ| |pⱼ − cⱼ|, to which errors are relative.
+    #[inline]
+    fn sums(&self, point: DVec3) -> DVec3 {
+        let size = (point - self.centre).abs();
+        DVec3::from(self.axes.map(|axis| axis.abs().dot(size)))
+    }
+
+    /// Returns the smallest box in the frame that certainly contains the triangle: it is rounded
+    /// outwards.
+    pub fn aabb(&self, triangle: &Triangle) -> Aabb {
+        /// 8ε, twice the bound of the error.
+        const ERROR: f64 = 4.0 * f64::EPSILON;
+        let mut min = DVec3::INFINITY;
+        let mut max = DVec3::NEG_INFINITY;
+        for corner in triangle.0.map(Vec3::as_dvec3) {
+            let point = self.point(corner);
+            let error = ERROR * self.sums(corner);
+            // A NaN of any corner must not be lost.
+            if point.is_nan() {
+                return Aabb { min: Vec3::NAN, max: Vec3::NAN };
+            }
+            min = min.min(point - error);
+            max = max.max(point + error);
+        }
+        Aabb { min: round_down(min), max: round_up(max) }
+    }
+
+    /// Returns the box of every triangle in the frame, in the same order.
+    pub fn boxes(&self, triangles: &[Triangle]) -> Vec<Aabb> {
+        triangles.iter().map(|triangle| self.aabb(triangle)).collect()
+    }
+}
+
+/// Triangles with their boxes and parts in a tree's frame, or in the file's axes if it has none.
+#[derive(Clone, Copy, Debug)]
+pub struct InFrame<'a> {
+    /// The triangles.
+    pub triangles: &'a [Triangle],
+    /// The frame.
+    pub frame: Option<&'a Frame>,
+}
+
+impl InFrame<'_> {
+    /// Returns the box of every triangle, in the same order.
+    pub fn boxes(&self) -> Vec<Aabb> {
+        self.triangles.iter().map(|triangle| self.aabb(triangle)).collect()
+    }
+
+    /// Returns the box of a triangle.
+    #[inline]
+    pub(crate) fn aabb(&self, triangle: &Triangle) -> Aabb {
+        self.frame.map_or_else(|| triangle.aabb(), |frame| frame.aabb(triangle))
+    }
+}
