@@ -96,7 +96,7 @@ const VALIDATION: f64 = 1.0;
 #[inline]
 fn clip(objects: &InFrame, object: u32, region: &Aabb, slack: f64) -> Aabb {
     let triangle = &objects.triangles[object as usize];
-    let full = objects.aabb(triangle);
+    let full = triangle.aabb_in(objects.frame);
     let common = full.intersection(region);
     // Most triangles are inside the region or outside of it, and need no cut.
     if common == full || common == Aabb::EMPTY {

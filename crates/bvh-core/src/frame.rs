@@ -64,7 +64,7 @@
 //! by less than 2⁻⁴⁸ (M + S) with the largest M, by which their origins are moved as above.
 
 use crate::aabb::{round_down, round_up};
-use crate::{Aabb, Triangle};
+use crate::{Aabb, Ray, Triangle};
 use glam::{DMat3, DVec3, Vec3};
 
 /// The frame of a tree's boxes: a rotation and a centre. The coordinates of a point p in the frame
@@ -81,8 +81,8 @@ use glam::{DMat3, DVec3, Vec3};
 /// let (sin, cos) = 0.5f32.sin_cos();
 /// let [a, b, c, d] = [[0.0; 3], [cos, sin, 0.0], [cos - sin, sin + cos, 0.0], [-sin, cos, 0.0]];
 /// let square = [[a, b, c], [a, c, d]].map(Triangle::from);
-/// assert!(square[0].aabb().half_area() > 0.6);
-/// assert!(frame.boxes(&square)[0].half_area() < 0.51);
+/// assert!(square[0].aabb().half_area() > 1.18);
+/// assert!(frame.boxes(&square)[0].half_area() < 1.001);
 /// # Ok::<(), bvh_core::InvalidFrame>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -193,6 +193,50 @@ impl Frame {
     }
 }
 
+impl Frame {
+    /// By how much the number is greater that is rounded to a reciprocal: 10u².
+    pub(crate) const ABOVE: f64 = 1.0 + 10.0 / (1u64 << 48) as f64;
+
+    /// Returns the ray for boxes in the frame that it begins near to.
+    #[inline(always)]
+    pub(crate) fn ray(&self, ray: &Ray) -> Ray {
+        let origin = self.point(ray.origin().as_dvec3()).as_vec3();
+        let direction = self.direction(ray.direction().as_dvec3());
+        let inverse = (Self::ABOVE / direction).as_vec3();
+        Ray::with_inverse(origin, direction.as_vec3(), inverse, ray.t_min(), ray.t_max())
+    }
+
+    /// Returns by how much rays that begin near a scene are off in the frame, apart from the
+    /// rounding to f32. `bounds` is the root's box in the frame.
+    #[inline(always)]
+    pub(crate) fn slack(bounds: &Aabb) -> f64 {
+        f64::from(size(bounds)) / (1u64 << 38) as f64
+    }
+
+    /// Returns by how much a ray of this origin is off in the frame in f64.
+    pub(crate) fn far_slack(&self, origin: DVec3, bounds: &Aabb) -> f64 {
+        let farthest = self.sums(origin).max_element() + f64::from(size(bounds));
+        farthest / (1u64 << 48) as f64
+    }
+
+    /// Returns a box of a tree as the layout has it, for rays whose origins are rounded to f32.
+    pub(crate) fn padded(aabb: &Aabb, slack: f64) -> Aabb {
+        const U: f64 = (f32::EPSILON / 2.0) as f64;
+        let pad = aabb.min.abs().max(aabb.max.abs()).as_dvec3() * U + slack;
+        // What no scene reaches needs no pad.
+        Aabb {
+            min: round_down(aabb.min.as_dvec3() - pad).max(Vec3::MIN),
+            max: round_up(aabb.max.as_dvec3() + pad).min(Vec3::MAX),
+        }
+    }
+}
+
+/// Returns the largest coordinate of a box.
+#[inline(always)]
+fn size(aabb: &Aabb) -> f32 {
+    aabb.min.abs().max(aabb.max.abs()).max_element()
+}
+
 /// Triangles with their boxes and parts in a tree's frame, or in the file's axes if it has none.
 #[derive(Clone, Copy, Debug)]
 pub struct InFrame<'a> {
@@ -205,12 +249,81 @@ pub struct InFrame<'a> {
 impl InFrame<'_> {
     /// Returns the box of every triangle, in the same order.
     pub fn boxes(&self) -> Vec<Aabb> {
-        self.triangles.iter().map(|triangle| self.aabb(triangle)).collect()
+        self.triangles.iter().map(|triangle| triangle.aabb_in(self.frame)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DQuat;
+    use num_bigint::BigInt;
+    use proptest::prelude::*;
+
+    /// A number times 2^1200: an integer for coordinates, rotations and their products here.
+    fn exactly(x: f64) -> BigInt {
+        let bits = x.abs().to_bits();
+        let (exponent, fraction) = ((bits >> 52) as i64, bits & ((1 << 52) - 1));
+        let (mantissa, exponent) =
+            if exponent == 0 { (fraction, -1074) } else { (fraction | 1 << 52, exponent - 1075) };
+        let size = BigInt::from(mantissa) << (exponent + 1200) as u64;
+        if x < 0.0 { -size } else { size }
     }
 
-    /// Returns the box of a triangle.
-    #[inline]
-    pub(crate) fn aabb(&self, triangle: &Triangle) -> Aabb {
-        self.frame.map_or_else(|| triangle.aabb(), |frame| frame.aabb(triangle))
+    proptest! {
+        #[test]
+        fn a_box_in_a_frame_contains_the_corners_in_real_arithmetic_and_little_else(
+            turn in prop::array::uniform4(-1.0f64..1.0),
+            centre in prop::array::uniform3(-1.0f64..1.0),
+            corners in prop::array::uniform9(-1.0f32..1.0),
+            exponents in prop::array::uniform2(-100i32..100),
+        ) {
+            let [size, far] = exponents.map(|exponent| libm::ldexp(1.0, exponent));
+            let rotation = DMat3::from_quat(DQuat::from_array(turn).normalize());
+            let frame = Frame::new(rotation, DVec3::from(centre) * far).unwrap();
+            let triangle = Triangle::from(corners.map(|x| x * size as f32));
+            let aabb = frame.aabb(&triangle);
+            let steps = BigInt::from(1) << 1200;
+            for axis in 0..3 {
+                let along = frame.axes[axis];
+                let coordinates = triangle.0.map(|corner| -> BigInt {
+                    let term = |i: usize| {
+                        exactly(along[i]) * (exactly(corner[i].into()) - exactly(frame.centre[i]))
+                    };
+                    (0..3).map(term).sum()
+                });
+                let [min, max] = [aabb.min[axis], aabb.max[axis]]
+                    .map(|x| exactly(x.into()) * &steps);
+                let least = coordinates.iter().min().unwrap();
+                let most = coordinates.iter().max().unwrap();
+                prop_assert!(&min <= least && most <= &max);
+                // Two steps of f32, of which the error in f64 may be one.
+                let step = (size + far) * f64::from(f32::EPSILON) * 4.0;
+                prop_assert!(&max - &min <= most - least + exactly(step) * &steps);
+            }
+        }
+    }
+
+    #[test]
+    fn only_rotations_and_finite_centres_make_a_frame() {
+        let turn = DMat3::from_rotation_y(0.3);
+        for rotation in [
+            DMat3::ZERO,
+            -turn,
+            turn * (1.0 + 1e-9),
+            DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::Y),
+            DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::NAN),
+            DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::INFINITY),
+        ] {
+            let rejected = Frame::new(rotation, DVec3::ZERO);
+            assert!(matches!(rejected, Err(InvalidFrame::Rotation(_))), "{rotation}");
+        }
+        for x in [f64::NAN, f64::INFINITY, 1e39] {
+            let rejected = Frame::new(turn, DVec3::new(0.0, 0.0, x));
+            assert!(matches!(rejected, Err(InvalidFrame::Centre(_))), "{x}");
+        }
+        let frame = Frame::new(turn, DVec3::ONE).unwrap();
+        assert_eq!((frame.rotation(), frame.centre()), (turn, DVec3::ONE));
+        assert_eq!(frame.point(DVec3::ONE), DVec3::ZERO);
     }
 }

@@ -93,7 +93,19 @@ impl Ray {
 
     #[inline]
     fn made(origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Self {
-        let inverse = (1.0 / direction.extend(1.0)).max(Vec4::MIN).min(Vec4::MAX);
+        Self::with_inverse(origin, direction, 1.0 / direction, t_min, t_max)
+    }
+
+    /// Makes a ray of these reciprocals, which may be infinite.
+    #[inline(always)]
+    pub(crate) fn with_inverse(
+        origin: Vec3,
+        direction: Vec3,
+        inverse: Vec3,
+        t_min: f32,
+        t_max: f32,
+    ) -> Self {
+        let inverse = inverse.extend(1.0).max(Vec4::MIN).min(Vec4::MAX);
         let sizes = inverse.abs();
         let least = sizes.x.min(sizes.y).min(sizes.z);
         // Adding 0 turns −0 into +0, so no kernel returns a distance of −0.

@@ -1,8 +1,9 @@
 //! The conservative ray–box test: it never misses a box that contains a hit.
 
+use crate::aabb::{round_down, round_up};
 use crate::ray::pow2;
-use crate::{Aabb, Ray};
-use glam::{Vec3, Vec4, Vec4Swizzles};
+use crate::{Aabb, Frame, Ray};
+use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 
 /// A ray prepared for tests against the boxes of one scene.
 ///
@@ -46,6 +47,8 @@ use glam::{Vec3, Vec4, Vec4Swizzles};
 /// *Far.* In the unit of a scene, the growth of its boxes increases with the distance from it. So
 /// rays from far away, and rays whose differences could overflow, are tested in f64. The quotient of
 /// a difference and d is rounded two or three times, by 2⁻⁵³ of itself; the factors are 1 ∓ 2⁻⁴⁹.
+///
+/// *In a frame.* [`frame`](crate::frame) has the errors of the ray's form in it.
 #[derive(Clone, Copy, Debug)]
 pub struct Slabs {
     /// The origin, as it is subtracted from lower and from upper corners.
@@ -54,8 +57,10 @@ pub struct Slabs {
     /// The reciprocals of the direction for entries and for exits.
     pub(crate) near: Vec4,
     pub(crate) far: Vec4,
+    /// The ray in the frame of the boxes.
     pub(crate) ray: Ray,
-    pub(crate) is_far: bool,
+    /// The ray in f64, if it begins far from the scene.
+    far_ray: Option<FarRay>,
 }
 
 /// The factor of entries, 1 − 4u.
@@ -71,15 +76,38 @@ impl Slabs {
     /// box.
     #[inline]
     pub fn new(ray: &Ray, bounds: &Aabb) -> Self {
-        let origin = ray.origin();
+        let far_ray = ray.is_far_from(bounds).then(|| FarRay::new(ray));
+        Self::from_origins(ray, [ray.origin(); 2], far_ray)
+    }
+
+    /// Prepares `ray` for boxes that lie in `frame`, and inside `bounds` there.
+    #[inline]
+    pub fn in_frame(ray: &Ray, frame: Option<&Frame>, bounds: &Aabb) -> Self {
+        match frame {
+            None => Self::new(ray, bounds),
+            Some(frame) => Self::of_frame(ray, frame, bounds),
+        }
+    }
+
+    #[inline(never)]
+    fn of_frame(ray: &Ray, frame: &Frame, bounds: &Aabb) -> Self {
+        let in_frame = frame.ray(ray);
+        let is_far = in_frame.is_far_from(bounds);
+        let far_ray = is_far.then(|| FarRay::in_frame(ray, frame, bounds));
+        let origin = frame.point(ray.origin().as_dvec3());
+        let slack = DVec3::splat(Frame::slack(bounds));
+        let origins = [round_up(origin + slack), round_down(origin - slack)];
+        Self::from_origins(&in_frame, origins, far_ray)
+    }
+
+    #[inline(always)]
+    fn from_origins(ray: &Ray, [mut lower, mut upper]: [Vec3; 2], far_ray: Option<FarRay>) -> Self {
         let inverse = ray.inverse_direction();
         let far = inverse * FAR;
-        let mut lower = origin;
-        let mut upper = origin;
         let is_parallel = far.abs().cmpeq(Vec3::INFINITY);
         if is_parallel.any() {
-            lower = Vec3::select(is_parallel, origin.map(f32::next_up), origin);
-            upper = Vec3::select(is_parallel, origin.map(f32::next_down), origin);
+            lower = Vec3::select(is_parallel, lower.map(f32::next_up), lower);
+            upper = Vec3::select(is_parallel, upper.map(f32::next_down), upper);
         }
         Self {
             lower: lower.extend(0.0),
@@ -87,16 +115,22 @@ impl Slabs {
             near: (inverse * NEAR).extend(0.0),
             far: far.extend(0.0),
             ray: *ray,
-            is_far: ray.is_far_from(bounds),
+            far_ray,
         }
+    }
+
+    /// Returns whether boxes are tested in f64.
+    #[inline(always)]
+    pub(crate) fn is_far(&self) -> bool {
+        self.far_ray.is_some()
     }
 
     /// Returns the distances between which the ray may be inside the box, from `t_min` on. The
     /// interval is empty if the first exceeds the second.
     #[inline(always)]
     pub fn interval(&self, aabb: &Aabb) -> (f32, f32) {
-        if self.is_far {
-            return self.far_interval(aabb);
+        if let Some(far_ray) = &self.far_ray {
+            return far_ray.rounded_interval(aabb, self.ray.t_min());
         }
         let Aabb { min, max } = *aabb;
         // Two overlapping loads of four lanes and a rotation. The fourth lane is not used.
@@ -111,18 +145,6 @@ impl Slabs {
         (entry, smaller(far.x, smaller(far.y, smaller(far.z, f32::INFINITY))))
     }
 
-    #[cold]
-    #[inline(never)]
-    fn far_interval(&self, aabb: &Aabb) -> (f32, f32) {
-        let (entry, exit) = interval_in_f64(&self.ray, aabb);
-        let entry = entry * NEAR_DOUBLE;
-        let exit = exit * FAR_DOUBLE;
-        if entry > exit {
-            return (f32::INFINITY, f32::NEG_INFINITY);
-        }
-        (larger(entry as f32, self.ray.t_min()), exit as f32)
-    }
-
     /// Returns the distances between which the ray may cross the plane across `axis` at `position`,
     /// a plane that meets the bounds. The ray may be in front of the plane up to the second
     /// distance, and behind it from the first on. The interval of a box in front of the plane ends
@@ -130,8 +152,8 @@ impl Slabs {
     /// bit by bit.
     #[inline(always)]
     pub fn crossing(&self, axis: usize, position: f32) -> (f32, f32) {
-        if self.is_far {
-            return self.far_crossing(axis, position);
+        if let Some(far_ray) = &self.far_ray {
+            return far_ray.crossing(axis, position);
         }
         let is_backwards = self.near[axis] < 0.0;
         // Of a box behind the plane, the plane is the first face; of a box in front, the last.
@@ -141,19 +163,6 @@ impl Slabs {
         // 0 · ∞ where the ray runs along the plane.
         let last = if last.is_nan() { f32::INFINITY } else { last };
         ((position - first[axis]) * self.near[axis], last)
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn far_crossing(&self, axis: usize, position: f32) -> (f32, f32) {
-        let difference = f64::from(position) - f64::from(self.ray.origin()[axis]);
-        let distance = difference / f64::from(self.ray.direction()[axis]);
-        // 0 / 0 where the ray runs in the plane.
-        if distance.is_nan() {
-            return (f32::NEG_INFINITY, f32::INFINITY);
-        }
-        let (first, last) = (distance * NEAR_DOUBLE, distance * FAR_DOUBLE);
-        (first.min(last) as f32, first.max(last) as f32)
     }
 
     /// Returns the distance at which the ray enters the box; infinity for a miss, which is beyond
@@ -206,28 +215,83 @@ pub(crate) fn near_region(bounds: &Aabb) -> Aabb {
     }
 }
 
-/// Returns the distances at which the line of a ray enters and leaves a box, each rounded by at most
-/// 2⁻⁵¹ of itself. The first exceeds the second, up to that rounding, if the line misses the box.
-#[inline]
-fn interval_in_f64(ray: &Ray, aabb: &Aabb) -> (f64, f64) {
-    let mut entry = f64::NEG_INFINITY;
-    let mut exit = f64::INFINITY;
-    for axis in 0..3 {
-        let origin = f64::from(ray.origin()[axis]);
-        let direction = f64::from(ray.direction()[axis]);
-        let low = f64::from(aabb.min[axis]) - origin;
-        let high = f64::from(aabb.max[axis]) - origin;
-        if direction == 0.0 {
-            if low > 0.0 || high < 0.0 {
-                return (f64::INFINITY, f64::NEG_INFINITY);
-            }
-            continue;
-        }
-        let (near, far) = if direction < 0.0 { (high, low) } else { (low, high) };
-        entry = entry.max(near / direction);
-        exit = exit.min(far / direction);
+/// A ray in f64, for boxes that f32 cannot tell apart from its origin.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FarRay {
+    /// The origin, as it is subtracted from lower and from upper corners. They differ in a frame.
+    pub(crate) lower: DVec3,
+    pub(crate) upper: DVec3,
+    pub(crate) direction: DVec3,
+}
+
+impl FarRay {
+    #[inline(always)]
+    pub(crate) fn new(ray: &Ray) -> Self {
+        let origin = ray.origin().as_dvec3();
+        Self { lower: origin, upper: origin, direction: ray.direction().as_dvec3() }
     }
-    (entry, exit)
+
+    /// Returns the ray for boxes that lie in a frame, and inside `bounds` there.
+    pub(crate) fn in_frame(ray: &Ray, frame: &Frame, bounds: &Aabb) -> Self {
+        let origin = ray.origin().as_dvec3();
+        let slack = DVec3::splat(frame.far_slack(origin, bounds));
+        let origin = frame.point(origin);
+        let direction = frame.direction(ray.direction().as_dvec3());
+        Self { lower: origin + slack, upper: origin - slack, direction }
+    }
+
+    /// Returns the distances at which the line of the ray enters and leaves a box, each rounded by
+    /// at most 2⁻⁵¹ of itself. The first exceeds the second, up to that rounding, if the line misses
+    /// the box.
+    #[inline]
+    fn interval(&self, aabb: &Aabb) -> (f64, f64) {
+        let mut entry = f64::NEG_INFINITY;
+        let mut exit = f64::INFINITY;
+        for axis in 0..3 {
+            let direction = self.direction[axis];
+            let low = f64::from(aabb.min[axis]) - self.lower[axis];
+            let high = f64::from(aabb.max[axis]) - self.upper[axis];
+            if direction == 0.0 {
+                if low > 0.0 || high < 0.0 {
+                    return (f64::INFINITY, f64::NEG_INFINITY);
+                }
+                continue;
+            }
+            let (near, far) = if direction < 0.0 { (high, low) } else { (low, high) };
+            entry = entry.max(near / direction);
+            exit = exit.min(far / direction);
+        }
+        (entry, exit)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn rounded_interval(&self, aabb: &Aabb, t_min: f32) -> (f32, f32) {
+        let (entry, exit) = self.interval(aabb);
+        let entry = entry * NEAR_DOUBLE;
+        let exit = exit * FAR_DOUBLE;
+        if entry > exit {
+            return (f32::INFINITY, f32::NEG_INFINITY);
+        }
+        (larger(entry as f32, t_min), exit as f32)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn crossing(&self, axis: usize, position: f32) -> (f32, f32) {
+        let direction = self.direction[axis];
+        let [lower, upper] =
+            [self.lower, self.upper].map(|origin| (f64::from(position) - origin[axis]) / direction);
+        // 0 / 0 where the ray runs in the plane.
+        if lower.is_nan() || upper.is_nan() {
+            return (f32::NEG_INFINITY, f32::INFINITY);
+        }
+        // Of a box behind the plane, the plane is the first face; of a box in front, the last.
+        let (first, last) = if direction < 0.0 { (upper, lower) } else { (lower, upper) };
+        let first = (first * NEAR_DOUBLE).min(first * FAR_DOUBLE);
+        let last = (last * NEAR_DOUBLE).max(last * FAR_DOUBLE);
+        (first as f32, last as f32)
+    }
 }
 
 /// Returns the larger of two numbers that are not NaN. Unlike `f32::max`, it is one instruction.
@@ -257,7 +321,7 @@ pub fn clip_to_box(ray: &Ray, bounds: &Aabb, t: f32, t_max: f32) -> Option<f32> 
     if t.is_nan() || t < ray.t_min() {
         return None;
     }
-    let (entry, exit) = interval_in_f64(ray, bounds);
+    let (entry, exit) = FarRay::new(ray).interval(bounds);
     let first = larger((entry * FAR_DOUBLE) as f32, ray.t_min());
     let last = (exit * NEAR_DOUBLE) as f32;
     // Adding 0 turns −0 into +0.
@@ -330,7 +394,7 @@ mod tests {
     /// Returns an upper bound of the entry and a lower bound of the exit in real arithmetic, which
     /// differ by 2⁻⁴⁸ of themselves from these distances.
     fn real_interval(ray: &Ray, aabb: &Aabb) -> (f64, f64) {
-        let (entry, exit) = interval_in_f64(ray, aabb);
+        let (entry, exit) = FarRay::new(ray).interval(aabb);
         (entry + entry.abs() * 1e-15, exit - exit.abs() * 1e-15)
     }
 

@@ -221,7 +221,7 @@ fn walk<C: Counter>(
     mut leaf: impl FnMut(&[u32], &mut f32, &mut C) -> ControlFlow<()>,
 ) {
     let Some(root) = tree.nodes.first() else { return };
-    let slabs = Slabs::new(ray, &root.aabb);
+    let slabs = Slabs::in_frame(ray, tree.frame, &root.aabb);
     let mut t_max = ray.t_max();
     counter.boxes(1);
     if slabs.entry(&root.aabb) > t_max {

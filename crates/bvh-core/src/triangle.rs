@@ -1,7 +1,7 @@
 //! Triangles, and a watertight ray test: no ray passes through the edge between two triangles.
 
 use crate::exact::{Line, is_degenerate};
-use crate::{Aabb, Ray};
+use crate::{Aabb, Frame, Ray};
 use bytemuck::{Pod, Zeroable};
 use glam::{Affine3A, DVec3, Vec3};
 
@@ -37,6 +37,12 @@ impl Triangle {
     #[inline]
     pub fn aabb(&self) -> Aabb {
         Aabb::around(self.0)
+    }
+
+    /// Returns a box around the triangle that lies in a frame, or in the file's axes without one.
+    #[inline]
+    pub(crate) fn aabb_in(&self, frame: Option<&Frame>) -> Aabb {
+        frame.map_or_else(|| self.aabb(), |frame| frame.aabb(self))
     }
 
     /// Returns the triangle's area in world units squared.

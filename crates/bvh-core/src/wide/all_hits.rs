@@ -44,7 +44,7 @@ use super::one_ray::{LeafRay, Leaves, traverse};
 use super::triangles::TriangleBlock;
 use super::{portable, vector};
 use crate::exact::Line;
-use crate::{Coherence, Hit, Kernel, Ray, Slabs, Triangle};
+use crate::{Coherence, Hit, Kernel, Ray, Triangle};
 
 impl WideBvh {
     /// Returns the hits of the ray in its range, each crossing of a surface once, the nearest
@@ -99,7 +99,7 @@ impl WideBvh {
             return unsafe { vector::dispatch(self.kernel, OneRay { wide: self, ray, hits }) };
         }
         let line = Line::new(ray);
-        let slabs = Slabs::new(ray, &self.bounds);
+        let slabs = self.slabs(ray);
         let intervals = |node: &WideNode| portable::intervals(&slabs, node);
         portable::traverse::<ANY_HIT>(self, ray.t_max(), intervals, &mut (), |block, _| {
             for (object, triangle) in block.triangles() {

@@ -96,12 +96,12 @@ impl<K: Instructions, F: Find> Task<K> for Batch<'_, F> {
             let mut next = 0;
             while next + K::Rays::N <= rays.len() {
                 prefetch::<K>(rays, next + RAYS);
-                let lanes = RayLanes::load(rays, next);
-                if lanes.cohere(&wide.near) {
-                    if !packet.takes(lanes.octant()) {
+                let (lanes, boxed) = RayLanes::load(rays, next, wide);
+                if boxed.cohere(&lanes, wide.near_box()) {
+                    if !packet.takes(boxed.octant()) {
                         packet.trace(wide, find);
                     }
-                    packet.add(lanes, next);
+                    packet.add(lanes, boxed, next);
                     rest::<K, F>(wide, rays, first_of_rest..next, find);
                     first_of_rest = next + K::Rays::N;
                 }

@@ -15,7 +15,7 @@ use super::instructions::Instructions;
 use super::lanes::{DoubleLanes, Lanes};
 use super::layout::WideNode;
 use crate::Ray;
-use crate::slabs::{FAR, FAR_DOUBLE, NEAR, NEAR_DOUBLE};
+use crate::slabs::{FAR, FAR_DOUBLE, FarRay, NEAR, NEAR_DOUBLE};
 
 /// The bytes of a node's eight planes.
 const PLANE: usize = size_of::<[f32; WideNode::LANES]>();
@@ -112,19 +112,27 @@ impl<K: Instructions> BoxTest<K> for BoxRay<K::Boxes> {
 /// A ray that begins [far](Ray::is_far_from) from the scene: boxes are tested in f64.
 pub(crate) struct FarBoxRay {
     planes: Planes,
-    origin: [f64; 3],
+    /// The origins of near and of far planes, which differ in a frame.
+    near_origin: [f64; 3],
+    far_origin: [f64; 3],
     inverse: [f64; 3],
     t_min: f32,
 }
 
 impl FarBoxRay {
-    pub(crate) fn new(ray: &Ray) -> Self {
+    /// `boxed` and `far` are forms of one ray.
+    pub(crate) fn new(boxed: &Ray, far: &FarRay) -> Self {
+        let is_backwards = |axis: usize| boxed.inverse_direction()[axis].is_sign_negative();
+        let origin = |axis: usize, is_lower: bool| {
+            if is_lower { far.lower[axis] } else { far.upper[axis] }
+        };
         Self {
-            planes: Planes::of(ray),
-            origin: ray.origin().as_dvec3().to_array(),
+            planes: Planes::of(boxed),
+            near_origin: [0, 1, 2].map(|axis| origin(axis, !is_backwards(axis))),
+            far_origin: [0, 1, 2].map(|axis| origin(axis, is_backwards(axis))),
             // The signs of zeros decide the planes, here as there.
-            inverse: ray.direction().as_dvec3().recip().to_array(),
-            t_min: ray.t_min(),
+            inverse: far.direction.recip().to_array(),
+            t_min: boxed.t_min(),
         }
     }
 }
@@ -140,9 +148,10 @@ impl<K: Instructions> BoxTest<K> for FarBoxRay {
             for axis in 0..3 {
                 let [near, far] = self.planes.load::<K::Boxes>(node, axis);
                 let inverse = double(self.inverse[axis]);
-                let origin = double(self.origin[axis]);
-                entry = ((near.double() - origin) * inverse).max(entry);
-                exit = ((far.double() - origin) * inverse).min(exit);
+                let near_origin = double(self.near_origin[axis]);
+                let far_origin = double(self.far_origin[axis]);
+                entry = ((near.double() - near_origin) * inverse).max(entry);
+                exit = ((far.double() - far_origin) * inverse).min(exit);
             }
             let entry = entry * double(NEAR_DOUBLE);
             let exit = exit * double(FAR_DOUBLE);

@@ -4,7 +4,6 @@ use super::decide::{Costs, Decision, areas, children, decide};
 use super::layout::{Child, WideBvh, WideNode};
 use super::triangles::TriangleBlock;
 use crate::collapse::{binary, binary_visited, collect};
-use crate::slabs::near_region;
 use crate::{Aabb, Bvh, Kernel, Triangle};
 
 /// By how much each subtree promises to stop a ray, in relation to the expected time of tracing a
@@ -60,10 +59,16 @@ pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) 
         root: None,
         nodes: Vec::new(),
         blocks: Vec::new(),
-        near: near_region(&bounds),
+        near: Aabb::EMPTY,
+        framed: None,
         kernel: Kernel::best(),
         stack_need: 0,
     };
+    let around = match tree.frame {
+        None => bounds,
+        Some(_) => Aabb::around(triangles.iter().flat_map(|triangle| triangle.0)),
+    };
+    wide.set_bounds(tree.frame, &bounds, around);
     if tree.nodes.is_empty() {
         return wide;
     }
@@ -142,7 +147,7 @@ fn lay_out_nodes(
             Some((node, lane)) => {
                 let parent: &mut WideNode = &mut nodes[node];
                 parent.children[lane] = child;
-                parent.set_box(lane, &tree.nodes[subtree].aabb);
+                parent.set_box(lane, &wide.laid(&tree.nodes[subtree].aabb));
             }
         }
     }

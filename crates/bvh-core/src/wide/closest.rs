@@ -116,8 +116,9 @@ impl WideBvh {
 
     fn closest_portable(&self, point: Vec3) -> Option<Closest> {
         let mut nearest = Nearest::new(point);
-        let scale = scale(point, &self.bounds);
-        let scaled = (point * scale).to_array();
+        let boxed = self.boxed_point(point);
+        let scale = scale(boxed, self.root_box());
+        let scaled = (boxed * scale).to_array();
         let intervals = |node: &WideNode| {
             let mut sums = [0.0; WideNode::LANES];
             for (axis, &scaled) in scaled.iter().enumerate() {
@@ -177,7 +178,8 @@ impl<K: Instructions> Task<K> for ClosestPoints<'_> {
             // SAFETY: the processor has the instructions; the stack has room for `stack_need`
             // children and one register more.
             *closest = unsafe {
-                let boxes = PointLanes::<K::Boxes>::new(point, &wide.bounds);
+                let boxed = wide.boxed_point(point);
+                let boxes = PointLanes::<K::Boxes>::new(boxed, wide.root_box());
                 let mut triangles = TargetLanes::<K::Block>::new(point, boxes.scale_of_one);
                 // Unused lanes are infinitely far away.
                 visit::<K, NEAREST_HIT>(wide, f32::MAX, &boxes, &mut triangles, stack);
@@ -190,7 +192,9 @@ impl<K: Instructions> Task<K> for ClosestPoints<'_> {
 /// A point as boxes are tested with it: in f32, [scaled](scale()).
 ///
 /// The computed square of a distance exceeds the real one by at most 2⁻²⁰ of it, and by at most
-/// 2⁻¹⁴⁰ where numbers are subnormal. The [limit](Nearest::limit) adds more than both.
+/// 2⁻¹⁴⁰ where numbers are subnormal. A [frame](crate::frame) adds 2⁻²³ of the distance, since what
+/// its errors have in common with the box is in the pad. The [limit](Nearest::limit) adds more than
+/// all of these.
 struct PointLanes<L> {
     scaled: [L; 3],
     scale: L,

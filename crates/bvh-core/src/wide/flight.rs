@@ -164,8 +164,9 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
             // SAFETY: the processor has the instructions; as many places as lanes are idle.
             unsafe {
                 prefetch::<K>(rays, self.from + K::Rays::N);
-                let ready = Ready::new(RayLanes::<K::Rays>::load_up_to(rays, from, self.end), wide);
-                let mut entering = there & ready.enter(&wide.bounds);
+                let lanes = RayLanes::<K::Rays>::load_up_to(rays, from, self.end, wide);
+                let ready = Ready::new(lanes, wide);
+                let mut entering = there & ready.enter(wide.root_box());
                 let mut others = !entering & u32::MAX >> (32 - K::Rays::N);
                 self.idle_count -= K::Rays::N;
                 let idle = self.idle.as_ptr().add(self.idle_count);

@@ -189,8 +189,9 @@ impl Instances {
             .collect::<Result<_, _>>()?;
         let boxes: Vec<Aabb> = placed.iter().map(|placed| placed.aabb).collect();
         validate(&top, &boxes)?;
-        // Slabs depend on the root's box, and so would answers.
+        // Slabs depend on the root's box, and so would answers. The boxes lie along the scene's axes.
         top.refit(&boxes);
+        top.frame = None;
         Ok(Self { parts, placed, top })
     }
 

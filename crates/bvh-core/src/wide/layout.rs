@@ -2,8 +2,10 @@
 
 use super::kernel::Kernel;
 use super::triangles::TriangleBlock;
-use crate::Aabb;
+use crate::slabs::{FarRay, near_region};
+use crate::{Aabb, Frame, Ray, Slabs};
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 
 /// A node's eight children, or fewer in the lower lanes: four cache lines.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -119,20 +121,99 @@ impl Places {
 /// ```
 #[derive(Clone, Debug)]
 pub struct WideBvh {
+    /// A box around the triangles along the file's axes.
     pub(crate) bounds: Aabb,
     /// `None` for the tree over no triangles.
     pub(crate) root: Option<Child>,
     pub(crate) nodes: Vec<WideNode>,
     pub(crate) blocks: Vec<TriangleBlock>,
-    /// The [region](crate::slabs::near_region) from which f32 tells the boxes apart.
+    /// The [region](crate::slabs::near_region) from which f32 tells the boxes apart, for rays as
+    /// they are; empty in a frame, so that none of them begins there.
     pub(crate) near: Aabb,
+    /// The frame that the boxes lie in, if it is not the file's.
+    pub(crate) framed: Option<Box<Framed>>,
     /// The kernel that traces it. The processor has its instructions.
     pub(crate) kernel: Kernel,
     /// The most children that can be waiting on the way through it.
     pub(crate) stack_need: usize,
 }
 
+/// The frame of a layout's boxes, and what the layout has of the file's axes otherwise.
+#[derive(Clone, Debug)]
+pub(crate) struct Framed {
+    pub(crate) frame: Frame,
+    /// The root's box, padded.
+    pub(crate) bounds: Aabb,
+    pub(crate) near: Aabb,
+    slack: f64,
+}
+
 impl WideBvh {
+    /// Sets the frame that the boxes lie in, and a box around all of them; `around` is a box around
+    /// the triangles along the file's axes.
+    pub(crate) fn set_bounds(&mut self, frame: Option<Frame>, bounds: &Aabb, around: Aabb) {
+        self.bounds = around;
+        self.near = if frame.is_some() { Aabb::EMPTY } else { near_region(bounds) };
+        self.framed = frame.map(|frame| {
+            let slack = Frame::slack(bounds);
+            let padded = Frame::padded(bounds, slack);
+            Box::new(Framed { frame, bounds: padded, near: near_region(bounds), slack })
+        });
+    }
+
+    /// Returns a box of the tree as nodes have it.
+    pub(crate) fn laid(&self, aabb: &Aabb) -> Aabb {
+        self.framed.as_ref().map_or(*aabb, |framed| Frame::padded(aabb, framed.slack))
+    }
+
+    /// The root's box as rays are tested with it.
+    #[inline(always)]
+    pub(crate) fn root_box(&self) -> &Aabb {
+        self.framed.as_ref().map_or(&self.bounds, |framed| &framed.bounds)
+    }
+
+    /// The region in which the boxed forms of rays begin that are tested in f32.
+    #[inline(always)]
+    pub(crate) fn near_box(&self) -> &Aabb {
+        self.framed.as_ref().map_or(&self.near, |framed| &framed.near)
+    }
+
+    /// Returns the ray as vector kernels test boxes with it, and whether it begins near the scene.
+    #[inline(always)]
+    pub(crate) fn boxed(&self, ray: &Ray) -> (Ray, bool) {
+        match &self.framed {
+            None => (*ray, ray.begins_in(&self.near)),
+            Some(framed) => {
+                let ray = framed.frame.ray(ray);
+                (ray, ray.begins_in(&framed.near))
+            }
+        }
+    }
+
+    /// Returns the ray as boxes are tested with it in f64.
+    pub(crate) fn far_ray(&self, ray: &Ray) -> FarRay {
+        match &self.framed {
+            None => FarRay::new(ray),
+            Some(framed) => FarRay::in_frame(ray, &framed.frame, &framed.bounds),
+        }
+    }
+
+    /// Returns a finite point as the distances of boxes are computed from it.
+    pub(crate) fn boxed_point(&self, point: Vec3) -> Vec3 {
+        self.framed.as_ref().map_or(point, |framed| {
+            let point = framed.frame.point(point.as_dvec3()).as_vec3();
+            // A point that is moved nearer is not farther from any box.
+            point.clamp(Vec3::MIN, Vec3::MAX)
+        })
+    }
+
+    /// The ray as the portable kernel tests boxes with it.
+    #[inline(always)]
+    pub(crate) fn slabs(&self, ray: &Ray) -> Slabs {
+        let frame = self.framed.as_ref().map(|framed| &framed.frame);
+        Slabs::in_frame(ray, frame, self.root_box())
+    }
+
     #[inline(always)]
     pub(crate) fn places(&self) -> Places {
         Places { nodes: self.nodes.as_ptr().cast(), blocks: self.blocks.as_ptr().cast() }

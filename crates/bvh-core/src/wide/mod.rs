@@ -52,7 +52,7 @@ pub use refit::RefitError;
 pub use tightness::NodeTest;
 pub(crate) use triangles::TriangleBlock;
 
-use crate::{Aabb, Bvh, Counter, Hit, InvalidBvh, Ray, Triangle, validate_references};
+use crate::{Bvh, Counter, Hit, InFrame, InvalidBvh, Ray, Triangle, validate_references};
 use answer::{ANY_HIT, NEAREST_HIT};
 use one_ray::{All, Filter, OneRay};
 use portable::walk;
@@ -112,8 +112,9 @@ impl WideBvh {
         triangles: &[Triangle],
         visits: Option<&[f32]>,
     ) -> Result<Self, InvalidBvh> {
-        let boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
-        validate_references(tree, &boxes, &triangles)?;
+        let objects = InFrame { triangles, frame: tree.frame.as_ref() };
+        let boxes = objects.boxes();
+        validate_references(tree, &boxes, &objects)?;
         // Boxes take a quarter of the layout's memory, and nobody reads them again.
         drop(boxes);
         Ok(build::widen(tree, triangles, visits))

@@ -97,7 +97,7 @@ pub(crate) unsafe fn traverse<K: Instructions, const ANY: bool>(
     }
 }
 
-/// The traversal of a ray that begins far from the scene, or of a deep layout.
+/// The traversal of a ray that begins far from the scene, or of a deep layout or one in a frame.
 struct Rare<'a, L, const ANY: bool> {
     wide: &'a WideBvh,
     ray: &'a Ray,
@@ -115,10 +115,12 @@ impl<K: Instructions, L: Leaves<K>, const ANY: bool> Task<K> for Rare<'_, L, ANY
         let base = deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
         // SAFETY: the stack has room for `stack_need` children; the rest is as in `traverse`.
         unsafe {
-            if ray.begins_in(&wide.near) {
-                visit::<K, ANY>(wide, ray.t_max(), &BoxRay::new(ray), leaves, base)
+            let (boxed, is_near) = wide.boxed(ray);
+            if is_near {
+                visit::<K, ANY>(wide, ray.t_max(), &BoxRay::new(&boxed), leaves, base)
             } else {
-                visit::<K, ANY>(wide, ray.t_max(), &FarBoxRay::new(ray), leaves, base)
+                let boxes = FarBoxRay::new(&boxed, &wide.far_ray(ray));
+                visit::<K, ANY>(wide, ray.t_max(), &boxes, leaves, base)
             }
         }
     }

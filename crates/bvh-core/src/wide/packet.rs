@@ -13,7 +13,7 @@ use super::lanes::{Lanes, Mask};
 use super::layout::{Child, WideBvh, WideNode};
 use super::packet_vector::Vector;
 use super::pinhole::{Seen, one_origin};
-use super::ray_lanes::{RayBounds, RayLanes};
+use super::ray_lanes::{BoxLanes, RayBounds, RayLanes};
 use super::triangles::TriangleBlock;
 use crate::Aabb;
 use crate::slabs::{FAR, NEAR};
@@ -71,11 +71,11 @@ impl<K: Instructions> Packet<K> {
 
     /// Adds rays that cohere, of which the first is number `first` of its batch.
     #[inline(always)]
-    pub(crate) fn add(&mut self, rays: RayLanes<K::Rays>, first: usize) {
-        self.bounds.add(&rays);
-        self.octant = rays.octant();
+    pub(crate) fn add(&mut self, rays: RayLanes<K::Rays>, boxed: BoxLanes<K::Rays>, first: usize) {
+        self.bounds.add(&rays, &boxed);
+        self.octant = boxed.octant();
         // SAFETY: values of the rays exist.
-        self.vectors[self.count].write(unsafe { Vector::new(rays, first) });
+        self.vectors[self.count].write(unsafe { Vector::new(rays, boxed, first) });
         self.count += 1;
     }
 
@@ -84,6 +84,27 @@ impl<K: Instructions> Packet<K> {
     pub(crate) unsafe fn trace<F: Find>(&mut self, wide: &WideBvh, find: &mut F) {
         // SAFETY: the processor has the instructions.
         unsafe { K::call(Trace { packet: self, wide, find }) };
+    }
+
+    /// The origin of all rays, if they have one. In a frame, origins that differ may be rounded to
+    /// the same one.
+    #[inline(always)]
+    unsafe fn one_origin(&self, wide: &WideBvh) -> Option<Vec3> {
+        if wide.framed.is_none() {
+            return one_origin(&self.bounds, &wide.bounds);
+        }
+        // SAFETY: the processor has the instructions; as many vectors are written as are counted.
+        unsafe {
+            let mut bounds = RayBounds::none();
+            for vector in &self.vectors[..self.count] {
+                let rays = &vector.assume_init_ref().rays;
+                let [x, y, z] = rays.direction;
+                let one = x.filled(1.0);
+                let inverse = [one / x, one / y, one / z];
+                bounds.add(rays, &BoxLanes { origin: rays.origin, inverse });
+            }
+            one_origin(&bounds, &wide.bounds)
+        }
     }
 
     #[inline(always)]
@@ -214,7 +235,7 @@ impl<K: Instructions> Packet<K> {
             let mut entry = vector.t_min;
             let mut exit = vector.nearest.t;
             for (axis, &[near, far]) in planes.iter().enumerate() {
-                let origin = vector.rays.origin[axis];
+                let origin = vector.box_origin[axis];
                 let near = (K::Rays::splat(near) - origin) * vector.near_factor[axis];
                 let far = (K::Rays::splat(far) - origin) * vector.far_factor[axis];
                 entry = entry.max(near);
@@ -254,7 +275,7 @@ impl<K: Instructions, F: Find> Task<K> for Trace<'_, K, F> {
         // SAFETY: the processor has the instructions.
         unsafe {
             let culling = Culling::<K::Boxes>::new(&packet.bounds, packet.octant);
-            packet.origin = one_origin(&packet.bounds, &wide.bounds);
+            packet.origin = packet.one_origin(wide);
             if let Some(root) = wide.root {
                 if F::ANY {
                     packet.traverse::<ANY_HIT>(wide, root, &culling);

@@ -2,7 +2,7 @@
 
 use super::lanes::{Lanes, Mask};
 use super::pairs::Pairs;
-use super::ray_lanes::RayLanes;
+use super::ray_lanes::{BoxLanes, RayLanes};
 use crate::Aabb;
 use crate::slabs::{FAR, NEAR};
 use core::mem::MaybeUninit;
@@ -38,6 +38,8 @@ impl<L: Lanes> Nearest<L> {
 
 /// Rays of a packet side by side.
 pub(super) struct Vector<L> {
+    /// The origins, as boxes are tested with them.
+    pub(super) box_origin: [L; 3],
     pub(super) near_factor: [L; 3],
     pub(super) far_factor: [L; 3],
     pub(super) t_min: L,
@@ -54,12 +56,13 @@ pub(super) struct Vector<L> {
 impl<L: Lanes> Vector<L> {
     /// Returns rays of which the first is number `first` of its batch.
     #[inline(always)]
-    pub(super) unsafe fn new(rays: RayLanes<L>, first: usize) -> Self {
+    pub(super) unsafe fn new(rays: RayLanes<L>, boxed: BoxLanes<L>, first: usize) -> Self {
         // SAFETY: the processor has the instructions.
         let [near, far, none] =
             unsafe { [L::splat(NEAR), L::splat(FAR), L::splat(f32::from_bits(u32::MAX))] };
-        let [x, y, z] = rays.inverse;
+        let [x, y, z] = boxed.inverse;
         Self {
+            box_origin: boxed.origin,
             near_factor: [x * near, y * near, z * near],
             far_factor: [x * far, y * far, z * far],
             t_min: rays.t_min,

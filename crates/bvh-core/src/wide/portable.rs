@@ -19,7 +19,7 @@ struct Pending {
 pub(super) fn intervals(slabs: &Slabs, node: &WideNode) -> ([f32; 8], [f32; 8]) {
     let mut entry = [slabs.ray.t_min(); 8];
     let mut exit = [f32::INFINITY; 8];
-    if slabs.is_far {
+    if slabs.is_far() {
         for lane in 0..8 {
             let miss = (f32::INFINITY, f32::NEG_INFINITY);
             (entry[lane], exit[lane]) =
@@ -69,7 +69,7 @@ pub(crate) fn walk<const ANY: bool>(
         }
         is_nearer
     };
-    let slabs = Slabs::new(ray, &wide.bounds);
+    let slabs = wide.slabs(ray);
     let intervals = |node: &WideNode| intervals(&slabs, node);
     let nearest = traverse::<ANY>(wide, ray.t_max(), intervals, counter, visit);
     (!nearest.is_miss()).then_some(nearest)

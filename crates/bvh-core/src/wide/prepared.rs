@@ -5,7 +5,7 @@ use super::instructions::Instructions;
 use super::lanes::{Lanes, Mask};
 use super::layout::{WideBvh, WideNode};
 use super::pairs::Pairs;
-use super::ray_lanes::RayLanes;
+use super::ray_lanes::{BoxLanes, RayLanes};
 use super::triangles::{TriangleBlock, three_by_three};
 use crate::Aabb;
 use crate::ray::AXES;
@@ -14,6 +14,8 @@ use crate::slabs::{FAR, NEAR};
 /// Rays side by side that are about to be written one after the other.
 pub(crate) struct Ready<L> {
     rays: RayLanes<L>,
+    /// The rays as boxes are tested with them.
+    boxed: BoxLanes<L>,
     near_factor: [L; 3],
     far_factor: [L; 3],
     /// A bit per ray that begins [far](Ray::is_far_from) from the scene, and is not traced here.
@@ -28,7 +30,7 @@ pub(crate) struct Prepared {
     near_factor: [f32; 3],
     /// The first two components of the direction in the shear's order of axes, as in [`Pairs`].
     x_direction: f32,
-    /// The origin by axis.
+    /// The origin by axis, as boxes are tested with it.
     box_origin: [f32; 3],
     pub(crate) t_max: f32,
     far_factor: [f32; 3],
@@ -55,14 +57,14 @@ pub(crate) struct Prepared {
 
 impl<L: Lanes> Ready<L> {
     #[inline(always)]
-    pub(crate) fn new(rays: RayLanes<L>, wide: &WideBvh) -> Self {
+    pub(crate) fn new((rays, boxed): (RayLanes<L>, BoxLanes<L>), wide: &WideBvh) -> Self {
         let reach = rays.reach(&wide.bounds);
-        let far = rays.beyond(&wide.near);
-        let [x, y, z] = rays.inverse;
+        let far = boxed.beyond(wide.near_box());
+        let [x, y, z] = boxed.inverse;
         let near = x.filled(NEAR);
         let exit = x.filled(FAR);
         let near_factor = [x * near, y * near, z * near];
-        Self { rays, near_factor, far_factor: [x * exit, y * exit, z * exit], far, reach }
+        Self { rays, boxed, near_factor, far_factor: [x * exit, y * exit, z * exit], far, reach }
     }
 
     /// Returns a bit per ray that begins near the scene and may meet something within `bounds`.
@@ -76,15 +78,15 @@ impl<L: Lanes> Ready<L> {
             let is_backwards = self.backwards(axis);
             let near = L::select(is_backwards, high, low);
             let far = L::select(is_backwards, low, high);
-            entry = entry.max((near - self.rays.origin[axis]) * self.near_factor[axis]);
-            exit = ((far - self.rays.origin[axis]) * self.far_factor[axis]).min(exit);
+            entry = entry.max((near - self.boxed.origin[axis]) * self.near_factor[axis]);
+            exit = ((far - self.boxed.origin[axis]) * self.far_factor[axis]).min(exit);
         }
         entry.le(exit).bits() & !self.far
     }
 
     #[inline(always)]
     fn backwards(&self, axis: usize) -> L::Mask {
-        let inverse = self.rays.inverse[axis];
+        let inverse = self.boxed.inverse[axis];
         inverse.lt(inverse.filled(0.0))
     }
 
@@ -111,7 +113,7 @@ impl<L: Lanes> Ready<L> {
         // SAFETY: there is room for a ray per lane.
         unsafe {
             write_row(&to, 0, self.near_factor, dx);
-            write_row(&to, 1, self.rays.origin, self.rays.t_max);
+            write_row(&to, 1, self.boxed.origin, self.rays.t_max);
             write_row(&to, 2, self.far_factor, dy);
             write_row(&to, 3, origin, dx / depth);
             write_row(&to, 4, [dy / depth, self.reach, depth], self.rays.t_min);

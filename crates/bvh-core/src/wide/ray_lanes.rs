@@ -1,41 +1,45 @@
 //! Rays side by side, a ray per lane.
 
 use super::instructions::Instructions;
-use super::lanes::{Lanes, Mask};
+use super::lanes::{DoubleLanes, Lanes, Mask};
+use super::layout::WideBvh;
 use super::pairs::Pairs;
 use crate::ray::AXES;
-use crate::{Aabb, Ray};
+use crate::{Aabb, Frame, Ray};
 
-/// One ray per lane. Vectors of three are by axis.
+/// One ray per lane, as triangles are tested with it. Vectors of three are by axis.
 #[derive(Clone, Copy)]
 pub(crate) struct RayLanes<L> {
     pub(crate) origin: [L; 3],
     pub(crate) direction: [L; 3],
-    pub(crate) inverse: [L; 3],
     pub(crate) t_min: L,
     pub(crate) t_max: L,
 }
 
+/// The same rays as boxes are tested with them: in the frame of the boxes.
+#[derive(Clone, Copy)]
+pub(crate) struct BoxLanes<L> {
+    pub(crate) origin: [L; 3],
+    pub(crate) inverse: [L; 3],
+}
+
 impl<L: Lanes> RayLanes<L> {
-    /// Returns the rays from number `first` on.
+    /// Returns the rays from number `first` on, in both forms.
     ///
     /// # Safety
     /// The processor has the instructions, and there are so many rays.
     #[inline(always)]
-    pub(crate) unsafe fn load(rays: &[Ray], first: usize) -> Self {
+    pub(crate) unsafe fn load(rays: &[Ray], first: usize, wide: &WideBvh) -> (Self, BoxLanes<L>) {
         // SAFETY: there are a ray per lane; a ray is three vectors of four lanes.
         unsafe {
             let rays = rays.as_ptr().add(first);
             let [ox, oy, oz, t_min] = transpose(rays, 0);
             let [dx, dy, dz, t_max] = transpose(rays, 1);
             let [ix, iy, iz, _] = transpose(rays, 2);
-            Self {
-                origin: [ox, oy, oz],
-                direction: [dx, dy, dz],
-                inverse: [ix, iy, iz],
-                t_min,
-                t_max,
-            }
+            let rays = Self { origin: [ox, oy, oz], direction: [dx, dy, dz], t_min, t_max };
+            let boxed = BoxLanes { origin: rays.origin, inverse: [ix, iy, iz] };
+            let boxed = wide.framed.as_ref().map_or(boxed, |framed| rays.in_frame(&framed.frame));
+            (rays, boxed)
         }
     }
 
@@ -45,25 +49,50 @@ impl<L: Lanes> RayLanes<L> {
     /// # Safety
     /// The processor has the instructions, and there is a ray.
     #[inline(always)]
-    pub(crate) unsafe fn load_up_to(rays: &[Ray], first: usize, end: usize) -> Self {
+    pub(crate) unsafe fn load_up_to(
+        rays: &[Ray],
+        first: usize,
+        end: usize,
+        wide: &WideBvh,
+    ) -> (Self, BoxLanes<L>) {
         // SAFETY: the rays exist, or the padding does.
         unsafe {
             if first + L::N <= end {
-                return Self::load(rays, first);
+                return Self::load(rays, first, wide);
             }
             let padded: [Ray; 16] = core::array::from_fn(|i| rays[(first + i).min(end - 1)]);
-            Self::load(&padded, 0)
+            Self::load(&padded, 0, wide)
         }
     }
 
-    /// Returns a bit per axis along which the first ray runs backwards.
+    /// Returns what [`Frame::ray`] returns for every ray, but for operations that are fused.
     #[inline(always)]
-    pub(crate) fn octant(&self) -> u32 {
-        let [x, y, z] = self.inverse;
-        x.signs() & 1 | (y.signs() & 1) << 1 | (z.signs() & 1) << 2
+    fn in_frame(&self, frame: &Frame) -> BoxLanes<L> {
+        let [ox, oy, oz] = self.origin;
+        let [dx, dy, dz] = self.direction;
+        let centre = frame.centre;
+        let x = ox.double();
+        let x = x - x.filled(centre.x);
+        let y = oy.double();
+        let y = y - y.filled(centre.y);
+        let z = oz.double();
+        let z = z - z.filled(centre.z);
+        let [dx, dy, dz] = [dx.double(), dy.double(), dz.double()];
+        let mut boxed = BoxLanes { origin: self.origin, inverse: self.direction };
+        for (axis, along) in frame.axes.iter().enumerate() {
+            let ax = x.filled(along.x);
+            let ay = x.filled(along.y);
+            let az = x.filled(along.z);
+            boxed.origin[axis] = L::single(z.mul_add(az, y.mul_add(ay, x * ax)));
+            let direction = dz.mul_add(az, dy.mul_add(ay, dx * ax));
+            let inverse = L::single(x.filled(Frame::ABOVE) / direction);
+            let most = inverse.filled(f32::MAX);
+            boxed.inverse[axis] = inverse.min(most).max(most.filled(f32::MIN));
+        }
+        boxed
     }
 
-    /// The axes of the shear of rays that [cohere](Self::cohere).
+    /// The axes of the shear of rays that [cohere](BoxLanes::cohere).
     #[inline(always)]
     pub(crate) fn axes(&self) -> [usize; 3] {
         let (second, third) = self.largest();
@@ -79,35 +108,6 @@ impl<L: Lanes> RayLanes<L> {
         let z = z.abs();
         let most = x.max(y);
         (x.lt(y) & z.le(most), most.lt(z))
-    }
-
-    /// Returns a bit per ray that begins outside of a region.
-    #[inline(always)]
-    pub(crate) fn beyond(&self, region: &Aabb) -> u32 {
-        let all = u32::MAX >> (32 - L::N);
-        let mut inside = all;
-        for axis in 0..3 {
-            let origin = self.origin[axis];
-            let (min, max) = (origin.filled(region.min[axis]), origin.filled(region.max[axis]));
-            inside &= (min.le(origin) & origin.le(max)).bits();
-        }
-        all & !inside
-    }
-
-    /// Returns whether all rays begin in a region, and run to the same sides, and mostly along the
-    /// same axis.
-    #[inline(always)]
-    pub(crate) fn cohere(&self, region: &Aabb) -> bool {
-        let all = u32::MAX >> (32 - L::N);
-        let same = |mask: u32| mask == 0 || mask == all;
-        let [x, y, z] = self.inverse;
-        let (second, third) = self.largest();
-        same(x.signs())
-            & same(y.signs())
-            & same(z.signs())
-            & same(second.bits())
-            & same(third.bits())
-            & (self.beyond(region) == 0)
     }
 
     /// Returns the largest coordinate of a point of `bounds` relative to each origin, rounded.
@@ -132,6 +132,44 @@ impl<L: Lanes> RayLanes<L> {
             self.reach(bounds),
             *t_min,
         )
+    }
+}
+
+impl<L: Lanes> BoxLanes<L> {
+    /// Returns a bit per axis along which the first ray runs backwards.
+    #[inline(always)]
+    pub(crate) fn octant(&self) -> u32 {
+        let [x, y, z] = self.inverse;
+        x.signs() & 1 | (y.signs() & 1) << 1 | (z.signs() & 1) << 2
+    }
+
+    /// Returns a bit per ray that begins outside of a region.
+    #[inline(always)]
+    pub(crate) fn beyond(&self, region: &Aabb) -> u32 {
+        let all = u32::MAX >> (32 - L::N);
+        let mut inside = all;
+        for axis in 0..3 {
+            let origin = self.origin[axis];
+            let (min, max) = (origin.filled(region.min[axis]), origin.filled(region.max[axis]));
+            inside &= (min.le(origin) & origin.le(max)).bits();
+        }
+        all & !inside
+    }
+
+    /// Returns whether all of these `rays` begin in a region of the boxes, and run to the same sides
+    /// of them, and mostly along the same axis of the triangles.
+    #[inline(always)]
+    pub(crate) fn cohere(&self, rays: &RayLanes<L>, region: &Aabb) -> bool {
+        let all = u32::MAX >> (32 - L::N);
+        let same = |mask: u32| mask == 0 || mask == all;
+        let [x, y, z] = self.inverse;
+        let (second, third) = rays.largest();
+        same(x.signs())
+            & same(y.signs())
+            & same(z.signs())
+            & same(second.bits())
+            & same(third.bits())
+            & (self.beyond(region) == 0)
     }
 }
 
@@ -187,8 +225,8 @@ impl<L: Lanes> RayBounds<L> {
     }
 
     #[inline(always)]
-    pub(crate) fn add(&mut self, rays: &RayLanes<L>) {
-        for (axis, (&origin, &inverse)) in rays.origin.iter().zip(&rays.inverse).enumerate() {
+    pub(crate) fn add(&mut self, rays: &RayLanes<L>, boxed: &BoxLanes<L>) {
+        for (axis, (&origin, &inverse)) in boxed.origin.iter().zip(&boxed.inverse).enumerate() {
             self.lowest[axis] = self.lowest[axis].min(origin);
             self.highest[axis] = self.highest[axis].max(origin);
             self.least[axis] = self.least[axis].min(inverse);

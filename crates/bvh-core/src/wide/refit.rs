@@ -2,7 +2,6 @@
 
 use super::layout::{Child, WideBvh, WideNode};
 use super::triangles::TriangleBlock;
-use crate::slabs::near_region;
 use crate::{Aabb, Triangle};
 
 /// Why a layout cannot follow its triangles, and has to be made anew.
@@ -58,8 +57,21 @@ impl WideBvh {
                 }
             }
         }
-        self.bounds = self.root.map_or(Aabb::EMPTY, |root| self.box_of(root, &around));
-        self.near = near_region(&self.bounds);
+        let bounds = self.root.map_or(Aabb::EMPTY, |root| self.box_of(root, &around));
+        let Some(framed) = self.framed.take() else {
+            self.set_bounds(None, &bounds, bounds);
+            return Ok(());
+        };
+        let corners = triangles.iter().flat_map(|triangle| triangle.0);
+        self.set_bounds(Some(framed.frame), &bounds, Aabb::around(corners));
+        for index in 0..self.nodes.len() {
+            for lane in 0..WideNode::LANES {
+                if let Some(aabb) = self.nodes[index].lane_box(lane) {
+                    let laid = self.laid(&aabb);
+                    self.nodes[index].set_box(lane, &laid);
+                }
+            }
+        }
         Ok(())
     }
 
@@ -68,12 +80,9 @@ impl WideBvh {
         if child.is_node() {
             return around[child.index()];
         }
-        let corners = self
-            .leaf(child)
-            .iter()
-            .flat_map(TriangleBlock::triangles)
-            .flat_map(|(_, triangle)| triangle.0);
-        Aabb::around(corners)
+        let frame = self.framed.as_ref().map(|framed| &framed.frame);
+        let triangles = self.leaf(child).iter().flat_map(TriangleBlock::triangles);
+        triangles.fold(Aabb::EMPTY, |aabb, (_, triangle)| aabb.union(&triangle.aabb_in(frame)))
     }
 
     /// The boxes of all nodes and leaves.
@@ -82,7 +91,7 @@ impl WideBvh {
             let child = move |lane| Some((node.lane_box(lane)?, node.children[lane]));
             (0..WideNode::LANES).filter_map(child)
         });
-        self.root.map(|root| (self.bounds, root)).into_iter().chain(lanes)
+        self.root.map(|root| (*self.root_box(), root)).into_iter().chain(lanes)
     }
 
     /// The blocks of a leaf.
@@ -101,7 +110,7 @@ impl WideBvh {
             aabb.half_area() * if child.is_node() { 1.0 } else { self.leaf(child).len() as f64 }
         };
         let total: f64 = self.boxes().map(visits).sum();
-        let area = self.bounds.half_area();
+        let area = self.root_box().half_area();
         if area > 0.0 { total / area } else { 0.0 }
     }
 }

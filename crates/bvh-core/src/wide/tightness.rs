@@ -78,28 +78,33 @@ impl<K: Instructions> Task<K> for Entered<'_> {
     unsafe fn run(self) -> u32 {
         let Self { wide, ray, node, test } = self;
         let t_max = ray.t_max();
-        let is_near = ray.begins_in(&wide.near);
+        let (boxed, is_near) = wide.boxed(ray);
         let equal = [*ray; 16];
         const { assert!(K::Rays::N <= 16) };
         // SAFETY: the processor has the instructions, and there are as many rays as lanes.
         unsafe {
-            let lanes = RayLanes::<K::Rays>::load(&equal, 0);
+            let (lanes, boxes) = RayLanes::<K::Rays>::load(&equal, 0, wide);
             match test {
                 // Packets are of rays that begin near the scene.
                 NodeTest::Packet if is_near => {
                     let mut bounds = RayBounds::none();
-                    bounds.add(&lanes);
-                    Culling::new(&bounds, lanes.octant()).cull::<K>(node, t_max).1
+                    bounds.add(&lanes, &boxes);
+                    Culling::new(&bounds, boxes.octant()).cull::<K>(node, t_max).1
                 }
                 // In flight are rays that begin near the scene, too.
                 NodeTest::InFlight if is_near => {
                     let mut rays = [const { MaybeUninit::<Prepared>::zeroed() }; 16];
                     let places = rays.each_mut().map(MaybeUninit::as_mut_ptr);
-                    Ready::new(lanes, wide).write(0, places);
+                    Ready::new((lanes, boxes), wide).write(0, places);
                     rays[0].assume_init_ref().boxes::<K>(node, t_max).1
                 }
-                _ if is_near => BoxTest::<K>::boxes(&BoxRay::<K::Boxes>::new(ray), node, t_max).1,
-                _ => BoxTest::<K>::boxes(&FarBoxRay::new(ray), node, t_max).1,
+                _ if is_near => {
+                    BoxTest::<K>::boxes(&BoxRay::<K::Boxes>::new(&boxed), node, t_max).1
+                }
+                _ => {
+                    let boxes = FarBoxRay::new(&boxed, &wide.far_ray(ray));
+                    BoxTest::<K>::boxes(&boxes, node, t_max).1
+                }
             }
         }
     }

@@ -62,7 +62,7 @@ fn the_closest_point_is_as_close_as_that_of_any_triangle_at_every_scale() {
             let mut points = vec![corner, Vec3::ZERO, distant, Vec3::MAX, Vec3::MIN];
             points.extend((0..200).map(|_| random.point() * 1.5 * scale));
             points.extend((0..20).map(|_| random.point() * Vec3::MAX));
-            for shape in 0..SHAPES.len() {
+            for shape in 0..=SHAPES.len() {
                 let mut closest = vec![None; points.len()];
                 let wide = layout(&triangles, shape);
                 wide.closest_points(&points, &mut closest);

@@ -1,6 +1,6 @@
 //! Tree files preserve trees and reject damage, and no bytes make a traversal leave the tree.
 
-use crate::support::layouts::divided;
+use crate::support::layouts::{divided, framed};
 use crate::support::{Random, SHAPES, boxes, grid_box, rays, soup, tree};
 use bvh_core::cost::{Objective, SahConstants};
 use bvh_core::file::{FileError, Header, Origin, TreeFile, boxes_checksum, load, save, sections};
@@ -77,6 +77,46 @@ fn a_saved_tree_can_be_loaded_and_viewed() {
         assert_eq!(file.header(), &header);
         assert_eq!(file.visits(), Ok(None));
         assert_eq!(bytes[8..12], Header::VERSION.to_le_bytes());
+    }
+}
+
+#[test]
+fn a_frame_comes_back_and_numbers_that_are_none_are_rejected() {
+    let mut random = Random(3);
+    let triangles = soup(40, &mut random);
+    let tree = framed(&triangles, &mut random).unwrap();
+    let boxes = boxes(&triangles);
+    assert_eq!(save(&tree, &boxes, &origin()), Err(FileError::Frame));
+    for visits in [&[][..], &halving(&tree)] {
+        let bytes = save_parts(&tree, &boxes, &Origin { visits, ..origin() });
+        assert_eq!(load(&bytes, &boxes).as_ref(), Ok(&tree));
+        let held = aligned(&bytes);
+        let file = TreeFile::open(bytemuck::cast_slice(&held)).unwrap();
+        assert_eq!(file.frame(), tree.frame.as_ref());
+        assert_eq!(file.view(), Ok((&tree).into()));
+        let first = bytes.len() - 96;
+        for (offset, number) in [
+            (0, 2.0),
+            (8, f64::NAN),
+            (64, f64::INFINITY),
+            (72, f64::NAN),
+            (80, f64::INFINITY),
+            (88, 1e39),
+        ] {
+            let mut forged = with_field(&bytes, first + offset, &number.to_le_bytes());
+            seal(&mut forged);
+            assert_eq!(load_any(&forged), Err(FileError::Field("frame")), "{offset}: {number}");
+        }
+        // A mirror: the first row with the other sign.
+        let mut mirrored = bytes.clone();
+        for x in 0..3 {
+            mirrored[first + 8 * x + 7] ^= 0x80;
+        }
+        seal(&mut mirrored);
+        assert_eq!(load_any(&mirrored), Err(FileError::Field("frame")));
+        let mut shorter = bytes[..first].to_vec();
+        seal(&mut shorter);
+        assert!(matches!(load_any(&shorter), Err(FileError::Length { .. })));
     }
 }
 

@@ -7,8 +7,8 @@ use crate::support::{
     scaled, soup, tree,
 };
 use bvh_core::{
-    Aabb, Bvh, Coherence, Hit, Node, PreparedRay, Ray, RefitError, TestCounts, Triangle, WideBvh,
-    any_hit, nearest_hit,
+    Aabb, Bvh, Coherence, Hit, InFrame, Node, PreparedRay, Ray, RefitError, TestCounts, Triangle,
+    WideBvh, any_hit, nearest_hit,
 };
 use glam::Vec3;
 
@@ -257,7 +257,7 @@ fn a_refitted_layout_answers_as_brute_force_at_the_new_places() {
         .collect();
     let mut traced = Traced::all(&triangles, &mut random);
     for Traced { tree, layouts } in &mut traced {
-        tree.refit(&boxes(&moved));
+        tree.refit(&InFrame { triangles: &moved, frame: tree.frame.as_ref() }.boxes());
         for (_, layout) in layouts {
             layout.refit(&moved).unwrap();
             let after = layout.expected_visits();

@@ -2,9 +2,10 @@
 
 use super::{Random, SHAPES, boxes, chain, size, tree};
 use bvh_core::{
-    Aabb, Bvh, Clip, Kernel, Node, Ray, Triangle, WideBvh, collapse_leaves, cost::SahConstants,
+    Aabb, Bvh, Clip, Frame, InFrame, Kernel, Node, Ray, Triangle, WideBvh, check_boxes,
+    collapse_leaves, cost::SahConstants,
 };
-use glam::Vec3;
+use glam::{DMat3, DQuat, DVec3, Vec3};
 
 /// Divides leaves of `tree` at random planes, and divides parts again. Returns the tree, and the
 /// object, axis and coordinate of each plane.
@@ -13,6 +14,7 @@ pub fn divided(
     triangles: &[Triangle],
     random: &mut Random,
 ) -> (Bvh, Vec<(u32, usize, f32)>) {
+    let objects = InFrame { triangles, frame: tree.frame.as_ref() };
     let mut tree = tree.clone();
     let mut planes = Vec::new();
     let mut index = 0;
@@ -26,8 +28,7 @@ pub fn divided(
             let somewhere = aabb.min[axis] + random.unit() * aabb.extent()[axis] as f32;
             // Planes through corners are the hard ones.
             let plane = random.of(&[somewhere, corner]);
-            let [low, high] =
-                aabb.halves(axis, plane).map(|region| triangles.clip(object, &region));
+            let [low, high] = aabb.halves(axis, plane).map(|region| objects.clip(object, &region));
             let divides = aabb.min[axis] < plane && plane < aabb.max[axis];
             if divides && low != Aabb::EMPTY && high != Aabb::EMPTY {
                 let first = tree.nodes.len() as u32;
@@ -44,10 +45,33 @@ pub fn divided(
     (tree, planes)
 }
 
-/// Returns a layout of the triangles by a tree of one of the shapes.
+/// Returns a layout of the triangles by a tree of one of the shapes, or by one more in a frame.
 pub fn layout(triangles: &[Triangle], shape: usize) -> WideBvh {
-    let tree = tree(&boxes(triangles), SHAPES[shape], &mut Random(5));
+    let mut random = Random(5);
+    let framed = if shape < SHAPES.len() { None } else { framed(triangles, &mut random) };
+    let shape = SHAPES[shape % SHAPES.len()];
+    let tree = framed.unwrap_or_else(|| tree(&boxes(triangles), shape, &mut random));
     WideBvh::new(&tree, triangles).unwrap()
+}
+
+/// Returns a tree in a frame that is turned at random, or a little, or by right angles, about a
+/// centre in the scene or beside it. `None` if its boxes would not be finite.
+pub fn framed(triangles: &[Triangle], random: &mut Random) -> Option<Bvh> {
+    let [x, y, z] = [(); 3].map(|()| random.point().x.into());
+    let turned = DQuat::from_xyzw(x, y, z, 0.2).normalize();
+    let nearly = DQuat::from_rotation_y(1e-8);
+    let swapped = DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X);
+    let rotation = random.of(&[DMat3::from_quat(turned), DMat3::from_quat(nearly), swapped]);
+    let corner = random.of(triangles).0[0].as_dvec3();
+    let centre = random
+        .of(&[DVec3::ZERO, corner, 3.0 * corner])
+        .clamp(DVec3::splat(f32::MIN.into()), DVec3::splat(f32::MAX.into()));
+    let frame = Frame::new(rotation, centre).unwrap();
+    let boxes = frame.boxes(triangles);
+    check_boxes(&boxes).ok()?;
+    let mut tree = tree(&boxes, SHAPES[0], random);
+    tree.frame = Some(frame);
+    Some(tree)
 }
 
 /// Returns the layout for every kernel that this processor has.
@@ -85,6 +109,11 @@ impl Traced {
             [&trees[0], &parts].map(|tree| collapse_leaves(tree, &SahConstants::default()));
         trees.extend(merged);
         trees.extend([parts, chain(&boxes)]);
+        for _ in 0..2 {
+            if let Some(framed) = framed(triangles, random) {
+                trees.extend([divided(&framed, triangles, random).0, framed]);
+            }
+        }
         (trees.into_iter().map(|tree| Self::new(tree, triangles)).collect(), planes)
     }
 }
