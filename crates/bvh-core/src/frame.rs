@@ -119,7 +119,8 @@ impl Frame {
         if !(is_orthogonal && rotation.determinant() > 0.0) {
             return Err(InvalidFrame::Rotation(rotation));
         }
-        if !(centre.abs().max_element() <= f64::from(f32::MAX)) || centre.is_nan() {
+        let range = f64::from(f32::MIN)..=f64::from(f32::MAX);
+        if !centre.to_array().iter().all(|x| range.contains(x)) {
             return Err(InvalidFrame::Centre(centre));
         }
         Ok(Self { axes, centre })
