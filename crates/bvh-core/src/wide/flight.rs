@@ -164,7 +164,7 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
             // SAFETY: the processor has the instructions; as many places as lanes are idle.
             unsafe {
                 prefetch::<K>(rays, self.from + K::Rays::N);
-                let lanes = RayLanes::<K::Rays>::load_up_to(rays, from, self.end, wide);
+                let lanes = RayLanes::<K::Rays>::load_up_to(rays, from, self.end, wide.frame());
                 let ready = Ready::new(lanes, wide);
                 let mut entering = there & ready.enter(wide.root_box());
                 let mut others = !entering & u32::MAX >> (32 - K::Rays::N);

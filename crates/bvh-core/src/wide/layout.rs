@@ -210,8 +210,13 @@ impl WideBvh {
     /// The ray as the portable kernel tests boxes with it.
     #[inline(always)]
     pub(crate) fn slabs(&self, ray: &Ray) -> Slabs {
-        let frame = self.framed.as_ref().map(|framed| &framed.frame);
-        Slabs::in_frame(ray, frame, self.root_box())
+        Slabs::in_frame(ray, self.frame(), self.root_box())
+    }
+
+    /// The frame that the boxes lie in, if it is not the file's.
+    #[inline(always)]
+    pub(crate) fn frame(&self) -> Option<&Frame> {
+        self.framed.as_ref().map(|framed| &framed.frame)
     }
 
     #[inline(always)]

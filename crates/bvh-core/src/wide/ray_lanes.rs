@@ -2,7 +2,6 @@
 
 use super::instructions::Instructions;
 use super::lanes::{DoubleLanes, Lanes, Mask};
-use super::layout::WideBvh;
 use super::pairs::Pairs;
 use crate::ray::AXES;
 use crate::{Aabb, Frame, Ray};
@@ -29,7 +28,11 @@ impl<L: Lanes> RayLanes<L> {
     /// # Safety
     /// The processor has the instructions, and there are so many rays.
     #[inline(always)]
-    pub(crate) unsafe fn load(rays: &[Ray], first: usize, wide: &WideBvh) -> (Self, BoxLanes<L>) {
+    pub(crate) unsafe fn load(
+        rays: &[Ray],
+        first: usize,
+        frame: Option<&Frame>,
+    ) -> (Self, BoxLanes<L>) {
         // SAFETY: there are a ray per lane; a ray is three vectors of four lanes.
         unsafe {
             let rays = rays.as_ptr().add(first);
@@ -37,8 +40,10 @@ impl<L: Lanes> RayLanes<L> {
             let [dx, dy, dz, t_max] = transpose(rays, 1);
             let [ix, iy, iz, _] = transpose(rays, 2);
             let rays = Self { origin: [ox, oy, oz], direction: [dx, dy, dz], t_min, t_max };
-            let boxed = BoxLanes { origin: rays.origin, inverse: [ix, iy, iz] };
-            let boxed = wide.framed.as_ref().map_or(boxed, |framed| rays.in_frame(&framed.frame));
+            let boxed = match frame {
+                None => BoxLanes { origin: rays.origin, inverse: [ix, iy, iz] },
+                Some(frame) => rays.in_frame(frame),
+            };
             (rays, boxed)
         }
     }
@@ -53,15 +58,15 @@ impl<L: Lanes> RayLanes<L> {
         rays: &[Ray],
         first: usize,
         end: usize,
-        wide: &WideBvh,
+        frame: Option<&Frame>,
     ) -> (Self, BoxLanes<L>) {
         // SAFETY: the rays exist, or the padding does.
         unsafe {
             if first + L::N <= end {
-                return Self::load(rays, first, wide);
+                return Self::load(rays, first, frame);
             }
             let padded: [Ray; 16] = core::array::from_fn(|i| rays[(first + i).min(end - 1)]);
-            Self::load(&padded, 0, wide)
+            Self::load(&padded, 0, frame)
         }
     }
 

@@ -80,7 +80,7 @@ impl WideBvh {
         if child.is_node() {
             return around[child.index()];
         }
-        let frame = self.framed.as_ref().map(|framed| &framed.frame);
+        let frame = self.frame();
         let triangles = self.leaf(child).iter().flat_map(TriangleBlock::triangles);
         triangles.fold(Aabb::EMPTY, |aabb, (_, triangle)| aabb.union(&triangle.aabb_in(frame)))
     }

@@ -83,7 +83,7 @@ impl<K: Instructions> Task<K> for Entered<'_> {
         const { assert!(K::Rays::N <= 16) };
         // SAFETY: the processor has the instructions, and there are as many rays as lanes.
         unsafe {
-            let (lanes, boxes) = RayLanes::<K::Rays>::load(&equal, 0, wide);
+            let (lanes, boxes) = RayLanes::<K::Rays>::load(&equal, 0, wide.frame());
             match test {
                 // Packets are of rays that begin near the scene.
                 NodeTest::Packet if is_near => {
