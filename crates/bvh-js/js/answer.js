@@ -1,12 +1,12 @@
 // The worker's side of `bakeInWorker`: one message in, reports of the progress and one result out. It
 // is told how to load, because an import map of the page does not hold in a worker.
-import { Tree } from '../wasm/bvh_js.js';
+import { bake } from '../wasm/bvh_js.js';
 
 export async function answer(load, { corners, seconds, work, seed, references, follows }, say) {
     try {
         await load();
         const follow = follows ? (fraction, cost) => say({ fraction, cost }) : undefined;
-        say({ bytes: Tree.bake(corners, seconds, work, seed, references, follow).save() });
+        say({ parts: bake(corners, seconds, work, seed, references, follow) });
     } catch (error) {
         say({ error: error.message });
     }

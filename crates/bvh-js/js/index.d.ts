@@ -10,35 +10,48 @@ export interface BakeOptions {
     seed?: number;
     /**
      * Up to so many leaves per triangle on average, 1 to 16; 1 keeps triangles whole. In buildings, 1.3 makes the first
-     * hits of rays much cheaper, but `raycast` then finds a divided triangle once for each part.
+     * hits of rays much cheaper. `raycast` finds a divided triangle once, but `shapecast` meets it once for each part.
      */
     references?: number;
     /**
-     * Called about twenty times a second with the part of the budget that is spent, and after each improvement with the
-     * cost. An exception ends the search and is thrown by `bake`.
+     * Called about twenty times a second with the part of the budget that is spent, after improvements with about the
+     * `cost` that the tree would have, and at the end with 1 and its cost. An exception ends the search, and `bake` and
+     * `bakeInWorker` reject with it.
      */
     onProgress?: (progress: { fraction: number; cost?: number }) => void;
 }
 
-/** A searched tree over the triangles of a geometry. */
+/** A searched tree over the triangles of a geometry. It takes about 150 bytes of JavaScript's memory per triangle. */
 export class Tree {
-    /** Reads a tree that was saved for this very geometry; rejects damaged bytes and other geometries. */
-    static load(bytes: Uint8Array, geometry: BufferGeometry): Promise<Tree>;
+    /**
+     * Reads a tree that was saved for this very geometry, of which another tree may have reordered the index since;
+     * rejects damaged bytes and other geometries.
+     */
+    static load(bytes: ArrayBufferLike | ArrayBufferView, geometry: BufferGeometry): Promise<Tree>;
     /** The tree as a file, which the program `bvh` and the interfaces of other languages read. */
     save(): Uint8Array;
     /**
-     * The tree as a `MeshBVH`, for `geometry.boundsTree`, `raycastFirst` and whatever takes one. Puts the triangles of the
-     * geometry's index into the order of the tree, as `new MeshBVH` does. With `indirect`, the default for geometries with
-     * groups or a draw range and for divided triangles, the index stays as it is and rays are a little slower.
+     * The tree as a `MeshBVH`, for `geometry.boundsTree`, `raycastFirst` and whatever takes one. Throws if the geometry,
+     * or its draw range, is another one than when the tree was baked or saved.
+     *
+     * Puts the triangles of the geometry's index into the order of the tree, as `new MeshBVH` does. With `indirect`, the
+     * index stays as it is and rays are a little slower. This is the default for geometries with groups or a draw range,
+     * for divided triangles, and for an index that another tree has reordered, so that both trees stay right.
      */
     toMeshBVH(geometry: BufferGeometry, options?: { indirect?: boolean }): MeshBVH;
     /** The expected cost of a ray, in tests of a triangle weighed as three-mesh-bvh does; see `costOf`. */
     readonly cost: number;
+    /** Drops the tree's memory at once; each `MeshBVH` has its own. Other calls then throw. */
+    dispose(): void;
 }
 
 /**
  * Searches the best tree of a geometry in this thread. Where rays would take more tests in it than in a greedy tree, as in
- * some smooth meshes, gives the greedy tree. Rejects a geometry without triangles or with infinite corners.
+ * some smooth meshes, gives the greedy tree; this is counted where it takes at most a quarter of the time. The tree has the
+ * triangles of the draw range, those of all groups and of none, as three.js draws them.
+ *
+ * Rejects a geometry without triangles, with an index beyond its vertices (`RangeError`), with coordinates that are not
+ * finite (`RangeError`), with morph targets or skin weights, and anything else than a geometry (`TypeError`).
  */
 export function bake(geometry: BufferGeometry, options?: BakeOptions): Promise<Tree>;
 

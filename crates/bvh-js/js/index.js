@@ -1,6 +1,6 @@
-import { BufferAttribute } from 'three';
 import { MeshBVH } from 'three-mesh-bvh';
-import { Tree as Searched, costOfRoot } from '../wasm/bvh_js.js';
+import * as wasm from '../wasm/bvh_js.js';
+import { fingerprint, reorder, reordered, restored, triangleCount, triangles } from './geometry.js';
 import { load } from '#load';
 import { startWorker } from '#worker';
 
@@ -11,96 +11,137 @@ const ready = () => (loaded ??= load());
 
 /** A tree over the triangles of a geometry. */
 export class Tree {
-    #searched;
-    #ids;
-    #fitted;
+    #parts;
 
-    constructor(searched, ids) {
-        this.#searched = searched;
-        this.#ids = ids;
+    constructor([file, nodes, order, cost], { count, hash }) {
+        this.#parts = { file, nodes, order, cost, count, hash };
     }
 
     static async load(bytes, geometry) {
+        const file = copyOf(bytes);
         await ready();
-        const { corners, ids } = triangles(geometry);
-        return new Tree(Searched.load(corners, bytes), ids);
+        const { corners, places } = triangles(geometry);
+        try {
+            return new Tree(wasm.load(corners, file), identity(corners));
+        } catch (error) {
+            if (!places) throw error;
+            const former = restored(places, corners);
+            return new Tree(wasm.load(former, file), identity(former));
+        }
+    }
+
+    get #kept() {
+        if (!this.#parts) throw new Error('the tree is disposed; accepted: a tree in use');
+        return this.#parts;
     }
 
     save() {
-        return this.#searched.save();
-    }
-
-    /** The tree for three-mesh-bvh, fitted when it is first needed. */
-    get #three() {
-        return (this.#fitted ??= this.#searched.forThreeMesh());
-    }
-
-    /** Why the index of the geometry must not be changed, if it must not. */
-    get #kept() {
-        if (this.#ids !== null) return 'that is drawn in part';
-        if (this.#three.order.length > this.#searched.triangles) return 'whose triangles the tree divides';
-    }
-
-    toMeshBVH(geometry, { indirect = geometry.groups.length > 0 || this.#kept !== undefined } = {}) {
-        const count = this.#ids?.length ?? triangleCount(geometry);
-        if (count !== this.#searched.triangles) {
-            throw new Error(`the geometry has ${count} triangles; accepted: the ${this.#searched.triangles} of the tree`);
-        }
-        if (!indirect && this.#kept) throw new Error(`indirect is false; accepted: true for a geometry ${this.#kept}`);
-        const three = this.#three;
-        const roots = [three.nodes.buffer];
-        let order = three.order;
-        if (this.#ids !== null) order = order.map((id) => this.#ids[id]);
-        if (indirect) {
-            return MeshBVH.deserialize({ version: 1, roots, index: null, indirectBuffer: order }, geometry, { setIndex: false });
-        }
-        const from = geometry.index?.array;
-        const vertices = geometry.attributes.position.count;
-        const index = new (from?.constructor ?? (vertices > 65535 ? Uint32Array : Uint16Array))(3 * order.length);
-        for (let to = 0; to < order.length; to++) {
-            for (let corner = 0; corner < 3; corner++) {
-                const at = 3 * order[to] + corner;
-                index[3 * to + corner] = from ? from[at] : at;
-            }
-        }
-        if (!from) geometry.setIndex(new BufferAttribute(index, 1));
-        return MeshBVH.deserialize({ version: 1, roots, index, indirectBuffer: null }, geometry);
+        return this.#kept.file.slice();
     }
 
     get cost() {
-        return this.#three.cost;
+        return this.#kept.cost;
     }
+
+    dispose() {
+        this.#parts = undefined;
+    }
+
+    toMeshBVH(geometry, options = {}) {
+        checkNames(options, ['indirect']);
+        const { nodes, order: baked, count, hash } = this.#kept;
+        const { corners, ids, places } = triangles(geometry);
+        if (corners.length !== 9 * count) {
+            throw new Error(`the geometry has ${corners.length / 9} triangles; accepted: the ${count} of the tree`);
+        }
+        let order = baked.slice();
+        if (fingerprint(corners) !== hash) {
+            if (!places || fingerprint(restored(places, corners)) !== hash) {
+                throw new Error('the geometry has other triangles than the tree, or in another order; '
+                    + 'accepted: the geometry as it was when its tree was baked');
+            }
+            order = order.map((id) => places[id]);
+        }
+        if (ids) order = order.map((id) => ids[id]);
+        const isDivided = order.length > count;
+        let unordered;
+        if (ids) unordered = 'that is drawn in part';
+        else if (geometry.groups.length > 0) unordered = 'with groups';
+        else if (isDivided) unordered = 'whose triangles the tree divides';
+        const isInOrder = order.every((id, place) => id === place);
+        // Another tree may be in use that needs the index in its own order.
+        const { indirect = unordered !== undefined || (places !== undefined && !isInOrder) } = options;
+        if (!indirect && unordered) throw new Error(`indirect is false; accepted: true for a geometry ${unordered}`);
+        const data = { version: 1, roots: [nodes.slice().buffer], index: null, indirectBuffer: indirect ? order : null };
+        if (!indirect && !(isInOrder && geometry.index)) {
+            reorder(geometry, order);
+            const after = new Uint32Array(count);
+            baked.forEach((id, place) => { after[id] = place; });
+            reordered.set(geometry.index, after);
+        }
+        const bvh = MeshBVH.deserialize(data, geometry, { setIndex: false });
+        return isDivided ? withHitsOnce(bvh) : bvh;
+    }
+}
+
+/** What tells a geometry from others. */
+function identity(corners) {
+    return { count: corners.length / 9, hash: fingerprint(corners) };
+}
+
+/** Lets `raycast` find a divided triangle once, not once for each part. */
+function withHitsOnce(bvh) {
+    bvh.raycast = (...query) => {
+        const found = new Set();
+        return MeshBVH.prototype.raycast.apply(bvh, query).filter(({ faceIndex, face }) => {
+            const hit = `${faceIndex} ${face.materialIndex}`;
+            return !found.has(hit) && found.add(hit);
+        });
+    };
+    return bvh;
 }
 
 export async function bake(geometry, options = {}) {
     const { seconds, work, seed, references } = checked(options);
     await ready();
-    const { corners, ids } = triangles(geometry);
-    const follow = options.onProgress && follower(options.onProgress);
-    return new Tree(Searched.bake(corners, seconds, work, seed, references, follow), ids);
+    const { corners } = triangles(geometry);
+    return new Promise((resolve, reject) => {
+        const follow = follower(options.onProgress, reject);
+        const parts = wasm.bake(corners, seconds, work, seed, references, follow);
+        // What an asynchronous `onProgress` has thrown comes first.
+        queueMicrotask(() => resolve(new Tree(parts, identity(corners))));
+    });
 }
 
 export async function bakeInWorker(geometry, options = {}) {
-    const limits = checked(options);
+    const limits = checked(options, ['signal']);
     const { onProgress, signal } = options;
-    await ready();
-    const { corners, ids } = triangles(geometry);
+    const { corners } = triangles(geometry);
+    const known = identity(corners);
     signal?.throwIfAborted();
     const worker = startWorker();
+    const ended = new AbortController();
     try {
-        const bytes = await new Promise((resolve, reject) => {
-            const follow = onProgress && follower(onProgress);
+        const parts = await new Promise((resolve, reject) => {
+            const follow = follower(onProgress, reject);
             worker.hear((said) => {
-                if (said.bytes) resolve(said.bytes);
+                if (said.parts) resolve(said.parts);
                 else if (said.error) reject(new Error(said.error));
-                else follow(said.fraction, said.cost);
+                else {
+                    try {
+                        follow(said.fraction, said.cost);
+                    } catch (error) {
+                        reject(error);
+                    }
+                }
             });
             worker.fail(reject);
-            signal?.addEventListener('abort', () => reject(signal.reason), { once: true });
-            worker.post({ ...limits, follows: Boolean(onProgress), corners: corners.slice() });
+            signal?.addEventListener('abort', () => reject(signal.reason), { signal: ended.signal });
+            worker.post({ ...limits, follows: Boolean(onProgress), corners });
         });
-        return new Tree(Searched.load(corners, bytes), ids);
+        return new Tree(parts, known);
     } finally {
+        ended.abort();
         worker.end();
     }
 }
@@ -110,16 +151,30 @@ export async function costOf(meshBVH) {
     const { roots, indirectBuffer } = MeshBVH.serialize(meshBVH, { cloneBuffers: false });
     if (roots.length !== 1) throw new Error(`the tree has ${roots.length} roots; accepted: one`);
     const count = indirectBuffer?.length ?? triangleCount(meshBVH.geometry);
-    return costOfRoot(new Uint8Array(roots[0]), count);
+    return wasm.costOfRoot(new Uint8Array(roots[0]), count);
 }
 
-/** Reports as objects; a cost is known only after an improvement. */
-function follower(onProgress) {
-    return (fraction, cost) => onProgress(Number.isNaN(cost) ? { fraction } : { fraction, cost });
+/**
+ * Reports as objects; a cost is known only after an improvement. Passes the later exception of an
+ * asynchronous function to `fail`.
+ */
+function follower(onProgress, fail) {
+    return onProgress && ((fraction, cost) => {
+        const answer = onProgress(Number.isNaN(cost) ? { fraction } : { fraction, cost });
+        if (typeof answer?.then === 'function') answer.then(undefined, fail);
+    });
 }
 
-function checked({ seconds, work, seed = 1, references = 1 }) {
-    if (seconds === undefined && work === undefined) seconds = 1;
+function checkNames(options, accepted) {
+    if (typeof options !== 'object' || options === null) throw new TypeError(`options is ${options}; accepted: an object`);
+    const other = Object.keys(options).find((name) => !accepted.includes(name));
+    if (other !== undefined) throw new TypeError(`option "${other}"; accepted: ${accepted.join(', ')}`);
+}
+
+function checked(options, more = []) {
+    checkNames(options, ['seconds', 'work', 'seed', 'references', 'onProgress', ...more]);
+    const { work, seed = 1, references = 1, onProgress, signal } = options;
+    const { seconds = work === undefined ? 1 : undefined } = options;
     const check = (name, value, accepted, isAccepted) => {
         if (value !== undefined && !(typeof value === 'number' && isAccepted(value))) {
             throw new RangeError(`${name} is ${value}; accepted: ${accepted}`);
@@ -129,46 +184,21 @@ function checked({ seconds, work, seed = 1, references = 1 }) {
     check('work', work, 'a whole number above 0', (value) => value > 0 && Number.isSafeInteger(value));
     check('seed', seed, 'a whole number from 0 on', (value) => value >= 0 && Number.isSafeInteger(value));
     check('references', references, 'a number from 1 to 16', (value) => value >= 1 && value <= 16);
+    if (onProgress !== undefined && typeof onProgress !== 'function') {
+        throw new TypeError(`onProgress is ${onProgress}; accepted: a function`);
+    }
+    if (signal !== undefined && typeof signal?.throwIfAborted !== 'function') {
+        throw new TypeError(`signal is ${signal}; accepted: an AbortSignal`);
+    }
     return { seconds, work, seed, references };
 }
 
-function triangleCount(geometry) {
-    return Math.floor((geometry.index ?? geometry.attributes.position).count / 3);
-}
-
-/**
- * The corners of the triangles that three-mesh-bvh would trace, and their ids; the ids are null
- * where it would trace all of them.
- */
-function triangles(geometry) {
-    const { index, groups, drawRange, attributes: { position } } = geometry;
-    if (!position) throw new Error('the geometry has no position');
-    const count = triangleCount(geometry);
-    const isDrawn = (start, end) => {
-        const first = Math.max(start, drawRange.start);
-        const last = Math.min(end, drawRange.start + drawRange.count);
-        return [Math.floor(first / 3), Math.min(count, Math.floor(last / 3))];
-    };
-    const ranges = groups.length > 0
-        ? groups.map((group) => isDrawn(group.start, group.start + group.count))
-        : [isDrawn(0, 3 * count)];
-    const drawn = new Uint8Array(count);
-    for (const [first, last] of ranges) drawn.fill(1, first, Math.max(first, last));
-    let all = 0;
-    for (const one of drawn) all += one;
-    const ids = all === count ? null : new Uint32Array(all);
-    const corners = new Float32Array(9 * all);
-    for (let triangle = 0, to = 0; triangle < count; triangle++) {
-        if (!drawn[triangle]) continue;
-        if (ids) ids[to] = triangle;
-        for (let corner = 0; corner < 3; corner++) {
-            const vertex = index ? index.getX(3 * triangle + corner) : 3 * triangle + corner;
-            const at = 9 * to + 3 * corner;
-            corners[at] = position.getX(vertex);
-            corners[at + 1] = position.getY(vertex);
-            corners[at + 2] = position.getZ(vertex);
-        }
-        to++;
+/** A copy of bytes, whoever holds them. */
+function copyOf(bytes) {
+    if (ArrayBuffer.isView(bytes)) return new Uint8Array(bytes.buffer, bytes.byteOffset, bytes.byteLength).slice();
+    const kind = Object.prototype.toString.call(bytes).slice(8, -1);
+    if (!/^(Shared)?ArrayBuffer$/.test(kind)) {
+        throw new TypeError(`bytes is of type ${kind}; accepted: an ArrayBuffer or a Uint8Array`);
     }
-    return { corners, ids };
+    return new Uint8Array(bytes).slice();
 }

@@ -2,7 +2,8 @@
 import { Worker } from 'node:worker_threads';
 
 export function startWorker() {
-    const worker = new Worker(new URL('./bake-node.js', import.meta.url));
+    // Flags such as `--input-type` are for the program alone.
+    const worker = new Worker(new URL('./bake-node.js', import.meta.url), { execArgv: [] });
     return {
         post: (message) => worker.postMessage(message, [message.corners.buffer]),
         hear: (listener) => worker.on('message', listener),

@@ -1,11 +1,11 @@
 //! The search behind the npm package `bvh-search`. `js/index.js` gives it the shape of a module for
 //! three.js.
 
+use bvh_core::cost::internal_area;
 use bvh_core::export::Target;
-use bvh_core::file::FileError;
-use bvh_core::{Primitives, Triangle};
-use bvh_search::{Budget, Event, Objects, Observer, Options, OwnedTree};
-use js_sys::{Float32Array, Function};
+use bvh_core::{Bvh, Primitives, Triangle};
+use bvh_search::{Bake, Budget, Event, Objects, Observer, OwnedTree};
+use js_sys::{Array, Float32Array, Function, Uint8Array, Uint32Array};
 use std::cell::{Cell, RefCell};
 use std::fmt::Display;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -31,13 +31,22 @@ thread_local! {
 /// Milliseconds between two reports of the progress without an improvement.
 const BETWEEN_REPORTS: f64 = 50.0;
 
+/// The rays that [`Target::fit_better`] casts through each of two trees.
+const RAYS: f64 = 8192.0;
+
+/// Tests of boxes and triangles in a millisecond, where every one waits for memory.
+const TESTS: f64 = 20_000.0;
+
 /// Follows a search by JavaScript's clock and function.
 struct Watch {
     start: f64,
-    /// The limit in milliseconds.
+    /// The limit of the search in milliseconds.
     limit: Option<f64>,
     most_work: Option<u64>,
     counted: AtomicU64,
+    /// The cost for the tracer of a tree without internal area, and what a unit of this area adds;
+    /// NaN if they are unknown.
+    estimate: [f64; 2],
 }
 
 impl Watch {
@@ -47,29 +56,30 @@ impl Watch {
         let of_work = self.most_work.map(|most| counted as f64 / most as f64);
         of_time.into_iter().chain(of_work).fold(0.0, f64::max).min(1.0)
     }
+}
 
-    /// Calls `onProgress` with the fraction of the budget and, of an improvement, its cost.
-    fn report(&self, cost: f64) {
-        let follower = FOLLOWER.with_borrow(Clone::clone);
-        let Some(follower) = follower else { return };
-        REPORTED.set(now());
-        if let Err(error) = follower.call2(&JsValue::NULL, &self.fraction().into(), &cost.into()) {
-            THROWN.set(Some(error));
-        }
+/// Calls `onProgress` with the fraction of the budget and, of an improvement, its cost.
+fn report(fraction: f64, cost: f64) {
+    let follower = FOLLOWER.with_borrow(Clone::clone);
+    let Some(follower) = follower else { return };
+    REPORTED.set(now());
+    if let Err(error) = follower.call2(&JsValue::NULL, &fraction.into(), &cost.into()) {
+        THROWN.set(Some(error));
     }
 }
 
 impl Observer for Watch {
     fn event(&self, event: &Event) {
         if event.cost <= event.incumbent {
-            self.report(event.incumbent);
+            let [cost, added] = self.estimate;
+            report(self.fraction(), cost + added * event.incumbent);
         }
     }
 
     fn counted(&self, _evaluations: u64, work: u64) {
         self.counted.store(work, Relaxed);
         if now() - REPORTED.get() > BETWEEN_REPORTS {
-            self.report(f64::NAN);
+            report(self.fraction(), f64::NAN);
         }
     }
 
@@ -84,90 +94,91 @@ impl Observer for Watch {
     }
 }
 
-/// A tree over triangles.
+/// Searches a tree over triangles of nine coordinates each, for `seconds` or up to so much `work`, in
+/// nodes visited. Returns the [parts](parts) of the tree.
 #[wasm_bindgen]
-pub struct Tree(OwnedTree);
+pub fn bake(
+    corners: &Float32Array,
+    seconds: Option<f64>,
+    work: Option<f64>,
+    seed: f64,
+    references: f64,
+    follower: Option<Function>,
+) -> Result<Array, JsValue> {
+    let most_work = work.map(|work| work as u64);
+    let limit = seconds.map(|seconds| 1000.0 * seconds);
+    let watch =
+        Watch { start: now(), limit, most_work, counted: 0.into(), estimate: [f64::NAN; 2] };
+    let shapes = triangles(corners)?;
+    let boxes = shapes.boxes();
+    let budget = Budget { max_work: most_work, ..Budget::UNLIMITED };
+    let seed = seed as u64;
+    let bake = Bake { shapes: Some(&shapes), references, seed, budget, ..Bake::new(&boxes) };
+    FOLLOWER.set(follower);
+    THROWN.set(None);
+    let found = search(&bake, watch);
+    if let Ok(parts) = &found {
+        report(1.0, parts.get(3).as_f64().unwrap_or(f64::NAN));
+    }
+    FOLLOWER.set(None);
+    THROWN.take().map_or(found, Err)
+}
 
-#[wasm_bindgen]
-impl Tree {
-    /// Searches a tree over triangles of nine coordinates each, for `seconds` or up to so much
-    /// `work`, in nodes visited.
-    pub fn bake(
-        corners: &Float32Array,
-        seconds: Option<f64>,
-        work: Option<f64>,
-        seed: f64,
-        references: f64,
-        follower: Option<Function>,
-    ) -> Result<Tree, JsValue> {
-        let most_work = work.map(|work| work as u64);
-        let budget = Budget { max_work: most_work, ..Budget::UNLIMITED };
-        let options = Options { references, seed: seed as u64, budget, rays: &[] };
-        FOLLOWER.set(follower);
-        THROWN.set(None);
-        let limit = seconds.map(|seconds| 1000.0 * seconds);
-        let watch = Watch { start: now(), limit, most_work, counted: 0.into() };
-        let found = OwnedTree::find(triangles(corners)?, &options, &watch);
-        FOLLOWER.set(None);
-        match THROWN.take() {
-            Some(thrown) => Err(thrown),
-            None => better(found.map_err(error)?, corners),
+fn search(bake: &Bake, mut watch: Watch) -> Result<Array, JsValue> {
+    let greedy = bake.greedy(&watch).map_err(error)?;
+    let mut comparison = f64::INFINITY;
+    if let Some(tree) = &greedy {
+        // Of many equal triangles, every ray meets all.
+        let cost = TARGET.cost(&TARGET.fit(tree));
+        comparison = 2.0 * RAYS * cost / TESTS;
+        // All trees of whole triangles have the same area of leaves.
+        if bake.references == 1.0 {
+            let root = tree.root_aabb().map_or(0.0, |root| root.half_area());
+            let added = TARGET.constants.traversal() / root;
+            watch.estimate = [cost - added * internal_area(tree), added];
         }
     }
-
-    /// Reads a tree over these triangles from the bytes of a tree file.
-    pub fn load(corners: &Float32Array, bytes: &[u8]) -> Result<Tree, JsValue> {
-        OwnedTree::load(triangles(corners)?, bytes).map(Self).map_err(error)
+    let is_compared = comparison <= 0.25 * watch.limit.unwrap_or(4000.0);
+    if is_compared {
+        watch.limit = watch.limit.map(|limit| limit - comparison);
     }
-
-    /// Returns the tree as a file, which the program `bvh` and all other interfaces read.
-    pub fn save(&self) -> Result<Vec<u8>, JsValue> {
-        self.0.save().map_err(|found: FileError| error(found))
-    }
-
-    /// The number of triangles.
-    #[wasm_bindgen(getter)]
-    pub fn triangles(&self) -> usize {
-        self.0.objects()
-    }
-
-    /// Returns the tree for three-mesh-bvh.
-    #[wasm_bindgen(js_name = forThreeMesh)]
-    pub fn for_three_mesh(&self) -> ThreeMesh {
-        let fitted = TARGET.fit(self.0.tree());
-        let cost = TARGET.cost(&fitted);
-        let nodes = bytemuck::cast_slice(&fitted.to_three_mesh()).to_vec();
-        ThreeMesh { nodes, order: fitted.prim_ids, cost }
-    }
+    // A search by the clock that has a tree begins with the division, which may take all its time.
+    let divides_later = watch.limit.is_some() && bake.references > 1.0;
+    let start = if divides_later { None } else { greedy.clone() };
+    let baked = bake.search(start, &watch).map_err(error)?;
+    let mut tree = baked.outcome.tree;
+    let fitted = match (greedy, bake.shapes) {
+        (Some(greedy), Some(Primitives::Triangles(shapes))) if is_compared => {
+            let better = TARGET.fit_better(&tree, &greedy, shapes);
+            if !better.is_searched() {
+                tree = greedy;
+            }
+            better.tree
+        }
+        _ => TARGET.fit(&tree),
+    };
+    let file = bake.write(&tree, baked.outcome.work, |sections| sections.concat());
+    Ok(parts(&fitted, &file.map_err(error)?))
 }
 
-/// The nodes of a tree for three-mesh-bvh, and the triangles in the order of its leaves.
+/// Reads a tree over these triangles from the bytes of a tree file. Returns its [parts](parts).
 #[wasm_bindgen]
-pub struct ThreeMesh {
-    nodes: Vec<u8>,
-    order: Vec<u32>,
-    cost: f64,
+pub fn load(corners: &Float32Array, bytes: &[u8]) -> Result<Array, JsValue> {
+    let shapes = Objects::Shapes(triangles(corners)?);
+    let tree = OwnedTree::load(shapes, bytes).map_err(error)?;
+    Ok(parts(&TARGET.fit(tree.tree()), bytes))
 }
 
-#[wasm_bindgen]
-impl ThreeMesh {
-    /// The bytes of the nodes.
-    #[wasm_bindgen(getter)]
-    pub fn nodes(&self) -> Vec<u8> {
-        self.nodes.clone()
-    }
-
-    /// The triangles in the order of the leaves.
-    #[wasm_bindgen(getter)]
-    pub fn order(&self) -> Vec<u32> {
-        self.order.clone()
-    }
-
-    /// The cost of a ray by the library's costs.
-    #[wasm_bindgen(getter)]
-    pub fn cost(&self) -> f64 {
-        self.cost
-    }
+/// Returns what JavaScript keeps of a tree, so that none of it stays in WebAssembly: the file, the
+/// nodes for three-mesh-bvh, the triangles in the order of the leaves, and the cost of a ray.
+fn parts(fitted: &Bvh, file: &[u8]) -> Array {
+    let nodes = fitted.to_three_mesh();
+    Array::of4(
+        &Uint8Array::from(file),
+        &Uint8Array::from(bytemuck::cast_slice::<_, u8>(&nodes)),
+        &Uint32Array::from(&*fitted.prim_ids),
+        &TARGET.cost(fitted).into(),
+    )
 }
 
 /// Returns the cost of a ray in a tree of three-mesh-bvh, by the bytes of one of its roots.
@@ -179,28 +190,16 @@ pub fn cost_of_root(bytes: &[u8], triangles: u32) -> Result<f64, JsValue> {
     Ok(TARGET.cost(&tree))
 }
 
-/// Returns a greedy tree instead of a searched one in which rays of three-mesh-bvh take more tests.
-fn better(searched: OwnedTree, corners: &Float32Array) -> Result<Tree, JsValue> {
-    // A search without any time is the greedy tree that others begin with.
-    let watch = Watch { start: now(), limit: Some(0.0), most_work: None, counted: 0.into() };
-    let greedy = OwnedTree::find(triangles(corners)?, &Options::default(), &watch);
-    let greedy = greedy.map_err(error)?;
-    let shapes = searched.triangles().unwrap_or_default();
-    let better = TARGET.fit_better(searched.tree(), greedy.tree(), shapes);
-    Ok(Tree(if better.is_searched() { searched } else { greedy }))
-}
-
-fn triangles(corners: &Float32Array) -> Result<Objects, JsValue> {
+fn triangles(corners: &Float32Array) -> Result<Primitives, JsValue> {
     let corners = corners.to_vec();
     let (triangles, rest) = corners.as_chunks::<9>();
     if !rest.is_empty() {
         let found = corners.len();
         return Err(error(format!("corners has {found} numbers; accepted: nine per triangle")));
     }
-    let triangle = |t: &[f32; 9]| {
-        Triangle::from([[t[0], t[1], t[2]], [t[3], t[4], t[5]], [t[6], t[7], t[8]]])
-    };
-    Ok(Objects::Shapes(Primitives::Triangles(triangles.iter().map(triangle).collect())))
+    let triangle =
+        |t: &[f32; 9]| Triangle::from([[t[0], t[1], t[2]], [t[3], t[4], t[5]], [t[6], t[7], t[8]]]);
+    Ok(Primitives::Triangles(triangles.iter().map(triangle).collect()))
 }
 
 fn error(found: impl Display) -> JsValue {

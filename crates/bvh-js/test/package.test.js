@@ -6,10 +6,10 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import {
-    Box3, BufferAttribute, BufferGeometry, DoubleSide, InterleavedBuffer, InterleavedBufferAttribute, Ray, SphereGeometry,
-    TorusKnotGeometry, Vector3,
+    BackSide, BatchedMesh, Box3, BoxGeometry, BufferAttribute, BufferGeometry, DoubleSide, FrontSide, InterleavedBuffer,
+    InterleavedBufferAttribute, Matrix4, Mesh, MeshBasicMaterial, Ray, Raycaster, SphereGeometry, TorusKnotGeometry, Vector3,
 } from 'three';
-import { MeshBVH, SAH } from 'three-mesh-bvh';
+import { acceleratedRaycast, MeshBVH, SAH } from 'three-mesh-bvh';
 import { bake, bakeInWorker, costOf, countTests, Tree } from 'bvh-search';
 import { loadExport } from '../examples/load-export.mjs';
 
@@ -70,6 +70,35 @@ function assertSameHits(ours, theirs, count, least = count / 10) {
     assert.ok(hits > least, `${hits} hits`);
 }
 
+const plain = Mesh.prototype.raycast;
+
+/** All hits of three's own `raycast`, or of another one, with the materials that they name. */
+function hitsOf(mesh, raycast, list = rays(400)) {
+    mesh.raycast = raycast;
+    const caster = new Raycaster();
+    return list.map((ray) => {
+        caster.set(ray.origin, ray.direction);
+        return caster.intersectObject(mesh).map(({ distance, face, batchId }) => [
+            distance.toFixed(5), face.materialIndex, [face.a, face.b, face.c].sort().join(), batchId,
+        ].join());
+    });
+}
+
+/** Materials that are seen from the sides. */
+const materials = (...sides) => sides.map((side) => new MeshBasicMaterial({ side }));
+
+/** Asserts that three finds the same in the geometry with its tree and without, also with its materials. */
+function assertAsThree(geometry, boundsTree, least = 20) {
+    geometry.boundsTree = boundsTree;
+    for (const material of [materials(DoubleSide)[0], materials(FrontSide, BackSide, DoubleSide)]) {
+        const mesh = new Mesh(geometry, material);
+        const expected = hitsOf(mesh, plain);
+        assert.deepEqual(hitsOf(mesh, acceleratedRaycast), expected);
+        const hits = expected.flat().length;
+        assert.ok(hits > least || Array.isArray(material) && geometry.groups.length === 0, `${hits} hits`);
+    }
+}
+
 test('a searched tree has the hits of the library’s own and costs less', async () => {
     const [geometry, other] = [scene(), scene()];
     const tree = await bake(geometry, { work: 3_000_000 });
@@ -90,6 +119,91 @@ test('a tree that divides triangles has the same first hits, costs less, and lea
     assert.ok(divided.cost < 0.95 * whole.cost, `${divided.cost} beside ${whole.cost}`);
     assert.ok(Math.abs((await costOf(divided.toMeshBVH(geometry))) / divided.cost - 1) < 1e-3);
     assert.throws(() => divided.toMeshBVH(geometry, { indirect: false }), /indirect is false.*divides/);
+    // `raycast` meets a triangle once, whole or divided, here and in a file.
+    assertAsThree(geometry, divided.toMeshBVH(geometry), 100);
+    assertAsThree(geometry, (await Tree.load(divided.save(), geometry)).toMeshBVH(geometry), 100);
+    assertAsThree(geometry, whole.toMeshBVH(geometry), 100);
+});
+
+test('a tree is applied twice, beside others, and to no other geometry than its own', async () => {
+    const geometry = scene();
+    const untouched = geometry.clone();
+    const [first, second] = await Promise.all([1, 2].map((seed) => bake(geometry, { work: 200_000, seed })));
+    const bytes = first.save();
+    const bvhs = [first, second, first].map((tree) => tree.toMeshBVH(geometry));
+    bvhs.push((await Tree.load(bytes, geometry)).toMeshBVH(geometry));
+    // Hot reload bakes again.
+    bvhs.push((await bake(geometry, { work: 200_000, seed: 3 })).toMeshBVH(geometry));
+    bvhs.push(first.toMeshBVH(geometry));
+    for (const bvh of bvhs) assertAsThree(geometry, bvh);
+    // The first one alone reorders the index; a refit of one tree leaves the others.
+    assert.deepEqual(bvhs.map(({ indirect }) => indirect), [false, true, false, false, true, false]);
+    bvhs[0].geometry.attributes.position.array.fill(0);
+    bvhs[0].refit();
+    assertAsThree(untouched, first.toMeshBVH(untouched));
+    assert.notDeepEqual(untouched.index.array, scene().index.array);
+
+    const bare = scene({ isIndexed: false });
+    const tree = await bake(bare, { work: 200_000 });
+    for (let turn = 0; turn < 2; turn++) assertAsThree(bare, tree.toMeshBVH(bare));
+    const moved = scene();
+    const moving = bakeInWorker(moved, { work: 200_000 });
+    const still = await bake(moved, { work: 200_000 });
+    moved.translate(5, 0, 0);
+    const flipped = scene();
+    flipped.index.array.reverse();
+    const others = [moved, flipped, scene().scale(2, 2, 2), geometry.clone().setIndex(null), new TorusKnotGeometry()];
+    for (const other of others) {
+        for (const baked of [still, await moving]) {
+            assert.throws(() => baked.toMeshBVH(other), /accepted: the/);
+            await assert.rejects(Tree.load(baked.save(), other));
+        }
+    }
+});
+
+test('groups, gaps between them, draw ranges and parts of a batch keep their materials and triangles', async () => {
+    const half = 3 * Math.floor(scene().index.count / 6);
+    const count = scene().index.count;
+    for (const [groups, range] of [
+        [[[0, half, 0], [half, count - half, 1]], [0, Infinity]],
+        [[[300, 300, 1], [half, 600, 2]], [0, Infinity]],
+        [[[0, half + 300, 0], [half - 300, Infinity, 1]], [0, Infinity]],
+        [[[0, half, 0], [half, count - half, 2]], [300, half]],
+        [[], [half, 3000]],
+    ]) {
+        for (const isIndexed of [true, false]) {
+            const geometry = scene({ isIndexed });
+            geometry.setDrawRange(...range);
+            for (const group of groups) geometry.addGroup(...group);
+            const tree = await bake(geometry, { work: 100_000 });
+            assertAsThree(geometry, tree.toMeshBVH(geometry), 10);
+            assertAsThree(geometry, (await Tree.load(tree.save(), geometry)).toMeshBVH(geometry), 10);
+            assert.throws(() => tree.toMeshBVH(geometry, { indirect: false }), /indirect is false.*(groups|part)/);
+        }
+    }
+    for (const [change, expected] of [
+        [(geometry) => geometry.setDrawRange(301, 900), /draw range begins at 301/],
+        [(geometry) => geometry.setDrawRange(300, 901), /draw range ends at 1201/],
+        [(geometry) => geometry.addGroup(4, 300), /group 0 begins at 4/],
+    ]) {
+        const geometry = scene();
+        change(geometry);
+        await assert.rejects(bake(geometry, { work: 1 }), expected);
+    }
+    const batch = new BatchedMesh(3, 4000, 20_000, materials(DoubleSide)[0]);
+    const ids = [new BoxGeometry(2, 2, 2), new TorusKnotGeometry()].map((geometry) => batch.addGeometry(geometry));
+    ids.forEach((id, x) => batch.setMatrixAt(batch.addInstance(id), new Matrix4().makeTranslation(x, 0, 0)));
+    const expected = hitsOf(batch, BatchedMesh.prototype.raycast);
+    batch.boundsTrees = [];
+    for (const id of ids) {
+        const { start, count } = batch.getGeometryRangeAt(id);
+        batch.geometry.setDrawRange(start, count);
+        batch.boundsTrees[id] = (await bake(batch.geometry, { work: 10_000 })).toMeshBVH(batch.geometry);
+    }
+    batch.geometry.setDrawRange(0, Infinity);
+    Mesh.prototype.raycast = acceleratedRaycast;
+    assert.deepEqual(hitsOf(batch, acceleratedRaycast).map((hits) => hits.sort()), expected.map((hits) => hits.sort()));
+    assert.ok(expected.flat().length > 100);
 });
 
 /** Tests of boxes and triangles, by the structure of the tree: what `raycast` visits without a limit. */
@@ -175,22 +289,70 @@ test('geometries without an index, with groups, with a draw range and with inter
 
 test('a worker finds the same tree, tells of its progress, and ends on a signal', async () => {
     const geometry = scene();
-    const work = 2_000_000;
-    const here = await bake(geometry, { work });
-    const fractions = [];
-    const there = await bakeInWorker(geometry, { work, onProgress: ({ fraction }) => fractions.push(fraction) });
-    assert.deepEqual(there.save(), here.save());
-    assert.ok(fractions.length > 2 && fractions.every((part) => part >= 0 && part <= 1));
+    const own = await costOf(new MeshBVH(scene(), { strategy: SAH, targetLeafSize: 1 }));
+    for (const budget of [{ work: 2_000_000 }, { seconds: 0.3 }]) {
+        const all = [];
+        for (const search of [bake, bakeInWorker]) {
+            const told = [];
+            const tree = await search(geometry, { ...budget, onProgress: (progress) => told.push(progress) });
+            const fractions = told.map(({ fraction }) => fraction);
+            assert.ok(fractions.length > 2);
+            assert.deepEqual(fractions, fractions.toSorted((a, b) => a - b));
+            assert.deepEqual(told.at(-1), { fraction: 1, cost: tree.cost });
+            const costs = told.map(({ cost }) => cost).filter((cost) => cost !== undefined);
+            assert.ok(costs.length > 2 && costs.every((cost) => cost > 0.97 * tree.cost && cost < 1.3 * own), `${costs}`);
+            all.push(tree.save());
+        }
+        if (budget.work) assert.deepEqual(all[0], all[1]);
+    }
     const ended = bakeInWorker(geometry, { seconds: 60, signal: AbortSignal.timeout(200) });
     await assert.rejects(ended, { name: 'TimeoutError' });
 });
 
-test('a time is kept, and an exception of onProgress ends the search', async () => {
-    const start = performance.now();
-    await bake(scene(), { seconds: 0.2 });
-    assert.ok(performance.now() - start < 5000);
+test('a time is kept, also where every ray meets every triangle', async () => {
+    const same = new BufferGeometry();
+    const corners = Float32Array.from({ length: 180_000 }, (_, at) => [0, 0, 0, 1, 0, 0, 0, 1, 1][at % 9]);
+    same.setAttribute('position', new BufferAttribute(corners, 3));
+    await bake(scene(), { work: 1 });
+    for (const [geometry, options, most] of [
+        [scene(), { seconds: 0.2 }, 1000],
+        [same, { seconds: 0.5 }, 2000],
+        [same, { work: 1 }, 2000],
+    ]) {
+        const start = performance.now();
+        await bake(geometry, options);
+        assert.ok(performance.now() - start < most, `${performance.now() - start} ms`);
+    }
+});
+
+test('what onProgress throws ends the search, in a worker too', async () => {
     const stop = new Error('enough');
-    await assert.rejects(bake(scene(), { seconds: 60, onProgress: () => { throw stop; } }), stop);
+    for (const search of [bake, bakeInWorker]) {
+        await assert.rejects(search(scene(), { seconds: 60, onProgress: () => { throw stop; } }), stop);
+        await assert.rejects(search(scene(), { seconds: 0.5, onProgress: async () => { throw stop; } }), stop);
+    }
+});
+
+test('trees that nobody keeps take no memory, and neither do the last ones', async () => {
+    const knot = new TorusKnotGeometry(1, 0.3, 200, 64);
+    const resident = async () => {
+        for (let turn = 0; turn < 25; turn++) await bake(knot, { work: 1 });
+        return process.memoryUsage().rss;
+    };
+    const first = await resident();
+    const grown = await resident() - first;
+    assert.ok(grown < 60e6, `${grown} bytes more`);
+    const tree = await bake(knot, { work: 1 });
+    tree.dispose();
+    assert.throws(() => tree.toMeshBVH(knot), /disposed/);
+});
+
+test('a program in the command line bakes in a worker', () => {
+    const program = `import { BoxGeometry } from 'three'; import { bakeInWorker } from 'bvh-search';
+        console.log((await bakeInWorker(new BoxGeometry(), { work: 1 })).cost > 0);`;
+    const folder = new URL('..', import.meta.url);
+    const said = execFileSync(process.execPath, ['--input-type=module', '-e', program], { cwd: folder, encoding: 'utf8' });
+    assert.equal(said, 'true\n');
 });
 
 test('a saved tree is the file of the program, and loads for its own geometry only', async () => {
@@ -200,6 +362,13 @@ test('a saved tree is the file of the program, and loads for its own geometry on
     assert.equal(tree.cost, (await bake(geometry, { work: 1_000_000, seed: 7 })).cost);
     await assert.rejects(Tree.load(bytes, new TorusKnotGeometry()), /scene|objects/);
     await assert.rejects(Tree.load(bytes.subarray(1), geometry));
+    const buffer = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length);
+    for (const form of [buffer, new DataView(buffer), Buffer.from(bytes)]) {
+        assert.deepEqual((await Tree.load(form, geometry)).save(), bytes);
+    }
+    for (const form of ['bytes', Promise.resolve(buffer), 5, undefined]) {
+        await assert.rejects(Tree.load(form, geometry), { name: 'TypeError', message: /bytes is .*accepted: an ArrayBuffer/ });
+    }
     if (!process.env.BVH) return;
     const folder = mkdtempSync(join(tmpdir(), 'bvh-'));
     const position = geometry.attributes.position.array;
@@ -232,13 +401,35 @@ test('the example of the README runs', async () => {
 });
 
 test('wrong arguments and geometries are named', async () => {
-    for (const [options, name] of [[{ seconds: -1 }, 'seconds'], [{ work: 0.5 }, 'work'], [{ seed: '1' }, 'seed'], [{ references: 0 }, 'references']]) {
-        await assert.rejects(bake(scene(), options), (error) => error instanceof RangeError && error.message.startsWith(`${name} is`));
+    const changed = (change) => {
+        const geometry = scene();
+        change(geometry);
+        return geometry;
+    };
+    const cases = [
+        [scene(), { seconds: -1 }, 'RangeError', /^seconds is -1/],
+        [scene(), { work: 0.5 }, 'RangeError', /^work is 0.5/],
+        [scene(), { seed: '1' }, 'RangeError', /^seed is 1/],
+        [scene(), { references: 0 }, 'RangeError', /^references is 0/],
+        [scene(), { second: 1 }, 'TypeError', /option "second"; accepted: seconds/],
+        [scene(), null, 'TypeError', /^options is null/],
+        [scene(), { onProgress: 5 }, 'TypeError', /^onProgress is 5; accepted: a function/],
+        [scene(), { signal: 5 }, 'TypeError', /signal/],
+        [undefined, {}, 'TypeError', /^geometry is undefined; accepted: a BufferGeometry/],
+        [new Mesh(scene()), {}, 'TypeError', /^geometry is a Mesh; accepted: a BufferGeometry/],
+        [new BufferGeometry(), {}, 'Error', /no position/],
+        [changed((geometry) => geometry.setDrawRange(0, 0)), {}, 'Error', /no triangles/],
+        [changed(({ index }) => index.setX(5, 65_000)), {}, 'RangeError', /^index\[5\] is 65000; accepted: 0 to \d+/],
+        [changed(({ attributes }) => attributes.position.setY(3, NaN)), {}, 'RangeError', /^vertex 3 .*NaN/],
+        [changed(({ morphAttributes }) => { morphAttributes.position = [new BufferAttribute(new Float32Array(3), 3)]; }),
+            {}, 'Error', /morph.*accepted/],
+        [changed((geometry) => geometry.setAttribute('skinIndex', geometry.index)), {}, 'Error', /skin.*accepted/],
+    ];
+    for (const [geometry, options, name, message] of cases) {
+        await assert.rejects(bakeInWorker(geometry, options), { name, message });
+        await assert.rejects(bake(geometry, options), { name, message });
     }
-    await assert.rejects(bake(new BufferGeometry()), /no position/);
-    const broken = scene();
-    broken.attributes.position.array[10] = NaN;
-    await assert.rejects(bake(broken), /object|box/);
     const tree = await bake(scene(), { work: 100_000 });
-    assert.throws(() => tree.toMeshBVH(new TorusKnotGeometry()), /triangles; accepted/);
+    assert.throws(() => tree.toMeshBVH(scene(), { indirekt: true }), { name: 'TypeError', message: /option "indirekt"/ });
+    assert.throws(() => tree.toMeshBVH(new Mesh(scene())), { name: 'TypeError', message: /^geometry is a Mesh/ });
 });
