@@ -7,9 +7,8 @@
 
 use crate::{Aabb, Bvh, Node, NodeKind, PackedAabb};
 
-pub(crate) use crate::layout_cost::call_in_turn;
 pub use crate::layout_cost::{
-    CallBoth, LayoutCost, LayoutTree, layout_area, layout_cost, layout_row,
+    CallBoth, LayoutCost, LayoutTree, call_in_turn, layout_area, layout_cost, layout_row,
 };
 
 /// The cost that a search minimises and that results report in the column `cost`.

@@ -115,7 +115,8 @@ pub fn layout_area(tree: &Bvh) -> f64 {
     layout_cost(tree, None, &call_in_turn)
 }
 
-pub(crate) fn call_in_turn(first: &mut (dyn FnMut() + Send), second: &mut (dyn FnMut() + Send)) {
+/// Calls two functions, one after the other: the [`CallBoth`] of a program without threads.
+pub fn call_in_turn(first: &mut (dyn FnMut() + Send), second: &mut (dyn FnMut() + Send)) {
     first();
     second();
 }

@@ -170,10 +170,13 @@ fn by_crossings(
     inside: &mut [bool],
     is_inside: impl Fn(&[Hit]) -> bool,
 ) {
+    // The half line must not end before a far wall: a mesh may be twice as wide as the largest f32.
+    let is_wide = wide.bounds.max.x - wide.bounds.min.x > f32::MAX;
+    let direction = if is_wide { 2.0 * Vec3::X } else { Vec3::X };
     // A point outside the box is outside the mesh: its range is empty. NaN fails every comparison.
     let half_line = |&point: &Vec3| {
         let is_within = wide.bounds.contains(&Aabb { min: point, max: point });
-        Ray::assume_valid(point, Vec3::X, 0.0, if is_within { f32::MAX } else { -1.0 })
+        Ray::assume_valid(point, direction, 0.0, if is_within { f32::MAX } else { -1.0 })
     };
     let rays: Vec<Ray> = points.iter().map(half_line).collect();
     let mut hits = Vec::new();

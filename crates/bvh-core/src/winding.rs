@@ -178,9 +178,11 @@ impl Winding {
         for (index, node) in nodes.iter().enumerate().rev() {
             let first = sorted.len();
             for &id in &prim_ids[node.prims()] {
-                // A divided triangle belongs to one of its leaves.
-                if seen.set(id as usize) {
-                    sorted.push(triangles[id as usize]);
+                let triangle = triangles[id as usize];
+                // A divided triangle belongs to one of its leaves. One without area winds round
+                // nothing, though roundings would let it where a point is on its line.
+                if seen.set(id as usize) && !triangle.is_degenerate() {
+                    sorted.push(triangle);
                 }
             }
             let (patch, range) = if node.is_leaf() {

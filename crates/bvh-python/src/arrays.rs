@@ -337,18 +337,32 @@ impl Place {
     /// Advances a ray that begins far away to the sphere around the tree's box. Returns the origin
     /// relative to the centre, and its distance in multiples of the direction's length. It is exact
     /// enough for a ray that misses the sphere: that ray advances to its point next to the sphere.
+    ///
+    /// A ray that is not so far away stays where it is if `f32` has its origin: distances and limits
+    /// are then exact.
     fn advanced(&self, origin: DVec3, direction: DVec3) -> (Vec3, f64) {
+        /// The largest distance of rays that may stay, in radii. The rounding of a direction moves a
+        /// ray further the longer it is.
+        const NEAR: f64 = 16.0;
         let (middle, radius) = self.sphere;
         let origin = origin - self.center;
         let square = direction.length_squared();
         let nearest = (middle - origin).dot(direction) / square;
         let distance = nearest - radius / square.sqrt();
-        if distance > 0.0 && distance.is_finite() {
+        let is_near = distance * square.sqrt() <= NEAR * radius;
+        let may_stay = is_near && origin.as_vec3().as_dvec3() == origin;
+        if distance > 0.0 && distance.is_finite() && !may_stay {
             ((origin + distance * direction).as_vec3(), distance)
         } else {
             (origin.as_vec3(), 0.0)
         }
     }
+}
+
+/// Returns the largest range of `f32` within a range: no distance outside is let in.
+fn inward([t_min, t_max]: [f64; 2]) -> [f32; 2] {
+    let up = |t: f64| if f64::from(t as f32) < t { (t as f32).next_up() } else { t as f32 };
+    [up(t_min), -up(-t_max)]
 }
 
 /// The arrays of rays. `t_min` and `t_max` are one number for all rays or one number per ray.
@@ -456,15 +470,14 @@ impl RaySource<'_> {
             // One number is for all rays.
             let limits = self.limits.map(|limits| *limits.get(index).unwrap_or(&limits[0]));
             let [t_min, t_max] = limits.map(|t| t as f32);
+            let inner = inward(limits.map(|t| t - advance));
             let ray = match Ray::new(origin, direction, t_min, t_max) {
                 // An empty range hits nothing.
                 Err(_) if self.misses => Ray::assume_valid(Vec3::ZERO, Vec3::X, 1.0, 0.0),
+                // The limits next to the caller's, and not their neighbours.
                 Err(error) => return Err(format!("ray {index}: {error}")),
-                Ok(_) if advance > 0.0 => {
-                    let [t_min, t_max] = limits.map(|t| (t - advance) as f32);
-                    Ray::assume_valid(origin, direction, t_min, t_max)
-                }
-                Ok(ray) => ray,
+                Ok(ray) if inner == [t_min, t_max] => ray,
+                Ok(_) => Ray::assume_valid(origin, direction, inner[0], inner[1]),
             };
             batch.rays.push(ray);
             if self.place.is_some() {

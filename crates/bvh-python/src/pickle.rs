@@ -1,6 +1,7 @@
 //! The bytes in the pickle of a tree. A pickle may be forged, so every part is checked.
 
 use crate::arrays::{invalid, shapes};
+use crate::threads::detached;
 use bvh_search::{Objects, OwnedTree};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -16,7 +17,7 @@ pub fn state<'py>(
     faces: Option<&[[u32; 3]]>,
 ) -> PyResult<State<'py>> {
     let bytes = |numbers: &[u8]| PyBytes::new(py, numbers);
-    let tree = owned.save().map_err(invalid)?;
+    let tree = detached(py, || owned.save())?.map_err(invalid)?;
     let (shape, objects) = match owned.triangles() {
         Some(triangles) => ("triangles", bytes(bytemuck::cast_slice(triangles))),
         None => ("boxes", bytes(bytemuck::cast_slice(owned.boxes()))),
@@ -26,13 +27,14 @@ pub fn state<'py>(
 }
 
 /// Restores a tree.
-pub fn tree(shape: &str, objects: &[u8], tree: &[u8]) -> PyResult<OwnedTree> {
+pub fn tree(py: Python, shape: &str, objects: &[u8], tree: &[u8]) -> PyResult<OwnedTree> {
     let objects = match shape {
         "triangles" => shapes(numbers("objects", objects)?),
         "boxes" => Objects::Boxes(numbers("objects", objects)?),
         _ => return Err(invalid(format!("shape is {shape:?}; accepted: triangles, boxes"))),
     };
-    OwnedTree::load(objects, tree).map_err(|error| invalid(format!("tree: {error}")))
+    let loaded = detached(py, || OwnedTree::load(objects, tree))?;
+    loaded.map_err(|error| invalid(format!("tree: {error}")))
 }
 
 /// Restores the faces of a mesh, whose triangles are the objects of the tree.

@@ -21,16 +21,17 @@ type Rows<'py, T> = Bound<'py, PyArray2<T>>;
 /// tree do not change the tracer.
 ///
 /// Rays have `origins` and `directions` of the shape `(m, 3)`. `t_min` and `t_max`, by default 0
-/// and infinity, are one number or have the shape `(m,)`. Distances are in multiples of the
-/// directions' lengths. `coherent` tells whether consecutive rays begin close to each other and have
-/// similar directions; by default a look at the rays decides. It changes the speed and no answer. An
-/// invalid ray, with a direction that is zero or a number that is not finite, raises a `ValueError`;
-/// with `invalid="miss"` it hits nothing.
+/// and infinity, are one number or have the shape `(m,)`; those in `float64` are rounded inwards.
+/// Distances are in multiples of the directions' lengths. `coherent` tells whether consecutive rays
+/// begin close to each other and have similar directions; by default a look at the rays decides. It
+/// changes the speed and no answer. An invalid ray, with a direction that is zero or a number that
+/// is not finite, raises a `ValueError`; with `invalid="miss"` it hits nothing.
 ///
 /// Trees have `float32` coordinates. For coordinates that need `float64`, move the triangles by
 /// `-center` before they are rounded, and pass `center`: rays, points and answers are then in the
 /// coordinates of the world, and only what is left after their move is rounded. A ray that begins
-/// outside the tree's box is first advanced to it in `float64`.
+/// outside the tree's box, far away or at a point that `float32` does not have, is first advanced to
+/// it in `float64`.
 ///
 /// >>> import numpy as np
 /// >>> from bvh_search import Tracer, Tree

@@ -6,6 +6,7 @@ use crate::improver::Improver;
 use crate::pickle::{self, State};
 use crate::scalars;
 use crate::search::{self, Limits};
+use crate::threads::detached;
 use bvh_scenes::files::{self, WriteError};
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
@@ -150,6 +151,7 @@ impl Tree {
     #[staticmethod]
     #[pyo3(signature = (path, *, triangles = None, boxes = None))]
     fn load(
+        py: Python,
         path: PathBuf,
         triangles: Option<&Bound<PyAny>>,
         boxes: Option<&Bound<PyAny>>,
@@ -162,7 +164,7 @@ impl Tree {
             }
         };
         let bytes = tree_file::read(&path).map_err(read_error)?;
-        OwnedTree::load(objects, &bytes)
+        detached(py, || OwnedTree::load(objects, &bytes))?
             .map(Self::new)
             .map_err(|error| invalid_argument("path", error))
     }
@@ -171,8 +173,9 @@ impl Tree {
     /// failure leaves the old one.
     ///
     /// >>> square.save(folder.name + "/square.bvh")
-    fn save(&self, path: PathBuf) -> PyResult<()> {
-        let bytes = self.owned().save().map_err(invalid)?;
+    fn save(&self, py: Python, path: PathBuf) -> PyResult<()> {
+        let owned = self.owned();
+        let bytes = detached(py, || owned.save())?.map_err(invalid)?;
         files::write(&path, &bytes).map_err(write_error)
     }
 
@@ -186,7 +189,7 @@ impl Tree {
         let target =
             Target::named(tracer).map_err(|unknown| invalid(format!("tracer is {unknown}")))?;
         let owned = self.owned();
-        Ok(PyBytes::new(py, &py.detach(|| owned.export(&target))))
+        Ok(PyBytes::new(py, &detached(py, || owned.export(&target))?))
     }
 
     /// Improves the tree for about `seconds`. Ctrl-C ends the search early, and the tree keeps its
@@ -296,8 +299,14 @@ impl Tree {
     }
 
     #[staticmethod]
-    fn _restore(shape: &str, objects: &[u8], tree: &[u8], faces: Option<&[u8]>) -> PyResult<Self> {
-        let owned = pickle::tree(shape, objects, tree)?;
+    fn _restore(
+        py: Python,
+        shape: &str,
+        objects: &[u8],
+        tree: &[u8],
+        faces: Option<&[u8]>,
+    ) -> PyResult<Self> {
+        let owned = pickle::tree(py, shape, objects, tree)?;
         let faces = faces.map(|faces| pickle::faces(&owned, faces)).transpose()?;
         Ok(Self { faces: faces.map(Arc::new), ..Self::new(owned) })
     }

@@ -144,6 +144,47 @@ def test_rays_from_far_away_hit_as_if_they_began_nearby():
         assert tracer.any(origins, -directions).sum() == 0
 
 
+@pytest.mark.parametrize("center", [None, [0, 0, 0], [1e6, 0, 0]])
+@pytest.mark.parametrize(
+    ("limits", "is_hit"),
+    [
+        ((0, 1 - 1e-9), False),
+        ((1 + 1e-9, np.inf), False),
+        ((1 - 1e-9, 1 + 1e-9), True),
+        ((1, 1), True),
+        ((1e-60, 1e300), True),
+        ((1e300, np.inf), False),
+        ((0, -1e-60), False),
+    ],
+)
+def test_limits_in_float64_exclude_every_distance_beyond_them(center, limits, is_hit):
+    tree = Tree.from_mesh([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]], work=10)
+    tracer = Tracer(tree, center=center)
+    rays = np.array([[0.25, 0.25, 0]]) + (0 if center is None else center), [[0, 0, 1]], limits[0], [limits[1]]
+    expected = [[is_hit], [is_hit], [0] * is_hit, [is_hit]]
+    found = [tracer.any(*rays), tracer.nearest(*rays)[1] == 0, tracer.all(*rays)[1], tracer.counts(*rays)]
+    assert [answer.tolist() for answer in found] == expected
+    if center is None:
+        scene = RaycastingScene(seconds=0.01)
+        scene.add_triangles([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+        assert scene.test_occlusions([[0.25, 0.25, 0, 0, 0, 1]], *limits).tolist() == [is_hit]
+
+
+@pytest.mark.parametrize("places", [[0, 1e4], [0, 0, 1e5], [1e9, 1e9], [0, -1e7], [5e8, 6e8, 5e8]])
+def test_a_scene_rounds_no_mesh_to_a_thousandth_of_its_size_in_silence(places):
+    vertices, faces = box()
+    scene = RaycastingScene(seconds=0.01)
+    for place in places:
+        scene.add_triangles(vertices + [place, 0, 0], faces)
+    rays = np.array([[place + 0.3, 0.2, 9, 0, 0, -1] for place in places])
+    largest = max(places) - min(places)
+    if largest < 1e5:
+        np.testing.assert_allclose(scene.cast_rays(rays)["t_hit"], 8, rtol=1e-6)
+        return
+    with pytest.raises(ValueError, match="geometry [0-9] .*rounded to .*float32.*accepted: "):
+        scene.cast_rays(rays)
+
+
 def test_surfaces_have_weights_and_normals():
     vertices, faces = box()
     tracer = Tracer(Tree.from_mesh(vertices, faces, work=1000))

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import pickle
 import signal
 import threading
 import time
@@ -65,6 +66,20 @@ def test_a_child_process_searches_and_traces_after_its_parent_did():
         np.testing.assert_array_equal(answers(), before)
 
     assert ends_in_a_child(compare)
+
+
+def test_a_child_process_saves_loads_pickles_and_exports_after_its_parent_did(tmp_path):
+    vertices, faces = grid(100)
+    tree = Tree.from_mesh(vertices, faces, work=1000)
+
+    def save_and_load():
+        pickle.loads(pickle.dumps(tree))
+        tree.save(tmp_path / "tree.bvh")
+        Tree.load(tmp_path / "tree.bvh", triangles=vertices[faces])
+        tree.export("three-mesh-bvh")
+
+    save_and_load()
+    assert ends_in_a_child(save_and_load, seconds=20)
 
 
 def test_a_child_process_uses_a_tree_that_a_thread_of_its_parent_moves():

@@ -108,6 +108,19 @@ def test_a_mesh_with_a_hole_has_an_inside():
     np.testing.assert_array_equal(inside, np.linalg.norm(points, axis=1) < 1)
 
 
+@pytest.mark.parametrize("stray", [[0, 0, 0], [np.nan] * 3, [-1e12, 1e12, 3]])
+def test_vertices_that_no_face_uses_change_no_answer(stray):
+    mesh = trimesh.creation.icosphere(subdivisions=2)
+    mesh.apply_translation([512345.678, 5412345.678, 321.5])
+    strayed = trimesh.Trimesh(np.concatenate([mesh.vertices, [stray]]), mesh.faces, process=False)
+    ours, same = RayMeshIntersector(mesh), RayMeshIntersector(strayed)
+    rays = rays_of(mesh)
+    assert 0.2 < (ours.intersects_first(*rays) >= 0).mean() < 0.9
+    for expected, found in zip(ours.intersects_location(*rays), same.intersects_location(*rays)):
+        np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(same.contains_points(rays[0]), ours.contains_points(rays[0]))
+
+
 def test_an_engine_follows_its_mesh_and_is_copied():
     mesh = trimesh.creation.box()
     mesh.ray = RayMeshIntersector(mesh)

@@ -2,8 +2,9 @@
 
 use crate::Scene;
 use crate::files::{ReadError, regular};
+use bvh_core::Bvh;
+use bvh_core::cost::call_in_turn;
 use bvh_core::file::{FileError, Header, TreeFile};
-use bvh_core::{Bvh, validate_references};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -55,7 +56,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, TreeFileError> {
 /// # Errors
 ///
 /// [`TreeFileError`] if the file is damaged or was saved for another scene, or if its tree is not
-/// [valid](validate_references) over these objects.
+/// [valid](bvh_core::validate_references) over these objects.
 pub fn load<'a>(
     path: &Path,
     scene: impl Into<Option<&'a Scene>>,
@@ -65,12 +66,12 @@ pub fn load<'a>(
     let checked = || {
         let file = TreeFile::open(&bytes)?;
         let header = file.header().clone();
-        let tree = file.tree()?;
-        if let Some(scene) = scene {
-            file.for_boxes(&scene.boxes)?;
-            // The checksums prove only that the file is intact: a forged tree can have right ones.
-            validate_references(&tree, &scene.boxes, &scene.primitives)?;
-        }
+        let tree = match scene {
+            Some(Scene { boxes, primitives, .. }) => {
+                file.for_boxes(boxes)?.tree_over(boxes, Some(primitives), &call_in_turn)?
+            }
+            None => file.tree()?,
+        };
         Ok((tree, header))
     };
     checked().map_err(TreeFileError::of(path))

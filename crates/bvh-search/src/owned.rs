@@ -2,11 +2,11 @@
 //! languages.
 
 use crate::bake::density_of;
-use crate::{Bake, BakeError, Baked, Budget, Division, Observer, SearchError};
+use crate::{Bake, BakeError, Baked, Budget, Division, Observer, SearchError, parallel};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
 use bvh_core::export::Target;
-use bvh_core::file::{self, FileError};
+use bvh_core::file::{FileError, TreeFile};
 use bvh_core::{
     Aabb, Bvh, InvalidBox, InvalidBvh, Primitives, RayDensity, Segment, Triangle, WideBvh,
     check_boxes,
@@ -109,10 +109,13 @@ impl OwnedTree {
 
     /// Reads a tree over these objects from `bytes`. Later searches have the seed of the file, and
     /// may use as many references as the tree has.
+    ///
+    /// Rejects the trees of other objects, and forged trees whose boxes do not contain their
+    /// objects, as [`TreeFile::tree_over`] does.
     pub fn load(objects: Objects, bytes: &[u8]) -> Result<Self, FileError> {
         let mut owned = Self::bare(objects);
-        let file = file::TreeFile::open(bytes)?.for_boxes(&owned.boxes)?;
-        owned.tree = file.tree()?;
+        let file = TreeFile::open(bytes)?.for_boxes(&owned.boxes)?;
+        owned.tree = file.tree_over(&owned.boxes, owned.shapes.as_ref(), &parallel::call_both)?;
         // Half a reference more keeps the product with the number of objects from being rounded
         // down.
         let references = owned.tree.prim_ids.len() as f64 + 0.5;

@@ -63,6 +63,9 @@ pub enum Error {
     /// A file of a finished run that no longer matches its checksum.
     #[error("{} is damaged", .0.display())]
     Damaged(PathBuf),
+    /// A file of a finished run with the name of another run.
+    #[error("{} has the rows of {found}; accepted: those of {accepted}", .path.display())]
+    OtherRun { path: PathBuf, found: String, accepted: String },
     /// Ctrl-C.
     #[error("interrupted; {}", kept(*finished, *runs))]
     Interrupted { finished: usize, runs: usize },

@@ -61,7 +61,7 @@
 //! Both checksums are the CRC-32 of zlib, gzip and PNG (reversed polynomial 0xedb88320), which
 //! standard libraries have: `zlib.crc32` in Python. It detects every change confined to 32
 //! consecutive bits, and all other changes except one in 2^32. It does not protect against forgery;
-//! the checks of the tree's structure do. `scripts/read_tree.py` and `scripts/read_tree.cpp` of the
+//! the checks of the tree do. `scripts/read_tree.py` and `scripts/read_tree.cpp` of the
 //! repository read this format.
 //!
 //! Versions 1 to 3 were never released. This crate rejects them with [`FileError::Version`].
@@ -78,8 +78,9 @@ pub use error::FileError;
 pub use header::Header;
 
 use crate::cost::{CallBoth, Objective, call_in_turn};
-use crate::validate::{Leaves, check_structure};
-use crate::{Aabb, Bvh, BvhView, Frame, InvalidBvh, Node, validate};
+use crate::frame::InFrame;
+use crate::validate::{Leaves, check_nesting, check_structure, validate_parts};
+use crate::{Aabb, Bvh, BvhView, Clip, Frame, InvalidBvh, Node, Primitives, validate};
 use bytemuck::Pod;
 use crc32fast::Hasher;
 use glam::Vec3;
@@ -198,9 +199,10 @@ fn check_range(visits: &[f32], node: usize, most: f32) -> Result<(), FileError> 
     if (0.0..=most).contains(&visits[node]) { Ok(()) } else { Err(FileError::Visits(node)) }
 }
 
-/// Returns a copy of the tree over `boxes` that is in `bytes`. O(bytes).
+/// Returns a copy of the tree over `boxes` that is in `bytes`, with the checks of
+/// [`TreeFile::tree_over`]. O(bytes).
 pub fn load(bytes: &[u8], boxes: &[Aabb]) -> Result<Bvh, FileError> {
-    TreeFile::open(bytes)?.for_boxes(boxes)?.tree()
+    TreeFile::open(bytes)?.for_boxes(boxes)?.tree_over(boxes, None, &call_in_turn)
 }
 
 /// Returns the checksum that identifies a scene in a tree file: the CRC-32 of min x, y, z, max x,
@@ -289,13 +291,47 @@ impl<'a> TreeFile<'a> {
 
     /// Returns a copy of the tree. Checks its structure, so that traversals end and stay in bounds,
     /// and checks that its boxes are finite. It does not check whether boxes contain their
-    /// children; the checksum or [`validate`](validate()) does. O(nodes + objects).
+    /// children and objects; [`tree_over`](Self::tree_over) does. O(nodes + objects).
     pub fn tree(&self) -> Result<Bvh, FileError> {
+        let tree = self.copied();
+        self.check((&tree).into())?;
+        Ok(tree)
+    }
+
+    fn copied(&self) -> Bvh {
         // The bytes may have any address.
         let nodes = bytemuck::pod_collect_to_vec(self.nodes);
         let prim_ids = bytemuck::pod_collect_to_vec(self.prim_ids);
-        let tree = Bvh { nodes, prim_ids, frame: self.frame };
-        self.check((&tree).into())?;
+        Bvh { nodes, prim_ids, frame: self.frame }
+    }
+
+    /// Returns a copy of the tree, which is [valid](crate::validate_references()) over `boxes`,
+    /// along the file's axes: a forged tree can have right checksums. `objects` are the shapes in
+    /// the boxes. Without them, the leaves of an object that is divided are only known to reach as
+    /// far as its box, and the leaves in a frame only to be in their nodes.
+    ///
+    /// Passes two checks of a tree that divides no object to `both`. O(nodes + references), and
+    /// O(k²) for an object that k leaves share.
+    pub fn tree_over(
+        &self,
+        boxes: &[Aabb],
+        objects: Option<&Primitives>,
+        both: CallBoth,
+    ) -> Result<Bvh, FileError> {
+        let tree = self.copied();
+        match (self.frame(), objects) {
+            (None, _) => {
+                validate_parts(&tree, boxes, objects.map(|objects| objects as &dyn Clip), both)?;
+            }
+            (frame, Some(Primitives::Triangles(triangles))) => {
+                let objects = InFrame { triangles, frame };
+                validate_parts(&tree, &objects.boxes(), Some(&objects), both)?;
+            }
+            _ => {
+                self.check((&tree).into())?;
+                check_nesting(&tree, &[], |_| false)?;
+            }
+        }
         Ok(tree)
     }
 

@@ -3,6 +3,7 @@
 
 mod covering;
 
+use crate::cost::{CallBoth, call_in_turn};
 use crate::{Aabb, Bvh, BvhView, Clip, InvalidBoxReason, MAX_OBJECTS, NodeKind};
 
 /// The reason why a tree is rejected. Nodes and objects are identified by index.
@@ -52,16 +53,16 @@ pub enum InvalidBvh {
 /// parent's box. Boxes are compared without tolerance. O(nodes + objects), without recursion; safe
 /// on any bits.
 pub fn validate(tree: &Bvh, boxes: &[Aabb]) -> Result<(), InvalidBvh> {
-    check_structure(tree.into(), boxes.len(), Leaves::One)?;
-    check_nesting(tree)?;
-    for (index, node) in tree.nodes.iter().enumerate() {
-        for &object in &tree.prim_ids[node.prims()] {
-            if !node.aabb.contains(&boxes[object as usize]) {
-                return Err(InvalidBvh::ObjectOutside { node: index, object: object as usize });
-            }
-        }
-    }
-    Ok(())
+    validate_whole(tree, boxes, &call_in_turn)
+}
+
+fn validate_whole(tree: &Bvh, boxes: &[Aabb], both: CallBoth) -> Result<(), InvalidBvh> {
+    let mut structure = Ok(());
+    let mut nesting = Ok(());
+    both(&mut || structure = check_structure(tree.into(), boxes.len(), Leaves::One), &mut || {
+        nesting = check_nesting(tree, boxes, |_| true)
+    });
+    structure.and(nesting)
 }
 
 /// Checks a tree in which an object may be in several leaves. The boxes of these leaves together
@@ -72,25 +73,32 @@ pub fn validate_references(
     boxes: &[Aabb],
     objects: &dyn Clip,
 ) -> Result<(), InvalidBvh> {
+    validate_parts(tree, boxes, Some(objects), &call_in_turn)
+}
+
+/// Checks a tree as [`validate_references`] does. Of divided objects of an unknown shape, their
+/// leaves together must reach as far as they do.
+pub(crate) fn validate_parts(
+    tree: &Bvh,
+    boxes: &[Aabb],
+    objects: Option<&dyn Clip>,
+    both: CallBoth,
+) -> Result<(), InvalidBvh> {
     if tree.prim_ids.len() == boxes.len() {
-        return validate(tree, boxes);
+        return validate_whole(tree, boxes, both);
     }
     check_structure(tree.into(), boxes.len(), Leaves::OneOrMore)?;
-    check_nesting(tree)?;
     let mut leaf_counts = vec![0u32; boxes.len()];
     for &object in &tree.prim_ids {
         leaf_counts[object as usize] += 1;
     }
+    let is_whole = |object: u32| leaf_counts[object as usize] == 1;
+    check_nesting(tree, boxes, is_whole)?;
     // Objects and leaves, for every divided object.
     let mut parts: Vec<(u32, u32)> = Vec::new();
     for (index, node) in tree.nodes.iter().enumerate() {
-        for &object in &tree.prim_ids[node.prims()] {
-            if leaf_counts[object as usize] > 1 {
-                parts.push((object, index as u32));
-            } else if !node.aabb.contains(&boxes[object as usize]) {
-                return Err(InvalidBvh::ObjectOutside { node: index, object: object as usize });
-            }
-        }
+        let divided = tree.prim_ids[node.prims()].iter().filter(|&&object| !is_whole(object));
+        parts.extend(divided.map(|&object| (object, index as u32)));
     }
     // Sorting gathers the leaves of each object.
     parts.sort_unstable();
@@ -100,19 +108,37 @@ pub fn validate_references(
         leaves.clear();
         leaves.extend(parts_of_object.iter().map(|&(_, leaf)| tree.nodes[leaf as usize].aabb));
         let aabb = &boxes[object as usize];
+        let is_covered = match objects {
+            Some(objects) => covering::is_covered(objects, object, aabb, &leaves),
+            None => Aabb::union_of(&leaves).contains(aabb),
+        };
         // Parts of a triangle that is not finite would be empty, and covered by anything.
-        if aabb.check().is_err() || !covering::is_covered(objects, object, aabb, &leaves) {
+        if aabb.check().is_err() || !is_covered {
             return Err(InvalidBvh::Uncovered { object: object as usize });
         }
     }
     Ok(())
 }
 
-fn check_nesting(tree: &Bvh) -> Result<(), InvalidBvh> {
+/// Checks that every child, and every object that is whole, is inside its node's box. Leaves what
+/// does not exist to [`check_structure`].
+pub(crate) fn check_nesting(
+    tree: &Bvh,
+    boxes: &[Aabb],
+    is_whole: impl Fn(u32) -> bool,
+) -> Result<(), InvalidBvh> {
     for (index, node) in tree.nodes.iter().enumerate() {
         for child in node.children() {
-            if !node.aabb.contains(&tree.nodes[child].aabb) {
+            let Some(part) = tree.nodes.get(child) else { break };
+            if !node.aabb.contains(&part.aabb) {
                 return Err(InvalidBvh::ChildOutside { node: index, child });
+            }
+        }
+        for position in node.prims() {
+            let Some(&object) = tree.prim_ids.get(position) else { break };
+            let Some(aabb) = boxes.get(object as usize) else { continue };
+            if is_whole(object) && !node.aabb.contains(aabb) {
+                return Err(InvalidBvh::ObjectOutside { node: index, object: object as usize });
             }
         }
     }

@@ -2,9 +2,9 @@
 
 use crate::support::layouts::{divided, framed};
 use crate::support::{Random, SHAPES, boxes, grid_box, rays, soup, tree};
-use bvh_core::cost::{Objective, SahConstants};
+use bvh_core::cost::{Objective, SahConstants, call_in_turn};
 use bvh_core::file::{FileError, Header, Origin, TreeFile, boxes_checksum, load, save, sections};
-use bvh_core::{Aabb, Bvh, InvalidBvh, nearest_hit_by};
+use bvh_core::{Aabb, Bvh, InvalidBvh, Primitives, nearest_hit_by};
 use glam::Vec3;
 
 fn origin() -> Origin<'static> {
@@ -23,11 +23,7 @@ fn scene(objects: usize) -> (Vec<Aabb>, Bvh) {
 /// Returns the file of a tree whose objects may be divided.
 fn save_parts(tree: &Bvh, boxes: &[Aabb], origin: &Origin) -> Vec<u8> {
     let cost = origin.objective.cost(tree);
-    let sections = sections(tree, boxes, cost, origin, &|first, second| {
-        first();
-        second();
-    });
-    sections.unwrap().concat()
+    sections(tree, boxes, cost, origin, &call_in_turn).unwrap().concat()
 }
 
 /// Gives a file the checksum of its bytes.
@@ -280,6 +276,33 @@ fn long_names_wrong_trees_and_misaligned_views_are_rejected() {
     let misaligned = TreeFile::open(beside).unwrap();
     assert_eq!(misaligned.view(), Err(FileError::Alignment(4)));
     assert_eq!(misaligned.tree(), Ok(tree));
+}
+
+#[test]
+fn a_tree_whose_boxes_do_not_contain_its_objects_is_rejected_with_any_checksum() {
+    let mut random = Random(5);
+    let triangles = soup(40, &mut random);
+    let boxes = boxes(&triangles);
+    let whole = tree(&boxes, SHAPES[0], &mut random);
+    let (parts, _) = divided(&whole, &triangles, &mut random);
+    let turned = framed(&triangles, &mut random).unwrap();
+    let shapes = Primitives::Triangles(triangles);
+    let point = Aabb { min: Vec3::ZERO, max: Vec3::ZERO };
+    let one_point = (1..whole.nodes.len()).map(|index| (&whole, index..index + 1));
+    let all_points = [&whole, &parts, &turned].map(|tree| (tree, 1..tree.nodes.len()));
+    for (tree, forged) in one_point.chain(all_points) {
+        let over = |tree: &Bvh, objects| {
+            let bytes = save_parts(tree, &boxes, &origin());
+            TreeFile::open(&bytes).unwrap().tree_over(&boxes, objects, &call_in_turn)
+        };
+        assert_eq!(over(tree, Some(&shapes)).as_ref(), Ok(tree));
+        let mut other = tree.clone();
+        other.nodes[forged.clone()].iter_mut().for_each(|node| node.aabb = point);
+        assert!(matches!(over(&other, Some(&shapes)), Err(FileError::Tree(_))), "{forged:?}");
+        // Without their corners, nobody knows the boxes of triangles in a frame.
+        let by_boxes = over(&other, None);
+        assert!(by_boxes.is_err() || tree.frame.is_some(), "{forged:?}");
+    }
 }
 
 /// Words that are likely to do damage: small indices, with and without the flag of leaves, huge

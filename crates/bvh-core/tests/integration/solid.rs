@@ -120,6 +120,34 @@ fn a_point_of_a_closed_mesh_is_inside_by_both_rules() {
 }
 
 #[test]
+fn a_mesh_wider_than_the_largest_f32_has_an_inside() {
+    for size in [1.6e38, 1.8e38, 3.4e38] {
+        let mesh = scaled(&outward(grid_box(1)), size);
+        let points = [[-0.9, 0.1, 0.2], [0.9, 0.1, 0.2], [0.0, 0.1, 0.2], [-0.99, 0.5, 0.1]]
+            .map(|point| size * Vec3::from(point));
+        for rule in [Auto, Parity, Winding] {
+            assert_eq!(contains(&mesh, 0, &points, rule), [true; 4], "{size}, {rule:?}");
+            assert_eq!(contains(&mesh[1..], 0, &points, Winding), [true; 4], "{size}");
+        }
+    }
+}
+
+#[test]
+fn a_triangle_without_area_changes_no_inside() {
+    let triangle = Triangle::from([[2.0, 2.0, 0.0], [1.0, 4.0, 3.0], [3.0, 1.0, 3.0]]);
+    let mut random = Random(3);
+    for _ in 0..50 {
+        // Whole numbers, so that the corners and the points are on one line exactly.
+        let [from, step] = [(); 2].map(|()| (8.0 * random.point()).round());
+        let on_line = [-3.0, 0.0, 2.0, -1.0, 1.0].map(|along| from + along * step);
+        let line = Triangle([on_line[0], on_line[1], on_line[2]]);
+        let [without, with] = [vec![triangle], vec![triangle, line]]
+            .map(|mesh| contains(&mesh, 0, &on_line, Winding));
+        assert_eq!(with, without, "{line:?}");
+    }
+}
+
+#[test]
 fn of_two_boxes_with_a_common_face_one_contains_each_point_of_it() {
     let left = outward(grid_box(2));
     let right = moved(&left, 2.0 * Vec3::X);

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ._bvh_search import Tracer, Tree, corners, rows
-from ._center import center_of
+from ._center import center_of, check_rounding
 
 __all__ = ["RaycastingScene"]
 
@@ -17,6 +17,7 @@ class RaycastingScene:
     The tree is found at the first query, in about `seconds`. Arrays of other shapes, and meshes that
     `Tree.from_mesh` would refuse, raise a `ValueError`. Coordinates may be `float64`: scenes far from
     zero are moved to it before they are rounded, and rays that begin far away are advanced to them.
+    Meshes so far apart that rounding would change the shape of one raise a `ValueError`.
 
     `nthreads` is accepted for compatibility: all threads answer.
 
@@ -53,8 +54,11 @@ class RaycastingScene:
         if self._made is None:
             triangles = np.concatenate([np.empty((0, 3, 3)), *self._triangles])
             center = center_of(triangles)
-            tracer = Tracer(Tree.from_triangles(triangles - center, self._seconds), center=center)
+            triangles -= center
             first = np.cumsum([0] + [len(part) for part in self._triangles])
+            for geometry, part in enumerate(np.split(triangles, first[1:-1])):
+                check_rounding(f"geometry {geometry}", part)
+            tracer = Tracer(Tree.from_triangles(triangles, self._seconds), center=center)
             self._made = tracer, first
         return self._made
 

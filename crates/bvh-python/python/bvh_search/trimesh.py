@@ -42,7 +42,9 @@ class RayMeshIntersector:
             seconds = self._seconds
             if seconds is None:
                 seconds = min(1.0, 1e-6 * len(faces))
-            center = center_of(vertices)
+            # A vertex that no face uses may be anywhere.
+            is_used = np.isin(np.arange(len(vertices)), faces)
+            center = center_of(vertices[is_used])
             tree = Tree.from_mesh(vertices - center, faces, seconds=seconds)
             self._made = state, Tracer(tree, center=center)
         return self._made[1]

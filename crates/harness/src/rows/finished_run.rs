@@ -1,12 +1,30 @@
 //! The rows of one finished run, and the file in which a run is kept.
 
+use super::RunRow;
 use super::csv_file::{Row, parse, to_bytes};
 use crate::processor::PROCESSOR;
 use crate::{Error, files};
 use bvh_scenes::{files::read_text, fnv1a};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::Path;
+
+/// What tells the runs of an experiment apart.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[allow(missing_docs, reason = "columns of `runs.csv`")]
+pub struct RunName {
+    pub scene: String,
+    pub method: String,
+    pub repetition: u32,
+}
+
+impl fmt::Display for RunName {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { scene, method, repetition } = self;
+        write!(f, "scene {scene}, method {method}, repetition {repetition}")
+    }
+}
 
 /// The rows of one finished run: one CSV file for every kind of rows that it has.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -36,6 +54,22 @@ impl FinishedRun {
     pub fn rows<R: Row>(&self) -> Result<Vec<R>, Error> {
         let text = self.files.get(R::FILE).map_or("", String::as_str);
         parse(text.as_bytes(), Path::new(R::FILE))
+    }
+
+    /// Reads a kept run, which must have this name.
+    ///
+    /// # Errors
+    ///
+    /// If the file differs from the written one, or if it is that of another run.
+    pub fn read_named(path: &Path, name: &RunName) -> Result<Self, Error> {
+        let run = Self::read(path)?;
+        let text = run.files.get(RunRow::FILE).map_or("", String::as_str);
+        let names: Vec<RunName> = parse(text.as_bytes(), path)?;
+        if names == [name.clone()] {
+            return Ok(run);
+        }
+        let found = names.first().map_or("no run".into(), RunName::to_string);
+        Err(Error::OtherRun { path: path.to_owned(), found, accepted: name.to_string() })
     }
 
     /// Reads a kept run.

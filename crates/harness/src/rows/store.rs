@@ -6,7 +6,7 @@
 //! run survives a crash, a full disk or `kill -9`. At the end the rows of all runs are joined in
 //! the order of the spec, so that their bytes do not depend on the order in which runs finish.
 
-use super::finished_run::FinishedRun;
+use super::finished_run::{FinishedRun, RunName};
 use super::lock::lock_folder;
 use super::{Row, to_bytes};
 use crate::Error;
@@ -116,14 +116,14 @@ impl Store {
         self.partial.join(run_file_name(index))
     }
 
-    /// Returns run `index`, if it has been kept.
+    /// Returns run `index`, which has this name, if it has been kept.
     ///
     /// # Errors
     ///
-    /// If its file is damaged.
-    pub fn kept(&self, index: usize) -> Result<Option<FinishedRun>, Error> {
+    /// If its file is damaged or that of another run.
+    pub fn kept(&self, index: usize, name: &RunName) -> Result<Option<FinishedRun>, Error> {
         let file = self.run_file(index);
-        if file.exists() { FinishedRun::read(&file).map(Some) } else { Ok(None) }
+        if file.exists() { FinishedRun::read_named(&file, name).map(Some) } else { Ok(None) }
     }
 
     /// Keeps run `index`. Replaces a damaged copy of it.
@@ -136,26 +136,26 @@ impl Store {
         run.write(&file)
     }
 
-    /// Keeps those of the runs 0 to `runs` − 1 that a part of the experiment in the folder `part` has
-    /// and this folder has not.
+    /// Keeps those of the runs with these names, in the order of the spec, that a part of the
+    /// experiment in the folder `part` has and this folder has not.
     ///
     /// # Errors
     ///
-    /// If the part is of another spec, scene or seed, if a run of it is damaged, or if it has
-    /// another result than the run that this folder has.
-    pub fn adopt(&self, part: &Path, runs: usize) -> Result<(), Error> {
+    /// If the part is of another spec, scene or seed, if a run of it is damaged or another one, or
+    /// if it has another result than the run that this folder has.
+    pub fn adopt(&self, part: &Path, names: &[RunName]) -> Result<(), Error> {
         let spec = spec_of_part(part);
         if read_text(&spec)? != read_text(&self.partial.join(SPEC))? {
             let spec = spec.display();
             return Err(Error::Usage(format!("{spec} has another spec, scene or seed")));
         }
-        for index in 0..runs {
+        for (index, name) in names.iter().enumerate() {
             let file = spec.with_file_name(run_file_name(index));
             if !file.exists() {
                 continue;
             }
-            let run = FinishedRun::read(&file)?;
-            match self.kept(index)? {
+            let run = FinishedRun::read_named(&file, name)?;
+            match self.kept(index, name)? {
                 None => self.keep(index, &run)?,
                 Some(kept) => {
                     if let Some(name) = kept.difference(&run) {
@@ -234,6 +234,13 @@ mod tests {
     // The tests `faults` and `protection` run the program on folders that are in use, unfinished or
     // blocked.
 
+    /// The file and the name of a run.
+    fn named(cost: u32) -> (String, RunName) {
+        let [scene, method] = ["s", "m"].map(String::from);
+        let rows = format!("scene,method,repetition,cost\ns,m,0,{cost}\n");
+        (rows, RunName { scene, method, repetition: 0 })
+    }
+
     fn run<const N: usize>(files: [(&str, &str); N]) -> FinishedRun {
         let files = files.map(|(name, text)| (name.to_owned(), text.to_owned()));
         FinishedRun { files: files.into(), ..FinishedRun::here() }
@@ -244,12 +251,13 @@ mod tests {
         let folders = ["a", "b"].map(|_| tempfile::tempdir().unwrap());
         let [kept, part] =
             [0, 1].map(|i| Store::open(folders[i].path(), "", Existing::Keep).unwrap());
-        let run = |cost, seconds| run([("runs.csv", cost), ("timing.csv", seconds)]);
-        kept.keep(0, &run("1\n", "0.1\n")).unwrap();
-        part.keep(0, &run("1\n", "0.2\n")).unwrap();
-        kept.adopt(part.folder(), 1).unwrap();
-        part.keep(0, &run("2\n", "0.1\n")).unwrap();
-        let error = kept.adopt(part.folder(), 1).unwrap_err().to_string();
+        let run = |cost, seconds| run([("runs.csv", &*named(cost).0), ("timing.csv", seconds)]);
+        let names = [named(1).1];
+        kept.keep(0, &run(1, "0.1\n")).unwrap();
+        part.keep(0, &run(1, "0.2\n")).unwrap();
+        kept.adopt(part.folder(), &names).unwrap();
+        part.keep(0, &run(2, "0.1\n")).unwrap();
+        let error = kept.adopt(part.folder(), &names).unwrap_err().to_string();
         assert!(error.ends_with("has this run with another runs.csv"), "{error}");
     }
 
@@ -257,13 +265,14 @@ mod tests {
     fn a_kept_run_that_is_emptied_cut_edited_or_no_file_is_refused_and_done_again() {
         let out = tempfile::tempdir().unwrap();
         let store = Store::open(&out.path().join("x"), "", Existing::Keep).unwrap();
-        let run = run([("runs.csv", "a,b\n1,2\n"), ("history.csv", "a\n1\n")]);
+        let (rows, name) = named(12);
+        let run = run([("runs.csv", &*rows), ("history.csv", "a\n1\n")]);
         let file = store.run_file(0);
         type Damage = fn(&Path, &str);
         let mut damages: Vec<Damage> = vec![
             |file, _| fs::write(file, "").unwrap(),
             |file, text| fs::write(file, &text[..text.len() - 1]).unwrap(),
-            |file, text| fs::write(file, text.replace("1,2", "1,3")).unwrap(),
+            |file, text| fs::write(file, text.replace(",12", ",13")).unwrap(),
         ];
         #[cfg(unix)]
         damages.push(|file, _| {
@@ -273,9 +282,9 @@ mod tests {
         });
         for damage in damages {
             store.keep(0, &run).unwrap();
-            assert_eq!(store.kept(0).unwrap().as_ref(), Some(&run));
+            assert_eq!(store.kept(0, &name).unwrap().as_ref(), Some(&run));
             damage(&file, &fs::read_to_string(&file).unwrap());
-            let message = store.kept(0).unwrap_err().to_string();
+            let message = store.kept(0, &name).unwrap_err().to_string();
             assert!(message.contains("000000.run is damaged"), "{message}");
         }
     }

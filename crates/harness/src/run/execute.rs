@@ -1,12 +1,13 @@
 //! Executes an experiment: opens its folder, performs its measurements and makes its reports.
 
 use super::finish::{Summary, conclude};
-use super::job::{base_costs, selected};
+use super::job::{Job, base_costs, selected};
 use super::perform::{Trees, Watch, Work};
 use super::resolved::{Resolved, finished, load_scenes, to_toml};
 use super::runs;
 use super::{ray_cost, trace};
 use crate::Error;
+use crate::rows::finished_run::RunName;
 use crate::rows::store::{Existing, Store};
 use crate::spec::Experiment;
 use crate::stress;
@@ -96,8 +97,9 @@ fn run(
     let mut remarks: Vec<String> = scenes.iter().filter_map(|scene| scene.remark.clone()).collect();
     // The subsets of one mesh share its remark.
     remarks.dedup();
+    let names: Vec<RunName> = jobs.iter().map(Job::name).collect();
     for part in &parts {
-        store.adopt(part, runs)?;
+        store.adopt(part, &names)?;
     }
     let mut work = Work {
         experiment,

@@ -3,6 +3,7 @@
 
 use crate::Error;
 use crate::contestant::Labelled;
+use crate::rows::finished_run::RunName;
 use crate::spec::Experiment;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
@@ -60,6 +61,12 @@ pub(crate) fn selected<'a>(
 }
 
 impl Job<'_> {
+    /// The name of the run in its rows.
+    pub fn name(&self) -> RunName {
+        let (scene, method) = (self.scene.name.clone(), self.labelled.label.clone());
+        RunName { scene, method, repetition: self.repetition }
+    }
+
     /// The seed of the run.
     pub fn seed(&self, experiment: &Experiment) -> u64 {
         let label = self.labelled.options.seed_as.as_ref().unwrap_or(&self.labelled.label);

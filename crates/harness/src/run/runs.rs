@@ -48,7 +48,7 @@ pub(crate) fn measure(work: &mut Work) -> Result<(), Error> {
 fn missing_runs<'a>(work: &mut Work<'a>) -> Vec<&'a Job<'a>> {
     let mut missing = Vec::new();
     for job in work.jobs {
-        match work.store.kept(job.index) {
+        match work.store.kept(job.index, &job.name()) {
             Ok(Some(_)) => continue,
             Ok(None) => {}
             Err(damaged) => work.remarks.push(format!("done again: {damaged}")),

@@ -47,7 +47,7 @@ fn search_seconds(job: &Job, work: &Work) -> Result<f64, Error> {
     let mut seconds = Vec::new();
     for (index, other) in work.jobs.iter().enumerate() {
         if other.scene.name == job.scene.name && other.labelled.label == job.labelled.label {
-            let rows: Vec<TimingRow> = match work.store.kept(index)? {
+            let rows: Vec<TimingRow> = match work.store.kept(index, &other.name())? {
                 Some(run) => run.rows()?,
                 None => vec![],
             };

@@ -104,23 +104,28 @@ fn the_finished_runs_of_an_interrupted_experiment_are_discarded_by_force_only() 
 }
 
 #[test]
-fn a_damaged_finished_run_is_named_and_repeated_or_rejected() {
+fn a_damaged_finished_run_or_one_with_another_name_is_named_and_repeated_or_rejected() {
     let folder = folder("spec.toml");
     let dir = folder.path();
     said(dir, &["spec.toml", "--out=whole"]);
     let whole = reproducible(&dir.join("whole/spec"));
-    part(dir, "spec.toml", 0, 2, &["--out=one"]);
     part(dir, "spec.toml", 1, 2, &["--out=two"]);
-    let kept = kept_runs(&dir.join("one/spec"));
-    let damaged = kept.last().unwrap();
     // The unit tests of the store try all kinds of damage.
-    fs::write(dir.join("one/spec/.partial").join(damaged), "").unwrap();
-    let join = ["merge", "one", "two", "--out=joined"];
-    crate::support::refused(dir, &join, 1, &[damaged, "damaged"]);
-    assert!(!dir.join("joined/spec/runs.csv").exists());
-    let resumed = run(dir, &["spec.toml", "--resume", "--out=one"]);
-    ended(&resumed, 0, &["done again", damaged]);
-    assert!(reproducible(&dir.join("one/spec")) == whole);
+    for (one, is_renamed, fault) in [("cut", false, "damaged"), ("renamed", true, "repetition 2")] {
+        part(dir, "spec.toml", 0, 2, &[&format!("--out={one}")]);
+        let kept = kept_runs(&dir.join(one).join("spec"));
+        let wrong = kept.last().unwrap();
+        let [first, last] =
+            [&kept[0], wrong].map(|name| dir.join(one).join("spec/.partial").join(name));
+        let contents = if is_renamed { fs::read(first).unwrap() } else { vec![] };
+        fs::write(last, contents).unwrap();
+        let out = format!("--out=joined {one}");
+        crate::support::refused(dir, &["merge", one, "two", &out], 1, &[wrong, fault]);
+        assert!(!dir.join(format!("joined {one}/spec/runs.csv")).exists());
+        let resumed = run(dir, &["spec.toml", "--resume", &format!("--out={one}")]);
+        ended(&resumed, 0, &["done again", wrong, fault]);
+        assert!(reproducible(&dir.join(one).join("spec")) == whole);
+    }
 }
 
 #[cfg(unix)]
