@@ -26,6 +26,10 @@ pub struct ExportArgs {
     /// The file to write, replaced when it is complete; `.json` for json.
     #[arg(long, value_name = "FILE.bin|.json")]
     pub out: PathBuf,
+    /// Accept a tree that divides triangles among leaves also for a tracer whose queries for all
+    /// hits would find them more than once, because yours are for the nearest or any hit.
+    #[arg(long)]
+    pub divided: bool,
 }
 
 /// Parses the names of the targets.
@@ -41,6 +45,17 @@ pub fn export(args: &ExportArgs, answer: &mut Answer) -> Result<(), Error> {
     output_file("--out", &args.out, extension)?;
     let scene = load_scene(&args.scene)?;
     let (tree, _) = tree_file::load(&args.file, &scene)?;
+    let [objects, references] = [scene.boxes.len(), tree.prim_ids.len()];
+    if references > objects && target.references == 1.0 && !args.divided {
+        return Err(Error::Usage(format!(
+            "{}: the tree has {references} references to {objects} triangles, and a query of {} \
+             for all hits would find the divided ones more than once; accepted: a tree of `bvh \
+             bake {} --for {1}`, or --divided if your queries are for the nearest or any hit",
+            args.file.display(),
+            target.name,
+            args.scene
+        )));
+    }
     // Only triangles can be traced there.
     let triangles = scene.triangles().map_err(|fault| Error::Usage(fault.to_string()))?;
     // The loaded tree is over the same boxes, so that these can be built over, too.

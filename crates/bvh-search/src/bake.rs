@@ -185,12 +185,7 @@ impl<'a> Bake<'a> {
             };
         }
         let splits = splits.filter(|_| division == Division::Allowed);
-        let problem = Problem {
-            objective: self.objective(),
-            splits,
-            measure: self.rays.map(|density| density as &dyn Measure),
-            ..Problem::new(self.boxes)
-        };
+        let problem = self.problem(splits);
         let greedy = greedy.map(|tree| Kept::new(tree, &problem));
         let greedy_cost = greedy.as_ref().map(|greedy| greedy.cost);
         let outcome = self.outcome(&problem, greedy, observer)?;
@@ -222,6 +217,22 @@ impl<'a> Bake<'a> {
             None => solve_or_keep(&config, problem, greedy, seed, budget, observer)?,
         };
         Ok(best::unless_behind(outcome, reinserted))
+    }
+
+    /// Returns the cost of a tree over these objects by which a search with this division compares
+    /// trees. O(nodes).
+    pub fn cost(&self, tree: &Bvh, division: Division) -> f64 {
+        let splits = self.splits().filter(|_| division == Division::Allowed);
+        self.problem(splits).cost(tree)
+    }
+
+    fn problem<'p>(&'p self, splits: Option<Splits<'p>>) -> Problem<'p> {
+        Problem {
+            objective: self.objective(),
+            splits,
+            measure: self.rays.map(|density| density as &dyn Measure),
+            ..Problem::new(self.boxes)
+        }
     }
 
     fn splits(&self) -> Option<Splits<'a>> {

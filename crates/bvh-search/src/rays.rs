@@ -3,7 +3,8 @@
 use crate::Stream;
 use bvh_core::glam::Vec3;
 use bvh_core::{
-    Aabb, Bvh, DensityError, Primitive, Primitives, Ray, RayDensity, Segment, nearest_hit,
+    Aabb, Bvh, DensityError, Primitive, Primitives, Ray, RayDensity, Segment, TestCounts,
+    nearest_hit_by,
 };
 use rand::{RngExt, SeedableRng};
 
@@ -48,7 +49,8 @@ pub fn ray_density(
 
 /// Returns the segments of `count` rays, up to their nearest hits: from random points of the
 /// scene's box in random directions, and from each hit one more. They are the same on every
-/// machine. Ends early, with fewer rays, when `is_over` returns true.
+/// machine. Ends early, with fewer rays, when `is_over` returns true or they take
+/// [too many tests](RayDensity::MOST_TESTS).
 fn traced<P: Primitive>(
     tree: &Bvh,
     objects: &[P],
@@ -60,14 +62,17 @@ fn traced<P: Primitive>(
     let mut rng = Stream::seed_from_u64(1);
     let mut segments = Vec::with_capacity(count);
     let mut bounce = None;
+    let mut tests = TestCounts::default();
     for _ in 0..count {
-        if is_over() {
+        if is_over() || !RayDensity::affords(&tests, 1.0) {
             break;
         }
         let inside = bounds.min + extent * Vec3::from_array(rng.random());
         let direction = random_direction(&mut rng);
         let Ok(ray) = Ray::half_line(bounce.unwrap_or(inside), direction) else { break };
-        let hit = nearest_hit(tree, objects, &ray);
+        let prepared = P::prepare(&ray);
+        let test = |id: u32, t_max| objects[id as usize].intersect(&prepared, t_max);
+        let hit = nearest_hit_by(tree, &ray, test, &mut tests);
         bounce = match (bounce, hit) {
             (None, Some(hit)) => Some(ray.at(hit.t * JUST_BEFORE)),
             _ => None,
@@ -95,7 +100,7 @@ fn random_direction(rng: &mut Stream) -> Vec3 {
 mod tests {
     use super::*;
     use bvh_build::{Builder, median_cut, muller_fellner};
-    use bvh_core::Triangle;
+    use bvh_core::{Node, Triangle};
     use std::cell::Cell;
 
     /// Returns walls across the x axis at 0, 1, 2, 3, and a tree over them.
@@ -144,6 +149,15 @@ mod tests {
             from.distance(to) > 0.01 && (0..4).any(is_through)
         };
         assert_eq!(segments.iter().find(passes), None);
+    }
+
+    #[test]
+    fn fewer_rays_guard_a_density_where_all_of_them_meet_all_objects() {
+        let triangle = Triangle::from([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 1.0]]);
+        let leaf = Node::leaf(triangle.aabb(), 0, 30_000);
+        let tree = Bvh { nodes: vec![leaf], prim_ids: (0..30_000).collect(), ..Bvh::default() };
+        let segments = traced(&tree, &[triangle; 30_000], &triangle.aabb(), 20_000, &|| false);
+        assert!((5_000..10_000).contains(&segments.len()), "{}", segments.len());
     }
 
     #[test]

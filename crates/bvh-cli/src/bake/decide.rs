@@ -55,7 +55,7 @@ pub fn work(objects: usize, answer: &mut Answer) -> Effort {
 
 /// Tries the combinations of the choices that the arguments leave open, and explains each choice in
 /// one line. Returns the plan with the choices that pay, and the parts of the decision that the
-/// bake needs too. Keeps the plan as it is if the user interrupts.
+/// bake needs too. If the user interrupts, the best tree so far is among these parts, with its plan.
 pub fn decide(
     args: &BakeArgs,
     plan: Plan,
@@ -104,25 +104,36 @@ pub fn decide(
     let budget = Budget { max_work: Some(tried as u64), ..Budget::UNLIMITED };
     // The expected tests of the judging rays, by references and then by costs.
     let mut tests = Vec::new();
+    let mut best_tried = None;
     let bar = bar(plans.len() as u64, "{bar:10} trying the choices, {pos} of {len}");
     bar.tick();
     if bar.is_hidden() {
         print_error(&format!("trying {} combinations of the choices", plans.len()));
     }
-    for plan in &plans {
+    for (index, plan) in plans.iter().enumerate() {
         // A trial of no work takes seconds in large scenes.
         let Some(judging) = judging.as_ref().filter(|_| !is_interrupted()) else { break };
         let density = prepared.density.as_ref().filter(|_| plan.rays.is_some());
         let division = prepared.division.as_ref();
         let bake = Bake { division, budget, ..plan.bake(scene, density) };
         let baked = bake.search(Some(greedy.clone()), &INTERRUPTED).map_err(failed)?;
-        tests.push(Objective::Layout.cost_by(&baked.outcome.tree, judging));
+        let found = Objective::Layout.cost_by(&baked.outcome.tree, judging);
+        if tests.iter().all(|&other| found < other) {
+            best_tried = Some((index, baked));
+        }
+        tests.push(found);
         bar.inc(1);
     }
     bar.finish_and_clear();
-    // An interrupted search says nothing about the choices.
+    // An interrupted search says nothing about the choices, but it has found trees.
     if is_interrupted() {
-        return Ok((plan, Prepared { density: None, division: None, ..prepared }));
+        prepared.division = None;
+        let (Some((index, baked)), Some(judging)) = (best_tried, judging) else {
+            return Ok((plan, Prepared { density: None, ..prepared }));
+        };
+        let plan = plans.swap_remove(index);
+        prepared.density.take_if(|_| plan.rays.is_none());
+        return Ok((plan, Prepared { tried: Some((baked, judging)), ..prepared }));
     }
     let best = tests.iter().copied().fold(f64::INFINITY, f64::min);
     let chosen = tests.iter().position(|&tests| tests <= best * (1.0 + TOLERANCE)).unwrap_or(0);

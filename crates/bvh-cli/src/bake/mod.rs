@@ -112,7 +112,8 @@ fn methods() -> impl TypedValueParser<Value = Method> {
 }
 
 /// Searches until the budget is spent or the user interrupts, writes the best tree, and prints its
-/// cost. An interrupted bake writes the file as well, and returns [`Error::Interrupted`].
+/// cost. An interrupted bake writes the file as well, unless the file has a better tree of the scene,
+/// and returns [`Error::Interrupted`].
 pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     // Wrong paths are reported before the scene is loaded, which may take long.
     if let Some(from) = &args.from {
@@ -176,6 +177,12 @@ fn explain(scene: &Scene, answer: &mut Answer) -> Result<(), Error> {
 
 /// Writes the file of the tree, and describes it.
 fn save(found: &Found, out: &Path, reserved: Reserved, answer: &mut Answer) -> Result<(), Error> {
+    if is_interrupted() && found.is_behind(out) {
+        return Err(Error::Interrupted(format!(
+            "{0} keeps its tree, which is better than the one so far; `--from {0}` continues",
+            out.display()
+        )));
+    }
     let bytes = found.save(out, reserved)?;
     if is_interrupted() {
         let out = out.display();

@@ -66,6 +66,8 @@ pub struct Prepared {
     pub density: Option<RayDensity>,
     /// The division of the objects with spatial splits.
     pub division: Option<Bvh>,
+    /// The best trial of a decision that the user interrupted, and the rays that judged it.
+    pub tried: Option<(Baked, RayDensity)>,
 }
 
 impl Plan {
@@ -96,7 +98,7 @@ impl Plan {
     ) -> Result<Found<'a>, Error> {
         hold();
         let failed = |error| Error::search(&scene.name, self.method.name())(error);
-        let Prepared { mut greedy, mut density, division } = prepared;
+        let Prepared { mut greedy, mut density, division, tried } = prepared;
         if greedy.is_none() {
             greedy = self.bake(scene, None).greedy(&INTERRUPTED).map_err(failed)?;
         }
@@ -110,13 +112,16 @@ impl Plan {
             start: start.map(|start| &start.tree),
             ..self.bake(scene, density.as_ref())
         };
-        let baked = bake.search(greedy, &watch);
+        let (baked, judging) = match tried {
+            Some((baked, judging)) => (Ok(baked), Some(judging)),
+            None => (bake.search(greedy, &watch), None),
+        };
         watch.bar.finish_and_clear();
         let baked = baked.map_err(failed)?;
         let seconds = watch.deadline.elapsed().as_secs_f64();
         // The work of all bakes that led to this tree, one after the other.
         let work = start.map_or(0, |start| start.work).saturating_add(baked.outcome.work);
-        Ok(Found { plan: self, scene, density, baked, area_of_greedy, work, seconds })
+        Ok(Found { plan: self, scene, density, baked, judging, area_of_greedy, work, seconds })
     }
 }
 
@@ -126,6 +131,8 @@ pub struct Found<'a> {
     pub scene: &'a Scene,
     pub density: Option<RayDensity>,
     pub baked: Baked,
+    /// The rays that judged the tree, if it is a trial.
+    judging: Option<RayDensity>,
     /// The total area of inner nodes of the greedy tree, which the documentation compares.
     pub area_of_greedy: Option<f64>,
     work: u64,
@@ -142,6 +149,20 @@ impl Found<'_> {
             Ok(sections.iter().map(|section| section.len()).sum())
         });
         written.map_err(TreeFileError::of(path))?
+    }
+
+    /// Returns whether the file at the path has a tree over the scene that is no worse than the one
+    /// of this interrupted search.
+    pub fn is_behind(&self, path: &Path) -> bool {
+        let Ok((old, _)) = tree_file::load(path, self.scene) else { return false };
+        let Baked { outcome, greedy, division, .. } = &self.baked;
+        let bake = self.plan.bake(self.scene, self.density.as_ref());
+        let [old, new] = [&old, &outcome.tree].map(|tree| match &self.judging {
+            Some(judging) => Objective::Layout.cost_by(tree, judging),
+            None => bake.cost(tree, *division),
+        });
+        // The old tree may be for another cost, by which a greedy tree would be behind.
+        old <= new || *greedy == Some(outcome.cost)
     }
 
     /// Names the cost that the search minimised, unless it is the total area of inner nodes.

@@ -1,6 +1,6 @@
 //! Ctrl-C while `bvh bake` searches: the best tree so far is written, and it is a good one. Other
 //! commands end at once.
-use crate::support::{begin, bvh, cost, ended, names, send, wait_until, words};
+use crate::support::{begin, bvh, cost, ended, names, number, send, wait_until, words};
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -25,6 +25,30 @@ fn ctrl_c_keeps_the_best_tree_so_far_also_while_a_bake_decides() {
         bvh(folder.path(), "verify a.bvh konistil");
         assert_eq!(names(folder.path()), ["a.bvh"]);
     }
+}
+
+#[test]
+fn ctrl_c_keeps_a_better_tree_in_the_file_and_the_best_one_of_a_decision() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    bvh(at, "bake konistil --budget=300Mwork --out=a.bvh");
+    let good = fs::read(at.join("a.bvh")).unwrap();
+    for bake in ["konistil --budget=1h", "konistil --budget=1h --rays=default", "konistil"] {
+        interrupted(at, bake, Duration::from_millis(100));
+        assert!(fs::read(at.join("a.bvh")).unwrap() == good, "{bake}");
+    }
+    // A tree of another scene is replaced.
+    bvh(at, "bake escher:100 --budget=0s --out=a.bvh");
+    let mut child = begin(at, &words("bake konistil --out=a.bvh"));
+    let mut messages = BufReader::new(child.stderr.take().unwrap());
+    let mut message = String::new();
+    while !message.contains("combinations") {
+        assert!(messages.read_line(&mut message).unwrap() > 0, "{message}");
+    }
+    std::thread::sleep(Duration::from_secs(2));
+    send("-INT", &child);
+    ended(&child.wait_with_output().unwrap(), 130, &[]);
+    assert!(number(at, "inspect a.bvh konistil", "work") > 1e6);
 }
 
 #[test]

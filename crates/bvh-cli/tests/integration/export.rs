@@ -1,6 +1,6 @@
 //! Exporting trees to other tracers from the command line.
 
-use crate::support::{bvh, facts};
+use crate::support::{bvh, facts, wrong};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
 use bvh_core::export::{Layout, Target};
@@ -37,6 +37,23 @@ fn a_greedy_tree_is_exported_where_its_rays_take_fewer_tests() {
     let greedy = muller_fellner::Config::default().build(&scene.boxes).unwrap();
     let expected = Target::OBVHS.bytes(&Target::OBVHS.fit(&greedy), &scene.boxes);
     assert_eq!(fs::read(at.join("y.bin")).unwrap(), expected);
+}
+
+#[test]
+fn a_tree_that_divides_triangles_is_for_tracers_that_count_hits_only_if_one_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    bvh(at, "bake escher:900 --budget=1Mwork --references=1.3 --out=x.bvh");
+    for target in Target::ALL {
+        let file = if target.layout == Layout::Json { "x.json" } else { "x.bin" };
+        let export = format!("export x.bvh escher:900 --for={} --out={file}", target.name);
+        if target.references == 1.0 {
+            let name = format!("escher:900 --for {}`", target.name);
+            wrong(at, &export, &["x.bvh", "to 900 triangles", &name, "--divided"]);
+        }
+        let divided = if target.references == 1.0 { " --divided" } else { "" };
+        bvh(at, &format!("{export}{divided}"));
+    }
 }
 
 #[test]

@@ -9,6 +9,9 @@ use glam::DVec3;
 
 /// The number of rays of each kind. Both trees trace the same rays, so that few suffice.
 const RAYS: u32 = 4096;
+/// The tests after which no more rays are traced: half a second. Where objects are as large as the
+/// scene, fewer rays must do.
+const MOST_TESTS: u64 = 1 << 26;
 
 /// A tree for a tracer, by [`Target::fit_better`].
 #[derive(Clone, Debug, PartialEq)]
@@ -44,38 +47,45 @@ impl Target {
     /// May panic on trees that [`validate`](crate::validate()) rejects.
     pub fn fit_better(&self, searched: &Bvh, own: &Bvh, triangles: &[Triangle]) -> Better {
         let [searched, own] = [self.fit(searched), self.fit(own)];
-        let [ours, theirs] = [&searched, &own].map(|tree| self.counted_costs(tree, triangles));
+        let [ours, theirs] = self.counted_costs([&searched, &own], triangles);
         let gains = [theirs[0] / ours[0], theirs[1] / ours[1]];
         let better = Better { tree: searched, gains };
         if better.is_searched() { better } else { Better { tree: own, ..better } }
     }
 
-    /// Returns the costs of all rays of each kind in a fitted tree.
-    fn counted_costs(&self, tree: &Bvh, triangles: &[Triangle]) -> [f64; 2] {
-        let Some(bounds) = tree.root_aabb() else { return [0.0; 2] };
-        let nodes = match self.layout {
+    /// Returns the costs of all rays of each kind in each of two fitted trees.
+    fn counted_costs(&self, trees: [&Bvh; 2], triangles: &[Triangle]) -> [[f64; 2]; 2] {
+        let mut costs = [[0.0; 2]; 2];
+        let Some(bounds) = trees[0].root_aabb() else { return costs };
+        let nodes = trees.map(|tree| match self.layout {
             Layout::ThreeMesh => tree.to_three_mesh(),
             // Visited by the nearer child first.
             Layout::FirstCount | Layout::FirstCountAligned | Layout::Json => Vec::new(),
-        };
-        let cost = |ray: Ray| {
+        });
+        let cost = |which: usize, ray: Ray, tests: &mut u64| {
             let mut counts = TestCounts::default();
+            let (tree, nodes) = (trees[which], &nodes[which]);
             if nodes.is_empty() {
                 let prepared = PreparedRay::new(&ray);
                 let test = |id, t_max| triangles[id as usize].intersect(&prepared, t_max);
                 nearest_hit_by(tree, &ray, test, &mut counts);
             } else {
-                ThreeMeshRay::new(&nodes, &tree.prim_ids, triangles, &ray, &mut counts)
-                    .first_hit(0);
+                ThreeMeshRay::new(nodes, &tree.prim_ids, triangles, &ray, &mut counts).first_hit(0);
             }
+            *tests += counts.boxes + counts.objects;
             // A visit of an inner node tests the boxes of two children.
             0.5 * self.constants.traversal * counts.boxes as f64
                 + self.constants.intersection * counts.objects as f64
         };
-        let mut costs = [0.0; 2];
-        for [inside, outside] in (0..RAYS).filter_map(|index| rays(&bounds, index)) {
-            costs[0] += cost(inside);
-            costs[1] += cost(outside);
+        let mut tests = 0;
+        for pair in (0..RAYS).filter_map(|index| rays(&bounds, index)) {
+            for (which, costs) in costs.iter_mut().enumerate() {
+                costs[0] += cost(which, pair[0], &mut tests);
+                costs[1] += cost(which, pair[1], &mut tests);
+            }
+            if tests > MOST_TESTS {
+                break;
+            }
         }
         costs
     }
@@ -192,6 +202,19 @@ mod tests {
             assert!(counts.objects <= 300);
         }
         assert!((500..3500).contains(&hits), "{hits}");
+    }
+
+    #[test]
+    fn fewer_rays_are_traced_where_all_of_them_meet_all_triangles() {
+        let triangles =
+            vec![Triangle([DVec3::ZERO, DVec3::X, DVec3::ONE].map(|c| c.as_vec3())); 30_000];
+        let leaf = Node::leaf(triangles[0].aabb(), 0, 30_000);
+        let tree = Bvh { nodes: vec![leaf], prim_ids: (0..30_000).collect(), ..Bvh::default() };
+        for target in [Target::PLAIN, Target::THREE_MESH_BVH] {
+            let costs = target.counted_costs([&tree; 2], &triangles);
+            assert_eq!(costs[0], costs[1]);
+            assert!(costs[0].iter().all(|&cost| (1e6..1e8).contains(&cost)), "{costs:?}");
+        }
     }
 
     #[test]

@@ -186,9 +186,11 @@ fn packed<N: NoUninit>(nodes: &[N], tree: &Bvh, boxes: &[Aabb]) -> Vec<u8> {
 }
 
 /// Returns a binary tree as [text](Layout::Json). Numbers have the fewest digits that are read back
-/// as the same numbers.
+/// as the same numbers in double precision, as most readers of JSON do. The digits of single
+/// precision would give them boxes smaller than their triangles.
 fn text(tree: &Bvh) -> String {
-    let node = |FirstCountNode { min: [a, b, c], max: [d, e, f], first, count }| {
+    let node = |FirstCountNode { min, max, first, count }| {
+        let [[a, b, c], [d, e, f]] = [min, max].map(|corner| corner.map(f64::from));
         format!("[{a:?},{b:?},{c:?},{d:?},{e:?},{f:?},{first},{count}]")
     };
     let nodes: Vec<String> = tree.to_first_count().into_iter().map(node).collect();

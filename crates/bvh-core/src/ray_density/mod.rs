@@ -40,7 +40,7 @@ mod crossings;
 mod segment;
 
 use crate::cost::Measure;
-use crate::{Aabb, Bvh, Node, PackedAabb};
+use crate::{Aabb, Bvh, Node, PackedAabb, TestCounts};
 use crossings::{CELLS, Crossings, index};
 use glam::{DVec3, DVec4, Vec4};
 pub use segment::{DensityError, Segment};
@@ -144,6 +144,19 @@ struct Rounded {
 impl RayDensity {
     /// The largest number of segments for which all arithmetic is exact: 4 · 2²⁰ · 2²⁷ · 8 < 2⁵³.
     pub const MOST_SEGMENTS: usize = 1 << 20;
+
+    /// The tests after which no more rays should be traced for a density: about two seconds. Rays
+    /// in scenes that a tree can divide take a tenth; where objects are as large as the scene, fewer
+    /// rays must do.
+    pub const MOST_TESTS: u64 = 1 << 28;
+
+    /// Returns whether one more ray can be traced for a density, after these tests of the rays among
+    /// the first part `done` of all, 0 to 1. Half of [`MOST_TESTS`](Self::MOST_TESTS) are for the
+    /// first rays and half for all in proportion, so that some rays of every part are traced.
+    pub fn affords(tests: &TestCounts, done: f64) -> bool {
+        let most = (0.5 + 0.5 * done) * Self::MOST_TESTS as f64;
+        ((tests.boxes + tests.objects) as f64) < most
+    }
 
     /// Makes the density of the rays between `segments`' ends over a scene with these bounds.
     /// `area_weight` is the share of the area in the measure of a box, 0 to 1. With a weight above

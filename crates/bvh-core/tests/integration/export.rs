@@ -204,12 +204,16 @@ fn a_file_for_a_tracer_has_the_documented_header_nodes_and_ids() {
             let (nodes, ids) =
                 text.strip_prefix("{\"nodes\":[").unwrap().split_once(",\"ids\":[").unwrap();
             let node = |text: &str| {
-                let numbers: Vec<f32> = text
+                let numbers: Vec<f64> = text
                     .split(',')
                     .filter(|word| !word.is_empty())
                     .map(|word| word.parse().unwrap())
                     .collect();
-                let [min, max] = [0, 3].map(|at| numbers[at..at + 3].try_into().unwrap());
+                let exact = |number: f64| {
+                    assert_eq!(f64::from(number as f32), number);
+                    number as f32
+                };
+                let [min, max] = [0, 3].map(|at| [0, 1, 2].map(|i| exact(numbers[at + i])));
                 let [first, count] = [6, 7].map(|at| numbers[at] as u32);
                 FirstCountNode { min, first, max, count }
             };

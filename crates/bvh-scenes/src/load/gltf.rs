@@ -10,7 +10,7 @@ mod document;
 mod nodes;
 
 use super::MeshError;
-use super::mesh::{Fault, MOST_TRIANGLES, Mesh, counted};
+use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Rounding, counted};
 use accessors::{F32, I8, I16, U8, U16, U32};
 use buffers::Buffers;
 use bvh_core::Triangle;
@@ -54,7 +54,8 @@ pub struct Placed {
 /// Reads the bytes of a glTF or GLB file, and the buffers that its meshes refer to from the folder
 /// of `path`. Returns the meshes at their places.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
-    let Parts { mut meshes, places, remarks } = read(bytes, path)?;
+    let Parts { mut meshes, places, mut remarks } = read(bytes, path)?;
+    let mut rounding = Rounding::default();
     // A file of a few kilobytes can place one mesh any number of times.
     let total = places.iter().map(|place| meshes[&place.mesh].len()).sum();
     check_total(total).map_err(Fault::of_file)?;
@@ -63,8 +64,10 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
         places.iter().map(|place| (place.mesh, place.node)).collect();
     for Placed { node, mesh, transform } in places {
         for triangle in &meshes[&mesh] {
-            let moved =
-                triangle.0.map(|corner| transform.transform_point3(corner.into()).as_vec3());
+            let moved = triangle.0.map(|corner| {
+                let exact = transform.transform_point3(corner.into());
+                Vec3::from(exact.to_array().map(|number| rounding.round(number)))
+            });
             if let Some(far) = moved.iter().find(|corner| !corner.is_finite()) {
                 let message =
                     format!("a vertex of meshes[{mesh}] at {far}; expected finite numbers");
@@ -77,6 +80,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
             meshes.remove(&mesh);
         }
     }
+    remarks.extend(rounding.remark(&triangles));
     Ok(Mesh::new(triangles, remarks))
 }
 

@@ -1,6 +1,6 @@
 //! The contents of a mesh file, and the faults of all formats.
 
-use bvh_core::Triangle;
+use bvh_core::{Aabb, Triangle};
 use std::fmt;
 
 /// The largest number of triangles that one file may contain. Together with boxes and a tree they
@@ -36,6 +36,64 @@ impl Mesh {
 /// Returns a clause about `count` things, and nothing if there are none.
 pub(super) fn counted(things: &str, count: usize) -> Option<String> {
     (count > 0).then(|| format!("{things}: {count}"))
+}
+
+/// What coordinates lose when they are rounded to single precision.
+pub(super) struct Rounding {
+    /// The largest loss by the exponent of the rounded number, so that the far vertices that no
+    /// face uses do not count.
+    lost: [f64; 256],
+}
+
+impl Default for Rounding {
+    fn default() -> Self {
+        Self { lost: [0.0; 256] }
+    }
+}
+
+impl Rounding {
+    /// The loss that matters, as a fraction of the smallest extent of a mesh.
+    const MOST: f64 = 1e-4;
+
+    pub fn round(&mut self, exact: f64) -> f32 {
+        let rounded = exact as f32;
+        self.note(rounded, || Some(exact));
+        rounded
+    }
+
+    /// Notes the loss of a number, and asks for the exact one only if no number of about this size
+    /// has lost nearly as much as possible.
+    pub fn note(&mut self, rounded: f32, exact: impl FnOnce() -> Option<f64>) {
+        let lost = &mut self.lost[exponent(rounded)];
+        // Half the distance of the next number; 0 for subnormal ones, which no move would help.
+        let power = f32::from_bits(rounded.to_bits() & f32::INFINITY.to_bits());
+        let most = f64::from(power) * f64::from(f32::EPSILON) / 2.0;
+        if *lost < 0.9 * most
+            && let Some(exact) = exact().filter(|exact| exact.is_finite())
+        {
+            *lost = lost.max((exact - f64::from(rounded)).abs());
+        }
+    }
+
+    /// Returns a clause about the loss of a mesh if it matters.
+    pub fn remark(&self, triangles: &[Triangle]) -> Option<String> {
+        let bounds = Aabb::union_of(&bvh_core::boxes(triangles));
+        let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
+        let lost = self.lost[..=exponent(largest)].iter().copied().fold(0.0, f64::max);
+        let extents = bounds.extent().to_array().into_iter().filter(|&extent| extent > 0.0);
+        let smallest = extents.reduce(f64::min).unwrap_or(0.0);
+        (lost > Self::MOST * smallest).then(|| {
+            format!(
+                "coordinates lose up to {lost:.1e} by rounding to single precision, and the \
+                 smallest extent is {smallest:.1e}, so move the mesh to the origin"
+            )
+        })
+    }
+}
+
+/// Returns the exponent in the bits of a number, without its bias.
+fn exponent(number: f32) -> usize {
+    (number.to_bits() >> 23 & 0xff) as usize
 }
 
 /// Vertices that often show that an export went wrong.

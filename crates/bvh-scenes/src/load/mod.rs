@@ -1,5 +1,6 @@
 //! Mesh files of every format. The bytes decide the format, and the name does where they do not.
 
+mod ears;
 pub mod gltf;
 pub mod mesh;
 mod obj;

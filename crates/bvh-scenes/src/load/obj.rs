@@ -11,7 +11,7 @@
 //! texture coordinates are ignored. Lines may end in LF, CRLF or CR, and a backslash at the end
 //! continues a statement on the next line.
 
-use super::mesh::{Fault, Mesh, counted};
+use super::mesh::{Fault, Mesh, Rounding, counted};
 use super::polygon::{MOST_CORNERS, Polygons};
 use super::text::{self, number, shown};
 use std::collections::BTreeMap;
@@ -48,6 +48,7 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
     polygons.short += geometry.short_faces;
     let mut remarks = polygons.remarks(geometry.vertices);
     remarks.extend(geometry.unknown);
+    remarks.extend(geometry.rounding.remark(&polygons.triangles));
     Ok(Mesh::new(polygons.triangles, remarks))
 }
 
@@ -68,6 +69,7 @@ struct Geometry {
     invalid: BTreeMap<usize, Fault>,
     /// The vertices below a face that the face names, counted from 1, and the face's line.
     ahead: Vec<(usize, usize)>,
+    rounding: Rounding,
 }
 
 impl Geometry {
@@ -126,7 +128,7 @@ impl Geometry {
         };
         let mut numbers = [1.0; 4];
         for (place, word) in words.iter().enumerate() {
-            numbers[place] = number(word).ok_or_else(|| fault(place))?;
+            numbers[place] = number(word, &mut self.rounding).ok_or_else(|| fault(place))?;
         }
         // `tobj` divides by the weight, and x / ∞ is finite.
         let [position @ .., weight] = numbers;

@@ -4,7 +4,7 @@
 //! Latin-1, lines that end in CR, elements without properties, and `-nan(ind)`; it reads an element
 //! that is declared twice at wrong places; and its errors speak of its grammar.
 
-use super::mesh::{AFTER_END, Fault, MOST_TRIANGLES, Mesh, counted};
+use super::mesh::{AFTER_END, Fault, MOST_TRIANGLES, Mesh, Rounding, counted};
 use super::polygon::Polygons;
 use super::{text, without_mark};
 
@@ -72,8 +72,9 @@ enum Encoding {
 
 /// Reads the bytes of a PLY file. O(bytes), and more for polygons that are not convex.
 pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
-    let mut file =
-        File { rest: without_mark(bytes), line: 0, words: &[], encoding: Encoding::Text };
+    let rest = without_mark(bytes);
+    let rounding = Rounding::default();
+    let mut file = File { rest, line: 0, words: &[], encoding: Encoding::Text, rounding };
     let elements = file.header().map_err(|message| Fault::in_line(file.line, message))?;
     let mut vertices = Vec::new();
     // The indices of all faces, one face after the other, and the ends of the faces.
@@ -106,6 +107,7 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
     let mut remarks = polygons.remarks(vertices.len());
     remarks.extend(counted(AFTER_END, file.rest.trim_ascii().len()));
     let triangles = polygons.triangles;
+    remarks.extend(file.rounding.remark(&triangles));
     if triangles.is_empty() || triangles.len() > MOST_TRIANGLES {
         let found = format!("{} vertices and {} triangles", vertices.len(), triangles.len());
         let message = format!("{found}; expected 1 to {MOST_TRIANGLES} triangles");
@@ -122,6 +124,7 @@ struct File<'a> {
     /// The rest of the current line.
     words: &'a [u8],
     encoding: Encoding,
+    rounding: Rounding,
 }
 
 impl<'a> File<'a> {
@@ -238,15 +241,19 @@ impl<'a> File<'a> {
 
     fn float(&mut self, scalar: Scalar) -> Result<f32, String> {
         if scalar.kind != Kind::Float {
-            return Ok(self.integer(scalar)? as f32);
+            let number = self.integer(scalar)? as f64;
+            return Ok(self.rounding.round(number));
         }
         if self.encoding == Encoding::Text {
             let word = self.word()?;
-            return text::number(word)
+            return text::number(word, &mut self.rounding)
                 .ok_or_else(|| format!("`{}`; expected a number", text::shown(word)));
         }
         let bits = self.bytes(scalar)?;
-        Ok(if scalar.size == 4 { f32::from_bits(bits as u32) } else { f64::from_bits(bits) as f32 })
+        Ok(match scalar.size {
+            4 => f32::from_bits(bits as u32),
+            _ => self.rounding.round(f64::from_bits(bits)),
+        })
     }
 
     fn integer(&mut self, scalar: Scalar) -> Result<i64, String> {

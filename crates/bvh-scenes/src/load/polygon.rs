@@ -1,21 +1,25 @@
 //! Polygons, split into triangles.
 
+use super::ears::ears;
 use super::mesh::{UNUSED, counted};
 use bvh_core::Triangle;
-use earcut::Earcut;
 use glam::{DVec2, DVec3, Vec3};
 
 /// The largest number of vertices of one polygon. The triangles of a larger one would need a hundred
 /// bytes of memory for every two bytes of the file.
 pub const MOST_CORNERS: usize = 1 << 16;
 
-/// The largest number of vertices of a polygon that needs more than a fan. The time of ear clipping
-/// grows with the square.
-const MOST_CLIPPED: usize = 1 << 13;
+/// Returns the most steps of ear clipping of a polygon of `n` corners. The teeth of a comb take an
+/// eighth; a polygon that takes more crosses itself.
+fn most_steps(n: u64) -> u64 {
+    8 * n * n + (1 << 16)
+}
 
-/// The largest sum of the squares of the numbers of corners, over all large polygons that ear
-/// clipping fails to cover. Without it a forged file of a few megabytes would take an hour.
-const MOST_FAILED: usize = 1 << 26;
+/// The steps of ear clipping of all polygons of a file: some seconds.
+const MOST_STEPS: u64 = 1 << 30;
+
+/// The steps per corner that do not count there: a microsecond.
+const FREE_STEPS: u64 = 1 << 8;
 
 /// The triangles of polygons between vertices, in the order in which the polygons were added.
 #[derive(Default)]
@@ -28,8 +32,8 @@ pub struct Polygons<'a> {
     pub short: usize,
     /// The number of polygons that no triangles between their corners cover.
     crossing: usize,
-    /// The sum that [`MOST_FAILED`] limits.
-    failed: usize,
+    /// The steps that remain of [`MOST_STEPS`].
+    steps: u64,
     /// The corners of the polygon that is being added, and their projections.
     corners: Vec<Vec3>,
     flat: Vec<DVec2>,
@@ -37,7 +41,8 @@ pub struct Polygons<'a> {
 
 impl<'a> Polygons<'a> {
     pub fn new(vertices: &'a [[f32; 3]]) -> Self {
-        Self { vertices, is_used: vec![false; vertices.len()], ..Self::default() }
+        let is_used = vec![false; vertices.len()];
+        Self { vertices, is_used, steps: MOST_STEPS, ..Self::default() }
     }
 
     /// Adds the polygon with the vertices of these indices; a last one that repeats the first is no
@@ -104,22 +109,21 @@ impl<'a> Polygons<'a> {
             self.triangles.extend(fan.map(at));
             return Ok(());
         }
-        let n = corners.len();
-        if n > MOST_CLIPPED || self.failed > MOST_FAILED {
+        let n = corners.len() as u64;
+        let most = self.steps.min(most_steps(n));
+        let mut left = most;
+        let mut ears = ears(flat, &mut left);
+        if left == 0 && most < most_steps(n) {
             return Err(format!(
-                "{n} vertices that are not convex; expected at most {MOST_CLIPPED}, and few faces \
-                 of many vertices that cross themselves"
+                "{n} vertices that are not convex, too many after the faces before; expected fewer, \
+                 or triangles"
             ));
         }
-        let mut indices: Vec<u32> = Vec::new();
-        let points = flat.iter().map(|point| point.to_array());
-        Earcut::new().earcut(points, &[0u32; 0], &mut indices);
-        let mut ears = indices.as_chunks().0.to_vec();
+        self.steps -= (most - left).saturating_sub(n * FREE_STEPS);
         let whole: f64 = fan.clone().map(area).sum();
         let covered: f64 = ears.iter().map(|&ear| area(ear).abs()).sum();
-        if (covered - whole).abs() > 1e-9 * whole {
+        if left == 0 || (covered - whole).abs() > 1e-9 * whole {
             self.crossing += 1;
-            self.failed += if n > 64 { n * n } else { 0 };
             self.triangles.extend(fan.map(at));
             return Ok(());
         }

@@ -4,7 +4,7 @@
 //! solids, mistakes `solid` without a name for a binary file, names no line, and knows neither of
 //! the ways in which programs write comments, colours, `end loop` and counts.
 
-use super::mesh::{AFTER_END, Fault, Mesh, counted};
+use super::mesh::{AFTER_END, Fault, Mesh, Rounding, counted};
 use super::{text, without_mark};
 use bvh_core::Triangle;
 use glam::Vec3;
@@ -48,7 +48,7 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Fault> {
     let text = without_mark(bytes);
     let is_text = !is_binary(bytes) && is_text(text);
     let (triangles, remarks) = match is_text {
-        true => (parse_text(text)?, None),
+        true => parse_text(text)?,
         false => parse_binary(bytes)?,
     };
     if triangles.is_empty() {
@@ -113,8 +113,10 @@ fn have_attributes(body: &[u8], facets: usize) -> bool {
 const KEYWORDS: [&str; 9] =
     ["color", "end", "endfacet", "endloop", "endsolid", "facet", "outer", "solid", "vertex"];
 
-/// Reads the corners of every loop, three at a time. Normals, colours and names are ignored.
-fn parse_text(bytes: &[u8]) -> Result<Vec<Triangle>, Fault> {
+/// Reads the corners of every loop, three at a time, and returns a remark on their rounding.
+/// Normals, colours and names are ignored.
+fn parse_text(bytes: &[u8]) -> Result<(Vec<Triangle>, Option<String>), Fault> {
+    let mut rounding = Rounding::default();
     let mut triangles = Vec::new();
     let mut corners: Vec<Vec3> = Vec::new();
     let mut rest = bytes;
@@ -134,7 +136,7 @@ fn parse_text(bytes: &[u8]) -> Result<Vec<Triangle>, Fault> {
             match (word, part) {
                 ("vertex", _) => {
                     let found: Vec<&str> = words.by_ref().take(3).collect();
-                    corners.push(corner(&found).ok_or_else(|| {
+                    corners.push(corner(&found, &mut rounding).ok_or_else(|| {
                         let found = found.join(" ");
                         fault(format!("vertex `{found}`; expected three finite numbers"))
                     })?);
@@ -177,11 +179,13 @@ fn parse_text(bytes: &[u8]) -> Result<Vec<Triangle>, Fault> {
         let message = "the file ends in a facet; expected `endfacet`";
         return Err(Fault::in_line(line, message));
     }
-    Ok(triangles)
+    let remark = rounding.remark(&triangles);
+    Ok((triangles, remark))
 }
 
-fn corner(words: &[&str]) -> Option<Vec3> {
-    let [x, y, z] = words else { return None };
-    let corner = Vec3::new(x.parse().ok()?, y.parse().ok()?, z.parse().ok()?);
+fn corner(words: &[&str], rounding: &mut Rounding) -> Option<Vec3> {
+    let &[x, y, z] = words else { return None };
+    let mut number = |word: &str| text::number(word.as_bytes(), rounding);
+    let corner = Vec3::new(number(x)?, number(y)?, number(z)?);
     corner.is_finite().then_some(corner)
 }

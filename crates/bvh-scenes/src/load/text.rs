@@ -1,5 +1,7 @@
 //! Lines, words and numbers of text files.
 
+use super::mesh::Rounding;
+
 /// Takes the first line off `rest`, without its end: LF, CRLF or CR.
 pub fn line<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
     if rest.is_empty() {
@@ -18,12 +20,14 @@ pub fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 
 /// Returns the number that a word spells, rounded to single precision. Accepts the spellings of NaN
 /// and of infinity in Microsoft's C library, such as `-nan(ind)` and `1.#INF`.
-pub fn number(word: &[u8]) -> Option<f32> {
+pub fn number(word: &[u8], rounding: &mut Rounding) -> Option<f32> {
     let word = std::str::from_utf8(word).ok()?;
-    word.parse().ok().or_else(|| {
-        let word = word.trim_start_matches(['+', '-']).to_ascii_lowercase();
-        (word.starts_with("nan(") || word.starts_with("1.#")).then_some(f32::NAN)
-    })
+    if let Ok(number) = word.parse() {
+        rounding.note(number, || word.parse().ok());
+        return Some(number);
+    }
+    let word = word.trim_start_matches(['+', '-']).to_ascii_lowercase();
+    (word.starts_with("nan(") || word.starts_with("1.#")).then_some(f32::NAN)
 }
 
 /// Makes a word printable for an error message, and short even if the file is one endless word.

@@ -6,7 +6,7 @@ use super::random::{Family, Kind, Viewpoint, in_box, on_sphere, random_ray};
 use crate::Scene;
 use crate::trace::Accelerator;
 use bvh_config::{OutOfRange, above, config};
-use bvh_core::{Aabb, Bvh, DensityError, Ray, RayDensity, Segment};
+use bvh_core::{Aabb, Bvh, DensityError, Ray, RayDensity, Segment, TestCounts};
 use glam::{DVec3, Vec3};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -97,8 +97,8 @@ pub struct TracedRay {
 
 /// Returns the rays of a renderer through `scene`: primary rays through random points of the
 /// pictures, `bounces` reflections in random directions, and shadow rays from primary hits to every
-/// light. `tree` is any valid tree over the scene. Ends early, with fewer rays, when `is_over` returns
-/// true.
+/// light. `tree` is any valid tree over the scene. Traces fewer rays where they take
+/// [too many tests](RayDensity::MOST_TESTS), and ends early when `is_over` returns true.
 pub fn of_renderer(
     config: &RenderedRays,
     scene: &Scene,
@@ -110,6 +110,9 @@ pub fn of_renderer(
     for index in 0..config.count {
         if is_over() {
             break;
+        }
+        if !tracing.affords(index, config.count) {
+            continue;
         }
         // One random position in each of `count` equal parts of the path covers it evenly.
         let position = (f64::from(index) + tracing.rng.random::<f64>()) / f64::from(config.count);
@@ -133,7 +136,8 @@ pub fn of_renderer(
 
 /// Returns rays that need no camera: `count` rays from random points in the scene, `count` rays
 /// through it from outside, and from each hit one ray in a random direction and one to a random
-/// point. Ends early, with fewer rays, when `is_over` returns true.
+/// point. Traces fewer rays where they take [too many tests](RayDensity::MOST_TESTS), and ends early
+/// when `is_over` returns true.
 pub fn of_anything(
     count: u32,
     scene: &Scene,
@@ -143,10 +147,13 @@ pub fn of_anything(
 ) -> Vec<TracedRay> {
     let mut tracing = Tracing::new(scene, tree, seed);
     let Some(root) = tree.root_aabb() else { return Vec::new() };
-    for family in [Family::Inside, Family::Lines] {
-        for _ in 0..count {
+    for (first, family) in [(0, Family::Inside), (count, Family::Lines)] {
+        for index in first..first + count {
             if is_over() {
                 return tracing.rays;
+            }
+            if !tracing.affords(index, 2 * count) {
+                continue;
             }
             let Some(ray) = random_ray(family, &root, &mut tracing.rng) else { continue };
             let hit = tracing.nearest(Kind::Incoherent, ray.origin(), ray.direction().as_dvec3());
@@ -197,20 +204,27 @@ struct Tracing<'a> {
     bounds: Aabb,
     rng: ChaCha8Rng,
     rays: Vec<TracedRay>,
+    tests: TestCounts,
 }
 
 impl<'a> Tracing<'a> {
     fn new(scene: &'a Scene, tree: &'a Bvh, seed: u64) -> Self {
         let accelerator = Accelerator::of_tree(&scene.primitives, tree);
         let bounds = tree.root_aabb().unwrap_or(Aabb::EMPTY);
-        Self { accelerator, bounds, rng: ChaCha8Rng::seed_from_u64(seed), rays: Vec::new() }
+        let rng = ChaCha8Rng::seed_from_u64(seed);
+        Self { accelerator, bounds, rng, rays: Vec::new(), tests: TestCounts::default() }
+    }
+
+    /// Returns whether the ray of this index, of so many, and those that follow it can be traced.
+    fn affords(&self, index: u32, count: u32) -> bool {
+        RayDensity::affords(&self.tests, f64::from(index) / f64::from(count))
     }
 
     /// Keeps a ray that needs its nearest hit. Returns a point just before the hit, where further
     /// rays may begin.
     fn nearest(&mut self, kind: Kind, origin: Vec3, direction: DVec3) -> Option<Vec3> {
         let ray = Ray::half_line(origin, direction.as_vec3()).ok()?;
-        let hit = self.accelerator.nearest_hit(&ray);
+        let hit = self.accelerator.nearest_hit_counted(&ray, &mut self.tests);
         // A ray without a hit ends outside the scene, because a density needs finite segments.
         let length = hit.map_or_else(|| self.beyond(&ray), |hit| hit.t);
         self.keep(kind, ray, length);
@@ -255,7 +269,7 @@ mod tests {
     use crate::SceneKind;
     use bvh_build::{Builder, muller_fellner};
     use bvh_config::Check;
-    use bvh_core::{Primitives, Triangle};
+    use bvh_core::{Node, Primitives, Triangle};
 
     /// Returns the segments of rays through four triangles whose corners are multiples of `unit`.
     fn segments_at_scale(unit: f32) -> Vec<[[f32; 3]; 2]> {
@@ -284,6 +298,25 @@ mod tests {
                 .collect();
             assert_eq!(segments_at_scale(unit), expected, "2^{exponent}");
         }
+    }
+
+    #[test]
+    fn fewer_rays_of_every_kind_are_traced_where_all_of_them_meet_all_objects() {
+        let triangle = Triangle::from([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 1.0]]);
+        let scene =
+            Scene::new("equal", SceneKind::File, Primitives::Triangles(vec![triangle; 30_000]));
+        let leaf = Node::leaf(triangle.aabb(), 0, 30_000);
+        let tree = Bvh { nodes: vec![leaf], prim_ids: (0..30_000).collect(), ..Bvh::default() };
+        let rays = of_anything(10_000, &scene, &tree, 1, &|| false);
+        let begins_inside = |traced: &&TracedRay| {
+            let origin = traced.ray.origin();
+            origin.min_element() > 0.01 && origin.max_element() < 0.99
+        };
+        let first = rays.iter().filter(|traced| traced.kind == Kind::Incoherent);
+        let inside = first.clone().filter(begins_inside).count();
+        let outside = first.count() - inside;
+        assert!((1000..6000).contains(&inside), "{inside}");
+        assert!((1000..6000).contains(&outside), "{outside}");
     }
 
     #[test]

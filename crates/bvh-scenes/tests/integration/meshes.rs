@@ -1,6 +1,6 @@
 //! Mesh files of every format give the same triangles.
 
-use crate::samples::{error, read, samples, square};
+use crate::samples::{error, gltf, ply_text, read, samples, square, with};
 use bvh_scenes::Scene;
 use bvh_scenes::load::mesh::Mesh;
 use bvh_scenes::load::{Format, MeshError, load};
@@ -20,6 +20,40 @@ fn every_format_gives_the_same_triangles_under_any_file_name() {
                 assert_eq!(Format::of(bytes, Path::new(name)), format);
                 assert_eq!(read(bytes, name).unwrap(), Mesh::new(square(), vec![]), "{name}");
             }
+        }
+    }
+}
+
+#[test]
+fn what_coordinates_lose_is_named_where_it_is_much_of_the_mesh() {
+    let obj = |x: f64| format!("v {x} 0 0\nv {} 1 0\nv {x} 0 1\nf 1 2 3\n", x + 1.0).into_bytes();
+    let ply = |x: f64| {
+        let header = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty double x\n\
+                      property double y\nproperty double z\nelement face 1\n\
+                      property list int int vertex_index\nend_header\n";
+        let corners = [x, 0.0, 0.0, x + 1.0, 1.0, 0.0, x, 0.0, 1.0].map(f64::to_le_bytes);
+        let face = [3i32, 0, 1, 2].map(i32::to_le_bytes);
+        [header.as_bytes(), corners.as_flattened(), face.as_flattened()].concat()
+    };
+    let stl = |x: f64| {
+        let corners = format!("vertex {x} 0 0 vertex {} 1 0 vertex {x} 0 1", x + 1.0);
+        format!("solid\nfacet outer loop {corners} endloop endfacet\nendsolid").into_bytes()
+    };
+    let gltf = |x: f64| {
+        let node = format!("[{{\"mesh\": 0, \"translation\": [{x}, 0, 0]}}],");
+        with(&gltf(), "[{\"mesh\": 0}],", &node)
+    };
+    let text_ply = |x: f64| with(&ply_text(), "0 0 0 255", &format!("{x} 0 0 255"));
+    let unused = |x: f64| [&obj(0.0)[..], format!("v {x} 1e30 0\n").as_bytes()].concat();
+    let formats: [&dyn Fn(f64) -> Vec<u8>; 6] = [&obj, &ply, &stl, &gltf, &text_ply, &unused];
+    // Up to this size no triangle moves by a ten thousandth of the extent 1 or ½.
+    for (x, is_lossy) in [(4_000_000.1, true), (4_000_000.25, false), (300.1, false), (0.1, false)]
+    {
+        for (number, format) in formats.iter().enumerate() {
+            let remark = read(format(x), "a").unwrap().remark().unwrap_or_default();
+            let found = remark.contains("lose up to 1.0e-1 ");
+            assert_eq!(found, is_lossy && number < 5, "{x}, {number}: {remark}");
+            assert_eq!(found, remark.contains("single precision"), "{x}, {number}: {remark}");
         }
     }
 }
