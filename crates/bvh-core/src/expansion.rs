@@ -128,7 +128,7 @@ impl Expansion<2> {
 }
 
 /// Returns the rounded sum of two numbers and the rounding error (Knuth).
-fn two_sum(a: f64, b: f64) -> (f64, f64) {
+pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_part = sum - a;
     let a_part = sum - b_part;
@@ -137,7 +137,7 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
 
 /// Returns the rounded product of two numbers and the rounding error (Dekker). It avoids the fused
 /// operation, which `core` and some processors lack.
-fn two_product(a: f64, b: f64) -> (f64, f64) {
+pub(crate) fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
     let (a_high, a_low) = split(a);
     let (b_high, b_low) = split(b);

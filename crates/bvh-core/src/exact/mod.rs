@@ -79,10 +79,12 @@
 //! because the next layer decides every answer within the errors of the shear.
 
 mod number;
+mod quotient;
 mod volumes;
 
 use crate::ray::AXES;
 pub(crate) use number::{Number, Point};
+use quotient::{NARROWER, Twice};
 use volumes::Volumes;
 
 /// The answer of a layer with rounding errors about a line and a triangle.
@@ -199,6 +201,44 @@ impl Line {
             return Verdict::Miss;
         }
         if low >= 0.0 { Verdict::Between(low, high) } else { Verdict::Unsure }
+    }
+
+    /// Returns the side from which the line comes to a triangle that it crosses: 1 along the normal,
+    /// −1 against it, and 0 for a line parallel to its plane.
+    #[inline]
+    pub(crate) fn side<P: Point>(&self, ray: [P; 2], triangle: &[P; 3]) -> i32 {
+        let [first, second, third] = *triangle;
+        let (normal, products) = normal(&self.edge(first, second), &self.edge(first, third));
+        let along = dot(&self.direction, &normal);
+        if ERROR * dot(&self.direction.map(f64::abs), &products) < along.abs() {
+            return if along > 0.0 { 1 } else { -1 };
+        }
+        let [origin, direction] = ray;
+        Volumes::new(origin, direction, triangle).map_or(0, |volumes| volumes.speed().sign())
+    }
+
+    /// Returns the distance of the plane of a triangle that the line crosses at or in front of the
+    /// origin, rounded once, where the distance in f64 is off by at most `slack`.
+    #[inline(never)]
+    pub(crate) fn rounded<P: Point<Number = f64>>(
+        &self,
+        ray: [P; 2],
+        triangle: &[P; 3],
+        slack: f64,
+    ) -> f64 {
+        let [origin, direction] = ray;
+        let [a, b, c] = triangle.map(P::double);
+        let minus = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|i| Twice::difference(p[i], q[i]));
+        let corner = minus(a, origin.double());
+        let Twice(high, low) =
+            quotient::distance(&corner, &direction.double(), &minus(b, a), &minus(c, a));
+        let slack = slack * NARROWER;
+        let rounded = high + (low + slack);
+        if high + (low - slack) == rounded {
+            return rounded + 0.0;
+        }
+        let volumes = Volumes::new(origin, direction, triangle);
+        volumes.and_then(|volumes| volumes.rounded_distance()).unwrap_or(high)
     }
 
     /// Returns the rounded distance at which the ray's line crosses the triangle at or in front of

@@ -77,6 +77,19 @@ impl Volumes {
             .unwrap_or(0)
     }
 
+    /// Returns d · n, exactly.
+    pub(super) fn speed(&self) -> Expansion<96> {
+        let [a, b, c] = self.triangle;
+        let (to_second, to_third) = (difference(b, a), difference(c, a));
+        let mut speed = Expansion::zero();
+        for axis in 0..3 {
+            let mut normal = Expansion::zero();
+            add_cross(&mut normal, &to_second, &to_third, axis);
+            speed.add_scaled(&normal, self.direction[axis]);
+        }
+        speed
+    }
+
     /// Returns the distance of the triangle's plane, rounded once; `None` as [`round_quotient`].
     pub(super) fn rounded_distance<N: Number>(&self) -> Option<N> {
         let [a, b, c] = self.triangle;

@@ -210,7 +210,7 @@ impl<K: Instructions> Task<K> for OneRay<'_> {
         let Self { wide, ray, hits } = self;
         // SAFETY: the processor has the instructions of `K`.
         unsafe {
-            let leaf_ray = LeafRay::<K::Block>::new(ray, &wide.bounds);
+            let leaf_ray = LeafRay::<K::Block>::new(ray, wide);
             traverse::<K, ANY_HIT>(wide, ray, &mut AllHits { ray, leaf_ray, hits });
         }
     }
