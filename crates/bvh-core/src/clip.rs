@@ -80,9 +80,9 @@ impl Clip for Primitives {
 }
 
 /// By how many error bounds builders widen a triangle's part: more than validation does.
-const BUILDERS: f64 = 4.0;
+pub(crate) const BUILDERS: f64 = 4.0;
 /// By how many error bounds validation widens a triangle's part.
-const VALIDATION: f64 = 1.0;
+pub(crate) const VALIDATION: f64 = 1.0;
 
 /// Returns the box around a triangle's part in a region.
 ///
@@ -96,7 +96,21 @@ const VALIDATION: f64 = 1.0;
 #[inline]
 fn clip(objects: &InFrame, object: u32, region: &Aabb, slack: f64) -> Aabb {
     let triangle = &objects.triangles[object as usize];
-    let full = triangle.aabb_in(objects.frame);
+    let corners = || {
+        let corners = triangle.0.map(Vec3::as_dvec3);
+        objects.frame.map_or(corners, |frame| corners.map(|corner| frame.point(corner)))
+    };
+    clip_corners(corners, triangle.aabb_in(objects.frame), region, slack)
+}
+
+/// Does the same for a triangle with this box.
+#[inline]
+pub(crate) fn clip_corners(
+    corners: impl FnOnce() -> [DVec3; 3],
+    full: Aabb,
+    region: &Aabb,
+    slack: f64,
+) -> Aabb {
     let common = full.intersection(region);
     // Most triangles are inside the region or outside of it, and need no cut.
     if common == full || common == Aabb::EMPTY {
@@ -107,9 +121,7 @@ fn clip(objects: &InFrame, object: u32, region: &Aabb, slack: f64) -> Aabb {
     let error = DVec3::splat(f64::from(largest) * (slack * (64.0 * f64::EPSILON)));
     let low = region.min.as_dvec3() - error;
     let high = region.max.as_dvec3() + error;
-    let corners = triangle.0.map(Vec3::as_dvec3);
-    let corners = objects.frame.map_or(corners, |frame| corners.map(|corner| frame.point(corner)));
-    let mut kept = Polygon::from_slice(&corners);
+    let mut kept = Polygon::from_slice(&corners());
     for axis in 0..3 {
         // Planes that miss the triangle cut nothing off.
         if full.min[axis] < region.min[axis] {

@@ -4,8 +4,7 @@
 //! are adjacent: between the last bit of a term and the first bit of the term before it is a zero
 //! bit. The terms before the last one together are therefore smaller than half of the last one,
 //! which has the sign of the sum. Sums and products of expansions are exact as long as nothing
-//! overflows or underflows, which coordinates in f32 guarantee: every number here is a multiple of
-//! 2⁻⁷⁵⁰ and below 2⁷⁵⁰.
+//! overflows or underflows, which the [range](crate::exact) of coordinates guarantees.
 //!
 //! Source: Shewchuk 1997, 'Adaptive precision floating-point arithmetic and fast robust geometric
 //! predicates', theorems 6 (Knuth's sum), 10 (grow-expansion), 18 (Dekker's product); zero terms
@@ -91,6 +90,12 @@ impl<const N: usize> Expansion<N> {
         }
     }
 
+    /// Returns the value times a power of two, which must neither overflow nor underflow.
+    pub(crate) fn scaled(mut self, power: f64) -> Self {
+        self.terms[..self.len].iter_mut().for_each(|term| *term *= power);
+        self
+    }
+
     /// Returns the sign of the exact value: −1, 0 or 1.
     pub(crate) fn sign(&self) -> i32 {
         match self.terms().last() {
@@ -108,8 +113,8 @@ impl<const N: usize> Expansion<N> {
 }
 
 impl Expansion<2> {
-    pub(crate) fn difference(a: f32, b: f32) -> Self {
-        let (sum, rest) = two_sum(f64::from(a), -f64::from(b));
+    pub(crate) fn difference(a: f64, b: f64) -> Self {
+        let (sum, rest) = two_sum(a, -b);
         let mut difference = Self::zero();
         // The rounding error is never adjacent to the sum.
         for term in [rest, sum] {
@@ -123,7 +128,7 @@ impl Expansion<2> {
 }
 
 /// Returns the rounded sum of two numbers and the rounding error (Knuth).
-fn two_sum(a: f64, b: f64) -> (f64, f64) {
+pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_part = sum - a;
     let a_part = sum - b_part;
@@ -132,7 +137,7 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
 
 /// Returns the rounded product of two numbers and the rounding error (Dekker). It avoids the fused
 /// operation, which `core` and some processors lack.
-fn two_product(a: f64, b: f64) -> (f64, f64) {
+pub(crate) fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
     let (a_high, a_low) = split(a);
     let (b_high, b_low) = split(b);

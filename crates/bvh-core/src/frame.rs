@@ -171,11 +171,16 @@ impl Frame {
     /// Returns the smallest box in the frame that certainly contains the triangle: it is rounded
     /// outwards.
     pub fn aabb(&self, triangle: &Triangle) -> Aabb {
+        self.aabb_of(triangle.0.map(Vec3::as_dvec3))
+    }
+
+    /// Returns the same for corners in f64.
+    pub(crate) fn aabb_of(&self, corners: [DVec3; 3]) -> Aabb {
         /// 8ε, twice the bound of the error.
         const ERROR: f64 = 4.0 * f64::EPSILON;
         let mut min = DVec3::INFINITY;
         let mut max = DVec3::NEG_INFINITY;
-        for corner in triangle.0.map(Vec3::as_dvec3) {
+        for corner in corners {
             let point = self.point(corner);
             let error = ERROR * self.sums(corner);
             // A NaN of any corner must not be lost.
@@ -201,10 +206,17 @@ impl Frame {
     /// Returns the ray for boxes in the frame that it begins near to.
     #[inline(always)]
     pub(crate) fn ray(&self, ray: &Ray) -> Ray {
-        let origin = self.point(ray.origin().as_dvec3()).as_vec3();
-        let direction = self.direction(ray.direction().as_dvec3());
+        let ends = ray.ends().map(Vec3::as_dvec3);
+        self.ray_of(ends, [ray.t_min(), ray.t_max()])
+    }
+
+    /// Returns the same for an origin and a direction in f64.
+    #[inline(always)]
+    pub(crate) fn ray_of(&self, [origin, direction]: [DVec3; 2], [t_min, t_max]: [f32; 2]) -> Ray {
+        let origin = self.point(origin).as_vec3();
+        let direction = self.direction(direction);
         let inverse = (Self::ABOVE / direction).as_vec3();
-        Ray::with_inverse(origin, direction.as_vec3(), inverse, ray.t_min(), ray.t_max())
+        Ray::with_inverse(origin, direction.as_vec3(), inverse, t_min, t_max)
     }
 
     /// Returns by how much rays that begin near a scene are off in the frame, apart from the

@@ -7,6 +7,7 @@ mod clip;
 mod collapse;
 pub mod cost;
 mod dispatch;
+mod double;
 mod exact;
 mod expansion;
 pub mod export;
@@ -31,6 +32,7 @@ pub use aabb::{Aabb, InvalidBox, InvalidBoxReason, check_boxes};
 pub use bvh::{Bvh, BvhView, MAX_OBJECTS, Node, NodeKind};
 pub use clip::Clip;
 pub use collapse::collapse_leaves;
+pub use double::{DHit, DRay, DTriangle, Orientation, OutOfExactRange, Select};
 pub use export::FirstCountNode;
 pub use frame::{Frame, InFrame, InvalidFrame};
 pub use mesh::MeshError;
@@ -50,8 +52,8 @@ pub use validate::{InvalidBvh, validate, validate_references};
 #[doc(hidden)]
 pub use wide::NodeTest;
 pub use wide::{
-    Closest, Coherence, Instance, InstanceHit, Instances, InvalidInstances, Kernel, RefitError,
-    WideBvh,
+    Closest, Coherence, DWideBvh, Instance, InstanceHit, Instances, InvalidInstances, Kernel,
+    RefitError, WideBvh,
 };
 
 pub use glam;

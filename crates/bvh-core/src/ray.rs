@@ -1,5 +1,6 @@
 //! A valid ray: finite, with a direction, over a range of distances.
 
+use crate::exact::Line;
 use glam::{Vec3, Vec4};
 
 /// The points `origin + t · direction` with `t_min <= t <= t_max`.
@@ -174,6 +175,17 @@ impl Ray {
     #[inline]
     pub fn t_max(&self) -> f32 {
         self.direction.w
+    }
+
+    /// Returns the origin and the direction.
+    #[inline(always)]
+    pub(crate) fn ends(&self) -> [Vec3; 2] {
+        [self.origin(), self.direction()]
+    }
+
+    #[inline(always)]
+    pub(crate) fn line(&self) -> Line {
+        Line::new(self.origin(), self.direction())
     }
 
     /// Returns the point at distance `t`, in f32.

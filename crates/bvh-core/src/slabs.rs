@@ -85,19 +85,22 @@ impl Slabs {
     pub fn in_frame(ray: &Ray, frame: Option<&Frame>, bounds: &Aabb) -> Self {
         match frame {
             None => Self::new(ray, bounds),
-            Some(frame) => Self::of_frame(ray, frame, bounds),
+            Some(frame) => {
+                let ends = ray.ends().map(Vec3::as_dvec3);
+                Self::of_frame(&frame.ray(ray), ends, frame, bounds)
+            }
         }
     }
 
+    /// Prepares a ray of these ends, whose form in the frame is `boxed`.
     #[inline(never)]
-    fn of_frame(ray: &Ray, frame: &Frame, bounds: &Aabb) -> Self {
-        let in_frame = frame.ray(ray);
-        let is_far = in_frame.is_far_from(bounds);
-        let far_ray = is_far.then(|| FarRay::in_frame(ray, frame, bounds));
-        let origin = frame.point(ray.origin().as_dvec3());
+    pub(crate) fn of_frame(boxed: &Ray, ends: [DVec3; 2], frame: &Frame, bounds: &Aabb) -> Self {
+        let is_far = boxed.is_far_from(bounds);
+        let far_ray = is_far.then(|| FarRay::in_frame(ends, frame, bounds));
+        let origin = frame.point(ends[0]);
         let slack = DVec3::splat(Frame::slack(bounds));
         let origins = [round_up(origin + slack), round_down(origin - slack)];
-        Self::from_origins(&in_frame, origins, far_ray)
+        Self::from_origins(boxed, origins, far_ray)
     }
 
     #[inline(always)]
@@ -232,11 +235,10 @@ impl FarRay {
     }
 
     /// Returns the ray for boxes that lie in a frame, and inside `bounds` there.
-    pub(crate) fn in_frame(ray: &Ray, frame: &Frame, bounds: &Aabb) -> Self {
-        let origin = ray.origin().as_dvec3();
+    pub(crate) fn in_frame([origin, direction]: [DVec3; 2], frame: &Frame, bounds: &Aabb) -> Self {
         let slack = DVec3::splat(frame.far_slack(origin, bounds));
         let origin = frame.point(origin);
-        let direction = frame.direction(ray.direction().as_dvec3());
+        let direction = frame.direction(direction);
         Self { lower: origin + slack, upper: origin - slack, direction }
     }
 

@@ -28,7 +28,7 @@ impl PreparedRay {
     /// Prepares a ray.
     #[inline(always)]
     pub fn new(ray: &Ray) -> Self {
-        Self { ray: *ray, line: Line::new(ray) }
+        Self { ray: *ray, line: ray.line() }
     }
 }
 
@@ -85,7 +85,7 @@ impl Triangle {
     /// triangle's plane. Their sum is 1. They interpolate values of the corners, such as normals,
     /// at a hit. Returns `None` for a ray in the plane.
     pub fn barycentrics(&self, ray: &Ray) -> Option<[f64; 3]> {
-        let weights = Line::new(ray).weights(&self.0);
+        let weights = ray.line().weights(&self.0);
         let sum: f64 = weights.iter().sum();
         (sum != 0.0).then(|| weights.map(|weight| weight / sum))
     }
@@ -137,7 +137,7 @@ impl Triangle {
     /// assert_eq!(triangle.intersect(&PreparedRay::new(&ray), 9.0), Some(1.0 / 3.0));
     /// ```
     pub fn intersect(&self, prepared: &PreparedRay, t_max: f32) -> Option<f32> {
-        let t = prepared.line.crossing(&prepared.ray, &self.0, false)?;
+        let t = prepared.line.crossing(prepared.ray.ends(), &self.0, false)?;
         (prepared.ray.t_min() <= t && t <= t_max).then_some(t)
     }
 
@@ -157,7 +157,7 @@ impl Triangle {
     /// assert_eq!(Triangle::from([a, c, d]).crossing(&diagonal), None);
     /// ```
     pub fn crossing(&self, ray: &Ray) -> Option<f32> {
-        let t = Line::new(ray).crossing(ray, &self.0, true)?;
+        let t = ray.line().crossing(ray.ends(), &self.0, true)?;
         (ray.t_min() <= t && t <= ray.t_max()).then_some(t)
     }
 }

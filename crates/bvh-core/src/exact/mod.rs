@@ -3,7 +3,7 @@
 //! # Meaning of an answer
 //!
 //! A ray has an origin `o`, a direction `d` and a range `t_min..=t_max`, a triangle has corners
-//! `a`, `b`, `c`; all are f32 and count as exact real numbers. The ray *meets* the triangle if its
+//! `a`, `b`, `c`; all are f32, or all f64, and count as exact real numbers. The ray *meets* the triangle if its
 //! line crosses the closed triangle (edges and corners belong to it) and is not parallel to the
 //! triangle's plane. With `A = a − o` and so on,
 //!
@@ -13,12 +13,12 @@
 //!   distance  t = A · n / d · n
 //! ```
 //!
-//! The real distance is *rounded once*, to the nearest f32, ties to even. The ray *hits* the
+//! The real distance is *rounded once*, to the nearest number, ties to even. The ray *hits* the
 //! triangle if `t ≥ 0` and `t_min ≤ rounded t ≤ t_max`. The cases at the border follow:
 //!
 //! - Triangles without area, and rays in a triangle's plane, have `d · n = 0`: never hit.
-//! - A triangle behind the origin is not hit, even very close to the origin; a distance below 2⁻¹⁵⁰
-//!   rounds to +0, and no distance is −0.
+//! - A triangle behind the origin is not hit, even very close to the origin; a distance below half
+//!   of the least number rounds to +0, and no distance is −0.
 //! - A distance that rounds to infinity is beyond every `t_max`.
 //! - A triangle with a corner that is not finite is never hit.
 //!
@@ -78,20 +78,22 @@
 //! predicates' (filters and expansions). Differs from Woop et al.: the shear decides no answer,
 //! because the next layer decides every answer within the errors of the shear.
 
+mod number;
+mod quotient;
 mod volumes;
 
-use crate::Ray;
-use crate::ray::{AXES, largest_axis};
-use glam::Vec3;
+use crate::ray::AXES;
+pub(crate) use number::{Number, Point};
+use quotient::{NARROWER, Twice};
 use volumes::Volumes;
 
 /// The answer of a layer with rounding errors about a line and a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Verdict {
-    /// The line does not cross the triangle, or crosses it behind the origin or beyond every f32.
+    /// The line does not cross the triangle, or crosses it behind the origin.
     Miss,
-    /// The line crosses the triangle at this distance, rounded from the real distance.
-    Hit(f32),
+    /// The line crosses the triangle between these distances, which are not negative.
+    Between(f64, f64),
     /// The error bound allows several answers.
     Unsure,
 }
@@ -109,25 +111,28 @@ pub(crate) struct Line {
 pub(crate) const ERROR: f64 = 1.0 / (1_u64 << 47) as f64;
 
 impl Line {
-    pub(crate) fn new(ray: &Ray) -> Self {
-        let origin = ray.origin();
-        let direction = ray.direction();
-        let axes = AXES[largest_axis(ray)];
+    #[inline(always)]
+    pub(crate) fn new<P: Point>(origin: P, direction: P) -> Self {
+        let origin = origin.double();
+        let direction = direction.double();
+        let [x, y, z] = direction.map(f64::abs);
+        let axis = if z > larger(x, y) { 2 } else { usize::from(y > x) };
+        let axes = AXES[axis];
         Self {
-            origin: axes.map(|axis| f64::from(origin[axis])),
-            direction: axes.map(|axis| f64::from(direction[axis])),
+            origin: axes.map(|axis| origin[axis]),
+            direction: axes.map(|axis| direction[axis]),
             axes,
         }
     }
 
     /// Returns the triangle's corners relative to the origin, in the order of `axes`.
     #[inline(always)]
-    fn relative(&self, triangle: &[Vec3; 3]) -> [[f64; 3]; 3] {
+    fn relative<P: Point>(&self, triangle: &[P; 3]) -> [[f64; 3]; 3] {
         let [kx, ky, kz] = self.axes;
         let [ox, oy, oz] = self.origin;
-        let relative = |corner: Vec3| {
-            let corner: &[f32; 3] = corner.as_ref();
-            [f64::from(corner[kx]) - ox, f64::from(corner[ky]) - oy, f64::from(corner[kz]) - oz]
+        let relative = |corner: P| {
+            let corner = corner.double();
+            [corner[kx] - ox, corner[ky] - oy, corner[kz] - oz]
         };
         let [a, b, c] = *triangle;
         [relative(a), relative(b), relative(c)]
@@ -135,10 +140,10 @@ impl Line {
 
     /// Returns the difference of two corners, in the order of `axes`.
     #[inline(always)]
-    fn edge(&self, from: Vec3, to: Vec3) -> [f64; 3] {
-        let from: &[f32; 3] = from.as_ref();
-        let to: &[f32; 3] = to.as_ref();
-        self.axes.map(|axis| f64::from(to[axis]) - f64::from(from[axis]))
+    fn edge<P: Point>(&self, from: P, to: P) -> [f64; 3] {
+        let from = from.double();
+        let to = to.double();
+        self.axes.map(|axis| to[axis] - from[axis])
     }
 
     /// Returns the edge values `u`, `v`, `w`, multiplied by `d_z`, and the bound of their errors.
@@ -156,13 +161,13 @@ impl Line {
     }
 
     /// Returns the edge values, computed in f64 and multiplied by `d_z`.
-    pub(crate) fn weights(&self, triangle: &[Vec3; 3]) -> [f64; 3] {
+    pub(crate) fn weights<P: Point>(&self, triangle: &[P; 3]) -> [f64; 3] {
         self.edges(&self.relative(triangle)).0
     }
 
     /// Decides in f64 if the error bounds permit.
     #[inline(always)]
-    pub(crate) fn filter(&self, triangle: &[Vec3; 3]) -> Verdict {
+    pub(crate) fn filter<P: Point>(&self, triangle: &[P; 3]) -> Verdict {
         let corners = self.relative(triangle);
         let ([u, v, w], error) = self.edges(&corners);
         let least = u.min(v).min(w);
@@ -178,7 +183,7 @@ impl Line {
 
     /// Decides in f64 where the line crosses the triangle's plane if the error bounds permit.
     #[inline(always)]
-    fn plane(&self, corner: &[f64; 3], [first, second, third]: &[Vec3; 3]) -> Verdict {
+    fn plane<P: Point>(&self, corner: &[f64; 3], [first, second, third]: &[P; 3]) -> Verdict {
         let to_second = self.edge(*first, *second);
         let to_third = self.edge(*first, *third);
         let (normal, products) = normal(&to_second, &to_third);
@@ -195,16 +200,45 @@ impl Line {
         if high < 0.0 {
             return Verdict::Miss;
         }
-        let low_rounded = low as f32;
-        let high_rounded = high as f32;
-        if low >= 0.0 && low_rounded == high_rounded {
-            return if high_rounded.is_finite() {
-                Verdict::Hit(high_rounded)
-            } else {
-                Verdict::Miss
-            };
+        if low >= 0.0 { Verdict::Between(low, high) } else { Verdict::Unsure }
+    }
+
+    /// Returns the side from which the line comes to a triangle that it crosses: 1 along the normal,
+    /// −1 against it, and 0 for a line parallel to its plane.
+    #[inline]
+    pub(crate) fn side<P: Point>(&self, ray: [P; 2], triangle: &[P; 3]) -> i32 {
+        let [first, second, third] = *triangle;
+        let (normal, products) = normal(&self.edge(first, second), &self.edge(first, third));
+        let along = dot(&self.direction, &normal);
+        if ERROR * dot(&self.direction.map(f64::abs), &products) < along.abs() {
+            return if along > 0.0 { 1 } else { -1 };
         }
-        Verdict::Unsure
+        let [origin, direction] = ray;
+        Volumes::new(origin, direction, triangle).map_or(0, |volumes| volumes.speed().sign())
+    }
+
+    /// Returns the distance of the plane of a triangle that the line crosses at or in front of the
+    /// origin, rounded once, where the distance in f64 is off by at most `slack`.
+    #[inline(never)]
+    pub(crate) fn rounded<P: Point<Number = f64>>(
+        &self,
+        ray: [P; 2],
+        triangle: &[P; 3],
+        slack: f64,
+    ) -> f64 {
+        let [origin, direction] = ray;
+        let [a, b, c] = triangle.map(P::double);
+        let minus = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|i| Twice::difference(p[i], q[i]));
+        let corner = minus(a, origin.double());
+        let Twice(high, low) =
+            quotient::distance(&corner, &direction.double(), &minus(b, a), &minus(c, a));
+        let slack = slack * NARROWER;
+        let rounded = high + (low + slack);
+        if high + (low - slack) == rounded {
+            return rounded + 0.0;
+        }
+        let volumes = Volumes::new(origin, direction, triangle);
+        volumes.and_then(|volumes| volumes.rounded_distance()).unwrap_or(high)
     }
 
     /// Returns the rounded distance at which the ray's line crosses the triangle at or in front of
@@ -212,8 +246,13 @@ impl Line {
     /// rule of [`Triangle::crossing`](crate::Triangle::crossing). Does not allocate.
     #[cold]
     #[inline(never)]
-    fn distance(&self, ray: &Ray, triangle: &[Vec3; 3], is_moved: bool) -> Option<f32> {
-        let volumes = Volumes::new(ray, triangle)?;
+    fn distance<P: Point>(
+        &self,
+        [origin, direction]: [P; 2],
+        triangle: &[P; 3],
+        is_moved: bool,
+    ) -> Option<P::Number> {
+        let volumes = Volumes::new(origin, direction, triangle)?;
         let corners = self.relative(triangle);
         let (edges, error) = self.edges(&corners);
         // The edge values in f64 are multiplied by the depth.
@@ -239,28 +278,44 @@ impl Line {
         if sides.contains(&-1) && sides.contains(&1) || is_moved && sides.contains(&0) {
             return None;
         }
-        match verdict {
-            Verdict::Hit(t) => Some(t),
-            _ => volumes.rounded_distance(),
+        match rounded(verdict) {
+            Some(distance) => distance,
+            None => volumes.rounded_distance(),
         }
     }
 
     /// Returns the rounded distance at which the ray crosses the triangle at or in front of the
     /// origin, by the rule of [`Triangle::crossing`](crate::Triangle::crossing) if the origin is
     /// moved, otherwise by that of [`Triangle::intersect`](crate::Triangle::intersect). `self` is
-    /// the line of `ray`.
+    /// the line of this origin and this direction.
     #[inline(always)]
-    pub(crate) fn crossing(&self, ray: &Ray, triangle: &[Vec3; 3], is_moved: bool) -> Option<f32> {
-        match self.filter(triangle) {
-            Verdict::Miss => None,
-            Verdict::Hit(t) => Some(t),
-            Verdict::Unsure => self.distance(ray, triangle, is_moved),
+    pub(crate) fn crossing<P: Point>(
+        &self,
+        ray: [P; 2],
+        triangle: &[P; 3],
+        is_moved: bool,
+    ) -> Option<P::Number> {
+        let verdict = self.filter(triangle);
+        if verdict == Verdict::Miss {
+            return None;
+        }
+        match rounded(verdict) {
+            Some(distance) => distance,
+            None => self.distance(ray, triangle, is_moved),
         }
     }
 }
 
+/// Returns the rounded distance, if the verdict decides it: `Some(None)` beyond every number.
+#[inline(always)]
+fn rounded<N: Number>(verdict: Verdict) -> Option<Option<N>> {
+    let Verdict::Between(low, high) = verdict else { return None };
+    let rounded = N::rounded(high);
+    (N::rounded(low) == rounded).then(|| rounded.is_finite().then_some(rounded))
+}
+
 /// Returns whether a triangle has no area; false if a corner is not finite.
-pub(crate) fn is_degenerate(triangle: &[Vec3; 3]) -> bool {
+pub(crate) fn is_degenerate<P: Point>(triangle: &[P; 3]) -> bool {
     triangle.iter().all(|corner| corner.is_finite())
         && (0..3).all(|axis| normal_sign(triangle, axis) == 0)
 }
@@ -268,8 +323,8 @@ pub(crate) fn is_degenerate(triangle: &[Vec3; 3]) -> bool {
 /// Returns the sign of a component of a finite triangle's normal: −1, 0 or 1. Each rounding in f64,
 /// of two differences, a product and their difference, is off by ε of the sum of the absolute
 /// products, which the bound 64ε covers.
-pub(crate) fn normal_sign(triangle: &[Vec3; 3], axis: usize) -> i32 {
-    let [a, b, c] = triangle.map(|corner| corner.to_array().map(f64::from));
+pub(crate) fn normal_sign<P: Point>(triangle: &[P; 3], axis: usize) -> i32 {
+    let [a, b, c] = triangle.map(P::double);
     let edge = |from: [f64; 3], to: [f64; 3]| [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
     let (normal, products) = normal(&edge(a, b), &edge(a, c));
     let error = ERROR * products[axis];

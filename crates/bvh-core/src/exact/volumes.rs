@@ -1,14 +1,13 @@
 //! The exact values that decide whether a ray hits a triangle, as expansions.
 
-use crate::Ray;
+use super::{Number, Point};
 use crate::expansion::Expansion;
-use glam::Vec3;
 
 /// An exact difference of two points.
 type Vector = [Expansion<2>; 3];
 
 #[inline]
-fn difference(p: Vec3, q: Vec3) -> Vector {
+fn difference(p: [f64; 3], q: [f64; 3]) -> Vector {
     let mut vector = [Expansion::zero(); 3];
     for (axis, component) in vector.iter_mut().enumerate() {
         *component = Expansion::difference(p[axis], q[axis]);
@@ -26,9 +25,9 @@ fn add_cross(sum: &mut Expansion<16>, p: &Vector, q: &Vector, axis: usize) {
 }
 
 /// The exact values that decide whether a ray hits a triangle.
-pub(super) struct Volumes<'a> {
-    direction: Vec3,
-    triangle: &'a [Vec3; 3],
+pub(super) struct Volumes {
+    direction: [f64; 3],
+    triangle: [[f64; 3]; 3],
     /// The corners relative to the origin.
     corners: [Vector; 3],
 }
@@ -36,18 +35,17 @@ pub(super) struct Volumes<'a> {
 /// The first and the second corner of the edges `u`, `v`, `w`.
 const EDGES: [[usize; 2]; 3] = [[2, 1], [0, 2], [1, 0]];
 
-impl<'a> Volumes<'a> {
+impl Volumes {
     /// Prepares exact values; `None` if a coordinate is not finite.
-    pub(super) fn new(ray: &Ray, triangle: &'a [Vec3; 3]) -> Option<Self> {
+    pub(super) fn new<P: Point>(origin: P, direction: P, triangle: &[P; 3]) -> Option<Self> {
         let [a, b, c] = *triangle;
-        let origin = ray.origin();
-        let direction = ray.direction();
         let is_finite = [a, b, c, origin, direction].iter().all(|point| point.is_finite());
         if !is_finite {
             return None;
         }
-        let corners = [difference(a, origin), difference(b, origin), difference(c, origin)];
-        Some(Self { direction, triangle, corners })
+        let triangle = triangle.map(P::double);
+        let corners = triangle.map(|corner| difference(corner, origin.double()));
+        Some(Self { direction: direction.double(), triangle, corners })
     }
 
     /// Returns the side of an edge on which the ray is: −1, 0 or 1.
@@ -57,7 +55,7 @@ impl<'a> Volumes<'a> {
         for axis in 0..3 {
             let mut normal = Expansion::zero();
             add_cross(&mut normal, &self.corners[first], &self.corners[second], axis);
-            volume.add_scaled(&normal, f64::from(self.direction[axis]));
+            volume.add_scaled(&normal, self.direction[axis]);
         }
         volume.sign()
     }
@@ -67,22 +65,34 @@ impl<'a> Volumes<'a> {
     pub(super) fn moved_side(&self, edge: usize) -> i32 {
         let [first, second] = EDGES[edge];
         let edge = difference(self.triangle[second], self.triangle[first]);
-        let direction = self.direction.to_array().map(f64::from);
         [(1, 2), (2, 0), (0, 1)]
             .into_iter()
             .map(|(i, j)| {
                 let mut component: Expansion<8> = Expansion::zero();
-                component.add_scaled(&edge[j], direction[i]);
-                component.add_scaled(&edge[i], -direction[j]);
+                component.add_scaled(&edge[j], self.direction[i]);
+                component.add_scaled(&edge[i], -self.direction[j]);
                 component.sign()
             })
             .find(|&sign| sign != 0)
             .unwrap_or(0)
     }
 
+    /// Returns d · n, exactly.
+    pub(super) fn speed(&self) -> Expansion<96> {
+        let [a, b, c] = self.triangle;
+        let (to_second, to_third) = (difference(b, a), difference(c, a));
+        let mut speed = Expansion::zero();
+        for axis in 0..3 {
+            let mut normal = Expansion::zero();
+            add_cross(&mut normal, &to_second, &to_third, axis);
+            speed.add_scaled(&normal, self.direction[axis]);
+        }
+        speed
+    }
+
     /// Returns the distance of the triangle's plane, rounded once; `None` as [`round_quotient`].
-    pub(super) fn rounded_distance(&self) -> Option<f32> {
-        let [a, b, c] = *self.triangle;
+    pub(super) fn rounded_distance<N: Number>(&self) -> Option<N> {
+        let [a, b, c] = self.triangle;
         let to_second = difference(b, a);
         let to_third = difference(c, a);
         let mut height = Expansion::zero();
@@ -91,7 +101,7 @@ impl<'a> Volumes<'a> {
             let mut normal = Expansion::zero();
             add_cross(&mut normal, &to_second, &to_third, axis);
             height.add_product(&normal, &self.corners[0][axis]);
-            speed.add_scaled(&normal, f64::from(self.direction[axis]));
+            speed.add_scaled(&normal, self.direction[axis]);
         }
         round_quotient(&height, &speed)
     }
@@ -100,49 +110,70 @@ impl<'a> Volumes<'a> {
 /// Returns the sign of a component of a finite triangle's normal, by exact arithmetic.
 #[cold]
 #[inline(never)]
-pub(super) fn normal_sign(&[a, b, c]: &[Vec3; 3], axis: usize) -> i32 {
+pub(super) fn normal_sign<P: Point>(triangle: &[P; 3], axis: usize) -> i32 {
+    let [a, b, c] = triangle.map(P::double);
     let mut normal = Expansion::zero();
     add_cross(&mut normal, &difference(b, a), &difference(c, a), axis);
     normal.sign()
 }
 
-/// Returns the quotient, rounded to the nearest f32, ties to even; `None` if it is negative, if the
-/// denominator is zero, or if the quotient rounds to infinity.
-fn round_quotient(numerator: &Expansion<192>, denominator: &Expansion<96>) -> Option<f32> {
+/// Returns the quotient, rounded to the nearest number, ties to even; `None` if it is negative, if
+/// the denominator is zero, or if the quotient rounds to infinity.
+fn round_quotient<N: Number>(numerator: &Expansion<192>, denominator: &Expansion<96>) -> Option<N> {
     let sign = denominator.sign();
     if sign == 0 || numerator.sign() * sign < 0 {
         return None;
     }
-    // The relative error of this quotient is below 2⁻³⁸, so it rounds to the right f32 or to a
-    // neighbour.
-    let near = ((numerator.approximate() / denominator.approximate()) as f32).min(f32::MAX);
-    // The side of `middle` on which the exact quotient is: −1, 0 or 1.
-    let side = |middle: f64| {
-        let mut difference: Expansion<384> = numerator.widened();
-        difference.add_scaled(denominator, -middle);
-        difference.sign() * sign
+    if numerator.sign() == 0 {
+        return Some(N::rounded(0.0));
+    }
+    // Scaled so that the quotient is about 1: products neither overflow nor lose bits below the
+    // least number.
+    let exponent = |x: f64| libm::ilogb(x);
+    let shift = exponent(numerator.approximate()) - exponent(denominator.approximate());
+    let [up, down] = [shift, -shift].map(|shift| libm::scalbn(1.0, shift.max(0)));
+    let denominator = denominator.scaled(up);
+    let numerator = numerator.scaled(down);
+    // The exact difference of the numerator and a multiple of the denominator.
+    let remainder = |parts: [f64; 2]| {
+        let mut remainder: Expansion<576> = numerator.widened();
+        parts.iter().for_each(|part| remainder.add_scaled(&denominator, -part));
+        remainder
     };
-    let is_odd = near.to_bits() & 1 == 1;
-    let above = side(middle_above(near));
-    if above > 0 || (above == 0 && is_odd) {
+    // Each quotient has a relative error below 2⁻³⁸, and so their sum one below 2⁻⁷⁵: it rounds to
+    // the right number or to a neighbour.
+    let speed = denominator.approximate();
+    let first = numerator.approximate() / speed;
+    let second = remainder([first, 0.0]).approximate() / speed;
+    let near = N::rounded(libm::scalbn(first + second, shift));
+    let near = if near.is_finite() { near } else { near.next_down() };
+    // The side of the middle between a number and the one above it on which the exact quotient is:
+    // −1, 0 or 1.
+    let side_of_middle = |below: N| {
+        let below_scaled = libm::scalbn(below.double(), -shift);
+        let step = half_step(below, shift);
+        remainder([below_scaled, step]).sign() * sign
+    };
+    let above = side_of_middle(near);
+    if above > 0 || (above == 0 && near.is_odd()) {
         let up = near.next_up();
         return up.is_finite().then_some(up);
     }
-    if near > 0.0 {
-        let below = side(middle_above(near.next_down()));
-        if below < 0 || (below == 0 && is_odd) {
+    if near.double() > 0.0 {
+        let below = side_of_middle(near.next_down());
+        if below < 0 || (below == 0 && near.is_odd()) {
             return Some(near.next_down());
         }
     }
     // Turn −0 into +0.
-    Some(near + 0.0)
+    Some(N::rounded(near.double() + 0.0))
 }
 
-/// Returns the middle between a number that is not negative and the next f32. The number after the
-/// largest f32 is 2¹²⁸.
-fn middle_above(number: f32) -> f64 {
-    const BEYOND: f64 = 2.0 * (1_u128 << 127) as f64;
+/// Returns half of the step from a number that is not negative to the next one, times 2^−shift. The
+/// number after the largest one is a power of two.
+fn half_step<N: Number>(number: N, shift: i32) -> f64 {
     let next = number.next_up();
-    let next = if next.is_finite() { f64::from(next) } else { BEYOND };
-    0.5 * (f64::from(number) + next)
+    let (from, to) = if next.is_finite() { (number, next) } else { (number.next_down(), number) };
+    // The step is a power of two: scaled first, since half of the least one is none.
+    libm::scalbn(to.double() - from.double(), -shift - 1)
 }

@@ -98,7 +98,7 @@ impl WideBvh {
             // SAFETY: a layout's kernel is available.
             return unsafe { vector::dispatch(self.kernel, OneRay { wide: self, ray, hits }) };
         }
-        let line = Line::new(ray);
+        let line = ray.line();
         let slabs = self.slabs(ray);
         let intervals = |node: &WideNode| portable::intervals(&slabs, node);
         portable::traverse::<ANY_HIT>(self, ray.t_max(), intervals, &mut (), |block, _| {
@@ -144,7 +144,7 @@ fn append_sorted(found: &[Found], hits: &mut Vec<Hit>, counts: &mut [u32]) {
 
 #[inline(always)]
 fn hit_of(ray: &Ray, line: &Line, object: u32, triangle: &Triangle) -> Option<Hit> {
-    let t = line.crossing(ray, &triangle.0, true)?;
+    let t = line.crossing(ray.ends(), &triangle.0, true)?;
     (ray.t_min() <= t && t <= ray.t_max()).then_some(Hit { t, object })
 }
 
@@ -210,7 +210,7 @@ impl<K: Instructions> Task<K> for OneRay<'_> {
         let Self { wide, ray, hits } = self;
         // SAFETY: the processor has the instructions of `K`.
         unsafe {
-            let leaf_ray = LeafRay::<K::Block>::new(ray, &wide.bounds);
+            let leaf_ray = LeafRay::<K::Block>::new(ray, wide);
             traverse::<K, ANY_HIT>(wide, ray, &mut AllHits { ray, leaf_ray, hits });
         }
     }
@@ -275,7 +275,7 @@ impl Decided {
     ) -> Option<Hit> {
         if self.unsure >> pair & 1 != 0 {
             let (object, triangle) = block.triangle(lane)?;
-            return hit_of(ray, &Line::new(ray), object, &triangle);
+            return hit_of(ray, &ray.line(), object, &triangle);
         }
         let hit = Hit { t: self.distances[pair & 15], object: block.id(lane) };
         (self.hits >> pair & 1 != 0).then_some(hit)

@@ -16,6 +16,17 @@ pub(crate) trait Find {
     /// Whether every hit counts, and none shortens a ray.
     const ALL: bool = false;
 
+    /// Whether the layers in f32 only pass on pairs that may be hits, and `decide` decides them.
+    const DECIDES: bool = false;
+    /// Whether a certain hit in f32 is an answer.
+    const TAKES_CERTAIN: bool = true;
+
+    /// Decides whether an object is the new nearest hit of a ray, and returns the distance beyond
+    /// which no box counts then.
+    fn decide(&mut self, _number: usize, _object: u32) -> Option<f32> {
+        None
+    }
+
     /// Writes the answer for a ray: the distance at which its traversal ended, and the hit object,
     /// `u32::MAX` for none.
     fn write(&mut self, _number: usize, _t: f32, _object: u32) {}

@@ -51,8 +51,14 @@ fn sizes(tree: &Bvh, decisions: &[Decision]) -> (usize, usize) {
 }
 
 /// The wide layout of least expected cost for rays that enter the nodes of `tree` as often as
-/// `visits` says, by default for random lines. `tree` must be valid over the triangles' boxes.
-pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) -> WideBvh {
+/// `visits` says, by default for random lines. `tree` must be valid over the triangles' boxes. Some
+/// triangles may be left out.
+pub(crate) fn widen(
+    tree: &Bvh,
+    triangles: &[Triangle],
+    visits: Option<&[f32]>,
+    is_left_out: impl Fn(u32) -> bool,
+) -> WideBvh {
     let bounds = tree.root_aabb().unwrap_or(Aabb::EMPTY);
     let mut wide = WideBvh {
         bounds,
@@ -61,6 +67,7 @@ pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) 
         blocks: Vec::new(),
         near: Aabb::EMPTY,
         framed: None,
+        error_factor: 1.0,
         kernel: Kernel::best(),
         stack_need: 0,
     };
@@ -102,7 +109,7 @@ pub(crate) fn widen(tree: &Bvh, triangles: &[Triangle], visits: Option<&[f32]>) 
             ids.sort_unstable();
             ids.dedup();
         }
-        ids.retain(|&id| !triangles[id as usize].is_degenerate());
+        ids.retain(|&id| !is_left_out(id));
         if ids.is_empty() {
             return None;
         }

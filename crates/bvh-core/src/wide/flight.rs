@@ -269,6 +269,7 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
                 let at = |k: usize| *self.at_leaves.get_unchecked((i + k).min(count - 1));
                 let four = [at(0), at(1), at(2), at(3)];
                 let (crossings, sure) = candidates::<K::Rays, F>(wide, four);
+                let sure = if F::TAKES_CERTAIN { sure } else { 0 };
                 for (k, &traversal) in four.iter().enumerate().take(quarters) {
                     let four = |pairs: u32| pairs >> (4 * k) & 0b1111;
                     let is_hit = F::ANY && four(sure) != 0;
@@ -305,6 +306,10 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
     #[inline(always)]
     unsafe fn decide(&mut self, hopeful: &[Hopeful]) {
         let wide = self.wide;
+        if F::DECIDES {
+            // SAFETY: the processor has the instructions; the rays are at blocks.
+            return unsafe { self.decide_one_by_one(hopeful) };
+        }
         let pairs = &mut self.gathered;
         // SAFETY: the processor has the instructions; the rays are at blocks.
         unsafe {
@@ -339,6 +344,30 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
             if !F::ANY && !F::ALL {
                 for &Hopeful { traversal, .. } in hopeful {
                     (*traversal).drop_farther::<K>();
+                }
+            }
+        }
+    }
+
+    /// Does the same where `find` decides.
+    #[inline(always)]
+    unsafe fn decide_one_by_one(&mut self, hopeful: &[Hopeful]) {
+        for &Hopeful { traversal, possible, .. } in hopeful {
+            // SAFETY: the ray is at a block; the processor has the instructions.
+            unsafe {
+                let traversal = &mut *traversal;
+                let block = traversal.block(self.wide);
+                let number = traversal.ray.number as usize;
+                let mut lanes = possible & block.used::<K::Block>();
+                while lanes != 0 {
+                    let object = block.id(lanes.trailing_zeros() as usize & 3);
+                    lanes &= lanes - 1;
+                    if let Some(t) = self.find.decide(number, object) {
+                        traversal.nearest = u64::from(t.to_bits()) << 32 | u64::from(object);
+                    }
+                }
+                if !F::ANY {
+                    traversal.drop_farther::<K>();
                 }
             }
         }

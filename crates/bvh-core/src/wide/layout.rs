@@ -132,6 +132,8 @@ pub struct WideBvh {
     pub(crate) near: Aabb,
     /// The frame that the boxes lie in, if it is not the file's.
     pub(crate) framed: Option<Box<Framed>>,
+    /// The factor of error bounds in f32, above 1 if corners and rays are rounded.
+    pub(crate) error_factor: f32,
     /// The kernel that traces it. The processor has its instructions.
     pub(crate) kernel: Kernel,
     /// The most children that can be waiting on the way through it.
@@ -145,7 +147,7 @@ pub(crate) struct Framed {
     /// The root's box, padded.
     pub(crate) bounds: Aabb,
     pub(crate) near: Aabb,
-    slack: f64,
+    pub(crate) slack: f64,
 }
 
 impl WideBvh {
@@ -194,7 +196,10 @@ impl WideBvh {
     pub(crate) fn far_ray(&self, ray: &Ray) -> FarRay {
         match &self.framed {
             None => FarRay::new(ray),
-            Some(framed) => FarRay::in_frame(ray, &framed.frame, &framed.bounds),
+            Some(framed) => {
+                let ends = ray.ends().map(Vec3::as_dvec3);
+                FarRay::in_frame(ends, &framed.frame, &framed.bounds)
+            }
         }
     }
 

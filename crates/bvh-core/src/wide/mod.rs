@@ -11,6 +11,7 @@ mod box_ray;
 mod build;
 mod closest;
 mod decide;
+mod double;
 mod flight;
 mod gathered;
 mod instances;
@@ -43,6 +44,7 @@ mod vector;
 pub use batch::Coherence;
 pub use closest::Closest;
 pub(crate) use decide::{BLOCK_COST, NODE_COST};
+pub use double::DWideBvh;
 pub use instances::{Instance, InstanceHit, Instances, InvalidInstances};
 pub use kernel::Kernel;
 pub use layout::WideBvh;
@@ -117,7 +119,8 @@ impl WideBvh {
         validate_references(tree, &boxes, &objects)?;
         // Boxes take a quarter of the layout's memory, and nobody reads them again.
         drop(boxes);
-        Ok(build::widen(tree, triangles, visits))
+        let is_left_out = |id: u32| triangles[id as usize].is_degenerate();
+        Ok(build::widen(tree, triangles, visits, is_left_out))
     }
 
     /// Returns the nearest triangle that `ray` meets in its range. Of several at the same distance,

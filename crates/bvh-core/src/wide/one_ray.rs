@@ -8,7 +8,7 @@ use super::layout::{Child, WideBvh};
 use super::pairs::{Crossings, Pairs};
 use super::triangles::TriangleBlock;
 use crate::ray::{AXES, largest_axis};
-use crate::{Aabb, Hit, Ray};
+use crate::{Hit, Ray};
 use core::mem::MaybeUninit;
 
 /// The search for a ray's nearest hit, or with `ANY` the first one found, among those that `filter`
@@ -26,13 +26,7 @@ impl<K: Instructions, F: Filter, const ANY: bool> Task<K> for OneRay<'_, F, ANY>
     unsafe fn run(self) -> Hit {
         let Self { wide, ray, filter } = self;
         let leaf_ray = MaybeUninit::<LeafRay<K::Block>>::uninit();
-        let mut leaves = FirstHits::<_, _, ANY> {
-            ray,
-            bounds: &wide.bounds,
-            leaf_ray,
-            is_prepared: false,
-            filter,
-        };
+        let mut leaves = FirstHits::<_, _, ANY> { ray, wide, leaf_ray, is_prepared: false, filter };
         // SAFETY: the processor has the instructions of `K`.
         unsafe { traverse::<K, ANY>(wide, ray, &mut leaves) }
     }
@@ -196,7 +190,7 @@ pub(crate) unsafe fn visit<K: Instructions, const ANY: bool>(
 /// Keeps the nearest hit among those that `filter` accepts.
 struct FirstHits<'r, L, F, const ANY: bool> {
     ray: &'r Ray,
-    bounds: &'r Aabb,
+    wide: &'r WideBvh,
     leaf_ray: MaybeUninit<LeafRay<L>>,
     is_prepared: bool,
     filter: F,
@@ -208,7 +202,7 @@ impl<K: Instructions, F: Filter, const ANY: bool> Leaves<K> for FirstHits<'_, K:
         // SAFETY: the processor has the instructions; the ray is prepared before its use.
         unsafe {
             if !self.is_prepared {
-                K::call(Prepare { ray: self.ray, bounds: self.bounds, to: &mut self.leaf_ray });
+                K::call(Prepare { ray: self.ray, wide: self.wide, to: &mut self.leaf_ray });
                 self.is_prepared = true;
             }
             let ray = self.leaf_ray.assume_init_ref();
@@ -257,7 +251,7 @@ impl<K: Instructions, F: Filter, const ANY: bool> Leaves<K> for FirstHits<'_, K:
 /// The preparation of a ray for triangles: most rays in the open meet none.
 struct Prepare<'a, L> {
     ray: &'a Ray,
-    bounds: &'a Aabb,
+    wide: &'a WideBvh,
     to: &'a mut MaybeUninit<LeafRay<L>>,
 }
 
@@ -267,7 +261,7 @@ impl<K: Instructions> Task<K> for Prepare<'_, K::Block> {
     #[inline(always)]
     unsafe fn run(self) {
         // SAFETY: the processor has the instructions.
-        self.to.write(unsafe { LeafRay::new(self.ray, self.bounds) });
+        self.to.write(unsafe { LeafRay::new(self.ray, self.wide) });
     }
 }
 
@@ -301,10 +295,10 @@ pub(crate) struct LeafRay<L> {
 
 impl<L: Lanes> LeafRay<L> {
     #[inline(always)]
-    pub(crate) unsafe fn new(ray: &Ray, bounds: &Aabb) -> Self {
+    pub(crate) unsafe fn new(ray: &Ray, wide: &WideBvh) -> Self {
         let origin = ray.origin().to_array();
         let direction = ray.direction().to_array();
-        let reach = ray.reach(bounds);
+        let reach = ray.reach(&wide.bounds) * wide.error_factor;
         let axes = AXES[largest_axis(ray)];
         // SAFETY: the processor has the instructions.
         unsafe {

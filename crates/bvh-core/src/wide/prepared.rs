@@ -59,6 +59,7 @@ impl<L: Lanes> Ready<L> {
     #[inline(always)]
     pub(crate) fn new((rays, boxed): (RayLanes<L>, BoxLanes<L>), wide: &WideBvh) -> Self {
         let reach = rays.reach(&wide.bounds);
+        let reach = reach * reach.filled(wide.error_factor);
         let far = boxed.beyond(wide.near_box());
         let [x, y, z] = boxed.inverse;
         let near = x.filled(NEAR);

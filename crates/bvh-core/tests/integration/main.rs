@@ -2,6 +2,7 @@
 
 mod all_hits;
 mod closest;
+mod double;
 mod exact;
 mod export;
 mod file;

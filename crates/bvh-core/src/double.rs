@@ -1,0 +1,287 @@
+//! Rays and triangles in f64.
+//!
+//! The definitions are those of [`exact`](crate::exact) with f64 for f32. Exactness needs room for
+//! products of three coordinates: every coordinate, and every component of a direction, is 0 or
+//! between 2⁻¹⁵⁰ and 2¹²⁰ in size. All values of the exact layer are then multiples of 2⁻⁶⁶⁰ below
+//! 2⁵⁰⁰.
+
+use crate::exact::{Line, Verdict, is_degenerate};
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+
+/// A triangle in f64, in world units. Rays can hit both sides.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct DTriangle(pub [DVec3; 3]);
+
+impl From<[[f64; 3]; 3]> for DTriangle {
+    /// Makes a triangle from three corners.
+    fn from(corners: [[f64; 3]; 3]) -> Self {
+        Self(corners.map(DVec3::from))
+    }
+}
+
+/// The points `origin + t · direction` with `t_min <= t <= t_max`, in f64.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DRay {
+    pub(crate) origin: DVec3,
+    pub(crate) direction: DVec3,
+    pub(crate) t_min: f64,
+    pub(crate) t_max: f64,
+}
+
+/// The reason why numbers in f64 are rejected.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum OutOfExactRange {
+    /// A coordinate of a ray's origin.
+    #[error("the ray's origin {0}: accepted are coordinates that are 0 or from 2^-150 to 2^120")]
+    Origin(DVec3),
+    /// A component of a ray's direction, or all of them.
+    #[error(
+        "the ray's direction {0}: accepted are components that are 0 or from 2^-150 to 2^120, the largest from 2^-100 to 2^100"
+    )]
+    Direction(DVec3),
+    /// The range is NaN or extends behind the origin.
+    #[error("the ray's range {0}..={1} must not be NaN and must start at 0 or later")]
+    Range(f64, f64),
+    /// A coordinate of a triangle.
+    #[error(
+        "triangle {triangle} has the corner {corner}: accepted are coordinates that are 0 or from 2^-150 to 2^120"
+    )]
+    Triangle {
+        /// The triangle.
+        triangle: usize,
+        /// The corner.
+        corner: DVec3,
+    },
+}
+
+/// Returns whether all coordinates are in the range in which answers are exact.
+fn is_exact(point: DVec3) -> bool {
+    const LEAST: f64 = 1.0 / (1u128 << 75) as f64 / (1u128 << 75) as f64;
+    const MOST: f64 = (1u128 << 120) as f64;
+    point.to_array().iter().all(|&x| x == 0.0 || (LEAST..=MOST).contains(&x.abs()))
+}
+
+impl DRay {
+    /// Makes the ray from `origin` in `direction` over `t_min..=t_max`. Distances `t` are in
+    /// multiples of the direction's length, which need not be 1. Arrays `[f64; 3]` are accepted.
+    pub fn new(
+        origin: impl Into<DVec3>,
+        direction: impl Into<DVec3>,
+        t_min: f64,
+        t_max: f64,
+    ) -> Result<Self, OutOfExactRange> {
+        const LONG: f64 = (1u128 << 100) as f64;
+        let origin = origin.into();
+        let direction = direction.into();
+        let longest = direction.abs().max_element();
+        if !is_exact(origin) {
+            return Err(OutOfExactRange::Origin(origin));
+        }
+        if !(is_exact(direction) && (1.0 / LONG..=LONG).contains(&longest)) {
+            return Err(OutOfExactRange::Direction(direction));
+        }
+        if !(t_min >= 0.0) || t_max.is_nan() {
+            return Err(OutOfExactRange::Range(t_min, t_max));
+        }
+        // Adding 0 turns −0 into +0.
+        Ok(Self { origin, direction, t_min: t_min + 0.0, t_max: t_max.min(f64::MAX) + 0.0 })
+    }
+
+    /// Makes a half line: `t` from 0 to the largest finite distance.
+    pub fn half_line(
+        origin: impl Into<DVec3>,
+        direction: impl Into<DVec3>,
+    ) -> Result<Self, OutOfExactRange> {
+        Self::new(origin, direction, 0.0, f64::MAX)
+    }
+
+    /// The point where `t` is 0.
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// The unit of `t`: not zero, of any length.
+    pub fn direction(&self) -> DVec3 {
+        self.direction
+    }
+
+    /// The smallest distance of a hit, 0 or more.
+    pub fn t_min(&self) -> f64 {
+        self.t_min
+    }
+
+    /// The largest distance of a hit.
+    pub fn t_max(&self) -> f64 {
+        self.t_max
+    }
+
+    fn is_in_range(&self, t: f64) -> bool {
+        self.t_min <= t && t <= self.t_max
+    }
+}
+
+/// The side from which a ray comes to the triangles that it hits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Orientation {
+    /// Either side.
+    #[default]
+    Any,
+    /// Along the normal of a triangle, whose corners run counterclockwise seen from outside: the ray
+    /// leaves a solid.
+    Exiting,
+    /// Against the normal: the ray enters a solid.
+    Entering,
+}
+
+/// Which hits of a ray count.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Select<'a> {
+    /// The side from which the ray comes.
+    pub orientation: Orientation,
+    /// The ids of triangles that do not count, such as the one that the ray starts on: a few, in any
+    /// order.
+    pub exclude: &'a [u32],
+}
+
+impl Select<'_> {
+    pub(crate) fn counts_all(&self) -> bool {
+        self.orientation == Orientation::Any && self.exclude.is_empty()
+    }
+}
+
+/// A hit of a ray with a triangle in f64.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DHit {
+    /// The distance, in multiples of the direction's length.
+    pub t: f64,
+    /// The triangle's id.
+    pub object: u32,
+}
+
+impl DTriangle {
+    /// Returns the distance at which the ray hits the triangle if that distance is in the ray's
+    /// range: the real distance, rounded once to the nearest f64. The same as
+    /// [`Triangle::intersect`](crate::Triangle::intersect).
+    pub fn intersect(&self, ray: &DRay) -> Option<f64> {
+        self.distance(ray, false)
+    }
+
+    /// Returns the distance at which the ray crosses the triangle, by the rule of
+    /// [`Triangle::crossing`](crate::Triangle::crossing).
+    pub fn crossing(&self, ray: &DRay) -> Option<f64> {
+        self.distance(ray, true)
+    }
+
+    fn distance(&self, ray: &DRay, is_moved: bool) -> Option<f64> {
+        let ends = [ray.origin, ray.direction];
+        let t = Line::new(ray.origin, ray.direction).crossing(ends, &self.0, is_moved)?;
+        ray.is_in_range(t).then_some(t)
+    }
+
+    /// Returns whether the corners coincide or are collinear, in real arithmetic.
+    pub fn is_degenerate(&self) -> bool {
+        is_degenerate(&self.0)
+    }
+}
+
+/// The search for the nearest hit of a ray among triangles that are offered in any order. Distances
+/// are known to the error of f64, and exactly where the answer depends on it.
+pub(crate) struct NearestHit<'a> {
+    ray: DRay,
+    line: Line,
+    select: Select<'a>,
+    nearest: Candidate,
+}
+
+/// A hit at a distance between two bounds, which are equal if it is known.
+#[derive(Clone, Copy)]
+struct Candidate {
+    low: f64,
+    high: f64,
+    object: u32,
+    triangle: DTriangle,
+}
+
+impl<'a> NearestHit<'a> {
+    #[inline]
+    pub(crate) fn new(ray: &DRay, select: Select<'a>) -> Self {
+        let line = Line::new(ray.origin, ray.direction);
+        let triangle = DTriangle([DVec3::ZERO; 3]);
+        let nearest = Candidate { low: ray.t_max, high: ray.t_max, object: u32::MAX, triangle };
+        Self { ray: *ray, line, select, nearest }
+    }
+
+    /// Takes a triangle if the ray hits it nearer, or as near and it has the lower id. Returns
+    /// whether it does.
+    #[inline]
+    pub(crate) fn offer(&mut self, object: u32, triangle: &DTriangle) -> bool {
+        let ends = [self.ray.origin, self.ray.direction];
+        let (low, high) = match self.line.filter(&triangle.0) {
+            Verdict::Miss => return false,
+            Verdict::Between(low, high) => (low, high),
+            Verdict::Unsure => match self.line.crossing(ends, &triangle.0, false) {
+                Some(t) => (t, t),
+                None => return false,
+            },
+        };
+        if high < self.ray.t_min || low > self.nearest.high || !self.counts(object, triangle) {
+            return false;
+        }
+        let mut new = Candidate { low, high, object, triangle: *triangle };
+        if low < self.ray.t_min || high >= self.nearest.low {
+            self.resolve(&mut new);
+            let mut nearest = self.nearest;
+            self.resolve(&mut nearest);
+            self.nearest = nearest;
+            let is_nearer =
+                new.low < nearest.low || new.low == nearest.low && object < nearest.object;
+            if new.low < self.ray.t_min || !is_nearer {
+                return false;
+            }
+        }
+        self.nearest = new;
+        true
+    }
+
+    #[inline]
+    fn counts(&self, object: u32, triangle: &DTriangle) -> bool {
+        let side = match self.select.orientation {
+            Orientation::Any => None,
+            Orientation::Exiting => Some(1),
+            Orientation::Entering => Some(-1),
+        };
+        let ends = [self.ray.origin, self.ray.direction];
+        !self.select.exclude.contains(&object)
+            && side.is_none_or(|side| self.line.side(ends, &triangle.0) == side)
+    }
+
+    /// Finds the rounded distance.
+    fn resolve(&self, candidate: &mut Candidate) {
+        if candidate.low < candidate.high {
+            let ends = [self.ray.origin, self.ray.direction];
+            let slack = candidate.high - candidate.low;
+            candidate.low = self.line.rounded(ends, &candidate.triangle.0, slack);
+            candidate.high = candidate.low;
+        }
+    }
+
+    pub(crate) fn select(&self) -> &Select<'a> {
+        &self.select
+    }
+
+    /// The distance beyond which nothing counts, or more.
+    #[inline]
+    pub(crate) fn limit(&self) -> f64 {
+        self.nearest.high
+    }
+
+    /// Returns the nearest of the hits.
+    pub(crate) fn hit(&self) -> Option<DHit> {
+        let mut nearest = self.nearest;
+        self.resolve(&mut nearest);
+        let is_hit = nearest.object != u32::MAX;
+        is_hit.then_some(DHit { t: nearest.low, object: nearest.object })
+    }
+}

@@ -1,0 +1,85 @@
+//! The numbers that rays and triangles may have: f32 and f64.
+
+use glam::{DVec3, Vec3};
+
+/// A number of coordinates and distances.
+pub(crate) trait Number: Copy + PartialEq + PartialOrd {
+    /// Rounds to the nearest number, ties to even.
+    fn rounded(x: f64) -> Self;
+
+    /// Returns the same number in f64.
+    fn double(self) -> f64;
+
+    fn next_up(self) -> Self;
+
+    fn next_down(self) -> Self;
+
+    /// Returns whether the last bit of the fraction is set.
+    fn is_odd(self) -> bool;
+
+    fn is_finite(self) -> bool;
+}
+
+macro_rules! number {
+    ($name:ident) => {
+        impl Number for $name {
+            #[inline(always)]
+            fn rounded(x: f64) -> Self {
+                x as Self
+            }
+
+            #[inline(always)]
+            fn double(self) -> f64 {
+                self.into()
+            }
+
+            fn next_up(self) -> Self {
+                self.next_up()
+            }
+
+            fn next_down(self) -> Self {
+                self.next_down()
+            }
+
+            fn is_odd(self) -> bool {
+                self.to_bits() & 1 == 1
+            }
+
+            #[inline(always)]
+            fn is_finite(self) -> bool {
+                self.is_finite()
+            }
+        }
+    };
+}
+number!(f32);
+number!(f64);
+
+/// A point or a direction of one of the numbers.
+pub(crate) trait Point: Copy {
+    type Number: Number;
+
+    /// Returns the coordinates in f64.
+    fn double(self) -> [f64; 3];
+
+    fn is_finite(self) -> bool;
+}
+
+macro_rules! point {
+    ($name:ident $number:ident) => {
+        impl Point for $name {
+            type Number = $number;
+
+            #[inline(always)]
+            fn double(self) -> [f64; 3] {
+                self.to_array().map(f64::from)
+            }
+
+            fn is_finite(self) -> bool {
+                self.is_finite()
+            }
+        }
+    };
+}
+point!(Vec3 f32);
+point!(DVec3 f64);

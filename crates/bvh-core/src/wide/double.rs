@@ -1,0 +1,385 @@
+//! The wide layout of triangles in f64.
+//!
+//! Boxes and triangles are laid out in f32, in the frame of the tree, and traversed by the kernels
+//! for f32. What they pass on is decided with the triangles in f64.
+//!
+//! # The bounds
+//!
+//! A corner in f32 is off by uS, with S the largest coordinate in the frame, and a ray's origin by
+//! u|o|. With R the largest coordinate relative to the origin and S ≤ kR, a relative corner is off
+//! by u (S + |o| + R) ≤ 2 (k + 1) uR, and each component of the direction by u of itself, where
+//! [`pairs`](super::pairs) has uR and nothing. The frame's own errors are below 2⁻³⁷ of both.
+//!
+//! With k = 1, a sheared coordinate is off by less than 14.4 uR and an edge value by less than
+//! 4 · 14.4 uRm + 8.5 uRm and a square: less than e (m + e) with e = 128 uR. A difference of depths
+//! is off by 10 uR, X by 5EΔ / |a| + (55 + 17) uR, and the other terms together by 36 uR: less than
+//! e, too. So the bounds of f32 hold with 2kR for R. A half of the largest extent is never more than
+//! R, and so k is at most S over that half.
+
+use super::answer::{ANY_HIT, Find, NEAREST_HIT};
+use super::box_ray::{BoxRay, FarBoxRay};
+use super::instructions::{Instructions, Pending, Task};
+use super::kernel::{SPARE, STACK, deep_stacks};
+use super::lanes::Lanes;
+use super::layout::{WideBvh, WideNode};
+use super::one_ray::{LeafRay, Leaves, visit};
+use super::triangles::TriangleBlock;
+use super::{build, portable, vector};
+use crate::clip::{BUILDERS, VALIDATION, clip_corners};
+use crate::double::NearestHit;
+use crate::slabs::FarRay;
+use crate::{
+    Aabb, Bvh, Clip, Coherence, DHit, DRay, DTriangle, Frame, Hit, InvalidBvh, Kernel, Ray, Select,
+    Slabs, Triangle, validate_references,
+};
+use core::mem::MaybeUninit;
+use glam::{DMat3, DVec3};
+
+/// An immutable copy of a tree and its triangles in f64, for tracing only.
+///
+/// Gives the answers of testing every triangle by [`DTriangle::intersect`], bit by bit, on every
+/// machine and with every [`Kernel`]. Boxes are those of a [`WideBvh`].
+#[derive(Clone, Debug)]
+pub struct DWideBvh {
+    /// The triangles in f32, in the frame.
+    wide: WideBvh,
+    frame: Frame,
+    triangles: Vec<DTriangle>,
+}
+
+/// Triangles in f64 with their parts in a frame.
+#[derive(Debug)]
+struct DoublesInFrame<'a>(&'a [DTriangle], &'a Frame);
+
+impl DoublesInFrame<'_> {
+    fn clip(&self, object: u32, region: &Aabb, slack: f64) -> Aabb {
+        let DTriangle(corners) = self.0[object as usize];
+        let in_frame = || corners.map(|corner| self.1.point(corner));
+        clip_corners(in_frame, self.1.aabb_of(corners), region, slack)
+    }
+}
+
+impl Clip for DoublesInFrame<'_> {
+    fn clip(&self, object: u32, region: &Aabb) -> Aabb {
+        self.clip(object, region, BUILDERS)
+    }
+
+    fn clip_tightly(&self, object: u32, region: &Aabb) -> Aabb {
+        self.clip(object, region, VALIDATION)
+    }
+}
+
+/// A ray as the layout is traversed with it.
+struct Boxed {
+    ray: Ray,
+    ends: [DVec3; 2],
+    /// The factor from distances of the ray to those of its form in f32.
+    scale: f64,
+}
+
+impl DWideBvh {
+    /// Lays out `tree`, valid over the [boxes](Self::boxes) of `triangles`, as [`WideBvh::new`]
+    /// does. Its frame should have its centre in the middle of the scene. O(n) time and memory.
+    pub fn new(tree: &Bvh, triangles: &[DTriangle]) -> Result<Self, InvalidBvh> {
+        let frame = tree
+            .frame
+            .unwrap_or(Frame { axes: [DVec3::X, DVec3::Y, DVec3::Z], centre: DVec3::ZERO });
+        let boxes = Self::boxes(triangles, &frame);
+        validate_references(tree, &boxes, &DoublesInFrame(triangles, &frame))?;
+        drop(boxes);
+        let in_frame = |corner: DVec3| frame.point(corner).as_vec3();
+        let rounded: Vec<Triangle> =
+            triangles.iter().map(|triangle| Triangle(triangle.0.map(in_frame))).collect();
+        let framed = Bvh { frame: Some(frame), ..tree.clone() };
+        let is_left_out = |id: u32| triangles[id as usize].is_degenerate();
+        let mut wide = build::widen(&framed, &rounded, None, is_left_out);
+        if let Some(framed) = wide.framed.take() {
+            let Aabb { min, max } = framed.bounds;
+            let half = 0.5 * (max - min).max_element();
+            let size = min.abs().max(max.abs()).max_element();
+            wide.error_factor = if half > 0.0 { 2.0 * (size / half).max(1.0) } else { f32::MAX };
+            wide.bounds = framed.bounds;
+            wide.near = framed.near;
+        }
+        Ok(Self { wide, frame, triangles: triangles.to_vec() })
+    }
+
+    /// Returns the boxes of triangles in a frame, to build a tree over.
+    pub fn boxes(triangles: &[DTriangle], frame: &Frame) -> Vec<Aabb> {
+        triangles.iter().map(|triangle| frame.aabb_of(triangle.0)).collect()
+    }
+
+    /// Returns a frame along the file's axes with its centre in the middle of the triangles.
+    pub fn centred(triangles: &[DTriangle]) -> Frame {
+        let corners = || triangles.iter().flat_map(|triangle| triangle.0);
+        let min = corners().fold(DVec3::INFINITY, DVec3::min);
+        let max = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let middle = min + (max - min) * 0.5;
+        let centre = if middle.is_finite() { middle } else { DVec3::ZERO };
+        Frame::new(DMat3::IDENTITY, centre)
+            .unwrap_or(Frame { axes: [DVec3::X, DVec3::Y, DVec3::Z], centre: DVec3::ZERO })
+    }
+
+    /// Returns the same layout for another kernel; `None` if this processor cannot run that kernel.
+    pub fn with_kernel(self, kernel: Kernel) -> Option<Self> {
+        Some(Self { wide: self.wide.with_kernel(kernel)?, ..self })
+    }
+
+    /// Returns the nearest triangle that `ray` meets in its range, among those that count. Of several
+    /// at the same distance, the one with the lowest id is nearest.
+    pub fn nearest_hit(&self, ray: &DRay, select: Select) -> Option<DHit> {
+        let mut nearest = NearestHit::new(ray, select);
+        self.search::<NEAREST_HIT>(ray, &mut nearest);
+        nearest.hit()
+    }
+
+    /// Returns whether `ray` meets any triangle that counts in its range.
+    pub fn any_hit(&self, ray: &DRay, select: Select) -> bool {
+        self.search::<ANY_HIT>(ray, &mut NearestHit::new(ray, select))
+    }
+
+    /// Writes the [nearest hit](Self::nearest_hit) of every ray. `select` excludes the same number of
+    /// ids for each ray, ray after ray.
+    ///
+    /// # Panics
+    /// If `rays` and `hits` are not equally many, or the number of excluded ids is no multiple.
+    pub fn nearest_hits(&self, rays: &[DRay], select: Select, hits: &mut [Option<DHit>]) {
+        assert_eq!(rays.len(), hits.len(), "a hit for every ray");
+        self.in_parts(rays, select, hits, |rays, boxed, select, hits| {
+            let state = |(i, ray)| NearestHit::new(ray, select_of(select, rays.len(), i));
+            let states = rays.iter().enumerate().map(state).collect();
+            self.wide.trace(
+                boxed,
+                Nearest { layout: self, rays, states, hits },
+                Coherence::Incoherent,
+            );
+        });
+    }
+
+    /// Writes whether every ray meets [any triangle](Self::any_hit), as
+    /// [`nearest_hits`](Self::nearest_hits) does.
+    ///
+    /// # Panics
+    /// As [`nearest_hits`](Self::nearest_hits).
+    pub fn any_hits(&self, rays: &[DRay], select: Select, hits: &mut [bool]) {
+        assert_eq!(rays.len(), hits.len(), "an answer for every ray");
+        self.in_parts(rays, select, hits, |rays, boxed, select, hits| {
+            if select.counts_all() {
+                let find = Any::<true> { layout: self, rays, select, hits };
+                self.wide.trace(boxed, find, Coherence::Incoherent);
+            } else {
+                let find = Any::<false> { layout: self, rays, select, hits };
+                self.wide.trace(boxed, find, Coherence::Incoherent);
+            }
+        });
+    }
+
+    /// Passes some rays at a time with their forms in f32, with what they exclude and their answers.
+    fn in_parts<T>(
+        &self,
+        rays: &[DRay],
+        select: Select,
+        answers: &mut [T],
+        mut trace: impl FnMut(&[DRay], &[Ray], Select, &mut [T]),
+    ) {
+        /// What is kept of these rays fits in the cache.
+        const AT_ONCE: usize = 512;
+        if rays.is_empty() {
+            return;
+        }
+        let excluded = select.exclude.len() / rays.len();
+        assert_eq!(select.exclude.len(), excluded * rays.len(), "ids to exclude for every ray");
+        let mut boxed = Vec::new();
+        for (part, answers) in answers.chunks_mut(AT_ONCE).enumerate() {
+            let first = part * AT_ONCE;
+            let rays = &rays[first..first + answers.len()];
+            boxed.clear();
+            boxed.extend(rays.iter().map(|ray| self.boxed(ray).ray));
+            let exclude = &select.exclude[excluded * first..excluded * (first + rays.len())];
+            trace(rays, &boxed, Select { exclude, ..select }, answers);
+        }
+    }
+
+    /// Returns the ray in the frame. Its direction has a largest component of about 1, so that f32
+    /// has all distances within the scene.
+    #[inline(always)]
+    fn boxed(&self, ray: &DRay) -> Boxed {
+        let exponent = ray.direction.abs().max_element().to_bits() >> 52;
+        // Powers of two: 2^k, and its reciprocal.
+        let scale = f64::from_bits(exponent << 52);
+        let ends = [ray.origin, ray.direction * f64::from_bits((2046 - exponent) << 52)];
+        let single = |t: f64| ((t * scale) as f32).min(f32::MAX);
+        let ray = self.frame.ray_of(ends, [single(ray.t_min), single(ray.t_max)]);
+        Boxed { ray, ends, scale }
+    }
+
+    /// Offers the triangles that the ray may meet, or with `ANY` ends at the first that counts.
+    /// Returns whether there is one that counts.
+    fn search<const ANY: bool>(&self, ray: &DRay, nearest: &mut NearestHit) -> bool {
+        let boxed = self.boxed(ray);
+        if self.wide.kernel != Kernel::Portable {
+            let task = Search::<ANY> { layout: self, boxed, nearest };
+            // SAFETY: a layout's kernel is available.
+            return unsafe { vector::dispatch(self.wide.kernel, task) };
+        }
+        let slabs = Slabs::of_frame(&boxed.ray, boxed.ends, &self.frame, &self.wide.bounds);
+        let intervals = |node: &WideNode| portable::intervals(&slabs, node);
+        let visit = |block: &TriangleBlock, limit: &mut Hit| {
+            let mut is_nearer = false;
+            for (object, _) in block.triangles() {
+                is_nearer |= nearest.offer(object, &self.triangles[object as usize]);
+            }
+            if is_nearer {
+                *limit = Hit { t: (nearest.limit() * boxed.scale) as f32, object: 0 };
+            }
+            is_nearer
+        };
+        let t_max = boxed.ray.t_max();
+        !portable::traverse::<ANY>(&self.wide, t_max, intervals, &mut (), visit).is_miss()
+    }
+}
+
+/// Returns what counts for one of several rays.
+fn select_of<'a>(select: Select<'a>, rays: usize, number: usize) -> Select<'a> {
+    let excluded = select.exclude.len() / rays;
+    Select { exclude: &select.exclude[excluded * number..][..excluded], ..select }
+}
+
+/// A search by a vector kernel.
+struct Search<'a, 's, const ANY: bool> {
+    layout: &'a DWideBvh,
+    boxed: Boxed,
+    nearest: &'a mut NearestHit<'s>,
+}
+
+impl<K: Instructions, const ANY: bool> Task<K> for Search<'_, '_, ANY> {
+    type Output = bool;
+
+    #[inline(always)]
+    unsafe fn run(self) -> bool {
+        let Self { layout, boxed, nearest } = self;
+        let wide = &layout.wide;
+        let mut stack = [const { MaybeUninit::<Pending>::uninit() }; STACK + SPARE];
+        let mut deep = deep_stacks::<Pending>(1, wide.stack_need);
+        let base = deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
+        let ray = &boxed.ray;
+        // SAFETY: the processor has the instructions; the stack has room for `stack_need` children
+        // and one register more.
+        let hit = unsafe {
+            let leaf_ray = LeafRay::<K::Block>::new(ray, wide);
+            let mut leaves = Candidates::<_, ANY> { layout, leaf_ray, scale: boxed.scale, nearest };
+            if ray.begins_in(&wide.near) {
+                visit::<K, ANY>(wide, ray.t_max(), &BoxRay::new(ray), &mut leaves, base)
+            } else {
+                let far = FarRay::in_frame(boxed.ends, &layout.frame, &wide.bounds);
+                visit::<K, ANY>(wide, ray.t_max(), &FarBoxRay::new(ray, &far), &mut leaves, base)
+            }
+        };
+        !hit.is_miss()
+    }
+}
+
+/// Passes the triangles of a block on that the ray may meet.
+struct Candidates<'a, 's, L, const ANY: bool> {
+    layout: &'a DWideBvh,
+    leaf_ray: LeafRay<L>,
+    scale: f64,
+    nearest: &'a mut NearestHit<'s>,
+}
+
+impl<K: Instructions, const ANY: bool> Leaves<K> for Candidates<'_, '_, K::Block, ANY> {
+    #[inline(always)]
+    unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool {
+        // SAFETY: the processor has the instructions.
+        let (mut lanes, sure) = unsafe {
+            let corners = self.leaf_ray.corners(block);
+            let candidates = self.leaf_ray.pairs.candidates(&corners);
+            let (possible, sure) =
+                self.leaf_ray.pairs.within(&candidates, K::Block::splat(nearest.t));
+            let used = block.used::<K::Block>();
+            (possible & used, sure & used)
+        };
+        if ANY && sure != 0 && self.nearest.select().counts_all() {
+            nearest.object = block.id(sure.trailing_zeros() as usize & 3);
+            return true;
+        }
+        let mut is_nearer = false;
+        while lanes != 0 {
+            let object = block.id(lanes.trailing_zeros() as usize & 3);
+            lanes &= lanes - 1;
+            if self.nearest.offer(object, &self.layout.triangles[object as usize]) {
+                let t = (self.nearest.limit() * self.scale) as f32;
+                *nearest = Hit { t, object };
+                is_nearer = true;
+            }
+        }
+        is_nearer
+    }
+}
+
+/// The nearest hit of every ray.
+struct Nearest<'a> {
+    layout: &'a DWideBvh,
+    rays: &'a [DRay],
+    states: Vec<NearestHit<'a>>,
+    hits: &'a mut [Option<DHit>],
+}
+
+impl Find for Nearest<'_> {
+    const DECIDES: bool = true;
+
+    #[inline(always)]
+    fn decide(&mut self, number: usize, object: u32) -> Option<f32> {
+        let state = &mut self.states[number];
+        let is_nearer = state.offer(object, &self.layout.triangles[object as usize]);
+        is_nearer.then(|| (state.limit() * self.layout.boxed(&self.rays[number]).scale) as f32)
+    }
+
+    #[inline(always)]
+    fn write(&mut self, number: usize, _: f32, _: u32) {
+        self.hits[number] = self.states[number].hit();
+    }
+
+    fn alone(&mut self, _: &WideBvh, number: usize, _: &Ray) {
+        self.layout.search::<NEAREST_HIT>(&self.rays[number], &mut self.states[number]);
+        self.hits[number] = self.states[number].hit();
+    }
+}
+
+/// Whether each ray hits anything. All triangles count if `PLAIN`.
+struct Any<'a, const PLAIN: bool> {
+    layout: &'a DWideBvh,
+    rays: &'a [DRay],
+    select: Select<'a>,
+    hits: &'a mut [bool],
+}
+
+impl<const PLAIN: bool> Any<'_, PLAIN> {
+    fn state(&self, number: usize) -> NearestHit<'_> {
+        let select = select_of(self.select, self.rays.len(), number);
+        NearestHit::new(&self.rays[number], select)
+    }
+}
+
+impl<const PLAIN: bool> Find for Any<'_, PLAIN> {
+    const ANY: bool = true;
+    const DECIDES: bool = true;
+    const TAKES_CERTAIN: bool = PLAIN;
+
+    #[inline(always)]
+    fn decide(&mut self, number: usize, object: u32) -> Option<f32> {
+        let triangle = &self.layout.triangles[object as usize];
+        self.state(number).offer(object, triangle).then_some(0.0)
+    }
+
+    #[inline(always)]
+    fn write(&mut self, number: usize, _: f32, object: u32) {
+        self.hits[number] = object != u32::MAX;
+    }
+
+    fn alone(&mut self, _: &WideBvh, number: usize, _: &Ray) {
+        let mut state = self.state(number);
+        let is_hit = self.layout.search::<ANY_HIT>(&self.rays[number], &mut state);
+        self.hits[number] = is_hit;
+    }
+}

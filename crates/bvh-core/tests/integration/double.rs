@@ -1,0 +1,266 @@
+//! Rays and triangles in f64: hits as in exact rationals, and every kernel as a test of every
+//! triangle.
+
+use crate::support::{Random, SHAPES, ball, chain, grid_box, junction, soup, tree};
+use bvh_core::{
+    Bvh, DHit, DRay, DTriangle, DWideBvh, Frame, Kernel, Orientation, OutOfExactRange, Select,
+};
+use glam::{DMat3, DQuat, DVec3};
+use num_bigint::BigInt;
+use num_rational::BigRational;
+
+type Vector = [BigRational; 3];
+
+fn point(p: DVec3) -> Vector {
+    p.to_array().map(|x| BigRational::from_float(x).unwrap())
+}
+
+fn minus(p: &Vector, q: &Vector) -> Vector {
+    [0, 1, 2].map(|i| &p[i] - &q[i])
+}
+
+fn cross(p: &Vector, q: &Vector) -> Vector {
+    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| &p[i] * &q[j] - &p[j] * &q[i])
+}
+
+fn dot(p: &Vector, q: &Vector) -> BigRational {
+    &p[0] * &q[0] + &p[1] * &q[1] + &p[2] * &q[2]
+}
+
+/// Returns the real distance by Cramer's rule, and the sign of d · n.
+fn cramer(ray: &DRay, triangle: &DTriangle) -> Option<(BigRational, i32)> {
+    let zero = BigRational::from_integer(BigInt::ZERO);
+    let [a, b, c] = triangle.0.map(point);
+    let direction = point(ray.direction());
+    let p = minus(&b, &a);
+    let q = minus(&c, &a);
+    let height = cross(&direction, &q);
+    let determinant = dot(&p, &height);
+    if determinant == zero {
+        return None;
+    }
+    let from_a = minus(&point(ray.origin()), &a);
+    let aside = cross(&from_a, &p);
+    let [t, v, w] = [dot(&q, &aside), dot(&from_a, &height), dot(&direction, &aside)]
+        .map(|numerator| numerator / &determinant);
+    let is_hit =
+        t >= zero && v >= zero && w >= zero && v + w <= BigRational::from_integer(1.into());
+    let along = dot(&direction, &cross(&p, &q));
+    is_hit.then(|| (t, if along > zero { 1 } else { -1 }))
+}
+
+fn is_rounded_to(x: &BigRational, rounded: f64) -> bool {
+    let middle = |a: f64, b: f64| {
+        let sum = BigRational::from_float(a).unwrap() + BigRational::from_float(b).unwrap();
+        sum / BigRational::from_integer(2.into())
+    };
+    let is_even = rounded.to_bits() & 1 == 0;
+    let below = (rounded > 0.0).then(|| middle(rounded.next_down(), rounded));
+    let above = middle(rounded, rounded.next_up());
+    below.is_none_or(|below| x > &below || is_even && x == &below)
+        && (x < &above || is_even && x == &above)
+}
+
+/// Returns scenes in f64 at many places and sizes, turned, with what f32 could not hold.
+fn scenes(random: &mut Random) -> Vec<(String, Vec<DTriangle>)> {
+    let shapes = [
+        ("soup", soup(60, random)),
+        ("ball", ball(2)),
+        ("grid", grid_box(3)),
+        ("junction", junction()),
+    ];
+    let mut scenes = Vec::new();
+    for (name, triangles) in shapes {
+        for (size, offset) in
+            [(1.0, 0.0), (1.0, 1e7), (1e-30, 0.0), (1e30, 0.0), (1e-3, 5e5), (3.0, 1e-5)]
+        {
+            let turn = DQuat::from_xyzw(0.1, 0.7, -0.3, 0.5).normalize();
+            let turn = if random.below(2) == 0 { turn } else { DQuat::IDENTITY };
+            let moved = |p: glam::Vec3| {
+                turn * (p.as_dvec3() * 1.1) * size + DVec3::new(offset, -offset, 0.3 * offset)
+            };
+            let triangles = triangles.iter().map(|t| DTriangle(t.0.map(moved))).collect();
+            scenes.push((format!("{name} * {size} + {offset}"), triangles));
+        }
+    }
+    scenes
+}
+
+/// Returns rays through corners, edges and insides, along axes and edges, and of any range.
+fn rays(triangles: &[DTriangle], count: usize, random: &mut Random) -> Vec<DRay> {
+    let corners = || triangles.iter().flat_map(|triangle| triangle.0);
+    let min = corners().fold(DVec3::INFINITY, DVec3::min);
+    let max = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let size = (max - min).max_element();
+    let middle = (min + max) * 0.5;
+    let mut rays = Vec::new();
+    while rays.len() < count {
+        let DTriangle([a, b, c]) = random.of(triangles);
+        let u = f64::from(random.unit());
+        let target = match random.below(5) {
+            0 => a,
+            1 => (a + b) * 0.5,
+            2 => a + (b - a) * u,
+            3 => (a + b + c) / 3.0,
+            _ => middle + random.point().as_dvec3() * size,
+        };
+        let from = match random.below(6) {
+            0 => target + random.point().as_dvec3() * size * 1e4,
+            1 => a - (b - a),
+            2 => target - DVec3::AXES[random.below(3)] * size,
+            3 => target,
+            _ => middle + random.point().as_dvec3() * size,
+        };
+        let mut direction = (target - from) / size;
+        match random.below(6) {
+            0 => direction = random.point().as_dvec3(),
+            1 => direction = DVec3::AXES[random.below(3)] * 1e-3,
+            2 => direction *= 3e7,
+            _ => (),
+        }
+        let length = f64::from(random.unit());
+        let (t_min, t_max) = random.of(&[
+            (0.0, f64::INFINITY),
+            (0.0, f64::INFINITY),
+            (0.0, size * length),
+            (size * length, f64::INFINITY),
+        ]);
+        rays.extend(DRay::new(from, direction, t_min, t_max));
+    }
+    rays
+}
+
+#[test]
+fn hits_and_distances_are_those_of_real_arithmetic_rounded_once() {
+    let mut random = Random(31);
+    let mut hits = 0;
+    for (name, triangles) in scenes(&mut random) {
+        for ray in rays(&triangles, 60, &mut random) {
+            let ray = DRay::half_line(ray.origin(), ray.direction()).unwrap();
+            for _ in 0..12 {
+                let triangle = random.of(&triangles);
+                let found = triangle.intersect(&ray);
+                let real = cramer(&ray, &triangle);
+                let is_right = match &real {
+                    Some((t, _)) => found.is_some_and(|found| is_rounded_to(t, found)),
+                    None => found.is_none(),
+                };
+                assert!(is_right, "{name}: {found:?} {real:?} {ray:?} {triangle:?}");
+                hits += usize::from(found.is_some());
+            }
+        }
+    }
+    assert!(hits > 500, "{hits}");
+}
+
+/// Returns the nearest hit that counts, by testing every triangle.
+fn brute_force(triangles: &[DTriangle], ray: &DRay, select: Select) -> Option<DHit> {
+    let hit = |(object, triangle): (u32, &DTriangle)| {
+        let t = triangle.intersect(ray)?;
+        let [a, b, c] = triangle.0.map(point);
+        let along = dot(&point(ray.direction()), &cross(&minus(&b, &a), &minus(&c, &a)));
+        let is_exiting = along > BigRational::from_integer(BigInt::ZERO);
+        let counts = match select.orientation {
+            Orientation::Any => true,
+            Orientation::Exiting => is_exiting,
+            Orientation::Entering => !is_exiting,
+        };
+        (counts && !select.exclude.contains(&object)).then_some(DHit { t, object })
+    };
+    let hits = (0..).zip(triangles).filter_map(hit);
+    hits.reduce(|a, b| if b.t < a.t { b } else { a })
+}
+
+fn trees(triangles: &[DTriangle], random: &mut Random) -> Vec<Bvh> {
+    let centred = DWideBvh::centred(triangles);
+    let turn = DMat3::from_quat(DQuat::from_xyzw(0.3, -0.2, 0.4, 0.7).normalize());
+    let turned = Frame::new(turn, centred.centre()).unwrap();
+    let aside = Frame::new(turn, triangles[0].0[0]).unwrap();
+    let mut trees = Vec::new();
+    for frame in [Some(centred), Some(turned), Some(aside), None] {
+        let boxes = match &frame {
+            Some(frame) => DWideBvh::boxes(triangles, frame),
+            None => {
+                let file = Frame::new(DMat3::IDENTITY, DVec3::ZERO).unwrap();
+                DWideBvh::boxes(triangles, &file)
+            }
+        };
+        let built = [tree(&boxes, random.of(&SHAPES), random), chain(&boxes)];
+        trees.extend(built.into_iter().map(|tree| Bvh { frame, ..tree }));
+    }
+    trees
+}
+
+#[test]
+fn every_kernel_answers_as_a_test_of_every_triangle() {
+    let mut random = Random(32);
+    let mut hits = 0;
+    for (name, triangles) in scenes(&mut random) {
+        let rays = rays(&triangles, 120, &mut random);
+        let excluded: Vec<u32> = rays
+            .iter()
+            .map(|ray| {
+                let nearest = brute_force(&triangles, ray, Select::default());
+                nearest.map_or(0, |hit| hit.object)
+            })
+            .collect();
+        let trees = trees(&triangles, &mut random);
+        for (orientation, excludes) in [
+            (Orientation::Any, false),
+            (Orientation::Any, true),
+            (Orientation::Exiting, false),
+            (Orientation::Entering, true),
+        ] {
+            let exclude = if excludes { &excluded[..] } else { &[] };
+            let all = Select { orientation, exclude };
+            let of = |i: usize| {
+                let exclude = if excludes { &excluded[i..=i] } else { &[] };
+                Select { orientation, exclude }
+            };
+            let expected: Vec<Option<DHit>> = rays
+                .iter()
+                .enumerate()
+                .map(|(i, ray)| brute_force(&triangles, ray, of(i)))
+                .collect();
+            hits += expected.iter().flatten().count();
+            for tree in &trees {
+                let layout = DWideBvh::new(tree, &triangles).unwrap();
+                for kernel in Kernel::ALL {
+                    let Some(layout) = layout.clone().with_kernel(kernel) else { continue };
+                    let mut nearest = vec![None; rays.len()];
+                    let mut any = vec![false; rays.len()];
+                    layout.nearest_hits(&rays, all, &mut nearest);
+                    layout.any_hits(&rays, all, &mut any);
+                    for (i, (ray, &expected)) in rays.iter().zip(&expected).enumerate() {
+                        let case = || format!("{name}, {kernel:?}, {orientation:?}, {ray:?}");
+                        assert_eq!(layout.nearest_hit(ray, of(i)), expected, "{}", case());
+                        assert_eq!(layout.any_hit(ray, of(i)), expected.is_some(), "{}", case());
+                        assert_eq!(
+                            (nearest[i], any[i]),
+                            (expected, expected.is_some()),
+                            "{}",
+                            case()
+                        );
+                    }
+                }
+            }
+        }
+    }
+    assert!(hits > 2000, "{hits}");
+}
+
+#[test]
+fn numbers_beyond_the_exact_range_are_rejected() {
+    let up = DVec3::Z;
+    for bad in [f64::NAN, f64::INFINITY, 1e40, 1e-50] {
+        let vector = DVec3::new(1.0, bad, 0.0);
+        assert!(matches!(DRay::half_line(vector, up), Err(OutOfExactRange::Origin(_))), "{bad}");
+        let rejected = DRay::half_line(up, vector);
+        assert!(matches!(rejected, Err(OutOfExactRange::Direction(_))), "{bad}");
+    }
+    assert!(matches!(DRay::half_line(up, DVec3::ZERO), Err(OutOfExactRange::Direction(_))));
+    for (t_min, t_max) in [(f64::NAN, 1.0), (0.0, f64::NAN), (-1.0, 1.0)] {
+        let rejected = DRay::new(up, up, t_min, t_max);
+        assert!(matches!(rejected, Err(OutOfExactRange::Range(..))));
+    }
+}
