@@ -56,17 +56,12 @@ impl WideBvh {
             return;
         }
         let find = &mut find;
+        let task = Batch::<_, false> { wide: self, rays, find, coherence };
         // SAFETY: a layout's kernel is available.
         unsafe {
             match self.framed {
-                None => {
-                    let batch = Batch::<_, false> { wide: self, rays, find, coherence };
-                    vector::dispatch(self.kernel, batch);
-                }
-                Some(_) => {
-                    let batch = Batch::<_, true> { wide: self, rays, find, coherence };
-                    vector::dispatch(self.kernel, batch);
-                }
+                None => vector::dispatch(self.kernel, task),
+                Some(_) => vector::dispatch(self.kernel, task.in_frame()),
             }
         }
     }
@@ -89,6 +84,13 @@ struct Batch<'a, F, const IN_FRAME: bool> {
     rays: &'a [Ray],
     find: &'a mut F,
     coherence: Coherence,
+}
+
+impl<'a, F> Batch<'a, F, false> {
+    fn in_frame(self) -> Batch<'a, F, true> {
+        let Self { wide, rays, find, coherence } = self;
+        Batch { wide, rays, find, coherence }
+    }
 }
 
 impl<K: Instructions, F: Find, const IN_FRAME: bool> Task<K> for Batch<'_, F, IN_FRAME> {
