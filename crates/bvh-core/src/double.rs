@@ -82,7 +82,8 @@ impl DRay {
         if !(is_exact(direction) && (1.0 / LONG..=LONG).contains(&longest)) {
             return Err(OutOfExactRange::Direction(direction));
         }
-        if !(t_min >= 0.0) || t_max.is_nan() {
+        // NaN is in no range.
+        if !(0.0..).contains(&t_min) || t_max.is_nan() {
             return Err(OutOfExactRange::Range(t_min, t_max));
         }
         // Adding 0 turns −0 into +0.
@@ -186,102 +187,123 @@ impl DTriangle {
     }
 }
 
-/// The search for the nearest hit of a ray among triangles that are offered in any order. Distances
-/// are known to the error of f64, and exactly where the answer depends on it.
-pub(crate) struct NearestHit<'a> {
-    ray: DRay,
-    line: Line,
-    select: Select<'a>,
-    nearest: Candidate,
-}
-
-/// A hit at a distance between two bounds, which are equal if it is known.
+/// The nearest hit of a ray so far, at a distance between two bounds, which are equal if it is
+/// known.
 #[derive(Clone, Copy)]
-struct Candidate {
-    low: f64,
-    high: f64,
-    object: u32,
-    triangle: DTriangle,
+pub(crate) struct NearestHit {
+    pub(crate) low: f64,
+    /// The distance beyond which nothing counts, or more.
+    pub(crate) high: f64,
+    /// The triangle's id; the greatest number without a hit.
+    pub(crate) object: u32,
+    /// Where the layout has the triangle.
+    pub(crate) place: u32,
 }
 
-impl<'a> NearestHit<'a> {
-    #[inline]
-    pub(crate) fn new(ray: &DRay, select: Select<'a>) -> Self {
-        let line = Line::new(ray.origin, ray.direction);
-        let triangle = DTriangle([DVec3::ZERO; 3]);
-        let nearest = Candidate { low: ray.t_max, high: ray.t_max, object: u32::MAX, triangle };
-        Self { ray: *ray, line, select, nearest }
+impl NearestHit {
+    pub(crate) fn new(ray: &DRay) -> Self {
+        Self { low: ray.t_max, high: ray.t_max, object: u32::MAX, place: 0 }
     }
 
-    /// Takes a triangle if the ray hits it nearer, or as near and it has the lower id. Returns
-    /// whether it does.
-    #[inline]
-    pub(crate) fn offer(&mut self, object: u32, triangle: &DTriangle) -> bool {
-        let ends = [self.ray.origin, self.ray.direction];
-        let (low, high) = match self.line.filter(&triangle.0) {
-            Verdict::Miss => return false,
-            Verdict::Between(low, high) => (low, high),
-            Verdict::Unsure => match self.line.crossing(ends, &triangle.0, false) {
-                Some(t) => (t, t),
-                None => return false,
-            },
-        };
-        if high < self.ray.t_min || low > self.nearest.high || !self.counts(object, triangle) {
+    pub(crate) fn is_known(&self) -> bool {
+        self.low == self.high
+    }
+
+    /// Returns the hit, whose distance is known.
+    pub(crate) fn hit(&self) -> Option<DHit> {
+        (self.object != u32::MAX).then_some(DHit { t: self.low, object: self.object })
+    }
+}
+
+/// A ray, and which of its hits count.
+#[derive(Clone, Copy)]
+pub(crate) struct Query<'a> {
+    pub(crate) ray: &'a DRay,
+    pub(crate) select: Select<'a>,
+}
+
+impl Query<'_> {
+    fn ends(&self) -> [DVec3; 2] {
+        [self.ray.origin, self.ray.direction]
+    }
+
+    fn line(&self) -> Line {
+        Line::new(self.ray.origin, self.ray.direction)
+    }
+
+    /// Takes a hit between two bounds if it counts, and if it is nearer, or as near and of a lower
+    /// id. Returns whether it is. `triangle` returns the triangle at a place.
+    #[inline(always)]
+    pub(crate) fn take(
+        &self,
+        nearest: &mut NearestHit,
+        new: NearestHit,
+        triangle: impl Fn(u32) -> DTriangle,
+    ) -> bool {
+        if new.high < self.ray.t_min || new.low > nearest.high {
             return false;
         }
-        let mut new = Candidate { low, high, object, triangle: *triangle };
-        if low < self.ray.t_min || high >= self.nearest.low {
-            self.resolve(&mut new);
-            let mut nearest = self.nearest;
-            self.resolve(&mut nearest);
-            self.nearest = nearest;
-            let is_nearer =
-                new.low < nearest.low || new.low == nearest.low && object < nearest.object;
-            if new.low < self.ray.t_min || !is_nearer {
-                return false;
-            }
+        if !self.select.counts_all() && !self.counts(new.object, &triangle(new.place)) {
+            return false;
         }
-        self.nearest = new;
+        if new.low < self.ray.t_min || new.high >= nearest.low {
+            return self.take_close(nearest, new, &triangle);
+        }
+        *nearest = new;
         true
     }
 
-    #[inline]
+    /// Does so where bounds do not decide.
+    #[cold]
+    #[inline(never)]
+    fn take_close(
+        &self,
+        nearest: &mut NearestHit,
+        mut new: NearestHit,
+        triangle: &dyn Fn(u32) -> DTriangle,
+    ) -> bool {
+        for hit in [&mut new, nearest] {
+            if !hit.is_known() {
+                self.resolve(hit, &triangle(hit.place));
+            }
+        }
+        let is_in_range = self.ray.t_min <= new.low;
+        let is_nearer =
+            new.low < nearest.low || new.low == nearest.low && new.object < nearest.object;
+        if is_in_range && is_nearer {
+            *nearest = new;
+        }
+        is_in_range && is_nearer
+    }
+
+    #[inline(never)]
     fn counts(&self, object: u32, triangle: &DTriangle) -> bool {
         let side = match self.select.orientation {
             Orientation::Any => None,
             Orientation::Exiting => Some(1),
             Orientation::Entering => Some(-1),
         };
-        let ends = [self.ray.origin, self.ray.direction];
         !self.select.exclude.contains(&object)
-            && side.is_none_or(|side| self.line.side(ends, &triangle.0) == side)
+            && side.is_none_or(|side| self.line().side(self.ends(), &triangle.0) == side)
     }
 
     /// Finds the rounded distance.
-    fn resolve(&self, candidate: &mut Candidate) {
-        if candidate.low < candidate.high {
-            let ends = [self.ray.origin, self.ray.direction];
-            let slack = candidate.high - candidate.low;
-            candidate.low = self.line.rounded(ends, &candidate.triangle.0, slack);
-            candidate.high = candidate.low;
+    pub(crate) fn resolve(&self, hit: &mut NearestHit, triangle: &DTriangle) {
+        hit.low = self.line().rounded(self.ends(), &triangle.0, hit.high - hit.low);
+        hit.high = hit.low;
+    }
+
+    /// Returns bounds of the distance at which the ray hits a triangle, without its range.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn bounds(&self, triangle: &DTriangle) -> Option<(f64, f64)> {
+        match self.line().filter(&triangle.0) {
+            Verdict::Miss => None,
+            Verdict::Between(low, high) => Some((low, high)),
+            Verdict::Unsure => {
+                let t = self.line().crossing(self.ends(), &triangle.0, false)?;
+                Some((t, t))
+            }
         }
-    }
-
-    pub(crate) fn select(&self) -> &Select<'a> {
-        &self.select
-    }
-
-    /// The distance beyond which nothing counts, or more.
-    #[inline]
-    pub(crate) fn limit(&self) -> f64 {
-        self.nearest.high
-    }
-
-    /// Returns the nearest of the hits.
-    pub(crate) fn hit(&self) -> Option<DHit> {
-        let mut nearest = self.nearest;
-        self.resolve(&mut nearest);
-        let is_hit = nearest.object != u32::MAX;
-        is_hit.then_some(DHit { t: nearest.low, object: nearest.object })
     }
 }

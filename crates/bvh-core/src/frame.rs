@@ -64,7 +64,7 @@
 //! by less than 2⁻⁴⁸ (M + S) with the largest M, by which their origins are moved as above.
 
 use crate::aabb::{round_down, round_up};
-use crate::{Aabb, Ray, Triangle};
+use crate::{Aabb, Ray};
 use glam::{DMat3, DVec3, Vec3};
 
 /// The frame of a tree's boxes: a rotation and a centre. The coordinates of a point p in the frame
@@ -168,13 +168,8 @@ impl Frame {
         DVec3::from(self.axes.map(|axis| axis.abs().dot(size)))
     }
 
-    /// Returns the smallest box in the frame that certainly contains the triangle: it is rounded
-    /// outwards.
-    pub fn aabb(&self, triangle: &Triangle) -> Aabb {
-        self.aabb_of(triangle.0.map(Vec3::as_dvec3))
-    }
-
-    /// Returns the same for corners in f64.
+    /// Returns the smallest box in the frame that certainly contains a triangle of these corners: it is
+    /// rounded outwards.
     pub(crate) fn aabb_of(&self, corners: [DVec3; 3]) -> Aabb {
         /// 8ε, twice the bound of the error.
         const ERROR: f64 = 4.0 * f64::EPSILON;
@@ -191,11 +186,6 @@ impl Frame {
             max = max.max(point + error);
         }
         Aabb { min: round_down(min), max: round_up(max) }
-    }
-
-    /// Returns the box of every triangle in the frame, in the same order.
-    pub fn boxes(&self, triangles: &[Triangle]) -> Vec<Aabb> {
-        triangles.iter().map(|triangle| self.aabb(triangle)).collect()
     }
 }
 
@@ -250,25 +240,10 @@ fn size(aabb: &Aabb) -> f32 {
     aabb.min.abs().max(aabb.max.abs()).max_element()
 }
 
-/// Triangles with their boxes and parts in a tree's frame, or in the file's axes if it has none.
-#[derive(Clone, Copy, Debug)]
-pub struct InFrame<'a> {
-    /// The triangles.
-    pub triangles: &'a [Triangle],
-    /// The frame.
-    pub frame: Option<&'a Frame>,
-}
-
-impl InFrame<'_> {
-    /// Returns the box of every triangle, in the same order.
-    pub fn boxes(&self) -> Vec<Aabb> {
-        self.triangles.iter().map(|triangle| triangle.aabb_in(self.frame)).collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Triangle;
     use glam::DQuat;
     use num_bigint::BigInt;
     use proptest::prelude::*;

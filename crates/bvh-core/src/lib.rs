@@ -34,7 +34,7 @@ pub use clip::Clip;
 pub use collapse::collapse_leaves;
 pub use double::{DHit, DRay, DTriangle, Orientation, OutOfExactRange, Select};
 pub use export::FirstCountNode;
-pub use frame::{Frame, InFrame, InvalidFrame};
+pub use frame::{Frame, InvalidFrame};
 pub use mesh::MeshError;
 pub use packed::PackedAabb;
 pub use primitives::{Primitive, Primitives, boxes};
@@ -47,7 +47,7 @@ pub use traverse::{
     Counter, TestCounts, any_hit, any_hit_by, any_hit_of_all, nearest_hit, nearest_hit_by,
     nearest_hit_of_all,
 };
-pub use triangle::{PreparedRay, Triangle};
+pub use triangle::{InFrame, PreparedRay, Triangle};
 pub use validate::{InvalidBvh, validate, validate_references};
 #[doc(hidden)]
 pub use wide::NodeTest;

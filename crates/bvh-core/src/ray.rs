@@ -228,9 +228,6 @@ pub(crate) const fn pow2(k: i32) -> f32 {
     f32::from_bits(((k + 127) as u32) << 23)
 }
 
-/// The axes of the shear, indexed by the axis of the direction's largest component.
-pub(crate) static AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
-
 /// Returns the axis of the direction's largest component, the lowest on ties, without a branch that
 /// the processor could not predict.
 #[inline(always)]

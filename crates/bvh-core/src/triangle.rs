@@ -162,6 +162,36 @@ impl Triangle {
     }
 }
 
+impl Frame {
+    /// Returns the smallest box in the frame that certainly contains the triangle: it is rounded
+    /// outwards.
+    #[inline]
+    pub fn aabb(&self, triangle: &Triangle) -> Aabb {
+        self.aabb_of(triangle.0.map(Vec3::as_dvec3))
+    }
+
+    /// Returns the box of every triangle in the frame, in the same order.
+    pub fn boxes(&self, triangles: &[Triangle]) -> Vec<Aabb> {
+        triangles.iter().map(|triangle| self.aabb(triangle)).collect()
+    }
+}
+
+/// Triangles with their boxes and parts in a tree's frame, or in the file's axes if it has none.
+#[derive(Clone, Copy, Debug)]
+pub struct InFrame<'a> {
+    /// The triangles.
+    pub triangles: &'a [Triangle],
+    /// The frame.
+    pub frame: Option<&'a Frame>,
+}
+
+impl InFrame<'_> {
+    /// Returns the box of every triangle, in the same order.
+    pub fn boxes(&self) -> Vec<Aabb> {
+        self.triangles.iter().map(|triangle| triangle.aabb_in(self.frame)).collect()
+    }
+}
+
 /// Returns the point of a segment nearest to zero, the same bits for both directions of the
 /// segment.
 fn nearest_of_edge(from: DVec3, to: DVec3) -> DVec3 {

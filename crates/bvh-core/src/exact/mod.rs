@@ -82,10 +82,12 @@ mod number;
 mod quotient;
 mod volumes;
 
-use crate::ray::AXES;
 pub(crate) use number::{Number, Point};
-use quotient::{NARROWER, Twice};
+pub(crate) use quotient::{NARROWER, Numbers, Twice, distance};
 use volumes::Volumes;
+
+/// The axes of the shear, indexed by the axis of the direction's largest component.
+pub(crate) static AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
 
 /// The answer of a layer with rounding errors about a line and a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -230,8 +232,7 @@ impl Line {
         let [a, b, c] = triangle.map(P::double);
         let minus = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|i| Twice::difference(p[i], q[i]));
         let corner = minus(a, origin.double());
-        let Twice(high, low) =
-            quotient::distance(&corner, &direction.double(), &minus(b, a), &minus(c, a));
+        let Twice(high, low) = distance(&corner, &direction.double(), &minus(b, a), &minus(c, a));
         let slack = slack * NARROWER;
         let rounded = high + (low + slack);
         if high + (low - slack) == rounded {

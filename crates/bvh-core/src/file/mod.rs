@@ -78,7 +78,7 @@ pub use error::FileError;
 pub use header::Header;
 
 use crate::cost::{CallBoth, Objective, call_in_turn};
-use crate::frame::InFrame;
+use crate::triangle::InFrame;
 use crate::validate::{Leaves, check_nesting, check_structure, validate_parts};
 use crate::{Aabb, Bvh, BvhView, Clip, Frame, InvalidBvh, Node, Primitives, validate};
 use bytemuck::Pod;

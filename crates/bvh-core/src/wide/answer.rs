@@ -1,6 +1,8 @@
 //! What is asked of every ray of a batch, and where the answers go.
 
+use super::instructions::Instructions;
 use super::layout::WideBvh;
+use super::triangles::TriangleBlock;
 use crate::{Hit, Ray};
 
 /// The value of the parameter `ANY` of a traversal that ends a ray at the first hit that is found.
@@ -21,9 +23,16 @@ pub(crate) trait Find {
     /// Whether a certain hit in f32 is an answer.
     const TAKES_CERTAIN: bool = true;
 
-    /// Decides whether an object is the new nearest hit of a ray, and returns the distance beyond
-    /// which no box counts then.
-    fn decide(&mut self, _number: usize, _object: u32) -> Option<f32> {
+    /// Returns the new nearest hit of a ray, if one of the possible triangles of a block is it.
+    ///
+    /// # Safety
+    /// The processor has the instructions; the block is one of the layout.
+    unsafe fn decide<K: Instructions>(
+        &mut self,
+        _number: usize,
+        _block: &TriangleBlock,
+        _possible: u32,
+    ) -> Option<Hit> {
         None
     }
 

@@ -18,15 +18,16 @@
 
 use super::answer::{ANY_HIT, Find, NEAREST_HIT};
 use super::box_ray::{BoxRay, FarBoxRay};
+use super::double_block::{Distances, DoubleBlock, rounded_distance};
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{SPARE, STACK, deep_stacks};
-use super::lanes::Lanes;
+use super::lanes::{Aligned, Lanes};
 use super::layout::{WideBvh, WideNode};
 use super::one_ray::{LeafRay, Leaves, visit};
 use super::triangles::TriangleBlock;
 use super::{build, portable, vector};
 use crate::clip::{BUILDERS, VALIDATION, clip_corners};
-use crate::double::NearestHit;
+use crate::double::{NearestHit, Query};
 use crate::slabs::FarRay;
 use crate::{
     Aabb, Bvh, Clip, Coherence, DHit, DRay, DTriangle, Frame, Hit, InvalidBvh, Kernel, Ray, Select,
@@ -44,7 +45,8 @@ pub struct DWideBvh {
     /// The triangles in f32, in the frame.
     wide: WideBvh,
     frame: Frame,
-    triangles: Vec<DTriangle>,
+    /// For every block in f32 the same triangles.
+    blocks: Vec<DoubleBlock>,
 }
 
 /// Triangles in f64 with their parts in a frame.
@@ -101,7 +103,8 @@ impl DWideBvh {
             wide.bounds = framed.bounds;
             wide.near = framed.near;
         }
-        Ok(Self { wide, frame, triangles: triangles.to_vec() })
+        let blocks = wide.blocks.iter().map(|block| DoubleBlock::new(block, triangles)).collect();
+        Ok(Self { wide, frame, blocks })
     }
 
     /// Returns the boxes of triangles in a frame, to build a tree over.
@@ -128,14 +131,14 @@ impl DWideBvh {
     /// Returns the nearest triangle that `ray` meets in its range, among those that count. Of several
     /// at the same distance, the one with the lowest id is nearest.
     pub fn nearest_hit(&self, ray: &DRay, select: Select) -> Option<DHit> {
-        let mut nearest = NearestHit::new(ray, select);
-        self.search::<NEAREST_HIT>(ray, &mut nearest);
+        let mut nearest = NearestHit::new(ray);
+        self.search::<NEAREST_HIT>(Query { ray, select }, &mut nearest);
         nearest.hit()
     }
 
     /// Returns whether `ray` meets any triangle that counts in its range.
     pub fn any_hit(&self, ray: &DRay, select: Select) -> bool {
-        self.search::<ANY_HIT>(ray, &mut NearestHit::new(ray, select))
+        self.search::<ANY_HIT>(Query { ray, select }, &mut NearestHit::new(ray))
     }
 
     /// Writes the [nearest hit](Self::nearest_hit) of every ray. `select` excludes the same number of
@@ -145,14 +148,16 @@ impl DWideBvh {
     /// If `rays` and `hits` are not equally many, or the number of excluded ids is no multiple.
     pub fn nearest_hits(&self, rays: &[DRay], select: Select, hits: &mut [Option<DHit>]) {
         assert_eq!(rays.len(), hits.len(), "a hit for every ray");
+        let mut nearest = Vec::new();
         self.in_parts(rays, select, hits, |rays, boxed, select, hits| {
-            let state = |(i, ray)| NearestHit::new(ray, select_of(select, rays.len(), i));
-            let states = rays.iter().enumerate().map(state).collect();
-            self.wide.trace(
-                boxed,
-                Nearest { layout: self, rays, states, hits },
-                Coherence::Incoherent,
-            );
+            nearest.clear();
+            nearest.extend(rays.iter().map(NearestHit::new));
+            let find = Nearest { layout: self, rays, select, nearest: &mut nearest };
+            self.wide.trace(boxed, find, Coherence::Incoherent);
+            self.resolve(rays, &mut nearest);
+            for (hit, nearest) in hits.iter_mut().zip(&nearest) {
+                *hit = nearest.hit();
+            }
         });
     }
 
@@ -172,6 +177,31 @@ impl DWideBvh {
                 self.wide.trace(boxed, find, Coherence::Incoherent);
             }
         });
+    }
+
+    fn triangle_at(&self, place: u32) -> DTriangle {
+        let (block, lane) =
+            (place as usize / TriangleBlock::LANES, place as usize % TriangleBlock::LANES);
+        self.blocks[block].triangle(lane)
+    }
+
+    /// Finds the distances that are not known yet.
+    fn resolve(&self, rays: &[DRay], nearest: &mut [NearestHit]) {
+        if self.wide.kernel != Kernel::Portable {
+            let task = Resolve { layout: self, rays, nearest };
+            // SAFETY: a layout's kernel is available.
+            return unsafe { vector::dispatch(self.wide.kernel, task) };
+        }
+        for (ray, nearest) in rays.iter().zip(nearest) {
+            self.resolve_alone(ray, nearest);
+        }
+    }
+
+    fn resolve_alone(&self, ray: &DRay, nearest: &mut NearestHit) {
+        if !nearest.is_known() {
+            let query = Query { ray, select: Select::default() };
+            query.resolve(nearest, &self.triangle_at(nearest.place));
+        }
     }
 
     /// Passes some rays at a time with their forms in f32, with what they exclude and their answers.
@@ -204,21 +234,18 @@ impl DWideBvh {
     /// has all distances within the scene.
     #[inline(always)]
     fn boxed(&self, ray: &DRay) -> Boxed {
-        let exponent = ray.direction.abs().max_element().to_bits() >> 52;
-        // Powers of two: 2^k, and its reciprocal.
-        let scale = f64::from_bits(exponent << 52);
-        let ends = [ray.origin, ray.direction * f64::from_bits((2046 - exponent) << 52)];
+        let scale = scale(ray);
+        let ends = [ray.origin, ray.direction / scale];
         let single = |t: f64| ((t * scale) as f32).min(f32::MAX);
         let ray = self.frame.ray_of(ends, [single(ray.t_min), single(ray.t_max)]);
         Boxed { ray, ends, scale }
     }
 
-    /// Offers the triangles that the ray may meet, or with `ANY` ends at the first that counts.
-    /// Returns whether there is one that counts.
-    fn search<const ANY: bool>(&self, ray: &DRay, nearest: &mut NearestHit) -> bool {
-        let boxed = self.boxed(ray);
+    /// Finds the nearest hit that counts, or with `ANY` any. Returns whether there is one.
+    fn search<const ANY: bool>(&self, query: Query, nearest: &mut NearestHit) -> bool {
+        let boxed = self.boxed(query.ray);
         if self.wide.kernel != Kernel::Portable {
-            let task = Search::<ANY> { layout: self, boxed, nearest };
+            let task = Search::<ANY> { layout: self, boxed, query, nearest };
             // SAFETY: a layout's kernel is available.
             return unsafe { vector::dispatch(self.wide.kernel, task) };
         }
@@ -226,94 +253,210 @@ impl DWideBvh {
         let intervals = |node: &WideNode| portable::intervals(&slabs, node);
         let visit = |block: &TriangleBlock, limit: &mut Hit| {
             let mut is_nearer = false;
-            for (object, _) in block.triangles() {
-                is_nearer |= nearest.offer(object, &self.triangles[object as usize]);
+            let first = self.first_place(block);
+            for lane in (0..TriangleBlock::LANES).filter(|&lane| block.triangle(lane).is_some()) {
+                let place = first + lane as u32;
+                is_nearer |= self.offer(query, nearest, block.id(lane), place);
             }
             if is_nearer {
-                *limit = Hit { t: (nearest.limit() * boxed.scale) as f32, object: 0 };
+                *limit = Hit { t: (nearest.high * boxed.scale) as f32, object: 0 };
             }
             is_nearer
         };
         let t_max = boxed.ray.t_max();
-        !portable::traverse::<ANY>(&self.wide, t_max, intervals, &mut (), visit).is_miss()
+        let hit = portable::traverse::<ANY>(&self.wide, t_max, intervals, &mut (), visit);
+        self.resolve_alone(query.ray, nearest);
+        !hit.is_miss()
+    }
+
+    /// The place of a block's first triangle.
+    #[inline(always)]
+    fn first_place(&self, block: &TriangleBlock) -> u32 {
+        let bytes = core::ptr::from_ref(block).addr() - self.wide.blocks.as_ptr().addr();
+        (bytes / size_of::<TriangleBlock>() * TriangleBlock::LANES) as u32
+    }
+
+    /// Takes a triangle, decided by itself.
+    fn offer(&self, query: Query, nearest: &mut NearestHit, object: u32, place: u32) -> bool {
+        let Some((low, high)) = query.bounds(&self.triangle_at(place)) else { return false };
+        let new = NearestHit { low, high, object, place };
+        query.take(nearest, new, |place| self.triangle_at(place))
+    }
+
+    /// Takes those of the `possible` triangles of a block that are nearer. Returns whether there are
+    /// any.
+    ///
+    /// # Safety
+    /// The processor has the instructions of `K`; the block is one of the layout.
+    #[inline(always)]
+    unsafe fn offer_block<K: Instructions>(
+        &self,
+        query: Query,
+        nearest: &mut NearestHit,
+        block: &TriangleBlock,
+        possible: u32,
+    ) -> bool {
+        let first = self.first_place(block);
+        // SAFETY: there is such a block in f64 for every one in f32.
+        let decided = unsafe {
+            let doubles = self.blocks.get_unchecked(first as usize / TriangleBlock::LANES);
+            doubles.decide::<K::Block>(query.ray, possible)
+        };
+        let mut is_nearer = false;
+        let mut lanes = decided.hits;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize & 3;
+            lanes &= lanes - 1;
+            let (low, high) = (decided.low[lane], decided.high[lane]);
+            let new = NearestHit { low, high, object: block.id(lane), place: first + lane as u32 };
+            is_nearer |= query.take(nearest, new, |place| self.triangle_at(place));
+        }
+        let mut lanes = decided.unsure;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize & 3;
+            lanes &= lanes - 1;
+            is_nearer |= self.offer(query, nearest, block.id(lane), first + lane as u32);
+        }
+        is_nearer
     }
 }
 
+/// Returns the power of two in the largest component of a ray's direction.
+#[inline(always)]
+fn scale(ray: &DRay) -> f64 {
+    f64::from_bits(ray.direction.abs().max_element().to_bits() >> 52 << 52)
+}
+
 /// Returns what counts for one of several rays.
+#[inline(always)]
 fn select_of<'a>(select: Select<'a>, rays: usize, number: usize) -> Select<'a> {
+    if select.exclude.is_empty() {
+        return select;
+    }
     let excluded = select.exclude.len() / rays;
     Select { exclude: &select.exclude[excluded * number..][..excluded], ..select }
 }
 
 /// A search by a vector kernel.
-struct Search<'a, 's, const ANY: bool> {
+struct Search<'a, const ANY: bool> {
     layout: &'a DWideBvh,
     boxed: Boxed,
-    nearest: &'a mut NearestHit<'s>,
+    query: Query<'a>,
+    nearest: &'a mut NearestHit,
 }
 
-impl<K: Instructions, const ANY: bool> Task<K> for Search<'_, '_, ANY> {
+impl<K: Instructions, const ANY: bool> Task<K> for Search<'_, ANY> {
     type Output = bool;
 
     #[inline(always)]
     unsafe fn run(self) -> bool {
-        let Self { layout, boxed, nearest } = self;
+        let Self { layout, boxed, query, nearest } = self;
         let wide = &layout.wide;
-        let mut stack = [const { MaybeUninit::<Pending>::uninit() }; STACK + SPARE];
+        let mut stack = MaybeUninit::<Aligned<[Pending; STACK + SPARE]>>::uninit();
         let mut deep = deep_stacks::<Pending>(1, wide.stack_need);
         let base = deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
         let ray = &boxed.ray;
         // SAFETY: the processor has the instructions; the stack has room for `stack_need` children
         // and one register more.
-        let hit = unsafe {
+        unsafe {
             let leaf_ray = LeafRay::<K::Block>::new(ray, wide);
-            let mut leaves = Candidates::<_, ANY> { layout, leaf_ray, scale: boxed.scale, nearest };
-            if ray.begins_in(&wide.near) {
+            let mut leaves =
+                Candidates::<_, ANY> { layout, leaf_ray, scale: boxed.scale, query, nearest };
+            let hit = if ray.begins_in(&wide.near) {
                 visit::<K, ANY>(wide, ray.t_max(), &BoxRay::new(ray), &mut leaves, base)
             } else {
                 let far = FarRay::in_frame(boxed.ends, &layout.frame, &wide.bounds);
                 visit::<K, ANY>(wide, ray.t_max(), &FarBoxRay::new(ray, &far), &mut leaves, base)
+            };
+            if !ANY && !nearest.is_known() {
+                let triangle = layout.triangle_at(nearest.place);
+                let slack = nearest.high - nearest.low;
+                match rounded_distance::<K::Block>(query.ray, &triangle, slack) {
+                    Some(t) => (nearest.low, nearest.high) = (t, t),
+                    None => layout.resolve_alone(query.ray, nearest),
+                }
             }
-        };
-        !hit.is_miss()
+            !hit.is_miss()
+        }
     }
 }
 
 /// Passes the triangles of a block on that the ray may meet.
-struct Candidates<'a, 's, L, const ANY: bool> {
+struct Candidates<'a, 'n, L, const ANY: bool> {
     layout: &'a DWideBvh,
     leaf_ray: LeafRay<L>,
     scale: f64,
-    nearest: &'a mut NearestHit<'s>,
+    query: Query<'a>,
+    nearest: &'n mut NearestHit,
 }
 
 impl<K: Instructions, const ANY: bool> Leaves<K> for Candidates<'_, '_, K::Block, ANY> {
     #[inline(always)]
     unsafe fn visit(&mut self, block: &TriangleBlock, nearest: &mut Hit) -> bool {
         // SAFETY: the processor has the instructions.
-        let (mut lanes, sure) = unsafe {
+        unsafe {
             let corners = self.leaf_ray.corners(block);
             let candidates = self.leaf_ray.pairs.candidates(&corners);
             let (possible, sure) =
                 self.leaf_ray.pairs.within(&candidates, K::Block::splat(nearest.t));
-            let used = block.used::<K::Block>();
-            (possible & used, sure & used)
-        };
-        if ANY && sure != 0 && self.nearest.select().counts_all() {
-            nearest.object = block.id(sure.trailing_zeros() as usize & 3);
-            return true;
-        }
-        let mut is_nearer = false;
-        while lanes != 0 {
-            let object = block.id(lanes.trailing_zeros() as usize & 3);
-            lanes &= lanes - 1;
-            if self.nearest.offer(object, &self.layout.triangles[object as usize]) {
-                let t = (self.nearest.limit() * self.scale) as f32;
-                *nearest = Hit { t, object };
-                is_nearer = true;
+            if possible == 0 {
+                return false;
             }
+            let used = block.used::<K::Block>();
+            if ANY && sure & used != 0 && self.query.select.counts_all() {
+                nearest.object = block.id(sure.trailing_zeros() as usize & 3);
+                return true;
+            }
+            let is_nearer =
+                self.layout.offer_block::<K>(self.query, self.nearest, block, possible & used);
+            if is_nearer {
+                let t = (self.nearest.high * self.scale) as f32;
+                *nearest = Hit { t, object: self.nearest.object };
+            }
+            is_nearer
         }
-        is_nearer
+    }
+}
+
+/// The search for distances that are not known yet.
+struct Resolve<'a> {
+    layout: &'a DWideBvh,
+    rays: &'a [DRay],
+    nearest: &'a mut [NearestHit],
+}
+
+impl<K: Instructions> Task<K> for Resolve<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run(self) {
+        let Self { layout, rays, nearest } = self;
+        let mut distances = Distances::EMPTY;
+        let mut numbers = [0; Distances::COUNT];
+        let mut count = 0;
+        for number in 0..nearest.len() {
+            let hit = nearest[number];
+            if !hit.is_known() {
+                let triangle = layout.triangle_at(hit.place);
+                distances.set(count, &rays[number], &triangle, hit.high - hit.low);
+                numbers[count] = number;
+                count += 1;
+            }
+            if count < K::Rays::N && (number + 1 < nearest.len() || count == 0) {
+                continue;
+            }
+            // SAFETY: the processor has the instructions.
+            let (rounded, is_decided) = unsafe { distances.rounded::<K::Rays>() };
+            for (lane, &number) in numbers[..count].iter().enumerate() {
+                if is_decided >> lane & 1 != 0 {
+                    let hit = &mut nearest[number];
+                    (hit.low, hit.high) = (rounded[lane], rounded[lane]);
+                } else {
+                    layout.resolve_alone(&rays[number], &mut nearest[number]);
+                }
+            }
+            count = 0;
+        }
     }
 }
 
@@ -321,28 +464,38 @@ impl<K: Instructions, const ANY: bool> Leaves<K> for Candidates<'_, '_, K::Block
 struct Nearest<'a> {
     layout: &'a DWideBvh,
     rays: &'a [DRay],
-    states: Vec<NearestHit<'a>>,
-    hits: &'a mut [Option<DHit>],
+    select: Select<'a>,
+    nearest: &'a mut [NearestHit],
+}
+
+impl<'a> Nearest<'a> {
+    #[inline(always)]
+    fn query(&self, number: usize) -> Query<'a> {
+        let select = select_of(self.select, self.rays.len(), number);
+        Query { ray: &self.rays[number], select }
+    }
 }
 
 impl Find for Nearest<'_> {
     const DECIDES: bool = true;
 
     #[inline(always)]
-    fn decide(&mut self, number: usize, object: u32) -> Option<f32> {
-        let state = &mut self.states[number];
-        let is_nearer = state.offer(object, &self.layout.triangles[object as usize]);
-        is_nearer.then(|| (state.limit() * self.layout.boxed(&self.rays[number]).scale) as f32)
-    }
-
-    #[inline(always)]
-    fn write(&mut self, number: usize, _: f32, _: u32) {
-        self.hits[number] = self.states[number].hit();
+    unsafe fn decide<K: Instructions>(
+        &mut self,
+        number: usize,
+        block: &TriangleBlock,
+        possible: u32,
+    ) -> Option<Hit> {
+        let query = self.query(number);
+        let nearest = &mut self.nearest[number];
+        // SAFETY: the processor has the instructions; the block is one of the layout.
+        let is_nearer = unsafe { self.layout.offer_block::<K>(query, nearest, block, possible) };
+        let t = (nearest.high * scale(query.ray)) as f32;
+        is_nearer.then_some(Hit { t, object: nearest.object })
     }
 
     fn alone(&mut self, _: &WideBvh, number: usize, _: &Ray) {
-        self.layout.search::<NEAREST_HIT>(&self.rays[number], &mut self.states[number]);
-        self.hits[number] = self.states[number].hit();
+        self.layout.search::<NEAREST_HIT>(self.query(number), &mut self.nearest[number]);
     }
 }
 
@@ -354,10 +507,11 @@ struct Any<'a, const PLAIN: bool> {
     hits: &'a mut [bool],
 }
 
-impl<const PLAIN: bool> Any<'_, PLAIN> {
-    fn state(&self, number: usize) -> NearestHit<'_> {
+impl<'a, const PLAIN: bool> Any<'a, PLAIN> {
+    #[inline(always)]
+    fn query(&self, number: usize) -> Query<'a> {
         let select = select_of(self.select, self.rays.len(), number);
-        NearestHit::new(&self.rays[number], select)
+        Query { ray: &self.rays[number], select }
     }
 }
 
@@ -367,9 +521,17 @@ impl<const PLAIN: bool> Find for Any<'_, PLAIN> {
     const TAKES_CERTAIN: bool = PLAIN;
 
     #[inline(always)]
-    fn decide(&mut self, number: usize, object: u32) -> Option<f32> {
-        let triangle = &self.layout.triangles[object as usize];
-        self.state(number).offer(object, triangle).then_some(0.0)
+    unsafe fn decide<K: Instructions>(
+        &mut self,
+        number: usize,
+        block: &TriangleBlock,
+        possible: u32,
+    ) -> Option<Hit> {
+        let query = self.query(number);
+        let mut nearest = NearestHit::new(query.ray);
+        // SAFETY: the processor has the instructions; the block is one of the layout.
+        let is_hit = unsafe { self.layout.offer_block::<K>(query, &mut nearest, block, possible) };
+        is_hit.then_some(Hit { t: 0.0, object: nearest.object })
     }
 
     #[inline(always)]
@@ -378,8 +540,8 @@ impl<const PLAIN: bool> Find for Any<'_, PLAIN> {
     }
 
     fn alone(&mut self, _: &WideBvh, number: usize, _: &Ray) {
-        let mut state = self.state(number);
-        let is_hit = self.layout.search::<ANY_HIT>(&self.rays[number], &mut state);
-        self.hits[number] = is_hit;
+        let query = self.query(number);
+        let mut nearest = NearestHit::new(query.ray);
+        self.hits[number] = self.layout.search::<ANY_HIT>(query, &mut nearest);
     }
 }

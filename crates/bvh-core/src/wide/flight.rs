@@ -25,7 +25,7 @@ use super::pairs::Crossings;
 use super::prepared::{Prepared, Ready, Test};
 use super::ray_lanes::{RayLanes, prefetch};
 use super::triangles::TriangleBlock;
-use crate::Ray;
+use crate::{Hit, Ray};
 use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 use core::ops::Range;
@@ -358,16 +358,12 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
                 let traversal = &mut *traversal;
                 let block = traversal.block(self.wide);
                 let number = traversal.ray.number as usize;
-                let mut lanes = possible & block.used::<K::Block>();
-                while lanes != 0 {
-                    let object = block.id(lanes.trailing_zeros() as usize & 3);
-                    lanes &= lanes - 1;
-                    if let Some(t) = self.find.decide(number, object) {
-                        traversal.nearest = u64::from(t.to_bits()) << 32 | u64::from(object);
+                let possible = possible & block.used::<K::Block>();
+                if let Some(Hit { t, object }) = self.find.decide::<K>(number, block, possible) {
+                    traversal.nearest = u64::from(t.to_bits()) << 32 | u64::from(object);
+                    if !F::ANY {
+                        traversal.drop_farther::<K>();
                     }
-                }
-                if !F::ANY {
-                    traversal.drop_farther::<K>();
                 }
             }
         }

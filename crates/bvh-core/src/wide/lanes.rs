@@ -1,6 +1,7 @@
 //! Lanes as a type: numbers side by side in one register. Kernels are written once over [`Lanes`];
 //! instruction sets are its implementations.
 
+use crate::exact::Numbers;
 use core::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Sub};
 
 /// A value that begins with a line of the cache, and is aligned for any register.
@@ -154,6 +155,9 @@ pub(crate) trait DoubleLanes:
     /// The same number in all lanes.
     unsafe fn splat(x: f64) -> Self;
 
+    /// As many numbers from any place as there are lanes.
+    unsafe fn load(from: *const f64) -> Self;
+
     /// Writes the numbers to any place.
     ///
     /// # Safety
@@ -195,6 +199,9 @@ pub(crate) trait DoubleLanes:
     /// both.
     fn mul_sub(self, factor: Self, term: Self) -> Self;
 
+    /// The rounded products and their rounding errors.
+    fn two_product(self, other: Self) -> (Self, Self);
+
     /// Where `self < other`.
     fn lt(self, other: Self) -> Self::Mask;
 
@@ -203,4 +210,11 @@ pub(crate) trait DoubleLanes:
 
     /// Where `self == other`.
     fn eq(self, other: Self) -> Self::Mask;
+}
+
+impl<D: DoubleLanes> Numbers for D {
+    #[inline(always)]
+    fn two_product(self, other: Self) -> (Self, Self) {
+        DoubleLanes::two_product(self, other)
+    }
 }

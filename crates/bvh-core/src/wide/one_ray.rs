@@ -7,7 +7,8 @@ use super::lanes::{Aligned, Lanes, Mask};
 use super::layout::{Child, WideBvh};
 use super::pairs::{Crossings, Pairs};
 use super::triangles::TriangleBlock;
-use crate::ray::{AXES, largest_axis};
+use crate::exact::AXES;
+use crate::ray::largest_axis;
 use crate::{Hit, Ray};
 use core::mem::MaybeUninit;
 

@@ -8,7 +8,7 @@ use super::pairs::Pairs;
 use super::ray_lanes::{BoxLanes, RayLanes};
 use super::triangles::{TriangleBlock, three_by_three};
 use crate::Aabb;
-use crate::ray::AXES;
+use crate::exact::AXES;
 use crate::slabs::{FAR, NEAR};
 
 /// Rays side by side that are about to be written one after the other.

@@ -3,7 +3,7 @@
 use super::instructions::Instructions;
 use super::lanes::{DoubleLanes, Lanes, Mask};
 use super::pairs::Pairs;
-use crate::ray::AXES;
+use crate::exact::AXES;
 use crate::{Aabb, Frame, Ray};
 
 /// One ray per lane, as triangles are tested with it. Vectors of three are by axis.

@@ -202,6 +202,26 @@ impl<const R: usize> DoubleLanes for Doubles<R> {
     }
 
     #[inline(always)]
+    unsafe fn load(from: *const f64) -> Self {
+        let at = |i: usize, half: usize| unsafe { load_double(from.add(4 * i + 2 * half)) };
+        Self(from_fn(|i| from_fn(|half| at(i, half))))
+    }
+
+    /// By Dekker, since products are not fused.
+    #[inline(always)]
+    fn two_product(self, other: Self) -> (Self, Self) {
+        let split = |x: Self| {
+            let scaled = x.filled(((1_u64 << 27) + 1) as f64) * x;
+            let high = scaled - (scaled - x);
+            (high, x - high)
+        };
+        let product = self * other;
+        let (a, a_low) = split(self);
+        let (b, b_low) = split(other);
+        (product, a * b - product + a * b_low + a_low * b + a_low * b_low)
+    }
+
+    #[inline(always)]
     unsafe fn store(self, to: *mut f64) {
         for (i, half) in self.0.as_flattened().iter().enumerate() {
             unsafe { store_double(to.add(2 * i), *half) };

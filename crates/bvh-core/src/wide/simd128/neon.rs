@@ -9,10 +9,10 @@ use core::mem::transmute;
 pub(super) use core::arch::aarch64::{
     float32x4_t as Single, float64x2_t as Double, vaddq_f32 as add, vaddq_f64 as add_double,
     vcvt_high_f64_f32 as double_high, vdivq_f32 as divide, vdivq_f64 as divide_double,
-    vdupq_n_f32 as splat, vdupq_n_f64 as splat_double, vld1q_f32 as load, vmulq_f32 as multiply,
-    vmulq_f64 as multiply_double, vrev64q_f32 as swap_ones, vst1q_f32 as store,
-    vst1q_f64 as store_double, vsubq_f32 as subtract, vsubq_f64 as subtract_double,
-    vzip1q_f32 as interleave_low, vzip2q_f32 as interleave_high,
+    vdupq_n_f32 as splat, vdupq_n_f64 as splat_double, vld1q_f32 as load, vld1q_f64 as load_double,
+    vmulq_f32 as multiply, vmulq_f64 as multiply_double, vrev64q_f32 as swap_ones,
+    vst1q_f32 as store, vst1q_f64 as store_double, vsubq_f32 as subtract,
+    vsubq_f64 as subtract_double, vzip1q_f32 as interleave_low, vzip2q_f32 as interleave_high,
 };
 
 /// Functions of two registers that are one instruction between other types of registers.

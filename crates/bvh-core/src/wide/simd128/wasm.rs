@@ -20,6 +20,12 @@ pub(super) unsafe fn load(from: *const f32) -> v128 {
 }
 
 #[inline(always)]
+pub(super) unsafe fn load_double(from: *const f64) -> v128 {
+    // SAFETY: the place has two numbers; the instruction accepts any alignment.
+    unsafe { v128_load(from.cast()) }
+}
+
+#[inline(always)]
 pub(super) unsafe fn store(to: *mut f32, a: v128) {
     // SAFETY: the place has four lanes; the instruction accepts any alignment.
     unsafe { v128_store(to.cast(), a) }

@@ -289,6 +289,15 @@ impl DoubleLanes for F64x4 {
         unsafe { Self(_mm256_set1_pd(x)) }
     }
     #[inline(always)]
+    unsafe fn load(from: *const f64) -> Self {
+        unsafe { Self(_mm256_loadu_pd(from)) }
+    }
+    #[inline(always)]
+    fn two_product(self, other: Self) -> (Self, Self) {
+        let product = self * other;
+        (product, self.mul_sub(other, product))
+    }
+    #[inline(always)]
     unsafe fn store(self, to: *mut f64) {
         unsafe { _mm256_storeu_pd(to, self.0) }
     }
@@ -323,6 +332,15 @@ impl DoubleLanes for F64x8 {
             let x = _mm512_fmadd_pd(_mm512_fnmadd_pd(self.0, x, one), x, x);
             Self(_mm512_fmadd_pd(_mm512_fnmadd_pd(self.0, x, one), x, x))
         }
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const f64) -> Self {
+        unsafe { Self(_mm512_loadu_pd(from)) }
+    }
+    #[inline(always)]
+    fn two_product(self, other: Self) -> (Self, Self) {
+        let product = self * other;
+        (product, self.mul_sub(other, product))
     }
     #[inline(always)]
     unsafe fn store(self, to: *mut f64) {
@@ -367,6 +385,15 @@ impl<T: DoubleLanes> DoubleLanes for Two<T> {
     #[inline(always)]
     fn inverse(self) -> Self {
         Self(self.0.inverse(), self.1.inverse())
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const f64) -> Self {
+        unsafe { Self(T::load(from), T::load(from.cast::<T>().add(1).cast())) }
+    }
+    #[inline(always)]
+    fn two_product(self, other: Self) -> (Self, Self) {
+        let product = self * other;
+        (product, self.mul_sub(other, product))
     }
     #[inline(always)]
     unsafe fn store(self, to: *mut f64) {
