@@ -170,7 +170,8 @@ impl File<'_> {
             self.binary.resize(self.binary.len().next_multiple_of(4), 0);
             let (start, length) = (self.binary.len(), 4 * numbers.len());
             self.binary.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
-            let view = json!({ "buffer": 0, "byteOffset": start, "byteLength": length });
+            let view = json!({ "buffer": 0, "byteOffset": start, "byteLength": length,
+                "target": 34962 });
             let mut accessor = self.json["accessors"][old].clone();
             accessor["byteOffset"] = 0.into();
             accessor["bufferView"] = self.push("bufferViews", view).into();
