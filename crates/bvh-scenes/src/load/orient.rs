@@ -1,10 +1,9 @@
 //! Mesh files whose meshes stand along axes of their own, with the rotation back beside them.
 
 use super::mesh::Fault;
-use super::text::{line, words};
 use super::{Format, MeshError, gltf, obj};
 use bvh_core::Triangle;
-use glam::{DMat3, DVec3};
+use glam::DMat3;
 use std::path::Path;
 
 /// Returns the rotation by which to turn the mesh with this number and these triangles, if any.
@@ -36,50 +35,15 @@ pub struct Oriented {
 pub fn orient(bytes: &[u8], path: &Path, out: &Path, find: Find) -> Result<Oriented, MeshError> {
     let oriented = match Format::of(bytes, path) {
         Format::Gltf => gltf::orient(bytes, path, out, find),
-        Format::Obj => obj::parse(bytes).and_then(|mesh| match find(0, &mesh.triangles) {
-            Some(rotation) => Ok(Oriented {
-                bytes: turned(bytes, &rotation)?,
-                turned: vec![0],
-                remarks: Vec::new(),
-            }),
-            None => Ok(Oriented { bytes: bytes.to_vec(), ..Oriented::default() }),
+        Format::Obj => obj::parse(bytes).and_then(|mesh| {
+            let rotation = find(0, &mesh.triangles);
+            let new = rotation.map_or(Ok(bytes.to_vec()), |rotation| obj::turned(bytes, &rotation));
+            let turned = rotation.iter().map(|_| 0).collect();
+            Ok(Oriented { bytes: new?, turned, remarks: Vec::new() })
         }),
         other => {
             Err(Fault::of_file(format!("a file of the kind {other:?}; expected OBJ, glTF or GLB")))
         }
     };
     oriented.map_err(MeshError::of(path))
-}
-
-/// Turns the vertices and the normals of an OBJ file, in double precision, which other programs may
-/// read.
-fn turned(bytes: &[u8], rotation: &DMat3) -> Result<Vec<u8>, Fault> {
-    let rows = rotation.to_cols_array().map(|number| number.to_string()).join(" ");
-    let mut turned = format!("# scene = matrix * vertex, matrix by rows: {rows}\n").into_bytes();
-    let mut rest = super::without_mark(bytes);
-    let mut number = 0;
-    loop {
-        let start = rest;
-        let Some(code) = line(&mut rest) else { return Ok(turned) };
-        number += 1;
-        let whole = &start[..start.len() - rest.len()];
-        let mut words = words(code);
-        let keyword = words.next().unwrap_or_default();
-        let is_vector = matches!(keyword, b"v" | b"V" | b"vn" | b"VN");
-        let triple: Vec<&[u8]> = words.take(if is_vector { 3 } else { 0 }).collect();
-        let numbers = triple.iter().map_while(|word| str::from_utf8(word).ok()?.parse().ok());
-        match numbers.filter(|x: &f64| x.is_finite()).collect::<Vec<f64>>()[..] {
-            [x, y, z] => {
-                let [x, y, z] = (*rotation * DVec3::new(x, y, z)).to_array();
-                let end = triple[2].as_ptr_range().end.addr() - whole.as_ptr().addr();
-                turned
-                    .extend([keyword, format!(" {x} {y} {z}").as_bytes(), &whole[end..]].concat());
-            }
-            _ if is_vector && code.ends_with(b"\\") => {
-                return Err(Fault::in_line(number, "a vertex on two lines; expected it on one"));
-            }
-            // What is no number is used by no face.
-            _ => turned.extend(whole),
-        }
-    }
 }

@@ -102,6 +102,8 @@ fn vectors_turn_and_everything_else_stays() {
         let [v, w] = [from, to].map(|v| Vec3::from_slice(v).as_dvec3());
         assert!((rotation() * v).distance(w) < 1e-6 && from.get(3) == to.get(3), "{v} {w}");
     }
+    let least = |axis: usize| (0..4).map(|i| to[3 * i + axis]).reduce(f32::min);
+    assert_eq!(json["accessors"][5]["min"], json!([0, 1, 2].map(least)));
     // What changed is changed in the old JSON, too, after which both must be the same.
     let primitive = &mut old["meshes"][0]["primitives"][0];
     primitive["attributes"] = json!({"POSITION": 5, "NORMAL": 6, "TANGENT": 8, "TEXCOORD_0": 9});
@@ -149,11 +151,19 @@ fn a_mesh_that_would_lose_something_is_left_as_it_is() {
         assert!(new.bytes == bytes && new.turned.is_empty(), "{reason}");
         assert!(new.remarks.iter().any(|remark| remark.contains(reason)), "{:?}", new.remarks);
     }
+    // Meshes that each use a part of the same vertices would make the file as many times as large.
+    let mut shared: Value = serde_json::from_str(RICH).unwrap();
+    shared["meshes"] = vec![json!({"primitives": [{"attributes": {"POSITION": 0}}]}); 99].into();
+    shared["nodes"] = (1..100).map(|mesh| json!({ "mesh": mesh })).collect();
+    let new = turned(&file(&shared), "shared.glb", DMat3::IDENTITY);
+    assert!((10..50).contains(&new.turned.len()) && new.bytes.len() < 30_000, "{:?}", new.turned);
+    assert!(new.remarks[0].contains("those of many meshes"), "{:?}", new.remarks);
 }
 
 #[test]
 fn an_obj_file_keeps_every_other_byte_and_has_its_matrix_in_a_comment() {
-    let text = "\u{feff}# a\r\nv 1 2 -3 0.5 0.25 1 # b\r\nvn 0 0 1\n V 4 5e0 6\rv 7 8 9 2\rf 1 2 3";
+    let text =
+        "\u{feff}# a\r\nv 1 2 -3 0.5 0.25 1 # b\r\nvn 0 0 1\n V 4 5e0 6#c\rv 7 8 9 2\rf 1 2 3";
     let new = turned(text.as_bytes(), "a.obj", rotation().transpose());
     let new = String::from_utf8(new.bytes).unwrap();
     let (comment, rest) = new.split_once('\n').unwrap();
