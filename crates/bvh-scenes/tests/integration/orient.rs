@@ -33,6 +33,7 @@ fn turned(bytes: &[u8], name: &str, back: DMat3) -> Oriented {
 /// Returns the JSON and the buffer of a GLB file.
 fn split(glb: &[u8]) -> (Value, &[u8]) {
     let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    assert!(length.is_multiple_of(4) && glb.len().is_multiple_of(4));
     (serde_json::from_slice(&glb[20..20 + length]).unwrap(), &glb[28 + length..])
 }
 
