@@ -20,8 +20,8 @@ use std::path::PathBuf;
 /// stays the same but for rounding turned vertices once, by up to half a unit in the last place.
 ///
 /// A glTF file becomes a GLB file, whose nodes have the inverse rotations. An OBJ file has the
-/// inverse matrix in a comment in its first line. A mesh is left as it is, with a remark, if it has a
-/// skin, quantised or sparse vertices, or an extension that may depend on them.
+/// inverse matrix in a comment in its first line. A mesh with a skin, with quantised vertices or with
+/// an extension that may depend on them is left as it is, with a remark.
 ///
 /// Example: bvh orient house.gltf --out house.glb --report
 #[derive(Args, Clone, Debug)]
@@ -43,8 +43,12 @@ pub struct OrientArgs {
 pub fn orient(args: &OrientArgs, answer: &mut Answer) -> Result<(), Error> {
     let OrientArgs { scene: path, out, report } = args;
     let bytes = files::read(path)?;
-    let is_obj = Format::of(&bytes, path) == Format::Obj;
-    output_file("--out", out, if is_obj { "obj" } else { "glb" })?;
+    match Format::of(&bytes, path) {
+        Format::Gltf => output_file("--out", out, "glb")?,
+        Format::Obj => output_file("--out", out, "obj")?,
+        // No name of a new file would be right, and the writer names the kind.
+        _ => {}
+    }
     if fs::canonicalize(out).is_ok_and(|out| fs::canonicalize(path).is_ok_and(|path| path == out)) {
         let message = format!("--out: {} is the scene; accepted: another name", out.display());
         return Err(Error::Usage(message));

@@ -48,6 +48,7 @@ fn folder() -> tempfile::TempDir {
     write("flipped.bvh", &flipped);
     write("file", b"");
     write("mesh.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write("mesh.ply", b"ply\n");
     write("wrong.toml", b"count = 9\nbouncy = 1\ncameras = []\n");
     write("blind.toml", b"cameras = [{ eye = [1.0, 2.0, 3.0] }]\n");
     write("none.toml", b"bounces = 1");
@@ -85,6 +86,7 @@ export good.bvh spheres75 --for=obvhs --out=x.bvh ! --out | .bin
 orient mesh.obj --out=mesh.obj ! --out: mesh.obj is the scene | another name
 orient mesh.obj --out=x.glb ! --out | .obj
 orient no.glb --out=x.glb ! no.glb: no such file
+orient mesh.ply --out=x.ply ! mesh.ply: a file of the kind Ply | OBJ, glTF or GLB
 orient good.bvh --out=x.obj ! good.bvh
 bake forest.glb --instances --budget=1h --out=full ! full contains files | new or empty
 bake forest.glb --instances --budget=1h --out=file/x ! file is no folder | new or empty
