@@ -9,6 +9,7 @@ mod inspect;
 mod interrupt;
 mod memory;
 mod npy;
+mod orient;
 mod output;
 mod rays;
 mod render;
@@ -58,6 +59,7 @@ enum Command {
         scene: String,
     },
     Export(export::ExportArgs),
+    Orient(orient::OrientArgs),
     Render(render::RenderArgs),
     Report(report::ReportArgs),
     /// List the built-in scenes and their sizes.
@@ -105,6 +107,7 @@ fn run(Cli { command, json, jobs }: Cli) -> Result<(), Error> {
             inspect::inspect(&args, &mut answer)?;
         }
         Command::Export(args) => export::export(&args, &mut answer)?,
+        Command::Orient(args) => orient::orient(&args, &mut answer)?,
         Command::Render(args) => render::render(&args, &mut answer)?,
         Command::Report(args) => report::report(&args, &mut answer)?,
         Command::Scenes => scenes::scenes(&mut answer)?,

@@ -48,6 +48,7 @@ fn folder() -> tempfile::TempDir {
     write("flipped.bvh", &flipped);
     write("file", b"");
     write("mesh.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write("mesh.ply", b"ply\n");
     write("wrong.toml", b"count = 9\nbouncy = 1\ncameras = []\n");
     write("blind.toml", b"cameras = [{ eye = [1.0, 2.0, 3.0] }]\n");
     write("none.toml", b"bounces = 1");
@@ -82,6 +83,11 @@ report good.bvh spheres7500 --out=no/x.html ! no is no folder
 report good.bvh spheres75 --out=good.bvh ! --out: good.bvh | .html
 report good.bvh escher --out=x.html ! good.bvh | scene
 export good.bvh spheres75 --for=obvhs --out=x.bvh ! --out | .bin
+orient mesh.obj --out=mesh.obj ! --out: mesh.obj is the scene | another name
+orient mesh.obj --out=x.glb ! --out | .obj
+orient no.glb --out=x.glb ! no.glb: no such file
+orient mesh.ply --out=x.ply ! mesh.ply: a file of the kind Ply | OBJ, glTF or GLB
+orient good.bvh --out=x.obj ! good.bvh
 bake forest.glb --instances --budget=1h --out=full ! full contains files | new or empty
 bake forest.glb --instances --budget=1h --out=file/x ! file is no folder | new or empty
 
@@ -199,6 +205,7 @@ fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     bvh(at, "bake spheres75 --budget=0s --out=good.bvh");
+    fs::write(at.join("mesh.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     // Every command needs its required arguments before a flag can be wrong.
     let flags = wrong_flags(
         at,
@@ -207,6 +214,7 @@ fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
             ("inspect", &["good.bvh", "spheres75"]),
             ("verify", &["good.bvh", "spheres75"]),
             ("export", &["good.bvh", "spheres75", "--for=obvhs", "--out=x.bin"]),
+            ("orient", &["mesh.obj", "--out=x.obj"]),
             ("render", &["spheres75", "--out=x.png", "--size=8x8"]),
             ("report", &["good.bvh", "spheres75"]),
             ("scenes", &[]),

@@ -9,5 +9,6 @@ mod commands;
 mod examples;
 mod export;
 mod inspect;
+mod orient;
 mod render;
 mod support;

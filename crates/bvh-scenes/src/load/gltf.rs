@@ -8,6 +8,7 @@ mod accessors;
 mod buffers;
 mod document;
 mod nodes;
+mod orient;
 
 use super::MeshError;
 use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Rounding, counted};
@@ -17,6 +18,7 @@ use bvh_core::Triangle;
 use document::{Document, Primitive, document, is_covered};
 use glam::{DMat4, DVec3, Vec3};
 use nodes::places;
+pub(super) use orient::orient;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::path::Path;
@@ -54,7 +56,8 @@ pub struct Placed {
 /// Reads the bytes of a glTF or GLB file, and the buffers that its meshes refer to from the folder
 /// of `path`. Returns the meshes at their places.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
-    let Parts { mut meshes, places, mut remarks } = read(bytes, path)?;
+    let (document, chunk) = document(bytes)?;
+    let Parts { mut meshes, places, mut remarks } = read(&document, chunk, path)?;
     let mut rounding = Rounding::default();
     // A file of a few kilobytes can place one mesh any number of times.
     let total = places.iter().map(|place| meshes[&place.mesh].len()).sum();
@@ -86,14 +89,14 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
 
 /// Reads a file as [`parse`] does, but returns every mesh once.
 pub fn parts(bytes: &[u8], path: &Path) -> Result<Parts, MeshError> {
-    read(bytes, path).map_err(MeshError::of(path))
+    let parts = document(bytes).and_then(|(document, chunk)| read(&document, chunk, path));
+    parts.map_err(MeshError::of(path))
 }
 
-fn read(bytes: &[u8], path: &Path) -> Result<Parts, Fault> {
-    let (document, chunk) = document(bytes)?;
-    let buffers = Buffers::new(&document, path, chunk);
+fn read(document: &Document, chunk: Option<&[u8]>, path: &Path) -> Result<Parts, Fault> {
+    let buffers = Buffers::new(document, path, chunk);
     let mut loader = Loader { buffers, total: 0, left_out: BTreeMap::new() };
-    let mut places = places(&document)?;
+    let mut places = places(document)?;
     let all = places.len();
     places.retain(|place| has_area(&place.transform));
     loader.left_out.insert(FLAT, all - places.len());
@@ -119,7 +122,7 @@ fn read(bytes: &[u8], path: &Path) -> Result<Parts, Fault> {
     meshes.retain(|_, triangles| !triangles.is_empty());
     places.retain(|place| meshes.contains_key(&place.mesh));
     let left_out = loader.left_out.iter().filter_map(|(things, &count)| counted(things, count));
-    let remarks: Vec<String> = remarks(&document).into_iter().chain(left_out).collect();
+    let remarks: Vec<String> = remarks(document).into_iter().chain(left_out).collect();
     if places.is_empty() {
         let found = [&["no triangle in its scene".into()], &remarks[..]].concat().join("; ");
         return Err(Fault::of_file(format!("{found}; expected a glTF file with at least one")));

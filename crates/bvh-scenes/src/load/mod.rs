@@ -4,6 +4,7 @@ mod ears;
 pub mod gltf;
 pub mod mesh;
 mod obj;
+mod orient;
 mod ply;
 mod polygon;
 mod stl;
@@ -11,6 +12,7 @@ mod text;
 
 use crate::files::{ReadError, read};
 use mesh::{Fault, Mesh};
+pub use orient::{Find, Oriented, orient};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 

@@ -1,7 +1,10 @@
 //! Any bytes give a mesh or an error that names its place.
 
 use crate::samples::{error, glb, read, samples, stl_binary};
+use bvh_scenes::load::orient;
+use glam::DMat3;
 use proptest::prelude::*;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 #[test]
@@ -41,8 +44,11 @@ fn cut_files_give_a_mesh_or_an_error() {
     }
 }
 
-/// Asserts that the bytes give an error, or a mesh with triangles that are all finite.
+/// Turns the bytes, which may be an error, and asserts that they give an error, or a mesh with
+/// triangles that are all finite.
 fn check(bytes: &[u8], name: &str) {
+    let find = &mut |_: usize, _: &[_]| Some(DMat3::from_rotation_x(1.0));
+    let _ = orient(bytes, Path::new(name), Path::new(name), find);
     if let Ok(mesh) = read(bytes, name) {
         assert!(!mesh.triangles.is_empty());
         assert!(mesh.triangles.iter().flat_map(|t| t.0).all(|corner| corner.is_finite()));

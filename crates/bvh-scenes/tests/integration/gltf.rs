@@ -44,7 +44,7 @@ fn view(text: &str) -> Vec<u8> {
     numbers.split(' ').flat_map(bytes).collect()
 }
 
-fn file(case: &Value) -> Vec<u8> {
+pub fn file(case: &Value) -> Vec<u8> {
     let mut binary = Vec::new();
     let mut views = Vec::new();
     for text in case["views"].as_array().unwrap() {
@@ -69,8 +69,8 @@ fn file(case: &Value) -> Vec<u8> {
     glb(document.to_string(), &binary)
 }
 
-#[test]
-fn everything_that_moves_or_repeats_a_vertex_is_read_or_named() {
+/// Returns the whole of all cases.
+pub fn cases() -> Vec<Value> {
     let default = json!({
         "views": ["f32 0 0 0 1 0 0 0 1 0"],
         "accessor": { "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3" },
@@ -79,26 +79,34 @@ fn everything_that_moves_or_repeats_a_vertex_is_read_or_named() {
         "triangles": [[0, 0, 0, 1, 0, 0, 0, 1, 0]], "remark": "",
     });
     let groups: Vec<Value> = serde_json::from_str(CASES).unwrap();
+    let mut cases = Vec::new();
     for mut group in groups {
-        let cases = group["cases"].take();
-        for patch in cases.as_array().unwrap() {
+        let patches = group["cases"].take();
+        for patch in patches.as_array().unwrap() {
             let mut case = default.clone();
             merge(&mut case, &group);
             merge(&mut case, patch);
-            let bytes = file(&case);
-            let name = case["name"].as_str().unwrap();
-            if let Some(words) = case["fault"].as_str() {
-                let message = error(&bytes, "a.glb");
-                assert!(message.contains(words), "{name}: {message}");
-                continue;
-            }
-            let mesh = read(&bytes, "a.glb").unwrap_or_else(|error| panic!("{name}: {error}"));
-            let expected: Vec<[f32; 9]> =
-                serde_json::from_value(case["triangles"].clone()).unwrap();
-            let expected: Vec<Triangle> = expected.into_iter().map(Triangle::from).collect();
-            assert_eq!(mesh.triangles, expected, "{name}");
-            assert_eq!(mesh.remark().unwrap_or_default(), case["remark"], "{name}");
+            cases.push(case);
         }
+    }
+    cases
+}
+
+#[test]
+fn everything_that_moves_or_repeats_a_vertex_is_read_or_named() {
+    for case in cases() {
+        let bytes = file(&case);
+        let name = case["name"].as_str().unwrap();
+        if let Some(words) = case["fault"].as_str() {
+            let message = error(&bytes, "a.glb");
+            assert!(message.contains(words), "{name}: {message}");
+            continue;
+        }
+        let mesh = read(&bytes, "a.glb").unwrap_or_else(|error| panic!("{name}: {error}"));
+        let expected: Vec<[f32; 9]> = serde_json::from_value(case["triangles"].clone()).unwrap();
+        let expected: Vec<Triangle> = expected.into_iter().map(Triangle::from).collect();
+        assert_eq!(mesh.triangles, expected, "{name}");
+        assert_eq!(mesh.remark().unwrap_or_default(), case["remark"], "{name}");
     }
 }
 

@@ -6,5 +6,6 @@ mod glb;
 mod gltf;
 mod meshes;
 mod obj;
+mod orient;
 mod polygons;
 mod samples;

@@ -63,7 +63,7 @@ impl Buffers<'_> {
         wanted: &[u32],
     ) -> Result<Vec<[f64; N]>, String> {
         let Accessor { count, component_type: component, normalized, .. } = *accessor;
-        let type_ = if N == 1 { "SCALAR" } else { "VEC3" };
+        let type_ = ["SCALAR", "VEC2", "VEC3", "VEC4"][N - 1];
         if accessor.type_ != type_ || !wanted.contains(&component) {
             let wanted: Vec<String> = wanted.iter().map(|&component| name(component)).collect();
             return Err(format!(

@@ -77,6 +77,8 @@ pub struct Mesh {
 #[derive(Debug, Deserialize)]
 pub struct Primitive {
     pub attributes: BTreeMap<String, usize>,
+    #[serde(default)]
+    pub targets: Vec<BTreeMap<String, usize>>,
     pub indices: Option<usize>,
     /// Points, three kinds of lines, triangles, strips and fans of triangles.
     #[serde(default = "triangles")]
@@ -119,17 +121,26 @@ pub struct Buffer {
     pub uri: Option<String>,
 }
 
-/// Reads a file's JSON, and returns the bytes of the binary chunk of a GLB file with it.
-pub fn document(bytes: &[u8]) -> Result<(Document, Option<&[u8]>), Fault> {
-    let (json, chunk) = match bytes.starts_with(b"glTF") {
+/// The text of a file's JSON; the binary chunk of a GLB file, and all chunks after it.
+type Chunks<'a> = (&'a [u8], Option<&'a [u8]>, &'a [u8]);
+
+/// Divides the bytes of a file.
+pub fn text(bytes: &[u8]) -> Result<Chunks<'_>, Fault> {
+    let (json, chunk, further) = match bytes.starts_with(b"glTF") {
         true => chunks(bytes).ok_or_else(|| {
             Fault::of_file("no chunk of JSON in version 2; expected a GLB file, and whole")
         })?,
-        false => (without_mark(bytes), None),
+        false => (without_mark(bytes), None, &[][..]),
     };
     // Some programs pad the chunk with zeros instead of blanks.
     let zeros = json.iter().rev().take_while(|&&byte| byte == 0).count();
-    let document: Document = serde_json::from_slice(&json[..json.len() - zeros])
+    Ok((&json[..json.len() - zeros], chunk, further))
+}
+
+/// Reads a file's JSON, and returns the bytes of the binary chunk of a GLB file with it.
+pub fn document(bytes: &[u8]) -> Result<(Document, Option<&[u8]>), Fault> {
+    let (json, chunk, _) = text(bytes)?;
+    let document: Document = serde_json::from_slice(json)
         .map_err(|error| Fault::of_file(format!("{error} of the JSON")))?;
     let version = &document.asset.version;
     let version = version.as_str().map_or_else(|| version.to_string(), Into::into);
@@ -150,7 +161,7 @@ pub fn is_covered(extension: &str) -> bool {
     COVERED.split(' ').any(|covered| covered == extension)
 }
 
-fn chunks(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
+fn chunks(bytes: &[u8]) -> Option<Chunks<'_>> {
     if bytes.get(4..8)? != [2, 0, 0, 0] {
         return None;
     }
@@ -160,7 +171,9 @@ fn chunks(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
     }
     // The file's header has 12 bytes, and each chunk's header has 8.
     let json = chunk(bytes, 12, b"JSON")?;
-    Some((json, chunk(bytes, 20 + json.len(), b"BIN\0")))
+    let binary = chunk(bytes, 20 + json.len(), b"BIN\0");
+    let end = 20 + json.len() + binary.map_or(0, |binary| 8 + binary.len());
+    Some((json, binary, bytes[..length].get(end..).unwrap_or_default()))
 }
 
 /// Returns the contents of the chunk whose header begins at `offset`, if it has this kind.
