@@ -62,6 +62,9 @@ typedef struct {
     uint64_t work;
     // The seed of the random numbers, which is 1 by default in Python and in the program `bvh`.
     uint64_t seed;
+    // 1 lets the boxes of triangles lie in a frame where that saves area, as by default in Python
+    // and in the program `bvh`: they are then no boxes for other tracers. 0 keeps the axes.
+    uint32_t frame;
 } BvhBake;
 
 // A binary node of 32 bytes with the layout of tinybvh's `BVH::BVHNode`. Node 0 is the root. If
@@ -172,8 +175,16 @@ BvhStatus bvh_tree_improve_until(BvhTree *tree, double seconds, uint8_t (*cancel
 // `tree` is a tree; `cost` points to a double.
 BvhStatus bvh_tree_cost(const BvhTree *tree, uint32_t kind, double *cost);
 
+// Writes the frame of the tree's boxes: 9 numbers, the rows of a rotation, then 3, a centre. The
+// boxes contain rotation * (p - centre) for the points p of their objects. Without a frame, these
+// are the identity and 0.
+//
+// `tree` is a tree; `frame` points to 12 doubles.
+BvhStatus bvh_tree_frame(const BvhTree *tree, double *frame);
+
 // Returns the nodes of the tree, and writes their number to `count`. The nodes belong to the tree
-// and are valid until it is improved or freed.
+// and are valid until it is improved or freed. Their boxes lie in its frame, if it has one: see
+// `bvh_tree_frame`.
 //
 // `tree` is a tree; `count` points to a size.
 const BvhNode *bvh_tree_nodes(const BvhTree *tree, size_t *count);

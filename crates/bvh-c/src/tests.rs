@@ -5,7 +5,7 @@ use crate::failure::{BvhStatus, bvh_last_error, status};
 use crate::{tracer::*, tree::*};
 use bvh_search::bvh_core::Primitives;
 use bvh_search::bvh_core::export::Target;
-use bvh_search::{Objects, Options, OwnedTree, prelude::*};
+use bvh_search::{Frames, Objects, Options, OwnedTree, prelude::*};
 use std::ffi::{CStr, CString, c_void};
 use std::ptr::{null, null_mut};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -35,6 +35,7 @@ const NO_BAKE: BvhBake = BvhBake {
     seconds: 0.0,
     work: 0,
     seed: 0,
+    frame: 0,
 };
 
 fn last_error() -> String {
@@ -228,7 +229,7 @@ fn files_are_those_of_the_library_and_a_wrong_one_is_named() {
         for target in Target::ALL {
             let tracer = CString::new(target.name).unwrap();
             ok(bvh_tree_export(tree, tracer.as_ptr(), named.as_ptr()));
-            assert_eq!(std::fs::read(&path).unwrap(), (*tree).owned.export(&target));
+            assert_eq!(std::fs::read(&path).unwrap(), (*tree).owned.export(&target).unwrap());
         }
         let status = bvh_tree_export(tree, c"embree".as_ptr(), named.as_ptr());
         invalid(status, "tracer is \"embree\"; accepted: three-mesh-bvh, ");
@@ -329,6 +330,7 @@ fn a_budget_of_work_gives_the_file_of_the_rust_crates() {
             references,
             work,
             seed: 3,
+            frame: 1,
             ..NO_BAKE
         };
         // SAFETY: every pointer comes with its array's length, and the tree is freed once.
@@ -339,7 +341,7 @@ fn a_budget_of_work_gives_the_file_of_the_rust_crates() {
         }
         let objects = Objects::Shapes(Primitives::Triangles(triangles.clone()));
         let budget = Budget { max_work: Some(work), ..Budget::UNLIMITED };
-        let options = Options { references, seed: 3, budget, rays };
+        let options = Options { references, seed: 3, budget, rays, frame: Frames::Auto };
         let expected = OwnedTree::find(objects, &options, &()).unwrap().save().unwrap();
         assert!(std::fs::read(&path).unwrap() == expected, "{references}, {} rays", rays.len());
     }

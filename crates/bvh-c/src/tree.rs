@@ -5,7 +5,8 @@ use bvh_search::bvh_core::Primitives;
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
 use bvh_search::bvh_core::export::{FirstCountNode, Target};
 use bvh_search::prelude::*;
-use bvh_search::{Objects, Observer, Options, OwnedTree};
+use bvh_search::bvh_core::glam::{DMat3, DVec3};
+use bvh_search::{Frames, Objects, Observer, Options, OwnedTree};
 use std::ffi::{CStr, c_char, c_void};
 use std::mem::offset_of;
 use std::sync::Arc;
@@ -90,7 +91,8 @@ pub unsafe extern "C" fn bvh_tree_from_triangles(
     made(|| {
         // SAFETY: `corners` points to 9 floats for each of `count` triangles.
         let triangles = unsafe { triangles_of(corners, count) }?;
-        found(triangles, &Options { references, ..Options::default() }, Some(seconds))
+        let frame = Frames::File;
+        found(triangles, &Options { references, frame, ..Options::default() }, Some(seconds))
     })
 }
 
@@ -121,6 +123,9 @@ pub struct BvhBake {
     pub work: u64,
     /// The seed of the random numbers, which is 1 by default in Python and in the program `bvh`.
     pub seed: u64,
+    /// 1 lets the boxes of triangles lie in a frame where that saves area, as by default in Python
+    /// and in the program `bvh`: they are then no boxes for other tracers. 0 keeps the axes.
+    pub frame: u32,
 }
 
 /// Searches for the best tree with these choices.
@@ -132,6 +137,11 @@ pub unsafe extern "C" fn bvh_tree_bake(bake: *const BvhBake) -> *mut BvhTree {
         // SAFETY: `bake` is null or points to a search.
         let bake = *unsafe { given("bake", bake) }?;
         let BvhBake { boxes, corners, count, rays, ray_count, seconds, work, seed, .. } = bake;
+        let frame = match bake.frame {
+            0 => Frames::File,
+            1 => Frames::Auto,
+            other => return Err(Failure::invalid(format!("frame is {other}; accepted: 0 or 1"))),
+        };
         let objects = match (boxes.is_null(), corners.is_null()) {
             // SAFETY: `corners` points to 9 floats for each of `count` triangles.
             (true, _) => unsafe { triangles_of(corners, count) }?,
@@ -147,7 +157,7 @@ pub unsafe extern "C" fn bvh_tree_bake(bake: *const BvhBake) -> *mut BvhTree {
         let references = if bake.references == 0.0 { 1.0 } else { bake.references };
         let max_work = (work > 0).then_some(work);
         let budget = Budget { max_work, ..Budget::UNLIMITED };
-        let options = Options { references, seed, budget, rays: &rays };
+        let options = Options { references, seed, budget, rays: &rays, frame };
         let is_timed = max_work.is_none() || seconds != 0.0;
         found(objects, &options, is_timed.then_some(seconds))
     })
@@ -245,8 +255,29 @@ pub unsafe extern "C" fn bvh_tree_cost(
     })
 }
 
+/// Writes the frame of the tree's boxes: 9 numbers, the rows of a rotation, then 3, a centre. The
+/// boxes contain rotation * (p - centre) for the points p of their objects. Without a frame, these
+/// are the identity and 0.
+///
+/// `tree` is a tree; `frame` points to 12 doubles.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvh_tree_frame(tree: *const BvhTree, frame: *mut f64) -> BvhStatus {
+    status(|| {
+        // SAFETY: nobody changes the tree during the call.
+        let tree = unsafe { given("tree", tree) }?;
+        // SAFETY: `frame` points to 12 doubles that nobody else uses during the call.
+        let numbers = unsafe { given_mut("frame", frame.cast::<[[f64; 3]; 4]>()) }?;
+        let frame = tree.owned.tree().frame;
+        let rows = frame.map_or(DMat3::IDENTITY, |frame| frame.rotation()).transpose();
+        let [x, y, z] = rows.to_cols_array_2d();
+        *numbers = [x, y, z, frame.map_or(DVec3::ZERO, |frame| frame.centre()).to_array()];
+        Ok(())
+    })
+}
+
 /// Returns the nodes of the tree, and writes their number to `count`. The nodes belong to the tree
-/// and are valid until it is improved or freed.
+/// and are valid until it is improved or freed. Their boxes lie in its frame, if it has one: see
+/// `bvh_tree_frame`.
 ///
 /// `tree` is a tree; `count` points to a size.
 #[unsafe(no_mangle)]
@@ -352,7 +383,8 @@ pub unsafe extern "C" fn bvh_tree_export(
         let [tracer, path] = unsafe { [text("tracer", tracer)?, text("path", path)?] };
         let target = Target::named(tracer)
             .map_err(|unknown| Failure::invalid(format!("tracer is {unknown}")))?;
-        Ok(bvh_scenes::files::write(path.as_ref(), &tree.owned.export(&target))?)
+        let bytes = tree.owned.export(&target).map_err(Failure::invalid)?;
+        Ok(bvh_scenes::files::write(path.as_ref(), &bytes)?)
     })
 }
 

@@ -6,6 +6,7 @@ use crate::arguments::{load_scene, output_file};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::export::{Layout, Target};
 use bvh_scenes::{files, tree_file};
+use bvh_search::FramedExport;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
@@ -45,6 +46,12 @@ pub fn export(args: &ExportArgs, answer: &mut Answer) -> Result<(), Error> {
     output_file("--out", &args.out, extension)?;
     let scene = load_scene(&args.scene)?;
     let (tree, _) = tree_file::load(&args.file, &scene)?;
+    if tree.frame.is_some() {
+        return Err(Error::Usage(format!(
+            "{}: {FramedExport} (--frame file)",
+            args.file.display()
+        )));
+    }
     let [objects, references] = [scene.boxes.len(), tree.prim_ids.len()];
     if references > objects && target.references == 1.0 && !args.divided {
         return Err(Error::Usage(format!(

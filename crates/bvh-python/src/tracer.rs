@@ -60,7 +60,7 @@ impl Tracer {
         let Some(wide) = source.layout() else {
             return Err(invalid("tree is over boxes; accepted: a tree over triangles"));
         };
-        let place = center.map(|center| Place::new(center, source.tree().root_aabb()));
+        let place = center.map(|center| Place::new(center, source.bounds()));
         Ok(Self { wide: wide.map_err(invalid)?, source, place, solid: OnceLock::new() })
     }
 

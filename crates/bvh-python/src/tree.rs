@@ -11,7 +11,7 @@ use bvh_scenes::files::{self, WriteError};
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
 use bvh_search::bvh_core::export::Target;
-use bvh_search::{BakeError, Objects, Options, OwnedTree, SearchError};
+use bvh_search::{BakeError, Frames, Objects, Options, OwnedTree, SearchError};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -78,11 +78,12 @@ impl Tree {
 #[pymethods]
 impl Tree {
     /// Searches for the best tree over the triangles of a mesh: vertices, `(v, 3)`, and faces, `(n,
-    /// 3)`, of three vertices each. `update` moves the vertices later.
+    /// 3)`, of three vertices each. `update` moves the vertices later. The boxes lie along other
+    /// axes than the vertices' where that saves area, see `frame`; `frame="file"` keeps the axes.
     ///
     /// >>> mesh = Tree.from_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], work=100)
     #[staticmethod]
-    #[pyo3(signature = (vertices, faces, seconds = None, *, references = 1.0, seed = 1, work = None, progress = None, rays = None))]
+    #[pyo3(signature = (vertices, faces, seconds = None, *, references = 1.0, seed = 1, work = None, progress = None, rays = None, frame = "auto"))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
     fn from_mesh(
         vertices: &Bound<PyAny>,
@@ -93,10 +94,13 @@ impl Tree {
         #[pyo3(from_py_with = scalars::work)] work: Option<u64>,
         progress: Option<Py<PyAny>>,
         rays: Option<&Bound<PyAny>>,
+        frame: &str,
     ) -> PyResult<Self> {
         let (triangles, faces) = mesh(MESH, vertices, faces)?;
         let limits = Limits { seconds, work, progress };
-        let options = Options { references, seed, rays: &segments(rays)?, ..Options::default() };
+        let rays = &segments(rays)?;
+        let frame = frames(frame)?;
+        let options = Options { references, seed, rays, frame, ..Options::default() };
         let mut tree = found(vertices.py(), "vertices", shapes(triangles), &options, limits)?;
         tree.faces = Some(Arc::new(faces));
         Ok(tree)
@@ -106,7 +110,7 @@ impl Tree {
     ///
     /// >>> triangle = Tree.from_triangles([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], seconds=0.1)
     #[staticmethod]
-    #[pyo3(signature = (triangles, seconds = None, *, references = 1.0, seed = 1, work = None, progress = None, rays = None))]
+    #[pyo3(signature = (triangles, seconds = None, *, references = 1.0, seed = 1, work = None, progress = None, rays = None, frame = "auto"))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
     fn from_triangles(
         triangles: &Bound<PyAny>,
@@ -116,10 +120,13 @@ impl Tree {
         #[pyo3(from_py_with = scalars::work)] work: Option<u64>,
         progress: Option<Py<PyAny>>,
         rays: Option<&Bound<PyAny>>,
+        frame: &str,
     ) -> PyResult<Self> {
         let objects = self::triangles(triangles)?;
         let limits = Limits { seconds, work, progress };
-        let options = Options { references, seed, rays: &segments(rays)?, ..Options::default() };
+        let rays = &segments(rays)?;
+        let frame = frames(frame)?;
+        let options = Options { references, seed, rays, frame, ..Options::default() };
         found(triangles.py(), "triangles", objects, &options, limits)
     }
 
@@ -189,7 +196,8 @@ impl Tree {
         let target =
             Target::named(tracer).map_err(|unknown| invalid(format!("tracer is {unknown}")))?;
         let owned = self.owned();
-        Ok(PyBytes::new(py, &detached(py, || owned.export(&target))?))
+        let bytes = detached(py, || owned.export(&target))?.map_err(invalid)?;
+        Ok(PyBytes::new(py, &bytes))
     }
 
     /// Improves the tree for about `seconds`. Ctrl-C ends the search early, and the tree keeps its
@@ -258,9 +266,19 @@ impl Tree {
         Ok(self.owned().cost(objective))
     }
 
+    /// The frame of the boxes, a rotation and a centre: they contain `rotation @ (p - centre)` for
+    /// the points p of their objects. `None` if they lie along the axes.
+    ///
+    /// >>> square.frame
+    #[getter]
+    fn frame(&self) -> Option<([[f64; 3]; 3], [f64; 3])> {
+        let frame = self.owned().tree().frame?;
+        Some((frame.rotation().transpose().to_cols_array_2d(), frame.centre().to_array()))
+    }
+
     /// Returns the nodes, the root first, as an array with the fields `min`, `first`, `max` and
     /// `count`. An inner node has the `count` 0, and its two children begin at `first`. The objects
-    /// of a leaf are `object_ids()[first:first + count]`.
+    /// of a leaf are `object_ids()[first:first + count]`. Boxes lie in the `frame`, if there is one.
     ///
     /// >>> square.nodes()["max"][0]
     /// array([1., 1., 0.], dtype=float32)
@@ -336,6 +354,15 @@ fn found(
         BakeError::Rays(_) | BakeError::Search(SearchError::OutOfRange(_)) => invalid(error),
         BakeError::Search(_) => invalid_argument(name, error),
     })
+}
+
+/// Reads the argument `frame`.
+fn frames(frame: &str) -> PyResult<Frames> {
+    match frame {
+        "auto" => Ok(Frames::Auto),
+        "file" => Ok(Frames::File),
+        _ => Err(invalid(format!("frame is {frame:?}; accepted: auto, file"))),
+    }
 }
 
 fn invalid_argument(name: &str, error: impl Display) -> PyErr {

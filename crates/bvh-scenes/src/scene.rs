@@ -3,7 +3,7 @@
 use crate::builtin::{spheres, stand_ins, stiff};
 use crate::subset::Subset;
 use crate::{fnv1a, load};
-use bvh_core::{Aabb, Primitives, Triangle};
+use bvh_core::{Aabb, Frame, Primitives, Triangle};
 use glam::DVec3;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -38,8 +38,10 @@ pub struct Scene {
     pub kind: SceneKind,
     /// The objects.
     pub primitives: Primitives,
-    /// One box per object.
+    /// One box per object, in the frame if there is one.
     pub boxes: Vec<Aabb>,
+    /// The frame that the boxes lie in; `None` for the file's axes.
+    pub frame: Option<Frame>,
     /// One line for the user about anything in the file besides plain triangles.
     pub remark: Option<String>,
 }
@@ -143,7 +145,19 @@ impl Scene {
 
     /// Creates a scene of these objects without a remark.
     pub fn new(name: &str, kind: SceneKind, primitives: Primitives) -> Self {
-        Self { name: name.into(), kind, boxes: primitives.boxes(), primitives, remark: None }
+        let (name, boxes) = (name.into(), primitives.boxes());
+        Self { name, kind, primitives, boxes, frame: None, remark: None }
+    }
+
+    /// Returns the same scene with the boxes of its triangles in a frame, if there is one.
+    #[must_use]
+    pub fn in_frame(self, frame: Option<Frame>) -> Self {
+        match (&self.primitives, &frame) {
+            (Primitives::Triangles(triangles), Some(turned)) => {
+                Self { boxes: turned.boxes(triangles), frame, ..self }
+            }
+            _ => self,
+        }
     }
 
     fn subset(self, subset: Subset, suffix: &str) -> Result<Self, SceneError> {

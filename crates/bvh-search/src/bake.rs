@@ -6,12 +6,13 @@ use crate::run::built_unless_cancelled;
 use crate::{Budget, Kept, Observer, Outcome, Problem, Search, SearchError, Splits};
 use crate::{best, optimize, ray_density, solve_or_keep};
 use best::Horizon;
-use bvh_build::{Builder, muller_fellner};
+use bvh_build::{Builder, Watch, muller_fellner};
 use bvh_config::OutOfRange;
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::file::{self, FileError, Origin};
 use bvh_core::{
-    Aabb, Bvh, DensityError, Primitives, RayDensity, Segment, validate, validate_references,
+    Aabb, Bvh, Clip, DensityError, Frame, InFrame, Primitives, RayDensity, Segment, validate,
+    validate_references,
 };
 use core::sync::atomic::AtomicBool;
 
@@ -36,8 +37,11 @@ const MOST_REFERENCES: f64 = 16.0;
 /// ```
 #[derive(Clone, Copy)]
 pub struct Bake<'a> {
-    /// One box per object.
+    /// One box per object, [in the frame](bvh_core::InFrame::boxes) if there is one.
     pub boxes: &'a [Aabb],
+    /// The frame that the boxes lie in, and the trees will; `None` for the file's axes. Only
+    /// triangles have frames. [`Choice`](crate::Choice) finds a good one.
+    pub frame: Option<&'a Frame>,
     /// The objects, if their shape is known. Other objects are not divided.
     pub shapes: Option<&'a Primitives>,
     /// The density of the rays that the tree is for; random lines if `None`.
@@ -50,7 +54,8 @@ pub struct Bake<'a> {
     pub references: f64,
     /// The division of the objects with spatial splits, if the caller has it.
     pub division: Option<&'a Bvh>,
-    /// The tree that the search continues from; the outcome never costs more. `None` builds one.
+    /// The tree that the search continues from, in the same frame; the outcome never costs more.
+    /// `None` builds one.
     pub start: Option<&'a Bvh>,
     /// The name of another method than [`best`], and the method. It divides no objects and
     /// continues from no tree.
@@ -111,6 +116,7 @@ impl<'a> Bake<'a> {
     pub fn new(boxes: &'a [Aabb]) -> Self {
         Self {
             boxes,
+            frame: None,
             shapes: None,
             rays: None,
             objective: None,
@@ -140,7 +146,9 @@ impl<'a> Bake<'a> {
     /// Builds the greedy tree, with which gains are compared. `None` if the observer cancels first.
     pub fn greedy(&self, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
         let config = muller_fellner::Config::default();
-        built_unless_cancelled(observer, |watch| config.build_watched(self.boxes, None, watch))
+        let build = |watch: &Watch| config.build_watched(self.boxes, None, watch);
+        let built = built_unless_cancelled(observer, build)?;
+        Ok(built.map(|tree| Bvh { frame: self.frame.copied(), ..tree }))
     }
 
     /// Searches until the budget is spent or the observer cancels. A budget of no work gives the
@@ -166,7 +174,8 @@ impl<'a> Bake<'a> {
         // Without work there is nothing to search for, and the first tree is the answer.
         let is_over = AtomicBool::new(true);
         let observer = if self.budget.max_work == Some(0) { &is_over } else { observer };
-        let mut splits = self.splits();
+        let framed = self.framed();
+        let mut splits = self.splits(framed.as_ref());
         // A division may take all the time of a search that has no tree yet. Such a search divides
         // later itself.
         let is_later = self.starts_divided() || is_timed && greedy.is_none();
@@ -188,7 +197,8 @@ impl<'a> Bake<'a> {
         let problem = self.problem(splits);
         let greedy = greedy.map(|tree| Kept::new(tree, &problem));
         let greedy_cost = greedy.as_ref().map(|greedy| greedy.cost);
-        let outcome = self.outcome(&problem, greedy, observer)?;
+        let mut outcome = self.outcome(&problem, greedy, observer)?;
+        outcome.tree.frame = self.frame.copied();
         let start = self.start.map(|tree| problem.cost(tree));
         Ok(Baked { outcome, greedy: greedy_cost, start, division })
     }
@@ -222,7 +232,8 @@ impl<'a> Bake<'a> {
     /// Returns the cost of a tree over these objects by which a search with this division compares
     /// trees. O(nodes).
     pub fn cost(&self, tree: &Bvh, division: Division) -> f64 {
-        let splits = self.splits().filter(|_| division == Division::Allowed);
+        let framed = self.framed();
+        let splits = self.splits(framed.as_ref()).filter(|_| division == Division::Allowed);
         self.problem(splits).cost(tree)
     }
 
@@ -235,9 +246,34 @@ impl<'a> Bake<'a> {
         }
     }
 
-    fn splits(&self) -> Option<Splits<'a>> {
+    /// Returns the triangles in the frame, if there is one.
+    fn framed(&self) -> Option<InFrame<'a>> {
+        match (self.frame, self.shapes) {
+            (Some(frame), Some(Primitives::Triangles(triangles))) => {
+                Some(InFrame { triangles, frame: Some(frame) })
+            }
+            _ => None,
+        }
+    }
+
+    /// Returns the parts of the objects. Nothing is known of those of spheres in a frame.
+    fn parts<'b>(&self, framed: Option<&'b InFrame<'b>>) -> Option<&'b dyn Clip>
+    where
+        'a: 'b,
+    {
+        match (framed, self.frame) {
+            (Some(framed), _) => Some(framed),
+            (None, Some(_)) => None,
+            (None, None) => self.shapes.map(|shapes| shapes as &dyn Clip),
+        }
+    }
+
+    fn splits<'b>(&self, framed: Option<&'b InFrame<'b>>) -> Option<Splits<'b>>
+    where
+        'a: 'b,
+    {
         let most = (self.references * self.boxes.len() as f64) as usize;
-        let splits = Splits::at_most(most, self.boxes, self.shapes?)?;
+        let splits = Splits::at_most(most, self.boxes, self.parts(framed)?)?;
         let is_best = self.method.is_none();
         is_best.then_some(Splits { division: self.division, ..splits })
     }
@@ -245,7 +281,7 @@ impl<'a> Bake<'a> {
     /// Divides the objects with spatial splits, or copies the caller's division, unless they stay
     /// whole anyway. `None` if the observer cancels first.
     pub fn divided(&self, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
-        best::division(self.splits(), self.boxes, observer)
+        best::division(self.splits(self.framed().as_ref()), self.boxes, observer)
     }
 
     /// Returns whether the start divides objects, after which no search returns to whole ones.
@@ -256,13 +292,20 @@ impl<'a> Bake<'a> {
     /// Passes the sections of the [file](bvh_core::file) of a tree over these objects to `write`.
     /// `work` is the work of all searches that led to the tree.
     ///
-    /// Rejects a tree that is not valid over the objects. O(nodes + objects).
+    /// Rejects a tree that is not valid over the objects, and a tree in a frame over other objects
+    /// than triangles. O(nodes + objects).
     pub fn write<T>(
         &self,
         tree: &Bvh,
         work: u64,
         write: impl FnOnce(&[&[u8]]) -> T,
     ) -> Result<T, FileError> {
+        let framed = self.framed();
+        if self.frame.is_some() && framed.is_none() {
+            return Err(FileError::Frame);
+        }
+        let along_file = framed.map(|framed| bvh_core::boxes(framed.triangles));
+        let parts = self.parts(framed.as_ref());
         let objective = self.objective();
         let mut cost = 0.0;
         let mut validated = Ok(());
@@ -273,8 +316,8 @@ impl<'a> Bake<'a> {
             &mut || {
                 parallel::call_both(
                     &mut || {
-                        validated = match self.shapes {
-                            Some(shapes) => validate_references(tree, self.boxes, shapes),
+                        validated = match parts {
+                            Some(parts) => validate_references(tree, self.boxes, parts),
                             None => validate(tree, self.boxes),
                         }
                     },
@@ -286,7 +329,8 @@ impl<'a> Bake<'a> {
         let name = self.method.map_or("best", |(name, _)| name);
         let name = if self.rays.is_some() { format!("{name} for rays") } else { name.into() };
         let origin = Origin { method: &name, seed: self.seed, work, visits: &visits, objective };
-        let sections = file::sections(tree, self.boxes, cost, &origin, &parallel::call_both)?;
+        let boxes = along_file.as_deref().unwrap_or(self.boxes);
+        let sections = file::sections(tree, boxes, cost, &origin, &parallel::call_both)?;
         Ok(write(&sections.each_ref().map(|section| &**section)))
     }
 
@@ -301,13 +345,11 @@ impl<'a> Bake<'a> {
     }
 }
 
-/// Returns the greedy tree and the [density](ray_density) of recorded segments.
-pub(crate) fn density_of(
-    boxes: &[Aabb],
-    shapes: Option<&Primitives>,
-    segments: &[Segment],
-) -> Result<(Bvh, RayDensity), BakeError> {
-    let greedy = muller_fellner::Config::default().build(boxes).map_err(SearchError::from)?;
-    let density = ray_density(&greedy, shapes, segments, &|| false)?;
-    Ok((greedy, density.expect("the density of rays that nobody cancels")))
+impl Bake<'_> {
+    /// Returns the greedy tree and the [density](ray_density) of recorded segments.
+    pub(crate) fn density(&self, segments: &[Segment]) -> Result<(Bvh, RayDensity), BakeError> {
+        let greedy = self.greedy(&())?.expect("a tree that nobody cancels");
+        let density = ray_density(&greedy, self.shapes, segments, &|| false)?;
+        Ok((greedy, density.expect("the density of rays that nobody cancels")))
+    }
 }

@@ -1,15 +1,16 @@
 //! A tree that owns its objects, for callers that cannot lend them: the bindings to other
 //! languages.
 
-use crate::bake::density_of;
-use crate::{Bake, BakeError, Baked, Budget, Division, Observer, SearchError, parallel};
+use crate::{
+    Bake, BakeError, Baked, Budget, Choice, Division, Frames, Observer, SearchError, parallel,
+};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
 use bvh_core::export::Target;
 use bvh_core::file::{FileError, TreeFile};
 use bvh_core::{
-    Aabb, Bvh, InvalidBox, InvalidBvh, Primitives, RayDensity, Segment, Triangle, WideBvh,
-    check_boxes,
+    Aabb, Bvh, Frame, InFrame, InvalidBox, InvalidBvh, Primitives, RayDensity, Segment, Triangle,
+    WideBvh, check_boxes,
 };
 
 /// The objects of a tree.
@@ -33,13 +34,24 @@ pub struct Options<'a> {
     pub budget: Budget,
     /// The rays that the tree is for, as in [`RayDensity`]; random lines if empty.
     pub rays: &'a [Segment],
+    /// Whether triangles choose the frame of their boxes.
+    pub frame: Frames,
 }
 
 impl Default for Options<'_> {
     fn default() -> Self {
-        Self { references: 1.0, seed: 1, budget: Budget::UNLIMITED, rays: &[] }
+        let (budget, frame) = (Budget::UNLIMITED, Frames::Auto);
+        Self { references: 1.0, seed: 1, budget, rays: &[], frame }
     }
 }
+
+/// The reason why a tree is not exported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the boxes of the tree lie in a frame, but those of other tracers along the file's axes; \
+     accepted: a tree of a bake with the file's frame"
+)]
+pub struct FramedExport;
 
 /// The tree of a [`Bake`], with its objects.
 #[derive(Clone, Debug)]
@@ -64,11 +76,17 @@ impl OwnedTree {
         options: &Options,
         observer: &dyn Observer,
     ) -> Result<Self, BakeError> {
-        let Options { references, seed, budget, rays } = *options;
-        let mut owned = Self { references, seed, ..Self::bare(objects) };
+        let Options { references, seed, budget, rays, frame } = *options;
+        let frame = match &objects {
+            Objects::Shapes(Primitives::Triangles(triangles)) if frame == Frames::Auto => {
+                Choice::of(triangles, budget, observer).frame
+            }
+            _ => None,
+        };
+        let mut owned = Self { references, seed, ..Self::bare(objects, frame) };
         let mut greedy = None;
         if !rays.is_empty() {
-            let (tree, density) = density_of(&owned.boxes, owned.shapes.as_ref(), rays)?;
+            let (tree, density) = owned.bake().density(rays)?;
             greedy = Some(tree);
             owned.density = Some(density);
         }
@@ -87,7 +105,7 @@ impl OwnedTree {
     /// # Panics
     /// Panics if the number of objects differs.
     pub fn refitted(&self, objects: Objects) -> Result<Self, InvalidBox> {
-        let (boxes, shapes) = boxes_of(objects);
+        let (boxes, shapes) = boxes_of(objects, self.tree.frame.as_ref());
         assert_eq!(boxes.len(), self.boxes.len(), "the same number of objects");
         check_boxes(&boxes)?;
         let mut tree = self.tree.clone();
@@ -113,9 +131,12 @@ impl OwnedTree {
     /// Rejects the trees of other objects, and forged trees whose boxes do not contain their
     /// objects, as [`TreeFile::tree_over`] does.
     pub fn load(objects: Objects, bytes: &[u8]) -> Result<Self, FileError> {
-        let mut owned = Self::bare(objects);
+        let mut owned = Self::bare(objects, None);
         let file = TreeFile::open(bytes)?.for_boxes(&owned.boxes)?;
         owned.tree = file.tree_over(&owned.boxes, owned.shapes.as_ref(), &parallel::call_both)?;
+        if let Some(frame) = owned.tree.frame {
+            owned.boxes = frame.boxes(owned.triangles().ok_or(FileError::Frame)?);
+        }
         // Half a reference more keeps the product with the number of objects from being rounded
         // down.
         let references = owned.tree.prim_ids.len() as f64 + 0.5;
@@ -148,14 +169,17 @@ impl OwnedTree {
     }
 
     /// Returns the tree as a [file](Target::bytes) for another tracer; of triangles, the greedy tree
-    /// if it is [better](Target::fit_better) there.
-    pub fn export(&self, target: &Target) -> Vec<u8> {
+    /// if it is [better](Target::fit_better) there. Rejects a tree in a frame.
+    pub fn export(&self, target: &Target) -> Result<Vec<u8>, FramedExport> {
+        if self.tree.frame.is_some() {
+            return Err(FramedExport);
+        }
         let fitted = match (self.triangles(), muller_fellner::Config::default().build(&self.boxes))
         {
             (Some(triangles), Ok(greedy)) => target.fit_better(&self.tree, &greedy, triangles).tree,
             _ => target.fit(&self.tree),
         };
-        target.bytes(&fitted, &self.boxes)
+        Ok(target.bytes(&fitted, &self.boxes))
     }
 
     /// Returns the tree as a file, which [`load`](Self::load) and the program `bvh` read.
@@ -178,7 +202,15 @@ impl OwnedTree {
         self.boxes.len()
     }
 
-    /// The boxes of the objects.
+    /// The box around all objects, along the file's axes. O(n) for a tree in a frame.
+    pub fn bounds(&self) -> Option<Aabb> {
+        match (&self.tree.frame, &self.shapes) {
+            (Some(_), Some(shapes)) => Some(Aabb::union_of(&shapes.boxes())),
+            _ => self.tree.root_aabb(),
+        }
+    }
+
+    /// The boxes of the objects, in the tree's frame if it has one.
     pub fn boxes(&self) -> &[Aabb] {
         &self.boxes
     }
@@ -192,15 +224,16 @@ impl OwnedTree {
     }
 
     /// Builds the value without a tree.
-    fn bare(objects: Objects) -> Self {
-        let (boxes, shapes) = boxes_of(objects);
-        let tree = Bvh::default();
+    fn bare(objects: Objects, frame: Option<Frame>) -> Self {
+        let (boxes, shapes) = boxes_of(objects, frame.as_ref());
+        let tree = Bvh { frame, ..Bvh::default() };
         Self { tree, boxes, shapes, references: 1.0, work: 0, seed: 1, density: None }
     }
 
     /// The search that continues from the tree.
     fn bake(&self) -> Bake<'_> {
         Bake {
+            frame: self.tree.frame.as_ref(),
             shapes: self.shapes.as_ref(),
             rays: self.density.as_ref(),
             references: self.references,
@@ -211,10 +244,16 @@ impl OwnedTree {
     }
 }
 
-/// Returns the boxes of objects, and their shapes if they have any.
-fn boxes_of(objects: Objects) -> (Vec<Aabb>, Option<Primitives>) {
+/// Returns the boxes of objects, those of triangles in a frame, and the shapes if there are any.
+fn boxes_of(objects: Objects, frame: Option<&Frame>) -> (Vec<Aabb>, Option<Primitives>) {
     match objects {
         Objects::Boxes(boxes) => (boxes, None),
-        Objects::Shapes(shapes) => (shapes.boxes(), Some(shapes)),
+        Objects::Shapes(shapes) => {
+            let boxes = match &shapes {
+                Primitives::Triangles(triangles) => InFrame { triangles, frame }.boxes(),
+                Primitives::Spheres(_) => shapes.boxes(),
+            };
+            (boxes, Some(shapes))
+        }
     }
 }

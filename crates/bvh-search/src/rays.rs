@@ -31,18 +31,26 @@ pub fn ray_density(
     is_over: &dyn Fn() -> bool,
 ) -> Result<Option<RayDensity>, DensityError> {
     let root = tree.root_aabb().unwrap_or(Aabb::EMPTY);
+    // Where rays from anywhere come from.
+    let bounds = match (&tree.frame, shapes) {
+        (Some(_), Some(shapes)) => Aabb::union_of(&shapes.boxes()),
+        _ => root,
+    };
     // The recorded segments leave room for the guard.
     let most = RayDensity::MOST_SEGMENTS / GUARD * (GUARD - 1);
     let step = segments.len().div_ceil(most).max(1);
     let mut sampled: Vec<Segment> = segments.iter().step_by(step).copied().collect();
     let count = sampled.len() / (GUARD - 1);
     sampled.extend(match shapes {
-        Some(Primitives::Triangles(triangles)) => traced(tree, triangles, &root, count, is_over),
-        Some(Primitives::Spheres(spheres)) => traced(tree, spheres, &root, count, is_over),
+        Some(Primitives::Triangles(triangles)) => traced(tree, triangles, &bounds, count, is_over),
+        Some(Primitives::Spheres(spheres)) => traced(tree, spheres, &bounds, count, is_over),
         None => vec![],
     });
     if is_over() {
         return Ok(None);
+    }
+    for segment in &mut sampled {
+        *segment = segment.in_frame(tree.frame.as_ref());
     }
     RayDensity::of_rays(&root, &sampled, AREA_WEIGHT).map(Some)
 }

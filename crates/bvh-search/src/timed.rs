@@ -1,8 +1,7 @@
 //! The everyday calls: the best tree for a given time, with every parameter at its default.
 
-use crate::bake::density_of;
-use crate::{Bake, BakeError, Deadline, Outcome, SearchError};
-use bvh_core::{Aabb, Bvh, Primitives, RayDensity, Segment, Triangle};
+use crate::{Bake, BakeError, Budget, Choice, Deadline, Outcome, SearchError};
+use bvh_core::{Aabb, Bvh, InFrame, Primitives, RayDensity, Segment, Triangle};
 use std::time::Duration;
 
 /// Returns the best tree over `boxes` that [`best`](crate::best) finds in about `time`, from the
@@ -38,7 +37,7 @@ pub fn improve(tree: &Bvh, boxes: &[Aabb], time: Duration) -> Result<Outcome, Se
 /// like the recorded `segments`, and the density of these rays as by
 /// [`ray_density`](crate::ray_density).
 ///
-/// The tree is best for its rays; other rays may take longer than with a tree from [`bake`]. The
+/// The boxes of the tree may lie in a [frame](Bvh::frame). The tree is best for its rays; other rays may take longer than with a tree from [`bake`]. The
 /// layout for the same rays is `WideBvh::for_rays(&tree, &triangles, &density.visits(&tree))`.
 ///
 /// ```
@@ -61,10 +60,13 @@ pub fn bake_for_rays(
     time: Duration,
 ) -> Result<(Outcome, RayDensity), BakeError> {
     let deadline = Deadline::after(time);
-    let boxes = bvh_core::boxes(triangles);
+    let Choice { frame, .. } = Choice::of(triangles, Budget::UNLIMITED, &deadline);
+    let frame = frame.as_ref();
+    let boxes = InFrame { triangles, frame }.boxes();
     let shapes = Primitives::Triangles(triangles.to_vec());
-    let (greedy, density) = density_of(&boxes, Some(&shapes), segments)?;
-    let bake = Bake { rays: Some(&density), ..Bake::new(&boxes) };
+    let bake = Bake { frame, shapes: Some(&shapes), ..Bake::new(&boxes) };
+    let (greedy, density) = bake.density(segments)?;
+    let bake = Bake { rays: Some(&density), ..bake };
     let outcome = bake.search(Some(greedy), &deadline)?.outcome;
     Ok((outcome, density))
 }

@@ -2,6 +2,7 @@
 
 mod decide;
 mod effort;
+pub mod frame;
 pub mod instances;
 pub mod parts;
 mod plan;
@@ -18,7 +19,7 @@ use bvh_core::cost::{Objective, internal_area};
 use bvh_core::export::Target;
 use bvh_scenes::Scene;
 use bvh_scenes::files::Reserved;
-use bvh_search::{Bake, Division, Method, Outcome, StopReason, shortcuts};
+use bvh_search::{Bake, Division, Frames, Method, Outcome, StopReason, shortcuts};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use decide::decide;
@@ -64,6 +65,11 @@ pub struct BakeArgs {
     /// has.
     #[arg(long, value_name = "N")]
     pub references: Option<f64>,
+    /// The axes of the boxes: `auto` turns them where that saves area, as it does around a building
+    /// that stands obliquely in its file; `file` keeps the file's, as --for, --parts, --instances
+    /// and other methods than best do. Without it, with --from, those of the tree.
+    #[arg(long, value_name = "auto|file", value_parser = frames(), conflicts_with = "from")]
+    pub frame: Option<Frames>,
     /// Search for the tracer of another library, for `bvh export`: by default with `--cost area`,
     /// and with as many references as pay there.
     #[arg(long = "for", value_name = "TRACER", value_parser = tracers())]
@@ -101,6 +107,13 @@ fn costs() -> impl TypedValueParser<Value = Objective> {
     })
 }
 
+fn frames() -> impl TypedValueParser<Value = Frames> {
+    PossibleValuesParser::new(["auto", "file"]).map(|frame| match frame.as_str() {
+        "file" => Frames::File,
+        _ => Frames::Auto,
+    })
+}
+
 /// The method that can continue from a given tree and divide objects.
 const BEST: &str = "best";
 
@@ -126,9 +139,6 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     if let Some(rays) = &plan.rays {
         rays.check(&scene)?;
     }
-    if args.explain {
-        explain(&scene, answer)?;
-    }
     let start = args.from.as_ref().map(|path| Start::load(path, &scene)).transpose()?;
     let objects = scene.boxes.len();
     if let (Some(from), Some(Start { tree, .. })) = (&args.from, &start)
@@ -152,6 +162,12 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     let mut most_references = plan.references;
     if args.budget.is_none() {
         plan.effort = decide::work(objects, answer);
+    }
+    let scene = frame::turned(args, &mut plan, scene, start.as_ref(), answer);
+    if args.explain {
+        explain(&scene, answer)?;
+    }
+    if args.budget.is_none() {
         // The decision may add references.
         most_references = most_references.max(decide::REFERENCES);
     }
@@ -215,6 +231,7 @@ fn summarise(found: &Found, answer: &mut Answer) {
     answer.record("objects", objects);
     answer.record("references", references);
     answer.record("method", method);
+    answer.record("frame", frame::facts(tree.frame.as_ref()));
     answer.record("seed", plan.seed);
     let area = internal_area(tree);
     if let Some(base) = found.area_of_greedy {

@@ -7,7 +7,7 @@ use crate::interrupt::{INTERRUPTED, hold};
 use crate::rays::Rays;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::file::Header;
-use bvh_core::{Bvh, Node, RayDensity};
+use bvh_core::{Bvh, Frame, Node, RayDensity};
 use bvh_scenes::Scene;
 use bvh_scenes::files::Reserved;
 use bvh_scenes::tree_file::{self, TreeFileError};
@@ -32,7 +32,9 @@ pub struct Plan {
 pub fn most_bytes(scene: &Scene, references: f64) -> usize {
     // A tree with n leaves has fewer than 2n nodes; each node may have a number of visits.
     let reference = 2 * (size_of::<Node>() + size_of::<f32>()) + size_of::<u32>();
-    Header::BYTES + (references * scene.boxes.len() as f64) as usize * reference
+    Header::BYTES
+        + size_of::<Frame>()
+        + (references * scene.boxes.len() as f64) as usize * reference
 }
 
 /// The tree of an earlier bake of the scene, from which a search continues.
@@ -74,6 +76,7 @@ impl Plan {
     /// Returns the bake of a scene.
     pub fn bake<'a>(&'a self, scene: &'a Scene, rays: Option<&'a RayDensity>) -> Bake<'a> {
         Bake {
+            frame: scene.frame.as_ref(),
             shapes: Some(&scene.primitives),
             rays,
             objective: Some(self.objective),

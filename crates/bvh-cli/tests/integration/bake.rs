@@ -9,6 +9,7 @@ use bvh_core::cost::{internal_area, layout_area};
 use bvh_core::file::TreeFile;
 use bvh_scenes::{Scene, tree_file};
 use bvh_search::{Budget, Objects, Options, OwnedTree};
+use glam::Mat3;
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -102,7 +103,7 @@ fn a_bake_of_work_writes_the_bytes_that_the_library_gives_other_languages() {
         bvh(at, &format!("bake escher:400 --out=x.bvh --seed=5 {flags}"));
         let objects = Objects::Shapes(scene.primitives.clone());
         let budget = Budget { max_work: Some(work), ..Budget::UNLIMITED };
-        let options = Options { references, seed: 5, budget, rays };
+        let options = Options { references, seed: 5, budget, rays, ..Options::default() };
         let owned = OwnedTree::find(objects, &options, &()).unwrap();
         assert!(fs::read(at.join("x.bvh")).unwrap() == owned.save().unwrap(), "{flags}");
     }
@@ -270,4 +271,49 @@ fn a_disk_without_room_is_noticed_before_the_search_and_the_old_file_stays() {
     ended(&output, 1, &["a.bvh: cannot reserve the file's space"]);
     assert_eq!(fs::read(at.join("a.bvh")).unwrap(), old);
     assert_eq!(names(at).len(), 1);
+}
+
+#[test]
+fn an_oblique_scene_is_baked_in_a_frame_that_every_command_and_later_bake_keeps() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let scene = Scene::load("escher").unwrap();
+    let rotation = Mat3::from_rotation_z(0.6) * Mat3::from_rotation_x(0.4);
+    let mut mesh = String::new();
+    for triangle in scene.triangles().unwrap() {
+        for corner in triangle.0 {
+            let [x, y, z] = (rotation * corner).to_array();
+            mesh += &format!("v {x} {y} {z}\n");
+        }
+        mesh += "f -3 -2 -1\n";
+    }
+    fs::write(at.join("turned.obj"), mesh).unwrap();
+    let bake = "bake turned.obj --budget=20Mwork";
+    assert!(bvh(at, &format!("{bake} --explain --out=a.bvh")).contains("frame: turned by "));
+    let baked = facts(at, &format!("{bake} --out=a.bvh"));
+    let frame = &baked["frame"];
+    assert_eq!(
+        (frame["rotation"].as_array().unwrap().len(), &frame["centre"][2]),
+        (3, &0.0.into())
+    );
+    assert_eq!(facts(at, "verify a.bvh turned.obj")["frame"], *frame);
+    let file = facts(at, &format!("{bake} --frame=file --out=b.bvh"));
+    assert!(file["frame"].is_null() && cost(at, "a.bvh") < 0.7 * cost(at, "b.bvh"));
+    assert!(facts(at, "bake escher --budget=20Mwork --out=e.bvh")["frame"].is_null());
+    let later =
+        facts(at, "bake turned.obj --budget=1Mwork --from=a.bvh --rays=default --out=c.bvh");
+    assert_eq!(later["frame"], *frame);
+    // The rays and the pictures of both trees are the same, and take fewer tests in the frame.
+    let tests = |file| {
+        number(at, &format!("inspect {file} turned.obj --rays=default"), "expected tests of a ray")
+    };
+    assert!(tests("c.bvh") < 0.9 * tests("b.bvh"));
+    let picture = |file: &str| {
+        bvh(at, &format!("render turned.obj --accel={file} --size=40x30 --out={file}.png"));
+        fs::read(at.join(format!("{file}.png"))).unwrap()
+    };
+    assert!(picture("a.bvh") == picture("b.bvh"));
+    assert!(bvh(at, "report a.bvh turned.obj").contains(" % cheaper"));
+    wrong(at, "export a.bvh turned.obj --for=json --out=x.json", &["a.bvh", "--frame file"]);
+    wrong(at, &format!("{bake} --from=a.bvh --frame=file --out=d.bvh"), &["--frame", "--from"]);
 }

@@ -1,7 +1,8 @@
 //! The segments of a density, and the reasons to reject them.
 
 use super::RayDensity;
-use crate::Ray;
+use crate::{Frame, Ray};
+use glam::Vec3;
 
 /// The part of a ray between its start and its end, in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +28,15 @@ impl Segment {
     pub fn of_ray(ray: &Ray, end: f32) -> Option<Self> {
         let to = ray.at(end);
         to.is_finite().then(|| Self { from: ray.origin().to_array(), to: to.to_array() })
+    }
+
+    /// Returns the segment in the coordinates of a tree's [frame](crate::Bvh::frame), rounded, for
+    /// the density of its boxes; the same without a frame.
+    #[must_use]
+    pub fn in_frame(self, frame: Option<&Frame>) -> Self {
+        let Some(frame) = frame else { return self };
+        let moved = |at: [f32; 3]| frame.point(Vec3::from(at).as_dvec3()).as_vec3().to_array();
+        Self { from: moved(self.from), to: moved(self.to) }
     }
 }
 

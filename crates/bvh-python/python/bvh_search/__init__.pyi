@@ -34,6 +34,7 @@ class Tree:
         work: int | None = None,
         progress: _Progress | None = None,
         rays: ArrayLike | None = None,
+        frame: Literal["auto", "file"] = "auto",
     ) -> Tree: ...
     @staticmethod
     def from_triangles(
@@ -45,6 +46,7 @@ class Tree:
         work: int | None = None,
         progress: _Progress | None = None,
         rays: ArrayLike | None = None,
+        frame: Literal["auto", "file"] = "auto",
     ) -> Tree: ...
     @staticmethod
     def from_boxes(
@@ -69,6 +71,8 @@ class Tree:
     def cost(
         self, kind: Literal["internal_area", "goldsmith_salmon", "sah", "layout"] = "internal_area"
     ) -> float: ...
+    @property
+    def frame(self) -> tuple[list[list[float]], list[float]] | None: ...
     def nodes(self) -> NDArray[np.void]: ...
     def object_ids(self) -> NDArray[np.uint32]: ...
     def __len__(self) -> int: ...

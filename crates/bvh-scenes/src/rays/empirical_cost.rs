@@ -5,6 +5,7 @@
 //! hit ends.
 
 use super::random::{Family, Kind, random_ray};
+use super::segments::bounds_along_file;
 use crate::trace::{Accelerator, Query};
 use bvh_config::config;
 use bvh_core::{Aabb, Bvh, Primitives, Ray, TestCounts, WideBvh};
@@ -102,7 +103,7 @@ pub fn empirical_cost(
     tree: &Bvh,
     seed: u64,
 ) -> EmpiricalCost {
-    let Some(root) = tree.root_aabb() else { return EmpiricalCost::default() };
+    let Some(root) = bounds_along_file(primitives, tree) else { return EmpiricalCost::default() };
     let accelerator = Accelerator::of_tree(primitives, tree);
     let sums = (0..config.count.div_ceil(CHUNK))
         .into_par_iter()

@@ -6,7 +6,7 @@ use super::random::{Family, Kind, Viewpoint, in_box, on_sphere, random_ray};
 use crate::Scene;
 use crate::trace::Accelerator;
 use bvh_config::{OutOfRange, above, config};
-use bvh_core::{Aabb, Bvh, DensityError, Ray, RayDensity, Segment, TestCounts};
+use bvh_core::{Aabb, Bvh, DensityError, Primitives, Ray, RayDensity, Segment, TestCounts};
 use glam::{DVec3, Vec3};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -146,7 +146,10 @@ pub fn of_anything(
     is_over: &dyn Fn() -> bool,
 ) -> Vec<TracedRay> {
     let mut tracing = Tracing::new(scene, tree, seed);
-    let Some(root) = tree.root_aabb() else { return Vec::new() };
+    let root = tracing.bounds;
+    if tree.nodes.is_empty() {
+        return Vec::new();
+    }
     for (first, family) in [(0, Family::Inside), (count, Family::Lines)] {
         for index in first..first + count {
             if is_over() {
@@ -171,8 +174,8 @@ pub fn of_anything(
 pub fn of_inside(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<TracedRay> {
     let mut tracing = Tracing::new(scene, tree, seed);
     for _ in 0..count {
-        let ray =
-            tree.root_aabb().and_then(|root| random_ray(Family::Inside, &root, &mut tracing.rng));
+        let root = Some(tracing.bounds).filter(|_| !tree.nodes.is_empty());
+        let ray = root.and_then(|root| random_ray(Family::Inside, &root, &mut tracing.rng));
         let Some(ray) = ray else { continue };
         tracing.nearest(Kind::Incoherent, ray.origin(), ray.direction().as_dvec3());
     }
@@ -194,9 +197,16 @@ const AREA_WEIGHT: f64 = 0.1;
 ///
 /// [`DensityError`] if there are no rays, too many, or the tree has no nodes.
 pub fn density(rays: &[TracedRay], tree: &Bvh) -> Result<RayDensity, DensityError> {
-    let segments: Vec<Segment> = rays.iter().map(|traced| traced.segment).collect();
+    let moved = |traced: &TracedRay| traced.segment.in_frame(tree.frame.as_ref());
+    let segments: Vec<Segment> = rays.iter().map(moved).collect();
     let bounds = tree.root_aabb().ok_or(DensityError::Bounds)?;
     RayDensity::of_rays(&bounds, &segments, AREA_WEIGHT)
+}
+
+/// Returns the box around a tree's objects along the file's axes, also of a tree in a frame.
+pub(super) fn bounds_along_file(primitives: &Primitives, tree: &Bvh) -> Option<Aabb> {
+    let root = tree.root_aabb()?;
+    Some(if tree.frame.is_some() { Aabb::union_of(&primitives.boxes()) } else { root })
 }
 
 struct Tracing<'a> {
@@ -210,7 +220,7 @@ struct Tracing<'a> {
 impl<'a> Tracing<'a> {
     fn new(scene: &'a Scene, tree: &'a Bvh, seed: u64) -> Self {
         let accelerator = Accelerator::of_tree(&scene.primitives, tree);
-        let bounds = tree.root_aabb().unwrap_or(Aabb::EMPTY);
+        let bounds = bounds_along_file(&scene.primitives, tree).unwrap_or(Aabb::EMPTY);
         let rng = ChaCha8Rng::seed_from_u64(seed);
         Self { accelerator, bounds, rng, rays: Vec::new(), tests: TestCounts::default() }
     }

@@ -2,6 +2,7 @@
 
 mod bake;
 mod cancellation;
+mod frames;
 mod local_search;
 mod measure;
 mod shortcuts;

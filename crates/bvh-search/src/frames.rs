@@ -1,0 +1,421 @@
+//! The choice of a [`Frame`]: the axes along which boxes around a scene's triangles are small.
+//!
+//! Walls and boards lie along a few directions, which their triangles tell: the normal, and a leg of
+//! the angle nearest 90°. A rotation by 90° about an axis of the frame changes no box, so rotations
+//! are compared up to the 24 rotations of a cube. Triangles that agree are one candidate. Of curved
+//! scenes, the principal axes and random rotations are candidates too, and a local search turns the
+//! best of all by smaller and smaller angles about their axes.
+//!
+//! Candidates are priced by the greedy tree over a sample of the triangles. It sees what boxes lose
+//! that are no longer exactly flat; clustering does not, and chooses frames that cost a seventh
+//! more. Samples that say little rank, and another one that says more decides.
+
+use crate::parallel;
+use crate::run::stream;
+use crate::{Bake, Budget, Observer, Stream};
+use bvh_build::{Builder, muller_fellner};
+use bvh_core::cost::internal_area;
+use bvh_core::glam::{DMat3, DQuat, DVec3, Vec3};
+use bvh_core::{Aabb, Frame, InFrame, Triangle};
+use rand::RngExt;
+use std::collections::BTreeMap;
+use std::f64::consts::FRAC_1_SQRT_2;
+
+/// The share of the budget for the choice.
+const SHARE: f64 = 0.1;
+/// The work of a greedy tree per object, by its time.
+const WORK_PER_OBJECT: f64 = 20.0;
+/// The work per object of the short search that confirms a choice. Greedy trees differ by up to 4 %
+/// where searched ones do not.
+const CONFIRMING: u64 = 64;
+/// The least gain by the short search.
+const CONFIRMED: f64 = 0.01;
+/// The nodes that a move visits, about.
+const WORK_PER_MOVE: f64 = 64.0;
+/// The least and the most triangles of the first sample.
+const FIRST: [usize; 2] = [64, 4096];
+/// By what each later sample is larger than the one before.
+const GROWTH: usize = 4;
+/// The triangles whose price tells the time of others.
+const CLOCKED: usize = 1024;
+/// The largest sample that tells directions, and how much larger it is than the first.
+const MOST_ASKED: usize = 1 << 14;
+const ASKED: usize = 8;
+/// Candidates of the local search: those that triangles tell, and those with random ones.
+const TOLD: usize = 12;
+const STARTS: usize = 17;
+/// Candidates that survive a step of the local search.
+const KEPT: usize = 4;
+/// The largest rotations of the steps, as tangents of half of the angles: 23° to 0.7°.
+const STEPS: [f64; 6] = [0.2, 0.1, 0.05, 0.025, 0.0125, 0.006];
+/// The share of one direction above which other candidates are not tried.
+const CLEAR: f64 = 0.5;
+/// The share above which a direction is no accident, and others have to be certainly better.
+const HEAVY: f64 = 0.005;
+/// The least gains by the greedy tree, of the heaviest direction and of a frame that was searched
+/// for.
+const LEAST_GAINS: [f64; 2] = [0.02, 0.04];
+/// What is added to it for a sample of one triangle; for a sample of n, √n times less.
+const DOUBT: f64 = 1.0;
+
+/// Whether a bake of triangles chooses a [`Frame`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Frames {
+    /// The [`Choice`] of the triangles.
+    #[default]
+    Auto,
+    /// The file's axes, along which other tracers have their boxes.
+    File,
+}
+
+/// The frame that was chosen for a scene, and why.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Choice {
+    /// The frame; `None` for the file's axes.
+    pub frame: Option<Frame>,
+    /// The fraction of area that a tree in the frame saves, by short searches over a sample of the
+    /// triangles. The whole tree saves more where triangles are small.
+    pub gain: f64,
+    /// The share of the triangles that lie along one direction and its perpendicular ones, weighted
+    /// by the roots of their areas.
+    pub agreeing: f64,
+}
+
+impl Choice {
+    /// The axes of the file, without a reason.
+    pub const FILE: Self = Self { frame: None, gain: 0.0, agreeing: 0.0 };
+
+    /// Chooses the frame for a search of triangles with this budget: the file's axes unless another
+    /// frame certainly saves area. The choice takes at most a tenth of the work or of the time. It is
+    /// the same on every machine for any number of threads, unless the observer has a clock.
+    /// O(n + budget).
+    pub fn of(triangles: &[Triangle], budget: Budget, observer: &dyn Observer) -> Self {
+        let bounds = triangles.iter().fold(Aabb::EMPTY, |all, part| all.union(&part.aabb()));
+        let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
+        // Turned boxes could overflow. The search will reject what is no number.
+        if farthest.is_nan() || farthest >= f32::MAX / 4.0 {
+            return Self::FILE;
+        }
+        let began = observer.progress();
+        let scene = Scene { triangles, centre: centre(&bounds), observer };
+        let limit = |most: Option<u64>| most.map_or(f64::INFINITY, |most| SHARE * most as f64);
+        let moves = WORK_PER_MOVE * limit(budget.max_evaluations);
+        let mut work = limit(budget.max_work).min(moves);
+        if let Some(began) = began {
+            // The first price tells how long the others take, of which larger ones take longer.
+            let first = sample(triangles, CLOCKED, 0);
+            scene.price(&first, None);
+            let took = 2.0 * (observer.progress().unwrap_or(1.0) - began);
+            let price = took.max(f64::MIN_POSITIVE) / (WORK_PER_OBJECT * first.len() as f64);
+            work = work.min(SHARE * (1.0 - began) / price);
+        }
+        // Within little work, only the heaviest direction is tried.
+        let affordable = [true, false].into_iter().find_map(|searches| {
+            let mut size = FIRST[1];
+            while scene.work(size, searches) > work {
+                size = size * 7 / 8;
+            }
+            (size >= FIRST[0].min(triangles.len())).then_some((size, searches))
+        });
+        let choice = affordable.and_then(|(size, searches)| scene.choose(size, searches));
+        choice.unwrap_or(Self::FILE)
+    }
+}
+
+/// A scene whose frame is chosen.
+struct Scene<'a> {
+    triangles: &'a [Triangle],
+    /// The centre of every frame.
+    centre: DVec3,
+    observer: &'a dyn Observer,
+}
+
+impl Scene<'_> {
+    /// Returns the work of a choice with a first sample of this size.
+    fn work(&self, size: usize, searches: bool) -> f64 {
+        let sample = |growth: usize| (growth * size).min(self.triangles.len());
+        let search = (STARTS + 3 * KEPT * STEPS.len()) * sample(1) + KEPT * sample(GROWTH);
+        let rest = sample(ASKED) + 3 * sample(GROWTH * GROWTH);
+        let confirming = 2 * CONFIRMING * sample(GROWTH * GROWTH) as u64;
+        confirming as f64 + WORK_PER_OBJECT * (rest + if searches { search } else { 0 }) as f64
+    }
+
+    /// Chooses with a first sample of this size. `None` if the observer cancels.
+    fn choose(&self, size: usize, searches: bool) -> Option<Choice> {
+        let asked = sample(self.triangles, (ASKED * size).min(MOST_ASKED), 1);
+        let told = directions(&asked);
+        let agreeing = told.first().map_or(0.0, |(_, share)| *share);
+        let heaviest = told.first().filter(|(_, share)| *share >= HEAVY);
+        let mut tried: Vec<(DQuat, f64)> =
+            heaviest.iter().map(|(rotation, _)| (*rotation, LEAST_GAINS[0])).collect();
+        if searches && agreeing < CLEAR {
+            let mut starts: Vec<DQuat> = told.iter().map(|(rotation, _)| *rotation).collect();
+            starts.push(principal(&asked));
+            tried.push((self.local_search(starts, size)?, LEAST_GAINS[1]));
+        }
+        tried.retain(|(rotation, _)| agreement(*rotation, DQuat::IDENTITY) < SAME);
+        if tried.is_empty() {
+            return Some(Choice { agreeing, ..Choice::FILE });
+        }
+        let last = sample(self.triangles, size * GROWTH * GROWTH, 4);
+        let is_whole = last.len() == self.triangles.len();
+        let doubt = if is_whole { 0.0 } else { DOUBT / (last.len() as f64).sqrt() };
+        // The heaviest direction has to beat the file's axes, and the other frame both.
+        let mut rotations = vec![None];
+        rotations.extend(tried.iter().map(|(rotation, _)| Some(*rotation)));
+        let prices = self.prices(&last, &rotations)?;
+        let mut best = 0;
+        for (index, (_, least)) in (1..).zip(&tried) {
+            if prices[index] < (1.0 - least - doubt) * prices[best] {
+                best = index;
+            }
+        }
+        let Some(frame) = rotations[best].and_then(|rotation| self.frame(rotation)) else {
+            return Some(Choice { agreeing, ..Choice::FILE });
+        };
+        let searched =
+            parallel::map(vec![None, Some(frame)], |tried| searched(&last, tried.as_ref()));
+        let gain = 1.0 - searched[1] / searched[0];
+        if self.observer.cancelled() || gain < CONFIRMED + doubt {
+            return Some(Choice { agreeing, ..Choice::FILE });
+        }
+        Some(Choice { frame: Some(frame), gain, agreeing })
+    }
+
+    /// Returns the best of some rotations, of random ones and of rotations near them. `None` if the
+    /// observer cancels.
+    fn local_search(&self, mut starts: Vec<DQuat>, size: usize) -> Option<DQuat> {
+        let mut rng = stream(1, 0);
+        starts.resize_with(STARTS, || random_rotation(&mut rng));
+        let first = sample(self.triangles, size, 2);
+        let mut ranked = Vec::new();
+        self.rank(&mut ranked, starts, &first)?;
+        for step in STEPS {
+            let mut near = Vec::new();
+            for &(_, rotation) in &ranked {
+                // A turn about one axis keeps a plane of symmetry.
+                for axis in 0..3 {
+                    let mut parts = [0.0, 0.0, 0.0, 1.0];
+                    parts[axis] = step * (2.0 * rng.random::<f64>() - 1.0);
+                    near.push((DQuat::from_array(parts) * rotation).normalize());
+                }
+            }
+            self.rank(&mut ranked, near, &first)?;
+        }
+        let best = ranked.drain(..).map(|(_, rotation)| rotation).collect();
+        self.rank(&mut ranked, best, &sample(self.triangles, GROWTH * size, 3))?;
+        ranked.first().map(|(_, rotation)| *rotation)
+    }
+
+    /// Adds candidates, and keeps the cheapest. `None` if the observer cancels.
+    fn rank(
+        &self,
+        ranked: &mut Vec<(f64, DQuat)>,
+        candidates: Vec<DQuat>,
+        sample: &[Triangle],
+    ) -> Option<()> {
+        let tried: Vec<Option<DQuat>> = candidates.iter().copied().map(Some).collect();
+        ranked.extend(self.prices(sample, &tried)?.into_iter().zip(candidates));
+        ranked.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        ranked.truncate(KEPT);
+        Some(())
+    }
+
+    /// Returns the areas of greedy trees over some triangles, along the file's axes for `None`.
+    /// `None` if the observer cancels.
+    fn prices(&self, triangles: &[Triangle], tried: &[Option<DQuat>]) -> Option<Vec<f64>> {
+        let prices = parallel::map(tried.to_vec(), |rotation| self.price(triangles, rotation));
+        (!self.observer.cancelled()).then_some(prices)
+    }
+
+    fn price(&self, triangles: &[Triangle], rotation: Option<DQuat>) -> f64 {
+        let frame = rotation.and_then(|rotation| self.frame(rotation));
+        let boxes = InFrame { triangles, frame: frame.as_ref() }.boxes();
+        let tree = muller_fellner::Config::default().build(&boxes);
+        tree.map_or(f64::INFINITY, |tree| internal_area(&tree))
+    }
+
+    fn frame(&self, rotation: DQuat) -> Option<Frame> {
+        Frame::new(DMat3::from_quat(smallest(rotation).normalize()), self.centre).ok()
+    }
+}
+
+/// Returns the area of the tree of a short search over some triangles.
+fn searched(triangles: &[Triangle], frame: Option<&Frame>) -> f64 {
+    let boxes = InFrame { triangles, frame }.boxes();
+    let max_work = Some(CONFIRMING * boxes.len() as u64);
+    let bake = Bake { budget: Budget { max_work, ..Budget::UNLIMITED }, ..Bake::new(&boxes) };
+    bake.search(None, &()).map_or(f64::INFINITY, |baked| baked.outcome.cost)
+}
+
+/// Returns `count` triangles, or all: one of each of `count` runs, so that all parts of the file are
+/// there.
+fn sample(triangles: &[Triangle], count: usize, index: u64) -> Vec<Triangle> {
+    if count >= triangles.len() {
+        return triangles.to_vec();
+    }
+    let mut rng = stream(1, index);
+    let place = |run: usize| (run as u64 * triangles.len() as u64 / count as u64) as usize;
+    (0..count).map(|run| triangles[rng.random_range(place(run)..place(run + 1))]).collect()
+}
+
+/// Returns the centre of frames: 0, unless the scene is far from it.
+fn centre(bounds: &Aabb) -> DVec3 {
+    let middle = 0.5 * bounds.doubled_centroid();
+    let is_near = middle.abs().max_element() <= bounds.extent().max_element();
+    if is_near { DVec3::ZERO } else { middle }
+}
+
+/// The tangent of half of the angle, 2.3°, that a cell of rotations spans.
+const CELL: f64 = 0.02;
+/// The cosines of half of 1.5°, 0.3°, 0.06° and 0.012°.
+const CLOSE: [f64; 4] = [0.999_914_327, 0.999_996_573, 0.999_999_863, 0.999_999_994_5];
+/// Rotations that agree so much are one.
+const SAME: f64 = CLOSE[3];
+
+/// Returns rotations by which many triangles lie along the axes, and their shares of all triangles
+/// by size, the largest first.
+fn directions(triangles: &[Triangle]) -> Vec<(DQuat, f64)> {
+    let mut cells: BTreeMap<[i32; 3], Vec<(DQuat, f64)>> = BTreeMap::new();
+    let mut all = 0.0;
+    for (rotation, size) in triangles.iter().filter_map(told) {
+        let cell = (rotation.xyz() / rotation.w / CELL).round().to_array().map(|x| x as i32);
+        cells.entry(cell).or_default().push((rotation, size));
+        all += size;
+    }
+    let mut means: Vec<(DQuat, f64)> = cells.values().map(|cell| mean(cell)).collect();
+    means.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+    let mut found: Vec<(DQuat, f64)> = Vec::new();
+    for (mean, size) in means {
+        // The same rotation may be in several cells, at the border of all smallest rotations.
+        if found.iter().all(|(other, _)| agreement(mean, *other) < CLOSE[0]) {
+            found.push((mean, size / all));
+        }
+        if found.len() == TOLD {
+            break;
+        }
+    }
+    found
+}
+
+/// Returns the mean of the rotations that agree most, and the size of all. Comes closer as long as
+/// half of the size remains, because a few triangles that lie a little obliquely would tilt all
+/// flat boxes.
+fn mean(told: &[(DQuat, f64)]) -> (DQuat, f64) {
+    let mut weight = 0.0;
+    let mut mean = DQuat::IDENTITY;
+    for close in [0.0].into_iter().chain(CLOSE) {
+        let near = told.iter().filter(|(rotation, _)| rotation.dot(mean) >= close);
+        let all: f64 = near.clone().map(|(_, size)| size).sum();
+        if all < 0.5 * weight {
+            break;
+        }
+        weight = all;
+        let zero = DQuat::from_array([0.0; 4]);
+        mean = near.fold(zero, |sum, (rotation, size)| sum + *rotation * (size / all)).normalize();
+    }
+    (mean, told.iter().map(|(_, size)| size).sum())
+}
+
+/// Returns the rotation to the axes of a triangle, and its size: the root of its area, so that one
+/// large floor is not more than all that stands on it. `None` for needles, whose directions are
+/// rounding errors.
+fn told(triangle: &Triangle) -> Option<(DQuat, f64)> {
+    let [a, b, c] = triangle.0.map(Vec3::as_dvec3);
+    let sides = [b - a, c - b, a - c];
+    let normal = sides[0].cross(sides[1]);
+    let area = normal.length();
+    let longest = sides.map(DVec3::length_squared).into_iter().fold(0.0, f64::max);
+    if area.is_nan() || area <= 1e-4 * longest {
+        return None;
+    }
+    let slant = |&corner: &usize| {
+        let [leg, other] = [sides[corner], sides[(corner + 1) % 3]];
+        leg.normalize().dot(other.normalize()).abs()
+    };
+    let right = [0, 1, 2].into_iter().min_by(|a, b| slant(a).total_cmp(&slant(b)))?;
+    let [first, second] = [sides[right], sides[(right + 1) % 3]];
+    let leg = if first.length_squared() < second.length_squared() { second } else { first };
+    let (x, z) = (leg.normalize(), normal.normalize());
+    let rows = DMat3::from_cols(x, z.cross(x), z);
+    Some((smallest(DQuat::from_mat3(&rows.transpose()).normalize()), area.sqrt()))
+}
+
+/// Returns the rotation to the principal axes of the surface. Planes of symmetry are perpendicular
+/// to them.
+fn principal(triangles: &[Triangle]) -> DQuat {
+    /// Rotations of Jacobi's method, more than it needs.
+    const TURNS: usize = 16;
+    let weighted = triangles.iter().map(|Triangle(corners)| {
+        let [a, b, c] = corners.map(Vec3::as_dvec3);
+        ((b - a).cross(c - a).length(), (a + b + c) / 3.0)
+    });
+    let all: f64 = weighted.clone().map(|(area, _)| area).sum();
+    let mean: DVec3 = weighted.clone().map(|(area, point)| point * (area / all)).sum();
+    let mut moments = DMat3::ZERO;
+    for (area, point) in weighted {
+        let (point, share) = (point - mean, area / all);
+        moments += DMat3::from_cols(point * point.x, point * point.y, point * point.z) * share;
+    }
+    // Turns about an axis make the greatest mixed moment zero.
+    let mut rotation = DQuat::IDENTITY;
+    for _ in 0..TURNS {
+        let turn = DMat3::from_quat(rotation);
+        let turned = (turn * moments * turn.transpose()).to_cols_array_2d();
+        let mixed = |axis: usize| turned[(axis + 1) % 3][(axis + 2) % 3];
+        let greatest = |a: &usize, b: &usize| mixed(*a).abs().total_cmp(&mixed(*b).abs());
+        let axis = [0, 1, 2].into_iter().max_by(greatest).unwrap_or(0);
+        let [p, q] = [1, 2].map(|next| (axis + next) % 3);
+        let ratio = (turned[p][p] - turned[q][q]) / (2.0 * mixed(axis));
+        let tangent = 1.0f64.copysign(ratio) / (ratio.abs() + (ratio * ratio + 1.0).sqrt());
+        // Not a number without area, or without a mixed moment between equal ones.
+        if tangent.is_nan() || tangent.abs() <= f64::EPSILON {
+            break;
+        }
+        let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
+        let half = (0.5 * (1.0 + cosine)).sqrt();
+        let mut parts = [0.0, 0.0, 0.0, half];
+        parts[axis] = -0.5 * tangent * cosine / half;
+        rotation = (DQuat::from_array(parts) * rotation).normalize();
+    }
+    smallest(rotation)
+}
+
+/// Returns the smallest of the 24 rotations that give the same boxes.
+fn smallest(rotation: DQuat) -> DQuat {
+    let mut best = rotation;
+    // The quaternions of the 24 rotations of a cube have parts of one size, one, two or four.
+    for code in 0..81 {
+        let digits = [code % 3, code / 3 % 3, code / 9 % 3, code / 27].map(|digit| digit - 1);
+        let turn = DQuat::from_array(digits.map(f64::from));
+        let parts = turn.length_squared();
+        if parts == 0.0 || parts == 3.0 {
+            continue;
+        }
+        let turned = turn * rotation * (1.0 / parts.sqrt());
+        if turned.w > best.w {
+            best = turned;
+        }
+    }
+    best
+}
+
+/// Returns the cosine of half of the angle between two rotations, up to those of a cube.
+fn agreement(a: DQuat, b: DQuat) -> f64 {
+    let mut parts = (a * b.conjugate()).to_array().map(f64::abs);
+    parts.sort_by(|a, b| b.total_cmp(a));
+    let [first, second, third, fourth] = parts;
+    first.max((first + second) * FRAC_1_SQRT_2).max(0.5 * (first + second + third + fourth))
+}
+
+/// Returns a rotation that is uniform, by arithmetic that is the same on every machine.
+fn random_rotation(rng: &mut Stream) -> DQuat {
+    loop {
+        let parts: [f64; 4] = rng.random();
+        let rotation = DQuat::from_array(parts.map(|part| 2.0 * part - 1.0));
+        let squared = rotation.length_squared();
+        if squared <= 1.0 && squared > 1e-3 {
+            return smallest(rotation.normalize());
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! Bakes turn the boxes of oblique scenes, and leave all others as they are.
+
+use crate::work;
+use bvh_scenes::Scene;
+use bvh_search::bvh_core::export::Target;
+use bvh_search::bvh_core::file::FileError;
+use bvh_search::bvh_core::glam::{DMat3, DVec3, EulerRot};
+use bvh_search::bvh_core::{Frame, InFrame, Primitives, validate_references};
+use bvh_search::{Choice, Frames, Objects, Options, OwnedTree, prelude::*};
+
+fn triangles(scene: &str) -> Vec<Triangle> {
+    Scene::load(scene).unwrap().triangles().unwrap().to_vec()
+}
+
+fn turned(triangles: &[Triangle], number: u8, scale: f64, offset: DVec3) -> Vec<Triangle> {
+    let angle = f64::from(number);
+    let rotation = DMat3::from_euler(EulerRot::XYZ, 0.3 + angle, 1.1 * angle, 0.7 * angle);
+    let moved = |corner: Vec3| (rotation * corner.as_dvec3() * scale + offset).as_vec3();
+    triangles.iter().map(|Triangle(corners)| Triangle(corners.map(moved))).collect()
+}
+
+fn shapes(triangles: &[Triangle]) -> Objects {
+    Objects::Shapes(Primitives::Triangles(triangles.to_vec()))
+}
+
+/// Returns the area of the inner nodes of the greedy tree.
+fn area(triangles: &[Triangle], frame: Option<Frame>) -> f64 {
+    let boxes = InFrame { triangles, frame: frame.as_ref() }.boxes();
+    cost::internal_area(&muller_fellner::Config::default().build(&boxes).unwrap())
+}
+
+#[test]
+fn a_turned_building_costs_what_it_cost_along_its_own_walls() {
+    for scene in ["escher", "cloister"] {
+        let straight = triangles(scene);
+        for (number, scale, offset) in
+            [(1, 1.0, DVec3::ZERO), (2, 1e-30, DVec3::ZERO), (3, 1e30, DVec3::ZERO)]
+        {
+            let triangles = turned(&straight, number, scale, offset);
+            let choice = Choice::of(&triangles, work(30_000_000), &());
+            let frame = choice.frame.expect("a frame");
+            assert_eq!(frame.centre(), DVec3::ZERO);
+            let ratio = area(&triangles, Some(frame)) / (area(&straight, None) * scale * scale);
+            assert!(ratio < 1.03, "{scene}, {number}: {ratio}");
+            assert!((0.1..1.0).contains(&choice.gain) && choice.agreeing > 0.05, "{choice:?}");
+        }
+        let far = turned(&straight, 4, 100.0, DVec3::new(512_345.0, 5_412_345.0, 0.0));
+        let frame = Choice::of(&far, work(30_000_000), &()).frame.expect("a frame");
+        let bounds = Aabb::union_of(&frame.boxes(&far));
+        assert!(bounds.max.max_element() <= bounds.extent().max_element() as f32, "{frame:?}");
+    }
+}
+
+#[test]
+fn the_choice_is_the_same_for_any_number_of_threads() {
+    let triangles = turned(&triangles("bijou:2000"), 1, 1.0, DVec3::ZERO);
+    let chosen = [1, 2, 3].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| Choice::of(&triangles, work(3_000_000), &()))
+    });
+    assert_eq!(chosen[0], chosen[1]);
+    assert_eq!(chosen[0], chosen[2]);
+}
+
+#[test]
+fn scenes_along_their_axes_and_budgets_of_nothing_keep_their_bytes() {
+    let escher = triangles("escher");
+    let oblique = turned(&escher, 1, 1.0, DVec3::ZERO);
+    for (triangles, most) in [(&escher, 300_000), (&escher, 5_000_000), (&oblique, 0)] {
+        let [auto, file] = [Frames::Auto, Frames::File].map(|frame| {
+            let options = Options { budget: work(most), frame, ..Options::default() };
+            OwnedTree::find(shapes(triangles), &options, &()).unwrap().save().unwrap()
+        });
+        assert!(auto == file, "{most}");
+    }
+    let deadline = Deadline::after(Duration::from_secs(2));
+    assert!(Choice::of(&oblique, Budget::UNLIMITED, &deadline).frame.is_some());
+    // A tenth, but other tests share the machine.
+    assert!(deadline.elapsed() < Duration::from_secs(1), "{:?}", deadline.elapsed());
+    let over = Deadline::after(Duration::ZERO);
+    assert_eq!(Choice::of(&oblique, Budget::UNLIMITED, &over), Choice::FILE);
+    let cancelled = core::sync::atomic::AtomicBool::new(true);
+    assert_eq!(Choice::of(&oblique, Budget::UNLIMITED, &cancelled), Choice::FILE);
+}
+
+#[test]
+fn odd_scenes_have_a_valid_tree_that_costs_no_more() {
+    let flat = |x: f32, y: f32| {
+        let at = |x: f32, y: f32| [x + y, x - y, 0.5 * x];
+        Triangle::from([at(x, y), at(x + 1.0, y), at(x, y + 1.0)])
+    };
+    let grid: Vec<Triangle> =
+        (0..400u16).map(|i| flat(f32::from(i % 20), f32::from(i / 20))).collect();
+    let needles = grid.iter().map(|&Triangle([a, b, _])| Triangle([a, b, a])).collect();
+    let points = vec![Triangle([Vec3::ONE; 3]); 50];
+    let huge = grid.iter().map(|Triangle(corners)| Triangle(corners.map(|corner| corner * 5e36)));
+    let mut scenes = vec![
+        vec![],
+        grid[..1].to_vec(),
+        grid[..2].to_vec(),
+        grid.clone(),
+        needles,
+        points,
+        huge.collect(),
+    ];
+    for scene in ["S06", "S17", "S22", "S23", "S24", "S25", "S29"] {
+        scenes.push(triangles(&format!("{scene}:300")));
+    }
+    for (index, triangles) in scenes.iter().enumerate() {
+        let [auto, file] = [Frames::Auto, Frames::File].map(|frame| {
+            let options = Options { budget: work(3_000_000), frame, ..Options::default() };
+            OwnedTree::find(shapes(triangles), &options, &()).unwrap()
+        });
+        let loaded = OwnedTree::load(shapes(triangles), &auto.save().unwrap()).unwrap();
+        assert_eq!(loaded.tree(), auto.tree(), "scene {index}");
+        let [auto, file] = [auto, file].map(|owned| owned.cost(Objective::InternalArea));
+        assert!(auto <= 1.005 * file, "scene {index}: {auto} {file}");
+    }
+}
+
+#[test]
+fn a_tree_in_a_frame_keeps_it_and_the_answers_of_rays() {
+    let straight = triangles("escher:300");
+    let triangles = turned(&straight, 2, 1.0, DVec3::ZERO);
+    let bounds = Aabb::union_of(&boxes(&triangles));
+    let size = bounds.extent().length() as f32;
+    let middle = (0.5 * bounds.doubled_centroid()).as_vec3();
+    let ray = |i: u16| {
+        let at = triangles[usize::from(i) * 7 % triangles.len()].0[0];
+        Ray::half_line(middle, at - middle + 0.001 * size).unwrap()
+    };
+    let rays: Vec<Segment> =
+        (0..500).filter_map(|i| Segment::of_ray(&ray(i), 0.1 * size)).collect();
+    for (references, rays) in [(1.0, &[][..]), (1.2, &[]), (1.2, &rays)] {
+        let [owned, plain] = [Frames::Auto, Frames::File].map(|frame| {
+            let budget = work(2_000_000);
+            let options = Options { references, budget, rays, frame, ..Options::default() };
+            OwnedTree::find(shapes(&triangles), &options, &()).unwrap()
+        });
+        let frame = owned.tree().frame.expect("a frame");
+        let framed = InFrame { triangles: &triangles, frame: Some(&frame) };
+        validate_references(owned.tree(), &framed.boxes(), &framed).unwrap();
+        assert!(owned.cost(Objective::InternalArea) < plain.cost(Objective::InternalArea));
+        let bytes = owned.save().unwrap();
+        let mut loaded = OwnedTree::load(shapes(&triangles), &bytes).unwrap();
+        assert_eq!((loaded.tree(), loaded.boxes()), (owned.tree(), owned.boxes()));
+        loaded.apply(loaded.improvement(work(100_000), &()).unwrap());
+        assert_eq!(loaded.tree().frame, Some(frame));
+        let spheres = Objects::Boxes(boxes(&triangles));
+        assert_eq!(OwnedTree::load(spheres, &bytes).unwrap_err(), FileError::Frame);
+        let moved = turned(&straight, 3, 2.0, DVec3::ONE);
+        let refitted = owned.refitted(shapes(&moved)).unwrap();
+        assert_eq!(refitted.tree().frame, Some(frame));
+        let plain_moved = plain.refitted(shapes(&moved)).unwrap();
+        for (found, plain) in [(&owned, &plain), (&loaded, &plain), (&refitted, &plain_moved)] {
+            let [found, plain] = [found, plain].map(|owned| owned.layout().unwrap().unwrap());
+            let hits =
+                |wide: &WideBvh| (0..500).map(|i| wide.nearest_hit(&ray(i))).collect::<Vec<_>>();
+            assert_eq!(hits(&found), hits(&plain));
+            assert!(hits(&found).iter().flatten().count() > 50);
+        }
+        let error = owned.export(&Target::ALL[0]).unwrap_err();
+        assert!(error.to_string().contains("the file's frame"), "{error}");
+        assert!(plain.export(&Target::ALL[0]).is_ok());
+    }
+}
