@@ -9,6 +9,7 @@ use bvh_core::cost::internal_area;
 use bvh_core::{Aabb, Frame, Triangle};
 use bvh_scenes::load::Format;
 use bvh_scenes::{SceneError, files};
+use bvh_search::{Budget, Choice};
 use clap::Args;
 use glam::{DMat3, DVec3};
 use serde_json::json;
@@ -104,17 +105,8 @@ fn area(triangles: &[Triangle], rotation: DMat3) -> f64 {
 
 /// Returns the rotation from the file's axes to better ones of a mesh.
 fn rotation_of(triangles: &[Triangle]) -> Option<DMat3> {
-    let own = area(triangles, DMat3::IDENTITY);
-    let mut heavy: Vec<&Triangle> = triangles.iter().collect();
-    heavy.sort_by(|a, b| b.aabb().half_area().total_cmp(&a.aabb().half_area()));
-    let frame = |triangle: &&Triangle| {
-        let [a, b, c] = triangle.0.map(|corner| corner.as_dvec3());
-        let x = (b - a).try_normalize()?;
-        let z = x.cross(c - a).try_normalize()?;
-        Some(DMat3::from_cols(x, z.cross(x), z).transpose())
-    };
-    let frames = heavy.iter().take(16).filter_map(frame);
-    let priced = frames.map(|rotation| (area(triangles, rotation), rotation));
-    let (best, rotation) = priced.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (best < 0.98 * own).then_some(rotation)
+    /// The work of a search whose tenth chooses the axes: a second or two.
+    const WORK: u64 = 300_000_000;
+    let budget = Budget { max_work: Some(WORK), ..Budget::UNLIMITED };
+    Choice::of(triangles, budget, &()).frame.map(|frame| frame.rotation())
 }

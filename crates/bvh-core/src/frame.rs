@@ -23,13 +23,14 @@
 //! # The bounds
 //!
 //! With ε = 2⁻⁵³ and M the sum of |Rᵢⱼ| |pⱼ − cⱼ| over j, a coordinate of R (p − c) that is computed
-//! in f64 is off by less than 4εM from its difference, product and two sums, and one of R d by less
-//! than 3ε times the same sum for d. The rows of R have length 1, and so M ≤ √3 |p − c|.
+//! in f64 is off by less than 4.1εM from its difference, product and two sums, and one of R d by less
+//! than 3.1ε times the same sum for d. The rows of R have length 1 up to 2⁻⁴¹, and so M is at most
+//! the length of p − c. What underflows in f64 is far below every slack.
 //!
 //! *Near.* Let S be the largest coordinate of the root's box in the frame, and let the ray begin in
-//! its [near region](crate::slabs::near_region), at most 513 S from 0 along each axis. Then M is
-//! below 2¹¹ S, and the origin O is off by less than 2⁻⁴⁰ S. Up to a point in the root's box, t |d|
-//! is at most √3 · 514 S: the direction's error moves that point by less than 2⁻⁴⁰ S. Let D be the
+//! its [near region](crate::slabs::near_region), less than 514 S from 0 along each axis. Then M is
+//! below 2¹⁰ S, and the origin O is off by less than 2⁻⁴⁰ S. Up to a point in the root's box, t |d|
+//! is at most √3 · 515 S: the direction's error moves that point by less than 2⁻⁴⁰ S. Let D be the
 //! computed component of the direction, and x the coordinate of a point of the scene at t. Both
 //! errors together, `slack` = 2⁻³⁸ S, give
 //!
@@ -37,11 +38,12 @@
 //!   x − slack ≤ O + t D ≤ x + slack
 //! ```
 //!
-//! [`Slabs`](crate::Slabs) move the origin by the slack, up for lower faces and down for upper
-//! faces, and round it there to the same side. The rest of their proof holds for O and D.
+//! [`Slabs`](crate::Slabs) move the origin by a slack, that of far rays, up for lower faces and down
+//! for upper faces, and round it there to the same side. The rest of their proof holds for O and D.
 //!
-//! Vector kernels round the origin to the nearest number o, off by u|O| with u = 2⁻²⁴, because they
-//! have one origin for both faces. Since |O| ≤ |x| + |x − O|, the planes of the layout are moved
+//! Vector kernels round the origin to the nearest number o, off by u|O| with u = 2⁻²⁴, or by half of
+//! the least number, which the rounding of planes outwards covers. They have one origin for both
+//! faces. Since |O| ≤ |x| + |x − O|, the planes of the layout are moved
 //! outwards by u|x| + slack, with the largest |x| in the box. What is left is at most ut|D|:
 //!
 //! ```text
@@ -53,7 +55,7 @@
 //! close to 1 / D that
 //!
 //! ```text
-//!   i D ≤ (1 + 12u²) / (1 − u)  and  i D ≥ (1 + u)² / ((1 + 4u) (1 − u))
+//!   i D ≤ (1 + u) / ((1 + 2u)² (1 − 4u))  and  i D ≥ (1 + u)² / ((1 + 4u) (1 − u))
 //! ```
 //!
 //! or, without third powers, 1 − u + 8u² ≤ i D ≤ 1 + u + 12u². Rounding to the nearest number keeps
@@ -73,6 +75,9 @@ use glam::{DMat3, DVec3, Vec3};
 /// A tree with a frame is traced by rays in the file's coordinates, and gives the answers of every
 /// other tree. Frames are for triangles only: [`boxes`](Self::boxes) returns the boxes to build a
 /// tree over.
+///
+/// Boxes are resolved to 2⁻²⁴ of their distance from the centre, and to 2⁻³⁸ of the largest such
+/// distance. Far from a small detail the centre costs time, never answers.
 ///
 /// ```
 /// use bvh_core::{Frame, Triangle, glam::{DMat3, DVec3}};

@@ -17,6 +17,8 @@ use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 /// 3. *Tight.* Boxes grow in proportion to their distance from the ray's origin alone: by less than
 ///    2⁻²⁰ of it, and by less than 2⁻⁴⁷ of it if the ray begins far from the scene. Along an axis
 ///    that the ray almost does not move along (see *Parallel*), a box may not bound the ray at all.
+///    In a [frame](crate::Frame), they grow by 2⁻⁴⁷ of the largest coordinates of the scene and of
+///    the origin besides.
 ///
 /// # Proof of the first
 ///
@@ -98,7 +100,7 @@ impl Slabs {
         let is_far = boxed.is_far_from(bounds);
         let far_ray = is_far.then(|| FarRay::in_frame(ends, frame, bounds));
         let origin = frame.point(ends[0]);
-        let slack = DVec3::splat(Frame::slack(bounds));
+        let slack = DVec3::splat(frame.far_slack(ends[0], bounds));
         let origins = [round_up(origin + slack), round_down(origin - slack)];
         Self::from_origins(boxed, origins, far_ray)
     }
@@ -289,7 +291,8 @@ impl FarRay {
             return (f32::NEG_INFINITY, f32::INFINITY);
         }
         // Of a box behind the plane, the plane is the first face; of a box in front, the last.
-        let (first, last) = if direction < 0.0 { (upper, lower) } else { (lower, upper) };
+        let is_backwards = direction.is_sign_negative();
+        let (first, last) = if is_backwards { (upper, lower) } else { (lower, upper) };
         let first = (first * NEAR_DOUBLE).min(first * FAR_DOUBLE);
         let last = (last * NEAR_DOUBLE).max(last * FAR_DOUBLE);
         (first as f32, last as f32)

@@ -62,7 +62,8 @@ impl Triangle {
 
     /// Returns the vector from `point` to the nearest point of the triangle. Triangles with a
     /// common edge or corner compute the same bits for a nearest point on it. Rounded or not, the
-    /// point is in the box of the corners, so no box around the triangle is farther.
+    /// point is in the box of the corners, so no box along the file's axes around the triangle is
+    /// farther.
     pub(crate) fn offset_from(&self, point: DVec3) -> DVec3 {
         let [a, b, c] = self.0.map(|corner| corner.as_dvec3() - point);
         let normal = (b - a).cross(c - a);

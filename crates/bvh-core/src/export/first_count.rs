@@ -31,7 +31,8 @@ pub struct FirstCountNode {
 impl Bvh {
     /// Converts the tree to binary nodes, the root first and children after their parents. The
     /// nodes refer to the tree's [`prim_ids`](Bvh::prim_ids). A node with more than two children
-    /// becomes several nodes, which halve the children in their order. O(nodes).
+    /// becomes several nodes, which halve the children in their order. Boxes lie in the tree's
+    /// [frame](Bvh::frame). O(nodes).
     ///
     /// # Panics
     /// May panic on a tree that [`validate`](crate::validate()) rejects.

@@ -129,8 +129,10 @@ impl Target {
     /// subtrees are too deep.
     ///
     /// # Panics
-    /// May panic on a tree that [`validate`](crate::validate()) rejects.
+    /// Panics if the tree lies in a [frame](crate::Frame): other tracers have boxes along the file's
+    /// axes. May panic on a tree that [`validate`](crate::validate()) rejects.
     pub fn fit(&self, tree: &Bvh) -> Bvh {
+        assert!(tree.frame.is_none(), "a tree along the file's axes");
         let mut fitted =
             collapse_at_most((&*binary(tree)).into(), &self.constants, self.most_objects);
         fitted.halve_leaves(self.most_objects as usize);
@@ -154,8 +156,9 @@ impl Target {
     /// [Text](Layout::Json) has no header.
     ///
     /// # Panics
-    /// May panic on a tree that [`validate`](crate::validate()) rejects, or that is not fitted.
+    /// As [`fit`](Self::fit), or if the tree is not fitted.
     pub fn bytes(&self, tree: &Bvh, boxes: &[Aabb]) -> Vec<u8> {
+        assert!(tree.frame.is_none(), "a tree along the file's axes");
         match self.layout {
             Layout::FirstCount => packed(&tree.to_first_count(), tree, boxes),
             Layout::FirstCountAligned => packed(&tree.to_first_count_aligned(), tree, boxes),

@@ -43,7 +43,8 @@ impl Bvh {
     /// triangles in the index of its geometry. O(nodes).
     ///
     /// Boxes grow by a few units in the last place, as the library's own do, because its arithmetic
-    /// is not watertight. A node with more than two children becomes several nodes.
+    /// is not watertight. They lie in the tree's [frame](Bvh::frame). A node with more than two children
+    /// becomes several nodes.
     ///
     /// # Panics
     /// Panics if a leaf has more than 65 535 objects; [`Target::fit`](super::Target::fit) divides

@@ -79,7 +79,8 @@ impl WideBvh {
     /// The point is the point of [`Triangle::closest_point`](crate::Triangle::closest_point), and no
     /// other triangle's point is closer as computed in f64. In a layout with divided triangles that
     /// are 10¹⁵ times as large as their distances, rounding decides which of them is the closest,
-    /// and kernels may differ in it. About O(log n) for a point near triangles that are spread out.
+    /// and kernels may differ in it; so it does in a frame with triangles that are 10⁸ times as long
+    /// as high. About O(log n) for a point near triangles that are spread out.
     ///
     /// ```
     /// # use bvh_core::{Aabb, Bvh, Node, Triangle, WideBvh};
@@ -192,7 +193,7 @@ impl<K: Instructions> Task<K> for ClosestPoints<'_> {
 /// A point as boxes are tested with it: in f32, [scaled](scale()).
 ///
 /// The computed square of a distance exceeds the real one by at most 2⁻²⁰ of it, and by at most
-/// 2⁻¹⁴⁰ where numbers are subnormal. A [frame](crate::frame) adds 2⁻²³ of the distance, since what
+/// 2⁻¹⁴⁰ where numbers are subnormal. A [frame](crate::frame) adds 2⁻²³ of the square, since what
 /// its errors have in common with the box is in the pad. The [limit](Nearest::limit) adds more than
 /// all of these.
 struct PointLanes<L> {

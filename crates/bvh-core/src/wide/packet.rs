@@ -100,7 +100,9 @@ impl<K: Instructions> Packet<K> {
                 let rays = &vector.assume_init_ref().rays;
                 let [x, y, z] = rays.direction;
                 let one = x.filled(1.0);
-                let inverse = [one / x, one / y, one / z];
+                // Sizes, because rays of one octant of the frame may run to both sides of an axis
+                // of the file.
+                let inverse = [one / x.abs(), one / y.abs(), one / z.abs()];
                 bounds.add(rays, &BoxLanes { origin: rays.origin, inverse });
             }
             one_origin(&bounds, &wide.bounds)

@@ -7,8 +7,8 @@ use crate::{Aabb, Triangle};
 /// Why a layout cannot follow its triangles, and has to be made anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RefitError {
-    /// A corner of a triangle is NaN or infinite.
-    #[error("triangle {0} has a corner that is not finite")]
+    /// A corner of a triangle is NaN or infinite, or its box in the frame is.
+    #[error("triangle {0} has a corner that is not finite, or a box in the frame of the layout")]
     NotFinite(u32),
     /// The layout has a triangle that the new ones lack, or that has lost its area.
     #[error("triangle {0} of the layout is missing or has lost its area: make the layout anew")]
@@ -35,7 +35,7 @@ impl WideBvh {
             }
         }
         for (id, (triangle, is_new)) in (0..).zip(triangles.iter().zip(is_new)) {
-            if !triangle.0.iter().all(|corner| corner.is_finite()) {
+            if triangle.aabb_in(self.frame()).check().is_err() {
                 return Err(RefitError::NotFinite(id));
             }
             if is_new && !triangle.is_degenerate() {

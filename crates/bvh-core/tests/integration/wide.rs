@@ -10,7 +10,7 @@ use bvh_core::{
     Aabb, Bvh, Coherence, Hit, InFrame, Node, PreparedRay, Ray, RefitError, TestCounts, Triangle,
     WideBvh, any_hit, nearest_hit,
 };
-use glam::Vec3;
+use glam::{DMat3, DVec3, Vec3};
 
 /// Checks all rays by all trees and layouts, one by one and in batches. Returns the number of rays
 /// that hit.
@@ -125,6 +125,31 @@ fn packets_from_one_origin_answer_as_brute_force() {
         }
     }
     assert!(hits > 2_000, "the rays should hit something: {hits}");
+}
+
+#[test]
+fn packets_of_a_frame_whose_directions_run_to_both_sides_and_are_long_answer_as_brute_force() {
+    let mut random = Random(3);
+    let [half, root] = [0.5, 0.5f64.sqrt()];
+    let rotation = DMat3::from_cols(
+        DVec3::new(root, root, 0.0),
+        DVec3::new(-half, half, root),
+        DVec3::new(half, -half, root),
+    )
+    .transpose();
+    let long = Vec3::new(1.0, 1.0, libm::exp2f(-41.0)) * libm::exp2f(60.0);
+    let directions = [Vec3::new(-1.0, 1.1, 2.0), Vec3::new(1.1, -1.0, 2.0), long];
+    let ray = |direction: &Vec3| [Ray::half_line(Vec3::ZERO, *direction).unwrap(); 16];
+    let rays: Vec<Ray> = directions.iter().flat_map(ray).collect();
+    let mut hits = 0;
+    for _ in 0..300 {
+        let mut corner =
+            || Vec3::from([0; 3].map(|_| random.below(9) as f32 - 4.0)) * libm::exp2f(37.0);
+        let triangles = [Triangle([corner(), corner(), corner()])];
+        let traced = [Traced::framed(&triangles, rotation, &mut random)];
+        hits += check("one triangle", &triangles, &traced, &rays);
+    }
+    assert!(hits > 100, "{hits}");
 }
 
 #[test]
@@ -302,6 +327,14 @@ fn a_layout_whose_triangles_cannot_be_followed_says_so_and_stays_as_it_was() {
     let flat = Triangle([Vec3::ONE; 3]);
     let new = Triangle([Vec3::X, Vec3::Y, Vec3::Z]);
     let infinite = Triangle([Vec3::X, Vec3::Y, Vec3::INFINITY]);
+    // Beyond f32 along the axes of a turned frame.
+    let mut turned = Traced::framed(&triangles, DMat3::from_rotation_z(-0.785), &mut random);
+    let far = 2.9e38 * (Vec3::X + Vec3::Y);
+    let far = triangles.iter().map(|t| Triangle(t.0.map(|p| far + p * 5e36)));
+    let far: Vec<Triangle> = far.collect();
+    for (_, layout) in &mut turned.layouts {
+        assert_eq!(layout.refit(&far), Err(RefitError::NotFinite(0)));
+    }
     for (_, layout) in traced.iter_mut().flat_map(|traced| &mut traced.layouts) {
         assert_eq!(layout.refit(&with(3, flat)), Err(RefitError::Lost(3)));
         assert_eq!(layout.refit(&with(7, new)), Err(RefitError::Gained(7)));

@@ -80,6 +80,9 @@ pub fn by_kernel(wide: &WideBvh) -> Vec<(Kernel, WideBvh)> {
     Kernel::ALL.into_iter().filter_map(of).collect()
 }
 
+/// The object, axis and coordinate of a plane that divides, and the frame that it lies in.
+pub type Plane = ((u32, usize, f32), Option<Frame>);
+
 /// A tree, and its layout for every kernel.
 pub struct Traced {
     pub tree: Bvh,
@@ -91,6 +94,13 @@ impl Traced {
         Self { layouts: by_kernel(&WideBvh::new(&tree, triangles).unwrap()), tree }
     }
 
+    /// Makes a tree in a frame about the origin.
+    pub fn framed(triangles: &[Triangle], rotation: DMat3, random: &mut Random) -> Self {
+        let frame = Frame::new(rotation, DVec3::ZERO).unwrap();
+        let tree = tree(&frame.boxes(triangles), SHAPES[0], random);
+        Self::new(Bvh { frame: Some(frame), ..tree }, triangles)
+    }
+
     /// Makes trees of all shapes, the deepest one, trees of larger leaves, and trees of divided
     /// triangles.
     pub fn all(triangles: &[Triangle], random: &mut Random) -> Vec<Self> {
@@ -98,10 +108,7 @@ impl Traced {
     }
 
     /// Returns the same, and the planes that divide triangles.
-    pub fn all_and_planes(
-        triangles: &[Triangle],
-        random: &mut Random,
-    ) -> (Vec<Self>, Vec<(u32, usize, f32)>) {
+    pub fn all_and_planes(triangles: &[Triangle], random: &mut Random) -> (Vec<Self>, Vec<Plane>) {
         let boxes = boxes(triangles);
         let mut trees: Vec<Bvh> = SHAPES.iter().map(|&shape| tree(&boxes, shape, random)).collect();
         let (parts, planes) = divided(&trees[0], triangles, &mut Random(9));
@@ -109,9 +116,12 @@ impl Traced {
             [&trees[0], &parts].map(|tree| collapse_leaves(tree, &SahConstants::default()));
         trees.extend(merged);
         trees.extend([parts, chain(&boxes)]);
+        let mut planes = Vec::from_iter(planes.into_iter().map(|plane| (plane, None)));
         for _ in 0..2 {
             if let Some(framed) = framed(triangles, random) {
-                trees.extend([divided(&framed, triangles, random).0, framed]);
+                let (parts, others) = divided(&framed, triangles, random);
+                planes.extend(others.into_iter().map(|plane| (plane, framed.frame)));
+                trees.extend([parts, framed]);
             }
         }
         (trees.into_iter().map(|tree| Self::new(tree, triangles)).collect(), planes)
@@ -122,7 +132,7 @@ impl Traced {
 /// are within it. Without a plane there are none.
 pub fn rays_on_planes(
     triangles: &[Triangle],
-    planes: &[(u32, usize, f32)],
+    planes: &[Plane],
     count: usize,
     random: &mut Random,
 ) -> Vec<Ray> {
@@ -132,15 +142,23 @@ pub fn rays_on_planes(
         return rays;
     }
     for _ in 0..count {
-        let (object, axis, plane) = random.of(planes);
+        let ((object, axis, plane), frame) = random.of(planes);
         let Triangle([a, b, c]) = triangles[object as usize];
         let u = random.unit();
         let v = random.unit();
         let mut target = a + (b - a) * u + (c - a) * (v * (1.0 - u));
-        target[axis] = plane;
         let mut from = target + random.point() * (size * random.of(&[3.0, 0.1, 1e-3]));
+        let onto_plane = |point: &mut Vec3| match frame {
+            None => point[axis] = plane,
+            Some(frame) => {
+                let away = f64::from(plane) - frame.point(point.as_dvec3())[axis];
+                let along = frame.rotation().transpose().col(axis);
+                *point = (point.as_dvec3() + along * away).as_vec3();
+            }
+        };
+        onto_plane(&mut target);
         if random.below(2) == 0 {
-            from[axis] = plane;
+            onto_plane(&mut from);
         }
         // Scaled, so that the direction stays in range for huge and tiny scenes.
         rays.extend(Ray::half_line(from, (target - from) / size));
