@@ -235,7 +235,8 @@ impl DWideBvh {
     #[inline(always)]
     fn boxed(&self, ray: &DRay) -> Boxed {
         let scale = scale(ray);
-        let ends = [ray.origin, ray.direction / scale];
+        // The reciprocal of a power of two is exact.
+        let ends = [ray.origin, ray.direction * scale.recip()];
         let single = |t: f64| ((t * scale) as f32).min(f32::MAX);
         let ray = self.frame.ray_of(ends, [single(ray.t_min), single(ray.t_max)]);
         Boxed { ray, ends, scale }
