@@ -271,8 +271,8 @@ impl Instances {
         self.nearest(ray, |part, _, local_ray| part.nearest_hit(local_ray))
     }
 
-    /// Writes the [nearest hit](Self::nearest_hit) of every ray to `hits`; [`InstanceHit::MISS`] for
-    /// a ray that meets nothing. Traces the rays one after the other.
+    /// Writes the [nearest hit](Self::nearest_hit) of every ray to `hits`; [`InstanceHit::MISS`]
+    /// for a ray that meets nothing. Traces the rays one after the other.
     ///
     /// # Panics
     /// If `rays` and `hits` are not equally many.
