@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "bvh.h"
+#include "bvh_search.h"
 
 enum { MOST = 64, RINGS = 16, STEPS = 360 };
 
@@ -15,13 +15,13 @@ typedef struct { float distance; int triangle; float normal[3]; } AudioHit;
 /* The nearest hits of at most MOST rays; a miss has an infinite distance. */
 static void batched_closest_hit(int count, const AudioRay *rays, const float *t_min, const float *t_max,
                                 AudioHit *hits, void *tracer) {
-    BvhRay batch[MOST];
-    BvhSurfaceHit found[MOST];
+    BvsRay batch[MOST];
+    BvsSurfaceHit found[MOST];
     for (int i = 0; i < count; i++) {
         const float *o = rays[i].origin, *d = rays[i].direction;
-        batch[i] = (BvhRay){{o[0], o[1], o[2]}, t_min[i], {d[0], d[1], d[2]}, t_max[i]};
+        batch[i] = (BvsRay){{o[0], o[1], o[2]}, t_min[i], {d[0], d[1], d[2]}, t_max[i]};
     }
-    bvh_tracer_surface_hits(tracer, batch, (size_t)count, 0, found);
+    bvs_tracer_surface_hits(tracer, batch, (size_t)count, 0, found);
     for (int i = 0; i < count; i++) {
         const float *n = found[i].normal;
         hits[i] = (AudioHit){found[i].t, (int)found[i].object, {n[0], n[1], n[2]}};
@@ -31,24 +31,24 @@ static void batched_closest_hit(int count, const AudioRay *rays, const float *t_
 /* Writes whether each of at most MOST rays is occluded. */
 static void batched_any_hit(int count, const AudioRay *rays, const float *t_min, const float *t_max,
                             unsigned char *occluded, void *tracer) {
-    BvhRay batch[MOST];
+    BvsRay batch[MOST];
     for (int i = 0; i < count; i++) {
         const float *o = rays[i].origin, *d = rays[i].direction;
-        batch[i] = (BvhRay){{o[0], o[1], o[2]}, t_min[i], {d[0], d[1], d[2]}, t_max[i]};
+        batch[i] = (BvsRay){{o[0], o[1], o[2]}, t_min[i], {d[0], d[1], d[2]}, t_max[i]};
     }
-    bvh_tracer_any_hits(tracer, batch, (size_t)count, 0, occluded);
+    bvs_tracer_any_hits(tracer, batch, (size_t)count, 0, occluded);
 }
 
 /* Returns the mean distance of the points of one turn of a LiDAR. */
-static double lidar_scan(const BvhTracer *tracer, const float at[3]) {
-    static BvhRay rays[RINGS * STEPS];
-    static BvhHit hits[RINGS * STEPS];
+static double lidar_scan(const BvsTracer *tracer, const float at[3]) {
+    static BvsRay rays[RINGS * STEPS];
+    static BvsHit hits[RINGS * STEPS];
     for (int i = 0; i < RINGS * STEPS; i++) {
         double up = (i / STEPS - RINGS / 2) * 0.03, turn = (i % STEPS) * 6.283185307179586 / STEPS;
         float x = (float)(cos(up) * cos(turn)), y = (float)(cos(up) * sin(turn)), z = (float)sin(up);
-        rays[i] = (BvhRay){{at[0], at[1], at[2]}, 0.1f, {x, y, z}, 200};
+        rays[i] = (BvsRay){{at[0], at[1], at[2]}, 0.1f, {x, y, z}, 200};
     }
-    bvh_tracer_nearest_hits(tracer, rays, RINGS * STEPS, 1, hits);
+    bvs_tracer_nearest_hits(tracer, rays, RINGS * STEPS, 1, hits);
     double sum = 0;
     for (int i = 0; i < RINGS * STEPS; i++) sum += hits[i].t;
     return sum / (RINGS * STEPS);
@@ -64,10 +64,10 @@ int main(void) {
         for (int c = 0; c < 3; c++)
             for (int axis = 0; axis < 3; axis++) corners[i][c][axis] = names[c] >> (2 - axis) & 1 ? 5 : -5;
     }
-    BvhTree *tree = bvh_tree_from_triangles(&corners[0][0][0], 12, 0.05, 1.0);
-    BvhTracer *tracer = tree ? bvh_tracer_new(tree) : NULL;
+    BvsTree *tree = bvs_tree_from_triangles(&corners[0][0][0], 12, 0.05, 1.0);
+    BvsTracer *tracer = tree ? bvs_tracer_new(tree) : NULL;
     if (!tracer) {
-        puts(bvh_last_error());
+        puts(bvs_last_error());
         return EXIT_FAILURE;
     }
     AudioRay rays[2] = {{{0, 0, 0}, {1, 0, 0}}, {{9, 9, 9}, {1, 0, 0}}};
@@ -77,16 +77,16 @@ int main(void) {
     batched_closest_hit(2, rays, t_min, t_max, hits, tracer);
     batched_any_hit(2, rays, t_min, t_max, occluded, tracer);
     /* A line through the middle crosses the box twice, although diagonals meet there. */
-    BvhRay line = {{-9, 0, 0}, 0, {1, 0, 0}, INFINITY};
-    BvhHit all[4];
+    BvsRay line = {{-9, 0, 0}, 0, {1, 0, 0}, INFINITY};
+    BvsHit all[4];
     uint32_t count;
     size_t total;
-    bvh_tracer_all_hits(tracer, &line, 1, all, 4, &count, &total);
+    bvs_tracer_all_hits(tracer, &line, 1, all, 4, &count, &total);
     float point[3] = {0, 0, 4};
-    BvhClosest closest;
+    BvsClosest closest;
     unsigned char inside;
-    bvh_tracer_closest_points(tracer, point, 1, &closest);
-    bvh_tracer_contains(tracer, point, 1, &inside);
+    bvs_tracer_closest_points(tracer, point, 1, &closest);
+    bvs_tracer_contains(tracer, point, 1, &inside);
     float at[3] = {0, 0, 0};
     double mean = lidar_scan(tracer, at);
     printf("audio %g and %g, crossings %u, closest %g, mean of the scan %g\n", hits[0].distance,
@@ -94,7 +94,7 @@ int main(void) {
     int is_right = hits[0].distance == 5 && fabsf(hits[0].normal[0]) == 1 && isinf(hits[1].distance) &&
                    occluded[0] == 1 && occluded[1] == 0 && total == 2 && all[0].t == 4 && all[1].t == 14 &&
                    closest.distance == 1 && inside == 1 && mean > 5 && mean < 7;
-    bvh_tracer_free(tracer);
-    bvh_tree_free(tree);
+    bvs_tracer_free(tracer);
+    bvs_tree_free(tree);
     return is_right ? EXIT_SUCCESS : EXIT_FAILURE;
 }

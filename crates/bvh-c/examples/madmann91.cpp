@@ -1,7 +1,7 @@
 // Exports a tree, loads it into madmann91/bvh (version 2, its src on the include path), and compares 100 000 nearest hits
 // with those in the tree that the library builds itself.
 
-#include "bvh.h"
+#include "bvh_search.h"
 #include "load_madmann91.h"
 
 #include <bvh/v2/default_builder.h>
@@ -49,12 +49,12 @@ int main(int count, char **arguments) {
         for (const Vec3 &corner : {at, at + along, at + across})
             for (int axis = 0; axis < 3; axis++) corners.push_back(corner[axis]);
     }
-    BvhBake search = {};
-    search.corners = corners.data(), search.count = triangles.size();
+    BvsBake search = {};
+    search.objects.vertices = corners.data(), search.objects.count = triangles.size();
     search.references = 1.3, search.work = 3000000;
-    BvhTree *tree = bvh_tree_bake(&search);
-    if (!tree || bvh_tree_export(tree, "madmann91-bvh", path) != BVH_STATUS_OK) return std::puts(bvh_last_error()), EXIT_FAILURE;
-    bvh_tree_free(tree);
+    BvsTree *tree = bvs_tree_bake(&search);
+    if (!tree || bvs_tree_export(tree, "madmann91-bvh", path) != BVS_STATUS_OK) return std::puts(bvs_last_error()), EXIT_FAILURE;
+    bvs_tree_free(tree);
     Bvh ours = load(path);
 
     Bvh own = bvh::v2::DefaultBuilder<bvh::v2::Node<float, 3>>::build(boxes, centers, {});

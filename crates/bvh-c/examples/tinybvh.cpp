@@ -1,7 +1,7 @@
 // Exports a tree of divided triangles, loads it into tinybvh (tiny_bvh.h on the include path), and compares 100 000 nearest hits
 // in each of its layouts with the library's own.
 
-#include "bvh.h"
+#include "bvh_search.h"
 
 #define TINYBVH_IMPLEMENTATION
 #include "load_tinybvh.h"
@@ -32,21 +32,21 @@ int main(int count, char **arguments) {
         }
     }
     uint32_t triangles = uint32_t(vertices.size() / 3);
-    BvhBake search = {};
-    search.corners = corners.data(), search.count = triangles;
+    BvsBake search = {};
+    search.objects.vertices = corners.data(), search.objects.count = triangles;
     search.references = 1.3, search.work = 3000000;
-    BvhTree *tree = bvh_tree_bake(&search);
-    if (!tree || bvh_tree_export(tree, "tinybvh", path) != BVH_STATUS_OK) return std::puts(bvh_last_error()), EXIT_FAILURE;
+    BvsTree *tree = bvs_tree_bake(&search);
+    if (!tree || bvs_tree_export(tree, "tinybvh", path) != BVS_STATUS_OK) return std::puts(bvs_last_error()), EXIT_FAILURE;
 
-    std::vector<BvhRay> rays(100000);
-    for (BvhRay &ray : rays) {
+    std::vector<BvsRay> rays(100000);
+    for (BvsRay &ray : rays) {
         ray.t_min = 0, ray.t_max = INFINITY;
         for (int axis = 0; axis < 3; axis++) ray.origin[axis] = within(5), ray.direction[axis] = within(1);
     }
-    BvhTracer *tracer = bvh_tracer_new(tree);
-    std::vector<BvhHit> expected(rays.size());
-    if (!tracer || bvh_tracer_nearest_hits(tracer, rays.data(), rays.size(), 0, expected.data()) != BVH_STATUS_OK)
-        return std::puts(bvh_last_error()), EXIT_FAILURE;
+    BvsTracer *tracer = bvs_tracer_new(tree);
+    std::vector<BvsHit> expected(rays.size());
+    if (!tracer || bvs_tracer_nearest_hits(tracer, rays.data(), rays.size(), 0, expected.data()) != BVS_STATUS_OK)
+        return std::puts(bvs_last_error()), EXIT_FAILURE;
 
     bool is_right = true;
     auto compare = [&](const char *layout, const auto &theirs) {
@@ -85,7 +85,7 @@ int main(int count, char **arguments) {
     convert(compressed, for_compressed, binary, 3);
     compare("CWBVH", compressed);
 #endif
-    bvh_tracer_free(tracer);
-    bvh_tree_free(tree);
+    bvs_tracer_free(tracer);
+    bvs_tree_free(tree);
     return is_right ? EXIT_SUCCESS : EXIT_FAILURE;
 }

@@ -1,6 +1,6 @@
 // Finds a tree in a moment, traces its nodes as tinybvh does, and compares every hit with the library's own tracer.
 
-#include "bvh.h"
+#include "bvh_search.h"
 #include "ray_triangle.h"
 
 #include <algorithm>
@@ -24,19 +24,19 @@ struct WaldNode {
     float aabbMax[3];
     uint32_t triCount;
 };
-static_assert(sizeof(WaldNode) == sizeof(BvhNode) && offsetof(WaldNode, leftFirst) == offsetof(BvhNode, first) &&
-                  offsetof(WaldNode, aabbMax) == offsetof(BvhNode, max) && offsetof(WaldNode, triCount) == offsetof(BvhNode, count),
+static_assert(sizeof(WaldNode) == sizeof(BvsNode) && offsetof(WaldNode, leftFirst) == offsetof(BvsNode, first) &&
+                  offsetof(WaldNode, aabbMax) == offsetof(BvsNode, max) && offsetof(WaldNode, triCount) == offsetof(BvsNode, count),
               "what the library lends is traced where it lies");
 
 template <class T> T *checked(T *made) {
     if (made) return made;
-    std::fprintf(stderr, "%s\n", bvh_last_error());
+    std::fprintf(stderr, "%s\n", bvs_last_error());
     std::exit(1);
 }
 
-void check(BvhStatus status) {
-    if (status == BVH_STATUS_OK) return;
-    std::fprintf(stderr, "%s\n", bvh_last_error());
+void check(BvsStatus status) {
+    if (status == BVS_STATUS_OK) return;
+    std::fprintf(stderr, "%s\n", bvs_last_error());
     std::exit(1);
 }
 
@@ -45,7 +45,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 }
 
 /// Where a ray enters a box before `nearest`, infinity if it does not.
-float enters(const WaldNode &node, const BvhRay &ray, float nearest) {
+float enters(const WaldNode &node, const BvsRay &ray, float nearest) {
     float low = ray.t_min, high = std::min(ray.t_max, nearest);
     for (int i = 0; i < 3; i++) {
         float a = (node.aabbMin[i] - ray.origin[i]) / ray.direction[i], b = (node.aabbMax[i] - ray.origin[i]) / ray.direction[i];
@@ -54,8 +54,8 @@ float enters(const WaldNode &node, const BvhRay &ray, float nearest) {
     return low <= high ? low : INFINITY;
 }
 
-BvhHit nearest_in(const WaldNode *nodes, const uint32_t *ids, const float *corners, const BvhRay &ray) {
-    BvhHit hit = {INFINITY, UINT32_MAX};
+BvsHit nearest_in(const WaldNode *nodes, const uint32_t *ids, const float *corners, const BvsRay &ray) {
+    BvsHit hit = {INFINITY, UINT32_MAX};
     std::vector<uint32_t> open(1, 0);
     while (!open.empty()) {
         const WaldNode &node = nodes[open.back()];
@@ -77,7 +77,7 @@ BvhHit nearest_in(const WaldNode *nodes, const uint32_t *ids, const float *corne
 }
 
 /// Compares distances with those of the library, from which rounding errors may differ.
-template <class Distance> void compare(const char *who, const std::vector<BvhHit> &hits, Distance distance) {
+template <class Distance> void compare(const char *who, const std::vector<BvsHit> &hits, Distance distance) {
     auto start = std::chrono::steady_clock::now();
     size_t met = 0, wrong = 0;
     for (size_t i = 0; i < hits.size(); i++) {
@@ -102,21 +102,21 @@ int main() {
     }
     size_t triangles = corners.size() / 9;
 
-    BvhTree *tree = checked(bvh_tree_from_triangles(corners.data(), triangles, 0.0, 1.0));
+    BvsTree *tree = checked(bvs_tree_from_triangles(corners.data(), triangles, 0.0, 1.0));
     double first = 0, cost = 0;
-    check(bvh_tree_cost(tree, BVH_COST_SAH, &first));
-    check(bvh_tree_improve(tree, 1.0));
+    check(bvs_tree_cost(tree, BVS_COST_SAH, &first));
+    check(bvs_tree_improve(tree, 1.0));
     // Another thread may end a search of any length.
     std::atomic<bool> enough = false;
     std::thread user([&] { std::this_thread::sleep_for(std::chrono::milliseconds(100)), enough = true; });
     auto is_enough = [](void *flag) { return uint8_t(static_cast<std::atomic<bool> *>(flag)->load()); };
-    check(bvh_tree_improve_until(tree, 3600.0, is_enough, &enough));
+    check(bvs_tree_improve_until(tree, 3600.0, is_enough, &enough));
     user.join();
-    check(bvh_tree_cost(tree, BVH_COST_SAH, &cost));
+    check(bvs_tree_cost(tree, BVS_COST_SAH, &cost));
     std::printf("%zu triangles: surface area heuristic %.2f, after a second %.2f\n", triangles, first, cost);
 
-    std::vector<BvhRay> rays(100000);
-    for (BvhRay &ray : rays) {
+    std::vector<BvsRay> rays(100000);
+    for (BvsRay &ray : rays) {
         ray.t_min = 0, ray.t_max = INFINITY;
         float length = 0;
         for (int i = 0; i < 3; i++) {
@@ -125,19 +125,24 @@ int main() {
         }
         for (float &component : ray.direction) component /= std::sqrt(length);
     }
-    BvhTracer *tracer = checked(bvh_tracer_new(tree));
-    std::vector<BvhHit> hits(rays.size());
+    BvsTracer *tracer = checked(bvs_tracer_new(tree));
+    std::vector<BvsHit> hits(rays.size());
     auto start = std::chrono::steady_clock::now();
-    check(bvh_tracer_nearest_hits(tracer, rays.data(), rays.size(), 0, hits.data()));
+    check(bvs_tracer_nearest_hits(tracer, rays.data(), rays.size(), 0, hits.data()));
     std::printf("the library: %zu rays, %.2f s\n", rays.size(), seconds_since(start));
 
+    // A search for a frame would have turned the boxes.
+    double frame[12];
+    check(bvs_tree_frame(tree, frame));
+    const double axes[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    if (!std::equal(frame, frame + 12, axes)) return 1;
     size_t node_count = 0, id_count = 0;
-    const BvhNode *nodes = checked(bvh_tree_nodes(tree, &node_count));
-    const uint32_t *ids = checked(bvh_tree_object_ids(tree, &id_count));
+    const BvsNode *nodes = checked(bvs_tree_nodes(tree, &node_count));
+    const uint32_t *ids = checked(bvs_tree_object_ids(tree, &id_count));
     std::vector<WaldNode> wald(node_count);
     std::memcpy(wald.data(), nodes, node_count * sizeof(WaldNode));
     compare("tinybvh's nodes", hits, [&](size_t i) { return nearest_in(wald.data(), ids, corners.data(), rays[i]).t; });
 
-    bvh_tracer_free(tracer);
-    bvh_tree_free(tree);
+    bvs_tracer_free(tracer);
+    bvs_tree_free(tree);
 }

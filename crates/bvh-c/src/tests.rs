@@ -1,8 +1,8 @@
 //! Wrong arguments from C are rejected by name, and the results of right ones agree with the Rust
 //! crates.
 
-use crate::failure::{BvhStatus, bvh_last_error, status};
-use crate::{tracer::*, tree::*};
+use crate::failure::{BvsStatus, bvs_last_error, status};
+use crate::{instances::*, tracer::*, tree::*};
 use bvh_search::bvh_core::Primitives;
 use bvh_search::bvh_core::export::Target;
 use bvh_search::{Frames, Objects, Options, OwnedTree, prelude::*};
@@ -16,19 +16,17 @@ fn corners(count: usize) -> Vec<f32> {
 }
 
 /// Returns rays that run upwards from a line below the staircase, and beyond its end.
-fn rays(slope: f32) -> Vec<BvhRay> {
+fn rays(slope: f32) -> Vec<BvsRay> {
     let origin = |i: u16| [f32::from(i) * 0.03, 0.2, -1.0];
     let direction = [slope, 0.0, 1.0];
     (0..1500)
-        .map(|i| BvhRay { origin: origin(i), t_min: 0.0, direction, t_max: f32::INFINITY })
+        .map(|i| BvsRay { origin: origin(i), t_min: 0.0, direction, t_max: f32::INFINITY })
         .collect()
 }
 
 /// A search without objects, and every choice at its default.
-const NO_BAKE: BvhBake = BvhBake {
-    boxes: null(),
-    corners: null(),
-    count: 0,
+const NO_BAKE: BvsBake = BvsBake {
+    objects: BvsObjects::NONE,
     rays: null(),
     ray_count: 0,
     references: 0.0,
@@ -38,16 +36,21 @@ const NO_BAKE: BvhBake = BvhBake {
     frame: 0,
 };
 
+/// Triangles of nine numbers each.
+fn soup(corners: &[f32]) -> BvsObjects {
+    BvsObjects { vertices: corners.as_ptr(), count: corners.len() / 9, ..BvsObjects::NONE }
+}
+
 fn last_error() -> String {
     // SAFETY: the message ends with a zero, and no call of this thread fails before the copy is
     // made.
-    let message = unsafe { CStr::from_ptr(bvh_last_error()) };
+    let message = unsafe { CStr::from_ptr(bvs_last_error()) };
     message.to_str().unwrap().to_owned()
 }
 
 #[track_caller]
-fn ok(status: BvhStatus) {
-    assert_eq!(status, BvhStatus::Ok, "{}", last_error());
+fn ok(status: BvsStatus) {
+    assert_eq!(status, BvsStatus::Ok, "{}", last_error());
 }
 
 #[track_caller]
@@ -56,13 +59,13 @@ fn rejected(has_failed: bool, part: &str) {
 }
 
 #[track_caller]
-fn invalid(status: BvhStatus, part: &str) {
-    rejected(status == BvhStatus::Invalid, part);
+fn invalid(status: BvsStatus, part: &str) {
+    rejected(status == BvsStatus::Invalid, part);
 }
 
-fn tree(corners: &[f32]) -> *mut BvhTree {
+fn tree(corners: &[f32]) -> *mut BvsTree {
     // SAFETY: `corners` has nine floats for each of the triangles.
-    unsafe { bvh_tree_from_triangles(corners.as_ptr(), corners.len() / 9, 0.02, 1.0) }
+    unsafe { bvs_tree_from_triangles(corners.as_ptr(), corners.len() / 9, 0.02, 1.0) }
 }
 
 #[test]
@@ -74,36 +77,41 @@ fn trees_and_hits_equal_the_results_of_the_rust_crates() {
     let mut count = 0;
     let mut ids = 0;
     let mut cost = 0.0;
-    let mut hits = vec![BvhHit { t: 0.0, object: 0 }; rays.len()];
+    let mut hits = vec![BvsHit { t: 0.0, object: 0 }; rays.len()];
     let mut any = vec![9u8; rays.len()];
     // SAFETY: every pointer comes with its array's length, and the nodes are copied before the tree
     // is improved.
     unsafe {
-        let nodes = std::slice::from_raw_parts(bvh_tree_nodes(tree, &mut count), count).to_vec();
-        let ids = std::slice::from_raw_parts(bvh_tree_object_ids(tree, &mut ids), ids);
+        let nodes = std::slice::from_raw_parts(bvs_tree_nodes(tree, &mut count), count).to_vec();
+        let ids = std::slice::from_raw_parts(bvs_tree_object_ids(tree, &mut ids), ids);
         assert_eq!((nodes.len(), ids.len(), nodes[0].first, nodes[0].min), (80, 40, 2, [0.0; 3]));
-        ok(bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut cost));
+        ok(bvs_tree_cost(tree, BvsCost::InternalArea as u32, &mut cost));
         assert_eq!(cost, cost::internal_area((*tree).owned.tree()));
         let before = cost;
-        ok(bvh_tree_improve(tree, 0.02));
-        ok(bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut cost));
+        ok(bvs_tree_improve(tree, 0.02));
+        ok(bvs_tree_cost(tree, BvsCost::InternalArea as u32, &mut cost));
         assert!(cost <= before);
-        let tracer = bvh_tracer_new(tree);
+        let tracer = bvs_tracer_new(tree);
         for coherent in [0, 1] {
             let count = rays.len();
             let rays = rays.as_ptr();
-            ok(bvh_tracer_nearest_hits(tracer, rays, count, coherent, hits.as_mut_ptr()));
-            ok(bvh_tracer_any_hits(tracer, rays, count, coherent, any.as_mut_ptr()));
+            ok(bvs_tracer_nearest_hits(tracer, rays, count, coherent, hits.as_mut_ptr()));
+            ok(bvs_tracer_any_hits(tracer, rays, count, coherent, any.as_mut_ptr()));
             for (index, (hit, any)) in hits.iter().zip(&any).enumerate() {
                 let ray = Ray::half_line((*rays.add(index)).origin, [0.0, 0.0, 1.0]).unwrap();
                 let expected = nearest_hit((*tree).owned.tree(), &triangles, &ray);
                 let Hit { t, object } = expected.unwrap_or(Hit::MISS);
-                assert_eq!((*hit, *any), (BvhHit { t, object }, u8::from(expected.is_some())));
+                let expected = (BvsHit { t, object }, u8::from(expected.is_some()));
+                assert_eq!((*hit, *any), expected);
+                let mut alone = (BvsHit { t: 0.0, object: 0 }, 9);
+                ok(bvs_nearest(tracer, rays.add(index), &mut alone.0));
+                ok(bvs_any(tracer, rays.add(index), &mut alone.1));
+                assert_eq!(alone, expected);
             }
         }
         assert!(any.contains(&0) && any.contains(&1));
-        bvh_tracer_free(tracer);
-        bvh_tree_free(tree);
+        bvs_tracer_free(tracer);
+        bvs_tree_free(tree);
     }
 }
 
@@ -114,34 +122,32 @@ fn surfaces_all_hits_closest_points_and_insides_equal_the_results_of_the_rust_cr
     let segments: Vec<f32> =
         (0..60).flat_map(|i| [i as f32 * 0.5, 0.2, -1.0, i as f32 * 0.5, 0.2, 30.0]).collect();
     let rays = rays(0.1);
-    let none = BvhSurfaceHit { t: 0.0, object: 0, u: 0.0, v: 0.0, normal: [0.0; 3] };
+    let none = BvsSurfaceHit { t: 0.0, object: 0, u: 0.0, v: 0.0, normal: [0.0; 3] };
     let mut surfaces = vec![none; rays.len()];
-    let mut hits = vec![BvhHit { t: 0.0, object: 0 }; 9000];
+    let mut hits = vec![BvsHit { t: 0.0, object: 0 }; 9000];
     let mut counts = vec![9; rays.len()];
     let mut total = 0;
     let points: Vec<f32> = rays.iter().flat_map(|ray| ray.origin).collect();
-    let far = BvhClosest { point: [0.0; 3], distance: 0.0, object: 0 };
+    let far = BvsClosest { point: [0.0; 3], distance: 0.0, object: 0 };
     let mut closest = vec![far; rays.len()];
     let mut inside = vec![9u8; rays.len()];
     // SAFETY: every pointer comes with its array's length.
     unsafe {
-        let (corners, rays_of_last_frame) = (corners.as_ptr(), segments.as_ptr());
-        let tree = bvh_tree_bake(&BvhBake {
-            corners,
-            count: 40,
-            rays: rays_of_last_frame,
+        let tree = bvs_tree_bake(&BvsBake {
+            objects: soup(&corners),
+            rays: segments.as_ptr(),
             ray_count: 60,
             seconds: 0.02,
             ..NO_BAKE
         });
-        let tracer = bvh_tracer_new(tree);
+        let tracer = bvs_tracer_new(tree);
         let count = rays.len();
-        ok(bvh_tracer_surface_hits(tracer, rays.as_ptr(), count, 0, surfaces.as_mut_ptr()));
-        ok(bvh_tracer_closest_points(tracer, points.as_ptr(), count, closest.as_mut_ptr()));
-        ok(bvh_tracer_contains(tracer, points.as_ptr(), count, inside.as_mut_ptr()));
+        ok(bvs_tracer_surface_hits(tracer, rays.as_ptr(), count, 0, surfaces.as_mut_ptr()));
+        ok(bvs_tracer_closest_points(tracer, points.as_ptr(), count, closest.as_mut_ptr()));
+        ok(bvs_tracer_contains(tracer, points.as_ptr(), count, inside.as_mut_ptr()));
         // Without room for all hits, their number is written nevertheless.
         for capacity in [10, 9000] {
-            ok(bvh_tracer_all_hits(
+            ok(bvs_tracer_all_hits(
                 tracer,
                 rays.as_ptr(),
                 count,
@@ -151,8 +157,8 @@ fn surfaces_all_hits_closest_points_and_insides_equal_the_results_of_the_rust_cr
                 &mut total,
             ));
         }
-        bvh_tracer_free(tracer);
-        bvh_tree_free(tree);
+        bvs_tracer_free(tracer);
+        bvs_tree_free(tree);
     }
     let mut first = 0;
     for (index, ray) in rays.iter().enumerate() {
@@ -169,7 +175,7 @@ fn surfaces_all_hits_closest_points_and_insides_equal_the_results_of_the_rust_cr
             assert!(point.distance(ray.at(surface.t)) < 1e-4);
             assert_eq!(Some(Vec3::from(surface.normal)), triangle.normal());
         } else {
-            assert_eq!(surface, BvhSurfaceHit { t: f32::INFINITY, object: u32::MAX, ..none });
+            assert_eq!(surface, BvsSurfaceHit { t: f32::INFINITY, object: u32::MAX, ..none });
         }
         let found = triangles[closest[index].object as usize].closest_point(ray.origin());
         assert_eq!(closest[index].point, found.to_array());
@@ -177,6 +183,86 @@ fn surfaces_all_hits_closest_points_and_insides_equal_the_results_of_the_rust_cr
     }
     assert_eq!(total, first);
     assert!(total > 100);
+}
+
+#[test]
+fn indexed_and_strided_vertices_move_trees_and_tracers_as_the_corners_themselves() {
+    let before = corners(40);
+    let after: Vec<f32> = before.iter().map(|number| number * 0.5 + 3.0).collect();
+    // Vertices in reverse order, with a normal behind each, and a material behind the indices.
+    let padded = |corners: &[f32]| -> Vec<f32> {
+        let vertices = corners.chunks(3).rev();
+        vertices.flat_map(|vertex| [vertex, &[f32::NAN; 3]].concat()).collect()
+    };
+    let ids: Vec<u32> =
+        (0..40).flat_map(|i| [119 - 3 * i, 118 - 3 * i, 117 - 3 * i, 999]).collect();
+    let [vertices, moved_vertices] = [&before, &after].map(|corners| padded(corners));
+    let objects = BvsObjects {
+        count: 40,
+        vertices: vertices.as_ptr(),
+        vertex_count: 120,
+        vertex_stride: 24,
+        indices: ids.as_ptr(),
+        index_stride: 16,
+        ..BvsObjects::NONE
+    };
+    let moved = BvsObjects { vertices: moved_vertices.as_ptr(), ..objects };
+    let bake = |objects| BvsBake { objects, work: 3000, seed: 1, ..NO_BAKE };
+    let rays = rays(0.1);
+    let mut hits = [(); 3].map(|()| vec![BvsHit { t: 0.0, object: 0 }; rays.len()]);
+    // SAFETY: every array has the promised length, and everything is freed once.
+    unsafe {
+        let [tree, of_corners] =
+            [objects, soup(&before)].map(|objects| bvs_tree_bake(&bake(objects)));
+        assert_eq!((*tree).owned.save(), (*of_corners).owned.save());
+        let kept = bvs_tracer_new(tree);
+        ok(bvs_tree_update(tree, &moved));
+        let expected = (*of_corners)
+            .owned
+            .refitted(Objects::Shapes(Primitives::Triangles(bytes_as_triangles(&after))));
+        assert_eq!((*tree).owned.save(), expected.unwrap().save());
+        let fresh = bvs_tracer_new(tree);
+        // A scene keeps the triangles that the tracer had.
+        let identity = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+        let here = BvsInstance { part: 0, transform: identity };
+        let mut above = here;
+        above.transform[11] = 10.0;
+        let scene = bvs_instances_new(&kept.cast_const(), 1, &here, 1, 0.0);
+        let [before, updated, new] = &mut hits;
+        ok(bvs_tracer_nearest_hits(kept, rays.as_ptr(), rays.len(), 0, before.as_mut_ptr()));
+        ok(bvs_tracer_update(kept, &moved));
+        ok(bvs_tracer_nearest_hits(kept, rays.as_ptr(), rays.len(), 0, updated.as_mut_ptr()));
+        ok(bvs_tracer_nearest_hits(fresh, rays.as_ptr(), rays.len(), 0, new.as_mut_ptr()));
+        assert!(updated == new && updated != before);
+        bvs_tracer_free(kept);
+        for (place, height) in [(here, 0.0), (above, 10.0)] {
+            ok(bvs_instances_update(scene, &place, 1));
+            let mut hits = vec![BvsInstanceHit { t: 0.0, instance: 9, triangle: 9 }; rays.len()];
+            let mut any = vec![9; rays.len()];
+            let count = rays.len();
+            // Steep, so that the same triangles are hit from below.
+            let lifted: Vec<_> = rays
+                .iter()
+                .cloned()
+                .map(|mut ray| {
+                    ray.origin[2] += height;
+                    ray
+                })
+                .collect();
+            ok(bvs_instances_nearest_hits(scene, lifted.as_ptr(), count, hits.as_mut_ptr()));
+            ok(bvs_instances_any_hits(scene, lifted.as_ptr(), count, any.as_mut_ptr()));
+            for ((found, any), expected) in hits.iter().zip(&any).zip(&*before) {
+                assert_eq!((found.triangle, found.instance == 0), (expected.object, *any == 1));
+                assert!((found.t - expected.t).abs() < 1e-4 || found.t == expected.t);
+            }
+        }
+        invalid(bvs_instances_update(scene, &here, 2), "count is 2; accepted: 1");
+        bvs_instances_free(scene);
+        bvs_instances_free(null_mut());
+        bvs_tracer_free(fresh);
+        bvs_tree_free(tree);
+        bvs_tree_free(of_corners);
+    }
 }
 
 fn bytes_as_triangles(corners: &[f32]) -> Vec<Triangle> {
@@ -198,7 +284,7 @@ fn a_search_of_hours_ends_when_the_caller_cancels_it_and_keeps_its_tree() {
     let corners: Vec<f32> =
         (0..9 * 3000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 16) as f32).collect();
     // SAFETY: `corners` has nine floats for each of the 3000 triangles.
-    let tree = unsafe { bvh_tree_from_triangles(corners.as_ptr(), 3000, 0.0, 1.0) };
+    let tree = unsafe { bvs_tree_from_triangles(corners.as_ptr(), 3000, 0.0, 1.0) };
     let mut asked = AtomicU64::new(0);
     let mut before = 0.0;
     let mut after = 0.0;
@@ -206,11 +292,11 @@ fn a_search_of_hours_ends_when_the_caller_cancels_it_and_keeps_its_tree() {
     // SAFETY: the tree is not freed before the last call, no other thread uses it, and any thread
     // may call the function, which only counts atomically.
     unsafe {
-        bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut before);
+        bvs_tree_cost(tree, BvsCost::InternalArea as u32, &mut before);
         let context = (&raw mut asked).cast();
-        ok(bvh_tree_improve_until(tree, 36_000.0, Some(asked_enough), context));
-        bvh_tree_cost(tree, BvhCost::InternalArea as u32, &mut after);
-        bvh_tree_free(tree);
+        ok(bvs_tree_improve_until(tree, 36_000.0, Some(asked_enough), context));
+        bvs_tree_cost(tree, BvsCost::InternalArea as u32, &mut after);
+        bvs_tree_free(tree);
     }
     assert!(asked.into_inner() > 1000 && start.elapsed().as_secs() < 600);
     assert!(after < before, "{after} of {before}");
@@ -219,6 +305,7 @@ fn a_search_of_hours_ends_when_the_caller_cancels_it_and_keeps_its_tree() {
 #[test]
 fn files_are_those_of_the_library_and_a_wrong_one_is_named() {
     let corners = corners(9);
+    let objects = soup(&corners);
     let tree = tree(&corners);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("tree.bvh");
@@ -228,23 +315,38 @@ fn files_are_those_of_the_library_and_a_wrong_one_is_named() {
     unsafe {
         for target in Target::ALL {
             let tracer = CString::new(target.name).unwrap();
-            ok(bvh_tree_export(tree, tracer.as_ptr(), named.as_ptr()));
+            ok(bvs_tree_export(tree, tracer.as_ptr(), named.as_ptr()));
             assert_eq!(std::fs::read(&path).unwrap(), (*tree).owned.export(&target).unwrap());
         }
-        let status = bvh_tree_export(tree, c"embree".as_ptr(), named.as_ptr());
+        let status = bvs_tree_export(tree, c"embree".as_ptr(), named.as_ptr());
         invalid(status, "tracer is \"embree\"; accepted: three-mesh-bvh, ");
-        ok(bvh_tree_save(tree, named.as_ptr()));
-        let loaded = bvh_tree_load_triangles(named.as_ptr(), corners.as_ptr(), 9);
+        ok(bvs_tree_save(tree, named.as_ptr()));
+        let loaded = bvs_tree_load(named.as_ptr(), &objects);
         assert_eq!((*loaded).owned.tree(), (*tree).owned.tree());
-        let other = bvh_tree_load_triangles(named.as_ptr(), corners.as_ptr(), 8);
-        rejected(other.is_null(), "9 objects; this one has 8");
+        let mut size = 0;
+        let bytes = bvs_tree_to_bytes(tree, &mut size);
+        let saved = std::slice::from_raw_parts(bytes, size);
+        assert!(saved == std::fs::read(&path).unwrap());
+        let from_bytes = bvs_tree_from_bytes(bytes, size, &objects);
+        assert_eq!((*from_bytes).owned.tree(), (*tree).owned.tree());
+        bvs_tree_free(from_bytes);
+        let fewer = BvsObjects { count: 8, ..objects };
+        for other in
+            [bvs_tree_load(named.as_ptr(), &fewer), bvs_tree_from_bytes(bytes, size, &fewer)]
+        {
+            rejected(other.is_null(), "9 objects; this one has 8");
+        }
+        let damaged = bvs_tree_from_bytes(bytes, size - 1, &objects);
+        rejected(damaged.is_null(), "");
+        bvs_bytes_free(bytes, size);
+        bvs_bytes_free(null_mut(), 0);
         std::fs::remove_file(&path).unwrap();
-        let removed = bvh_tree_load_triangles(named.as_ptr(), corners.as_ptr(), 9);
+        let removed = bvs_tree_load(named.as_ptr(), &objects);
         rejected(removed.is_null(), path.to_str().unwrap());
-        assert_eq!(bvh_tree_save(tree, c"/nowhere/at/all".as_ptr()), BvhStatus::File);
-        invalid(bvh_tree_save(tree, c"\xff".as_ptr()), "path is not UTF-8");
-        bvh_tree_free(loaded);
-        bvh_tree_free(tree);
+        assert_eq!(bvs_tree_save(tree, c"/nowhere/at/all".as_ptr()), BvsStatus::File);
+        invalid(bvs_tree_save(tree, c"\xff".as_ptr()), "path is not UTF-8");
+        bvs_tree_free(loaded);
+        bvs_tree_free(tree);
     }
 }
 
@@ -254,54 +356,88 @@ fn invalid_arguments_are_rejected_by_name() {
     let tree = tree(&wrong);
     wrong[9 * 3] = f32::NAN;
     let boxes = [0.0f32, 0.0, 0.0, 1.0, 1.0, 1.0];
-    let ray = BvhRay { origin: [0.0; 3], t_min: 0.0, direction: [0.0; 3], t_max: 1.0 };
+    let ray = BvsRay { origin: [0.0; 3], t_min: 0.0, direction: [0.0; 3], t_max: 1.0 };
     // SAFETY: every pointer that a call dereferences comes with its array's length; null, unaligned
     // and oversized arrays are rejected before.
     unsafe {
         for (corners, count, seconds, references, message) in [
             (wrong.as_ptr(), 5, 0.0, 1.0, "3"),
-            (null(), 5, 0.0, 1.0, "corners is null"),
-            (wrong.as_ptr().byte_add(1), 5, 0.0, 1.0, "corners is not aligned to a multiple of 4"),
+            (null(), 5, 0.0, 1.0, "vertices is null"),
+            (wrong.as_ptr().byte_add(1), 5, 0.0, 1.0, "vertices is not aligned to a multiple of 4"),
             (wrong.as_ptr(), usize::MAX, 0.0, 1.0, "more than memory has"),
             (wrong.as_ptr(), 5, 0.0, f64::NAN, "references is NaN; accepted: 1 to 16"),
             (wrong.as_ptr(), 5, -1.0, 1.0, "seconds is -1.0; accepted: 0 to 1e19"),
             (wrong.as_ptr(), 0, f64::INFINITY, 1.0, "seconds is inf"),
         ] {
-            let tree = bvh_tree_from_triangles(corners, count, seconds, references);
+            let tree = bvs_tree_from_triangles(corners, count, seconds, references);
             rejected(tree.is_null(), message);
         }
-        let timeless = bvh_tree_from_boxes(boxes.as_ptr(), 1, -1.0);
+        let timeless = bvs_tree_from_boxes(boxes.as_ptr(), 1, -1.0);
         rejected(timeless.is_null(), "seconds is -1.0; accepted: 0 to 1e19");
-        let boxed = bvh_tree_from_boxes(boxes.as_ptr(), 1, 0.0);
-        rejected(bvh_tracer_new(boxed).is_null(), "tree is over boxes");
-        rejected(bvh_tree_load_boxes(null(), boxes.as_ptr(), 1).is_null(), "path is null");
+        let boxed = bvs_tree_from_boxes(boxes.as_ptr(), 1, 0.0);
+        rejected(bvs_tracer_new(boxed).is_null(), "tree is over boxes");
+        rejected(bvs_tree_load(null(), &BvsObjects::NONE).is_null(), "path is null");
+        rejected(bvs_tree_load(c"none".as_ptr(), null()).is_null(), "objects is null");
+        rejected(bvs_tree_to_bytes(tree, null_mut()).is_null(), "size is null");
         let mut cost = 7.0;
-        invalid(bvh_tree_cost(tree, 4, &mut cost), "kind is 4; accepted: 0 to 3");
-        invalid(bvh_tree_cost(null(), 0, &mut cost), "tree is null");
+        invalid(bvs_tree_cost(tree, 4, &mut cost), "kind is 4; accepted: 0 to 3");
+        invalid(bvs_tree_cost(null(), 0, &mut cost), "tree is null");
         assert_eq!(cost, 7.0);
-        invalid(bvh_tree_cost(tree, 0, null_mut()), "cost is null");
+        invalid(bvs_tree_cost(tree, 0, null_mut()), "cost is null");
         let misaligned = (&raw mut cost).byte_add(1);
-        invalid(bvh_tree_cost(tree, 0, misaligned), "cost is not aligned to a multiple of 8");
-        let both = BvhBake { boxes: wrong.as_ptr(), corners: wrong.as_ptr(), count: 3, ..NO_BAKE };
-        rejected(bvh_tree_bake(&both).is_null(), "boxes and corners; accepted: one of the two");
-        let many = BvhBake { boxes: null(), references: 17.0, count: 0, ..both };
-        rejected(bvh_tree_bake(&many).is_null(), "references is 17; accepted: 1 to 16");
-        rejected(bvh_tree_bake(null()).is_null(), "bake is null");
-        rejected(bvh_tree_nodes(tree, null_mut()).is_null(), "count is null");
-        rejected(bvh_tree_nodes(null(), &mut 0).is_null(), "tree is null");
-        invalid(bvh_tree_improve(null_mut(), 1.0), "tree is null");
-        let tracer = bvh_tracer_new(tree);
-        let mut hit = BvhHit { t: 5.0, object: 5 };
-        let status = bvh_tracer_nearest_hits(tracer, &ray, 1, 0, &mut hit);
+        invalid(bvs_tree_cost(tree, 0, misaligned), "cost is not aligned to a multiple of 8");
+        let ids = [0u32, 1, 2, 0, 2, 15];
+        let indexed =
+            BvsObjects { count: 2, vertex_count: 15, indices: ids.as_ptr(), ..soup(&wrong) };
+        for (objects, message) in [
+            (BvsObjects { boxes: wrong.as_ptr(), ..indexed }, "boxes and vertices; accepted: one"),
+            (BvsObjects { vertices: null(), ..indexed }, "vertices is null"),
+            (indexed, "triangle 1 has vertex 15 of 15, counted from 0"),
+            (BvsObjects { vertex_stride: 8, ..indexed }, "vertices has a stride of 8 bytes"),
+            (BvsObjects { index_stride: 14, ..indexed }, "indices has a stride of 14 bytes"),
+            (BvsObjects { index_stride: usize::MAX - 3, ..indexed }, "more than memory has"),
+            (BvsObjects { indices: null(), ..indexed }, "vertex_count is 15 without indices"),
+        ] {
+            rejected(bvs_tree_bake(&BvsBake { objects, ..NO_BAKE }).is_null(), message);
+            invalid(bvs_tree_update(tree, &BvsObjects { count: 5, ..objects }), "");
+        }
+        let fewer = BvsObjects { count: 4, ..soup(&wrong) };
+        invalid(bvs_tree_update(tree, &fewer), "objects are 4 triangles; accepted: 5 triangles");
+        let boxes_now = BvsObjects { count: 5, boxes: wrong.as_ptr(), ..BvsObjects::NONE };
+        invalid(bvs_tree_update(tree, &boxes_now), "objects are 5 boxes; accepted: 5 triangles");
+        invalid(bvs_tree_update(tree, &soup(&wrong)), "3");
+        let many = BvsBake { references: 17.0, ..NO_BAKE };
+        rejected(bvs_tree_bake(&many).is_null(), "references is 17; accepted: 1 to 16");
+        rejected(bvs_tree_bake(null()).is_null(), "bake is null");
+        rejected(bvs_tree_nodes(tree, null_mut()).is_null(), "count is null");
+        rejected(bvs_tree_nodes(null(), &mut 0).is_null(), "tree is null");
+        invalid(bvs_tree_improve(null_mut(), 1.0), "tree is null");
+        let tracer = bvs_tracer_new(tree);
+        let mut hit = BvsHit { t: 5.0, object: 5 };
+        let status = bvs_tracer_nearest_hits(tracer, &ray, 1, 0, &mut hit);
         invalid(status, "rays[0]: the ray's direction");
-        ok(bvh_tracer_nearest_hits(tracer, null(), 0, 0, null_mut()));
-        invalid(bvh_tracer_any_hits(tracer, null(), 1, 0, null_mut()), "rays is null");
+        invalid(bvs_nearest(tracer, &ray, &mut hit), "the ray's direction");
+        invalid(bvs_any(tracer, &ray, null_mut()), "the ray's direction");
+        let up = BvsRay { direction: [0.0, 0.0, 1.0], ..ray };
+        invalid(bvs_nearest(tracer, &up, null_mut()), "hit is null");
+        invalid(bvs_any(null(), &up, null_mut()), "tracer is null");
+        invalid(bvs_tracer_update(tracer, &fewer), "objects are 4 triangles; accepted: 5");
+        let flat = [0.0; 45];
+        invalid(bvs_tracer_update(tracer, &soup(&flat)), "make the layout anew");
+        let parts = [tracer.cast_const(), null()];
+        let instance = BvsInstance { part: 0, transform: [0.0; 12] };
+        let no_scene = bvs_instances_new(parts.as_ptr(), 2, &instance, 1, 0.0);
+        rejected(no_scene.is_null(), "parts[1] is null");
+        let no_scene = bvs_instances_new(parts.as_ptr(), 1, &instance, 1, 0.0);
+        rejected(no_scene.is_null(), "transform of instance 0");
+        ok(bvs_tracer_nearest_hits(tracer, null(), 0, 0, null_mut()));
+        invalid(bvs_tracer_any_hits(tracer, null(), 1, 0, null_mut()), "rays is null");
         assert_eq!(hit.object, 5);
         for freed in [tree, boxed, null_mut()] {
-            bvh_tree_free(freed);
+            bvs_tree_free(freed);
         }
-        bvh_tracer_free(tracer);
-        bvh_tracer_free(null_mut());
+        bvs_tracer_free(tracer);
+        bvs_tracer_free(null_mut());
     }
 }
 
@@ -322,9 +458,8 @@ fn a_budget_of_work_gives_the_file_of_the_rust_crates() {
     let name = CString::new(path.to_str().unwrap()).unwrap();
     for (references, rays) in [(1.0, &[][..]), (1.5, &[]), (1.0, &segments), (1.5, &segments)] {
         let work = 50_000;
-        let bake = BvhBake {
-            corners: corners.as_ptr(),
-            count: triangles.len(),
+        let bake = BvsBake {
+            objects: soup(&corners),
             rays: floats.as_ptr(),
             ray_count: rays.len(),
             references,
@@ -335,9 +470,9 @@ fn a_budget_of_work_gives_the_file_of_the_rust_crates() {
         };
         // SAFETY: every pointer comes with its array's length, and the tree is freed once.
         unsafe {
-            let tree = bvh_tree_bake(&bake);
-            ok(bvh_tree_save(tree, name.as_ptr()));
-            bvh_tree_free(tree);
+            let tree = bvs_tree_bake(&bake);
+            ok(bvs_tree_save(tree, name.as_ptr()));
+            bvs_tree_free(tree);
         }
         let objects = Objects::Shapes(Primitives::Triangles(triangles.clone()));
         let budget = Budget { max_work: Some(work), ..Budget::UNLIMITED };
@@ -349,10 +484,10 @@ fn a_budget_of_work_gives_the_file_of_the_rust_crates() {
 
 #[test]
 fn a_panic_becomes_a_status_and_a_message_for_its_thread() {
-    assert_eq!(status(|| panic!("node {} is missing", 3)), BvhStatus::Fault);
+    assert_eq!(status(|| panic!("node {} is missing", 3)), BvsStatus::Fault);
     assert_eq!(last_error(), "a fault of the library: node 3 is missing");
     assert_eq!(std::thread::spawn(last_error).join().unwrap(), "");
     // A success does not clear the message.
-    assert_eq!(status(|| Ok(())), BvhStatus::Ok);
+    assert_eq!(status(|| Ok(())), BvsStatus::Ok);
     assert_eq!(last_error(), "a fault of the library: node 3 is missing");
 }

@@ -1,20 +1,23 @@
 //! Tracers: triangles in the wide layout, which answer batches of rays and points.
 
-use crate::failure::{BvhStatus, Failure, given, made, slice, slice_mut, status};
-use crate::tree::BvhTree;
+use crate::failure::{BvsStatus, Failure, given, given_mut, made, slice, slice_mut, status};
+use crate::tree::{BvsObjects, BvsTree, moved};
 use bvh_search::OwnedTree;
+use bvh_search::bvh_core::InvalidRay;
 use bvh_search::prelude::*;
 use std::sync::{Arc, OnceLock};
 
-/// Triangles in the wide layout. Any number of threads may use a tracer at the same time.
-pub struct BvhTracer {
-    wide: WideBvh,
+/// Triangles in the wide layout. Any number of threads may trace rays at the same time. A thread
+/// that updates or frees a tracer must be the only user.
+pub struct BvsTracer {
+    /// Instances share it.
+    pub(crate) wide: Arc<WideBvh>,
     source: Arc<OwnedTree>,
     /// Made when it is first needed.
     solid: OnceLock<Solid>,
 }
 
-impl BvhTracer {
+impl BvsTracer {
     fn triangles(&self) -> &[Triangle] {
         self.source.triangles().unwrap_or(&[])
     }
@@ -24,7 +27,7 @@ impl BvhTracer {
 /// length except 0; `t_min` is 0 or more; `t_max` may be infinite.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
-pub struct BvhRay {
+pub struct BvsRay {
     /// The point with t = 0.
     pub origin: [f32; 3],
     /// The smallest distance.
@@ -35,22 +38,37 @@ pub struct BvhRay {
     pub t_max: f32,
 }
 
+impl BvsRay {
+    fn check(&self) -> Result<(), InvalidRay> {
+        Ray::new(self.origin, self.direction, self.t_min, self.t_max).map(drop)
+    }
+
+    /// Converts a ray that has been checked. To pass on the ray of the check would copy it, right
+    /// behind the stores of its parts, which costs a ray 10 ns.
+    fn checked(&self) -> Ray {
+        Ray::assume_valid(self.origin, self.direction, self.t_min, self.t_max)
+    }
+}
+
 /// The nearest triangle that a ray hits; of several at the same distance, the triangle with the
 /// lowest index. A ray without a hit has infinity and UINT32_MAX.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BvhHit {
+pub struct BvsHit {
     /// The distance, in multiples of the direction's length.
     pub t: f32,
     /// The index of the triangle.
     pub object: u32,
 }
 
+// Batches write the library's hits as these.
+same_layout!(BvsHit, Hit, t, object);
+
 /// A hit with the surface there. Without a hit, `t` is infinity, `object` is UINT32_MAX, and all
 /// other numbers are 0.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BvhSurfaceHit {
+pub struct BvsSurfaceHit {
     /// The distance, in multiples of the direction's length.
     pub t: f32,
     /// The index of the triangle.
@@ -68,7 +86,7 @@ pub struct BvhSurfaceHit {
 /// infinity, `object` is UINT32_MAX, and the point is NaN.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BvhClosest {
+pub struct BvsClosest {
     /// The closest point.
     pub point: [f64; 3],
     /// Its distance from the given point.
@@ -82,15 +100,85 @@ pub struct BvhClosest {
 ///
 /// `tree` is a tree.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tracer_new(tree: *const BvhTree) -> *mut BvhTracer {
+pub unsafe extern "C" fn bvs_tracer_new(tree: *const BvsTree) -> *mut BvsTracer {
     made(|| {
         // SAFETY: the caller keeps the tree alive and unchanged during the call.
         let owned = &unsafe { given("tree", tree) }?.owned;
         let Some(wide) = owned.layout() else {
             return Err(Failure::invalid("tree is over boxes; accepted: a tree over triangles"));
         };
-        let wide = wide.map_err(Failure::invalid)?;
-        Ok(BvhTracer { wide, source: owned.clone(), solid: OnceLock::new() })
+        let wide = Arc::new(wide.map_err(Failure::invalid)?);
+        Ok(BvsTracer { wide, source: owned.clone(), solid: OnceLock::new() })
+    })
+}
+
+/// Moves the triangles of a tracer: as many as it has, elsewhere. Answers are those of a new
+/// tracer, which takes much longer; rays become slower as neighbours part. Triangles with an area
+/// still have one, and others none, or the call fails. Instances of the tracer remain as they are.
+///
+/// `tracer` is a tracer that no other thread uses; `objects` are triangles whose arrays have the
+/// promised lengths.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvs_tracer_update(
+    tracer: *mut BvsTracer,
+    objects: *const BvsObjects,
+) -> BvsStatus {
+    status(|| {
+        // SAFETY: no other thread uses the tracer during the call.
+        let tracer = unsafe { given_mut("tracer", tracer) }?;
+        // SAFETY: `objects` is null or points to objects whose arrays have the promised lengths.
+        let source = unsafe { moved(&tracer.source, objects) }?;
+        let triangles = source.triangles().unwrap_or(&[]);
+        Arc::make_mut(&mut tracer.wide).refit(triangles).map_err(Failure::invalid)?;
+        tracer.solid = OnceLock::new();
+        tracer.source = Arc::new(source);
+        Ok(())
+    })
+}
+
+/// Writes the nearest hit of one ray to `hit`. Dozens of rays at once are faster in
+/// `bvs_tracer_nearest_hits`.
+///
+/// `tracer` is a tracer; `ray` points to a ray, and `hit` to a hit.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvs_nearest(
+    tracer: *const BvsTracer,
+    ray: *const BvsRay,
+    hit: *mut BvsHit,
+) -> BvsStatus {
+    status(|| {
+        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
+        let tracer = unsafe { given("tracer", tracer) }?;
+        // SAFETY: `ray` points to a ray that nobody changes during the call.
+        let ray = unsafe { given("ray", ray) }?;
+        ray.check().map_err(Failure::invalid)?;
+        // SAFETY: `hit` points to a hit that nobody else uses during the call.
+        let hit = unsafe { given_mut("hit", hit) }?;
+        let Hit { t, object } = tracer.wide.nearest_hit(&ray.checked()).unwrap_or(Hit::MISS);
+        *hit = BvsHit { t, object };
+        Ok(())
+    })
+}
+
+/// Writes to `hit` whether one ray hits any triangle: 1 or 0. Dozens of rays at once are faster in
+/// `bvs_tracer_any_hits`.
+///
+/// `tracer` is a tracer; `ray` points to a ray, and `hit` to a byte.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvs_any(
+    tracer: *const BvsTracer,
+    ray: *const BvsRay,
+    hit: *mut u8,
+) -> BvsStatus {
+    status(|| {
+        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
+        let tracer = unsafe { given("tracer", tracer) }?;
+        // SAFETY: `ray` points to a ray that nobody changes during the call.
+        let ray = unsafe { given("ray", ray) }?;
+        ray.check().map_err(Failure::invalid)?;
+        // SAFETY: `hit` points to a byte that nobody else uses during the call.
+        *unsafe { given_mut("hit", hit) }? = u8::from(tracer.wide.any_hit(&ray.checked()));
+        Ok(())
     })
 }
 
@@ -100,43 +188,39 @@ pub unsafe extern "C" fn bvh_tracer_new(tree: *const BvhTree) -> *mut BvhTracer 
 ///
 /// `tracer` is a tracer; `rays` and `hits` point to `count` elements each, and do not overlap.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tracer_nearest_hits(
-    tracer: *const BvhTracer,
-    rays: *const BvhRay,
+pub unsafe extern "C" fn bvs_tracer_nearest_hits(
+    tracer: *const BvsTracer,
+    rays: *const BvsRay,
     count: usize,
     coherent: i32,
-    hits: *mut BvhHit,
-) -> BvhStatus {
+    hits: *mut BvsHit,
+) -> BvsStatus {
     status(|| {
         // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
         let tracer = unsafe { given("tracer", tracer) }?;
         // SAFETY: `rays` points to `count` elements that nobody changes during the call.
         let rays = unsafe { slice("rays", rays, count) }?;
         // SAFETY: `hits` points to `count` elements that nobody else uses during the call.
-        let hits = unsafe { slice_mut("hits", hits, count) }?;
-        let mut found = [Hit::MISS; BATCH];
+        let hits = unsafe { slice_mut("hits", hits.cast::<Hit>(), count) }?;
         in_batches(rays, |start, rays| {
-            let found = &mut found[..rays.len()];
-            tracer.wide.nearest_hits(rays, found, coherence(coherent));
-            for (to, &Hit { t, object }) in hits[start..].iter_mut().zip(&*found) {
-                *to = BvhHit { t, object };
-            }
+            let hits = &mut hits[start..start + rays.len()];
+            tracer.wide.nearest_hits(rays, hits, coherence(coherent));
         })
     })
 }
 
 /// Writes to `hits` whether each of `count` rays hits any triangle: 1 or 0. `coherent` has the
-/// meaning that it has in `bvh_tracer_nearest_hits`.
+/// meaning that it has in `bvs_tracer_nearest_hits`.
 ///
 /// `tracer` is a tracer; `rays` and `hits` point to `count` elements each, and do not overlap.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tracer_any_hits(
-    tracer: *const BvhTracer,
-    rays: *const BvhRay,
+pub unsafe extern "C" fn bvs_tracer_any_hits(
+    tracer: *const BvsTracer,
+    rays: *const BvsRay,
     count: usize,
     coherent: i32,
     hits: *mut u8,
-) -> BvhStatus {
+) -> BvsStatus {
     status(|| {
         // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
         let tracer = unsafe { given("tracer", tracer) }?;
@@ -144,29 +228,24 @@ pub unsafe extern "C" fn bvh_tracer_any_hits(
         let rays = unsafe { slice("rays", rays, count) }?;
         // SAFETY: `hits` points to `count` elements that nobody else uses during the call.
         let hits = unsafe { slice_mut("hits", hits, count) }?;
-        let mut found = [false; BATCH];
-        in_batches(rays, |start, rays| {
-            let found = &mut found[..rays.len()];
-            tracer.wide.any_hits(rays, found, coherence(coherent));
-            for (to, &hit) in hits[start..].iter_mut().zip(&*found) {
-                *to = u8::from(hit);
-            }
+        flags_in_batches(rays, hits, |rays, hits| {
+            tracer.wide.any_hits(rays, hits, coherence(coherent));
         })
     })
 }
 
 /// Writes the nearest hits of `count` rays with the surfaces there to `hits`. `coherent` has the
-/// meaning that it has in `bvh_tracer_nearest_hits`.
+/// meaning that it has in `bvs_tracer_nearest_hits`.
 ///
 /// `tracer` is a tracer; `rays` and `hits` point to `count` elements each, and do not overlap.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tracer_surface_hits(
-    tracer: *const BvhTracer,
-    rays: *const BvhRay,
+pub unsafe extern "C" fn bvs_tracer_surface_hits(
+    tracer: *const BvsTracer,
+    rays: *const BvsRay,
     count: usize,
     coherent: i32,
-    hits: *mut BvhSurfaceHit,
-) -> BvhStatus {
+    hits: *mut BvsSurfaceHit,
+) -> BvsStatus {
     status(|| {
         // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
         let tracer = unsafe { given("tracer", tracer) }?;
@@ -174,7 +253,7 @@ pub unsafe extern "C" fn bvh_tracer_surface_hits(
         let rays = unsafe { slice("rays", rays, count) }?;
         // SAFETY: `hits` points to `count` elements that nobody else uses during the call.
         let hits = unsafe { slice_mut("hits", hits, count) }?;
-        let mut found = [Hit::MISS; BATCH];
+        let mut found = vec![Hit::MISS; count.min(BATCH)];
         in_batches(rays, |start, rays| {
             let found = &mut found[..rays.len()];
             tracer.wide.nearest_hits(rays, found, coherence(coherent));
@@ -183,7 +262,7 @@ pub unsafe extern "C" fn bvh_tracer_surface_hits(
                 let weights = triangle.and_then(|triangle| triangle.barycentrics(ray));
                 let normal = triangle.and_then(Triangle::normal);
                 let [_, u, v] = weights.unwrap_or_default().map(|weight| weight as f32);
-                *to = BvhSurfaceHit {
+                *to = BvsSurfaceHit {
                     t,
                     object,
                     u,
@@ -203,22 +282,22 @@ pub unsafe extern "C" fn bvh_tracer_surface_hits(
 /// `tracer` is a tracer; `rays` and `counts` point to `count` elements each, `hits` points to
 /// `capacity` elements, and `total` points to a size.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tracer_all_hits(
-    tracer: *const BvhTracer,
-    rays: *const BvhRay,
+pub unsafe extern "C" fn bvs_tracer_all_hits(
+    tracer: *const BvsTracer,
+    rays: *const BvsRay,
     count: usize,
-    hits: *mut BvhHit,
+    hits: *mut BvsHit,
     capacity: usize,
     counts: *mut u32,
     total: *mut usize,
-) -> BvhStatus {
+) -> BvsStatus {
     status(|| {
         // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
         let tracer = unsafe { given("tracer", tracer) }?;
         // SAFETY: `rays` points to `count` elements that nobody changes during the call.
         let rays = unsafe { slice("rays", rays, count) }?;
         // SAFETY: `hits` points to `capacity` elements that nobody else uses during the call.
-        let hits = unsafe { slice_mut("hits", hits, capacity) }?;
+        let hits = unsafe { slice_mut("hits", hits.cast::<Hit>(), capacity) }?;
         // SAFETY: `counts` points to `count` elements that nobody else uses during the call.
         let counts = unsafe { slice_mut("counts", counts, count) }?;
         // SAFETY: `total` points to a size that nobody else uses during the call.
@@ -230,9 +309,8 @@ pub unsafe extern "C" fn bvh_tracer_all_hits(
             let counts = &mut counts[start..start + rays.len()];
             tracer.wide.all_hits_of(rays, &mut found, counts);
             let room = hits.get_mut(written..).unwrap_or_default();
-            for (to, &Hit { t, object }) in room.iter_mut().zip(&found) {
-                *to = BvhHit { t, object };
-            }
+            let count = room.len().min(found.len());
+            room[..count].copy_from_slice(&found[..count]);
             written += found.len();
         })?;
         total[0] = written;
@@ -245,12 +323,12 @@ pub unsafe extern "C" fn bvh_tracer_all_hits(
 ///
 /// `tracer` is a tracer; `points` points to 3 * `count` floats, and `closest` to `count` elements.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tracer_closest_points(
-    tracer: *const BvhTracer,
+pub unsafe extern "C" fn bvs_tracer_closest_points(
+    tracer: *const BvsTracer,
     points: *const f32,
     count: usize,
-    closest: *mut BvhClosest,
-) -> BvhStatus {
+    closest: *mut BvsClosest,
+) -> BvsStatus {
     status(|| {
         // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
         let tracer = unsafe { given("tracer", tracer) }?;
@@ -263,7 +341,7 @@ pub unsafe extern "C" fn bvh_tracer_closest_points(
             let found = &mut found[..points.len()];
             tracer.wide.closest_points(points, found);
             for (to, closest) in closest.iter_mut().zip(&*found) {
-                *to = BvhClosest {
+                *to = BvsClosest {
                     point: closest.map_or([f64::NAN; 3], |closest| closest.point.to_array()),
                     distance: closest.map_or(f64::INFINITY, |closest| closest.distance),
                     object: closest.map_or(u32::MAX, |closest| closest.object),
@@ -280,12 +358,12 @@ pub unsafe extern "C" fn bvh_tracer_closest_points(
 ///
 /// `tracer` is a tracer; `points` points to 3 * `count` floats, and `inside` to `count` bytes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tracer_contains(
-    tracer: *const BvhTracer,
+pub unsafe extern "C" fn bvs_tracer_contains(
+    tracer: *const BvsTracer,
     points: *const f32,
     count: usize,
     inside: *mut u8,
-) -> BvhStatus {
+) -> BvsStatus {
     status(|| {
         // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
         let tracer = unsafe { given("tracer", tracer) }?;
@@ -311,7 +389,7 @@ pub unsafe extern "C" fn bvh_tracer_contains(
 ///
 /// `tracer` is null, or a tracer that nobody uses any more.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tracer_free(tracer: *mut BvhTracer) {
+pub unsafe extern "C" fn bvs_tracer_free(tracer: *mut BvsTracer) {
     if !tracer.is_null() {
         // SAFETY: `made` has created the pointer from a box, and the caller frees it once.
         drop(unsafe { Box::from_raw(tracer) });
@@ -328,20 +406,35 @@ fn coherence(coherent: i32) -> Coherence {
 
 /// Passes all rays to `trace`, batch by batch, with the index of each batch's first ray. Passes
 /// none if one of the rays is invalid.
-fn in_batches(rays: &[BvhRay], mut trace: impl FnMut(usize, &[Ray])) -> Result<(), Failure> {
+pub(crate) fn in_batches(
+    rays: &[BvsRay],
+    mut trace: impl FnMut(usize, &[Ray]),
+) -> Result<(), Failure> {
     // All rays are checked first, because a failed call must not change `hits`.
     for (index, ray) in rays.iter().enumerate() {
-        Ray::new(ray.origin, ray.direction, ray.t_min, ray.t_max)
-            .map_err(|error| Failure::invalid(format!("rays[{index}]: {error}")))?;
+        ray.check().map_err(|error| Failure::invalid(format!("rays[{index}]: {error}")))?;
     }
-    let mut batch = Vec::with_capacity(BATCH);
+    let mut batch = Vec::with_capacity(rays.len().min(BATCH));
     for (number, rays) in rays.chunks(BATCH).enumerate() {
         batch.clear();
-        batch.extend(
-            rays.iter()
-                .map(|ray| Ray::assume_valid(ray.origin, ray.direction, ray.t_min, ray.t_max)),
-        );
+        batch.extend(rays.iter().map(BvsRay::checked));
         trace(number * BATCH, &batch);
     }
     Ok(())
+}
+
+/// Passes all rays like [`in_batches`], and turns the answers of `trace` into bytes.
+pub(crate) fn flags_in_batches(
+    rays: &[BvsRay],
+    flags: &mut [u8],
+    mut trace: impl FnMut(&[Ray], &mut [bool]),
+) -> Result<(), Failure> {
+    let mut found = [false; BATCH];
+    in_batches(rays, |start, rays| {
+        let found = &mut found[..rays.len()];
+        trace(rays, found);
+        for (to, &is_hit) in flags[start..].iter_mut().zip(&*found) {
+            *to = u8::from(is_hit);
+        }
+    })
 }

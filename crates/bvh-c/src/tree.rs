@@ -1,19 +1,21 @@
 //! Trees: found over boxes or triangles, improved, measured, saved, loaded, and lent as nodes.
 
-use crate::failure::{BvhStatus, Failure, array, given, given_mut, made, slice, status};
+use crate::failure::{
+    BvsStatus, Failure, array, given, given_mut, made, slice, status, strided, try_made,
+};
 use bvh_search::bvh_core::Primitives;
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
 use bvh_search::bvh_core::export::{FirstCountNode, Target};
-use bvh_search::prelude::*;
 use bvh_search::bvh_core::glam::{DMat3, DVec3};
+use bvh_search::prelude::*;
 use bvh_search::{Frames, Objects, Observer, Options, OwnedTree};
 use std::ffi::{CStr, c_char, c_void};
-use std::mem::offset_of;
+use std::ptr::null;
 use std::sync::Arc;
 
 /// A tree with its objects. Any number of threads may read a tree at the same time. A thread that
 /// improves or frees it must be the only user.
-pub struct BvhTree {
+pub struct BvsTree {
     /// Tracers share the tree until it is improved.
     pub(crate) owned: Arc<OwnedTree>,
     nodes: Vec<FirstCountNode>,
@@ -23,7 +25,7 @@ pub struct BvhTree {
 /// there are more nodes, node 1 is unused, so that both children of a node share a cache line.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BvhNode {
+pub struct BvsNode {
     /// The lower corner of the box.
     pub min: [f32; 3],
     /// The index of the first of two adjacent children, or the position of the leaf's first object
@@ -35,27 +37,20 @@ pub struct BvhNode {
     pub count: u32,
 }
 
-// `bvh_tree_nodes` lends the library's nodes as these.
-const _: () = assert!(
-    size_of::<BvhNode>() == size_of::<FirstCountNode>()
-        && align_of::<BvhNode>() == align_of::<FirstCountNode>()
-        && offset_of!(BvhNode, min) == offset_of!(FirstCountNode, min)
-        && offset_of!(BvhNode, first) == offset_of!(FirstCountNode, first)
-        && offset_of!(BvhNode, max) == offset_of!(FirstCountNode, max)
-        && offset_of!(BvhNode, count) == offset_of!(FirstCountNode, count)
-);
+// `bvs_tree_nodes` lends the library's nodes as these.
+same_layout!(BvsNode, FirstCountNode, min, first, max, count);
 
 /// A kind of cost. Tree files use the same numbers.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BvhCost {
+pub enum BvsCost {
     /// The total half area of the inner nodes' boxes.
     InternalArea = 0,
     /// The cost of Goldsmith and Salmon.
     GoldsmithSalmon = 1,
     /// The surface area heuristic with both constants 1.
     Sah = 2,
-    /// The cost of the layout that `bvh_tracer_new` makes.
+    /// The cost of the layout that `bvs_tracer_new` makes.
     Layout = 3,
 }
 
@@ -64,49 +59,79 @@ pub enum BvhCost {
 ///
 /// `boxes` points to 6 * `count` floats.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_from_boxes(
+pub unsafe extern "C" fn bvs_tree_from_boxes(
     boxes: *const f32,
     count: usize,
     seconds: f64,
-) -> *mut BvhTree {
+) -> *mut BvsTree {
     made(|| {
         // SAFETY: `boxes` points to 6 floats for each of `count` boxes.
-        let boxes = unsafe { boxes_of(boxes, count) }?;
+        let boxes = unsafe { objects_of(&BvsObjects { count, boxes, ..BvsObjects::NONE }) }?;
         found(boxes, &Options::default(), Some(seconds))
     })
 }
 
 /// Searches for the best tree over `count` triangles for about `seconds`, 0 or more. Each triangle
-/// is 9 floats: three corners. With `references` above 1, up to 16, triangles may be divided among
+/// is 9 floats: three vertices. With `references` above 1, up to 16, triangles may be divided among
 /// leaves, on average into that many parts each.
 ///
-/// `corners` points to 9 * `count` floats.
+/// `vertices` points to 9 * `count` floats.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_from_triangles(
-    corners: *const f32,
+pub unsafe extern "C" fn bvs_tree_from_triangles(
+    vertices: *const f32,
     count: usize,
     seconds: f64,
     references: f64,
-) -> *mut BvhTree {
+) -> *mut BvsTree {
     made(|| {
-        // SAFETY: `corners` points to 9 floats for each of `count` triangles.
-        let triangles = unsafe { triangles_of(corners, count) }?;
+        let triangles = BvsObjects { count, vertices, ..BvsObjects::NONE };
+        // SAFETY: `vertices` points to 9 floats for each of `count` triangles.
+        let triangles = unsafe { objects_of(&triangles) }?;
         let frame = Frames::File;
         found(triangles, &Options { references, frame, ..Options::default() }, Some(seconds))
     })
 }
 
-/// A search with every choice. Fields that are 0 or null have their defaults; either `boxes` or
-/// `corners` is given.
+/// Boxes, or triangles between vertices. Either `boxes` or `vertices` is given; other fields that
+/// are 0 or null have their defaults.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
-pub struct BvhBake {
-    /// 6 floats for each of `count` boxes: the lower corner, then the upper corner.
-    pub boxes: *const f32,
-    /// 9 floats for each of `count` triangles: three corners.
-    pub corners: *const f32,
+pub struct BvsObjects {
     /// The number of boxes or triangles.
     pub count: usize,
+    /// 6 floats for each of `count` boxes: the lower corner, then the upper corner.
+    pub boxes: *const f32,
+    /// 3 floats for each vertex.
+    pub vertices: *const f32,
+    /// The number of vertices; without `indices` 0 is 3 * `count`.
+    pub vertex_count: usize,
+    /// The bytes from a vertex to the next one, a multiple of 4; 0 is 12.
+    pub vertex_stride: usize,
+    /// The 3 vertices of each of `count` triangles, counted from 0; null for 0, 1, 2, then 3, 4, 5,
+    /// and so on.
+    pub indices: *const u32,
+    /// The bytes from a triangle's indices to the next one's, a multiple of 4; 0 is 12.
+    pub index_stride: usize,
+}
+
+impl BvsObjects {
+    pub(crate) const NONE: Self = Self {
+        count: 0,
+        boxes: null(),
+        vertices: null(),
+        vertex_count: 0,
+        vertex_stride: 0,
+        indices: null(),
+        index_stride: 0,
+    };
+}
+
+/// A search with every choice. Fields that are 0 or null have their defaults.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct BvsBake {
+    /// What the tree is over.
+    pub objects: BvsObjects,
     /// 6 floats for each of `ray_count` recorded rays that the tree is for: its origin, then its
     /// hit or a point outside the scene.
     pub rays: *const f32,
@@ -132,25 +157,18 @@ pub struct BvhBake {
 ///
 /// `bake` is a search whose arrays have the promised lengths.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_bake(bake: *const BvhBake) -> *mut BvhTree {
+pub unsafe extern "C" fn bvs_tree_bake(bake: *const BvsBake) -> *mut BvsTree {
     made(|| {
         // SAFETY: `bake` is null or points to a search.
         let bake = *unsafe { given("bake", bake) }?;
-        let BvhBake { boxes, corners, count, rays, ray_count, seconds, work, seed, .. } = bake;
+        let BvsBake { objects, rays, ray_count, seconds, work, seed, .. } = bake;
         let frame = match bake.frame {
             0 => Frames::File,
             1 => Frames::Auto,
             other => return Err(Failure::invalid(format!("frame is {other}; accepted: 0 or 1"))),
         };
-        let objects = match (boxes.is_null(), corners.is_null()) {
-            // SAFETY: `corners` points to 9 floats for each of `count` triangles.
-            (true, _) => unsafe { triangles_of(corners, count) }?,
-            // SAFETY: `boxes` points to 6 floats for each of `count` boxes.
-            (false, true) => unsafe { boxes_of(boxes, count) }?,
-            (false, false) => {
-                return Err(Failure::invalid("boxes and corners; accepted: one of the two"));
-            }
-        };
+        // SAFETY: the arrays of the objects have the promised lengths.
+        let objects = unsafe { objects_of(&objects) }?;
         // SAFETY: `rays` points to 6 floats for each of `ray_count` rays.
         let rays = unsafe { slice("rays", rays.cast::<[[f32; 3]; 2]>(), ray_count) }?;
         let rays: Vec<Segment> = rays.iter().map(|&[from, to]| Segment { from, to }).collect();
@@ -163,30 +181,30 @@ pub unsafe extern "C" fn bvh_tree_bake(bake: *const BvhBake) -> *mut BvhTree {
     })
 }
 
-/// Improves a tree for about `seconds`, 0 or more. Arrays from `bvh_tree_nodes` and
-/// `bvh_tree_object_ids` become invalid.
+/// Improves a tree for about `seconds`, 0 or more. Arrays from `bvs_tree_nodes` and
+/// `bvs_tree_object_ids` become invalid.
 ///
 /// `tree` is a tree that no other thread uses.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_improve(tree: *mut BvhTree, seconds: f64) -> BvhStatus {
+pub unsafe extern "C" fn bvs_tree_improve(tree: *mut BvsTree, seconds: f64) -> BvsStatus {
     // SAFETY: the caller promises that no other thread uses the tree, and there is no function to
     // call.
-    unsafe { bvh_tree_improve_until(tree, seconds, None, std::ptr::null_mut()) }
+    unsafe { bvs_tree_improve_until(tree, seconds, None, std::ptr::null_mut()) }
 }
 
-/// Improves a tree like `bvh_tree_improve`, and ends soon after `cancelled(context)` returns a
+/// Improves a tree like `bvs_tree_improve`, and ends soon after `cancelled(context)` returns a
 /// number other than 0. The tree is then the best one so far, and the call succeeds. To cancel a
 /// search from its beginning, create the tree in 0 seconds first.
 ///
 /// `tree` is a tree that no other thread uses; `cancelled` is null, or a function that throws no
 /// exception and that any number of threads may call at the same time until this call returns.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_improve_until(
-    tree: *mut BvhTree,
+pub unsafe extern "C" fn bvs_tree_improve_until(
+    tree: *mut BvsTree,
     seconds: f64,
     cancelled: Option<unsafe extern "C" fn(context: *mut c_void) -> u8>,
     context: *mut c_void,
-) -> BvhStatus {
+) -> BvsStatus {
     status(|| {
         // SAFETY: no other thread uses the tree during the call.
         let tree = unsafe { given_mut("tree", tree) }?;
@@ -225,22 +243,42 @@ impl Observer for Until {
     }
 }
 
-/// Writes the cost of the kind `kind`, one of `BvhCost`, to `cost`.
+/// Moves the objects of the tree: as many boxes or triangles as it has, elsewhere. Boxes become
+/// tight again, and nodes remain. The growth of the cost tells when a search is worth its time.
+/// Arrays from `bvs_tree_nodes` and `bvs_tree_object_ids` become invalid. Tracers do not move.
+///
+/// `tree` is a tree that no other thread uses; `objects` are objects whose arrays have the promised
+/// lengths.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvs_tree_update(
+    tree: *mut BvsTree,
+    objects: *const BvsObjects,
+) -> BvsStatus {
+    status(|| {
+        // SAFETY: no other thread uses the tree during the call.
+        let tree = unsafe { given_mut("tree", tree) }?;
+        // SAFETY: `objects` is null or points to objects.
+        *tree = whole(unsafe { moved(&tree.owned, objects) }?);
+        Ok(())
+    })
+}
+
+/// Writes the cost of the kind `kind`, one of `BvsCost`, to `cost`.
 ///
 /// `tree` is a tree; `cost` points to a double.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_cost(
-    tree: *const BvhTree,
+pub unsafe extern "C" fn bvs_tree_cost(
+    tree: *const BvsTree,
     kind: u32,
     cost: *mut f64,
-) -> BvhStatus {
+) -> BvsStatus {
     status(|| {
         // A parameter of an enum's type would be undefined behaviour for any other number from C.
         let kinds = [
-            (BvhCost::InternalArea, Objective::InternalArea),
-            (BvhCost::GoldsmithSalmon, Objective::GoldsmithSalmon),
-            (BvhCost::Sah, Objective::Sah(SahConstants::default())),
-            (BvhCost::Layout, Objective::Layout),
+            (BvsCost::InternalArea, Objective::InternalArea),
+            (BvsCost::GoldsmithSalmon, Objective::GoldsmithSalmon),
+            (BvsCost::Sah, Objective::Sah(SahConstants::default())),
+            (BvsCost::Layout, Objective::Layout),
         ];
         let found = kinds.iter().find(|(number, _)| *number as u32 == kind);
         let Some((_, objective)) = found else {
@@ -261,7 +299,7 @@ pub unsafe extern "C" fn bvh_tree_cost(
 ///
 /// `tree` is a tree; `frame` points to 12 doubles.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_frame(tree: *const BvhTree, frame: *mut f64) -> BvhStatus {
+pub unsafe extern "C" fn bvs_tree_frame(tree: *const BvsTree, frame: *mut f64) -> BvsStatus {
     status(|| {
         // SAFETY: nobody changes the tree during the call.
         let tree = unsafe { given("tree", tree) }?;
@@ -277,11 +315,11 @@ pub unsafe extern "C" fn bvh_tree_frame(tree: *const BvhTree, frame: *mut f64) -
 
 /// Returns the nodes of the tree, and writes their number to `count`. The nodes belong to the tree
 /// and are valid until it is improved or freed. Their boxes lie in its frame, if it has one: see
-/// `bvh_tree_frame`.
+/// `bvs_tree_frame`.
 ///
 /// `tree` is a tree; `count` points to a size.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_nodes(tree: *const BvhTree, count: *mut usize) -> *const BvhNode {
+pub unsafe extern "C" fn bvs_tree_nodes(tree: *const BvsTree, count: *mut usize) -> *const BvsNode {
     array(|| {
         // SAFETY: nobody changes the tree during the call.
         let tree = unsafe { given("tree", tree) }?;
@@ -297,8 +335,8 @@ pub unsafe extern "C" fn bvh_tree_nodes(tree: *const BvhTree, count: *mut usize)
 ///
 /// `tree` is a tree; `count` points to a size.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_object_ids(
-    tree: *const BvhTree,
+pub unsafe extern "C" fn bvs_tree_object_ids(
+    tree: *const BvsTree,
     count: *mut usize,
 ) -> *const u32 {
     array(|| {
@@ -312,42 +350,69 @@ pub unsafe extern "C" fn bvh_tree_object_ids(
     })
 }
 
-/// Loads the tree over these boxes, given as for `bvh_tree_from_boxes`, from the file `path`, in
-/// UTF-8.
+/// Loads the tree over these objects from the file `path`, in UTF-8.
 ///
-/// `path` is a string; `boxes` points to 6 * `count` floats.
+/// `path` is a string; `objects` are objects whose arrays have the promised lengths.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_load_boxes(
+pub unsafe extern "C" fn bvs_tree_load(
     path: *const c_char,
-    boxes: *const f32,
-    count: usize,
-) -> *mut BvhTree {
+    objects: *const BvsObjects,
+) -> *mut BvsTree {
     made(|| {
         // SAFETY: `path` is null or ends with a zero.
         let path = unsafe { text("path", path) }?;
-        // SAFETY: `boxes` points to 6 floats for each of `count` boxes.
-        let boxes = unsafe { boxes_of(boxes, count) }?;
-        loaded(path, boxes)
+        // SAFETY: `objects` is null or points to objects whose arrays have the promised lengths.
+        let objects = unsafe { objects_of(given("objects", objects)?) }?;
+        let bytes = bvh_scenes::tree_file::read(path.as_ref())?;
+        let loaded = OwnedTree::load(objects, &bytes);
+        loaded.map(whole).map_err(|error| Failure::invalid(format!("{path}: {error}")))
     })
 }
 
-/// Loads the tree over these triangles, given as for `bvh_tree_from_triangles`, from the file
-/// `path`, in UTF-8.
+/// Loads the tree over these objects from the bytes of a tree file.
 ///
-/// `path` is a string; `corners` points to 9 * `count` floats.
+/// `bytes` points to `size` bytes; `objects` are objects whose arrays have the promised lengths.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_load_triangles(
-    path: *const c_char,
-    corners: *const f32,
-    count: usize,
-) -> *mut BvhTree {
+pub unsafe extern "C" fn bvs_tree_from_bytes(
+    bytes: *const u8,
+    size: usize,
+    objects: *const BvsObjects,
+) -> *mut BvsTree {
     made(|| {
-        // SAFETY: `path` is null or ends with a zero.
-        let path = unsafe { text("path", path) }?;
-        // SAFETY: `corners` points to 9 floats for each of `count` triangles.
-        let triangles = unsafe { triangles_of(corners, count) }?;
-        loaded(path, triangles)
+        // SAFETY: `bytes` points to `size` bytes.
+        let bytes = unsafe { slice("bytes", bytes, size) }?;
+        // SAFETY: `objects` is null or points to objects whose arrays have the promised lengths.
+        let objects = unsafe { objects_of(given("objects", objects)?) }?;
+        OwnedTree::load(objects, bytes).map(whole).map_err(Failure::invalid)
     })
+}
+
+/// Returns the bytes of the tree's file, and writes their number to `size`. `bvs_bytes_free` frees
+/// them.
+///
+/// `tree` is a tree; `size` points to a size.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvs_tree_to_bytes(tree: *const BvsTree, size: *mut usize) -> *mut u8 {
+    try_made(|| {
+        // SAFETY: nobody changes the tree during the call.
+        let tree = unsafe { given("tree", tree) }?;
+        // SAFETY: `size` points to a size that nobody else uses during the call.
+        let size = unsafe { given_mut("size", size) }?;
+        let bytes = tree.owned.save().map_err(Failure::invalid)?.into_boxed_slice();
+        *size = bytes.len();
+        Ok(Box::into_raw(bytes).cast())
+    })
+}
+
+/// Frees the bytes of a tree. Ignores null.
+///
+/// `bytes` is null, or `size` bytes from `bvs_tree_to_bytes`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvs_bytes_free(bytes: *mut u8, size: usize) {
+    if !bytes.is_null() {
+        // SAFETY: `bvs_tree_to_bytes` has created both from a box, and the caller frees it once.
+        drop(unsafe { Box::from_raw(std::ptr::slice_from_raw_parts_mut(bytes, size)) });
+    }
 }
 
 /// Writes the tree to the file `path`, in UTF-8. An existing file is replaced when the new one is
@@ -355,7 +420,7 @@ pub unsafe extern "C" fn bvh_tree_load_triangles(
 ///
 /// `tree` is a tree; `path` is a string.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_save(tree: *const BvhTree, path: *const c_char) -> BvhStatus {
+pub unsafe extern "C" fn bvs_tree_save(tree: *const BvsTree, path: *const c_char) -> BvsStatus {
     status(|| {
         // SAFETY: nobody changes the tree during the call.
         let tree = unsafe { given("tree", tree) }?;
@@ -371,11 +436,11 @@ pub unsafe extern "C" fn bvh_tree_save(tree: *const BvhTree, path: *const c_char
 ///
 /// `tree` is a tree; `tracer` and `path` are strings.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_export(
-    tree: *const BvhTree,
+pub unsafe extern "C" fn bvs_tree_export(
+    tree: *const BvsTree,
     tracer: *const c_char,
     path: *const c_char,
-) -> BvhStatus {
+) -> BvsStatus {
     status(|| {
         // SAFETY: nobody changes the tree during the call.
         let tree = unsafe { given("tree", tree) }?;
@@ -392,53 +457,94 @@ pub unsafe extern "C" fn bvh_tree_export(
 ///
 /// `tree` is null, or a tree that nobody uses any more.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bvh_tree_free(tree: *mut BvhTree) {
+pub unsafe extern "C" fn bvs_tree_free(tree: *mut BvsTree) {
     if !tree.is_null() {
         // SAFETY: `made` has created the pointer from a box, and the caller frees it once.
         drop(unsafe { Box::from_raw(tree) });
     }
 }
 
-fn whole(owned: OwnedTree) -> BvhTree {
-    BvhTree { nodes: owned.tree().to_first_count_aligned(), owned: Arc::new(owned) }
+fn whole(owned: OwnedTree) -> BvsTree {
+    BvsTree { nodes: owned.tree().to_first_count_aligned(), owned: Arc::new(owned) }
 }
 
-fn found(objects: Objects, options: &Options, seconds: Option<f64>) -> Result<BvhTree, Failure> {
+fn found(objects: Objects, options: &Options, seconds: Option<f64>) -> Result<BvsTree, Failure> {
     let deadline = seconds.map(deadline).transpose()?;
     let observer = deadline.as_ref().map_or(&() as &dyn Observer, |deadline| deadline);
     OwnedTree::find(objects, options, observer).map(whole).map_err(Failure::invalid)
 }
 
-fn loaded(path: &str, objects: Objects) -> Result<BvhTree, Failure> {
-    let bytes = bvh_scenes::tree_file::read(path.as_ref())?;
-    let loaded = OwnedTree::load(objects, &bytes);
-    loaded.map(whole).map_err(|error| Failure::invalid(format!("{path}: {error}")))
-}
-
-fn deadline(seconds: f64) -> Result<Deadline, Failure> {
+pub(crate) fn deadline(seconds: f64) -> Result<Deadline, Failure> {
     Duration::try_from_secs_f64(seconds)
         .map(Deadline::after)
         .map_err(|_| Failure::invalid(format!("seconds is {seconds:?}; accepted: 0 to 1e19")))
 }
 
-/// Copies boxes.
+/// Returns the tree over its objects at other places.
 ///
 /// # Safety
-/// `first` points to 6 · `count` floats.
-unsafe fn boxes_of(first: *const f32, count: usize) -> Result<Objects, Failure> {
-    // SAFETY: an `Aabb` is `repr(C)` with 6 floats, and `first` points to that many for each box.
-    let boxes = unsafe { slice("boxes", first.cast::<Aabb>(), count) }?.to_vec();
-    Ok(Objects::Boxes(boxes))
+/// `objects` is null, or points to objects whose arrays have the promised lengths.
+pub(crate) unsafe fn moved(
+    tree: &OwnedTree,
+    objects: *const BvsObjects,
+) -> Result<OwnedTree, Failure> {
+    // SAFETY: what the caller promises.
+    let objects = unsafe { given("objects", objects) }?;
+    let expected = if tree.triangles().is_some() { "triangles" } else { "boxes" };
+    let found = if objects.boxes.is_null() { "triangles" } else { "boxes" };
+    if (objects.count, found) != (tree.objects(), expected) {
+        return Err(Failure::invalid(format!(
+            "objects are {} {found}; accepted: {} {expected}, as the tree has",
+            objects.count,
+            tree.objects()
+        )));
+    }
+    // SAFETY: what the caller promises.
+    tree.refitted(unsafe { objects_of(objects) }?).map_err(Failure::invalid)
 }
 
-/// Copies triangles.
+/// Copies objects.
 ///
 /// # Safety
-/// `first` points to 9 · `count` floats.
-unsafe fn triangles_of(first: *const f32, count: usize) -> Result<Objects, Failure> {
-    // SAFETY: a `Triangle` is `repr(C)` with 9 floats, and `first` points to that many for each
-    // triangle.
-    let triangles = unsafe { slice("corners", first.cast::<Triangle>(), count) }?.to_vec();
+/// The arrays have the promised lengths.
+unsafe fn objects_of(objects: &BvsObjects) -> Result<Objects, Failure> {
+    let BvsObjects { count, boxes, vertices, vertex_count, indices, .. } = *objects;
+    if !boxes.is_null() {
+        if !vertices.is_null() {
+            return Err(Failure::invalid("boxes and vertices; accepted: one of the two"));
+        }
+        // SAFETY: an `Aabb` is `repr(C)` with 6 floats, and `boxes` points to that many for each.
+        let boxes = unsafe { slice("boxes", boxes.cast::<Aabb>(), count) }?;
+        return Ok(Objects::Boxes(boxes.to_vec()));
+    }
+    let corners = count.saturating_mul(3);
+    if indices.is_null() && vertex_count != 0 && vertex_count != corners {
+        return Err(Failure::invalid(format!(
+            "vertex_count is {vertex_count} without indices; accepted: {corners}, or 0"
+        )));
+    }
+    let vertex_count = if indices.is_null() { corners } else { vertex_count };
+    // SAFETY: there are 3 floats in each of `vertex_count` strides.
+    let vertex = unsafe {
+        strided::<[f32; 3]>("vertices", vertices.cast(), vertex_count, objects.vertex_stride)
+    }?;
+    let index_count = if indices.is_null() { 0 } else { count };
+    // SAFETY: if there are indices, there are 3 in each of `count` strides.
+    let indices = unsafe {
+        strided::<[u32; 3]>("indices", indices.cast(), index_count, objects.index_stride)
+    }?;
+    let triangle = |number: usize| {
+        let ids = indices(number).map(|ids| ids.map(|id| id as usize));
+        let ids = ids.unwrap_or([3 * number, 3 * number + 1, 3 * number + 2]);
+        let corners = ids.map(&vertex);
+        let [Some(a), Some(b), Some(c)] = corners else {
+            let missing = ids[corners.iter().position(Option::is_none).unwrap_or(0)];
+            let range = format!("vertex {missing} of {vertex_count}, counted from 0");
+            return Err(Failure::invalid(format!("triangle {number} has {range}")));
+        };
+        Ok(Triangle::from([a, b, c]))
+    };
+    let triangles = (0..count).map(triangle).collect::<Result<_, _>>()?;
     Ok(Objects::Shapes(Primitives::Triangles(triangles)))
 }
 

@@ -195,8 +195,9 @@ impl Ray {
     }
 }
 
-/// A hit of a ray with an object.
+/// A hit of a ray with an object, in the layout that C has for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Hit {
     /// The distance, in multiples of the direction's length.
     pub t: f32,

@@ -23,15 +23,20 @@
 //! // Any builder of `bvh-build` can make the tree over these boxes. Here it is a single leaf.
 //! let boxes = Instance::boxes(&instances, &parts)?;
 //! let top = Bvh::new(vec![Node::leaf(boxes[0].union(&boxes[1]), 0, 2)], vec![0, 1]);
-//! let scene = Instances::new(parts, instances, top)?;
+//! let mut scene = Instances::new(parts, instances, top)?;
 //! let ray = Ray::half_line([0.2, 0.2, 9.0], [0.0, 0.0, -1.0]).unwrap();
 //! assert_eq!(scene.nearest_hit(&ray), Some(InstanceHit { t: 5.0, instance: 1, triangle: 0 }));
+//! // The next frame.
+//! scene.refit(&[moved(6.0), moved(4.0)])?;
+//! assert_eq!(scene.nearest_hit(&ray), Some(InstanceHit { t: 3.0, instance: 0, triangle: 0 }));
 //! # Ok::<(), bvh_core::InvalidInstances>(())
 //! ```
 
 use super::layout::WideBvh;
 use crate::{Aabb, Bvh, Hit, InvalidBvh, Ray, Slabs, any_hit_by, nearest_hit_by, validate};
 use glam::{Affine3A, DAffine3, DMat3, DVec3, Vec3Swizzles};
+use std::borrow::Borrow;
+use std::sync::Arc;
 
 /// A transformed copy of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,17 +75,32 @@ pub enum InvalidInstances {
 impl Instance {
     /// Returns the boxes of all instances in the scene's coordinates, in the same order, for any
     /// builder. They do not depend on the trees of the parts.
-    pub fn boxes(instances: &[Self], parts: &[WideBvh]) -> Result<Vec<Aabb>, InvalidInstances> {
+    pub fn boxes(
+        instances: &[Self],
+        parts: &[impl Borrow<WideBvh>],
+    ) -> Result<Vec<Aabb>, InvalidInstances> {
+        Ok(Self::place(instances, parts)?.iter().map(|placed| placed.aabb).collect())
+    }
+
+    /// Checks the instances and prepares them for rays.
+    fn place(
+        instances: &[Self],
+        parts: &[impl Borrow<WideBvh>],
+    ) -> Result<Vec<Placed>, InvalidInstances> {
         (instances.iter().enumerate())
-            .map(|(index, instance)| Ok(instance.place(index, parts)?.aabb))
+            .map(|(index, instance)| {
+                let missing = InvalidInstances::Part {
+                    instance: index,
+                    part: instance.part,
+                    parts: parts.len(),
+                };
+                instance.placed(index, parts.get(instance.part as usize).ok_or(missing)?.borrow())
+            })
             .collect()
     }
 
-    /// Checks the instance and prepares it for rays. `instance` is its index, for errors.
-    fn place(&self, instance: usize, parts: &[WideBvh]) -> Result<Placed, InvalidInstances> {
-        let Some(part) = parts.get(self.part as usize) else {
-            return Err(InvalidInstances::Part { instance, part: self.part, parts: parts.len() });
-        };
+    /// Checks the instance of this part. `instance` is its index, for errors.
+    fn placed(&self, instance: usize, part: &WideBvh) -> Result<Placed, InvalidInstances> {
         if part.root.is_none() {
             return Err(InvalidInstances::Empty(instance));
         }
@@ -149,8 +169,9 @@ impl Placed {
     }
 }
 
-/// The nearest hit of a ray among instances.
+/// The nearest hit of a ray among instances, in the layout that C has for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct InstanceHit {
     /// The distance, in multiples of the length of the ray's direction.
     pub t: f32,
@@ -161,6 +182,9 @@ pub struct InstanceHit {
 }
 
 impl InstanceHit {
+    /// The value that a batch writes for a ray without a hit, as [`Hit::MISS`].
+    pub const MISS: Self = Self { t: f32::INFINITY, instance: u32::MAX, triangle: u32::MAX };
+
     fn new(instance: u32, Hit { t, object: triangle }: Hit) -> Self {
         Self { t, instance, triangle }
     }
@@ -169,7 +193,7 @@ impl InstanceHit {
 /// A scene of instances for tracing.
 #[derive(Clone, Debug)]
 pub struct Instances {
-    parts: Vec<WideBvh>,
+    parts: Vec<Arc<WideBvh>>,
     placed: Vec<Placed>,
     /// Its boxes are tight.
     top: Bvh,
@@ -177,22 +201,60 @@ pub struct Instances {
 
 impl Instances {
     /// Makes a scene of `instances` of `parts`, with a tree over the [boxes of the
-    /// instances](Instance::boxes), whose boxes it makes tight. If instances move, they need a
-    /// refitted or new tree, but no new parts. O(instances).
+    /// instances](Instance::boxes), whose boxes it makes tight. Parts may be shared with other
+    /// scenes, as `Arc<WideBvh>`. O(instances).
     pub fn new(
-        parts: Vec<WideBvh>,
+        parts: Vec<impl Into<Arc<WideBvh>>>,
         instances: Vec<Instance>,
-        mut top: Bvh,
+        top: Bvh,
     ) -> Result<Self, InvalidInstances> {
-        let placed: Vec<Placed> = (instances.iter().enumerate())
-            .map(|(index, instance)| instance.place(index, &parts))
-            .collect::<Result<_, _>>()?;
+        let parts = parts.into_iter().map(Into::into).collect();
+        let mut scene = Self { parts, placed: Vec::new(), top: Bvh::default() };
+        scene.replace(&instances, top)?;
+        Ok(scene)
+    }
+
+    /// Replaces all instances, and the tree over their boxes. The parts remain, and nothing of them
+    /// is copied. A rejected scene is unchanged. O(instances).
+    pub fn replace(
+        &mut self,
+        instances: &[Instance],
+        mut top: Bvh,
+    ) -> Result<(), InvalidInstances> {
+        let placed = Instance::place(instances, &self.parts)?;
         let boxes: Vec<Aabb> = placed.iter().map(|placed| placed.aabb).collect();
         validate(&top, &boxes)?;
         // Slabs depend on the root's box, and so would answers. The boxes lie along the scene's axes.
         top.refit(&boxes);
         top.frame = None;
-        Ok(Self { parts, placed, top })
+        self.placed = placed;
+        self.top = top;
+        Ok(())
+    }
+
+    /// Moves the instances: as many as there are, with other transforms or parts, in the nodes of
+    /// the present tree. Once they are far from where they were, a new tree and
+    /// [`replace`](Self::replace) make rays faster. A rejected scene is unchanged. O(instances).
+    ///
+    /// # Panics
+    /// If the number of instances differs.
+    pub fn refit(&mut self, instances: &[Instance]) -> Result<(), InvalidInstances> {
+        assert_eq!(instances.len(), self.placed.len(), "the same number of instances");
+        let placed = Instance::place(instances, &self.parts)?;
+        let boxes: Vec<Aabb> = placed.iter().map(|placed| placed.aabb).collect();
+        self.top.refit(&boxes);
+        self.placed = placed;
+        Ok(())
+    }
+
+    /// The parts.
+    pub fn parts(&self) -> &[Arc<WideBvh>] {
+        &self.parts
+    }
+
+    /// The number of instances.
+    pub fn instances(&self) -> usize {
+        self.placed.len()
     }
 
     fn part_of(&self, instance: u32) -> &WideBvh {
@@ -207,6 +269,30 @@ impl Instances {
     /// at the same distance, the lowest instance comes first, then the lowest id.
     pub fn nearest_hit(&self, ray: &Ray) -> Option<InstanceHit> {
         self.nearest(ray, |part, _, local_ray| part.nearest_hit(local_ray))
+    }
+
+    /// Writes the [nearest hit](Self::nearest_hit) of every ray to `hits`; [`InstanceHit::MISS`]
+    /// for a ray that meets nothing. Traces the rays one after the other.
+    ///
+    /// # Panics
+    /// If `rays` and `hits` are not equally many.
+    pub fn nearest_hits(&self, rays: &[Ray], hits: &mut [InstanceHit]) {
+        assert_eq!(rays.len(), hits.len(), "a hit for every ray");
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = self.nearest_hit(ray).unwrap_or(InstanceHit::MISS);
+        }
+    }
+
+    /// Writes to `hits` whether each ray hits [any instance](Self::any_hit). Traces the rays one
+    /// after the other.
+    ///
+    /// # Panics
+    /// If `rays` and `hits` are not equally many.
+    pub fn any_hits(&self, rays: &[Ray], hits: &mut [bool]) {
+        assert_eq!(rays.len(), hits.len(), "an answer for every ray");
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = self.any_hit(ray);
+        }
     }
 
     /// Returns the nearest hit that `accept` accepts, for example where a texture is opaque.

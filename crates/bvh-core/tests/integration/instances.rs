@@ -8,6 +8,7 @@ use bvh_core::{
     nearest_hit,
 };
 use glam::{Affine3A, Mat3, Mat3A, Quat, Vec3, Vec3A};
+use std::sync::Arc;
 
 /// Parts as triangles and in the wide layout, and instances of the parts.
 struct Scene {
@@ -260,4 +261,49 @@ fn an_invalid_scene_is_rejected_by_its_instance() {
     let empty = Instances::new(parts, vec![], Bvh::default()).unwrap();
     let ray = Ray::half_line([0.0; 3], [1.0; 3]).unwrap();
     assert!(empty.nearest_hit(&ray).is_none() && !empty.any_hit(&ray));
+}
+
+#[test]
+fn moved_and_replaced_instances_answer_as_a_new_scene_of_the_same_parts() {
+    let mut random = Random(7);
+    let mut transforms = |count| (0..count).map(|_| nested_transform(&mut random)).collect();
+    let places: [Vec<Affine3A>; 3] = [transforms(30), transforms(30), transforms(50)];
+    let mut random = Random(8);
+    let mut now = scene(vec![ball(2), grid_box(2)], vec![], &mut random);
+    let parts: Vec<Arc<WideBvh>> = now.parts.iter().cloned().map(Arc::new).collect();
+    let mut moving = Instances::new(parts.clone(), vec![], Bvh::default()).unwrap();
+    for (frame, transforms) in places.into_iter().enumerate() {
+        now.instances = (0..)
+            .zip(transforms)
+            .map(|(i, transform)| Instance { part: i % 2, transform })
+            .collect();
+        let expected = now.all(&mut random).remove(0);
+        if frame == 1 {
+            moving.refit(&now.instances).unwrap();
+        } else {
+            let boxes = Instance::boxes(&now.instances, moving.parts()).unwrap();
+            moving.replace(&now.instances, tree(&boxes, SHAPES[0], &mut random)).unwrap();
+        }
+        // Rejected, and unchanged.
+        let mut wrong = now.instances.clone();
+        wrong[3].part = 2;
+        let no_part = InvalidInstances::Part { instance: 3, part: 2, parts: 2 };
+        assert_eq!(moving.refit(&wrong), Err(no_part));
+        assert!(moving.replace(&now.instances, Bvh::default()).is_err());
+        let rays = rays_of_every_kind(&now.flat().0, &mut random);
+        let mut hits = vec![InstanceHit { t: 0.0, instance: 0, triangle: 0 }; rays.len()];
+        let mut any = vec![false; rays.len()];
+        moving.nearest_hits(&rays, &mut hits);
+        moving.any_hits(&rays, &mut any);
+        for ((ray, hit), any) in rays.iter().zip(hits).zip(any) {
+            let expected = expected.nearest_hit(ray);
+            assert_eq!(
+                (bits(Some(hit)), any),
+                (bits(expected.or(Some(InstanceHit::MISS))), expected.is_some())
+            );
+        }
+    }
+    for (part, kept) in parts.iter().zip(moving.parts()) {
+        assert!(Arc::ptr_eq(part, kept));
+    }
 }
