@@ -1,6 +1,7 @@
 //! The results of a command: text for people, or one JSON object with all digits.
 
 use crate::output::print_line;
+use bvh_core::Frame;
 use indicatif::HumanCount;
 use serde_json::{Map, Value, json};
 
@@ -90,6 +91,14 @@ pub fn gain(cost: f64, base: f64) -> String {
     let direction = if percent > 0.0 { "above" } else { "below" };
     let digits = if percent.abs() < 10.0 { 2 } else { 1 };
     format!("{:.digits$} % {direction}", percent.abs())
+}
+
+/// Returns a frame as facts: `null`, or the rows of its rotation and its centre.
+pub fn frame_facts(frame: Option<&Frame>) -> Value {
+    frame.map_or(Value::Null, |frame| {
+        let columns = frame.rotation().transpose().to_cols_array_2d();
+        json!({ "rotation": columns, "centre": frame.centre().to_array() })
+    })
 }
 
 #[cfg(test)]

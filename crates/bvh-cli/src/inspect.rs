@@ -2,9 +2,8 @@
 //! its tree.
 
 use crate::Error;
-use crate::answer::Answer;
+use crate::answer::{Answer, frame_facts};
 use crate::arguments::{load_scene, output_file};
-use crate::bake::frame;
 use crate::output::write_table;
 use crate::rays::Rays;
 use bvh_build::{Builder, muller_fellner};
@@ -60,7 +59,7 @@ pub fn inspect(args: &InspectArgs, answer: &mut Answer) -> Result<(), Error> {
     answer.fact("version", Header::VERSION);
     answer.fact("bytes", files::regular(&args.file)?);
     describe(&header, answer);
-    answer.fact("frame", frame::facts(tree.frame.as_ref()));
+    answer.fact("frame", frame_facts(tree.frame.as_ref()));
     answer.fact("cost", header.objective.cost(&tree));
     measure(&tree, answer);
     // The build cannot fail, because a valid tree over these boxes proves that they are finite.

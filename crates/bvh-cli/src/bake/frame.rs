@@ -7,7 +7,6 @@ use crate::answer::Answer;
 use bvh_core::Frame;
 use bvh_scenes::Scene;
 use bvh_search::{Budget, Choice, Frames, Method};
-use serde_json::{Value, json};
 
 /// Returns the scene in the frame of its bake, and says why it is the best one. What the choice
 /// takes of a budget of time is missing from the plan's.
@@ -55,12 +54,4 @@ fn angle(frame: &Frame) -> f64 {
     let rotation = frame.rotation();
     let trace = rotation.x_axis.x + rotation.y_axis.y + rotation.z_axis.z;
     (0.5 * (trace - 1.0)).clamp(-1.0, 1.0).acos()
-}
-
-/// Returns a frame as facts: `null`, or the rows of its rotation and its centre.
-pub fn facts(frame: Option<&Frame>) -> Value {
-    frame.map_or(Value::Null, |frame| {
-        let columns = frame.rotation().transpose().to_cols_array_2d();
-        json!({ "rotation": columns, "centre": frame.centre().to_array() })
-    })
 }

@@ -9,7 +9,7 @@ mod plan;
 mod watch;
 
 use crate::Error;
-use crate::answer::{Answer, gain, short, whole};
+use crate::answer::{Answer, frame_facts, gain, short, whole};
 use crate::arguments::{input_file, load_scene, output_file, output_or_free};
 use crate::export::tracers;
 use crate::interrupt::{hold, is_interrupted};
@@ -231,7 +231,7 @@ fn summarise(found: &Found, answer: &mut Answer) {
     answer.record("objects", objects);
     answer.record("references", references);
     answer.record("method", method);
-    answer.record("frame", frame::facts(tree.frame.as_ref()));
+    answer.record("frame", frame_facts(tree.frame.as_ref()));
     answer.record("seed", plan.seed);
     let area = internal_area(tree);
     if let Some(base) = found.area_of_greedy {
