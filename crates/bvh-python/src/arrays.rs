@@ -3,7 +3,7 @@
 //! accepted.
 
 use bvh_search::bvh_core::glam::DVec3;
-use bvh_search::bvh_core::{MeshError, Primitives};
+use bvh_search::bvh_core::{InvalidRay, MeshError, Primitives};
 use bvh_search::{Objects, prelude::*};
 use numpy::{
     Element, PyArrayDescrMethods, PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArray,
@@ -12,7 +12,6 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::fmt::Display;
-use std::ops::Range;
 
 /// Creates the error of an invalid argument.
 pub fn invalid(message: impl Display) -> PyErr {
@@ -23,25 +22,43 @@ pub fn invalid(message: impl Display) -> PyErr {
 ///
 /// numpy's own slices are no substitute: they also give the elements of an array in column order,
 /// in that order.
-pub struct Array<'py, T: Element>(PyReadonlyArrayDyn<'py, T>);
+pub struct Array<'py, T: Element> {
+    converted: PyReadonlyArrayDyn<'py, T>,
+    /// The array before its conversion.
+    given: Bound<'py, PyAny>,
+}
 
 impl<'py, T: Element> Array<'py, T> {
     pub fn shape(&self) -> &[usize] {
-        self.0.shape()
+        self.converted.shape()
     }
 
     /// Returns the elements in row order.
     pub fn elements(&self) -> PyResult<&[T]> {
-        Ok(self.0.as_slice()?)
+        Ok(self.converted.as_slice()?)
     }
 
     pub fn into_numpy(self) -> Bound<'py, PyArrayDyn<T>> {
-        (*self.0).clone()
+        (*self.converted).clone()
+    }
+
+    /// Returns numbers as the caller gave them, for messages. Numbers beyond `float32` are infinite
+    /// after their conversion.
+    fn given<const N: usize>(&self, first: usize) -> PyResult<[f64; N]> {
+        let flat = self.given.getattr("flat")?;
+        let mut numbers = [0.0; N];
+        for (position, number) in (first..).zip(&mut numbers) {
+            *number = flat.get_item(position)?.extract()?;
+        }
+        Ok(numbers)
     }
 }
 
 /// The kinds of elements that are accepted, by numpy's letters, and their name.
 type Kinds = (&'static str, &'static str);
+
+/// The range of numbers.
+const FLOAT32: &str = "finite numbers of float32, up to 3.4e38";
 
 const REAL_NUMBERS: Kinds = ("biuf", "real numbers");
 const INTEGERS: Kinds = ("iu", "integers");
@@ -79,18 +96,39 @@ pub fn numbers<'py, T: Number>(
     let numpy = py.import("numpy")?;
     let no_array =
         |error: PyErr| invalid(format!("{name}: {}; accepted: {accepted}", error.value(py)));
-    // `asanyarray` keeps masked arrays, whose masks the conversion below would drop silently.
-    let given = numpy.call_method1("asanyarray", (argument,)).map_err(no_array)?;
+    // `asanyarray` keeps masked arrays, whose masks the conversion below would drop silently. It
+    // would read the numbers of a tensor that is no array one by one.
+    let given = match argument {
+        tensor if tensor.hasattr("__array__")? => numpy.call_method1("asanyarray", (tensor,)),
+        tensor if tensor.hasattr("__dlpack__")? => numpy.call_method1("from_dlpack", (tensor,)),
+        tensor if tensor.hasattr("numpy")? => tensor.call_method0("numpy"),
+        other => numpy.call_method1("asanyarray", (other,)),
+    };
+    let given = given.map_err(no_array)?;
     check_elements(name, &numpy, &given, T::KINDS)?;
     // In row order, aligned, and no subclass.
-    let array = numpy.call_method1("require", (given, T::DTYPE, "CAE")).map_err(no_array)?;
-    let array: PyReadonlyArrayDyn<T> = array.extract()?;
-    assert!(array.is_c_contiguous(), "numpy converts to row order");
-    if accepts(array.shape()) {
-        return Ok(Array(array));
+    let array = numpy.call_method1("require", (&given, T::DTYPE, "CAE")).map_err(no_array)?;
+    let converted: PyReadonlyArrayDyn<T> = array.extract()?;
+    assert!(converted.is_c_contiguous(), "numpy converts to row order");
+    if accepts(converted.shape()) {
+        return Ok(Array { converted, given });
     }
-    let sizes: Vec<String> = array.shape().iter().map(usize::to_string).collect();
-    Err(invalid(format!("{name} has shape ({}); accepted: {accepted}", sizes.join(", "))))
+    Err(invalid(format!("{name} has shape {}; accepted: {accepted}", array.getattr("shape")?)))
+}
+
+/// Reads `float32`, all of whose numbers count.
+fn single_numbers<'py>(
+    name: &str,
+    argument: &Bound<'py, PyAny>,
+    accepted: &str,
+    accepts: impl Fn(&[usize]) -> bool,
+) -> PyResult<Array<'py, f32>> {
+    let array = numbers::<f32>(name, argument, accepted, accepts)?;
+    if let Some(infinite) = array.elements()?.iter().position(|number| number.is_infinite()) {
+        let [found] = array.given(infinite)?;
+        return Err(invalid(format!("{name} has {found:?}; accepted: {FLOAT32}")));
+    }
+    Ok(array)
 }
 
 /// Rejects elements that would silently lose their fraction, imaginary part, unit or mask in a
@@ -126,7 +164,7 @@ fn check_elements(
 /// Reads triangles with three corners each.
 pub fn triangles(argument: &Bound<PyAny>) -> PyResult<Objects> {
     let array =
-        numbers::<f32>("triangles", argument, "(n, 3, 3)", |shape| matches!(shape, [_, 3, 3]))?;
+        single_numbers("triangles", argument, "(n, 3, 3)", |shape| matches!(shape, [_, 3, 3]))?;
     let triangles: &[Triangle] = bytemuck::cast_slice(array.elements()?);
     Ok(shapes(triangles.to_vec()))
 }
@@ -196,12 +234,17 @@ fn triangles_of(
     faces: &[[u32; 3]],
     unknown: impl Fn(usize, u32) -> PyErr,
 ) -> PyResult<Vec<Triangle>> {
-    let (vertices, _) = vertices.elements()?.as_chunks::<3>();
-    Triangle::from_mesh(vertices, faces).map_err(|error| match error {
+    let (corners, _) = vertices.elements()?.as_chunks::<3>();
+    Triangle::from_mesh(corners, faces).map_err(|error| match error {
         MeshError::Index { triangle, index, .. } => unknown(triangle, index),
-        MeshError::NotFinite { triangle, index, found } => {
-            let found = format!("vertex {index} of face {triangle} is {found}");
-            invalid(format!("{}: {found}; accepted: finite coordinates", names.vertices))
+        MeshError::NotFinite { triangle, index, .. } => {
+            match vertices.given::<3>(3 * index as usize) {
+                Ok(found) => {
+                    let found = format!("vertex {index} of face {triangle} is {found:?}");
+                    invalid(format!("{}: {found}; accepted: {FLOAT32}", names.vertices))
+                }
+                Err(error) => error,
+            }
         }
         MeshError::TooMany(_) => invalid(format!("{}: {error}", names.faces)),
     })
@@ -210,7 +253,7 @@ fn triangles_of(
 /// Reads recorded rays: segments of the shape `(m, 2, 3)`.
 pub fn segments(argument: Option<&Bound<PyAny>>) -> PyResult<Vec<Segment>> {
     let Some(argument) = argument else { return Ok(vec![]) };
-    let array = numbers::<f32>("rays", argument, "(m, 2, 3)", |shape| matches!(shape, [_, 2, 3]))?;
+    let array = single_numbers("rays", argument, "(m, 2, 3)", |shape| matches!(shape, [_, 2, 3]))?;
     let (segments, _) = array.elements()?.as_chunks::<6>();
     let segment = |&[a, b, c, d, e, f]: &[f32; 6]| Segment { from: [a, b, c], to: [d, e, f] };
     Ok(segments.iter().map(segment).collect())
@@ -240,7 +283,7 @@ pub fn point(name: &str, argument: &Bound<PyAny>) -> PyResult<DVec3> {
 
 /// Reads boxes with a lower and an upper corner each.
 pub fn boxes(argument: &Bound<PyAny>) -> PyResult<Objects> {
-    let array = numbers::<f32>("boxes", argument, "(n, 2, 3) or (n, 6)", |shape| {
+    let array = single_numbers("boxes", argument, "(n, 2, 3) or (n, 6)", |shape| {
         matches!(shape, [_, 2, 3] | [_, 6])
     })?;
     let boxes: &[Aabb] = bytemuck::cast_slice(array.elements()?);
@@ -281,10 +324,11 @@ impl<'py> Vectors<'py> {
     }
 
     fn len(&self) -> usize {
-        match self {
-            Self::Single(array) => array.shape()[0],
-            Self::Double(array) => array.shape()[0],
-        }
+        let shape = match self {
+            Self::Single(array) => array.shape(),
+            Self::Double(array) => array.shape(),
+        };
+        shape.iter().product::<usize>() / 3
     }
 
     fn slice(&self) -> PyResult<VectorSlice<'_>> {
@@ -295,6 +339,7 @@ impl<'py> Vectors<'py> {
     }
 }
 
+/// A vector for each index, or one for all.
 #[derive(Clone, Copy)]
 enum VectorSlice<'a> {
     Single(&'a [[f32; 3]]),
@@ -305,17 +350,23 @@ impl VectorSlice<'_> {
     #[inline(always)]
     fn at(self, index: usize) -> Vec3 {
         match self {
-            Self::Single(vectors) => Vec3::from(vectors[index]),
-            Self::Double(vectors) => Vec3::from(vectors[index].map(|x| x as f32)),
+            Self::Single(vectors) => Vec3::from(*at(vectors, index)),
+            Self::Double(vectors) => Vec3::from(at(vectors, index).map(|x| x as f32)),
         }
     }
 
     fn exact(self, index: usize) -> DVec3 {
         match self {
-            Self::Single(vectors) => Vec3::from(vectors[index]).as_dvec3(),
-            Self::Double(vectors) => DVec3::from(vectors[index]),
+            Self::Single(vectors) => Vec3::from(*at(vectors, index)).as_dvec3(),
+            Self::Double(vectors) => DVec3::from(*at(vectors, index)),
         }
     }
+}
+
+/// Returns an element; the first one is for all later ones that are missing.
+#[inline(always)]
+fn at<T>(elements: &[T], index: usize) -> &T {
+    elements.get(index).unwrap_or(&elements[0])
 }
 
 /// The place of a tree in a world whose coordinates `float32` is too coarse for.
@@ -365,8 +416,9 @@ fn inward([t_min, t_max]: [f64; 2]) -> [f32; 2] {
     [up(t_min), -up(-t_max)]
 }
 
-/// The arrays of rays. `t_min` and `t_max` are one number for all rays or one number per ray.
+/// The arrays of rays. Each has one element for all rays or one per ray.
 pub struct RayArrays<'py> {
+    rays: usize,
     origins: Vectors<'py>,
     directions: Vectors<'py>,
     limits: [Vec<f64>; 2],
@@ -391,11 +443,17 @@ impl<'py> RayArrays<'py> {
                 return Err(self::invalid(message));
             }
         };
-        let origins = Vectors::read("origins", origins, "(m, 3)", |shape| matches!(shape, [_, 3]))?;
-        let rays = origins.len();
-        let accepted = format!("({rays}, 3), as origins");
-        let directions =
-            Vectors::read("directions", directions, &accepted, |shape| shape == [rays, 3])?;
+        let are_vectors = |shape: &[usize]| matches!(shape, [_, 3] | [3]);
+        let origins = Vectors::read("origins", origins, "(m, 3) or (3,)", are_vectors)?;
+        let accepted = match origins.len() {
+            1 => "(m, 3) or (3,)".to_owned(),
+            rays => format!("({rays}, 3), as origins, or (3,)"),
+        };
+        let directions = Vectors::read("directions", directions, &accepted, |shape| {
+            are_vectors(shape) && (origins.len() == 1 || matches!(shape, [3] | [1, 3]))
+                || shape == [origins.len(), 3]
+        })?;
+        let rays = if origins.len() == 1 { directions.len() } else { origins.len() };
         let accepted = format!("a number or ({rays},), as origins");
         let mut limits = [vec![0.0], vec![f64::INFINITY]];
         for ((name, argument), limit) in
@@ -410,7 +468,7 @@ impl<'py> RayArrays<'py> {
                 .to_vec();
             }
         }
-        Ok(Self { origins, directions, limits, misses })
+        Ok(Self { rays, origins, directions, limits, misses })
     }
 
     /// Returns the rays for threads without Python.
@@ -419,7 +477,7 @@ impl<'py> RayArrays<'py> {
             origins: self.origins.slice()?,
             directions: self.directions.slice()?,
             limits: self.limits.each_ref().map(Vec::as_slice),
-            rays: self.origins.len(),
+            rays: self.rays,
             misses: self.misses,
             place,
         })
@@ -456,10 +514,10 @@ impl Batch {
 }
 
 impl RaySource<'_> {
-    /// Returns some of the rays, or the fault of an invalid one.
-    pub fn batch(&self, range: Range<usize>) -> Result<Batch, String> {
+    /// Returns the batch of this number, of batches of so many rays, or the fault of an invalid ray.
+    pub fn batch(&self, number: usize, size: usize) -> Result<Batch, String> {
         let mut batch = Batch::default();
-        for index in range {
+        for index in (number * size..self.rays).take(size) {
             let direction = self.directions.at(index);
             let (origin, advance) = match self.place {
                 Some(place) => {
@@ -467,15 +525,14 @@ impl RaySource<'_> {
                 }
                 None => (self.origins.at(index), 0.0),
             };
-            // One number is for all rays.
-            let limits = self.limits.map(|limits| *limits.get(index).unwrap_or(&limits[0]));
+            let limits = self.limits.map(|limits| *at(limits, index));
             let [t_min, t_max] = limits.map(|t| t as f32);
             let inner = inward(limits.map(|t| t - advance));
             let ray = match Ray::new(origin, direction, t_min, t_max) {
                 // An empty range hits nothing.
                 Err(_) if self.misses => Ray::assume_valid(Vec3::ZERO, Vec3::X, 1.0, 0.0),
                 // The limits next to the caller's, and not their neighbours.
-                Err(error) => return Err(format!("ray {index}: {error}")),
+                Err(error) => return Err(self.fault(index, &error)),
                 Ok(ray) if inner == [t_min, t_max] => ray,
                 Ok(_) => Ray::assume_valid(origin, direction, inner[0], inner[1]),
             };
@@ -485,5 +542,21 @@ impl RaySource<'_> {
             }
         }
         Ok(batch)
+    }
+
+    /// Says what is wrong with a ray, in the caller's numbers.
+    fn fault(&self, index: usize, error: &InvalidRay) -> String {
+        let [origin, direction] =
+            [self.origins, self.directions].map(|v| v.exact(index).to_array());
+        match error {
+            InvalidRay::Origin(_) => {
+                format!("ray {index}: the ray's origin is {origin:?}; accepted: {FLOAT32}")
+            }
+            InvalidRay::Direction(_) => format!(
+                "ray {index}: the ray's direction is {direction:?}; accepted: finite, its largest \
+                 component between 2^-100 and 2^100"
+            ),
+            InvalidRay::Range { .. } => format!("ray {index}: {error}"),
+        }
     }
 }

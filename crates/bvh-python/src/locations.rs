@@ -1,9 +1,14 @@
 //! The function `locations`: hit points in double precision.
 
-use crate::arrays::{invalid, numbers};
+use crate::arrays::numbers;
+use crate::threads::Query;
 use bvh_search::bvh_core::glam::DVec3;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
+use rayon::prelude::*;
+
+/// The number of hits that a thread locates at once.
+const PART: usize = 1024;
 
 /// Returns the points, in `float64`, where rays cross triangles: the indices of triangles and rays
 /// are from `Tracer.all`. `triangles` has the shape `(n, 3, 3)`. Each point is in the box of its
@@ -30,15 +35,28 @@ pub fn locations<'py>(
     let (triangles, _) = corners.as_chunks::<3>();
     let (origins, _) = origins.elements()?.as_chunks::<3>();
     let (directions, _) = directions.elements()?.as_chunks::<3>();
-    let mut points = Vec::with_capacity(3 * ray.shape()[0]);
-    for (&triangle, &ray) in triangle.elements()?.iter().zip(ray.elements()?) {
-        let missing = || invalid("locations: accepted: hits of these rays and triangles");
-        let corners = triangles.get(triangle as usize).ok_or_else(missing)?.map(DVec3::from);
-        let origin = DVec3::from(*origins.get(ray as usize).ok_or_else(missing)?);
-        let direction = DVec3::from(*directions.get(ray as usize).ok_or_else(missing)?);
-        points.extend(location(corners, origin, direction).to_array());
-    }
-    points.into_pyarray(py).reshape([triangle.shape()[0], 3])
+    let hits = (triangle.elements()?, ray.elements()?);
+    let count = hits.0.len();
+    let points = Query::ask(py, None, count.div_ceil(PART), |query| {
+        let mut points = vec![0.0; 3 * count];
+        let parts =
+            (points.par_chunks_mut(3 * PART), hits.0.par_chunks(PART), hits.1.par_chunks(PART));
+        query.answer(parts.into_par_iter(), |_, (points, triangle, ray)| {
+            for ((point, &triangle), &ray) in
+                points.as_chunks_mut().0.iter_mut().zip(triangle).zip(ray)
+            {
+                let missing = || "locations: accepted: hits of these rays and triangles";
+                let corners =
+                    triangles.get(triangle as usize).ok_or_else(missing)?.map(DVec3::from);
+                let origin = DVec3::from(*origins.get(ray as usize).ok_or_else(missing)?);
+                let direction = DVec3::from(*directions.get(ray as usize).ok_or_else(missing)?);
+                *point = location(corners, origin, direction).to_array();
+            }
+            Ok(())
+        })?;
+        Ok(points)
+    })?;
+    points.into_pyarray(py).reshape([count, 3])
 }
 
 /// Returns the point where a ray crosses the triangle that it is known to hit.

@@ -2,16 +2,10 @@
 
 use crate::arrays::invalid;
 use crate::scalars::SECONDS;
-use crate::threads::pool;
+use crate::threads::{Follower, followed};
 use bvh_search::{Event, Observer, prelude::*};
 use pyo3::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
-use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::thread;
-use std::time::Instant;
-
-/// The longest time between a press of Ctrl-C and the reaction.
-const NOTICE: Duration = Duration::from_millis(50);
 
 /// The limits of a search, and the function that follows it.
 pub struct Limits {
@@ -60,42 +54,12 @@ pub fn run<T: Send>(
     let seconds = if work.is_none() { Some(seconds.unwrap_or(1.0)) } else { seconds };
     let limit = seconds.map(duration).transpose()?;
     let budget = Budget { max_work: work, ..Budget::UNLIMITED };
-    let start = Instant::now();
     let watch = &Watch {
         deadline: limit.map(Deadline::after),
         pressed: AtomicBool::new(false),
         cost: AtomicU64::new(f64::INFINITY.to_bits()),
     };
-    let react = |py: Python| {
-        py.check_signals()?;
-        if let Some(progress) = &progress {
-            let cost = f64::from_bits(watch.cost.load(Relaxed));
-            progress.call1(py, (start.elapsed().as_secs_f64(), cost))?;
-        }
-        Ok(())
-    };
-    let pool = &pool(py)?;
-    // Python runs signal handlers on its main thread only. The calling thread may be the main
-    // thread, so a second thread searches while this one waits for signals.
-    Ok(py.detach(|| {
-        thread::scope(|scope| {
-            let (sender, receiver) = channel();
-            scope.spawn(move || sender.send(pool.install(|| search(budget, watch))));
-            let mut raised = Ok(());
-            loop {
-                match receiver.recv_timeout(NOTICE) {
-                    Ok(found) => return (found, raised),
-                    Err(RecvTimeoutError::Disconnected) => {
-                        panic!("the search ended without a tree")
-                    }
-                    Err(RecvTimeoutError::Timeout) if raised.is_ok() => {
-                        raised = Python::attach(react);
-                        watch.pressed.store(raised.is_err(), Relaxed);
-                    }
-                    // The search has been cancelled and is about to end.
-                    Err(RecvTimeoutError::Timeout) => {}
-                }
-            }
-        })
-    }))
+    let cost = || f64::from_bits(watch.cost.load(Relaxed));
+    let found = || search(budget, watch);
+    followed(py, &Follower::new(progress), &watch.pressed, cost, found)
 }

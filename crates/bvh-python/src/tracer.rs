@@ -1,8 +1,8 @@
 //! The class `Tracer`: triangles in the wide layout, which answer batches of rays and points on all
 //! threads.
 
-use crate::arrays::{Batch, Place, RayArrays, RaySource, invalid, numbers, point, points};
-use crate::threads::detached;
+use crate::arrays::{Place, RayArrays, invalid, numbers, point, points};
+use crate::threads::{Query, detached};
 use crate::tree::Tree;
 use bvh_search::OwnedTree;
 use bvh_search::bvh_core::glam::DVec3;
@@ -20,7 +20,8 @@ type Rows<'py, T> = Bound<'py, PyArray2<T>>;
 /// The triangles of a tree in a layout for fast traversal. Later improvements and updates of the
 /// tree do not change the tracer.
 ///
-/// Rays have `origins` and `directions` of the shape `(m, 3)`. `t_min` and `t_max`, by default 0
+/// Rays have `origins` and `directions` of the shape `(m, 3)`; one of the shape `(3,)` or `(1, 3)` is
+/// for all rays. `t_min` and `t_max`, by default 0
 /// and infinity, are one number or have the shape `(m,)`; those in `float64` are rounded inwards.
 /// Distances are in multiples of the directions' lengths. `coherent` tells whether consecutive rays
 /// begin close to each other and have similar directions; by default a look at the rays decides. It
@@ -32,6 +33,10 @@ type Rows<'py, T> = Bound<'py, PyArray2<T>>;
 /// coordinates of the world, and only what is left after their move is rounded. A ray that begins
 /// outside the tree's box, far away or at a point that `float32` does not have, is first advanced to
 /// it in `float64`.
+///
+/// Ctrl-C ends every call. `progress(seconds, fraction)` is called about twenty times per second with
+/// the elapsed time and the part of the rays or points that is answered, and at the end with 1; if it
+/// raises an exception, the call ends.
 ///
 /// >>> import numpy as np
 /// >>> from bvh_search import Tracer, Tree
@@ -47,8 +52,10 @@ pub struct Tracer {
     solid: OnceLock<Solid>,
 }
 
-/// The number of rays or points that a thread answers at once.
+/// The number of rays that a thread traces at once.
 const BATCH: usize = 1024;
+/// The number of rays or points that a thread answers at once where one may take long.
+const FEW: usize = 128;
 
 #[pymethods]
 impl Tracer {
@@ -69,7 +76,7 @@ impl Tracer {
     ///
     /// >>> tracer.nearest([[0.25, 0.5, 3], [2, 2, 3]], [[0, 0, -1], [0, 0, -1]])
     /// (array([ 3., inf], dtype=float32), array([ 1, -1], dtype=int32))
-    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, coherent = None, invalid = "error"))]
+    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, coherent = None, invalid = "error", progress = None))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
     fn nearest<'py>(
         &self,
@@ -79,16 +86,17 @@ impl Tracer {
         t_max: Option<&Bound<'py, PyAny>>,
         coherent: Option<bool>,
         invalid: &str,
+        progress: Option<Py<PyAny>>,
     ) -> PyResult<(Column<'py, f32>, Column<'py, i32>)> {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source(self.place)?;
-        let (t, objects) = traced(py, || {
+        let (t, objects) = Query::ask(py, progress, source.rays.div_ceil(BATCH), |query| {
             let mut t = vec![0.0; source.rays];
             let mut objects = vec![0; source.rays];
             let parts = t.par_chunks_mut(BATCH).zip(objects.par_chunks_mut(BATCH));
-            parts.enumerate().try_for_each(|(batch, (t, objects))| {
-                let batch = batch_of(source, batch)?;
+            query.answer(parts, |batch, (t, objects)| {
+                let batch = source.batch(batch, BATCH)?;
                 let mut hits = [Hit::MISS; BATCH];
                 let hits = &mut hits[..batch.rays.len()];
                 let coherence = self.coherence(coherent, &batch.rays);
@@ -98,7 +106,7 @@ impl Tracer {
                     // The cast turns the id of a miss, `u32::MAX`, into −1.
                     *object = hit.object as i32;
                 }
-                Ok::<_, String>(())
+                Ok(())
             })?;
             Ok((t, objects))
         })?;
@@ -109,7 +117,7 @@ impl Tracer {
     ///
     /// >>> tracer.any([[0.25, 0.5, 3], [2, 2, 3]], [[0, 0, -1], [0, 0, -1]])
     /// array([ True, False])
-    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, coherent = None, invalid = "error"))]
+    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, coherent = None, invalid = "error", progress = None))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
     fn any<'py>(
         &self,
@@ -119,16 +127,15 @@ impl Tracer {
         t_max: Option<&Bound<'py, PyAny>>,
         coherent: Option<bool>,
         invalid: &str,
+        progress: Option<Py<PyAny>>,
     ) -> PyResult<Column<'py, bool>> {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source(self.place)?;
-        let hits = traced(py, || {
-            answers(source.rays, false, |batch, hits| {
-                let rays = batch_of(source, batch)?.rays;
-                self.wide.any_hits(&rays, hits, self.coherence(coherent, &rays));
-                Ok(())
-            })
+        let hits = answers(py, progress, source.rays, BATCH, |batch, hits| {
+            let rays = source.batch(batch, BATCH)?.rays;
+            self.wide.any_hits(&rays, hits, self.coherence(coherent, &rays));
+            Ok(())
         })?;
         Ok(hits.into_pyarray(py))
     }
@@ -139,7 +146,8 @@ impl Tracer {
     ///
     /// >>> tracer.all([[0.5, 0.5, 3], [2, 2, 3]], [[0, 0, -1], [0, 0, -1]])
     /// (array([3.], dtype=float32), array([0], dtype=int32), array([0]))
-    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, invalid = "error"))]
+    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, invalid = "error", progress = None))]
+    #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
     fn all<'py>(
         &self,
         origins: &Bound<'py, PyAny>,
@@ -147,33 +155,33 @@ impl Tracer {
         t_min: Option<&Bound<'py, PyAny>>,
         t_max: Option<&Bound<'py, PyAny>>,
         invalid: &str,
+        progress: Option<Py<PyAny>>,
     ) -> PyResult<(Column<'py, f32>, Column<'py, i32>, Column<'py, i64>)> {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source(self.place)?;
-        let (t, objects, numbers) = traced(py, || {
-            let batches = (0..source.rays.div_ceil(BATCH)).into_par_iter();
-            let found: Vec<(Vec<Hit>, Vec<u32>)> = batches
-                .map(|batch| {
-                    let batch = batch_of(source, batch)?;
-                    let mut hits = Vec::with_capacity(2 * batch.rays.len());
-                    let mut counts = vec![0; batch.rays.len()];
-                    self.wide.all_hits_of(&batch.rays, &mut hits, &mut counts);
-                    let mut own = hits.iter_mut();
-                    for (ray, &count) in counts.iter().enumerate() {
-                        for hit in own.by_ref().take(count as usize) {
-                            hit.t = batch.distance(ray, hit.t);
-                        }
+        let parts = source.rays.div_ceil(FEW);
+        let (t, objects, numbers) = Query::ask(py, progress, parts, |query| {
+            let mut found = vec![(Vec::new(), Vec::new()); parts];
+            query.answer(found.par_iter_mut(), |batch, (hits, counts)| {
+                let batch = source.batch(batch, FEW)?;
+                *counts = vec![0; batch.rays.len()];
+                self.wide.all_hits_of(&batch.rays, hits, counts);
+                let mut own = hits.iter_mut();
+                for (ray, &count) in counts.iter().enumerate() {
+                    for hit in own.by_ref().take(count as usize) {
+                        hit.t = batch.distance(ray, hit.t);
                     }
-                    Ok((hits, counts))
-                })
-                .collect::<Result<_, String>>()?;
+                }
+                Ok(())
+            })?;
             let hits = found.iter().map(|(hits, _)| hits.len()).sum();
             let mut t = Vec::with_capacity(hits);
             let mut objects = Vec::with_capacity(hits);
             let mut numbers = Vec::with_capacity(hits);
             let mut number = 0;
             for (hits, counts) in found {
+                query.go_on()?;
                 t.extend(hits.iter().map(|hit| hit.t));
                 objects.extend(hits.iter().map(|hit| hit.object as i32));
                 for count in counts {
@@ -190,7 +198,8 @@ impl Tracer {
     ///
     /// >>> tracer.counts([[0.5, 0.5, 3], [2, 2, 3]], [[0, 0, -1], [0, 0, -1]])
     /// array([1, 0], dtype=uint32)
-    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, invalid = "error"))]
+    #[pyo3(signature = (origins, directions, t_min = None, t_max = None, *, invalid = "error", progress = None))]
+    #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
     fn counts<'py>(
         &self,
         origins: &Bound<'py, PyAny>,
@@ -198,15 +207,14 @@ impl Tracer {
         t_min: Option<&Bound<'py, PyAny>>,
         t_max: Option<&Bound<'py, PyAny>>,
         invalid: &str,
+        progress: Option<Py<PyAny>>,
     ) -> PyResult<Column<'py, u32>> {
         let py = origins.py();
         let arrays = RayArrays::read(origins, directions, t_min, t_max, invalid)?;
         let source = arrays.source(self.place)?;
-        let counts = traced(py, || {
-            answers(source.rays, 0, |batch, counts| {
-                self.wide.all_hits_of(&batch_of(source, batch)?.rays, &mut Vec::new(), counts);
-                Ok(())
-            })
+        let counts = answers(py, progress, source.rays, FEW, |batch, counts| {
+            self.wide.all_hits_of(&source.batch(batch, FEW)?.rays, &mut Vec::new(), counts);
+            Ok(())
         })?;
         Ok(counts.into_pyarray(py))
     }
@@ -234,16 +242,20 @@ impl Tracer {
     ///
     /// >>> tracer.contains([[0.5, 0.5, 1]])
     /// array([False])
-    #[pyo3(signature = (points, *, by = "auto"))]
-    fn contains<'py>(&self, points: &Bound<'py, PyAny>, by: &str) -> PyResult<Column<'py, bool>> {
+    #[pyo3(signature = (points, *, by = "auto", progress = None))]
+    fn contains<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        by: &str,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Column<'py, bool>> {
         let py = points.py();
         let rule = rule(by)?;
         let points = self::points(points, self.place.as_ref())?;
         let solid = self.solid(py)?;
-        let inside = detached(py, || {
-            of_points(&points, false, |points, inside| {
-                solid.contains(&self.wide, points, rule, inside);
-            })
+        let inside = answers(py, progress, points.len(), FEW, |part, inside| {
+            solid.contains(&self.wide, &points[part * FEW..][..inside.len()], rule, inside);
+            Ok(())
         })?;
         Ok(inside.into_pyarray(py))
     }
@@ -255,30 +267,45 @@ impl Tracer {
     ///
     /// >>> tracer.closest([[0.5, 0.25, 2]])
     /// (array([[0.5 , 0.25, 0.  ]]), array([0], dtype=int32), array([2.]))
+    #[pyo3(signature = (points, *, progress = None))]
     fn closest<'py>(
         &self,
         points: &Bound<'py, PyAny>,
+        progress: Option<Py<PyAny>>,
     ) -> PyResult<(Rows<'py, f64>, Column<'py, i32>, Column<'py, f64>)> {
         let py = points.py();
         let points = self::points(points, self.place.as_ref())?;
         let center = self.place.map_or(DVec3::ZERO, |place| place.center);
-        let (closest, objects, distances) = detached(py, || {
-            let closest = of_points(&points, None, |points, closest| {
-                self.wide.closest_points(points, closest)
-            });
-            let mut positions = Vec::with_capacity(3 * points.len());
-            let mut objects = Vec::with_capacity(points.len());
-            let mut distances = Vec::with_capacity(points.len());
-            for closest in closest {
-                let position = closest.map_or(DVec3::NAN, |closest| closest.point + center);
-                positions.extend(position.to_array());
-                objects.push(closest.map_or(-1, |closest| closest.object as i32));
-                distances.push(closest.map_or(f64::INFINITY, |closest| closest.distance));
-            }
-            (positions, objects, distances)
-        })?;
-        let closest = closest.into_pyarray(py).reshape([points.len(), 3])?;
-        Ok((closest, objects.into_pyarray(py), distances.into_pyarray(py)))
+        let answer = |query: &Query| {
+            let mut positions = vec![0.0; 3 * points.len()];
+            let mut objects = vec![0; points.len()];
+            let mut distances = vec![0.0; points.len()];
+            let parts = (
+                positions.par_chunks_mut(3 * FEW),
+                objects.par_chunks_mut(FEW),
+                distances.par_chunks_mut(FEW),
+                points.par_chunks(FEW),
+            );
+            query.answer(parts.into_par_iter(), |_, (positions, objects, distances, points)| {
+                let mut closest = [None; FEW];
+                let closest = &mut closest[..points.len()];
+                self.wide.closest_points(points, closest);
+                let positions = positions.as_chunks_mut().0;
+                for (((closest, position), object), distance) in
+                    closest.iter().zip(positions).zip(objects).zip(distances)
+                {
+                    *position = closest.map_or(DVec3::NAN, |at| at.point + center).to_array();
+                    *object = closest.map_or(-1, |at| at.object as i32);
+                    *distance = closest.map_or(f64::INFINITY, |at| at.distance);
+                }
+                Ok(())
+            })?;
+            Ok((positions, objects, distances))
+        };
+        let (positions, objects, distances) =
+            Query::ask(py, progress, points.len().div_ceil(FEW), answer)?;
+        let positions = positions.into_pyarray(py).reshape([points.len(), 3])?;
+        Ok((positions, objects.into_pyarray(py), distances.into_pyarray(py)))
     }
 
     /// Returns the distance of each point, `(m, 3)`, from the triangles, negative for points that
@@ -286,20 +313,21 @@ impl Tracer {
     ///
     /// >>> tracer.signed_distance([[0.5, 0.25, 2]])
     /// array([2.])
-    #[pyo3(signature = (points, *, by = "auto"))]
+    #[pyo3(signature = (points, *, by = "auto", progress = None))]
     fn signed_distance<'py>(
         &self,
         points: &Bound<'py, PyAny>,
         by: &str,
+        progress: Option<Py<PyAny>>,
     ) -> PyResult<Column<'py, f64>> {
         let py = points.py();
         let rule = rule(by)?;
         let points = self::points(points, self.place.as_ref())?;
         let solid = self.solid(py)?;
-        let distances = detached(py, || {
-            of_points(&points, 0.0, |points, distances| {
-                solid.signed_distances(&self.wide, points, rule, distances);
-            })
+        let distances = answers(py, progress, points.len(), FEW, |part, distances| {
+            let points = &points[part * FEW..][..distances.len()];
+            solid.signed_distances(&self.wide, points, rule, distances);
+            Ok(())
         })?;
         Ok(distances.into_pyarray(py))
     }
@@ -330,29 +358,45 @@ impl Tracer {
                 format!("triangle: accepted: an index below {} per ray, or -1", triangles.len());
             return Err(invalid(message));
         }
-        let surfaces = traced(py, || {
-            answers(source.rays, ([0.0; 2], [0.0; 3]), |batch, surfaces| {
-                let rays = batch_of(source, batch)?.rays;
-                for ((ray, &index), surface) in
-                    rays.iter().zip(&indices[batch * BATCH..]).zip(surfaces)
+        let (u, v, normals) = Query::ask(py, None, source.rays.div_ceil(BATCH), |query| {
+            let mut u = vec![0.0; source.rays];
+            let mut v = vec![0.0; source.rays];
+            let mut normals = vec![0.0; 3 * source.rays];
+            let parts = (
+                u.par_chunks_mut(BATCH),
+                v.par_chunks_mut(BATCH),
+                normals.par_chunks_mut(3 * BATCH),
+                indices.par_chunks(BATCH),
+            );
+            query.answer(parts.into_par_iter(), |batch, (u, v, normals, indices)| {
+                let rays = source.batch(batch, BATCH)?.rays;
+                let normals = normals.as_chunks_mut().0;
+                for ((((ray, &index), u), v), normal) in
+                    rays.iter().zip(indices).zip(u).zip(v).zip(normals)
                 {
                     if let Some(triangle) = triangles.get(index as usize) {
-                        let [_, u, v] = triangle.barycentrics(ray).unwrap_or_default();
-                        *surface = ([u, v], triangle.normal().unwrap_or_default().to_array());
+                        [_, *u, *v] = triangle.barycentrics(ray).unwrap_or_default();
+                        *normal = triangle.normal().unwrap_or_default().to_array();
                     }
                 }
                 Ok(())
-            })
+            })?;
+            Ok((u, v, normals))
         })?;
-        let u: Vec<f64> = surfaces.iter().map(|([u, _], _)| *u).collect();
-        let v: Vec<f64> = surfaces.iter().map(|([_, v], _)| *v).collect();
-        let normals: Vec<f32> = surfaces.iter().flat_map(|(_, normal)| *normal).collect();
         let normals = normals.into_pyarray(py).reshape([source.rays, 3])?;
         Ok((u.into_pyarray(py), v.into_pyarray(py), normals))
     }
 
     fn __len__(&self) -> usize {
         self.source.objects()
+    }
+
+    fn __repr__(&self) -> String {
+        let triangles = self.source.objects();
+        match self.place {
+            Some(place) => format!("<Tracer of {triangles} triangles at {}>", place.center),
+            None => format!("<Tracer of {triangles} triangles>"),
+        }
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, State)> {
@@ -411,38 +455,17 @@ fn rule(by: &str) -> PyResult<InsideRule> {
     }
 }
 
-/// Calls a function on all threads, and turns the fault of a ray into an error.
-fn traced<T: Send>(py: Python, function: impl FnOnce() -> Result<T, String> + Send) -> PyResult<T> {
-    detached(py, function)?.map_err(invalid)
-}
-
-fn batch_of(source: RaySource, batch: usize) -> Result<Batch, String> {
-    let first = batch * BATCH;
-    source.batch(first..(first + BATCH).min(source.rays))
-}
-
-/// Returns one answer per ray; `answer` writes the answers of a batch.
-fn answers<T: Clone + Send + Sync>(
-    rays: usize,
-    filler: T,
+/// Returns one answer per ray or point; `answer` writes the answers of a part of them, by its number.
+fn answers<T: Clone + Default + Send + Sync>(
+    py: Python,
+    progress: Option<Py<PyAny>>,
+    count: usize,
+    part: usize,
     answer: impl Fn(usize, &mut [T]) -> Result<(), String> + Sync,
-) -> Result<Vec<T>, String> {
-    let mut answers = vec![filler; rays];
-    answers
-        .par_chunks_mut(BATCH)
-        .enumerate()
-        .try_for_each(|(batch, answers)| answer(batch, answers))?;
-    Ok(answers)
-}
-
-/// Returns one answer per point; `answer` writes the answers of some points.
-fn of_points<T: Clone + Send + Sync>(
-    points: &[Vec3],
-    filler: T,
-    answer: impl Fn(&[Vec3], &mut [T]) + Sync,
-) -> Vec<T> {
-    let mut answers = vec![filler; points.len()];
-    let parts = points.par_chunks(BATCH).zip(answers.par_chunks_mut(BATCH));
-    parts.for_each(|(points, answers)| answer(points, answers));
-    answers
+) -> PyResult<Vec<T>> {
+    Query::ask(py, progress, count.div_ceil(part), |query| {
+        let mut answers = vec![T::default(); count];
+        query.answer(answers.par_chunks_mut(part), &answer)?;
+        Ok(answers)
+    })
 }

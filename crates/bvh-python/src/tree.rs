@@ -148,7 +148,8 @@ impl Tree {
         found(boxes.py(), "boxes", self::boxes(boxes)?, &options, limits)
     }
 
-    /// Loads the tree in a file. The triangles or boxes must be the ones that it was saved for.
+    /// Loads the tree in a file. The mesh, triangles or boxes must be the ones that it was saved for.
+    /// With `vertices` and `faces`, `update` moves the vertices later.
     ///
     /// >>> import tempfile
     /// >>> folder = tempfile.TemporaryDirectory()
@@ -156,24 +157,35 @@ impl Tree {
     /// >>> Tree.load(folder.name + "/scene.bvh", triangles=[[[0, 0, 0], [1, 0, 0], [0, 1, 0]]])
     /// <Tree of 1 nodes over 1 objects>
     #[staticmethod]
-    #[pyo3(signature = (path, *, triangles = None, boxes = None))]
+    #[pyo3(signature = (path, *, triangles = None, boxes = None, vertices = None, faces = None))]
     fn load(
         py: Python,
         path: PathBuf,
         triangles: Option<&Bound<PyAny>>,
         boxes: Option<&Bound<PyAny>>,
+        vertices: Option<&Bound<PyAny>>,
+        faces: Option<&Bound<PyAny>>,
     ) -> PyResult<Self> {
-        let objects = match (triangles, boxes) {
-            (Some(triangles), None) => self::triangles(triangles)?,
-            (None, Some(boxes)) => self::boxes(boxes)?,
+        let mut corners = None;
+        let objects = match (triangles, boxes, vertices, faces) {
+            (Some(triangles), None, None, None) => self::triangles(triangles)?,
+            (None, Some(boxes), None, None) => self::boxes(boxes)?,
+            (None, None, Some(vertices), Some(faces)) => {
+                let (triangles, faces) = mesh(MESH, vertices, faces)?;
+                corners = Some(Arc::new(faces));
+                shapes(triangles)
+            }
             _ => {
-                return Err(invalid("a tree is over triangles or boxes; accepted: one of the two"));
+                let accepted = "one of triangles, boxes, and vertices with faces";
+                return Err(invalid(format!(
+                    "a tree is over triangles or boxes; accepted: {accepted}"
+                )));
             }
         };
         let bytes = tree_file::read(&path).map_err(read_error)?;
-        detached(py, || OwnedTree::load(objects, &bytes))?
-            .map(Self::new)
-            .map_err(|error| invalid_argument("path", error))
+        let loaded = detached(py, || OwnedTree::load(objects, &bytes))?;
+        let owned = loaded.map_err(|error| invalid_argument("path", error))?;
+        Ok(Self { faces: corners, ..Self::new(owned) })
     }
 
     /// Writes the tree to a file. An existing file is replaced when the new one is complete; a
@@ -225,14 +237,15 @@ impl Tree {
         raised
     }
 
-    /// Moves the vertices, `(v, 3)`, of a tree from `from_mesh`. The nodes remain and their boxes
+    /// Moves the vertices, `(v, 3)`, of a tree from `from_mesh` or `load`. The nodes remain and their boxes
     /// become tight, in milliseconds; `improve` may find better nodes. Tracers of the tree do not
     /// change.
     ///
     /// >>> mesh.update([[0, 0, 1], [1, 0, 1], [0, 1, 1]])
     fn update(&self, vertices: &Bound<PyAny>) -> PyResult<()> {
         let Some(faces) = &self.faces else {
-            return Err(invalid("the tree has no faces; accepted: a tree from Tree.from_mesh"));
+            let accepted = "a tree of vertices and faces, from Tree.from_mesh or Tree.load";
+            return Err(invalid(format!("the tree has no faces; accepted: {accepted}")));
         };
         let objects = moved_mesh(vertices, faces)?;
         let _improving = self.improver.begin()?;

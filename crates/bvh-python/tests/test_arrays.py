@@ -68,8 +68,8 @@ def of_trimesh(name):
 
 def loaded(tmp_path_factory, **arrays):
     path = tmp_path_factory.mktemp("trees") / "tree.bvh"
-    make = Tree.from_boxes if "boxes" in arrays else Tree.from_triangles
-    make(next(iter(arrays.values())).copy(order="C"), work=1000).save(path)
+    make = {"boxes": Tree.from_boxes, "triangles": Tree.from_triangles, "vertices": Tree.from_mesh}[next(iter(arrays))]
+    make(*[array.copy(order="C") for array in arrays.values()], work=1000).save(path)
     return Tree.load(path, **arrays).nodes()
 
 
@@ -80,6 +80,7 @@ CALLS = {
     "Tree.from_boxes": (trees(Tree.from_boxes), {"boxes": BOXES, "rays": SEGMENTS}),
     "Tree.load": (loaded, {"triangles": TRIANGLES}),
     "Tree.load of boxes": (loaded, {"boxes": BOXES}),
+    "Tree.load of a mesh": (loaded, {"vertices": VERTICES, "faces": FACES}),
     "Tree.update": (updated, {"vertices": VERTICES}),
     **{f"Tracer.{name}": (getattr(Tracer(TREE), name), RAYS | LIMITS) for name in ("nearest", "any", "all", "counts")},
     "Tracer.surface": (Tracer(TREE).surface, RAYS | {"triangle": RANDOM.integers(-1, 20, COUNT)}),

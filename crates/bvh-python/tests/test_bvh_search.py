@@ -230,8 +230,8 @@ def test_errors_name_the_argument(call, message):
     ("rays", "message"),
     [
         (([[0, 0]], [[0, 0, 1]]), r"origins has shape \(1, 2\); accepted: \(m, 3\)"),
-        (([[0, 0, 0]], [[0, 0, 1]] * 2), r"directions has shape \(2, 3\); accepted: \(1, 3\), as origins"),
-        (([[0, 0, 0]] * 2, [[0, 0, 1]] * 2, [0]), r"t_min has shape \(1\); accepted: a number or \(2,\), as origins"),
+        (([[0, 0, 0]] * 3, [[0, 0, 1]] * 2), r"directions has shape \(2, 3\); accepted: \(3, 3\), as origins, or \(3,\)"),
+        (([[0, 0, 0]] * 2, [[0, 0, 1]] * 2, [0]), r"t_min has shape \(1,\); accepted: a number or \(2,\), as origins"),
         (([[0, 0, 0]] * 2, [[0, 0, 1], [0, 0, 0]]), "ray 1: the ray's direction"),
     ],
 )

@@ -1,11 +1,14 @@
 """Tests all hits, points, copies and the classes for users of trimesh and Open3D."""
 
+import ast
 import copy
 import doctest
 import importlib
 import importlib.util
 import inspect
+import os
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -228,7 +231,7 @@ def test_trees_and_tracers_are_copied_and_pickled():
     assert twin.cost() == pytest.approx(4 * tree.cost())
     for tracer, t in [(tracer, 1), (pickle.loads(pickle.dumps(tracer)), 1), (Tracer(twin), 2)]:
         assert tracer.nearest([[0, 0, 0]], [[1, 0.1, 0.2]])[0].tolist() == [t]
-    with pytest.raises(ValueError, match="accepted: a tree from Tree.from_mesh"):
+    with pytest.raises(ValueError, match="accepted: a tree of vertices and faces"):
         Tree.from_boxes([[0, 0, 0, 1, 1, 1]], work=9).update(vertices)
     with pytest.raises(ValueError, match="faces: face 1 names vertex -1"):
         Tree.from_mesh(vertices, [[0, 1, 2], [0, -1, 2]])
@@ -265,6 +268,31 @@ def test_copies_keep_the_faces_and_move_alone():
         # A tracer and its copies remain at the old places.
         for old in (tracer, copy.copy(tracer), copy.deepcopy(tracer), Tracer(tree)):
             assert old.nearest(*inside)[0].tolist() == [1]
+
+
+def test_a_loaded_tree_of_a_mesh_moves(tmp_path):
+    vertices, faces = box()
+    Tree.from_mesh(vertices, faces, work=1000).save(tmp_path / "box.bvh")
+    tree = Tree.load(tmp_path / "box.bvh", vertices=vertices, faces=faces)
+    tree.update(vertices + [0, 0, 7])
+    tracer = Tracer(tree)
+    assert tracer.nearest([0.1, 0.2, 0], [0, 0, 1])[0].tolist() == [6]
+    assert repr(tracer) == "<Tracer of 12 triangles>"
+    assert repr(Tracer(tree, center=[1, 2, 3.5])) == "<Tracer of 12 triangles at [1, 2, 3.5]>"
+
+
+@pytest.mark.parametrize("center", [None, [0, 0, 0.5]])
+@pytest.mark.parametrize("kind", ["f4", "f8"])
+def test_one_origin_or_direction_is_for_all_rays(center, kind):
+    tracer = Tracer(Tree.from_mesh(*box(), work=1000), center=center)
+    many = RANDOM.uniform(-0.9, 0.9, (3000, 3)).astype(kind)
+    one = np.array([3, 0.1, 0.2], kind)
+    for name in ("nearest", "any", "all", "counts"):
+        ask = getattr(tracer, name)
+        for all_of_one in (one, one[None]):
+            for rays, whole in [((all_of_one, many), (np.tile(one, (3000, 1)), many)), ((many, all_of_one), (many, np.tile(one, (3000, 1))))]:
+                np.testing.assert_equal(ask(*rays), ask(*whole))
+    assert tracer.any(one, np.empty((0, 3))).shape == (0,)
 
 
 def test_a_search_follows_seed_work_rays_and_progress():
@@ -321,6 +349,98 @@ def test_a_scene_has_open3ds_answers():
         np.testing.assert_allclose(a + u * (b - a) + v * (c - a), point, atol=1e-6)
 
 
+class Tensor:
+    """The parts of Open3D's tensors that matter here."""
+
+    def __init__(self, array):
+        self.array = np.array(array)
+
+    def __dlpack__(self, **options):
+        return self.array.__dlpack__(**options)
+
+    def __dlpack_device__(self):
+        return self.array.__dlpack_device__()
+
+    @staticmethod
+    def from_numpy(array):
+        return Tensor(array)
+
+    def numpy(self):
+        return self.array
+
+    def __len__(self):
+        return len(self.array)
+
+    def __getitem__(self, index):
+        raise AssertionError("nobody reads a tensor number by number")
+
+
+class NoTensor:
+    def __init__(self, **attributes):
+        self.__dict__.update(attributes)
+
+
+def test_a_scene_takes_and_answers_open3ds_meshes_and_tensors():
+    vertices, faces = box()
+    tensors = NoTensor(vertex={"positions": Tensor(vertices)}, triangle={"indices": Tensor(faces)})
+    legacy = NoTensor(vertices=vertices, triangles=faces)
+    rays, points = np.array([[3, 0.1, 0.2, -1, 0, 0]], "f4"), np.array([[0, 0, 0.5]], "f4")
+    for mesh in ((tensors,), (legacy,), (Tensor(vertices), Tensor(faces))):
+        scene = RaycastingScene(seconds=0)
+        assert scene.add_triangles(*mesh) == 0
+        for name, question in [
+            *[(name, rays) for name in ("cast_rays", "test_occlusions", "count_intersections", "list_intersections")],
+            *[(f"compute_{name}", points) for name in ("closest_points", "distance", "signed_distance", "occupancy")],
+        ]:
+            arrays, answers = getattr(scene, name)(question), getattr(scene, name)(Tensor(question))
+            if not isinstance(arrays, dict):
+                arrays, answers = {"": arrays}, {"": answers}
+            for key, array in arrays.items():
+                assert type(answers[key]) is Tensor and type(array.cpu().numpy()) is np.ndarray
+                assert isinstance(array, np.ndarray) and array.isfinite().all()
+                np.testing.assert_array_equal(answers[key].numpy(), array)
+    camera = RaycastingScene.create_rays_pinhole(Tensor(np.eye(3)), Tensor(np.eye(4)), 2, 3)
+    assert type(camera) is Tensor and camera.numpy().shape == (3, 2, 6)
+    assert Tracer(Tree.from_mesh(vertices, faces, 0)).any(Tensor(rays[:, :3]), Tensor(rays[:, 3:])).tolist() == [True]
+
+
+def test_a_scene_answers_like_open3d():
+    o3d = pytest.importorskip("open3d", exc_type=ImportError)
+    mesh = o3d.t.geometry.TriangleMesh.create_sphere(1.0, 12)
+    theirs, ours = o3d.t.geometry.RaycastingScene(), RaycastingScene(seconds=0)
+    for place in (0.0, 3.0):
+        moved = mesh.clone().translate([place, 0, 0])
+        assert ours.add_triangles(moved) == theirs.add_triangles(moved)
+    assert ours.add_triangles(mesh.to_legacy()) == 2
+    ours = RaycastingScene(seconds=0)
+    for place in (0.0, 3.0):
+        ours.add_triangles(mesh.clone().translate([place, 0, 0]))
+    origins = RANDOM.uniform(-3, 3, (40, 50, 3)).astype("f4")
+    rays = o3d.core.Tensor(np.concatenate([origins, [1, 0, 0] - origins + 0.3 * RANDOM.normal(size=origins.shape)], 2).astype("f4"))
+    hits, same = ours.cast_rays(rays), theirs.cast_rays(rays)
+    assert set(hits) == set(same)
+    for name, answer in hits.items():
+        assert (type(answer), answer.dtype, answer.shape) == (type(same[name]), same[name].dtype, same[name].shape)
+    # A few rays meet an edge, where Open3D may name either face.
+    assert (hits["primitive_ids"] == same["primitive_ids"]).numpy().mean() > 0.99
+    assert (hits["geometry_ids"] == same["geometry_ids"]).numpy().mean() > 0.99
+    hit = hits["t_hit"].isfinite()
+    np.testing.assert_allclose(hits["t_hit"][hit].numpy(), same["t_hit"][hit].numpy(), rtol=1e-3)
+    points = o3d.core.Tensor(origins)
+    for name in ("compute_distance", "compute_signed_distance", "compute_occupancy"):
+        answer, expected = getattr(ours, name)(points), getattr(theirs, name)(points)
+        assert (type(answer), answer.dtype, answer.shape) == (type(expected), expected.dtype, expected.shape)
+        np.testing.assert_allclose(answer.numpy(), expected.numpy(), atol=1e-4)
+    for name in ("test_occlusions", "count_intersections"):
+        answer, expected = getattr(ours, name)(rays), getattr(theirs, name)(rays)
+        assert (answer.dtype, answer.shape) == (expected.dtype, expected.shape)
+        assert (answer == expected).numpy().mean() > 0.98
+    every, expected = ours.list_intersections(rays), theirs.list_intersections(rays)
+    assert {name: answer.dtype for name, answer in every.items()} == {name: expected[name].dtype for name in every}
+    cloud = rays.reshape((-1, 6)).numpy()[:, :3]
+    assert o3d.t.geometry.PointCloud(ours.compute_closest_points(cloud)["points"]).point.positions.shape == (2000, 3)
+
+
 def test_a_scene_far_from_zero_keeps_the_precision_of_its_coordinates():
     vertices, faces = box()
     offset = np.array([4.5e5, 5.4e6, 100])
@@ -352,6 +472,36 @@ def test_a_pinhole_camera_has_open3ds_rays():
     rays = RaycastingScene.create_rays_pinhole(**view)
     np.testing.assert_allclose(rays[0], [[0, 0, 5, -2 / 3, 0, 1], [0, 0, 5, 0, 0, 1], [0, 0, 5, 2 / 3, 0, 1]], atol=1e-15)
     np.testing.assert_array_equal(RaycastingScene.create_rays_pinhole(*view.values()), rays)
+
+
+def test_the_stub_has_the_documentation_of_the_module():
+    """UPDATE_STUB=1 writes it."""
+    path = Path(bvh_search.__file__).with_name("_bvh_search.pyi")
+    module = importlib.import_module("bvh_search._bvh_search")
+    lines, stale = path.read_text().splitlines(), []
+    parts = [(node, module) for node in ast.parse(path.read_text()).body]
+    parts += [(child, getattr(module, node.name)) for node, _ in parts if isinstance(node, ast.ClassDef) for child in node.body]
+    # From the end, so that the numbers of earlier lines remain.
+    for node, parent in sorted(parts, key=lambda part: -part[0].lineno):
+        if not isinstance(node, (ast.ClassDef, ast.FunctionDef)) or node.name.startswith("_"):
+            continue
+        documentation = inspect.getdoc(getattr(parent, node.name))
+        if ast.get_docstring(node) == documentation:
+            continue
+        stale.append(node.name)
+        body, indent = node.body[0], " " * (node.col_offset + 4)
+        written = [(indent + line).rstrip() for line in f'"""{documentation}\n"""'.splitlines()]
+        first = min([body.lineno, *[decorator.lineno for decorator in getattr(body, "decorator_list", [])]])
+        if ast.get_docstring(node):
+            lines[body.lineno - 1 : body.end_lineno] = written
+        elif isinstance(node, ast.ClassDef):
+            lines[first - 1 : first - 1] = [*written, ""]
+        else:
+            lines[first - 1 : first] = [lines[first - 1][: body.col_offset].rstrip(), *written]
+    if os.environ.get("UPDATE_STUB"):
+        path.write_text("\n".join(lines) + "\n")
+    else:
+        assert stale == [], "UPDATE_STUB=1 writes the stub"
 
 
 def test_every_public_function_has_an_example_and_all_examples_run():

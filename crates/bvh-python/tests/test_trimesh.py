@@ -2,6 +2,8 @@
 
 import copy
 import pickle
+import subprocess
+import sys
 from fractions import Fraction
 
 import numpy as np
@@ -133,3 +135,23 @@ def test_an_engine_follows_its_mesh_and_is_copied():
         assert twin.intersects_any(above, down).tolist() == [True]
     assert mesh.ray.intersects_first([[0, 0, 5]] * 2, [[0, 0, 0], [np.nan, 0, 1]]).tolist() == [-1, -1]
     assert mesh.ray.intersects_first(np.empty((0, 3)), np.empty((0, 3))).shape == (0,)
+
+
+MANY_MESHES = """
+import gc, trimesh, weakref
+from bvh_search.trimesh import RayMeshIntersector
+# The collector itself would not run here.
+gc.set_threshold(1_000_000)
+sphere, engines = trimesh.creation.icosphere(subdivisions=5), []
+for _ in range(100):
+    mesh = trimesh.Trimesh(sphere.vertices, sphere.faces, process=False)
+    mesh.ray = RayMeshIntersector(mesh, seconds=0)
+    mesh.ray.intersects_any([[0, 0, 5]], [[0, 0, -1]])
+    engines.append(weakref.ref(mesh.ray))
+print(sum(engine() is not None for engine in engines) * len(sphere.faces))
+"""
+
+
+def test_meshes_that_nobody_uses_are_freed_before_they_fill_the_memory():
+    ended = subprocess.run([sys.executable, "-c", MANY_MESHES], capture_output=True, text=True, check=True)
+    assert int(ended.stdout) <= 1_100_000

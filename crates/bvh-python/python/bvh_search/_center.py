@@ -1,6 +1,7 @@
 """The move of far coordinates to zero, because trees have `float32` coordinates."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 # Coordinates this many times as large as the extent of their points are far.
 _FAR = 16.0
@@ -8,17 +9,18 @@ _FAR = 16.0
 _ROUNDING = 1e-3
 
 
-def center_of(points):
+def center_of(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Returns the middle of far points, and zero for other points."""
     points = points.reshape((-1, 3))
     if len(points) == 0:
         return np.zeros(3)
     low, high = points.min(axis=0), points.max(axis=0)
     is_far = np.abs([low, high]).max() > _FAR * (high - low).max()
-    return (low + high) / 2 if is_far else np.zeros(3)
+    center: NDArray[np.float64] = (low + high) / 2
+    return center if is_far else np.zeros(3)
 
 
-def check_rounding(name, points):
+def check_rounding(name: str, points: NDArray[np.float64]) -> None:
     """Raises a `ValueError` if `float32` is too coarse for the shape of the points."""
     points = points.reshape((-1, 3))
     if len(points) == 0:

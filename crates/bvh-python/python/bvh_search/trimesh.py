@@ -8,12 +8,43 @@
 array([ True])
 """
 
+import gc
+from typing import Any, Protocol
+
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ._bvh_search import Tracer, Tree, locations
 from ._center import center_of
+from ._numbers import Progress
 
 __all__ = ["RayMeshIntersector"]
+
+# The number of faces after which Python's collector is called: some 300 MB with their trees.
+_COLLECTED = 1_000_000
+_faces_since_collection = 0
+
+
+def _collect(faces: int) -> None:
+    """Frees the meshes that nobody uses any more.
+
+    A mesh of trimesh is a cycle of references, and keeps itself, its engine and its tree in memory
+    until Python's collector runs. That waits for hundreds of new objects, of whatever size.
+    """
+    global _faces_since_collection
+    _faces_since_collection += faces
+    if _faces_since_collection >= _COLLECTED and gc.isenabled():
+        _faces_since_collection = faces
+        gc.collect()
+
+
+class _Mesh(Protocol):
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def faces(self) -> Any: ...
+    @property
+    def triangles(self) -> Any: ...
 
 
 class RayMeshIntersector:
@@ -22,21 +53,24 @@ class RayMeshIntersector:
     All hits of a ray count each crossing of the surface once, also through edges and corners. Rays
     whose direction is zero or not finite hit nothing. Rays may begin far away: they are advanced to
     the mesh in `float64`, and locations are in `float64`. The tree is found at the first query, in about
-    `seconds`, and again after the mesh has changed.
+    `seconds`, and again after the mesh has changed. Ctrl-C ends every query, and
+    `progress(seconds, fraction)` follows it as it does those of `Tracer`.
     """
 
-    def __init__(self, geometry, scale_to_box=True, seconds=None):
+    def __init__(self, geometry: _Mesh, scale_to_box: bool = True, seconds: float | None = None) -> None:
         """`scale_to_box` is accepted for compatibility: answers do not depend on the scale. The default
         of `seconds` is a microsecond per face, up to one second."""
         self.mesh = geometry
         self._scale_to_box = scale_to_box
         self._seconds = seconds
-        self._made = None
+        self._made: tuple[int, Tracer] | None = None
 
-    def _tracer(self):
+    def _tracer(self) -> Tracer:
         """Returns the tracer of the mesh as it is."""
         state = hash(self.mesh)
         if self._made is None or self._made[0] != state:
+            # The old tracer need not be in memory any longer.
+            self._made = None
             vertices = np.asarray(self.mesh.vertices, dtype=np.float64)
             faces = np.asarray(self.mesh.faces, dtype=np.int64).reshape((-1, 3))
             seconds = self._seconds
@@ -45,12 +79,15 @@ class RayMeshIntersector:
             # A vertex that no face uses may be anywhere.
             is_used = np.isin(np.arange(len(vertices)), faces)
             center = center_of(vertices[is_used])
+            _collect(len(faces))
             tree = Tree.from_mesh(vertices - center, faces, seconds=seconds)
             self._made = state, Tracer(tree, center=center)
         return self._made[1]
 
     @staticmethod
-    def _rays(ray_origins, ray_directions):
+    def _rays(
+        ray_origins: ArrayLike, ray_directions: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         origins = np.ascontiguousarray(ray_origins, dtype=np.float64).view(np.ndarray)
         directions = np.ascontiguousarray(ray_directions, dtype=np.float64).view(np.ndarray)
         if origins.shape != directions.shape:
@@ -59,7 +96,9 @@ class RayMeshIntersector:
             return np.empty((0, 3)), np.empty((0, 3))
         return origins, directions
 
-    def intersects_location(self, ray_origins, ray_directions, multiple_hits=True, **kwargs):
+    def intersects_location(
+        self, ray_origins: ArrayLike, ray_directions: ArrayLike, multiple_hits: bool = True, **kwargs: Any
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
         """Returns the locations of hits, `(h, 3)`, and the indices of their rays and faces.
 
         >>> mesh.ray.intersects_location([[0.1, 0.2, 5]], [[0, 0, -1]])[0]
@@ -72,8 +111,15 @@ class RayMeshIntersector:
         return found, index_ray, index_tri
 
     def intersects_id(
-        self, ray_origins, ray_directions, multiple_hits=True, max_hits=100, return_locations=False
-    ):
+        self,
+        ray_origins: ArrayLike,
+        ray_directions: ArrayLike,
+        multiple_hits: bool = True,
+        max_hits: int = 100,
+        return_locations: bool = False,
+        *,
+        progress: Progress | None = None,
+    ) -> Any:
         """Returns the indices of the faces that are hit and of their rays, and with
         `return_locations` the locations. Hits are sorted by ray, then by distance.
 
@@ -82,14 +128,14 @@ class RayMeshIntersector:
         """
         rays = self._rays(ray_origins, ray_directions)
         if multiple_hits:
-            _, index_tri, index_ray = self._tracer().all(*rays, invalid="miss")
+            _, index_tri, index_ray = self._tracer().all(*rays, invalid="miss", progress=progress)
             # A ray has more hits if the hit so many places later is its own, too.
             if (index_ray[max_hits:] == index_ray[: max(len(index_ray) - max_hits, 0)]).any():
                 first = np.searchsorted(index_ray, index_ray)
                 kept = np.arange(len(index_ray)) - first < max_hits
                 index_tri, index_ray = index_tri[kept], index_ray[kept]
         else:
-            _, index_tri = self._tracer().nearest(*rays, invalid="miss")
+            _, index_tri = self._tracer().nearest(*rays, invalid="miss", progress=progress)
             index_ray = np.nonzero(index_tri >= 0)[0]
             index_tri = index_tri[index_ray]
         if not return_locations:
@@ -98,23 +144,31 @@ class RayMeshIntersector:
         found = locations(corners, *rays, index_tri, index_ray)
         return index_tri.astype(np.int64), index_ray, found
 
-    def intersects_first(self, ray_origins, ray_directions):
+    def intersects_first(
+        self, ray_origins: ArrayLike, ray_directions: ArrayLike, *, progress: Progress | None = None
+    ) -> NDArray[np.int32]:
         """Returns the index of the first face that each ray hits, or -1.
 
         >>> mesh.ray.intersects_first([[5, 5, 5]], [[0, 0, -1]])
         array([-1], dtype=int32)
         """
-        return self._tracer().nearest(*self._rays(ray_origins, ray_directions), invalid="miss")[1]
+        rays = self._rays(ray_origins, ray_directions)
+        return self._tracer().nearest(*rays, invalid="miss", progress=progress)[1]
 
-    def intersects_any(self, ray_origins, ray_directions):
+    def intersects_any(
+        self, ray_origins: ArrayLike, ray_directions: ArrayLike, *, progress: Progress | None = None
+    ) -> NDArray[np.bool_]:
         """Returns whether each ray hits the mesh.
 
         >>> mesh.ray.intersects_any([[5, 5, 5]], [[0, 0, -1]])
         array([False])
         """
-        return self._tracer().any(*self._rays(ray_origins, ray_directions), invalid="miss")
+        rays = self._rays(ray_origins, ray_directions)
+        return self._tracer().any(*rays, invalid="miss", progress=progress)
 
-    def contains_points(self, points):
+    def contains_points(
+        self, points: ArrayLike, *, progress: Progress | None = None
+    ) -> NDArray[np.bool_]:
         """Returns whether each point is inside the mesh, by `Tracer.contains`: also for meshes that
         overlap themselves, and by the generalised winding number for meshes with holes. Vertices and
         points are rounded to `float32`, next to the middle of a mesh that is far from zero.
@@ -122,16 +176,16 @@ class RayMeshIntersector:
         >>> mesh.ray.contains_points([[0, 0, 0.25], [0, 0, 1]])
         array([ True, False])
         """
-        points = np.ascontiguousarray(points, dtype=np.float64).view(np.ndarray)
-        if points.ndim != 2 or points.shape[1] != 3:
+        array = np.ascontiguousarray(points, dtype=np.float64).view(np.ndarray)
+        if array.ndim != 2 or array.shape[1] != 3:
             raise ValueError("points must be (n, 3)!")
-        return self._tracer().contains(points)
+        return self._tracer().contains(array, progress=progress)
 
-    def __getstate__(self):
+    def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_made": None}
 
-    def __copy__(self):
+    def __copy__(self) -> "RayMeshIntersector":
         return RayMeshIntersector(self.mesh, self._scale_to_box, self._seconds)
 
-    def __deepcopy__(self, memo):
+    def __deepcopy__(self, memo: Any) -> "RayMeshIntersector":
         return self.__copy__()
