@@ -110,7 +110,7 @@ CALLS = {
 
 # Parameters that are no arrays of numbers.
 OTHERS = {"self", "seconds", "references", "seed", "work", "progress", "path", "kind", "coherent", "invalid", "tracer"}
-OTHERS |= {"by", "nthreads", "nsamples", "args", "tnear", "tfar", "multiple_hits", "max_hits", "return_locations", "kwargs", "memo"}
+OTHERS |= {"by", "frame", "nthreads", "nsamples", "args", "tnear", "tfar", "multiple_hits", "max_hits", "return_locations", "kwargs", "memo"}
 
 
 def unaligned(array):
