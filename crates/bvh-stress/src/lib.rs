@@ -10,6 +10,8 @@
 //! - **P7**: every cost is finite and equals the tree's cost.
 //! - **P8**: every traversal tests at most twice as many boxes and objects as in real arithmetic,
 //!   except where boxes are smaller than 2⁻²⁰ of their distance from the ray's origin, as in S24.
+//! - **P9**: a bake costs at most 1.03 times the area, and rays at most 1.1 times the tests, of the
+//!   same scene as its author built it, however the scene stands and wherever it is.
 //!
 //! [`CASES`] lists the cases, some of which promise more about their own scene. A [`Case`] is
 //! checked by [`Case::cells`]. The checks themselves work on any tree: [`examine::check_outcome`] on

@@ -6,6 +6,7 @@ mod hard_rays;
 mod laws;
 mod never_worse;
 mod objectives;
+mod orientation;
 #[cfg(target_arch = "x86_64")]
 mod subnormals;
 mod suite;

@@ -15,6 +15,7 @@ use crate::rows::lock::wait_for_folder;
 use crate::rows::store::Store;
 use crate::rows::{BoundRow, ROUNDING, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
 use crate::run::resolved::{LoadedScene, Resolved};
+use crate::spec::turn::Turn;
 use bvh_core::cost::Objective;
 use bvh_search::exact;
 use std::fs;
@@ -35,7 +36,10 @@ pub(crate) fn update(
     revision: &str,
     store: &Store,
 ) -> Result<(), Error> {
-    let runs: Vec<RunRow> = read_if_any(store.folder())?;
+    let mut runs: Vec<RunRow> = read_if_any(store.folder())?;
+    // The trees of a scene are those with boxes along the axes of its file.
+    let frames = |label: &str| resolved.experiment.chooses_frame(label);
+    runs.retain(|run| Turn::parse(&run.scene).is_none() && !frames(&run.method));
     let bounds: Vec<BoundRow> = read_if_any(store.folder())?;
     let _lock = wait_for_folder(out)?;
     let path = out.join(BEST_KNOWN);

@@ -9,7 +9,7 @@ use crate::report::Report;
 use crate::rows;
 use bvh_config::OutOfRange;
 use bvh_scenes::subset;
-use bvh_search::{Budget, Method, best};
+use bvh_search::{Budget, Frames, Method, best};
 use std::collections::HashSet;
 
 /// The maximum number of runs of an experiment.
@@ -20,6 +20,7 @@ impl Experiment {
     pub(super) fn check_together(&self) -> Result<(), OutOfRange> {
         self.check_question()?;
         self.check_scenes()?;
+        self.check_frames()?;
         self.check_run_count()?;
         self.check_labels()?;
         let mut files: Vec<String> = rows::FILES.iter().map(|file| (*file).to_owned()).collect();
@@ -66,6 +67,33 @@ impl Experiment {
         Ok(())
     }
 
+    /// Rejects measurements that know of boxes along the file's axes only.
+    fn check_frames(&self) -> Result<(), OutOfRange> {
+        let has = |is_set: fn(&EntryOptions) -> bool| {
+            self.methods.iter().any(|labelled| is_set(&labelled.options))
+        };
+        let mut names = self.scenes.iter().chain(&self.optional_scenes);
+        let is_turned = |name: &String| name.contains(":turn:") || name.contains(":rotation:");
+        if !names.any(is_turned) && !has(|options| options.frame == Some(Frames::Auto)) {
+            return Ok(());
+        }
+        let along_file = [
+            ("lower_bound", self.lower_bound.is_some()),
+            ("render", self.render.is_some()),
+            ("tracing", self.tracing.is_some()),
+            ("ray_cost", self.ray_cost.is_some()),
+            ("judge", has(|options| options.judge.is_some())),
+            ("references", has(|options| options.references.is_some())),
+        ];
+        match along_file.into_iter().find(|(_, is_set)| *is_set) {
+            Some((key, _)) => {
+                let found = "set with a turned scene or a chosen frame";
+                Err(OutOfRange::new(key, found, "`rays` to measure trees in frames"))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// Checks that there is at least one run, and at most [`MOST_RUNS`].
     pub(crate) fn check_run_count(&self) -> Result<(), OutOfRange> {
         let scenes =
@@ -87,7 +115,8 @@ impl Experiment {
 
     fn check_method(&self, labelled: &Labelled) -> Result<(), OutOfRange> {
         let Labelled { method, options, .. } = labelled;
-        let EntryOptions { budget, keep, judge, for_rays, objective, references, .. } = options;
+        let EntryOptions { budget, keep, judge, for_rays, objective, references, frame, .. } =
+            options;
         let is_ours = matches!(method, Contestant::Ours(_));
         let is_best = matches!(method, Contestant::Ours(Method::Best(_)));
         let judged = Labelled::JUDGED;
@@ -100,6 +129,7 @@ impl Experiment {
             ("objective", objective.is_some(), is_ours, ours),
             ("for_rays", for_rays.is_some(), is_ours && method.name() != "median_cut", sized),
             ("references", references.is_some(), is_best, "with best"),
+            ("frame", frame.is_some(), is_ours, ours),
             ("judge", judge.is_some(), judged.contains(&method.name()), &with_judged),
         ];
         for (key, is_set, is_accepted, accepted) in restricted_keys {
