@@ -4,6 +4,7 @@ use bvh_core::Aabb;
 use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
+use std::num::NonZeroU32;
 
 /// A selection of a scene's objects, which the end of the scene's name specifies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,23 +73,30 @@ pub fn names(name: &str) -> u64 {
     // The first word is the scene, whose path may contain two dots.
     let ranges = name.split(':').skip(1).filter_map(range);
     ranges
-        .map(|(low, high)| (u64::from(high) + 1).saturating_sub(low.into()))
+        .map(|(low, high, step)| {
+            let step = u64::from(step.get());
+            (u64::from(high) + step).saturating_sub(low.into()) / step
+        })
         .fold(1, u64::saturating_mul)
 }
 
-fn range(word: &str) -> Option<(u32, u32)> {
+fn range(word: &str) -> Option<(u32, u32, NonZeroU32)> {
     let (low, high) = word.split_once("..")?;
-    Some((low.parse().ok()?, high.parse().ok()?))
+    let (high, step) = high.split_once('/').unwrap_or((high, "1"));
+    Some((low.parse().ok()?, high.parse().ok()?, step.parse().ok()?))
 }
 
-/// Replaces every `A..B` after a colon of `name` by A, A + 1, …, B. One line of a spec can thus
-/// name many subsets of a scene.
+/// Replaces every `A..B` after a colon of `name` by A, A + 1, …, B, and `A..B/STEP` by every number
+/// at a step from A. One line of a spec can thus name many subsets of a scene.
 pub fn expand(name: &str) -> Vec<String> {
     let mut words = name.split(':');
     let mut names = vec![words.next().unwrap_or_default().to_owned()];
     for word in words {
         let words: Vec<String> = match range(word) {
-            Some((low, high)) => (low..=high).map(|number| number.to_string()).collect(),
+            Some((low, high, step)) => {
+                let numbers = (low..=high).step_by(step.get() as usize);
+                numbers.map(|number| number.to_string()).collect()
+            }
             None => vec![word.to_owned()],
         };
         names = names
@@ -120,8 +128,12 @@ mod tests {
     fn ranges_are_expanded_from_left_to_right() {
         let expected = ["a:random:6:0", "a:random:6:1", "a:random:7:0", "a:random:7:1"];
         assert_eq!(expand("a:random:6..7:0..1"), expected);
+        assert_eq!(expand("a:0..9/4"), ["a:0", "a:4", "a:8"]);
+        assert_eq!(expand("a:0..9/0"), ["a:0..9/0"]);
         assert_eq!(expand("../x..y.obj"), ["../x..y.obj"]);
-        for name in ["a", "a:1..3", "a:random:6..7:0..1", "../x..y.obj", "a:3..1"] {
+        for name in
+            ["a", "a:1..3", "a:random:6..7:0..1", "../x..y.obj", "a:3..1", "a:0..9/3", "a:1..3/9"]
+        {
             assert_eq!(names(name), expand(name).len() as u64, "{name}");
         }
     }

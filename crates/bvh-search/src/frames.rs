@@ -60,6 +60,11 @@ const DOUBT: f64 = 1.0;
 
 /// Whether a bake of triangles chooses a [`Frame`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum Frames {
     /// The [`Choice`] of the triangles.
     #[default]

@@ -5,7 +5,7 @@ use crate::peers::Peer;
 use bvh_config::{Check, Keys, Nested, OutOfRange, fault};
 use bvh_core::cost::Objective;
 use bvh_scenes::rays::RandomRays;
-use bvh_search::{Budget, Method, Shortcut};
+use bvh_search::{Budget, Frames, Method, Shortcut};
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::Table;
 
@@ -90,6 +90,9 @@ bvh_config::config! { serde;
         /// Maximum number of references per object if the method may divide objects among leaves:
         /// for `best`. Default none: it may not.
         references: Option<f64>, in 1.0..=16.0;
+        /// Axes of the boxes: `auto` for those that the triangles choose, as `bvh bake` does, `file`
+        /// for the scene's. Default the scene's.
+        frame: Option<Frames>;
     }
 }
 

@@ -247,6 +247,17 @@ rows! {
         lower_bound: f64,
     }
 
+    /// One row of `turns.csv`: how a turned scene stands.
+    TurnRow in "turns.csv" {
+        scene: String,
+        /// The scene that is turned.
+        mesh: String,
+        /// The angle about the vertical; empty for a random rotation.
+        degrees: Option<u16>,
+        /// The seed of the random rotation.
+        rotation: Option<u64>,
+    }
+
     /// One row of `best_known.csv` and `references.csv`: what gaps are measured from. Trees are
     /// binary, with one object per leaf.
     ReferenceRow in "references.csv" {

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, HashSet};
 
 /// One run of an experiment.
+#[derive(Clone)]
 pub(crate) struct Job<'a> {
     /// The position of the run in the order of the spec.
     pub index: usize,

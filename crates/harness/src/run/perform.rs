@@ -9,13 +9,17 @@ use crate::rows::finished_run::FinishedRun;
 use crate::rows::store::Store;
 use crate::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, TrialRow};
 use crate::spec::Experiment;
+use crate::spec::turn::{in_chosen_frame, turn_of};
 use bvh_core::cost::{self, Measure, SahConstants};
-use bvh_core::{Bvh, validate_references};
+use bvh_core::{Bvh, validate, validate_references};
 use bvh_scenes::Scene;
 use bvh_scenes::rays::{Family, RandomRays, empirical_cost};
 use bvh_scenes::trace::Query;
-use bvh_search::{Event, Judge, Method, Observer, Outcome, Problem, Splits, StopReason, solve};
+use bvh_search::{
+    Event, Frames, Judge, Method, Observer, Outcome, Problem, Splits, StopReason, solve,
+};
 use indicatif::ProgressBar;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -74,9 +78,16 @@ pub(crate) fn perform(work: &Work, job: &Job) -> Result<Option<(FinishedRun, Bvh
     if watch.cancelled() {
         return Ok(None);
     }
-    let Job { scene, labelled, repetition, first_of_scene, .. } = *job;
+    let Job { labelled, repetition, first_of_scene, .. } = *job;
     let seed = job.seed(experiment);
     let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
+    let mut scene = Cow::Borrowed(job.scene);
+    if labelled.options.frame == Some(Frames::Auto) {
+        let framed = in_chosen_frame(&scene, experiment.budget_of(labelled), &stopwatch);
+        scene = Cow::Owned(framed?);
+    }
+    let scene = &*scene;
+    let job = &Job { scene, ..job.clone() };
     let result = match &labelled.method {
         Contestant::Ours(method) => search(experiment, job, method, seed, &stopwatch),
         Contestant::Peer(peer) => build(experiment, job, peer, seed, &stopwatch),
@@ -85,10 +96,15 @@ pub(crate) fn perform(work: &Work, job: &Job) -> Result<Option<(FinishedRun, Bvh
     if watch.cancelled() {
         return Ok(None);
     }
-    let (outcome, seconds) = result?;
+    let (mut outcome, seconds) = result?;
+    outcome.tree.frame = scene.frame;
     let tree = &outcome.tree;
     // A method's defect must not become a published number.
-    let valid = validate_references(tree, &scene.boxes, &scene.primitives);
+    let valid = match scene.frame {
+        // Nothing that divides objects is accepted with frames.
+        Some(_) => validate(tree, &scene.boxes),
+        None => validate_references(tree, &scene.boxes, &scene.primitives),
+    };
     valid.map_err(|source| Error::InvalidTree {
         scene: scene.name.clone(),
         method: labelled.label.clone(),
@@ -145,6 +161,7 @@ pub(crate) fn perform(work: &Work, job: &Job) -> Result<Option<(FinishedRun, Bvh
     finished.add(&rays)?;
     finished.add(&clock)?;
     finished.add(bounds.as_slice())?;
+    finished.add(turn_of(&scene.name).filter(|_| first_of_scene).as_slice())?;
     finished.add(&renders)?;
     finished.add(&render_times)?;
     Ok(Some((finished, outcome.tree)))
@@ -203,8 +220,9 @@ fn ray_row(
         Query::Nearest => "nearest",
         Query::All => "all",
     };
-    // Every method gets the same rays, so that methods differ only in their trees.
-    let ray_seed = experiment.seed_of(&scene.name, stream, 0);
+    let straight = turn_of(&scene.name).map_or(scene.name.clone(), |turn| turn.mesh);
+    // Every method gets the same rays, at all angles, so that methods differ only in their trees.
+    let ray_seed = experiment.seed_of(&straight, stream, 0);
     let cost = empirical_cost(config, &scene.primitives, tree, ray_seed);
     let [boxes_low, boxes_high] = cost.boxes.interval();
     RayRow {

@@ -35,6 +35,10 @@ pub(crate) fn update(
     revision: &str,
     store: &Store,
 ) -> Result<(), Error> {
+    // The boxes of best known trees lie along the axes of the scene's file.
+    if resolved.experiment.has_frames() {
+        return Ok(());
+    }
     let runs: Vec<RunRow> = read_if_any(store.folder())?;
     let bounds: Vec<BoundRow> = read_if_any(store.folder())?;
     let _lock = wait_for_folder(out)?;

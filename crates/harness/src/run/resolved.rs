@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::rows::store::is_unfinished;
-use crate::spec::Experiment;
+use crate::spec::{Experiment, turn};
 use bvh_scenes::files::read_text;
 use bvh_scenes::{Scene, subset};
 use serde::de::DeserializeOwned;
@@ -77,10 +77,10 @@ pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>),
         return Ok(Default::default());
     }
     let names = experiment.scenes.iter().flat_map(|name| subset::expand(name));
-    let mut scenes = names.map(|name| Scene::load(&name)).collect::<Result<Vec<_>, _>>()?;
+    let mut scenes = names.map(|name| turn::load(&name)).collect::<Result<Vec<_>, _>>()?;
     let mut skipped_scenes = Vec::new();
     for name in &experiment.optional_scenes {
-        match Scene::load(name) {
+        match turn::load(name) {
             Ok(scene) => scenes.push(scene),
             // An optional scene that cannot be loaded is one that nobody has fetched.
             Err(_) => skipped_scenes.push(name.clone()),

@@ -20,6 +20,7 @@ impl Experiment {
     pub(super) fn check_together(&self) -> Result<(), OutOfRange> {
         self.check_question()?;
         self.check_scenes()?;
+        self.check_frames()?;
         self.check_run_count()?;
         self.check_labels()?;
         let mut files: Vec<String> = rows::FILES.iter().map(|file| (*file).to_owned()).collect();
@@ -66,6 +67,25 @@ impl Experiment {
         Ok(())
     }
 
+    /// Rejects measurements that know of boxes along the file's axes only.
+    fn check_frames(&self) -> Result<(), OutOfRange> {
+        let is_other = |EntryOptions { judge, references, .. }: &EntryOptions| {
+            judge.is_some() || references.is_some()
+        };
+        let is_along_file = self.lower_bound.is_some()
+            || self.render.is_some()
+            || self.tracing.is_some()
+            || self.ray_cost.is_some()
+            || self.needs_references()
+            || self.methods.iter().any(|labelled| is_other(&labelled.options));
+        if !(is_along_file && self.has_frames()) {
+            return Ok(());
+        }
+        let found = "turned scenes or `frame` with lower_bound, render, tracing, ray_cost, judge, \
+                     references or gaps, which know no frames";
+        Err(OutOfRange::new("scenes, frame", found, "`rays` to measure trees in frames"))
+    }
+
     /// Checks that there is at least one run, and at most [`MOST_RUNS`].
     pub(crate) fn check_run_count(&self) -> Result<(), OutOfRange> {
         let scenes =
@@ -87,7 +107,8 @@ impl Experiment {
 
     fn check_method(&self, labelled: &Labelled) -> Result<(), OutOfRange> {
         let Labelled { method, options, .. } = labelled;
-        let EntryOptions { budget, keep, judge, for_rays, objective, references, .. } = options;
+        let EntryOptions { budget, keep, judge, for_rays, objective, references, frame, .. } =
+            options;
         let is_ours = matches!(method, Contestant::Ours(_));
         let is_best = matches!(method, Contestant::Ours(Method::Best(_)));
         let judged = Labelled::JUDGED;
@@ -100,6 +121,7 @@ impl Experiment {
             ("objective", objective.is_some(), is_ours, ours),
             ("for_rays", for_rays.is_some(), is_ours && method.name() != "median_cut", sized),
             ("references", references.is_some(), is_best, "with best"),
+            ("frame", frame.is_some(), is_ours, ours),
             ("judge", judge.is_some(), judged.contains(&method.name()), &with_judged),
         ];
         for (key, is_set, is_accepted, accepted) in restricted_keys {

@@ -6,6 +6,7 @@
 
 mod check;
 mod read;
+pub mod turn;
 
 use crate::contestant::Labelled;
 use crate::measure::picture;
@@ -16,7 +17,7 @@ use bvh_config::{Nested, config};
 use bvh_core::cost::Objective;
 use bvh_scenes::fnv1a;
 use bvh_scenes::rays::RandomRays;
-use bvh_search::Budget;
+use bvh_search::{Budget, Frames};
 pub use read::Overrides;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -39,8 +40,10 @@ config! {
         question: String;
         /// A measurement over the suite of stiff cases instead of runs on scenes.
         suite: Option<bvh_stress::Effort>, in Nested;
-        /// Names or paths of the scenes; `A..B` after a colon means all numbers from A to B. With
-        /// `suite`, names of cases, none for all.
+        /// Names or paths of the scenes; `A..B` after a colon means all numbers from A to B, and
+        /// `A..B/STEP` those at a step. With
+        /// `suite`, names of cases, none for all. After a name, `:turn:DEGREES` and
+        /// `:rotation:SEED` turn a scene of triangles.
         scenes: Vec<String>;
         /// Scenes that are skipped, with a note, if they have not been fetched.
         optional_scenes: Vec<String>;
@@ -121,6 +124,13 @@ impl Experiment {
     pub fn keeps_rows_for(&self, other: &Self) -> bool {
         let has_clock = self.needs_references() || !other.needs_references();
         has_clock && other.trial_methods().is_subset(&self.trial_methods())
+    }
+
+    /// Returns true if boxes of some runs lie in frames.
+    pub fn has_frames(&self) -> bool {
+        let mut names = self.scenes.iter().chain(&self.optional_scenes);
+        names.any(|name| name.contains(":turn:") || name.contains(":rotation:"))
+            || self.methods.iter().any(|labelled| labelled.options.frame == Some(Frames::Auto))
     }
 
     /// The limits of a method's runs.

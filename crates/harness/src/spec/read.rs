@@ -6,6 +6,7 @@ use crate::peers;
 use crate::report::Report;
 use bvh_config::{OutOfRange, fault};
 use bvh_scenes::files::read_text;
+use bvh_scenes::subset;
 use bvh_search::Method;
 use serde::{Deserialize, Deserializer, de};
 use std::ffi::OsStr;
@@ -109,6 +110,8 @@ impl Experiment {
             experiment.scenes.clone_from(&overrides.scenes);
             experiment.optional_scenes.clear();
         }
+        experiment.optional_scenes =
+            experiment.optional_scenes.iter().flat_map(|name| subset::expand(name)).collect();
         // The suite is about all methods; a list in the spec would miss new ones.
         if experiment.suite.is_some() && experiment.methods.is_empty() {
             experiment.methods = Method::all().into_iter().map(Labelled::new).collect();
