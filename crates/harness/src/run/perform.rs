@@ -9,13 +9,15 @@ use crate::rows::finished_run::FinishedRun;
 use crate::rows::store::Store;
 use crate::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, TrialRow, TurnRow};
 use crate::spec::Experiment;
-use crate::spec::turn::{self, Turn};
+use crate::spec::turn::{in_chosen_frame, turn_of};
 use bvh_core::cost::{self, Measure, SahConstants};
 use bvh_core::{Bvh, validate, validate_references};
 use bvh_scenes::Scene;
 use bvh_scenes::rays::{Family, RandomRays, empirical_cost};
 use bvh_scenes::trace::Query;
-use bvh_search::{Event, Judge, Method, Observer, Outcome, Problem, Splits, StopReason, solve};
+use bvh_search::{
+    Event, Frames, Judge, Method, Observer, Outcome, Problem, Splits, StopReason, solve,
+};
 use indicatif::ProgressBar;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -80,8 +82,8 @@ pub(crate) fn perform(work: &Work, job: &Job) -> Result<Option<(FinishedRun, Bvh
     let seed = job.seed(experiment);
     let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
     let mut scene = Cow::Borrowed(job.scene);
-    if experiment.chooses_frame(&labelled.label) {
-        let framed = turn::in_chosen_frame(&scene, experiment.budget_of(labelled), &stopwatch);
+    if labelled.options.frame == Some(Frames::Auto) {
+        let framed = in_chosen_frame(&scene, experiment.budget_of(labelled), &stopwatch);
         scene = Cow::Owned(framed?);
     }
     let scene = &*scene;
@@ -159,7 +161,7 @@ pub(crate) fn perform(work: &Work, job: &Job) -> Result<Option<(FinishedRun, Bvh
     finished.add(&rays)?;
     finished.add(&clock)?;
     finished.add(bounds.as_slice())?;
-    finished.add(turn_row(scene).filter(|_| first_of_scene).as_slice())?;
+    finished.add(turn_of(&scene.name).filter(|_| first_of_scene).as_slice())?;
     finished.add(&renders)?;
     finished.add(&render_times)?;
     Ok(Some((finished, outcome.tree)))
@@ -218,8 +220,9 @@ fn ray_row(
         Query::Nearest => "nearest",
         Query::All => "all",
     };
+    let straight = turn_of(&scene.name).map_or(scene.name.clone(), |turn| turn.mesh);
     // Every method gets the same rays, at all angles, so that methods differ only in their trees.
-    let ray_seed = experiment.seed_of(turn::straight(&scene.name), stream, 0);
+    let ray_seed = experiment.seed_of(&straight, stream, 0);
     let cost = empirical_cost(config, &scene.primitives, tree, ray_seed);
     let [boxes_low, boxes_high] = cost.boxes.interval();
     RayRow {

@@ -36,10 +36,11 @@ pub(crate) fn update(
     revision: &str,
     store: &Store,
 ) -> Result<(), Error> {
-    let mut runs: Vec<RunRow> = read_if_any(store.folder())?;
-    // The trees of a scene are those with boxes along the axes of its file.
-    let frames = |label: &str| resolved.experiment.chooses_frame(label);
-    runs.retain(|run| Turn::parse(&run.scene).is_none() && !frames(&run.method));
+    // The boxes of best known trees lie along the axes of the scene's file.
+    if resolved.experiment.has_frames() {
+        return Ok(());
+    }
+    let runs: Vec<RunRow> = read_if_any(store.folder())?;
     let bounds: Vec<BoundRow> = read_if_any(store.folder())?;
     let _lock = wait_for_folder(out)?;
     let path = out.join(BEST_KNOWN);

@@ -69,29 +69,21 @@ impl Experiment {
 
     /// Rejects measurements that know of boxes along the file's axes only.
     fn check_frames(&self) -> Result<(), OutOfRange> {
-        let has = |is_set: fn(&EntryOptions) -> bool| {
-            self.methods.iter().any(|labelled| is_set(&labelled.options))
+        let is_other = |EntryOptions { judge, references, .. }: &EntryOptions| {
+            judge.is_some() || references.is_some()
         };
-        let mut names = self.scenes.iter().chain(&self.optional_scenes);
-        let is_turned = |name: &String| name.contains(":turn:") || name.contains(":rotation:");
-        if !names.any(is_turned) && !has(|options| options.frame == Some(Frames::Auto)) {
+        let is_along_file = self.lower_bound.is_some()
+            || self.render.is_some()
+            || self.tracing.is_some()
+            || self.ray_cost.is_some()
+            || self.needs_references()
+            || self.methods.iter().any(|labelled| is_other(&labelled.options));
+        if !(is_along_file && self.has_frames()) {
             return Ok(());
         }
-        let along_file = [
-            ("lower_bound", self.lower_bound.is_some()),
-            ("render", self.render.is_some()),
-            ("tracing", self.tracing.is_some()),
-            ("ray_cost", self.ray_cost.is_some()),
-            ("judge", has(|options| options.judge.is_some())),
-            ("references", has(|options| options.references.is_some())),
-        ];
-        match along_file.into_iter().find(|(_, is_set)| *is_set) {
-            Some((key, _)) => {
-                let found = "set with a turned scene or a chosen frame";
-                Err(OutOfRange::new(key, found, "`rays` to measure trees in frames"))
-            }
-            None => Ok(()),
-        }
+        let found = "turned scenes or `frame` with lower_bound, render, tracing, ray_cost, judge, \
+                     references or gaps, which know no frames";
+        Err(OutOfRange::new("scenes, frame", found, "`rays` to measure trees in frames"))
     }
 
     /// Checks that there is at least one run, and at most [`MOST_RUNS`].

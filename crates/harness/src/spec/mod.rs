@@ -126,10 +126,11 @@ impl Experiment {
         has_clock && other.trial_methods().is_subset(&self.trial_methods())
     }
 
-    /// Returns true if the runs of the method with this label choose the frame of their boxes.
-    pub fn chooses_frame(&self, label: &str) -> bool {
-        let is_framed = |labelled: &Labelled| labelled.options.frame == Some(Frames::Auto);
-        self.methods.iter().any(|labelled| labelled.label == label && is_framed(labelled))
+    /// Returns true if boxes of some runs lie in frames.
+    pub fn has_frames(&self) -> bool {
+        let mut names = self.scenes.iter().chain(&self.optional_scenes);
+        names.any(|name| name.contains(":turn:") || name.contains(":rotation:"))
+            || self.methods.iter().any(|labelled| labelled.options.frame == Some(Frames::Auto))
     }
 
     /// The limits of a method's runs.
