@@ -7,7 +7,7 @@ use crate::measure::picture;
 use crate::peers::{self, Built, Peer, Task};
 use crate::rows::finished_run::FinishedRun;
 use crate::rows::store::Store;
-use crate::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, TrialRow, TurnRow};
+use crate::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, TrialRow};
 use crate::spec::Experiment;
 use crate::spec::turn::{in_chosen_frame, turn_of};
 use bvh_core::cost::{self, Measure, SahConstants};
@@ -241,16 +241,6 @@ fn ray_row(
         objects_per_ray: cost.objects.mean,
         objects_standard_error: cost.objects.standard_error,
     }
-}
-
-/// Returns how a turned scene stands.
-fn turn_row(scene: &Scene) -> Option<TurnRow> {
-    let (mesh, turn) = Turn::parse(&scene.name)?;
-    let (degrees, rotation) = match turn {
-        Turn::Vertical(degrees) => (Some(degrees), None),
-        Turn::Random(seed) => (None, Some(seed)),
-    };
-    Some(TurnRow { scene: scene.name.clone(), mesh: mesh.into(), degrees, rotation })
 }
 
 /// Builds the tree of another library or program, as the outcome of a search of one evaluation.

@@ -15,7 +15,6 @@ use crate::rows::lock::wait_for_folder;
 use crate::rows::store::Store;
 use crate::rows::{BoundRow, ROUNDING, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
 use crate::run::resolved::{LoadedScene, Resolved};
-use crate::spec::turn::Turn;
 use bvh_core::cost::Objective;
 use bvh_search::exact;
 use std::fs;

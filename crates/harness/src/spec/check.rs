@@ -9,7 +9,7 @@ use crate::report::Report;
 use crate::rows;
 use bvh_config::OutOfRange;
 use bvh_scenes::subset;
-use bvh_search::{Budget, Frames, Method, best};
+use bvh_search::{Budget, Method, best};
 use std::collections::HashSet;
 
 /// The maximum number of runs of an experiment.
