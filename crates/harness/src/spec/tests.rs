@@ -86,6 +86,11 @@ const WRONG_METHODS: &[(&str, &[&str])] = &[
         "[{ method = 'obvhs', for_rays = 'inside' }]",
         &["methods[0].for_rays is set for obvhs", "of ours"],
     ),
+    ("[{ method = 'obvhs', frame = 'auto' }]", &["methods[0].frame is set for obvhs", "of ours"]),
+    (
+        "[{ method = 'best', frame = 'auto', references = 1.2 }]",
+        &["scenes, frame is turned scenes", "`rays` to measure"],
+    ),
     (
         "[{ method = 'bvh' }]",
         &["methods[0].method is \"bvh\"", "attic/Cargo.toml --`", "median_cut"],
