@@ -50,7 +50,7 @@ use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 /// rays from far away, and rays whose differences could overflow, are tested in f64. The quotient of
 /// a difference and d is rounded two or three times, by 2⁻⁵³ of itself; the factors are 1 ∓ 2⁻⁴⁹.
 ///
-/// *In a frame.* [`frame`](crate::frame) has the errors of the ray's form in it.
+/// *In a frame.* The module `frame` has the errors of the ray's form in it.
 #[derive(Clone, Copy, Debug)]
 pub struct Slabs {
     /// The origin, as it is subtracted from lower and from upper corners.
