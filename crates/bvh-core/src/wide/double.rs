@@ -152,7 +152,8 @@ impl DWideBvh {
         self.in_parts(rays, select, hits, |rays, boxed, select, hits| {
             nearest.clear();
             nearest.extend(rays.iter().map(NearestHit::new));
-            let find = Nearest { layout: self, rays, select, nearest: &mut nearest };
+            let part = Part { layout: self, rays, select };
+            let find = Nearest { part, nearest: &mut nearest };
             self.wide.trace(boxed, find, Coherence::Incoherent);
             self.resolve(rays, &mut nearest);
             for (hit, nearest) in hits.iter_mut().zip(&nearest) {
@@ -169,12 +170,11 @@ impl DWideBvh {
     pub fn any_hits(&self, rays: &[DRay], select: Select, hits: &mut [bool]) {
         assert_eq!(rays.len(), hits.len(), "an answer for every ray");
         self.in_parts(rays, select, hits, |rays, boxed, select, hits| {
+            let part = Part { layout: self, rays, select };
             if select.counts_all() {
-                let find = Any::<true> { layout: self, rays, select, hits };
-                self.wide.trace(boxed, find, Coherence::Incoherent);
+                self.wide.trace(boxed, Any::<true> { part, hits }, Coherence::Incoherent);
             } else {
-                let find = Any::<false> { layout: self, rays, select, hits };
-                self.wide.trace(boxed, find, Coherence::Incoherent);
+                self.wide.trace(boxed, Any::<false> { part, hits }, Coherence::Incoherent);
             }
         });
     }
@@ -461,20 +461,26 @@ impl<K: Instructions> Task<K> for Resolve<'_> {
     }
 }
 
-/// The nearest hit of every ray.
-struct Nearest<'a> {
+/// Some rays of a batch, with what counts for each.
+#[derive(Clone, Copy)]
+struct Part<'a> {
     layout: &'a DWideBvh,
     rays: &'a [DRay],
     select: Select<'a>,
-    nearest: &'a mut [NearestHit],
 }
 
-impl<'a> Nearest<'a> {
+impl<'a> Part<'a> {
     #[inline(always)]
     fn query(&self, number: usize) -> Query<'a> {
         let select = select_of(self.select, self.rays.len(), number);
         Query { ray: &self.rays[number], select }
     }
+}
+
+/// The nearest hit of every ray.
+struct Nearest<'a> {
+    part: Part<'a>,
+    nearest: &'a mut [NearestHit],
 }
 
 impl Find for Nearest<'_> {
@@ -487,33 +493,25 @@ impl Find for Nearest<'_> {
         block: &TriangleBlock,
         possible: u32,
     ) -> Option<Hit> {
-        let query = self.query(number);
+        let query = self.part.query(number);
         let nearest = &mut self.nearest[number];
         // SAFETY: the processor has the instructions; the block is one of the layout.
-        let is_nearer = unsafe { self.layout.offer_block::<K>(query, nearest, block, possible) };
+        let is_nearer =
+            unsafe { self.part.layout.offer_block::<K>(query, nearest, block, possible) };
         let t = (nearest.high * scale(query.ray)) as f32;
         is_nearer.then_some(Hit { t, object: nearest.object })
     }
 
     fn alone(&mut self, _: &WideBvh, number: usize, _: &Ray) {
-        self.layout.search::<NEAREST_HIT>(self.query(number), &mut self.nearest[number]);
+        let query = self.part.query(number);
+        self.part.layout.search::<NEAREST_HIT>(query, &mut self.nearest[number]);
     }
 }
 
 /// Whether each ray hits anything. All triangles count if `PLAIN`.
 struct Any<'a, const PLAIN: bool> {
-    layout: &'a DWideBvh,
-    rays: &'a [DRay],
-    select: Select<'a>,
+    part: Part<'a>,
     hits: &'a mut [bool],
-}
-
-impl<'a, const PLAIN: bool> Any<'a, PLAIN> {
-    #[inline(always)]
-    fn query(&self, number: usize) -> Query<'a> {
-        let select = select_of(self.select, self.rays.len(), number);
-        Query { ray: &self.rays[number], select }
-    }
 }
 
 impl<const PLAIN: bool> Find for Any<'_, PLAIN> {
@@ -528,10 +526,11 @@ impl<const PLAIN: bool> Find for Any<'_, PLAIN> {
         block: &TriangleBlock,
         possible: u32,
     ) -> Option<Hit> {
-        let query = self.query(number);
+        let query = self.part.query(number);
         let mut nearest = NearestHit::new(query.ray);
         // SAFETY: the processor has the instructions; the block is one of the layout.
-        let is_hit = unsafe { self.layout.offer_block::<K>(query, &mut nearest, block, possible) };
+        let is_hit =
+            unsafe { self.part.layout.offer_block::<K>(query, &mut nearest, block, possible) };
         is_hit.then_some(Hit { t: 0.0, object: nearest.object })
     }
 
@@ -541,8 +540,8 @@ impl<const PLAIN: bool> Find for Any<'_, PLAIN> {
     }
 
     fn alone(&mut self, _: &WideBvh, number: usize, _: &Ray) {
-        let query = self.query(number);
+        let query = self.part.query(number);
         let mut nearest = NearestHit::new(query.ray);
-        self.hits[number] = self.layout.search::<ANY_HIT>(query, &mut nearest);
+        self.hits[number] = self.part.layout.search::<ANY_HIT>(query, &mut nearest);
     }
 }

@@ -1,6 +1,7 @@
 //! Rays and triangles in f64: hits as in exact rationals, and every kernel as a test of every
 //! triangle.
 
+use crate::support::rational::{cross, dot, exactly as point, minus};
 use crate::support::{Random, SHAPES, ball, chain, grid_box, junction, soup, tree};
 use bvh_core::{
     Bvh, DHit, DRay, DTriangle, DWideBvh, Frame, Kernel, Orientation, OutOfExactRange, Select,
@@ -8,24 +9,6 @@ use bvh_core::{
 use glam::{DMat3, DQuat, DVec3};
 use num_bigint::BigInt;
 use num_rational::BigRational;
-
-type Vector = [BigRational; 3];
-
-fn point(p: DVec3) -> Vector {
-    p.to_array().map(|x| BigRational::from_float(x).unwrap())
-}
-
-fn minus(p: &Vector, q: &Vector) -> Vector {
-    [0, 1, 2].map(|i| &p[i] - &q[i])
-}
-
-fn cross(p: &Vector, q: &Vector) -> Vector {
-    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| &p[i] * &q[j] - &p[j] * &q[i])
-}
-
-fn dot(p: &Vector, q: &Vector) -> BigRational {
-    &p[0] * &q[0] + &p[1] * &q[1] + &p[2] * &q[2]
-}
 
 /// Returns the real distance by Cramer's rule, and the sign of d · n.
 fn cramer(ray: &DRay, triangle: &DTriangle) -> Option<(BigRational, i32)> {

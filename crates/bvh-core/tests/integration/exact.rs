@@ -1,5 +1,6 @@
 //! Hits and distances agree with real arithmetic, rounded once: a comparison with exact rationals.
 
+use crate::support::rational::{Vector, cross, dot, exactly, minus};
 use crate::support::{Random, size};
 use bvh_core::{PreparedRay, Ray, Triangle};
 use glam::Vec3;
@@ -7,22 +8,8 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use proptest::prelude::*;
 
-type Vector = [BigRational; 3];
-
 fn point(p: Vec3) -> Vector {
-    p.to_array().map(|x| BigRational::from_float(x).unwrap())
-}
-
-fn minus(p: &Vector, q: &Vector) -> Vector {
-    [0, 1, 2].map(|i| &p[i] - &q[i])
-}
-
-fn cross(p: &Vector, q: &Vector) -> Vector {
-    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| &p[i] * &q[j] - &p[j] * &q[i])
-}
-
-fn dot(p: &Vector, q: &Vector) -> BigRational {
-    &p[0] * &q[0] + &p[1] * &q[1] + &p[2] * &q[2]
+    exactly(p.as_dvec3())
 }
 
 /// Returns the distance and the weights of the second and third corner by Cramer's rule (Möller &

@@ -1,6 +1,7 @@
 //! Scenes, trees and rays for the tests of traversals.
 
 pub mod layouts;
+pub mod rational;
 
 pub use bvh_core::boxes;
 use bvh_core::{
