@@ -1,6 +1,7 @@
 import { MeshBVH } from 'three-mesh-bvh';
 import * as wasm from '../wasm/bvh_js.js';
 import { fingerprint, reorder, reordered, restored, triangleCount, triangles } from './geometry.js';
+import { checkMesh, turn } from './orient.js';
 import { load } from '#load';
 import { startWorker } from '#worker';
 
@@ -101,10 +102,18 @@ function withHitsOnce(bvh) {
     return bvh;
 }
 
-export async function bake(geometry, options = {}) {
-    const { seconds, work, seed, references } = checked(options);
+export async function orient(mesh) {
+    checkMesh(mesh);
+    const { corners } = triangles(mesh.geometry);
     await ready();
-    const { corners } = triangles(geometry);
+    return turn(mesh, wasm.axes(corners));
+}
+
+export async function bake(target, options = {}) {
+    const { seconds, work, seed, references, orient: orients } = checked(options);
+    if (orients) await orient(target);
+    await ready();
+    const { corners } = triangles(orients ? target.geometry : target);
     return new Promise((resolve, reject) => {
         const follow = follower(options.onProgress, reject);
         const parts = wasm.bake(corners, seconds, work, seed, references, follow);
@@ -113,19 +122,30 @@ export async function bake(geometry, options = {}) {
     });
 }
 
-export async function bakeInWorker(geometry, options = {}) {
-    const limits = checked(options, ['signal']);
+export async function bakeInWorker(target, options = {}) {
+    const { orient: orients, ...limits } = checked(options, ['signal']);
     const { onProgress, signal } = options;
-    const { corners } = triangles(geometry);
+    if (orients) {
+        checkMesh(target);
+        const { corners } = triangles(target.geometry);
+        turn(target, await inWorker({ asks: 'axes', corners }, undefined, signal));
+    }
+    const { corners } = triangles(orients ? target.geometry : target);
     const known = identity(corners);
+    const message = { asks: 'tree', ...limits, follows: Boolean(onProgress), corners };
+    return new Tree(await inWorker(message, onProgress, signal), known);
+}
+
+/** What the worker answers to the message. Ends on the signal, or if `onProgress` throws. */
+async function inWorker(message, onProgress, signal) {
     signal?.throwIfAborted();
     const worker = startWorker();
     const ended = new AbortController();
     try {
-        const parts = await new Promise((resolve, reject) => {
+        return await new Promise((resolve, reject) => {
             const follow = follower(onProgress, reject);
             worker.hear((said) => {
-                if (said.parts) resolve(said.parts);
+                if (said.found) resolve(said.found);
                 else if (said.error) reject(new Error(said.error));
                 else {
                     try {
@@ -137,9 +157,8 @@ export async function bakeInWorker(geometry, options = {}) {
             });
             worker.fail(reject);
             signal?.addEventListener('abort', () => reject(signal.reason), { signal: ended.signal });
-            worker.post({ ...limits, follows: Boolean(onProgress), corners });
+            worker.post(message);
         });
-        return new Tree(parts, known);
     } finally {
         ended.abort();
         worker.end();
@@ -172,8 +191,8 @@ function checkNames(options, accepted) {
 }
 
 function checked(options, more = []) {
-    checkNames(options, ['seconds', 'work', 'seed', 'references', 'onProgress', ...more]);
-    const { work, seed = 1, references = 1, onProgress, signal } = options;
+    checkNames(options, ['seconds', 'work', 'seed', 'references', 'orient', 'onProgress', ...more]);
+    const { work, seed = 1, references = 1, orient: orients = false, onProgress, signal } = options;
     const { seconds = work === undefined ? 1 : undefined } = options;
     const check = (name, value, accepted, isAccepted) => {
         if (value !== undefined && !(typeof value === 'number' && isAccepted(value))) {
@@ -184,13 +203,14 @@ function checked(options, more = []) {
     check('work', work, 'a whole number above 0', (value) => value > 0 && Number.isSafeInteger(value));
     check('seed', seed, 'a whole number from 0 on', (value) => value >= 0 && Number.isSafeInteger(value));
     check('references', references, 'a number from 1 to 16', (value) => value >= 1 && value <= 16);
+    if (typeof orients !== 'boolean') throw new TypeError(`orient is ${orients}; accepted: true or false`);
     if (onProgress !== undefined && typeof onProgress !== 'function') {
         throw new TypeError(`onProgress is ${onProgress}; accepted: a function`);
     }
     if (signal !== undefined && typeof signal?.throwIfAborted !== 'function') {
         throw new TypeError(`signal is ${signal}; accepted: an AbortSignal`);
     }
-    return { seconds, work, seed, references };
+    return { seconds, work, seed, references, orient: orients };
 }
 
 /** A copy of bytes, whoever holds them. */

@@ -6,11 +6,14 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import {
-    BackSide, BatchedMesh, Box3, BoxGeometry, BufferAttribute, BufferGeometry, DoubleSide, FrontSide, InterleavedBuffer,
-    InterleavedBufferAttribute, Matrix4, Mesh, MeshBasicMaterial, Ray, Raycaster, SphereGeometry, TorusKnotGeometry, Vector3,
+    BackSide, BatchedMesh, Box3, BoxGeometry, BufferAttribute, BufferGeometry, DoubleSide, Euler, FrontSide, Group,
+    InstancedBufferGeometry, InstancedMesh, InterleavedBuffer, InterleavedBufferAttribute, Matrix3, Matrix4, Mesh,
+    MeshBasicMaterial, MeshStandardMaterial, ObjectSpaceNormalMap, Ray, Raycaster, SkinnedMesh, SphereGeometry,
+    Texture, TorusKnotGeometry, Vector3,
 } from 'three';
+import { mergeGeometries } from 'three/addons/utils/BufferGeometryUtils.js';
 import { acceleratedRaycast, MeshBVH, SAH } from 'three-mesh-bvh';
-import { bake, bakeInWorker, costOf, countTests, Tree } from 'bvh-search';
+import { bake, bakeInWorker, costOf, countTests, orient, Tree } from 'bvh-search';
 import { loadExport } from '../examples/load-export.mjs';
 
 /** Numbers from 0 to 1, the same in every run. */
@@ -387,6 +390,201 @@ test('a saved tree is the file of the program, and loads for its own geometry on
     assertSameHits(ours, new MeshBVH(scene()), 20_000);
 });
 
+const OBLIQUE = new Matrix4().makeRotationFromEuler(new Euler(0.4, 0.5, 0.6));
+
+/** Boards along the axes that the matrix turns to. */
+function boards(matrix = OBLIQUE) {
+    const next = random(4);
+    const parts = Array.from({ length: 300 }, () => {
+        const [width, height, depth] = [next(), next(), next()].map((x) => 0.02 + 3 * x ** 8);
+        return new BoxGeometry(width, height, depth).translate(...[next(), next(), next()].map((x) => 4 * x - 2));
+    });
+    const geometry = mergeGeometries(parts).applyMatrix4(matrix);
+    geometry.computeTangents();
+    geometry.computeBoundingBox();
+    geometry.computeBoundingSphere();
+    return geometry;
+}
+
+/** Attributes that share a buffer, and small numbers in their place. */
+function compressed() {
+    const geometry = boards();
+    const { position, normal } = geometry.attributes;
+    const buffer = new InterleavedBuffer(new Float32Array(4 * position.count), 4);
+    const interleaved = new InterleavedBufferAttribute(buffer, 3, 1);
+    for (let vertex = 0; vertex < position.count; vertex++) {
+        interleaved.setXYZ(vertex, position.getX(vertex), position.getY(vertex), position.getZ(vertex));
+    }
+    geometry.setAttribute('position', interleaved);
+    geometry.setAttribute('normal', new BufferAttribute(Int8Array.from(normal.array, (x) => 127 * x), 3, true));
+    return geometry;
+}
+
+/** A mesh with two children in a group whose scale is not the same along all axes. */
+function placed(geometry, change = () => {}) {
+    const mesh = new Mesh(geometry, materials(DoubleSide)[0]);
+    mesh.position.set(1, 2, 3);
+    mesh.quaternion.setFromEuler(new Euler(1, 2, 3));
+    const [child, still] = [new Group(), new Group()];
+    child.position.set(3, 2, 1);
+    child.scale.set(1, 2, 3);
+    still.matrixAutoUpdate = false;
+    still.matrix.makeShear(1, 0, 0, 0, 0, 0).setPosition(1, 1, 1);
+    mesh.add(child, still);
+    change(mesh);
+    const group = new Group();
+    group.scale.set(1, 2, 0.5);
+    group.add(mesh);
+    group.updateMatrixWorld();
+    return mesh;
+}
+
+/** Where everything of a mesh is in the world: directions, as three's shaders have them, and points. */
+function world(mesh) {
+    const { position, normal, tangent } = mesh.geometry.attributes;
+    const normalMatrix = new Matrix3().getNormalMatrix(mesh.matrixWorld);
+    const vectors = (attribute, place) => Array.from({ length: attribute.count }, (_, vertex) =>
+        place(new Vector3().fromBufferAttribute(attribute, vertex)));
+    return {
+        points: vectors(position, (point) => point.applyMatrix4(mesh.matrixWorld)),
+        directions: [
+            vectors(normal, (direction) => direction.applyMatrix3(normalMatrix)),
+            vectors(tangent, (direction) => direction.transformDirection(mesh.matrixWorld)),
+        ].flat(),
+        signs: Array.from({ length: tangent.count }, (_, vertex) => tangent.getW(vertex)),
+        children: mesh.children.flatMap(({ matrixWorld }) => matrixWorld.elements),
+    };
+}
+
+/** The first hits of rays in the world. */
+function hitsInWorld(mesh, raycast) {
+    mesh.raycast = raycast;
+    const caster = new Raycaster();
+    return rays(400).map((ray) => {
+        caster.set(ray.origin.add(mesh.getWorldPosition(new Vector3())), ray.direction);
+        const [hit] = caster.intersectObject(mesh, false);
+        return hit && { distance: hit.distance, corners: [hit.face.a, hit.face.b, hit.face.c].sort().join() };
+    });
+}
+
+function assertSameWorld(after, before, size) {
+    const farthest = (a, b) => Math.max(...a.map((vector, at) => vector.distanceTo(b[at])));
+    assert.ok(farthest(after.points, before.points) <= 2 ** -23 * size);
+    assert.ok(farthest(after.directions, before.directions) < 1e-6);
+    assert.deepEqual(after.signs, before.signs);
+    after.children.forEach((x, at) => assert.ok(Math.abs(x - before.children[at]) < 1e-12));
+}
+
+function assertSameWorldHits(after, before) {
+    after.forEach((hit, at) => {
+        assert.equal(hit?.corners, before[at]?.corners);
+        if (hit) assert.ok(Math.abs(hit.distance - before[at].distance) < 1e-5);
+    });
+    assert.ok(after.filter(Boolean).length > 100);
+}
+
+test('a mesh that stands obliquely is turned, and nothing in the world moves', async () => {
+    const still = (mesh) => {
+        mesh.matrixAutoUpdate = false;
+        mesh.updateMatrix();
+    };
+    for (const [geometry, change, isComposed] of [
+        [boards(), undefined, true],
+        [compressed(), (mesh) => mesh.scale.setScalar(0.5), true],
+        [boards(), (mesh) => mesh.scale.set(-2, 2, 2), true],
+        [boards(), (mesh) => mesh.scale.set(2, -2, -2), true],
+        [boards(), (mesh) => mesh.scale.setScalar(-1), true],
+        [boards(), still, true],
+        [boards(), (mesh) => { mesh.scale.set(1, 2, 3); still(mesh); }, false],
+        [boards(), (mesh) => { still(mesh); mesh.matrix.makeShear(1, 2, 0, 0, 0, 0); }, false],
+    ]) {
+        const mesh = placed(geometry, change);
+        const attributes = { ...geometry.attributes };
+        const arrays = Object.values(attributes).map((attribute) => attribute.array.slice());
+        const [before, hits] = [world(mesh), hitsInWorld(mesh, plain)];
+        const size = geometry.boundingSphere.radius * mesh.matrixWorld.getMaxScaleOnAxis();
+        const { turned, gain } = await orient(mesh);
+        assert.ok(turned && gain > 0.2 && gain < 1, `${turned} ${gain}`);
+        assertSameWorld(world(mesh), before, size);
+        assertSameWorldHits(hitsInWorld(mesh, plain), hits);
+        mesh.parent.updateMatrixWorld(true);
+        assertSameWorld(world(mesh), before, size);
+        if (isComposed) {
+            mesh.updateMatrix();
+            mesh.parent.updateMatrixWorld(true);
+            assertSameWorld(world(mesh), before, size);
+        }
+        // Another geometry may have the same attributes.
+        assert.deepEqual(Object.values(attributes).map(({ array }) => array), arrays);
+        const { position } = geometry.attributes;
+        assert.notEqual(position, attributes.position);
+        assert.deepEqual(geometry.boundingBox, new Box3().setFromBufferAttribute(position));
+        const matrix = mesh.matrix.clone();
+        assert.deepEqual(await orient(mesh), { turned: false, gain: 0 });
+        assert.equal(geometry.attributes.position, position);
+        assert.deepEqual(mesh.matrix, matrix);
+    }
+});
+
+test('a bake that orients has the hits of three in the world, costs less, and leaves what stands well', async () => {
+    const flat = await bake(boards(), { work: 1_000_000 });
+    const files = [];
+    for (const search of [bake, bakeInWorker]) {
+        const mesh = placed(boards());
+        const hits = hitsInWorld(mesh, plain);
+        const tree = await search(mesh, { work: 1_000_000, orient: true });
+        assert.ok(tree.cost < 0.7 * flat.cost, `${tree.cost} beside ${flat.cost}`);
+        mesh.geometry.boundsTree = tree.toMeshBVH(mesh.geometry);
+        assertSameWorldHits(hitsInWorld(mesh, acceleratedRaycast), hits);
+        files.push(tree.save());
+        // What the README says of a saved tree.
+        const loaded = placed(boards());
+        await assert.rejects(Tree.load(files[0], loaded.geometry));
+        await orient(loaded);
+        assert.equal((await Tree.load(files[0], loaded.geometry)).cost, tree.cost);
+    }
+    assert.deepEqual(files[0], files[1]);
+    for (const geometry of [boards(new Matrix4()), new SphereGeometry()]) {
+        const mesh = placed(geometry, ({ scale }) => scale.setScalar(3));
+        const [{ position }, { matrix, quaternion }] = [geometry.attributes, mesh.clone()];
+        assert.deepEqual(await orient(mesh), { turned: false, gain: 0 });
+        assert.equal(geometry.attributes.position, position);
+        assert.ok(mesh.matrix.equals(matrix) && mesh.quaternion.equals(quaternion));
+        const [tree, same] = [await bake(mesh, { work: 1000, orient: true }), await bake(geometry, { work: 1000 })];
+        assert.deepEqual(tree.save(), same.save());
+    }
+});
+
+test('a mesh that would look different if it were turned is refused as it is', async () => {
+    const mapped = new MeshStandardMaterial({ normalMap: new Texture(), normalMapType: ObjectSpaceNormalMap });
+    const geometry = boards();
+    const morphing = boards();
+    morphing.morphAttributes.position = [morphing.attributes.position];
+    const changed = (change) => placed(geometry.clone(), change);
+    for (const [mesh, name, message] of [
+        [undefined, 'TypeError', /^mesh is undefined; accepted: a Mesh/],
+        [geometry, 'TypeError', /^mesh is a BufferGeometry/],
+        [new SkinnedMesh(geometry), 'TypeError', /^mesh is of type SkinnedMesh.*accepted/],
+        [new InstancedMesh(geometry, mapped, 2), 'TypeError', /^mesh is of type InstancedMesh/],
+        [new BatchedMesh(1, 3), 'TypeError', /^mesh is of type BatchedMesh/],
+        [new Mesh(new InstancedBufferGeometry().copy(geometry)), 'TypeError', /InstancedBufferGeometry/],
+        [changed(({ geometry }) => { geometry.boundsTree = {}; }), 'Error', /boundsTree/],
+        [changed((mesh) => { mesh.material = [mesh.material, mapped]; }), 'Error', /normal map/],
+        [changed((mesh) => { mesh.children[0].pivot = new Vector3(); }), 'Error', /pivot/],
+        [changed(({ scale }) => scale.set(1, 2, 1)), 'Error', /^mesh.scale is 1, 2, 1; accepted: the same/],
+        [changed(({ scale }) => scale.set(1, NaN, 1)), 'Error', /^mesh.scale is 1, NaN, 1/],
+        [changed((mesh) => mesh.add(new Mesh(mesh.geometry))), 'Error', /another object/],
+        [new Mesh(morphing), 'Error', /morph/],
+    ]) {
+        const [before, matrix] = [mesh?.geometry?.attributes.position, mesh?.matrix?.clone()];
+        for (const search of [orient, bake, bakeInWorker]) {
+            await assert.rejects(search(mesh, { work: 1, orient: true }), { name, message });
+        }
+        assert.equal(mesh?.geometry?.attributes.position, before);
+        assert.deepEqual(mesh?.matrix, matrix);
+    }
+});
+
 test('the example of the README runs', async () => {
     const readme = readFileSync(new URL('../README.md', import.meta.url), 'utf8');
     const example = new URL('./readme-example.mjs', import.meta.url);
@@ -413,6 +611,7 @@ test('wrong arguments and geometries are named', async () => {
         [scene(), { references: 0 }, 'RangeError', /^references is 0/],
         [scene(), { second: 1 }, 'TypeError', /option "second"; accepted: seconds/],
         [scene(), null, 'TypeError', /^options is null/],
+        [scene(), { orient: 1 }, 'TypeError', /^orient is 1; accepted: true or false/],
         [scene(), { onProgress: 5 }, 'TypeError', /^onProgress is 5; accepted: a function/],
         [scene(), { signal: 5 }, 'TypeError', /signal/],
         [undefined, {}, 'TypeError', /^geometry is undefined; accepted: a BufferGeometry/],
