@@ -110,6 +110,9 @@ pub enum InvalidFrame {
 }
 
 impl Frame {
+    /// The axes and the centre of the file.
+    pub(crate) const FILE: Self =
+        Self { axes: [DVec3::X, DVec3::Y, DVec3::Z], centre: DVec3::ZERO };
     /// The number of bytes in a file.
     pub(crate) const BYTES: usize = 96;
 

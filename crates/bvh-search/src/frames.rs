@@ -36,6 +36,9 @@ const WORK_PER_MOVE: f64 = 64.0;
 const FIRST: [usize; 2] = [64, 4096];
 /// By what each later sample is larger than the one before.
 const GROWTH: usize = 4;
+/// The neighbours in the file that the last sample keeps together, as they are in most scenes: the
+/// details that a small rotation spoils are lost where all around them is left out.
+const RUN: usize = 256;
 /// The triangles whose price tells the time of others.
 const CLOCKED: usize = 1024;
 /// The largest sample that tells directions, and how much larger it is than the first.
@@ -108,7 +111,7 @@ impl Choice {
         let mut work = limit(budget.max_work).min(moves);
         if let Some(began) = began {
             // The first price tells how long the others take, of which larger ones take longer.
-            let first = sample(triangles, CLOCKED, 0);
+            let first = sample(triangles, CLOCKED, 1, 0);
             scene.price(&first, None);
             let took = 2.0 * (observer.progress().unwrap_or(1.0) - began);
             let price = took.max(f64::MIN_POSITIVE) / (WORK_PER_OBJECT * first.len() as f64);
@@ -147,33 +150,33 @@ impl Scene<'_> {
 
     /// Chooses with a first sample of this size. `None` if the observer cancels.
     fn choose(&self, size: usize, searches: bool) -> Option<Choice> {
-        let asked = sample(self.triangles, (ASKED * size).min(MOST_ASKED), 1);
+        let asked = sample(self.triangles, (ASKED * size).min(MOST_ASKED), 1, 1);
         let told = directions(&asked);
         let agreeing = told.first().map_or(0.0, |(_, share)| *share);
         let heaviest = told.first().filter(|(_, share)| *share >= HEAVY);
-        let mut tried: Vec<(DQuat, f64)> =
-            heaviest.iter().map(|(rotation, _)| (*rotation, LEAST_GAINS[0])).collect();
+        // With the least gain, and whether a sample leaves doubt: the heaviest direction is no
+        // accident, and a search confirms it.
+        let mut tried: Vec<(DQuat, f64, f64)> =
+            heaviest.iter().map(|(rotation, _)| (*rotation, LEAST_GAINS[0], 0.0)).collect();
         if searches && agreeing < CLEAR {
             let mut starts: Vec<DQuat> = told.iter().map(|(rotation, _)| *rotation).collect();
             starts.push(principal(&asked));
-            tried.push((self.local_search(starts, size)?, LEAST_GAINS[1]));
+            tried.push((self.local_search(starts, size)?, LEAST_GAINS[1], 1.0));
         }
-        tried.retain(|(rotation, _)| agreement(*rotation, DQuat::IDENTITY) < SAME);
+        tried.retain(|(rotation, ..)| agreement(*rotation, DQuat::IDENTITY) < SAME);
         if tried.is_empty() {
             return Some(Choice { agreeing, ..Choice::FILE });
         }
-        let last = sample_in_runs(self.triangles, size * GROWTH * GROWTH, 4);
+        let last = sample(self.triangles, size * GROWTH * GROWTH, RUN, 4);
         let is_whole = last.len() == self.triangles.len();
         let doubt = if is_whole { 0.0 } else { DOUBT / (last.len() as f64).sqrt() };
         // The heaviest direction has to beat the file's axes, and the other frame both.
         let mut rotations = vec![None];
-        rotations.extend(tried.iter().map(|(rotation, _)| Some(*rotation)));
+        rotations.extend(tried.iter().map(|(rotation, ..)| Some(*rotation)));
         let prices = self.prices(&last, &rotations)?;
         let mut best = 0;
-        for (index, (_, least)) in (1..).zip(&tried) {
-            // The heaviest direction is no accident, and a search confirms it.
-            let doubt = if *least == LEAST_GAINS[0] { 0.0 } else { doubt };
-            if prices[index] < (1.0 - least - doubt) * prices[best] {
+        for (index, (_, least, doubts)) in (1..).zip(&tried) {
+            if prices[index] < (1.0 - least - doubts * doubt) * prices[best] {
                 best = index;
             }
         }
@@ -194,7 +197,7 @@ impl Scene<'_> {
     fn local_search(&self, mut starts: Vec<DQuat>, size: usize) -> Option<DQuat> {
         let mut rng = stream(1, 0);
         starts.resize_with(STARTS, || random_rotation(&mut rng));
-        let first = sample(self.triangles, size, 2);
+        let first = sample(self.triangles, size, 1, 2);
         let mut ranked = Vec::new();
         self.rank(&mut ranked, starts, &first)?;
         for step in STEPS {
@@ -210,7 +213,7 @@ impl Scene<'_> {
             self.rank(&mut ranked, near, &first)?;
         }
         let best = ranked.drain(..).map(|(_, rotation)| rotation).collect();
-        self.rank(&mut ranked, best, &sample(self.triangles, GROWTH * size, 3))?;
+        self.rank(&mut ranked, best, &sample(self.triangles, GROWTH * size, 1, 3))?;
         ranked.first().map(|(_, rotation)| *rotation)
     }
 
@@ -255,31 +258,21 @@ fn searched(triangles: &[Triangle], frame: Option<&Frame>) -> f64 {
     bake.search(None, &()).map_or(f64::INFINITY, |baked| baked.outcome.cost)
 }
 
-/// Returns `count` triangles, or all: one of each of `count` runs, so that all parts of the file are
-/// there.
-fn sample(triangles: &[Triangle], count: usize, index: u64) -> Vec<Triangle> {
+/// Returns about `count` triangles, or all, in runs of neighbours in the file from all of its parts.
+fn sample(triangles: &[Triangle], count: usize, run: usize, index: u64) -> Vec<Triangle> {
     if count >= triangles.len() {
         return triangles.to_vec();
     }
     let mut rng = stream(1, index);
-    let place = |run: usize| (run as u64 * triangles.len() as u64 / count as u64) as usize;
-    (0..count).map(|run| triangles[rng.random_range(place(run)..place(run + 1))]).collect()
-}
-
-/// Returns the same in runs of neighbours in the file, which are neighbours in most scenes: the
-/// details that a small rotation spoils are lost where all around them is left out.
-fn sample_in_runs(triangles: &[Triangle], count: usize, index: u64) -> Vec<Triangle> {
-    const RUN: usize = 256;
-    if count >= triangles.len() {
-        return triangles.to_vec();
+    let runs = triangles.len().div_ceil(run) as u64;
+    let wanted = (count / run).max(1) as u64;
+    let place = |part: u64| (part * runs / wanted) as usize;
+    let mut chosen = Vec::with_capacity(count);
+    for part in 0..wanted {
+        let first = run * rng.random_range(place(part)..place(part + 1));
+        chosen.extend_from_slice(&triangles[first..(first + run).min(triangles.len())]);
     }
-    let runs: Vec<&[Triangle]> = triangles.chunks(RUN).collect();
-    let wanted = (count / RUN).max(1);
-    let mut rng = stream(1, index);
-    let place = |run: usize| run * runs.len() / wanted;
-    (0..wanted)
-        .flat_map(|run| runs[rng.random_range(place(run)..place(run + 1))].iter().copied())
-        .collect()
+    chosen
 }
 
 /// Returns the centre of frames: 0, unless the scene is far from it.

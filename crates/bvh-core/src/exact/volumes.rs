@@ -79,19 +79,18 @@ impl Volumes {
 
     /// Returns d · n, exactly.
     pub(super) fn speed(&self) -> Expansion<96> {
-        let [a, b, c] = self.triangle;
-        let (to_second, to_third) = (difference(b, a), difference(c, a));
-        let mut speed = Expansion::zero();
-        for axis in 0..3 {
-            let mut normal = Expansion::zero();
-            add_cross(&mut normal, &to_second, &to_third, axis);
-            speed.add_scaled(&normal, self.direction[axis]);
-        }
-        speed
+        self.plane().1
     }
 
     /// Returns the distance of the triangle's plane, rounded once; `None` as [`round_quotient`].
     pub(super) fn rounded_distance<N: Number>(&self) -> Option<N> {
+        let (height, speed) = self.plane();
+        round_quotient(&height, &speed)
+    }
+
+    /// Returns A · n and d · n.
+    #[inline(always)]
+    fn plane(&self) -> (Expansion<192>, Expansion<96>) {
         let [a, b, c] = self.triangle;
         let to_second = difference(b, a);
         let to_third = difference(c, a);
@@ -103,7 +102,7 @@ impl Volumes {
             height.add_product(&normal, &self.corners[0][axis]);
             speed.add_scaled(&normal, self.direction[axis]);
         }
-        round_quotient(&height, &speed)
+        (height, speed)
     }
 }
 

@@ -35,6 +35,7 @@ use crate::{
 };
 use core::mem::MaybeUninit;
 use glam::{DMat3, DVec3};
+use std::borrow::Cow;
 
 /// An immutable copy of a tree and its triangles in f64, for tracing only.
 ///
@@ -83,16 +84,17 @@ impl DWideBvh {
     /// Lays out `tree`, valid over the [boxes](Self::boxes) of `triangles`, as [`WideBvh::new`]
     /// does. Its frame should have its centre in the middle of the scene. O(n) time and memory.
     pub fn new(tree: &Bvh, triangles: &[DTriangle]) -> Result<Self, InvalidBvh> {
-        let frame = tree
-            .frame
-            .unwrap_or(Frame { axes: [DVec3::X, DVec3::Y, DVec3::Z], centre: DVec3::ZERO });
+        let frame = tree.frame.unwrap_or(Frame::FILE);
         let boxes = Self::boxes(triangles, &frame);
         validate_references(tree, &boxes, &DoublesInFrame(triangles, &frame))?;
         drop(boxes);
         let in_frame = |corner: DVec3| frame.point(corner).as_vec3();
         let rounded: Vec<Triangle> =
             triangles.iter().map(|triangle| Triangle(triangle.0.map(in_frame))).collect();
-        let framed = Bvh { frame: Some(frame), ..tree.clone() };
+        let framed = match tree.frame {
+            Some(_) => Cow::Borrowed(tree),
+            None => Cow::Owned(Bvh { frame: Some(frame), ..tree.clone() }),
+        };
         let is_left_out = |id: u32| triangles[id as usize].is_degenerate();
         let mut wide = build::widen(&framed, &rounded, None, is_left_out);
         if let Some(framed) = wide.framed.take() {
@@ -119,8 +121,7 @@ impl DWideBvh {
         let max = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
         let middle = min + (max - min) * 0.5;
         let centre = if middle.is_finite() { middle } else { DVec3::ZERO };
-        Frame::new(DMat3::IDENTITY, centre)
-            .unwrap_or(Frame { axes: [DVec3::X, DVec3::Y, DVec3::Z], centre: DVec3::ZERO })
+        Frame::new(DMat3::IDENTITY, centre).unwrap_or(Frame::FILE)
     }
 
     /// Returns the same layout for another kernel; `None` if this processor cannot run that kernel.
