@@ -118,6 +118,15 @@ impl DRay {
         self.t_max
     }
 
+    /// The reciprocal of the power of two in the direction's largest component, exactly: the
+    /// factor to distances from those of a ray whose direction has about the length 1.
+    #[inline(always)]
+    pub(crate) fn unit(&self) -> f64 {
+        const BIAS: u64 = 1023;
+        let exponent = self.direction.abs().max_element().to_bits() >> 52;
+        f64::from_bits((2 * BIAS - exponent) << 52)
+    }
+
     fn is_in_range(&self, t: f64) -> bool {
         self.t_min <= t && t <= self.t_max
     }
@@ -149,6 +158,16 @@ pub struct Select<'a> {
 impl Select<'_> {
     pub(crate) fn counts_all(&self) -> bool {
         self.orientation == Orientation::Any && self.exclude.is_empty()
+    }
+
+    /// Returns those of some hits that are of the orientation, by the bits of those along the normal.
+    #[inline(always)]
+    pub(crate) fn oriented(&self, hits: u32, along: u32) -> u32 {
+        match self.orientation {
+            Orientation::Any => hits,
+            Orientation::Exiting => hits & along,
+            Orientation::Entering => hits & !along,
+        }
     }
 }
 
@@ -194,15 +213,22 @@ pub(crate) struct NearestHit {
     pub(crate) low: f64,
     /// The distance beyond which nothing counts, or more.
     pub(crate) high: f64,
+    /// The ray's [unit](DRay::unit).
+    pub(crate) unit: f64,
     /// The triangle's id; the greatest number without a hit.
     pub(crate) object: u32,
-    /// Where the layout has the triangle.
-    pub(crate) place: u32,
 }
 
 impl NearestHit {
     pub(crate) fn new(ray: &DRay) -> Self {
-        Self { low: ray.t_max, high: ray.t_max, object: u32::MAX, place: 0 }
+        let [low, high] = [ray.t_max; 2];
+        Self { low, high, unit: ray.unit(), object: u32::MAX }
+    }
+
+    /// Returns a hit of the same ray.
+    #[inline(always)]
+    pub(crate) fn other(&self, (low, high): (f64, f64), object: u32) -> Self {
+        Self { low, high, object, ..*self }
     }
 
     pub(crate) fn is_known(&self) -> bool {
@@ -215,9 +241,10 @@ impl NearestHit {
     }
 }
 
-/// A ray, and which of its hits count.
+/// A ray, and which of its hits with triangles count.
 #[derive(Clone, Copy)]
 pub(crate) struct Query<'a> {
+    pub(crate) triangles: &'a [DTriangle],
     pub(crate) ray: &'a DRay,
     pub(crate) select: Select<'a>,
 }
@@ -231,77 +258,96 @@ impl Query<'_> {
         Line::new(self.ray.origin, self.ray.direction)
     }
 
-    /// Takes a hit between two bounds if it counts, and if it is nearer, or as near and of a lower
-    /// id. Returns whether it is. `triangle` returns the triangle at a place.
+    /// Returns whether a hit is certainly out of the range or behind the nearest one.
     #[inline(always)]
-    pub(crate) fn take(
-        &self,
-        nearest: &mut NearestHit,
-        new: NearestHit,
-        triangle: impl Fn(u32) -> DTriangle,
-    ) -> bool {
-        if new.high < self.ray.t_min || new.low > nearest.high {
+    pub(crate) fn leaves_out(&self, nearest: &NearestHit, new: &NearestHit) -> bool {
+        new.high < self.ray.t_min || nearest.high < new.low
+    }
+
+    /// Takes a triangle, decided by itself. Returns whether it is the new nearest hit.
+    pub(crate) fn offer(&self, nearest: &mut NearestHit, object: u32) -> bool {
+        let Some(bounds) = self.bounds(object) else { return false };
+        self.take(nearest, nearest.other(bounds, object))
+    }
+
+    /// Takes a hit, if it counts and is nearer. Returns whether it is.
+    pub(crate) fn take(&self, nearest: &mut NearestHit, new: NearestHit) -> bool {
+        if self.leaves_out(nearest, &new) {
             return false;
         }
-        if !self.select.counts_all() && !self.counts(new.object, &triangle(new.place)) {
+        if !self.select.counts_all() && !self.counts(new.object) {
             return false;
         }
-        if new.low < self.ray.t_min || new.high >= nearest.low {
-            return self.take_close(nearest, new, &triangle);
+        if new.low < self.ray.t_min || nearest.low <= new.high {
+            return self.take_close(nearest, new);
         }
         *nearest = new;
         true
     }
 
-    /// Does so where bounds do not decide.
+    /// Takes a hit that counts, and is not left out, if it is in the range and nearer, or as near
+    /// and of a lower id. Returns whether it is. Where the bounds do not decide, there are narrower
+    /// ones.
     #[cold]
     #[inline(never)]
-    fn take_close(
-        &self,
-        nearest: &mut NearestHit,
-        mut new: NearestHit,
-        triangle: &dyn Fn(u32) -> DTriangle,
-    ) -> bool {
-        for hit in [&mut new, nearest] {
-            if !hit.is_known() {
-                self.resolve(hit, &triangle(hit.place));
+    pub(crate) fn take_close(&self, nearest: &mut NearestHit, mut new: NearestHit) -> bool {
+        for narrow in [Self::narrow, Self::resolve] {
+            for hit in [&mut new, &mut *nearest] {
+                if !hit.is_known() {
+                    narrow(self, hit);
+                }
+            }
+            if self.leaves_out(nearest, &new) {
+                return false;
+            }
+            if self.ray.t_min <= new.low && new.high < nearest.low {
+                *nearest = new;
+                return true;
             }
         }
-        let is_in_range = self.ray.t_min <= new.low;
-        let is_nearer =
-            new.low < nearest.low || new.low == nearest.low && new.object < nearest.object;
-        if is_in_range && is_nearer {
+        let is_nearer = new.object < nearest.object;
+        if is_nearer {
             *nearest = new;
         }
-        is_in_range && is_nearer
+        is_nearer
     }
 
+    /// Returns whether hits of a triangle count.
     #[inline(never)]
-    fn counts(&self, object: u32, triangle: &DTriangle) -> bool {
-        let side = match self.select.orientation {
-            Orientation::Any => None,
-            Orientation::Exiting => Some(1),
-            Orientation::Entering => Some(-1),
-        };
-        !self.select.exclude.contains(&object)
-            && side.is_none_or(|side| self.line().side(self.ends(), &triangle.0) == side)
+    pub(crate) fn counts(&self, object: u32) -> bool {
+        let Select { orientation, exclude } = self.select;
+        if orientation == Orientation::Any {
+            return !exclude.contains(&object);
+        }
+        let side = if orientation == Orientation::Exiting { 1 } else { -1 };
+        let DTriangle(corners) = &self.triangles[object as usize];
+        !exclude.contains(&object) && self.line().side(self.ends(), corners) == side
+    }
+
+    /// Finds bounds of the distance in f64.
+    fn narrow(&self, hit: &mut NearestHit) {
+        if let Some(bounds) = self.bounds(hit.object) {
+            (hit.low, hit.high) = bounds;
+        }
     }
 
     /// Finds the rounded distance.
-    pub(crate) fn resolve(&self, hit: &mut NearestHit, triangle: &DTriangle) {
-        hit.low = self.line().rounded(self.ends(), &triangle.0, hit.high - hit.low);
+    pub(crate) fn resolve(&self, hit: &mut NearestHit) {
+        let DTriangle(corners) = &self.triangles[hit.object as usize];
+        hit.low = self.line().rounded(self.ends(), corners);
         hit.high = hit.low;
     }
 
     /// Returns bounds of the distance at which the ray hits a triangle, without its range.
     #[cold]
     #[inline(never)]
-    pub(crate) fn bounds(&self, triangle: &DTriangle) -> Option<(f64, f64)> {
-        match self.line().filter(&triangle.0) {
+    pub(crate) fn bounds(&self, object: u32) -> Option<(f64, f64)> {
+        let DTriangle(corners) = &self.triangles[object as usize];
+        match self.line().filter(corners) {
             Verdict::Miss => None,
             Verdict::Between(low, high) => Some((low, high)),
             Verdict::Unsure => {
-                let t = self.line().crossing(self.ends(), &triangle.0, false)?;
+                let t = self.line().crossing(self.ends(), corners, false)?;
                 Some((t, t))
             }
         }

@@ -86,7 +86,7 @@ impl WideBvh {
         let mut found = Vec::new();
         for (rays, counts) in rays.chunks(AT_ONCE).zip(counts.chunks_mut(AT_ONCE)) {
             found.clear();
-            self.trace(rays, All(&mut found), Coherence::Incoherent);
+            self.trace(All { rays, found: &mut found }, Coherence::Incoherent);
             append_sorted(&found, hits, counts);
         }
     }
@@ -178,20 +178,38 @@ struct Found {
 }
 
 /// All hits of every ray, in no order; the hits of a divided triangle once for each of its leaves.
-struct All<'a>(&'a mut Vec<Found>);
+struct All<'a> {
+    rays: &'a [Ray],
+    found: &'a mut Vec<Found>,
+}
 
-impl Find for All<'_> {
+impl<'a> Find for All<'a> {
+    type Rays = &'a [Ray];
     const ALL: bool = true;
 
     #[inline(always)]
-    fn append(&mut self, number: usize, hit: Hit) {
-        self.0.push(Found { number: number as u32, hit });
+    fn rays(&self) -> &'a [Ray] {
+        self.rays
     }
 
-    fn alone(&mut self, wide: &WideBvh, number: usize, ray: &Ray) {
+    #[inline(always)]
+    fn append(
+        &mut self,
+        number: usize,
+        decided: &Decided,
+        pair: usize,
+        block: &TriangleBlock,
+        lane: usize,
+    ) {
+        let hit = decided.hit_of(pair, block, lane, &self.rays[number]);
+        self.found.extend(hit.map(|hit| Found { number: number as u32, hit }));
+    }
+
+    fn alone(&mut self, wide: &WideBvh, number: usize) {
         let mut hits = Vec::new();
-        wide.append_hits(ray, &mut hits);
-        hits.into_iter().for_each(|hit| self.append(number, hit));
+        wide.append_hits(&self.rays[number], &mut hits);
+        let number = number as u32;
+        self.found.extend(hits.into_iter().map(|hit| Found { number, hit }));
     }
 }
 

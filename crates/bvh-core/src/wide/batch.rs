@@ -5,7 +5,7 @@ use super::instructions::{Instructions, Task};
 use super::lanes::Lanes;
 use super::layout::WideBvh;
 use super::packet::{Packet, RAYS};
-use super::ray_lanes::{RayLanes, prefetch};
+use super::ray_lanes::Rays;
 use super::{flight, vector};
 use crate::{Hit, Kernel, Ray};
 use core::ops::Range;
@@ -32,7 +32,7 @@ impl WideBvh {
     pub fn nearest_hits(&self, rays: &[Ray], hits: &mut [Hit], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "a hit for every ray");
         for (rays, hits) in rays.chunks(AT_ONCE).zip(hits.chunks_mut(AT_ONCE)) {
-            self.trace(rays, Nearest(hits), coherence);
+            self.trace(Nearest { rays, hits }, coherence);
         }
     }
 
@@ -43,20 +43,18 @@ impl WideBvh {
     pub fn any_hits(&self, rays: &[Ray], hits: &mut [bool], coherence: Coherence) {
         assert_eq!(rays.len(), hits.len(), "an answer for every ray");
         for (rays, hits) in rays.chunks(AT_ONCE).zip(hits.chunks_mut(AT_ONCE)) {
-            self.trace(rays, Any(hits), coherence);
+            self.trace(Any { rays, hits }, coherence);
         }
     }
 
     /// Answers at most [`AT_ONCE`] rays.
-    pub(super) fn trace(&self, rays: &[Ray], mut find: impl Find, coherence: Coherence) {
-        if self.kernel == Kernel::Portable || rays.len() < FEW {
-            for (number, ray) in rays.iter().enumerate() {
-                find.alone(self, number, ray);
-            }
+    pub(super) fn trace(&self, mut find: impl Find, coherence: Coherence) {
+        let count = find.rays().count();
+        if self.kernel == Kernel::Portable || count < FEW {
+            (0..count).for_each(|number| find.alone(self, number));
             return;
         }
-        let find = &mut find;
-        let task = Batch::<_, false> { wide: self, rays, find, coherence };
+        let task = Batch::<_, false> { wide: self, find: &mut find, coherence };
         // SAFETY: a layout's kernel is available.
         unsafe {
             match self.framed {
@@ -81,15 +79,14 @@ const MANY: usize = 128;
 /// that meet little.
 struct Batch<'a, F, const IN_FRAME: bool> {
     wide: &'a WideBvh,
-    rays: &'a [Ray],
     find: &'a mut F,
     coherence: Coherence,
 }
 
 impl<'a, F> Batch<'a, F, false> {
     fn in_frame(self) -> Batch<'a, F, true> {
-        let Self { wide, rays, find, coherence } = self;
-        Batch { wide, rays, find, coherence }
+        let Self { wide, find, coherence } = self;
+        Batch { wide, find, coherence }
     }
 }
 
@@ -98,26 +95,27 @@ impl<K: Instructions, F: Find, const IN_FRAME: bool> Task<K> for Batch<'_, F, IN
 
     #[inline(always)]
     unsafe fn run(self) {
-        let Self { wide, rays, find, coherence } = self;
+        let Self { wide, find, coherence } = self;
+        let rays = find.rays();
         // SAFETY: the processor has the instructions of `K`.
         unsafe {
             if F::ALL || coherence == Coherence::Incoherent {
-                return flight::trace::<K, F>(wide, rays, 0..rays.len(), find);
+                return flight::trace::<K, F>(wide, 0..rays.count(), find);
             }
             let mut packet = Packet::<K>::new();
             // The rays from `first_of_rest` up to `next` fit no packet, and wait for `rest`.
             let mut first_of_rest = 0;
             let mut next = 0;
-            while next + K::Rays::N <= rays.len() {
-                prefetch::<K>(rays, next + RAYS);
+            while next + K::Rays::N <= rays.count() {
+                rays.prefetch::<K>(next + RAYS);
                 let frame = if IN_FRAME { wide.frame() } else { None };
-                let (lanes, boxed) = RayLanes::load(rays, next, frame);
+                let (lanes, boxed) = rays.load(next, frame);
                 if boxed.cohere(&lanes, wide.near_box()) {
                     if !packet.takes(boxed.octant()) {
                         packet.trace(wide, find);
                     }
                     packet.add(lanes, boxed, next);
-                    rest::<K, F>(wide, rays, first_of_rest..next, find);
+                    rest::<K, F>(wide, first_of_rest..next, find);
                     first_of_rest = next + K::Rays::N;
                 }
                 next += K::Rays::N;
@@ -125,7 +123,7 @@ impl<K: Instructions, F: Find, const IN_FRAME: bool> Task<K> for Batch<'_, F, IN
             if !packet.is_empty() {
                 packet.trace(wide, find);
             }
-            rest::<K, F>(wide, rays, first_of_rest..rays.len(), find);
+            rest::<K, F>(wide, first_of_rest..rays.count(), find);
         }
     }
 }
@@ -133,19 +131,12 @@ impl<K: Instructions, F: Find, const IN_FRAME: bool> Task<K> for Batch<'_, F, IN
 /// Traces the rays between two packets. A few rays at the edge of something are nearly coherent and
 /// faster one by one; a long run of them is faster in flight.
 #[inline(always)]
-unsafe fn rest<K: Instructions, F: Find>(
-    wide: &WideBvh,
-    rays: &[Ray],
-    numbers: Range<usize>,
-    find: &mut F,
-) {
+unsafe fn rest<K: Instructions, F: Find>(wide: &WideBvh, numbers: Range<usize>, find: &mut F) {
     let is_many = numbers.len() >= MANY;
     if is_many {
         // SAFETY: the processor has the instructions of `K`.
-        unsafe { flight::trace::<K, F>(wide, rays, numbers, find) };
+        unsafe { flight::trace::<K, F>(wide, numbers, find) };
     } else {
-        for number in numbers {
-            find.alone(wide, number, &rays[number]);
-        }
+        numbers.for_each(|number| find.alone(wide, number));
     }
 }

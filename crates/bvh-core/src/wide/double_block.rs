@@ -41,11 +41,6 @@ impl DoubleBlock {
         Self { corners }
     }
 
-    #[inline(always)]
-    pub(super) fn triangle(&self, lane: usize) -> DTriangle {
-        DTriangle(self.corners.each_ref().map(|axes| DVec3::from(axes.each_ref().map(|x| x[lane]))))
-    }
-
     /// Decides about those of the `possible` triangles that f64 suffices for.
     ///
     /// # Safety
@@ -88,24 +83,10 @@ impl DoubleBlock {
             let below = zero - bound;
             let is_inside = bound.lt(least) | most.lt(below);
             let is_outside = least.lt(below) & bound.lt(most);
-            // As in `Line::plane`.
-            let [px, py, pz] = minus(second, first);
-            let [qx, qy, qz] = minus(third, first);
-            let [a, b] = [py * qz, pz * qy];
-            let [c, d] = [pz * qx, px * qz];
-            let [e, f] = [px * qy, py * qx];
-            let normal = [a - b, c - d, e - f];
-            let products = [a.abs() + b.abs(), c.abs() + d.abs(), e.abs() + f.abs()];
-            let along = dot([dx, dy, dz], normal);
-            let along_error = error * dot([dx.abs(), dy.abs(), dz.abs()], products);
-            let t = dot(from, normal) / along;
-            let sizes = [from[0].abs(), from[1].abs(), from[2].abs()];
-            let slack = error * dot(sizes, products) + t.abs() * along_error;
-            let slack = L::Double::splat(0.25) * slack / along.abs();
+            let sides = [minus(second, first), minus(third, first)];
+            let (t, slack, is_known) = plane(from, [dx, dy, dz], sides);
             let low = t - slack;
             let high = t + slack;
-            // NaN fails every comparison.
-            let is_known = along_error.le(along.abs());
             let hits = is_inside & is_known & zero.le(low);
             let misses = is_outside | is_inside & is_known & high.lt(zero);
             let hits = L::narrow(hits).bits() & possible;
@@ -169,27 +150,52 @@ fn difference<D: DoubleLanes>(a: Vector<D>, b: Vector<D>) -> [Twice<D>; 3] {
     [Twice::difference(a[0], b[0]), Twice::difference(a[1], b[1]), Twice::difference(a[2], b[2])]
 }
 
+#[inline(always)]
+fn larger<D: DoubleLanes>([x, y, z]: &[Twice<D>; 3]) -> Vector<D> {
+    [x.0, y.0, z.0]
+}
+
+/// Returns the distances of planes, their errors, and where they are known, as in `Line::plane`: by
+/// the corners relative to the origin, the direction and the sides.
+#[inline(always)]
+fn plane<D: DoubleLanes>(
+    from: Vector<D>,
+    direction: Vector<D>,
+    [[px, py, pz], [qx, qy, qz]]: [Vector<D>; 2],
+) -> (D, D, D::Mask) {
+    let [a, b] = [py * qz, pz * qy];
+    let [c, d] = [pz * qx, px * qz];
+    let [e, f] = [px * qy, py * qx];
+    let normal = [a - b, c - d, e - f];
+    let products = [a.abs() + b.abs(), c.abs() + d.abs(), e.abs() + f.abs()];
+    let along = dot(direction, normal);
+    let error = along.filled(ERROR);
+    let [dx, dy, dz] = direction;
+    let along_error = error * dot([dx.abs(), dy.abs(), dz.abs()], products);
+    let t = dot(from, normal) / along;
+    let sizes = [from[0].abs(), from[1].abs(), from[2].abs()];
+    let slack = error * dot(sizes, products) + t.abs() * along_error;
+    // NaN fails every comparison.
+    (t, slack.filled(0.25) * slack / along.abs(), along_error.le(along.abs()))
+}
+
 /// Rays with the triangles that they hit, side by side.
 pub(super) struct Distances {
     /// Of the rays' origins and directions, and of the triangles' corners.
     rows: [[f64; Self::COUNT]; 15],
-    /// The errors of distances in f64.
-    slack: [f64; Self::COUNT],
 }
 
 impl Distances {
     /// The most that one register needs.
     pub(super) const COUNT: usize = 16;
-    pub(super) const EMPTY: Self =
-        Self { rows: [[0.0; Self::COUNT]; 15], slack: [0.0; Self::COUNT] };
+    pub(super) const EMPTY: Self = Self { rows: [[0.0; Self::COUNT]; 15] };
 
     #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, ray: &DRay, triangle: &DTriangle, slack: f64) {
+    pub(super) fn set(&mut self, lane: usize, ray: &DRay, triangle: &DTriangle) {
         let DTriangle([a, b, c]) = *triangle;
         for (i, point) in [ray.origin, ray.direction, a, b, c].into_iter().enumerate() {
             (0..3).for_each(|axis| self.rows[3 * i + axis][lane] = point[axis]);
         }
-        self.slack[lane] = slack;
     }
 
     /// Returns the rounded distances, and a bit for each that is decided.
@@ -206,7 +212,7 @@ impl Distances {
                     *coordinate = L::Double::load(row.as_ptr());
                 }
             }
-            rounded::<L>(points, L::Double::load(self.slack.as_ptr()))
+            rounded::<L>(points)
         }
     }
 }
@@ -216,17 +222,12 @@ impl Distances {
 /// # Safety
 /// The processor has the instructions of `L`.
 #[inline(always)]
-pub(super) unsafe fn rounded_distance<L: Lanes>(
-    ray: &DRay,
-    triangle: &DTriangle,
-    slack: f64,
-) -> Option<f64> {
+pub(super) unsafe fn rounded_distance<L: Lanes>(ray: &DRay, triangle: &DTriangle) -> Option<f64> {
     let DTriangle([a, b, c]) = *triangle;
     // SAFETY: the processor has the instructions.
     let (distances, is_decided) = unsafe {
         let [origin, direction] = [splat::<L>(ray.origin), splat::<L>(ray.direction)];
-        let points = [origin, direction, splat::<L>(a), splat::<L>(b), splat::<L>(c)];
-        rounded::<L>(points, L::Double::splat(slack))
+        rounded::<L>([origin, direction, splat::<L>(a), splat::<L>(b), splat::<L>(c)])
     };
     (is_decided & 1 != 0).then_some(distances[0])
 }
@@ -236,14 +237,15 @@ pub(super) unsafe fn rounded_distance<L: Lanes>(
 #[inline(always)]
 unsafe fn rounded<L: Lanes>(
     [origin, direction, a, b, c]: [[L::Double; 3]; 5],
-    slack: L::Double,
 ) -> ([f64; Distances::COUNT], u32) {
     const { assert!(L::N <= Distances::COUNT) };
     let (corner, p, q) = (difference(a, origin), difference(b, a), difference(c, a));
     let Twice(high, low) = distance(&corner, &direction, &p, &q);
+    let sides = [larger(&p), larger(&q)];
+    let (_, slack, is_known) = plane(larger(&corner), direction, sides);
     let slack = slack * slack.filled(NARROWER);
     let rounded = high + (low + slack);
-    let is_decided = rounded.eq(high + (low - slack));
+    let is_decided = is_known & rounded.eq(high + (low - slack));
     let mut distances = [0.0; Distances::COUNT];
     // SAFETY: there is room. Adding 0 turns −0 into +0.
     unsafe { (rounded + rounded.filled(0.0)).store(distances.as_mut_ptr()) };

@@ -15,7 +15,7 @@
 //! the order of children and those behind a hit are found without branches, too. A ray is at the
 //! end when its stack is empty, which is seen with the leaves.
 
-use super::answer::Find;
+use super::answer::{Bounded, Find};
 use super::gathered::Gathered;
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{LINE, SPARE, STACK, deep_stacks};
@@ -23,9 +23,10 @@ use super::lanes::{Aligned, Lanes};
 use super::layout::{Child, Places, WideBvh, WideNode};
 use super::pairs::Crossings;
 use super::prepared::{Prepared, Ready, Test};
-use super::ray_lanes::{RayLanes, prefetch};
+use super::ray_lanes::Rays;
 use super::triangles::TriangleBlock;
-use crate::{Hit, Ray};
+use crate::Hit;
+use bytemuck::Zeroable;
 use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 use core::ops::Range;
@@ -40,7 +41,6 @@ const RAYS: usize = 16;
 #[inline(always)]
 pub(crate) unsafe fn trace<K: Instructions, F: Find>(
     wide: &WideBvh,
-    rays: &[Ray],
     numbers: Range<usize>,
     find: &mut F,
 ) {
@@ -54,7 +54,6 @@ pub(crate) unsafe fn trace<K: Instructions, F: Find>(
     }
     let flight = Flight::<K, F> {
         wide,
-        rays,
         find,
         from: numbers.start,
         end: numbers.end,
@@ -95,7 +94,6 @@ unsafe fn append(list: &mut List, count: &mut usize, traversal: *mut Traversal, 
 struct Flight<'a, K, F> {
     /// The layout at whose root rays start.
     wide: &'a WideBvh,
-    rays: &'a [Ray],
     find: &'a mut F,
     /// The numbers of the rays that have not been prepared.
     from: usize,
@@ -154,7 +152,8 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
     /// that miss the box around everything, and by themselves those that begin far from it.
     #[inline(always)]
     unsafe fn start_idle(&mut self) {
-        let Self { wide, rays, .. } = *self;
+        let wide = self.wide;
+        let rays = self.find.rays();
         let root = wide.root.unwrap_or(Child::END);
         let mut counts = self.counts;
         while self.idle_count >= K::Rays::N && self.from < self.end {
@@ -163,8 +162,8 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
             let there = u32::MAX >> (32 - (self.from - from));
             // SAFETY: the processor has the instructions; as many places as lanes are idle.
             unsafe {
-                prefetch::<K>(rays, self.from + K::Rays::N);
-                let lanes = RayLanes::<K::Rays>::load_up_to(rays, from, self.end, wide.frame());
+                rays.prefetch::<K>(self.from + K::Rays::N);
+                let lanes = rays.load_up_to::<K::Rays>(from, self.end, wide.frame());
                 let ready = Ready::new(lanes, wide);
                 let mut entering = there & ready.enter(wide.root_box());
                 let mut others = !entering & u32::MAX >> (32 - K::Rays::N);
@@ -189,10 +188,8 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
                     if number >= self.from {
                         continue;
                     }
-                    let ray = &rays[number];
-                    // An empty range is a miss, from afar too.
-                    if ready.far >> lane & 1 != 0 && ray.t_min() <= ray.t_max() {
-                        self.find.alone(wide, number, ray);
+                    if ready.far >> lane & 1 != 0 {
+                        self.find.alone(wide, number);
                     } else {
                         self.find.write(number, f32::INFINITY, u32::MAX);
                     }
@@ -269,10 +266,9 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
                 let at = |k: usize| *self.at_leaves.get_unchecked((i + k).min(count - 1));
                 let four = [at(0), at(1), at(2), at(3)];
                 let (crossings, sure) = candidates::<K::Rays, F>(wide, four);
-                let sure = if F::TAKES_CERTAIN { sure } else { 0 };
                 for (k, &traversal) in four.iter().enumerate().take(quarters) {
                     let four = |pairs: u32| pairs >> (4 * k) & 0b1111;
-                    let is_hit = F::ANY && four(sure) != 0;
+                    let is_hit = F::ANY && F::TAKES_CERTAIN && four(sure) != 0;
                     if F::ANY {
                         let nearest = (*traversal).nearest;
                         (*traversal).nearest = if is_hit { 0 } else { nearest };
@@ -308,13 +304,13 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
         let wide = self.wide;
         if F::DECIDES {
             // SAFETY: the processor has the instructions; the rays are at blocks.
-            return unsafe { self.decide_one_by_one(hopeful) };
+            return unsafe { self.decide_elsewhere(hopeful) };
         }
         let pairs = &mut self.gathered;
         // SAFETY: the processor has the instructions; the rays are at blocks.
         unsafe {
             pairs.clear();
-            for (i, &Hopeful { traversal, possible, certain }) in hopeful.iter().enumerate() {
+            for (i, &Hopeful { traversal, possible, certain, .. }) in hopeful.iter().enumerate() {
                 let traversal = &*traversal;
                 let block = traversal.block(wide);
                 let mut lanes = possible & block.used::<K::Block>();
@@ -333,8 +329,7 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
                     let block = traversal.block(wide);
                     if F::ALL {
                         let number = traversal.ray.number as usize;
-                        let hit = decided.hit_of(pair - first, block, lane, &self.rays[number]);
-                        hit.into_iter().for_each(|hit| self.find.append(number, hit));
+                        self.find.append(number, &decided, pair - first, block, lane);
                     } else {
                         let key = decided.key(pair - first, block.id(lane));
                         traversal.nearest = traversal.nearest.min(key);
@@ -351,18 +346,24 @@ impl<K: Instructions, F: Find> Flight<'_, K, F> {
 
     /// Does the same where `find` decides.
     #[inline(always)]
-    unsafe fn decide_one_by_one(&mut self, hopeful: &[Hopeful]) {
-        for &Hopeful { traversal, possible, .. } in hopeful {
-            // SAFETY: the ray is at a block; the processor has the instructions.
+    unsafe fn decide_elsewhere(&mut self, hopeful: &[Hopeful]) {
+        let quarters = K::Rays::N / 4;
+        for i in (0..hopeful.len()).step_by(quarters) {
+            // SAFETY: the rays are at blocks; the processor has the instructions.
             unsafe {
-                let traversal = &mut *traversal;
-                let block = traversal.block(self.wide);
-                let number = traversal.ray.number as usize;
-                let possible = possible & block.used::<K::Block>();
-                if let Some(Hit { t, object }) = self.find.decide::<K>(number, block, possible) {
-                    traversal.nearest = u64::from(t.to_bits()) << 32 | u64::from(object);
-                    if !F::ANY {
-                        traversal.drop_farther::<K>();
+                let at = |k: usize| hopeful[(i + k).min(hopeful.len() - 1)].traversal;
+                let four = [at(0), at(1), at(2), at(3)];
+                let bounded = bounds::<K::Rays>(self.wide, four);
+                for (traversal, bounded) in four.into_iter().zip(&bounded).take(hopeful.len() - i) {
+                    let traversal = &mut *traversal;
+                    let block = traversal.block(self.wide);
+                    let number = traversal.ray.number as usize;
+                    let hit = self.find.decide::<K>(number, block, bounded);
+                    if let Some(Hit { t, object }) = hit {
+                        traversal.nearest = u64::from(t.to_bits()) << 32 | u64::from(object);
+                        if !F::ANY {
+                            traversal.drop_farther::<K>();
+                        }
                     }
                 }
             }
@@ -512,4 +513,30 @@ unsafe fn candidates<L: Lanes, F: Find>(
         let (possible, sure) = rays.within(&candidates, t_max.spread::<1>());
         (Crossings { possible, ..crossings }, sure)
     }
+}
+
+/// Returns the same with bounds of the distances.
+#[inline(always)]
+unsafe fn bounds<L: Lanes>(wide: &WideBvh, four: [*mut Traversal; 4]) -> [Bounded; 4] {
+    let mut bounded = [Bounded::zeroed(); 4];
+    // SAFETY: as in `candidates`; there is room.
+    unsafe {
+        let tests = four.map(|at| Test { ray: &(*at).ray, block: (*at).block(wide) });
+        let rays = Test::rays::<L>(tests);
+        let candidates = rays.candidates(&Test::corners(tests));
+        let t_max = L::load_quarters(four.map(|at| (&raw const (*at).nearest).cast()));
+        let (possible, certain) = rays.within(&candidates, t_max.spread::<1>());
+        let ([low, high], along) = rays.distances(&candidates);
+        let to = bounded.as_mut_ptr();
+        let to = [to, to.add(1), to.add(2), to.add(3)];
+        low.store_quarters(to.map(|to| (&raw mut (*to).low).cast()));
+        high.store_quarters(to.map(|to| (&raw mut (*to).high).cast()));
+        for (k, to) in bounded.iter_mut().enumerate().take(L::N / 4) {
+            let four = |pairs: u32| pairs >> (4 * k) & 0b1111;
+            to.possible = four(possible);
+            to.certain = four(certain);
+            to.along = four(along);
+        }
+    }
+    bounded
 }

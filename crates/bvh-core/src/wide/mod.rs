@@ -12,6 +12,7 @@ mod build;
 mod closest;
 mod decide;
 mod double;
+mod double_batch;
 mod double_block;
 mod flight;
 mod gathered;

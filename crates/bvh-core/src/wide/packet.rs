@@ -6,16 +6,15 @@
 //! volume hierarchies'; Overbeck, Ramamoorthi & Mark 2008, 'Large ray packets for real-time Whitted
 //! ray tracing' (ranged traversal).
 
-use super::answer::{ANY_HIT, Find, NEAREST_HIT};
+use super::answer::{ANY_HIT, Bounded, Find, NEAREST_HIT};
 use super::instructions::{Instructions, Task, lane_of, last_key};
 use super::kernel::{SPARE, STACK, deep_stacks};
 use super::lanes::{Lanes, Mask};
 use super::layout::{Child, WideBvh, WideNode};
-use super::packet_vector::Vector;
+use super::packet_vector::{Nearest, Vector};
 use super::pinhole::{Seen, one_origin};
 use super::ray_lanes::{BoxLanes, RayBounds, RayLanes};
 use super::triangles::TriangleBlock;
-use crate::Aabb;
 use crate::slabs::{FAR, NEAR};
 use core::mem::MaybeUninit;
 use glam::Vec3;
@@ -89,7 +88,10 @@ impl<K: Instructions> Packet<K> {
     /// The origin of all rays, if they have one. In a frame, origins that differ may be rounded to
     /// the same one.
     #[inline(always)]
-    unsafe fn one_origin(&self, wide: &WideBvh) -> Option<Vec3> {
+    unsafe fn one_origin<F: Find>(&self, wide: &WideBvh) -> Option<Vec3> {
+        if F::ANY || F::DECIDES {
+            return None;
+        }
         if wide.framed.is_none() {
             return one_origin(&self.bounds, &wide.bounds);
         }
@@ -110,7 +112,7 @@ impl<K: Instructions> Packet<K> {
     }
 
     #[inline(always)]
-    unsafe fn write(&self, find: &mut impl Find) {
+    unsafe fn write<F: Find>(&self, find: &mut F) {
         const { assert!(K::Rays::N <= 16) };
         let mut distances = [0.0; 16];
         let mut objects = [0; 16];
@@ -120,6 +122,13 @@ impl<K: Instructions> Packet<K> {
                 let vector = vector.assume_init_ref();
                 vector.nearest.t.store(distances.as_mut_ptr());
                 vector.nearest.object.store(objects.as_mut_ptr().cast());
+                if F::DECIDES && !F::ANY {
+                    let known = vector.nearest.known();
+                    for (number, known) in (vector.first..).zip(known).take(K::Rays::N) {
+                        find.learn(number, known);
+                    }
+                    continue;
+                }
                 vector.first
             };
             for (lane, (&t, &object)) in distances.iter().zip(&objects).enumerate().take(K::Rays::N)
@@ -130,16 +139,16 @@ impl<K: Instructions> Packet<K> {
     }
 
     #[inline(always)]
-    unsafe fn traverse<const ANY: bool>(
+    unsafe fn traverse<F: Find>(
         &mut self,
         wide: &WideBvh,
+        find: &mut F,
         root: Child,
         culling: &Culling<K::Boxes>,
     ) {
         // SAFETY: the references of the layout are sound, and its stacks large enough.
         unsafe {
             let nodes = wide.nodes.as_ptr();
-            let blocks = wide.blocks.as_ptr();
             let mut farthest = self.bounds.end();
             let mut end = last_key(farthest);
             let mut keys = MaybeUninit::<[u32; STACK + SPARE]>::uninit();
@@ -165,7 +174,7 @@ impl<K: Instructions> Packet<K> {
                     let node = &*nodes.add(child.index());
                     let (entries, mask) = culling.cull::<K>(node, farthest);
                     if mask != 0 {
-                        if ANY {
+                        if F::ANY {
                             K::compress_keys(entries, mask, keys.add(top));
                         } else {
                             K::sort_keys(entries, mask, keys.add(top));
@@ -177,11 +186,11 @@ impl<K: Instructions> Packet<K> {
                         fetch::<K>(wide, node, mask);
                     }
                 } else {
-                    let block = blocks.add(child.index());
-                    if self.visit_leaf::<ANY>(first, entered, &planes, block, &wide.bounds) {
+                    let block = child.index();
+                    if self.visit_leaf(first, entered, &planes, block, wide, find) {
                         farthest = self.farthest();
                         end = last_key(farthest);
-                        if ANY && farthest < 0.0 {
+                        if F::ANY && farthest < 0.0 {
                             return;
                         }
                     }
@@ -277,13 +286,9 @@ impl<K: Instructions, F: Find> Task<K> for Trace<'_, K, F> {
         // SAFETY: the processor has the instructions.
         unsafe {
             let culling = Culling::<K::Boxes>::new(&packet.bounds, packet.octant);
-            packet.origin = packet.one_origin(wide);
+            packet.origin = packet.one_origin::<F>(wide);
             if let Some(root) = wide.root {
-                if F::ANY {
-                    packet.traverse::<ANY_HIT>(wide, root, &culling);
-                } else {
-                    packet.traverse::<NEAREST_HIT>(wide, root, &culling);
-                }
+                packet.traverse(wide, find, root, &culling);
             }
             packet.write(find);
             packet.count = 0;
@@ -297,35 +302,38 @@ impl<K: Instructions> Packet<K> {
     /// the vector `first` that enters the box of these planes, and earlier vectors do not enter it.
     /// Returns whether any ray has a new nearest hit.
     #[inline(always)]
-    unsafe fn visit_leaf<const ANY: bool>(
+    unsafe fn visit_leaf<F: Find>(
         &mut self,
         first: usize,
         entered: u32,
         planes: &[[f32; 2]; 3],
-        mut block: *const TriangleBlock,
-        bounds: &Aabb,
+        mut index: usize,
+        wide: &WideBvh,
+        find: &mut F,
     ) -> bool {
         let mut is_hit = false;
         // SAFETY: the processor has the instructions; the vectors are counted; a block that is not
         // its leaf's last is followed by another.
         unsafe {
             loop {
-                let origin = if ANY { None } else { self.origin };
-                let seen = origin.map(|origin| Seen::new::<K::Block>(&*block, origin));
+                let block = &*wide.blocks.as_ptr().add(index);
+                let seen = self.origin.map(|origin| Seen::new::<K::Block>(block, origin));
                 for i in first..self.count {
                     let entered = if i > first { self.enter(i, planes) } else { entered };
                     if entered != 0 {
                         let vector = self.vectors.get_unchecked_mut(i).assume_init_mut();
                         is_hit |= match &seen {
-                            Some(seen) => seen.test(vector, entered, &*block, bounds),
-                            None => test::<_, ANY>(vector, entered, &*block, bounds),
+                            _ if F::DECIDES => bound::<K, F>(vector, entered, index, wide, find),
+                            Some(seen) => seen.test(vector, entered, block, wide),
+                            None if F::ANY => test::<_, ANY_HIT>(vector, entered, block, wide),
+                            None => test::<_, NEAREST_HIT>(vector, entered, block, wide),
                         };
                     }
                 }
-                if (*block).is_last() {
+                if block.is_last() {
                     return is_hit;
                 }
-                block = block.add(1);
+                index += 1;
             }
         }
     }
@@ -338,10 +346,10 @@ unsafe fn test<L: Lanes, const ANY: bool>(
     vector: &mut Vector<L>,
     entered: u32,
     block: &TriangleBlock,
-    bounds: &Aabb,
+    wide: &WideBvh,
 ) -> bool {
     let mut is_hit = false;
-    vector.shear(bounds);
+    vector.shear(wide);
     // SAFETY: the processor has the instructions of `L`; the vector has been sheared.
     unsafe {
         let pairs = vector.pairs.assume_init_ref();
@@ -371,6 +379,117 @@ unsafe fn test<L: Lanes, const ANY: bool>(
         }
     }
     is_hit
+}
+
+/// Does the same where `find` decides: what bounds in f32 leave open.
+#[inline(always)]
+unsafe fn bound<K: Instructions, F: Find>(
+    vector: &mut Vector<K::Rays>,
+    entered: u32,
+    index: usize,
+    wide: &WideBvh,
+    find: &mut F,
+) -> bool {
+    let mut is_hit = false;
+    vector.shear(wide);
+    // SAFETY: the processor has the instructions; the vector has been sheared, and there is such a
+    // block.
+    unsafe {
+        let block = wide.blocks.get_unchecked(index);
+        let pairs = vector.pairs.assume_init_ref();
+        for lane in 0..block.len() {
+            let corners = block.splat_corners::<K::Rays>(lane, vector.axes);
+            let mut candidates = pairs.candidates(&corners);
+            candidates.crossings.possible &= entered;
+            let nearest = &mut vector.nearest;
+            let (possible, certain) = pairs.within(&candidates, nearest.t);
+            if possible == 0 {
+                continue;
+            }
+            let (bounds, along) = pairs.distances(&candidates);
+            let counted = find.counted(certain, along);
+            let taken = if F::ANY {
+                is_hit |= F::TAKES_CERTAIN && nearest.end(bounds[0].mask(counted), block.id(lane));
+                if F::TAKES_CERTAIN { counted } else { 0 }
+            } else {
+                let hits = bounds[1].lt(nearest.low) & nearest.t.mask(counted);
+                nearest.take(hits, bounds, block.id(lane));
+                hits.bits()
+            };
+            is_hit |= taken != 0;
+            let others = possible & !(certain & !counted) & !taken;
+            if others != 0 {
+                let one = One { pairs: others, certain, along, bounds, lane };
+                is_hit |= K::call(Decide { nearest, first: vector.first, block, one, find });
+            }
+        }
+    }
+    is_hit
+}
+
+/// Pairs of rays and one triangle of a block, with what f32 knows.
+struct One<L> {
+    pairs: u32,
+    certain: u32,
+    along: u32,
+    bounds: [L; 2],
+    lane: usize,
+}
+
+/// The decision of pairs that bounds leave open, which are few.
+struct Decide<'a, L, F> {
+    nearest: &'a mut Nearest<L>,
+    /// The number of the first ray.
+    first: usize,
+    block: &'a TriangleBlock,
+    one: One<L>,
+    find: &'a mut F,
+}
+
+impl<K: Instructions, F: Find> Task<K> for Decide<'_, K::Rays, F> {
+    /// Whether any ray has a new nearest hit.
+    type Output = bool;
+
+    #[inline(always)]
+    unsafe fn run(self) -> bool {
+        let Self { nearest, first, block, one, find } = self;
+        let mut is_hit = false;
+        let mut distances = [[0.0; 16]; 2];
+        for (distances, bounds) in distances.iter_mut().zip(one.bounds) {
+            // SAFETY: there is room for sixteen lanes.
+            unsafe { bounds.store(distances.as_mut_ptr()) };
+        }
+        let [low, high] = distances;
+        let known = nearest.known();
+        for ray in (0..K::Rays::N).filter(|ray| one.pairs >> ray & 1 != 0) {
+            let bit = |of: u32| (of >> ray & 1) << one.lane;
+            let bounded = Bounded {
+                low: [low[ray]; TriangleBlock::LANES],
+                high: [high[ray]; TriangleBlock::LANES],
+                possible: 1 << one.lane,
+                certain: bit(one.certain),
+                along: bit(one.along),
+            };
+            let number = first + ray;
+            if !F::ANY {
+                find.learn(number, known[ray]);
+            }
+            // SAFETY: the processor has the instructions; the block is one of the layout.
+            let Some(hit) = (unsafe { find.decide::<K>(number, block, &bounded) }) else {
+                continue;
+            };
+            is_hit = true;
+            let this = nearest.t.mask(1 << ray);
+            if F::ANY {
+                nearest.end(this, hit.object);
+            } else {
+                let known = find.known(number);
+                let bounds = [known.low, known.high].map(|t| nearest.t.filled(t));
+                nearest.take(this, bounds, known.object);
+            }
+        }
+        is_hit
+    }
 }
 
 /// The bounds of a packet as boxes are tested with them: along each axis the origins for which the

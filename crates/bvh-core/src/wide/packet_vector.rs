@@ -1,15 +1,19 @@
 //! A vector of rays in a packet: what the tests of boxes and of triangles need of them.
 
+use super::answer::Known;
 use super::lanes::{Lanes, Mask};
+use super::layout::WideBvh;
 use super::pairs::Pairs;
 use super::ray_lanes::{BoxLanes, RayLanes};
-use crate::Aabb;
 use crate::slabs::{FAR, NEAR};
 use core::mem::MaybeUninit;
 
 /// The nearest hits of rays so far, or their ends and `u32::MAX`.
 pub(super) struct Nearest<L> {
     pub(super) t: L,
+    /// At most the distances; the same, unless hits are decided elsewhere, and `t` is at least the
+    /// distance.
+    pub(super) low: L,
     pub(super) object: L,
 }
 
@@ -25,6 +29,29 @@ impl<L: Lanes> Nearest<L> {
             self.object = L::select(nearer, object, self.object);
         }
         is_hit
+    }
+
+    /// Takes some hits between bounds of their distances.
+    #[inline(always)]
+    pub(super) fn take(&mut self, hits: L::Mask, [low, high]: [L; 2], object: u32) {
+        self.t = L::select(hits, high, self.t);
+        self.low = L::select(hits, low, self.low);
+        self.object = L::select(hits, high.filled_with_bits(object), self.object);
+    }
+
+    /// Returns what is known of the hit in every lane.
+    #[inline(always)]
+    pub(super) fn known(&self) -> [Known; 16] {
+        let mut numbers = [[0.0; 16]; 3];
+        let [low, high, object] = &mut numbers;
+        // SAFETY: there is room for sixteen lanes.
+        unsafe {
+            self.low.store(low.as_mut_ptr());
+            self.t.store(high.as_mut_ptr());
+            self.object.store(object.as_mut_ptr());
+        }
+        let [low, high, object] = numbers;
+        core::array::from_fn(|i| Known { low: low[i], high: high[i], object: object[i].to_bits() })
     }
 
     /// Ends rays that have their answer: before they begin. Returns whether there are any.
@@ -66,7 +93,7 @@ impl<L: Lanes> Vector<L> {
             near_factor: [x * near, y * near, z * near],
             far_factor: [x * far, y * far, z * far],
             t_min: rays.t_min,
-            nearest: Nearest { t: rays.t_max, object: none },
+            nearest: Nearest { t: rays.t_max, low: rays.t_max, object: none },
             axes: rays.axes(),
             rays,
             is_sheared: false,
@@ -75,11 +102,11 @@ impl<L: Lanes> Vector<L> {
         }
     }
 
-    /// Makes `pairs` for triangles within `bounds`, unless they have been made.
+    /// Makes `pairs` for triangles of a layout, unless they have been made.
     #[inline(always)]
-    pub(super) fn shear(&mut self, bounds: &Aabb) {
+    pub(super) fn shear(&mut self, wide: &WideBvh) {
         if !self.is_sheared {
-            self.pairs.write(self.rays.sheared(self.axes, bounds));
+            self.pairs.write(self.rays.sheared(self.axes, wide));
             self.is_sheared = true;
         }
     }

@@ -48,7 +48,8 @@
 //! subnormal. Hence a product beyond 8EΔ + (e + 2⁻¹²⁶|d_z|) |a| has the sign of the difference of T
 //! and the rounded distance, or that difference is 0 within the range. Below R = 2⁴⁰ nothing
 //! overflows but T d_z, which then has the right sign, and its products; other rays get an infinite
-//! bound.
+//! bound. Without the term T d_z the sum is −ta d_z, off by no more: divided by |a d_z| with four
+//! roundings, where |a| is at least 3E and nothing underflows, it bounds t from both sides.
 //!
 //! *f64*, ε = 2⁻⁵³. Corners are sheared by multiplication with d_z, so S = spread · |d_z| is at
 //! least the largest |x|, |y|, and the edge values are within E = e (S + e) with e = 64εR|d_z|, as
@@ -132,6 +133,18 @@ pub(crate) struct Candidates<L> {
     depths: [L; 3],
 }
 
+/// What decides about the ranges of rays: aT d_z − az_A − aX, where az_A is left out.
+struct Tilt<L> {
+    /// a, as in the bounds above.
+    area: L,
+    /// −aX.
+    tilt: L,
+    /// The sign of a d_z.
+    flip: L,
+    /// The error of the sum.
+    slack: L,
+}
+
 /// The planes of triangles, a triangle per lane. Vectors are in the shear's order of axes.
 pub(crate) struct Plane<L: Lanes> {
     /// The first corners.
@@ -196,18 +209,9 @@ impl<L: Lanes> Pairs<L> {
     /// are, in f32.
     #[inline(always)]
     pub(crate) fn within(&self, candidates: &Candidates<L>, t_max: L) -> (u32, u32) {
-        let underflow = t_max.filled(f32::MIN_POSITIVE);
-        let [_, _, range_error] = self.errors;
-        let [u, v, w] = candidates.edges;
-        let [az, bz, cz] = candidates.depths;
         let depth = self.direction[2];
-        let area = u + v + w;
-        let side = bz - az;
-        let other = cz - az;
-        let tilt = v.mul_add(side, w * other);
-        let flip = area.filled(-0.0) & (area ^ depth);
-        let slack = (candidates.error * area.filled(8.0))
-            .mul_add(side.abs().max(other.abs()), range_error.mul_add(area.abs(), underflow));
+        let [az, _, _] = candidates.depths;
+        let Tilt { area, tilt, flip, slack } = self.tilt(candidates);
         let begin = area.mul_add(self.t_min.mul_add(depth, az), tilt) ^ flip;
         let end = area.mul_add(t_max.mul_add(depth, az), tilt) ^ flip;
         let no_slack = slack.filled(0.0) - slack;
@@ -216,6 +220,37 @@ impl<L: Lanes> Pairs<L> {
         let Crossings { possible, certain } = candidates.crossings;
         let certain = certain & possible;
         (possible & !(certain & beyond.bits()), certain & within.bits())
+    }
+
+    /// Returns bounds of the distances at which rays certainly hit triangles, and a bit for each that
+    /// is hit along its normal.
+    #[inline(always)]
+    pub(crate) fn distances(&self, candidates: &Candidates<L>) -> ([L; 2], u32) {
+        /// Covers five roundings.
+        const ROUNDINGS: f32 = 4.0 * f32::EPSILON;
+        let depth = self.direction[2];
+        let [az, _, _] = candidates.depths;
+        let Tilt { area, tilt, flip, slack } = self.tilt(candidates);
+        let height = slack.filled(0.0) - (area.mul_add(az, tilt) ^ flip);
+        let inverse = slack.filled(1.0) / (area * depth).abs();
+        let low = (height - slack) * inverse * slack.filled(1.0 - ROUNDINGS);
+        let high = (height + slack) * inverse * slack.filled(1.0 + ROUNDINGS);
+        ([low, high], flip.signs())
+    }
+
+    #[inline(always)]
+    fn tilt(&self, candidates: &Candidates<L>) -> Tilt<L> {
+        let [_, _, range_error] = self.errors;
+        let [u, v, w] = candidates.edges;
+        let [az, bz, cz] = candidates.depths;
+        let area = u + v + w;
+        let side = bz - az;
+        let other = cz - az;
+        let underflow = area.filled(f32::MIN_POSITIVE);
+        let slack = (candidates.error * area.filled(8.0))
+            .mul_add(side.abs().max(other.abs()), range_error.mul_add(area.abs(), underflow));
+        let flip = area.filled(-0.0) & (area ^ self.direction[2]);
+        Tilt { area, tilt: v.mul_add(side, w * other), flip, slack }
     }
 
     #[inline(always)]

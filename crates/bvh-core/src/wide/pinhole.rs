@@ -21,6 +21,7 @@
 //! What either leaves open is tested as in any packet.
 
 use super::lanes::{DoubleLanes, Lanes, Mask};
+use super::layout::WideBvh;
 use super::packet_vector::Vector;
 use super::pairs::{Crossings, Plane, meet};
 use super::ray_lanes::RayBounds;
@@ -105,7 +106,7 @@ impl Seen {
         vector: &mut Vector<L>,
         entered: u32,
         block: &TriangleBlock,
-        bounds: &Aabb,
+        wide: &WideBvh,
     ) -> bool {
         // SAFETY: the processor has the instructions of `L`; lanes are below four.
         unsafe {
@@ -131,7 +132,7 @@ impl Seen {
                 let (meets, is_behind, mut t) = meet(&normal, direction, (plane(3), plane(4)));
                 let mut inside = meets & t.mask(certain);
                 if possible & !(certain & (meets | is_behind).bits()) != 0 {
-                    vector.shear(bounds);
+                    vector.shear(wide);
                     let pairs = vector.pairs.assume_init_ref();
                     let corners = block.splat_corners::<L>(lane, vector.axes);
                     let crossings = pairs.candidates(&corners).crossings;

@@ -2,6 +2,7 @@
 
 use super::instructions::Instructions;
 use super::lanes::{DoubleLanes, Lanes, Mask};
+use super::layout::WideBvh;
 use super::pairs::Pairs;
 use crate::exact::AXES;
 use crate::{Aabb, Frame, Ray};
@@ -22,81 +23,125 @@ pub(crate) struct BoxLanes<L> {
     pub(crate) inverse: [L; 3],
 }
 
-impl<L: Lanes> RayLanes<L> {
-    /// Returns the rays from number `first` on, in both forms.
+/// The rays of a batch, in f32 or in f64.
+pub(crate) trait Rays: Copy {
+    fn count(self) -> usize;
+
+    /// Returns the rays from number `first` on, in both forms; `frame` is that of the boxes.
     ///
     /// # Safety
-    /// The processor has the instructions, and there are so many rays.
-    #[inline(always)]
-    pub(crate) unsafe fn load(
-        rays: &[Ray],
+    /// The processor has the instructions, and there are a ray per lane.
+    unsafe fn load<L: Lanes>(
+        self,
         first: usize,
         frame: Option<&Frame>,
-    ) -> (Self, BoxLanes<L>) {
-        // SAFETY: there are a ray per lane; a ray is three vectors of four lanes.
-        unsafe {
-            let rays = rays.as_ptr().add(first);
-            let [ox, oy, oz, t_min] = transpose(rays, 0);
-            let [dx, dy, dz, t_max] = transpose(rays, 1);
-            let [ix, iy, iz, _] = transpose(rays, 2);
-            let rays = Self { origin: [ox, oy, oz], direction: [dx, dy, dz], t_min, t_max };
-            let boxed = match frame {
-                None => BoxLanes { origin: rays.origin, inverse: [ix, iy, iz] },
-                Some(frame) => rays.in_frame(frame),
-            };
-            (rays, boxed)
-        }
-    }
+    ) -> (RayLanes<L>, BoxLanes<L>);
 
-    /// Returns the rays from number `first` on. The last one before `end` fills the lanes that have
-    /// none.
+    /// Does the same; the last ray before `end` fills the lanes that have none.
     ///
     /// # Safety
     /// The processor has the instructions, and there is a ray.
-    #[inline(always)]
-    pub(crate) unsafe fn load_up_to(
-        rays: &[Ray],
+    unsafe fn load_up_to<L: Lanes>(
+        self,
         first: usize,
         end: usize,
         frame: Option<&Frame>,
-    ) -> (Self, BoxLanes<L>) {
+    ) -> (RayLanes<L>, BoxLanes<L>);
+
+    /// Fetches the rays from number `first` on, as many as a vector's. They need not exist. While a
+    /// packet is traced, the processor does not see that the rays of the next one follow.
+    ///
+    /// # Safety
+    /// The processor has the instructions.
+    unsafe fn prefetch<K: Instructions>(self, first: usize);
+}
+
+impl Rays for &[Ray] {
+    #[inline(always)]
+    fn count(self) -> usize {
+        self.len()
+    }
+
+    #[inline(always)]
+    unsafe fn load<L: Lanes>(
+        self,
+        first: usize,
+        frame: Option<&Frame>,
+    ) -> (RayLanes<L>, BoxLanes<L>) {
+        // SAFETY: there are a ray per lane; a ray is three vectors of four lanes.
+        unsafe {
+            let rays = self.as_ptr().add(first);
+            let [ox, oy, oz, t_min] = transpose::<L>(rays, 0);
+            let [dx, dy, dz, t_max] = transpose::<L>(rays, 1);
+            let [ix, iy, iz, _] = transpose(rays, 2);
+            let (origin, direction) = ([ox, oy, oz], [dx, dy, dz]);
+            let boxed = match frame {
+                None => BoxLanes { origin, inverse: [ix, iy, iz] },
+                Some(frame) => {
+                    let doubled = [ox.double(), oy.double(), oz.double()];
+                    let along = [dx.double(), dy.double(), dz.double()];
+                    in_frame::<L>(doubled, along, frame).1
+                }
+            };
+            (RayLanes { origin, direction, t_min, t_max }, boxed)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn load_up_to<L: Lanes>(
+        self,
+        first: usize,
+        end: usize,
+        frame: Option<&Frame>,
+    ) -> (RayLanes<L>, BoxLanes<L>) {
         // SAFETY: the rays exist, or the padding does.
         unsafe {
             if first + L::N <= end {
-                return Self::load(rays, first, frame);
+                return self.load(first, frame);
             }
-            let padded: [Ray; 16] = core::array::from_fn(|i| rays[(first + i).min(end - 1)]);
-            Self::load(&padded, 0, frame)
+            let padded: [Ray; 16] = core::array::from_fn(|i| self[(first + i).min(end - 1)]);
+            (&padded[..]).load(0, frame)
         }
     }
 
-    /// Returns what [`Frame::ray`] returns for every ray, but for operations that are fused.
     #[inline(always)]
-    fn in_frame(&self, frame: &Frame) -> BoxLanes<L> {
-        let [ox, oy, oz] = self.origin;
-        let [dx, dy, dz] = self.direction;
-        let centre = frame.centre;
-        let x = ox.double();
-        let x = x - x.filled(centre.x);
-        let y = oy.double();
-        let y = y - y.filled(centre.y);
-        let z = oz.double();
-        let z = z - z.filled(centre.z);
-        let [dx, dy, dz] = [dx.double(), dy.double(), dz.double()];
-        let mut boxed = BoxLanes { origin: self.origin, inverse: self.direction };
-        for (axis, along) in frame.axes.iter().enumerate() {
-            let ax = x.filled(along.x);
-            let ay = x.filled(along.y);
-            let az = x.filled(along.z);
-            boxed.origin[axis] = L::single(z.mul_add(az, y.mul_add(ay, x * ax)));
-            let direction = dz.mul_add(az, dy.mul_add(ay, dx * ax));
-            let inverse = L::single(x.filled(Frame::ABOVE) / direction);
-            let most = inverse.filled(f32::MAX);
-            boxed.inverse[axis] = inverse.min(most).max(most.filled(f32::MIN));
-        }
-        boxed
+    unsafe fn prefetch<K: Instructions>(self, first: usize) {
+        let next = self.as_ptr().wrapping_add(first).cast::<u8>();
+        // SAFETY: a prefetch may name any address.
+        unsafe { K::prefetch_bytes(next, K::Rays::N * size_of::<Ray>()) };
     }
+}
 
+/// Returns the directions of rays in a frame, and what [`Frame::ray_of`] returns for every ray, but
+/// for operations that are fused.
+#[inline(always)]
+pub(super) fn in_frame<L: Lanes>(
+    [x, y, z]: [L::Double; 3],
+    [dx, dy, dz]: [L::Double; 3],
+    frame: &Frame,
+) -> ([L; 3], BoxLanes<L>) {
+    let centre = frame.centre;
+    let x = x - x.filled(centre.x);
+    let y = y - y.filled(centre.y);
+    let z = z - z.filled(centre.z);
+    let nothing = L::single(x);
+    let mut directions = [nothing; 3];
+    let mut boxed = BoxLanes { origin: directions, inverse: directions };
+    for (axis, along) in frame.axes.iter().enumerate() {
+        let ax = x.filled(along.x);
+        let ay = x.filled(along.y);
+        let az = x.filled(along.z);
+        boxed.origin[axis] = L::single(z.mul_add(az, y.mul_add(ay, x * ax)));
+        let direction = dz.mul_add(az, dy.mul_add(ay, dx * ax));
+        directions[axis] = L::single(direction);
+        let inverse = L::single(x.filled(Frame::ABOVE) / direction);
+        let most = inverse.filled(f32::MAX);
+        boxed.inverse[axis] = inverse.min(most).max(most.filled(f32::MIN));
+    }
+    (directions, boxed)
+}
+
+impl<L: Lanes> RayLanes<L> {
     /// The axes of the shear of rays that [cohere](BoxLanes::cohere).
     #[inline(always)]
     pub(crate) fn axes(&self) -> [usize; 3] {
@@ -126,15 +171,16 @@ impl<L: Lanes> RayLanes<L> {
         along(0).max(along(1)).max(along(2))
     }
 
-    /// Returns the rays as triangles within `bounds` are tested with them.
+    /// Returns the rays as triangles of a layout are tested with them.
     #[inline(always)]
-    pub(crate) fn sheared(&self, [x, y, z]: [usize; 3], bounds: &Aabb) -> Pairs<L> {
+    pub(crate) fn sheared(&self, [x, y, z]: [usize; 3], wide: &WideBvh) -> Pairs<L> {
         let Self { origin, direction, t_min, .. } = self;
+        let reach = self.reach(&wide.bounds);
         Pairs::new(
             [origin[x], origin[y], origin[z]],
             [direction[x], direction[y], direction[z]],
             [direction[x] / direction[z], direction[y] / direction[z]],
-            self.reach(bounds),
+            reach * reach.filled(wide.error_factor),
             *t_min,
         )
     }
@@ -176,15 +222,6 @@ impl<L: Lanes> BoxLanes<L> {
             & same(third.bits())
             & (self.beyond(region) == 0)
     }
-}
-
-/// Fetches the rays that follow number `first`, as many as a vector's. They need not exist. While a
-/// packet is traced, the processor does not see that the rays of the next one follow.
-#[inline(always)]
-pub(crate) unsafe fn prefetch<K: Instructions>(rays: &[Ray], first: usize) {
-    let next = rays.as_ptr().wrapping_add(first).cast::<u8>();
-    // SAFETY: a prefetch may name any address.
-    unsafe { K::prefetch_bytes(next, K::Rays::N * size_of::<Ray>()) };
 }
 
 /// Returns one of the three vectors of rays, by component.

@@ -7,7 +7,7 @@ use super::lanes::Lanes;
 use super::layout::WideNode;
 use super::packet::Culling;
 use super::prepared::{Prepared, Ready};
-use super::ray_lanes::{RayBounds, RayLanes};
+use super::ray_lanes::{RayBounds, Rays};
 use super::{WideBvh, vector};
 use crate::{Aabb, Kernel, Ray, TestCounts};
 use core::mem::MaybeUninit;
@@ -83,7 +83,7 @@ impl<K: Instructions> Task<K> for Entered<'_> {
         const { assert!(K::Rays::N <= 16) };
         // SAFETY: the processor has the instructions, and there are as many rays as lanes.
         unsafe {
-            let (lanes, boxes) = RayLanes::<K::Rays>::load(&equal, 0, wide.frame());
+            let (lanes, boxes) = (&equal[..]).load::<K::Rays>(0, wide.frame());
             match test {
                 // Packets are of rays that begin near the scene.
                 NodeTest::Packet if is_near => {

@@ -4,7 +4,8 @@
 use crate::support::rational::{cross, dot, exactly as point, minus};
 use crate::support::{Random, SHAPES, ball, chain, grid_box, junction, soup, tree};
 use bvh_core::{
-    Bvh, DHit, DRay, DTriangle, DWideBvh, Frame, Kernel, Orientation, OutOfExactRange, Select,
+    Bvh, Coherence, DHit, DRay, DTriangle, DWideBvh, Frame, Kernel, Orientation, OutOfExactRange,
+    Select,
 };
 use glam::{DMat3, DQuat, DVec3};
 use num_bigint::BigInt;
@@ -206,14 +207,23 @@ fn every_kernel_answers_as_a_test_of_every_triangle() {
                 .map(|(i, ray)| brute_force(&triangles, ray, of(i)))
                 .collect();
             hits += expected.iter().flatten().count();
+            // Packets take sixteen rays that cohere.
+            let coherent: Vec<DRay> = rays.iter().flat_map(|&ray| [ray; 16]).collect();
+            let exclude: Vec<u32> = exclude.iter().flat_map(|&id| [id; 16]).collect();
+            let all_coherent = Select { orientation, exclude: &exclude };
             for tree in &trees {
                 let layout = DWideBvh::new(tree, &triangles).unwrap();
                 for kernel in Kernel::ALL {
                     let Some(layout) = layout.clone().with_kernel(kernel) else { continue };
                     let mut nearest = vec![None; rays.len()];
                     let mut any = vec![false; rays.len()];
-                    layout.nearest_hits(&rays, all, &mut nearest);
-                    layout.any_hits(&rays, all, &mut any);
+                    layout.nearest_hits(&rays, all, &mut nearest, Coherence::Incoherent);
+                    layout.any_hits(&rays, all, &mut any, Coherence::Incoherent);
+                    let mut nearest_of_packets = vec![None; coherent.len()];
+                    let mut any_of_packets = vec![false; coherent.len()];
+                    let (nearest_to, any_to) = (&mut nearest_of_packets, &mut any_of_packets);
+                    layout.nearest_hits(&coherent, all_coherent, nearest_to, Coherence::Coherent);
+                    layout.any_hits(&coherent, all_coherent, any_to, Coherence::Coherent);
                     for (i, (ray, &expected)) in rays.iter().zip(&expected).enumerate() {
                         let case = || format!("{name}, {kernel:?}, {orientation:?}, {ray:?}");
                         assert_eq!(layout.nearest_hit(ray, of(i)), expected, "{}", case());
@@ -224,6 +234,14 @@ fn every_kernel_answers_as_a_test_of_every_triangle() {
                             "{}",
                             case()
                         );
+                        let packet = 16 * i..16 * (i + 1);
+                        assert_eq!(
+                            nearest_of_packets[packet.clone()],
+                            [expected; 16],
+                            "{}",
+                            case()
+                        );
+                        assert_eq!(any_of_packets[packet], [expected.is_some(); 16], "{}", case());
                     }
                 }
             }

@@ -1,0 +1,335 @@
+//! Batches of rays in f64: traced as those in f32, with distances between bounds, and at the end the
+//! distance of each ray's hit.
+
+use super::answer::{ANY_HIT, Bounded, Find, Known, NEAREST_HIT};
+use super::double::{DWideBvh, single};
+use super::double_block::Distances;
+use super::instructions::{Instructions, Task};
+use super::lanes::{Aligned, DoubleLanes, Lanes};
+use super::layout::WideBvh;
+use super::ray_lanes::{BoxLanes, RayLanes, Rays, in_frame};
+use super::triangles::TriangleBlock;
+use super::vector;
+use crate::double::{NearestHit, Query};
+use crate::{Coherence, DHit, DRay, Frame, Hit, Kernel, Select};
+
+/// The number of rays of which something is kept at a time.
+const AT_ONCE: usize = 4096;
+
+impl DWideBvh {
+    /// Writes the [nearest hit](Self::nearest_hit) of every ray. `select` excludes the same number of
+    /// ids for each ray, ray after ray.
+    ///
+    /// # Panics
+    /// If `rays` and `hits` are not equally many, or the number of excluded ids is no multiple.
+    pub fn nearest_hits(
+        &self,
+        rays: &[DRay],
+        select: Select,
+        hits: &mut [Option<DHit>],
+        coherence: Coherence,
+    ) {
+        assert_eq!(rays.len(), hits.len(), "a hit for every ray");
+        let mut nearest = Vec::new();
+        for (part, hits) in self.parts(rays, select).zip(hits.chunks_mut(AT_ONCE)) {
+            nearest.clear();
+            nearest.extend(part.rays.iter().map(NearestHit::new));
+            self.wide.trace(Nearest { part, nearest: &mut nearest }, part.coherence(coherence));
+            self.resolve(part.rays, &mut nearest);
+            for (hit, nearest) in hits.iter_mut().zip(&nearest) {
+                *hit = nearest.hit();
+            }
+        }
+    }
+
+    /// Writes whether every ray meets [any triangle](Self::any_hit), as
+    /// [`nearest_hits`](Self::nearest_hits) does.
+    ///
+    /// # Panics
+    /// As [`nearest_hits`](Self::nearest_hits).
+    pub fn any_hits(&self, rays: &[DRay], select: Select, hits: &mut [bool], coherence: Coherence) {
+        assert_eq!(rays.len(), hits.len(), "an answer for every ray");
+        for (part, hits) in self.parts(rays, select).zip(hits.chunks_mut(AT_ONCE)) {
+            if select.counts_all() {
+                self.wide.trace(Any::<true> { part, hits }, coherence);
+            } else {
+                self.wide.trace(Any::<false> { part, hits }, part.coherence(coherence));
+            }
+        }
+    }
+
+    fn parts<'a>(&'a self, rays: &'a [DRay], select: Select<'a>) -> impl Iterator<Item = Part<'a>> {
+        let excluded = select.exclude.len().checked_div(rays.len()).unwrap_or(0);
+        assert_eq!(select.exclude.len(), excluded * rays.len(), "ids to exclude for every ray");
+        rays.chunks(AT_ONCE).enumerate().map(move |(number, rays)| {
+            let exclude = &select.exclude[excluded * number * AT_ONCE..][..excluded * rays.len()];
+            Part { layout: self, rays, select: Select { exclude, ..select }, excluded }
+        })
+    }
+
+    /// Finds the distances that are not known yet.
+    fn resolve(&self, rays: &[DRay], nearest: &mut [NearestHit]) {
+        if self.wide.kernel != Kernel::Portable {
+            let task = Resolve { layout: self, rays, nearest };
+            // SAFETY: a layout's kernel is available.
+            return unsafe { vector::dispatch(self.wide.kernel, task) };
+        }
+        for (ray, nearest) in rays.iter().zip(nearest) {
+            self.resolve_alone(ray, nearest);
+        }
+    }
+}
+
+/// The search for distances that are not known yet.
+struct Resolve<'a> {
+    layout: &'a DWideBvh,
+    rays: &'a [DRay],
+    nearest: &'a mut [NearestHit],
+}
+
+impl<K: Instructions> Task<K> for Resolve<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run(self) {
+        let Self { layout, rays, nearest } = self;
+        let mut distances = Distances::EMPTY;
+        let mut numbers = [0; Distances::COUNT];
+        let mut count = 0;
+        for number in 0..nearest.len() {
+            let hit = nearest[number];
+            if !hit.is_known() {
+                distances.set(count, &rays[number], &layout.triangles[hit.object as usize]);
+                numbers[count] = number;
+                count += 1;
+            }
+            if count < K::Rays::N && (number + 1 < nearest.len() || count == 0) {
+                continue;
+            }
+            // SAFETY: the processor has the instructions.
+            let (rounded, is_decided) = unsafe { distances.rounded::<K::Rays>() };
+            for (lane, &number) in numbers[..count].iter().enumerate() {
+                if is_decided >> lane & 1 != 0 {
+                    let hit = &mut nearest[number];
+                    (hit.low, hit.high) = (rounded[lane], rounded[lane]);
+                } else {
+                    layout.resolve_alone(&rays[number], &mut nearest[number]);
+                }
+            }
+            count = 0;
+        }
+    }
+}
+
+/// Some rays of a batch, with what counts for each.
+#[derive(Clone, Copy)]
+struct Part<'a> {
+    layout: &'a DWideBvh,
+    rays: &'a [DRay],
+    select: Select<'a>,
+    /// The number of ids that each ray excludes.
+    excluded: usize,
+}
+
+impl<'a> Part<'a> {
+    #[inline(always)]
+    fn query(&self, number: usize) -> Query<'a> {
+        let exclude = &self.select.exclude[self.excluded * number..][..self.excluded];
+        let triangles = &self.layout.triangles;
+        Query { triangles, ray: &self.rays[number], select: Select { exclude, ..self.select } }
+    }
+
+    /// Packets exclude nothing.
+    fn coherence(&self, coherence: Coherence) -> Coherence {
+        if self.excluded == 0 { coherence } else { Coherence::Incoherent }
+    }
+
+    #[inline(always)]
+    fn rays(&self) -> DRays<'a> {
+        DRays { rays: self.rays, frame: &self.layout.frame }
+    }
+}
+
+/// Rays in f64, to be traced in a frame.
+#[derive(Clone, Copy)]
+struct DRays<'a> {
+    rays: &'a [DRay],
+    frame: &'a Frame,
+}
+
+impl Rays for DRays<'_> {
+    #[inline(always)]
+    fn count(self) -> usize {
+        self.rays.len()
+    }
+
+    #[inline(always)]
+    unsafe fn load<L: Lanes>(
+        self,
+        first: usize,
+        frame: Option<&Frame>,
+    ) -> (RayLanes<L>, BoxLanes<L>) {
+        // SAFETY: the rays exist.
+        unsafe { self.load_up_to(first, first + L::N, frame) }
+    }
+
+    /// Returns what [`DWideBvh::boxed`] returns for every ray, but for operations that are fused.
+    #[inline(always)]
+    unsafe fn load_up_to<L: Lanes>(
+        self,
+        first: usize,
+        end: usize,
+        _: Option<&Frame>,
+    ) -> (RayLanes<L>, BoxLanes<L>) {
+        let mut rows = Aligned([[0.0; 16]; 9]);
+        for lane in 0..L::N {
+            // SAFETY: there is a ray before the end.
+            let ray = unsafe { self.rays.get_unchecked((first + lane).min(end - 1)) };
+            let unit = ray.unit();
+            for axis in 0..3 {
+                rows.0[axis][lane] = ray.origin[axis];
+                rows.0[3 + axis][lane] = ray.direction[axis] * unit;
+            }
+            rows.0[6][lane] = ray.t_min;
+            rows.0[7][lane] = ray.t_max;
+            rows.0[8][lane] = unit;
+        }
+        // SAFETY: the processor has the instructions; there are so many numbers.
+        unsafe {
+            let [x, y, z] = load::<L>(&rows.0, 0);
+            let [dx, dy, dz] = load::<L>(&rows.0, 3);
+            let [t_min, t_max, unit] = load::<L>(&rows.0, 6);
+            let size = unit.filled(1.0) / unit;
+            let (direction, boxed) = in_frame::<L>([x, y, z], [dx, dy, dz], self.frame);
+            let t_min = L::single(t_min * size);
+            let t_max = L::single(t_max * size);
+            let most = t_max.filled(f32::MAX);
+            let (t_min, t_max) = (t_min.min(most), t_max.min(most));
+            (RayLanes { origin: boxed.origin, direction, t_min, t_max }, boxed)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn prefetch<K: Instructions>(self, first: usize) {
+        let next = self.rays.as_ptr().wrapping_add(first).cast::<u8>();
+        // SAFETY: a prefetch may name any address.
+        unsafe { K::prefetch_bytes(next, K::Rays::N * size_of::<DRay>()) };
+    }
+}
+
+/// Loads three rows.
+#[inline(always)]
+unsafe fn load<L: Lanes>(rows: &[[f64; 16]; 9], first: usize) -> [L::Double; 3] {
+    // SAFETY: the processor has the instructions; there are so many numbers.
+    unsafe {
+        [
+            L::Double::load(rows[first].as_ptr()),
+            L::Double::load(rows[first + 1].as_ptr()),
+            L::Double::load(rows[first + 2].as_ptr()),
+        ]
+    }
+}
+
+/// The nearest hit of every ray.
+struct Nearest<'a> {
+    part: Part<'a>,
+    nearest: &'a mut [NearestHit],
+}
+
+impl<'a> Find for Nearest<'a> {
+    type Rays = DRays<'a>;
+    const DECIDES: bool = true;
+
+    #[inline(always)]
+    fn rays(&self) -> DRays<'a> {
+        self.part.rays()
+    }
+
+    #[inline(always)]
+    fn counted(&self, certain: u32, along: u32) -> u32 {
+        self.part.select.oriented(certain, along)
+    }
+
+    fn learn(&mut self, number: usize, Known { low, high, object }: Known) {
+        let nearest = &mut self.nearest[number];
+        // What is known of the same triangle already is more.
+        if object != nearest.object {
+            let bounds = (f64::from(low) * nearest.unit, f64::from(high) * nearest.unit);
+            *nearest = nearest.other(bounds, object);
+        }
+    }
+
+    fn known(&self, number: usize) -> Known {
+        let NearestHit { low, high, unit, object } = self.nearest[number];
+        let (low, high) = (single(low, unit).next_down(), single(high, unit).next_up());
+        Known { low, high, object }
+    }
+
+    #[inline(always)]
+    unsafe fn decide<K: Instructions>(
+        &mut self,
+        number: usize,
+        block: &TriangleBlock,
+        bounded: &Bounded,
+    ) -> Option<Hit> {
+        let query = self.part.query(number);
+        let nearest = &mut self.nearest[number];
+        // SAFETY: the processor has the instructions; the block is one of the layout.
+        let is_nearer =
+            unsafe { self.part.layout.offer_block::<K>(query, nearest, block, bounded) };
+        let t = single(nearest.high, nearest.unit);
+        is_nearer.then_some(Hit { t, object: nearest.object })
+    }
+
+    fn alone(&mut self, _: &WideBvh, number: usize) {
+        let query = self.part.query(number);
+        self.part.layout.search::<NEAREST_HIT>(query, &mut self.nearest[number]);
+    }
+}
+
+/// Whether each ray hits anything. All triangles count if `PLAIN`.
+struct Any<'a, const PLAIN: bool> {
+    part: Part<'a>,
+    hits: &'a mut [bool],
+}
+
+impl<'a, const PLAIN: bool> Find for Any<'a, PLAIN> {
+    type Rays = DRays<'a>;
+    const ANY: bool = true;
+    const DECIDES: bool = true;
+    const TAKES_CERTAIN: bool = PLAIN;
+
+    #[inline(always)]
+    fn rays(&self) -> DRays<'a> {
+        self.part.rays()
+    }
+
+    #[inline(always)]
+    fn counted(&self, certain: u32, along: u32) -> u32 {
+        self.part.select.oriented(certain, along)
+    }
+
+    #[inline(always)]
+    unsafe fn decide<K: Instructions>(
+        &mut self,
+        number: usize,
+        block: &TriangleBlock,
+        bounded: &Bounded,
+    ) -> Option<Hit> {
+        let query = self.part.query(number);
+        // SAFETY: the processor has the instructions; the block is one of the layout.
+        let hit = unsafe { self.part.layout.any_of::<K>(query, block, bounded) };
+        hit.map(|object| Hit { t: 0.0, object })
+    }
+
+    #[inline(always)]
+    fn write(&mut self, number: usize, _: f32, object: u32) {
+        self.hits[number] = object != u32::MAX;
+    }
+
+    fn alone(&mut self, _: &WideBvh, number: usize) {
+        let query = self.part.query(number);
+        let mut nearest = NearestHit::new(query.ray);
+        self.hits[number] = self.part.layout.search::<ANY_HIT>(query, &mut nearest);
+    }
+}
