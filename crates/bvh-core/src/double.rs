@@ -6,6 +6,7 @@
 //! 2⁵⁰⁰.
 
 use crate::exact::{Line, Verdict, is_degenerate};
+use crate::triangle::offset_from;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
@@ -58,12 +59,14 @@ pub enum OutOfExactRange {
 
 /// Returns whether all coordinates are in the range in which answers are exact.
 fn is_exact(point: DVec3) -> bool {
-    const LEAST: f64 = 1.0 / (1u128 << 75) as f64 / (1u128 << 75) as f64;
     const MOST: f64 = (1u128 << 120) as f64;
-    point.to_array().iter().all(|&x| x == 0.0 || (LEAST..=MOST).contains(&x.abs()))
+    point.to_array().iter().all(|&x| x == 0.0 || (DRay::LEAST..=MOST).contains(&x.abs()))
 }
 
 impl DRay {
+    /// The least size of a coordinate but 0: 2⁻¹⁵⁰.
+    pub(crate) const LEAST: f64 = 1.0 / (1u128 << 75) as f64 / (1u128 << 75) as f64;
+
     /// Makes the ray from `origin` in `direction` over `t_min..=t_max`. Distances `t` are in
     /// multiples of the direction's length, which need not be 1. Arrays `[f64; 3]` are accepted.
     pub fn new(
@@ -192,6 +195,13 @@ impl DTriangle {
     /// [`Triangle::crossing`](crate::Triangle::crossing).
     pub fn crossing(&self, ray: &DRay) -> Option<f64> {
         self.distance(ray, true)
+    }
+
+    /// Returns the point of the triangle nearest to `point`, as
+    /// [`Triangle::closest_point`](crate::Triangle::closest_point) does.
+    pub fn closest_point(&self, point: impl Into<DVec3>) -> DVec3 {
+        let point = point.into();
+        point + offset_from(point, self.0)
     }
 
     fn distance(&self, ray: &DRay, is_moved: bool) -> Option<f64> {

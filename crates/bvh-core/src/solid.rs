@@ -10,9 +10,9 @@
 
 use crate::exact::normal_sign;
 use crate::winding::{Open, Winding};
-use crate::{Aabb, BvhView, Hit, Ray, Triangle, WideBvh};
+use crate::{Aabb, BvhView, Closest, DRay, DTriangle, DWideBvh, Ray, Triangle, WideBvh};
 use core::cmp::Ordering;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// The rule by which a point is inside of a mesh.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
@@ -67,13 +67,15 @@ enum Turns {
 impl Solid {
     /// Examines the edges of all triangles. `tree` is a valid tree over the triangles. O(n log n)
     /// time, O(n) memory.
-    pub fn new<'t>(tree: impl Into<BvhView<'t>>, triangles: &[Triangle]) -> Self {
+    pub fn new<'t, T: Corners>(tree: impl Into<BvhView<'t>>, triangles: &[T]) -> Self {
+        let triangles: Vec<[DVec3; 3]> = triangles.iter().map(Corners::corners).collect();
+        let triangles = &triangles[..];
         let edges = sorted_edges(triangles);
         let groups = || edges.chunk_by(|a, b| a.0 == b.0);
         let is_closed = groups().all(|group| group.iter().map(|edge| edge.1).sum::<i64>() == 0);
         let is_paired = groups().all(|group| group.len() == 2);
         let turns = if is_closed {
-            let sign = |triangle: &Triangle| normal_sign(&triangle.0, 0) as i8;
+            let sign = |triangle: &[DVec3; 3]| normal_sign(triangle, 0) as i8;
             Turns::Signs(triangles.iter().map(sign).collect())
         } else {
             Turns::Angles(Winding::new(tree.into(), triangles))
@@ -95,7 +97,13 @@ impl Solid {
     ///
     /// # Panics
     /// Panics if `points` and `inside` are not equally many.
-    pub fn contains(&self, wide: &WideBvh, points: &[Vec3], rule: InsideRule, inside: &mut [bool]) {
+    pub fn contains<L: Traced>(
+        &self,
+        wide: &L,
+        points: &[L::Point],
+        rule: InsideRule,
+        inside: &mut [bool],
+    ) {
         assert_eq!(points.len(), inside.len(), "an answer for every point");
         let is_by_parity = match rule {
             InsideRule::Auto => self.is_paired && matches!(self.turns, Turns::Angles(_)),
@@ -103,14 +111,15 @@ impl Solid {
             InsideRule::Winding => false,
         };
         match &self.turns {
-            _ if is_by_parity => by_crossings(wide, points, inside, |hits| hits.len() % 2 == 1),
-            Turns::Signs(signs) => by_crossings(wide, points, inside, |hits| {
-                hits.iter().map(|hit| i64::from(signs[hit.object as usize])).sum::<i64>() != 0
+            _ if is_by_parity => wide.by_crossings(points, inside, |hits| hits.count() % 2 == 1),
+            Turns::Signs(signs) => wide.by_crossings(points, inside, |hits| {
+                hits.map(|object| i64::from(signs[object as usize])).sum::<i64>() != 0
             }),
             Turns::Angles(winding) => {
                 let mut open = Open::default();
                 for (point, inside) in points.iter().zip(inside) {
-                    *inside = point.is_finite() && winding.is_inside(*point, &mut open);
+                    let point = L::double(*point);
+                    *inside = point.is_finite() && winding.is_inside(point, &mut open);
                 }
             }
         }
@@ -122,10 +131,10 @@ impl Solid {
     ///
     /// # Panics
     /// Panics if `points` and `distances` are not equally many.
-    pub fn signed_distances(
+    pub fn signed_distances<L: Traced>(
         &self,
-        wide: &WideBvh,
-        points: &[Vec3],
+        wide: &L,
+        points: &[L::Point],
         rule: InsideRule,
         distances: &mut [f64],
     ) {
@@ -133,7 +142,7 @@ impl Solid {
         let mut inside = vec![false; points.len()];
         self.contains(wide, points, rule, &mut inside);
         let mut closest = vec![None; points.len()];
-        wide.closest_points(points, &mut closest);
+        wide.closest_to(points, &mut closest);
         for ((closest, inside), distance) in closest.iter().zip(inside).zip(distances) {
             let size = closest.map_or(f64::INFINITY, |closest| closest.distance);
             *distance = if inside { -size } else { size };
@@ -142,15 +151,15 @@ impl Solid {
 }
 
 /// An edge between positions, the lower one first, and its direction: 1 upwards, −1 downwards.
-type Edge = ([[u32; 3]; 2], i64);
+type Edge = ([[u64; 3]; 2], i64);
 
 /// Returns the edges of all triangles; equal edges are adjacent. Edges without length are omitted.
-fn sorted_edges(triangles: &[Triangle]) -> Vec<Edge> {
+fn sorted_edges(triangles: &[[DVec3; 3]]) -> Vec<Edge> {
     // The sum turns −0 into 0.
-    let bits = |corner: Vec3| (corner + 0.0).to_array().map(f32::to_bits);
+    let bits = |corner: DVec3| (corner + 0.0).to_array().map(f64::to_bits);
     let mut edges: Vec<Edge> = Vec::with_capacity(3 * triangles.len());
     for triangle in triangles {
-        let [a, b, c] = triangle.0.map(bits);
+        let [a, b, c] = triangle.map(bits);
         for [from, to] in [[a, b], [b, c], [c, a]] {
             match from.cmp(&to) {
                 Ordering::Less => edges.push(([from, to], 1)),
@@ -163,29 +172,108 @@ fn sorted_edges(triangles: &[Triangle]) -> Vec<Edge> {
     edges
 }
 
-/// Writes whether `is_inside` holds for the hits of the half line from every point along +x.
-fn by_crossings(
-    wide: &WideBvh,
-    points: &[Vec3],
-    inside: &mut [bool],
-    is_inside: impl Fn(&[Hit]) -> bool,
-) {
-    // The half line must not end before a far wall: a mesh may be twice as wide as the largest f32.
-    let is_wide = wide.bounds.max.x - wide.bounds.min.x > f32::MAX;
-    let direction = if is_wide { 2.0 * Vec3::X } else { Vec3::X };
-    // A point outside the box is outside the mesh: its range is empty. NaN fails every comparison.
-    let half_line = |&point: &Vec3| {
-        let is_within = wide.bounds.contains(&Aabb { min: point, max: point });
-        Ray::assume_valid(point, direction, 0.0, if is_within { f32::MAX } else { -1.0 })
-    };
-    let rays: Vec<Ray> = points.iter().map(half_line).collect();
-    let mut hits = Vec::new();
-    let mut counts = vec![0; rays.len()];
-    wide.all_hits_of(&rays, &mut hits, &mut counts);
-    let mut hits = &hits[..];
-    for (inside, count) in inside.iter_mut().zip(counts) {
-        let hits_of_point;
-        (hits_of_point, hits) = hits.split_at(count as usize);
-        *inside = is_inside(hits_of_point);
+/// A triangle in f32 or in f64.
+pub trait Corners {
+    /// Returns the corners in f64.
+    fn corners(&self) -> [DVec3; 3];
+}
+
+impl Corners for Triangle {
+    fn corners(&self) -> [DVec3; 3] {
+        self.0.map(Vec3::as_dvec3)
+    }
+}
+
+impl Corners for DTriangle {
+    fn corners(&self) -> [DVec3; 3] {
+        self.0
+    }
+}
+
+/// A layout in f32 or in f64.
+pub trait Traced {
+    /// A point. In f64, coordinates too small for a [ray](DRay) count as 0.
+    type Point: Copy;
+
+    /// Returns the point in f64.
+    fn double(point: Self::Point) -> DVec3;
+
+    /// Writes whether `is_inside` holds for the triangles that the half line from every point along
+    /// +x crosses.
+    fn by_crossings(
+        &self,
+        points: &[Self::Point],
+        inside: &mut [bool],
+        is_inside: impl Fn(&mut dyn ExactSizeIterator<Item = u32>) -> bool,
+    );
+
+    /// Writes the closest point of every point.
+    fn closest_to(&self, points: &[Self::Point], closest: &mut [Option<Closest>]);
+}
+
+impl Traced for WideBvh {
+    type Point = Vec3;
+
+    fn double(point: Vec3) -> DVec3 {
+        point.as_dvec3()
+    }
+
+    fn by_crossings(
+        &self,
+        points: &[Vec3],
+        inside: &mut [bool],
+        is_inside: impl Fn(&mut dyn ExactSizeIterator<Item = u32>) -> bool,
+    ) {
+        // The half line must not end before a far wall: a mesh may be twice as wide as the largest
+        // f32.
+        let is_wide = self.bounds.max.x - self.bounds.min.x > f32::MAX;
+        let direction = if is_wide { 2.0 * Vec3::X } else { Vec3::X };
+        // A point outside the box is outside the mesh: its range is empty. NaN fails every
+        // comparison.
+        let half_line = |&point: &Vec3| {
+            let is_within = self.bounds.contains(&Aabb { min: point, max: point });
+            Ray::assume_valid(point, direction, 0.0, if is_within { f32::MAX } else { -1.0 })
+        };
+        let rays: Vec<Ray> = points.iter().map(half_line).collect();
+        let mut hits = Vec::new();
+        let mut counts = vec![0; rays.len()];
+        self.all_hits_of(&rays, &mut hits, &mut counts);
+        let mut hits = &hits[..];
+        for (inside, count) in inside.iter_mut().zip(counts) {
+            let hits_of_point;
+            (hits_of_point, hits) = hits.split_at(count as usize);
+            *inside = is_inside(&mut hits_of_point.iter().map(|hit| hit.object));
+        }
+    }
+
+    fn closest_to(&self, points: &[Vec3], closest: &mut [Option<Closest>]) {
+        self.closest_points(points, closest);
+    }
+}
+
+impl Traced for DWideBvh {
+    type Point = DVec3;
+
+    fn double(point: DVec3) -> DVec3 {
+        point
+    }
+
+    fn by_crossings(
+        &self,
+        points: &[DVec3],
+        inside: &mut [bool],
+        is_inside: impl Fn(&mut dyn ExactSizeIterator<Item = u32>) -> bool,
+    ) {
+        for (&point, inside) in points.iter().zip(inside) {
+            let point = point.map(|x| if x.abs() < DRay::LEAST { 0.0 } else { x });
+            // A point beyond the range of all coordinates is outside.
+            let ray = DRay::half_line(point, DVec3::X);
+            let hits = ray.map(|ray| self.all_hits(&ray)).unwrap_or_default();
+            *inside = is_inside(&mut hits.iter().map(|hit| hit.object));
+        }
+    }
+
+    fn closest_to(&self, points: &[DVec3], closest: &mut [Option<Closest>]) {
+        self.closest_points(points, closest);
     }
 }

@@ -57,29 +57,7 @@ impl Triangle {
     /// Source: Ericson 2005, *Real-Time Collision Detection*, section 5.1.5.
     pub fn closest_point(&self, point: impl Into<Vec3>) -> DVec3 {
         let point = point.into().as_dvec3();
-        point + self.offset_from(point)
-    }
-
-    /// Returns the vector from `point` to the nearest point of the triangle. Triangles with a
-    /// common edge or corner compute the same bits for a nearest point on it. Rounded or not, the
-    /// point is in the box of the corners, so no box along the file's axes around the triangle is
-    /// farther.
-    pub(crate) fn offset_from(&self, point: DVec3) -> DVec3 {
-        let [a, b, c] = self.0.map(|corner| corner.as_dvec3() - point);
-        let normal = (b - a).cross(c - a);
-        let is_inside = |from: DVec3, to: DVec3| normal.dot(from.cross(to)) > 0.0;
-        if is_inside(a, b) && is_inside(b, c) && is_inside(c, a) {
-            let offset = normal * (normal.dot(a) / normal.length_squared());
-            return into_box(offset, lesser(lesser(a, b), c), greater(greater(a, b), c));
-        }
-        let mut nearest = nearest_of_edge(a, b);
-        for (from, to) in [(b, c), (c, a)] {
-            let offset = nearest_of_edge(from, to);
-            if offset.length_squared() < nearest.length_squared() {
-                nearest = offset;
-            }
-        }
-        nearest
+        point + offset_from(point, self.0.map(Vec3::as_dvec3))
     }
 
     /// Returns the weights of the three corners at the point where the ray's line meets the
@@ -191,6 +169,28 @@ impl InFrame<'_> {
     pub fn boxes(&self) -> Vec<Aabb> {
         self.triangles.iter().map(|triangle| triangle.aabb_in(self.frame)).collect()
     }
+}
+
+/// Returns the vector from `point` to the nearest point of the triangle of these corners. Triangles
+/// with a common edge or corner compute the same bits for a nearest point on it. Rounded or not, the
+/// point is in the box of the corners, so no box along the file's axes around the triangle is
+/// farther.
+pub(crate) fn offset_from(point: DVec3, corners: [DVec3; 3]) -> DVec3 {
+    let [a, b, c] = corners.map(|corner| corner - point);
+    let normal = (b - a).cross(c - a);
+    let is_inside = |from: DVec3, to: DVec3| normal.dot(from.cross(to)) > 0.0;
+    if is_inside(a, b) && is_inside(b, c) && is_inside(c, a) {
+        let offset = normal * (normal.dot(a) / normal.length_squared());
+        return into_box(offset, lesser(lesser(a, b), c), greater(greater(a, b), c));
+    }
+    let mut nearest = nearest_of_edge(a, b);
+    for (from, to) in [(b, c), (c, a)] {
+        let offset = nearest_of_edge(from, to);
+        if offset.length_squared() < nearest.length_squared() {
+            nearest = offset;
+        }
+    }
+    nearest
 }
 
 /// Returns the point of a segment nearest to zero, the same bits for both directions of the

@@ -29,11 +29,12 @@
 
 use crate::collapse::collapse_at_most;
 use crate::cost::SahConstants;
+use crate::exact::is_degenerate;
 use crate::validate::Marks;
-use crate::{Aabb, Bvh, BvhView, Triangle};
+use crate::{Bvh, BvhView};
 use core::f64::consts::PI;
 use core::ops::Range;
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec3};
 use std::collections::BinaryHeap;
 
 /// Triangles that are near to each other, and the terms of their solid angles.
@@ -50,7 +51,8 @@ struct Patch {
     moment: DMat3,
     /// ∫ |h|² dA.
     spread: f64,
-    aabb: Aabb,
+    /// The least and the greatest coordinates.
+    bounds: [DVec3; 2],
     first: u32,
     count: u32,
     /// Whether the range above is of triangles, or of patches.
@@ -65,7 +67,7 @@ impl Patch {
         normal: DVec3::ZERO,
         moment: DMat3::ZERO,
         spread: 0.0,
-        aabb: Aabb::EMPTY,
+        bounds: [DVec3::INFINITY, DVec3::NEG_INFINITY],
         first: 0,
         count: 0,
         is_leaf: true,
@@ -76,15 +78,14 @@ impl Patch {
     }
 
     /// Returns the patch of one triangle. About its centroid, the triangle has no first moment.
-    fn of(triangle: &Triangle) -> Self {
-        let [a, b, c] = triangle.0.map(|corner| corner.as_dvec3());
+    fn of(&[a, b, c]: &[DVec3; 3]) -> Self {
         let center = (a + b + c) / 3.0;
         let normal = (b - a).cross(c - a) / 2.0;
         let area = normal.length();
         let squares: f64 = [a, b, c].iter().map(|p| p.distance_squared(center)).sum();
         let spread = area * squares / 12.0;
-        let aabb = triangle.aabb();
-        Self { center, area, normal, spread, aabb, ..Self::EMPTY }
+        let bounds = [a.min(b).min(c), a.max(b).max(c)];
+        Self { center, area, normal, spread, bounds, ..Self::EMPTY }
     }
 
     /// Returns the terms of all parts together.
@@ -93,7 +94,8 @@ impl Patch {
         for part in parts.clone() {
             whole.area += part.area;
             whole.center += part.area * part.center;
-            whole.aabb = whole.aabb.union(&part.aabb);
+            let ([lower, upper], [min, max]) = (whole.bounds, part.bounds);
+            whole.bounds = [lower.min(min), upper.max(max)];
         }
         // Nothing without an area winds round a point; with the radius 0 it is never opened.
         if whole.area == 0.0 {
@@ -107,7 +109,7 @@ impl Patch {
             whole.moment += part.moment
                 + DMat3::from_cols(part.normal * h.x, part.normal * h.y, part.normal * h.z);
         }
-        let [lower, upper] = [whole.aabb.min, whole.aabb.max].map(Vec3::as_dvec3);
+        let [lower, upper] = whole.bounds;
         whole.radius = (whole.center - lower).max(upper - whole.center).length();
         whole
     }
@@ -140,8 +142,7 @@ impl Patch {
 
 /// Returns the solid angle of a triangle, positive where its corners run clockwise.
 #[inline]
-fn solid_angle(triangle: &Triangle, point: DVec3) -> f64 {
-    let [p, q, r] = triangle.0.map(|corner| corner.as_dvec3());
+fn solid_angle(&[p, q, r]: &[DVec3; 3], point: DVec3) -> f64 {
     let [a, b, c] = [p - point, q - point, r - point];
     let [la, lb, lc] = [a.length(), b.length(), c.length()];
     let volume = a.dot((q - p).cross(r - p));
@@ -161,12 +162,12 @@ pub(crate) struct Open {
 #[derive(Clone, Debug)]
 pub(crate) struct Winding {
     patches: Vec<Patch>,
-    triangles: Vec<Triangle>,
+    triangles: Vec<[DVec3; 3]>,
 }
 
 impl Winding {
     /// Makes the patches of a valid tree over triangles. O(n) time and memory.
-    pub(crate) fn new(tree: BvhView, triangles: &[Triangle]) -> Self {
+    pub(crate) fn new(tree: BvhView, triangles: &[[DVec3; 3]]) -> Self {
         /// The number of triangles up to which a subtree becomes a leaf.
         const LEAF: u32 = 8;
         let free_leaves = SahConstants { traversal: 1.0, intersection: 0.0 };
@@ -181,7 +182,7 @@ impl Winding {
                 let triangle = triangles[id as usize];
                 // A divided triangle belongs to one of its leaves. One without area winds round
                 // nothing, though roundings would let it where a point is on its line.
-                if seen.set(id as usize) && !triangle.is_degenerate() {
+                if seen.set(id as usize) && !is_degenerate(&triangle) {
                     sorted.push(triangle);
                 }
             }
@@ -199,10 +200,9 @@ impl Winding {
 
     /// Returns whether triangles wind round a finite point, in either direction: whether the size
     /// of the winding number exceeds one half.
-    pub(crate) fn is_inside(&self, point: Vec3, open: &mut Open) -> bool {
+    pub(crate) fn is_inside(&self, point: DVec3, open: &mut Open) -> bool {
         /// Covers the rounding of the sums.
         const SLACK: f64 = 1e-9;
-        let point = point.as_dvec3();
         open.estimated.clear();
         open.near.clear();
         open.near.extend(self.patches.first().map(|_| 0));
@@ -246,13 +246,13 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn points(count: Range<usize>) -> impl Strategy<Value = Vec<Vec3>> {
-        prop::collection::vec(prop::array::uniform3(-1.0f32..1.0).prop_map(Vec3::from), count)
+    fn points(count: Range<usize>) -> impl Strategy<Value = Vec<DVec3>> {
+        prop::collection::vec(prop::array::uniform3(-1.0f64..1.0).prop_map(DVec3::from), count)
     }
 
     #[test]
     fn no_patch_without_area_is_opened() {
-        let degenerate = [Vec3::X, Vec3::Y].map(|end| Patch::of(&Triangle([end, end, Vec3::ONE])));
+        let degenerate = [DVec3::X, DVec3::Y].map(|end| Patch::of(&[end, end, DVec3::ONE]));
         let patches = [&[][..], &degenerate[..]].map(|of| Patch::merged(of.iter().cloned()));
         let whole = Patch::merged(patches.iter().cloned());
         for patch in patches.iter().chain([&whole]) {
@@ -271,12 +271,12 @@ mod tests {
             are_inverted in any::<bool>(),
         ) {
             let (corners, _) = corners.as_chunks::<3>();
-            let mut triangles: Vec<Triangle> = corners.iter().map(|&c| Triangle(c)).collect();
+            let mut triangles = corners.to_vec();
             if are_inverted {
                 // Two layers whose first terms cancel each other.
                 for i in 0..triangles.len() {
-                    let [a, b, c] = triangles[i].0.map(|corner| 0.9 * corner);
-                    triangles.push(Triangle([a, c, b]));
+                    let [a, b, c] = triangles[i].map(|corner| 0.9 * corner);
+                    triangles.push([a, c, b]);
                 }
             }
             let patch = Patch::merged(triangles.iter().map(Patch::of));
@@ -293,7 +293,7 @@ mod tests {
         #[test]
         fn patches_of_patches_have_the_terms_of_all_their_triangles(corners in points(6..60)) {
             let (corners, _) = corners.as_chunks::<3>();
-            let parts: Vec<Patch> = corners.iter().map(|&c| Patch::of(&Triangle(c))).collect();
+            let parts: Vec<Patch> = corners.iter().map(Patch::of).collect();
             let whole = Patch::merged(parts.iter().cloned());
             let (left, right) = parts.split_at(parts.len() / 2);
             let halves = [left, right].map(|half| Patch::merged(half.iter().cloned()));

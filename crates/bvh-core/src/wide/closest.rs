@@ -2,6 +2,8 @@
 
 use super::answer::NEAREST_HIT;
 use super::box_ray::BoxTest;
+use super::double::DWideBvh;
+use super::double_block::DoubleBlock;
 use super::instructions::{Instructions, Pending, Task};
 use super::kernel::{SPARE, STACK, deep_stacks};
 use super::lanes::{DoubleLanes, Lanes, Mask};
@@ -10,7 +12,8 @@ use super::one_ray::{Leaves, visit};
 use super::triangles::TriangleBlock;
 use super::{portable, vector};
 use crate::ray::pow2;
-use crate::{Aabb, Hit, Kernel};
+use crate::triangle::offset_from;
+use crate::{Aabb, Hit, Kernel, Triangle};
 use core::mem::MaybeUninit;
 use glam::{DVec3, Vec3};
 
@@ -35,8 +38,7 @@ struct Nearest {
 
 impl Nearest {
     #[inline(always)]
-    fn new(point: Vec3) -> Self {
-        let target = point.as_dvec3();
+    fn new(target: DVec3) -> Self {
         Self { target, object: u32::MAX, offset: DVec3::ZERO, distance_squared: f64::INFINITY }
     }
 
@@ -104,47 +106,149 @@ impl WideBvh {
     /// # Panics
     /// Panics if `points` and `closest` are not equally many.
     pub fn closest_points(&self, points: &[Vec3], closest: &mut [Option<Closest>]) {
-        assert_eq!(points.len(), closest.len(), "an answer for every point");
-        if self.kernel != Kernel::Portable {
-            let task = ClosestPoints { wide: self, points, closest };
-            // SAFETY: a layout's kernel is available.
-            return unsafe { vector::dispatch(self.kernel, task) };
-        }
-        for (&point, closest) in points.iter().zip(closest) {
-            *closest = self.closest_portable(point);
-        }
+        closest_points(self, points, closest);
+    }
+}
+
+impl DWideBvh {
+    /// Returns the closest point of the triangles, as [`WideBvh::closest_point`] does. Returns
+    /// `None`, too, for a point so far that the square of its distance overflows.
+    pub fn closest_point(&self, point: impl Into<DVec3>) -> Option<Closest> {
+        let mut closest = [None];
+        self.closest_points(&[point.into()], &mut closest);
+        closest[0]
     }
 
-    fn closest_portable(&self, point: Vec3) -> Option<Closest> {
-        let mut nearest = Nearest::new(point);
-        let boxed = self.boxed_point(point);
-        let scale = scale(boxed, self.root_box());
-        let scaled = (boxed * scale).to_array();
-        let intervals = |node: &WideNode| {
-            let mut sums = [0.0; WideNode::LANES];
-            for (axis, &scaled) in scaled.iter().enumerate() {
-                for (lane, sum) in sums.iter_mut().enumerate() {
-                    let below = node.planes[axis][lane] * scale - scaled;
-                    let above = scaled - node.planes[axis + 3][lane] * scale;
-                    let outside = below.max(above).max(0.0);
-                    *sum += outside * outside;
-                }
-            }
-            // Unused lanes are infinitely far away.
-            (sums, [f32::MAX; WideNode::LANES])
-        };
-        let visit = |block: &TriangleBlock, limit: &mut Hit| {
-            for (object, triangle) in block.triangles() {
-                nearest.offer(object, triangle.offset_from(nearest.target));
-            }
-            limit.t = nearest.limit(scale);
-            false
-        };
-        if point.is_finite() {
-            portable::traverse::<NEAREST_HIT>(self, f32::MAX, intervals, &mut (), visit);
-        }
-        nearest.closest()
+    /// Writes the [closest point](Self::closest_point) of every point.
+    ///
+    /// # Panics
+    /// Panics if `points` and `closest` are not equally many.
+    pub fn closest_points(&self, points: &[DVec3], closest: &mut [Option<Closest>]) {
+        closest_points(self, points, closest);
     }
+}
+
+/// A layout of triangles in f32 or in f64.
+trait Surface {
+    type Point: Copy;
+
+    fn wide(&self) -> &WideBvh;
+
+    fn target(point: Self::Point) -> DVec3;
+
+    /// The point as the distances of boxes are computed from it.
+    fn boxed(&self, point: Self::Point) -> Vec3;
+
+    /// Returns the corners of a triangle of a block.
+    fn corners(&self, object: u32, triangle: &Triangle) -> [DVec3; 3];
+
+    /// Returns the corners of a block's triangles.
+    ///
+    /// # Safety
+    /// The processor has the instructions of `L`, which has four lanes.
+    unsafe fn lanes<L: Lanes>(&self, block: &TriangleBlock) -> [Vector<L::Double>; 3];
+}
+
+impl Surface for WideBvh {
+    type Point = Vec3;
+
+    fn wide(&self) -> &WideBvh {
+        self
+    }
+
+    fn target(point: Vec3) -> DVec3 {
+        point.as_dvec3()
+    }
+
+    fn boxed(&self, point: Vec3) -> Vec3 {
+        self.boxed_point(point)
+    }
+
+    fn corners(&self, _: u32, triangle: &Triangle) -> [DVec3; 3] {
+        triangle.0.map(Vec3::as_dvec3)
+    }
+
+    #[inline(always)]
+    unsafe fn lanes<L: Lanes>(&self, block: &TriangleBlock) -> [Vector<L::Double>; 3] {
+        // SAFETY: the processor has the instructions.
+        let [a, b, c] = unsafe { block.corners_along::<L>(TriangleBlock::ROWS) };
+        [doubled(a), doubled(b), doubled(c)]
+    }
+}
+
+impl Surface for DWideBvh {
+    type Point = DVec3;
+
+    fn wide(&self) -> &WideBvh {
+        &self.wide
+    }
+
+    fn target(point: DVec3) -> DVec3 {
+        point
+    }
+
+    fn boxed(&self, point: DVec3) -> Vec3 {
+        // As in `WideBvh::boxed_point`.
+        self.frame.point(point).as_vec3().clamp(Vec3::MIN, Vec3::MAX)
+    }
+
+    fn corners(&self, object: u32, _: &Triangle) -> [DVec3; 3] {
+        self.triangles[object as usize].0
+    }
+
+    #[inline(always)]
+    unsafe fn lanes<L: Lanes>(&self, block: &TriangleBlock) -> [Vector<L::Double>; 3] {
+        let block = DoubleBlock::new(block, &self.triangles);
+        // SAFETY: the processor has the instructions.
+        unsafe { [block.corner::<L>(0), block.corner::<L>(1), block.corner::<L>(2)] }
+    }
+}
+
+fn closest_points<S: Surface>(surface: &S, points: &[S::Point], closest: &mut [Option<Closest>]) {
+    assert_eq!(points.len(), closest.len(), "an answer for every point");
+    let kernel = surface.wide().kernel;
+    if kernel != Kernel::Portable {
+        let task = ClosestPoints { surface, points, closest };
+        // SAFETY: a layout's kernel is available.
+        return unsafe { vector::dispatch(kernel, task) };
+    }
+    for (&point, closest) in points.iter().zip(closest) {
+        *closest = closest_portable(surface, point);
+    }
+}
+
+fn closest_portable<S: Surface>(surface: &S, point: S::Point) -> Option<Closest> {
+    let wide = surface.wide();
+    let target = S::target(point);
+    let mut nearest = Nearest::new(target);
+    let boxed = surface.boxed(point);
+    let scale = scale(boxed, wide.root_box());
+    let scaled = (boxed * scale).to_array();
+    let intervals = |node: &WideNode| {
+        let mut sums = [0.0; WideNode::LANES];
+        for (axis, &scaled) in scaled.iter().enumerate() {
+            for (lane, sum) in sums.iter_mut().enumerate() {
+                let below = node.planes[axis][lane] * scale - scaled;
+                let above = scaled - node.planes[axis + 3][lane] * scale;
+                let outside = below.max(above).max(0.0);
+                *sum += outside * outside;
+            }
+        }
+        // Unused lanes are infinitely far away.
+        (sums, [f32::MAX; WideNode::LANES])
+    };
+    let visit = |block: &TriangleBlock, limit: &mut Hit| {
+        for (object, triangle) in block.triangles() {
+            let corners = surface.corners(object, &triangle);
+            nearest.offer(object, offset_from(target, corners));
+        }
+        limit.t = nearest.limit(scale);
+        false
+    };
+    if target.is_finite() && boxed.is_finite() {
+        portable::traverse::<NEAREST_HIT>(wide, f32::MAX, intervals, &mut (), visit);
+    }
+    nearest.closest()
 }
 
 /// Returns the power of two that makes the largest coordinate about 1, so that no square overflows.
@@ -155,33 +259,35 @@ fn scale(point: Vec3, bounds: &Aabb) -> f32 {
 }
 
 /// The search for the closest points of points by a vector kernel.
-struct ClosestPoints<'a> {
-    wide: &'a WideBvh,
-    points: &'a [Vec3],
+struct ClosestPoints<'a, S: Surface> {
+    surface: &'a S,
+    points: &'a [S::Point],
     closest: &'a mut [Option<Closest>],
 }
 
-impl<K: Instructions> Task<K> for ClosestPoints<'_> {
+impl<K: Instructions, S: Surface> Task<K> for ClosestPoints<'_, S> {
     type Output = ();
 
     #[inline(always)]
     unsafe fn run(self) {
-        let Self { wide, points, closest } = self;
+        let Self { surface, points, closest } = self;
+        let wide = surface.wide();
         let mut stack = [const { MaybeUninit::<Pending>::uninit() }; STACK + SPARE];
         let mut deep = deep_stacks::<Pending>(1, wide.stack_need);
         let stack =
             deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
         for (&point, closest) in points.iter().zip(closest) {
-            if !point.is_finite() {
+            let boxed = surface.boxed(point);
+            if !(S::target(point).is_finite() && boxed.is_finite()) {
                 *closest = None;
                 continue;
             }
             // SAFETY: the processor has the instructions; the stack has room for `stack_need`
             // children and one register more.
             *closest = unsafe {
-                let boxed = wide.boxed_point(point);
                 let boxes = PointLanes::<K::Boxes>::new(boxed, wide.root_box());
-                let mut triangles = TargetLanes::<K::Block>::new(point, boxes.scale_of_one);
+                let scale = boxes.scale_of_one;
+                let mut triangles = TargetLanes::<_, K::Block>::new(surface, point, scale);
                 // Unused lanes are infinitely far away.
                 visit::<K, NEAREST_HIT>(wide, f32::MAX, &boxes, &mut triangles, stack);
                 triangles.nearest.closest()
@@ -242,7 +348,8 @@ impl<K: Instructions> BoxTest<K> for PointLanes<K::Boxes> {
 }
 
 /// A point in f64, in the lanes of a block of triangles, and its nearest triangle.
-struct TargetLanes<L: Lanes> {
+struct TargetLanes<'a, S, L: Lanes> {
+    surface: &'a S,
     target: [L::Double; 3],
     nearest: Nearest,
     scale: f32,
@@ -250,32 +357,27 @@ struct TargetLanes<L: Lanes> {
 
 type Vector<D> = [D; 3];
 
-impl<L: Lanes> TargetLanes<L> {
+impl<'a, S: Surface, L: Lanes> TargetLanes<'a, S, L> {
     #[inline(always)]
-    unsafe fn new(point: Vec3, scale: f32) -> Self {
-        let nearest = Nearest::new(point);
+    unsafe fn new(surface: &'a S, point: S::Point, scale: f32) -> Self {
+        let nearest = Nearest::new(S::target(point));
         let DVec3 { x, y, z } = nearest.target;
         // SAFETY: the processor has the instructions.
         let target = unsafe { [L::Double::splat(x), L::Double::splat(y), L::Double::splat(z)] };
-        Self { target, nearest, scale }
-    }
-
-    #[inline(always)]
-    fn relative(&self, corner: [L; 3]) -> Vector<L::Double> {
-        let [x, y, z] = corner;
-        [x.double() - self.target[0], y.double() - self.target[1], z.double() - self.target[2]]
+        Self { surface, target, nearest, scale }
     }
 }
 
-impl<K: Instructions> Leaves<K> for TargetLanes<K::Block> {
+impl<K: Instructions, S: Surface> Leaves<K> for TargetLanes<'_, S, K::Block> {
     /// Offers the triangles of a block that are as near as the nearest so far, and lowers `limit` to
     /// the greatest bound that a box with a nearer triangle may have.
     #[inline(always)]
     unsafe fn visit(&mut self, block: &TriangleBlock, limit: &mut Hit) -> bool {
         // SAFETY: the processor has the instructions; there is room for four numbers.
         unsafe {
-            let [a, b, c] = block.corners_along::<K::Block>(TriangleBlock::ROWS);
-            let offset = offset(self.relative(a), self.relative(b), self.relative(c));
+            let [a, b, c] = self.surface.lanes::<K::Block>(block);
+            let target = self.target;
+            let offset = offset(minus(a, target), minus(b, target), minus(c, target));
             let most = offset[0].filled(self.nearest.distance_squared);
             let mut lanes = K::Block::narrow(dot(offset, offset).le(most)).bits();
             if lanes == 0 {
@@ -299,7 +401,7 @@ impl<K: Instructions> Leaves<K> for TargetLanes<K::Block> {
 }
 
 /// Returns the vectors to the nearest points of triangles: the operations of
-/// `Triangle::offset_from`, bit by bit.
+/// [`offset_from`], bit by bit.
 #[inline(always)]
 fn offset<D: DoubleLanes>(a: Vector<D>, b: Vector<D>, c: Vector<D>) -> Vector<D> {
     let normal = cross(minus(b, a), minus(c, a));
@@ -351,6 +453,11 @@ fn select<D: DoubleLanes>(mask: D::Mask, yes: Vector<D>, no: Vector<D>) -> Vecto
 #[inline(always)]
 fn into_box<D: DoubleLanes>(point: Vector<D>, min: Vector<D>, max: Vector<D>) -> Vector<D> {
     lesser(max, greater(min, point))
+}
+
+#[inline(always)]
+fn doubled<L: Lanes>([x, y, z]: [L; 3]) -> Vector<L::Double> {
+    [x.double(), y.double(), z.double()]
 }
 
 #[inline(always)]

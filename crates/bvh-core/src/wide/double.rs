@@ -147,6 +147,44 @@ impl DWideBvh {
         self.search::<ANY_HIT>(self.query(ray, select), &mut NearestHit::new(ray))
     }
 
+    /// Returns the hits of the ray in its range, each crossing of a surface once, the nearest first;
+    /// among hits at the same distance the lowest id first. The rule is that of
+    /// [`WideBvh::all_hits`], and the hits those of [`DTriangle::crossing`].
+    pub fn all_hits(&self, ray: &DRay) -> Vec<DHit> {
+        let mut hits = Vec::new();
+        if self.wide.kernel == Kernel::Portable {
+            self.visit_portable::<ANY_HIT>(&self.boxed(ray), |block, _| {
+                block.triangles().for_each(|(object, _)| hits.extend(self.hit_of(ray, object)));
+                false
+            });
+        } else {
+            let task = AllHits { layout: self, ray, hits: &mut hits };
+            // SAFETY: a layout's kernel is available.
+            unsafe { vector::dispatch(self.wide.kernel, task) };
+        }
+        // No distance is negative or −0, so distances are ordered as their bits are. A divided
+        // triangle is hit in several leaves, every time at the same distance.
+        hits.sort_unstable_by_key(|hit| (hit.t.to_bits(), hit.object));
+        hits.dedup();
+        hits
+    }
+
+    fn hit_of(&self, ray: &DRay, object: u32) -> Option<DHit> {
+        let t = self.triangles[object as usize].crossing(ray)?;
+        Some(DHit { t, object })
+    }
+
+    /// Visits the blocks that a ray enters by [`Kernel::Portable`].
+    fn visit_portable<const ANY: bool>(
+        &self,
+        boxed: &Boxed,
+        visit: impl FnMut(&TriangleBlock, &mut Hit) -> bool,
+    ) -> Hit {
+        let slabs = Slabs::of_frame(&boxed.ray, boxed.ends, &self.frame, &self.wide.bounds);
+        let intervals = |node: &WideNode| portable::intervals(&slabs, node);
+        portable::traverse::<ANY>(&self.wide, boxed.ray.t_max(), intervals, &mut (), visit)
+    }
+
     pub(super) fn resolve_alone(&self, ray: &DRay, nearest: &mut NearestHit) {
         if !nearest.is_known() {
             self.query(ray, Select::default()).resolve(nearest);
@@ -175,8 +213,6 @@ impl DWideBvh {
             return unsafe { vector::dispatch(self.wide.kernel, task) };
         }
         let boxed = self.boxed(query.ray);
-        let slabs = Slabs::of_frame(&boxed.ray, boxed.ends, &self.frame, &self.wide.bounds);
-        let intervals = |node: &WideNode| portable::intervals(&slabs, node);
         let visit = |block: &TriangleBlock, limit: &mut Hit| {
             let mut is_nearer = false;
             for (object, _) in block.triangles() {
@@ -187,8 +223,7 @@ impl DWideBvh {
             }
             is_nearer
         };
-        let t_max = boxed.ray.t_max();
-        let hit = portable::traverse::<ANY>(&self.wide, t_max, intervals, &mut (), visit);
+        let hit = self.visit_portable::<ANY>(&boxed, visit);
         self.resolve_alone(query.ray, nearest);
         !hit.is_miss()
     }
@@ -294,22 +329,11 @@ impl<K: Instructions, const ANY: bool> Task<K> for Search<'_, ANY> {
     unsafe fn run(self) -> bool {
         let Self { layout, query, nearest } = self;
         let boxed = layout.boxed(query.ray);
-        let wide = &layout.wide;
-        let mut stack = MaybeUninit::<Aligned<[Pending; STACK + SPARE]>>::uninit();
-        let mut deep = deep_stacks::<Pending>(1, wide.stack_need);
-        let base = deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
-        let ray = &boxed.ray;
-        // SAFETY: the processor has the instructions; the stack has room for `stack_need` children
-        // and one register more.
+        // SAFETY: the processor has the instructions.
         unsafe {
-            let leaf_ray = LeafRay::<K::Block>::new(ray, wide);
+            let leaf_ray = LeafRay::<K::Block>::new(&boxed.ray, &layout.wide);
             let mut leaves = Candidates::<_, ANY> { layout, leaf_ray, query, nearest };
-            let hit = if ray.begins_in(&wide.near) {
-                visit::<K, ANY>(wide, ray.t_max(), &BoxRay::new(ray), &mut leaves, base)
-            } else {
-                let far = FarRay::in_frame(boxed.ends, &layout.frame, &wide.bounds);
-                visit::<K, ANY>(wide, ray.t_max(), &FarBoxRay::new(ray, &far), &mut leaves, base)
-            };
+            let hit = traverse::<K, ANY>(layout, &boxed, &mut leaves);
             if !ANY && !nearest.is_known() {
                 let triangle = &layout.triangles[nearest.object as usize];
                 match rounded_distance::<K::Block>(query.ray, triangle) {
@@ -319,6 +343,74 @@ impl<K: Instructions, const ANY: bool> Task<K> for Search<'_, ANY> {
             }
             !hit.is_miss()
         }
+    }
+}
+
+/// Visits the leaves that a ray enters.
+#[inline(always)]
+unsafe fn traverse<K: Instructions, const ANY: bool>(
+    layout: &DWideBvh,
+    boxed: &Boxed,
+    leaves: &mut impl Leaves<K>,
+) -> Hit {
+    let Boxed { ray, ends } = boxed;
+    let wide = &layout.wide;
+    let mut stack = MaybeUninit::<Aligned<[Pending; STACK + SPARE]>>::uninit();
+    let mut deep = deep_stacks::<Pending>(1, wide.stack_need);
+    let base = deep.as_mut().map_or(stack.as_mut_ptr().cast(), |deep| deep.as_mut_ptr().cast());
+    // SAFETY: the processor has the instructions; the stack has room for `stack_need` children and
+    // one register more.
+    unsafe {
+        if ray.begins_in(&wide.near) {
+            visit::<K, ANY>(wide, ray.t_max(), &BoxRay::new(ray), leaves, base)
+        } else {
+            let far = FarRay::in_frame(*ends, &layout.frame, &wide.bounds);
+            visit::<K, ANY>(wide, ray.t_max(), &FarBoxRay::new(ray, &far), leaves, base)
+        }
+    }
+}
+
+/// The search for all hits of a ray by a vector kernel.
+struct AllHits<'a> {
+    layout: &'a DWideBvh,
+    ray: &'a DRay,
+    hits: &'a mut Vec<DHit>,
+}
+
+impl<K: Instructions> Task<K> for AllHits<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run(self) {
+        let boxed = self.layout.boxed(self.ray);
+        // SAFETY: the processor has the instructions.
+        unsafe {
+            let leaf_ray = LeafRay::<K::Block>::new(&boxed.ray, &self.layout.wide);
+            let layout = self.layout;
+            traverse::<K, ANY_HIT>(layout, &boxed, &mut AllCandidates { leaf_ray, hits: self });
+        }
+    }
+}
+
+/// Takes the triangles of a block that the ray crosses.
+struct AllCandidates<'a, L> {
+    leaf_ray: LeafRay<L>,
+    hits: AllHits<'a>,
+}
+
+impl<K: Instructions> Leaves<K> for AllCandidates<'_, K::Block> {
+    #[inline(always)]
+    unsafe fn visit(&mut self, block: &TriangleBlock, _: &mut Hit) -> bool {
+        let AllHits { layout, ray, hits } = &mut self.hits;
+        // SAFETY: the processor has the instructions.
+        let possible = unsafe {
+            let corners = self.leaf_ray.corners(block);
+            self.leaf_ray.pairs.candidates(&corners).crossings.possible & block.used::<K::Block>()
+        };
+        for lane in (0..TriangleBlock::LANES).filter(|lane| possible >> lane & 1 != 0) {
+            hits.extend(layout.hit_of(ray, block.id(lane)));
+        }
+        false
     }
 }
 

@@ -41,6 +41,16 @@ impl DoubleBlock {
         Self { corners }
     }
 
+    /// Returns one of the corners of each triangle.
+    ///
+    /// # Safety
+    /// As [`decide`](Self::decide).
+    #[inline(always)]
+    pub(super) unsafe fn corner<L: Lanes>(&self, corner: usize) -> [L::Double; 3] {
+        // SAFETY: the processor has the instructions.
+        unsafe { load::<L>(&self.corners[corner], [0, 1, 2]) }
+    }
+
     /// Decides about those of the `possible` triangles that f64 suffices for.
     ///
     /// # Safety

@@ -4,8 +4,8 @@
 use crate::support::rational::{cross, dot, exactly as point, minus};
 use crate::support::{Random, SHAPES, ball, chain, grid_box, junction, soup, tree};
 use bvh_core::{
-    Bvh, Coherence, DHit, DRay, DTriangle, DWideBvh, Frame, Kernel, Orientation, OutOfExactRange,
-    Select,
+    Bvh, Coherence, DHit, DRay, DTriangle, DWideBvh, Frame, InsideRule, Kernel, Orientation,
+    OutOfExactRange, Select, Solid,
 };
 use glam::{DMat3, DQuat, DVec3};
 use num_bigint::BigInt;
@@ -248,6 +248,56 @@ fn every_kernel_answers_as_a_test_of_every_triangle() {
         }
     }
     assert!(hits > 2000, "{hits}");
+}
+
+#[test]
+fn every_kernel_finds_all_hits_closest_points_and_insides_as_all_triangles_together_have_them() {
+    let mut random = Random(33);
+    let (mut hits, mut insides) = (0, 0);
+    for (name, triangles) in scenes(&mut random) {
+        let rays = rays(&triangles, 40, &mut random);
+        let points: Vec<DVec3> = rays.iter().map(DRay::origin).collect();
+        let with_area = || triangles.iter().filter(|triangle| !triangle.is_degenerate());
+        let all_hits = |ray: &DRay| {
+            let of = |(object, triangle): (u32, &DTriangle)| {
+                Some(DHit { t: triangle.crossing(ray)?, object })
+            };
+            let mut hits: Vec<DHit> = (0..).zip(&triangles).filter_map(of).collect();
+            hits.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.object.cmp(&b.object)));
+            hits
+        };
+        let along = |point: &DVec3| DRay::half_line(*point, DVec3::X).unwrap();
+        let expected: Vec<Vec<DHit>> = rays.iter().map(all_hits).collect();
+        let parities: Vec<bool> =
+            points.iter().map(|point| all_hits(&along(point)).len() % 2 == 1).collect();
+        hits += expected.iter().flatten().count();
+        insides += parities.iter().filter(|&&inside| inside).count();
+        for tree in &trees(&triangles, &mut random) {
+            let layout = DWideBvh::new(tree, &triangles).unwrap();
+            let solid = Solid::new(tree, &triangles);
+            for kernel in Kernel::ALL {
+                let Some(layout) = layout.clone().with_kernel(kernel) else { continue };
+                let mut inside = vec![false; points.len()];
+                solid.contains(&layout, &points, InsideRule::Parity, &mut inside);
+                assert_eq!(inside, parities, "{name}, {kernel:?}");
+                if solid.is_watertight() {
+                    solid.contains(&layout, &points, InsideRule::Auto, &mut inside);
+                    assert_eq!(inside, parities, "{name}, {kernel:?}");
+                }
+                for ((ray, all), &point) in rays.iter().zip(&expected).zip(&points) {
+                    assert_eq!(&layout.all_hits(ray), all, "{name}, {kernel:?}, {ray:?}");
+                    let found = layout.closest_point(point).unwrap();
+                    let of = |triangle: &DTriangle| triangle.closest_point(point);
+                    let distance = |triangle| of(triangle).distance(point);
+                    assert_eq!(found.point, of(&triangles[found.object as usize]));
+                    let least = with_area().map(distance).fold(f64::INFINITY, f64::min);
+                    let rounding = 1e-9 * least + 1e-15 * point.abs().max_element();
+                    assert!((found.distance - least).abs() <= rounding, "{name}, {kernel:?}");
+                }
+            }
+        }
+    }
+    assert!(hits > 1000 && insides > 100, "{hits} {insides}");
 }
 
 #[test]
