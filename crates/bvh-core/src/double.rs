@@ -59,41 +59,68 @@ pub enum OutOfExactRange {
 
 /// Returns whether all coordinates are in the range in which answers are exact.
 fn is_exact(point: DVec3) -> bool {
-    const MOST: f64 = (1u128 << 120) as f64;
-    point.to_array().iter().all(|&x| x == 0.0 || (DRay::LEAST..=MOST).contains(&x.abs()))
+    point.to_array().iter().all(|&x| x == 0.0 || (DRay::LEAST..=DRay::MOST).contains(&x.abs()))
 }
 
 impl DRay {
     /// The least size of a coordinate but 0: 2⁻¹⁵⁰.
     pub(crate) const LEAST: f64 = 1.0 / (1u128 << 75) as f64 / (1u128 << 75) as f64;
+    const MOST: f64 = (1u128 << 120) as f64;
+    /// The greatest size of a direction's largest component.
+    const LONG: f64 = (1u128 << 100) as f64;
 
     /// Makes the ray from `origin` in `direction` over `t_min..=t_max`. Distances `t` are in
     /// multiples of the direction's length, which need not be 1. Arrays `[f64; 3]` are accepted.
+    #[inline]
     pub fn new(
         origin: impl Into<DVec3>,
         direction: impl Into<DVec3>,
         t_min: f64,
         t_max: f64,
     ) -> Result<Self, OutOfExactRange> {
-        const LONG: f64 = (1u128 << 100) as f64;
         let origin = origin.into();
         let direction = direction.into();
-        let longest = direction.abs().max_element();
+        let (sizes, others) = (direction.abs(), origin.abs());
+        let longest = sizes.max_element();
+        let DVec3 { x, y, z } = sizes + others;
+        let least = sizes.min(others).min_element();
+        // NaN fails every comparison. Zeros are looked at one by one.
+        let is_valid = (x + y + z <= Self::MOST)
+            & (least >= Self::LEAST)
+            & (1.0 / Self::LONG <= longest)
+            & (longest <= Self::LONG)
+            & (t_min >= 0.0)
+            & !t_max.is_nan();
+        if !is_valid {
+            Self::check(origin, direction, t_min, t_max)?;
+        }
+        // Adding 0 turns −0 into +0.
+        Ok(Self { origin, direction, t_min: t_min + 0.0, t_max: t_max.min(f64::MAX) + 0.0 })
+    }
+
+    #[inline(never)]
+    fn check(
+        origin: DVec3,
+        direction: DVec3,
+        t_min: f64,
+        t_max: f64,
+    ) -> Result<(), OutOfExactRange> {
         if !is_exact(origin) {
             return Err(OutOfExactRange::Origin(origin));
         }
-        if !(is_exact(direction) && (1.0 / LONG..=LONG).contains(&longest)) {
+        let longest = direction.abs().max_element();
+        if !(is_exact(direction) && (1.0 / Self::LONG..=Self::LONG).contains(&longest)) {
             return Err(OutOfExactRange::Direction(direction));
         }
         // NaN is in no range.
         if !(0.0..).contains(&t_min) || t_max.is_nan() {
             return Err(OutOfExactRange::Range(t_min, t_max));
         }
-        // Adding 0 turns −0 into +0.
-        Ok(Self { origin, direction, t_min: t_min + 0.0, t_max: t_max.min(f64::MAX) + 0.0 })
+        Ok(())
     }
 
     /// Makes a half line: `t` from 0 to the largest finite distance.
+    #[inline]
     pub fn half_line(
         origin: impl Into<DVec3>,
         direction: impl Into<DVec3>,
