@@ -87,8 +87,7 @@ impl DRay {
         // NaN fails every comparison. Zeros are looked at one by one.
         let is_valid = (x + y + z <= Self::MOST)
             & (least >= Self::LEAST)
-            & (1.0 / Self::LONG <= longest)
-            & (longest <= Self::LONG)
+            & (1.0 / Self::LONG..=Self::LONG).contains(&longest)
             & (t_min >= 0.0)
             & !t_max.is_nan();
         if !is_valid {
