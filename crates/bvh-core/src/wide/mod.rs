@@ -23,6 +23,7 @@ mod lanes;
 mod layout;
 mod one_ray;
 mod packet;
+mod packet_bounds;
 mod packet_vector;
 mod pairs;
 mod pinhole;
