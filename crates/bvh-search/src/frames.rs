@@ -16,7 +16,7 @@ use crate::{Bake, Budget, Observer, Stream};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::internal_area;
 use bvh_core::glam::{DMat3, DQuat, DVec3, Vec3};
-use bvh_core::{Aabb, Frame, InFrame, Triangle};
+use bvh_core::{Aabb, DTriangle, DWideBvh, Frame, InFrame, Triangle};
 use rand::RngExt;
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -127,6 +127,28 @@ impl Choice {
         });
         let choice = affordable.and_then(|(size, searches)| scene.choose(size, searches));
         choice.unwrap_or(Self::FILE)
+    }
+}
+
+impl Choice {
+    /// Chooses the frame of triangles in f64: its centre is in their middle.
+    pub(crate) fn of_doubles(
+        triangles: &[DTriangle],
+        frames: Frames,
+        budget: Budget,
+        observer: &dyn Observer,
+    ) -> Frame {
+        let centred = DWideBvh::centred(triangles);
+        if frames == Frames::File {
+            return centred;
+        }
+        let single = |corner: DVec3| centred.point(corner).as_vec3();
+        let rounded: Vec<Triangle> =
+            triangles.iter().map(|triangle| Triangle(triangle.0.map(single))).collect();
+        let turned = Self::of(&rounded, budget, observer).frame;
+        turned
+            .and_then(|frame| Frame::new(frame.rotation(), centred.centre()).ok())
+            .unwrap_or(centred)
     }
 }
 
