@@ -1,7 +1,7 @@
 //! Tracers: triangles in the wide layout, which answer batches of rays and points.
 
 use crate::failure::{BvsStatus, Failure, given, given_mut, made, slice, slice_mut, status};
-use crate::tree::{BvsObjects, BvsTree, moved};
+use crate::tree::{BvsObjects, BvsTree, kind, moved};
 use bvh_search::OwnedTree;
 use bvh_search::bvh_core::InvalidRay;
 use bvh_search::prelude::*;
@@ -105,7 +105,8 @@ pub unsafe extern "C" fn bvs_tracer_new(tree: *const BvsTree) -> *mut BvsTracer 
         // SAFETY: the caller keeps the tree alive and unchanged during the call.
         let owned = &unsafe { given("tree", tree) }?.owned;
         let Some(wide) = owned.layout() else {
-            return Err(Failure::invalid("tree is over boxes; accepted: a tree over triangles"));
+            let accepted = "accepted: a tree over `vertices`";
+            return Err(Failure::invalid(format!("tree is over {}; {accepted}", kind(owned))));
         };
         let wide = Arc::new(wide.map_err(Failure::invalid)?);
         Ok(BvsTracer { wide, source: owned.clone(), solid: OnceLock::new() })
@@ -398,7 +399,7 @@ pub unsafe extern "C" fn bvs_tracer_free(tracer: *mut BvsTracer) {
 
 /// The number of rays that are converted and traced at once: enough to make the cost of a call
 /// negligible, and few enough to stay in the cache.
-const BATCH: usize = 512;
+pub(crate) const BATCH: usize = 512;
 
 fn coherence(coherent: i32) -> Coherence {
     if coherent != 0 { Coherence::Coherent } else { Coherence::Incoherent }
