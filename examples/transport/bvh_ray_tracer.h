@@ -100,6 +100,16 @@ public:
     return false;
   }
 
+  // The nearest face and its distance.
+  std::pair<double, MeshID> closest(TreeID tree, const Position& point) override {
+    const Tree& faces = trees_.at(tree);
+    const double at[3] = {point.x, point.y, point.z};
+    BvsClosest found;
+    check(bvs_tracer_closest_points_f64(faces.tracer.get(), at, 1, &found) != BVS_STATUS_OK);
+    if (found.object == UINT32_MAX) return {INFTY, ID_NONE};
+    return {found.distance, faces.labels[found.object].face};
+  }
+
   // Writes the distance of the nearest face on the ray, or INFTY.
   bool occluded(TreeID tree, const Position& origin, const Direction& direction, double& dist) const override {
     BvsHitF64 hit = nearest(trees_.at(tree), origin, direction, INFTY, HitOrientation::ANY, nullptr);
@@ -150,7 +160,9 @@ private:
     bake.objects.count = faces.size();
     bake.work = work_per_face_ * faces.size() + 1;
     bake.frame = 1;
+    // Not null for a volume without faces.
     std::vector<double> corners;
+    corners.reserve(9 * faces.size() + 9);
     Tree tree;
     for (const Face& face : faces) {
       corners.insert(corners.end(), face.corners.begin(), face.corners.end());

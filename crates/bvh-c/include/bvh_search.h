@@ -445,6 +445,12 @@ BvsStatus bvs_tracer_nearest_hits_f64(const BvsTracerF64 *tracer, const BvsRayF6
 // `select` is null, or what counts.
 BvsStatus bvs_tracer_any_hits_f64(const BvsTracerF64 *tracer, const BvsRayF64 *rays, size_t ray_stride, size_t count, const BvsSelect *select, uint8_t *hits, size_t hit_stride);
 
+// Writes the closest points of the triangles to `count` points, 3 doubles each, as
+// `bvs_tracer_closest_points` does.
+//
+// `tracer` is a tracer; `points` points to 3 * `count` doubles, and `closest` to `count` elements.
+BvsStatus bvs_tracer_closest_points_f64(const BvsTracerF64 *tracer, const double *points, size_t count, BvsClosest *closest);
+
 // Frees a tracer. Ignores null.
 //
 // `tracer` is null, or a tracer that nobody uses any more.

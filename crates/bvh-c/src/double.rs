@@ -1,9 +1,9 @@
 //! Tracers in f64, which select what counts by its side and by its id.
 
 use crate::failure::{
-    BvsStatus, Failure, given, given_mut, made, slice, status, strided, strided_mut,
+    BvsStatus, Failure, given, given_mut, made, slice, slice_mut, status, strided, strided_mut,
 };
-use crate::tracer::BATCH;
+use crate::tracer::{BATCH, BvsClosest};
 use crate::tree::BvsTree;
 use bvh_search::bvh_core::{DHit, DRay, DWideBvh, Orientation, OutOfExactRange, Select};
 
@@ -213,6 +213,31 @@ pub unsafe extern "C" fn bvs_tracer_any_hits_f64(
         let trace = DWideBvh::any_hits;
         // SAFETY: there are `count` rays and bytes at these distances.
         unsafe { in_batches(tracer, (rays, ray_stride), count, select, (hits, hit_stride), trace) }
+    })
+}
+
+/// Writes the closest points of the triangles to `count` points, 3 doubles each, as
+/// `bvs_tracer_closest_points` does.
+///
+/// `tracer` is a tracer; `points` points to 3 * `count` doubles, and `closest` to `count` elements.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvs_tracer_closest_points_f64(
+    tracer: *const BvsTracerF64,
+    points: *const f64,
+    count: usize,
+    closest: *mut BvsClosest,
+) -> BvsStatus {
+    status(|| {
+        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
+        let tracer = unsafe { given("tracer", tracer) }?;
+        // SAFETY: `points` points to 3 doubles for each of `count` points.
+        let points = unsafe { slice("points", points.cast::<[f64; 3]>(), count) }?;
+        // SAFETY: `closest` points to `count` elements that nobody else uses during the call.
+        let closest = unsafe { slice_mut("closest", closest, count) }?;
+        for (to, &point) in closest.iter_mut().zip(points) {
+            *to = tracer.wide.closest_point(point, f64::INFINITY).into();
+        }
+        Ok(())
     })
 }
 

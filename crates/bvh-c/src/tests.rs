@@ -360,6 +360,13 @@ fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_exclu
             }
             assert!((200..1400).contains(&found), "{found}");
         }
+        let points = [particles[3].ray.origin, [f64::MAX; 3]];
+        let far = BvsClosest { point: [0.0; 3], distance: 0.0, object: 0 };
+        let mut closest = [far; 2];
+        let first = closest.as_mut_ptr();
+        ok(bvs_tracer_closest_points_f64(tracer, points.as_ptr().cast(), 2, first));
+        assert_eq!(closest[0], wide.closest_point(points[0], f64::INFINITY).into());
+        assert_eq!((closest[1].distance, closest[1].object), (f64::INFINITY, u32::MAX));
         let ray = particles[0].ray;
         let mut hit = missing;
         let wrong = BvsSelect { orientation: 3, excluded_count: 0, excluded: null() };

@@ -3,7 +3,8 @@
 use crate::failure::{BvsStatus, Failure, given, given_mut, made, slice, slice_mut, status};
 use crate::tree::{BvsObjects, BvsTree, kind, moved};
 use bvh_search::OwnedTree;
-use bvh_search::bvh_core::InvalidRay;
+use bvh_search::bvh_core::glam::DVec3;
+use bvh_search::bvh_core::{Closest, InvalidRay};
 use bvh_search::prelude::*;
 use std::sync::{Arc, OnceLock};
 
@@ -93,6 +94,14 @@ pub struct BvsClosest {
     pub distance: f64,
     /// The index of the triangle; of several at the same distance, the lowest.
     pub object: u32,
+}
+
+impl From<Option<Closest>> for BvsClosest {
+    fn from(closest: Option<Closest>) -> Self {
+        let none = Closest { object: u32::MAX, point: DVec3::NAN, distance: f64::INFINITY };
+        let Closest { object, point, distance } = closest.unwrap_or(none);
+        Self { point: point.to_array(), distance, object }
+    }
 }
 
 /// Creates a tracer of a tree over triangles. The tracer is independent of the tree: the tree may
@@ -342,11 +351,7 @@ pub unsafe extern "C" fn bvs_tracer_closest_points(
             let found = &mut found[..points.len()];
             tracer.wide.closest_points(points, found);
             for (to, closest) in closest.iter_mut().zip(&*found) {
-                *to = BvsClosest {
-                    point: closest.map_or([f64::NAN; 3], |closest| closest.point.to_array()),
-                    distance: closest.map_or(f64::INFINITY, |closest| closest.distance),
-                    object: closest.map_or(u32::MAX, |closest| closest.object),
-                };
+                *to = (*closest).into();
             }
         }
         Ok(())
