@@ -35,7 +35,7 @@ theirs() {
 }
 theirs -I"$catch/extras" -c "$catch/extras/catch_amalgamated.cpp" -o "$folder/catch.o"
 for source in config element_face_accessor error mesh_manager_interface metadata_interface \
-    ray_tracing_interface tetrahedron_contain timer topology_interface triangle_intersect geometry/closest \
+    ray_tracing_interface tetrahedron_contain timer triangle_intersect geometry/closest \
     geometry/measure geometry/plucker util/str_utils embree/ray_tracer; do
     [ ! -e "$xdg/src/$source.cpp" ] || theirs -c "$xdg/src/$source.cpp" -o "$folder/$(basename $source).xdg.o"
 done
