@@ -432,24 +432,31 @@ BvsStatus bvs_nearest_f64(const BvsTracerF64 *tracer, const BvsRayF64 *ray, cons
 BvsStatus bvs_any_f64(const BvsTracerF64 *tracer, const BvsRayF64 *ray, const BvsSelect *select, uint8_t *hit);
 
 // Writes the nearest hits of `count` rays to `hits`. A ray begins `ray_stride` bytes after the one
-// before, and a hit `hit_stride` bytes: multiples of 8; 0 is right behind it.
+// before, and a hit `hit_stride` bytes: multiples of 8; 0 is right behind it. `coherent` has the
+// meaning that it has in `bvs_tracer_nearest_hits`.
 //
 // `tracer` is a tracer; `rays` and `hits` point to `count` elements each, which do not overlap;
 // `select` is null, or what counts.
-BvsStatus bvs_tracer_nearest_hits_f64(const BvsTracerF64 *tracer, const BvsRayF64 *rays, size_t ray_stride, size_t count, const BvsSelect *select, BvsHitF64 *hits, size_t hit_stride);
+BvsStatus bvs_tracer_nearest_hits_f64(const BvsTracerF64 *tracer, const BvsRayF64 *rays, size_t ray_stride, size_t count, int32_t coherent, const BvsSelect *select, BvsHitF64 *hits, size_t hit_stride);
 
 // Writes to `hits` whether each of `count` rays hits any triangle that counts: 1 or 0. Strides are
 // those of `bvs_tracer_nearest_hits_f64`; that of `hits` is any number of bytes.
 //
 // `tracer` is a tracer; `rays` and `hits` point to `count` elements each, which do not overlap;
 // `select` is null, or what counts.
-BvsStatus bvs_tracer_any_hits_f64(const BvsTracerF64 *tracer, const BvsRayF64 *rays, size_t ray_stride, size_t count, const BvsSelect *select, uint8_t *hits, size_t hit_stride);
+BvsStatus bvs_tracer_any_hits_f64(const BvsTracerF64 *tracer, const BvsRayF64 *rays, size_t ray_stride, size_t count, int32_t coherent, const BvsSelect *select, uint8_t *hits, size_t hit_stride);
 
 // Writes the closest points of the triangles to `count` points, 3 doubles each, as
 // `bvs_tracer_closest_points` does.
 //
 // `tracer` is a tracer; `points` points to 3 * `count` doubles, and `closest` to `count` elements.
 BvsStatus bvs_tracer_closest_points_f64(const BvsTracerF64 *tracer, const double *points, size_t count, BvsClosest *closest);
+
+// Writes to `inside` whether each of `count` points, 3 doubles each, is inside of the mesh: 1 or 0,
+// as `bvs_tracer_contains` does.
+//
+// `tracer` is a tracer; `points` points to 3 * `count` doubles, and `inside` to `count` bytes.
+BvsStatus bvs_tracer_contains_f64(const BvsTracerF64 *tracer, const double *points, size_t count, uint8_t *inside);
 
 // Frees a tracer. Ignores null.
 //

@@ -3,14 +3,20 @@
 use crate::failure::{
     BvsStatus, Failure, given, given_mut, made, slice, slice_mut, status, strided, strided_mut,
 };
-use crate::tracer::{BATCH, BvsClosest};
+use crate::tracer::{BATCH, BvsClosest, coherence, contained};
 use crate::tree::BvsTree;
-use bvh_search::bvh_core::{DHit, DRay, DWideBvh, Orientation, OutOfExactRange, Select};
+use bvh_search::OwnedTree;
+use bvh_search::bvh_core::glam::DVec3;
+use bvh_search::bvh_core::{DHit, DRay, DWideBvh, Orientation, OutOfExactRange, Select, Solid};
+use std::sync::{Arc, OnceLock};
 
 /// Triangles in f64 in the wide layout. Any number of threads may trace rays at the same time. A
 /// thread that frees a tracer must be the only user.
 pub struct BvsTracerF64 {
     wide: DWideBvh,
+    source: Arc<OwnedTree>,
+    /// Made when it is first needed.
+    solid: OnceLock<Solid>,
 }
 
 /// The points `origin` + t * `direction` with `t_min` <= t <= `t_max`. The direction may have any
@@ -109,12 +115,12 @@ unsafe fn selected<'a>(select: *const BvsSelect, count: usize) -> Result<Select<
 pub unsafe extern "C" fn bvs_tracer_f64_new(tree: *const BvsTree) -> *mut BvsTracerF64 {
     made(|| {
         // SAFETY: the caller keeps the tree alive and unchanged during the call.
-        let owned = &unsafe { given("tree", tree) }?.owned;
-        let Some(triangles) = owned.doubles() else {
+        let source = unsafe { given("tree", tree) }?.owned.clone();
+        let Some(triangles) = source.doubles() else {
             return Err(Failure::invalid("tree is not over `vertices_f64`; accepted: such a tree"));
         };
-        let wide = DWideBvh::new(owned.tree(), triangles).map_err(Failure::invalid)?;
-        Ok(BvsTracerF64 { wide })
+        let wide = DWideBvh::new(source.tree(), triangles).map_err(Failure::invalid)?;
+        Ok(BvsTracerF64 { wide, source, solid: OnceLock::new() })
     })
 }
 
@@ -169,7 +175,8 @@ pub unsafe extern "C" fn bvs_any_f64(
 }
 
 /// Writes the nearest hits of `count` rays to `hits`. A ray begins `ray_stride` bytes after the one
-/// before, and a hit `hit_stride` bytes: multiples of 8; 0 is right behind it.
+/// before, and a hit `hit_stride` bytes: multiples of 8; 0 is right behind it. `coherent` has the
+/// meaning that it has in `bvs_tracer_nearest_hits`.
 ///
 /// `tracer` is a tracer; `rays` and `hits` point to `count` elements each, which do not overlap;
 /// `select` is null, or what counts.
@@ -179,6 +186,7 @@ pub unsafe extern "C" fn bvs_tracer_nearest_hits_f64(
     rays: *const BvsRayF64,
     ray_stride: usize,
     count: usize,
+    coherent: i32,
     select: *const BvsSelect,
     hits: *mut BvsHitF64,
     hit_stride: usize,
@@ -186,7 +194,9 @@ pub unsafe extern "C" fn bvs_tracer_nearest_hits_f64(
     status(|| {
         // SAFETY: what the caller promises.
         let tracer = unsafe { given("tracer", tracer) }?;
-        let trace = DWideBvh::nearest_hits;
+        let trace = |wide: &DWideBvh, rays: &[DRay], select: Select<'_>, hits: &mut [_]| {
+            wide.nearest_hits(rays, select, hits, coherence(coherent));
+        };
         // SAFETY: there are `count` rays and hits at these distances.
         unsafe { in_batches(tracer, (rays, ray_stride), count, select, (hits, hit_stride), trace) }
     })
@@ -203,6 +213,7 @@ pub unsafe extern "C" fn bvs_tracer_any_hits_f64(
     rays: *const BvsRayF64,
     ray_stride: usize,
     count: usize,
+    coherent: i32,
     select: *const BvsSelect,
     hits: *mut u8,
     hit_stride: usize,
@@ -210,7 +221,9 @@ pub unsafe extern "C" fn bvs_tracer_any_hits_f64(
     status(|| {
         // SAFETY: what the caller promises.
         let tracer = unsafe { given("tracer", tracer) }?;
-        let trace = DWideBvh::any_hits;
+        let trace = |wide: &DWideBvh, rays: &[DRay], select: Select<'_>, hits: &mut [_]| {
+            wide.any_hits(rays, select, hits, coherence(coherent));
+        };
         // SAFETY: there are `count` rays and bytes at these distances.
         unsafe { in_batches(tracer, (rays, ray_stride), count, select, (hits, hit_stride), trace) }
     })
@@ -235,9 +248,30 @@ pub unsafe extern "C" fn bvs_tracer_closest_points_f64(
         // SAFETY: `closest` points to `count` elements that nobody else uses during the call.
         let closest = unsafe { slice_mut("closest", closest, count) }?;
         for (to, &point) in closest.iter_mut().zip(points) {
-            *to = tracer.wide.closest_point(point, f64::INFINITY).into();
+            *to = tracer.wide.closest_point(point).into();
         }
         Ok(())
+    })
+}
+
+/// Writes to `inside` whether each of `count` points, 3 doubles each, is inside of the mesh: 1 or 0,
+/// as `bvs_tracer_contains` does.
+///
+/// `tracer` is a tracer; `points` points to 3 * `count` doubles, and `inside` to `count` bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bvs_tracer_contains_f64(
+    tracer: *const BvsTracerF64,
+    points: *const f64,
+    count: usize,
+    inside: *mut u8,
+) -> BvsStatus {
+    status(|| {
+        // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
+        let BvsTracerF64 { wide, source, solid } = unsafe { given("tracer", tracer) }?;
+        let triangles = source.doubles().unwrap_or(&[]);
+        let solid = solid.get_or_init(|| Solid::new(source.tree(), triangles));
+        // SAFETY: there are 3 doubles for each of `count` points, and as many bytes.
+        unsafe { contained(solid, wide, points.cast::<DVec3>(), count, inside) }
     })
 }
 

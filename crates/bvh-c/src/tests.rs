@@ -333,6 +333,7 @@ fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_exclu
                 rays,
                 size_of::<Particle>(),
                 count,
+                1,
                 select,
                 any.as_mut_ptr(),
                 2,
@@ -340,7 +341,7 @@ fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_exclu
             let first = particles.as_mut_ptr();
             let (rays, hits) = (&raw const (*first).ray, &raw mut (*first).hit);
             let stride = size_of::<Particle>();
-            ok(bvs_tracer_nearest_hits_f64(tracer, rays, stride, count, select, hits, stride));
+            ok(bvs_tracer_nearest_hits_f64(tracer, rays, stride, count, 0, select, hits, stride));
             let mut found = 0;
             for (number, Particle { energy, ray, hit, material }) in particles.iter().enumerate() {
                 let exclude = &excluded[2 * number..][..excluded_count as usize];
@@ -365,7 +366,10 @@ fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_exclu
         let mut closest = [far; 2];
         let first = closest.as_mut_ptr();
         ok(bvs_tracer_closest_points_f64(tracer, points.as_ptr().cast(), 2, first));
-        assert_eq!(closest[0], wide.closest_point(points[0], f64::INFINITY).into());
+        assert_eq!(closest[0], wide.closest_point(points[0]).into());
+        let mut inside = [9; 2];
+        ok(bvs_tracer_contains_f64(tracer, points.as_ptr().cast(), 2, inside.as_mut_ptr()));
+        assert_eq!(inside, [0; 2]);
         assert_eq!((closest[1].distance, closest[1].object), (f64::INFINITY, u32::MAX));
         let ray = particles[0].ray;
         let mut hit = missing;
@@ -378,7 +382,7 @@ fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_exclu
         invalid(bvs_nearest_f64(tracer, &ray, &wrong, &mut hit), "excluded is null");
         let rays = [ray, BvsRayF64 { origin: [0.0, 1e-300, 0.0], ..ray }];
         let batch = |rays, stride, hits| {
-            bvs_tracer_nearest_hits_f64(tracer, rays, stride, 2, null(), hits, 0)
+            bvs_tracer_nearest_hits_f64(tracer, rays, stride, 2, 0, null(), hits, 0)
         };
         invalid(batch(rays.as_ptr(), 0, &mut hit), "rays[1]: the ray's origin");
         invalid(batch(rays.as_ptr(), 60, &mut hit), "rays has a stride of 60 bytes");

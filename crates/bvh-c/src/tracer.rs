@@ -4,7 +4,7 @@ use crate::failure::{BvsStatus, Failure, given, given_mut, made, slice, slice_mu
 use crate::tree::{BvsObjects, BvsTree, kind, moved};
 use bvh_search::OwnedTree;
 use bvh_search::bvh_core::glam::DVec3;
-use bvh_search::bvh_core::{Closest, InvalidRay};
+use bvh_search::bvh_core::{Closest, InvalidRay, Traced};
 use bvh_search::prelude::*;
 use std::sync::{Arc, OnceLock};
 
@@ -373,22 +373,36 @@ pub unsafe extern "C" fn bvs_tracer_contains(
     status(|| {
         // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
         let tracer = unsafe { given("tracer", tracer) }?;
-        // SAFETY: `points` points to 3 floats for each of `count` points.
-        let points = unsafe { slice("points", points.cast::<Vec3>(), count) }?;
-        // SAFETY: `inside` points to `count` bytes that nobody else uses during the call.
-        let inside = unsafe { slice_mut("inside", inside, count) }?;
         let solid =
             tracer.solid.get_or_init(|| Solid::new(tracer.source.tree(), tracer.triangles()));
-        let mut found = [false; BATCH];
-        for (points, inside) in points.chunks(BATCH).zip(inside.chunks_mut(BATCH)) {
-            let found = &mut found[..points.len()];
-            solid.contains(&tracer.wide, points, InsideRule::Auto, found);
-            for (to, &is_inside) in inside.iter_mut().zip(&*found) {
-                *to = u8::from(is_inside);
-            }
-        }
-        Ok(())
+        // SAFETY: there are 3 floats for each of `count` points, and as many bytes.
+        unsafe { contained(solid, &*tracer.wide, points.cast::<Vec3>(), count, inside) }
     })
+}
+
+/// Writes whether each of `count` points is inside.
+///
+/// # Safety
+/// Both arrays have `count` elements that nobody else uses during the call.
+pub(crate) unsafe fn contained<L: Traced>(
+    solid: &Solid,
+    wide: &L,
+    points: *const L::Point,
+    count: usize,
+    inside: *mut u8,
+) -> Result<(), Failure> {
+    // SAFETY: what the caller promises.
+    let (points, inside) =
+        unsafe { (slice("points", points, count)?, slice_mut("inside", inside, count)?) };
+    let mut found = [false; BATCH];
+    for (points, inside) in points.chunks(BATCH).zip(inside.chunks_mut(BATCH)) {
+        let found = &mut found[..points.len()];
+        solid.contains(wide, points, InsideRule::Auto, found);
+        for (to, &is_inside) in inside.iter_mut().zip(&*found) {
+            *to = u8::from(is_inside);
+        }
+    }
+    Ok(())
 }
 
 /// Frees a tracer. Ignores null.
@@ -406,7 +420,7 @@ pub unsafe extern "C" fn bvs_tracer_free(tracer: *mut BvsTracer) {
 /// negligible, and few enough to stay in the cache.
 pub(crate) const BATCH: usize = 512;
 
-fn coherence(coherent: i32) -> Coherence {
+pub(crate) fn coherence(coherent: i32) -> Coherence {
     if coherent != 0 { Coherence::Coherent } else { Coherence::Incoherent }
 }
 
