@@ -58,9 +58,7 @@ impl Triangle {
     /// triangle's plane. Their sum is 1. They interpolate values of the corners, such as normals,
     /// at a hit. Returns `None` for a ray in the plane.
     pub fn barycentrics(&self, ray: &Ray) -> Option<[f64; 3]> {
-        let weights = ray.line().weights(&self.0);
-        let sum: f64 = weights.iter().sum();
-        (sum != 0.0).then(|| weights.map(|weight| weight / sum))
+        ray.line().barycentrics(&self.0)
     }
 
     /// Returns the triangle moved by a transform, such as the transform of an
@@ -74,12 +72,7 @@ impl Triangle {
     /// Returns the unit vector perpendicular to the triangle, on the side from which its corners
     /// run counterclockwise, computed in f64; `None` for a degenerate triangle.
     pub fn normal(&self) -> Option<Vec3> {
-        let [a, b, c] = self.0.map(Vec3::as_dvec3);
-        // Scaled edges have lengths of about one, so their product neither overflows nor
-        // underflows.
-        let scale = (b - a).abs().max((c - a).abs()).max_element();
-        let normal = ((b - a) / scale).cross((c - a) / scale).try_normalize();
-        normal.map(|normal| normal.as_vec3())
+        normal_of(self.corners()).map(|normal| normal.as_vec3())
     }
 
     /// Returns whether the corners coincide or are collinear, in real arithmetic. Such a triangle is
@@ -184,6 +177,13 @@ impl<T: Corners> InFrame<'_, T> {
     pub fn boxes(&self) -> Vec<Aabb> {
         self.triangles.iter().map(|triangle| triangle.aabb_in(self.frame)).collect()
     }
+}
+
+/// Returns the unit vector perpendicular to a triangle, `None` for a degenerate one.
+pub(crate) fn normal_of([a, b, c]: [DVec3; 3]) -> Option<DVec3> {
+    // Scaled edges have lengths of about one, so their product neither overflows nor underflows.
+    let scale = (b - a).abs().max((c - a).abs()).max_element();
+    ((b - a) / scale).cross((c - a) / scale).try_normalize()
 }
 
 /// Returns the vector from `point` to the nearest point of the triangle of these corners. Triangles

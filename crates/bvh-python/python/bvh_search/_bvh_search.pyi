@@ -9,11 +9,14 @@ from numpy.typing import NDArray
 
 from ._numbers import Numbers, Progress
 
-__all__ = ["Tracer", "Tree", "__version__", "corners", "locations", "rows"]
+__all__ = ["Tracer", "Tree", "__version__", "corners", "rows"]
 
 __version__: str
 
 _Invalid = Literal["error", "miss"]
+_Orientation = Literal["any", "exiting", "entering"]
+_Precision = Literal["single", "double"]
+_Real = np.float32 | np.float64
 _Rule = Literal["auto", "parity", "winding"]
 
 @final
@@ -52,6 +55,7 @@ class Tree:
         progress: Progress | None = None,
         rays: Numbers | None = None,
         frame: Literal["auto", "file"] = "auto",
+        precision: _Precision = "single",
     ) -> Tree:
         """Searches for the best tree over the triangles of a mesh: vertices, `(v, 3)`, and faces, `(n,
         3)`, of three vertices each. `update` moves the vertices later. The boxes lie along other
@@ -70,6 +74,7 @@ class Tree:
         progress: Progress | None = None,
         rays: Numbers | None = None,
         frame: Literal["auto", "file"] = "auto",
+        precision: _Precision = "single",
     ) -> Tree:
         """Searches for the best tree over triangles, `(n, 3, 3)`.
 
@@ -97,6 +102,7 @@ class Tree:
         boxes: Numbers | None = None,
         vertices: Numbers | None = None,
         faces: Numbers | None = None,
+        precision: _Precision = "single",
     ) -> Tree:
         """Loads the tree in a file. The mesh, triangles or boxes must be the ones that it was saved for.
         With `vertices` and `faces`, `update` moves the vertices later.
@@ -146,6 +152,8 @@ class Tree:
         >>> square.cost("sah") > 0
         True
         """
+    @property
+    def precision(self) -> _Precision: ...
     @property
     def frame(self) -> tuple[list[list[float]], list[float]] | None:
         """The frame of the boxes, a rotation and a centre: they contain `rotation @ (p - centre)` for
@@ -201,7 +209,7 @@ class Tracer:
     >>> tracer = Tracer(square)
     """
 
-    def __new__(cls, tree: Tree, *, center: Numbers | None = None) -> Tracer: ...
+    def __new__(cls, tree: Tree) -> Tracer: ...
     @property
     def watertight(self) -> bool:
         """Whether the mesh has no holes: every edge runs as often in one direction as in the other, or
@@ -217,10 +225,12 @@ class Tracer:
         t_min: Numbers | None = None,
         t_max: Numbers | None = None,
         *,
+        orientation: _Orientation = "any",
+        exclude: Numbers | None = None,
         coherent: bool | None = None,
         invalid: _Invalid = "error",
         progress: Progress | None = None,
-    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    ) -> tuple[NDArray[_Real], NDArray[np.int32]]:
         """Returns the distances of the nearest hits and the triangles' indices. A ray without a hit
         has infinity and −1.
 
@@ -234,6 +244,8 @@ class Tracer:
         t_min: Numbers | None = None,
         t_max: Numbers | None = None,
         *,
+        orientation: _Orientation = "any",
+        exclude: Numbers | None = None,
         coherent: bool | None = None,
         invalid: _Invalid = "error",
         progress: Progress | None = None,
@@ -252,7 +264,7 @@ class Tracer:
         *,
         invalid: _Invalid = "error",
         progress: Progress | None = None,
-    ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int64]]:
+    ) -> tuple[NDArray[_Real], NDArray[np.int32], NDArray[np.int64]]:
         """Returns all hits, ray after ray and the nearest first: distances, triangles, and the indices
         of the rays. Each crossing of the surface counts once, although triangles share edges and
         corners, so the number of hits of a line with a closed mesh is even.
@@ -310,7 +322,7 @@ class Tracer:
         """
     def surface(
         self, origins: Numbers, directions: Numbers, triangle: Numbers
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float32]]:
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[_Real]]:
         """Returns the weights `u` and `v` of the second and third corner at hits, and the unit normals
         of the triangles, on the side from which their corners run counterclockwise. `triangle` has
         one index per ray; where it is −1 all numbers are 0.
@@ -320,16 +332,9 @@ class Tracer:
         """
     def __len__(self) -> int: ...
 
-def corners(vertex_positions: Numbers, triangle_indices: Numbers) -> NDArray[np.float64]:
+def corners(vertex_positions: Numbers, triangle_indices: Numbers) -> NDArray[_Real]:
     """Returns the corners, `(n, 3, 3)` in `float64`, of the triangles of a mesh, with the checks of
     `Tree.from_mesh`.
-    """
-def locations(
-    triangles: Numbers, origins: Numbers, directions: Numbers, triangle: Numbers, ray: Numbers
-) -> NDArray[np.float64]:
-    """Returns the points, in `float64`, where rays cross triangles: the indices of triangles and rays
-    are from `Tracer.all`. `triangles` has the shape `(n, 3, 3)`. Each point is in the box of its
-    triangle.
     """
 def rows(name: str, argument: Numbers, length: int) -> NDArray[Any]:
     """Converts the argument called `name` to `float32` or `float64` and checks that its last axis has
