@@ -267,7 +267,12 @@ impl DTriangle {
 
     fn distance(&self, ray: &DRay, is_moved: bool) -> Option<f64> {
         let ends = [ray.origin, ray.direction];
-        let t = Line::new(ray.origin, ray.direction).crossing(ends, &self.0, is_moved)?;
+        let line = Line::new(ray.origin, ray.direction);
+        let t = match line.filter(&self.0) {
+            // It crosses, and twice f64 nearly always rounds its distance.
+            Verdict::Between(..) => line.rounded(ends, &self.0),
+            _ => line.crossing(ends, &self.0, is_moved)?,
+        };
         ray.is_in_range(t).then_some(t)
     }
 

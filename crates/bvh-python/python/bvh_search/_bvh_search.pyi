@@ -34,7 +34,8 @@ class Tree:
     times per second with the elapsed time and the lowest cost so far; if it raises an exception,
     the search ends. `rays` are recorded rays of the shape `(m, 2, 3)`, from their origins to their
     hits: the tree is then for rays like these. `references` above 1, up to 16, divides triangles
-    among leaves, on average into that many parts each.
+    among leaves, on average into that many parts each. With `precision="double"` the triangles have
+    `float64` coordinates, each 0 or 2^-150 to 2^120 in size, and `Tracer` answers in `float64`.
 
     >>> from bvh_search import Tree
     >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
@@ -105,7 +106,8 @@ class Tree:
         precision: _Precision = "single",
     ) -> Tree:
         """Loads the tree in a file. The mesh, triangles or boxes must be the ones that it was saved for.
-        With `vertices` and `faces`, `update` moves the vertices later.
+        With `vertices` and `faces`, `update` moves the vertices later. `precision` is that of the saved
+        tree.
 
         >>> import tempfile
         >>> folder = tempfile.TemporaryDirectory()
@@ -153,7 +155,13 @@ class Tree:
         True
         """
     @property
-    def precision(self) -> _Precision: ...
+    def precision(self) -> _Precision:
+        """The numbers of the triangles' coordinates: `single`, `float32`, as those of all boxes, or
+        `double`, `float64`.
+
+        >>> square.precision
+        'single'
+        """
     @property
     def frame(self) -> tuple[list[list[float]], list[float]] | None:
         """The frame of the boxes, a rotation and a centre: they contain `rotation @ (p - centre)` for
@@ -186,17 +194,20 @@ class Tracer:
 
     Rays have `origins` and `directions` of the shape `(m, 3)`; one of the shape `(3,)` or `(1, 3)` is
     for all rays. `t_min` and `t_max`, by default 0
-    and infinity, are one number or have the shape `(m,)`; those in `float64` are rounded inwards.
-    Distances are in multiples of the directions' lengths. `coherent` tells whether consecutive rays
+    and infinity, are one number or have the shape `(m,)`. Distances are in multiples of the directions' lengths. `coherent` tells whether consecutive rays
     begin close to each other and have similar directions; by default a look at the rays decides. It
     changes the speed and no answer. An invalid ray, with a direction that is zero or a number that
     is not finite, raises a `ValueError`; with `invalid="miss"` it hits nothing.
 
-    Trees have `float32` coordinates. For coordinates that need `float64`, move the triangles by
-    `-center` before they are rounded, and pass `center`: rays, points and answers are then in the
-    coordinates of the world, and only what is left after their move is rounded. A ray that begins
-    outside the tree's box, far away or at a point that `float32` does not have, is first advanced to
-    it in `float64`.
+    The tracer of a tree with `precision="double"` answers in `float64`, exactly, however far the
+    triangles and the rays are from the origin. Coordinates are 0 or 2^-150 to 2^120 in size; with
+    `invalid="miss"`, what is smaller in a ray counts as 0. In other tracers, rays and points are
+    rounded to `float32`, and `t_min` and `t_max` inwards.
+
+    `nearest` and `any` choose which triangles count, in trees with `precision="double"`: those with
+    the `orientation` `"exiting"`, which the ray meets along their normal as where it leaves a solid,
+    `"entering"`, against it, or `"any"`, and none of the indices `exclude`. That is one index,
+    an array `(m,)` or `(m, k)` of some for each ray; -1 excludes nothing.
 
     Ctrl-C ends every call. `progress(seconds, fraction)` is called about twenty times per second with
     the elapsed time and the part of the rays or points that is answered, and at the end with 1; if it
@@ -333,8 +344,8 @@ class Tracer:
     def __len__(self) -> int: ...
 
 def corners(vertex_positions: Numbers, triangle_indices: Numbers) -> NDArray[_Real]:
-    """Returns the corners, `(n, 3, 3)` in `float64`, of the triangles of a mesh, with the checks of
-    `Tree.from_mesh`.
+    """Returns the corners, `(n, 3, 3)`, of the triangles of a mesh, with the checks of
+    `Tree.from_mesh`: in `float32` if the vertices are, and otherwise in `float64`.
     """
 def rows(name: str, argument: Numbers, length: int) -> NDArray[Any]:
     """Converts the argument called `name` to `float32` or `float64` and checks that its last axis has

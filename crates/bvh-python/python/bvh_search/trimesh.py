@@ -42,8 +42,6 @@ class _Mesh(Protocol):
     def vertices(self) -> Any: ...
     @property
     def faces(self) -> Any: ...
-    @property
-    def triangles(self) -> Any: ...
 
 
 class RayMeshIntersector:
@@ -136,10 +134,8 @@ class RayMeshIntersector:
             t, index_tri = t[index_ray], index_tri[index_ray]
         if not return_locations:
             return index_tri.astype(np.int64), index_ray
-        origins, directions = (vectors[index_ray] for vectors in rays)
-        corners = np.asarray(self.mesh.triangles, dtype=np.float64)[index_tri]
-        # Rounding moves no location out of the box of its face.
-        found = np.clip(origins + t[:, None] * directions, corners.min(axis=1), corners.max(axis=1))
+        origins, directions = (vectors.take(index_ray, axis=0) for vectors in rays)
+        found = origins + t[:, None] * directions
         return index_tri.astype(np.int64), index_ray, found
 
     def intersects_first(
