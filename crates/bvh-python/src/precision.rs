@@ -271,11 +271,7 @@ impl Real for f64 {
     }
 
     fn all(layout: &DWideBvh, rays: &[DRay], hits: &mut Vec<DHit>, counts: &mut [u32]) {
-        for (ray, count) in rays.iter().zip(counts) {
-            let found = layout.all_hits(ray);
-            *count = found.len() as u32;
-            hits.extend(found);
-        }
+        layout.all_hits_of(rays, hits, counts);
     }
 
     fn parts(hit: &DHit) -> (f64, i32) {

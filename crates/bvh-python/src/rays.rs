@@ -157,21 +157,23 @@ pub struct RaySource<'a> {
 impl RaySource<'_> {
     /// Returns the batch of this number, of batches of so many rays, or the fault of an invalid ray.
     pub fn batch<N: Real>(&self, number: usize, size: usize) -> Result<Vec<N::Ray>, String> {
-        let ray = |index: usize| {
+        let mut rays = Vec::with_capacity(size.min(self.rays));
+        for index in (number * size..self.rays).take(size) {
             let origin = self.origins.at(index);
             let direction = self.directions.at(index);
             let limits = self.limits.map(|limits| *at(limits, index));
-            let ray = N::ray(origin, direction, limits);
-            if self.misses && ray.is_err() {
-                // What is too small for a tree in `float64` is nothing next to what is not.
-                let [origin, direction] = [origin, direction].map(without_least);
-                return N::ray(origin, direction, limits)
+            rays.push(match N::ray(origin, direction, limits) {
+                Err(_) if self.misses => {
+                    // What is too small for a tree in `float64` is nothing next to what is not.
+                    let [origin, direction] = [origin, direction].map(without_least);
+                    let ray = N::ray(origin, direction, limits);
                     // An empty range hits nothing.
-                    .or_else(|_| N::ray(DVec3::ZERO, DVec3::X, [1.0, 0.0]));
-            }
-            ray.map_err(|fault| format!("ray {index}: {fault}"))
-        };
-        (number * size..self.rays).take(size).map(ray).collect()
+                    ray.or_else(|_| N::ray(DVec3::ZERO, DVec3::X, [1.0, 0.0]))?
+                }
+                ray => ray.map_err(|fault| format!("ray {index}: {fault}"))?,
+            });
+        }
+        Ok(rays)
     }
 }
 
