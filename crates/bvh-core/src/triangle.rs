@@ -244,6 +244,7 @@ fn greater(a: DVec3, b: DVec3) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{DRay, DTriangle};
 
     #[test]
     fn the_weights_of_the_corners_are_those_of_the_point_that_is_hit() {
@@ -259,6 +260,9 @@ mod tests {
             for direction in [Vec3::Z, -Vec3::Z, Vec3::new(0.5, -0.25, 1.0)] {
                 let ray = Ray::half_line(target - direction * 2.0, direction).unwrap();
                 assert_eq!(triangle.barycentrics(&ray), Some(expected));
+                let [origin, direction] = ray.ends().map(Vec3::as_dvec3);
+                let ray = DRay::half_line(origin, direction).unwrap();
+                assert_eq!(DTriangle(triangle.corners()).barycentrics(&ray), Some(expected));
             }
         }
         let in_plane = Ray::half_line(triangle.0[0], triangle.0[1] - triangle.0[0]).unwrap();
@@ -275,6 +279,7 @@ mod tests {
                 Vec3::new(0.0, scale, 0.0),
             ]);
             assert_eq!(triangle.normal(), Some(Vec3::Z), "2^{exponent}");
+            assert_eq!(DTriangle(triangle.corners()).normal(), Some(DVec3::Z), "2^{exponent}");
             let [a, b, c] = triangle.0;
             assert_eq!(Triangle([a, c, b]).normal(), Some(-Vec3::Z), "2^{exponent}");
         }

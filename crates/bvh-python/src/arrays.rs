@@ -120,7 +120,9 @@ fn coordinates<'py, N: Real>(
     let array = numbers::<N>(name, argument, accepted, accepts)?;
     if let Some(wrong) = array.elements()?.iter().position(|number| !number.is_accepted()) {
         let [found] = array.given(wrong)?;
-        return Err(invalid(format!("{name} has {found:?}; accepted: {}", N::ACCEPTED)));
+        let row = wrong / (array.elements()?.len() / array.shape()[0]);
+        let accepted = N::ACCEPTED;
+        return Err(invalid(format!("{name} has {found:?} in row {row}; accepted: {accepted}")));
     }
     Ok(array)
 }
