@@ -44,8 +44,8 @@ impl<'py, N: Real> Call<'_, 'py, N> {
             let parts = t.par_chunks_mut(BATCH).zip(objects.par_chunks_mut(BATCH));
             query.answer(parts, |number, (t, objects)| {
                 let rays = source.batch::<N>(number, BATCH)?;
-                let select = select.batch(number, BATCH, rays.len());
-                let hits = N::nearest(layout, &rays, select, hint.coherence::<N>(&rays));
+                let how = (select.batch(number, BATCH, rays.len()), hint.coherence::<N>(&rays));
+                let hits = N::nearest(layout, &rays, how);
                 for ((hit, t), object) in hits.iter().zip(t).zip(objects) {
                     (*t, *object) = N::parts(hit);
                 }
@@ -65,8 +65,8 @@ impl<'py, N: Real> Call<'_, 'py, N> {
         let layout = self.layout;
         self.columns(source.rays, BATCH, |number, hits| {
             let rays = source.batch::<N>(number, BATCH)?;
-            let select = select.batch(number, BATCH, rays.len());
-            N::any(layout, &rays, select, hint.coherence::<N>(&rays), hits);
+            let how = (select.batch(number, BATCH, rays.len()), hint.coherence::<N>(&rays));
+            N::any(layout, &rays, how, hits);
             Ok(())
         })
     }

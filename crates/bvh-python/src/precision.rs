@@ -63,6 +63,9 @@ macro_rules! with_precision {
 }
 pub(crate) use with_precision;
 
+/// What counts, in `f64` only, and whether the rays are similar.
+type How<'a> = (Select<'a>, Coherence);
+
 /// A number of coordinates, and how triangles with such corners are traced.
 pub trait Real: Number + Pod + Default {
     type Triangle: Corners + From<[[Self; 3]; 3]> + Pod + Sync;
@@ -89,20 +92,9 @@ pub trait Real: Number + Pod + Default {
     /// Returns the origin and the direction.
     fn ends(ray: &Self::Ray) -> [DVec3; 2];
 
-    fn nearest(
-        layout: &Self::Layout,
-        rays: &[Self::Ray],
-        select: Select,
-        coherence: Coherence,
-    ) -> Vec<Self::Hit>;
+    fn nearest(layout: &Self::Layout, rays: &[Self::Ray], how: How) -> Vec<Self::Hit>;
 
-    fn any(
-        layout: &Self::Layout,
-        rays: &[Self::Ray],
-        select: Select,
-        coherence: Coherence,
-        hits: &mut [bool],
-    );
+    fn any(layout: &Self::Layout, rays: &[Self::Ray], how: How, hits: &mut [bool]);
 
     /// Appends all hits, ray after ray, and writes how many each ray has.
     fn all(
@@ -180,13 +172,13 @@ impl Real for f32 {
         [ray.origin(), ray.direction()].map(Vec3::as_dvec3)
     }
 
-    fn nearest(layout: &WideBvh, rays: &[Ray], _: Select, coherence: Coherence) -> Vec<Hit> {
+    fn nearest(layout: &WideBvh, rays: &[Ray], (_, coherence): How) -> Vec<Hit> {
         let mut hits = vec![Hit::MISS; rays.len()];
         layout.nearest_hits(rays, &mut hits, coherence);
         hits
     }
 
-    fn any(layout: &WideBvh, rays: &[Ray], _: Select, coherence: Coherence, hits: &mut [bool]) {
+    fn any(layout: &WideBvh, rays: &[Ray], (_, coherence): How, hits: &mut [bool]) {
         layout.any_hits(rays, hits, coherence);
     }
 
@@ -248,25 +240,14 @@ impl Real for f64 {
         [ray.origin(), ray.direction()]
     }
 
-    fn nearest(
-        layout: &DWideBvh,
-        rays: &[DRay],
-        select: Select,
-        coherence: Coherence,
-    ) -> Vec<DHit> {
+    fn nearest(layout: &DWideBvh, rays: &[DRay], (select, coherence): How) -> Vec<DHit> {
         const MISS: DHit = DHit { t: f64::INFINITY, object: u32::MAX };
         let mut hits = vec![None; rays.len()];
         layout.nearest_hits(rays, select, &mut hits, coherence);
         hits.into_iter().map(|hit| hit.unwrap_or(MISS)).collect()
     }
 
-    fn any(
-        layout: &DWideBvh,
-        rays: &[DRay],
-        select: Select,
-        coherence: Coherence,
-        hits: &mut [bool],
-    ) {
+    fn any(layout: &DWideBvh, rays: &[DRay], (select, coherence): How, hits: &mut [bool]) {
         layout.any_hits(rays, select, hits, coherence);
     }
 

@@ -193,10 +193,10 @@ class Tracer:
     tree do not change the tracer.
 
     Rays have `origins` and `directions` of the shape `(m, 3)`; one of the shape `(3,)` or `(1, 3)` is
-    for all rays. `t_min` and `t_max`, by default 0
-    and infinity, are one number or have the shape `(m,)`. Distances are in multiples of the directions' lengths. `coherent` tells whether consecutive rays
-    begin close to each other and have similar directions; by default a look at the rays decides. It
-    changes the speed and no answer. An invalid ray, with a direction that is zero or a number that
+    for all rays. `t_min` and `t_max`, by default 0 and infinity, are one number or have the shape
+    `(m,)`. Distances are in multiples of the directions' lengths. `coherent` tells whether consecutive
+    rays begin close to each other and have similar directions; by default a look at the rays decides.
+    It changes the speed and no answer. An invalid ray, with a direction that is zero or a number that
     is not finite, raises a `ValueError`; with `invalid="miss"` it hits nothing.
 
     The tracer of a tree with `precision="double"` answers in `float64`, exactly, however far the

@@ -1,6 +1,6 @@
 """A scene with the method names of Open3D's `RaycastingScene`."""
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,9 +86,10 @@ class RaycastingScene:
         if self._made is None:
             triangles = np.concatenate([np.empty((0, 3, 3), np.float32), *self._triangles])
             first = np.cumsum([0] + [len(part) for part in self._triangles])
-            precision = "double" if triangles.dtype == np.float64 else "single"
-            tracer = Tracer(Tree.from_triangles(triangles, self._seconds, precision=precision))
-            self._made = tracer, first
+            is_double = triangles.dtype == np.float64
+            precision: Literal["single", "double"] = "double" if is_double else "single"
+            tree = Tree.from_triangles(triangles, self._seconds, precision=precision)
+            self._made = Tracer(tree), first
         return self._made
 
     @staticmethod
