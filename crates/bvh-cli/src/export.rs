@@ -76,8 +76,8 @@ pub fn export(args: &ExportArgs, answer: &mut Answer) -> Result<(), Error> {
     let [inside, outside] = better.gains.map(|times| gain(1.0, times));
     let nodes = better.tree.nodes.len();
     answer.say(&format!(
-        "{}: {} nodes of {which}; tests of rays from inside the scene {inside} a greedy tree's, of \
-         rays from outside {outside}",
+        "{}: {} nodes of {which}; {inside} tests of rays from inside the scene against a greedy \
+         tree, {outside} of rays from outside",
         args.out.display(),
         whole(nodes)
     ));

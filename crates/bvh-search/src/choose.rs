@@ -1,0 +1,483 @@
+//! What a bake chooses by itself: its cost, the rays that it is for, divided objects, and its work.
+//!
+//! Short searches try the combinations of the choices that are open, over the scene, or over parts
+//! of a large one. Rays that trained no tree judge the trees. Chosen is the simplest combination
+//! that is within [`TOLERANCE`] of the best one. What it gains forecasts what a longer search is
+//! worth.
+
+use crate::bake::Untimed;
+use crate::{Bake, BakeError, Baked, Budget, Choice, Observer, SearchError, parallel, ray_density};
+use bvh_core::cost::Objective;
+use bvh_core::{Aabb, Bvh, DensityError, Frame, Primitives, RayDensity, Segment};
+use core::fmt;
+
+/// The work per object of a bake that chooses its own budget. On the 7 scenes of
+/// `results/anytime`, `best` ends within 0.3 % of the best known cost after this work; six times
+/// the work saves at most 0.3 % (`results/anytime_long`).
+const WORK_PER_OBJECT: u64 = 8000;
+/// The work up to which a bake chooses [`WORK_PER_OBJECT`]: about a minute on one core.
+const MOST_WORK: u64 = 4_000_000_000;
+/// The work per object of the largest scenes. `best` ends within 1.3 % of the best known cost.
+const LEAST_WORK_PER_OBJECT: u64 = 800;
+/// The share of the work that each short search of a large scene spends.
+const TRIED: f64 = 0.02;
+/// The work of the short searches of smaller scenes: a fraction of a second each.
+const LEAST_TRIED: f64 = 1e7;
+/// The largest share of the work that a short search spends. Five times less chose wrongly on small
+/// scenes, where dividing objects pays late in the search.
+const MOST_TRIED: f64 = 0.1;
+/// The most objects that are tried, and those of a part of a larger scene.
+const MOST_OBJECTS: usize = 1 << 17;
+const PART: usize = 1 << 12;
+/// The fraction of the expected tests of rays that a simpler combination may lose. Two searches
+/// with other seeds differ by as much.
+const TOLERANCE: f64 = 0.005;
+/// The fraction of the tests below which a long search does not pay, and the work that then
+/// suffices: ten seconds' on two cores, or more in large scenes.
+const LITTLE: f64 = 0.06;
+const ENOUGH: u64 = 250_000_000;
+const ENOUGH_PER_OBJECT: u64 = 300;
+
+/// Makes the density of the rays of a seed through shapes; the tree is any valid one over them.
+/// `None` soon after the function returns true.
+pub type MadeRays<'a> = &'a (
+         dyn Fn(&Primitives, &Bvh, u64, &dyn Fn() -> bool) -> MadeDensity + Sync
+     );
+
+type MadeDensity = Result<Option<RayDensity>, DensityError>;
+
+/// The rays that a tree is for.
+#[derive(Clone, Copy)]
+pub enum Rays<'a> {
+    /// Random lines, unless the choice of rays is open and [others](Open::anywhere) pay.
+    Any,
+    /// Recorded rays, as in [`ray_density`].
+    Recorded(&'a [Segment]),
+    /// Rays that the caller makes, with the seed of the bake.
+    Made(MadeRays<'a>),
+}
+
+/// What a bake leaves open. All other choices are its own.
+#[derive(Clone, Copy)]
+pub struct Open<'a> {
+    /// The work. The other choices are made only if this one is.
+    pub budget: bool,
+    /// The cost.
+    pub cost: bool,
+    /// Whether objects are divided.
+    pub references: bool,
+    /// The rays that the tree is for.
+    pub rays: Rays<'a>,
+    /// Makes rays from anywhere in the scene. They judge the trees, and may train them. Without
+    /// them, random lines judge.
+    pub anywhere: Option<MadeRays<'a>>,
+}
+
+impl Open<'_> {
+    /// Leaves nothing open.
+    pub const NOTHING: Self =
+        Open { budget: false, cost: false, references: false, rays: Rays::Any, anywhere: None };
+
+    /// The seed of rays that judge trees. A bake trains on other rays, unless this is its seed.
+    pub const JUDGING: u64 = u64::MAX;
+
+    /// The number of references per object where divided objects pay.
+    pub const REFERENCES: f64 = 1.2;
+}
+
+impl Budget {
+    /// The budget of a bake of so many objects that chooses its own.
+    pub fn of_objects(objects: usize) -> Self {
+        let objects = objects as u64;
+        let work = (WORK_PER_OBJECT * objects).min(MOST_WORK).max(LEAST_WORK_PER_OBJECT * objects);
+        Self { max_work: Some(work), ..Self::UNLIMITED }
+    }
+}
+
+/// A choice of a bake, and why. It is shown as one line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reason {
+    /// The frame.
+    Frame(Choice),
+    /// Something that was tried, other things being equal.
+    Tried {
+        /// What it is.
+        choice: Tried,
+        /// Whether it was chosen.
+        is_chosen: bool,
+        /// The fraction of the expected tests of untrained rays that it saves; below 0 if it costs
+        /// some.
+        saved: f64,
+    },
+    /// The work.
+    Work {
+        /// The nodes to visit.
+        work: u64,
+        /// The nodes to visit per object.
+        per_object: u64,
+        /// The fraction of the tests that a short search saves, if that is so little that a long one
+        /// does not pay.
+        little: Option<f64>,
+    },
+}
+
+/// Something that a bake tries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tried {
+    /// The cost of the wide layout instead of area.
+    Layout,
+    /// Rays from anywhere instead of random lines.
+    Rays,
+    /// Divided objects.
+    References,
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Frame(Choice { frame: None, .. }) => {
+                f.write_str("frame: no other saves enough area; kept are the file's axes")
+            }
+            Self::Frame(Choice { frame: Some(frame), gain, .. }) => {
+                let degrees = angle(frame).to_degrees();
+                let percent = 100.0 * gain;
+                write!(
+                    f,
+                    "frame: turned by {degrees:.0} degrees, {percent:.0} % less area than along \
+                     the file's axes"
+                )
+            }
+            Self::Tried { choice, is_chosen, saved } => {
+                let name = match choice {
+                    Tried::Layout => "cost: the wide layout's",
+                    Tried::Rays => "rays: default",
+                    Tried::References => "references: 1.2 per object",
+                };
+                let verdict = if *is_chosen { "yes" } else { "no" };
+                let percent = 100.0 * saved.abs();
+                let direction = if *saved < 0.0 { "more" } else { "fewer" };
+                write!(
+                    f,
+                    "{name}: {verdict}, {percent:.1} % {direction} expected tests of untrained rays"
+                )
+            }
+            Self::Work { work, per_object, little } => {
+                let millions = *work as f64 / 1e6;
+                write!(f, "budget: {millions:.0} Mwork, {per_object} nodes per object; ")?;
+                match little {
+                    Some(saved) => write!(
+                        f,
+                        "little is to be won here, a short search saves {:.1} % of the tests \
+                         (--budget searches longer)",
+                        100.0 * saved
+                    ),
+                    None if *per_object >= WORK_PER_OBJECT => {
+                        f.write_str("more would hardly pay")
+                    }
+                    None => f.write_str("because the scene is large; more would pay (--budget)"),
+                }
+            }
+        }
+    }
+}
+
+/// Returns the angle of the frame's rotation.
+fn angle(frame: &Frame) -> f64 {
+    let rotation = frame.rotation();
+    let trace = rotation.x_axis.x + rotation.y_axis.y + rotation.z_axis.z;
+    libm::acos((0.5 * (trace - 1.0)).clamp(-1.0, 1.0))
+}
+
+/// The choices of a bake, and what making them has found.
+pub struct Chosen {
+    /// The greedy tree, if it was given or needed.
+    pub greedy: Option<Bvh>,
+    /// The density of the rays that the tree is for.
+    pub density: Option<RayDensity>,
+    /// The best tree that was tried, if the observer cancelled meanwhile. It is for these choices.
+    pub tried: Option<Baked>,
+    /// Why, one line each.
+    pub reasons: Vec<Reason>,
+    /// The cost.
+    pub objective: Objective,
+    references: f64,
+    budget: Budget,
+    divided: Option<Bvh>,
+    judging: Option<RayDensity>,
+}
+
+impl Chosen {
+    /// Returns the bake with these choices.
+    pub fn bake<'b>(&'b self, bake: &Bake<'b>) -> Bake<'b> {
+        Bake {
+            objective: Some(self.objective),
+            rays: self.density.as_ref(),
+            references: self.references,
+            budget: self.budget,
+            divided: self.divided.as_ref(),
+            ..*bake
+        }
+    }
+
+    /// The tests of rays in the wide layout of a tree, in a unit that its frame decides: of the rays
+    /// that judged combinations, otherwise of those that the tree is for, or of random lines.
+    /// O(nodes).
+    pub fn tests(&self, tree: &Bvh) -> f64 {
+        match self.judging.as_ref().or(self.density.as_ref()) {
+            Some(density) => Objective::Layout.cost_by(tree, density),
+            None => Objective::Layout.cost(tree),
+        }
+    }
+}
+
+/// A combination of choices.
+#[derive(Clone, Copy)]
+struct Combination {
+    objective: Objective,
+    has_rays: bool,
+    references: f64,
+}
+
+impl Bake<'_> {
+    /// Makes the choices that are open. Takes the `greedy` tree if the caller has it. The choices
+    /// are the same on every machine, for any number of threads. They are made without a look at the
+    /// clock of a timed observer.
+    ///
+    /// Only [`best`](crate::best) has choices, without a [start](Bake::start), and of triangles,
+    /// which alone have a wide layout. With a budget, only the density of given rays is made.
+    pub fn choose(
+        &self,
+        open: &Open,
+        greedy: Option<Bvh>,
+        observer: &dyn Observer,
+    ) -> Result<Chosen, BakeError> {
+        let is_for_rays = !matches!(open.rays, Rays::Any);
+        let default = if is_for_rays { Objective::Layout } else { Objective::default() };
+        let mut chosen = Chosen {
+            greedy,
+            density: None,
+            tried: None,
+            reasons: Vec::new(),
+            objective: self.objective.unwrap_or(default),
+            references: self.references,
+            budget: self.budget,
+            divided: None,
+            judging: None,
+        };
+        let untimed = Untimed(observer);
+        let combinations = self.combinations(open, chosen.objective);
+        if chosen.greedy.is_none() && (is_for_rays || combinations.len() > 1) {
+            chosen.greedy = self.greedy(&untimed)?;
+        }
+        if let Some(greedy) = &chosen.greedy {
+            chosen.density = self.made(open.rays, greedy, self.seed, &untimed)?;
+        }
+        if open.budget {
+            chosen.budget = Budget::of_objects(self.boxes.len());
+        }
+        let mut forecast = None;
+        if combinations.len() > 1 && chosen.greedy.is_some() {
+            forecast = self.compare(open, &combinations, &mut chosen, observer)?;
+        }
+        if let Some(ample) = chosen.budget.max_work.filter(|_| open.budget) {
+            let objects = self.boxes.len().max(1) as u64;
+            let enough = ENOUGH.max(ENOUGH_PER_OBJECT * objects);
+            let little = forecast.filter(|saved| *saved < LITTLE && enough < ample);
+            let work = if little.is_some() { enough } else { ample };
+            chosen.budget.max_work = Some(work);
+            let per_object = work / objects;
+            chosen.reasons.insert(0, Reason::Work { work, per_object, little });
+        }
+        Ok(chosen)
+    }
+
+    /// Returns the combinations of the open choices. The simpler ones come first, and the last one
+    /// has all choices.
+    fn combinations(&self, open: &Open, objective: Objective) -> Vec<Combination> {
+        let is_triangles = matches!(self.shapes, Some(Primitives::Triangles(_)));
+        let has_choices = self.method.is_none() && self.start.is_none() && is_triangles;
+        if !(has_choices && open.budget) {
+            return Vec::new();
+        }
+        let is_for_rays = !matches!(open.rays, Rays::Any);
+        let mut costs = vec![(objective, is_for_rays)];
+        if open.cost && !is_for_rays {
+            costs.push((Objective::Layout, false));
+        }
+        if open.anywhere.is_some() && !is_for_rays {
+            costs.push((costs[costs.len() - 1].0, true));
+        }
+        let divided = if open.references { &[1.0, Open::REFERENCES][..] } else { &[self.references] };
+        let mut combinations = Vec::new();
+        for &references in divided {
+            for &(objective, has_rays) in &costs {
+                combinations.push(Combination { objective, has_rays, references });
+            }
+        }
+        combinations
+    }
+
+    /// Returns the density of the rays, `None` for random lines or if the observer cancels.
+    fn made(
+        &self,
+        rays: Rays,
+        greedy: &Bvh,
+        seed: u64,
+        observer: &dyn Observer,
+    ) -> Result<Option<RayDensity>, BakeError> {
+        let is_over = || observer.cancelled();
+        Ok(match (rays, self.shapes) {
+            (Rays::Recorded(segments), shapes) => ray_density(greedy, shapes, segments, &is_over)?,
+            (Rays::Made(make), Some(shapes)) => make(shapes, greedy, seed, &is_over)?,
+            _ => None,
+        })
+    }
+
+    /// Tries the combinations, and chooses one. Returns the fraction of the tests of untrained rays
+    /// that it saves, unless the observer cancels.
+    fn compare(
+        &self,
+        open: &Open,
+        combinations: &[Combination],
+        chosen: &mut Chosen,
+        observer: &dyn Observer,
+    ) -> Result<Option<f64>, BakeError> {
+        let untimed = Untimed(observer);
+        let (Some(greedy), Some(most)) = (&chosen.greedy, combinations.last()) else {
+            return Ok(None);
+        };
+        let anywhere = open.anywhere.map_or(Rays::Any, Rays::Made);
+        chosen.judging = self.made(anywhere, greedy, Open::JUDGING, &untimed)?;
+        if most.has_rays && chosen.density.is_none() {
+            chosen.density = self.made(anywhere, greedy, self.seed, &untimed)?;
+        }
+        let selected = self.selected(greedy);
+        let mut parts = Vec::new();
+        for (boxes, shapes) in &selected {
+            let bake = Bake { boxes, shapes: shapes.as_ref(), ..*self };
+            let greedy = bake.greedy(&untimed)?;
+            parts.push((bake, greedy));
+        }
+        if parts.is_empty() {
+            parts.push((*self, Some(greedy.clone())));
+        }
+        let is_whole = selected.is_empty();
+        let mut divided = Vec::new();
+        for (bake, _) in &parts {
+            let bake = Bake { references: most.references, ..*bake };
+            divided.push(bake.divided(&untimed)?);
+        }
+        let objects = parts.iter().map(|(bake, _)| bake.boxes.len()).sum();
+        let work = Budget::of_objects(objects).max_work.unwrap_or(0) as f64;
+        let per_object = (TRIED * work).max(LEAST_TRIED.min(MOST_TRIED * work)) / objects as f64;
+        let mut tests: Vec<f64> = Vec::new();
+        let mut tried = None;
+        for (index, combination) in combinations.iter().enumerate() {
+            observer.trying(index, combinations.len());
+            // A trial of no work takes seconds in large scenes.
+            if observer.cancelled() {
+                break;
+            }
+            let density = chosen.density.as_ref().filter(|_| combination.has_rays);
+            let trial = |((bake, greedy), divided): (&(Bake, Option<Bvh>), &Option<Bvh>)| {
+                let work = (per_object * bake.boxes.len() as f64) as u64;
+                let bake = Bake {
+                    objective: Some(combination.objective),
+                    rays: density,
+                    references: combination.references,
+                    divided: divided.as_ref(),
+                    budget: Budget { max_work: Some(work), ..Budget::UNLIMITED },
+                    ..*bake
+                };
+                bake.search(greedy.clone(), &untimed)
+            };
+            let found = parallel::map(parts.iter().zip(&divided).collect(), trial);
+            let mut found = found.into_iter().collect::<Result<Vec<Baked>, SearchError>>()?;
+            let cost = found.iter().map(|baked| chosen.tests(&baked.outcome.tree)).sum();
+            if is_whole && tests.iter().all(|&other| cost < other) {
+                tried = found.pop().map(|baked| (index, baked));
+            }
+            tests.push(cost);
+        }
+        observer.trying(combinations.len(), combinations.len());
+        let greedy = parts.iter().filter_map(|(_, greedy)| greedy.as_ref());
+        let of_greedy: f64 = greedy.map(|tree| chosen.tests(tree)).sum();
+        let whole = divided.pop().flatten().filter(|_| is_whole);
+        drop(parts);
+        // An interrupted search says nothing about the choices, but it has found trees.
+        if observer.cancelled() {
+            let (index, baked) = tried.unzip();
+            chosen.settle(combinations[index.unwrap_or(0)], None);
+            chosen.tried = baked;
+            return Ok(None);
+        }
+        let best = tests.iter().copied().fold(f64::INFINITY, f64::min);
+        let place = tests.iter().position(|&tests| tests <= best * (1.0 + TOLERANCE)).unwrap_or(0);
+        chosen.explain(open, &tests, place);
+        chosen.settle(combinations[place], whole);
+        Ok(Some(1.0 - tests[place] / of_greedy))
+    }
+
+    /// Returns the objects of parts from all over a large scene, which lie together in the greedy
+    /// tree, with their boxes; nothing of a scene that is tried as a whole.
+    fn selected(&self, greedy: &Bvh) -> Vec<(Vec<Aabb>, Option<Primitives>)> {
+        let nodes = &greedy.nodes;
+        if self.boxes.len() <= MOST_OBJECTS {
+            return Vec::new();
+        }
+        let mut counts = vec![0; nodes.len()];
+        let mut roots = Vec::new();
+        // Children come after their parents.
+        for (index, node) in nodes.iter().enumerate().rev() {
+            let children = node.children();
+            counts[index] = counts[children.clone()].iter().sum::<usize>() + node.prims().len();
+            if counts[index] > PART {
+                roots.extend(children.filter(|&child| (PART / 4..=PART).contains(&counts[child])));
+            }
+        }
+        let step = roots.len().div_ceil(MOST_OBJECTS / PART).max(1);
+        let mut selected = Vec::new();
+        for root in roots.into_iter().step_by(step) {
+            let mut objects = Vec::new();
+            let mut open = vec![root];
+            while let Some(index) = open.pop() {
+                open.extend(nodes[index].children());
+                objects.extend(greedy.prim_ids[nodes[index].prims()].iter().map(|&id| id as usize));
+            }
+            objects.sort_unstable();
+            let boxes = objects.iter().map(|&object| self.boxes[object]).collect();
+            selected.push((boxes, self.shapes.map(|shapes| shapes.select(&objects))));
+        }
+        selected
+    }
+}
+
+impl Chosen {
+    fn settle(&mut self, combination: Combination, divided: Option<Bvh>) {
+        self.objective = combination.objective;
+        self.references = combination.references;
+        self.density.take_if(|_| !combination.has_rays);
+        self.divided = divided.filter(|_| combination.references > 1.0);
+    }
+
+    /// Compares each choice with its alternative, other things being equal: `tests` of the costs
+    /// without divided objects, and then with them.
+    fn explain(&mut self, open: &Open, tests: &[f64], place: usize) {
+        let columns = if open.references { tests.len() / 2 } else { tests.len() };
+        let column = place % columns;
+        let row = place - column;
+        let last = columns - 1;
+        let is_free = matches!(open.rays, Rays::Any);
+        let mut tried = |choice, is_open, is_chosen, with: usize, without: usize| {
+            if is_open {
+                let saved = 1.0 - tests[with] / tests[without];
+                self.reasons.push(Reason::Tried { choice, is_chosen, saved });
+            }
+        };
+        let (of_cost, of_rays) = (open.cost && is_free, open.anywhere.is_some() && is_free);
+        tried(Tried::Layout, of_cost, column > 0, row + column.max(1), row);
+        tried(Tried::Rays, of_rays, column == last, row + last, row + last.saturating_sub(1));
+        let divided = (columns + column).min(tests.len() - 1);
+        tried(Tried::References, open.references, row > 0, divided, column);
+    }
+}
