@@ -44,7 +44,7 @@ impl Answer {
         self.list(list, line);
     }
 
-    /// Adds a fact and prints it as a line, `name: value`.
+    /// Adds a fact, whose key is the name with underscores, and prints it as a line, `name: value`.
     pub fn fact(&mut self, name: &str, value: impl Into<Value>) {
         let value = value.into();
         let text = match &value {
@@ -56,7 +56,7 @@ impl Answer {
             other => other.to_string(),
         };
         self.say(&format!("{name}: {text}"));
-        self.record(name, value);
+        self.record(&snake(name), value);
     }
 
     /// Prints the facts as JSON, if that is the form.
@@ -65,6 +65,12 @@ impl Answer {
             print_line(&format!("{:#}", Value::Object(facts)));
         }
     }
+}
+
+/// Returns a name in words as a key: `depth of leaves` as `depth_of_leaves`.
+pub fn snake(name: &str) -> String {
+    let words = name.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
+    words.collect::<Vec<_>>().join("_").to_lowercase()
 }
 
 /// Writes a whole number with its digits in groups of three.

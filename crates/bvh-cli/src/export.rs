@@ -82,9 +82,9 @@ pub fn export(args: &ExportArgs, answer: &mut Answer) -> Result<(), Error> {
         whole(nodes)
     ));
     answer.record("nodes", nodes);
-    answer.record("cost of a ray", target.cost(&better.tree));
-    answer.record("is searched", better.is_searched());
-    answer.record("gain inside", better.gains[0]);
-    answer.record("gain outside", better.gains[1]);
+    answer.record("cost_per_ray", target.cost(&better.tree));
+    answer.record("is_searched", better.is_searched());
+    answer.record("gain_inside", better.gains[0]);
+    answer.record("gain_outside", better.gains[1]);
     Ok(())
 }

@@ -23,7 +23,7 @@ fn an_export_is_the_fitted_tree_and_says_how_it_compares() {
         assert_eq!(bytes, target.bytes(&target.fit(&tree), &scene.boxes));
     }
     let json = facts(at, "export x.bvh escher:900 --for=obvhs --out=x.bin");
-    assert!(json["gain inside"].is_f64() && json["is searched"] == true, "{json:?}");
+    assert!(json["gain_inside"].is_f64() && json["is_searched"] == true, "{json:?}");
 }
 
 #[test]
