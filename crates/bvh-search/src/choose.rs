@@ -40,9 +40,8 @@ const ENOUGH_PER_OBJECT: u64 = 300;
 
 /// Makes the density of the rays of a seed through shapes; the tree is any valid one over them.
 /// `None` soon after the function returns true.
-pub type MadeRays<'a> = &'a (
-         dyn Fn(&Primitives, &Bvh, u64, &dyn Fn() -> bool) -> MadeDensity + Sync
-     );
+pub type MadeRays<'a> =
+    &'a (dyn Fn(&Primitives, &Bvh, u64, &dyn Fn() -> bool) -> MadeDensity + Sync);
 
 type MadeDensity = Result<Option<RayDensity>, DensityError>;
 
@@ -171,9 +170,7 @@ impl fmt::Display for Reason {
                          (--budget searches longer)",
                         100.0 * saved
                     ),
-                    None if *per_object >= WORK_PER_OBJECT => {
-                        f.write_str("more would hardly pay")
-                    }
+                    None if *per_object >= WORK_PER_OBJECT => f.write_str("more would hardly pay"),
                     None => f.write_str("because the scene is large; more would pay (--budget)"),
                 }
             }
@@ -307,7 +304,8 @@ impl Bake<'_> {
         if open.anywhere.is_some() && !is_for_rays {
             costs.push((costs[costs.len() - 1].0, true));
         }
-        let divided = if open.references { &[1.0, Open::REFERENCES][..] } else { &[self.references] };
+        let divided =
+            if open.references { &[1.0, Open::REFERENCES][..] } else { &[self.references] };
         let mut combinations = Vec::new();
         for &references in divided {
             for &(objective, has_rays) in &costs {

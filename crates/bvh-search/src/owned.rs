@@ -2,8 +2,8 @@
 //! languages.
 
 use crate::{
-    Bake, BakeError, Baked, Budget, Choice, Division, Frames, MadeRays, Observer, Open, Rays, Reason,
-    SearchError, parallel,
+    Bake, BakeError, Baked, Budget, Choice, Division, Frames, MadeRays, Observer, Open, Rays,
+    Reason, SearchError, parallel,
 };
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
@@ -133,7 +133,14 @@ impl OwnedTree {
         check_boxes(&boxes)?;
         let mut tree = self.tree.clone();
         tree.refit(&boxes);
-        Ok(Self { tree, boxes, shapes, reasons: self.reasons.clone(), density: self.density.clone(), ..*self })
+        Ok(Self {
+            tree,
+            boxes,
+            shapes,
+            reasons: self.reasons.clone(),
+            density: self.density.clone(),
+            ..*self
+        })
     }
 
     /// Returns the layout of the tree that traces rays, for the rays of its search if there are

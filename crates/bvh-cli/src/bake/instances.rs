@@ -63,7 +63,8 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     let ample = Budget::of_objects(objects).max_work.unwrap_or(0);
     plan.effort.get_or_insert(Effort::Work(ample));
     // The top tree's objects are boxes, which cannot be divided, and no wide layout is made of it.
-    let plan_of_top = Plan { references: 1.0, objective: Some(Objective::InternalArea), ..plan.clone() };
+    let plan_of_top =
+        Plan { references: 1.0, objective: Some(Objective::InternalArea), ..plan.clone() };
     let names = parts.meshes.keys().map(|mesh| format!("mesh_{mesh}.bvh")).chain([TOP.into()]);
     let given = scenes.iter().map(|scene| (scene, &plan)).chain([(&top, &plan_of_top)]);
     for (name, (scene, plan)) in names.zip(given) {

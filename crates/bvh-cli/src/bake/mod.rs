@@ -147,7 +147,8 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     hold();
     let open = args.open();
     // Reserving the file first reports a full disk before the search and not after it.
-    let most = if open.references { Open::REFERENCES.max(plan.references) } else { plan.references };
+    let most =
+        if open.references { Open::REFERENCES.max(plan.references) } else { plan.references };
     let reserved = Reserved::new(&out, plan::most_bytes(&scene, most), args.out.is_none())?;
     let scene = args.turned(&plan, scene, start, &watch, answer);
     if args.explain {

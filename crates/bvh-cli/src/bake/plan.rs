@@ -11,9 +11,7 @@ use bvh_core::{Bvh, Frame, Node};
 use bvh_scenes::Scene;
 use bvh_scenes::files::Reserved;
 use bvh_scenes::tree_file::{self, TreeFileError};
-use bvh_search::{
-    self, Bake, BakeError, Baked, Budget, Chosen, Division, Method, Observer, Open,
-};
+use bvh_search::{self, Bake, BakeError, Baked, Budget, Chosen, Division, Method, Observer, Open};
 use std::path::Path;
 
 /// A search for the best tree of any scene.

@@ -211,6 +211,7 @@ fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
         at,
         &[
             ("bake", &["spheres75", "--budget=0s", "--out=x.bvh"]),
+            ("bench", &["good.bvh", "spheres75"]),
             ("inspect", &["good.bvh", "spheres75"]),
             ("verify", &["good.bvh", "spheres75"]),
             ("export", &["good.bvh", "spheres75", "--for=obvhs", "--out=x.bin"]),
