@@ -487,7 +487,7 @@ fn a_budget_of_work_and_none_at_all_give_the_file_of_the_rust_crates() {
             seed: 3,
             budget: Budget { max_work, ..Budget::UNLIMITED },
             rays,
-            anywhere: Some(&bvh_scenes::rays::anywhere),
+            anywhere: Some(bvh_scenes::rays::anywhere),
             ..Options::default()
         };
         let expected = OwnedTree::find(objects, &options, &()).unwrap();

@@ -8,7 +8,7 @@ use bvh_search::bvh_core::cost::{Objective, SahConstants};
 use bvh_search::bvh_core::export::{FirstCountNode, Target};
 use bvh_search::bvh_core::glam::{DMat3, DVec3};
 use bvh_search::prelude::*;
-use bvh_search::{Frames, MadeRays, Objects, Observer, Options, OwnedTree};
+use bvh_search::{Anywhere, Frames, Objects, Observer, Options, OwnedTree};
 use std::ffi::{CStr, c_char, c_void};
 use std::ptr::null;
 use std::sync::Arc;
@@ -180,7 +180,7 @@ pub unsafe extern "C" fn bvs_tree_bake(bake: *const BvsBake) -> *mut BvsTree {
         let references = (bake.references != 0.0).then_some(bake.references);
         let max_work = (work > 0).then_some(work);
         let budget = Budget { max_work, ..Budget::UNLIMITED };
-        let anywhere: Option<MadeRays> = Some(&bvh_scenes::rays::anywhere);
+        let anywhere: Option<Anywhere> = Some(bvh_scenes::rays::anywhere);
         let options = Options { references, seed, budget, rays: &rays, anywhere, frame };
         found(objects, &options, (seconds != 0.0).then_some(seconds))
     })

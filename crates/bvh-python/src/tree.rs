@@ -11,7 +11,7 @@ use bvh_scenes::files::{self, WriteError};
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
 use bvh_search::bvh_core::export::Target;
-use bvh_search::{BakeError, Frames, MadeRays, Objects, Options, OwnedTree, SearchError};
+use bvh_search::{Anywhere, BakeError, Frames, Objects, Options, OwnedTree, SearchError};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -371,7 +371,7 @@ fn found(
     limits: Limits,
 ) -> PyResult<Tree> {
     let (found, raised) = search::run(py, limits, |budget, observer| {
-        let anywhere: Option<MadeRays> = Some(&bvh_scenes::rays::anywhere);
+        let anywhere: Option<Anywhere> = Some(bvh_scenes::rays::anywhere);
         OwnedTree::find(objects, &Options { budget, anywhere, ..*options }, observer)
     })?;
     raised?;

@@ -4,14 +4,14 @@
 use crate::parallel;
 use crate::run::built_unless_cancelled;
 use crate::{Budget, Kept, Observer, Outcome, Problem, Search, SearchError, Splits};
-use crate::{best, optimize, ray_density, solve_or_keep};
+use crate::{best, optimize, solve_or_keep};
 use best::Horizon;
 use bvh_build::{Builder, Watch, muller_fellner};
 use bvh_config::OutOfRange;
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::file::{self, FileError, Origin};
 use bvh_core::{
-    Aabb, Bvh, Clip, DensityError, Frame, InFrame, Primitives, RayDensity, Segment, validate,
+    Aabb, Bvh, Clip, DensityError, Frame, InFrame, Primitives, RayDensity, validate,
     validate_references,
 };
 use core::sync::atomic::AtomicBool;
@@ -187,7 +187,7 @@ impl<'a> Bake<'a> {
         // later itself.
         let is_later = self.starts_divided() || is_timed && greedy.is_none();
         let divided = match self.divided {
-            None if !is_later => self.divided(observer)?,
+            None if !is_later => self.division(observer)?,
             _ => None,
         };
         let mut division = Division::No;
@@ -287,7 +287,7 @@ impl<'a> Bake<'a> {
 
     /// Divides the objects with spatial splits, or copies the caller's division, unless they stay
     /// whole anyway. `None` if the observer cancels first.
-    pub(crate) fn divided(&self, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
+    pub(crate) fn division(&self, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
         best::divided(self.splits(self.framed().as_ref()), self.boxes, observer)
     }
 
@@ -349,14 +349,5 @@ impl<'a> Bake<'a> {
         let chunks = tree.nodes.chunks(NODES_PER_TASK).collect();
         // One copy of whole chunks; an iterator over all of them would move number by number.
         parallel::map(chunks, |nodes| density.visits_of(&root, nodes)).concat()
-    }
-}
-
-impl Bake<'_> {
-    /// Returns the greedy tree and the [density](ray_density) of recorded segments.
-    pub(crate) fn density(&self, segments: &[Segment]) -> Result<(Bvh, RayDensity), BakeError> {
-        let greedy = self.greedy(&())?.expect("a tree that nobody cancels");
-        let density = ray_density(&greedy, self.shapes, segments, &|| false)?;
-        Ok((greedy, density.expect("the density of rays that nobody cancels")))
     }
 }

@@ -6,9 +6,9 @@
 //! worth.
 
 use crate::bake::Untimed;
-use crate::{Bake, BakeError, Baked, Budget, Choice, Observer, SearchError, parallel, ray_density};
+use crate::{Bake, BakeError, Baked, Budget, Choice, Observer, SearchError, parallel};
 use bvh_core::cost::Objective;
-use bvh_core::{Aabb, Bvh, DensityError, Frame, Primitives, RayDensity, Segment};
+use bvh_core::{Aabb, Bvh, DensityError, Frame, Primitives, RayDensity};
 use core::fmt;
 
 /// The work per object of a bake that chooses its own budget. On the 7 scenes of
@@ -38,45 +38,31 @@ const LITTLE: f64 = 0.06;
 const ENOUGH: u64 = 250_000_000;
 const ENOUGH_PER_OBJECT: u64 = 300;
 
-/// Makes the density of the rays of a seed through shapes; the tree is any valid one over them.
-/// `None` soon after the function returns true.
-pub type MadeRays<'a> =
-    &'a (dyn Fn(&Primitives, &Bvh, u64, &dyn Fn() -> bool) -> MadeDensity + Sync);
+/// Makes the density of the rays of a seed in the scene of a bake, by any valid tree over it. `None`
+/// soon after the function returns true.
+pub type MadeRays<'a> = &'a (dyn Fn(&Bvh, u64, &dyn Fn() -> bool) -> MadeDensity + Sync);
 
-type MadeDensity = Result<Option<RayDensity>, DensityError>;
-
-/// The rays that a tree is for.
-#[derive(Clone, Copy)]
-pub enum Rays<'a> {
-    /// Random lines, unless the choice of rays is open and [others](Open::anywhere) pay.
-    Any,
-    /// Recorded rays, as in [`ray_density`].
-    Recorded(&'a [Segment]),
-    /// Rays that the caller makes, with the seed of the bake.
-    Made(MadeRays<'a>),
-}
+/// The result of [`MadeRays`].
+pub type MadeDensity = Result<Option<RayDensity>, DensityError>;
 
 /// What a bake leaves open. All other choices are its own.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct Open<'a> {
     /// The work. The other choices are made only if this one is.
     pub budget: bool,
-    /// The cost.
+    /// The cost, unless there are rays.
     pub cost: bool,
     /// Whether objects are divided.
     pub references: bool,
-    /// The rays that the tree is for.
-    pub rays: Rays<'a>,
-    /// Makes rays from anywhere in the scene. They judge the trees, and may train them. Without
-    /// them, random lines judge.
+    /// Makes the rays that the tree is for. Without them, it is for random lines, or for rays from
+    /// anywhere if these pay.
+    pub rays: Option<MadeRays<'a>>,
+    /// Makes rays from anywhere in the scene. They judge trees, and may train them. Without them,
+    /// random lines judge.
     pub anywhere: Option<MadeRays<'a>>,
 }
 
 impl Open<'_> {
-    /// Leaves nothing open.
-    pub const NOTHING: Self =
-        Open { budget: false, cost: false, references: false, rays: Rays::Any, anywhere: None };
-
     /// The seed of rays that judge trees. A bake trains on other rays, unless this is its seed.
     pub const JUDGING: u64 = u64::MAX;
 
@@ -189,14 +175,14 @@ fn angle(frame: &Frame) -> f64 {
 pub struct Chosen {
     /// The greedy tree, if it was given or needed.
     pub greedy: Option<Bvh>,
+    /// The cost.
+    pub objective: Objective,
     /// The density of the rays that the tree is for.
     pub density: Option<RayDensity>,
     /// The best tree that was tried, if the observer cancelled meanwhile. It is for these choices.
     pub tried: Option<Baked>,
     /// Why, one line each.
     pub reasons: Vec<Reason>,
-    /// The cost.
-    pub objective: Objective,
     references: f64,
     budget: Budget,
     divided: Option<Bvh>,
@@ -235,10 +221,17 @@ struct Combination {
     references: f64,
 }
 
+/// A scene, or a part of one, over which combinations are tried.
+struct Trial<'a> {
+    bake: Bake<'a>,
+    greedy: Option<Bvh>,
+    divided: Option<Bvh>,
+}
+
 impl Bake<'_> {
     /// Makes the choices that are open. Takes the `greedy` tree if the caller has it. The choices
-    /// are the same on every machine, for any number of threads. They are made without a look at the
-    /// clock of a timed observer.
+    /// are the same on every machine, for any number of threads; a clock of the observer is not
+    /// read.
     ///
     /// Only [`best`](crate::best) has choices, without a [start](Bake::start), and of triangles,
     /// which alone have a wide layout. With a budget, only the density of given rays is made.
@@ -248,14 +241,13 @@ impl Bake<'_> {
         greedy: Option<Bvh>,
         observer: &dyn Observer,
     ) -> Result<Chosen, BakeError> {
-        let is_for_rays = !matches!(open.rays, Rays::Any);
-        let default = if is_for_rays { Objective::Layout } else { Objective::default() };
+        let default = if open.rays.is_some() { Objective::Layout } else { Objective::InternalArea };
         let mut chosen = Chosen {
             greedy,
+            objective: self.objective.unwrap_or(default),
             density: None,
             tried: None,
             reasons: Vec::new(),
-            objective: self.objective.unwrap_or(default),
             references: self.references,
             budget: self.budget,
             divided: None,
@@ -263,21 +255,26 @@ impl Bake<'_> {
         };
         let untimed = Untimed(observer);
         let combinations = self.combinations(open, chosen.objective);
-        if chosen.greedy.is_none() && (is_for_rays || combinations.len() > 1) {
+        if chosen.greedy.is_none() && (open.rays.is_some() || combinations.len() > 1) {
             chosen.greedy = self.greedy(&untimed)?;
         }
-        if let Some(greedy) = &chosen.greedy {
-            chosen.density = self.made(open.rays, greedy, self.seed, &untimed)?;
+        if let (Some(rays), Some(greedy)) = (open.rays, &chosen.greedy) {
+            chosen.density = rays(greedy, self.seed, &|| untimed.cancelled())?;
         }
-        if open.budget {
-            chosen.budget = Budget::of_objects(self.boxes.len());
-        }
-        let mut forecast = None;
-        if combinations.len() > 1 && chosen.greedy.is_some() {
-            forecast = self.compare(open, &combinations, &mut chosen, observer)?;
-        }
-        if let Some(ample) = chosen.budget.max_work.filter(|_| open.budget) {
-            let objects = self.boxes.len().max(1) as u64;
+        let forecast = match chosen.greedy.take() {
+            Some(greedy) if combinations.len() > 1 => {
+                let forecast = self.compare(open, &combinations, &greedy, &mut chosen, observer)?;
+                chosen.greedy = Some(greedy);
+                forecast
+            }
+            greedy => {
+                chosen.greedy = greedy;
+                None
+            }
+        };
+        let objects = self.boxes.len();
+        if let (true, Some(ample)) = (open.budget, Budget::of_objects(objects).max_work) {
+            let objects = objects.max(1) as u64;
             let enough = ENOUGH.max(ENOUGH_PER_OBJECT * objects);
             let little = forecast.filter(|saved| *saved < LITTLE && enough < ample);
             let work = if little.is_some() { enough } else { ample };
@@ -296,39 +293,21 @@ impl Bake<'_> {
         if !(has_choices && open.budget) {
             return Vec::new();
         }
-        let is_for_rays = !matches!(open.rays, Rays::Any);
-        let mut costs = vec![(objective, is_for_rays)];
-        if open.cost && !is_for_rays {
+        let mut costs = vec![(objective, open.rays.is_some())];
+        if open.chooses_cost() {
             costs.push((Objective::Layout, false));
         }
-        if open.anywhere.is_some() && !is_for_rays {
+        if open.chooses_rays() {
             costs.push((costs[costs.len() - 1].0, true));
         }
         let divided =
             if open.references { &[1.0, Open::REFERENCES][..] } else { &[self.references] };
-        let mut combinations = Vec::new();
-        for &references in divided {
-            for &(objective, has_rays) in &costs {
-                combinations.push(Combination { objective, has_rays, references });
-            }
-        }
-        combinations
-    }
-
-    /// Returns the density of the rays, `None` for random lines or if the observer cancels.
-    fn made(
-        &self,
-        rays: Rays,
-        greedy: &Bvh,
-        seed: u64,
-        observer: &dyn Observer,
-    ) -> Result<Option<RayDensity>, BakeError> {
-        let is_over = || observer.cancelled();
-        Ok(match (rays, self.shapes) {
-            (Rays::Recorded(segments), shapes) => ray_density(greedy, shapes, segments, &is_over)?,
-            (Rays::Made(make), Some(shapes)) => make(shapes, greedy, seed, &is_over)?,
-            _ => None,
-        })
+        let with = |&references: &f64| {
+            let combination =
+                move |&(objective, has_rays)| Combination { objective, has_rays, references };
+            costs.iter().map(combination)
+        };
+        divided.iter().flat_map(with).collect()
     }
 
     /// Tries the combinations, and chooses one. Returns the fraction of the tests of untrained rays
@@ -337,39 +316,34 @@ impl Bake<'_> {
         &self,
         open: &Open,
         combinations: &[Combination],
+        greedy: &Bvh,
         chosen: &mut Chosen,
         observer: &dyn Observer,
     ) -> Result<Option<f64>, BakeError> {
         let untimed = Untimed(observer);
-        let (Some(greedy), Some(most)) = (&chosen.greedy, combinations.last()) else {
-            return Ok(None);
-        };
-        let anywhere = open.anywhere.map_or(Rays::Any, Rays::Made);
-        chosen.judging = self.made(anywhere, greedy, Open::JUDGING, &untimed)?;
-        if most.has_rays && chosen.density.is_none() {
-            chosen.density = self.made(anywhere, greedy, self.seed, &untimed)?;
+        let most = combinations[combinations.len() - 1];
+        if let Some(anywhere) = open.anywhere {
+            chosen.judging = anywhere(greedy, Open::JUDGING, &|| untimed.cancelled())?;
+            if open.chooses_rays() {
+                chosen.density = anywhere(greedy, self.seed, &|| untimed.cancelled())?;
+            }
         }
-        let selected = self.selected(greedy);
-        let mut parts = Vec::new();
-        for (boxes, shapes) in &selected {
+        let parts = self.parts_of(greedy);
+        let mut trials = Vec::new();
+        for (boxes, shapes) in &parts {
             let bake = Bake { boxes, shapes: shapes.as_ref(), ..*self };
-            let greedy = bake.greedy(&untimed)?;
-            parts.push((bake, greedy));
+            trials.push((bake, bake.greedy(&untimed)?));
         }
         if parts.is_empty() {
-            parts.push((*self, Some(greedy.clone())));
+            trials.push((*self, Some(greedy.clone())));
         }
-        let is_whole = selected.is_empty();
-        let mut divided = Vec::new();
-        for (bake, _) in &parts {
-            let bake = Bake { references: most.references, ..*bake };
-            divided.push(bake.divided(&untimed)?);
+        let mut tried = Vec::new();
+        for (bake, greedy) in trials {
+            let divided = Bake { references: most.references, ..bake }.division(&untimed)?;
+            tried.push(Trial { bake, greedy, divided });
         }
-        let objects = parts.iter().map(|(bake, _)| bake.boxes.len()).sum();
-        let work = Budget::of_objects(objects).max_work.unwrap_or(0) as f64;
-        let per_object = (TRIED * work).max(LEAST_TRIED.min(MOST_TRIED * work)) / objects as f64;
+        let (mut trials, mut best_tree) = (tried, None);
         let mut tests: Vec<f64> = Vec::new();
-        let mut tried = None;
         for (index, combination) in combinations.iter().enumerate() {
             observer.trying(index, combinations.len());
             // A trial of no work takes seconds in large scenes.
@@ -377,76 +351,93 @@ impl Bake<'_> {
                 break;
             }
             let density = chosen.density.as_ref().filter(|_| combination.has_rays);
-            let trial = |((bake, greedy), divided): (&(Bake, Option<Bvh>), &Option<Bvh>)| {
-                let work = (per_object * bake.boxes.len() as f64) as u64;
-                let bake = Bake {
-                    objective: Some(combination.objective),
-                    rays: density,
-                    references: combination.references,
-                    divided: divided.as_ref(),
-                    budget: Budget { max_work: Some(work), ..Budget::UNLIMITED },
-                    ..*bake
-                };
-                bake.search(greedy.clone(), &untimed)
-            };
-            let found = parallel::map(parts.iter().zip(&divided).collect(), trial);
-            let mut found = found.into_iter().collect::<Result<Vec<Baked>, SearchError>>()?;
+            let mut found = tried_by(&trials, combination, density, &untimed)?;
             let cost = found.iter().map(|baked| chosen.tests(&baked.outcome.tree)).sum();
-            if is_whole && tests.iter().all(|&other| cost < other) {
-                tried = found.pop().map(|baked| (index, baked));
+            if parts.is_empty() && tests.iter().all(|&other| cost < other) {
+                best_tree = found.pop().map(|baked| (index, baked));
             }
             tests.push(cost);
         }
         observer.trying(combinations.len(), combinations.len());
-        let greedy = parts.iter().filter_map(|(_, greedy)| greedy.as_ref());
-        let of_greedy: f64 = greedy.map(|tree| chosen.tests(tree)).sum();
-        let whole = divided.pop().flatten().filter(|_| is_whole);
-        drop(parts);
         // An interrupted search says nothing about the choices, but it has found trees.
         if observer.cancelled() {
-            let (index, baked) = tried.unzip();
+            let (index, baked) = best_tree.unzip();
             chosen.settle(combinations[index.unwrap_or(0)], None);
             chosen.tried = baked;
             return Ok(None);
         }
+        let greedy = trials.iter().filter_map(|trial| trial.greedy.as_ref());
+        let of_greedy: f64 = greedy.map(|tree| chosen.tests(tree)).sum();
+        let divided = trials.pop().and_then(|trial| trial.divided);
         let best = tests.iter().copied().fold(f64::INFINITY, f64::min);
         let place = tests.iter().position(|&tests| tests <= best * (1.0 + TOLERANCE)).unwrap_or(0);
         chosen.explain(open, &tests, place);
-        chosen.settle(combinations[place], whole);
+        chosen.settle(combinations[place], divided.filter(|_| parts.is_empty()));
         Ok(Some(1.0 - tests[place] / of_greedy))
     }
 
-    /// Returns the objects of parts from all over a large scene, which lie together in the greedy
-    /// tree, with their boxes; nothing of a scene that is tried as a whole.
-    fn selected(&self, greedy: &Bvh) -> Vec<(Vec<Aabb>, Option<Primitives>)> {
-        let nodes = &greedy.nodes;
+    /// Returns the boxes and the shapes of parts from all over a large scene, each a subtree of the
+    /// greedy tree; nothing of a scene that is tried as a whole.
+    fn parts_of(&self, greedy: &Bvh) -> Vec<(Vec<Aabb>, Option<Primitives>)> {
         if self.boxes.len() <= MOST_OBJECTS {
             return Vec::new();
         }
-        let mut counts = vec![0; nodes.len()];
-        let mut roots = Vec::new();
-        // Children come after their parents.
+        let nodes = &greedy.nodes;
+        let mut objects: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
+        let mut parts = Vec::new();
+        // Children come after their parents. An inner node takes the objects of small children.
         for (index, node) in nodes.iter().enumerate().rev() {
-            let children = node.children();
-            counts[index] = counts[children.clone()].iter().sum::<usize>() + node.prims().len();
-            if counts[index] > PART {
-                roots.extend(children.filter(|&child| (PART / 4..=PART).contains(&counts[child])));
+            let ids = greedy.prim_ids[node.prims()].iter();
+            let mut all: Vec<usize> = ids.map(|&id| id as usize).collect();
+            for child in node.children() {
+                all.append(&mut objects[child]);
             }
+            if all.len() >= PART {
+                parts.push(std::mem::take(&mut all));
+            }
+            objects[index] = all;
         }
-        let step = roots.len().div_ceil(MOST_OBJECTS / PART).max(1);
-        let mut selected = Vec::new();
-        for root in roots.into_iter().step_by(step) {
-            let mut objects = Vec::new();
-            let mut open = vec![root];
-            while let Some(index) = open.pop() {
-                open.extend(nodes[index].children());
-                objects.extend(greedy.prim_ids[nodes[index].prims()].iter().map(|&id| id as usize));
-            }
-            objects.sort_unstable();
+        let step = parts.len().div_ceil(MOST_OBJECTS / PART);
+        let part = |objects: &Vec<usize>| {
             let boxes = objects.iter().map(|&object| self.boxes[object]).collect();
-            selected.push((boxes, self.shapes.map(|shapes| shapes.select(&objects))));
-        }
-        selected
+            (boxes, self.shapes.map(|shapes| shapes.select(objects)))
+        };
+        parts.iter().step_by(step.max(1)).map(part).collect()
+    }
+}
+
+/// Searches all trials by a combination. Scenes of any size take about as much work.
+fn tried_by(
+    trials: &[Trial],
+    combination: &Combination,
+    density: Option<&RayDensity>,
+    observer: &dyn Observer,
+) -> Result<Vec<Baked>, SearchError> {
+    let objects = trials.iter().map(|trial| trial.bake.boxes.len()).sum();
+    let work = Budget::of_objects(objects).max_work.unwrap_or(0) as f64;
+    let per_object = (TRIED * work).max(LEAST_TRIED.min(MOST_TRIED * work)) / objects as f64;
+    let search = |Trial { bake, greedy, divided }: &Trial| {
+        let work = (per_object * bake.boxes.len() as f64) as u64;
+        let bake = Bake {
+            objective: Some(combination.objective),
+            rays: density,
+            references: combination.references,
+            divided: divided.as_ref(),
+            budget: Budget { max_work: Some(work), ..Budget::UNLIMITED },
+            ..*bake
+        };
+        bake.search(greedy.clone(), observer)
+    };
+    parallel::map(trials.iter().collect(), search).into_iter().collect()
+}
+
+impl Open<'_> {
+    fn chooses_cost(&self) -> bool {
+        self.cost && self.rays.is_none()
+    }
+
+    fn chooses_rays(&self) -> bool {
+        self.anywhere.is_some() && self.rays.is_none()
     }
 }
 
@@ -462,19 +453,17 @@ impl Chosen {
     /// without divided objects, and then with them.
     fn explain(&mut self, open: &Open, tests: &[f64], place: usize) {
         let columns = if open.references { tests.len() / 2 } else { tests.len() };
-        let column = place % columns;
+        let (column, last) = (place % columns, columns - 1);
         let row = place - column;
-        let last = columns - 1;
-        let is_free = matches!(open.rays, Rays::Any);
         let mut tried = |choice, is_open, is_chosen, with: usize, without: usize| {
             if is_open {
                 let saved = 1.0 - tests[with] / tests[without];
                 self.reasons.push(Reason::Tried { choice, is_chosen, saved });
             }
         };
-        let (of_cost, of_rays) = (open.cost && is_free, open.anywhere.is_some() && is_free);
-        tried(Tried::Layout, of_cost, column > 0, row + column.max(1), row);
-        tried(Tried::Rays, of_rays, column == last, row + last, row + last.saturating_sub(1));
+        let before = row + last.saturating_sub(1);
+        tried(Tried::Layout, open.chooses_cost(), column > 0, row + column.max(1), row);
+        tried(Tried::Rays, open.chooses_rays(), column == last, row + last, before);
         let divided = (columns + column).min(tests.len() - 1);
         tried(Tried::References, open.references, row > 0, divided, column);
     }

@@ -34,12 +34,12 @@ pub use bake::{Bake, BakeError, Baked, Division};
 pub use baselines::{rebuild, rotation, treelet};
 pub use bvh_build;
 pub use bvh_core;
-pub use choose::{Chosen, MadeRays, Open, Rays, Reason, Tried};
+pub use choose::{Chosen, MadeDensity, MadeRays, Open, Reason, Tried};
 pub use frames::{Choice, Frames};
 pub use local::reinsertion;
 pub use optimize::optimize;
 pub use orders::{genetic, random_orders};
-pub use owned::{FramedExport, Objects, Options, OwnedTree};
+pub use owned::{Anywhere, FramedExport, Objects, Options, OwnedTree};
 pub use rays::ray_density;
 #[cfg(feature = "serde")]
 pub use registry::Method;

@@ -2,8 +2,8 @@
 //! languages.
 
 use crate::{
-    Bake, BakeError, Baked, Budget, Choice, Division, Frames, MadeRays, Observer, Open, Rays,
-    Reason, SearchError, parallel,
+    Bake, BakeError, Baked, Budget, Choice, Division, Frames, MadeDensity, Observer, Open, Reason,
+    SearchError, parallel, ray_density,
 };
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
@@ -37,11 +37,14 @@ pub struct Options<'a> {
     /// The rays that the tree is for, as in [`RayDensity`]; if empty, random lines, or rays from
     /// anywhere if they are chosen.
     pub rays: &'a [Segment],
-    /// Makes rays from anywhere in a scene of shapes, for a bake that chooses.
-    pub anywhere: Option<MadeRays<'a>>,
+    /// Makes rays from anywhere in a scene, for a bake that chooses.
+    pub anywhere: Option<Anywhere>,
     /// Whether triangles choose the frame of their boxes.
     pub frame: Frames,
 }
+
+/// Makes the [rays](Open::anywhere) of a seed from anywhere in a scene of these shapes.
+pub type Anywhere = fn(&Primitives, &Bvh, u64, &dyn Fn() -> bool) -> MadeDensity;
 
 impl Default for Options<'_> {
     fn default() -> Self {
@@ -101,9 +104,20 @@ impl OwnedTree {
         let mut owned = Self::bare(objects, choice.and_then(|choice| choice.frame));
         (owned.references, owned.seed) = (references.unwrap_or(1.0), seed);
         owned.reasons.extend(choice.map(Reason::Frame));
-        let rays = if rays.is_empty() { Rays::Any } else { Rays::Recorded(rays) };
-        let references = references.is_none();
-        let open = Open { budget: is_open, cost: true, references, rays, anywhere };
+        let shapes = owned.shapes.as_ref();
+        let recorded =
+            |tree: &Bvh, _, is_over: &dyn Fn() -> bool| ray_density(tree, shapes, rays, is_over);
+        let made = |tree: &Bvh, seed, is_over: &dyn Fn() -> bool| match (anywhere, shapes) {
+            (Some(anywhere), Some(shapes)) => anywhere(shapes, tree, seed, is_over),
+            _ => Ok(None),
+        };
+        let open = Open {
+            budget: is_open,
+            cost: true,
+            references: references.is_none(),
+            rays: if rays.is_empty() { None } else { Some(&recorded) },
+            anywhere: if anywhere.is_some() { Some(&made) } else { None },
+        };
         let bake = Bake { budget, start: None, ..owned.bake() };
         let mut chosen = bake.choose(&open, None, observer)?;
         let greedy = chosen.greedy.take();

@@ -18,7 +18,7 @@ use bvh_core::export::Target;
 use bvh_scenes::Scene;
 use bvh_scenes::files::Reserved;
 use bvh_search::{
-    Bake, Choice, Division, Frames, Method, Open, Outcome, Reason, StopReason, shortcuts,
+    Bake, Choice, Division, Frames, MadeRays, Method, Open, Outcome, Reason, StopReason, shortcuts,
 };
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -145,15 +145,18 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     let start = args.start(&scene, &mut plan)?;
     let start = start.as_ref();
     hold();
-    let open = args.open();
-    // Reserving the file first reports a full disk before the search and not after it.
-    let most =
-        if open.references { Open::REFERENCES.max(plan.references) } else { plan.references };
-    let reserved = Reserved::new(&out, plan::most_bytes(&scene, most), args.out.is_none())?;
     let scene = args.turned(&plan, scene, start, &watch, answer);
     if args.explain {
         explain(&scene, answer)?;
     }
+    let anywhere = |tree: &_, seed, is_over: &dyn Fn() -> bool| {
+        Rays::Default.density(&scene, tree, seed, is_over)
+    };
+    let open = args.open(&anywhere);
+    // Reserving the file first reports a full disk before the search and not after it.
+    let chosen = if open.references { Open::REFERENCES } else { 1.0 };
+    let bytes = plan::most_bytes(&scene, plan.references.max(chosen));
+    let reserved = Reserved::new(&out, bytes, args.out.is_none())?;
     let found = plan.search(&scene, start, &open, watch)?;
     for reason in &found.chosen.reasons {
         answer.line("choices", reason.to_string());
@@ -291,14 +294,14 @@ impl BakeArgs {
     }
 
     /// Returns what the arguments leave open. The tracers of others have a cost of their own.
-    fn open(&self) -> Open<'static> {
+    fn open<'a>(&self, anywhere: MadeRays<'a>) -> Open<'a> {
         let is_ours = self.tracer.is_none();
         Open {
             budget: self.budget.is_none(),
             cost: is_ours && self.cost.is_none(),
             references: is_ours && self.references.is_none(),
-            anywhere: if is_ours { Some(&bvh_scenes::rays::anywhere) } else { None },
-            ..Open::NOTHING
+            anywhere: is_ours.then_some(anywhere),
+            ..Open::default()
         }
     }
 

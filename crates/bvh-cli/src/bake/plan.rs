@@ -11,7 +11,9 @@ use bvh_core::{Bvh, Frame, Node};
 use bvh_scenes::Scene;
 use bvh_scenes::files::Reserved;
 use bvh_scenes::tree_file::{self, TreeFileError};
-use bvh_search::{self, Bake, BakeError, Baked, Budget, Chosen, Division, Method, Observer, Open};
+use bvh_search::{
+    self, Bake, BakeError, Baked, Budget, Chosen, Division, MadeRays, Method, Observer, Open,
+};
 use std::path::Path;
 
 /// A search for the best tree of any scene.
@@ -108,10 +110,10 @@ impl Plan {
         let greedy = bake.greedy(&INTERRUPTED).map_err(failed)?;
         let area = greedy.as_ref().map(internal_area);
         let rays = self.rays.as_ref();
-        let density = |_: &_, tree: &_, seed, is_over: &dyn Fn() -> bool| {
+        let made = |tree: &_, seed, is_over: &dyn Fn() -> bool| {
             rays.unwrap_or(&Rays::Default).density(scene, tree, seed, is_over)
         };
-        let rays = rays.map_or(bvh_search::Rays::Any, |_| bvh_search::Rays::Made(&density));
+        let rays: Option<MadeRays> = if rays.is_some() { Some(&made) } else { None };
         let untimed: &dyn Observer = if open.budget { &watch } else { &INTERRUPTED };
         let chosen = bake.choose(&Open { rays, ..*open }, greedy, untimed);
         let mut chosen = chosen.map_err(|error| match error {

@@ -8,7 +8,7 @@ use bvh_core::Segment;
 use bvh_core::cost::{internal_area, layout_area};
 use bvh_core::file::TreeFile;
 use bvh_scenes::{Scene, tree_file};
-use bvh_search::{Budget, Frames, MadeRays, Objects, Options, OwnedTree};
+use bvh_search::{Anywhere, Budget, Frames, Objects, Options, OwnedTree};
 use glam::Mat3;
 use std::fs;
 use std::path::Path;
@@ -109,7 +109,7 @@ fn a_bake_of_work_or_without_flags_writes_the_bytes_that_the_library_gives_other
         bvh(at, &format!("bake escher:400 --out=x.bvh --seed=5 {flags}"));
         let objects = Objects::Shapes(scene.primitives.clone());
         let budget = Budget { max_work, ..Budget::UNLIMITED };
-        let anywhere: Option<MadeRays> = Some(&bvh_scenes::rays::anywhere);
+        let anywhere: Option<Anywhere> = Some(bvh_scenes::rays::anywhere);
         let frame = Frames::Auto;
         let options = Options { references, seed: 5, budget, rays, anywhere, frame };
         let owned = OwnedTree::find(objects, &options, &()).unwrap();
