@@ -383,26 +383,28 @@ impl Bake<'_> {
             return Vec::new();
         }
         let nodes = &greedy.nodes;
-        let mut objects: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
-        let mut parts = Vec::new();
-        // Children come after their parents. An inner node takes the objects of small children.
+        let mut counts = vec![0usize; nodes.len()];
+        let mut roots = Vec::new();
+        // Children come after their parents.
         for (index, node) in nodes.iter().enumerate().rev() {
-            let ids = greedy.prim_ids[node.prims()].iter();
-            let mut all: Vec<usize> = ids.map(|&id| id as usize).collect();
-            for child in node.children() {
-                all.append(&mut objects[child]);
+            let children = node.children();
+            counts[index] = counts[children.clone()].iter().sum::<usize>() + node.prims().len();
+            if counts[index] > PART {
+                roots.extend(children.filter(|&child| (PART / 4..=PART).contains(&counts[child])));
             }
-            if all.len() >= PART {
-                parts.push(std::mem::take(&mut all));
-            }
-            objects[index] = all;
         }
-        let step = parts.len().div_ceil(MOST_OBJECTS / PART);
-        let part = |objects: &Vec<usize>| {
+        let step = roots.len().div_ceil(MOST_OBJECTS / PART).max(1);
+        let part = |root: usize| {
+            let mut objects = Vec::new();
+            let mut open = vec![root];
+            while let Some(index) = open.pop() {
+                open.extend(nodes[index].children());
+                objects.extend(greedy.prim_ids[nodes[index].prims()].iter().map(|&id| id as usize));
+            }
             let boxes = objects.iter().map(|&object| self.boxes[object]).collect();
-            (boxes, self.shapes.map(|shapes| shapes.select(objects)))
+            (boxes, self.shapes.map(|shapes| shapes.select(&objects)))
         };
-        parts.iter().step_by(step.max(1)).map(part).collect()
+        roots.into_iter().step_by(step).map(part).collect()
     }
 }
 
