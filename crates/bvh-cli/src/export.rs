@@ -4,6 +4,7 @@ use crate::Error;
 use crate::answer::{Answer, gain, whole};
 use crate::arguments::{load_scene, output_file};
 use bvh_build::{Builder, muller_fellner};
+use bvh_core::cost::Objective;
 use bvh_core::export::{Layout, Target};
 use bvh_scenes::{files, tree_file};
 use bvh_search::FramedExport;
@@ -45,7 +46,7 @@ pub fn export(args: &ExportArgs, answer: &mut Answer) -> Result<(), Error> {
     let extension = if target.layout == Layout::Json { "json" } else { "bin" };
     output_file("--out", &args.out, extension)?;
     let scene = load_scene(&args.scene)?;
-    let (tree, _) = tree_file::load(&args.file, &scene)?;
+    let (tree, header) = tree_file::load(&args.file, &scene)?;
     if tree.frame.is_some() {
         return Err(Error::Usage(format!(
             "{}: {FramedExport} (--frame file)",
@@ -81,6 +82,12 @@ pub fn export(args: &ExportArgs, answer: &mut Answer) -> Result<(), Error> {
         args.out.display(),
         whole(nodes)
     ));
+    if header.objective == Objective::Layout {
+        answer.say(&format!(
+            "the tree is for the wide layout; `bvh bake {} --for {}` searches for this tracer",
+            args.scene, target.name
+        ));
+    }
     answer.record("nodes", nodes);
     answer.record("cost_per_ray", target.cost(&better.tree));
     answer.record("is_searched", better.is_searched());

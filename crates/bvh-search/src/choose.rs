@@ -6,10 +6,10 @@
 //! worth.
 
 use crate::bake::Untimed;
-use crate::{Bake, BakeError, Baked, Budget, Choice, Observer, SearchError, parallel};
+use crate::reason::{More, Reason, Tried};
+use crate::{Bake, BakeError, Baked, Budget, Observer, SearchError, parallel};
 use bvh_core::cost::Objective;
-use bvh_core::{Aabb, Bvh, DensityError, Frame, Primitives, RayDensity};
-use core::fmt;
+use bvh_core::{Aabb, Bvh, DensityError, Primitives, RayDensity};
 
 /// The work per object of a bake that chooses its own budget. On the 7 scenes of
 /// `results/anytime`, `best` ends within 0.3 % of the best known cost after this work; six times
@@ -77,98 +77,6 @@ impl Budget {
         let work = (WORK_PER_OBJECT * objects).min(MOST_WORK).max(LEAST_WORK_PER_OBJECT * objects);
         Self { max_work: Some(work), ..Self::UNLIMITED }
     }
-}
-
-/// A choice of a bake, and why. It is shown as one line.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Reason {
-    /// The frame.
-    Frame(Choice),
-    /// Something that was tried, other things being equal.
-    Tried {
-        /// What it is.
-        choice: Tried,
-        /// Whether it was chosen.
-        is_chosen: bool,
-        /// The fraction of the expected tests of untrained rays that it saves; below 0 if it costs
-        /// some.
-        saved: f64,
-    },
-    /// The work.
-    Work {
-        /// The nodes to visit.
-        work: u64,
-        /// The nodes to visit per object.
-        per_object: u64,
-        /// The fraction of the tests that a short search saves, if that is so little that a long one
-        /// does not pay.
-        little: Option<f64>,
-    },
-}
-
-/// Something that a bake tries.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tried {
-    /// The cost of the wide layout instead of area.
-    Layout,
-    /// Rays from anywhere instead of random lines.
-    Rays,
-    /// Divided objects.
-    References,
-}
-
-impl fmt::Display for Reason {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Self::Frame(Choice { frame: None, .. }) => {
-                f.write_str("frame: no other saves enough area; kept are the file's axes")
-            }
-            Self::Frame(Choice { frame: Some(frame), gain, .. }) => {
-                let degrees = angle(frame).to_degrees();
-                let percent = 100.0 * gain;
-                write!(
-                    f,
-                    "frame: turned by {degrees:.0} degrees, {percent:.0} % less area than along \
-                     the file's axes"
-                )
-            }
-            Self::Tried { choice, is_chosen, saved } => {
-                let name = match choice {
-                    Tried::Layout => "cost: the wide layout's",
-                    Tried::Rays => "rays: default",
-                    Tried::References => "references: 1.2 per object",
-                };
-                let verdict = if *is_chosen { "yes" } else { "no" };
-                let percent = 100.0 * saved.abs();
-                let direction = if *saved < 0.0 { "more" } else { "fewer" };
-                write!(
-                    f,
-                    "{name}: {verdict}, {percent:.1} % {direction} expected tests of untrained rays"
-                )
-            }
-            Self::Work { work, per_object, little } => {
-                let millions = *work as f64 / 1e6;
-                write!(f, "budget: {millions:.0} Mwork, {per_object} nodes per object; ")?;
-                match little {
-                    Some(saved) => write!(
-                        f,
-                        "little is to be won here, a short search saves {:.1} % of the tests \
-                         (--budget searches longer)",
-                        100.0 * saved
-                    ),
-                    None if *per_object >= WORK_PER_OBJECT => f.write_str("more would hardly pay"),
-                    None => f.write_str("because the scene is large; more would pay (--budget)"),
-                }
-            }
-        }
-    }
-}
-
-/// Returns the angle of the frame's rotation.
-fn angle(frame: &Frame) -> f64 {
-    let rotation = frame.rotation();
-    let trace = rotation.x_axis.x + rotation.y_axis.y + rotation.z_axis.z;
-    libm::acos((0.5 * (trace - 1.0)).clamp(-1.0, 1.0))
 }
 
 /// The choices of a bake, and what making them has found.
@@ -261,26 +169,25 @@ impl Bake<'_> {
         if let (Some(rays), Some(greedy)) = (open.rays, &chosen.greedy) {
             chosen.density = rays(greedy, self.seed, &|| untimed.cancelled())?;
         }
-        let forecast = match chosen.greedy.take() {
-            Some(greedy) if combinations.len() > 1 => {
-                let forecast = self.compare(open, &combinations, &greedy, &mut chosen, observer)?;
-                chosen.greedy = Some(greedy);
-                forecast
+        let mut forecast = None;
+        if let Some(greedy) = chosen.greedy.take() {
+            if combinations.len() > 1 {
+                forecast = self.compare(open, &combinations, &greedy, &mut chosen, observer)?;
             }
-            greedy => {
-                chosen.greedy = greedy;
-                None
-            }
-        };
+            chosen.greedy = Some(greedy);
+        }
         let objects = self.boxes.len();
         if let (true, Some(ample)) = (open.budget, Budget::of_objects(objects).max_work) {
             let objects = objects.max(1) as u64;
             let enough = ENOUGH.max(ENOUGH_PER_OBJECT * objects);
-            let little = forecast.filter(|saved| *saved < LITTLE && enough < ample);
-            let work = if little.is_some() { enough } else { ample };
+            let (work, more) = match forecast {
+                Some(saved) if saved < LITTLE && enough < ample => (enough, More::Little(saved)),
+                _ if ample < WORK_PER_OBJECT * objects => (ample, More::Pays),
+                _ => (ample, More::HardlyPays),
+            };
             chosen.budget.max_work = Some(work);
             let per_object = work / objects;
-            chosen.reasons.insert(0, Reason::Work { work, per_object, little });
+            chosen.reasons.insert(0, Reason::Work { work, per_object, more });
         }
         Ok(chosen)
     }
@@ -329,20 +236,8 @@ impl Bake<'_> {
             }
         }
         let parts = self.parts_of(greedy);
-        let mut trials = Vec::new();
-        for (boxes, shapes) in &parts {
-            let bake = Bake { boxes, shapes: shapes.as_ref(), ..*self };
-            trials.push((bake, bake.greedy(&untimed)?));
-        }
-        if parts.is_empty() {
-            trials.push((*self, Some(greedy.clone())));
-        }
-        let mut tried = Vec::new();
-        for (bake, greedy) in trials {
-            let divided = Bake { references: most.references, ..bake }.division(&untimed)?;
-            tried.push(Trial { bake, greedy, divided });
-        }
-        let (mut trials, mut best_tree) = (tried, None);
+        let mut trials = self.trials(&parts, greedy, most.references, &untimed)?;
+        let mut best_tree = None;
         let mut tests: Vec<f64> = Vec::new();
         for (index, combination) in combinations.iter().enumerate() {
             observer.trying(index, combinations.len());
@@ -374,6 +269,33 @@ impl Bake<'_> {
         chosen.explain(open, &tests, place);
         chosen.settle(combinations[place], divided.filter(|_| parts.is_empty()));
         Ok(Some(1.0 - tests[place] / of_greedy))
+    }
+
+    /// Prepares the trials of parts of the scene, or of the whole scene if there are none.
+    fn trials<'b>(
+        &'b self,
+        parts: &'b [(Vec<Aabb>, Option<Primitives>)],
+        greedy: &Bvh,
+        references: f64,
+        observer: &dyn Observer,
+    ) -> Result<Vec<Trial<'b>>, SearchError> {
+        let part = |(boxes, shapes): &'b (Vec<Aabb>, Option<Primitives>)| Bake {
+            boxes,
+            shapes: shapes.as_ref(),
+            ..*self
+        };
+        let mut bakes: Vec<Bake> = parts.iter().map(part).collect();
+        if parts.is_empty() {
+            bakes.push(*self);
+        }
+        let mut trials = Vec::new();
+        for bake in bakes {
+            let greedy =
+                if parts.is_empty() { Some(greedy.clone()) } else { bake.greedy(observer)? };
+            let divided = Bake { references, ..bake }.division(observer)?;
+            trials.push(Trial { bake, greedy, divided });
+        }
+        Ok(trials)
     }
 
     /// Returns the boxes and the shapes of parts from all over a large scene, each a subtree of the

@@ -5,7 +5,7 @@ use bvh_scenes::Scene;
 use bvh_scenes::rays::anywhere;
 use bvh_search::bvh_core::Primitives;
 use bvh_search::{
-    Chosen, Frames, Objects, Observer, Open, Options, OwnedTree, Reason, Tried, prelude::*,
+    Chosen, Frames, More, Objects, Observer, Open, Options, OwnedTree, Reason, Tried, prelude::*,
 };
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -84,7 +84,7 @@ fn little_to_be_won_ends_a_bake_early_and_says_so() {
     let scene = Scene::new("hill", bvh_scenes::SceneKind::File, Primitives::Triangles(triangles));
     let open = Open { references: false, ..BUT_RAYS };
     let hill = chosen(&scene, &open, &());
-    let Some(&Reason::Work { work, little: Some(saved), .. }) = hill.reasons.first() else {
+    let Some(&Reason::Work { work, more: More::Little(saved), .. }) = hill.reasons.first() else {
         panic!("{:?}", hill.reasons)
     };
     let ample = Budget::of_objects(scene.boxes.len()).max_work.unwrap();
