@@ -71,7 +71,7 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
         // Every tree gets a share of the budget in proportion to its number of objects.
         let part = scene.boxes.len() as f64 / objects as f64;
         let plan = plan.share(part);
-        let found = plan.search(scene, None, &Open::default(), Watch::new(plan.effort))?;
+        let found = plan.search(scene, None, &Open::default(), Watch::new(plan.effort), answer)?;
         save_part(&found, &out.join(name), answer)?;
     }
     if is_interrupted() {

@@ -157,10 +157,7 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     let chosen = if open.references { Open::REFERENCES } else { 1.0 };
     let bytes = plan::most_bytes(&scene, plan.references.max(chosen));
     let reserved = Reserved::new(&out, bytes, args.out.is_none())?;
-    let found = plan.search(&scene, start, &open, watch)?;
-    for reason in &found.chosen.reasons {
-        answer.line("choices", reason.to_string());
-    }
+    let found = plan.search(&scene, start, &open, watch, answer)?;
     save(&found, &out, reserved, answer)?;
     next(args, &found, &out, answer);
     Ok(())
@@ -345,7 +342,7 @@ impl BakeArgs {
             _ => return scene,
         };
         let choice = Choice::of(triangles, plan.budget(triangles.len()), watch);
-        answer.say(&Reason::Frame(choice).to_string());
+        watch.bar.suspend(|| answer.say(&Reason::Frame(choice).to_string()));
         if self.explain && choice.agreeing > 0.0 {
             let percent = 100.0 * choice.agreeing;
             let line = format!("frame: {percent:.0} % of the triangles, by size, share their axes");

@@ -72,8 +72,13 @@ pub fn bake(args: &BakeArgs, count: u32, answer: &mut Answer) -> Result<(), Erro
             continue;
         }
         let scene = part.scene(&scene);
-        let found =
-            part.plan.search(&scene, None, &Open::default(), Watch::new(part.plan.effort))?;
+        let found = part.plan.search(
+            &scene,
+            None,
+            &Open::default(),
+            Watch::new(part.plan.effort),
+            answer,
+        )?;
         // A part whose search was cut short would differ from run to run.
         if is_interrupted() {
             let folder = folder.display();
@@ -90,7 +95,8 @@ pub fn bake(args: &BakeArgs, count: u32, answer: &mut Answer) -> Result<(), Erro
     let reserved = Reserved::new(&out, bytes, args.out.is_none())?;
     let start = join(&scene, &parts, &folder)?;
     let plan = plan.share(1.0 - SHARE_OF_PARTS);
-    let found = plan.search(&scene, Some(&start), &Open::default(), Watch::new(plan.effort))?;
+    let found =
+        plan.search(&scene, Some(&start), &Open::default(), Watch::new(plan.effort), answer)?;
     save(&found, &out, reserved, answer)
 }
 

@@ -3,6 +3,7 @@
 use super::effort::Effort;
 use super::watch::Watch;
 use crate::Error;
+use crate::answer::Answer;
 use crate::interrupt::{INTERRUPTED, hold};
 use crate::rays::Rays;
 use bvh_core::cost::{Objective, internal_area};
@@ -13,6 +14,7 @@ use bvh_scenes::files::Reserved;
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_search::{
     self, Bake, BakeError, Baked, Budget, Chosen, Division, MadeRays, Method, Observer, Open,
+    Reason,
 };
 use std::path::Path;
 
@@ -94,7 +96,7 @@ impl Plan {
         }
     }
 
-    /// Makes the open choices, and searches until the budget is spent, or the watch's time is over,
+    /// Makes the open choices, prints their reasons, and searches until the budget is spent, or the watch's time is over,
     /// or the user interrupts.
     pub fn search<'a>(
         &'a self,
@@ -102,6 +104,7 @@ impl Plan {
         start: Option<&'a Start>,
         open: &Open,
         watch: Watch,
+        answer: &mut Answer,
     ) -> Result<Found<'a>, Error> {
         hold();
         let failed = |error| Error::search(&scene.name, self.method.name())(error);
@@ -120,6 +123,8 @@ impl Plan {
             BakeError::Search(error) => failed(error),
             BakeError::Rays(source) => Error::Tracing { scene: scene.name.clone(), source },
         })?;
+        let explain = |reason: &Reason| answer.line("choices", reason.to_string());
+        watch.bar.suspend(|| chosen.reasons.iter().for_each(explain));
         let greedy = chosen.greedy.take();
         let is_traced = scene.triangles().is_ok();
         let tests = greedy.as_ref().filter(|_| is_traced).map(|tree| chosen.tests(tree));
