@@ -34,7 +34,7 @@ const PART: usize = 1 << 12;
 const TOLERANCE: f64 = 0.005;
 /// The fraction of the tests below which a long search does not pay, and the work that then
 /// suffices: ten seconds' on two cores, or more in large scenes.
-const LITTLE: f64 = 0.06;
+const LITTLE: f64 = 1.0 / 16.0;
 const ENOUGH: u64 = 250_000_000;
 const ENOUGH_PER_OBJECT: u64 = 300;
 
@@ -143,6 +143,23 @@ impl Bake<'_> {
     ///
     /// Only [`best`](crate::best) has choices, without a [start](Bake::start), and of triangles,
     /// which alone have a wide layout. With a budget, only the density of given rays is made.
+    ///
+    /// ```
+    /// use bvh_search::{Open, bvh_core::Primitives, prelude::*};
+    /// let at = |x: f32| [[x, 0.0, 0.0], [x + 1.5, 1.0, 0.0], [x, 1.0, 2.0]];
+    /// let shapes = Primitives::Triangles((0..50u8).map(|x| at(x.into()).into()).collect());
+    /// let boxes = shapes.boxes();
+    /// let bake = Bake { shapes: Some(&shapes), ..Bake::new(&boxes) };
+    /// let open = Open { budget: true, cost: true, references: true, ..Open::default() };
+    /// let mut chosen = bake.choose(&open, None, &())?;
+    /// for reason in &chosen.reasons {
+    ///     println!("{reason}");
+    /// }
+    /// let greedy = chosen.greedy.take();
+    /// let baked = chosen.bake(&bake).search(greedy, &())?;
+    /// assert!(cost::total_area(&baked.outcome.tree) > 0.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn choose(
         &self,
         open: &Open,

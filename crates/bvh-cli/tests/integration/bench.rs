@@ -14,8 +14,8 @@ fn a_bench_measures_every_kind_of_rays_and_finds_the_greedy_tree_as_fast_as_itse
     for kind in kinds {
         let [low, high] = [0, 1].map(|end| kind["ratio_interval"][end].as_f64().unwrap());
         let ratio = kind["ratio"].as_f64().unwrap();
-        // Other tests share the machine.
-        assert!(low <= ratio && ratio <= high && (0.5..2.0).contains(&ratio), "{kind}");
+        // Other tests share the machine, and may stop some rounds.
+        assert!(low <= ratio && ratio <= high && low < 1.5 && high > 0.7, "{kind}");
         let [baked, greedy] = ["baked", "greedy"].map(|tree| &kind[format!("{tree}_per_second")]);
         assert!(baked.as_f64() > Some(1e3) && greedy.as_f64() > Some(1e3), "{kind}");
     }
