@@ -204,7 +204,9 @@ impl Bake<'_> {
             };
             chosen.budget.max_work = Some(work);
             let per_object = work / objects;
-            chosen.reasons.insert(0, Reason::Work { work, per_object, more });
+            if !observer.cancelled() {
+                chosen.reasons.insert(0, Reason::Work { work, per_object, more });
+            }
         }
         Ok(chosen)
     }

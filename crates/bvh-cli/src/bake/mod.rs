@@ -33,8 +33,8 @@ use watch::Watch;
 pub struct BakeArgs {
     /// Name of a scene, or path of a mesh file.
     pub scene: String,
-    /// How long to search: a time (`10s`, `1m 30s`), or work (`50Mwork`: 50 million nodes visited),
-    /// which gives the same bytes on every machine. `0s` and `0work` give the greedy tree, or the
+    /// How long to take: a time (`10s`, `1m 30s`), loading included, or work (`50Mwork`: 50 million
+    /// nodes visited), which gives the same bytes on every machine. `0s` and `0work` give the greedy tree, or the
     /// one of --from. Without it, the bake ends when more work would hardly pay; it also chooses
     /// --rays, --cost and --references where they are not given, and prints the reasons.
     #[arg(long, value_name = "TIME|WORK")]
