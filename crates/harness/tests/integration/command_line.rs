@@ -162,7 +162,6 @@ fn mistakes_are_named_before_any_work() {
         (&["spec.toml", "--out", "file"], &["--out", "file is a file", "a folder"]),
         (&["spec.toml", "--check", "--resume"], &["--check", "--resume"]),
         (&["spec.toml", "other/spec.toml"], &["two specs are called spec"]),
-        (&["report"], &["--results", "results is no folder"]),
         (&[], &["Usage"]),
     ] {
         refused(folder.path(), args, 2, parts);
