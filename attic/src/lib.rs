@@ -1,9 +1,8 @@
-//! Other libraries as methods of experiments, the times of rays, and a lower bound. The instruments of this package
-//! are its benchmarks.
+//! Other libraries as methods of experiments, and the times of rays. The instruments of this package are its
+//! benchmarks.
 
 pub mod bvh;
 mod comparison;
-pub mod lower_bound;
 pub mod obvhs;
 mod programs;
 mod rows;
@@ -38,11 +37,7 @@ pub const LIBRARIES: &[&dyn Library] = &[&bvh::Crate, &obvhs::Crate];
 const RACERS: &[&dyn Racer] = &[&bvh::Crate, &obvhs::Crate];
 
 /// What the program contains beside the harness.
-pub const OTHERS: Others = Others {
-    libraries: LIBRARIES,
-    tracing: &tracing::Rounds,
-    lower_bound: lower_bound::internal_area,
-};
+pub const OTHERS: Others = Others { libraries: LIBRARIES, tracing: &tracing::Rounds };
 
 /// Makes the result of a build. Costs are compared by tight boxes; a library may pad its own.
 fn tight(mut tree: Bvh, seconds: f64, boxes: &[Aabb]) -> Built {

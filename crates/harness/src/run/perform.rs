@@ -4,10 +4,10 @@ use super::job::Job;
 use crate::Error;
 use crate::contestant::Contestant;
 use crate::measure::picture;
-use crate::peers::{self, Built, Peer, Task};
+use crate::peers::{Built, Peer, Task};
 use crate::rows::finished_run::FinishedRun;
 use crate::rows::store::Store;
-use crate::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, TrialRow};
+use crate::rows::{ClockRow, HistoryRow, RayRow, RunRow, TimingRow, TrialRow};
 use crate::spec::Experiment;
 use crate::spec::turn::{in_chosen_frame, turn_of};
 use bvh_core::cost::{self, Measure, SahConstants};
@@ -61,15 +61,6 @@ impl Work<'_> {
     pub fn interrupted(&self) -> Error {
         Error::Interrupted { finished: self.jobs.len(), runs: self.jobs.len() }
     }
-}
-
-/// Computes the lower bound of the scene's internal area that the experiment requests, if any.
-fn bound(experiment: &Experiment, scene: &Scene, watch: &Watch) -> Result<Option<BoundRow>, Error> {
-    let Some(effort) = experiment.lower_bound else { return Ok(None) };
-    let others = peers::others("lower_bound").map_err(|fault| Error::Usage(fault.to_string()))?;
-    let lower_bound = (others.lower_bound)(&scene.boxes, effort, watch)
-        .map_err(Error::search(&scene.name, "the lower bound"))?;
-    Ok(Some(BoundRow { scene: scene.name.clone(), objects: scene.boxes.len(), lower_bound }))
 }
 
 /// Performs one run. Returns its rows and its tree, or `None` if it was interrupted.
@@ -140,7 +131,6 @@ pub(crate) fn perform(work: &Work, job: &Job) -> Result<Option<(FinishedRun, Bvh
     let timing = TimingRow { scene: scene_name, method, seed, repetition, threads, seconds };
     let rays: Vec<RayRow> =
         experiment.rays.iter().map(|rays| ray_row(experiment, job, seed, tree, rays)).collect();
-    let bounds = if first_of_scene { bound(experiment, scene, watch)? } else { None };
     let (renders, render_times) = match &experiment.render {
         // Nobody reads the seconds of quick variants.
         Some(config) => {
@@ -149,10 +139,6 @@ pub(crate) fn perform(work: &Work, job: &Job) -> Result<Option<(FinishedRun, Bvh
         }
         None => Default::default(),
     };
-    // An interrupted bound is not a result.
-    if watch.cancelled() {
-        return Ok(None);
-    }
     let mut finished = FinishedRun::here();
     finished.add(&[run])?;
     finished.add(&history)?;
@@ -160,7 +146,6 @@ pub(crate) fn perform(work: &Work, job: &Job) -> Result<Option<(FinishedRun, Bvh
     finished.add(&[timing])?;
     finished.add(&rays)?;
     finished.add(&clock)?;
-    finished.add(bounds.as_slice())?;
     finished.add(turn_of(&scene.name).filter(|_| first_of_scene).as_slice())?;
     finished.add(&renders)?;
     finished.add(&render_times)?;

@@ -65,9 +65,6 @@ config! {
         objective: Objective;
         /// Limits of every run; by default none.
         budget: Budget = Budget::UNLIMITED;
-        /// Effort of a lower bound of every scene's internal area, which the program in `attic/`
-        /// computes; by default no bound is computed.
-        lower_bound: Option<u32>;
         /// The methods, at least one; with `suite`, none for every method of the registry.
         methods: Vec<Labelled>;
         /// Measurements of every run's tree with random rays.

@@ -33,7 +33,6 @@ fn assert_rejected(text: &str, parts: &[&str]) {
 /// relations between keys, and places within one.
 const WRONG_LINES: &[(&str, &[&str])] = &[
     ("name = 'x'", &["name", "the file's name is used"]),
-    ("lower_bound = 2", &["lower_bound is set, which needs `cargo run", "attic/Cargo.toml"]),
     ("[tracing]\ncount = 9", &["tracing is set, which needs `cargo run", "attic/Cargo.toml"]),
     ("repetitions = 4294967295", &["repetitions", "4294967295 runs"]),
     ("objective = { sah = { traversal = -1.0 } }", &["objective.sah.traversal: -1 is not"]),

@@ -90,9 +90,8 @@ fn specs() -> Vec<Value> {
     for (_, text) in experiments() {
         let mut spec: Table = text.parse().unwrap();
         spec.remove("quick");
-        // The program in `attic/` contains the bound, the times of rays and other libraries. A method of ours replaces
+        // The program in `attic/` contains the times of rays and other libraries. A method of ours replaces
         // them.
-        spec.remove("lower_bound");
         spec.remove("tracing");
         for method in spec.get_mut("methods").and_then(Value::as_array_mut).into_iter().flatten() {
             if Peer::NAMES.contains(&method["method"].as_str().unwrap()) {
@@ -271,11 +270,7 @@ fn a_wrong_value_of_any_flag_is_rejected_by_name() {
     // Every command with its required arguments.
     let flags = wrong_flags(
         folder.path(),
-        &[
-            ("", &["spec.toml"]),
-            ("jobs", &["spec.toml"]),
-            ("merge", &["folder", "--out=x"]),
-        ],
+        &[("", &["spec.toml"]), ("jobs", &["spec.toml"]), ("merge", &["folder", "--out=x"])],
     );
     assert!(flags > 14, "{flags} flags");
 }
