@@ -1,7 +1,7 @@
 //! Time and peak memory of builds and bakes on scenes of millions of triangles, on one thread, and of
 //! bakes on two.
 //!
-//! `cargo bench --manifest-path attic/Cargo.toml --bench scale -- terrain:1000000 forest:8000000` writes
+//! `cargo bench --manifest-path attic/Cargo.toml --bench scale -- city:1000000 forest:8000000` writes
 //! `results/scale/timing_scale.csv`, and keeps its rows of other scenes. Without scenes it measures
 //! forests of 1, 8 and 20 million triangles.
 //!
@@ -11,7 +11,7 @@
 mod landscape;
 mod measured;
 
-use bvh_build::{Builder, Watch, muller_fellner, ploc, spatial};
+use bvh_build::{Builder, muller_fellner, ploc};
 use bvh_core::cost;
 use bvh_core::{Aabb, Bvh};
 use bvh_scenes::Scene;
@@ -134,12 +134,13 @@ impl Phases {
             .phase("build PLOC", || ploc::Config::default().build(boxes).expect("finite boxes"));
         self.cost(&clustered, base);
         drop(clustered);
-        let triangles = scene.triangles().expect("triangles");
-        self.phase("build with spatial splits", || {
-            let most = boxes.len() * 6 / 5;
-            spatial::build(most, boxes, &triangles, &Watch::default()).expect("finite boxes")
+        // The library's stopwatch excludes the conversion to our tree.
+        let built = self.phase("build obvhs VerySlow", || {
+            attic::build_by_obvhs(attic::Preset::VerySlow, boxes)
         });
-        self.peers(&scene, base);
+        self.rows.last_mut().expect("a phase").seconds = built.seconds;
+        self.cost(&built.tree, base);
+        drop(built);
         for (seconds, threads) in [(10, 1), (10, 2), (18, 1), (60, 2), (60, 1)] {
             self.bake(boxes, base, seconds, threads);
         }
@@ -162,16 +163,5 @@ impl Phases {
         };
         let baked = self.phase(&name, || pool(threads).install(bake));
         self.cost(&baked, base);
-    }
-
-    fn peers(&mut self, scene: &Scene, base: f64) {
-        use attic::{Preset, build_by_obvhs};
-        for preset in [Preset::Medium, Preset::VerySlow] {
-            let name = format!("build obvhs {preset:?}");
-            let built = self.phase(&name, || build_by_obvhs(preset, &scene.boxes));
-            // The library's stopwatch excludes the conversion to our tree.
-            self.rows.last_mut().expect("a phase").seconds = built.seconds;
-            self.cost(&built.tree, base);
-        }
     }
 }
