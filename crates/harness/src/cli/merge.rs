@@ -5,7 +5,7 @@ use super::terminal::{Jobs, input_folder, output_folder};
 use crate::rows::store::{Existing, spec_of_part};
 use crate::run::execute::{Extent, execute};
 use crate::run::finish;
-use crate::run::resolved::{Resolved, read_toml};
+use crate::run::resolved::Resolved;
 use crate::spec::Overrides;
 use crate::{Error, files};
 use std::collections::BTreeMap;
@@ -48,7 +48,7 @@ pub fn merge(args: &MergeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let mut differences = 0;
     for (name, parts) in parts {
         let spec = spec_of_part(&parts[0].join(name));
-        let Resolved { experiment, .. } = read_toml(&spec)?;
+        let Resolved { experiment, .. } = files::read_toml(&spec)?;
         // Somebody may have edited it.
         experiment
             .check_run_count()

@@ -6,7 +6,6 @@ use crate::Error;
 use crate::rows::store::Existing;
 use crate::run::execute::{Extent, execute};
 use crate::run::finish::Summary;
-use crate::run::resolved::load_scenes;
 use crate::run::{check, finish, reference};
 use crate::spec::{Experiment, Overrides};
 use std::collections::HashSet;
@@ -79,7 +78,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     // Resumed and selected runs are too short for every scene to be loaded twice.
     if !args.redraw && !args.resume && args.runs.is_empty() {
         for (path, experiment) in args.specs.iter().zip(&experiments).skip(1) {
-            load_scenes(experiment).map_err(|error| args.overrides.named(path, error))?;
+            experiment.load_scenes().map_err(|error| args.overrides.named(path, error))?;
         }
     }
     let mut differences = 0;

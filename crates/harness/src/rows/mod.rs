@@ -14,7 +14,7 @@
 #![allow(missing_docs, reason = "columns in the table above, or whose names are clear")]
 
 pub mod csv_file;
-pub mod finished_run;
+pub mod kept_run;
 pub mod lock;
 pub mod store;
 

@@ -1,9 +1,8 @@
 //! Compares fresh results with committed ones: the resolved spec line by line, and CSV files row by
 //! row. Files with times and figures are not compared; `--redraw` makes figures again.
 
-use super::resolved::{read_toml, to_toml};
 use crate::Error;
-use crate::files;
+use crate::files::{self, read_toml, to_toml};
 use csv::StringRecord;
 use std::collections::BTreeSet;
 use std::path::Path;

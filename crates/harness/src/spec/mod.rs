@@ -6,7 +6,7 @@
 
 mod check;
 mod read;
-pub mod turn;
+pub mod scenes;
 
 use crate::contestant::Labelled;
 use crate::measure::picture;
@@ -99,6 +99,11 @@ impl Experiment {
     /// The rays that judge the experiment's trees, if any do.
     pub fn judges(&self) -> Option<&ray_cost::Config> {
         self.ray_cost.as_ref().filter(|config| config.count > 0)
+    }
+
+    /// Returns true if a measurement after the runs needs the trees of this repetition.
+    pub fn needs_tree(&self, repetition: u32) -> bool {
+        self.judges().is_some() || self.tracing.is_some() && repetition == 0
     }
 
     /// Returns true if a report measures gaps, for which runs keep the times of improvements.
