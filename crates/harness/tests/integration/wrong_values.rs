@@ -8,12 +8,9 @@ use bvh_search::Method;
 use harness::peers::Peer;
 use harness::report::Report;
 use harness::spec::{Experiment, Overrides};
-use proptest::prelude::*;
-use proptest::sample::Index;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::path::Path;
-use std::sync::LazyLock;
 use toml::{Table, Value};
 
 /// The way from a spec to a value in it: keys and indices.
@@ -216,51 +213,6 @@ fn a_wrong_value_under_any_key_of_a_spec_is_rejected_by_name() {
     }
     let found = found.take();
     assert!(found.is_empty(), "\n{}", found.into_iter().collect::<Vec<_>>().join("\n"));
-}
-
-/// Checks that a text is rejected with the name of its file, or that the resolved spec reads back
-/// as itself.
-fn check_text(text: &str, quick: bool) {
-    let path = Path::new("spec.toml");
-    match Experiment::parse(path, text, &Overrides { quick, ..Default::default() }) {
-        Ok(experiment) => {
-            let mut expected = Experiment { name: String::new(), quick: false, ..experiment };
-            let resolved = toml::to_string(&expected).unwrap();
-            let read = Experiment::parse(path, &resolved, &Overrides::default());
-            expected.name = "spec".into();
-            assert_eq!(read.unwrap(), expected, "{resolved}");
-        }
-        Err(error) => {
-            assert_eq!(error.exit_code(), 2);
-            assert!(error.to_string().starts_with("spec.toml: "), "{error}");
-        }
-    }
-}
-
-/// Returns the last place up to `byte` where a character begins.
-fn boundary(text: &str, byte: usize) -> usize {
-    (0..=byte).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0)
-}
-
-proptest! {
-    #[test]
-    fn a_damaged_spec_is_rejected_or_reads_back_as_itself(
-        which in any::<Index>(),
-        quick in any::<bool>(),
-        edits in prop::collection::vec(
-            (any::<Index>(), 0usize..40, "-1|0|nan|1e39|18446744073709551616|[ -~]{0,3}|\\n"),
-            1..8,
-        ),
-    ) {
-        static SPECS: LazyLock<Vec<(String, String)>> = LazyLock::new(experiments);
-        let (_, mut text) = which.get(&SPECS).clone();
-        for (place, length, word) in edits {
-            let start = boundary(&text, place.index(text.len() + 1));
-            let end = boundary(&text, (start + length).min(text.len()));
-            text.replace_range(start..end, &word);
-        }
-        check_text(&text, quick);
-    }
 }
 
 #[test]
