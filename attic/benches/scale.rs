@@ -2,8 +2,7 @@
 //! bakes on two.
 //!
 //! `cargo bench --manifest-path attic/Cargo.toml --bench scale -- city:1000000 forest:8000000` writes
-//! `results/scale/timing_scale.csv`, and keeps its rows of other scenes. Without scenes it measures
-//! forests of 1, 8 and 20 million triangles.
+//! `results/scale/timing_scale.csv`, and keeps its rows of other scenes.
 //!
 //! The program counts the bytes that it requests from its allocator; counting adds about 1 % to the
 //! times.
@@ -12,8 +11,7 @@ mod landscape;
 mod measured;
 
 use bvh_build::{Builder, muller_fellner, ploc};
-use bvh_core::cost;
-use bvh_core::{Aabb, Bvh};
+use bvh_core::{Aabb, Bvh, cost};
 use bvh_scenes::Scene;
 use bvh_search::best::{self, Horizon};
 use bvh_search::{Budget, Deadline, Kept, Problem, solve_or_keep};
@@ -28,10 +26,7 @@ use std::time::{Duration, Instant};
 #[global_allocator]
 static ALLOCATED: PeakAlloc = PeakAlloc;
 
-const FOLDER: &str = "results/scale";
-const DEFAULT: [&str; 3] = ["forest:1000000", "forest:8000000", "forest:20000000"];
-
-/// One row of `timing_scale.csv`: one phase on a scene of millions of triangles, on one thread.
+/// One row of `timing_scale.csv`: a tree over a scene of millions of triangles.
 #[derive(Serialize, Deserialize)]
 struct ScaleRow {
     scene: String,
@@ -42,13 +37,13 @@ struct ScaleRow {
     phase: String,
     /// Wall time; of a bake, the greedy tree included.
     seconds: f64,
-    /// The most bytes allocated at once, the scene and the trees that the phase needs included.
+    /// The most bytes allocated at once, the scene included.
     peak_bytes: usize,
     bytes_per_object: f64,
     /// Bytes that stay allocated after the phase.
     bytes_after: usize,
-    /// Internal area over the greedy tree's, of phases that make a tree.
-    cost_over_base: Option<f64>,
+    /// Internal area over the greedy tree's.
+    cost_over_base: f64,
 }
 
 impl Row for ScaleRow {
@@ -58,15 +53,12 @@ impl Row for ScaleRow {
 fn main() {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     std::env::set_current_dir(&top).expect("the project's folder");
-    let mut names: Vec<String> =
-        std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
-    if names.is_empty() {
-        names = DEFAULT.map(String::from).into();
-    }
-    for name in names {
-        let mut phases = Phases { scene: name, objects: 0, rows: Vec::new() };
+    // Cargo passes a flag to every benchmark.
+    for name in std::env::args().skip(1).filter(|argument| !argument.starts_with("--")) {
+        let scene = landscape::load(&name).expect("a scene");
+        let mut phases = Phases { scene, rows: Vec::new(), base: None };
         pool(1).install(|| phases.measure());
-        measured::replace(FOLDER, phases.rows, key);
+        measured::replace("results/scale", phases.rows, key);
     }
 }
 
@@ -78,90 +70,78 @@ fn pool(threads: usize) -> ThreadPool {
     ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool of threads")
 }
 
+fn greedy(boxes: &[Aabb]) -> Bvh {
+    muller_fellner::Config::default().build(boxes).expect("finite boxes")
+}
+
 /// The measured phases of one scene.
 struct Phases {
-    scene: String,
-    objects: usize,
+    scene: Scene,
     rows: Vec<ScaleRow>,
+    /// The area of the first phase's tree, the greedy one.
+    base: Option<f64>,
 }
 
 impl Phases {
-    /// Performs a phase, and records its time and the most bytes allocated at once, those of the
-    /// scene and of the trees that the phase needs included.
-    fn phase<T>(&mut self, phase: &str, perform: impl FnOnce() -> T) -> T {
+    fn measure(&mut self) {
+        self.phase("build greedy", greedy);
+        self.phase("build PLOC", |boxes| {
+            ploc::Config::default().build(boxes).expect("finite boxes")
+        });
+        // The library's stopwatch excludes the conversion to our tree.
+        let mut seconds = 0.0;
+        self.phase("build obvhs VerySlow", |boxes| {
+            let built = attic::build_by_obvhs(attic::Preset::VerySlow, boxes);
+            seconds = built.seconds;
+            built.tree
+        });
+        self.rows.last_mut().expect("a phase").seconds = seconds;
+        for (seconds, threads) in [(10, 1), (10, 2), (18, 1), (60, 2), (60, 1)] {
+            let plural = if threads == 1 { "" } else { "s" };
+            let name = format!("bake {seconds} s, {threads} thread{plural}");
+            self.phase(&name, |boxes| pool(threads).install(|| bake(boxes, seconds)));
+        }
+    }
+
+    /// Makes a tree. Records the time, the most bytes allocated at once, the scene included, and the
+    /// cost.
+    fn phase(&mut self, phase: &str, make: impl FnOnce(&[Aabb]) -> Bvh) {
         ALLOCATED.reset_peak_usage();
         let start = Instant::now();
-        let result = perform();
+        let tree = make(&self.scene.boxes);
         let seconds = start.elapsed().as_secs_f64();
-        let peak_bytes = ALLOCATED.peak_usage();
-        let bytes_per_object = peak_bytes as f64 / self.objects as f64;
+        let (peak_bytes, bytes_after) = (ALLOCATED.peak_usage(), ALLOCATED.current_usage());
+        let area = cost::internal_area(&tree);
+        let cost_over_base = area / *self.base.get_or_insert(area);
+        let objects = self.scene.boxes.len();
+        let bytes_per_object = peak_bytes as f64 / objects as f64;
         println!(
-            "{:<18} {phase:<28} {seconds:>8.2} s {bytes_per_object:>7.0} bytes per triangle",
-            self.scene
+            "{:<18} {phase:<22} {seconds:>8.2} s {bytes_per_object:>7.0} bytes per triangle \
+             {cost_over_base:>8.4} of greedy's cost",
+            self.scene.name
         );
         self.rows.push(ScaleRow {
-            scene: self.scene.clone(),
-            objects: self.objects,
+            scene: self.scene.name.clone(),
+            objects,
             processor: PROCESSOR.name(),
             phase: phase.into(),
             seconds,
             peak_bytes,
             bytes_per_object,
-            bytes_after: ALLOCATED.current_usage(),
-            cost_over_base: None,
+            bytes_after,
+            cost_over_base,
         });
-        result
     }
+}
 
-    /// Adds the cost of the tree that the last phase made.
-    fn cost(&mut self, tree: &Bvh, base: f64) {
-        let ratio = cost::internal_area(tree) / base;
-        println!("{:<18} {:<28} {ratio:>8.4} of greedy's cost", "", "");
-        self.rows.last_mut().expect("a phase").cost_over_base = Some(ratio);
-    }
-
-    fn measure(&mut self) {
-        let scene = landscape::load(&self.scene).expect("a scene");
-        let boxes = &scene.boxes;
-        self.objects = boxes.len();
-        let greedy = self.phase("build greedy", || {
-            muller_fellner::Config::default().build(boxes).expect("finite boxes")
-        });
-        let base = cost::internal_area(&greedy);
-        self.cost(&greedy, base);
-        drop(greedy);
-        let clustered = self
-            .phase("build PLOC", || ploc::Config::default().build(boxes).expect("finite boxes"));
-        self.cost(&clustered, base);
-        drop(clustered);
-        // The library's stopwatch excludes the conversion to our tree.
-        let built = self.phase("build obvhs VerySlow", || {
-            attic::build_by_obvhs(attic::Preset::VerySlow, boxes)
-        });
-        self.rows.last_mut().expect("a phase").seconds = built.seconds;
-        self.cost(&built.tree, base);
-        drop(built);
-        for (seconds, threads) in [(10, 1), (10, 2), (18, 1), (60, 2), (60, 1)] {
-            self.bake(boxes, base, seconds, threads);
-        }
-    }
-
-    /// Bakes for `seconds` as the program does, which builds the greedy tree before the time
-    /// begins.
-    fn bake(&mut self, boxes: &[Aabb], base: f64, seconds: u64, threads: usize) {
-        let config = best::Config { horizon: Some(Horizon::Known), ..Default::default() };
-        let plural = if threads == 1 { "" } else { "s" };
-        let name = format!("bake {seconds} s, {threads} thread{plural}");
-        let bake = || {
-            let greedy = muller_fellner::Config::default().build(boxes).expect("finite boxes");
-            let deadline = Deadline::after(Duration::from_secs(seconds));
-            let problem = Problem::new(boxes);
-            let greedy = Kept::new(greedy, &problem);
-            solve_or_keep(&config, &problem, Some(greedy), 1, Budget::UNLIMITED, &deadline)
-                .expect("a tree")
-                .tree
-        };
-        let baked = self.phase(&name, || pool(threads).install(bake));
-        self.cost(&baked, base);
-    }
+/// Bakes for `seconds` as the program does, which builds the greedy tree before the time begins.
+fn bake(boxes: &[Aabb], seconds: u64) -> Bvh {
+    let config = best::Config { horizon: Some(Horizon::Known), ..Default::default() };
+    let greedy = greedy(boxes);
+    let deadline = Deadline::after(Duration::from_secs(seconds));
+    let problem = Problem::new(boxes);
+    let greedy = Kept::new(greedy, &problem);
+    solve_or_keep(&config, &problem, Some(greedy), 1, Budget::UNLIMITED, &deadline)
+        .expect("a tree")
+        .tree
 }

@@ -50,11 +50,6 @@ pub fn build_by_obvhs(preset: Preset, boxes: &[Aabb]) -> Built {
     obvhs::build(&Obvhs { preset, reinsertion: None }, boxes)
 }
 
-/// Builds with the crate `bvh`.
-pub fn build_by_bvh(boxes: &[Aabb]) -> Built {
-    bvh::build(boxes)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -111,7 +106,7 @@ mod tests {
     #[test]
     fn other_libraries_find_nearly_all_hits_and_nothing_else() {
         let scene = Scene::load("escher:2000").unwrap();
-        let tree = build_by_bvh(&scene.boxes).tree;
+        let tree = bvh::build(&scene.boxes).tree;
         let rays = rays(Kind::Incoherent, 4000, &scene, &tree, &Default::default(), 1);
         let batch = Batch {
             query: Query::Nearest,
