@@ -10,6 +10,7 @@
 mod landscape;
 mod measured;
 
+use attic::obvhs::{self, Obvhs, Preset};
 use bvh_build::{Builder, muller_fellner, ploc};
 use bvh_core::{Aabb, Bvh, cost};
 use bvh_scenes::Scene;
@@ -90,8 +91,9 @@ impl Phases {
         });
         // The library's stopwatch excludes the conversion to our tree.
         let mut seconds = 0.0;
+        let settings = Obvhs { preset: Preset::VerySlow, ..Obvhs::default() };
         self.phase("build obvhs VerySlow", |boxes| {
-            let built = attic::build_by_obvhs(attic::Preset::VerySlow, boxes);
+            let built = obvhs::build(&settings, boxes);
             seconds = built.seconds;
             built.tree
         });

@@ -8,9 +8,6 @@ mod programs;
 mod rows;
 pub mod tracing;
 
-pub use crate::obvhs::Preset;
-
-use crate::obvhs::Obvhs;
 use crate::tracing::contender::Contender;
 use bvh_config::OutOfRange;
 use bvh_core::{Aabb, Bvh, Triangle};
@@ -43,11 +40,6 @@ pub const OTHERS: Others = Others { libraries: LIBRARIES, tracing: &tracing::Rou
 fn tight(mut tree: Bvh, seconds: f64, boxes: &[Aabb]) -> Built {
     tree.refit(boxes);
     Built { tree, seconds }
-}
-
-/// Builds with a preset of `obvhs`.
-pub fn build_by_obvhs(preset: Preset, boxes: &[Aabb]) -> Built {
-    obvhs::build(&Obvhs { preset, reinsertion: None }, boxes)
 }
 
 #[cfg(test)]
