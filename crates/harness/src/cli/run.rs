@@ -6,7 +6,7 @@ use crate::Error;
 use crate::rows::store::Existing;
 use crate::run::execute::{Extent, execute};
 use crate::run::finish::Summary;
-use crate::run::{check, finish, reference};
+use crate::run::{check, finish, forecast, reference};
 use crate::spec::{Experiment, Overrides};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -97,6 +97,10 @@ fn perform(
     extent: &Extent,
     interrupted: &AtomicBool,
 ) -> Result<usize, Error> {
+    if !args.redraw && !args.quiet && args.runs.is_empty() {
+        let times = forecast::line(experiment, &args.out.join(experiment.folder()))?;
+        times.iter().for_each(|line| print_error(line));
+    }
     let is_new = args.redraw || args.force || args.resume || !args.runs.is_empty();
     if args.check || !is_new && finish::has_results_of(experiment, &args.out)? {
         return repeat(experiment, &args.out, &[], interrupted, args.quiet || args.check);

@@ -4,6 +4,7 @@ pub mod check;
 pub mod execute;
 pub mod finish;
 mod finished;
+pub mod forecast;
 pub(crate) mod jobs;
 mod measurement;
 mod perform;

@@ -219,7 +219,7 @@ fn without_reports_there_is_a_table_and_on_request_nothing_is_printed() {
     let folder = folder_with("plain.toml", spec);
     let output = run(folder.path(), &["plain.toml"]);
     let out = text(&output.stdout);
-    let parts = ["Runs:", "spheres75", "median_cut", "least_over_base"];
+    let parts = ["Runs:", "spheres75", "median_cut", "least over base"];
     assert!(parts.iter().all(|part| out.contains(part)), "{out}");
     assert!(output.stderr.is_empty());
     let quiet = run(folder.path(), &["plain.toml", "--quiet", "--force"]);
