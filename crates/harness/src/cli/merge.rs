@@ -1,7 +1,7 @@
 //! `harness merge`: joins the parts of experiments that ran with `--run`.
 
 use super::run::{print_outcome, repeat};
-use super::terminal::{Jobs, input_folder, output_folder};
+use super::terminal::{Threads, input_folder, output_folder};
 use crate::rows::store::{Existing, spec_of_part};
 use crate::run::execute::{Extent, execute};
 use crate::run::finish;
@@ -27,13 +27,13 @@ pub struct MergeArgs {
     pub force: bool,
     /// Limits the threads.
     #[command(flatten)]
-    pub jobs: Jobs,
+    pub threads: Threads,
 }
 
 /// Merges the parts and prints the tables of every experiment.
 pub fn merge(args: &MergeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     output_folder("--out", &args.out)?;
-    args.jobs.apply()?;
+    args.threads.apply()?;
     let mut parts: BTreeMap<PathBuf, Vec<PathBuf>> = BTreeMap::new();
     for out in &args.folders {
         input_folder("DIR", out)?;

@@ -1,7 +1,7 @@
 //! `harness SPEC.toml...`: runs experiments, compares them with committed results, or makes their
 //! reports again.
 
-use super::terminal::{Jobs, output_folder, print_error, print_line};
+use super::terminal::{Threads, output_folder, print_error, print_line};
 use crate::Error;
 use crate::rows::store::Existing;
 use crate::run::execute::{Extent, execute};
@@ -26,7 +26,7 @@ pub struct RunArgs {
     pub overrides: Overrides,
     /// Limits the threads.
     #[command(flatten)]
-    pub jobs: Jobs,
+    pub threads: Threads,
     /// Only compare with the committed results; exit code 1 on a difference.
     #[arg(long, conflicts_with = "resume")]
     pub check: bool,
@@ -53,7 +53,7 @@ pub struct RunArgs {
 pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     // A wrong folder is found before hours of work, not after them.
     output_folder("--out", &args.out)?;
-    args.jobs.apply()?;
+    args.threads.apply()?;
     // A mistake in the last spec must not surface after hours of runs of the first.
     let experiments = args
         .specs
