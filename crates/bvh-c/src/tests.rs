@@ -278,8 +278,8 @@ struct Particle {
 #[test]
 fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_excluded_ids() {
     const FAR: f64 = 5_412_345.678;
-    let corners: Vec<f64> = corners(40).into_iter().map(|x| f64::from(x) / 3.0 + FAR).collect();
-    let triangles: Vec<DTriangle> = corners
+    let numbers: Vec<f64> = corners(40).into_iter().map(|x| f64::from(x) / 3.0 + FAR).collect();
+    let triangles: Vec<DTriangle> = numbers
         .as_chunks::<3>()
         .0
         .as_chunks::<3>()
@@ -288,7 +288,7 @@ fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_exclu
         .map(|&triangle| DTriangle::from(triangle))
         .collect();
     let vertices: Vec<f64> =
-        corners.chunks(3).flat_map(|xyz| [xyz, &[f64::NAN]].concat()).collect();
+        numbers.chunks(3).flat_map(|xyz| [xyz, &[f64::NAN]].concat()).collect();
     let ids: Vec<u32> = (0..120).collect();
     let objects = BvsObjects {
         count: 40,
@@ -314,6 +314,11 @@ fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_exclu
     unsafe {
         let tree = bvs_tree_bake(&BvsBake { objects, work: 3000, frame: 1, ..NO_BAKE });
         ok(bvs_tree_save(tree, path.as_ptr()));
+        ok(bvs_tree_update(tree, &objects));
+        let corners = corners(40);
+        let single = soup(&corners);
+        let accepted = "objects are 40 triangles; accepted: 40 triangles in f64";
+        invalid(bvs_tree_update(tree, &single), accepted);
         let loaded = bvs_tree_load(path.as_ptr(), &objects);
         assert_eq!((*loaded).owned.tree(), (*tree).owned.tree());
         let wide = DWideBvh::new((*loaded).owned.tree(), &triangles).unwrap();
