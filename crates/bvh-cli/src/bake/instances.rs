@@ -1,8 +1,9 @@
 //! `bvh bake --instances`: writes a tree for every mesh of a glTF file, and one tree over the
 //! instances that its nodes place, into a folder.
 
-use super::plan::{Found, Plan, Prepared};
-use super::{BakeArgs, decide};
+use super::plan::{Found, Plan};
+use super::watch::Watch;
+use super::{BakeArgs, Effort};
 use crate::Error;
 use crate::answer::{Answer, gain, short, whole};
 use crate::interrupt::is_interrupted;
@@ -13,6 +14,7 @@ use bvh_core::{Instance, InvalidInstances, Primitives, Triangle, WideBvh};
 use bvh_scenes::files;
 use bvh_scenes::load::{Format, gltf};
 use bvh_scenes::{Scene, SceneError, SceneKind};
+use bvh_search::{Budget, Open};
 use glam::Affine3A;
 use serde_json::json;
 use std::fs;
@@ -58,18 +60,18 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
         .map(|(place, instance)| (place.node, place.mesh, instance.transform.to_cols_array()));
     write_table(&path, COLUMNS, rows)?;
     let objects: usize = scenes.iter().chain([&top]).map(|scene| scene.boxes.len()).sum();
-    if args.budget.is_none() {
-        plan.effort = decide::work(objects, answer);
-    }
+    let ample = Budget::of_objects(objects).max_work.unwrap_or(0);
+    plan.effort.get_or_insert(Effort::Work(ample));
     // The top tree's objects are boxes, which cannot be divided, and no wide layout is made of it.
-    let plan_of_top = Plan { references: 1.0, objective: Objective::InternalArea, ..plan.clone() };
+    let plan_of_top =
+        Plan { references: 1.0, objective: Some(Objective::InternalArea), ..plan.clone() };
     let names = parts.meshes.keys().map(|mesh| format!("mesh_{mesh}.bvh")).chain([TOP.into()]);
     let given = scenes.iter().map(|scene| (scene, &plan)).chain([(&top, &plan_of_top)]);
     for (name, (scene, plan)) in names.zip(given) {
         // Every tree gets a share of the budget in proportion to its number of objects.
         let part = scene.boxes.len() as f64 / objects as f64;
-        let plan = Plan { effort: plan.effort.share(part), ..plan.clone() };
-        let found = plan.search(scene, None, Prepared::default())?;
+        let plan = plan.share(part);
+        let found = plan.search(scene, None, &Open::default(), Watch::new(plan.effort), answer)?;
         save_part(&found, &out.join(name), answer)?;
     }
     if is_interrupted() {
@@ -94,11 +96,11 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
 pub(super) fn save_part(found: &Found, path: &Path, answer: &mut Answer) -> Result<(), Error> {
     found.save(path, files::Reserved::new(path, 0, false)?)?;
     let cost = found.baked.outcome.cost;
-    let Some(base) = found.baked.greedy else { return Ok(()) };
+    let Some(base) = found.baked.greedy_cost else { return Ok(()) };
     let objects = found.scene.boxes.len();
     let file = path.display().to_string();
     answer.say(&format!(
-        "{file}: {} objects, {} {}, {} the greedy tree's",
+        "{file}: {} objects, {} {}, {} against a greedy tree",
         whole(objects),
         found.unit().unwrap_or("total area of inner nodes"),
         short(cost),
@@ -106,7 +108,7 @@ pub(super) fn save_part(found: &Found, path: &Path, answer: &mut Answer) -> Resu
     ));
     answer.list(
         "trees",
-        json!({ "file": file, "objects": objects, "cost": cost, "cost in the greedy tree": base }),
+        json!({ "file": file, "objects": objects, "cost": cost, "greedy_cost": base }),
     );
     Ok(())
 }

@@ -211,6 +211,7 @@ fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
         at,
         &[
             ("bake", &["spheres75", "--budget=0s", "--out=x.bvh"]),
+            ("bench", &["good.bvh", "spheres75"]),
             ("inspect", &["good.bvh", "spheres75"]),
             ("verify", &["good.bvh", "spheres75"]),
             ("export", &["good.bvh", "spheres75", "--for=obvhs", "--out=x.bin"]),
@@ -231,9 +232,13 @@ fn the_results_of_all_commands_are_printed_as_json() {
         ("bake escher --budget=10kwork --out=x.bvh --rays=through.csv", "seconds"),
         ("bake escher --budget=1Mwork --parts=2 --list", "parts"),
         ("render spheres75 --size=8x8 --out=x.png", "rays"),
-        ("report good.bvh spheres75", "Depth"),
+        ("report good.bvh spheres75", "depth"),
+        ("verify good.bvh spheres75", "valid"),
     ] {
         let facts = facts(folder.path(), line);
         assert!(facts.contains_key(fact), "{line}: {facts:?}");
+        let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+        let odd = facts.keys().find(|key| !key.chars().all(is_plain));
+        assert_eq!(odd, None, "{line}");
     }
 }

@@ -5,6 +5,7 @@ mod bake_instances;
 #[cfg(unix)]
 mod bake_interrupted;
 mod bake_parts;
+mod bench;
 mod commands;
 mod examples;
 mod export;

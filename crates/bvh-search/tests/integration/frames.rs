@@ -136,6 +136,7 @@ fn a_tree_in_a_frame_keeps_it_and_the_answers_of_rays() {
     for (references, rays) in [(1.0, &[][..]), (1.2, &[]), (1.2, &rays)] {
         let [owned, plain] = [Frames::Auto, Frames::File].map(|frame| {
             let budget = work(2_000_000);
+            let references = Some(references);
             let options = Options { references, budget, rays, frame, ..Options::default() };
             OwnedTree::find(shapes(&triangles), &options, &()).unwrap()
         });
