@@ -92,10 +92,11 @@ typedef struct {
     const float *rays;
     // The number of rays; 0 for a tree for random lines.
     size_t ray_count;
-    // The average number of parts into which triangles may be divided among leaves, up to 16; 0 is
-    // 1, for whole triangles.
+    // The average number of parts into which triangles may be divided among leaves, up to 16; 1 is
+    // for whole triangles. 0 is 1 with `work` or `seconds`, and chosen without.
     double references;
-    // The time of the search in seconds, if there is no `work` or if it is not 0.
+    // The time of the search in seconds; 0 is no limit. Without `seconds` and `work`, the search
+    // chooses its work, its cost and its rays, as Python and the program `bvh` do.
     double seconds;
     // The largest number of nodes created or visited; 0 is no limit. With `work` and without
     // `seconds`, the tree is the same on every machine, and the same as from Python and from the

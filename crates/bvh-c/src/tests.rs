@@ -5,7 +5,7 @@ use crate::failure::{BvsStatus, bvs_last_error, status};
 use crate::{double::*, instances::*, tracer::*, tree::*};
 use bvh_search::bvh_core::export::Target;
 use bvh_search::bvh_core::{DRay, DTriangle, DWideBvh, Orientation, Primitives, Select};
-use bvh_search::{Frames, Objects, Options, OwnedTree, prelude::*};
+use bvh_search::{Objects, Options, OwnedTree, prelude::*};
 use std::ffi::{CStr, CString, c_void};
 use std::ptr::{null, null_mut};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -278,8 +278,8 @@ struct Particle {
 #[test]
 fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_excluded_ids() {
     const FAR: f64 = 5_412_345.678;
-    let corners: Vec<f64> = corners(40).into_iter().map(|x| f64::from(x) / 3.0 + FAR).collect();
-    let triangles: Vec<DTriangle> = corners
+    let numbers: Vec<f64> = corners(40).into_iter().map(|x| f64::from(x) / 3.0 + FAR).collect();
+    let triangles: Vec<DTriangle> = numbers
         .as_chunks::<3>()
         .0
         .as_chunks::<3>()
@@ -288,7 +288,7 @@ fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_exclu
         .map(|&triangle| DTriangle::from(triangle))
         .collect();
     let vertices: Vec<f64> =
-        corners.chunks(3).flat_map(|xyz| [xyz, &[f64::NAN]].concat()).collect();
+        numbers.chunks(3).flat_map(|xyz| [xyz, &[f64::NAN]].concat()).collect();
     let ids: Vec<u32> = (0..120).collect();
     let objects = BvsObjects {
         count: 40,
@@ -314,6 +314,11 @@ fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_exclu
     unsafe {
         let tree = bvs_tree_bake(&BvsBake { objects, work: 3000, frame: 1, ..NO_BAKE });
         ok(bvs_tree_save(tree, path.as_ptr()));
+        ok(bvs_tree_update(tree, &objects));
+        let corners = corners(40);
+        let single = soup(&corners);
+        let accepted = "objects are 40 triangles; accepted: 40 triangles in f64";
+        invalid(bvs_tree_update(tree, &single), accepted);
         let loaded = bvs_tree_load(path.as_ptr(), &objects);
         assert_eq!((*loaded).owned.tree(), (*tree).owned.tree());
         let wide = DWideBvh::new((*loaded).owned.tree(), &triangles).unwrap();
@@ -582,7 +587,7 @@ fn invalid_arguments_are_rejected_by_name() {
 }
 
 #[test]
-fn a_budget_of_work_gives_the_file_of_the_rust_crates() {
+fn a_budget_of_work_and_none_at_all_give_the_file_of_the_rust_crates() {
     let corners = corners(40);
     let triangles = bytes_as_triangles(&corners);
     let segments: Vec<Segment> = (0..60u8)
@@ -596,8 +601,13 @@ fn a_budget_of_work_gives_the_file_of_the_rust_crates() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("c.bvh");
     let name = CString::new(path.to_str().unwrap()).unwrap();
-    for (references, rays) in [(1.0, &[][..]), (1.5, &[]), (1.0, &segments), (1.5, &segments)] {
-        let work = 50_000;
+    for (references, work, rays) in [
+        (1.0, 50_000, &[][..]),
+        (1.5, 50_000, &[]),
+        (1.0, 50_000, &segments),
+        (1.5, 50_000, &segments),
+        (0.0, 0, &[]),
+    ] {
         let bake = BvsBake {
             objects: soup(&corners),
             rays: floats.as_ptr(),
@@ -615,9 +625,19 @@ fn a_budget_of_work_gives_the_file_of_the_rust_crates() {
             bvs_tree_free(tree);
         }
         let objects = Objects::Shapes(Primitives::Triangles(triangles.clone()));
-        let budget = Budget { max_work: Some(work), ..Budget::UNLIMITED };
-        let options = Options { references, seed: 3, budget, rays, frame: Frames::Auto };
-        let expected = OwnedTree::find(objects, &options, &()).unwrap().save().unwrap();
+        let given = |number: f64| (number > 0.0).then_some(number);
+        let max_work = given(work as f64).map(|work| work as u64);
+        let options = Options {
+            references: given(references),
+            seed: 3,
+            budget: Budget { max_work, ..Budget::UNLIMITED },
+            rays,
+            anywhere: Some(bvh_scenes::rays::anywhere),
+            ..Options::default()
+        };
+        let expected = OwnedTree::find(objects, &options, &()).unwrap();
+        assert_eq!(expected.reasons().len() > 1, work == 0);
+        let expected = expected.save().unwrap();
         assert!(std::fs::read(&path).unwrap() == expected, "{references}, {} rays", rays.len());
     }
 }

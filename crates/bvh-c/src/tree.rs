@@ -8,7 +8,7 @@ use bvh_search::bvh_core::export::{FirstCountNode, Target};
 use bvh_search::bvh_core::glam::{DMat3, DVec3};
 use bvh_search::bvh_core::{DTriangle, Primitives};
 use bvh_search::prelude::*;
-use bvh_search::{Frames, Objects, Observer, Options, OwnedTree};
+use bvh_search::{Anywhere, Frames, Objects, Observer, Options, OwnedTree};
 use std::ffi::{CStr, c_char, c_void};
 use std::ptr::null;
 use std::sync::Arc;
@@ -88,7 +88,11 @@ pub unsafe extern "C" fn bvs_tree_from_triangles(
         // SAFETY: `vertices` points to 9 floats for each of `count` triangles.
         let triangles = unsafe { objects_of(&triangles) }?;
         let frame = Frames::File;
-        found(triangles, &Options { references, frame, ..Options::default() }, Some(seconds))
+        found(
+            triangles,
+            &Options { references: Some(references), frame, ..Options::default() },
+            Some(seconds),
+        )
     })
 }
 
@@ -141,10 +145,11 @@ pub struct BvsBake {
     pub rays: *const f32,
     /// The number of rays; 0 for a tree for random lines.
     pub ray_count: usize,
-    /// The average number of parts into which triangles may be divided among leaves, up to 16; 0 is
-    /// 1, for whole triangles.
+    /// The average number of parts into which triangles may be divided among leaves, up to 16; 1 is
+    /// for whole triangles. 0 is 1 with `work` or `seconds`, and chosen without.
     pub references: f64,
-    /// The time of the search in seconds, if there is no `work` or if it is not 0.
+    /// The time of the search in seconds; 0 is no limit. Without `seconds` and `work`, the search
+    /// chooses its work, its cost and its rays, as Python and the program `bvh` do.
     pub seconds: f64,
     /// The largest number of nodes created or visited; 0 is no limit. With `work` and without
     /// `seconds`, the tree is the same on every machine, and the same as from Python and from the
@@ -176,12 +181,12 @@ pub unsafe extern "C" fn bvs_tree_bake(bake: *const BvsBake) -> *mut BvsTree {
         // SAFETY: `rays` points to 6 floats for each of `ray_count` rays.
         let rays = unsafe { slice("rays", rays.cast::<[[f32; 3]; 2]>(), ray_count) }?;
         let rays: Vec<Segment> = rays.iter().map(|&[from, to]| Segment { from, to }).collect();
-        let references = if bake.references == 0.0 { 1.0 } else { bake.references };
+        let references = (bake.references != 0.0).then_some(bake.references);
         let max_work = (work > 0).then_some(work);
         let budget = Budget { max_work, ..Budget::UNLIMITED };
-        let options = Options { references, seed, budget, rays: &rays, frame };
-        let is_timed = max_work.is_none() || seconds != 0.0;
-        found(objects, &options, is_timed.then_some(seconds))
+        let anywhere: Option<Anywhere> = Some(bvh_scenes::rays::anywhere);
+        let options = Options { references, seed, budget, rays: &rays, anywhere, frame };
+        found(objects, &options, (seconds != 0.0).then_some(seconds))
     })
 }
 

@@ -44,7 +44,7 @@ impl Answer {
         self.list(list, line);
     }
 
-    /// Adds a fact and prints it as a line, `name: value`.
+    /// Adds a fact, whose key is the name with underscores, and prints it as a line, `name: value`.
     pub fn fact(&mut self, name: &str, value: impl Into<Value>) {
         let value = value.into();
         let text = match &value {
@@ -56,7 +56,7 @@ impl Answer {
             other => other.to_string(),
         };
         self.say(&format!("{name}: {text}"));
-        self.record(name, value);
+        self.record(&snake(name), value);
     }
 
     /// Prints the facts as JSON, if that is the form.
@@ -65,6 +65,12 @@ impl Answer {
             print_line(&format!("{:#}", Value::Object(facts)));
         }
     }
+}
+
+/// Returns a name in words as a key: `depth of leaves` as `depth_of_leaves`.
+pub fn snake(name: &str) -> String {
+    let words = name.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
+    words.collect::<Vec<_>>().join("_").to_lowercase()
 }
 
 /// Writes a whole number with its digits in groups of three.
@@ -85,12 +91,17 @@ pub fn short(number: f64) -> String {
     }
 }
 
-/// Says by how many per cent `cost` is below or above `base`.
+/// Says by how many per cent `cost` is below or above `base`: `−12.4 %`.
 pub fn gain(cost: f64, base: f64) -> String {
-    let percent = if base > 0.0 { 100.0 * (cost / base - 1.0) } else { 0.0 };
-    let direction = if percent > 0.0 { "above" } else { "below" };
+    let percent = 0.0 - 100.0 * saved(cost, base);
     let digits = if percent.abs() < 10.0 { 2 } else { 1 };
-    format!("{:.digits$} % {direction}", percent.abs())
+    // A hyphen would be shorter than the plus.
+    format!("{percent:+.digits$} %").replace('-', "−")
+}
+
+/// Returns the fraction by which `cost` is below `base`.
+pub fn saved(cost: f64, base: f64) -> f64 {
+    if base > 0.0 { 1.0 - cost / base } else { 0.0 }
 }
 
 /// Returns a frame as facts: `null`, or the rows of its rotation and its centre.
@@ -124,6 +135,6 @@ mod tests {
         let numbers = [0, 7, 999, 1000, 149_089_272].map(whole);
         assert_eq!(numbers, ["0", "7", "999", "1 000", "149 089 272"]);
         let gains = [(0.5, 1.0), (1.0, 1.0), (1.0, 0.0), (1.034, 1.0)].map(|(a, b)| gain(a, b));
-        assert_eq!(gains, ["50.0 % below", "0.00 % below", "0.00 % below", "3.40 % above"]);
+        assert_eq!(gains, ["−50.0 %", "+0.00 %", "+0.00 %", "+3.40 %"]);
     }
 }

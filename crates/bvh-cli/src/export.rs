@@ -4,6 +4,7 @@ use crate::Error;
 use crate::answer::{Answer, gain, whole};
 use crate::arguments::{load_scene, output_file};
 use bvh_build::{Builder, muller_fellner};
+use bvh_core::cost::Objective;
 use bvh_core::export::{Layout, Target};
 use bvh_scenes::{files, tree_file};
 use bvh_search::FramedExport;
@@ -45,7 +46,7 @@ pub fn export(args: &ExportArgs, answer: &mut Answer) -> Result<(), Error> {
     let extension = if target.layout == Layout::Json { "json" } else { "bin" };
     output_file("--out", &args.out, extension)?;
     let scene = load_scene(&args.scene)?;
-    let (tree, _) = tree_file::load(&args.file, &scene)?;
+    let (tree, header) = tree_file::load(&args.file, &scene)?;
     if tree.frame.is_some() {
         return Err(Error::Usage(format!(
             "{}: {FramedExport} (--frame file)",
@@ -76,15 +77,21 @@ pub fn export(args: &ExportArgs, answer: &mut Answer) -> Result<(), Error> {
     let [inside, outside] = better.gains.map(|times| gain(1.0, times));
     let nodes = better.tree.nodes.len();
     answer.say(&format!(
-        "{}: {} nodes of {which}; tests of rays from inside the scene {inside} a greedy tree's, of \
-         rays from outside {outside}",
+        "{}: {} nodes of {which}; {inside} tests of rays from inside the scene against a greedy \
+         tree, {outside} of rays from outside",
         args.out.display(),
         whole(nodes)
     ));
+    if header.objective == Objective::Layout {
+        answer.say(&format!(
+            "the tree is for the wide layout; `bvh bake {} --for {}` searches for this tracer",
+            args.scene, target.name
+        ));
+    }
     answer.record("nodes", nodes);
-    answer.record("cost of a ray", target.cost(&better.tree));
-    answer.record("is searched", better.is_searched());
-    answer.record("gain inside", better.gains[0]);
-    answer.record("gain outside", better.gains[1]);
+    answer.record("cost_per_ray", target.cost(&better.tree));
+    answer.record("is_searched", better.is_searched());
+    answer.record("gain_inside", better.gains[0]);
+    answer.record("gain_outside", better.gains[1]);
     Ok(())
 }

@@ -2,7 +2,7 @@
 //! its tree.
 
 use crate::Error;
-use crate::answer::{Answer, frame_facts};
+use crate::answer::{Answer, frame_facts, saved};
 use crate::arguments::{load_scene, output_file};
 use crate::output::write_table;
 use crate::rays::Rays;
@@ -22,7 +22,7 @@ pub struct InspectArgs {
     #[arg(value_name = "FILE.bvh")]
     pub file: PathBuf,
     /// The tree's scene, by name or path of a mesh file. Checks the tree against the scene's
-    /// objects, and compares it with the Müller–Fellner tree.
+    /// objects, and compares it with the greedy tree.
     pub scene: Option<String>,
     /// Measure the expected tests of rays in the wide layout of the tree: `default` for rays that
     /// need no camera, or a file that describes the rays of a renderer. No bake trains on the same
@@ -50,12 +50,13 @@ pub fn inspect(args: &InspectArgs, answer: &mut Answer) -> Result<(), Error> {
     };
     match &scene {
         Some(scene) => {
-            answer.fact("valid", "yes, over this scene's objects");
+            answer.say("valid: yes, over this scene's objects");
             answer.fact("scene", scene.name.as_str());
         }
         // Without a scene there are no boxes to check against, which the fact must not hide.
-        None => answer.fact("valid", "as a tree; name a scene to check its objects too"),
+        None => answer.say("valid: as a tree; name a scene to check its objects too"),
     }
+    answer.record("valid", true);
     answer.fact("version", Header::VERSION);
     answer.fact("bytes", files::regular(&args.file)?);
     describe(&header, answer);
@@ -65,13 +66,13 @@ pub fn inspect(args: &InspectArgs, answer: &mut Answer) -> Result<(), Error> {
     // The build cannot fail, because a valid tree over these boxes proves that they are finite.
     if let Some(scene) = &scene
         && let Ok(greedy) = muller_fellner::Config::default().build(&scene.boxes)
-        && cost::internal_area(&greedy) > 0.0
     {
-        let ratio = cost::internal_area(&tree) / cost::internal_area(&greedy);
-        answer.fact("internal area over Müller–Fellner's", ratio);
+        let base = cost::internal_area(&greedy);
+        answer.fact("greedy area", base);
+        answer.fact("saved", saved(cost::internal_area(&tree), base));
     }
     if let Some(tests) = tests {
-        answer.fact("expected tests of a ray", tests);
+        answer.fact("tests per ray", tests);
     }
     if let Some(path) = &args.nodes {
         write_nodes(&tree, path)?;
@@ -129,8 +130,8 @@ fn measure(tree: &Bvh, answer: &mut Answer) {
     answer.fact("inner nodes", tree.inner_count());
     answer.fact("leaves", tree.nodes.len() - tree.inner_count());
     answer.fact("depth", tree.depth());
-    answer.fact("internal area", area);
-    answer.fact("internal area over root area", cost::over_root_area(tree, area));
+    answer.fact("area", area);
+    answer.fact("area over root area", cost::over_root_area(tree, area));
     answer.fact("Goldsmith–Salmon cost", cost::goldsmith_salmon(tree));
     answer.fact("surface area heuristic", cost::sah(tree, &SahConstants::default()));
     // Sorted by size, so that the same tree always gives the same line.

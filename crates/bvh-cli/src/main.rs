@@ -3,6 +3,7 @@
 mod answer;
 mod arguments;
 mod bake;
+mod bench;
 mod error;
 mod export;
 mod inspect;
@@ -48,6 +49,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Bake(Box<bake::BakeArgs>),
+    Bench(bench::BenchArgs),
     Inspect(InspectArgs),
     /// Prove that a tree file from any source contains a tree for a scene. Computes validity and
     /// costs again.
@@ -96,11 +98,11 @@ fn run(Cli { command, json, jobs }: Cli) -> Result<(), Error> {
     }
     let mut answer = Answer::new(json);
     match command {
-        Command::Bake(args) if args.instances => bake::instances::bake(&args, &mut answer)?,
         Command::Bake(args) => match args.parts {
             Some(count) => bake::parts::bake(&args, count, &mut answer)?,
             None => bake::bake(&args, &mut answer)?,
         },
+        Command::Bench(args) => bench::bench(&args, &mut answer)?,
         Command::Inspect(args) => inspect::inspect(&args, &mut answer)?,
         Command::Verify { file, scene } => {
             let args = InspectArgs { file, scene: Some(scene), rays: None, nodes: None };

@@ -79,8 +79,8 @@ pub fn orient(args: &OrientArgs, answer: &mut Answer) -> Result<(), Error> {
         let [objects, gain] = [whole(triangles), gain(after, before)];
         let areas = [before, after].map(short).join(" to ");
         answer.say(&format!("mesh {mesh}: {objects} triangles, area {areas}, {gain}"));
-        let facts = json!({ "mesh": mesh, "triangles": triangles, "area before": before,
-            "area after": after });
+        let facts = json!({ "mesh": mesh, "triangles": triangles, "greedy_area_before": before,
+            "greedy_area_after": after });
         answer.list("meshes", facts);
     }
     let turned = oriented.turned.len();

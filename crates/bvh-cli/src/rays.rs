@@ -6,11 +6,11 @@ use crate::interrupt::is_interrupted;
 use crate::npy::read_npy;
 use bvh_config::fault;
 use bvh_core::cost::Objective;
-use bvh_core::{Aabb, Bvh, Ray, RayDensity, Segment, Slabs};
+use bvh_core::{Aabb, Bvh, DensityError, Ray, RayDensity, Segment, Slabs};
 use bvh_scenes::Scene;
 use bvh_scenes::files::{read, read_text};
-use bvh_scenes::rays::{RenderedRays, TRAINED, density, of_anything, of_renderer};
-use bvh_search::ray_density;
+use bvh_scenes::rays::{RenderedRays, anywhere, density, of_renderer};
+use bvh_search::{Open, ray_density};
 use glam::Vec3;
 use std::path::Path;
 
@@ -26,10 +26,6 @@ pub enum Rays {
 }
 
 impl Rays {
-    /// The seed of rays that judge trees. A bake trains on other rays, unless its `--seed` is this
-    /// number.
-    pub const JUDGING: u64 = u64::MAX;
-
     /// Returns the rays named `default`, or reads the file with this name.
     pub fn read(named: &str) -> Result<Self, Error> {
         if named == "default" {
@@ -77,39 +73,35 @@ impl Rays {
         Err(Error::Usage(message))
     }
 
-    /// Returns the rays' density in a scene, or `None` soon after the user interrupts; `tree` is any
-    /// valid tree over the scene.
+    /// Returns the rays' density in a scene, or `None` soon after `is_over` returns true; `tree` is
+    /// any valid tree over the scene.
     pub fn density(
         &self,
         scene: &Scene,
         tree: &Bvh,
         seed: u64,
-    ) -> Result<Option<RayDensity>, Error> {
-        let density = match self {
-            Self::Default => {
-                let rays = of_anything(TRAINED, scene, tree, seed, &is_interrupted);
-                density(&rays, tree).map(Some)
-            }
+        is_over: &dyn Fn() -> bool,
+    ) -> Result<Option<RayDensity>, DensityError> {
+        match self {
+            Self::Default => anywhere(&scene.primitives, tree, seed, is_over),
             Self::Rendered(config) => {
-                let rays = of_renderer(config, scene, tree, &is_interrupted);
-                density(&rays, tree).map(Some)
+                let rays = of_renderer(config, scene, tree, is_over);
+                // After an interruption there may be none, which is an error otherwise.
+                if is_over() { Ok(None) } else { density(&rays, tree).map(Some) }
             }
             Self::Recorded(_, segments) => {
-                ray_density(tree, Some(&scene.primitives), segments, &is_interrupted)
+                ray_density(tree, Some(&scene.primitives), segments, is_over)
             }
-        };
-        // After an interruption some rays are missing, or all of them, which is an error otherwise.
-        if is_interrupted() {
-            return Ok(None);
         }
-        density.map_err(|source| Error::Tracing { scene: scene.name.clone(), source })
     }
 
     /// Returns the expected number of tests of a ray that enters the scene, in the wide layout of a
     /// tree. No bake trains on the same default rays.
     pub fn expected_tests(&self, tree: &Bvh, scene: &Scene) -> Result<f64, Error> {
         self.check(scene)?;
-        let density = self.density(scene, tree, Self::JUDGING)?;
+        let density = self
+            .density(scene, tree, Open::JUDGING, &is_interrupted)
+            .map_err(|source| Error::Tracing { scene: scene.name.clone(), source })?;
         let (Some(density), Some(root)) = (density, tree.root_aabb()) else { return Ok(0.0) };
         let tests = Objective::Layout.cost_by(tree, &density);
         let entering = density.measure(&root);

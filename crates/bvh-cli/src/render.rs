@@ -124,8 +124,8 @@ pub fn render(args: &RenderArgs, answer: &mut Answer) -> Result<(), Error> {
     ));
     answer.record("objects", objects);
     answer.record("rays", film.rays);
-    answer.record("seconds to build", built);
-    answer.record("seconds to render", rendered);
+    answer.record("seconds_to_build", built);
+    answer.record("seconds_to_render", rendered);
     if args.accel != "wide" {
         let rays_per_pixel = f64::from(options.samples * options.samples);
         answer.fact("boxes per ray", film.counts.boxes as f64 / film.rays as f64);

@@ -1,7 +1,7 @@
 //! `bvh report`: one page about a tree file, compared with the plain tree that a library builds.
 
 use crate::Error;
-use crate::answer::{Answer, short, whole};
+use crate::answer::{Answer, short, snake, whole};
 use crate::arguments::{load_scene, output_file, output_or_free};
 use crate::output::png;
 use crate::rays::Rays;
@@ -59,7 +59,7 @@ pub fn report(args: &ReportArgs, answer: &mut Answer) -> Result<(), Error> {
     answer.say(&format!("{}: {title}", out.display()));
     answer.record("file", out.display().to_string());
     for ((name, baked), (_, greedy)) in facts.iter().zip(&facts_of_greedy) {
-        answer.record(name, json!({ "baked": baked, "greedy": greedy }));
+        answer.record(&snake(name), json!({ "baked": baked, "greedy": greedy }));
     }
     let ranges = [&film, &film_of_greedy].map(range);
     // The same colour must mean the same number of tests in both.
@@ -112,7 +112,7 @@ fn measure(
     let over_root = |cost| cost::over_root_area(greedy, cost);
     let tests = (film.counts.boxes + film.counts.objects) as f64 / film.rays.max(1) as f64;
     let mut facts = vec![
-        ("Total area of inner nodes over the root's", over_root(cost::internal_area(tree))),
+        ("Area of inner nodes over the root's", over_root(cost::internal_area(tree))),
         ("Cost of the wide layout by area", over_root(Objective::Layout.cost(tree))),
         ("Tests per ray of the picture, in the binary tree", tests),
         ("Depth", tree.depth() as f64),

@@ -17,8 +17,8 @@ pub fn seconds(argument: &Bound<PyAny>) -> PyResult<Option<f64>> {
 }
 
 /// Reads the argument `references`.
-pub fn references(argument: &Bound<PyAny>) -> PyResult<f64> {
-    number("references", argument, "1 to 16")
+pub fn references(argument: &Bound<PyAny>) -> PyResult<Option<f64>> {
+    optional("references", argument, "1 to 16")
 }
 
 /// Reads the argument `seed`.

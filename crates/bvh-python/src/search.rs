@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
 /// The limits of a search, and the function that follows it.
 pub struct Limits {
-    /// The time; 1 second if there is no limit of work either.
+    /// The time.
     pub seconds: Option<f64>,
     /// Nodes created or visited.
     pub work: Option<u64>,
@@ -51,7 +51,6 @@ pub fn run<T: Send>(
     Limits { seconds, work, progress }: Limits,
     search: impl FnOnce(Budget, &dyn Observer) -> T + Send,
 ) -> PyResult<(T, PyResult<()>)> {
-    let seconds = if work.is_none() { Some(seconds.unwrap_or(1.0)) } else { seconds };
     let limit = seconds.map(duration).transpose()?;
     let budget = Budget { max_work: work, ..Budget::UNLIMITED };
     let watch = &Watch {

@@ -12,7 +12,7 @@ use bvh_scenes::files::{self, WriteError};
 use bvh_scenes::tree_file::{self, TreeFileError};
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
 use bvh_search::bvh_core::export::Target;
-use bvh_search::{BakeError, Frames, Objects, Options, OwnedTree, SearchError};
+use bvh_search::{Anywhere, BakeError, Frames, Objects, Options, OwnedTree, SearchError};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -28,14 +28,16 @@ use std::sync::{Arc, PoisonError, RwLock, RwLockWriteGuard};
 /// its objects and its faces, but forgets the `rays`, the `seed` and the `references` of its
 /// search, as a file does: `improve` then minimises the cost for random lines.
 ///
-/// Searches have these arguments. They end after `seconds`, by default 1, or after `work` nodes
-/// created or visited. With `work` and without `seconds`, the same `seed` gives the same tree on
+/// Searches have these arguments. They end after `seconds` or after `work` nodes created or visited.
+/// Without either, a search chooses its work, and what else is not given: `reasons` says why. With
+/// `work` and without `seconds`, the same `seed` gives the same tree on
 /// every machine, and the same file as `bvh bake`. `progress(seconds, cost)` is called about twenty
 /// times per second with the elapsed time and the lowest cost so far; if it raises an exception,
 /// the search ends. `rays` are recorded rays of the shape `(m, 2, 3)`, from their origins to their
 /// hits: the tree is then for rays like these. `references` above 1, up to 16, divides triangles
-/// among leaves, on average into that many parts each. With `precision="double"` the triangles have
-/// `float64` coordinates, each 0 or 2^-150 to 2^120 in size, and `Tracer` answers in `float64`.
+/// among leaves, on average into that many parts each; 1 keeps them whole. With
+/// `precision="double"` the triangles have `float64` coordinates, each 0 or 2^-150 to 2^120 in size,
+/// and `Tracer` answers in `float64`.
 ///
 /// >>> from bvh_search import Tree
 /// >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
@@ -85,13 +87,13 @@ impl Tree {
     ///
     /// >>> mesh = Tree.from_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], work=100)
     #[staticmethod]
-    #[pyo3(signature = (vertices, faces, seconds = None, *, references = 1.0, seed = 1, work = None, progress = None, rays = None, frame = "auto", precision = "single"))]
+    #[pyo3(signature = (vertices, faces, seconds = None, *, references = None, seed = 1, work = None, progress = None, rays = None, frame = "auto", precision = "single"))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
     fn from_mesh(
         vertices: &Bound<PyAny>,
         faces: &Bound<PyAny>,
         #[pyo3(from_py_with = scalars::seconds)] seconds: Option<f64>,
-        #[pyo3(from_py_with = scalars::references)] references: f64,
+        #[pyo3(from_py_with = scalars::references)] references: Option<f64>,
         #[pyo3(from_py_with = scalars::seed)] seed: u64,
         #[pyo3(from_py_with = scalars::work)] work: Option<u64>,
         progress: Option<Py<PyAny>>,
@@ -113,12 +115,12 @@ impl Tree {
     ///
     /// >>> triangle = Tree.from_triangles([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], seconds=0.1)
     #[staticmethod]
-    #[pyo3(signature = (triangles, seconds = None, *, references = 1.0, seed = 1, work = None, progress = None, rays = None, frame = "auto", precision = "single"))]
+    #[pyo3(signature = (triangles, seconds = None, *, references = None, seed = 1, work = None, progress = None, rays = None, frame = "auto", precision = "single"))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments")]
     fn from_triangles(
         triangles: &Bound<PyAny>,
         #[pyo3(from_py_with = scalars::seconds)] seconds: Option<f64>,
-        #[pyo3(from_py_with = scalars::references)] references: f64,
+        #[pyo3(from_py_with = scalars::references)] references: Option<f64>,
         #[pyo3(from_py_with = scalars::seed)] seed: u64,
         #[pyo3(from_py_with = scalars::work)] work: Option<u64>,
         progress: Option<Py<PyAny>>,
@@ -219,7 +221,7 @@ impl Tree {
         Ok(PyBytes::new(py, &bytes))
     }
 
-    /// Improves the tree for about `seconds`. Ctrl-C ends the search early, and the tree keeps its
+    /// Improves the tree for about `seconds`, by default 1, or for `work`. Ctrl-C ends the search early, and the tree keeps its
     /// gains. Until the call returns, other threads see the old tree, and a second `improve` raises
     /// a `RuntimeError`.
     ///
@@ -234,6 +236,7 @@ impl Tree {
     ) -> PyResult<()> {
         let _improving = self.improver.begin()?;
         let owned = self.owned();
+        let seconds = seconds.or(work.is_none().then_some(1.0));
         let limits = Limits { seconds, work, progress };
         let (improvement, raised) =
             search::run(py, limits, |budget, observer| owned.improvement(budget, observer))?;
@@ -297,6 +300,15 @@ impl Tree {
             Precision::Single => "single",
             Precision::Double => "double",
         }
+    }
+
+    /// What the search chose by itself, and why: one line each. A loaded tree has none.
+    ///
+    /// >>> square.reasons
+    /// ["frame: no other saves enough area; kept are the file's axes"]
+    #[getter]
+    fn reasons(&self) -> Vec<String> {
+        self.owned().reasons().iter().map(ToString::to_string).collect()
     }
 
     /// The frame of the boxes, a rotation and a centre: they contain `rotation @ (p - centre)` for
@@ -380,7 +392,8 @@ fn found(
     limits: Limits,
 ) -> PyResult<Tree> {
     let (found, raised) = search::run(py, limits, |budget, observer| {
-        OwnedTree::find(objects, &Options { budget, ..*options }, observer)
+        let anywhere: Option<Anywhere> = Some(bvh_scenes::rays::anywhere);
+        OwnedTree::find(objects, &Options { budget, anywhere, ..*options }, observer)
     })?;
     raised?;
     found.map(Tree::new).map_err(|error| match error {

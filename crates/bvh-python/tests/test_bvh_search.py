@@ -110,9 +110,9 @@ def test_a_tree_whose_boxes_do_not_contain_its_objects_is_no_tree(tmp_path, refe
             Tree.load(path, **objects)
 
 
-@pytest.mark.parametrize("references", [1.0, 1.3])
+@pytest.mark.parametrize("references", [1.0, 1.3, None])
 @pytest.mark.parametrize("has_rays", [False, True])
-def test_a_budget_of_work_gives_the_file_of_the_program(tmp_path, references, has_rays):
+def test_a_budget_of_work_and_none_at_all_give_the_file_of_the_program(tmp_path, references, has_rays):
     program = os.environ.get("BVH_PROGRAM")
     if not program:
         pytest.skip("BVH_PROGRAM is not the path of the program bvh")
@@ -121,10 +121,13 @@ def test_a_budget_of_work_gives_the_file_of_the_program(tmp_path, references, ha
     (tmp_path / "mesh.obj").write_text(corners + faces)
     rays = RANDOM.uniform(0, 10, (90, 2, 3)).astype(np.float32)
     rays.astype("<f4").tofile(tmp_path / "rays.bin")
-    flags = ["--budget=300kwork", f"--references={references}", "--out=program.bvh"]
-    flags += ["--rays=rays.bin"] if has_rays else []
+    is_limited = references is not None
+    flags = ["--budget=300kwork", f"--references={references}"] if is_limited else []
+    flags += ["--out=program.bvh"] + (["--rays=rays.bin"] if has_rays else [])
     subprocess.run([program, "bake", "mesh.obj", *flags], cwd=tmp_path, check=True)
-    tree = Tree.from_triangles(TRIANGLES, work=300_000, references=references, rays=rays if has_rays else None)
+    work = 300_000 if is_limited else None
+    tree = Tree.from_triangles(TRIANGLES, work=work, references=references, rays=rays if has_rays else None)
+    assert len(tree.reasons) == (1 if is_limited else 3 if has_rays else 5)
     tree.save(tmp_path / "python.bvh")
     assert (tmp_path / "python.bvh").read_bytes() == (tmp_path / "program.bvh").read_bytes()
     export = ["export", "program.bvh", "mesh.obj", "--for=obvhs", "--out=program.bin"]

@@ -4,15 +4,14 @@
 use crate::parallel;
 use crate::run::built_unless_cancelled;
 use crate::{Budget, Kept, Observer, Outcome, Problem, Search, SearchError, Splits};
-use crate::{best, optimize, ray_density, solve_or_keep};
+use crate::{best, optimize, solve_or_keep};
 use best::Horizon;
 use bvh_build::{Builder, Watch, muller_fellner};
 use bvh_config::OutOfRange;
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::file::{self, FileError, Origin};
 use bvh_core::{
-    Aabb, Bvh, Clip, DensityError, Frame, Primitives, RayDensity, Segment, validate,
-    validate_references,
+    Aabb, Bvh, Clip, DensityError, Frame, Primitives, RayDensity, validate, validate_references,
 };
 use core::sync::atomic::AtomicBool;
 
@@ -52,8 +51,8 @@ pub struct Bake<'a> {
     pub objective: Option<Objective>,
     /// The largest average number of references to an object, from 1 for whole objects to 16.
     pub references: f64,
-    /// The division of the objects with spatial splits, if the caller has it.
-    pub division: Option<&'a Bvh>,
+    /// The tree that spatial splits divide the objects into, if the caller has it.
+    pub divided: Option<&'a Bvh>,
     /// The tree that the search continues from, in the same frame; the outcome never costs more.
     /// `None` builds one.
     pub start: Option<&'a Bvh>,
@@ -72,9 +71,9 @@ pub struct Baked {
     /// The result of the search.
     pub outcome: Outcome,
     /// The cost of the greedy tree by the same objective, if there was one.
-    pub greedy: Option<f64>,
+    pub greedy_cost: Option<f64>,
     /// The cost of the [start](Bake::start) by the same objective.
-    pub start: Option<f64>,
+    pub start_cost: Option<f64>,
     /// Whether the search divided objects among leaves.
     pub division: Division,
 }
@@ -101,13 +100,13 @@ pub enum BakeError {
     Rays(#[from] DensityError),
 }
 
-/// Asks the observer to cancel and tells it nothing, because what it hears of belongs to another
-/// search.
-struct Unheard<'a>(&'a dyn Observer);
+/// Asks an observer without a clock to cancel, and tells it nothing, because what it hears of belongs
+/// to another search. One with a clock would make results depend on the machine.
+pub(crate) struct Untimed<'a>(pub &'a dyn Observer);
 
-impl Observer for Unheard<'_> {
+impl Observer for Untimed<'_> {
     fn cancelled(&self) -> bool {
-        self.0.cancelled()
+        self.0.progress().is_none() && self.0.cancelled()
     }
 }
 
@@ -121,7 +120,7 @@ impl<'a> Bake<'a> {
             rays: None,
             objective: None,
             references: 1.0,
-            division: None,
+            divided: None,
             start: None,
             method: None,
             seed: 1,
@@ -141,6 +140,13 @@ impl<'a> Bake<'a> {
             true => Ok(()),
             false => Err(OutOfRange::new("references", references, "1 to 16")),
         }
+    }
+
+    /// Returns the number of [references](Self::references) per object that permits so many in all.
+    pub fn references_of(references: usize, objects: usize) -> f64 {
+        // Half a reference more keeps the product with the number of objects from being rounded
+        // down.
+        ((references as f64 + 0.5) / objects.max(1) as f64).max(1.0)
     }
 
     /// Builds the greedy tree, with which gains are compared. `None` if the observer cancels first.
@@ -179,14 +185,14 @@ impl<'a> Bake<'a> {
         // A division may take all the time of a search that has no tree yet. Such a search divides
         // later itself.
         let is_later = self.starts_divided() || is_timed && greedy.is_none();
-        let divided = match self.division {
-            None if !is_later => self.divided(observer)?,
+        let divided = match self.divided {
+            None if !is_later => self.division(observer)?,
             _ => None,
         };
         let mut division = Division::No;
         if let Some(allowed) = &mut splits {
-            allowed.division = allowed.division.or(divided.as_ref());
-            division = match allowed.division {
+            allowed.divided = allowed.divided.or(divided.as_ref());
+            division = match allowed.divided {
                 _ if is_later => Division::Allowed,
                 Some(tree) if tree.prim_ids.len() > self.boxes.len() => Division::Allowed,
                 Some(_) => Division::Useless,
@@ -199,8 +205,8 @@ impl<'a> Bake<'a> {
         let greedy_cost = greedy.as_ref().map(|greedy| greedy.cost);
         let mut outcome = self.outcome(&problem, greedy, observer)?;
         outcome.tree.frame = self.frame.copied();
-        let start = self.start.map(|tree| problem.cost(tree));
-        Ok(Baked { outcome, greedy: greedy_cost, start, division })
+        let start_cost = self.start.map(|tree| problem.cost(tree));
+        Ok(Baked { outcome, greedy_cost, start_cost, division })
     }
 
     fn outcome(
@@ -216,7 +222,7 @@ impl<'a> Bake<'a> {
         // An early end of a long search leaves a tree that is behind reinsertion's.
         let reinserted = match budget.max_work {
             Some(work) if observer.progress().is_none() && !observer.cancelled() => {
-                best::fallback(problem, work, &Unheard(observer))?
+                best::fallback(problem, work, &Untimed(observer))?
             }
             _ => None,
         };
@@ -255,13 +261,13 @@ impl<'a> Bake<'a> {
         let most = (self.references * self.boxes.len() as f64) as usize;
         let splits = Splits::at_most(most, self.boxes, parts?)?;
         let is_best = self.method.is_none();
-        is_best.then_some(Splits { division: self.division, ..splits })
+        is_best.then_some(Splits { divided: self.divided, ..splits })
     }
 
     /// Divides the objects with spatial splits, or copies the caller's division, unless they stay
     /// whole anyway. `None` if the observer cancels first.
-    pub fn divided(&self, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
-        best::division(self.splits(self.parts().as_deref()), self.boxes, observer)
+    pub(crate) fn division(&self, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
+        best::divided(self.splits(self.parts().as_deref()), self.boxes, observer)
     }
 
     /// Returns whether the start divides objects, after which no search returns to whole ones.
@@ -322,14 +328,5 @@ impl<'a> Bake<'a> {
         let chunks = tree.nodes.chunks(NODES_PER_TASK).collect();
         // One copy of whole chunks; an iterator over all of them would move number by number.
         parallel::map(chunks, |nodes| density.visits_of(&root, nodes)).concat()
-    }
-}
-
-impl Bake<'_> {
-    /// Returns the greedy tree and the [density](ray_density) of recorded segments.
-    pub(crate) fn density(&self, segments: &[Segment]) -> Result<(Bvh, RayDensity), BakeError> {
-        let greedy = self.greedy(&())?.expect("a tree that nobody cancels");
-        let density = ray_density(&greedy, self.shapes, segments, &|| false)?;
-        Ok((greedy, density.expect("the density of rays that nobody cancels")))
     }
 }

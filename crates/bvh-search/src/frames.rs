@@ -6,9 +6,9 @@
 //! scenes, the principal axes and random rotations are candidates too, and a local search turns the
 //! best of all by smaller and smaller angles about their axes.
 //!
-//! Candidates are priced by the greedy tree over a sample of the triangles. It sees what boxes lose
-//! that are no longer exactly flat; clustering does not, and chooses frames that cost a seventh
-//! more. Samples that say little rank, and another one that says more decides.
+//! The greedy trees over samples of the triangles rank the candidates. They see what boxes lose that
+//! are no longer exactly flat; clusterings do not, and choose frames that cost a seventh more. Short
+//! searches over a sample that says more decide.
 
 use crate::parallel;
 use crate::run::stream;
@@ -25,11 +25,13 @@ use std::f64::consts::FRAC_1_SQRT_2;
 const SHARE: f64 = 0.1;
 /// The work of a greedy tree per object, by its time.
 const WORK_PER_OBJECT: f64 = 20.0;
-/// The work per object of the short search that confirms a choice. Greedy trees differ by up to 4 %
-/// where searched ones do not.
+/// The work per object of the short searches that decide. Greedy trees differ by up to 4 % where
+/// searched ones do not.
 const CONFIRMING: u64 = 64;
-/// The least gain by the short search.
-const CONFIRMED: f64 = 0.01;
+/// The work per object of the last sample, over which two or three frames are searched.
+const LAST: f64 = 188.0;
+/// The least gain by a short search.
+const LEAST_GAIN: f64 = 0.01;
 /// The nodes that a move visits, about.
 const WORK_PER_MOVE: f64 = 64.0;
 /// The least and the most triangles of the first sample.
@@ -53,12 +55,9 @@ const KEPT: usize = 4;
 const STEPS: [f64; 6] = [0.2, 0.1, 0.05, 0.025, 0.0125, 0.006];
 /// The share of one direction above which other candidates are not tried.
 const CLEAR: f64 = 0.5;
-/// The share above which a direction is no accident, and others have to be certainly better.
+/// The share above which a direction is no accident.
 const HEAVY: f64 = 0.005;
-/// The least gains by the greedy tree, of the heaviest direction and of a frame that was searched
-/// for.
-const LEAST_GAINS: [f64; 2] = [0.01, 0.03];
-/// What is added to it for a sample of one triangle; for a sample of n, √n times less.
+/// What is added to the least gain for a sample of one triangle; for a sample of n, √n times less.
 const DOUBT: f64 = 1.0;
 
 /// Whether a bake of triangles chooses a [`Frame`].
@@ -137,18 +136,17 @@ impl Choice {
         frames: Frames,
         budget: Budget,
         observer: &dyn Observer,
-    ) -> Frame {
+    ) -> Self {
         let centred = DWideBvh::centred(triangles);
         if frames == Frames::File {
-            return centred;
+            return Self { frame: Some(centred), ..Self::FILE };
         }
         let single = |corner: DVec3| centred.point(corner).as_vec3();
         let rounded: Vec<Triangle> =
             triangles.iter().map(|triangle| Triangle(triangle.0.map(single))).collect();
-        let turned = Self::of(&rounded, budget, observer).frame;
-        turned
-            .and_then(|frame| Frame::new(frame.rotation(), centred.centre()).ok())
-            .unwrap_or(centred)
+        let choice = Self::of(&rounded, budget, observer);
+        let turn = |frame: Frame| Frame::new(frame.rotation(), centred.centre()).ok();
+        Self { frame: Some(choice.frame.and_then(turn).unwrap_or(centred)), ..choice }
     }
 }
 
@@ -165,9 +163,8 @@ impl Scene<'_> {
     fn work(&self, size: usize, searches: bool) -> f64 {
         let sample = |growth: usize| (growth * size).min(self.triangles.len());
         let search = (STARTS + 3 * KEPT * STEPS.len()) * sample(1) + KEPT * sample(GROWTH);
-        let rest = sample(ASKED) + 3 * sample(GROWTH * GROWTH);
-        let confirming = 2 * CONFIRMING * sample(GROWTH * GROWTH) as u64;
-        confirming as f64 + WORK_PER_OBJECT * (rest + if searches { search } else { 0 }) as f64
+        let rest = sample(ASKED) + if searches { search } else { 0 };
+        LAST * sample(GROWTH * GROWTH) as f64 + WORK_PER_OBJECT * rest as f64
     }
 
     /// Chooses with a first sample of this size. `None` if the observer cancels.
@@ -176,42 +173,32 @@ impl Scene<'_> {
         let told = directions(&asked);
         let agreeing = told.first().map_or(0.0, |(_, share)| *share);
         let heaviest = told.first().filter(|(_, share)| *share >= HEAVY);
-        // With the least gain, and whether a sample leaves doubt: the heaviest direction is no
-        // accident, and a search confirms it.
-        let mut tried: Vec<(DQuat, f64, f64)> =
-            heaviest.iter().map(|(rotation, _)| (*rotation, LEAST_GAINS[0], 0.0)).collect();
+        let mut tried: Vec<DQuat> = heaviest.iter().map(|(rotation, _)| *rotation).collect();
         if searches && agreeing < CLEAR {
             let mut starts: Vec<DQuat> = told.iter().map(|(rotation, _)| *rotation).collect();
             starts.push(principal(&asked));
-            tried.push((self.local_search(starts, size)?, LEAST_GAINS[1], 1.0));
+            tried.push(self.local_search(starts, size)?);
         }
-        tried.retain(|(rotation, ..)| agreement(*rotation, DQuat::IDENTITY) < SAME);
-        if tried.is_empty() {
+        tried.retain(|rotation| agreement(*rotation, DQuat::IDENTITY) < SAME);
+        let mut frames = vec![None];
+        frames.extend(tried.into_iter().map(|rotation| self.frame(rotation)));
+        if frames.len() == 1 {
             return Some(Choice { agreeing, ..Choice::FILE });
         }
         let last = sample(self.triangles, size * GROWTH * GROWTH, RUN, 4);
         let is_whole = last.len() == self.triangles.len();
         let doubt = if is_whole { 0.0 } else { DOUBT / (last.len() as f64).sqrt() };
+        let areas = parallel::map(frames.clone(), |frame| searched(&last, frame.as_ref()));
         // The heaviest direction has to beat the file's axes, and the other frame both.
-        let mut rotations = vec![None];
-        rotations.extend(tried.iter().map(|(rotation, ..)| Some(*rotation)));
-        let prices = self.prices(&last, &rotations)?;
         let mut best = 0;
-        for (index, (_, least, doubts)) in (1..).zip(&tried) {
-            if prices[index] < (1.0 - least - doubts * doubt) * prices[best] {
+        for index in 1..areas.len() {
+            if areas[index] < (1.0 - LEAST_GAIN - doubt) * areas[best] {
                 best = index;
             }
         }
-        let Some(frame) = rotations[best].and_then(|rotation| self.frame(rotation)) else {
-            return Some(Choice { agreeing, ..Choice::FILE });
-        };
-        let searched =
-            parallel::map(vec![None, Some(frame)], |tried| searched(&last, tried.as_ref()));
-        let gain = 1.0 - searched[1] / searched[0];
-        if self.observer.cancelled() || gain < CONFIRMED + doubt {
-            return Some(Choice { agreeing, ..Choice::FILE });
-        }
-        Some(Choice { frame: Some(frame), gain, agreeing })
+        let gain = 1.0 - areas[best] / areas[0];
+        let choice = Choice { frame: frames[best], gain, agreeing };
+        Some(if self.observer.cancelled() { Choice { agreeing, ..Choice::FILE } } else { choice })
     }
 
     /// Returns the best of some rotations, of random ones and of rotations near them. `None` if the

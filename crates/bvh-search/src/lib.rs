@@ -6,6 +6,7 @@ mod bake;
 mod baselines;
 pub mod best;
 mod candidates;
+mod choose;
 pub mod exact;
 mod frames;
 pub mod grasp;
@@ -17,6 +18,7 @@ mod owned;
 mod parallel;
 pub mod prelude;
 mod rays;
+mod reason;
 #[cfg(feature = "serde")]
 mod registry;
 mod run;
@@ -33,12 +35,14 @@ pub use bake::{Bake, BakeError, Baked, Division};
 pub use baselines::{rebuild, rotation, treelet};
 pub use bvh_build;
 pub use bvh_core;
+pub use choose::{Chosen, MadeDensity, MadeRays, Open};
 pub use frames::{Choice, Frames};
 pub use local::reinsertion;
 pub use optimize::optimize;
 pub use orders::{genetic, random_orders};
-pub use owned::{FramedExport, Objects, Options, OwnedTree};
+pub use owned::{Anywhere, FramedExport, Objects, Options, OwnedTree};
 pub use rays::ray_density;
+pub use reason::{More, Reason, Tried};
 #[cfg(feature = "serde")]
 pub use registry::Method;
 #[cfg(feature = "std")]

@@ -2,7 +2,8 @@
 //! languages.
 
 use crate::{
-    Bake, BakeError, Baked, Budget, Choice, Division, Frames, Observer, SearchError, parallel,
+    Bake, BakeError, Baked, Budget, Choice, Division, Frames, MadeDensity, Observer, Open, Reason,
+    SearchError, parallel, ray_density,
 };
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
@@ -22,26 +23,33 @@ pub enum Objects {
     Shapes(Primitives),
 }
 
-/// The choices of a search for an [`OwnedTree`].
-#[derive(Clone, Copy, Debug)]
+/// The choices of a search for an [`OwnedTree`]. Without a limit of work or of time, a bake
+/// [chooses](Bake::choose) its work and all that is not given.
+#[derive(Clone, Copy)]
 pub struct Options<'a> {
     /// The average number of parts into which shapes may be divided among leaves; 1 keeps them
-    /// whole.
-    pub references: f64,
+    /// whole, as `None` does within a limit.
+    pub references: Option<f64>,
     /// The seed of the random numbers.
     pub seed: u64,
     /// The limits of the search besides its observer.
     pub budget: Budget,
-    /// The rays that the tree is for, as in [`RayDensity`]; random lines if empty.
+    /// The rays that the tree is for, as in [`RayDensity`]; if empty, random lines, or rays from
+    /// anywhere if they are chosen.
     pub rays: &'a [Segment],
+    /// Makes rays from anywhere in a scene, for a bake that chooses.
+    pub anywhere: Option<Anywhere>,
     /// Whether triangles choose the frame of their boxes.
     pub frame: Frames,
 }
 
+/// Makes the [rays](Open::anywhere) of a seed from anywhere in a scene of these shapes.
+pub type Anywhere = fn(&Primitives, &Bvh, u64, &dyn Fn() -> bool) -> MadeDensity;
+
 impl Default for Options<'_> {
     fn default() -> Self {
         let (budget, frame) = (Budget::UNLIMITED, Frames::Auto);
-        Self { references: 1.0, seed: 1, budget, rays: &[], frame }
+        Self { references: None, seed: 1, budget, rays: &[], anywhere: None, frame }
     }
 }
 
@@ -61,39 +69,67 @@ pub struct OwnedTree {
     shapes: Option<Primitives>,
     /// The largest average number of references to an object.
     references: f64,
+    /// The cost that searches minimise; `None` is the default of a [`Bake`].
+    objective: Option<Objective>,
     /// The work of all searches so far.
     work: u64,
     seed: u64,
     /// The density of the rays that the tree is for.
     density: Option<RayDensity>,
+    reasons: Vec<Reason>,
 }
 
 impl OwnedTree {
-    /// Searches until the options' budget is spent or `observer` cancels, as a
-    /// [`Deadline`](crate::Deadline) does.
+    /// Searches until the options' budget is spent, or the one that the bake chooses, or until
+    /// `observer` cancels, as a [`Deadline`](crate::Deadline) does.
     pub fn find(
         objects: Objects,
         options: &Options,
         observer: &dyn Observer,
     ) -> Result<Self, BakeError> {
-        let Options { references, seed, budget, rays, frame } = *options;
-        let frame = match &objects {
+        let Options { references, seed, rays, anywhere, frame, .. } = *options;
+        let is_open = options.budget == Budget::UNLIMITED && observer.progress().is_none();
+        let count = match &objects {
+            Objects::Boxes(boxes) => boxes.len(),
+            Objects::Shapes(shapes) => shapes.count(),
+        };
+        let budget = if is_open { Budget::of_objects(count) } else { options.budget };
+        let choice = match &objects {
             Objects::Shapes(Primitives::Triangles(triangles)) if frame == Frames::Auto => {
-                Choice::of(triangles, budget, observer).frame
+                Some(Choice::of(triangles, budget, observer))
             }
             Objects::Shapes(Primitives::Doubles(triangles)) => {
                 Some(Choice::of_doubles(triangles, frame, budget, observer))
             }
             _ => None,
         };
-        let mut owned = Self { references, seed, ..Self::bare(objects, frame) };
-        let mut greedy = None;
-        if !rays.is_empty() {
-            let (tree, density) = owned.bake().density(rays)?;
-            greedy = Some(tree);
-            owned.density = Some(density);
-        }
-        let baked = Bake { budget, start: None, ..owned.bake() }.search(greedy, observer)?;
+        let mut owned = Self::bare(objects, choice.and_then(|choice| choice.frame));
+        (owned.references, owned.seed) = (references.unwrap_or(1.0), seed);
+        owned.reasons.extend(choice.map(Reason::Frame));
+        let shapes = owned.shapes.as_ref();
+        let recorded =
+            |tree: &Bvh, _, is_over: &dyn Fn() -> bool| ray_density(tree, shapes, rays, is_over);
+        let made = |tree: &Bvh, seed, is_over: &dyn Fn() -> bool| match (anywhere, shapes) {
+            (Some(anywhere), Some(shapes)) => anywhere(shapes, tree, seed, is_over),
+            _ => Ok(None),
+        };
+        let open = Open {
+            budget: is_open,
+            cost: true,
+            references: references.is_none(),
+            rays: if rays.is_empty() { None } else { Some(&recorded) },
+            anywhere: if anywhere.is_some() { Some(&made) } else { None },
+        };
+        let bake = Bake { budget, start: None, ..owned.bake() };
+        let mut chosen = bake.choose(&open, None, observer)?;
+        let greedy = chosen.greedy.take();
+        let settled = chosen.bake(&bake);
+        let references = settled.references;
+        let baked = settled.search(greedy, observer)?;
+        owned.references = references;
+        owned.objective = Some(chosen.objective);
+        owned.density = chosen.density;
+        owned.reasons.extend(chosen.reasons);
         owned.apply(baked);
         Ok(owned)
     }
@@ -113,9 +149,14 @@ impl OwnedTree {
         check_boxes(&boxes)?;
         let mut tree = self.tree.clone();
         tree.refit(&boxes);
-        let density = self.density.clone();
-        let Self { references, work, seed, .. } = *self;
-        Ok(Self { tree, boxes, shapes, references, work, seed, density })
+        Ok(Self {
+            tree,
+            boxes,
+            shapes,
+            reasons: self.reasons.clone(),
+            density: self.density.clone(),
+            ..*self
+        })
     }
 
     /// Returns the layout of the tree that traces rays, for the rays of its search if there are
@@ -141,10 +182,9 @@ impl OwnedTree {
             let shapes = owned.shapes.as_ref().ok_or(FileError::Frame)?;
             owned.boxes = shapes.boxes_in(Some(&frame));
         }
-        // Half a reference more keeps the product with the number of objects from being rounded
-        // down.
-        let references = owned.tree.prim_ids.len() as f64 + 0.5;
-        owned.references = (references / owned.boxes.len().max(1) as f64).max(1.0);
+        owned.references = Bake::references_of(owned.tree.prim_ids.len(), owned.boxes.len());
+        // A bake minimises no other costs.
+        owned.objective = Some(file.header().objective).filter(|cost| *cost == Objective::Layout);
         owned.work = file.header().work;
         owned.seed = file.header().seed;
         Ok(owned)
@@ -196,6 +236,11 @@ impl OwnedTree {
         objective.cost(&self.tree)
     }
 
+    /// What the bake chose by itself, and why.
+    pub fn reasons(&self) -> &[Reason] {
+        &self.reasons
+    }
+
     /// The tree.
     pub fn tree(&self) -> &Bvh {
         &self.tree
@@ -239,7 +284,17 @@ impl OwnedTree {
     fn bare(objects: Objects, frame: Option<Frame>) -> Self {
         let (boxes, shapes) = boxes_of(objects, frame.as_ref());
         let tree = Bvh { frame, ..Bvh::default() };
-        Self { tree, boxes, shapes, references: 1.0, work: 0, seed: 1, density: None }
+        Self {
+            tree,
+            boxes,
+            shapes,
+            references: 1.0,
+            objective: None,
+            work: 0,
+            seed: 1,
+            density: None,
+            reasons: Vec::new(),
+        }
     }
 
     /// The search that continues from the tree.
@@ -248,6 +303,7 @@ impl OwnedTree {
             frame: self.tree.frame.as_ref(),
             shapes: self.shapes.as_ref(),
             rays: self.density.as_ref(),
+            objective: self.objective,
             references: self.references,
             start: Some(&self.tree),
             seed: self.seed,

@@ -1,6 +1,6 @@
 //! The everyday calls: the best tree for a given time, with every parameter at its default.
 
-use crate::{Bake, BakeError, Budget, Choice, Deadline, Outcome, SearchError};
+use crate::{Bake, BakeError, Budget, Choice, Deadline, Open, Outcome, SearchError, ray_density};
 use bvh_core::{Aabb, Bvh, InFrame, Primitives, RayDensity, Segment, Triangle};
 use std::time::Duration;
 
@@ -65,8 +65,12 @@ pub fn bake_for_rays(
     let boxes = InFrame { triangles, frame }.boxes();
     let shapes = Primitives::Triangles(triangles.to_vec());
     let bake = Bake { frame, shapes: Some(&shapes), ..Bake::new(&boxes) };
-    let (greedy, density) = bake.density(segments)?;
-    let bake = Bake { rays: Some(&density), ..bake };
-    let outcome = bake.search(Some(greedy), &deadline)?.outcome;
-    Ok((outcome, density))
+    let rays = |tree: &_, _, is_over: &dyn Fn() -> bool| {
+        ray_density(tree, Some(&shapes), segments, is_over)
+    };
+    let mut chosen =
+        bake.choose(&Open { rays: Some(&rays), ..Open::default() }, None, &deadline)?;
+    let greedy = chosen.greedy.take();
+    let outcome = chosen.bake(&bake).search(greedy, &deadline)?.outcome;
+    Ok((outcome, chosen.density.expect("the density of rays that nobody cancels")))
 }

@@ -1,15 +1,12 @@
 //! `bvh bake`: searches for the best tree of a scene within a budget, and writes it to a file.
 
-mod decide;
 mod effort;
-pub mod frame;
-pub mod instances;
 pub mod parts;
 mod plan;
 mod watch;
 
 use crate::Error;
-use crate::answer::{Answer, frame_facts, gain, short, whole};
+use crate::answer::{Answer, frame_facts, gain, saved, short, whole};
 use crate::arguments::{input_file, load_scene, output_file, output_or_free};
 use crate::export::tracers;
 use crate::interrupt::{hold, is_interrupted};
@@ -19,33 +16,32 @@ use bvh_core::cost::{Objective, internal_area};
 use bvh_core::export::Target;
 use bvh_scenes::Scene;
 use bvh_scenes::files::Reserved;
-use bvh_search::{Bake, Division, Frames, Method, Outcome, StopReason, shortcuts};
+use bvh_search::{
+    Bake, Choice, Division, Frames, MadeRays, Method, Open, Outcome, Reason, StopReason, shortcuts,
+};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use decide::decide;
 use effort::Effort;
 use plan::{Found, Plan, Start};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
+use watch::Watch;
 
 /// Search for the best tree of a scene within a budget, and save it.
 #[derive(Args, Clone, Debug)]
 pub struct BakeArgs {
     /// Name of a scene, or path of a mesh file.
     pub scene: String,
-    /// How long to search: a time (`10s`, `1m 30s`), or work (`50Mwork`: 50 million nodes visited),
-    /// which gives the same bytes on every machine. `0s` and `0work` give the greedy tree, or the
+    /// How long to take: a time (`10s`, `1m 30s`), loading included, or work (`50Mwork`: 50 million
+    /// nodes visited), which gives the same bytes on every machine. `0s` and `0work` give the greedy tree, or the
     /// one of --from. Without it, the bake ends when more work would hardly pay; it also chooses
     /// --rays, --cost and --references where they are not given, and prints the reasons.
     #[arg(long, value_name = "TIME|WORK")]
     pub budget: Option<Effort>,
-    /// The file to write. It replaces an existing file when it is complete. With --instances, a new
-    /// or empty folder. Without it, a new file or folder with the scene's name, in this folder.
-    #[arg(long, value_name = "FILE.bvh|DIR")]
+    /// The file to write. It replaces an existing file when it is complete. Without it, a new file
+    /// with the scene's name, in this folder.
+    #[arg(long, value_name = "FILE.bvh")]
     pub out: Option<PathBuf>,
-    /// Bake one tree for every mesh of a glTF file, and one tree over the instances that its nodes
-    /// place.
-    #[arg(long, conflicts_with_all = ["rays", "from", "explain"])]
-    pub instances: bool,
     /// Seed of the random numbers.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -66,14 +62,14 @@ pub struct BakeArgs {
     #[arg(long, value_name = "N")]
     pub references: Option<f64>,
     /// The axes of the boxes: `auto` turns them where that saves area, as it does around a building
-    /// that stands obliquely in its file; `file` keeps the file's, as --for, --parts, --instances
-    /// and other methods than best do. Without it, with --from, those of the tree.
+    /// that stands obliquely in its file; `file` keeps the file's, as --for, --parts and other
+    /// methods than best do. Without it, with --from, those of the tree.
     #[arg(long, value_name = "auto|file", value_parser = frames(), conflicts_with = "from")]
     pub frame: Option<Frames>,
     /// Search for the tracer of another library, for `bvh export`: by default with `--cost area`,
     /// and with as many references as pay there.
     #[arg(long = "for", value_name = "TRACER", value_parser = tracers())]
-    #[arg(conflicts_with_all = ["rays", "instances", "parts"])]
+    #[arg(conflicts_with_all = ["rays", "parts"])]
     pub tracer: Option<Target>,
     /// The method, with its default parameters.
     #[arg(long, value_name = "NAME", default_value = BEST, value_parser = methods())]
@@ -84,7 +80,7 @@ pub struct BakeArgs {
     /// Cut the scene by space into N parts, bake each into the folder `FILE.parts`, and join their
     /// trees under a greedy top. Finished parts are not baked again.
     #[arg(long, value_name = "N", requires = "budget", help_heading = ADVANCED)]
-    #[arg(conflicts_with_all = ["rays", "from", "instances", "explain"])]
+    #[arg(conflicts_with_all = ["rays", "from", "explain"])]
     #[arg(value_parser = clap::value_parser!(u32).range(2..=65_536))]
     pub parts: Option<u32>,
     /// With --parts, list the parts, one a line: identifier, estimated work, description.
@@ -128,6 +124,8 @@ fn methods() -> impl TypedValueParser<Value = Method> {
 /// cost. An interrupted bake writes the file as well, unless the file has a better tree of the scene,
 /// and returns [`Error::Interrupted`].
 pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
+    // A budget of time is the whole wait.
+    let watch = Watch::new(args.budget);
     // Wrong paths are reported before the scene is loaded, which may take long.
     if let Some(from) = &args.from {
         input_file("--from", from)?;
@@ -139,44 +137,25 @@ pub fn bake(args: &BakeArgs, answer: &mut Answer) -> Result<(), Error> {
     if let Some(rays) = &plan.rays {
         rays.check(&scene)?;
     }
-    let start = args.from.as_ref().map(|path| Start::load(path, &scene)).transpose()?;
-    let objects = scene.boxes.len();
-    if let (Some(from), Some(Start { tree, .. })) = (&args.from, &start)
-        && tree.prim_ids.len() > objects.max((plan.references * objects as f64) as usize)
-    {
-        let references = tree.prim_ids.len();
-        if args.references.is_some() || args.tracer.is_some() {
-            // Rounded up, so that the message's number suffices.
-            let least = (100 * references).div_ceil(objects) as f64 / 100.0;
-            return Err(Error::Usage(format!(
-                "--from {}: the tree has {references} references to {objects} objects; accepted: \
-                 --references {least:.2} or more",
-                from.display()
-            )));
-        }
-        // No search makes all divided objects whole again. Half a reference more keeps the product
-        // with the number of objects from being rounded down.
-        plan.references = (references as f64 + 0.5) / objects as f64;
-    }
+    let start = args.start(&scene, &mut plan)?;
+    let start = start.as_ref();
     hold();
-    let mut most_references = plan.references;
-    if args.budget.is_none() {
-        plan.effort = decide::work(objects, answer);
-    }
-    let scene = frame::turned(args, &mut plan, scene, start.as_ref(), answer);
+    let scene = args.turned(&plan, scene, start, &watch, answer);
     if args.explain {
         explain(&scene, answer)?;
     }
-    if args.budget.is_none() {
-        // The decision may add references.
-        most_references = most_references.max(decide::REFERENCES);
-    }
+    let anywhere = |tree: &_, seed, is_over: &dyn Fn() -> bool| {
+        Rays::Default.density(&scene, tree, seed, is_over)
+    };
+    let open = args.open(&anywhere);
     // Reserving the file first reports a full disk before the search and not after it.
-    let bytes = plan::most_bytes(&scene, most_references);
+    let chosen = if open.references { Open::REFERENCES } else { 1.0 };
+    let bytes = plan::most_bytes(&scene, plan.references.max(chosen));
     let reserved = Reserved::new(&out, bytes, args.out.is_none())?;
-    let (plan, prepared) = decide(args, plan, &scene, answer)?;
-    let found = plan.search(&scene, start.as_ref(), prepared)?;
-    save(&found, &out, reserved, answer)
+    let found = plan.search(&scene, start, &open, watch, answer)?;
+    save(&found, &out, reserved, answer)?;
+    next(args, &found, &out, answer);
+    Ok(())
 }
 
 /// Lists the steps that the scene does not need and that are skipped, one line each.
@@ -215,7 +194,7 @@ fn save(found: &Found, out: &Path, reserved: Reserved, answer: &mut Answer) -> R
 }
 
 fn summarise(found: &Found, answer: &mut Answer) {
-    let Found { plan, scene, baked, seconds, .. } = found;
+    let Found { plan, scene, chosen, baked, greedy, seconds, .. } = found;
     let Outcome { tree, cost, evaluations: moves, work, stop, .. } = &baked.outcome;
     let objects = scene.boxes.len();
     let references = tree.prim_ids.len();
@@ -234,24 +213,28 @@ fn summarise(found: &Found, answer: &mut Answer) {
     answer.record("frame", frame_facts(tree.frame.as_ref()));
     answer.record("seed", plan.seed);
     let area = internal_area(tree);
-    if let Some(base) = found.area_of_greedy {
-        answer.say(&format!(
-            "total area of inner nodes {} that of a greedy SAH sweep's tree",
-            gain(area, base)
-        ));
-        answer.record("total area of inner nodes in the greedy tree", base);
-    }
-    answer.record("total area of inner nodes", area);
-    // The gain in area is no measure of a search for another cost.
-    if let (Some(base), Some(unit)) = (baked.greedy, found.unit()) {
-        answer
-            .say(&format!("{unit}, which was minimised, {} the greedy tree's", gain(*cost, base)));
-        answer.record("cost in the greedy tree", base);
+    answer.record("area", area);
+    if let Some(base) = greedy.area {
+        let mut gains = format!("{} area of inner nodes", gain(area, base));
+        if let Some(base) = greedy.tests {
+            let tests = chosen.tests(tree);
+            gains = format!("{} tests of rays, {gains}", gain(tests, base));
+            answer.record("tests_saved", saved(tests, base));
+        }
+        answer.say(&format!("{gains}, against a greedy SAH sweep's tree"));
+        answer.record("greedy_area", base);
+        answer.record("saved", saved(area, base));
     }
     answer.record("cost", *cost);
-    if let Some(before) = baked.start {
-        answer.say(&format!("{} the cost of the tree it started from", gain(*cost, before)));
-        answer.record("cost of the start", before);
+    // The gain in area is no measure of a search for another cost.
+    if let (Some(base), Some(unit)) = (baked.greedy_cost, found.unit()) {
+        let gain = gain(*cost, base);
+        answer.say(&format!("{unit}, which was minimised, {gain} against the greedy tree"));
+        answer.record("greedy_cost", base);
+    }
+    if let Some(before) = baked.start_cost {
+        answer.say(&format!("{} cost against the tree it started from", gain(*cost, before)));
+        answer.record("start_cost", before);
     }
     if references > objects {
         answer.say(&format!("{} references to {} objects", whole(references), whole(objects)));
@@ -262,21 +245,33 @@ fn summarise(found: &Found, answer: &mut Answer) {
     }
     // A method that plans its time completes its plan just before the time is over, and then could
     // have used more.
-    let in_time =
-        matches!(plan.effort, Effort::Time(limit) if *seconds >= 0.5 * limit.as_secs_f64());
+    let limit = if let Some(Effort::Time(limit)) = plan.effort { limit } else { Duration::MAX };
     let why = match stop {
-        StopReason::Completed if !in_time => ", and the method has completed",
+        StopReason::Completed if *seconds < 0.5 * limit.as_secs_f64() => {
+            ", and the method has completed"
+        }
         StopReason::Optimal => ", and no tree is better",
         _ => "",
     };
     answer.say(&format!(
-        "{} moves, {} nodes visited, {seconds:.1} s{why}",
+        "{} moves, {} nodes visited, {seconds:.1} s in all{why}",
         whole(*moves),
         whole(*work)
     ));
     answer.record("moves", *moves);
     answer.record("work", *work);
     answer.record("seconds", *seconds);
+}
+
+/// Names the commands that people want next.
+fn next(args: &BakeArgs, found: &Found, out: &Path, answer: &Answer) {
+    let (out, scene) = (out.display(), &args.scene);
+    let tracer = args.tracer.map_or("TRACER", |target| target.name);
+    let mut commands = format!("`bvh bench {out} {scene}`, `bvh report {out} {scene}`");
+    if found.scene.frame.is_none() && found.scene.triangles().is_ok() {
+        commands += &format!(", `bvh export {out} {scene} --for {tracer} --out FILE`");
+    }
+    answer.say(&format!("next: {commands}"));
 }
 
 impl BakeArgs {
@@ -286,12 +281,73 @@ impl BakeArgs {
             let stem = scene.file_stem().unwrap_or(scene.as_os_str());
             // The colon of `escher:1000` is no part of a file's name everywhere.
             let stem = stem.to_string_lossy().replace(':', "-");
-            PathBuf::from(stem + if self.instances { "" } else { ".bvh" })
+            PathBuf::from(stem + ".bvh")
         })
     }
 
-    /// Returns the search that the arguments specify. Without `--budget` it has no work yet, which
-    /// [`decide::work`] chooses. Rejects methods that would ignore other arguments.
+    /// Returns what the arguments leave open. The tracers of others have a cost of their own.
+    fn open<'a>(&self, anywhere: MadeRays<'a>) -> Open<'a> {
+        let is_ours = self.tracer.is_none();
+        Open {
+            budget: self.budget.is_none(),
+            cost: is_ours && self.cost.is_none(),
+            references: is_ours && self.references.is_none(),
+            anywhere: is_ours.then_some(anywhere),
+            ..Open::default()
+        }
+    }
+
+    /// Loads the tree of `--from`, whose references the plan then permits.
+    fn start(&self, scene: &Scene, plan: &mut Plan) -> Result<Option<Start>, Error> {
+        let Some(from) = &self.from else { return Ok(None) };
+        let start = Start::load(from, scene)?;
+        let [objects, references] = [scene.boxes.len(), start.tree.prim_ids.len()];
+        if references <= objects.max((plan.references * objects as f64) as usize) {
+            return Ok(Some(start));
+        }
+        if self.references.is_some() || self.tracer.is_some() {
+            // Rounded up, so that the message's number suffices.
+            let least = (100 * references).div_ceil(objects) as f64 / 100.0;
+            return Err(Error::Usage(format!(
+                "--from {}: the tree has {references} references to {objects} objects; accepted: \
+                 --references {least:.2} or more",
+                from.display()
+            )));
+        }
+        // No search makes all divided objects whole again.
+        plan.references = Bake::references_of(references, objects);
+        Ok(Some(start))
+    }
+
+    /// Returns the scene in the frame of its bake, and says why it is the best one.
+    fn turned(
+        &self,
+        plan: &Plan,
+        scene: Scene,
+        start: Option<&Start>,
+        watch: &Watch,
+        answer: &mut Answer,
+    ) -> Scene {
+        if let Some(Start { tree, .. }) = start {
+            return scene.in_frame(tree.frame);
+        }
+        let is_free = matches!(plan.method, Method::Best(_)) && self.tracer.is_none();
+        let triangles = match scene.triangles() {
+            Ok(triangles) if is_free && self.frame != Some(Frames::File) => triangles,
+            _ => return scene,
+        };
+        let choice = Choice::of(triangles, plan.budget(triangles.len()), watch);
+        watch.bar.suspend(|| answer.say(&Reason::Frame(choice).to_string()));
+        if self.explain && choice.agreeing > 0.0 {
+            let percent = 100.0 * choice.agreeing;
+            let line = format!("frame: {percent:.0} % of the triangles, by size, share their axes");
+            answer.line("explanation", line);
+        }
+        scene.in_frame(choice.frame)
+    }
+
+    /// Returns the search that the arguments specify. Rejects methods that would ignore other
+    /// arguments.
     fn plan(&self) -> Result<Plan, Error> {
         let rays = self.rays.as_deref().map(Rays::read).transpose()?;
         let is_best = matches!(self.method, Method::Best(_));
@@ -308,13 +364,11 @@ impl BakeArgs {
         if let Some(ignored) = ignored {
             return Err(Error::Usage(format!("{ignored}; accepted: {BEST}")));
         }
-        // The cost of the layout saves more tests of rays than area does: `results/ray_objective`.
-        let default = if rays.is_some() { Objective::Layout } else { Objective::InternalArea };
         Ok(Plan {
             method: self.method.clone(),
-            effort: self.budget.unwrap_or(Effort::Work(0)),
+            effort: self.budget,
             seed: self.seed,
-            objective: self.cost.unwrap_or(default),
+            objective: self.cost,
             references,
             rays,
         })

@@ -1,11 +1,11 @@
 //! `bvh bake --parts`: cuts a scene by space into parts, bakes each as a job of its own, and joins
 //! the trees of the parts under a greedy top.
 
-use super::instances::save_part;
-use super::plan::{Plan, Prepared, Start, most_bytes};
+use super::plan::{Found, Plan, Start, most_bytes};
+use super::watch::Watch;
 use super::{BakeArgs, save};
 use crate::Error;
-use crate::answer::Answer;
+use crate::answer::{Answer, gain, short, whole};
 use crate::arguments::{load_scene, output_file};
 use crate::interrupt::is_interrupted;
 use bvh_build::{Builder, muller_fellner};
@@ -13,6 +13,7 @@ use bvh_core::{Aabb, Bvh, Node, NodeKind};
 use bvh_scenes::files::{Reserved, WriteError};
 use bvh_scenes::tree_file;
 use bvh_scenes::{Scene, fnv1a};
+use bvh_search::Open;
 use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -49,7 +50,7 @@ pub fn bake(args: &BakeArgs, count: u32, answer: &mut Answer) -> Result<(), Erro
     if args.list {
         for (number, Part { id, objects, plan }) in (1..).zip(&parts) {
             let objects = objects.len();
-            let work = plan.effort.work().unwrap_or(objects as u64);
+            let work = plan.budget(objects).max_work.unwrap_or(objects as u64);
             // Programs that start the parts read these lines.
             answer.say(&format!("{id} {work} part {number} of {count}, {objects} objects"));
             answer.list("parts", json!({ "id": id, "work": work, "objects": objects }));
@@ -70,7 +71,13 @@ pub fn bake(args: &BakeArgs, count: u32, answer: &mut Answer) -> Result<(), Erro
             continue;
         }
         let scene = part.scene(&scene);
-        let found = part.plan.search(&scene, None, Prepared::default())?;
+        let found = part.plan.search(
+            &scene,
+            None,
+            &Open::default(),
+            Watch::new(part.plan.effort),
+            answer,
+        )?;
         // A part whose search was cut short would differ from run to run.
         if is_interrupted() {
             let folder = folder.display();
@@ -86,8 +93,9 @@ pub fn bake(args: &BakeArgs, count: u32, answer: &mut Answer) -> Result<(), Erro
     let bytes = most_bytes(&scene, plan.references);
     let reserved = Reserved::new(&out, bytes, args.out.is_none())?;
     let start = join(&scene, &parts, &folder)?;
-    let plan = Plan { effort: plan.effort.share(1.0 - SHARE_OF_PARTS), ..plan };
-    let found = plan.search(&scene, Some(&start), Prepared::default())?;
+    let plan = plan.share(1.0 - SHARE_OF_PARTS);
+    let found =
+        plan.search(&scene, Some(&start), &Open::default(), Watch::new(plan.effort), answer)?;
     save(&found, &out, reserved, answer)
 }
 
@@ -105,7 +113,7 @@ fn parts(plan: &Plan, scene: &Scene, count: u32) -> Result<Vec<Part>, Error> {
     let mut parts = Vec::new();
     for (number, objects) in cut(&scene.boxes, count as usize).into_iter().enumerate() {
         let share = SHARE_OF_PARTS * objects.len() as f64 / all as f64;
-        let plan = Plan { effort: plan.effort.share(share), ..plan.clone() };
+        let plan = plan.share(share);
         let Plan { method, effort, seed, objective, references, .. } = &plan;
         let method = method.name();
         let identity = format!(
@@ -193,6 +201,27 @@ fn joined(top: &Bvh, trees: &[Bvh], objects: &[&[usize]]) -> Bvh {
         whole.prim_ids.extend(ids.iter().map(|&id| objects[part][id as usize] as u32));
     }
     whole
+}
+
+/// Writes the tree over a part of a scene.
+fn save_part(found: &Found, path: &Path, answer: &mut Answer) -> Result<(), Error> {
+    found.save(path, Reserved::new(path, 0, false)?)?;
+    let cost = found.baked.outcome.cost;
+    let Some(base) = found.baked.greedy_cost else { return Ok(()) };
+    let objects = found.scene.boxes.len();
+    let file = path.display().to_string();
+    answer.say(&format!(
+        "{file}: {} objects, {} {}, {} against a greedy tree",
+        whole(objects),
+        found.unit().unwrap_or("total area of inner nodes"),
+        short(cost),
+        gain(cost, base)
+    ));
+    answer.list(
+        "trees",
+        json!({ "file": file, "objects": objects, "cost": cost, "greedy_cost": base }),
+    );
+    Ok(())
 }
 
 #[cfg(test)]

@@ -3,24 +3,30 @@
 use super::effort::Effort;
 use super::watch::Watch;
 use crate::Error;
+use crate::answer::Answer;
 use crate::interrupt::{INTERRUPTED, hold};
 use crate::rays::Rays;
 use bvh_core::cost::{Objective, internal_area};
 use bvh_core::file::Header;
-use bvh_core::{Bvh, Frame, Node, RayDensity};
+use bvh_core::{Bvh, Frame, Node};
 use bvh_scenes::Scene;
 use bvh_scenes::files::Reserved;
 use bvh_scenes::tree_file::{self, TreeFileError};
-use bvh_search::{Bake, Baked, Budget, Division, Method};
+use bvh_search::{
+    self, Bake, BakeError, Baked, Budget, Chosen, Division, MadeRays, Method, Observer, Open,
+    Reason,
+};
 use std::path::Path;
 
 /// A search for the best tree of any scene.
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub method: Method,
-    pub effort: Effort,
+    /// The budget, unless the bake chooses it.
+    pub effort: Option<Effort>,
     pub seed: u64,
-    pub objective: Objective,
+    /// The cost, unless it is the default for the rays.
+    pub objective: Option<Objective>,
     /// The largest number of references per object; 1 for whole objects.
     pub references: f64,
     /// The rays whose visits replace areas.
@@ -60,94 +66,114 @@ impl Start {
     }
 }
 
-/// The results of a decision that the search needs too, and would otherwise make again.
-#[derive(Default)]
-pub struct Prepared {
-    pub greedy: Option<Bvh>,
-    /// The density of the plan's rays.
-    pub density: Option<RayDensity>,
-    /// The division of the objects with spatial splits.
-    pub division: Option<Bvh>,
-    /// The best trial of a decision that the user interrupted, and the rays that judged it.
-    pub tried: Option<(Baked, RayDensity)>,
-}
-
 impl Plan {
-    /// Returns the bake of a scene.
-    pub fn bake<'a>(&'a self, scene: &'a Scene, rays: Option<&'a RayDensity>) -> Bake<'a> {
+    /// Returns the limits of a search over so many objects besides its time.
+    pub fn budget(&self, objects: usize) -> Budget {
+        match self.effort {
+            None => Budget::of_objects(objects),
+            Some(effort) => Budget { max_work: effort.work(), ..Budget::UNLIMITED },
+        }
+    }
+
+    /// Returns the same search with a fraction of the budget.
+    pub fn share(&self, part: f64) -> Self {
+        Self { effort: self.effort.map(|effort| effort.share(part)), ..self.clone() }
+    }
+
+    fn bake<'a>(&'a self, scene: &'a Scene) -> Bake<'a> {
         Bake {
             frame: scene.frame.as_ref(),
             shapes: Some(&scene.primitives),
-            rays,
-            objective: Some(self.objective),
+            objective: self.objective,
             references: self.references,
             method: match &self.method {
                 Method::Best(_) => None,
                 method => Some((method.name(), method)),
             },
             seed: self.seed,
-            budget: Budget { max_work: self.effort.work(), ..Budget::UNLIMITED },
+            budget: self.budget(scene.boxes.len()),
             ..Bake::new(&scene.boxes)
         }
     }
 
-    /// Searches until the budget is spent or the user interrupts. The time of a budget begins
-    /// when the greedy tree is built.
+    /// Makes the open choices, prints their reasons, and searches until the budget is spent, or the watch's time is over,
+    /// or the user interrupts.
     pub fn search<'a>(
         &'a self,
         scene: &'a Scene,
         start: Option<&'a Start>,
-        prepared: Prepared,
+        open: &Open,
+        watch: Watch,
+        answer: &mut Answer,
     ) -> Result<Found<'a>, Error> {
         hold();
         let failed = |error| Error::search(&scene.name, self.method.name())(error);
-        let Prepared { mut greedy, mut density, division, tried } = prepared;
-        if greedy.is_none() {
-            greedy = self.bake(scene, None).greedy(&INTERRUPTED).map_err(failed)?;
-        }
-        let watch = Watch::new(self.effort);
-        if let (None, Some(rays), Some(tree)) = (&density, &self.rays, &greedy) {
-            density = rays.density(scene, tree, self.seed)?;
-        }
-        let area_of_greedy = greedy.as_ref().map(internal_area);
-        let bake = Bake {
-            division: division.as_ref(),
-            start: start.map(|start| &start.tree),
-            ..self.bake(scene, density.as_ref())
+        let bake = Bake { start: start.map(|start| &start.tree), ..self.bake(scene) };
+        // Without time, the greedy tree is the answer.
+        let greedy = bake.greedy(&INTERRUPTED).map_err(failed)?;
+        let area = greedy.as_ref().map(internal_area);
+        let rays = self.rays.as_ref();
+        let made = |tree: &_, seed, is_over: &dyn Fn() -> bool| {
+            rays.unwrap_or(&Rays::Default).density(scene, tree, seed, is_over)
         };
-        let (baked, judging) = match tried {
-            Some((baked, judging)) => (Ok(baked), Some(judging)),
-            None => (bake.search(greedy, &watch), None),
+        let rays: Option<MadeRays> = if rays.is_some() { Some(&made) } else { None };
+        let untimed: &dyn Observer = if open.budget { &watch } else { &INTERRUPTED };
+        let chosen = bake.choose(&Open { rays, ..*open }, greedy, untimed);
+        let mut chosen = chosen.map_err(|error| match error {
+            BakeError::Search(error) => failed(error),
+            BakeError::Rays(source) => Error::Tracing { scene: scene.name.clone(), source },
+        })?;
+        let explain = |reason: &Reason| answer.line("choices", reason.to_string());
+        watch.bar.suspend(|| chosen.reasons.iter().for_each(explain));
+        let greedy = chosen.greedy.take();
+        let is_traced = scene.triangles().is_ok();
+        let tests = greedy.as_ref().filter(|_| is_traced).map(|tree| chosen.tests(tree));
+        let tried = chosen.tried.take();
+        let is_tried = tried.is_some();
+        let settled = chosen.bake(&bake);
+        let watch = watch.within(settled.budget.max_work);
+        let baked = match tried {
+            Some(tried) => Ok(tried),
+            None => settled.search(greedy, &watch),
         };
         watch.bar.finish_and_clear();
         let baked = baked.map_err(failed)?;
         let seconds = watch.deadline.elapsed().as_secs_f64();
         // The work of all bakes that led to this tree, one after the other.
         let work = start.map_or(0, |start| start.work).saturating_add(baked.outcome.work);
-        Ok(Found { plan: self, scene, density, baked, judging, area_of_greedy, work, seconds })
+        let greedy = Greedy { area, tests };
+        Ok(Found { plan: self, scene, chosen, is_tried, baked, greedy, work, seconds })
     }
+}
+
+/// What the greedy tree costs, if there was one.
+pub struct Greedy {
+    /// The total area of inner nodes, which the documentation compares.
+    pub area: Option<f64>,
+    /// The tests of rays in the wide layout.
+    pub tests: Option<f64>,
 }
 
 /// The result of a search, with what its file and its summary need.
 pub struct Found<'a> {
     pub plan: &'a Plan,
     pub scene: &'a Scene,
-    pub density: Option<RayDensity>,
+    pub chosen: Chosen,
+    /// Whether the tree is a trial that the user interrupted.
+    is_tried: bool,
     pub baked: Baked,
-    /// The rays that judged the tree, if it is a trial.
-    judging: Option<RayDensity>,
-    /// The total area of inner nodes of the greedy tree, which the documentation compares.
-    pub area_of_greedy: Option<f64>,
+    pub greedy: Greedy,
     work: u64,
-    /// The time since the greedy tree was built.
+    /// The time since the command began.
     pub seconds: f64,
 }
 
 impl Found<'_> {
     /// Writes the file of the tree. Returns its number of bytes.
     pub fn save(&self, path: &Path, reserved: Reserved) -> Result<usize, Error> {
-        let bake = self.plan.bake(self.scene, self.density.as_ref());
-        let written = bake.write(&self.baked.outcome.tree, self.work, |sections| {
+        let bake = self.plan.bake(self.scene);
+        let settled = self.chosen.bake(&bake);
+        let written = settled.write(&self.baked.outcome.tree, self.work, |sections| {
             reserved.write(sections)?;
             Ok(sections.iter().map(|section| section.len()).sum())
         });
@@ -158,19 +184,19 @@ impl Found<'_> {
     /// of this interrupted search.
     pub fn is_behind(&self, path: &Path) -> bool {
         let Ok((old, _)) = tree_file::load(path, self.scene) else { return false };
-        let Baked { outcome, greedy, division, .. } = &self.baked;
-        let bake = self.plan.bake(self.scene, self.density.as_ref());
-        let [old, new] = [&old, &outcome.tree].map(|tree| match &self.judging {
-            Some(judging) => Objective::Layout.cost_by(tree, judging),
-            None => bake.cost(tree, *division),
+        let Baked { outcome, greedy_cost, division, .. } = &self.baked;
+        let bake = self.plan.bake(self.scene);
+        let settled = self.chosen.bake(&bake);
+        let [old, new] = [&old, &outcome.tree].map(|tree| {
+            if self.is_tried { self.chosen.tests(tree) } else { settled.cost(tree, *division) }
         });
         // The old tree may be for another cost, by which a greedy tree would be behind.
-        old <= new || *greedy == Some(outcome.cost)
+        old <= new || *greedy_cost == Some(outcome.cost)
     }
 
     /// Names the cost that the search minimised, unless it is the total area of inner nodes.
     pub fn unit(&self) -> Option<&'static str> {
-        match (self.plan.objective, self.density.is_some()) {
+        match (self.chosen.objective, self.chosen.density.is_some()) {
             (Objective::Layout, true) => Some("cost of the wide layout for rays"),
             (Objective::Layout, false) => Some("cost of the wide layout"),
             (_, true) => Some("visits of rays"),

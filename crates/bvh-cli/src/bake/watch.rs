@@ -1,6 +1,7 @@
 //! Observes a bake, ends it in time, and shows its progress.
 
 use super::effort::Effort;
+use crate::answer::gain;
 use crate::interrupt::is_interrupted;
 use crate::output::{bar, print_error};
 use bvh_search::{Deadline, Event, Observer};
@@ -16,23 +17,31 @@ const LENGTH: f64 = 1000.0;
 pub struct Watch {
     /// The progress bar, which is hidden unless standard error is a terminal.
     pub bar: ProgressBar,
-    /// A budget of work has a deadline that never comes.
+    /// The time of the command, and its end if the budget is a time.
     pub deadline: Deadline,
-    effort: Effort,
+    effort: Option<Effort>,
+    /// The bits of the first cost, NaN before.
+    first: AtomicU64,
     /// The time of the last line, in tens of seconds since the beginning.
     shown: AtomicU64,
 }
 
 impl Watch {
-    /// Begins to measure the time.
-    pub fn new(effort: Effort) -> Self {
-        let limit = if let Effort::Time(limit) = effort { limit } else { Duration::MAX };
+    /// Begins to measure the time. `None` is a budget that is not chosen yet.
+    pub fn new(effort: Option<Effort>) -> Self {
+        let limit = if let Some(Effort::Time(limit)) = effort { limit } else { Duration::MAX };
         Self {
             bar: bar(LENGTH as u64, "{bar:10} {wide_msg} {eta} left").with_message("searching"),
             deadline: Deadline::after(limit),
             effort,
+            first: AtomicU64::new(f64::NAN.to_bits()),
             shown: AtomicU64::new(0),
         }
+    }
+
+    /// Continues with this budget of work, if there is one.
+    pub fn within(self, work: Option<u64>) -> Self {
+        Self { effort: work.map(Effort::Work).or(self.effort), ..self }
     }
 
     /// Returns whether this caller, of all threads of the search, must show the next line.
@@ -50,11 +59,23 @@ impl Watch {
 
 impl Observer for Watch {
     fn event(&self, event: &Event) {
-        self.bar.set_message(format!("cost {:.6e}", event.incumbent));
+        let cost = event.incumbent;
+        let _ = self.first.fetch_update(Relaxed, Relaxed, |bits| {
+            f64::from_bits(bits).is_nan().then_some(cost.to_bits())
+        });
+        let first = f64::from_bits(self.first.load(Relaxed));
+        self.bar.set_message(format!("searching, cost {}", gain(cost, first)));
+    }
+
+    fn trying(&self, tried: usize, of: usize) {
+        if tried == 0 && self.bar.is_hidden() {
+            print_error(&format!("trying {of} combinations of the choices"));
+        }
+        self.bar.set_message(format!("trying the choices, {tried} of {of}"));
     }
 
     fn counted(&self, _evaluations: u64, work: u64) {
-        if let Effort::Work(most) = self.effort {
+        if let Some(Effort::Work(most)) = self.effort {
             let done = work as f64 / most.max(1) as f64;
             self.bar.set_position((LENGTH * done.min(1.0)) as u64);
         }
@@ -73,8 +94,8 @@ impl Observer for Watch {
 
     fn progress(&self) -> Option<f64> {
         match self.effort {
-            Effort::Time(_) => self.deadline.progress(),
-            Effort::Work(_) => None,
+            Some(Effort::Time(_)) => self.deadline.progress(),
+            Some(Effort::Work(_)) | None => None,
         }
     }
 }
@@ -85,12 +106,14 @@ mod tests {
 
     #[test]
     fn every_ten_seconds_one_line_says_how_far_the_search_has_come() {
-        let watch = Watch::new(Effort::Work(1000));
+        let watch = Watch::new(Some(Effort::Work(1000)));
         let line = || watch.line(Duration::from_secs(12));
         assert_eq!(line(), "searching after 12 s, 0.0 % of the budget");
         watch.counted(7, 255);
-        watch.event(&Event { evaluations: 7, work: 255, cost: 2e3, incumbent: 1.25e3 });
-        assert_eq!(line(), "cost 1.250000e3 after 12 s, 25.5 % of the budget");
+        for cost in [2e3, 1.25e3] {
+            watch.event(&Event { evaluations: 7, work: 255, cost, incumbent: cost });
+        }
+        assert_eq!(line(), "searching, cost −37.5 % after 12 s, 25.5 % of the budget");
         // Whichever thread comes first.
         let times = [0.0, 9.9, 10.0, 10.1, 45.0, 39.0, 49.9, 50.0];
         let due = times.map(|seconds| watch.is_due(Duration::from_secs_f64(seconds)));

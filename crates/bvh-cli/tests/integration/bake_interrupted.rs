@@ -45,7 +45,7 @@ fn ctrl_c_keeps_a_better_tree_in_the_file_and_the_best_one_of_a_decision() {
     while !message.contains("combinations") {
         assert!(messages.read_line(&mut message).unwrap() > 0, "{message}");
     }
-    std::thread::sleep(Duration::from_secs(2));
+    std::thread::sleep(Duration::from_secs(5));
     send("-INT", &child);
     ended(&child.wait_with_output().unwrap(), 130, &[]);
     assert!(number(at, "inspect a.bvh konistil", "work") > 1e6);

@@ -88,14 +88,10 @@ orient mesh.obj --out=x.glb ! --out | .obj
 orient no.glb --out=x.glb ! no.glb: no such file
 orient mesh.ply --out=x.ply ! mesh.ply: a file of the kind Ply | OBJ, glTF or GLB
 orient good.bvh --out=x.obj ! good.bvh
-bake forest.glb --instances --budget=1h --out=full ! full contains files | new or empty
-bake forest.glb --instances --budget=1h --out=file/x ! file is no folder | new or empty
 
 bake sofa LONG ! scene sofa: no such scene; accepted: bijou
 bake esher LONG ! no such scene; did you mean escher?
 bake no.glb LONG ! error: scene no.glb: no such file
-bake mesh.obj --instances --budget=1h --out=x ! mesh.obj | Obj | glTF
-bake no.glb --instances --budget=1h --out=x ! no.glb | no such file
 bake spheres75 LONG --from=cut.bvh ! cut.bvh | cut or extended
 bake spheres75 LONG --from=flipped.bvh ! flipped.bvh | checksum
 bake spheres75 LONG --from=file ! file | not a tree file
@@ -211,6 +207,7 @@ fn a_wrong_value_of_any_flag_is_rejected_with_the_flags_name() {
         at,
         &[
             ("bake", &["spheres75", "--budget=0s", "--out=x.bvh"]),
+            ("bench", &["good.bvh", "spheres75"]),
             ("inspect", &["good.bvh", "spheres75"]),
             ("verify", &["good.bvh", "spheres75"]),
             ("export", &["good.bvh", "spheres75", "--for=obvhs", "--out=x.bin"]),
@@ -231,9 +228,13 @@ fn the_results_of_all_commands_are_printed_as_json() {
         ("bake escher --budget=10kwork --out=x.bvh --rays=through.csv", "seconds"),
         ("bake escher --budget=1Mwork --parts=2 --list", "parts"),
         ("render spheres75 --size=8x8 --out=x.png", "rays"),
-        ("report good.bvh spheres75", "Depth"),
+        ("report good.bvh spheres75", "depth"),
+        ("verify good.bvh spheres75", "valid"),
     ] {
         let facts = facts(folder.path(), line);
         assert!(facts.contains_key(fact), "{line}: {facts:?}");
+        let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+        let odd = facts.keys().find(|key| !key.chars().all(is_plain));
+        assert_eq!(odd, None, "{line}");
     }
 }

@@ -1,10 +1,10 @@
 //! The program `bvh`, run as users run it.
 
 mod bake;
-mod bake_instances;
 #[cfg(unix)]
 mod bake_interrupted;
 mod bake_parts;
+mod bench;
 mod commands;
 mod examples;
 mod export;

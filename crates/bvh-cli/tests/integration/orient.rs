@@ -25,7 +25,8 @@ fn an_oblique_mesh_gets_smaller_boxes_and_is_turned_once() {
     fs::write(at.join("walls.obj"), obj).unwrap();
     let facts = facts(at, "orient walls.obj --out=new.obj --report");
     let mesh = &facts["meshes"][0];
-    let [before, after] = ["area before", "area after"].map(|area| mesh[area].as_f64().unwrap());
+    let [before, after] =
+        ["greedy_area_before", "greedy_area_after"].map(|area| mesh[area].as_f64().unwrap());
     assert!(mesh["triangles"] == 300 && after < 0.8 * before, "{mesh}");
     let areas = ["walls.obj", "new.obj"].map(|name| {
         let scene = Scene::load(at.join(name).to_str().unwrap()).unwrap();

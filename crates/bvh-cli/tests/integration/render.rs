@@ -45,7 +45,7 @@ fn a_report_compares_a_tree_with_the_greedy_tree_on_one_page_and_replaces_no_fil
         let title = title.trim_end().strip_prefix("a.html: ").unwrap();
         assert!(title.ends_with(" % cheaper than a plain build"), "{title}");
         let page = fs::read_to_string(at.join("a.html")).unwrap();
-        for part in [title, "Total area of inner nodes", "greedy tree: median"] {
+        for part in [title, "Area of inner nodes", "greedy tree: median"] {
             assert!(page.contains(part), "{scene}: {part}");
         }
         assert_eq!(page.matches("data:image/png;base64,").count(), 3, "{scene}");

@@ -42,5 +42,5 @@ pub fn number(at: &Path, line: &str, name: &str) -> f64 {
 
 /// Returns the internal area of the tree in a file.
 pub fn cost(at: &Path, file: &str) -> f64 {
-    number(at, &format!("inspect {file}"), "internal area")
+    number(at, &format!("inspect {file}"), "area")
 }

@@ -28,14 +28,16 @@ class Tree:
     its objects and its faces, but forgets the `rays`, the `seed` and the `references` of its
     search, as a file does: `improve` then minimises the cost for random lines.
 
-    Searches have these arguments. They end after `seconds`, by default 1, or after `work` nodes
-    created or visited. With `work` and without `seconds`, the same `seed` gives the same tree on
+    Searches have these arguments. They end after `seconds` or after `work` nodes created or visited.
+    Without either, a search chooses its work, and what else is not given: `reasons` says why. With
+    `work` and without `seconds`, the same `seed` gives the same tree on
     every machine, and the same file as `bvh bake`. `progress(seconds, cost)` is called about twenty
     times per second with the elapsed time and the lowest cost so far; if it raises an exception,
     the search ends. `rays` are recorded rays of the shape `(m, 2, 3)`, from their origins to their
     hits: the tree is then for rays like these. `references` above 1, up to 16, divides triangles
-    among leaves, on average into that many parts each. With `precision="double"` the triangles have
-    `float64` coordinates, each 0 or 2^-150 to 2^120 in size, and `Tracer` answers in `float64`.
+    among leaves, on average into that many parts each; 1 keeps them whole. With
+    `precision="double"` the triangles have `float64` coordinates, each 0 or 2^-150 to 2^120 in size,
+    and `Tracer` answers in `float64`.
 
     >>> from bvh_search import Tree
     >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
@@ -50,7 +52,7 @@ class Tree:
         faces: Numbers,
         seconds: float | None = None,
         *,
-        references: float = 1.0,
+        references: float | None = None,
         seed: int = 1,
         work: int | None = None,
         progress: Progress | None = None,
@@ -69,7 +71,7 @@ class Tree:
         triangles: Numbers,
         seconds: float | None = None,
         *,
-        references: float = 1.0,
+        references: float | None = None,
         seed: int = 1,
         work: int | None = None,
         progress: Progress | None = None,
@@ -132,7 +134,7 @@ class Tree:
     def improve(
         self, seconds: float | None = None, *, work: int | None = None, progress: Progress | None = None
     ) -> None:
-        """Improves the tree for about `seconds`. Ctrl-C ends the search early, and the tree keeps its
+        """Improves the tree for about `seconds`, by default 1, or for `work`. Ctrl-C ends the search early, and the tree keeps its
         gains. Until the call returns, other threads see the old tree, and a second `improve` raises
         a `RuntimeError`.
 
@@ -161,6 +163,13 @@ class Tree:
 
         >>> square.precision
         'single'
+        """
+    @property
+    def reasons(self) -> list[str]:
+        """What the search chose by itself, and why: one line each. A loaded tree has none.
+
+        >>> square.reasons
+        ["frame: no other saves enough area; kept are the file's axes"]
         """
     @property
     def frame(self) -> tuple[list[list[float]], list[float]] | None:

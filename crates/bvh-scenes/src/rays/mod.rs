@@ -10,6 +10,6 @@ pub use camera::{Camera, View, frame};
 pub use empirical_cost::{EmpiricalCost, Mean, RandomRays, empirical_cost, tests_per_ray};
 pub use random::{Family, Kind, Viewpoint, in_box, on_sphere, random_ray};
 pub use segments::{
-    OF_ANYTHING, RenderedRays, TRAINED, TracedRay, check_count, density, of_anything, of_inside,
-    of_renderer,
+    OF_ANYTHING, RenderedRays, TRAINED, TracedRay, anywhere, check_count, density, of_anything,
+    of_inside, of_renderer,
 };

@@ -105,7 +105,7 @@ pub fn of_renderer(
     tree: &Bvh,
     is_over: &dyn Fn() -> bool,
 ) -> Vec<TracedRay> {
-    let mut tracing = Tracing::new(scene, tree, config.seed);
+    let mut tracing = Tracing::new(&scene.primitives, tree, config.seed);
     let up = scene.up();
     for index in 0..config.count {
         if is_over() {
@@ -145,7 +145,17 @@ pub fn of_anything(
     seed: u64,
     is_over: &dyn Fn() -> bool,
 ) -> Vec<TracedRay> {
-    let mut tracing = Tracing::new(scene, tree, seed);
+    through(count, &scene.primitives, tree, seed, is_over)
+}
+
+fn through(
+    count: u32,
+    primitives: &Primitives,
+    tree: &Bvh,
+    seed: u64,
+    is_over: &dyn Fn() -> bool,
+) -> Vec<TracedRay> {
+    let mut tracing = Tracing::new(primitives, tree, seed);
     let root = tracing.bounds;
     if tree.nodes.is_empty() {
         return Vec::new();
@@ -172,7 +182,7 @@ pub fn of_anything(
 
 /// Returns `count` of the paper's random rays, up to their nearest hits.
 pub fn of_inside(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<TracedRay> {
-    let mut tracing = Tracing::new(scene, tree, seed);
+    let mut tracing = Tracing::new(&scene.primitives, tree, seed);
     for _ in 0..count {
         let root = Some(tracing.bounds).filter(|_| !tree.nodes.is_empty());
         let ray = root.and_then(|root| random_ray(Family::Inside, &root, &mut tracing.rng));
@@ -185,6 +195,24 @@ pub fn of_inside(count: u32, scene: &Scene, tree: &Bvh, seed: u64) -> Vec<Traced
 /// The default number of primary rays that train a tree; without a camera, the number of rays of
 /// each family.
 pub const TRAINED: u32 = 100_000;
+
+/// Returns the density of [rays that need no camera](of_anything), [`TRAINED`] of each family: those
+/// that train the trees of bakes, and, of another seed, judge them. `None` soon after `is_over`
+/// returns true.
+///
+/// # Errors
+///
+/// As [`density`].
+pub fn anywhere(
+    primitives: &Primitives,
+    tree: &Bvh,
+    seed: u64,
+    is_over: &dyn Fn() -> bool,
+) -> Result<Option<RayDensity>, DensityError> {
+    let rays = through(TRAINED, primitives, tree, seed, is_over);
+    // After an interruption some rays are missing, or all of them, which is an error otherwise.
+    if is_over() { Ok(None) } else { density(&rays, tree).map(Some) }
+}
 
 /// The share of area in a box's measure. Without it a box that no sampled ray enters would be free.
 /// For a camera, shares from 0.02 to 0.3 change trees by less than seeds do; without a camera, 0.3
@@ -218,9 +246,9 @@ struct Tracing<'a> {
 }
 
 impl<'a> Tracing<'a> {
-    fn new(scene: &'a Scene, tree: &'a Bvh, seed: u64) -> Self {
-        let accelerator = Accelerator::of_tree(&scene.primitives, tree);
-        let bounds = bounds_along_file(&scene.primitives, tree).unwrap_or(Aabb::EMPTY);
+    fn new(primitives: &'a Primitives, tree: &'a Bvh, seed: u64) -> Self {
+        let accelerator = Accelerator::of_tree(primitives, tree);
+        let bounds = bounds_along_file(primitives, tree).unwrap_or(Aabb::EMPTY);
         let rng = ChaCha8Rng::seed_from_u64(seed);
         Self { accelerator, bounds, rng, rays: Vec::new(), tests: TestCounts::default() }
     }

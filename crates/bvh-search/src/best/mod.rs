@@ -68,16 +68,16 @@ pub(crate) fn unless_behind(found: Outcome, fallback: Option<Outcome>) -> Outcom
 /// they may not be divided, or if the observer cancels first. If the result has no more references than
 /// objects, no plane saves anything. A search would then hardly find a saving either, and would
 /// spend its work on looking.
-pub(crate) fn division(
+pub(crate) fn divided(
     splits: Option<Splits>,
     boxes: &[Aabb],
     observer: &dyn Observer,
 ) -> Result<Option<Bvh>, SearchError> {
-    let Some(Splits { objects, most, division }) = splits.filter(|s| s.most > boxes.len()) else {
+    let Some(Splits { objects, most, divided }) = splits.filter(|s| s.most > boxes.len()) else {
         return Ok(None);
     };
-    if let Some(division) = division {
-        return Ok(Some(division.clone()));
+    if let Some(divided) = divided {
+        return Ok(Some(divided.clone()));
     }
     built_unless_cancelled(observer, |watch| spatial::build(most, boxes, objects, watch))
 }
@@ -100,7 +100,7 @@ impl Config {
     ) -> Found {
         if problem.splits.is_some() || problem.objective == Objective::Layout {
             let tree = self.initial(None, problem, run)?;
-            let other = division(problem.splits, problem.boxes, run.observer())?;
+            let other = divided(problem.splits, problem.boxes, run.observer())?;
             let best = Incumbent::begin(tree, problem, run);
             return self.improved(best, other, metric, problem, seed, run);
         }

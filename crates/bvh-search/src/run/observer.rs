@@ -53,6 +53,9 @@ pub trait Observer: Sync {
     /// Called whenever moves or trees have been counted, with all evaluations and all work so far.
     /// A search may run long without an event.
     fn counted(&self, _evaluations: u64, _work: u64) {}
+    /// Called before each of the combinations that a [choice](crate::Bake::choose) tries, with the
+    /// number of those before it, and at the end.
+    fn trying(&self, _tried: usize, _of: usize) {}
     /// Polled often, by constructions too. The search returns its incumbent soon after this becomes
     /// true. Without an incumbent, it returns the tree that the caller [kept](crate::solve_or_keep),
     /// or a tree of the fastest builder.

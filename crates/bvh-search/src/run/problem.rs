@@ -22,14 +22,14 @@ pub struct Splits<'a> {
     pub most: usize,
     /// The division of these objects by [`spatial`](bvh_build::spatial), if the caller has it, so
     /// that the search need not repeat it.
-    pub division: Option<&'a Bvh>,
+    pub divided: Option<&'a Bvh>,
 }
 
 impl<'a> Splits<'a> {
     /// Permits up to `most` references; `None` if these are not more than the `boxes`. Nothing can
     /// then be divided, and more methods solve the problem without splits.
     pub fn at_most(most: usize, boxes: &[Aabb], objects: &'a dyn Clip) -> Option<Self> {
-        (most > boxes.len()).then_some(Self { objects, most, division: None })
+        (most > boxes.len()).then_some(Self { objects, most, divided: None })
     }
 }
 

@@ -68,7 +68,7 @@ fn a_tree_with_its_objects_is_improved_saved_and_loaded_divided_or_whole() {
         [(shapes(), 1.0), (shapes(), 2.0), (Objects::Boxes(boxes.clone()), 2.0)]
     {
         let deadline = || Deadline::after(Duration::from_millis(50));
-        let options = Options { references, seed: 7, ..Options::default() };
+        let options = Options { references: Some(references), seed: 7, ..Options::default() };
         let mut owned = OwnedTree::find(objects.clone(), &options, &deadline()).unwrap();
         let first = cost::total_area(owned.tree());
         let may_divide = references > 1.0 && owned.triangles().is_some();

@@ -136,6 +136,7 @@ fn a_tree_in_a_frame_keeps_it_and_the_answers_of_rays() {
     for (references, rays) in [(1.0, &[][..]), (1.2, &[]), (1.2, &rays)] {
         let [owned, plain] = [Frames::Auto, Frames::File].map(|frame| {
             let budget = work(2_000_000);
+            let references = Some(references);
             let options = Options { references, budget, rays, frame, ..Options::default() };
             OwnedTree::find(shapes(&triangles), &options, &()).unwrap()
         });
@@ -181,8 +182,9 @@ fn triangles_in_f64_are_baked_at_map_coordinates_and_traced_from_their_file() {
         let options = Options { frame, references, budget: work(10_000_000), ..Options::default() };
         OwnedTree::find(objects(&triangles), &options, &()).unwrap()
     };
-    let [file, auto, divided] = [(Frames::File, 1.0), (Frames::Auto, 1.0), (Frames::Auto, 1.3)]
-        .map(|(frame, references)| baked(frame, references));
+    let [file, auto, divided] =
+        [(Frames::File, Some(1.0)), (Frames::Auto, Some(1.0)), (Frames::Auto, Some(1.3))]
+            .map(|(frame, references)| baked(frame, references));
     let [along, turned] = [&file, &auto].map(|owned| cost::internal_area(owned.tree()));
     assert!(turned < 0.9 * along, "{turned} of {along}");
     assert!(divided.tree().prim_ids.len() > triangles.len());

@@ -2,6 +2,7 @@
 
 mod bake;
 mod cancellation;
+mod choose;
 mod frames;
 mod local_search;
 mod measure;

@@ -33,7 +33,7 @@ fn passes_divide_and_reunite_within_the_limit_and_every_reference_saves_its_pric
         // With fewer allowed references than the tree has, nothing is divided, and leaves that
         // pay little are still reunited.
         for most in [180, 200, 160, 150] {
-            let mut divider = Divider::new(Splits { objects, most, division: None }, by_layout);
+            let mut divider = Divider::new(Splits { objects, most, divided: None }, by_layout);
             let mut references = tree.objects();
             for round in 0..4 {
                 let tally = divider.pass(&mut tree, quota, &mut stream(7, round), &());

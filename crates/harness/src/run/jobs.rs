@@ -1,9 +1,10 @@
-//! The runs of an experiment, before they are performed, and their choice when several processes
-//! share an experiment.
+//! The runs of an experiment, before they are performed, their choice when several processes share an
+//! experiment, and what all measurements share.
 
+use super::watch::Watch;
 use crate::Error;
 use crate::contestant::Labelled;
-use crate::rows::finished_run::RunName;
+use crate::rows::kept_run::RunName;
 use crate::spec::Experiment;
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::Objective;
@@ -11,6 +12,8 @@ use bvh_core::{Bvh, RayDensity};
 use bvh_scenes::Scene;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashSet};
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// One run of an experiment.
 #[derive(Clone)]
@@ -22,6 +25,7 @@ pub(crate) struct Job<'a> {
     pub scene: &'a Scene,
     pub labelled: &'a Labelled,
     pub repetition: u32,
+    pub seed: u64,
     /// True if this run also makes the measurements that depend only on the scene.
     pub first_of_scene: bool,
 }
@@ -44,8 +48,10 @@ pub(crate) fn selected<'a>(
             for repetition in 0..experiment.repetitions {
                 let index = jobs.len();
                 let id = experiment.run_id(&scene.name, &labelled.label, repetition);
+                let label = labelled.options.seed_as.as_ref().unwrap_or(&labelled.label);
+                let seed = experiment.seed_of(&scene.name, label, repetition);
                 let first_of_scene = index == first;
-                jobs.push(Job { index, id, scene, labelled, repetition, first_of_scene });
+                jobs.push(Job { index, id, scene, labelled, repetition, seed, first_of_scene });
             }
         }
     }
@@ -66,12 +72,6 @@ impl Job<'_> {
     pub fn name(&self) -> RunName {
         let (scene, method) = (self.scene.name.clone(), self.labelled.label.clone());
         RunName { scene, method, repetition: self.repetition }
-    }
-
-    /// The seed of the run.
-    pub fn seed(&self, experiment: &Experiment) -> u64 {
-        let label = self.labelled.options.seed_as.as_ref().unwrap_or(&self.labelled.label);
-        experiment.seed_of(&self.scene.name, label, self.repetition)
     }
 
     /// Returns the density of the rays whose visits the run minimises, if it does. Every repetition
@@ -101,12 +101,46 @@ pub(crate) fn tracing_error(scene: &Scene) -> impl Fn(String) -> Error + use<> {
     move |message| Error::Tracing { scene: scene.clone(), message }
 }
 
+/// The jobs of an experiment, with everything that its measurements share.
+pub(crate) struct Jobs<'a> {
+    pub experiment: &'a Experiment,
+    /// The selected runs: all runs, unless several processes share the experiment.
+    pub list: Vec<Job<'a>>,
+    /// The costs of the greedy trees by scene.
+    pub bases: BTreeMap<String, f64>,
+    pub watch: Watch<'a>,
+    trees: Mutex<BTreeMap<usize, Arc<Bvh>>>,
+}
+
+impl<'a> Jobs<'a> {
+    /// Selects the runs with these identifiers, as [`selected`] does, and builds the greedy trees of
+    /// their scenes.
+    pub fn new(
+        experiment: &'a Experiment,
+        scenes: &'a [Scene],
+        ids: &[String],
+        interrupted: &'a AtomicBool,
+    ) -> Result<Self, Error> {
+        let list = selected(experiment, scenes, ids)?;
+        let bases = base_costs(&experiment.objective, &list)?;
+        let watch = Watch::new(list.len() as u64, interrupted);
+        Ok(Self { experiment, list, bases, watch, trees: Mutex::default() })
+    }
+
+    /// The trees of performed runs that later measurements need, by the index of the run.
+    pub fn trees(&self) -> MutexGuard<'_, BTreeMap<usize, Arc<Bvh>>> {
+        self.trees.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns the error of a measurement that is interrupted after all runs are finished.
+    pub fn interrupted(&self) -> Error {
+        Error::Interrupted { finished: self.list.len(), runs: self.list.len() }
+    }
+}
+
 /// Returns the costs of the greedy Müller–Fellner trees of the jobs' scenes, the bases of all
 /// ratios, by the scene's name.
-pub(crate) fn base_costs(
-    objective: &Objective,
-    jobs: &[Job],
-) -> Result<BTreeMap<String, f64>, Error> {
+fn base_costs(objective: &Objective, jobs: &[Job]) -> Result<BTreeMap<String, f64>, Error> {
     let base = |jobs: &[Job]| {
         let scene = jobs[0].scene;
         let tree = muller_fellner::Config::default().build(&scene.boxes);

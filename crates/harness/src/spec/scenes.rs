@@ -1,17 +1,47 @@
-//! Turned scenes: `SCENE:turn:DEGREES` is turned about the vertical, `SCENE:rotation:SEED` by a
-//! random rotation.
+//! The scenes of a spec, turned if their names say so: `SCENE:turn:DEGREES` is turned about the
+//! vertical, `SCENE:rotation:SEED` by a random rotation.
 //!
 //! Nothing is moved. Boxes along the file's axes around a scene that is turned by R are boxes in
 //! the frame R around the scene itself. So rays are the same at all angles, and vertices are not
 //! rounded.
 
+use super::Experiment;
+use crate::Error;
 use crate::rows::TurnRow;
 use bvh_core::glam::{DMat3, DQuat, DVec3, Vec3};
 use bvh_core::{Frame, Triangle};
 use bvh_scenes::builtin::stand_ins::cos_sin;
-use bvh_scenes::{Scene, SceneError};
+use bvh_scenes::{Scene, SceneError, subset};
 use bvh_search::{Budget, Choice, Observer, Stream};
 use rand::{RngExt, SeedableRng};
+use std::collections::HashSet;
+
+impl Experiment {
+    /// Loads the scenes. Returns them and the names of optional scenes that are missing.
+    pub fn load_scenes(&self) -> Result<(Vec<Scene>, Vec<String>), Error> {
+        // The scenes of the suite are names of cases, which the suite itself makes.
+        if self.suite.is_some() {
+            return Ok(Default::default());
+        }
+        let names = self.scenes.iter().flat_map(|name| subset::expand(name));
+        let mut scenes = names.map(|name| load(&name)).collect::<Result<Vec<_>, _>>()?;
+        let mut skipped = Vec::new();
+        for name in &self.optional_scenes {
+            match load(name) {
+                Ok(scene) => scenes.push(scene),
+                // An optional scene that cannot be loaded is one that nobody has fetched.
+                Err(_) => skipped.push(name.clone()),
+            }
+        }
+        let mut names = HashSet::new();
+        match scenes.iter().find(|scene| !names.insert(&scene.name)) {
+            Some(twice) => {
+                Err(Error::Usage(format!("two scenes are called {}; name each once", twice.name)))
+            }
+            None => Ok((scenes, skipped)),
+        }
+    }
+}
 
 /// Returns how the scene of this name stands, if it is turned.
 pub fn turn_of(name: &str) -> Option<TurnRow> {
@@ -25,7 +55,7 @@ pub fn turn_of(name: &str) -> Option<TurnRow> {
 }
 
 /// Loads a scene, turned if its name says so. Only triangles are turned.
-pub fn load(name: &str) -> Result<Scene, SceneError> {
+fn load(name: &str) -> Result<Scene, SceneError> {
     let Some(TurnRow { mesh, degrees, rotation, .. }) = turn_of(name) else {
         return Scene::load(name);
     };

@@ -1,4 +1,4 @@
-//! The rows of one finished run, and the file in which a run is kept.
+//! The rows of one finished run, and the file in which they are kept.
 
 use super::RunRow;
 use super::csv_file::{Row, parse, to_bytes};
@@ -28,14 +28,14 @@ impl fmt::Display for RunName {
 
 /// The rows of one finished run: one CSV file for every kind of rows that it has.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct FinishedRun {
+pub struct KeptRun {
     /// The processor that performed it.
     pub(super) processor: String,
     /// The texts of the files by their names.
     pub(super) files: BTreeMap<String, String>,
 }
 
-impl FinishedRun {
+impl KeptRun {
     /// Makes a run of this processor without rows.
     pub fn here() -> Self {
         Self { processor: PROCESSOR.name(), files: BTreeMap::new() }
