@@ -173,8 +173,9 @@ typedef struct {
 } BvsClosest;
 
 // The points `origin` + t * `direction` with `t_min` <= t <= `t_max`. The direction may have any
-// length except 0; `t_min` is 0 or more; `t_max` may be infinite. Coordinates are 0 or from 2^-150
-// to 2^120 in size, and the largest component of a direction is from 2^-100 to 2^100.
+// length except 0; `t_min` is 0 or more; `t_max` may be infinite. Coordinates are
+// at most 2^120 in size, below 2^-150 they count as 0, and the largest component of a direction is
+// from 2^-100 to 2^100.
 typedef struct {
     // The point with t = 0.
     double origin[3];

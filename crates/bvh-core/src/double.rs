@@ -36,11 +36,11 @@ pub struct DRay {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum OutOfExactRange {
     /// A coordinate of a ray's origin.
-    #[error("the ray's origin {0}: accepted are coordinates that are 0 or from 2^-150 to 2^120")]
+    #[error("the ray's origin {0}: accepted are coordinates up to 2^120")]
     Origin(DVec3),
     /// A component of a ray's direction, or all of them.
     #[error(
-        "the ray's direction {0}: accepted are components that are 0 or from 2^-150 to 2^120, the largest from 2^-100 to 2^100"
+        "the ray's direction {0}: accepted are components up to 2^100, the largest of at least 2^-100"
     )]
     Direction(DVec3),
     /// The range is NaN or extends behind the origin.
@@ -73,6 +73,9 @@ impl DRay {
 
     /// Makes the ray from `origin` in `direction` over `t_min..=t_max`. Distances `t` are in
     /// multiples of the direction's length, which need not be 1. Arrays `[f64; 3]` are accepted.
+    ///
+    /// Coordinates and components below 2⁻¹⁵⁰ count as 0: they are what cancellation leaves where a
+    /// path comes to a plane through zero, and the path must not end there.
     #[inline]
     pub fn new(
         origin: impl Into<DVec3>,
@@ -80,8 +83,8 @@ impl DRay {
         t_min: f64,
         t_max: f64,
     ) -> Result<Self, OutOfExactRange> {
-        let origin = origin.into();
-        let direction = direction.into();
+        let mut origin = origin.into();
+        let mut direction = direction.into();
         let (sizes, others) = (direction.abs(), origin.abs());
         let longest = sizes.max_element();
         let DVec3 { x, y, z } = sizes + others;
@@ -93,19 +96,21 @@ impl DRay {
             & (t_min >= 0.0)
             & !t_max.is_nan();
         if !is_valid {
-            Self::check(origin, direction, t_min, t_max)?;
+            [origin, direction] = Self::checked(origin, direction, t_min, t_max)?;
         }
         // Adding 0 turns −0 into +0.
         Ok(Self { origin, direction, t_min: t_min + 0.0, t_max: t_max.min(f64::MAX) + 0.0 })
     }
 
     #[inline(never)]
-    fn check(
+    fn checked(
         origin: DVec3,
         direction: DVec3,
         t_min: f64,
         t_max: f64,
-    ) -> Result<(), OutOfExactRange> {
+    ) -> Result<[DVec3; 2], OutOfExactRange> {
+        let [origin, direction] =
+            [origin, direction].map(|p| p.map(|x| if x.abs() < Self::LEAST { 0.0 } else { x }));
         if !is_exact(origin) {
             return Err(OutOfExactRange::Origin(origin));
         }
@@ -117,7 +122,7 @@ impl DRay {
         if !(0.0..).contains(&t_min) || t_max.is_nan() {
             return Err(OutOfExactRange::Range(t_min, t_max));
         }
-        Ok(())
+        Ok([origin, direction])
     }
 
     /// Makes a half line: `t` from 0 to the largest finite distance.

@@ -174,7 +174,7 @@ fn sorted_edges(triangles: &[[DVec3; 3]]) -> Vec<Edge> {
 
 /// A layout in f32 or in f64.
 pub trait Traced {
-    /// A point. In f64, coordinates too small for a [ray](DRay) count as 0.
+    /// A point. In f64, coordinates count as those of a [ray](DRay::new).
     type Point: Copy;
 
     /// Returns the point in f64.
@@ -243,7 +243,6 @@ impl Traced for DWideBvh {
         is_inside: impl Fn(&mut dyn ExactSizeIterator<Item = u32>) -> bool,
     ) {
         let half_line = |&point: &DVec3| {
-            let point = point.map(|x| if x.abs() < DRay::LEAST { 0.0 } else { x });
             // A point beyond the range of all coordinates is outside: its range is empty.
             let ray = DRay::half_line(point, DVec3::X);
             ray.or_else(|_| DRay::new(DVec3::ZERO, DVec3::X, 1.0, 0.0)).expect("a valid ray")

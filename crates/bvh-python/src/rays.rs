@@ -3,7 +3,7 @@
 use crate::arrays::{Array, invalid, numbers};
 use crate::precision::{Precision, Real};
 use bvh_search::bvh_core::glam::DVec3;
-use bvh_search::bvh_core::{DRay, Orientation, Select, Traced};
+use bvh_search::bvh_core::{Orientation, Select, Traced};
 use pyo3::prelude::*;
 
 /// Reads points, `(m, 3)`.
@@ -164,21 +164,14 @@ impl RaySource<'_> {
             let limits = self.limits.map(|limits| *at(limits, index));
             rays.push(match N::ray(origin, direction, limits) {
                 Err(_) if self.misses => {
-                    // What is too small for a tree in `float64` is nothing next to what is not.
-                    let [origin, direction] = [origin, direction].map(without_least);
-                    let ray = N::ray(origin, direction, limits);
                     // An empty range hits nothing.
-                    ray.or_else(|_| N::ray(DVec3::ZERO, DVec3::X, [1.0, 0.0]))?
+                    N::ray(DVec3::ZERO, DVec3::X, [1.0, 0.0])?
                 }
                 ray => ray.map_err(|fault| format!("ray {index}: {fault}"))?,
             });
         }
         Ok(rays)
     }
-}
-
-fn without_least(vector: DVec3) -> DVec3 {
-    vector.map(|x| if x.abs() < DRay::LEAST { 0.0 } else { x })
 }
 
 /// Which triangles count for each ray.

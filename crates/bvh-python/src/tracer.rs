@@ -24,8 +24,8 @@ use std::sync::{Arc, OnceLock};
 /// is not finite, raises a `ValueError`; with `invalid="miss"` it hits nothing.
 ///
 /// The tracer of a tree with `precision="double"` answers in `float64`, exactly, however far the
-/// triangles and the rays are from the origin. Coordinates are 0 or 2^-150 to 2^120 in size; with
-/// `invalid="miss"`, what is smaller in a ray counts as 0. In other tracers, rays and points are
+/// triangles and the rays are from the origin. Coordinates are up to 2^120 in size, and
+/// count as 0 below 2^-150. In other tracers, rays and points are
 /// rounded to `float32`, and `t_min` and `t_max` inwards.
 ///
 /// `nearest` and `any` choose which triangles count, in trees with `precision="double"`: those with

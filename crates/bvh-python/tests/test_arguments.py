@@ -229,6 +229,13 @@ def test_numbers_beyond_the_exact_range_are_named_with_the_range(number):
         (lambda: Tree.from_mesh(wrong, FACE, precision="double"), rf"^vertices: vertex 2 of face 0 is \[0.0, {name}, 0.0\]; {RANGE}$"),
         (lambda: double().update(wrong), rf"^vertices: vertex 2 of face 0 is \[0.0, {name}, 0.0\]; {RANGE}$"),
         (lambda: Tree.from_triangles([CORNERS, wrong], precision="double"), f"^triangles has {name} in row 1; {RANGE}$"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            call()
+    if number == 1e-46:
+        assert Tracer(double()).nearest(wrong, DOWN[1])[1].tolist() == Tracer(double()).nearest([[0, 0, 0], [1, 0, 0], [0, 0, 0]], DOWN[1])[1].tolist()
+        return
+    for call, message in [
         (lambda: Tracer(double()).nearest(wrong, DOWN[1]), rf"^ray 2: the ray's origin is \[0.0, {name}, 0.0\]; {RANGE}$"),
         (lambda: Tracer(double()).all([0, 0, 1], [0, number, 1]), rf"^ray 0: the ray's direction is \[0.0, {name}, 1.0\]; {RANGE}, the largest from 2\^-100 to 2\^100$"),
     ]:

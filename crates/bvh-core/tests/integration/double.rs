@@ -307,7 +307,9 @@ fn every_kernel_finds_all_hits_closest_points_and_insides_as_all_triangles_toget
 #[test]
 fn numbers_beyond_the_exact_range_are_rejected() {
     let up = DVec3::Z;
-    for bad in [f64::NAN, f64::INFINITY, 1e40, 1e-50] {
+    let tiny = DRay::half_line([1.0, 1e-50, -5e-324], [1e-60, 0.0, 1.0]);
+    assert_eq!(tiny, DRay::half_line(DVec3::X, up));
+    for bad in [f64::NAN, f64::INFINITY, 1e40] {
         let vector = DVec3::new(1.0, bad, 0.0);
         assert!(matches!(DRay::half_line(vector, up), Err(OutOfExactRange::Origin(_))), "{bad}");
         let rejected = DRay::half_line(up, vector);
