@@ -81,13 +81,7 @@ struct Trial {
 
 impl Config {
     /// Runs trials in parallel. They are independent, because each draws from a separate stream.
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Found {
+    fn search_by(&self, metric: impl Metric, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         let scene = Presorted::new(problem.boxes)?;
         let construction = (2 * problem.boxes.len() as u64).saturating_sub(1);
         let observer = run.observer();

@@ -34,13 +34,7 @@ bvh_config::config! {
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Found {
+    fn search_by(&self, metric: impl Metric, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         let Self { climb, hot, cold, work_per_object } = *self;
         let mover = || SingleMover::new(climb);
         anneal_initial(mover, [hot, cold], work_per_object, metric, problem, seed, run)

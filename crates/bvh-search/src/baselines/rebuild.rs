@@ -45,13 +45,7 @@ search_by_metric!(Config);
 
 impl Config {
     /// Rebuilds disjoint subtrees in parallel, each with a separate random stream.
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        seed: u64,
-        run: &mut Run,
-    ) -> Found {
+    fn search_by(&self, metric: impl Metric, problem: &Problem, seed: u64, run: &mut Run) -> Found {
         let (mut best, mut tree) = Incumbent::build(problem, metric, run)?;
         let n = tree.objects() as u64;
         if n < 3 {

@@ -28,13 +28,7 @@ bvh_config::config! {
 search_by_metric!(Config);
 
 impl Config {
-    fn search_by<A: Metric>(
-        &self,
-        metric: A,
-        problem: &Problem,
-        _seed: u64,
-        run: &mut Run,
-    ) -> Found {
+    fn search_by(&self, metric: impl Metric, problem: &Problem, _: u64, run: &mut Run) -> Found {
         let (mut best, mut tree) = Incumbent::build(problem, metric, run)?;
         let mut solver = Solver::new(self.size, &tree);
         best.improve(&mut tree, self.sweeps, run, |tree, quota, observer| {
