@@ -179,7 +179,6 @@ mod tests {
     use crate::scatter::scatter;
     use crate::{Budget, solve};
     use bvh_core::validate;
-    use std::sync::atomic::AtomicBool;
 
     fn configs() -> [Config; 6] {
         let config =
@@ -235,17 +234,5 @@ mod tests {
         let within =
             improved.history.iter().take_while(|event| event.work < improved.work / 3).count();
         assert_eq!(one.history, improved.history[..=within]);
-    }
-
-    #[test]
-    fn a_trial_cut_off_by_the_observer_is_recorded_as_constructed() {
-        let boxes = scatter(500);
-        let config = Config { local_search: LocalSearch::Reinsertion, ..Config::default() };
-        let cancelled = AtomicBool::new(true);
-        let outcome =
-            solve(&config, &Problem::new(&boxes), 3, Budget::UNLIMITED, &cancelled).unwrap();
-        let plain = Config { trials: 1, ..Config::default() };
-        let plain = solve(&plain, &Problem::new(&boxes), 3, Budget::UNLIMITED, &()).unwrap();
-        assert_eq!((outcome.tree, outcome.cost), (plain.tree, plain.cost));
     }
 }

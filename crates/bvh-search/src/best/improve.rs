@@ -439,35 +439,3 @@ impl Observer for Until<'_> {
         self.observer.progress()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use crate::run::{Budget, Observer, Problem, solve};
-    use crate::scatter::scatter;
-    use crate::{best, reinsertion};
-    use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
-
-    /// A slow clock that cancels after 5000 polls.
-    struct StoppedEarly(AtomicU32);
-
-    impl Observer for StoppedEarly {
-        fn progress(&self) -> Option<f64> {
-            Some(f64::from(self.0.fetch_add(1, Relaxed)) * 1e-9)
-        }
-        fn cancelled(&self) -> bool {
-            self.0.load(Relaxed) > 5000
-        }
-    }
-
-    #[test]
-    fn a_long_search_under_a_clock_that_is_stopped_early_is_not_behind_reinsertion() {
-        let boxes = scatter(300);
-        let problem = Problem::new(&boxes);
-        let config = reinsertion::Config::default();
-        let plain = solve(&config, &problem, 1, Budget::UNLIMITED, &()).unwrap();
-        let clock = StoppedEarly(AtomicU32::new(0));
-        let found =
-            solve(&best::Config::default(), &problem, 1, Budget::UNLIMITED, &clock).unwrap();
-        assert!(found.cost <= plain.cost, "{} is above {}", found.cost, plain.cost);
-    }
-}

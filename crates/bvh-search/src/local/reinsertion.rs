@@ -59,7 +59,10 @@ pub(crate) fn pass_by_area(
         return Tally::default();
     }
     let mut order = tree.preorder();
-    sort_by_area(tree, &mut order);
+    // The sort is stable. Areas are never negative, so their inverted bits are in reverse order. A
+    // key is read from memory once and not at every comparison, which in large trees takes most of
+    // the time.
+    order.sort_by_cached_key(|&index| !tree.nodes[index as usize].area.to_bits());
     pass(tree, &order, quota, observer)
 }
 
@@ -70,14 +73,6 @@ pub(crate) fn to_local_optimum(
     observer: &dyn Observer,
 ) -> Tally {
     repeat(quota, observer, |quota| pass_by_area(tree, quota, observer))
-}
-
-/// Sorts nodes by area, the largest first. The sort is stable: nodes of equal area keep their
-/// order.
-pub(crate) fn sort_by_area(tree: &Working<impl Metric>, order: &mut [u32]) {
-    // Areas are never negative, so their inverted bits are in reverse order. A key is read from
-    // memory once and not at every comparison, which in large trees takes most of the time.
-    order.sort_by_cached_key(|&index| !tree.nodes[index as usize].area.to_bits());
 }
 
 /// Repeats a pass until it keeps no move, the quota is used up, or the observer cancels.

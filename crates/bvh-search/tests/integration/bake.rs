@@ -45,13 +45,8 @@ fn a_tree_of_many_references_per_object_is_loaded_and_improved() {
     let bytes = bake.write(&tree, 0, |sections| sections.concat()).unwrap();
     let mut owned = OwnedTree::load(Objects::Shapes(shapes), &bytes).unwrap();
     let before = owned.cost(Objective::InternalArea);
-    improve_owned(&mut owned, Duration::from_millis(20));
+    owned.apply(owned.improvement(work(100_000), &()).unwrap());
     assert!(owned.cost(Objective::InternalArea) <= before);
-}
-
-fn improve_owned(owned: &mut OwnedTree, time: Duration) {
-    let improvement = owned.improvement(Budget::UNLIMITED, &Deadline::after(time)).unwrap();
-    owned.apply(improvement);
 }
 
 #[test]
@@ -67,28 +62,20 @@ fn a_tree_with_its_objects_is_improved_saved_and_loaded_divided_or_whole() {
     for (objects, references) in
         [(shapes(), 1.0), (shapes(), 2.0), (Objects::Boxes(boxes.clone()), 2.0)]
     {
-        let deadline = || Deadline::after(Duration::from_millis(50));
-        let options = Options { references: Some(references), seed: 7, ..Options::default() };
-        let mut owned = OwnedTree::find(objects.clone(), &options, &deadline()).unwrap();
+        let budget = work(30_000);
+        let options =
+            Options { references: Some(references), seed: 7, budget, ..Options::default() };
+        let mut owned = OwnedTree::find(objects.clone(), &options, &()).unwrap();
         let first = cost::total_area(owned.tree());
+        owned.apply(owned.improvement(work(3_000_000), &()).unwrap());
+        assert!(cost::total_area(owned.tree()) <= first * (1.0 + 1e-12));
         let may_divide = references > 1.0 && owned.triangles().is_some();
-        let mut time = Duration::from_millis(50);
-        let divides = loop {
-            improve_owned(&mut owned, time);
-            assert!(cost::total_area(owned.tree()) <= first * (1.0 + 1e-12));
-            let divides = owned.tree().prim_ids.len() > boxes.len();
-            // A busy or an emulated processor may need more than a moment before it divides any.
-            if divides == may_divide || time > Duration::from_secs(30) {
-                break divides;
-            }
-            time *= 2;
-        };
-        assert_eq!(divides, may_divide);
+        assert_eq!(owned.tree().prim_ids.len() > boxes.len(), may_divide);
         let saved = owned.save().unwrap();
         let mut loaded = OwnedTree::load(objects, &saved).unwrap();
         assert!(loaded.save().unwrap() == saved, "another seed or work");
         assert_eq!((loaded.tree(), loaded.objects()), (owned.tree(), boxes.len()));
-        improve_owned(&mut loaded, Duration::from_millis(50));
+        loaded.apply(loaded.improvement(work(100_000), &()).unwrap());
         assert!(cost::total_area(loaded.tree()) <= first * (1.0 + 1e-12));
     }
 }

@@ -19,7 +19,7 @@ fn methods() -> impl Iterator<Item = Method> {
 }
 
 /// The builder of the tree that local searches begin with.
-pub(crate) fn construction() -> muller_fellner::Config {
+fn construction() -> muller_fellner::Config {
     let heuristic = muller_fellner::Heuristic::AreaTimesPower(0.9);
     muller_fellner::Config { heuristic, ..Default::default() }
 }
