@@ -3,9 +3,7 @@
 // Tests that make pipes or lose output are left out on Windows, and their imports stay.
 #![cfg_attr(windows, allow(unused_imports))]
 
-use crate::support::{
-    bvh, facts, names, program, refused, said, unsaid, words, wrong, wrong_flags,
-};
+use crate::support::{bvh, facts, names, program, said, unsaid, words, wrong, wrong_flags};
 use std::fs;
 use std::path::Path;
 use std::process::Stdio;
@@ -172,19 +170,6 @@ fn a_full_output_is_an_error_and_a_closed_pipe_is_none() {
         let mut child = program(at, &words(line)).stdout(Stdio::piped()).spawn().unwrap();
         drop(child.stdout.take());
         assert!(child.wait().unwrap().success(), "{line}");
-    }
-}
-
-// Not even root can make files in this folder.
-#[cfg(target_os = "linux")]
-#[test]
-fn a_folder_that_cannot_be_written_is_named() {
-    let folder = folder();
-    for (line, parts) in [
-        ("bake spheres75 --budget=1h --out=/proc/x.bvh", ["/proc/x.bvh", "cannot create"]),
-        ("render spheres75 --size=8x8 --out=/proc/x.png", ["/proc/x.png", "cannot create"]),
-    ] {
-        refused(folder.path(), &words(line), 1, &parts);
     }
 }
 

@@ -1,6 +1,7 @@
 //! The everyday calls keep their time limit, use all of it, and end with good trees.
 
 use crate::{scatter, work};
+use bvh_scenes::Scene;
 use bvh_search::bvh_core::Primitives;
 use bvh_search::{Objects, Options, OwnedTree, prelude::*};
 use std::time::Instant;
@@ -51,14 +52,9 @@ fn a_tree_of_many_references_per_object_is_loaded_and_improved() {
 
 #[test]
 fn a_tree_with_its_objects_is_improved_saved_and_loaded_divided_or_whole() {
-    // Long and thin, so that dividing them pays.
-    let shifted = |corner: Vec3, by: f32| (corner + Vec3::splat(by)).to_array();
-    let thin = scatter(300, 1).into_iter().map(|aabb| {
-        Triangle::from([aabb.min.to_array(), shifted(aabb.min, 0.3), shifted(aabb.max, 0.3)])
-    });
-    let triangles: Vec<Triangle> = thin.collect();
-    let boxes = boxes(&triangles);
-    let shapes = || Objects::Shapes(Primitives::Triangles(triangles.clone()));
+    // Dividing these pays.
+    let Scene { primitives, boxes, .. } = Scene::load("escher:300").unwrap();
+    let shapes = || Objects::Shapes(primitives.clone());
     for (objects, references) in
         [(shapes(), 1.0), (shapes(), 2.0), (Objects::Boxes(boxes.clone()), 2.0)]
     {
@@ -119,7 +115,7 @@ fn a_tree_with_its_objects_follows_a_seed_a_budget_recorded_rays_and_moved_objec
 #[test]
 fn no_bake_of_work_is_behind_reinsertion_within_the_same_work() {
     for (name, objects) in [("escher", 60), ("bijou", 500), ("konistil", 300), ("S04", 200)] {
-        let scene = bvh_scenes::Scene::load(&format!("{name}:{objects}")).unwrap();
+        let scene = Scene::load(&format!("{name}:{objects}")).unwrap();
         let boxes = &scene.boxes;
         for per_object in [1, 5, 20, 30, 50, 100, 200, 400, 1000, 3000, 20_000, 60_000] {
             let budget = work(per_object * objects);
