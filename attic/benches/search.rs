@@ -28,8 +28,6 @@ const RUNS: [(&str, usize, f64); 3] =
 /// rest.
 const PLANNED: f64 = 0.97;
 
-const FOLDER: &str = "results/threads";
-
 /// One row of `timing_threads.csv`: one run of `best` against the clock.
 #[derive(Serialize, Deserialize)]
 struct ThreadsRow {
@@ -73,10 +71,8 @@ fn main() {
     std::env::set_current_dir(&top).expect("the project's folder");
     let Args { scenes, seconds, seeds, .. } = Args::parse();
     for name in scenes {
-        match Scene::load(&name) {
-            Ok(scene) => measured::replace(FOLDER, measure(&scene, &seconds, seeds), key),
-            Err(error) => println!("{error}"),
-        }
+        let scene = Scene::load(&name).expect("a scene");
+        measured::replace("results/threads", measure(&scene, &seconds, seeds), key);
     }
 }
 

@@ -1,17 +1,13 @@
-//! Other libraries as methods of experiments, the times of rays, and a lower bound. The instruments of this package
-//! are its benchmarks.
+//! Other libraries as methods of experiments, and the times of rays. The instruments of this package are its
+//! benchmarks.
 
 pub mod bvh;
 mod comparison;
-pub mod lower_bound;
 pub mod obvhs;
 mod programs;
 mod rows;
 pub mod tracing;
 
-pub use crate::obvhs::Preset;
-
-use crate::obvhs::Obvhs;
 use crate::tracing::contender::Contender;
 use bvh_config::OutOfRange;
 use bvh_core::{Aabb, Bvh, Triangle};
@@ -38,26 +34,12 @@ pub const LIBRARIES: &[&dyn Library] = &[&bvh::Crate, &obvhs::Crate];
 const RACERS: &[&dyn Racer] = &[&bvh::Crate, &obvhs::Crate];
 
 /// What the program contains beside the harness.
-pub const OTHERS: Others = Others {
-    libraries: LIBRARIES,
-    tracing: &tracing::Rounds,
-    lower_bound: lower_bound::internal_area,
-};
+pub const OTHERS: Others = Others { libraries: LIBRARIES, tracing: &tracing::Rounds };
 
 /// Makes the result of a build. Costs are compared by tight boxes; a library may pad its own.
 fn tight(mut tree: Bvh, seconds: f64, boxes: &[Aabb]) -> Built {
     tree.refit(boxes);
     Built { tree, seconds }
-}
-
-/// Builds with a preset of `obvhs`.
-pub fn build_by_obvhs(preset: Preset, boxes: &[Aabb]) -> Built {
-    obvhs::build(&Obvhs { preset, reinsertion: None }, boxes)
-}
-
-/// Builds with the crate `bvh`.
-pub fn build_by_bvh(boxes: &[Aabb]) -> Built {
-    bvh::build(boxes)
 }
 
 #[cfg(test)]
@@ -116,7 +98,7 @@ mod tests {
     #[test]
     fn other_libraries_find_nearly_all_hits_and_nothing_else() {
         let scene = Scene::load("escher:2000").unwrap();
-        let tree = build_by_bvh(&scene.boxes).tree;
+        let tree = bvh::build(&scene.boxes).tree;
         let rays = rays(Kind::Incoherent, 4000, &scene, &tree, &Default::default(), 1);
         let batch = Batch {
             query: Query::Nearest,

@@ -1,4 +1,4 @@
-//! The harness with other libraries as methods, and a lower bound.
+//! The harness with other libraries as methods, and the times of rays.
 
 fn main() -> std::process::ExitCode {
     harness::peers::bring(attic::OTHERS);

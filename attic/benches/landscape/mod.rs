@@ -16,14 +16,13 @@ const GLADE: f64 = 6.0;
 /// The edge of the square of ground that one building has.
 const PLOT: f64 = 40.0;
 
-/// Generates a landscape of `N` triangles by its name, `city:N`, `forest:N` or `terrain:N`, or
-/// loads any other scene.
+/// Generates a landscape of `N` triangles by its name, `city:N` or `forest:N`, or loads any other
+/// scene.
 pub fn load(name: &str) -> Result<Scene, SceneError> {
     let (kind, count) = name.split_once(':').unwrap_or((name, ""));
     let generator = match kind {
         "city" => city,
         "forest" => forest,
-        "terrain" => terrain,
         _ => return Scene::load(name),
     };
     let Ok(count) = count.parse() else { return Scene::load(name) };

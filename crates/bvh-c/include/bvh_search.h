@@ -34,6 +34,16 @@ typedef enum {
     BVS_COST_LAYOUT = 3,
 } BvsCost;
 
+// The side from which a ray comes to a triangle.
+typedef enum {
+    // Either side.
+    BVS_ORIENTATION_ANY = 0,
+    // Along the normal, on whose side the corners run counterclockwise: the ray leaves a solid.
+    BVS_ORIENTATION_EXITING = 1,
+    // Against the normal: the ray enters a solid.
+    BVS_ORIENTATION_ENTERING = 2,
+} BvsOrientation;
+
 // A scene of tracers in many places. Any number of threads may trace its rays at the same time. A
 // thread that updates or frees it must be the only user.
 typedef struct BvsInstances BvsInstances;
@@ -42,12 +52,16 @@ typedef struct BvsInstances BvsInstances;
 // that updates or frees a tracer must be the only user.
 typedef struct BvsTracer BvsTracer;
 
+// Triangles in f64 in the wide layout. Any number of threads may trace rays at the same time. A
+// thread that frees a tracer must be the only user.
+typedef struct BvsTracerF64 BvsTracerF64;
+
 // A tree with its objects. Any number of threads may read a tree at the same time. A thread that
 // improves or frees it must be the only user.
 typedef struct BvsTree BvsTree;
 
-// Boxes, or triangles between vertices. Either `boxes` or `vertices` is given; other fields that
-// are 0 or null have their defaults.
+// Boxes, or triangles between vertices. One of `boxes`, `vertices` and `vertices_f64` is given;
+// other fields that are 0 or null have their defaults.
 typedef struct {
     // The number of boxes or triangles.
     size_t count;
@@ -55,9 +69,12 @@ typedef struct {
     const float *boxes;
     // 3 floats for each vertex.
     const float *vertices;
+    // 3 doubles for each vertex, each 0 or from 2^-150 to 2^120 in size. Trees over them are
+    // traced by `bvs_tracer_f64_new`. Their boxes lie in a frame with its centre in the middle.
+    const double *vertices_f64;
     // The number of vertices; without `indices` 0 is 3 * `count`.
     size_t vertex_count;
-    // The bytes from a vertex to the next one, a multiple of 4; 0 is 12.
+    // The bytes from a vertex to the next one, a multiple of 4, or of 8 for doubles; 0 is 12 or 24.
     size_t vertex_stride;
     // The 3 vertices of each of `count` triangles, counted from 0; null for 0, 1, 2, then 3, 4, 5,
     // and so on.
@@ -154,6 +171,40 @@ typedef struct {
     // The index of the triangle; of several at the same distance, the lowest.
     uint32_t object;
 } BvsClosest;
+
+// The points `origin` + t * `direction` with `t_min` <= t <= `t_max`. The direction may have any
+// length except 0; `t_min` is 0 or more; `t_max` may be infinite. Coordinates are 0 or from 2^-150
+// to 2^120 in size, and the largest component of a direction is from 2^-100 to 2^100.
+typedef struct {
+    // The point with t = 0.
+    double origin[3];
+    // The smallest distance.
+    double t_min;
+    // The vector from the origin to the point with t = 1.
+    double direction[3];
+    // The largest distance.
+    double t_max;
+} BvsRayF64;
+
+// Which triangles count.
+typedef struct {
+    // One of `BvsOrientation`.
+    uint32_t orientation;
+    // The number of ids in `excluded` for each ray.
+    uint32_t excluded_count;
+    // The indices of triangles that do not count, `excluded_count` for each ray; UINT32_MAX is
+    // none.
+    const uint32_t *excluded;
+} BvsSelect;
+
+// The nearest triangle that a ray hits, as in `BvsHit`. The distance is the real one, rounded
+// once.
+typedef struct {
+    // The distance, in multiples of the direction's length.
+    double t;
+    // The index of the triangle.
+    uint32_t object;
+} BvsHitF64;
 
 // A transformed copy of a part.
 typedef struct {
@@ -361,6 +412,57 @@ BvsStatus bvs_tracer_contains(const BvsTracer *tracer, const float *points, size
 //
 // `tracer` is null, or a tracer that nobody uses any more.
 void bvs_tracer_free(BvsTracer *tracer);
+
+// Creates a tracer of a tree over triangles in f64. The tracer is independent of the tree.
+//
+// `tree` is a tree.
+BvsTracerF64 *bvs_tracer_f64_new(const BvsTree *tree);
+
+// Writes the nearest hit of one ray to `hit`. Dozens of rays at once are faster in
+// `bvs_tracer_nearest_hits_f64`.
+//
+// `tracer` is a tracer; `ray` points to a ray, and `hit` to a hit; `select` is null, or what
+// counts.
+BvsStatus bvs_nearest_f64(const BvsTracerF64 *tracer, const BvsRayF64 *ray, const BvsSelect *select, BvsHitF64 *hit);
+
+// Writes to `hit` whether one ray hits any triangle that counts: 1 or 0. Dozens of rays at once
+// are faster in `bvs_tracer_any_hits_f64`.
+//
+// `tracer` is a tracer; `ray` points to a ray, and `hit` to a byte; `select` is null, or what
+// counts.
+BvsStatus bvs_any_f64(const BvsTracerF64 *tracer, const BvsRayF64 *ray, const BvsSelect *select, uint8_t *hit);
+
+// Writes the nearest hits of `count` rays to `hits`. A ray begins `ray_stride` bytes after the one
+// before, and a hit `hit_stride` bytes: multiples of 8; 0 is right behind it. `coherent` has the
+// meaning that it has in `bvs_tracer_nearest_hits`.
+//
+// `tracer` is a tracer; `rays` and `hits` point to `count` elements each, which do not overlap;
+// `select` is null, or what counts.
+BvsStatus bvs_tracer_nearest_hits_f64(const BvsTracerF64 *tracer, const BvsRayF64 *rays, size_t ray_stride, size_t count, int32_t coherent, const BvsSelect *select, BvsHitF64 *hits, size_t hit_stride);
+
+// Writes to `hits` whether each of `count` rays hits any triangle that counts: 1 or 0. Strides are
+// those of `bvs_tracer_nearest_hits_f64`; that of `hits` is any number of bytes.
+//
+// `tracer` is a tracer; `rays` and `hits` point to `count` elements each, which do not overlap;
+// `select` is null, or what counts.
+BvsStatus bvs_tracer_any_hits_f64(const BvsTracerF64 *tracer, const BvsRayF64 *rays, size_t ray_stride, size_t count, int32_t coherent, const BvsSelect *select, uint8_t *hits, size_t hit_stride);
+
+// Writes the closest points of the triangles to `count` points, 3 doubles each, as
+// `bvs_tracer_closest_points` does.
+//
+// `tracer` is a tracer; `points` points to 3 * `count` doubles, and `closest` to `count` elements.
+BvsStatus bvs_tracer_closest_points_f64(const BvsTracerF64 *tracer, const double *points, size_t count, BvsClosest *closest);
+
+// Writes to `inside` whether each of `count` points, 3 doubles each, is inside of the mesh: 1 or 0,
+// as `bvs_tracer_contains` does.
+//
+// `tracer` is a tracer; `points` points to 3 * `count` doubles, and `inside` to `count` bytes.
+BvsStatus bvs_tracer_contains_f64(const BvsTracerF64 *tracer, const double *points, size_t count, uint8_t *inside);
+
+// Frees a tracer. Ignores null.
+//
+// `tracer` is null, or a tracer that nobody uses any more.
+void bvs_tracer_f64_free(BvsTracerF64 *tracer);
 
 // Creates a scene of `count` instances of `part_count` tracers, the parts. Searches for the best
 // tree over the instances for about `seconds`, 0 or more. The parts are shared, not copied; their

@@ -194,6 +194,38 @@ pub(crate) unsafe fn strided<T: Copy>(
     count: usize,
     stride: usize,
 ) -> Result<impl Fn(usize) -> Option<T>, Failure> {
+    let stride = stride_of(name, first, count, stride)?;
+    // SAFETY: `first` and strides are aligned, and there are `count` elements.
+    Ok(move |index| (index < count).then(|| unsafe { first.byte_add(index * stride).read() }))
+}
+
+/// Returns what writes the elements of such an array by their index, and nothing behind the last
+/// one.
+///
+/// # Safety
+/// `first` is null or not aligned, or points to `count` elements at these distances that nobody
+/// else uses while the result is in use.
+pub(crate) unsafe fn strided_mut<T>(
+    name: &str,
+    first: *mut T,
+    count: usize,
+    stride: usize,
+) -> Result<impl Fn(usize, T), Failure> {
+    let stride = stride_of(name, first, count, stride)?;
+    Ok(move |index, value| {
+        if index < count {
+            // SAFETY: `first` and strides are aligned, and there are `count` elements.
+            unsafe { first.byte_add(index * stride).write(value) }
+        }
+    })
+}
+
+fn stride_of<T>(
+    name: &str,
+    first: *const T,
+    count: usize,
+    stride: usize,
+) -> Result<usize, Failure> {
     let [size, multiple] = [size_of::<T>(), align_of::<T>()];
     let stride = if stride == 0 { size } else { stride };
     if stride < size || !stride.is_multiple_of(multiple) {
@@ -203,6 +235,5 @@ pub(crate) unsafe fn strided<T: Copy>(
     if count > 0 {
         check(name, first, count, stride)?;
     }
-    // SAFETY: `first` and strides are aligned, and there are `count` elements.
-    Ok(move |index| (index < count).then(|| unsafe { first.byte_add(index * stride).read() }))
+    Ok(stride)
 }

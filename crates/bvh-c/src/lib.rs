@@ -11,6 +11,7 @@ macro_rules! same_layout {
     };
 }
 
+mod double;
 mod failure;
 mod instances;
 #[cfg(test)]

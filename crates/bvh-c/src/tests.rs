@@ -2,9 +2,9 @@
 //! crates.
 
 use crate::failure::{BvsStatus, bvs_last_error, status};
-use crate::{instances::*, tracer::*, tree::*};
-use bvh_search::bvh_core::Primitives;
+use crate::{double::*, instances::*, tracer::*, tree::*};
 use bvh_search::bvh_core::export::Target;
+use bvh_search::bvh_core::{DRay, DTriangle, DWideBvh, Orientation, Primitives, Select};
 use bvh_search::{Objects, Options, OwnedTree, prelude::*};
 use std::ffi::{CStr, CString, c_void};
 use std::ptr::{null, null_mut};
@@ -265,6 +265,148 @@ fn indexed_and_strided_vertices_move_trees_and_tracers_as_the_corners_themselves
     }
 }
 
+/// A ray between other numbers, as programs have them.
+#[repr(C)]
+#[derive(Clone, Copy)]
+struct Particle {
+    energy: f64,
+    ray: BvsRayF64,
+    hit: BvsHitF64,
+    material: u64,
+}
+
+#[test]
+fn hits_in_f64_equal_the_results_of_the_rust_crates_with_strides_sides_and_excluded_ids() {
+    const FAR: f64 = 5_412_345.678;
+    let numbers: Vec<f64> = corners(40).into_iter().map(|x| f64::from(x) / 3.0 + FAR).collect();
+    let triangles: Vec<DTriangle> = numbers
+        .as_chunks::<3>()
+        .0
+        .as_chunks::<3>()
+        .0
+        .iter()
+        .map(|&triangle| DTriangle::from(triangle))
+        .collect();
+    let vertices: Vec<f64> =
+        numbers.chunks(3).flat_map(|xyz| [xyz, &[f64::NAN]].concat()).collect();
+    let ids: Vec<u32> = (0..120).collect();
+    let objects = BvsObjects {
+        count: 40,
+        vertices_f64: vertices.as_ptr(),
+        vertex_count: 120,
+        vertex_stride: 32,
+        indices: ids.as_ptr(),
+        ..BvsObjects::NONE
+    };
+    let missing = BvsHitF64 { t: 0.0, object: 7 };
+    let mut particles: Vec<Particle> = (0..1500u16)
+        .map(|i| {
+            let up = f64::from(i % 2) * 2.0 - 1.0;
+            let origin = [FAR + f64::from(i) * 0.01, FAR + 0.1, FAR + 7.0 - up * 9.0];
+            let ray = BvsRayF64 { origin, t_min: 0.5, direction: [0.01, 0.0, up], t_max: 13.0 };
+            Particle { energy: 1.0, ray, hit: missing, material: 5 }
+        })
+        .collect();
+    let excluded: Vec<u32> = (0..1500u32).flat_map(|i| [i / 38, u32::MAX]).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = CString::new(folder.path().join("c.bvh").to_str().unwrap()).unwrap();
+    // SAFETY: every array has the promised length, and everything is freed once.
+    unsafe {
+        let tree = bvs_tree_bake(&BvsBake { objects, work: 3000, frame: 1, ..NO_BAKE });
+        ok(bvs_tree_save(tree, path.as_ptr()));
+        ok(bvs_tree_update(tree, &objects));
+        let corners = corners(40);
+        let single = soup(&corners);
+        let accepted = "objects are 40 triangles; accepted: 40 triangles in f64";
+        invalid(bvs_tree_update(tree, &single), accepted);
+        let loaded = bvs_tree_load(path.as_ptr(), &objects);
+        assert_eq!((*loaded).owned.tree(), (*tree).owned.tree());
+        let wide = DWideBvh::new((*loaded).owned.tree(), &triangles).unwrap();
+        rejected(bvs_tracer_new(loaded).is_null(), "tree is over triangles in f64");
+        let tracer = bvs_tracer_f64_new(loaded);
+        bvs_tree_free(tree);
+        bvs_tree_free(loaded);
+        for (orientation, excluded_count) in [(0, 0), (1, 2), (2, 2), (0, 2)] {
+            let side = [Orientation::Any, Orientation::Exiting, Orientation::Entering];
+            let select = BvsSelect { orientation, excluded_count, excluded: excluded.as_ptr() };
+            let select = if orientation + excluded_count == 0 { null() } else { &raw const select };
+            let rays = &raw const particles[0].ray;
+            let count = particles.len();
+            let mut any = vec![9; 2 * count];
+            ok(bvs_tracer_any_hits_f64(
+                tracer,
+                rays,
+                size_of::<Particle>(),
+                count,
+                1,
+                select,
+                any.as_mut_ptr(),
+                2,
+            ));
+            let first = particles.as_mut_ptr();
+            let (rays, hits) = (&raw const (*first).ray, &raw mut (*first).hit);
+            let stride = size_of::<Particle>();
+            ok(bvs_tracer_nearest_hits_f64(tracer, rays, stride, count, 0, select, hits, stride));
+            let mut found = 0;
+            for (number, Particle { energy, ray, hit, material }) in particles.iter().enumerate() {
+                let exclude = &excluded[2 * number..][..excluded_count as usize];
+                let expected = wide.nearest_hit(
+                    &DRay::new(ray.origin, ray.direction, ray.t_min, ray.t_max).unwrap(),
+                    Select { orientation: side[orientation as usize], exclude },
+                );
+                assert_eq!((*hit, *energy, *material), (expected.into(), 1.0, 5));
+                let is_hit = u8::from(expected.is_some());
+                assert_eq!(any[2 * number..][..2], [is_hit, 9]);
+                let alone = BvsSelect { orientation, excluded_count, excluded: exclude.as_ptr() };
+                let mut single = (missing, 9);
+                ok(bvs_nearest_f64(tracer, ray, &alone, &mut single.0));
+                ok(bvs_any_f64(tracer, ray, &alone, &mut single.1));
+                assert_eq!(single, (expected.into(), is_hit));
+                found += usize::from(is_hit);
+            }
+            assert!((200..1400).contains(&found), "{found}");
+        }
+        let points = [particles[3].ray.origin, [f64::MAX; 3]];
+        let far = BvsClosest { point: [0.0; 3], distance: 0.0, object: 0 };
+        let mut closest = [far; 2];
+        let first = closest.as_mut_ptr();
+        ok(bvs_tracer_closest_points_f64(tracer, points.as_ptr().cast(), 2, first));
+        assert_eq!(closest[0], wide.closest_point(points[0]).into());
+        let mut inside = [9; 2];
+        ok(bvs_tracer_contains_f64(tracer, points.as_ptr().cast(), 2, inside.as_mut_ptr()));
+        assert_eq!(inside, [0; 2]);
+        assert_eq!((closest[1].distance, closest[1].object), (f64::INFINITY, u32::MAX));
+        let ray = particles[0].ray;
+        let mut hit = missing;
+        let wrong = BvsSelect { orientation: 3, excluded_count: 0, excluded: null() };
+        invalid(
+            bvs_nearest_f64(tracer, &ray, &wrong, &mut hit),
+            "orientation is 3; accepted: 0 to 2",
+        );
+        let wrong = BvsSelect { orientation: 0, excluded_count: 1, excluded: null() };
+        invalid(bvs_nearest_f64(tracer, &ray, &wrong, &mut hit), "excluded is null");
+        let rays = [ray, BvsRayF64 { origin: [0.0, 1e-300, 0.0], ..ray }];
+        let batch = |rays, stride, hits| {
+            bvs_tracer_nearest_hits_f64(tracer, rays, stride, 2, 0, null(), hits, 0)
+        };
+        invalid(batch(rays.as_ptr(), 0, &mut hit), "rays[1]: the ray's origin");
+        invalid(batch(rays.as_ptr(), 60, &mut hit), "rays has a stride of 60 bytes");
+        invalid(batch(rays.as_ptr(), 0, null_mut()), "hits is null");
+        invalid(bvs_any_f64(tracer, null(), null(), null_mut()), "ray is null");
+        assert_eq!(hit, missing);
+        bvs_tracer_f64_free(tracer);
+        bvs_tracer_f64_free(null_mut());
+        let mut tiny = vertices.clone();
+        tiny[4 * 5 + 1] = 1e-300;
+        let objects = BvsObjects { vertices_f64: tiny.as_ptr(), ..objects };
+        let refused = bvs_tree_bake(&BvsBake { objects, ..NO_BAKE });
+        rejected(refused.is_null(), "triangle 1 has the corner [");
+        let single = self::tree(&[0.0; 9]);
+        rejected(bvs_tracer_f64_new(single).is_null(), "vertices_f64");
+        bvs_tree_free(single);
+    }
+}
+
 fn bytes_as_triangles(corners: &[f32]) -> Vec<Triangle> {
     let (points, _) = corners.as_chunks::<3>();
     let (triangles, _) = points.as_chunks::<3>();
@@ -390,7 +532,10 @@ fn invalid_arguments_are_rejected_by_name() {
         let indexed =
             BvsObjects { count: 2, vertex_count: 15, indices: ids.as_ptr(), ..soup(&wrong) };
         for (objects, message) in [
-            (BvsObjects { boxes: wrong.as_ptr(), ..indexed }, "boxes and vertices; accepted: one"),
+            (
+                BvsObjects { boxes: wrong.as_ptr(), ..indexed },
+                "several of boxes, vertices and vertices_f64; accepted: one",
+            ),
             (BvsObjects { vertices: null(), ..indexed }, "vertices is null"),
             (indexed, "triangle 1 has vertex 15 of 15, counted from 0"),
             (BvsObjects { vertex_stride: 8, ..indexed }, "vertices has a stride of 8 bytes"),

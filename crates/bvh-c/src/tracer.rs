@@ -1,9 +1,10 @@
 //! Tracers: triangles in the wide layout, which answer batches of rays and points.
 
 use crate::failure::{BvsStatus, Failure, given, given_mut, made, slice, slice_mut, status};
-use crate::tree::{BvsObjects, BvsTree, moved};
+use crate::tree::{BvsObjects, BvsTree, kind, moved};
 use bvh_search::OwnedTree;
-use bvh_search::bvh_core::InvalidRay;
+use bvh_search::bvh_core::glam::DVec3;
+use bvh_search::bvh_core::{Closest, InvalidRay, Traced};
 use bvh_search::prelude::*;
 use std::sync::{Arc, OnceLock};
 
@@ -95,6 +96,14 @@ pub struct BvsClosest {
     pub object: u32,
 }
 
+impl From<Option<Closest>> for BvsClosest {
+    fn from(closest: Option<Closest>) -> Self {
+        let none = Closest { object: u32::MAX, point: DVec3::NAN, distance: f64::INFINITY };
+        let Closest { object, point, distance } = closest.unwrap_or(none);
+        Self { point: point.to_array(), distance, object }
+    }
+}
+
 /// Creates a tracer of a tree over triangles. The tracer is independent of the tree: the tree may
 /// be freed, and later improvements do not change the tracer.
 ///
@@ -105,7 +114,8 @@ pub unsafe extern "C" fn bvs_tracer_new(tree: *const BvsTree) -> *mut BvsTracer 
         // SAFETY: the caller keeps the tree alive and unchanged during the call.
         let owned = &unsafe { given("tree", tree) }?.owned;
         let Some(wide) = owned.layout() else {
-            return Err(Failure::invalid("tree is over boxes; accepted: a tree over triangles"));
+            let accepted = "accepted: a tree over `vertices`";
+            return Err(Failure::invalid(format!("tree is over {}; {accepted}", kind(owned))));
         };
         let wide = Arc::new(wide.map_err(Failure::invalid)?);
         Ok(BvsTracer { wide, source: owned.clone(), solid: OnceLock::new() })
@@ -341,11 +351,7 @@ pub unsafe extern "C" fn bvs_tracer_closest_points(
             let found = &mut found[..points.len()];
             tracer.wide.closest_points(points, found);
             for (to, closest) in closest.iter_mut().zip(&*found) {
-                *to = BvsClosest {
-                    point: closest.map_or([f64::NAN; 3], |closest| closest.point.to_array()),
-                    distance: closest.map_or(f64::INFINITY, |closest| closest.distance),
-                    object: closest.map_or(u32::MAX, |closest| closest.object),
-                };
+                *to = (*closest).into();
             }
         }
         Ok(())
@@ -367,22 +373,36 @@ pub unsafe extern "C" fn bvs_tracer_contains(
     status(|| {
         // SAFETY: the caller keeps the tracer alive during the call; nobody changes a tracer.
         let tracer = unsafe { given("tracer", tracer) }?;
-        // SAFETY: `points` points to 3 floats for each of `count` points.
-        let points = unsafe { slice("points", points.cast::<Vec3>(), count) }?;
-        // SAFETY: `inside` points to `count` bytes that nobody else uses during the call.
-        let inside = unsafe { slice_mut("inside", inside, count) }?;
         let solid =
             tracer.solid.get_or_init(|| Solid::new(tracer.source.tree(), tracer.triangles()));
-        let mut found = [false; BATCH];
-        for (points, inside) in points.chunks(BATCH).zip(inside.chunks_mut(BATCH)) {
-            let found = &mut found[..points.len()];
-            solid.contains(&tracer.wide, points, InsideRule::Auto, found);
-            for (to, &is_inside) in inside.iter_mut().zip(&*found) {
-                *to = u8::from(is_inside);
-            }
-        }
-        Ok(())
+        // SAFETY: there are 3 floats for each of `count` points, and as many bytes.
+        unsafe { contained(solid, &*tracer.wide, points.cast::<Vec3>(), count, inside) }
     })
+}
+
+/// Writes whether each of `count` points is inside.
+///
+/// # Safety
+/// Both arrays have `count` elements that nobody else uses during the call.
+pub(crate) unsafe fn contained<L: Traced>(
+    solid: &Solid,
+    wide: &L,
+    points: *const L::Point,
+    count: usize,
+    inside: *mut u8,
+) -> Result<(), Failure> {
+    // SAFETY: what the caller promises.
+    let (points, inside) =
+        unsafe { (slice("points", points, count)?, slice_mut("inside", inside, count)?) };
+    let mut found = [false; BATCH];
+    for (points, inside) in points.chunks(BATCH).zip(inside.chunks_mut(BATCH)) {
+        let found = &mut found[..points.len()];
+        solid.contains(wide, points, InsideRule::Auto, found);
+        for (to, &is_inside) in inside.iter_mut().zip(&*found) {
+            *to = u8::from(is_inside);
+        }
+    }
+    Ok(())
 }
 
 /// Frees a tracer. Ignores null.
@@ -398,9 +418,9 @@ pub unsafe extern "C" fn bvs_tracer_free(tracer: *mut BvsTracer) {
 
 /// The number of rays that are converted and traced at once: enough to make the cost of a call
 /// negligible, and few enough to stay in the cache.
-const BATCH: usize = 512;
+pub(crate) const BATCH: usize = 512;
 
-fn coherence(coherent: i32) -> Coherence {
+pub(crate) fn coherence(coherent: i32) -> Coherence {
     if coherent != 0 { Coherence::Coherent } else { Coherence::Incoherent }
 }
 

@@ -3,10 +3,10 @@
 use crate::failure::{
     BvsStatus, Failure, array, given, given_mut, made, slice, status, strided, try_made,
 };
-use bvh_search::bvh_core::Primitives;
 use bvh_search::bvh_core::cost::{Objective, SahConstants};
 use bvh_search::bvh_core::export::{FirstCountNode, Target};
 use bvh_search::bvh_core::glam::{DMat3, DVec3};
+use bvh_search::bvh_core::{DTriangle, Primitives};
 use bvh_search::prelude::*;
 use bvh_search::{Anywhere, Frames, Objects, Observer, Options, OwnedTree};
 use std::ffi::{CStr, c_char, c_void};
@@ -96,8 +96,8 @@ pub unsafe extern "C" fn bvs_tree_from_triangles(
     })
 }
 
-/// Boxes, or triangles between vertices. Either `boxes` or `vertices` is given; other fields that
-/// are 0 or null have their defaults.
+/// Boxes, or triangles between vertices. One of `boxes`, `vertices` and `vertices_f64` is given;
+/// other fields that are 0 or null have their defaults.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct BvsObjects {
@@ -107,9 +107,12 @@ pub struct BvsObjects {
     pub boxes: *const f32,
     /// 3 floats for each vertex.
     pub vertices: *const f32,
+    /// 3 doubles for each vertex, each 0 or from 2^-150 to 2^120 in size. Trees over them are
+    /// traced by `bvs_tracer_f64_new`. Their boxes lie in a frame with its centre in the middle.
+    pub vertices_f64: *const f64,
     /// The number of vertices; without `indices` 0 is 3 * `count`.
     pub vertex_count: usize,
-    /// The bytes from a vertex to the next one, a multiple of 4; 0 is 12.
+    /// The bytes from a vertex to the next one, a multiple of 4, or of 8 for doubles; 0 is 12 or 24.
     pub vertex_stride: usize,
     /// The 3 vertices of each of `count` triangles, counted from 0; null for 0, 1, 2, then 3, 4, 5,
     /// and so on.
@@ -123,6 +126,7 @@ impl BvsObjects {
         count: 0,
         boxes: null(),
         vertices: null(),
+        vertices_f64: null(),
         vertex_count: 0,
         vertex_stride: 0,
         indices: null(),
@@ -485,6 +489,19 @@ pub(crate) fn deadline(seconds: f64) -> Result<Deadline, Failure> {
         .map_err(|_| Failure::invalid(format!("seconds is {seconds:?}; accepted: 0 to 1e19")))
 }
 
+const BOXES: &str = "boxes";
+const TRIANGLES: &str = "triangles";
+const TRIANGLES_F64: &str = "triangles in f64";
+
+/// Returns what the tree is over.
+pub(crate) fn kind(tree: &OwnedTree) -> &'static str {
+    match (tree.triangles(), tree.doubles()) {
+        (Some(_), _) => TRIANGLES,
+        (_, Some(_)) => TRIANGLES_F64,
+        _ => BOXES,
+    }
+}
+
 /// Returns the tree over its objects at other places.
 ///
 /// # Safety
@@ -495,8 +512,12 @@ pub(crate) unsafe fn moved(
 ) -> Result<OwnedTree, Failure> {
     // SAFETY: what the caller promises.
     let objects = unsafe { given("objects", objects) }?;
-    let expected = if tree.triangles().is_some() { "triangles" } else { "boxes" };
-    let found = if objects.boxes.is_null() { "triangles" } else { "boxes" };
+    let expected = kind(tree);
+    let found = match objects {
+        BvsObjects { boxes, .. } if !boxes.is_null() => BOXES,
+        BvsObjects { vertices_f64, .. } if !vertices_f64.is_null() => TRIANGLES_F64,
+        _ => TRIANGLES,
+    };
     if (objects.count, found) != (tree.objects(), expected) {
         return Err(Failure::invalid(format!(
             "objects are {} {found}; accepted: {} {expected}, as the tree has",
@@ -513,15 +534,37 @@ pub(crate) unsafe fn moved(
 /// # Safety
 /// The arrays have the promised lengths.
 unsafe fn objects_of(objects: &BvsObjects) -> Result<Objects, Failure> {
-    let BvsObjects { count, boxes, vertices, vertex_count, indices, .. } = *objects;
+    let BvsObjects { count, boxes, vertices, vertices_f64, .. } = *objects;
+    let given = [!boxes.is_null(), !vertices.is_null(), !vertices_f64.is_null()];
+    if given.iter().filter(|&&is_given| is_given).count() > 1 {
+        return Err(Failure::invalid("several of boxes, vertices and vertices_f64; accepted: one"));
+    }
     if !boxes.is_null() {
-        if !vertices.is_null() {
-            return Err(Failure::invalid("boxes and vertices; accepted: one of the two"));
-        }
         // SAFETY: an `Aabb` is `repr(C)` with 6 floats, and `boxes` points to that many for each.
         let boxes = unsafe { slice("boxes", boxes.cast::<Aabb>(), count) }?;
         return Ok(Objects::Boxes(boxes.to_vec()));
     }
+    Ok(Objects::Shapes(if vertices_f64.is_null() {
+        // SAFETY: what the caller promises.
+        Primitives::Triangles(unsafe { triangles_of("vertices", vertices, objects) }?)
+    } else {
+        // SAFETY: what the caller promises.
+        let triangles = unsafe { triangles_of("vertices_f64", vertices_f64, objects) }?;
+        DTriangle::check(&triangles).map_err(Failure::invalid)?;
+        Primitives::Doubles(triangles)
+    }))
+}
+
+/// Copies triangles between vertices.
+///
+/// # Safety
+/// `vertices` are those of `objects`, whose arrays have the promised lengths.
+unsafe fn triangles_of<N: Copy, T: From<[[N; 3]; 3]>>(
+    name: &str,
+    vertices: *const N,
+    objects: &BvsObjects,
+) -> Result<Vec<T>, Failure> {
+    let BvsObjects { count, vertex_count, vertex_stride, indices, index_stride, .. } = *objects;
     let corners = count.saturating_mul(3);
     if indices.is_null() && vertex_count != 0 && vertex_count != corners {
         return Err(Failure::invalid(format!(
@@ -529,15 +572,13 @@ unsafe fn objects_of(objects: &BvsObjects) -> Result<Objects, Failure> {
         )));
     }
     let vertex_count = if indices.is_null() { corners } else { vertex_count };
-    // SAFETY: there are 3 floats in each of `vertex_count` strides.
-    let vertex = unsafe {
-        strided::<[f32; 3]>("vertices", vertices.cast(), vertex_count, objects.vertex_stride)
-    }?;
     let index_count = if indices.is_null() { 0 } else { count };
-    // SAFETY: if there are indices, there are 3 in each of `count` strides.
-    let indices = unsafe {
-        strided::<[u32; 3]>("indices", indices.cast(), index_count, objects.index_stride)
-    }?;
+    // SAFETY: there are 3 numbers in each of `vertex_count` strides, and if there are indices, 3 in
+    // each of `count` strides.
+    let (vertex, indices) = unsafe {
+        let vertex = strided::<[N; 3]>(name, vertices.cast(), vertex_count, vertex_stride)?;
+        (vertex, strided::<[u32; 3]>("indices", indices.cast(), index_count, index_stride)?)
+    };
     let triangle = |number: usize| {
         let ids = indices(number).map(|ids| ids.map(|id| id as usize));
         let ids = ids.unwrap_or([3 * number, 3 * number + 1, 3 * number + 2]);
@@ -547,10 +588,9 @@ unsafe fn objects_of(objects: &BvsObjects) -> Result<Objects, Failure> {
             let range = format!("vertex {missing} of {vertex_count}, counted from 0");
             return Err(Failure::invalid(format!("triangle {number} has {range}")));
         };
-        Ok(Triangle::from([a, b, c]))
+        Ok(T::from([a, b, c]))
     };
-    let triangles = (0..count).map(triangle).collect::<Result<_, _>>()?;
-    Ok(Objects::Shapes(Primitives::Triangles(triangles)))
+    (0..count).map(triangle).collect()
 }
 
 /// Returns a string of C as text.

@@ -98,7 +98,6 @@ fn run(Cli { command, json, jobs }: Cli) -> Result<(), Error> {
     }
     let mut answer = Answer::new(json);
     match command {
-        Command::Bake(args) if args.instances => bake::instances::bake(&args, &mut answer)?,
         Command::Bake(args) => match args.parts {
             Some(count) => bake::parts::bake(&args, count, &mut answer)?,
             None => bake::bake(&args, &mut answer)?,

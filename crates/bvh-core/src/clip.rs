@@ -19,9 +19,9 @@
 //! region is.
 
 use crate::aabb::{round_down, round_up};
-use crate::{Aabb, InFrame, Primitives, Triangle};
+use crate::{Aabb, Corners, Frame, InFrame, Primitives, Sphere, Triangle};
 use core::fmt::Debug;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use smallvec::SmallVec;
 
 /// Objects whose parts have boxes.
@@ -51,7 +51,7 @@ impl Clip for &[Triangle] {
     }
 }
 
-impl Clip for InFrame<'_> {
+impl<T: Corners> Clip for InFrame<'_, T> {
     #[inline]
     fn clip(&self, object: u32, region: &Aabb) -> Aabb {
         clip(self, object, region, BUILDERS)
@@ -63,26 +63,52 @@ impl Clip for InFrame<'_> {
 }
 
 /// The part of a sphere is the intersection of its box with the region: cheap and exact.
+impl Clip for &[Sphere] {
+    fn clip(&self, object: u32, region: &Aabb) -> Aabb {
+        self[object as usize].aabb().intersection(region)
+    }
+}
+
+impl Primitives {
+    /// Returns the parts of the objects in these boxes; `None` for spheres in a frame, of which
+    /// nothing is known.
+    pub fn parts_in<'a>(&'a self, frame: Option<&'a Frame>) -> Option<Box<dyn Clip + 'a>> {
+        Some(match self {
+            Self::Triangles(triangles) => Box::new(InFrame { triangles, frame }),
+            Self::Doubles(triangles) => Box::new(InFrame { triangles, frame }),
+            Self::Spheres(spheres) if frame.is_none() => Box::new(spheres.as_slice()),
+            Self::Spheres(_) => return None,
+        })
+    }
+}
+
 impl Clip for Primitives {
     fn clip(&self, object: u32, region: &Aabb) -> Aabb {
-        match self {
-            Self::Triangles(triangles) => triangles.as_slice().clip(object, region),
-            Self::Spheres(spheres) => spheres[object as usize].aabb().intersection(region),
-        }
+        part(self, object, region, BUILDERS)
     }
 
     fn clip_tightly(&self, object: u32, region: &Aabb) -> Aabb {
-        match self {
-            Self::Triangles(triangles) => triangles.as_slice().clip_tightly(object, region),
-            Self::Spheres(_) => self.clip(object, region),
+        part(self, object, region, VALIDATION)
+    }
+}
+
+fn part(objects: &Primitives, object: u32, region: &Aabb, slack: f64) -> Aabb {
+    let frame = None;
+    match objects {
+        Primitives::Triangles(triangles) => {
+            clip(&InFrame { triangles, frame }, object, region, slack)
         }
+        Primitives::Doubles(triangles) => {
+            clip(&InFrame { triangles, frame }, object, region, slack)
+        }
+        Primitives::Spheres(spheres) => spheres.as_slice().clip(object, region),
     }
 }
 
 /// By how many error bounds builders widen a triangle's part: more than validation does.
-pub(crate) const BUILDERS: f64 = 4.0;
+const BUILDERS: f64 = 4.0;
 /// By how many error bounds validation widens a triangle's part.
-pub(crate) const VALIDATION: f64 = 1.0;
+const VALIDATION: f64 = 1.0;
 
 /// Returns the box around a triangle's part in a region.
 ///
@@ -94,23 +120,9 @@ pub(crate) const VALIDATION: f64 = 1.0;
 /// triangle's largest coordinate: 2⁻⁴⁶ of it, 64 rounding errors, while each of the six cuts makes
 /// at most 5, and a frame at most 4 · 3 where it makes the corners.
 #[inline]
-fn clip(objects: &InFrame, object: u32, region: &Aabb, slack: f64) -> Aabb {
+fn clip<T: Corners>(objects: &InFrame<T>, object: u32, region: &Aabb, slack: f64) -> Aabb {
     let triangle = &objects.triangles[object as usize];
-    let corners = || {
-        let corners = triangle.0.map(Vec3::as_dvec3);
-        objects.frame.map_or(corners, |frame| corners.map(|corner| frame.point(corner)))
-    };
-    clip_corners(corners, triangle.aabb_in(objects.frame), region, slack)
-}
-
-/// Does the same for a triangle with this box.
-#[inline]
-pub(crate) fn clip_corners(
-    corners: impl FnOnce() -> [DVec3; 3],
-    full: Aabb,
-    region: &Aabb,
-    slack: f64,
-) -> Aabb {
+    let full = triangle.aabb_in(objects.frame);
     let common = full.intersection(region);
     // Most triangles are inside the region or outside of it, and need no cut.
     if common == full || common == Aabb::EMPTY {
@@ -121,7 +133,9 @@ pub(crate) fn clip_corners(
     let error = DVec3::splat(f64::from(largest) * (slack * (64.0 * f64::EPSILON)));
     let low = region.min.as_dvec3() - error;
     let high = region.max.as_dvec3() + error;
-    let mut kept = Polygon::from_slice(&corners());
+    let corners = triangle.corners();
+    let corners = objects.frame.map_or(corners, |frame| corners.map(|corner| frame.point(corner)));
+    let mut kept = Polygon::from_slice(&corners);
     for axis in 0..3 {
         // Planes that miss the triangle cut nothing off.
         if full.min[axis] < region.min[axis] {
@@ -170,6 +184,7 @@ fn cut(polygon: &Polygon, axis: usize, position: f64, side: f64) -> Polygon {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
     use proptest::prelude::*;
 
     fn coordinate() -> impl Strategy<Value = f32> {

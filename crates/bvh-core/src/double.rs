@@ -7,6 +7,7 @@
 
 use crate::exact::{Line, Verdict, is_degenerate};
 use crate::triangle::offset_from;
+use crate::{Aabb, Corners, Frame};
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
@@ -209,7 +210,29 @@ pub struct DHit {
     pub object: u32,
 }
 
+impl Corners for DTriangle {
+    #[inline]
+    fn corners(&self) -> [DVec3; 3] {
+        self.0
+    }
+
+    #[inline]
+    fn aabb_in(&self, frame: Option<&Frame>) -> Aabb {
+        frame.unwrap_or(&Frame::FILE).aabb_of(self.0)
+    }
+}
+
 impl DTriangle {
+    /// Rejects triangles beyond the range in which answers are exact.
+    pub fn check(triangles: &[Self]) -> Result<(), OutOfExactRange> {
+        for (triangle, DTriangle(corners)) in triangles.iter().enumerate() {
+            if let Some(&corner) = corners.iter().find(|corner| !is_exact(**corner)) {
+                return Err(OutOfExactRange::Triangle { triangle, corner });
+            }
+        }
+        Ok(())
+    }
+
     /// Returns the distance at which the ray hits the triangle if that distance is in the ray's
     /// range: the real distance, rounded once to the nearest f64. The same as
     /// [`Triangle::intersect`](crate::Triangle::intersect).

@@ -41,13 +41,13 @@ pub use primitives::{Primitive, Primitives, boxes};
 pub use ray::{Hit, InvalidRay, Ray};
 pub use ray_density::{DensityError, RayDensity, Segment};
 pub use slabs::{Slabs, clip_to_box};
-pub use solid::{Corners, InsideRule, Solid, Traced};
+pub use solid::{InsideRule, Solid, Traced};
 pub use sphere::Sphere;
 pub use traverse::{
     Counter, TestCounts, any_hit, any_hit_by, any_hit_of_all, nearest_hit, nearest_hit_by,
     nearest_hit_of_all,
 };
-pub use triangle::{InFrame, PreparedRay, Triangle};
+pub use triangle::{Corners, InFrame, PreparedRay, Triangle};
 pub use validate::{InvalidBvh, validate, validate_references};
 #[doc(hidden)]
 pub use wide::NodeTest;

@@ -1,6 +1,6 @@
 //! The geometry of a scene's objects.
 
-use crate::{Aabb, PreparedRay, Ray, Sphere, Triangle};
+use crate::{Aabb, DTriangle, Frame, InFrame, PreparedRay, Ray, Sphere, Triangle};
 
 /// An object of any kind that has a box and that can be tested against rays.
 pub trait Primitive {
@@ -65,15 +65,32 @@ pub fn boxes<P: Primitive>(objects: &[P]) -> Vec<Aabb> {
 pub enum Primitives {
     /// Triangles in world units.
     Triangles(Vec<Triangle>),
+    /// Triangles in f64, in world units.
+    Doubles(Vec<DTriangle>),
     /// Spheres in world units.
     Spheres(Vec<Sphere>),
 }
 
 impl Primitives {
-    /// Returns the box of every object, in the same order.
-    pub fn boxes(&self) -> Vec<Aabb> {
+    /// Returns the number of objects.
+    pub fn count(&self) -> usize {
         match self {
-            Self::Triangles(triangles) => boxes(triangles),
+            Self::Triangles(triangles) => triangles.len(),
+            Self::Doubles(triangles) => triangles.len(),
+            Self::Spheres(spheres) => spheres.len(),
+        }
+    }
+
+    /// Returns the box of every object along the file's axes, in the same order.
+    pub fn boxes(&self) -> Vec<Aabb> {
+        self.boxes_in(None)
+    }
+
+    /// Returns the box of every object, that of triangles in a frame if there is one.
+    pub fn boxes_in(&self, frame: Option<&Frame>) -> Vec<Aabb> {
+        match self {
+            Self::Triangles(triangles) => InFrame { triangles, frame }.boxes(),
+            Self::Doubles(triangles) => InFrame { triangles, frame }.boxes(),
             Self::Spheres(spheres) => boxes(spheres),
         }
     }
@@ -86,6 +103,7 @@ impl Primitives {
     pub fn select(&self, indices: &[usize]) -> Self {
         match self {
             Self::Triangles(triangles) => Self::Triangles(select(triangles, indices)),
+            Self::Doubles(triangles) => Self::Doubles(select(triangles, indices)),
             Self::Spheres(spheres) => Self::Spheres(select(spheres, indices)),
         }
     }

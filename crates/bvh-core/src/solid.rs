@@ -10,7 +10,7 @@
 
 use crate::exact::normal_sign;
 use crate::winding::{Open, Winding};
-use crate::{Aabb, BvhView, Closest, DRay, DTriangle, DWideBvh, Ray, Triangle, WideBvh};
+use crate::{Aabb, BvhView, Closest, Corners, DRay, DWideBvh, Ray, WideBvh};
 use core::cmp::Ordering;
 use glam::{DVec3, Vec3};
 
@@ -170,24 +170,6 @@ fn sorted_edges(triangles: &[[DVec3; 3]]) -> Vec<Edge> {
     }
     edges.sort_unstable();
     edges
-}
-
-/// A triangle in f32 or in f64.
-pub trait Corners {
-    /// Returns the corners in f64.
-    fn corners(&self) -> [DVec3; 3];
-}
-
-impl Corners for Triangle {
-    fn corners(&self) -> [DVec3; 3] {
-        self.0.map(Vec3::as_dvec3)
-    }
-}
-
-impl Corners for DTriangle {
-    fn corners(&self) -> [DVec3; 3] {
-        self.0
-    }
 }
 
 /// A layout in f32 or in f64.

@@ -39,12 +39,6 @@ impl Triangle {
         Aabb::around(self.0)
     }
 
-    /// Returns a box around the triangle that lies in a frame, or in the file's axes without one.
-    #[inline]
-    pub(crate) fn aabb_in(&self, frame: Option<&Frame>) -> Aabb {
-        frame.map_or_else(|| self.aabb(), |frame| frame.aabb(self))
-    }
-
     /// Returns the triangle's area in world units squared.
     pub(crate) fn area(&self) -> f64 {
         let [a, b, c] = self.0.map(|corner| corner.as_dvec3());
@@ -155,16 +149,37 @@ impl Frame {
     }
 }
 
+/// A triangle in f32 or f64.
+pub trait Corners: Copy + core::fmt::Debug + Sync {
+    /// Returns the corners.
+    fn corners(&self) -> [DVec3; 3];
+
+    /// Returns a box around the triangle that lies in a frame, or in the file's axes without one.
+    fn aabb_in(&self, frame: Option<&Frame>) -> Aabb;
+}
+
+impl Corners for Triangle {
+    #[inline]
+    fn corners(&self) -> [DVec3; 3] {
+        self.0.map(Vec3::as_dvec3)
+    }
+
+    #[inline]
+    fn aabb_in(&self, frame: Option<&Frame>) -> Aabb {
+        frame.map_or_else(|| self.aabb(), |frame| frame.aabb(self))
+    }
+}
+
 /// Triangles with their boxes and parts in a tree's frame, or in the file's axes if it has none.
 #[derive(Clone, Copy, Debug)]
-pub struct InFrame<'a> {
+pub struct InFrame<'a, T = Triangle> {
     /// The triangles.
-    pub triangles: &'a [Triangle],
+    pub triangles: &'a [T],
     /// The frame.
     pub frame: Option<&'a Frame>,
 }
 
-impl InFrame<'_> {
+impl<T: Corners> InFrame<'_, T> {
     /// Returns the box of every triangle, in the same order.
     pub fn boxes(&self) -> Vec<Aabb> {
         self.triangles.iter().map(|triangle| triangle.aabb_in(self.frame)).collect()

@@ -175,6 +175,9 @@ impl Scene {
     pub fn triangles(&self) -> Result<&[Triangle], SceneError> {
         match &self.primitives {
             Primitives::Triangles(triangles) => Ok(triangles),
+            Primitives::Doubles(_) => {
+                Err(SceneError::new(&self.name, "triangles in f64; accepted: triangles in f32"))
+            }
             Primitives::Spheres(_) => {
                 Err(SceneError::new(&self.name, "spheres; accepted: a scene of triangles"))
             }

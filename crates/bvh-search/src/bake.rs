@@ -11,8 +11,7 @@ use bvh_config::OutOfRange;
 use bvh_core::cost::{Measure, Objective};
 use bvh_core::file::{self, FileError, Origin};
 use bvh_core::{
-    Aabb, Bvh, Clip, DensityError, Frame, InFrame, Primitives, RayDensity, validate,
-    validate_references,
+    Aabb, Bvh, Clip, DensityError, Frame, Primitives, RayDensity, validate, validate_references,
 };
 use core::sync::atomic::AtomicBool;
 
@@ -181,8 +180,8 @@ impl<'a> Bake<'a> {
         // Without work there is nothing to search for, and the first tree is the answer.
         let is_over = AtomicBool::new(true);
         let observer = if self.budget.max_work == Some(0) { &is_over } else { observer };
-        let framed = self.framed();
-        let mut splits = self.splits(framed.as_ref());
+        let parts = self.parts();
+        let mut splits = self.splits(parts.as_deref());
         // A division may take all the time of a search that has no tree yet. Such a search divides
         // later itself.
         let is_later = self.starts_divided() || is_timed && greedy.is_none();
@@ -239,8 +238,8 @@ impl<'a> Bake<'a> {
     /// Returns the cost of a tree over these objects by which a search with this division compares
     /// trees. O(nodes).
     pub fn cost(&self, tree: &Bvh, division: Division) -> f64 {
-        let framed = self.framed();
-        let splits = self.splits(framed.as_ref()).filter(|_| division == Division::Allowed);
+        let parts = self.parts();
+        let splits = self.splits(parts.as_deref()).filter(|_| division == Division::Allowed);
         self.problem(splits).cost(tree)
     }
 
@@ -253,34 +252,14 @@ impl<'a> Bake<'a> {
         }
     }
 
-    /// Returns the triangles in the frame, if there is one.
-    fn framed(&self) -> Option<InFrame<'a>> {
-        match (self.frame, self.shapes) {
-            (Some(frame), Some(Primitives::Triangles(triangles))) => {
-                Some(InFrame { triangles, frame: Some(frame) })
-            }
-            _ => None,
-        }
+    /// Returns the parts of the objects, if they are known.
+    fn parts(&self) -> Option<Box<dyn Clip + 'a>> {
+        self.shapes?.parts_in(self.frame)
     }
 
-    /// Returns the parts of the objects. Nothing is known of those of spheres in a frame.
-    fn parts<'b>(&self, framed: Option<&'b InFrame<'b>>) -> Option<&'b dyn Clip>
-    where
-        'a: 'b,
-    {
-        match (framed, self.frame) {
-            (Some(framed), _) => Some(framed),
-            (None, Some(_)) => None,
-            (None, None) => self.shapes.map(|shapes| shapes as &dyn Clip),
-        }
-    }
-
-    fn splits<'b>(&self, framed: Option<&'b InFrame<'b>>) -> Option<Splits<'b>>
-    where
-        'a: 'b,
-    {
+    fn splits<'b>(&'b self, parts: Option<&'b (dyn Clip + 'a)>) -> Option<Splits<'b>> {
         let most = (self.references * self.boxes.len() as f64) as usize;
-        let splits = Splits::at_most(most, self.boxes, self.parts(framed)?)?;
+        let splits = Splits::at_most(most, self.boxes, parts?)?;
         let is_best = self.method.is_none();
         is_best.then_some(Splits { divided: self.divided, ..splits })
     }
@@ -288,7 +267,7 @@ impl<'a> Bake<'a> {
     /// Divides the objects with spatial splits, or copies the caller's division, unless they stay
     /// whole anyway. `None` if the observer cancels first.
     pub(crate) fn division(&self, observer: &dyn Observer) -> Result<Option<Bvh>, SearchError> {
-        best::divided(self.splits(self.framed().as_ref()), self.boxes, observer)
+        best::divided(self.splits(self.parts().as_deref()), self.boxes, observer)
     }
 
     /// Returns whether the start divides objects, after which no search returns to whole ones.
@@ -307,12 +286,12 @@ impl<'a> Bake<'a> {
         work: u64,
         write: impl FnOnce(&[&[u8]]) -> T,
     ) -> Result<T, FileError> {
-        let framed = self.framed();
-        if self.frame.is_some() && framed.is_none() {
+        let parts = self.parts();
+        if self.frame.is_some() && parts.is_none() {
             return Err(FileError::Frame);
         }
-        let along_file = framed.map(|framed| bvh_core::boxes(framed.triangles));
-        let parts = self.parts(framed.as_ref());
+        let shapes = self.shapes.filter(|_| self.frame.is_some());
+        let along_file = shapes.map(Primitives::boxes);
         let objective = self.objective();
         let mut cost = 0.0;
         let mut validated = Ok(());
@@ -323,8 +302,8 @@ impl<'a> Bake<'a> {
             &mut || {
                 parallel::call_both(
                     &mut || {
-                        validated = match parts {
-                            Some(parts) => validate_references(tree, self.boxes, parts),
+                        validated = match &parts {
+                            Some(parts) => validate_references(tree, self.boxes, &**parts),
                             None => validate(tree, self.boxes),
                         }
                     },

@@ -16,7 +16,7 @@ use crate::{Bake, Budget, Observer, Stream};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::cost::internal_area;
 use bvh_core::glam::{DMat3, DQuat, DVec3, Vec3};
-use bvh_core::{Aabb, Frame, InFrame, Triangle};
+use bvh_core::{Aabb, DTriangle, DWideBvh, Frame, InFrame, Triangle};
 use rand::RngExt;
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -126,6 +126,27 @@ impl Choice {
         });
         let choice = affordable.and_then(|(size, searches)| scene.choose(size, searches));
         choice.unwrap_or(Self::FILE)
+    }
+}
+
+impl Choice {
+    /// Chooses the frame of triangles in f64: its centre is in their middle.
+    pub(crate) fn of_doubles(
+        triangles: &[DTriangle],
+        frames: Frames,
+        budget: Budget,
+        observer: &dyn Observer,
+    ) -> Self {
+        let centred = DWideBvh::centred(triangles);
+        if frames == Frames::File {
+            return Self { frame: Some(centred), ..Self::FILE };
+        }
+        let single = |corner: DVec3| centred.point(corner).as_vec3();
+        let rounded: Vec<Triangle> =
+            triangles.iter().map(|triangle| Triangle(triangle.0.map(single))).collect();
+        let choice = Self::of(&rounded, budget, observer);
+        let turn = |frame: Frame| Frame::new(frame.rotation(), centred.centre()).ok();
+        Self { frame: Some(choice.frame.and_then(turn).unwrap_or(centred)), ..choice }
     }
 }
 

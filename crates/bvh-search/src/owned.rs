@@ -10,7 +10,7 @@ use bvh_core::cost::Objective;
 use bvh_core::export::Target;
 use bvh_core::file::{FileError, TreeFile};
 use bvh_core::{
-    Aabb, Bvh, Frame, InFrame, InvalidBox, InvalidBvh, Primitives, RayDensity, Segment, Triangle,
+    Aabb, Bvh, DTriangle, Frame, InvalidBox, InvalidBvh, Primitives, RayDensity, Segment, Triangle,
     WideBvh, check_boxes,
 };
 
@@ -91,13 +91,15 @@ impl OwnedTree {
         let is_open = options.budget == Budget::UNLIMITED && observer.progress().is_none();
         let count = match &objects {
             Objects::Boxes(boxes) => boxes.len(),
-            Objects::Shapes(Primitives::Triangles(triangles)) => triangles.len(),
-            Objects::Shapes(Primitives::Spheres(spheres)) => spheres.len(),
+            Objects::Shapes(shapes) => shapes.count(),
         };
         let budget = if is_open { Budget::of_objects(count) } else { options.budget };
         let choice = match &objects {
             Objects::Shapes(Primitives::Triangles(triangles)) if frame == Frames::Auto => {
                 Some(Choice::of(triangles, budget, observer))
+            }
+            Objects::Shapes(Primitives::Doubles(triangles)) => {
+                Some(Choice::of_doubles(triangles, frame, budget, observer))
             }
             _ => None,
         };
@@ -158,7 +160,7 @@ impl OwnedTree {
     }
 
     /// Returns the layout of the tree that traces rays, for the rays of its search if there are
-    /// any; `None` for objects that are not triangles.
+    /// any; `None` for objects that are not triangles in f32.
     pub fn layout(&self) -> Option<Result<WideBvh, InvalidBvh>> {
         let triangles = self.triangles()?;
         Some(match &self.density {
@@ -177,7 +179,8 @@ impl OwnedTree {
         let file = TreeFile::open(bytes)?.for_boxes(&owned.boxes)?;
         owned.tree = file.tree_over(&owned.boxes, owned.shapes.as_ref(), &parallel::call_both)?;
         if let Some(frame) = owned.tree.frame {
-            owned.boxes = frame.boxes(owned.triangles().ok_or(FileError::Frame)?);
+            let shapes = owned.shapes.as_ref().ok_or(FileError::Frame)?;
+            owned.boxes = shapes.boxes_in(Some(&frame));
         }
         owned.references = Bake::references_of(owned.tree.prim_ids.len(), owned.boxes.len());
         // A bake minimises no other costs.
@@ -261,10 +264,18 @@ impl OwnedTree {
         &self.boxes
     }
 
-    /// The objects, if they are triangles.
+    /// The objects, if they are triangles in f32.
     pub fn triangles(&self) -> Option<&[Triangle]> {
         match &self.shapes {
             Some(Primitives::Triangles(triangles)) => Some(triangles),
+            _ => None,
+        }
+    }
+
+    /// The objects, if they are triangles in f64.
+    pub fn doubles(&self) -> Option<&[DTriangle]> {
+        match &self.shapes {
+            Some(Primitives::Doubles(triangles)) => Some(triangles),
             _ => None,
         }
     }
@@ -306,10 +317,7 @@ fn boxes_of(objects: Objects, frame: Option<&Frame>) -> (Vec<Aabb>, Option<Primi
     match objects {
         Objects::Boxes(boxes) => (boxes, None),
         Objects::Shapes(shapes) => {
-            let boxes = match &shapes {
-                Primitives::Triangles(triangles) => InFrame { triangles, frame }.boxes(),
-                Primitives::Spheres(_) => shapes.boxes(),
-            };
+            let boxes = shapes.boxes_in(frame);
             (boxes, Some(shapes))
         }
     }

@@ -20,7 +20,7 @@ const JUST_BEFORE: f32 = 0.9999;
 
 /// Returns the density of recorded segments between the surfaces of a scene, with a tenth of area.
 /// The segments begin where rays began and end at their hits or outside the scene. If the `shapes`
-/// are known, a quarter of the density's rays comes from anywhere in the scene, so that rays from
+/// are known, in f32, a quarter of the density's rays comes from anywhere in the scene, so that rays from
 /// elsewhere lose little; they are traced through `tree`, any valid tree over the shapes. Of more
 /// segments than fit into [`RayDensity::MOST_SEGMENTS`], every n-th counts. Returns `None` soon
 /// after `is_over` returns true.
@@ -44,7 +44,7 @@ pub fn ray_density(
     sampled.extend(match shapes {
         Some(Primitives::Triangles(triangles)) => traced(tree, triangles, &bounds, count, is_over),
         Some(Primitives::Spheres(spheres)) => traced(tree, spheres, &bounds, count, is_over),
-        None => vec![],
+        Some(Primitives::Doubles(_)) | None => vec![],
     });
     if is_over() {
         return Ok(None);

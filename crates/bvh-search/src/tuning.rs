@@ -1,9 +1,7 @@
 //! The tuned numbers of `best` and of its annealing: one table of values, units and trade-offs.
 //!
-//! Numbers that a spec can set are declared with their units and ranges by
-//! [`best::Config`](crate::best::Config) and [`Ruin`](crate::ruin_recreate::Ruin). All were found
-//! on two virtual cores over the meshes and stand-ins, one at a time, by the commands named here.
-//! Each trades cost at one budget for cost at another; none affects correctness.
+//! All were found on two virtual cores over the meshes and stand-ins, one at a time, by the commands
+//! named here. Each trades cost at one budget for cost at another; none affects correctness.
 //!
 //! The comment behind a value is its unit: *work* is nodes created or visited; *sort times* are
 //! multiples of the time that the Morton sort of the scene takes, about 25 ns per object; a
@@ -55,6 +53,23 @@ pub(crate) const BELOW_SUBTREE_ROOTS: u8 = 6; // levels
 /// move.
 pub(crate) const SMALLEST_SUBTREES: f64 = 0.5; // fraction of the size
 
+// The move of ruin and recreate.
+
+/// Maximum number of levels from the random node up to the top of the ruined part.
+pub(crate) const RUIN_LEVELS: u32 = 8; // levels
+/// Maximum number of subtrees that random descents remove.
+pub(crate) const RUINED_SUBTREES: u32 = 14; // subtrees
+/// Part of the moves that remove a layer.
+pub(crate) const LAYERS: f64 = 0.2; // fraction of the moves
+/// Maximum thickness of the layer.
+pub(crate) const LAYER_THICKNESS: f64 = 0.6; // fraction of the box
+/// Maximum number of subtrees in a layer. A layer with more is not removed.
+pub(crate) const SUBTREES_IN_A_LAYER: usize = 24; // subtrees
+/// Part of the moves that search positions nearby only, in the smallest subtree above the top whose
+/// box contains the top's former box. Better positions are seldom further up, and a quarter more
+/// moves fit into the same work.
+pub(crate) const NEARBY: f64 = 0.6; // fraction of the moves
+
 // The cost of the wide layout.
 // Found by `bvh bake SCENE --cost layout --budget 100Mwork --out FILE`
 
@@ -88,6 +103,29 @@ pub(crate) const WORK_ON_REFERENCES: f64 = 0.2; // fraction of the work of a rou
 // `best`, from a second on.
 // Found by `cd attic; cargo bench --bench search -- --seconds 0.1,1,10,60 SCENE...`
 
+/// The first generation if the end is not known.
+pub(crate) const FIRST_GENERATION: f64 = 1500.0; // work per object
+/// Length of every generation relative to the previous one, if the end is not known.
+pub(crate) const GROWTH: f64 = 2.0; // factor
+/// Maximum length of an annealing run if the end is known. More work is divided into equal runs.
+pub(crate) const LONGEST: f64 = 100_000.0; // work per object
+/// First temperature of an annealing run, by its length.
+pub(crate) const HEAT: f64 = 0.02; // per 1000 nodes of work per object
+/// Highest temperature.
+pub(crate) const HOTTEST: f64 = 0.2; // temperature
+/// Last temperature.
+pub(crate) const COLD: f64 = 0.003; // temperature
+/// First temperature of the short annealing runs after a long one.
+pub(crate) const REHEAT: f64 = 0.07; // temperature
+/// Number of short annealing runs after a long one.
+pub(crate) const REHEATS: u32 = 6; // runs
+/// Part of the work or time reserved for the short annealing runs.
+pub(crate) const REHEATED: f64 = 0.3; // fraction
+/// Minimum length of a long annealing run that short runs follow.
+pub(crate) const REHEATS_FROM: f64 = 7000.0; // work per object
+/// Minimum length of an annealing run whose temperatures are relative to the area of the top of a
+/// move. Long runs end lower with it, short runs higher.
+pub(crate) const TOP_FROM: f64 = 20_000.0; // work per object
 /// Minimum gain for which the incumbent is converted and reported during an annealing run.
 pub(crate) const WORTH_AN_EVENT: f64 = 1e-3; // fraction of the cost
 /// Longest useful annealing run of the smallest scenes. Beyond it, two runs end lower than one.

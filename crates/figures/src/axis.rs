@@ -8,17 +8,13 @@ use plotters::coord::ranged1d::Ranged;
 use plotters::coord::types::RangedCoordf64;
 use plotters::data::float::pretty_print_float;
 
-use super::model::{Axis, Layer, Marks, Panel, Scale, Unit};
+use super::model::{Axis, LARGEST, Layer, Marks, Panel, Scale, Unit};
 
-/// Values of a larger magnitude count as non-finite, so that no difference overflows.
-const LARGEST: f64 = 1e300;
-
-/// The shown part of an axis with its ticks, in coordinates. `low` is at the left or the bottom; it
-/// is above `high` for rows, which are counted from the top.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Ruled {
-    log: bool,
-    unit: Unit,
+/// An axis as it is drawn: its shown part, in coordinates, and its ticks. `low` is at the left or the
+/// bottom; it is above `high` for rows, which are counted from the top.
+#[derive(Clone, Debug)]
+pub(super) struct Ruled<'a> {
+    axis: &'a Axis,
     pub low: f64,
     pub high: f64,
     /// Ticks with labels.
@@ -26,16 +22,14 @@ pub(super) struct Ruled {
 }
 
 /// Returns both axes of a panel, without ticks, and true if any series has data to show.
-pub(super) fn axes(panel: &Panel) -> (Ruled, Ruled, bool) {
-    let marks = || panel.layers.iter().map(|layer| &layer.marks);
-    // Only the scale decides whether a value has a coordinate, so axes without ranges suffice here.
-    let [x, y] = [&panel.x, &panel.y].map(|axis| Ruled::new(axis, &[], 0.0));
+pub(super) fn axes(panel: &Panel) -> (Ruled<'_>, Ruled<'_>, bool) {
+    let Panel { x, y, layers, .. } = panel;
     let is_shown = |at: &(f64, f64)| x.coordinate(at.0).is_some() && y.coordinate(at.1).is_some();
-    let (mut xs, mut ys): (Vec<f64>, Vec<f64>) =
-        marks().flat_map(Marks::data).filter(is_shown).unzip();
+    let data = layers.iter().flat_map(|layer| layer.marks.data()).filter(is_shown);
+    let (mut xs, mut ys): (Vec<f64>, Vec<f64>) = data.unzip();
     let data = xs.len();
-    for marks in marks() {
-        match marks {
+    for layer in layers {
+        match &layer.marks {
             Marks::Spans(spans) => {
                 xs.extend(spans.iter().flatten().map(|end| end.0));
                 ys.extend(spans.iter().flatten().map(|end| end.1));
@@ -46,77 +40,46 @@ pub(super) fn axes(panel: &Panel) -> (Ruled, Ruled, bool) {
         }
     }
     // Lines may run from edge to edge; markers and upright reference lines need room at the ends.
-    let has_margin = xs.len() > data || panel.layers.iter().any(Layer::is_marked);
+    let has_margin = xs.len() > data || layers.iter().any(Layer::is_marked);
     let margin = if has_margin { 0.04 } else { 0.0 };
-    (Ruled::new(&panel.x, &xs, margin), Ruled::new(&panel.y, &ys, 0.05), data > 0)
+    (Ruled::new(x, &xs, margin), Ruled::new(y, &ys, 0.05), data > 0)
 }
 
 /// Gives the axes of all panels, which have the same scales, the ranges that show the data of all of
 /// them.
 pub fn share_axes(panels: &mut [Panel]) {
-    let ruled: Vec<(Ruled, Ruled, bool)> = panels.iter().map(axes).collect();
-    let range = |of: fn(&(Ruled, Ruled, bool)) -> &Ruled| {
-        let low = ruled.iter().map(|axes| of(axes).low).fold(f64::INFINITY, f64::min);
-        let high = ruled.iter().map(|axes| of(axes).high).fold(f64::NEG_INFINITY, f64::max);
-        let is_log = ruled.iter().any(|axes| of(axes).log);
-        if is_log { (libm::exp10(low), libm::exp10(high)) } else { (low, high) }
-    };
-    let (x, y) = (range(|axes| &axes.0), range(|axes| &axes.1));
+    let axes: Vec<(Ruled, Ruled, bool)> = panels.iter().map(axes).collect();
+    let (xs, ys): (Vec<&Ruled>, Vec<&Ruled>) = axes.iter().map(|(x, y, _)| (x, y)).unzip();
+    let [x, y] = [xs, ys].map(|ruled| {
+        let low = ruled.iter().map(|axis| axis.low).fold(f64::INFINITY, f64::min);
+        let high = ruled.iter().map(|axis| axis.high).fold(f64::NEG_INFINITY, f64::max);
+        ruled.first().map(|axis| (axis.axis.value(low), axis.axis.value(high)))
+    });
     for panel in panels {
-        (panel.x.range, panel.y.range) = (Some(x), Some(y));
+        (panel.x.range, panel.y.range) = (x, y);
     }
 }
 
-impl Ruled {
+impl<'a> Ruled<'a> {
     /// Chooses the shown part of `axis`: its own range if it has one, otherwise all `values` with a
     /// margin of `margin` times their extent.
-    pub fn new(axis: &Axis, values: &[f64], margin: f64) -> Self {
-        let log = axis.scale == Scale::Log;
-        let any = Self { log, unit: axis.unit, ..Self::default() };
-        if let Scale::Rows(names, _) = &axis.scale {
-            return Self { low: names.len().max(1) as f64 - 0.5, high: -0.5, ..any };
-        }
-        let shown = || values.iter().filter_map(|&value| any.coordinate(value));
-        let least = shown().reduce(f64::min).unwrap_or(0.0);
-        let most = shown().reduce(f64::max).unwrap_or(1.0);
-        // A single value is in the middle of a range proportional to it, or of one decade.
-        let alone = if log || least == 0.0 { 0.5 } else { 0.1 * least.abs() };
-        let margin = if most > least { margin * (most - least) } else { alone };
-        // No margin beyond zero: a length or a count does not become negative.
-        let low = if !log && least >= 0.0 { (least - margin).max(0.0) } else { least - margin };
-        let high = if !log && most <= 0.0 && least < most {
-            (most + margin).min(0.0)
-        } else {
-            most + margin
+    fn new(axis: &'a Axis, values: &[f64], margin: f64) -> Self {
+        let (low, high) = match &axis.scale {
+            Scale::Rows(names, _) => (names.len().max(1) as f64 - 0.5, -0.5),
+            _ => range(axis, values, margin),
         };
-        let set = |end: Option<f64>| end.and_then(|value| any.coordinate(value));
-        let low = set(axis.range.map(|range| range.0)).unwrap_or(low);
-        let high = set(axis.range.map(|range| range.1)).filter(|&high| high > low).unwrap_or(high);
-        // A narrower range would have ends that are equal in ten digits.
-        let narrowest = (1e-9 * low.abs().max(high.abs())).max(1e-200);
-        Self {
-            low,
-            high: if high > low { high.max(low + narrowest) } else { low + narrowest.max(1.0) },
-            ..any
-        }
-    }
-
-    /// Returns the value's coordinate, which may be outside the shown part; `None` if the axis
-    /// cannot show the value.
-    pub fn coordinate(&self, value: f64) -> Option<f64> {
-        let possible = value.abs() <= LARGEST && (value > 0.0 || !self.log);
-        possible.then(|| if self.log { libm::log10(value) } else { value })
+        Self { axis, low, high, ticks: Vec::new() }
     }
 
     /// Returns the coordinate if it is in the shown part or less than a pixel outside.
     pub fn shown(&self, value: f64) -> Option<f64> {
-        self.coordinate(value).filter(|&at| (-1e-3..=1.001).contains(&self.fraction(at)))
+        self.axis.coordinate(value).filter(|&at| (-1e-3..=1.001).contains(&self.fraction(at)))
     }
 
     /// Returns the shown coordinate nearest to the value; the lower end for a finite value without
     /// a logarithm.
     pub fn nearest(&self, value: f64) -> Option<f64> {
-        let at = self.coordinate(value).or((value.abs() <= LARGEST).then_some(self.low));
+        let at = self.axis.coordinate(value).or((value.abs() <= LARGEST).then_some(self.low));
         at.map(|at| at.clamp(self.low.min(self.high), self.high.max(self.low)))
     }
 
@@ -127,21 +90,19 @@ impl Ruled {
 
     /// Adds at most `most` ticks, and at least two if possible.
     pub fn rule(&mut self, most: usize) {
-        if self.unit == Unit::Bare {
+        let axis = self.axis;
+        if axis.unit == Unit::Bare {
             return;
         }
-        let (low, high) = match self.log {
-            true => (libm::exp10(self.low), libm::exp10(self.high)),
-            false => (self.low, self.high),
-        };
-        let mut ticks = if self.log { self.decades(most) } else { vec![] };
+        let mut ticks = if axis.scale == Scale::Log { self.decades(most) } else { vec![] };
         // One tick tells no distance.
         if ticks.len() < 2 {
-            let linear = |most| RangedCoordf64::from(low..high).key_points(most);
+            let ends = axis.value(self.low)..axis.value(self.high);
+            let linear = |most| RangedCoordf64::from(ends.clone()).key_points(most);
             let ample = (most..most + 4).map(linear).find(|ticks| ticks.len() > 1);
             ticks = ample.unwrap_or_else(|| linear(most));
         }
-        let tick = |value| Some((self.coordinate(value)?, self.label(value)));
+        let tick = |value| Some((axis.coordinate(value)?, label(value, axis.unit)));
         self.ticks = ticks.into_iter().filter_map(tick).collect();
     }
 
@@ -163,18 +124,40 @@ impl Ruled {
             .find(|ticks| ticks.len() <= most)
             .unwrap_or_default()
     }
+}
 
-    /// Writes a value in up to ten digits.
-    fn label(&self, value: f64) -> String {
-        let number = |value: f64| {
-            let is_plain = value == 0.0 || (1e-4..1e6).contains(&value.abs());
-            pretty_print_float(value, !is_plain).replace('-', "−")
-        };
-        match self.unit {
-            Unit::Percent => format!("{} %", number(100.0 * value)),
-            Unit::Number | Unit::Bare => number(value),
-        }
+/// Returns the shown part of an axis of numbers, as [`Ruled::new`] says.
+fn range(axis: &Axis, values: &[f64], margin: f64) -> (f64, f64) {
+    let is_log = axis.scale == Scale::Log;
+    let coordinates = || values.iter().filter_map(|&value| axis.coordinate(value));
+    let least = coordinates().reduce(f64::min).unwrap_or(0.0);
+    let most = coordinates().reduce(f64::max).unwrap_or(1.0);
+    // A single value is in the middle of a range proportional to it, or of one decade.
+    let alone = if is_log || least == 0.0 { 0.5 } else { 0.1 * least.abs() };
+    let margin = if most > least { margin * (most - least) } else { alone };
+    let (mut low, mut high) = (least - margin, most + margin);
+    // No margin beyond zero: a length or a count does not become negative.
+    if !is_log && least >= 0.0 {
+        low = low.max(0.0);
     }
+    if !is_log && most <= 0.0 && least < most {
+        high = high.min(0.0);
+    }
+    if let Some((from, to)) = axis.range {
+        low = axis.coordinate(from).unwrap_or(low);
+        high = axis.coordinate(to).filter(|&to| to > low).unwrap_or(high);
+    }
+    // A narrower range would have ends that are equal in ten digits.
+    let narrowest = (1e-9 * low.abs().max(high.abs())).max(1e-200);
+    (low, if high > low { high.max(low + narrowest) } else { low + narrowest.max(1.0) })
+}
+
+/// Writes a value in up to ten digits.
+fn label(value: f64, unit: Unit) -> String {
+    let value = if unit == Unit::Percent { 100.0 * value } else { value };
+    let is_plain = value == 0.0 || (1e-4..1e6).contains(&value.abs());
+    let number = pretty_print_float(value, !is_plain).replace('-', "−");
+    if unit == Unit::Percent { format!("{number} %") } else { number }
 }
 
 #[cfg(test)]
@@ -227,7 +210,8 @@ mod tests {
             Layer::new("", Marks::VLine(1.0)),
             Layer::new("", Marks::HLine(3.0)),
         ];
-        let (x, y, has_data) = axes(&Panel { layers, ..Panel::default() });
+        let panel = Panel { layers, ..Panel::default() };
+        let (x, y, has_data) = axes(&panel);
         assert!(has_data && x.low < 1.0 && y.high > 3.0);
     }
 }

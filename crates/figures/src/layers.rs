@@ -14,9 +14,9 @@ const THIN: f64 = 1.5;
 pub(super) struct Layers<'a> {
     pub layers: &'a [Layer],
     /// The horizontal axis.
-    pub x: &'a Ruled,
+    pub x: &'a Ruled<'a>,
     /// The vertical axis.
-    pub y: &'a Ruled,
+    pub y: &'a Ruled<'a>,
     pub strokes: &'a Strokes,
     /// The place of the plot on the sheet.
     pub frame: Frame,

@@ -92,7 +92,22 @@ pub enum Unit {
     Bare,
 }
 
+/// Values of a larger magnitude count as non-finite, so that no difference overflows.
+pub(super) const LARGEST: f64 = 1e300;
+
 impl Axis {
+    /// Returns a value's coordinate: the value, or its logarithm; `None` if the scale cannot show it.
+    pub(super) fn coordinate(&self, value: f64) -> Option<f64> {
+        let is_log = self.scale == Scale::Log;
+        let is_possible = value.abs() <= LARGEST && (value > 0.0 || !is_log);
+        is_possible.then(|| if is_log { libm::log10(value) } else { value })
+    }
+
+    /// Returns the value of a coordinate.
+    pub(super) fn value(&self, coordinate: f64) -> f64 {
+        if self.scale == Scale::Log { libm::exp10(coordinate) } else { coordinate }
+    }
+
     /// Makes a linear axis around the data.
     pub fn linear(label: impl Into<String>) -> Self {
         Self { label: label.into(), ..Self::default() }

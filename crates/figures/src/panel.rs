@@ -17,8 +17,8 @@ const NAMES: f64 = 310.0;
 /// A panel with the space it needs around its plot.
 pub(super) struct Plot<'a> {
     panel: &'a Panel,
-    x: Ruled,
-    y: Ruled,
+    x: Ruled<'a>,
+    y: Ruled<'a>,
     has_data: bool,
     /// The names of rows.
     names: Vec<String>,

@@ -9,7 +9,6 @@ pub mod contestant;
 pub mod error;
 mod files;
 pub mod measure;
-pub mod page;
 pub mod peers;
 pub mod processor;
 pub mod report;

@@ -14,9 +14,6 @@ use figures::{Axis, Layer, Marks, Panel, Unit};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// The name of the figure of all checks.
-pub const FIGURE: &str = "matrix";
-
 /// Runs the cases (all if none are named) and writes rows.
 pub fn execute(
     effort: &Effort,
@@ -68,7 +65,7 @@ pub fn output(folder: &Path) -> Result<Output, Error> {
         output.unwritten.push(("Broken promises".into(), bytes));
     }
     let caption = "A mark per case and method. Empty where the case has no check of it.";
-    output.add_figure(FIGURE, caption, 1, panels(&cells));
+    output.add_figure("matrix", caption, 1, panels(&cells));
     Ok(output)
 }
 

@@ -1,7 +1,6 @@
 //! `bvh bake`: searches for the best tree of a scene within a budget, and writes it to a file.
 
 mod effort;
-pub mod instances;
 pub mod parts;
 mod plan;
 mod watch;
@@ -39,14 +38,10 @@ pub struct BakeArgs {
     /// --rays, --cost and --references where they are not given, and prints the reasons.
     #[arg(long, value_name = "TIME|WORK")]
     pub budget: Option<Effort>,
-    /// The file to write. It replaces an existing file when it is complete. With --instances, a new
-    /// or empty folder. Without it, a new file or folder with the scene's name, in this folder.
-    #[arg(long, value_name = "FILE.bvh|DIR")]
+    /// The file to write. It replaces an existing file when it is complete. Without it, a new file
+    /// with the scene's name, in this folder.
+    #[arg(long, value_name = "FILE.bvh")]
     pub out: Option<PathBuf>,
-    /// Bake one tree for every mesh of a glTF file, and one tree over the instances that its nodes
-    /// place.
-    #[arg(long, conflicts_with_all = ["rays", "from", "explain"])]
-    pub instances: bool,
     /// Seed of the random numbers.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -67,14 +62,14 @@ pub struct BakeArgs {
     #[arg(long, value_name = "N")]
     pub references: Option<f64>,
     /// The axes of the boxes: `auto` turns them where that saves area, as it does around a building
-    /// that stands obliquely in its file; `file` keeps the file's, as --for, --parts, --instances
-    /// and other methods than best do. Without it, with --from, those of the tree.
+    /// that stands obliquely in its file; `file` keeps the file's, as --for, --parts and other
+    /// methods than best do. Without it, with --from, those of the tree.
     #[arg(long, value_name = "auto|file", value_parser = frames(), conflicts_with = "from")]
     pub frame: Option<Frames>,
     /// Search for the tracer of another library, for `bvh export`: by default with `--cost area`,
     /// and with as many references as pay there.
     #[arg(long = "for", value_name = "TRACER", value_parser = tracers())]
-    #[arg(conflicts_with_all = ["rays", "instances", "parts"])]
+    #[arg(conflicts_with_all = ["rays", "parts"])]
     pub tracer: Option<Target>,
     /// The method, with its default parameters.
     #[arg(long, value_name = "NAME", default_value = BEST, value_parser = methods())]
@@ -85,7 +80,7 @@ pub struct BakeArgs {
     /// Cut the scene by space into N parts, bake each into the folder `FILE.parts`, and join their
     /// trees under a greedy top. Finished parts are not baked again.
     #[arg(long, value_name = "N", requires = "budget", help_heading = ADVANCED)]
-    #[arg(conflicts_with_all = ["rays", "from", "instances", "explain"])]
+    #[arg(conflicts_with_all = ["rays", "from", "explain"])]
     #[arg(value_parser = clap::value_parser!(u32).range(2..=65_536))]
     pub parts: Option<u32>,
     /// With --parts, list the parts, one a line: identifier, estimated work, description.
@@ -286,7 +281,7 @@ impl BakeArgs {
             let stem = scene.file_stem().unwrap_or(scene.as_os_str());
             // The colon of `escher:1000` is no part of a file's name everywhere.
             let stem = stem.to_string_lossy().replace(':', "-");
-            PathBuf::from(stem + if self.instances { "" } else { ".bvh" })
+            PathBuf::from(stem + ".bvh")
         })
     }
 

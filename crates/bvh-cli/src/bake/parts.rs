@@ -1,12 +1,11 @@
 //! `bvh bake --parts`: cuts a scene by space into parts, bakes each as a job of its own, and joins
 //! the trees of the parts under a greedy top.
 
-use super::instances::save_part;
-use super::plan::{Plan, Start, most_bytes};
+use super::plan::{Found, Plan, Start, most_bytes};
 use super::watch::Watch;
 use super::{BakeArgs, save};
 use crate::Error;
-use crate::answer::Answer;
+use crate::answer::{Answer, gain, short, whole};
 use crate::arguments::{load_scene, output_file};
 use crate::interrupt::is_interrupted;
 use bvh_build::{Builder, muller_fellner};
@@ -202,6 +201,27 @@ fn joined(top: &Bvh, trees: &[Bvh], objects: &[&[usize]]) -> Bvh {
         whole.prim_ids.extend(ids.iter().map(|&id| objects[part][id as usize] as u32));
     }
     whole
+}
+
+/// Writes the tree over a part of a scene.
+fn save_part(found: &Found, path: &Path, answer: &mut Answer) -> Result<(), Error> {
+    found.save(path, Reserved::new(path, 0, false)?)?;
+    let cost = found.baked.outcome.cost;
+    let Some(base) = found.baked.greedy_cost else { return Ok(()) };
+    let objects = found.scene.boxes.len();
+    let file = path.display().to_string();
+    answer.say(&format!(
+        "{file}: {} objects, {} {}, {} against a greedy tree",
+        whole(objects),
+        found.unit().unwrap_or("total area of inner nodes"),
+        short(cost),
+        gain(cost, base)
+    ));
+    answer.list(
+        "trees",
+        json!({ "file": file, "objects": objects, "cost": cost, "greedy_cost": base }),
+    );
+    Ok(())
 }
 
 #[cfg(test)]

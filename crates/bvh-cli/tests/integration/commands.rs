@@ -85,14 +85,10 @@ orient mesh.glb --out=mesh.glb ! --out: mesh.glb is the scene | another name
 orient mesh.glb --out=x.obj ! --out | .glb
 orient no.glb --out=x.glb ! no.glb: no such file
 orient mesh.obj --out=x.glb ! mesh.obj: a file of the kind Obj | glTF or GLB
-bake forest.glb --instances --budget=1h --out=full ! full contains files | new or empty
-bake forest.glb --instances --budget=1h --out=file/x ! file is no folder | new or empty
 
 bake sofa LONG ! scene sofa: no such scene; accepted: bijou
 bake esher LONG ! no such scene; did you mean escher?
 bake no.glb LONG ! error: scene no.glb: no such file
-bake mesh.obj --instances --budget=1h --out=x ! mesh.obj | Obj | glTF
-bake no.glb --instances --budget=1h --out=x ! no.glb | no such file
 bake spheres75 LONG --from=cut.bvh ! cut.bvh | cut or extended
 bake spheres75 LONG --from=flipped.bvh ! flipped.bvh | checksum
 bake spheres75 LONG --from=file ! file | not a tree file

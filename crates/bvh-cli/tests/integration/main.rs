@@ -1,7 +1,6 @@
 //! The program `bvh`, run as users run it.
 
 mod bake;
-mod bake_instances;
 #[cfg(unix)]
 mod bake_interrupted;
 mod bake_parts;

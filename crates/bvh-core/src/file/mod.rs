@@ -78,9 +78,8 @@ pub use error::FileError;
 pub use header::Header;
 
 use crate::cost::{CallBoth, Objective, call_in_turn};
-use crate::triangle::InFrame;
 use crate::validate::{Leaves, check_nesting, check_structure, validate_parts};
-use crate::{Aabb, Bvh, BvhView, Clip, Frame, InvalidBvh, Node, Primitives, validate};
+use crate::{Aabb, Bvh, BvhView, Frame, InvalidBvh, Node, Primitives, validate};
 use bytemuck::Pod;
 use crc32fast::Hasher;
 use glam::Vec3;
@@ -319,13 +318,12 @@ impl<'a> TreeFile<'a> {
         both: CallBoth,
     ) -> Result<Bvh, FileError> {
         let tree = self.copied();
-        match (self.frame(), objects) {
-            (None, _) => {
-                validate_parts(&tree, boxes, objects.map(|objects| objects as &dyn Clip), both)?;
-            }
-            (frame, Some(Primitives::Triangles(triangles))) => {
-                let objects = InFrame { triangles, frame };
-                validate_parts(&tree, &objects.boxes(), Some(&objects), both)?;
+        let frame = self.frame();
+        let parts = objects.and_then(|objects| objects.parts_in(frame));
+        match (frame, objects, parts.as_deref()) {
+            (None, _, parts) => validate_parts(&tree, boxes, parts, both)?,
+            (_, Some(objects), Some(parts)) => {
+                validate_parts(&tree, &objects.boxes_in(frame), Some(parts), both)?;
             }
             _ => {
                 self.check((&tree).into())?;

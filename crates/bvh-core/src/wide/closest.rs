@@ -39,7 +39,7 @@ struct Nearest {
 impl Nearest {
     #[inline(always)]
     fn new(target: DVec3) -> Self {
-        Self { target, object: u32::MAX, offset: DVec3::ZERO, distance_squared: f64::INFINITY }
+        Self { target, object: u32::MAX, offset: DVec3::ZERO, distance_squared: f64::MAX }
     }
 
     /// Takes a triangle if it is nearer, or as near and of a lower id; `offset` is the vector to its
@@ -58,7 +58,9 @@ impl Nearest {
     #[inline(always)]
     fn limit(&self, scale: f32) -> f32 {
         let scaled = self.distance_squared * f64::from(scale) * f64::from(scale);
-        (scaled * (1.0 + 1.0 / (1 << 18) as f64)) as f32 + f32::MIN_POSITIVE
+        let limit = (scaled * (1.0 + 1.0 / (1 << 18) as f64)) as f32 + f32::MIN_POSITIVE;
+        // Beyond it are the unused lanes.
+        limit.min(f32::MAX)
     }
 
     #[inline(always)]

@@ -33,11 +33,10 @@ use super::layout::{WideBvh, WideNode};
 use super::one_ray::{LeafRay, Leaves, visit};
 use super::triangles::TriangleBlock;
 use super::{build, portable, vector};
-use crate::clip::{BUILDERS, VALIDATION, clip_corners};
 use crate::double::{NearestHit, Query};
 use crate::slabs::FarRay;
 use crate::{
-    Aabb, Bvh, Clip, DHit, DRay, DTriangle, Frame, Hit, InvalidBvh, Kernel, Ray, Select, Slabs,
+    Aabb, Bvh, DHit, DRay, DTriangle, Frame, Hit, InFrame, InvalidBvh, Kernel, Ray, Select, Slabs,
     Triangle, validate_references,
 };
 use bytemuck::Zeroable;
@@ -60,28 +59,6 @@ pub struct DWideBvh {
     pub(super) triangles: Box<[DTriangle]>,
 }
 
-/// Triangles in f64 with their parts in a frame.
-#[derive(Debug)]
-struct DoublesInFrame<'a>(&'a [DTriangle], &'a Frame);
-
-impl DoublesInFrame<'_> {
-    fn clip(&self, object: u32, region: &Aabb, slack: f64) -> Aabb {
-        let DTriangle(corners) = self.0[object as usize];
-        let in_frame = || corners.map(|corner| self.1.point(corner));
-        clip_corners(in_frame, self.1.aabb_of(corners), region, slack)
-    }
-}
-
-impl Clip for DoublesInFrame<'_> {
-    fn clip(&self, object: u32, region: &Aabb) -> Aabb {
-        self.clip(object, region, BUILDERS)
-    }
-
-    fn clip_tightly(&self, object: u32, region: &Aabb) -> Aabb {
-        self.clip(object, region, VALIDATION)
-    }
-}
-
 /// A ray as the layout is traversed with it.
 struct Boxed {
     ray: Ray,
@@ -93,9 +70,8 @@ impl DWideBvh {
     /// does. Its frame should have its centre in the middle of the scene. O(n) time and memory.
     pub fn new(tree: &Bvh, triangles: &[DTriangle]) -> Result<Self, InvalidBvh> {
         let frame = tree.frame.unwrap_or(Frame::FILE);
-        let boxes = Self::boxes(triangles, &frame);
-        validate_references(tree, &boxes, &DoublesInFrame(triangles, &frame))?;
-        drop(boxes);
+        let objects = InFrame { triangles, frame: Some(&frame) };
+        validate_references(tree, &objects.boxes(), &objects)?;
         let in_frame = |corner: DVec3| frame.point(corner).as_vec3();
         let rounded: Vec<Triangle> =
             triangles.iter().map(|triangle| Triangle(triangle.0.map(in_frame))).collect();
@@ -120,7 +96,7 @@ impl DWideBvh {
 
     /// Returns the boxes of triangles in a frame, to build a tree over.
     pub fn boxes(triangles: &[DTriangle], frame: &Frame) -> Vec<Aabb> {
-        triangles.iter().map(|triangle| frame.aabb_of(triangle.0)).collect()
+        InFrame { triangles, frame: Some(frame) }.boxes()
     }
 
     /// Returns a frame along the file's axes with its centre in the middle of the triangles.

@@ -2,7 +2,7 @@
 
 use super::layout::{Child, WideBvh, WideNode};
 use super::triangles::TriangleBlock;
-use crate::{Aabb, Triangle};
+use crate::{Aabb, Corners, Triangle};
 
 /// Why a layout cannot follow its triangles, and has to be made anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

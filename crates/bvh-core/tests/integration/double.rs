@@ -315,3 +315,23 @@ fn numbers_beyond_the_exact_range_are_rejected() {
         assert!(matches!(rejected, Err(OutOfExactRange::Range(..))));
     }
 }
+
+#[test]
+fn a_point_beyond_f32_has_a_closest_point_unless_its_square_overflows() {
+    let mut random = Random(9);
+    for (name, triangles) in scenes(&mut random) {
+        let frame = DWideBvh::centred(&triangles);
+        let boxes = DWideBvh::boxes(&triangles, &frame);
+        let tree = Bvh { frame: Some(frame), ..tree(&boxes, SHAPES[1], &mut random) };
+        let wide = DWideBvh::new(&tree, &triangles).unwrap();
+        for kernel in Kernel::ALL {
+            let Some(wide) = wide.clone().with_kernel(kernel) else { continue };
+            for far in [1e39, 1e153, 1e160, f64::MAX] {
+                let closest = wide.closest_point(DVec3::new(-far, 0.5 * far, far));
+                assert_eq!(closest.is_some(), far * far < f64::MAX, "{name}, {kernel:?}, {far}");
+                let is_near = |distance: f64| (1.49 * far..1.51 * far).contains(&distance);
+                assert!(closest.is_none_or(|closest| is_near(closest.distance)), "{name}");
+            }
+        }
+    }
+}

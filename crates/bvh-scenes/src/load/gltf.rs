@@ -10,7 +10,6 @@ mod document;
 mod nodes;
 mod orient;
 
-use super::MeshError;
 use super::mesh::{Fault, MOST_TRIANGLES, Mesh, Rounding, counted};
 use accessors::{F32, I8, I16, U8, U16, U32};
 use buffers::Buffers;
@@ -30,21 +29,20 @@ const MOST_BYTES: u64 = 48 * MOST_TRIANGLES as u64;
 const MOST_ITEMS: u64 = 6 * MOST_TRIANGLES as u64;
 
 /// The meshes of a file, each once, and their places.
-#[derive(Clone, Debug)]
-pub struct Parts {
+struct Parts {
     /// Triangles in the mesh's own coordinates, by the mesh's number in the file. Contains only
     /// meshes with a place and at least one triangle.
-    pub meshes: BTreeMap<usize, Vec<Triangle>>,
+    meshes: BTreeMap<usize, Vec<Triangle>>,
     /// The places of the meshes, in the order of the file's nodes, except those in which no triangle
     /// has an area.
-    pub places: Vec<Placed>,
+    places: Vec<Placed>,
     /// The file's contents besides plain triangles, one clause for each kind.
-    pub remarks: Vec<String>,
+    remarks: Vec<String>,
 }
 
 /// A mesh that a node places in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placed {
+pub(super) struct Placed {
     /// The node's number in the file.
     pub node: usize,
     /// The mesh's number in the file.
@@ -85,12 +83,6 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Fault> {
     }
     remarks.extend(rounding.remark(&triangles));
     Ok(Mesh::new(triangles, remarks))
-}
-
-/// Reads a file as [`parse`] does, but returns every mesh once.
-pub fn parts(bytes: &[u8], path: &Path) -> Result<Parts, MeshError> {
-    let parts = document(bytes).and_then(|(document, chunk)| read(&document, chunk, path));
-    parts.map_err(MeshError::of(path))
 }
 
 fn read(document: &Document, chunk: Option<&[u8]>, path: &Path) -> Result<Parts, Fault> {

@@ -1,7 +1,7 @@
 //! Mesh files of every format. The bytes decide the format, and the name does where they do not.
 
 mod ears;
-pub mod gltf;
+mod gltf;
 pub mod mesh;
 mod obj;
 mod ply;

@@ -13,7 +13,7 @@ pub fn automatic(scene: &Scene, aspect: f64) -> View {
     let front = if up == DVec3::Y { DVec3::Z } else { -DVec3::Y };
     // Meshes are seen from higher above, because their floor would otherwise be edge on.
     let (side, height) = match scene.primitives {
-        Primitives::Triangles(_) => (0.62, 0.58),
+        Primitives::Triangles(_) | Primitives::Doubles(_) => (0.62, 0.58),
         Primitives::Spheres(_) => (0.20, 0.17),
     };
     framing(bounds, up.cross(front) * side + up * height + front, up, aspect)

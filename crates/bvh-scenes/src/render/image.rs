@@ -80,3 +80,22 @@ pub fn encode(light: DVec3) -> [u8; 3] {
         (encoded * 255.0 + 0.5) as u8
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_has_the_bytes_of_srgb_and_the_curve_of_film() {
+        // The grey card of photographers, and the ends of the straight part.
+        for (light, byte) in
+            [(0.0, 0), (0.003_130_8, 10), (0.18, 118), (0.5, 188), (1.0, 255), (9.0, 255)]
+        {
+            assert_eq!(encode(DVec3::splat(light)), [byte; 3], "{light}");
+        }
+        for (light, expected) in [(0.0, 0.0), (1.0, 2.54 / 3.16), (1e9, 1.0)] {
+            let film = expose(DVec3::splat(light / EXPOSURE)).x;
+            assert!((film - expected).abs() < 1e-15, "{light}: {film}");
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! The surface at the end of a ray: its position, orientation and appearance.
 
-use bvh_core::{Aabb, Hit, Primitives};
+use bvh_core::{Aabb, Corners, Hit, Primitives};
 use glam::DVec3;
 
 /// A point of a surface, seen from one side. Colours are linear red, green and blue.
@@ -36,14 +36,15 @@ impl Surface {
     pub fn of_object(objects: &Primitives, hit: &Hit, origin: DVec3, direction: DVec3) -> Self {
         let id = hit.object as usize;
         let met = origin + direction * f64::from(hit.t);
+        let of_triangle = |[a, b, c]: [DVec3; 3]| {
+            // Edges are normalised first, so that tiny triangles have a normal.
+            let ab = (b - a).normalize_or_zero();
+            let ac = (c - a).normalize_or_zero();
+            (met, ab.cross(ac).normalize_or(-direction), PLASTER, 0.0)
+        };
         let (point, normal, colour, mirror) = match objects {
-            Primitives::Triangles(triangles) => {
-                let [a, b, c] = triangles[id].0.map(|corner| corner.as_dvec3());
-                // Edges are normalised first, so that tiny triangles have a normal.
-                let ab = (b - a).normalize_or_zero();
-                let ac = (c - a).normalize_or_zero();
-                (met, ab.cross(ac).normalize_or(-direction), PLASTER, 0.0)
-            }
+            Primitives::Triangles(triangles) => of_triangle(triangles[id].corners()),
+            Primitives::Doubles(triangles) => of_triangle(triangles[id].corners()),
             Primitives::Spheres(spheres) => {
                 let center = spheres[id].center.as_dvec3();
                 let normal = (met - center).normalize_or(-direction);

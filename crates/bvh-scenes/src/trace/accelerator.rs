@@ -4,7 +4,7 @@
 use super::kd_tree::KdTree;
 use super::unpruned;
 use bvh_core::{
-    Bvh, Counter, Hit, PreparedRay, Primitives, Ray, TestCounts, WideBvh, any_hit_by,
+    Bvh, Counter, DRay, Hit, PreparedRay, Primitives, Ray, TestCounts, WideBvh, any_hit_by,
     any_hit_of_all, nearest_hit_by, nearest_hit_of_all,
 };
 use std::borrow::Cow;
@@ -87,7 +87,9 @@ impl<'a> Accelerator<'a> {
             Structure::Tree(tree) => nearest_hit_by(&**tree, ray, test(), counter),
             Structure::Unpruned(tree) => unpruned::nearest_hit(tree, ray, test(), counter),
             Structure::KdTree(tree) => tree.nearest_hit(ray, test(), counter),
-            Structure::Brute => nearest_hit_of_all(count(self.objects), ray, test(), counter),
+            Structure::Brute => {
+                nearest_hit_of_all(self.objects.count() as u32, ray, test(), counter)
+            }
         }
     }
 
@@ -134,16 +136,9 @@ impl<'a> Accelerator<'a> {
                 any_hit_by(&**tree, ray, visited, counter)
             }
             Structure::KdTree(tree) => tree.any_hit(ray, visited, counter),
-            _ => any_hit_of_all(count(self.objects), visited, counter),
+            _ => any_hit_of_all(self.objects.count() as u32, visited, counter),
         };
         is_hit
-    }
-}
-
-fn count(objects: &Primitives) -> u32 {
-    match objects {
-        Primitives::Triangles(triangles) => triangles.len() as u32,
-        Primitives::Spheres(spheres) => spheres.len() as u32,
     }
 }
 
@@ -153,6 +148,11 @@ fn test(objects: &Primitives, ray: &Ray) -> impl Fn(u32, f32) -> Option<f32> {
     let prepared = PreparedRay::new(ray);
     move |id, t_max| match objects {
         Primitives::Triangles(triangles) => triangles[id as usize].intersect(&prepared, t_max),
+        Primitives::Doubles(triangles) => {
+            let [origin, direction] = [ray.origin(), ray.direction()].map(|end| end.as_dvec3());
+            let ray = DRay::new(origin, direction, ray.t_min().into(), t_max.into()).ok()?;
+            triangles[id as usize].intersect(&ray).map(|t| t as f32)
+        }
         Primitives::Spheres(spheres) => spheres[id as usize].intersect(ray, t_max),
     }
 }

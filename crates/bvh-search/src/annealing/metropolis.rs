@@ -73,3 +73,52 @@ fn cool_plain<M: Mover>(
         tally.kept += u64::from(mover.step(tree, temperature, rng));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::stream;
+    use crate::scatter::{built, scatter};
+    use bvh_build::muller_fellner;
+    use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+    /// Makes moves that take this work and change nothing.
+    struct Idle {
+        each: u64,
+        work: u64,
+    }
+
+    impl Mover for Idle {
+        fn begin(&mut self, _: &Working<impl Metric>, _: Vec<u32>) {}
+        fn step(&mut self, _: &mut Working<impl Metric>, _: f64, _: &mut Stream) -> bool {
+            self.work += self.each;
+            false
+        }
+        fn work(&self) -> u64 {
+            self.work
+        }
+    }
+
+    struct Polls(AtomicU64);
+
+    impl Observer for Polls {
+        fn cancelled(&self) -> bool {
+            self.0.fetch_add(1, Relaxed);
+            false
+        }
+    }
+
+    #[test]
+    fn the_observer_is_polled_after_every_long_move_and_now_and_then_after_short_ones() {
+        let mut tree = built(&muller_fellner::Config::default(), &scatter(10));
+        let moves = 10 * MOVES_PER_TEMPERATURE;
+        for (each, expected) in [(LONG_MOVE, 10), (LONG_MOVE + 1, moves)] {
+            let mover = &mut Idle { each, work: 0 };
+            let quota = Quota { moves, work: u64::MAX };
+            let polls = Polls(0.into());
+            cool_plain(mover, &mut tree, vec![], [0.5, 0.4], quota, &mut stream(1, 0), &polls);
+            // The first is before the beginning.
+            assert_eq!(polls.0.into_inner(), 1 + expected, "{each} nodes");
+        }
+    }
+}

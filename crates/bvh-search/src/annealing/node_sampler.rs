@@ -162,10 +162,16 @@ mod tests {
     }
 
     #[test]
-    fn every_part_of_a_large_tree_is_drawn_from_at_some_time() {
+    fn every_part_of_a_large_tree_is_drawn_from_by_its_weight() {
         let tree = built(&muller_fellner::Config::default(), &scatter(40_000));
         let counts = drawn(vec![], &tree, 2_000_000);
-        assert!(counts[1..].chunks(512).all(|part| part.iter().sum::<u32>() > 0));
+        let weights: Vec<f64> = (1..tree.nodes.len()).map(|at| weight(&tree, at as u32)).collect();
+        let total: f64 = weights.iter().sum();
+        for (counts, weights) in counts[1..].chunks(4096).zip(weights.chunks(4096)) {
+            let expected = 2e6 * weights.iter().sum::<f64>() / total;
+            let found = f64::from(counts.iter().sum::<u32>());
+            assert!((found / expected - 1.0).abs() < 0.01, "{found} of {expected}");
+        }
     }
 
     #[test]

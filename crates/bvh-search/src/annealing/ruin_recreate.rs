@@ -8,66 +8,33 @@
 use super::layout::Layout;
 use super::metropolis::Mover;
 use super::node_sampler::NodeSampler;
-use super::schedule::{anneal_initial, check_fall};
+use super::schedule::anneal_initial;
 use super::side::Side;
 use crate::run::{Found, Problem, Run, Stream};
 use crate::tree::{ANCHOR, Metric, Node, PositionSearch, Scope, Working, search_by_metric};
-use crate::tuning::{DEARER_BY_AREA, LAYOUT_HEAT};
-use bvh_config::{Nested, above};
+use crate::tuning::{
+    DEARER_BY_AREA, LAYER_THICKNESS, LAYERS, LAYOUT_HEAT, NEARBY, RUIN_LEVELS, RUINED_SUBTREES,
+    SUBTREES_IN_A_LAYER,
+};
 use rand::RngExt;
 use rand::seq::SliceRandom;
 
 bvh_config::config! {
-    /// The move, the temperatures and the amount of work.
+    /// The amount of work.
     pub struct Config {
-        /// The move.
-        ruin: Ruin, in Nested;
-        /// First temperature, relative to the move's `scale`. The default suits 8000 nodes of work
-        /// per object or more. Less work needs a proportionally lower temperature.
-        hot: f64 = 0.1, in above(0.0);
-        /// Last temperature, not above `hot`.
-        cold: f64 = 0.003, in above(0.0);
         /// Work per object, unless the budget has less.
         work_per_object: u64 = 10_000;
     }
-    check |config: &Config| check_fall(config.hot, config.cold);
 }
 
-bvh_config::config! {
-    /// A move. The *top* of the ruined part is some levels above a random node, more often a node
-    /// below a large one. The move removes either the ends of several random descents from the top,
-    /// or everything in a layer at one side of the top's box, without which that box cannot shrink.
-    /// Then every removed subtree gets the best position.
-    pub struct Ruin {
-        /// Maximum number of levels from the random node up to the top.
-        climb: u32 = 8, in 1..=u32::MAX - 1;
-        /// Maximum number of subtrees that random descents remove.
-        removed: u32 = 14, in 1..=1000;
-        /// Fraction of the moves that remove a layer.
-        slabs: f64 = 0.2, in 0.0..=1.0;
-        /// Maximum thickness of the layer, as a fraction of the box.
-        thickness: f64 = 0.6, in 0.0..=1.0;
-        /// Maximum number of subtrees in a layer. A layer with more is not removed.
-        most: u32 = 24, in 1..=1000;
-        /// Fraction of the moves that search positions nearby only, in the smallest subtree above
-        /// the top whose box contains the top's former box. Better positions are seldom further up,
-        /// and a quarter more moves fit into the same work.
-        near: f64 = 0.6, in 0.0..=1.0;
-        /// The area that temperatures are relative to.
-        scale: Scale = Scale::Saved;
-    }
-}
+/// First and last temperature, relative to the area that the removal saves. They suit 8000 nodes of
+/// work per object or more; less work needs a proportionally lower first temperature.
+const HEAT: [f64; 2] = [0.1, 0.003];
 
 /// The area that temperatures are relative to, so that one schedule suits nodes of all sizes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-pub enum Scale {
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Scale {
     /// The area that the removal saves.
-    #[default]
     Saved,
     /// The area of the top of the ruined part.
     Top,
@@ -77,18 +44,21 @@ search_by_metric!(Config);
 
 impl Config {
     fn search_by(&self, metric: impl Metric, problem: &Problem, seed: u64, run: &mut Run) -> Found {
-        let Self { hot, cold, work_per_object, .. } = *self;
+        let Self { work_per_object } = *self;
         let length =
             work_per_object.min(run.left().work / problem.boxes.len().max(1) as u64) as f64;
-        let mover = || RuinMover::new(&self.ruin, length, false);
-        anneal_initial(mover, [hot, cold], work_per_object, metric, problem, seed, run)
+        let mover = || RuinMover::new(Scale::Saved, length, false);
+        anneal_initial(mover, HEAT, work_per_object, metric, problem, seed, run)
     }
 }
 
-/// Makes ruin-and-recreate moves.
+/// Makes ruin-and-recreate moves. The *top* of the ruined part is some levels above a random node,
+/// more often a node below a large one. The move removes either the ends of several random descents
+/// from the top, or everything in a layer at one side of the top's box, without which that box
+/// cannot shrink. Then every removed subtree gets the best position.
 #[derive(Debug)]
-pub(crate) struct RuinMover<'a> {
-    ruin: &'a Ruin,
+pub(crate) struct RuinMover {
+    scale: Scale,
     sampler: NodeSampler,
     search: PositionSearch,
     side: Side,
@@ -127,14 +97,14 @@ impl Removed {
     }
 }
 
-impl<'a> RuinMover<'a> {
+impl RuinMover {
     /// Builds a mover for an annealing run of `length` work per object, judged by the cost of the
     /// wide layout or by the tree's area.
-    pub fn new(ruin: &'a Ruin, length: f64, by_layout: bool) -> Self {
+    pub fn new(scale: Scale, length: f64, by_layout: bool) -> Self {
         let (search, side, removed) = Default::default();
         let layout = by_layout.then(Layout::default);
         Self {
-            ruin,
+            scale,
             sampler: NodeSampler::for_work(length),
             search,
             side,
@@ -154,7 +124,7 @@ impl<'a> RuinMover<'a> {
         levels: u32,
         rng: &mut Stream,
     ) {
-        for _ in 0..rng.random_range(1..=self.ruin.removed) {
+        for _ in 0..rng.random_range(1..=RUINED_SUBTREES) {
             let mut node = scope.root(tree);
             // The scope has shrunk to one leaf, which stays as its root.
             if tree.nodes[node as usize].is_leaf() {
@@ -173,12 +143,11 @@ impl<'a> RuinMover<'a> {
     /// Removes a layer at one side of the scope's box. The scope keeps a root.
     #[inline(always)]
     fn layer(&mut self, tree: &mut Working<impl Metric>, scope: Scope, rng: &mut Stream) {
-        let Ruin { thickness, most, .. } = *self.ruin;
         let top = scope.root(tree);
         if tree.nodes[top as usize].is_leaf() {
             return;
         }
-        self.work += self.side.find(tree, top, thickness, most as usize, rng);
+        self.work += self.side.find(tree, top, LAYER_THICKNESS, SUBTREES_IN_A_LAYER, rng);
         for &node in &self.side.roots {
             if scope.root(tree) != node {
                 self.work += self.removed.take(tree, node);
@@ -187,7 +156,7 @@ impl<'a> RuinMover<'a> {
     }
 }
 
-impl Mover for RuinMover<'_> {
+impl Mover for RuinMover {
     fn work(&self) -> u64 {
         self.work + self.search.visits + self.layout.as_ref().map_or(0, |layout| layout.visits)
     }
@@ -206,9 +175,8 @@ impl Mover for RuinMover<'_> {
         temperature: f64,
         rng: &mut Stream,
     ) -> bool {
-        let ruin = self.ruin;
         let mut top = self.sampler.draw(rng);
-        let levels = rng.random_range(1..=ruin.climb);
+        let levels = rng.random_range(1..=RUIN_LEVELS);
         let mut above = tree.nodes[top as usize].parent;
         for _ in 0..levels {
             if above == ANCHOR {
@@ -221,12 +189,12 @@ impl Mover for RuinMover<'_> {
         let Node { aabb: top_box, area: top_area, .. } = tree.nodes[top as usize];
         tree.begin();
         self.removed.clear();
-        if rng.random::<f64>() < ruin.slabs {
+        if rng.random::<f64>() < LAYERS {
             self.layer(tree, scope, rng);
         } else {
             self.scattered(tree, scope, levels, rng);
         }
-        let near = rng.random::<f64>() < ruin.near;
+        let near = rng.random::<f64>() < NEARBY;
         // Every removed subtree is inside the top's former box, and a scope must contain the boxes
         // of its items.
         let positions = if near { scope.around(tree, &top_box) } else { Scope::ALL };
@@ -237,7 +205,7 @@ impl Mover for RuinMover<'_> {
         // Metropolis draws its random number first, so that a move above the resulting limit need
         // not be finished.
         let chance = 1.0 - rng.random::<f64>();
-        let scale = match ruin.scale {
+        let scale = match self.scale {
             Scale::Saved => *saved,
             Scale::Top => top_area,
         };

@@ -5,7 +5,7 @@ use super::config::{Config, Horizon};
 use super::recombine::recombine;
 use crate::annealing::cool;
 use crate::annealing::references::Divider;
-use crate::annealing::ruin_recreate::RuinMover;
+use crate::annealing::ruin_recreate::{RuinMover, Scale};
 use crate::annealing::schedule::{Schedule, anneal};
 use crate::local::incumbent::Incumbent;
 use crate::local::reinsertion;
@@ -13,9 +13,11 @@ use crate::parallel::threads;
 use crate::run::{Observer, Problem, Run, StopReason, Tally, stream};
 use crate::tree::{Metric, Shape, Working};
 use crate::tuning::{
-    FINISH_AT_MOST, FINISH_WORK, LARGE_SUBTREE, LEAST_LARGE_SUBTREES, MOST_GENERATIONS,
-    MOST_SUBTREES, PROBE, RECOMBINED_AT_ONCE, ROUNDS_PER_LOOK, SECURED_FROM, SUBTREES_PER_THREAD,
-    TRIAL, WORK_ON_REFERENCES, WORK_PER_PAIR, WORTH_AN_EVENT, WORTH_LARGE_SUBTREES, WORTH_SUBTREES,
+    COLD, FINISH_AT_MOST, FINISH_WORK, FIRST_GENERATION, GROWTH, HEAT, HOTTEST, LARGE_SUBTREE,
+    LEAST_LARGE_SUBTREES, LONGEST, MOST_GENERATIONS, MOST_SUBTREES, PROBE, RECOMBINED_AT_ONCE,
+    REHEAT, REHEATED, REHEATS, REHEATS_FROM, ROUNDS_PER_LOOK, SECURED_FROM, SUBTREES_PER_THREAD,
+    TOP_FROM, TRIAL, WORK_ON_REFERENCES, WORK_PER_PAIR, WORTH_AN_EVENT, WORTH_LARGE_SUBTREES,
+    WORTH_SUBTREES,
 };
 use bvh_core::cost::Objective;
 use bvh_core::{Aabb, Bvh};
@@ -137,12 +139,7 @@ impl Improvement<'_, '_, '_, '_> {
         let began = observer.progress().unwrap_or(0.0);
         // Short runs pay only because they are recombined, and trees judged by their layout cannot
         // be.
-        let config = if self.by_layout {
-            &Config { reheats: 0, ..self.config.clone() }
-        } else {
-            self.config
-        };
-        let (plan, each) = plan(config, length, n);
+        let (plan, each) = plan(length, n, if self.by_layout { 0 } else { REHEATS });
         for (number, Planned { hot, until }) in (0..).zip(plan) {
             let due = (until * all as f64) as u64;
             let work =
@@ -161,12 +158,12 @@ impl Improvement<'_, '_, '_, '_> {
     /// Searches a local optimum, then anneals in generations of growing length.
     fn until_stopped(&mut self, tree: &mut Working<impl Metric>) {
         self.reinsert(tree);
-        let mut length = self.config.first;
+        let mut length = FIRST_GENERATION;
         for number in 0..MOST_GENERATIONS {
             let work = self.left.min((length * self.n as f64) as u64);
-            let schedule = self.schedule(self.config.hot(length), work, 1.0, length);
+            let schedule = self.schedule(hot(length), work, 1.0, length);
             self.anneal(tree, &ScheduledRun { number, schedule, length, is_first: false });
-            length *= self.config.growth;
+            length *= GROWTH;
         }
     }
 
@@ -219,12 +216,12 @@ impl Improvement<'_, '_, '_, '_> {
                 TRIAL * in_time.min(self.left as f64)
             }
             Horizon::Known => TRIAL * self.left as f64,
-            Horizon::Open => self.config.first * n,
+            Horizon::Open => FIRST_GENERATION * n,
         };
         let length = work / n;
         for (number, tree) in [&mut *tree, &mut other].into_iter().enumerate() {
             let end = began + (1.0 - began) * TRIAL * (number + 1) as f64;
-            let schedule = self.schedule(self.config.hot(length), work as u64, end, length);
+            let schedule = self.schedule(hot(length), work as u64, end, length);
             let number = TRIALS + number as u64;
             self.anneal(tree, &ScheduledRun { number, schedule, length, is_first: true });
         }
@@ -238,11 +235,10 @@ impl Improvement<'_, '_, '_, '_> {
     /// Returns the schedule of an annealing run. `length` is the work per object of the whole
     /// search, or of the generation.
     fn schedule(&self, hot: f64, work: u64, end: f64, length: f64) -> Schedule {
-        let Config { cold, .. } = *self.config;
         let quota = self.run.left().at_most(work);
         Schedule {
-            hot: hot.max(cold),
-            cold,
+            hot: hot.max(COLD),
+            cold: COLD,
             quota,
             end,
             subtrees: self.subtrees(length),
@@ -273,11 +269,11 @@ impl Improvement<'_, '_, '_, '_> {
     /// at this rate.
     fn probe(&mut self, tree: &mut Working<impl Metric>) -> f64 {
         let observer = self.run.observer();
-        let heat = [self.config.cold; 2];
+        let heat = [COLD; 2];
         let quota = self.run.left().at_most(self.left.min(PROBE * self.n));
         let rng = &mut stream(self.seed, 0);
         let began = observer.progress();
-        let mut mover = RuinMover::new(&self.config.ruin, PROBE as f64, self.by_layout);
+        let mut mover = RuinMover::new(Scale::Saved, PROBE as f64, self.by_layout);
         let tally = cool(&mut mover, tree, Vec::new(), heat, quota, rng, observer);
         let in_time = match (began, observer.progress()) {
             (Some(began), Some(now)) => {
@@ -305,7 +301,7 @@ impl Improvement<'_, '_, '_, '_> {
         // probe, the last streams to the divider.
         let streams = [self.seed, 1 + (number << 40)];
         let mut division = stream(self.seed, (1 << 63) + number);
-        let ruin = self.config.ruin(length);
+        let scale = if length < TOP_FROM { Scale::Saved } else { Scale::Top };
         let best = &mut *self.best;
         let run = &mut *self.run;
         let by_layout = self.by_layout;
@@ -338,7 +334,7 @@ impl Improvement<'_, '_, '_, '_> {
         };
         let mut divider = self.divider.as_mut().filter(|_| is_first);
         anneal(
-            || RuinMover::new(&ruin, length, by_layout),
+            || RuinMover::new(scale, length, by_layout),
             schedule,
             tree,
             streams,
@@ -399,25 +395,31 @@ struct Planned {
 }
 
 /// Returns the annealing runs for `length` work per object, and the work per object of each long
-/// run including its short runs.
-fn plan(config: &Config, length: f64, n: u64) -> (Vec<Planned>, f64) {
-    let longest = config.longest.min(WORK_PER_PAIR * n as f64);
+/// run including its short runs, of which `most` follow a run that is long enough.
+fn plan(length: f64, n: u64, most: u32) -> (Vec<Planned>, f64) {
+    let longest = LONGEST.min(WORK_PER_PAIR * n as f64);
     // Runs of equal length: a short last run would begin at a low temperature.
     let long_runs = (length / longest).ceil().clamp(1.0, MOST_GENERATIONS as f64);
     let length_of_run = length / long_runs;
-    let hot = config.hot(length_of_run);
-    let reheats = if length_of_run < config.reheats_from { 0 } else { config.reheats };
-    let kept = if reheats == 0 { 0.0 } else { config.reheated };
+    let hot_of_run = hot(length_of_run);
+    let reheats = if length_of_run < REHEATS_FROM { 0 } else { most };
+    let kept = if reheats == 0 { 0.0 } else { REHEATED };
     let mut plan = Vec::new();
     for number in 0..long_runs as u64 {
         for reheat in 0..=reheats {
             // A short run never starts hotter than its long run.
-            let hot = if reheat == 0 { hot } else { hot.min(config.reheat) };
+            let hot = if reheat == 0 { hot_of_run } else { hot_of_run.min(REHEAT) };
             let part = 1.0 - kept + kept * f64::from(reheat) / f64::from(reheats.max(1));
             plan.push(Planned { hot, until: (number as f64 + part) / long_runs });
         }
     }
     (plan, length_of_run)
+}
+
+/// Returns the first temperature of an annealing run of `length` work per object, unless the last
+/// temperature is higher.
+fn hot(length: f64) -> f64 {
+    (HEAT * length / 1000.0).min(HOTTEST)
 }
 
 fn cost(tree: &Working<impl Metric>, by_layout: bool) -> f64 {

@@ -5,7 +5,7 @@ use bvh_build::{Builder, median_cut, ploc};
 use bvh_core::{Bvh, validate};
 use bvh_search::{
     Budget, Event, Judge, Kept, Method, Observer, Problem, StopReason, best, genetic, grasp,
-    random_orders, ruin_recreate, solve, solve_or_keep,
+    random_orders, solve, solve_or_keep,
 };
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -77,19 +77,6 @@ fn the_observer_hears_of_moves_that_improve_nothing() {
     let calls = counts.calls.into_inner();
     let events = counts.events.into_inner();
     assert!(calls > 2 * events, "{calls} calls, {events} events");
-}
-
-#[test]
-fn the_observer_is_polled_between_moves_however_long_they_are() {
-    let boxes = scatter(3000, 1);
-    let ruin = ruin_recreate::Ruin { climb: 1000, removed: 1000, ..Default::default() };
-    let polls = Polls { polled: 0.into(), until: u64::MAX };
-    let budget = Budget { max_evaluations: Some(2000), ..Budget::UNLIMITED };
-    let config = ruin_recreate::Config { ruin, ..Default::default() };
-    let outcome = solve(&config, &Problem::new(&boxes), 1, budget, &polls).unwrap();
-    let polled = polls.polled.into_inner();
-    assert!(outcome.work / outcome.evaluations > 2000, "long moves");
-    assert!(polled > outcome.work >> 16, "{polled} polls in {} nodes of work", outcome.work);
 }
 
 #[test]

@@ -5,7 +5,9 @@ use bvh_scenes::Scene;
 use bvh_search::bvh_core::export::Target;
 use bvh_search::bvh_core::file::FileError;
 use bvh_search::bvh_core::glam::{DMat3, DVec3, EulerRot};
-use bvh_search::bvh_core::{Frame, InFrame, Primitives, validate_references};
+use bvh_search::bvh_core::{
+    DHit, DRay, DTriangle, DWideBvh, Frame, InFrame, Primitives, Select, validate_references,
+};
 use bvh_search::{Choice, Frames, Objects, Options, OwnedTree, prelude::*};
 
 fn triangles(scene: &str) -> Vec<Triangle> {
@@ -163,5 +165,46 @@ fn a_tree_in_a_frame_keeps_it_and_the_answers_of_rays() {
         let error = owned.export(&Target::ALL[0]).unwrap_err();
         assert!(error.to_string().contains("the file's frame"), "{error}");
         assert!(plain.export(&Target::ALL[0]).is_ok());
+    }
+}
+
+#[test]
+fn triangles_in_f64_are_baked_at_map_coordinates_and_traced_from_their_file() {
+    let far = DVec3::new(512_345.678, 5_412_345.678, 0.1);
+    let turn = DMat3::from_euler(EulerRot::XYZ, 0.3, 1.1, 0.7);
+    let moved = |corner: Vec3| turn * corner.as_dvec3() + far;
+    let straight = triangles("escher");
+    let triangles: Vec<DTriangle> =
+        straight.iter().map(|Triangle(corners)| DTriangle(corners.map(moved))).collect();
+    let objects =
+        |triangles: &[DTriangle]| Objects::Shapes(Primitives::Doubles(triangles.to_vec()));
+    let baked = |frame, references| {
+        let options = Options { frame, references, budget: work(10_000_000), ..Options::default() };
+        OwnedTree::find(objects(&triangles), &options, &()).unwrap()
+    };
+    let [file, auto, divided] =
+        [(Frames::File, Some(1.0)), (Frames::Auto, Some(1.0)), (Frames::Auto, Some(1.3))]
+            .map(|(frame, references)| baked(frame, references));
+    let [along, turned] = [&file, &auto].map(|owned| cost::internal_area(owned.tree()));
+    assert!(turned < 0.9 * along, "{turned} of {along}");
+    assert!(divided.tree().prim_ids.len() > triangles.len());
+    for owned in [file, auto, divided] {
+        let bytes = owned.save().unwrap();
+        let loaded = OwnedTree::load(objects(&triangles), &bytes).unwrap();
+        assert_eq!((loaded.tree(), loaded.boxes()), (owned.tree(), owned.boxes()));
+        let mut other = triangles.clone();
+        other[0].0[0] += DVec3::splat(1000.0);
+        assert!(OwnedTree::load(objects(&other), &bytes).is_err());
+        let wide = DWideBvh::new(loaded.tree(), &triangles).unwrap();
+        for (number, triangle) in triangles.iter().step_by(29).enumerate() {
+            let middle = triangle.0.iter().sum::<DVec3>() / 3.0;
+            let direction = turn * DVec3::new(0.3, number as f64, -0.2);
+            let ray = DRay::half_line(middle - 3.0 * direction, direction).unwrap();
+            let distances = triangles.iter().zip(0..).filter_map(|(triangle, object)| {
+                Some(DHit { t: triangle.intersect(&ray)?, object })
+            });
+            let nearest = distances.min_by(|a, b| a.t.total_cmp(&b.t));
+            assert_eq!(wide.nearest_hit(&ray, Select::default()), nearest);
+        }
     }
 }

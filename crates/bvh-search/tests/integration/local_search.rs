@@ -4,8 +4,8 @@ use crate::{scatter, work};
 use bvh_build::{Builder, muller_fellner};
 use bvh_core::{Aabb, Bvh, Node, cost, validate};
 use bvh_search::{
-    Budget, Event, Method, Observer, Outcome, Problem, Search, SearchError, StopReason, best,
-    genetic, optimize, rebuild, ruin_recreate, solve,
+    Budget, Event, Method, Observer, Outcome, Problem, Search, SearchError, StopReason, annealing,
+    best, genetic, optimize, rebuild, solve,
 };
 use proptest::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
@@ -116,8 +116,8 @@ fn budgets_and_observers_end_a_search_where_they_say() {
 #[test]
 fn a_budget_barely_above_what_the_best_does_without_one_is_kept() {
     let boxes = scatter(1000, 4);
-    for work_per_object in [100, 200, 300, 400] {
-        let config = best::Config { work_per_object, first: 50.0, ..Default::default() };
+    for work_per_object in [100, 400, 2000, 6000] {
+        let config = best::Config { work_per_object, ..Default::default() };
         // `best` does not count the start and the first descent in its work per object.
         let max_work = work_per_object * 1000 + 60_000;
         let outcome = solve(&config, &Problem::new(&boxes), 5, work(max_work), &()).unwrap();
@@ -218,11 +218,8 @@ fn parameters_that_contradict_others_or_that_no_poll_could_interrupt_are_named()
         let boxes = scatter(objects, 1);
         solve(method, &Problem::new(&boxes), 1, Budget::UNLIMITED, &()).unwrap_err().to_string()
     }
-    let cold = ruin_recreate::Config { cold: 1.0, ..Default::default() };
+    let cold = annealing::Config { cold: 1.0, ..Default::default() };
     assert_eq!(error(&cold, 0), "cold is 1; accepted: above 0, not above hot");
-    let ruin = ruin_recreate::Ruin { removed: u32::MAX, ..Default::default() };
-    let ruin = ruin_recreate::Config { ruin, ..Default::default() };
-    assert_eq!(error(&ruin, 0), "ruin.removed is 4294967295; accepted: 1 to 1000");
     let climb = rebuild::Config { climb: 1 << 31, ..Default::default() };
     assert_eq!(error(&climb, 0), "climb is 2147483648; accepted: 0 to 1000");
     let population = genetic::Config { population: 1_000_000, ..Default::default() };

@@ -7,6 +7,7 @@ mod laws;
 mod never_worse;
 mod objectives;
 mod orientation;
+mod particles;
 #[cfg(target_arch = "x86_64")]
 mod subnormals;
 mod suite;

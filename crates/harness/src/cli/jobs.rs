@@ -3,8 +3,7 @@
 use super::terminal::print_line;
 use crate::Error;
 use crate::run::execute::reject_indivisible;
-use crate::run::job::{Job, selected};
-use crate::run::resolved::load_scenes;
+use crate::run::jobs::{Job, selected};
 use crate::spec::{Experiment, Overrides};
 use std::cmp::Reverse;
 use std::path::PathBuf;
@@ -26,7 +25,7 @@ pub fn jobs(args: &JobsArgs) -> Result<(), Error> {
     let experiment = Experiment::read(&args.spec, &args.overrides)?;
     reject_indivisible(&experiment)?;
     let (scenes, _) =
-        load_scenes(&experiment).map_err(|error| args.overrides.named(&args.spec, error))?;
+        experiment.load_scenes().map_err(|error| args.overrides.named(&args.spec, error))?;
     let mut jobs = selected(&experiment, &scenes, &[])?;
     // A long run that begins last would leave all other workers idle. Scenes differ most, and specs
     // begin with what is quick.

@@ -1,11 +1,11 @@
 //! `harness merge`: joins the parts of experiments that ran with `--run`.
 
 use super::run::{print_outcome, repeat};
-use super::terminal::{Jobs, input_folder, output_folder};
+use super::terminal::{Threads, input_folder, output_folder};
 use crate::rows::store::{Existing, spec_of_part};
 use crate::run::execute::{Extent, execute};
 use crate::run::finish;
-use crate::run::resolved::{Resolved, read_toml};
+use crate::run::resolved::Resolved;
 use crate::spec::Overrides;
 use crate::{Error, files};
 use std::collections::BTreeMap;
@@ -27,13 +27,13 @@ pub struct MergeArgs {
     pub force: bool,
     /// Limits the threads.
     #[command(flatten)]
-    pub jobs: Jobs,
+    pub threads: Threads,
 }
 
 /// Merges the parts and prints the tables of every experiment.
 pub fn merge(args: &MergeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     output_folder("--out", &args.out)?;
-    args.jobs.apply()?;
+    args.threads.apply()?;
     let mut parts: BTreeMap<PathBuf, Vec<PathBuf>> = BTreeMap::new();
     for out in &args.folders {
         input_folder("DIR", out)?;
@@ -48,7 +48,7 @@ pub fn merge(args: &MergeArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     let mut differences = 0;
     for (name, parts) in parts {
         let spec = spec_of_part(&parts[0].join(name));
-        let Resolved { experiment, .. } = read_toml(&spec)?;
+        let Resolved { experiment, .. } = files::read_toml(&spec)?;
         // Somebody may have edited it.
         experiment
             .check_run_count()

@@ -3,6 +3,5 @@
 pub mod jobs;
 pub mod merge;
 pub mod program;
-pub mod report;
 pub mod run;
 pub mod terminal;

@@ -1,7 +1,7 @@
 //! The program: parses the arguments, dispatches to a command, and sets the exit code.
 
 use super::terminal::{self, INTERRUPTED, print_error};
-use super::{jobs, merge, report, run};
+use super::{jobs, merge, run};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -22,7 +22,6 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    Report(report::ReportArgs),
     Jobs(jobs::JobsArgs),
     Merge(merge::MergeArgs),
 }
@@ -33,7 +32,6 @@ pub fn main() -> ExitCode {
     terminal::listen();
     let result = match cli.command {
         None => run::run(&cli.run, &INTERRUPTED),
-        Some(Command::Report(args)) => report::report(&args),
         Some(Command::Jobs(args)) => jobs::jobs(&args),
         Some(Command::Merge(args)) => merge::merge(&args, &INTERRUPTED),
     };

@@ -1,13 +1,12 @@
 //! `harness SPEC.toml...`: runs experiments, compares them with committed results, or makes their
 //! reports again.
 
-use super::terminal::{Jobs, output_folder, print_error, print_line};
+use super::terminal::{Threads, output_folder, print_error, print_line};
 use crate::Error;
 use crate::rows::store::Existing;
 use crate::run::execute::{Extent, execute};
 use crate::run::finish::Summary;
-use crate::run::resolved::load_scenes;
-use crate::run::{check, finish, reference};
+use crate::run::{check, finish, forecast, reference};
 use crate::spec::{Experiment, Overrides};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -27,7 +26,7 @@ pub struct RunArgs {
     pub overrides: Overrides,
     /// Limits the threads.
     #[command(flatten)]
-    pub jobs: Jobs,
+    pub threads: Threads,
     /// Only compare with the committed results; exit code 1 on a difference.
     #[arg(long, conflicts_with = "resume")]
     pub check: bool,
@@ -54,7 +53,7 @@ pub struct RunArgs {
 pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     // A wrong folder is found before hours of work, not after them.
     output_folder("--out", &args.out)?;
-    args.jobs.apply()?;
+    args.threads.apply()?;
     // A mistake in the last spec must not surface after hours of runs of the first.
     let experiments = args
         .specs
@@ -79,7 +78,7 @@ pub fn run(args: &RunArgs, interrupted: &AtomicBool) -> Result<(), Error> {
     // Resumed and selected runs are too short for every scene to be loaded twice.
     if !args.redraw && !args.resume && args.runs.is_empty() {
         for (path, experiment) in args.specs.iter().zip(&experiments).skip(1) {
-            load_scenes(experiment).map_err(|error| args.overrides.named(path, error))?;
+            experiment.load_scenes().map_err(|error| args.overrides.named(path, error))?;
         }
     }
     let mut differences = 0;
@@ -98,6 +97,10 @@ fn perform(
     extent: &Extent,
     interrupted: &AtomicBool,
 ) -> Result<usize, Error> {
+    if !args.redraw && !args.quiet && args.runs.is_empty() {
+        let times = forecast::line(experiment, &args.out.join(experiment.folder()))?;
+        times.iter().for_each(|line| print_error(line));
+    }
     let is_new = args.redraw || args.force || args.resume || !args.runs.is_empty();
     if args.check || !is_new && finish::has_results_of(experiment, &args.out)? {
         return repeat(experiment, &args.out, &[], interrupted, args.quiet || args.check);

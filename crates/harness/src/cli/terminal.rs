@@ -46,14 +46,14 @@ pub fn print_error(line: &str) {
 
 /// The limit on the program's threads.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]
-pub struct Jobs {
+pub struct Threads {
     /// Number of threads; the default is one per processor. It changes only times, and the results
     /// of budgets of time.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
 }
 
-impl Jobs {
+impl Threads {
     /// Limits the program to this number of threads. Call it once.
     pub fn apply(self) -> Result<(), Error> {
         // By default rayon starts one thread per processor when it is first used.

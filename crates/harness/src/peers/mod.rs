@@ -1,18 +1,16 @@
 //! Third-party libraries and programs as methods of experiments: our costs of their trees.
 //!
 //! The harness contains no library. The program in `attic/` does: it brings each as a [`Library`],
-//! a [lower bound](LowerBound) and the [times of rays](Tracing), and is the same program otherwise.
-//! A program of your own needs no code here: see [`command`].
+//! and the [times of rays](Tracing), and is the same program otherwise. A program of your own needs
+//! no code here: see [`command`].
 
 pub mod command;
 mod program;
 
 use crate::Error;
-use bvh_build::BuildError;
 use bvh_config::OutOfRange;
 use bvh_core::{Aabb, Bvh, Clip};
 use bvh_scenes::Scene;
-use bvh_search::Observer;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::sync::OnceLock;
 use toml::Table;
@@ -101,18 +99,12 @@ pub struct FirstRun<'a> {
 /// The name of a file of results, and its bytes.
 pub type NamedBytes = (&'static str, Vec<u8>);
 
-/// A proven lower bound of the internal area of every binary tree over boxes, which grows with an
-/// effort.
-pub type LowerBound = fn(&[Aabb], u32, &dyn Observer) -> Result<f64, BuildError>;
-
 /// What a program contains beside the harness.
 pub struct Others {
     /// The libraries that specs may name.
     pub libraries: &'static [&'static dyn Library],
     /// The measurement of a spec's key `tracing`.
     pub tracing: &'static dyn Tracing,
-    /// The bound of a spec's key `lower_bound`.
-    pub lower_bound: LowerBound,
 }
 
 /// What this program contains, which does not change while it runs.

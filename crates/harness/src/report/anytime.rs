@@ -1,4 +1,4 @@
-//! Error against run time: the gap of the incumbent to the exact optimum or the best known cost.
+//! Error against run time: the gap of the incumbent to the best known cost.
 
 use super::config::check_file;
 use super::data::{Series, ratio};

@@ -1,6 +1,5 @@
 //! Distributions of the costs of independent trials.
 
-use super::drawing::{Point, Shape, curve};
 use super::paper::{PaperRow, Verdict};
 use super::prelude::*;
 use crate::statistics::{mean, quantile, range, sorted, variance};
@@ -44,33 +43,16 @@ pub(super) struct Summary<'a> {
 }
 
 pub(super) fn write(config: &Config, rows: &Rows) -> Result<Output, Error> {
-    let mut output = Output::default();
     let mut summaries = Vec::new();
-    let mut panels = Vec::new();
     for scene in rows.scenes() {
-        let base_cost = rows.base_cost(scene);
-        let mut layers = Vec::new();
         for method in &config.methods {
             let costs = sorted(&rows.trial_costs(scene, method));
-            summaries.push(summarise(scene, method, &costs, base_cost));
-            let count = costs.len() as f64;
-            let step = |(cost, rank): (&f64, u32)| {
-                let (x, y) = (cost / base_cost, f64::from(rank) / count);
-                Point { x, y, ends: None }
-            };
-            let steps: Vec<Point> = costs.iter().zip(1..).map(step).collect();
-            layers.extend(curve(method, &steps, Shape::Steps));
+            summaries.push(summarise(scene, method, &costs, rows.base_cost(scene)));
         }
-        layers.push(Layer::new("greedy", Marks::VLine(1.0)));
-        let y = Axis::linear("trials at most as costly").range(0.0, 1.0).unit(Unit::Percent);
-        let x = Axis::linear("cost / greedy");
-        panels.push(panel(rows.shown(scene), x, y, layers));
     }
-    for method in &config.methods {
-        output.paper.extend(config.majority(rows, method));
-    }
+    let paper = config.methods.iter().filter_map(|method| config.majority(rows, method)).collect();
+    let mut output = Output { paper, ..Output::default() };
     output.add_csv("distribution", &summaries)?;
-    output.add_figure("distribution", "Every trial of every repetition.", 2, panels);
     Ok(output)
 }
 

@@ -80,10 +80,10 @@ pub enum Shape {
 
 /// A value and its interval.
 #[derive(Clone, Copy)]
-pub(super) struct Point {
-    pub x: f64,
-    pub y: f64,
-    pub ends: Option<(f64, f64)>,
+struct Point {
+    x: f64,
+    y: f64,
+    ends: Option<(f64, f64)>,
 }
 
 impl Drawing {
@@ -236,7 +236,7 @@ impl Drawing {
 
 /// Draws a line through points, x ascending, on the band between the ends of their intervals. A
 /// single point, and every one of points alone, has a mark and a line from end to end.
-pub(super) fn curve(series: &str, points: &[Point], shape: Shape) -> Vec<Layer> {
+fn curve(series: &str, points: &[Point], shape: Shape) -> Vec<Layer> {
     let path = match shape {
         Shape::Steps => stairs(points),
         _ => points.to_vec(),

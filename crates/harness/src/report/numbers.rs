@@ -1,4 +1,4 @@
-//! Medians and quartiles of costs and gaps, lower bounds, and times until targets are reached, by
+//! Medians and quartiles of costs and gaps, and times until targets are reached, by
 //! method and scene.
 
 use super::data::{Series, ratio};
@@ -10,7 +10,7 @@ report! {
     pub struct Config {
         /// Labels of the methods.
         methods: Vec<String>, in OneOrMore;
-        /// Distances above the best known cost or exact optimum in per cent, for a table of the
+        /// Distances above the best known cost in per cent, for a table of the
         /// seconds that the methods need to get there. Default none.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         targets: Vec<f64> = vec![], in 0.0..=1e6;
@@ -25,17 +25,11 @@ pub(super) struct Numbers<'a> {
     runs: usize,
     /// Median of cost over base, over repetitions.
     cost_over_base_median: f64,
-    /// `exact optimum` or `best known`.
-    reference: &'static str,
-    /// The cost that gaps are measured from.
+    /// The best known cost, that gaps are measured from.
     reference_cost: f64,
     gap_quartile_1: f64,
     gap_median: f64,
     gap_quartile_3: f64,
-    /// Proven lower bound of the cost of binary trees, if there is one.
-    lower_bound: Option<f64>,
-    /// `lower_bound` over `reference_cost`.
-    lower_bound_over_reference: Option<f64>,
 }
 
 /// The seconds of one method on one scene, as written to `timing_numbers.csv`.
@@ -76,19 +70,15 @@ impl Config {
                 let of_costs = quartiles(&costs);
                 let [gap_quartile_1, gap_median, gap_quartile_3] =
                     of_costs.map(|cost| ratio(cost, reference.cost) - 1.0);
-                let over_reference = |bound| ratio(bound, reference.cost);
                 numbers.push(Numbers {
                     scene,
                     method,
                     runs: costs.len(),
                     cost_over_base_median: ratio(of_costs[1], rows.base_cost(scene)),
-                    reference: if reference.is_optimum() { "exact optimum" } else { "best known" },
                     reference_cost: reference.cost,
                     gap_quartile_1,
                     gap_median,
                     gap_quartile_3,
-                    lower_bound: reference.lower_bound,
-                    lower_bound_over_reference: reference.lower_bound.map(over_reference),
                 });
                 let [seconds_quartile_1, seconds_median, seconds_quartile_3] =
                     quartiles(&rows.seconds_of(scene, method));

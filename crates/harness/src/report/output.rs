@@ -6,7 +6,7 @@ use super::paper::PaperRow;
 use super::query::Row;
 use crate::Error;
 use crate::rows::csv_file::{bytes_of, parse, to_bytes};
-use comfy_table::{Table, presets};
+use comfy_table::{ColumnConstraint, ContentArrangement, Table, Width, presets};
 use figures::{Axis, Figure, Layer, Panel};
 use serde::Serialize;
 use std::path::Path;
@@ -28,6 +28,9 @@ pub struct Output {
 
 /// The greatest number of rows of a CSV file that are shown: nobody reads more.
 const MOST_SHOWN: usize = 100;
+
+/// The greatest width of a table, in characters.
+const WIDTH: u16 = 100;
 
 /// Columns of sentences, which would not fit beside others.
 const SENTENCES: [&str; 2] = ["rule", "reason"];
@@ -104,6 +107,17 @@ impl Output {
             row.retain(|column, _| !SENTENCES.contains(&column.as_str()));
             row.values_mut().for_each(|text| *text = four_digits(text));
         }
+        for (_, rows) in &mut tables {
+            let is_empty = |name: &str| rows.iter().all(|row| row[name].is_empty());
+            let empty: Vec<String> = rows
+                .first()
+                .into_iter()
+                .flat_map(Row::keys)
+                .filter(|name| is_empty(name))
+                .cloned()
+                .collect();
+            rows.iter_mut().for_each(|row| row.retain(|name, _| !empty.contains(name)));
+        }
         Ok(tables)
     }
 
@@ -116,8 +130,17 @@ impl Output {
                 continue;
             };
             let mut table = Table::new();
-            table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(first.keys());
+            table.load_preset(presets::UTF8_BORDERS_ONLY).set_width(WIDTH);
+            table.set_content_arrangement(ContentArrangement::Dynamic);
+            table.set_header(first.keys().map(|name| name.replace('_', " ")));
             table.add_rows(rows.iter().map(Row::values));
+            // Lines end between words.
+            for (column, name) in table.column_iter_mut().zip(first.keys()) {
+                let words = rows.iter().flat_map(|row| row[name].split(' ')).chain(name.split('_'));
+                let widest = words.map(|word| word.chars().count()).max().unwrap_or_default();
+                let width = Width::Fixed(widest as u16 + column.padding_width());
+                column.set_constraint(ColumnConstraint::LowerBoundary(width));
+            }
             text += &format!("{title}:\n{table}\n\n");
         }
         Ok(text)
@@ -166,13 +189,24 @@ mod tests {
         let long = format!("scene\n{}", "many\n".repeat(MOST_SHOWN + 1)).into_bytes();
         let csv = vec![("short".into(), short.clone()), ("long".into(), long.clone())];
         let text = Output { csv, ..Output::default() }.text().unwrap();
-        assert!(text.contains("short.csv:\n") && text.contains("│ s     ┆ 1.235 │"), "{text}");
+        assert!(text.contains("short.csv:\n") && text.contains("│ s       1.235 │"), "{text}");
         assert!(text.contains("long.csv: 101 rows\n") && !text.contains("many"), "{text}");
         // Nothing else has the rows that no file has.
         let unwritten = vec![("Title".into(), short), ("All".into(), long)];
         let text = Output { unwritten, ..Output::default() }.text().unwrap();
-        assert!(text.contains("Title:\n") && text.contains("│ s     ┆ 1.235 │"), "{text}");
+        assert!(text.contains("Title:\n") && text.contains("│ s       1.235 │"), "{text}");
         assert_eq!(text.matches("many").count(), MOST_SHOWN + 1, "{text}");
+    }
+
+    #[test]
+    fn wide_tables_are_shown_within_their_width_without_columns_that_are_empty() {
+        let names: Vec<String> = (0..9).map(|at| format!("cost_over_base_{at}")).collect();
+        let bytes = format!("{},empty\n{},\n", names.join(","), ["1.5"; 9].join(","));
+        let csv = vec![("wide".into(), bytes.into_bytes())];
+        let text = Output { csv, ..Output::default() }.text().unwrap();
+        let widest = text.lines().map(|line| line.chars().count()).max();
+        assert!(widest <= Some(usize::from(WIDTH)) && text.contains("cost"), "{text}");
+        assert!(!text.contains("empty") && !text.contains("cost over base 0"), "{text}");
     }
 
     #[test]

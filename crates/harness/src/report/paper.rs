@@ -118,12 +118,6 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// Returns the name in `paper.csv`.
-    pub fn name(self) -> String {
-        let name = serde_json::to_value(self).unwrap_or_default();
-        name.as_str().unwrap_or_default().to_owned()
-    }
-
     /// Compares our ratio to base with the paper's: by the relative distance `tolerance`, and by
     /// the side of the base.
     fn of_ratios(paper: f64, ours: f64, tolerance: f64) -> Self {

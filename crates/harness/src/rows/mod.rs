@@ -14,7 +14,7 @@
 #![allow(missing_docs, reason = "columns in the table above, or whose names are clear")]
 
 pub mod csv_file;
-pub mod finished_run;
+pub mod kept_run;
 pub mod lock;
 pub mod store;
 
@@ -239,14 +239,6 @@ rows! {
         render_seconds: f64,
     }
 
-    /// One row of `bounds.csv`: a proven lower bound of a scene.
-    BoundRow in "bounds.csv" {
-        scene: String,
-        objects: usize,
-        /// No binary tree with one object per leaf has less `internal_area`.
-        lower_bound: f64,
-    }
-
     /// One row of `turns.csv`: how a turned scene stands.
     TurnRow in "turns.csv" {
         scene: String,
@@ -267,25 +259,16 @@ rows! {
         checksum: String,
         /// Name of the objective.
         objective: String,
-        /// The least known, or the exact optimum.
+        /// The least known.
         cost: f64,
-        /// Label of the method that found it; `exact` for the optimum.
+        /// Label of the method that found it.
         method: String,
         /// Seed of the run that found it.
         seed: u64,
         /// Git revision of the program that found it.
         revision: String,
-        /// The greatest proven lower bound known, in the unit of `cost`.
-        lower_bound: Option<f64>,
     }
 }
 
 /// Costs that differ by less than this, relatively, are equal: the rest is rounding.
 pub const ROUNDING: f64 = 1e-12;
-
-impl ReferenceRow {
-    /// Returns true if the lower bound proves the reference to be the optimum.
-    pub fn is_optimum(&self) -> bool {
-        self.lower_bound.is_some_and(|bound| bound >= self.cost * (1.0 - ROUNDING))
-    }
-}

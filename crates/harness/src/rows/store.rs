@@ -6,7 +6,7 @@
 //! run survives a crash, a full disk or `kill -9`. At the end the rows of all runs are joined in
 //! the order of the spec, so that their bytes do not depend on the order in which runs finish.
 
-use super::finished_run::{FinishedRun, RunName};
+use super::kept_run::{KeptRun, RunName};
 use super::lock::lock_folder;
 use super::{Row, to_bytes};
 use crate::Error;
@@ -28,7 +28,8 @@ pub enum Existing {
     Replace,
 }
 
-/// The file in `.partial/` with the resolved spec of its runs, which do not count without it.
+/// The file with the resolved spec, of finished results or, in `.partial/`, of kept runs, which do not
+/// count without it.
 const SPEC: &str = "resolved.toml";
 
 /// How the names of files of kept runs end.
@@ -121,13 +122,13 @@ impl Store {
     /// # Errors
     ///
     /// If its file is damaged or that of another run.
-    pub fn kept(&self, index: usize, name: &RunName) -> Result<Option<FinishedRun>, Error> {
+    pub fn kept(&self, index: usize, name: &RunName) -> Result<Option<KeptRun>, Error> {
         let file = self.run_file(index);
-        if file.exists() { FinishedRun::read_named(&file, name).map(Some) } else { Ok(None) }
+        if file.exists() { KeptRun::read_named(&file, name).map(Some) } else { Ok(None) }
     }
 
     /// Keeps run `index`. Replaces a damaged copy of it.
-    pub fn keep(&self, index: usize, run: &FinishedRun) -> Result<(), Error> {
+    pub fn keep(&self, index: usize, run: &KeptRun) -> Result<(), Error> {
         let file = self.run_file(index);
         // What stands there may be a link, which a new file must not be written through.
         if file.symlink_metadata().is_ok() {
@@ -154,7 +155,7 @@ impl Store {
             if !file.exists() {
                 continue;
             }
-            let run = FinishedRun::read_named(&file, name)?;
+            let run = KeptRun::read_named(&file, name)?;
             match self.kept(index, name)? {
                 None => self.keep(index, &run)?,
                 Some(kept) => {
@@ -176,7 +177,7 @@ impl Store {
         let mut joined: BTreeMap<String, String> = BTreeMap::new();
         let mut processors = BTreeSet::new();
         for index in 0..runs {
-            let run = FinishedRun::read(&self.run_file(index))?;
+            let run = KeptRun::read(&self.run_file(index))?;
             processors.insert(run.processor);
             for (name, text) in run.files {
                 match joined.get_mut(&name) {
@@ -226,6 +227,15 @@ pub fn is_unfinished(folder: &Path) -> bool {
     spec_of_part(folder).exists()
 }
 
+/// Returns the text of the resolved spec of the finished results in a folder, if it has any.
+pub fn finished_spec(folder: &Path) -> Result<Option<String>, Error> {
+    let recorded = folder.join(SPEC);
+    if is_unfinished(folder) || !recorded.is_file() {
+        return Ok(None);
+    }
+    Ok(Some(read_text(&recorded)?))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -241,9 +251,9 @@ mod tests {
         (rows, RunName { scene, method, repetition: 0 })
     }
 
-    fn run<const N: usize>(files: [(&str, &str); N]) -> FinishedRun {
+    fn run<const N: usize>(files: [(&str, &str); N]) -> KeptRun {
         let files = files.map(|(name, text)| (name.to_owned(), text.to_owned()));
-        FinishedRun { files: files.into(), ..FinishedRun::here() }
+        KeptRun { files: files.into(), ..KeptRun::here() }
     }
 
     #[test]

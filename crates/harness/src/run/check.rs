@@ -1,22 +1,15 @@
 //! Compares fresh results with committed ones: the resolved spec line by line, and CSV files row by
 //! row. Files with times and figures are not compared; `--redraw` makes figures again.
 
-use super::resolved::{read_toml, to_toml};
 use crate::Error;
-use crate::files;
+use crate::files::{self, read_toml, to_toml};
 use csv::StringRecord;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use toml::{Table, Value};
 
 /// The number of differences per file that are listed; further ones are only counted.
 const SHOWN: usize = 5;
-
-/// A parsed CSV file.
-struct Rows {
-    header: StringRecord,
-    records: Vec<StringRecord>,
-}
 
 /// Lists the differences between the folders `fresh` and `committed`, one line each.
 ///
@@ -27,57 +20,47 @@ pub fn compare(
     committed: &Path,
     skipped_scenes: &[String],
 ) -> Result<Vec<String>, Error> {
-    let mut names = untimed_tables(fresh)?;
     if !committed.is_dir() {
         return Ok(vec![format!("{}: no committed results to compare with", committed.display())]);
     }
-    names.extend(untimed_tables(committed)?);
-    let mut differences = compare_specs(fresh, committed, skipped_scenes)?;
+    let [now, then] = [spec(fresh, skipped_scenes)?, spec(committed, skipped_scenes)?];
+    let mut differences = shortened("resolved.toml", spec_differences(&now, &then));
+    let [now, then] = [tables(fresh, skipped_scenes)?, tables(committed, skipped_scenes)?];
+    let names: BTreeSet<&String> = now.keys().chain(then.keys()).collect();
     for name in names {
-        let fresh_file = fresh.join(&name);
-        let committed_file = committed.join(&name);
-        if !committed_file.is_file() {
-            differences.push(format!("{name} is not among the committed results"));
-        } else if !fresh_file.is_file() {
-            differences.push(format!("{name} is committed but is no longer written"));
-        } else {
-            let fresh_rows = read_rows(&fresh_file, skipped_scenes)?;
-            let committed_rows = read_rows(&committed_file, skipped_scenes)?;
-            let all_scenes = skipped_scenes.is_empty();
-            differences.extend(compare_rows(&name, &fresh_rows, &committed_rows, all_scenes));
+        match (now.get(name), then.get(name)) {
+            (Some(now), Some(then)) => {
+                differences.extend(shortened(name, now.differences(then, skipped_scenes)));
+            }
+            (Some(_), None) => {
+                differences.push(format!("{name} is not among the committed results"));
+            }
+            _ => differences.push(format!("{name} is committed but is no longer written")),
         }
     }
     Ok(differences)
 }
 
-/// Compares the resolved specs line by line.
-fn compare_specs(
-    fresh: &Path,
-    committed: &Path,
-    skipped_scenes: &[String],
-) -> Result<Vec<String>, Error> {
-    let [fresh, committed] =
-        [read_spec(fresh, skipped_scenes)?, read_spec(committed, skipped_scenes)?];
-    let [now, then] = [&fresh, &committed].map(|text| text.lines().collect::<BTreeSet<_>>());
-    let added = now.difference(&then).map(|line| format!("not committed: {line}"));
-    let removed = then.difference(&now).map(|line| format!("only committed: {line}"));
-    let mut differences: Vec<String> = added.chain(removed).collect();
-    if differences.is_empty() && fresh != committed {
-        differences.push("the same lines in another order or number".into());
-    }
-    Ok(shortened("resolved.toml", differences))
-}
-
 /// Returns the text of a resolved spec without the skipped scenes.
-fn read_spec(folder: &Path, skipped_scenes: &[String]) -> Result<String, Error> {
+fn spec(folder: &Path, skipped_scenes: &[String]) -> Result<String, Error> {
     let mut spec: Table = read_toml(&folder.join("resolved.toml"))?;
     if let Some(Value::Array(scenes)) = spec.get_mut("scenes") {
-        scenes.retain(|scene| {
-            let name = scene.get("name").and_then(Value::as_str);
-            !skipped_scenes.iter().any(|skipped| Some(skipped.as_str()) == name)
-        });
+        let is_kept = |name: &str| skipped_scenes.iter().all(|skipped| skipped != name);
+        scenes.retain(|scene| scene.get("name").and_then(Value::as_str).is_none_or(is_kept));
     }
     to_toml(&spec)
+}
+
+/// Compares resolved specs line by line.
+fn spec_differences(fresh: &str, committed: &str) -> Vec<String> {
+    let [now, then] = [fresh, committed].map(|text| text.lines().collect::<BTreeSet<_>>());
+    let added = now.difference(&then).map(|line| format!("not committed: {line}"));
+    let removed = then.difference(&now).map(|line| format!("only committed: {line}"));
+    let differences: Vec<String> = added.chain(removed).collect();
+    match differences.is_empty() && fresh != committed {
+        true => vec!["the same lines in another order or number".into()],
+        false => differences,
+    }
 }
 
 /// Returns the first differences in a file and the number of further ones.
@@ -91,39 +74,60 @@ fn shortened(file: &str, mut differences: Vec<String>) -> Vec<String> {
     differences.into_iter().map(|difference| format!("{file}: {difference}")).collect()
 }
 
-/// Returns the names of the tables in a folder that hold no seconds.
-fn untimed_tables(folder: &Path) -> Result<BTreeSet<String>, Error> {
-    let mut names = files::names(folder)?;
-    names.retain(|name| name.ends_with(".csv") && !name.starts_with("timing"));
-    Ok(names)
+/// The rows of a CSV file, which may differ in length: that is a difference and no error.
+struct Rows {
+    header: StringRecord,
+    records: Vec<StringRecord>,
 }
 
-fn compare_rows(name: &str, fresh: &Rows, committed: &Rows, all_scenes: bool) -> Vec<String> {
-    let header = &fresh.header;
-    // Rows that name no scene are about all scenes, and some are missing here.
-    if !all_scenes && !header.iter().any(|column| column == "scene") {
-        return vec![];
+/// Reads the tables in a folder that hold no seconds, by their names, without the skipped scenes.
+fn tables(folder: &Path, skipped_scenes: &[String]) -> Result<BTreeMap<String, Rows>, Error> {
+    let mut tables = BTreeMap::new();
+    for name in files::names(folder)? {
+        if !name.ends_with(".csv") || name.starts_with("timing") {
+            continue;
+        }
+        let path = folder.join(&name);
+        let bytes = bvh_scenes::files::read(&path)?;
+        let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..]);
+        let header = reader.headers().map_err(Error::csv(&path))?.clone();
+        let records = reader.records().collect::<Result<Vec<StringRecord>, _>>();
+        let mut records = records.map_err(Error::csv(&path))?;
+        if let Some(scene) = header.iter().position(|column| column == "scene") {
+            let is_skipped = |name: &str| skipped_scenes.iter().any(|skipped| skipped == name);
+            records.retain(|record| !record.get(scene).is_some_and(is_skipped));
+        }
+        tables.insert(name, Rows { header, records });
     }
-    // Cells under different columns cannot be compared one by one.
-    if *header != committed.header {
-        let committed_header = &committed.header;
-        return vec![format!("{name}: columns are {header:?}, committed {committed_header:?}")];
-    }
-    let mut differences = Vec::new();
-    for (fresh_row, committed_row) in fresh.records.iter().zip(&committed.records) {
-        for (column, (now, then)) in header.iter().zip(fresh_row.iter().zip(committed_row)) {
-            if now != then {
-                let row = identity(header, committed_row);
-                differences.push(format!("{row}: {column} is {now}, committed {then}"));
+    Ok(tables)
+}
+
+impl Rows {
+    fn differences(&self, committed: &Self, skipped_scenes: &[String]) -> Vec<String> {
+        let Self { header, records } = self;
+        // Rows that name no scene are about all scenes, and some are missing here.
+        if !skipped_scenes.is_empty() && !header.iter().any(|column| column == "scene") {
+            return vec![];
+        }
+        // Cells under different columns cannot be compared one by one.
+        if *header != committed.header {
+            return vec![format!("columns are {header:?}, committed {:?}", committed.header)];
+        }
+        let mut differences = Vec::new();
+        for (now, then) in records.iter().zip(&committed.records) {
+            for (column, (now, then_is)) in header.iter().zip(now.iter().zip(then)) {
+                if now != then_is {
+                    let row = identity(header, then);
+                    differences.push(format!("{row}: {column} is {now}, committed {then_is}"));
+                }
             }
         }
+        let (now, then) = (records.len(), committed.records.len());
+        if now != then {
+            differences.push(format!("{now} rows, committed {then}"));
+        }
+        differences
     }
-    let fresh_count = fresh.records.len();
-    let committed_count = committed.records.len();
-    if fresh_count != committed_count {
-        differences.push(format!("{fresh_count} rows, committed {committed_count}"));
-    }
-    shortened(name, differences)
 }
 
 /// Returns the columns that identify a row: its scene, method and so on.
@@ -131,22 +135,6 @@ fn identity(header: &StringRecord, row: &StringRecord) -> String {
     let keys = ["scene", "method", "column", "quantity", "repetition", "trials", "evaluations"];
     let values = header.iter().zip(row).filter(|(column, _)| keys.contains(column));
     values.map(|(column, value)| format!("{column} {value}")).collect::<Vec<_>>().join(", ")
-}
-
-fn read_rows(path: &Path, skipped_scenes: &[String]) -> Result<Rows, Error> {
-    // A row of another length is a difference to report, not an error.
-    let bytes = bvh_scenes::files::read(path)?;
-    let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..]);
-    let header = reader.headers().map_err(Error::csv(path))?.clone();
-    let mut records: Vec<StringRecord> =
-        reader.records().collect::<Result<_, _>>().map_err(Error::csv(path))?;
-    if let Some(scene_column) = header.iter().position(|column| column == "scene") {
-        records.retain(|record| {
-            let scene = record.get(scene_column);
-            !skipped_scenes.iter().any(|skipped| Some(skipped.as_str()) == scene)
-        });
-    }
-    Ok(Rows { header, records })
 }
 
 #[cfg(test)]

@@ -1,18 +1,14 @@
-//! Executes an experiment: opens its folder, performs its measurements and makes its reports.
+//! Executes an experiment: opens its folder, takes its measurements and concludes with its reports.
 
 use super::finish::{Summary, conclude};
-use super::job::{Job, base_costs, selected};
-use super::perform::{Trees, Watch, Work};
-use super::resolved::{Resolved, finished, load_scenes, to_toml};
-use super::runs;
-use super::{ray_cost, trace};
+use super::jobs::{Job, Jobs};
+use super::measurement::Measurement;
+use super::resolved::Resolved;
 use crate::Error;
-use crate::rows::finished_run::RunName;
-use crate::rows::store::{Existing, Store};
+use crate::files::to_toml;
+use crate::rows::kept_run::RunName;
+use crate::rows::store::{Existing, Store, finished_spec};
 use crate::spec::Experiment;
-use crate::stress;
-use bvh_search::Observer;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -52,16 +48,12 @@ pub fn execute(
 
 /// Returns an error if several processes cannot share the experiment.
 pub fn reject_indivisible(experiment: &Experiment) -> Result<(), Error> {
-    let reason = if experiment.suite.is_some() {
-        "the suite of cases cannot be split"
-    } else if experiment.tracing.is_some() {
-        "ray times are compared within one process"
-    } else if experiment.judges().is_some() {
-        "rays judge all trees of a scene together"
-    } else {
-        return Ok(());
-    };
-    Err(Error::Usage(format!("{}: {reason}; run it without --run", experiment.name)))
+    match experiment.measurements().iter().find_map(Measurement::indivisible) {
+        Some(reason) => {
+            Err(Error::Usage(format!("{}: {reason}; run it without --run", experiment.name)))
+        }
+        None => Ok(()),
+    }
 }
 
 fn run(
@@ -72,18 +64,44 @@ fn run(
 ) -> Result<Summary, Error> {
     let Extent { existing, runs: ref ids, ref parts } = *extent;
     let is_part = !ids.is_empty();
-    let (scenes, skipped_scenes) = load_scenes(experiment)?;
+    let (scenes, skipped_scenes) = experiment.load_scenes()?;
     let resolved = Resolved::new(experiment, &scenes);
     let folder = out.join(experiment.folder());
-    if is_finished(&folder, &resolved, existing, is_part)? {
-        let text = "All runs are finished; nothing was done. \
-                    --force repeats them, --redraw makes the reports again.\n";
-        return Ok(Summary { text: text.into(), skipped_scenes, folder, ..Summary::default() });
+    let mut summary = Summary { skipped_scenes, folder, ..Summary::default() };
+    if is_finished(&summary.folder, &resolved, existing, is_part)? {
+        summary.text = "All runs are finished; nothing was done. \
+                        --force repeats them, --redraw makes the reports again.\n"
+            .into();
+        return Ok(summary);
     }
     // Neither an unknown identifier nor a base that cannot be built leaves a folder.
-    let jobs = selected(experiment, &scenes, ids)?;
-    let bases = base_costs(&experiment.objective, &jobs)?;
-    let parts: Vec<PathBuf> = parts.iter().map(|out| out.join(experiment.folder())).collect();
+    let jobs = Jobs::new(experiment, &scenes, ids, interrupted)?;
+    let store = open(&jobs, &resolved, out, existing, parts)?;
+    summary.remarks.extend(scenes.iter().filter_map(|scene| scene.remark.clone()));
+    // The subsets of one mesh share its remark.
+    summary.remarks.dedup();
+    for measurement in experiment.measurements() {
+        measurement.take(&jobs, &store, &mut summary)?;
+    }
+    if is_part {
+        summary.text = format!("{} runs; `harness merge` joins the parts.\n", jobs.list.len());
+        return Ok(summary);
+    }
+    conclude(&resolved, out, store, &mut summary)?;
+    Ok(summary)
+}
+
+/// Opens the experiment's folder in `out`, and takes the runs of the parts.
+fn open(
+    jobs: &Jobs,
+    resolved: &Resolved,
+    out: &Path,
+    existing: Existing,
+    parts: &[PathBuf],
+) -> Result<Store, Error> {
+    let folder = out.join(resolved.experiment.folder());
+    let parts: Vec<PathBuf> =
+        parts.iter().map(|part| part.join(resolved.experiment.folder())).collect();
     // A part that is discarded or finished would lose its runs. Symbolic links and `..` may hide
     // that two paths are the same folder.
     if let Ok(folder) = folder.canonicalize()
@@ -92,46 +110,12 @@ fn run(
         let out = out.display();
         return Err(Error::Usage(format!("--out {out} is also one of the parts; choose another")));
     }
-    let store = Store::open(&folder, &to_toml(&resolved)?, existing)?;
-    let runs = jobs.len();
-    let mut remarks: Vec<String> = scenes.iter().filter_map(|scene| scene.remark.clone()).collect();
-    // The subsets of one mesh share its remark.
-    remarks.dedup();
-    let names: Vec<RunName> = jobs.iter().map(Job::name).collect();
+    let store = Store::open(&folder, &to_toml(resolved)?, existing)?;
+    let names: Vec<RunName> = jobs.list.iter().map(Job::name).collect();
     for part in &parts {
         store.adopt(part, &names)?;
     }
-    let mut work = Work {
-        experiment,
-        bases,
-        jobs: &jobs,
-        store: &store,
-        watch: Watch { bar: progress(runs as u64), interrupted },
-        trees: Trees::new(),
-        remarks,
-    };
-    let mut text = String::new();
-    if let Some(effort) = &experiment.suite {
-        let cancelled = || work.watch.cancelled();
-        stress::execute(effort, &experiment.scenes, &experiment.methods, &store, &cancelled)?;
-    } else {
-        runs::measure(&mut work)?;
-        if let Some(config) = &experiment.tracing {
-            text += &trace::measure(config, &mut work)?;
-        }
-        if let Some(config) = experiment.judges() {
-            ray_cost::measure(config, &mut work)?;
-        }
-    }
-    let mut remarks = work.remarks;
-    if is_part {
-        let text = format!("{runs} runs; `harness merge` joins the parts.\n");
-        return Ok(Summary { text, skipped_scenes, remarks, folder });
-    }
-    let (tables, remark) = conclude(&resolved, out, store)?;
-    let text = tables + &text;
-    remarks.extend(remark);
-    Ok(Summary { text, skipped_scenes, remarks, folder })
+    Ok(store)
 }
 
 /// Returns true if a folder already holds all requested results.
@@ -148,7 +132,10 @@ fn is_finished(
     existing: Existing,
     is_part: bool,
 ) -> Result<bool, Error> {
-    let recorded = if existing == Existing::Replace { None } else { finished(folder)? };
+    let recorded = match existing {
+        Existing::Replace => None,
+        _ => finished_spec(folder)?,
+    };
     let Some(text) = recorded else { return Ok(false) };
     let is_same = toml::from_str(&text).is_ok_and(|found| resolved.repeats(&found));
     let found = match (is_same, existing == Existing::Resume && !is_part) {
@@ -159,14 +146,4 @@ fn is_finished(
     let folder = folder.display();
     let message = format!("{folder} has {found}, --force replaces them, another --out keeps them");
     Err(Error::Usage(message))
-}
-
-/// Creates a bar that shows the time left; it is hidden unless standard error is a terminal.
-fn progress(runs: u64) -> ProgressBar {
-    let bar = ProgressBar::new(runs);
-    let template = "{msg} {wide_bar} {pos}/{len} runs, {eta} left";
-    bar.set_style(
-        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
-    );
-    bar
 }

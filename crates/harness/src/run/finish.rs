@@ -2,12 +2,13 @@
 //! reports.
 
 use crate::Error;
+use crate::files::{read_toml, to_toml};
 use crate::report;
 use crate::report::output::Output;
 use crate::rows::store::{self, Store};
 use crate::run::provenance::Provenance;
 use crate::run::reference;
-use crate::run::resolved::{Resolved, finished, read_toml, to_toml};
+use crate::run::resolved::Resolved;
 use crate::spec::Experiment;
 use crate::stress;
 use bvh_scenes::files::read_text;
@@ -26,13 +27,14 @@ pub struct Summary {
     pub folder: PathBuf,
 }
 
-/// Joins the kept runs and makes the reports of results in `out`. Returns the text for the terminal,
-/// and a remark if the seconds come from processors of several models.
+/// Joins the kept runs and makes the reports of results in `out`. Adds their tables to the summary,
+/// before its text, and a remark if the seconds come from processors of several models.
 pub(crate) fn conclude(
     resolved: &Resolved,
     out: &Path,
     store: Store,
-) -> Result<(String, Option<String>), Error> {
+    summary: &mut Summary,
+) -> Result<(), Error> {
     let processors = store.join(resolved.run_count())?;
     let are_unlike = processors.len() > 1;
     let provenance = Provenance::gather(processors);
@@ -44,9 +46,12 @@ pub(crate) fn conclude(
         store.write("provenance.toml", to_toml(&provenance)?.as_bytes())?;
         store.finish()?;
     }
-    let cpu = provenance.cpu;
-    let remark = are_unlike.then(|| format!("the seconds come from unlike processors: {cpu}"));
-    Ok((text?, remark))
+    summary.text.insert_str(0, &text?);
+    if are_unlike {
+        let cpu = provenance.cpu;
+        summary.remarks.push(format!("the seconds come from unlike processors: {cpu}"));
+    }
+    Ok(())
 }
 
 /// Improves the best known costs and makes the reports of joined rows. Returns the text for the
@@ -82,7 +87,7 @@ pub fn remade(folder: &Path) -> Result<(Experiment, Vec<Output>), Error> {
 
 /// Returns true if `out` has finished results of the same runs, perhaps with other reports.
 pub fn has_results_of(experiment: &Experiment, out: &Path) -> Result<bool, Error> {
-    let text = finished(&out.join(experiment.folder()))?;
+    let text = store::finished_spec(&out.join(experiment.folder()))?;
     let recorded: Option<Resolved> = text.and_then(|text| toml::from_str(&text).ok());
     Ok(recorded.is_some_and(|recorded| recorded.has_runs_of(experiment)))
 }

@@ -3,7 +3,10 @@
 pub mod check;
 pub mod execute;
 pub mod finish;
-pub(crate) mod job;
+mod finished;
+pub mod forecast;
+pub(crate) mod jobs;
+mod measurement;
 mod perform;
 pub mod provenance;
 mod ray_cost;
@@ -11,3 +14,4 @@ pub mod reference;
 pub mod resolved;
 mod runs;
 mod trace;
+mod watch;

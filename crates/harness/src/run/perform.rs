@@ -1,96 +1,40 @@
 //! Performs one run of an experiment: applies a method to a scene and observes it.
 
-use super::job::Job;
+use super::finished::Finished;
+use super::jobs::{Job, Jobs};
+use super::watch::Stopwatch;
 use crate::Error;
 use crate::contestant::Contestant;
-use crate::measure::picture;
-use crate::peers::{self, Built, Peer, Task};
-use crate::rows::finished_run::FinishedRun;
-use crate::rows::store::Store;
-use crate::rows::{BoundRow, ClockRow, HistoryRow, RayRow, RunRow, TimingRow, TrialRow};
+use crate::peers::{Built, Peer, Task};
+use crate::rows::kept_run::RunName;
 use crate::spec::Experiment;
-use crate::spec::turn::{in_chosen_frame, turn_of};
-use bvh_core::cost::{self, Measure, SahConstants};
+use crate::spec::scenes::in_chosen_frame;
+use bvh_core::cost::Measure;
 use bvh_core::{Bvh, validate, validate_references};
 use bvh_scenes::Scene;
-use bvh_scenes::rays::{Family, RandomRays, empirical_cost};
-use bvh_scenes::trace::Query;
+use bvh_scenes::rays::{RandomRays, empirical_cost};
 use bvh_search::{
     Event, Frames, Judge, Method, Observer, Outcome, Problem, Splits, StopReason, solve,
 };
-use indicatif::ProgressBar;
 use std::borrow::Cow;
-use std::collections::BTreeMap;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::time::Instant;
 
-/// The trees of runs by the index of the run.
-pub(crate) type Trees = BTreeMap<usize, Bvh>;
-
-/// A running experiment, with everything that its measurements share.
-pub(crate) struct Work<'a> {
-    pub experiment: &'a Experiment,
-    /// The selected runs: all runs, unless several processes share the experiment.
-    pub jobs: &'a [Job<'a>],
-    /// The costs of the greedy trees by scene.
-    pub bases: BTreeMap<String, f64>,
-    pub store: &'a Store,
-    pub watch: Watch<'a>,
-    /// The trees of performed runs that later measurements need.
-    pub trees: Trees,
-    /// Peculiarities of scene files and damaged runs, one line each.
-    pub remarks: Vec<String>,
-}
-
-impl Work<'_> {
-    /// Rebuilds the wanted trees whose runs were kept from an interrupted experiment.
-    pub fn complete_trees(&mut self, is_wanted: impl Fn(&Job) -> bool) -> Result<(), Error> {
-        for (index, job) in self.jobs.iter().enumerate() {
-            if is_wanted(job) && !self.trees.contains_key(&index) {
-                // The same seed gives the same tree, so a kept run needs no tree file.
-                let performed = perform(self, job)?;
-                let (_, tree) = performed.ok_or_else(|| self.interrupted())?;
-                self.trees.insert(index, tree);
-            }
-        }
-        Ok(())
-    }
-
-    /// Returns the error of a measurement that is interrupted after all runs are finished.
-    pub fn interrupted(&self) -> Error {
-        Error::Interrupted { finished: self.jobs.len(), runs: self.jobs.len() }
-    }
-}
-
-/// Computes the lower bound of the scene's internal area that the experiment requests, if any.
-fn bound(experiment: &Experiment, scene: &Scene, watch: &Watch) -> Result<Option<BoundRow>, Error> {
-    let Some(effort) = experiment.lower_bound else { return Ok(None) };
-    let others = peers::others("lower_bound").map_err(|fault| Error::Usage(fault.to_string()))?;
-    let lower_bound = (others.lower_bound)(&scene.boxes, effort, watch)
-        .map_err(Error::search(&scene.name, "the lower bound"))?;
-    Ok(Some(BoundRow { scene: scene.name.clone(), objects: scene.boxes.len(), lower_bound }))
-}
-
-/// Performs one run. Returns its rows and its tree, or `None` if it was interrupted.
-pub(crate) fn perform(work: &Work, job: &Job) -> Result<Option<(FinishedRun, Bvh)>, Error> {
-    let Work { experiment, watch, .. } = work;
+/// Performs one run; returns `None` if it was interrupted.
+pub(crate) fn perform<'a>(jobs: &'a Jobs, job: &'a Job) -> Result<Option<Finished<'a>>, Error> {
+    let Jobs { experiment, watch, .. } = jobs;
     if watch.cancelled() {
         return Ok(None);
     }
-    let Job { labelled, repetition, first_of_scene, .. } = *job;
-    let seed = job.seed(experiment);
-    let stopwatch = Stopwatch { watch, start: Instant::now(), events: Mutex::default() };
-    let mut scene = Cow::Borrowed(job.scene);
-    if labelled.options.frame == Some(Frames::Auto) {
-        let framed = in_chosen_frame(&scene, experiment.budget_of(labelled), &stopwatch);
-        scene = Cow::Owned(framed?);
-    }
-    let scene = &*scene;
-    let job = &Job { scene, ..job.clone() };
-    let result = match &labelled.method {
-        Contestant::Ours(method) => search(experiment, job, method, seed, &stopwatch),
-        Contestant::Peer(peer) => build(experiment, job, peer, seed, &stopwatch),
+    let stopwatch = Stopwatch::start(watch);
+    let scene = match job.labelled.options.frame {
+        Some(Frames::Auto) => {
+            let budget = experiment.budget_of(job.labelled);
+            Cow::Owned(in_chosen_frame(job.scene, budget, &stopwatch)?)
+        }
+        _ => Cow::Borrowed(job.scene),
+    };
+    let result = match &job.labelled.method {
+        Contestant::Ours(method) => search(experiment, job, &scene, method, &stopwatch),
+        Contestant::Peer(peer) => build(experiment, job, &scene, peer, &stopwatch),
     };
     // Cancelling kills the external program, which is not an error.
     if watch.cancelled() {
@@ -98,167 +42,34 @@ pub(crate) fn perform(work: &Work, job: &Job) -> Result<Option<(FinishedRun, Bvh
     }
     let (mut outcome, seconds) = result?;
     outcome.tree.frame = scene.frame;
-    let tree = &outcome.tree;
     // A method's defect must not become a published number.
     let valid = match scene.frame {
         // Nothing that divides objects is accepted with frames.
-        Some(_) => validate(tree, &scene.boxes),
-        None => validate_references(tree, &scene.boxes, &scene.primitives),
+        Some(_) => validate(&outcome.tree, &scene.boxes),
+        None => validate_references(&outcome.tree, &scene.boxes, &scene.primitives),
     };
-    valid.map_err(|source| Error::InvalidTree {
-        scene: scene.name.clone(),
-        method: labelled.label.clone(),
-        source,
+    valid.map_err(|source| {
+        let RunName { scene, method, .. } = job.name();
+        Error::InvalidTree { scene, method, source }
     })?;
-    let run = run_row(job, seed, &outcome, work.bases[&scene.name]);
-    let identity = || (scene.name.clone(), labelled.label.clone(), repetition);
-    let mut history = Vec::new();
-    let mut clock = Vec::new();
-    let event_seconds = stopwatch.seconds();
-    for (index, event) in milestones(&outcome.history) {
-        let Event { evaluations, work, incumbent, .. } = *event;
-        let (scene, method, repetition) = identity();
-        if experiment.needs_references() {
-            let (scene, method, _) = identity();
-            let seconds = event_seconds[index];
-            clock.push(ClockRow { scene, method, repetition, event: clock.len(), seconds });
-        }
-        if experiment.keeps_history() {
-            history.push(HistoryRow { scene, method, repetition, evaluations, work, incumbent });
-        }
-    }
-    let mut trials = Vec::new();
-    if experiment.trial_methods().contains(&*labelled.label) {
-        for event in &outcome.history {
-            let Event { evaluations, cost, .. } = *event;
-            let (scene, method, repetition) = identity();
-            trials.push(TrialRow { scene, method, repetition, evaluations, cost });
-        }
-    }
-    let threads = rayon::current_num_threads();
-    let (scene_name, method, _) = identity();
-    let timing = TimingRow { scene: scene_name, method, seed, repetition, threads, seconds };
-    let rays: Vec<RayRow> =
-        experiment.rays.iter().map(|rays| ray_row(experiment, job, seed, tree, rays)).collect();
-    let bounds = if first_of_scene { bound(experiment, scene, watch)? } else { None };
-    let (renders, render_times) = match &experiment.render {
-        // Nobody reads the seconds of quick variants.
-        Some(config) => {
-            let most = if experiment.quick { 1 } else { picture::MOST_REPEATS };
-            config.measure(scene, tree, &run, seconds, first_of_scene, most)?
-        }
-        None => Default::default(),
-    };
-    // An interrupted bound is not a result.
-    if watch.cancelled() {
-        return Ok(None);
-    }
-    let mut finished = FinishedRun::here();
-    finished.add(&[run])?;
-    finished.add(&history)?;
-    finished.add(&trials)?;
-    finished.add(&[timing])?;
-    finished.add(&rays)?;
-    finished.add(&clock)?;
-    finished.add(bounds.as_slice())?;
-    finished.add(turn_of(&scene.name).filter(|_| first_of_scene).as_slice())?;
-    finished.add(&renders)?;
-    finished.add(&render_times)?;
-    Ok(Some((finished, outcome.tree)))
-}
-
-/// Returns the events that `history.csv` keeps, each with its index: the first, every improvement,
-/// and the last.
-fn milestones(history: &[Event]) -> impl Iterator<Item = (usize, &Event)> {
-    history.iter().enumerate().filter(|&(index, event)| {
-        let is_end = index == 0 || index + 1 == history.len();
-        is_end || event.incumbent < history[index - 1].incumbent
-    })
-}
-
-/// `base_cost` is the cost of the scene's greedy tree.
-fn run_row(job: &Job, seed: u64, outcome: &Outcome, base_cost: f64) -> RunRow {
-    let Job { scene, labelled, repetition, .. } = *job;
-    let Outcome { ref tree, cost, evaluations, work, stop, .. } = *outcome;
-    let internal_area = cost::internal_area(tree);
-    RunRow {
-        scene: scene.name.clone(),
-        scene_kind: scene.kind.to_string(),
-        method: labelled.label.clone(),
-        seed,
-        repetition,
-        objects: scene.boxes.len(),
-        evaluations,
-        work,
-        stop,
-        cost,
-        base_cost,
-        cost_over_base: if base_cost > 0.0 { cost / base_cost } else { 1.0 },
-        cost_over_root_area: cost::over_root_area(tree, internal_area),
-        internal_area,
-        goldsmith_salmon: cost::goldsmith_salmon(tree),
-        sah: cost::sah(tree, &SahConstants::default()),
-        nodes: tree.nodes.len(),
-        depth: tree.depth(),
-    }
-}
-
-fn ray_row(
-    experiment: &Experiment,
-    job: &Job,
-    seed: u64,
-    tree: &Bvh,
-    config: &RandomRays,
-) -> RayRow {
-    let Job { scene, labelled, repetition, .. } = *job;
-    let (family, stream) = match config.family {
-        Family::Inside => ("inside", "rays Inside"),
-        Family::Lines => ("lines", "rays Lines"),
-    };
-    let query = match config.query {
-        Query::Any => "any",
-        Query::Nearest => "nearest",
-        Query::All => "all",
-    };
-    let straight = turn_of(&scene.name).map_or(scene.name.clone(), |turn| turn.mesh);
-    // Every method gets the same rays, at all angles, so that methods differ only in their trees.
-    let ray_seed = experiment.seed_of(&straight, stream, 0);
-    let cost = empirical_cost(config, &scene.primitives, tree, ray_seed);
-    let [boxes_low, boxes_high] = cost.boxes.interval();
-    RayRow {
-        scene: scene.name.clone(),
-        method: labelled.label.clone(),
-        seed,
-        repetition,
-        family: family.into(),
-        query: query.into(),
-        rays: cost.rays,
-        hit_fraction: cost.hit_fraction,
-        boxes_per_ray: cost.boxes.mean,
-        boxes_standard_error: cost.boxes.standard_error,
-        boxes_low,
-        boxes_high,
-        objects_per_ray: cost.objects.mean,
-        objects_standard_error: cost.objects.standard_error,
-    }
+    let event_seconds = stopwatch.into_seconds();
+    Ok(Some(Finished { jobs, job, scene, outcome, seconds, event_seconds }))
 }
 
 /// Builds the tree of another library or program, as the outcome of a search of one evaluation.
 fn build(
     experiment: &Experiment,
     job: &Job,
+    scene: &Scene,
     peer: &Peer,
-    seed: u64,
     stopwatch: &Stopwatch,
 ) -> Result<(Outcome, f64), Error> {
-    let Job { scene, labelled, .. } = *job;
-    let cancelled = || stopwatch.watch.cancelled();
-    let task =
-        Task { boxes: &scene.boxes, objects: &scene.primitives, seed, cancelled: &cancelled };
-    let Built { tree, seconds } = peer.build(&task).map_err(|source| Error::Library {
-        scene: scene.name.clone(),
-        method: labelled.label.clone(),
-        source,
+    let Scene { boxes, primitives: objects, .. } = scene;
+    let cancelled = || stopwatch.cancelled();
+    let task = Task { boxes, objects, seed: job.seed, cancelled: &cancelled };
+    let Built { tree, seconds } = peer.build(&task).map_err(|source| {
+        let RunName { scene, method, .. } = job.name();
+        Error::Library { scene, method, source }
     })?;
     // It reports no events; its end is the only one.
     stopwatch.note(seconds);
@@ -273,11 +84,11 @@ fn build(
 fn search(
     experiment: &Experiment,
     job: &Job,
+    scene: &Scene,
     method: &Method,
-    seed: u64,
     stopwatch: &Stopwatch,
 ) -> Result<(Outcome, f64), Error> {
-    let Job { scene, labelled, .. } = *job;
+    let labelled = job.labelled;
     let options = &labelled.options;
     // The judge's rays differ from the rays of all measurements.
     let ray_seed = experiment.seed_of(&scene.name, "rays of the judge", job.repetition);
@@ -292,7 +103,7 @@ fn search(
         disabled: &options.keep,
         ..Problem::new(&scene.boxes)
     };
-    let result = solve(method, &problem, seed, experiment.budget_of(labelled), stopwatch);
+    let result = solve(method, &problem, job.seed, experiment.budget_of(labelled), stopwatch);
     let seconds = stopwatch.start.elapsed().as_secs_f64();
     let mut outcome = result.map_err(Error::search(&scene.name, &labelled.label))?;
     // Rows compare all methods by the experiment's objective, whatever the search minimised.
@@ -323,70 +134,5 @@ struct RayJudge<'a> {
 impl Judge for RayJudge<'_> {
     fn judge(&self, tree: &Bvh) -> f64 {
         empirical_cost(self.rays, &self.scene.primitives, tree, self.seed).boxes.mean
-    }
-}
-
-/// Observes all runs: moves the bar and forwards an interruption.
-pub(crate) struct Watch<'a> {
-    pub bar: ProgressBar,
-    pub interrupted: &'a AtomicBool,
-}
-
-impl Observer for Watch<'_> {
-    fn event(&self, _event: &Event) {
-        self.bar.tick();
-    }
-
-    fn cancelled(&self) -> bool {
-        self.interrupted.load(Relaxed)
-    }
-}
-
-/// Records the times of a run's events.
-struct Stopwatch<'a> {
-    watch: &'a Watch<'a>,
-    start: Instant,
-    events: Mutex<Vec<f64>>,
-}
-
-impl Stopwatch<'_> {
-    fn note(&self, seconds: f64) {
-        self.events.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(seconds);
-    }
-
-    /// Returns the time of each event so far, in seconds since the start.
-    fn seconds(&self) -> Vec<f64> {
-        self.events.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone()
-    }
-}
-
-impl Observer for Stopwatch<'_> {
-    fn event(&self, event: &Event) {
-        self.note(self.start.elapsed().as_secs_f64());
-        self.watch.event(event);
-    }
-
-    fn cancelled(&self) -> bool {
-        self.watch.cancelled()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_history_keeps_the_first_event_every_improvement_and_the_last() {
-        let incumbents = [9.0, 9.0, 7.0, 7.0, 6.0, 6.0, 6.0];
-        let history = incumbents.map(|incumbent| Event {
-            evaluations: 1,
-            work: 1,
-            cost: incumbent,
-            incumbent,
-        });
-        let kept: Vec<usize> = milestones(&history).map(|(index, _)| index).collect();
-        assert_eq!(kept, [0, 2, 4, 6]);
-        assert_eq!(milestones(&history[..1]).count(), 1);
-        assert_eq!(milestones(&[]).count(), 0);
     }
 }

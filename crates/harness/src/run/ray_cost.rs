@@ -1,9 +1,10 @@
-//! Judges the trees of all runs by rays that they were not trained on.
+//! The measurement that judges the trees of all runs by rays that they were not trained on.
 
-use super::job::{Job, tracing_error};
-use super::perform::Work;
+use super::jobs::{Job, Jobs, tracing_error};
+use super::runs::with_trees;
 use crate::Error;
 use crate::measure::ray_cost::{Config, TestRays, TrainedOn, test_rays};
+use crate::rows::store::Store;
 use crate::rows::{LayoutRow, RunTestRow, TestRow, VisitRow};
 use crate::spec::Experiment;
 use crate::statistics::{mean, standard_error};
@@ -12,20 +13,19 @@ use bvh_core::{Bvh, WideBvh, collapse_leaves};
 use bvh_scenes::rays::tests_per_ray;
 use bvh_search::Observer;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// The name that results give to all trees trained on rays, whatever the label of their method.
 const RAYS: &str = "rays";
 
 /// A run and its tree.
-type Run<'a> = (&'a Job<'a>, &'a Bvh);
+type Run<'a> = (&'a Job<'a>, Arc<Bvh>);
 
 /// Counts the tests of the same rays in the trees of all runs on a scene. Each tree is laid out for
 /// the rays that it was trained on.
-pub(crate) fn measure(config: &Config, work: &mut Work) -> Result<(), Error> {
-    work.complete_trees(|_| true)?;
-    let runs: Vec<Run> =
-        work.trees.iter().map(|(&index, tree)| (&work.jobs[index], tree)).collect();
-    let experiment = work.experiment;
+pub(crate) fn measure(config: &Config, jobs: &Jobs, store: &Store) -> Result<(), Error> {
+    let runs: Vec<Run> = with_trees(jobs, |_| true)?;
+    let experiment = jobs.experiment;
     let repetitions = experiment.repetitions as usize;
     let (mut tests, mut sizes, mut visits) = (Vec::new(), Vec::new(), Vec::new());
     let mut run_tests = Vec::new();
@@ -50,9 +50,9 @@ pub(crate) fn measure(config: &Config, work: &mut Work) -> Result<(), Error> {
             }));
         }
         let seed = experiment.seed_of(&scene.name, "rays that judge trees", 0);
-        for rays in test_rays(config, scene, runs[0].1, seed) {
-            if work.watch.cancelled() {
-                return Err(work.interrupted());
+        for rays in test_rays(config, scene, &runs[0].1, seed) {
+            if jobs.watch.cancelled() {
+                return Err(jobs.interrupted());
             }
             let tests_of = |wide: &WideBvh| tests_per_ray(wide, rays.kind, &rays.rays);
             let of_runs: Vec<[f64; 2]> = layouts.par_iter().map(tests_of).collect();
@@ -70,11 +70,11 @@ pub(crate) fn measure(config: &Config, work: &mut Work) -> Result<(), Error> {
             tests.extend(of_methods.map(|(runs, tests)| test_row(runs[0].0, &rays, tests)));
         }
     }
-    work.store.write_rows(&tests)?;
-    work.store.write_rows(&sizes)?;
+    store.write_rows(&tests)?;
+    store.write_rows(&sizes)?;
     if !config.costs.is_empty() {
-        work.store.write_rows(&visits)?;
-        work.store.write_rows(&run_tests)?;
+        store.write_rows(&visits)?;
+        store.write_rows(&run_tests)?;
     }
     Ok(())
 }
@@ -118,7 +118,7 @@ fn layout_row(runs: &[Run], layouts: &[WideBvh]) -> LayoutRow {
     let job = runs[0].0;
     let objects = job.scene.boxes.len() as f64;
     let constants = SahConstants::default();
-    let trees = runs.iter().map(|(_, tree)| *tree);
+    let trees = runs.iter().map(|(_, tree)| &**tree);
     let bytes: usize = layouts.iter().map(WideBvh::bytes).sum();
     let references_per_object = trees.clone().map(|tree| tree.prim_ids.len() as f64 / objects);
     let layout_over_root =

@@ -13,7 +13,7 @@ use crate::Error;
 use crate::files;
 use crate::rows::lock::wait_for_folder;
 use crate::rows::store::Store;
-use crate::rows::{BoundRow, ROUNDING, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
+use crate::rows::{ROUNDING, ReferenceRow, Row, RunRow, read, read_if_any, to_bytes};
 use crate::run::resolved::{LoadedScene, Resolved};
 use bvh_core::cost::Objective;
 use bvh_search::exact;
@@ -40,7 +40,6 @@ pub(crate) fn update(
         return Ok(());
     }
     let runs: Vec<RunRow> = read_if_any(store.folder())?;
-    let bounds: Vec<BoundRow> = read_if_any(store.folder())?;
     let _lock = wait_for_folder(out)?;
     let path = out.join(BEST_KNOWN);
     let before: Vec<ReferenceRow> = if path.is_file() { read(&path)? } else { vec![] };
@@ -51,12 +50,10 @@ pub(crate) fn update(
     for scene in &resolved.scenes {
         // Experiments solve small scenes by the hundred, and nothing reads their costs later.
         if scene.objects > exact::MOST_OBJECTS || experiment.needs_references() {
-            let bound =
-                bounds.iter().find(|row| row.scene == scene.name).map(|row| row.lower_bound);
             let eligible = runs
                 .iter()
                 .filter(|run| run.scene == scene.name && run.nodes + 1 == 2 * run.objects);
-            for found in eligible.flat_map(|run| references_of(scene, &objective, run, bound)) {
+            for found in eligible.flat_map(|run| references_of(scene, &objective, run)) {
                 let found = ReferenceRow { revision: revision.to_owned(), ..found };
                 offer(&mut known, found);
             }
@@ -102,22 +99,18 @@ fn objective_name(objective: &Objective) -> String {
 }
 
 /// Returns the costs of one run: under the experiment's objective, and under the objectives that
-/// are columns of every run. `bound` is a lower bound of the internal area.
+/// are columns of every run.
 fn references_of(
     scene: &LoadedScene,
     objective: &str,
     run: &RunRow,
-    bound: Option<f64>,
 ) -> impl Iterator<Item = ReferenceRow> {
-    let root_area = run.internal_area / run.cost_over_root_area;
-    // Goldsmith and Salmon's cost is twice the internal area over the root's, and so is its bound.
-    let goldsmith_salmon_bound = bound.map(|bound| 2.0 * bound / root_area);
     let costs = [
-        (objective_name(&Objective::InternalArea), run.internal_area, bound),
-        (objective_name(&Objective::GoldsmithSalmon), run.goldsmith_salmon, goldsmith_salmon_bound),
-        (objective.to_owned(), run.cost, None),
+        (objective_name(&Objective::InternalArea), run.internal_area),
+        (objective_name(&Objective::GoldsmithSalmon), run.goldsmith_salmon),
+        (objective.to_owned(), run.cost),
     ];
-    costs.into_iter().map(|(objective, cost, lower_bound)| ReferenceRow {
+    costs.into_iter().map(|(objective, cost)| ReferenceRow {
         scene: scene.name.clone(),
         objects: scene.objects,
         checksum: scene.checksum.clone(),
@@ -126,7 +119,6 @@ fn references_of(
         method: run.method.clone(),
         seed: run.seed,
         revision: String::new(),
-        lower_bound: lower_bound.filter(|bound| bound.is_finite()),
     })
 }
 
@@ -135,19 +127,16 @@ fn offer(known: &mut Vec<ReferenceRow>, found: ReferenceRow) {
     let Some(old) = known.iter_mut().find(|row| key_of(row) == key_of(&found)) else {
         return known.push(found);
     };
-    // A bound holds whoever found the cost, so the greatest one is kept.
-    let lower_bound = old.lower_bound.into_iter().chain(found.lower_bound).reduce(f64::max);
     if found.cost < old.cost * (1.0 - ROUNDING) {
         *old = found;
     }
-    old.lower_bound = lower_bound;
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn row(scene: &str, cost: f64, lower_bound: Option<f64>) -> ReferenceRow {
+    fn row(scene: &str, cost: f64) -> ReferenceRow {
         ReferenceRow {
             scene: scene.into(),
             objects: 100,
@@ -157,26 +146,23 @@ mod tests {
             method: format!("{cost}"),
             seed: 1,
             revision: String::new(),
-            lower_bound,
         }
     }
 
     #[test]
-    fn the_lower_cost_and_the_higher_bound_are_kept() {
+    fn the_lower_cost_is_kept_unless_only_rounding_is_lower() {
         let mut known = Vec::new();
-        for (cost, bound) in
-            [(9.0, None), (7.0, Some(3.0)), (8.0, Some(4.0)), (7.0 - 1e-14, Some(2.0))]
-        {
-            offer(&mut known, row("a", cost, bound));
+        for cost in [9.0, 7.0, 8.0, 7.0 - 1e-14] {
+            offer(&mut known, row("a", cost));
         }
-        assert_eq!(known, [row("a", 7.0, Some(4.0))]);
+        assert_eq!(known, [row("a", 7.0)]);
     }
 
     #[test]
     fn scenes_are_identified_by_their_boxes() {
-        let mut known = vec![row("a", 1.0, None)];
-        offer(&mut known, ReferenceRow { checksum: "1".into(), ..row("a", 9.0, None) });
-        offer(&mut known, ReferenceRow { objects: 99, ..row("a", 8.0, None) });
+        let mut known = vec![row("a", 1.0)];
+        offer(&mut known, ReferenceRow { checksum: "1".into(), ..row("a", 9.0) });
+        offer(&mut known, ReferenceRow { objects: 99, ..row("a", 8.0) });
         let costs: Vec<f64> = known.iter().map(|row| row.cost).collect();
         assert_eq!(costs, [1.0, 9.0, 8.0]);
     }

@@ -1,14 +1,8 @@
 //! The resolved spec of an experiment: every default spelled out, and the scenes it runs on.
 
-use crate::Error;
-use crate::rows::store::is_unfinished;
-use crate::spec::{Experiment, turn};
-use bvh_scenes::files::read_text;
-use bvh_scenes::{Scene, subset};
-use serde::de::DeserializeOwned;
+use crate::spec::Experiment;
+use bvh_scenes::Scene;
 use serde::{Deserialize, Serialize};
-use std::collections::HashSet;
-use std::path::Path;
 
 /// Contents of `resolved.toml`.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -59,49 +53,4 @@ impl Resolved {
     pub fn run_count(&self) -> usize {
         self.scenes.len() * self.experiment.methods.len() * self.experiment.repetitions as usize
     }
-}
-
-/// Returns the text of the resolved spec of the finished results in a folder, if it has any.
-pub(crate) fn finished(folder: &Path) -> Result<Option<String>, Error> {
-    let recorded = folder.join("resolved.toml");
-    if is_unfinished(folder) || !recorded.is_file() {
-        return Ok(None);
-    }
-    Ok(Some(read_text(&recorded)?))
-}
-
-/// Loads an experiment's scenes. Returns them and the names of optional scenes that are missing.
-pub fn load_scenes(experiment: &Experiment) -> Result<(Vec<Scene>, Vec<String>), Error> {
-    // The scenes of the suite are names of cases, which the suite itself makes.
-    if experiment.suite.is_some() {
-        return Ok(Default::default());
-    }
-    let names = experiment.scenes.iter().flat_map(|name| subset::expand(name));
-    let mut scenes = names.map(|name| turn::load(&name)).collect::<Result<Vec<_>, _>>()?;
-    let mut skipped_scenes = Vec::new();
-    for name in &experiment.optional_scenes {
-        match turn::load(name) {
-            Ok(scene) => scenes.push(scene),
-            // An optional scene that cannot be loaded is one that nobody has fetched.
-            Err(_) => skipped_scenes.push(name.clone()),
-        }
-    }
-    let mut names = HashSet::new();
-    match scenes.iter().find(|scene| !names.insert(&scene.name)) {
-        Some(twice) => {
-            Err(Error::Usage(format!("two scenes are called {}; name each once", twice.name)))
-        }
-        None => Ok((scenes, skipped_scenes)),
-    }
-}
-
-/// Reads a TOML file that a harness has written.
-pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
-    toml::from_str(&read_text(path)?).map_err(Error::toml(path))
-}
-
-/// Serialises `value` as TOML.
-pub(crate) fn to_toml(value: &impl Serialize) -> Result<String, Error> {
-    toml::to_string(value)
-        .map_err(|error| Error::Usage(format!("cannot be written as TOML: {error}")))
 }

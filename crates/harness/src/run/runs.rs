@@ -1,34 +1,35 @@
-//! The runs of all methods on all scenes: in parallel or one by one.
+//! The measurement of the runs of all methods on all scenes: in parallel or one by one.
 
-use super::job::Job;
-use super::perform::{Trees, Work, perform};
+use super::finish::Summary;
+use super::jobs::{Job, Jobs};
+use super::perform::perform;
 use crate::Error;
+use crate::rows::store::Store;
+use bvh_core::Bvh;
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
-use std::sync::{Mutex, PoisonError};
 
 /// Performs the runs that are missing or damaged in the store, and keeps each once it finishes.
-pub(crate) fn measure(work: &mut Work) -> Result<(), Error> {
-    let missing = missing_runs(work);
-    let experiment = work.experiment;
-    let runs = work.jobs.len();
+pub(crate) fn measure(jobs: &Jobs, store: &Store, summary: &mut Summary) -> Result<(), Error> {
+    let missing = missing_runs(jobs, store, &mut summary.remarks);
+    let runs = jobs.list.len();
     let finished = AtomicUsize::new(runs - missing.len());
-    let trees: Mutex<Trees> = Mutex::default();
-    let bar = &work.watch.bar;
-    bar.set_message(experiment.name.clone());
+    let bar = &jobs.watch.bar;
+    bar.set_message(jobs.experiment.name.clone());
     bar.set_position((runs - missing.len()) as u64);
     bar.reset_eta();
     let run = |job: &&Job| -> Result<(), Error> {
-        let Some((run, tree)) = perform(work, job)? else { return Ok(()) };
-        work.store.keep(job.index, &run)?;
-        if experiment.judges().is_some() || experiment.tracing.is_some() && job.repetition == 0 {
-            trees.lock().unwrap_or_else(PoisonError::into_inner).insert(job.index, tree);
+        let Some(run) = perform(jobs, job)? else { return Ok(()) };
+        store.keep(job.index, &run.rows()?)?;
+        if jobs.experiment.needs_tree(job.repetition) {
+            jobs.trees().insert(job.index, Arc::new(run.outcome.tree));
         }
         finished.fetch_add(1, Relaxed);
         bar.inc(1);
         Ok(())
     };
-    let result = if experiment.sequential {
+    let result = if jobs.experiment.sequential {
         missing.iter().try_for_each(run)
     } else {
         missing.par_iter().try_for_each(run)
@@ -37,25 +38,22 @@ pub(crate) fn measure(work: &mut Work) -> Result<(), Error> {
     result?;
     match finished.into_inner() {
         finished if finished < runs => Err(Error::Interrupted { finished, runs }),
-        _ => {
-            work.trees = trees.into_inner().unwrap_or_else(PoisonError::into_inner);
-            Ok(())
-        }
+        _ => Ok(()),
     }
 }
 
 /// Returns the runs to perform, in their order, and adds a remark on damaged ones.
-fn missing_runs<'a>(work: &mut Work<'a>) -> Vec<&'a Job<'a>> {
+fn missing_runs<'j>(jobs: &'j Jobs, store: &Store, remarks: &mut Vec<String>) -> Vec<&'j Job<'j>> {
     let mut missing = Vec::new();
-    for job in work.jobs {
-        match work.store.kept(job.index, &job.name()) {
+    for job in &jobs.list {
+        match store.kept(job.index, &job.name()) {
             Ok(Some(_)) => continue,
             Ok(None) => {}
-            Err(damaged) => work.remarks.push(format!("done again: {damaged}")),
+            Err(damaged) => remarks.push(format!("done again: {damaged}")),
         }
         missing.push(job);
     }
-    let experiment = work.experiment;
+    let experiment = jobs.experiment;
     if experiment.sequential {
         // Methods alternate, so that a disturbance of the machine does not affect all repetitions
         // of one method.
@@ -63,4 +61,25 @@ fn missing_runs<'a>(work: &mut Work<'a>) -> Vec<&'a Job<'a>> {
         missing.sort_by_key(|job| (job.index / runs_of_scene, job.repetition));
     }
     missing
+}
+
+/// Returns the wanted runs, each with its tree. A run that was kept from an interrupted experiment
+/// is performed again: the same seed gives the same tree, so it needs no tree file.
+pub(super) fn with_trees<'j, 'a>(
+    jobs: &'j Jobs<'a>,
+    is_wanted: impl Fn(&Job) -> bool,
+) -> Result<Vec<(&'j Job<'a>, Arc<Bvh>)>, Error> {
+    let mut runs = Vec::new();
+    for job in jobs.list.iter().filter(|job| is_wanted(job)) {
+        let known = jobs.trees().get(&job.index).cloned();
+        let tree = match known {
+            Some(tree) => tree,
+            None => {
+                let run = perform(jobs, job)?.ok_or_else(|| jobs.interrupted())?;
+                jobs.trees().entry(job.index).or_insert(Arc::new(run.outcome.tree)).clone()
+            }
+        };
+        runs.push((job, tree));
+    }
+    Ok(runs)
 }

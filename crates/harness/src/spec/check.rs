@@ -4,7 +4,6 @@
 
 use super::Experiment;
 use crate::contestant::{Contestant, EntryOptions, Labelled};
-use crate::peers;
 use crate::report::Report;
 use crate::rows;
 use bvh_config::OutOfRange;
@@ -27,9 +26,6 @@ impl Experiment {
         for (index, report) in self.reports.iter().enumerate() {
             let checked = self.check_report(report, &mut files);
             checked.map_err(|fault| fault.below(format!("reports[{index}]")))?;
-        }
-        if self.lower_bound.is_some() {
-            peers::others("lower_bound")?;
         }
         for (index, labelled) in self.methods.iter().enumerate() {
             let fault = self.check_method(labelled).err();
@@ -72,8 +68,7 @@ impl Experiment {
         let is_other = |EntryOptions { judge, references, .. }: &EntryOptions| {
             judge.is_some() || references.is_some()
         };
-        let is_along_file = self.lower_bound.is_some()
-            || self.render.is_some()
+        let is_along_file = self.render.is_some()
             || self.tracing.is_some()
             || self.ray_cost.is_some()
             || self.needs_references()
@@ -81,7 +76,7 @@ impl Experiment {
         if !(is_along_file && self.has_frames()) {
             return Ok(());
         }
-        let found = "turned scenes or `frame` with lower_bound, render, tracing, ray_cost, judge, \
+        let found = "turned scenes or `frame` with render, tracing, ray_cost, judge, \
                      references or gaps, which know no frames";
         Err(OutOfRange::new("scenes, frame", found, "`rays` to measure trees in frames"))
     }

@@ -6,7 +6,7 @@
 
 mod check;
 mod read;
-pub mod turn;
+pub mod scenes;
 
 use crate::contestant::Labelled;
 use crate::measure::picture;
@@ -65,9 +65,6 @@ config! {
         objective: Objective;
         /// Limits of every run; by default none.
         budget: Budget = Budget::UNLIMITED;
-        /// Effort of a lower bound of every scene's internal area, which the program in `attic/`
-        /// computes; by default no bound is computed.
-        lower_bound: Option<u32>;
         /// The methods, at least one; with `suite`, none for every method of the registry.
         methods: Vec<Labelled>;
         /// Measurements of every run's tree with random rays.
@@ -102,6 +99,11 @@ impl Experiment {
     /// The rays that judge the experiment's trees, if any do.
     pub fn judges(&self) -> Option<&ray_cost::Config> {
         self.ray_cost.as_ref().filter(|config| config.count > 0)
+    }
+
+    /// Returns true if a measurement after the runs needs the trees of this repetition.
+    pub fn needs_tree(&self, repetition: u32) -> bool {
+        self.judges().is_some() || self.tracing.is_some() && repetition == 0
     }
 
     /// Returns true if a report measures gaps, for which runs keep the times of improvements.

@@ -130,26 +130,3 @@ fn a_full_disk_is_reported_and_finished_runs_are_kept() {
         assert!(results(&folder.path().join(&out)) == whole);
     }
 }
-
-#[test]
-fn a_folder_instead_of_a_file_is_named_and_so_is_the_reverse() {
-    let folder = folder();
-    let dir = folder.path();
-    fs::create_dir(dir.join("folder.obj")).unwrap();
-    fs::create_dir(dir.join("folder.toml")).unwrap();
-    refused(dir, &["folder.toml"], 2, &["folder.toml"]);
-    refused(dir, &["spec.toml", "--scene=folder.obj"], 2, &["folder.obj", "a folder"]);
-    for folder in ["a/spec/runs.csv", "b/spec/.lock", "c/spec", "d"] {
-        fs::create_dir_all(dir.join(folder)).unwrap();
-    }
-    refused(dir, &["spec.toml", "--out=a"], 1, &["a/spec/runs.csv", "cannot replace the file"]);
-    assert!(!dir.join("a/spec/runs.csv.unfinished").exists());
-    fs::remove_dir(dir.join("a/spec/runs.csv")).unwrap();
-    // The runs were not lost.
-    said(dir, &["spec.toml", "--out=a", "--resume"]);
-    refused(dir, &["spec.toml", "--out=b"], 1, &["b/spec/.lock", "cannot create the file"]);
-    fs::write(dir.join("c/spec/.partial"), "").unwrap();
-    refused(dir, &["spec.toml", "--out=c"], 1, &["c/spec/.partial", "could not be read"]);
-    fs::write(dir.join("d/spec"), "").unwrap();
-    refused(dir, &["spec.toml", "--out=d"], 1, &["d/spec", "cannot create the folder"]);
-}

@@ -8,7 +8,6 @@ mod examples;
 mod external;
 mod faults;
 mod merge;
-mod page;
 mod paper;
 mod pictures;
 mod protection;
