@@ -27,9 +27,7 @@ fn an_oblique_mesh_gets_smaller_boxes_and_is_turned_once() {
     fs::write(at.join("walls.glb"), glb(json.into(), &bytes)).unwrap();
     let facts = facts(at, "orient walls.glb --out=new.glb --report");
     let mesh = &facts["meshes"][0];
-    let [before, after] =
-        ["greedy_area_before", "greedy_area_after"].map(|area| mesh[area].as_f64().unwrap());
-    assert!(mesh["triangles"] == 300 && after < 0.8 * before, "{mesh}");
+    assert!(mesh["triangles"] == 300 && mesh["saved"].as_f64() > Some(0.2), "{mesh}");
     let said = bvh(at, "orient new.glb --out=again.glb");
     assert!(said.contains("nothing to gain"), "{said}");
     assert_eq!(fs::read(at.join("again.glb")).unwrap(), fs::read(at.join("new.glb")).unwrap());
