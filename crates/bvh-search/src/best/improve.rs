@@ -168,7 +168,7 @@ impl Improvement<'_, '_, '_, '_> {
     }
 
     fn reinsert(&mut self, tree: &mut Working<impl Metric>) {
-        self.best.improve(tree, u32::MAX, self.run, reinsertion::pass_by_area);
+        self.best.improve(tree, self.run, reinsertion::pass_by_area);
     }
 
     /// Keeps a local optimum of reinsertion. A caller who stops a time-limited search before

@@ -31,11 +31,8 @@ use crate::tree::{ANCHOR, Metric, PositionSearch, Working, search_by_metric};
 use bvh_core::with_vector_instructions;
 
 bvh_config::config! {
-    /// The number of passes.
-    pub struct Config {
-        /// Maximum number of passes; the method ends earlier at a local optimum.
-        sweeps: u32 = 1000, in 1..;
-    }
+    /// Without parameters.
+    pub struct Config {}
 }
 
 search_by_metric!(Config);
@@ -43,7 +40,7 @@ search_by_metric!(Config);
 impl Config {
     fn search_by(&self, metric: impl Metric, problem: &Problem, _: u64, run: &mut Run) -> Found {
         let (mut best, mut tree) = Incumbent::build(problem, metric, run)?;
-        best.improve(&mut tree, self.sweeps, run, pass_by_area);
+        best.improve(&mut tree, run, pass_by_area);
         Ok(best.tree)
     }
 }
